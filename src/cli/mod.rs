@@ -1,0 +1,84 @@
+//! The program: arguments in, exit code out. Everything it does is a call of the library.
+
+mod terminal;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use miette::GraphicalReportHandler;
+
+use metalith::Error;
+pub use terminal::Terminal;
+
+/// What every command answers with when it did its work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// Exit code 0.
+    Fine,
+    /// Exit code 1: done, but outside the limits.
+    OutsideLimits,
+    /// Exit code 3: something that was asked for could not be done.
+    NotDone,
+}
+
+/// From the phase of a metalens array to the layout a cleanroom writes, and back from that file to the
+/// image it makes.
+#[derive(Parser)]
+#[command(version, propagate_version = true, arg_required_else_help = true)]
+#[command(after_help = "Exit codes: 0 fine, 1 outside limits, 2 bad input, 3 could not be done.")]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+
+    /// Threads to use; all cores if left out. The answer does not depend on it.
+    #[arg(long, global = true, value_name = "N")]
+    threads: Option<usize>,
+
+    /// Print nothing but errors and what was asked for.
+    #[arg(long, short, global = true)]
+    quiet: bool,
+}
+
+/// One file in this folder for each.
+#[derive(Subcommand)]
+enum Command {}
+
+/// Run the program with the arguments of the process.
+pub fn run() -> ExitCode {
+    let arguments = Arguments::parse();
+    if let Some(threads) = arguments.threads {
+        // A pool that exists already (it cannot, this early) would only cost speed.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    }
+    let terminal = Terminal::new(arguments.quiet);
+    let outcome = dispatch(&arguments.command, &terminal);
+    terminal.clear();
+    match outcome {
+        Ok(Outcome::Fine) => ExitCode::SUCCESS,
+        Ok(Outcome::OutsideLimits) => ExitCode::from(1),
+        Ok(Outcome::NotDone) => ExitCode::from(3),
+        Err(error) => {
+            report(&error);
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn dispatch(command: &Command, _terminal: &Terminal) -> metalith::Result<Outcome> {
+    match *command {}
+}
+
+/// Errors in text files are shown with the text and its places marked, all others as one paragraph.
+fn report(error: &Error) {
+    if let Error::Text(faults) = error {
+        let mut drawn = String::new();
+        if GraphicalReportHandler::new()
+            .render_report(&mut drawn, faults.as_ref())
+            .is_ok()
+        {
+            eprintln!("{drawn}");
+            return;
+        }
+    }
+    eprintln!("error: {error}");
+}

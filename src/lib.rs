@@ -1,0 +1,13 @@
+//! metalith
+
+mod document;
+mod error;
+mod file;
+mod lattice;
+mod progress;
+
+pub use document::{Fault, Faults};
+pub use error::{Error, Result};
+pub use file::WholeFile;
+pub use lattice::{Lattice, WidthMap};
+pub use progress::{Progress, Silent};

@@ -1,0 +1,7 @@
+//! The `metalith` program. See `metalith --help`.
+
+mod cli;
+
+fn main() -> std::process::ExitCode {
+    cli::run()
+}
