@@ -1,11 +1,13 @@
 //! metalith
 
+mod cell;
 mod document;
 mod error;
 mod file;
 mod lattice;
 mod progress;
 
+pub use cell::{CellModel, Fidelity};
 pub use document::{Fault, Faults};
 pub use error::{Error, Result};
 pub use file::WholeFile;
