@@ -20,7 +20,7 @@ impl Lattice {
     /// # Errors
     /// If the pitch is zero or odd (half of it must be whole nanometres), or there are no sites.
     pub fn new(pitch_nm: u32, sites: usize) -> Result<Self> {
-        if pitch_nm == 0 || pitch_nm % 2 != 0 {
+        if pitch_nm == 0 || !pitch_nm.is_multiple_of(2) {
             return Err(Error::invalid(
                 format!("a pitch of {pitch_nm} nm puts pillar centres off the 1 nm grid"),
                 "use an even, positive number of nanometres",

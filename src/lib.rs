@@ -1,6 +1,7 @@
 //! metalith
 
 mod cell;
+#[allow(dead_code, unused_imports)] // read by the design, the rules and the measurements to come
 mod document;
 mod error;
 mod file;
