@@ -1,16 +1,25 @@
 //! metalith
 
+mod array;
 mod cell;
+mod design;
 #[allow(dead_code, unused_imports)] // read by the design, the rules and the measurements to come
 mod document;
 mod error;
 mod file;
 mod lattice;
+mod phase;
 mod progress;
 
-pub use cell::{CellModel, Fidelity};
+pub use array::{Class, Group, PillarArray, Placed, Symmetry, WidthRule};
+pub use cell::{Basis, CellModel, Fidelity, ForwardPolynomial, InversePolynomial, PublishedCell};
+pub use design::{
+    ApertureSpec, ArraySpec, CellSpec, ChipSpec, Design, Element, FieldAngle, Hierarchy, Layer, Layers, LayoutSpec,
+    LensSpec, LimitSpec, MappingSpec, MarkSpec, VerifySpec,
+};
 pub use document::{Fault, Faults};
 pub use error::{Error, Result};
 pub use file::WholeFile;
 pub use lattice::{Lattice, WidthMap};
+pub use phase::{ElementPhase, Interpolation, LensPhase, RadialPhase, Wedge};
 pub use progress::{Progress, Silent};

@@ -1,5 +1,9 @@
 //! The cell: a square pillar on its lattice site, and how light passes it.
 
 mod model;
+mod polynomial;
+mod published;
 
 pub use model::{CellModel, Fidelity};
+pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};
+pub use published::PublishedCell;

@@ -1,0 +1,58 @@
+//! `[mapping]`: from phase to width.
+
+use serde::Serialize;
+
+use super::CellSpec;
+use super::lens::WAVELENGTH;
+use crate::cell::{Basis, InversePolynomial};
+use crate::document::{Limits, Section};
+
+/// How phase becomes width.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MappingSpec {
+    /// Wavelength lambda_0 that the mapping is made for [um].
+    pub wavelength_um: f64,
+    /// Duty cycle over phase.
+    pub polynomial: InversePolynomial,
+}
+
+impl MappingSpec {
+    pub(super) fn read(s: &Section<'_, '_>, cell: &CellSpec) -> Self {
+        let published = InversePolynomial::published();
+        let wavelength_um = s
+            .optional_float("wavelength_nm", WAVELENGTH)
+            .map_or(published.wavelength_um, |nm| nm * 1e-3);
+        let basis = s.choice(
+            "basis",
+            &[("all_powers", Basis::AllPowers), ("even_powers", Basis::EvenPowers)],
+            Some(published.basis),
+        );
+        let coefficients = if s.has("coefficients") {
+            s.floats("coefficients", Limits::new(-100.0..=100.0, "(duty cycle over turns)"))
+        } else {
+            published.coefficients
+        };
+        let polynomial = InversePolynomial {
+            wavelength_um,
+            basis,
+            coefficients,
+        };
+        let (low, high) = polynomial.range();
+        let pitch = f64::from(cell.pitch_nm);
+        let (narrow, wide) = cell.width_range_nm;
+        let half_step = f64::from(cell.width_step_nm) / 2.0;
+        let fits = low * pitch >= f64::from(narrow) - half_step && high * pitch <= f64::from(wide) + half_step;
+        if !fits && !polynomial.coefficients.is_empty() {
+            s.fault(
+                "coefficients",
+                format!("this mapping asks for widths from {:.1} to {:.1} nm", low * pitch, high * pitch),
+                format!("the cell allows {narrow} to {wide} nm: change the coefficients or [cell] width_min_nm, width_max_nm"),
+            );
+        }
+        s.finish();
+        Self {
+            wavelength_um,
+            polynomial,
+        }
+    }
+}
