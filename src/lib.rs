@@ -10,6 +10,7 @@ mod file;
 mod lattice;
 mod phase;
 mod progress;
+pub mod report;
 
 pub use array::{Class, Group, PillarArray, Placed, Symmetry, WidthRule};
 pub use cell::{Basis, CellModel, Fidelity, ForwardPolynomial, InversePolynomial, PublishedCell};
