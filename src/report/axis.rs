@@ -238,7 +238,7 @@ mod tests {
         assert_eq!(text, ["100", "150", "200", "250", "300"]);
         assert_eq!(title, "width [nm]");
         let (text, title) = labels(&Axis::linear("pillars", ""), [0.0, 6_411_448.0]);
-        assert_eq!(text, ["0", "2", "4", "6", "8"]);
+        assert_eq!(text, ["0", "1", "2", "3", "4", "5", "6", "7"]);
         assert_eq!(title, "pillars [10⁶]");
         let (text, _) = labels(&Axis::log("|E|²", ""), [3e-5, 0.4]);
         assert_eq!(text, ["10⁻⁵", "10⁻⁴", "10⁻³", "10⁻²", "10⁻¹", "10⁰"]);
