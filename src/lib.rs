@@ -8,11 +8,12 @@ mod document;
 mod error;
 mod file;
 mod lattice;
+mod layout;
 mod phase;
 mod progress;
 pub mod report;
 
-pub use array::{Class, Group, PillarArray, Placed, Symmetry, WidthRule};
+pub use array::{Class, DomainPart, Group, PillarArray, Placed, Symmetry, WidthRule};
 pub use cell::{Basis, CellModel, Fidelity, ForwardPolynomial, InversePolynomial, PublishedCell};
 pub use design::{
     ApertureSpec, ArraySpec, CellSpec, ChipSpec, Design, Element, FieldAngle, Hierarchy, Layer, Layers, LayoutSpec,
@@ -22,5 +23,6 @@ pub use document::{Fault, Faults};
 pub use error::{Error, Result};
 pub use file::WholeFile;
 pub use lattice::{Lattice, WidthMap};
+pub use layout::{Written, write_apertures, write_layer_properties, write_pillars};
 pub use phase::{ElementPhase, Interpolation, LensPhase, RadialPhase, Wedge};
 pub use progress::{Progress, Silent};

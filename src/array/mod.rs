@@ -3,7 +3,7 @@
 mod symmetry;
 mod widths;
 
-pub use symmetry::{Group, Symmetry};
+pub use symmetry::{DomainPart, Group, Symmetry};
 pub use widths::WidthRule;
 
 use crate::design::{Design, Element};
@@ -70,19 +70,6 @@ impl PillarArray {
     pub fn pillars(&self) -> u64 {
         let of_class = self.classes.iter().map(|c| c.widths.pillars()).collect::<Vec<_>>();
         self.placed.iter().map(|p| of_class[p.class]).sum()
-    }
-
-    /// Number of pillars that symmetry leaves unique.
-    pub fn unique_pillars(&self) -> u64 {
-        self.classes
-            .iter()
-            .map(|c| {
-                c.group
-                    .domain(&c.widths)
-                    .map(|part| part.sites.len() as u64)
-                    .sum::<u64>()
-            })
-            .sum()
     }
 
     /// The pillars of one element.

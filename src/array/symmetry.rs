@@ -81,14 +81,19 @@ pub struct Group {
     members: Vec<Symmetry>,
 }
 
-/// Sites of a fundamental domain that the same number of copies covers the lens with.
-#[derive(Clone, Debug)]
+/// A part of a fundamental domain that the same copies cover the lens with.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DomainPart {
-    /// `(ix, iy)`, row by row.
-    pub sites: Vec<(u32, u32)>,
-    /// The symmetries that, applied to the sites, give all their copies, each once.
+    /// Which symmetries of the group leave the sites of this part where they are.
+    stabiliser: Stabiliser,
+    /// The symmetries that, applied to the part, give all its copies, each once.
     pub copies: Vec<Symmetry>,
+    /// Number of pillars of the part.
+    pub pillars: u64,
 }
+
+/// Bit `k` is set if member `k` of the group leaves a site where it is.
+type Stabiliser = u8;
 
 impl Group {
     /// The group of a lens: each symmetry is tried on every site.
@@ -112,51 +117,57 @@ impl Group {
 
     /// The pillars that the group leaves unique, in parts of equally many copies: inside a lens with
     /// all eight symmetries an octant with eight copies and its diagonal with four.
-    pub fn domain(&self, widths: &WidthMap) -> impl Iterator<Item = DomainPart> + use<> {
+    pub fn domain(&self, widths: &WidthMap) -> Vec<DomainPart> {
         let n = widths.lattice.sites();
-        let mut parts: Vec<(Vec<bool>, DomainPart)> = Vec::new();
+        let mut parts: Vec<DomainPart> = Vec::new();
         for ((iy, ix), _) in widths.width_nm.indexed_iter().filter(|(_, w)| **w != 0) {
-            let place = |s: &Symmetry| s.site(n, ix, iy);
-            // The first of the copies stands for all.
-            if self.members.iter().any(|s| {
-                let (jx, jy) = place(s);
-                (jy, jx) < (iy, ix)
-            }) {
+            let Some(stabiliser) = self.stabiliser(n, ix, iy) else {
                 continue;
-            }
-            let stays = self.members.iter().map(|s| place(s) == (ix, iy)).collect::<Vec<_>>();
-            let site = (ix as u32, iy as u32);
-            match parts.iter_mut().find(|(known, _)| *known == stays) {
-                Some((_, part)) => part.sites.push(site),
-                None => {
-                    let copies = self.copies(|s| place(s));
-                    parts.push((
-                        stays,
-                        DomainPart {
-                            sites: vec![site],
-                            copies,
-                        },
-                    ));
-                }
+            };
+            match parts.iter_mut().find(|part| part.stabiliser == stabiliser) {
+                Some(part) => part.pillars += 1,
+                None => parts.push(DomainPart {
+                    stabiliser,
+                    copies: self.copies(n, ix, iy),
+                    pillars: 1,
+                }),
             }
         }
-        parts.into_iter().map(|(_, part)| part)
+        parts
+    }
+
+    /// Whether a site of a lattice of `n` sites an axis belongs to a part of the domain.
+    pub fn holds(&self, part: &DomainPart, n: usize, ix: usize, iy: usize) -> bool {
+        self.stabiliser(n, ix, iy) == Some(part.stabiliser)
+    }
+
+    /// What leaves a site where it is; none if another copy of the site, the first in reading order,
+    /// stands for it.
+    fn stabiliser(&self, n: usize, ix: usize, iy: usize) -> Option<Stabiliser> {
+        let mut stays = 0;
+        for (k, member) in self.members.iter().enumerate() {
+            let (jx, jy) = member.site(n, ix, iy);
+            match (jy, jx).cmp(&(iy, ix)) {
+                std::cmp::Ordering::Less => return None,
+                std::cmp::Ordering::Equal => stays |= 1 << k,
+                std::cmp::Ordering::Greater => {}
+            }
+        }
+        Some(stays)
     }
 
     /// One symmetry for each distinct place that the group moves a site to.
-    fn copies(&self, place: impl Fn(&Symmetry) -> (usize, usize)) -> Vec<Symmetry> {
+    fn copies(&self, n: usize, ix: usize, iy: usize) -> Vec<Symmetry> {
         let mut seen = Vec::new();
-        self.members
-            .iter()
-            .filter(|s| {
-                let to = place(s);
-                !seen.contains(&to) && {
-                    seen.push(to);
-                    true
-                }
-            })
-            .copied()
-            .collect()
+        let mut copies = Vec::new();
+        for member in &self.members {
+            let place = member.site(n, ix, iy);
+            if !seen.contains(&place) {
+                seen.push(place);
+                copies.push(*member);
+            }
+        }
+        copies
     }
 }
 
@@ -184,11 +195,14 @@ mod tests {
         let n = map.lattice.sites();
         let mut seen = WidthMap::empty(map.lattice);
         for part in group.domain(map) {
-            for &(ix, iy) in &part.sites {
+            for (iy, ix) in (0..n * n).map(|k| (k / n, k % n)) {
+                if map.width_nm[[iy, ix]] == 0 || !group.holds(&part, n, ix, iy) {
+                    continue;
+                }
                 for s in &part.copies {
-                    let (jx, jy) = s.site(n, ix as usize, iy as usize);
+                    let (jx, jy) = s.site(n, ix, iy);
                     assert_eq!(seen.width_nm[[jy, jx]], 0, "a site covered twice");
-                    seen.width_nm[[jy, jx]] = map.width_nm[[iy as usize, ix as usize]];
+                    seen.width_nm[[jy, jx]] = map.width_nm[[iy, ix]];
                 }
             }
         }
@@ -202,9 +216,10 @@ mod tests {
         assert_eq!(group.members().len(), 8);
         let counts = group
             .domain(&map)
-            .map(|p| (p.sites.len(), p.copies.len()))
+            .iter()
+            .map(|p| (p.pillars, p.copies.len() as u64))
             .collect::<Vec<_>>();
-        assert_eq!(counts.iter().map(|(s, c)| s * c).sum::<usize>() as u64, map.pillars());
+        assert_eq!(counts.iter().map(|(s, c)| s * c).sum::<u64>(), map.pillars());
         assert!(counts.iter().any(|c| c.1 == 8) && counts.iter().any(|c| c.1 == 4));
         unfold(&map, &group);
     }

@@ -1,5 +1,6 @@
 //! The program: arguments in, exit code out. Everything it does is a call of the library.
 
+mod layout;
 mod terminal;
 
 use std::process::ExitCode;
@@ -12,6 +13,7 @@ pub use terminal::Terminal;
 
 /// What every command answers with when it did its work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(dead_code)] // the commands that judge come next
 pub enum Outcome {
     /// Exit code 0.
     Fine,
@@ -41,7 +43,9 @@ struct Arguments {
 
 /// One file in this folder for each.
 #[derive(Subcommand)]
-enum Command {}
+enum Command {
+    Layout(layout::LayoutArgs),
+}
 
 /// Run the program with the arguments of the process.
 pub fn run() -> ExitCode {
@@ -64,8 +68,10 @@ pub fn run() -> ExitCode {
     }
 }
 
-fn dispatch(command: &Command, _terminal: &Terminal) -> metalith::Result<Outcome> {
-    match *command {}
+fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome> {
+    match command {
+        Command::Layout(args) => layout::run(args, terminal),
+    }
 }
 
 /// Errors in text files are shown with the text and its places marked, all others as one paragraph.

@@ -1,0 +1,40 @@
+//! Alignment crosses and the outline of the chip.
+
+use gds21::GdsElement;
+
+use super::polygon;
+use crate::design::{ChipSpec, Layer, MarkSpec};
+
+/// All crosses of a design on one layer, each a polygon of twelve corners.
+pub(super) fn crosses(marks: &[MarkSpec], layer: &Layer) -> Vec<GdsElement> {
+    marks
+        .iter()
+        .flat_map(|set| set.centres_nm.iter().map(|&centre| polygon(layer, &cross(set, centre))))
+        .collect()
+}
+
+/// Corners of a cross, counter-clockwise from the lower left of its lower arm.
+fn cross(set: &MarkSpec, (x, y): (i64, i64)) -> [(i64, i64); 12] {
+    let (l, w) = (set.length_nm / 2, set.width_nm / 2);
+    [
+        (-w, -l),
+        (w, -l),
+        (w, -w),
+        (l, -w),
+        (l, w),
+        (w, w),
+        (w, l),
+        (-w, l),
+        (-w, w),
+        (-l, w),
+        (-l, -w),
+        (-w, -w),
+    ]
+    .map(|(dx, dy)| (x + dx, y + dy))
+}
+
+/// The edge of the chip.
+pub(super) fn outline(chip: &ChipSpec, layer: &Layer) -> GdsElement {
+    let (x, y) = (chip.size_nm.0 / 2, chip.size_nm.1 / 2);
+    polygon(layer, &[(-x, -y), (x, -y), (x, y), (-x, y)])
+}
