@@ -3,6 +3,7 @@
 mod model;
 mod polynomial;
 mod published;
+pub mod rcwa;
 
 pub use model::{CellModel, Fidelity};
 pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};
