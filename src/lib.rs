@@ -15,7 +15,9 @@ mod progress;
 pub mod report;
 
 pub use array::{Class, DomainPart, Group, PillarArray, Placed, Symmetry, WidthRule};
-pub use cell::{Basis, CellModel, Fidelity, ForwardPolynomial, InversePolynomial, PublishedCell, rcwa};
+pub use cell::{
+    Basis, CellModel, CellStack, Fidelity, ForwardPolynomial, InversePolynomial, Material, PublishedCell, rcwa,
+};
 pub use design::{
     ApertureSpec, ArraySpec, CellSpec, ChipSpec, Design, Element, FieldAngle, Hierarchy, Layer, Layers, LayoutSpec,
     LensSpec, LimitSpec, MappingSpec, MarkSpec, VerifySpec,
