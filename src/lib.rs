@@ -13,6 +13,7 @@ pub mod optimise;
 mod phase;
 mod progress;
 pub mod report;
+mod wave;
 
 pub use array::{Class, DomainPart, Group, PillarArray, Placed, Symmetry, WidthRule};
 pub use cell::{
@@ -29,3 +30,7 @@ pub use lattice::{Lattice, WidthMap};
 pub use layout::{Written, write_apertures, write_layer_properties, write_pillars};
 pub use phase::{ElementPhase, Interpolation, LensPhase, RadialPhase, Wedge};
 pub use progress::{Progress, Silent};
+pub use wave::{
+    Accuracy, Aperture, Direct, Fade, Field, Fold, Hankel, PhaseArray, PhaseFunction, Pillars, PlaneWave, Propagator,
+    Scratch, Window,
+};
