@@ -6,7 +6,9 @@ mod design;
 #[allow(dead_code, unused_imports)] // read by the design, the rules and the measurements to come
 mod document;
 mod error;
+mod extract;
 mod file;
+mod gds;
 mod lattice;
 mod layout;
 pub mod optimise;
@@ -25,7 +27,15 @@ pub use design::{
 };
 pub use document::{Fault, Faults};
 pub use error::{Error, Result};
+pub use extract::{
+    ElementSite, Elements, ExtractedElement, Extraction, ExtractionPlan, LayerSummary, Oddities, Oddity, Survey,
+    TextSummary, Why, extract,
+};
 pub use file::WholeFile;
+pub use gds::{
+    Cell, Child, Faulty, Layer, LayerTally, Layout, Point, ReadLimits, Rect, Selection, Shape, ShapeKind, Text,
+    Transform, Visitor,
+};
 pub use lattice::{Lattice, WidthMap};
 pub use layout::{Written, write_apertures, write_layer_properties, write_pillars};
 pub use phase::{ElementPhase, Interpolation, LensPhase, RadialPhase, Wedge};

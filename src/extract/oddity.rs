@@ -1,0 +1,80 @@
+//! What stands on the pillar layer and is not a pillar on its lattice.
+
+use serde::Serialize;
+
+/// Why a shape is not a pillar.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Why {
+    /// A square in an element, its centre not on a site. (A square of odd width may be half a database
+    /// unit off: no place of its edges on the grid is nearer.)
+    OffLattice,
+    /// An upright rectangle with unequal sides.
+    NotSquare,
+    /// Not an upright rectangle, or not a whole number of nanometres wide.
+    OddShape,
+    /// A second square on a site that has one.
+    DuplicateSite,
+    /// A square whose centre is in no element.
+    OutsideElements,
+    /// Wider than the pitch: it overlaps its neighbours' sites.
+    TooWide,
+}
+
+impl Why {
+    /// All reasons, in the order of [`Oddities::by_why`].
+    pub const ALL: [Self; 6] = [
+        Self::OffLattice,
+        Self::NotSquare,
+        Self::OddShape,
+        Self::DuplicateSite,
+        Self::OutsideElements,
+        Self::TooWide,
+    ];
+
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::OffLattice => "off the lattice",
+            Self::NotSquare => "not square",
+            Self::OddShape => "not an upright rectangle",
+            Self::DuplicateSite => "second pillar on its site",
+            Self::OutsideElements => "outside every element",
+            Self::TooWide => "wider than the pitch",
+        }
+    }
+}
+
+/// One shape that is not a pillar.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Oddity {
+    pub why: Why,
+    /// Middle of its bounding box in the layout [nm].
+    pub centre_nm: [f64; 2],
+    /// Its bounding box [nm].
+    pub size_nm: [f64; 2],
+    /// Place in the file of its element, or of the reference that placed it.
+    pub offset: u64,
+}
+
+/// Shapes that are not pillars: the first of them, and the number of all.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Oddities {
+    pub listed: Vec<Oddity>,
+    /// Number for each of [`Why::ALL`].
+    pub by_why: [u64; 6],
+}
+
+impl Oddities {
+    /// Number of all.
+    pub fn total(&self) -> u64 {
+        self.by_why.iter().sum()
+    }
+
+    pub(super) fn add(&mut self, oddity: Oddity, most: usize) {
+        self.by_why[oddity.why as usize] += 1;
+        if self.listed.len() < most {
+            self.listed.push(oddity);
+        }
+    }
+}

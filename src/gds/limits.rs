@@ -1,0 +1,46 @@
+//! What keeps reading bounded, whatever the bytes say.
+
+/// Limits of one reading. A file of a few hundred bytes can describe more squares than there are atoms
+/// in the wafer; past a limit reading ends with an error that says which.
+#[derive(Clone, Copy, Debug)]
+pub struct ReadLimits {
+    /// Cells in the file.
+    pub cells: usize,
+    /// Bytes of a cell's name; the format says 32.
+    pub name_bytes: usize,
+    /// Bytes of all names together.
+    pub all_name_bytes: usize,
+    /// Distinct pairs of (cell, layer) and of (cell, child).
+    pub tallies: usize,
+    /// Vertices of one element, over all its XY records; the format says 8191 a record.
+    pub vertices: usize,
+    /// Longest chain of references.
+    pub depth: u32,
+    /// Copies of cells that are too large to be placed shape by shape; each costs 56 bytes.
+    pub placements: u64,
+    /// Shapes in the whole layout with every reference followed.
+    pub flat_shapes: u64,
+}
+
+impl Default for ReadLimits {
+    /// Twelve times the largest array asked for (5 x 5, 160 million pillars) in under a gigabyte.
+    fn default() -> Self {
+        Self {
+            cells: 1 << 20,
+            name_bytes: 1024,
+            all_name_bytes: 1 << 26,
+            tallies: 1 << 22,
+            vertices: 1 << 20,
+            depth: 256,
+            placements: 1 << 22,
+            flat_shapes: 2_000_000_000,
+        }
+    }
+}
+
+/// Largest magnification, and the inverse of the smallest, of a reference and of a chain of them.
+pub(super) const MAGNIFICATION: f64 = 1e6;
+
+/// Coordinates of placed shapes are held within this of the origin [database units], so that sums and
+/// differences of a few of them cannot overflow. The format's own coordinates end at 2^31.
+pub(super) const FARTHEST: i64 = 1 << 50;

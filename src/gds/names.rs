@@ -1,0 +1,66 @@
+//! Names of cells as small numbers.
+
+use std::collections::HashMap;
+
+const SLOTS: usize = 1024;
+
+/// Names met so far, numbered in the order they were met.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Names {
+    list: Vec<Box<[u8]>>,
+    numbers: HashMap<Box<[u8]>, u32>,
+    bytes: usize,
+}
+
+impl Names {
+    /// Bytes of all names.
+    pub fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    pub fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    pub fn name(&self, number: u32) -> &[u8] {
+        &self.list[number as usize]
+    }
+
+    /// The number of a name, if it was met.
+    pub fn find(&self, name: &[u8]) -> Option<u32> {
+        self.numbers.get(name).copied()
+    }
+
+    /// The number of a name, a new one if it is new.
+    pub fn number(&mut self, name: &[u8]) -> u32 {
+        if let Some(number) = self.find(name) {
+            return number;
+        }
+        let number = self.list.len() as u32;
+        self.bytes += name.len();
+        self.list.push(name.into());
+        self.numbers.insert(name.into(), number);
+        number
+    }
+}
+
+/// Numbers of short names found lately, by key ([`super::fast::Reference`]): the millions of references of
+/// a layout go to a few hundred cells.
+pub(super) struct Recent(Vec<(u64, u32)>);
+
+impl Recent {
+    pub fn new() -> Self {
+        Self(vec![(0, 0); SLOTS])
+    }
+
+    /// The number of the name with this key, asked of `find` if it was not met lately.
+    #[inline]
+    pub fn number(&mut self, key: u64, find: impl FnOnce(&[u8]) -> u32) -> u32 {
+        let slot = &mut self.0[(key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 54) as usize % SLOTS];
+        if slot.0 != key {
+            let bytes = key.to_le_bytes();
+            *slot = (key, find(&bytes[..8 - key.leading_zeros() as usize / 8]));
+        }
+        slot.1
+    }
+}
