@@ -11,11 +11,11 @@ use crate::progress::Progress;
 
 /// Tiles of the map of occupied places [nm]: two elements with an empty tile between them are two. Wider
 /// than any pitch, so that sparse places of a lens hold together.
-const TILE_NM: i64 = 1 << 15;
-/// Tiles of the map: 5 x 5 lenses of 1 mm occupy 25,000.
-const MOST_TILES: usize = 1 << 20;
+const TILE_NM: i64 = 1 << 13;
+/// Tiles of the map: 5 x 5 lenses of 1 mm occupy 300,000.
+const MOST_TILES: usize = 1 << 21;
 /// Centres remembered a tile, to tell pitch and phase from.
-const SAMPLES: usize = 96;
+const SAMPLES: usize = 24;
 /// Wider squares are pads or marks [nm].
 const WIDEST_NM: i64 = 4000;
 /// Fewer squares together are no element.
@@ -30,7 +30,9 @@ const SITES_PER_PILLAR: u64 = 64;
 struct Tile {
     squares: u64,
     bounds: Option<Rect>,
-    samples: Vec<(i64, i64)>,
+    /// Centres from the tile's corner, doubled [half nm]; so many of them.
+    samples: [(u16, u16); SAMPLES],
+    sampled: u8,
 }
 
 struct Map {
@@ -116,7 +118,7 @@ impl Map {
             if *guess == next {
                 if self.tiles.len() >= MOST_TILES {
                     return Err(Error::invalid(
-                        "small squares are spread over more than a million places of 33 um",
+                        "small squares are spread over more than two million places of 8 um",
                         "give the design, or name the cell of one element with --top",
                     ));
                 }
@@ -132,8 +134,10 @@ impl Map {
             y1: y,
         };
         tile.bounds.get_or_insert(centre).unite(&centre);
-        if tile.samples.len() < SAMPLES && width % 2 == 0 {
-            tile.samples.push((x, y));
+        if usize::from(tile.sampled) < SAMPLES && width % 2 == 0 {
+            let from_corner = |v: i64| v.rem_euclid(2 * TILE_NM) as u16;
+            tile.samples[usize::from(tile.sampled)] = (from_corner(x), from_corner(y));
+            tile.sampled += 1;
         }
         Ok(())
     }
@@ -164,6 +168,14 @@ impl Map {
         clusters
     }
 
+    /// Centres remembered of a tile, doubled [half nm].
+    fn samples(&self, tile: usize) -> impl Iterator<Item = (i64, i64)> + '_ {
+        let ((x, y), tile) = &self.tiles[tile];
+        tile.samples[..usize::from(tile.sampled)]
+            .iter()
+            .map(move |s| (2 * TILE_NM * x + i64::from(s.0), 2 * TILE_NM * y + i64::from(s.1)))
+    }
+
     /// The lattice of one cluster; none if it is too small to be an element.
     fn element(&self, cluster: &[usize]) -> Result<Option<ElementSite>> {
         let squares: u64 = cluster.iter().map(|&k| self.tiles[k].1.squares).sum();
@@ -172,9 +184,8 @@ impl Map {
         }
         let mut steps: BTreeMap<i64, u64> = BTreeMap::new();
         for &k in cluster {
-            let samples = &self.tiles[k].1.samples;
-            for axis in [|s: &(i64, i64)| s.0, |s: &(i64, i64)| s.1] {
-                let mut places: Vec<i64> = samples.iter().map(axis).collect();
+            for axis in [|s: (i64, i64)| s.0, |s: (i64, i64)| s.1] {
+                let mut places: Vec<i64> = self.samples(k).map(axis).collect();
                 places.sort_unstable();
                 places.dedup();
                 for pair in places.windows(2) {
@@ -192,9 +203,9 @@ impl Map {
                 sum.unite(&b);
                 sum
             });
-        let axis = |of: fn(&(i64, i64)) -> i64, from: i64, to: i64| {
+        let axis = |of: fn((i64, i64)) -> i64, from: i64, to: i64| {
             let mut phases: BTreeMap<i64, u64> = BTreeMap::new();
-            for s in cluster.iter().flat_map(|&k| &self.tiles[k].1.samples) {
+            for s in cluster.iter().flat_map(|&k| self.samples(k)) {
                 *phases.entry(of(s).rem_euclid(step)).or_default() += 1;
             }
             let phase = most_common(phases).unwrap_or(0);

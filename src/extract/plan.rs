@@ -21,7 +21,7 @@ pub enum Elements {
     /// As a design says.
     Given(Vec<ElementSite>),
     /// Wherever clusters of squares are: pitch and phase of the lattice from their distances, its centre
-    /// from the middle of the outermost. Elements less than two tiles of 33 um apart count as one.
+    /// from the middle of the outermost. Elements less than 8 um apart count as one.
     Discover,
 }
 

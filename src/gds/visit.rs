@@ -59,6 +59,21 @@ impl Layout {
     /// If the layout has faults and the selection is not lenient, if it is beyond the limits of reading,
     /// if the file cannot be read again, and what the visitor returns.
     pub fn visit<V: Visitor>(&self, selection: &Selection, visitor: &mut V, progress: &dyn Progress) -> Result<()> {
+        self.visit_by(Walk::new(self.limits(), progress), selection, visitor)
+    }
+
+    /// As [`Layout::visit`] by the grammar alone.
+    #[cfg(test)]
+    pub(super) fn visit_slowly<V: Visitor>(
+        &self,
+        selection: &Selection,
+        visitor: &mut V,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        self.visit_by(Walk::new(self.limits(), progress).slowly(), selection, visitor)
+    }
+
+    fn visit_by<V: Visitor>(&self, mut walk: Walk<'_>, selection: &Selection, visitor: &mut V) -> Result<()> {
         let roots = self.roots(selection)?;
         let (counts, depths) = tree::count(self.cells(), &self.tree().order, &roots);
         if let Some(what) = tree::beyond(self.cells(), &counts, &depths, self.limits()) {
@@ -78,8 +93,7 @@ impl Layout {
             .filter(|&k| !placed[k].is_empty() && worth(&self.cells()[k]))
             .collect();
         let bytes = |k: &usize| self.cells()[*k].bytes.end - self.cells()[*k].bytes.start;
-        progress.begin("reading shapes", chosen.iter().map(bytes).sum());
-        let mut walk = Walk::new(self.limits(), progress);
+        walk.progress.begin("reading shapes", chosen.iter().map(bytes).sum());
         let mut spread = Spread {
             layout: self,
             visitor,
