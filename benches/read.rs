@@ -6,7 +6,7 @@
 mod gds;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use metalith::{ElementSite, ExtractionPlan, Lattice, Layer, Layout, ReadLimits, Silent, extract};
+use metalith::{ElementSite, ExtractionPlan, Lattice, LayerNumber, Layout, ReadLimits, Silent, extract};
 
 const SITES: usize = 400;
 
@@ -49,11 +49,11 @@ fn read(criterion: &mut Criterion) {
         let bytes: std::sync::Arc<[u8]> = bytes.into();
         let open = || Layout::from_bytes(name, bytes.clone(), ReadLimits::default()).expect("a layout");
         group.bench_function(format!("{name}, counted"), |b| b.iter(open));
-        let given = ExtractionPlan::given(Layer::new(1, 0), vec![site]);
+        let given = ExtractionPlan::given(LayerNumber::new(1, 0), vec![site]);
         group.bench_function(format!("{name}, extracted"), |b| {
             b.iter(|| extract(&open(), &given, &Silent).expect("pillars"));
         });
-        let discover = ExtractionPlan::discover(Layer::new(1, 0));
+        let discover = ExtractionPlan::discover(LayerNumber::new(1, 0));
         group.bench_function(format!("{name}, discovered and extracted"), |b| {
             b.iter(|| extract(&open(), &discover, &Silent).expect("pillars"));
         });

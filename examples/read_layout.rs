@@ -1,6 +1,6 @@
 //! What is in a layout from anywhere: `cargo run --release --example read_layout -- FILE.gds [LAYER/DATATYPE]`
 
-use metalith::{ExtractionPlan, Layer, Layout, Silent, extract};
+use metalith::{ExtractionPlan, LayerNumber, Layout, Silent, extract};
 
 fn main() -> metalith::Result<()> {
     let mut arguments = std::env::args().skip(1);
@@ -9,7 +9,7 @@ fn main() -> metalith::Result<()> {
     let mut numbers = layer
         .split('/')
         .map(|n| n.parse().expect("LAYER/DATATYPE, such as 1/0"));
-    let layer = Layer::new(numbers.next().unwrap_or(1), numbers.next().unwrap_or(0));
+    let layer = LayerNumber::new(numbers.next().unwrap_or(1), numbers.next().unwrap_or(0));
     let layout = Layout::open(path.as_ref())?;
     println!(
         "{} cells, {} levels, {} shapes flat, {} bytes, unit {} nm",

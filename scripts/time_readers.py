@@ -12,7 +12,6 @@ import sys
 import tempfile
 from pathlib import Path
 
-
 import numpy as np
 
 OURS = Path(__file__).resolve().parent.parent / "target/release/examples/read_layout"

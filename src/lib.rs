@@ -33,7 +33,7 @@ pub use extract::{
 };
 pub use file::WholeFile;
 pub use gds::{
-    Cell, Child, Faulty, Layer, LayerTally, Layout, Point, ReadLimits, Rect, Selection, Shape, ShapeKind, Text,
+    Cell, Child, Faulty, LayerNumber, LayerTally, Layout, Point, ReadLimits, Rect, Selection, Shape, ShapeKind, Text,
     Transform, Visitor,
 };
 pub use lattice::{Lattice, WidthMap};

@@ -9,13 +9,13 @@ use std::path::PathBuf;
 
 use gds::Gds;
 use metalith::{
-    ElementSite, Error, Extraction, ExtractionPlan, Lattice, Layer, Layout, Point, ReadLimits, Rect, Selection, Shape,
-    Silent, Transform, Visitor, Why, WidthMap, extract,
+    ElementSite, Error, Extraction, ExtractionPlan, Lattice, LayerNumber, Layout, Point, ReadLimits, Rect, Selection,
+    Shape, Silent, Transform, Visitor, Why, WidthMap, extract,
 };
 use proptest::prelude::*;
 use rand::SeedableRng;
 
-const PILLARS: Layer = Layer { layer: 1, datatype: 0 };
+const PILLARS: LayerNumber = LayerNumber { layer: 1, datatype: 0 };
 
 fn layout(bytes: Vec<u8>) -> Layout {
     Layout::from_bytes("test.gds", bytes, ReadLimits::default()).unwrap()
@@ -29,7 +29,7 @@ fn fault_of(bytes: Vec<u8>) -> (u64, String) {
 }
 
 /// All areas of a layout, flat: bounding boxes and outlines where they stand.
-struct Flat(Vec<(Layer, Vec<Point>)>);
+struct Flat(Vec<(LayerNumber, Vec<Point>)>);
 
 impl Visitor for Flat {
     fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> metalith::Result<()> {
@@ -374,7 +374,10 @@ fn placed() -> impl Strategy<Value = Placed> {
         })
 }
 
-fn library(cells: &[(Vec<(i32, i32, i32, i32)>, Vec<Placed>)]) -> gds21::GdsLibrary {
+/// Rectangles of a cell (corner and size) and its references.
+type Drawn = (Vec<(i32, i32, i32, i32)>, Vec<Placed>);
+
+fn library(cells: &[Drawn]) -> gds21::GdsLibrary {
     use gds21::*;
     let mut library = GdsLibrary::new("RANDOM");
     for (k, (rects, references)) in cells.iter().enumerate() {

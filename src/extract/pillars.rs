@@ -5,11 +5,11 @@ use super::plan::{ExtractedElement, ExtractionPlan};
 use super::sites::{Scale, Sites, Standing};
 use super::survey::{Survey, Surveyor};
 use crate::error::Result;
-use crate::gds::{Cell, Layer, Point, Rect, Shape, Text, Transform, Visitor, rectangle_of, simplified};
+use crate::gds::{Cell, LayerNumber, Point, Rect, Shape, Text, Transform, Visitor, rectangle_of, simplified};
 
 /// Fills width maps from the shapes of a layout.
 pub(super) struct Pillars<'a> {
-    layer: Layer,
+    layer: LayerNumber,
     listed: usize,
     scale: Scale,
     sites: Sites,

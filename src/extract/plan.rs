@@ -2,7 +2,7 @@
 
 use super::oddity::Oddities;
 use super::survey::Survey;
-use crate::gds::Layer;
+use crate::gds::LayerNumber;
 use crate::lattice::{Lattice, WidthMap};
 
 /// Where an element is and which lattice its pillars should stand on.
@@ -29,7 +29,7 @@ pub enum Elements {
 #[derive(Clone, Debug)]
 pub struct ExtractionPlan {
     /// Layer that the pillars are on.
-    pub pillar_layer: Layer,
+    pub pillar_layer: LayerNumber,
     pub elements: Elements,
     /// Cell to start from; the top cell if there is one only.
     pub top: Option<String>,
@@ -39,7 +39,7 @@ pub struct ExtractionPlan {
 
 impl ExtractionPlan {
     /// The elements of a design.
-    pub fn given(pillar_layer: Layer, elements: Vec<ElementSite>) -> Self {
+    pub fn given(pillar_layer: LayerNumber, elements: Vec<ElementSite>) -> Self {
         Self {
             pillar_layer,
             elements: Elements::Given(elements),
@@ -49,7 +49,7 @@ impl ExtractionPlan {
     }
 
     /// A layout from anywhere.
-    pub fn discover(pillar_layer: Layer) -> Self {
+    pub fn discover(pillar_layer: LayerNumber) -> Self {
         Self {
             elements: Elements::Discover,
             ..Self::given(pillar_layer, Vec::new())

@@ -3,12 +3,12 @@
 use serde::Serialize;
 
 use super::sites::Scale;
-use crate::gds::{Layer, Point, Rect, Shape, Text, Transform};
+use crate::gds::{LayerNumber, Point, Rect, Shape, Text, Transform};
 
 /// One layer with all references followed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LayerSummary {
-    pub layer: Layer,
+    pub layer: LayerNumber,
     /// Areas.
     pub shapes: u64,
     /// Texts.
@@ -21,7 +21,7 @@ pub struct LayerSummary {
 /// One text.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TextSummary {
-    pub layer: Layer,
+    pub layer: LayerNumber,
     pub string: String,
     pub at_nm: [f64; 2],
 }
@@ -54,10 +54,10 @@ impl Extent {
 /// Gathers a survey. Shapes are counted in the coordinates of their cell, and placed with it once.
 #[derive(Default)]
 pub(super) struct Surveyor {
-    cell: Vec<(Layer, Extent)>,
+    cell: Vec<(LayerNumber, Extent)>,
     last: usize,
     placements: Vec<Transform>,
-    total: Vec<(Layer, Extent)>,
+    total: Vec<(LayerNumber, Extent)>,
     texts: Vec<TextSummary>,
 }
 
@@ -70,7 +70,7 @@ impl Surveyor {
     }
 
     #[inline]
-    fn entry(&mut self, layer: Layer) -> &mut Extent {
+    fn entry(&mut self, layer: LayerNumber) -> &mut Extent {
         if self.cell.get(self.last).is_none_or(|(l, _)| *l != layer) {
             self.last = self.cell.iter().position(|(l, _)| *l == layer).unwrap_or_else(|| {
                 self.cell.push((layer, Extent::NONE));
@@ -137,7 +137,7 @@ impl Surveyor {
     }
 }
 
-fn add(total: &mut Vec<(Layer, Extent)>, layer: Layer, extent: &Extent, placements: &[Transform]) {
+fn add(total: &mut Vec<(LayerNumber, Extent)>, layer: LayerNumber, extent: &Extent, placements: &[Transform]) {
     let k = total.iter().position(|(l, _)| *l == layer).unwrap_or_else(|| {
         total.push((layer, Extent::NONE));
         total.len() - 1

@@ -1,6 +1,6 @@
 //! What is kept of a cell after the first reading: numbers, not shapes.
 
-use super::shape::{Layer, Rect};
+use super::shape::{LayerNumber, Rect};
 
 /// One cell ("structure") of a layout in number.
 #[derive(Clone, Debug)]
@@ -9,7 +9,7 @@ pub struct Cell {
     /// Its bytes in the file, from BGNSTR to behind ENDSTR.
     pub bytes: std::ops::Range<u64>,
     /// What is drawn in it, by layer, in the order of first use.
-    pub layers: Vec<(Layer, LayerTally)>,
+    pub layers: Vec<(LayerNumber, LayerTally)>,
     /// Which cells it refers to.
     pub children: Vec<Child>,
     /// Elements with properties.

@@ -3,7 +3,7 @@
 use super::input::Input;
 use super::limits::ReadLimits;
 use super::record::{self, Record, data, kind};
-use super::shape::{Layer, Point};
+use super::shape::{LayerNumber, Point};
 use super::transform::Transform;
 use crate::error::Result;
 
@@ -40,7 +40,7 @@ impl ElementKind {
 pub(super) struct Element {
     pub offset: u64,
     pub kind: ElementKind,
-    pub layer: Layer,
+    pub layer: LayerNumber,
     pub points: Vec<Point>,
     /// Name of the cell referred to.
     pub name: Vec<u8>,
@@ -63,7 +63,7 @@ impl Default for Element {
         Self {
             offset: 0,
             kind: ElementKind::Boundary,
-            layer: Layer::default(),
+            layer: LayerNumber::default(),
             points: Vec::new(),
             name: Vec::new(),
             string: Vec::new(),

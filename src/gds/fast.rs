@@ -1,7 +1,7 @@
 //! The two elements that a pillar layout consists of, recognised by their bytes: the upright square and
 //! the plain reference. Anything else, however close, goes through [`super::element`].
 
-use super::shape::{Layer, Point};
+use super::shape::{LayerNumber, Point};
 
 /// Bytes of a BOUNDARY with five points and no optional record.
 pub(super) const BOUNDARY_BYTES: usize = 64;
@@ -16,7 +16,7 @@ fn word(bytes: &[u8; BOUNDARY_BYTES], at: usize) -> u32 {
 
 /// A BOUNDARY of exactly LAYER, DATATYPE, XY with five points, ENDEL.
 #[inline]
-pub(super) fn boundary(bytes: &[u8; BOUNDARY_BYTES]) -> Option<(Layer, [Point; 5])> {
+pub(super) fn boundary(bytes: &[u8; BOUNDARY_BYTES]) -> Option<(LayerNumber, [Point; 5])> {
     let heads = word(bytes, 0) == 0x0004_0800
         && word(bytes, 4) == 0x0006_0D02
         && word(bytes, 10) == 0x0006_0E02
@@ -25,7 +25,7 @@ pub(super) fn boundary(bytes: &[u8; BOUNDARY_BYTES]) -> Option<(Layer, [Point; 5
     if !heads {
         return None;
     }
-    let layer = Layer::new(
+    let layer = LayerNumber::new(
         u16::from_be_bytes([bytes[8], bytes[9]]),
         u16::from_be_bytes([bytes[14], bytes[15]]),
     );
@@ -57,7 +57,7 @@ pub(super) fn reference(bytes: &[u8; REFERENCE_BYTES]) -> Option<Reference> {
         return None;
     }
     let name = usize::from(bytes[5]).wrapping_sub(4);
-    if name > NAME_BYTES || name < 2 || name % 2 != 0 {
+    if !(2..=NAME_BYTES).contains(&name) || name % 2 != 0 {
         return None;
     }
     let after = 8 + name;

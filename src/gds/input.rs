@@ -222,7 +222,7 @@ impl Input {
     /// The body of a record that must have this data type and be a whole number of `unit` bytes long.
     pub fn checked(&self, record: Record, data: u8, unit: usize) -> Result<&[u8]> {
         let body = self.body(record);
-        if record.data != data || body.is_empty() || body.len() % unit != 0 {
+        if record.data != data || body.is_empty() || !body.len().is_multiple_of(unit) {
             return Err(self.fault(
                 record.offset,
                 format!(

@@ -30,6 +30,6 @@ mod walk;
 pub use cell::{Cell, Child, LayerTally};
 pub use layout::{Faulty, Layout};
 pub use limits::ReadLimits;
-pub use shape::{Layer, Point, Rect, Shape, ShapeKind, Text, rectangle_of, simplified};
+pub use shape::{LayerNumber, Point, Rect, Shape, ShapeKind, Text, rectangle_of, simplified};
 pub use transform::Transform;
 pub use visit::{Selection, Visitor};

@@ -4,7 +4,7 @@ use super::element::{Element, ElementKind};
 use super::input::Input;
 use super::layout::Layout;
 use super::names::Recent;
-use super::shape::{Layer, Point};
+use super::shape::{LayerNumber, Point};
 use super::transform::Transform;
 use super::tree;
 use super::walk::{Sink, Walk};
@@ -71,7 +71,7 @@ impl Placer<'_> {
 }
 
 impl Sink for Placer<'_> {
-    fn five_points(&mut self, _offset: u64, _layer: Layer, _points: &[Point; 5]) -> Result<()> {
+    fn five_points(&mut self, _offset: u64, _layer: LayerNumber, _points: &[Point; 5]) -> Result<()> {
         Ok(())
     }
 

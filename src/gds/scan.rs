@@ -9,7 +9,7 @@ use super::limits::ReadLimits;
 use super::names::{Names, Recent};
 use super::outline::outline;
 use super::record::{self, kind};
-use super::shape::{Layer, Point, Rect};
+use super::shape::{LayerNumber, Point, Rect};
 use super::walk::{Sink, Walk};
 use crate::error::{Error, Result};
 use crate::progress::Progress;
@@ -122,7 +122,7 @@ struct Tally {
     names: Names,
     numbers: Vec<u32>,
     recent: Recent,
-    layers: HashMap<Layer, usize>,
+    layers: HashMap<LayerNumber, usize>,
     last: usize,
     /// References to each name from the current cell: how many, how many copies, the first one's place.
     counts: Vec<(u64, u64, u64)>,
@@ -202,7 +202,7 @@ impl Tally {
     }
 
     #[inline]
-    fn layer(&mut self, layer: Layer, offset: u64) -> Result<&mut LayerTally> {
+    fn layer(&mut self, layer: LayerNumber, offset: u64) -> Result<&mut LayerTally> {
         let cell = self.cells.last_mut().expect("a cell was begun");
         if cell.layers.get(self.last).is_none_or(|(l, _)| *l != layer) {
             let next = cell.layers.len();
@@ -251,7 +251,7 @@ fn too_many(offset: u64, what: &str) -> Error {
 
 impl Sink for Tally {
     #[inline]
-    fn five_points(&mut self, offset: u64, layer: Layer, points: &[Point; 5]) -> Result<()> {
+    fn five_points(&mut self, offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<()> {
         let tally = self.layer(layer, offset)?;
         tally.boundaries += 1;
         tally.vertices += 5;
@@ -319,7 +319,7 @@ mod tests {
     use crate::gds::{Shape, Transform};
     use crate::progress::Silent;
 
-    struct All(Vec<(Layer, Vec<Point>, Option<Rect>)>);
+    struct All(Vec<(LayerNumber, Vec<Point>, Option<Rect>)>);
 
     impl Visitor for All {
         fn shape(&mut self, shape: &Shape<'_>, _placements: &[Transform]) -> Result<()> {

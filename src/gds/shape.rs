@@ -2,19 +2,19 @@
 
 /// Layer number and datatype (texttype for texts, boxtype for boxes, nodetype for nodes).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
-pub struct Layer {
+pub struct LayerNumber {
     pub layer: u16,
     pub datatype: u16,
 }
 
-impl Layer {
-    /// `Layer::new(1, 0)` is written 1/0.
+impl LayerNumber {
+    /// `LayerNumber::new(1, 0)` is written 1/0.
     pub fn new(layer: u16, datatype: u16) -> Self {
         Self { layer, datatype }
     }
 }
 
-impl std::fmt::Display for Layer {
+impl std::fmt::Display for LayerNumber {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}/{}", self.layer, self.datatype)
     }
@@ -102,7 +102,7 @@ pub enum ShapeKind {
 #[derive(Clone, Copy, Debug)]
 pub struct Shape<'a> {
     pub kind: ShapeKind,
-    pub layer: Layer,
+    pub layer: LayerNumber,
     /// The outline as the file has it: the last point repeats the first where the format is kept.
     pub points: &'a [Point],
     /// The same as an upright rectangle, if it is one, with area and with five points.
@@ -114,7 +114,7 @@ pub struct Shape<'a> {
 /// A label: no area, no exposure.
 #[derive(Clone, Copy, Debug)]
 pub struct Text<'a> {
-    pub layer: Layer,
+    pub layer: LayerNumber,
     pub string: &'a [u8],
     pub at: Point,
     pub offset: u64,

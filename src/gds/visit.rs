@@ -7,7 +7,7 @@ use super::layout::Layout;
 use super::names::Recent;
 use super::outline::outline;
 use super::place::{self, magnified};
-use super::shape::{Layer, Point, Rect, Shape, ShapeKind, Text, rectangle_of};
+use super::shape::{LayerNumber, Point, Rect, Shape, ShapeKind, Text, rectangle_of};
 use super::transform::Transform;
 use super::tree;
 use super::walk::{Sink, Walk};
@@ -46,7 +46,7 @@ pub struct Selection {
     /// Name of the cell to start from; the top cell if there is one only.
     pub top: Option<String>,
     /// Layers of shapes and texts; all if left out.
-    pub layers: Option<Vec<Layer>>,
+    pub layers: Option<Vec<LayerNumber>>,
     /// Go round circles and dangling references, and start from every top cell, instead of an error: for
     /// rules that report these faults themselves.
     pub lenient: bool,
@@ -84,7 +84,7 @@ impl Layout {
         let mut own_input = self.source().open()?;
         let library = self.inline_shapes(&mut own_input, &counts)?;
         drop(own_input);
-        let wanted = |layer: Layer| selection.layers.as_ref().is_none_or(|l| l.contains(&layer));
+        let wanted = |layer: LayerNumber| selection.layers.as_ref().is_none_or(|l| l.contains(&layer));
         let has = |cell: &Cell| cell.layers.iter().any(|(l, _)| wanted(*l));
         let worth = |cell: &Cell| {
             has(cell) || tree::followed(cell).any(|(t, _)| self.cells()[t].inline && has(&self.cells()[t]))
@@ -135,7 +135,7 @@ impl Layout {
 #[derive(Clone, Debug)]
 struct Kept {
     kind: ShapeKind,
-    layer: Layer,
+    layer: LayerNumber,
     points: Vec<Point>,
     rect: Option<Rect>,
 }
@@ -144,7 +144,7 @@ struct Kept {
 struct Keep(Vec<Kept>);
 
 impl Sink for Keep {
-    fn five_points(&mut self, _offset: u64, layer: Layer, points: &[Point; 5]) -> Result<()> {
+    fn five_points(&mut self, _offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<()> {
         self.0.push(Kept {
             kind: ShapeKind::Boundary,
             layer,
@@ -192,7 +192,7 @@ fn outline_of(element: &Element, points: &mut Vec<Point>) -> Option<ShapeKind> {
 struct Spread<'a, V> {
     layout: &'a Layout,
     visitor: &'a mut V,
-    layers: Option<&'a [Layer]>,
+    layers: Option<&'a [LayerNumber]>,
     placements: &'a [Transform],
     library: &'a [Vec<Kept>],
     recent: Recent,
@@ -203,7 +203,7 @@ struct Spread<'a, V> {
 
 impl<V: Visitor> Spread<'_, V> {
     #[inline]
-    fn wants(&self, layer: Layer) -> bool {
+    fn wants(&self, layer: LayerNumber) -> bool {
         self.layers.is_none_or(|layers| layers.contains(&layer))
     }
 
@@ -246,7 +246,7 @@ impl<V: Visitor> Spread<'_, V> {
 
 impl<V: Visitor> Sink for Spread<'_, V> {
     #[inline]
-    fn five_points(&mut self, offset: u64, layer: Layer, points: &[Point; 5]) -> Result<()> {
+    fn five_points(&mut self, offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<()> {
         if !self.wants(layer) {
             return Ok(());
         }

@@ -5,14 +5,14 @@ use super::fast;
 use super::input::Input;
 use super::limits::ReadLimits;
 use super::record::{self, kind};
-use super::shape::{Layer, Point};
+use super::shape::{LayerNumber, Point};
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 
 /// What takes the elements of a cell.
 pub(super) trait Sink {
     /// A BOUNDARY of five points; most of them are upright squares.
-    fn five_points(&mut self, offset: u64, layer: Layer, points: &[Point; 5]) -> Result<()>;
+    fn five_points(&mut self, offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<()>;
 
     /// A plain reference, the name by its key.
     fn plain_reference(&mut self, offset: u64, key: u64, at: Point) -> Result<()>;

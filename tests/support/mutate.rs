@@ -2,7 +2,9 @@
 
 #![allow(dead_code, reason = "each test uses a part of it")]
 
-use metalith::{Error, ExtractionPlan, Layer, Layout, ReadLimits, Selection, Shape, Silent, Text, Transform, Visitor};
+use metalith::{
+    Error, ExtractionPlan, LayerNumber, Layout, ReadLimits, Selection, Shape, Silent, Text, Transform, Visitor,
+};
 use rand::Rng;
 
 /// Limits small enough that the worst a mutant can ask for is done in milliseconds.
@@ -111,7 +113,7 @@ pub fn survives(bytes: &[u8]) -> bool {
             located(&error);
         }
     }
-    match metalith::extract(&layout, &ExtractionPlan::discover(Layer::new(1, 0)), &Silent) {
+    match metalith::extract(&layout, &ExtractionPlan::discover(LayerNumber::new(1, 0)), &Silent) {
         Ok(extraction) => extraction.oddities.total() < u64::MAX,
         Err(error) => {
             located(&error);
