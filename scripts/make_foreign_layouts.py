@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import gdstk
+from gdstk import Library
 import klayout.db as db
 
 PITCH, HALF, CENTRE = 350, 12, (5000, -3000)  # nm, sites on each side of the middle, nm
@@ -39,7 +40,7 @@ def gdstk_square(x, y, w):
 
 
 def gdstk_file(path, fill, unit=1e-6, precision=1e-9):
-    library = gdstk.Library("FOREIGN", unit, precision)
+    library = Library("FOREIGN", unit, precision)
     top, lens = library.new_cell("TOP"), library.new_cell("LENS")
     fill(library, lens)
     lens.add(gdstk.Polygon([(x * UM, y * UM) for x, y in RING], layer=2))

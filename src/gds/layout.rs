@@ -18,7 +18,7 @@ use crate::progress::{Progress, Silent};
 pub struct Layout {
     source: Source,
     limits: ReadLimits,
-    library: String,
+    title: String,
     units: [f64; 2],
     cells: Vec<Cell>,
     names: Names,
@@ -76,7 +76,7 @@ impl Layout {
         Self {
             source,
             limits,
-            library: scan.library,
+            title: scan.title,
             units: scan.units,
             cells: scan.cells,
             names: scan.names,
@@ -102,7 +102,7 @@ impl Layout {
 
     /// Name of the library.
     pub fn library(&self) -> &str {
-        &self.library
+        &self.title
     }
 
     /// Database unit [nm].

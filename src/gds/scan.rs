@@ -16,7 +16,7 @@ use crate::progress::Progress;
 
 /// What the first reading found.
 pub(super) struct Scan {
-    pub library: String,
+    pub title: String,
     /// Database unit in user units, and in metres.
     pub units: [f64; 2],
     pub cells: Vec<Cell>,
@@ -44,13 +44,13 @@ pub(super) fn scan_with(input: &mut Input, bytes: u64, walk: &mut Walk<'_>) -> R
         return Err(input.fault(0, what, "is this a GDSII file? OASIS and compressed files are not read"));
     }
     input.next()?;
-    let mut library = String::new();
+    let mut title = String::new();
     let mut units = None;
     let mut tally = Tally::new(*walk.limits);
     loop {
         let record = input.next()?;
         match record.kind {
-            kind::LIBNAME => library = String::from_utf8_lossy(input.text(record)?).into_owned(),
+            kind::LIBNAME => title = String::from_utf8_lossy(input.text(record)?).into_owned(),
             kind::UNITS => units = Some(read_units(input, record)?),
             kind::BGNSTR => {
                 if units.is_none() {
@@ -83,7 +83,7 @@ pub(super) fn scan_with(input: &mut Input, bytes: u64, walk: &mut Walk<'_>) -> R
         input.consume(count);
     }
     Ok(Scan {
-        library,
+        title,
         units,
         cells: tally.cells,
         names: tally.names,

@@ -82,7 +82,7 @@ impl Layout {
         let mut input = self.source().open()?;
         let placed = place::placements(self, &mut input, &roots)?;
         let mut own_input = self.source().open()?;
-        let library = self.inline_shapes(&mut own_input, &counts)?;
+        let small = self.inline_shapes(&mut own_input, &counts)?;
         drop(own_input);
         let wanted = |layer: LayerNumber| selection.layers.as_ref().is_none_or(|l| l.contains(&layer));
         let has = |cell: &Cell| cell.layers.iter().any(|(l, _)| wanted(*l));
@@ -99,7 +99,7 @@ impl Layout {
             visitor,
             layers: selection.layers.as_deref(),
             placements: &[],
-            library: &library,
+            small: &small,
             recent: Recent::new(),
             path: Vec::new(),
             moved: Vec::new(),
@@ -117,17 +117,17 @@ impl Layout {
 
     /// Decode the cells that are placed shape by shape.
     fn inline_shapes(&self, input: &mut Input, counts: &[u64]) -> Result<Vec<Vec<Kept>>> {
-        let mut library = vec![Vec::new(); self.cells().len()];
+        let mut small = vec![Vec::new(); self.cells().len()];
         let mut walk = Walk::new(self.limits(), &Silent);
         for (index, cell) in self.cells().iter().enumerate() {
             if cell.inline && counts[index] > 0 {
                 let mut keep = Keep::default();
                 self.seek_cell(input, index)?;
                 walk.cell(input, &mut keep)?;
-                library[index] = keep.0;
+                small[index] = keep.0;
             }
         }
-        Ok(library)
+        Ok(small)
     }
 }
 
@@ -194,7 +194,7 @@ struct Spread<'a, V> {
     visitor: &'a mut V,
     layers: Option<&'a [LayerNumber]>,
     placements: &'a [Transform],
-    library: &'a [Vec<Kept>],
+    small: &'a [Vec<Kept>],
     recent: Recent,
     path: Vec<Point>,
     moved: Vec<Point>,
@@ -210,7 +210,7 @@ impl<V: Visitor> Spread<'_, V> {
     /// One copy of an inline cell.
     #[inline]
     fn copy(&mut self, cell: usize, own: Transform, offset: u64) -> Result<()> {
-        let library = self.library;
+        let small = self.small;
         if !own.is_square() {
             self.chains.clear();
             for placement in self.placements {
@@ -218,7 +218,7 @@ impl<V: Visitor> Spread<'_, V> {
                 self.chains.push(chain);
             }
         }
-        for kept in &library[cell] {
+        for kept in &small[cell] {
             if !self.wants(kept.layer) {
                 continue;
             }
