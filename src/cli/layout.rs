@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metalith::{Design, Hierarchy, PillarArray, Result, write_apertures, write_layer_properties, write_pillars};
+use metalith::{
+    Design, Hierarchy, PillarArray, Result, Written, write_apertures, write_layer_properties, write_pillars,
+};
 
 use super::{Outcome, Terminal};
 
@@ -34,6 +36,13 @@ pub struct Target {
     hierarchy: Option<HierarchyArg>,
 }
 
+/// What was written.
+pub struct Files {
+    pub pillars: Written,
+    pub apertures: Written,
+    pub properties: PathBuf,
+}
+
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum HierarchyArg {
     /// What symmetry leaves unique, once.
@@ -52,8 +61,23 @@ impl Target {
             .unwrap_or_else(|| PathBuf::from("out").join(&design.name))
     }
 
+    /// Write all files of a design.
+    pub fn write(&self, design: &Design, array: &PillarArray, terminal: &Terminal) -> Result<Files> {
+        let folder = self.folder(design);
+        let file = |suffix: &str| folder.join(format!("{}{suffix}", design.name));
+        let properties = file(".lyp");
+        let pillars = write_pillars(design, array, self.hierarchy(design), &file("_pillars.gds"), terminal)?;
+        let apertures = write_apertures(design, &file("_apertures.gds"))?;
+        write_layer_properties(design, &properties)?;
+        Ok(Files {
+            pillars,
+            apertures,
+            properties,
+        })
+    }
+
     /// The hierarchy that is asked for.
-    pub fn hierarchy(&self, design: &Design) -> Hierarchy {
+    fn hierarchy(&self, design: &Design) -> Hierarchy {
         match self.hierarchy {
             None => design.layout.hierarchy,
             Some(HierarchyArg::Folded) => Hierarchy::Folded,
@@ -66,33 +90,31 @@ impl Target {
 pub fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
     let design = Design::read(&args.design)?;
     terminal.stop_on_interrupt();
-    let folder = args.target.folder(&design);
-    let hierarchy = args.target.hierarchy(&design);
     let array = PillarArray::build(&design, terminal)?;
-    let file = |suffix: &str| folder.join(format!("{}{suffix}", design.name));
-    let pillars = write_pillars(&design, &array, hierarchy, &file("_pillars.gds"), terminal)?;
-    let apertures = write_apertures(&design, &file("_apertures.gds"))?;
-    write_layer_properties(&design, &file(".lyp"))?;
+    let written = args.target.write(&design, &array, terminal)?;
     terminal.clear();
-    for remark in &pillars.remarks {
+    for remark in &written.pillars.remarks {
         terminal.say(&format!("note: {remark}"));
     }
     if args.json {
-        let written = serde_json::json!({
+        let json = serde_json::json!({
             "design": design.name,
             "digest": design.digest(),
-            "hierarchy": hierarchy,
+            "hierarchy": args.target.hierarchy(&design),
             "pillars": array.pillars(),
             "distinct_elements": array.classes.len(),
-            "files": [&pillars.path, &apertures.path, &file(".lyp")],
-            "bytes": [pillars.bytes, apertures.bytes],
+            "files": [&written.pillars.path, &written.apertures.path, &written.properties],
+            "bytes": [written.pillars.bytes, written.apertures.bytes],
         });
-        println!("{written:#}");
+        println!("{json:#}");
     } else {
-        for written in [&pillars, &apertures] {
-            println!("{}  {:.1} MB", written.path.display(), written.bytes as f64 * 1e-6);
+        for file in [&written.pillars, &written.apertures] {
+            println!("{}  {:.3} MB", file.path.display(), file.bytes as f64 * 1e-6);
         }
-        println!("{}  open it in KLayout with the layouts", file(".lyp").display());
+        println!(
+            "{}  for KLayout: names and colours of the layers",
+            written.properties.display()
+        );
         println!(
             "{} pillars in {} elements, {} of them distinct",
             array.pillars(),

@@ -3,12 +3,13 @@
 mod layout;
 mod terminal;
 
+use std::fmt;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use miette::GraphicalReportHandler;
+use miette::{Diagnostic, GraphicalReportHandler, SourceCode};
 
-use metalith::Error;
+use metalith::{Error, Faults};
 pub use terminal::Terminal;
 
 /// What every command answers with when it did its work.
@@ -78,13 +79,40 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
 fn report(error: &Error) {
     if let Error::Text(faults) = error {
         let mut drawn = String::new();
+        let headline = Headline(faults);
         if GraphicalReportHandler::new()
-            .render_report(&mut drawn, faults.as_ref())
+            .render_report(&mut drawn, &headline)
             .is_ok()
         {
-            eprintln!("{drawn}");
+            eprint!("{drawn}");
             return;
         }
     }
     eprintln!("error: {error}");
+}
+
+/// The faults of a file under one line that counts them; each is then drawn at its place.
+#[derive(Debug)]
+struct Headline<'a>(&'a Faults);
+
+impl fmt::Display for Headline<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let path = self.0.path().display();
+        match self.0.faults().len() {
+            1 => write!(f, "one mistake in {path}"),
+            count => write!(f, "{count} mistakes in {path}"),
+        }
+    }
+}
+
+impl std::error::Error for Headline<'_> {}
+
+impl Diagnostic for Headline<'_> {
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        self.0.source_code()
+    }
+
+    fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
+        self.0.related()
+    }
 }

@@ -50,6 +50,11 @@ impl Faults {
         }
     }
 
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// The mistakes, in the order of the file.
     pub fn faults(&self) -> &[Fault] {
         &self.faults

@@ -59,7 +59,9 @@ impl<'d, 't> Section<'d, 't> {
 
     /// Record a fault at a key of this section, or at the section itself if the key is absent.
     pub fn fault(&self, key: &str, what: impl Into<String>, hint: impl Into<String>) {
-        self.document.fault(self.span_of(key), what, hint);
+        if !self.vacant {
+            self.document.fault(self.span_of(key), what, hint);
+        }
     }
 
     /// Whether the key is there.

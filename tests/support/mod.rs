@@ -1,5 +1,8 @@
 //! Golden files: what was right once is held to, byte for byte, until someone says otherwise.
 
+// Each test uses a part of this.
+#![allow(dead_code)]
+
 use std::fs;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};

@@ -1,0 +1,171 @@
+"""Time the writing and reading of one full-size lens (6.4 million pillars) with this program and with what a
+user would pick instead. Prints CPU seconds, peak memory and ratios.
+
+usage: peers_layout.py METALITH FOLDER          needs: pip install gdstk klayout numpy
+
+Every tool writes the same pillars: the centre element of prototype_3x3. Peers get them as arrays, ready to be
+written, and their times do not count the making of these; ours does.
+"""
+
+import json
+import os
+import pathlib
+import resource
+import subprocess
+import sys
+import time
+
+import numpy as np
+
+PITCH, DIAMETER, FOCAL, WAVELENGTH = 350, 1_000_000, 2400.0, 0.55
+
+
+def lens():
+    n = 2858
+    k = 2 * np.arange(n) - (n - 1)
+    x, y = np.meshgrid(k, k)
+    inside = (x * x + y * y) * (PITCH // 2) ** 2 <= (DIAMETER // 2) ** 2
+    x, y = x[inside], y[inside]
+    r2 = (x * x + y * y) * (PITCH * 0.5e-3) ** 2
+    u = (-r2 / (np.sqrt(r2 + FOCAL**2) + FOCAL) / WAVELENGTH) % 1.0
+    width = 2 * np.rint(PITCH / 2 * (0.2923 + 0.6809 * u - 0.1484 * u * u)).astype(np.int64)
+    return x * (PITCH // 2), y * (PITCH // 2), width
+
+
+def gdstk_flat(path):
+    import gdstk
+    x, y, w = lens()
+    start = cpu()
+    library = gdstk.Library(unit=1e-6, precision=1e-9)
+    top = library.new_cell("TOP")
+    for v in np.unique(w):
+        at = np.stack([x[w == v] - v // 2, y[w == v] - v // 2], 1) * 1e-3
+        square = gdstk.rectangle(tuple(at[0]), tuple(at[0] + v * 1e-3), layer=1)
+        square.repetition = gdstk.Repetition(offsets=at[1:] - at[0])
+        top.add(square)
+    library.write_gds(path)
+    return cpu() - start
+
+
+def gdstk_sref(path):
+    import gdstk
+    x, y, w = lens()
+    start = cpu()
+    library = gdstk.Library(unit=1e-6, precision=1e-9)
+    top = library.new_cell("TOP")
+    for v in np.unique(w):
+        h = v // 2 * 1e-3
+        cell = library.new_cell(f"W{v}")
+        cell.add(gdstk.rectangle((-h, -h), (h, h), layer=1))
+        at = np.stack([x[w == v], y[w == v]], 1) * 1e-3
+        reference = gdstk.Reference(cell, tuple(at[0]))
+        reference.repetition = gdstk.Repetition(offsets=at[1:] - at[0])
+        top.add(reference)
+    library.write_gds(path)
+    return cpu() - start
+
+
+def gdstk_objects(path):
+    import gdstk
+    x, y, w = lens()
+    start = cpu()
+    library = gdstk.Library(unit=1e-6, precision=1e-9)
+    top = library.new_cell("TOP")
+    left, low, size = (x - w // 2) * 1e-3, (y - w // 2) * 1e-3, w * 1e-3
+    top.add(*[gdstk.rectangle((a, b), (a + c, b + c), layer=1) for a, b, c in zip(left.tolist(), low.tolist(), size.tolist())])
+    library.write_gds(path)
+    return cpu() - start
+
+
+def klayout_flat(path):
+    import klayout.db as db
+    x, y, w = lens()
+    start = cpu()
+    layout = db.Layout()
+    layout.dbu = 0.001
+    insert, box = layout.create_cell("TOP").shapes(layout.layer(1, 0)).insert, db.Box
+    for a, b, h in zip(x.tolist(), y.tolist(), (w // 2).tolist()):
+        insert(box(a - h, b - h, a + h, b + h))
+    layout.write(path)
+    return cpu() - start
+
+
+def gdstk_read(path):
+    import gdstk
+    start = cpu()
+    top = gdstk.read_gds(path).top_level()[0]
+    boxes = np.array([p.bounding_box() for p in top.polygons])
+    check_count(len(boxes))
+    return cpu() - start
+
+
+def klayout_read(path):
+    import klayout.db as db
+    start = cpu()
+    layout = db.Layout()
+    layout.read(path)
+    boxes = []
+    for shape in layout.top_cell().each_shape(layout.layer(1, 0)):
+        b = shape.bbox()
+        boxes.append((b.left, b.bottom, b.width()))
+    check_count(len(np.array(boxes)))
+    return cpu() - start
+
+
+def check_count(found):
+    if found != 6_411_448:
+        sys.exit(f"read {found} pillars")
+
+
+def cpu():
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    return used.ru_utime + used.ru_stime
+
+
+def measure(command):
+    """CPU seconds, wall seconds and peak memory [MB] of a command, by the operating system's account."""
+    start = time.perf_counter()
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    output = process.stdout.read()
+    _, status, used = os.wait4(process.pid, 0)
+    if status:
+        sys.exit(f"{command} failed")
+    return used.ru_utime + used.ru_stime, time.perf_counter() - start, used.ru_maxrss / 1024, output
+
+
+def main(program, folder):
+    folder = pathlib.Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    designs = pathlib.Path(__file__).resolve().parent.parent / "designs"
+    design = folder / "one_lens.toml"
+    text = (designs / "prototype_3x3.toml").read_text()
+    design.write_text(text.replace("elements = [3, 3]", "elements = [1, 1]").replace('"prototype_3x3"', '"one_lens"')
+                      .replace('file = "', f'file = "{designs}/'))
+    ours = {}
+    print(f"{'writing one lens, 6.4 million pillars':44} {'CPU s':>7} {'MB':>7}")
+    for hierarchy in ("folded", "sref", "flat"):
+        out = folder / hierarchy
+        seconds, _, memory, _ = measure([program, "layout", design, "--hierarchy", hierarchy, "--out", out, "--quiet"])
+        ours[hierarchy] = seconds
+        print(f"{'metalith ' + hierarchy + ', from the design on':44} {seconds:7.2f} {memory:7.0f}")
+    for peer, against in (("gdstk_flat", "flat"), ("gdstk_sref", "sref"), ("gdstk_objects", "flat"), ("klayout_flat", "flat")):
+        run_peer(peer, folder / f"{peer}.gds", ours[against])
+    flat = folder / "flat" / "one_lens_pillars.gds"
+    print(f"\n{'reading its flat file':44} {'CPU s':>7} {'MB':>7}")
+    seconds, _, memory, _ = measure([program, "psf", flat, "--extract-only", "--json"])
+    print(f"{'metalith, every pillar on its site':44} {seconds:7.2f} {memory:7.0f}")
+    for peer in ("gdstk_read", "klayout_read"):
+        run_peer(peer, flat, seconds)
+
+
+def run_peer(peer, path, ours):
+    _, _, memory, output = measure([sys.executable, __file__, "--peer", peer, path])
+    seconds = json.loads(output)
+    print(f"{peer:44} {seconds:7.2f} {memory:7.0f}   {seconds / ours:5.1f} x ours", flush=True)
+
+
+if __name__ == "__main__":
+    if sys.argv[1] == "--peer":
+        print(json.dumps(globals()[sys.argv[2]](sys.argv[3])))
+    else:
+        main(sys.argv[1], sys.argv[2])
