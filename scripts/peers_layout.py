@@ -33,46 +33,46 @@ def lens():
 
 
 def gdstk_flat(path):
-    import gdstk
+    from gdstk import Library, Repetition, rectangle
     x, y, w = lens()
     start = cpu()
-    library = gdstk.Library(unit=1e-6, precision=1e-9)
+    library = Library(unit=1e-6, precision=1e-9)
     top = library.new_cell("TOP")
     for v in np.unique(w):
         at = np.stack([x[w == v] - v // 2, y[w == v] - v // 2], 1) * 1e-3
-        square = gdstk.rectangle(tuple(at[0]), tuple(at[0] + v * 1e-3), layer=1)
-        square.repetition = gdstk.Repetition(offsets=at[1:] - at[0])
+        square = rectangle(tuple(at[0]), tuple(at[0] + v * 1e-3), layer=1)
+        square.repetition = Repetition(offsets=at[1:] - at[0])
         top.add(square)
     library.write_gds(path)
     return cpu() - start
 
 
 def gdstk_sref(path):
-    import gdstk
+    from gdstk import Library, Reference, Repetition, rectangle
     x, y, w = lens()
     start = cpu()
-    library = gdstk.Library(unit=1e-6, precision=1e-9)
+    library = Library(unit=1e-6, precision=1e-9)
     top = library.new_cell("TOP")
     for v in np.unique(w):
         h = v // 2 * 1e-3
         cell = library.new_cell(f"W{v}")
-        cell.add(gdstk.rectangle((-h, -h), (h, h), layer=1))
+        cell.add(rectangle((-h, -h), (h, h), layer=1))
         at = np.stack([x[w == v], y[w == v]], 1) * 1e-3
-        reference = gdstk.Reference(cell, tuple(at[0]))
-        reference.repetition = gdstk.Repetition(offsets=at[1:] - at[0])
+        reference = Reference(cell, tuple(at[0]))
+        reference.repetition = Repetition(offsets=at[1:] - at[0])
         top.add(reference)
     library.write_gds(path)
     return cpu() - start
 
 
 def gdstk_objects(path):
-    import gdstk
+    from gdstk import Library, rectangle
     x, y, w = lens()
     start = cpu()
-    library = gdstk.Library(unit=1e-6, precision=1e-9)
+    library = Library(unit=1e-6, precision=1e-9)
     top = library.new_cell("TOP")
     left, low, size = (x - w // 2) * 1e-3, (y - w // 2) * 1e-3, w * 1e-3
-    top.add(*[gdstk.rectangle((a, b), (a + c, b + c), layer=1) for a, b, c in zip(left.tolist(), low.tolist(), size.tolist())])
+    top.add(*[rectangle((a, b), (a + c, b + c), layer=1) for a, b, c in zip(left.tolist(), low.tolist(), size.tolist())])
     library.write_gds(path)
     return cpu() - start
 
@@ -91,9 +91,9 @@ def klayout_flat(path):
 
 
 def gdstk_read(path):
-    import gdstk
+    from gdstk import read_gds
     start = cpu()
-    top = gdstk.read_gds(path).top_level()[0]
+    top = read_gds(path).top_level()[0]
     boxes = np.array([p.bounding_box() for p in top.polygons])
     check_count(len(boxes))
     return cpu() - start
