@@ -19,7 +19,8 @@ mod wave;
 
 pub use array::{Class, DomainPart, Group, PillarArray, Placed, Symmetry, WidthRule};
 pub use cell::{
-    Basis, CellModel, CellStack, Fidelity, ForwardPolynomial, InversePolynomial, Material, PublishedCell, rcwa,
+    Basis, CellModel, CellStack, CellTable, Fidelity, ForwardPolynomial, InversePolynomial, Material, Origin,
+    PublishedCell, RigorousCell, TableSpec, cache_folder, rcwa,
 };
 pub use design::{
     ApertureSpec, ArraySpec, CellSpec, ChipSpec, Design, Element, FieldAngle, Hierarchy, Layer, Layers, LayoutSpec,

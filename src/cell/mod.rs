@@ -1,14 +1,21 @@
 //! The cell: a square pillar on its lattice site, and how light passes it.
 
+mod cache;
+mod column;
 mod material;
 mod model;
 mod polynomial;
 mod published;
 pub mod rcwa;
+mod rigorous;
 mod stack;
+mod table;
 
+pub use cache::cache_folder;
 pub use material::Material;
 pub use model::{CellModel, Fidelity};
 pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};
 pub use published::PublishedCell;
+pub use rigorous::RigorousCell;
 pub use stack::CellStack;
+pub use table::{CellTable, Origin, TableSpec};

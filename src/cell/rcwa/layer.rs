@@ -36,8 +36,13 @@ pub(super) struct Section<'a> {
 }
 
 impl Section<'_> {
-    fn is_uniform(&self) -> bool {
-        self.outline.is_empty() || self.inside == self.outside
+    /// The permittivity of a layer without structure.
+    fn uniform(&self) -> Option<Complex64> {
+        if self.outline.is_empty() || self.inside == self.outside {
+            Some(self.outside)
+        } else {
+            self.outline.fills(self.pitch_nm).then_some(self.inside)
+        }
     }
 }
 
@@ -51,8 +56,8 @@ pub(super) struct Modes {
 
 impl Modes {
     pub fn of(section: &Section<'_>, basis: &Basis) -> Result<Self> {
-        if section.is_uniform() {
-            let medium = Medium::new(section.outside, basis);
+        if let Some(permittivity) = section.uniform() {
+            let medium = Medium::new(permittivity, basis);
             let identity = Mat::<Complex64>::identity(basis.len(), basis.len());
             return Ok(Self {
                 v: medium.admittance(basis, &identity),

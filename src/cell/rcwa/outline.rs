@@ -65,6 +65,13 @@ impl Outline {
         self.corners_nm.iter().all(|c| c[0] <= 0.0 || c[1] <= 0.0)
     }
 
+    /// Whether it covers the whole of a square this wide.
+    pub(super) fn fills(&self, width_nm: f64) -> bool {
+        self.corners_nm
+            .iter()
+            .any(|c| c[0] >= 0.5 * width_nm && c[1] >= 0.5 * width_nm)
+    }
+
     /// Whether the diagonal mirrors it as well, so that x and y polarisation see the same.
     pub fn is_square(&self) -> bool {
         let n = self.corners_nm.len();
