@@ -77,11 +77,11 @@ impl Column {
     fn grade(&self, open: &mut [bool]) {
         let length = |i: usize| self.wavelengths_um[i] - self.wavelengths_um[i - 1];
         let last = self.wavelengths_um.len() - 1;
-        for i in 1..=last {
+        for (i, open) in open.iter_mut().enumerate().skip(1) {
             let beside = [(i > 1).then(|| length(i - 1)), (i < last).then(|| length(i + 1))];
             let shortest = beside.into_iter().flatten().fold(f64::INFINITY, f64::min);
             if length(i) > GRADING * shortest {
-                open[i] = true;
+                *open = true;
             }
         }
     }
