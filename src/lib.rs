@@ -9,6 +9,7 @@ mod error;
 mod extract;
 mod file;
 mod gds;
+pub mod image;
 mod lattice;
 mod layout;
 pub mod optimise;
