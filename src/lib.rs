@@ -9,6 +9,7 @@ mod error;
 mod extract;
 mod file;
 mod gds;
+mod handoff;
 pub mod image;
 mod lattice;
 mod layout;
@@ -37,6 +38,10 @@ pub use file::WholeFile;
 pub use gds::{
     Cell, Child, Faulty, LayerNumber, LayerTally, Layout, Point, ReadLimits, Rect, Selection, Shape, ShapeKind, Text,
     Transform, Visitor,
+};
+pub use handoff::{
+    Beam, CellCount, Census, Cross, DoseRow, Entry, Exposure, Handoff, HandoffOptions, LayerCount, Manifest, Process,
+    Site, Verification, WriteTime, handoff, verify_handoff,
 };
 pub use lattice::{Lattice, WidthMap};
 pub use layout::{Written, write_apertures, write_layer_properties, write_pillars};

@@ -1,5 +1,6 @@
 //! The program: arguments in, exit code out. Everything it does is a call of the library.
 
+mod handoff;
 mod layout;
 mod terminal;
 
@@ -46,6 +47,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Layout(layout::LayoutArgs),
+    Handoff(handoff::HandoffArgs),
 }
 
 /// Run the program with the arguments of the process.
@@ -72,6 +74,7 @@ pub fn run() -> ExitCode {
 fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome> {
     match command {
         Command::Layout(args) => layout::run(args, terminal),
+        Command::Handoff(args) => handoff::run(args, terminal),
     }
 }
 

@@ -18,6 +18,7 @@ pub struct Plan {
     layers: Vec<(String, Fill)>,
     shapes: Vec<(usize, Shape)>,
     labels: Vec<(f64, f64, String)>,
+    reached: Vec<(f64, f64)>,
     width: f64,
 }
 
@@ -42,6 +43,7 @@ impl Plan {
             layers: Vec::new(),
             shapes: Vec::new(),
             labels: Vec::new(),
+            reached: Vec::new(),
             width: 620.0,
         }
     }
@@ -110,6 +112,12 @@ impl Plan {
         self
     }
 
+    /// Make the frame reach to a place where nothing is drawn [um], such as that of a label.
+    pub fn reach(&mut self, x_um: f64, y_um: f64) -> &mut Self {
+        self.reached.push((x_um, y_um));
+        self
+    }
+
     /// Width of the drawing; 620 else.
     pub fn width(mut self, width: f64) -> Self {
         self.width = width.max(240.0);
@@ -138,6 +146,7 @@ impl Plan {
                 Shape::Polygon(points) => points.iter().for_each(|&(x, y)| take(x, y)),
             }
         }
+        self.reached.iter().for_each(|&(x, y)| take(x, y));
         if e[0] > e[2] {
             e = [0.0, 0.0, 1.0, 1.0];
         }
@@ -217,13 +226,8 @@ impl From<Plan> for Figure {
                 .add(rectangle(left, middle - 6.0, 20.0, 12.0, &class(*fill, i)))
                 .add(text(left + 26.0, middle + 4.0, Anchor::Start, name.as_str()));
         }
-        let bar = scale_bar(
-            frame.left + 12.0,
-            frame.bottom - 10.0,
-            frame.width() / 4.0,
-            1.0 / scale,
-            "plate",
-        );
+        // Below the frame: inside it would hide what is drawn there.
+        let bar = scale_bar(frame.left, frame.bottom + 38.0, frame.width() / 4.0, 1.0 / scale, "ink");
         let frame_line = line(frame.left, frame.bottom, frame.right, frame.bottom, "axis");
         let layers: Vec<_> = plan.layers.iter().map(|l| l.0.as_str()).collect();
         let words = format!(

@@ -1,0 +1,146 @@
+//! `metalith handoff`: everything that a cleanroom needs, in one folder and one archive.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use metalith::report::Verdict;
+use metalith::{Design, Handoff, HandoffOptions, Result, Verification, handoff, verify_handoff};
+
+use super::{Outcome, Terminal};
+
+/// Make the folder and the archive that a cleanroom starts from, or look whether a received one is whole.
+#[derive(Args)]
+#[command(
+    after_help = "Examples:\n  metalith handoff designs/mini_3x3.toml --process processes/jbx6300_zep520a.toml\n  \
+                  metalith handoff --verify out/mini_3x3_handoff\n\n\
+                  Exit codes: 0 fine; 1 a check failed, or the folder is not as it was sent; 2 bad input; \
+                  3 a check could not be run."
+)]
+pub struct HandoffArgs {
+    /// The design file.
+    #[arg(required_unless_present = "verify", conflicts_with = "verify")]
+    design: Option<PathBuf>,
+
+    /// The process file: writer, resist, doses, currents, overheads.
+    #[arg(long, value_name = "FILE", default_value = "processes/jbx6300_zep520a.toml")]
+    process: PathBuf,
+
+    /// Folder to make; `out/NAME_handoff` if left out. The archive stands beside it.
+    #[arg(long, short, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+
+    /// Say whether this received folder is whole and unaltered, and do nothing else.
+    #[arg(long, value_name = "FOLDER")]
+    verify: Option<PathBuf>,
+
+    /// Print what came out as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &HandoffArgs, terminal: &Terminal) -> Result<Outcome> {
+    terminal.stop_on_interrupt();
+    match (&args.verify, &args.design) {
+        (Some(folder), _) => look(folder, args.json, terminal),
+        (None, Some(design)) => make(design, args, terminal),
+        (None, None) => unreachable!("one of both is required"),
+    }
+}
+
+fn make(design: &Path, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcome> {
+    let out = match &args.out {
+        Some(out) => out.clone(),
+        None => PathBuf::from("out").join(format!("{}_handoff", Design::read(design)?.name)),
+    };
+    let options = HandoffOptions {
+        design: design.to_owned(),
+        process: args.process.clone(),
+        out,
+        command: std::iter::once("metalith".to_owned())
+            .chain(std::env::args().skip(1))
+            .collect::<Vec<_>>()
+            .join(" "),
+    };
+    let made = handoff(&options, terminal)?;
+    terminal.clear();
+    if args.json {
+        println!(
+            "{:#}",
+            serde_json::json!({
+                "folder": made.folder,
+                "archive": made.archive,
+                "checks": made.checks,
+                "manifest": made.manifest,
+            })
+        );
+    } else {
+        tell(&made);
+    }
+    Ok(outcome(&made))
+}
+
+fn outcome(made: &Handoff) -> Outcome {
+    let any = |verdict| made.checks.iter().any(|c| c.verdict == verdict);
+    if any(Verdict::Fail) {
+        Outcome::OutsideLimits
+    } else if any(Verdict::NotRun) {
+        Outcome::NotDone
+    } else {
+        Outcome::Fine
+    }
+}
+
+fn tell(made: &Handoff) {
+    println!("{}  start with index.html", made.folder.display());
+    println!("{}  the same, packed", made.archive.display());
+    for check in &made.checks {
+        println!("{}: {}: {}", check.verdict.word(), check.name, check.words);
+    }
+    println!("{} files, seal {}", made.manifest.files.len(), made.manifest.seal);
+}
+
+fn look(folder: &Path, json: bool, terminal: &Terminal) -> Result<Outcome> {
+    let found = verify_handoff(folder, terminal)?;
+    terminal.clear();
+    if json {
+        let mut value = serde_json::to_value(&found).expect("plain data serialises");
+        value["whole_and_unaltered"] = found.holds().into();
+        println!("{value:#}");
+    } else {
+        describe(&found);
+    }
+    Ok(if found.holds() {
+        Outcome::Fine
+    } else {
+        Outcome::OutsideLimits
+    })
+}
+
+fn describe(found: &Verification) {
+    let m = &found.manifest;
+    println!(
+        "hand-off of {}, process {}, made by metalith {}",
+        m.design, m.process, m.metalith
+    );
+    println!("seal {}", m.seal);
+    for (what, names) in [
+        ("missing", &found.missing),
+        ("altered", &found.altered),
+        ("not in the manifest", &found.unknown),
+    ] {
+        for name in names {
+            println!("{what}: {name}");
+        }
+    }
+    if !found.seal_holds {
+        println!("altered: the manifest itself, its seal does not match");
+    }
+    if found.holds() {
+        println!(
+            "whole and unaltered: {} files. Compare the seal with the sender's.",
+            m.files.len()
+        );
+    } else {
+        println!("not as it was sent: ask the sender for it again");
+    }
+}

@@ -1,0 +1,458 @@
+//! Making the folder: everything is made beside its place and moved there when it is complete.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::census::Census;
+use super::dose::{Beam, DoseRow, Exposure, WriteTime, doses};
+use super::drawing::Rect;
+use super::manifest::{self, Manifest, entry_of, files_below};
+use super::matrix::{self, Block};
+use super::process::Process;
+use super::sites::{Cross, Site, crosses, sites};
+use super::structures::{Structure, Structures};
+use super::{fields, front, job, tables, zip};
+use crate::array::PillarArray;
+use crate::design::Design;
+use crate::error::{Error, Result};
+use crate::layout::{write_apertures, write_layer_properties, write_pillars};
+use crate::phase::RadialPhase;
+use crate::progress::Progress;
+use crate::report::{Verdict, write_json};
+
+/// What to hand over, and where to.
+#[derive(Clone, Debug)]
+pub struct HandoffOptions {
+    /// The design file.
+    pub design: PathBuf,
+    /// The process file.
+    pub process: PathBuf,
+    /// Folder to make; the archive stands beside it, with `.zip` behind its name.
+    pub out: PathBuf,
+    /// The command as it was given, for the manifest.
+    pub command: String,
+}
+
+/// What was handed over.
+#[derive(Clone, Debug)]
+pub struct Handoff {
+    pub folder: PathBuf,
+    pub archive: PathBuf,
+    pub manifest: Manifest,
+    pub checks: Vec<Check>,
+}
+
+/// One look at the layout that is part of the hand-off.
+#[derive(Clone, Debug, Serialize)]
+pub struct Check {
+    pub name: String,
+    #[serde(serialize_with = "as_word")]
+    pub verdict: Verdict,
+    /// What came out, in one sentence.
+    pub words: String,
+    /// Its own report, in the folder.
+    pub report: Option<String>,
+}
+
+fn as_word<S: serde::Serializer>(verdict: &Verdict, s: S) -> Result<S::Ok, S::Error> {
+    s.serialize_str(verdict.word())
+}
+
+/// Everything that the front page and `handoff.json` tell.
+#[derive(Serialize)]
+pub(super) struct Contents<'a> {
+    #[serde(skip)]
+    pub design: &'a Design,
+    pub process: &'a Process,
+    pub command: &'a str,
+    pub design_digest: String,
+    pub pillars: u64,
+    pub census: Vec<Census>,
+    /// Exposure of each file of the first step, with its time at each current.
+    pub exposures: Vec<(String, Exposure, Vec<WriteTime>)>,
+    /// Root mean square change of the widths when snapped to the shots of each beam [nm].
+    pub snapping: Vec<(Beam, f64)>,
+    pub doses: Vec<DoseRow>,
+    #[serde(skip)]
+    pub blocks: Vec<Block>,
+    #[serde(skip)]
+    pub structures: Vec<Structure>,
+    #[serde(skip)]
+    pub tests_frame: (Rect, (i64, i64)),
+    pub sites: Vec<Site>,
+    pub crosses: Vec<Cross>,
+    pub checks: Vec<Check>,
+    /// Path in the folder and what it is for.
+    pub files: Vec<(String, String)>,
+}
+
+/// Make the hand-off of a design for a process.
+///
+/// The folder appears whole or not at all. An older hand-off at the same place is replaced; any other
+/// folder with something in it is left alone.
+///
+/// # Errors
+/// Mistakes in the design or process file; a folder in the way; a file that cannot be written; the user
+/// stopped it.
+pub fn handoff(options: &HandoffOptions, progress: &dyn Progress) -> Result<Handoff> {
+    let design = Design::read(&options.design)?;
+    let process = Process::read(&options.process)?;
+    fits(&design, &process)?;
+    replaceable(&options.out)?;
+    let name = options.out.file_name().ok_or_else(|| {
+        Error::invalid(
+            format!("{} is not the name of a folder", options.out.display()),
+            "name a folder with --out",
+        )
+    })?;
+    let part = options.out.with_file_name(format!(".{}.part", name.to_string_lossy()));
+    if part.exists() {
+        fs::remove_dir_all(&part).map_err(Error::io("remove", &part))?;
+    }
+    let made = fill(&part, options, &design, &process, progress);
+    let (manifest, checks) = match made {
+        Ok(made) => made,
+        Err(error) => {
+            // What is left of an unfinished hand-off is of no use; the first error is the one to tell.
+            let _ = fs::remove_dir_all(&part);
+            return Err(error);
+        }
+    };
+    if options.out.exists() {
+        fs::remove_dir_all(&options.out).map_err(Error::io("replace", &options.out))?;
+    }
+    fs::rename(&part, &options.out).map_err(Error::io("rename to", &options.out))?;
+
+    let archive = options.out.with_file_name(format!("{}.zip", name.to_string_lossy()));
+    let (there, _) = files_below(&options.out)?;
+    let packed: Vec<_> = there
+        .into_iter()
+        .map(|(file, path)| (format!("{}/{file}", name.to_string_lossy()), path))
+        .collect();
+    zip::pack(&archive, &packed, progress)?;
+    Ok(Handoff {
+        folder: options.out.clone(),
+        archive,
+        manifest,
+        checks,
+    })
+}
+
+/// Whether the process can make the design at all.
+fn fits(design: &Design, process: &Process) -> Result<()> {
+    if !process.exposes_pillars() {
+        return Err(Error::invalid(
+            format!(
+                "with this resist and transfer {}: the pillars of the layout would become holes",
+                process.exposed_becomes()
+            ),
+            "a positive resist needs `method = \"lift_off\"`, a negative one `method = \"direct_etch\"`",
+        ));
+    }
+    let taken = design.layout.layers.all();
+    if let Some((key, layer)) = taken.iter().find(|(_, l)| l.layer == process.dose_matrix.layer) {
+        return Err(Error::invalid(
+            format!(
+                "layer {} of the dose matrix is that of `{key}` in the design",
+                layer.layer
+            ),
+            "choose another `layer` in [dose_matrix] of the process file",
+        ));
+    }
+    Ok(())
+}
+
+/// Whether the folder is not there, empty, or holds nothing but an older hand-off.
+fn replaceable(folder: &Path) -> Result<()> {
+    if !folder.exists() {
+        return Ok(());
+    }
+    let (there, other) = files_below(folder)?;
+    let known = if there.contains_key(manifest::NAME) {
+        manifest::listed(folder)?
+    } else {
+        Vec::new()
+    };
+    let strange = there
+        .keys()
+        .chain(&other)
+        .find(|name| *name != manifest::NAME && !known.contains(name));
+    match strange {
+        None => Ok(()),
+        Some(name) => Err(Error::invalid(
+            format!("{} holds {name}, which no hand-off put there", folder.display()),
+            "choose another folder with --out, or move the file away",
+        )),
+    }
+}
+
+fn fill(
+    folder: &Path,
+    options: &HandoffOptions,
+    design: &Design,
+    process: &Process,
+    progress: &dyn Progress,
+) -> Result<(Manifest, Vec<Check>)> {
+    let at = |name: &str| folder.join(name);
+    let named = |folder: &str, rest: &str| format!("{folder}/{}_{rest}", design.name);
+    let mut files: Vec<(String, String)> = Vec::new();
+    let mut list = |name: String, purpose: &str| -> PathBuf {
+        files.push((name.clone(), purpose.to_owned()));
+        folder.join(name)
+    };
+
+    let array = PillarArray::build(design, progress)?;
+    let pillars = list(named("layout", "pillars.gds"), "layout of step 1: pillars and marks");
+    write_pillars(design, &array, design.layout.hierarchy, &pillars, progress)?;
+    let apertures = list(
+        named("layout", "apertures.gds"),
+        "layout of step 2: openings in the metal and marks, flat",
+    );
+    write_apertures(design, &apertures)?;
+    write_layer_properties(
+        design,
+        &list(
+            format!("layout/{}.lyp", design.name),
+            "layer names and colours for KLayout",
+        ),
+    )?;
+
+    let matrix_file = list(
+        named("dose", "dose_matrix.gds"),
+        "dose matrix for step 1: nine doses, datatype is the dose",
+    );
+    let blocks = matrix::write(&matrix_file, design, process)?;
+    let doses = doses(process);
+    let dose_table = list(
+        "dose/dose_table.csv".into(),
+        "the nine doses, where each is, a column to fill in",
+    );
+    tables::write_doses(&dose_table, &doses, &blocks, process.dose_matrix.layer)?;
+
+    let structures = Structures::new(design, process);
+    let tests_frame = (structures.frame, structures.field_border);
+    let tests = list(named("tests", "tests_pillars.gds"), "test structures of step 1");
+    let tests2 = list(named("tests", "tests_apertures.gds"), "test structures of step 2, flat");
+    let structures = structures.write(design, &tests, &tests2)?;
+    tables::write_structures(
+        &list(
+            "tests/structures.csv".into(),
+            "what each test structure is for and where",
+        ),
+        &structures,
+    )?;
+    let reference = reference_design(design, process);
+    let single = PillarArray::build(&reference, progress)?;
+    let lens = list(
+        named("tests", "reference_pillars.gds"),
+        "hyperbolic reference lens, step 1",
+    );
+    write_pillars(&reference, &single, reference.layout.hierarchy, &lens, progress)?;
+    write_apertures(
+        &reference,
+        &list(
+            named("tests", "reference_apertures.gds"),
+            "hyperbolic reference lens, step 2",
+        ),
+    )?;
+
+    let sites = sites(design, process, &array, &structures);
+    let cd = list(
+        "metrology/cd_table.csv".into(),
+        "where to measure widths, columns to fill in",
+    );
+    tables::write_sites(&cd, &sites, process)?;
+    let crosses = crosses(design);
+    let layers = &design.layout.layers;
+    let both = format!(
+        "{}/{} step 1, {}/{} step 2",
+        layers.pillar_marks.layer,
+        layers.pillar_marks.datatype,
+        layers.aperture_marks.layer,
+        layers.aperture_marks.datatype
+    );
+    let alignment = list("metrology/alignment.csv".into(), "alignment crosses of both steps");
+    tables::write_crosses(&alignment, &crosses, &both)?;
+
+    let mut census = Vec::new();
+    for file in [&pillars, &apertures, &matrix_file, &tests, &tests2, &lens] {
+        census.push(Census::take(file, progress)?);
+    }
+    let exposures = exposures(design, process, &census)?;
+    let times: Vec<_> = exposures.iter().map(|(f, _, t)| (f.clone(), t.clone())).collect();
+    tables::write_times(
+        &list(
+            "dose/write_time.csv".into(),
+            "time of each file of step 1 at each current",
+        ),
+        &times,
+    )?;
+    let snapping = snapping(&array, process)?;
+    for (beam, _) in &snapping {
+        let name = |kind: &str| format!("job/{}_{}nA.{kind}", design.name, beam.current_na);
+        let deck = job::job_deck(design, process, &crosses, beam);
+        let schedule = job::schedule(design, process, beam);
+        write_text(
+            &list(name("jdf"), "DRAFT of the job deck, to be reviewed by staff"),
+            &deck,
+        )?;
+        write_text(
+            &list(name("sdf"), "DRAFT of the schedule, to be reviewed by staff"),
+            &schedule,
+        )?;
+    }
+
+    for (source, name, purpose) in inputs(options, design) {
+        let target = list(format!("inputs/{name}"), purpose);
+        let bytes = fs::read(&source).map_err(Error::io("read", &source))?;
+        crate::file::WholeFile::write(&target, &bytes)?;
+    }
+    let checks = Vec::new();
+    for (name, purpose) in [
+        ("index.html", "this page: start here"),
+        ("handoff.json", "all numbers of this page for programs"),
+        ("chip.svg", "the chip with origin and orientation"),
+        ("tone.svg", "tone of both steps in cross-section"),
+    ] {
+        list(name.into(), purpose);
+    }
+    let contents = Contents {
+        design,
+        process,
+        command: &options.command,
+        design_digest: design.digest(),
+        pillars: array.pillars(),
+        census,
+        exposures,
+        snapping,
+        doses,
+        blocks,
+        structures,
+        tests_frame,
+        sites,
+        crosses,
+        checks,
+        files,
+    };
+    front::write(folder, &contents)?;
+    write_json(&at("handoff.json"), "handoff", &contents)?;
+
+    let mut listed = std::collections::BTreeMap::new();
+    let (there, _) = files_below(folder)?;
+    progress.begin("digests", there.len() as u64);
+    for (name, path) in there {
+        listed.insert(name, entry_of(&path, &crate::progress::Silent)?);
+        progress.advance(1);
+    }
+    let manifest = Manifest {
+        metalith: env!("CARGO_PKG_VERSION").into(),
+        command: options.command.clone(),
+        design: design.name.clone(),
+        design_digest: design.digest(),
+        process: process.name.clone(),
+        files: listed,
+        seal: String::new(),
+    }
+    .sealed();
+    manifest.write(folder)?;
+    Ok((manifest, contents.checks))
+}
+
+/// The design with one hyperbolic lens on a chip of its own, at full size.
+fn reference_design(design: &Design, process: &Process) -> Design {
+    let mut reference = matrix::hyperbolic(design, process.tests.reference_wavelength_nm);
+    reference.name = "reference_lens".into();
+    reference.title = "Hyperbolic reference lens".into();
+    reference.layout.marks.clear();
+    let room = i64::from(design.lens.diameter_nm) + 4 * design.layout.apertures.margin_nm + 20_000;
+    let room = room + room % 2;
+    reference.layout.chip.size_nm = (room, room);
+    reference
+}
+
+/// What each file of the first step exposes, and how long that takes.
+fn exposures(design: &Design, process: &Process, census: &[Census]) -> Result<Vec<(String, Exposure, Vec<WriteTime>)>> {
+    let layers = &design.layout.layers;
+    let mut exposures = Vec::new();
+    for file in census {
+        let exposed = |l: &&super::census::LayerCount| {
+            let number = (i32::from(l.layer), i32::from(l.datatype));
+            let is = |layer: &crate::design::Layer| number == (i32::from(layer.layer), i32::from(layer.datatype));
+            is(&layers.pillars) || is(&layers.pillar_marks) || number.0 == i32::from(process.dose_matrix.layer)
+        };
+        let mut exposure = Exposure::default();
+        let mut bounds: Option<[f64; 4]> = None;
+        for layer in file.layers.iter().filter(exposed) {
+            exposure.area_um2 += layer.area_um2;
+            exposure.shapes += layer.shapes;
+            if let Some(b) = layer.bounds_um {
+                bounds = Some(bounds.map_or(b, |a| [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])]));
+            }
+        }
+        let Some(bounds) = bounds else { continue };
+        exposure.fields = if exposures.is_empty() {
+            fields::of_design(design, process)
+        } else {
+            fields::of_bounds(bounds, process)
+        };
+        let times = process
+            .writer
+            .currents_na
+            .iter()
+            .map(|&i| WriteTime::of(process, &exposure, i))
+            .collect::<Result<Vec<_>>>()?;
+        exposures.push((file.file.clone(), exposure, times));
+    }
+    Ok(exposures)
+}
+
+/// How much the widths of the array change on the shots of each beam, root mean square over all pillars.
+fn snapping(array: &PillarArray, process: &Process) -> Result<Vec<(Beam, f64)>> {
+    let mut counts: Vec<u64> = Vec::new();
+    let histograms: Vec<_> = array.classes.iter().map(|c| c.widths.histogram()).collect();
+    for placed in &array.placed {
+        let histogram = &histograms[placed.class];
+        counts.resize(counts.len().max(histogram.len()), 0);
+        counts.iter_mut().zip(histogram).for_each(|(all, n)| *all += n);
+    }
+    let pillars: u64 = counts.iter().skip(1).sum();
+    process
+        .writer
+        .currents_na
+        .iter()
+        .map(|&current| {
+            let beam = Beam::choose(&process.writer, current, process.resist.dose_uc_cm2)?;
+            let square = |(w, &n): (usize, &u64)| n as f64 * (beam.snapped_nm(w as f64) - w as f64).powi(2);
+            let sum: f64 = counts.iter().enumerate().skip(1).map(square).sum();
+            Ok((beam, (sum / pillars.max(1) as f64).sqrt()))
+        })
+        .collect()
+}
+
+/// What the hand-off was made from: path, name in the folder, purpose.
+fn inputs(options: &HandoffOptions, design: &Design) -> Vec<(PathBuf, String, &'static str)> {
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let mut inputs = vec![
+        (
+            options.design.clone(),
+            format!("design_{}", name(&options.design)),
+            "the design",
+        ),
+        (
+            options.process.clone(),
+            format!("process_{}", name(&options.process)),
+            "the process values",
+        ),
+    ];
+    if let RadialPhase::Table { file, .. } = &design.lens.phase {
+        inputs.push((file.clone(), name(file), "phase of the lens over its radius"));
+    }
+    inputs
+}
+
+fn write_text(path: &Path, text: &str) -> Result<()> {
+    // The writer's computer and a PC both read lines that end this way.
+    crate::file::WholeFile::write(path, text.replace('\n', "\r\n").as_bytes())
+}

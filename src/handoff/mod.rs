@@ -1,0 +1,29 @@
+//! The hand-off: one folder, and one archive of it, from which a cleanroom can start.
+//!
+//! Layouts of both steps, dose matrix, test structures, tables to fill in, a draft of the writer's job,
+//! write times, what was checked, and a manifest with the digest of every file. What belongs to the
+//! design comes from the design, what belongs to the lab from a [`Process`] file, nothing from here.
+//! Counts, areas and bounding boxes are read from the bytes of the files that are handed over.
+
+mod build;
+mod census;
+mod dose;
+mod drawing;
+mod fields;
+mod front;
+mod job;
+mod manifest;
+mod matrix;
+mod pictures;
+mod process;
+mod sites;
+mod structures;
+mod tables;
+mod zip;
+
+pub use build::{Handoff, HandoffOptions, handoff};
+pub use census::{CellCount, Census, LayerCount};
+pub use dose::{Beam, DoseRow, Exposure, WriteTime};
+pub use manifest::{Entry, Manifest, Verification, verify as verify_handoff};
+pub use process::Process;
+pub use sites::{Cross, Site};
