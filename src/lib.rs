@@ -17,12 +17,13 @@ pub mod optimise;
 mod phase;
 mod progress;
 pub mod report;
+mod verify;
 mod wave;
 
 pub use array::{Class, DomainPart, Group, PillarArray, Placed, Symmetry, WidthRule};
 pub use cell::{
     Basis, CellModel, CellStack, CellTable, Fidelity, ForwardPolynomial, InversePolynomial, Material, Origin,
-    PublishedCell, RigorousCell, TableSpec, cache_folder, rcwa,
+    PublishedCell, RigorousCell, TableSpec, cache_folder, cell_models, rcwa,
 };
 pub use design::{
     ApertureSpec, ArraySpec, CellSpec, ChipSpec, Design, Element, FieldAngle, Hierarchy, Layer, Layers, LayoutSpec,
@@ -41,12 +42,17 @@ pub use gds::{
 };
 pub use handoff::{
     Beam, CellCount, Census, Cross, DoseRow, Entry, Exposure, Handoff, HandoffOptions, LayerCount, Manifest, Process,
-    Site, Verification, WriteTime, handoff, verify_handoff,
+    Site, Verification as HandoffVerification, WriteTime, handoff, verify_handoff,
 };
+pub use image::{Matched, Psf, PsfMeasures, Steepness};
 pub use lattice::{Lattice, WidthMap};
 pub use layout::{Written, write_apertures, write_layer_properties, write_pillars};
 pub use phase::{ElementPhase, Interpolation, LensPhase, RadialPhase, Wedge};
 pub use progress::{Progress, Silent};
+pub use verify::{
+    Check, DistinctElement, ElementCheck, LayoutFacts, Orders, PhaseError, PhaseErrors, Sense, Spot, SpotPair,
+    Verification, WidthCheck, verify, write_report,
+};
 pub use wave::{
     Accuracy, Aperture, Direct, Fade, Field, Fold, Hankel, PhaseArray, PhaseFunction, Pillars, PlaneWave, Propagator,
     Scratch, Window,

@@ -2,7 +2,9 @@
 
 mod handoff;
 mod layout;
+mod run;
 mod terminal;
+mod verify;
 
 use std::fmt;
 use std::process::ExitCode;
@@ -15,7 +17,6 @@ pub use terminal::Terminal;
 
 /// What every command answers with when it did its work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(dead_code)] // the commands that judge come next
 pub enum Outcome {
     /// Exit code 0.
     Fine,
@@ -46,8 +47,10 @@ struct Arguments {
 /// One file in this folder for each.
 #[derive(Subcommand)]
 enum Command {
+    Run(run::RunArgs),
     Layout(layout::LayoutArgs),
     Handoff(handoff::HandoffArgs),
+    Verify(verify::VerifyArgs),
 }
 
 /// Run the program with the arguments of the process.
@@ -73,8 +76,10 @@ pub fn run() -> ExitCode {
 
 fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome> {
     match command {
+        Command::Run(args) => run::run(args, terminal),
         Command::Layout(args) => layout::run(args, terminal),
         Command::Handoff(args) => handoff::run(args, terminal),
+        Command::Verify(args) => verify::run(args, terminal),
     }
 }
 

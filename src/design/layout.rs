@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::{ArraySpec, LensSpec};
 use crate::document::{Limits, Section};
+use crate::gds::LayerNumber;
 
 /// How the geometry is nested in the file. All three hold the same geometry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -25,6 +26,14 @@ pub struct Layer {
     pub datatype: i16,
     /// For people: shown in the viewer and in the hand-off.
     pub purpose: String,
+}
+
+impl Layer {
+    /// Its number as readers of layouts know it.
+    pub fn number(&self) -> LayerNumber {
+        // Both are 0 to 255, checked when the design was read.
+        LayerNumber::new(self.layer as u16, self.datatype as u16)
+    }
 }
 
 /// The layers of both files.

@@ -42,7 +42,9 @@ impl PhaseErrors {
         let by_width = |nm: f64| TAU * forward.turns(nm / pitch_nm, wavelength_um);
         let directions = transmissions.iter().map(unit).collect::<Vec<_>>();
         let written = (0..directions.len()).map(|w| by_width(w as f64)).collect::<Vec<_>>();
-        let rounding = accumulate(widths, phase, |width, u| written[width] - by_width(rule.unrounded_nm(u)));
+        let rounding = accumulate(widths, phase, |width, u| {
+            written[width] - by_width(rule.unrounded_nm(u))
+        });
         let mean = sum_rows(widths, phase, Complex64::new(0.0, 0.0), |width, u| {
             directions[width] * Complex64::cis(-TAU * u)
         });
@@ -60,11 +62,7 @@ fn unit(t: &Complex64) -> Complex64 {
 }
 
 /// Root mean square and largest of an error over all pillars.
-fn accumulate(
-    widths: &WidthMap,
-    phase: &ElementPhase<'_>,
-    error: impl Fn(usize, f64) -> f64 + Sync,
-) -> PhaseError {
+fn accumulate(widths: &WidthMap, phase: &ElementPhase<'_>, error: impl Fn(usize, f64) -> f64 + Sync) -> PhaseError {
     let rows = per_row(widths, phase, |sites| {
         sites.fold((0.0_f64, 0.0_f64, 0_u64), |(squares, largest, count), (width, u)| {
             let e = error(width, u);
@@ -86,9 +84,11 @@ fn sum_rows(
     zero: Complex64,
     value: impl Fn(usize, f64) -> Complex64 + Sync,
 ) -> Complex64 {
-    per_row(widths, phase, |sites| sites.map(|(width, u)| value(width, u)).fold(zero, |a, b| a + b))
-        .into_iter()
-        .fold(zero, |a, b| a + b)
+    per_row(widths, phase, |sites| {
+        sites.map(|(width, u)| value(width, u)).fold(zero, |a, b| a + b)
+    })
+    .into_iter()
+    .fold(zero, |a, b| a + b)
 }
 
 /// Fold each row on whatever thread; the caller adds the rows in order, so that sums do not depend on

@@ -26,21 +26,26 @@ impl WidthCheck {
     /// # Panics
     /// If the two are on different lattices.
     pub fn compare(intended: &WidthMap, found: &WidthMap) -> Self {
-        assert_eq!(intended.lattice, found.lattice, "an element is read back on its own lattice");
+        assert_eq!(
+            intended.lattice, found.lattice,
+            "an element is read back on its own lattice"
+        );
         let mut check = Self::default();
-        Zip::from(&intended.width_nm).and(&found.width_nm).for_each(|&meant, &got| {
-            check.pillars += u64::from(got != 0);
-            if meant != got {
-                match (meant, got) {
-                    (_, 0) => check.missing += 1,
-                    (0, _) => check.extra += 1,
-                    _ => {
-                        check.wrong += 1;
-                        check.largest_nm = check.largest_nm.max(meant.abs_diff(got));
+        Zip::from(&intended.width_nm)
+            .and(&found.width_nm)
+            .for_each(|&meant, &got| {
+                check.pillars += u64::from(got != 0);
+                if meant != got {
+                    match (meant, got) {
+                        (_, 0) => check.missing += 1,
+                        (0, _) => check.extra += 1,
+                        _ => {
+                            check.wrong += 1;
+                            check.largest_nm = check.largest_nm.max(meant.abs_diff(got));
+                        }
                     }
                 }
-            }
-        });
+            });
         check
     }
 
