@@ -23,7 +23,7 @@ mod wave;
 pub use array::{Class, DomainPart, Group, PillarArray, Placed, Symmetry, WidthRule};
 pub use cell::{
     Basis, CellModel, CellStack, CellTable, Fidelity, ForwardPolynomial, InversePolynomial, Material, Origin,
-    PublishedCell, RigorousCell, TableSpec, cache_folder, cell_models, rcwa,
+    PointwiseCell, PublishedCell, RigorousCell, TableSpec, cache_folder, cell_models, rcwa,
 };
 pub use design::{
     ApertureSpec, ArraySpec, CellSpec, ChipSpec, Design, Element, FieldAngle, Hierarchy, Layer, Layers, LayoutSpec,

@@ -73,7 +73,7 @@ impl Judging {
         let beside = [Fidelity::Rigorous, Fidelity::Published];
         let beside = beside.into_iter().filter(|f| *f != judge);
         let wanted = std::iter::once(judge).chain(beside).collect::<Vec<_>>();
-        let models = cell_models(design, &wanted, terminal)?;
+        let models = cell_models(design, &wanted)?;
         let models = models.iter().map(AsRef::as_ref).collect::<Vec<_>>();
         let accuracy = if self.fast { Accuracy::Fast } else { Accuracy::Accurate };
         let found = verify(design, array, layout, &models, accuracy, terminal)?;

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::Verification;
+use super::{SpotPair, Verification};
 use crate::design::LimitSpec;
 
 /// One limit and what was reached.
@@ -82,7 +82,7 @@ pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
             .iter()
             .flat_map(|d| d.spots.iter().map(move |s| (s.label(&d.element), s)))
     };
-    let optical: [(&str, &'static str, f64, &dyn Fn(&super::SpotPair) -> f64); 3] = [
+    let optical: [Optical<'_>; 3] = [
         (
             "distance of the centroids [um]",
             "centroid_shift_max_um",
@@ -123,6 +123,9 @@ pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
     }
     checks
 }
+
+/// Name, key and limit of what is measured of a spot.
+type Optical<'a> = (&'static str, &'static str, f64, &'a dyn Fn(&SpotPair) -> f64);
 
 /// The greatest value with its place; one that is not a number is greater than all.
 fn worst(values: impl Iterator<Item = (String, f64)>) -> Option<(String, f64)> {
