@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::report::Verdict;
-use metalith::{Design, Handoff, HandoffOptions, Result, Verification, handoff, verify_handoff};
+use metalith::{Design, Handoff, HandoffOptions, HandoffVerification, Result, handoff, verify_handoff};
 
 use super::{Outcome, Terminal};
 
@@ -116,7 +116,7 @@ fn look(folder: &Path, json: bool, terminal: &Terminal) -> Result<Outcome> {
     })
 }
 
-fn describe(found: &Verification) {
+fn describe(found: &HandoffVerification) {
     let m = &found.manifest;
     println!(
         "hand-off of {}, process {}, made by metalith {}",
