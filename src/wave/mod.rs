@@ -24,3 +24,4 @@ pub use fade::{Accuracy, Fade};
 pub use fold::Fold;
 pub use hankel::Hankel;
 pub use plane::{Field, PlaneWave, Propagator, Scratch, Window};
+pub(crate) use zoom::fft_size;

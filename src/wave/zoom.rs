@@ -93,7 +93,7 @@ pub(super) fn process(fft: &dyn Fft<f32>, buffer: &mut [Complex32], scratch: &mu
 }
 
 /// The smallest size not below `n` that transforms fast: 2^a 3^b, a >= 3, or 5 of those.
-pub(super) fn fft_size(n: usize) -> usize {
+pub(crate) fn fft_size(n: usize) -> usize {
     let mut best = n.next_power_of_two().max(8);
     for odd in [3, 5, 9, 15, 27, 45, 81, 135] {
         let size = odd * n.div_ceil(odd).next_power_of_two().max(8);
