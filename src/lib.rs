@@ -22,8 +22,10 @@ mod wave;
 
 pub use array::{Class, DomainPart, Group, PillarArray, Placed, Symmetry, WidthRule};
 pub use cell::{
-    Basis, CellModel, CellStack, CellTable, Fidelity, ForwardPolynomial, InversePolynomial, Material, Origin,
-    PointwiseCell, PublishedCell, RigorousCell, TableSpec, cache_folder, cell_models, rcwa,
+    BadCell, Basis, CellModel, CellStack, CellTable, Fidelity, FittedCell, ForwardFit, ForwardPolynomial, InverseFit,
+    InversePolynomial, MappingError, MappingTable, Material, Origin, PhaseCurve, PointwiseCell, PublishedCell,
+    RampOrders, RigorousCell, TableSpec, bad_cells, cache_folder, cell_models, curves_over, fit_forward, fit_inverse,
+    forward_errors, rcwa, round_trip,
 };
 pub use design::{
     ApertureSpec, ArraySpec, CellSpec, ChipSpec, Design, Element, FieldAngle, Hierarchy, Layer, Layers, LayoutSpec,

@@ -2,6 +2,9 @@
 
 mod cache;
 mod column;
+mod curve;
+mod exact;
+mod fit;
 mod material;
 mod model;
 mod models;
@@ -14,6 +17,11 @@ mod stack;
 mod table;
 
 pub use cache::cache_folder;
+pub use curve::{BadCell, PhaseCurve, bad_cells};
+pub use exact::{MappingTable, RampOrders};
+pub use fit::{
+    FittedCell, ForwardFit, InverseFit, MappingError, curves_over, fit_forward, fit_inverse, forward_errors, round_trip,
+};
 pub use material::Material;
 pub use model::{CellModel, Fidelity};
 pub use models::cell_models;

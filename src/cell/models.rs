@@ -1,10 +1,10 @@
 //! The cell of a design, as true as asked for.
 
-use super::{CellModel, CellStack, Fidelity, PointwiseCell, PublishedCell};
 use std::path::Path;
 
+use super::{CellModel, CellStack, Fidelity, FittedCell, PointwiseCell, PublishedCell, RigorousCell};
 use crate::design::Design;
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 /// The cells of a design for a few wavelengths, one for each fidelity asked for.
 ///
@@ -21,10 +21,15 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
                     let stack = CellStack::of_spec(&design.cell, folder)?;
                     Ok(Box::new(PointwiseCell::new(stack, design.cell.widths_nm())))
                 }
-                Fidelity::Fitted => Err(Error::invalid(
-                    "the `fitted` cell cannot be had yet",
-                    "use --fidelity published or rigorous",
-                )),
+                Fidelity::Fitted => {
+                    let stack = CellStack::of_spec(&design.cell, folder)?;
+                    let band_um = RigorousCell::band_um(design);
+                    Ok(Box::new(FittedCell::of_stack(
+                        &stack,
+                        band_um,
+                        design.cell.width_range_nm,
+                    )?))
+                }
             }
         })
         .collect()

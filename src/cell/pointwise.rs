@@ -19,16 +19,27 @@ const ORDERS: usize = 17;
 pub struct PointwiseCell {
     stack: CellStack,
     widths_nm: Vec<u16>,
+    orders: Orders,
 }
 
 impl PointwiseCell {
     /// The cell for these widths [nm]. Widths between them are interpolated, those beyond them get the
     /// nearest.
     pub fn new(stack: CellStack, widths_nm: impl IntoIterator<Item = u16>) -> Self {
+        let orders = Orders::new(ORDERS).expect("a constant that is odd and not large");
+        Self::with_orders(stack, widths_nm, orders)
+    }
+
+    /// The same with another number of diffraction orders.
+    pub fn with_orders(stack: CellStack, widths_nm: impl IntoIterator<Item = u16>, orders: Orders) -> Self {
         let mut widths_nm = widths_nm.into_iter().filter(|w| *w > 0).collect::<Vec<_>>();
         widths_nm.sort_unstable();
         widths_nm.dedup();
-        Self { stack, widths_nm }
+        Self {
+            stack,
+            widths_nm,
+            orders,
+        }
     }
 }
 
@@ -38,11 +49,10 @@ impl CellModel for PointwiseCell {
     }
 
     fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
-        let orders = Orders::new(ORDERS)?;
         let solved = self
             .widths_nm
             .par_iter()
-            .map(|&w| self.stack.transmission(f64::from(w), wavelength_um, orders))
+            .map(|&w| self.stack.transmission(f64::from(w), wavelength_um, self.orders))
             .collect::<Result<Vec<_>>>()?;
         let at = |width: u16| {
             let above = self

@@ -38,13 +38,17 @@ impl RigorousCell {
     pub fn table_spec(design: &Design) -> Result<TableSpec> {
         let folder = design.path.parent().unwrap_or(Path::new(""));
         let stack = CellStack::of_spec(&design.cell, folder)?;
-        let band_um = design
+        Ok(TableSpec::new(stack, Self::band_um(design), design.cell.width_range_nm))
+    }
+
+    /// The visible and all wavelengths that a design names [um].
+    pub(super) fn band_um(design: &Design) -> (f64, f64) {
+        let named = design
             .verify
             .wavelengths_um
             .iter()
-            .chain([&design.mapping.wavelength_um])
-            .fold(VISIBLE_UM, |(short, long), &l| (short.min(l), long.max(l)));
-        Ok(TableSpec::new(stack, band_um, design.cell.width_range_nm))
+            .chain([&design.mapping.wavelength_um]);
+        named.fold(VISIBLE_UM, |(short, long), &l| (short.min(l), long.max(l)))
     }
 
     /// The cell of a table.

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
+use ndarray::Array2;
 use num_complex::Complex64;
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::material::Material;
@@ -115,6 +117,26 @@ impl CellStack {
             Side::Below,
             orders,
         )
+    }
+
+    /// [`CellStack::transmission`] of all pairs of widths [nm] and wavelengths [um], in parallel. Shape
+    /// `[wavelengths, widths]`.
+    ///
+    /// # Errors
+    /// As [`CellStack::transmission`], the first in order.
+    pub fn transmissions(
+        &self,
+        widths_nm: &[f64],
+        wavelengths_um: &[f64],
+        orders: Orders,
+    ) -> Result<Array2<Complex64>> {
+        let columns = widths_nm.len();
+        let values = (0..columns * wavelengths_um.len())
+            .into_par_iter()
+            .map(|i| self.transmission(widths_nm[i % columns], wavelengths_um[i / columns], orders))
+            .collect::<Vec<_>>();
+        let values = values.into_iter().collect::<Result<Vec<_>>>()?;
+        Ok(Array2::from_shape_vec((wavelengths_um.len(), columns), values).expect("one value for each pair"))
     }
 
     /// |t| where all power goes on in the zero order: sqrt of the index of the substrate over that of

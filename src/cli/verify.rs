@@ -46,6 +46,8 @@ pub struct Judging {
 pub enum FidelityArg {
     /// Phase by the published polynomials, no amplitude.
     Published,
+    /// Phase by polynomials fitted to the rigorous cell, no amplitude.
+    Fitted,
     /// Complex transmission by rigorous coupled-wave analysis.
     Rigorous,
 }
@@ -54,6 +56,7 @@ impl From<FidelityArg> for Fidelity {
     fn from(arg: FidelityArg) -> Self {
         match arg {
             FidelityArg::Published => Self::Published,
+            FidelityArg::Fitted => Self::Fitted,
             FidelityArg::Rigorous => Self::Rigorous,
         }
     }
@@ -70,7 +73,7 @@ impl Judging {
         terminal: &Terminal,
     ) -> Result<Outcome> {
         let judge = Fidelity::from(self.fidelity);
-        let beside = [Fidelity::Rigorous, Fidelity::Published];
+        let beside = [Fidelity::Rigorous, Fidelity::Fitted, Fidelity::Published];
         let beside = beside.into_iter().filter(|f| *f != judge);
         let wanted = std::iter::once(judge).chain(beside).collect::<Vec<_>>();
         let models = cell_models(design, &wanted)?;
