@@ -52,8 +52,8 @@ pub use layout::{Written, write_apertures, write_layer_properties, write_pillars
 pub use phase::{ElementPhase, Interpolation, LensPhase, RadialPhase, Wedge};
 pub use progress::{Progress, Silent};
 pub use verify::{
-    Check, DistinctElement, ElementCheck, LayoutFacts, Orders, PhaseError, PhaseErrors, Sense, Spot, SpotPair,
-    Verification, WidthCheck, verify, write_report,
+    Check, DistinctElement, ElementCheck, LayoutFacts, Lighting, LonePsf, Orders, PhaseError, PhaseErrors, Sense, Spot,
+    SpotPair, Verification, WidthCheck, lone_psfs, verify, write_lone_report, write_report,
 };
 pub use wave::{
     Accuracy, Aperture, Direct, Fade, Field, Fold, Hankel, PhaseArray, PhaseFunction, Pillars, PlaneWave, Propagator,

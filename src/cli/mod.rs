@@ -2,6 +2,7 @@
 
 mod handoff;
 mod layout;
+mod psf;
 mod run;
 mod terminal;
 mod verify;
@@ -50,8 +51,9 @@ struct Arguments {
 enum Command {
     Run(run::RunArgs),
     Layout(layout::LayoutArgs),
-    Handoff(handoff::HandoffArgs),
     Verify(verify::VerifyArgs),
+    Psf(psf::PsfArgs),
+    Handoff(handoff::HandoffArgs),
 }
 
 /// Run the program with the arguments of the process.
@@ -81,6 +83,7 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::Layout(args) => layout::run(args, terminal),
         Command::Handoff(args) => handoff::run(args, terminal),
         Command::Verify(args) => verify::run(args, terminal),
+        Command::Psf(args) => psf::run(args, terminal),
     }
 }
 

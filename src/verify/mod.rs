@@ -2,6 +2,7 @@
 //! and simulated.
 
 mod check;
+mod lone;
 mod optics;
 mod page;
 mod phase;
@@ -24,6 +25,7 @@ use crate::progress::Progress;
 use crate::wave::Accuracy;
 
 pub use check::{Check, Sense};
+pub use lone::{Lighting, LonePsf, lone_psfs, write_lone_report};
 pub use optics::{Orders, Spot, SpotPair};
 pub use page::write_report;
 pub use phase::{PhaseError, PhaseErrors};

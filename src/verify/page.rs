@@ -50,7 +50,10 @@ fn page(design: &Design, array: &PillarArray, found: &Verification) -> Page {
     limits(&mut page, found);
     designed(&mut page, design, array);
     written(&mut page, design, found);
-    for element in &found.distinct {
+    // From the middle outwards: the plainest element first.
+    let mut elements = found.distinct.iter().collect::<Vec<_>>();
+    elements.sort_by_key(|e| e.element.index.0.abs() + e.element.index.1.abs());
+    for element in elements {
         simulated(&mut page, found, element);
     }
     method(&mut page, design, found);
