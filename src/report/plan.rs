@@ -227,7 +227,7 @@ impl From<Plan> for Figure {
                 .add(text(left + 26.0, middle + 4.0, Anchor::Start, name.as_str()));
         }
         // Below the frame: inside it would hide what is drawn there.
-        let bar = scale_bar(frame.left, frame.bottom + 38.0, frame.width() / 4.0, 1.0 / scale, "ink");
+        let bar = scale_bar(frame.left, frame.bottom + 46.0, frame.width() / 4.0, 1.0 / scale, "ink");
         let frame_line = line(frame.left, frame.bottom, frame.right, frame.bottom, "axis");
         let layers: Vec<_> = plan.layers.iter().map(|l| l.0.as_str()).collect();
         let words = format!(
@@ -237,7 +237,7 @@ impl From<Plan> for Figure {
             layers.join(", "),
             super::count(plan.shapes.len() as u64)
         );
-        let height = frame.bottom + 48.0;
+        let height = frame.bottom + 58.0;
         Figure::new(
             plan.width,
             height,
