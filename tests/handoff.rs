@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use metalith::{
-    Census, Design, Error, HandoffOptions, Lattice, Layout, Manifest, PillarArray, Progress, Result, Selection, Shape,
-    Silent, Transform, Visitor, handoff, verify_handoff,
+    Accuracy, Census, Design, Error, Fidelity, HandoffOptions, Lattice, Layout, Manifest, PillarArray, Progress,
+    Result, Selection, Shape, Silent, Transform, Visitor, handoff, verify_handoff,
 };
 
 const DESIGN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/designs/mini_3x3.toml");
@@ -20,6 +20,9 @@ fn options(out: &Path) -> HandoffOptions {
         process: PROCESS.into(),
         out: out.to_owned(),
         command: "metalith handoff designs/mini_3x3.toml".into(),
+        // What is simulated is not the matter here.
+        fidelity: Fidelity::Published,
+        accuracy: Accuracy::Fast,
     }
 }
 

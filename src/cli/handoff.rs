@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::report::Verdict;
-use metalith::{Design, Handoff, HandoffOptions, HandoffVerification, Result, handoff, verify_handoff};
+use metalith::{Accuracy, Design, Handoff, HandoffOptions, HandoffVerification, Result, handoff, verify_handoff};
 
+use super::verify::FidelityArg;
 use super::{Outcome, Terminal};
 
 /// Make the folder and the archive that a cleanroom starts from, or look whether a received one is whole.
@@ -32,6 +33,14 @@ pub struct HandoffArgs {
     /// Say whether this received folder is whole and unaltered, and do nothing else.
     #[arg(long, value_name = "FOLDER")]
     verify: Option<PathBuf>,
+
+    /// Simulate with errors of 1e-3 instead of 1e-5 of the peak, several times faster.
+    #[arg(long)]
+    fast: bool,
+
+    /// The cell that the layout is judged by.
+    #[arg(long, value_enum, default_value = "rigorous")]
+    fidelity: FidelityArg,
 
     /// Print what came out as JSON.
     #[arg(long)]
@@ -60,6 +69,8 @@ fn make(design: &Path, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcom
             .chain(std::env::args().skip(1))
             .collect::<Vec<_>>()
             .join(" "),
+        fidelity: args.fidelity.into(),
+        accuracy: if args.fast { Accuracy::Fast } else { Accuracy::Accurate },
     };
     let made = handoff(&options, terminal)?;
     terminal.clear();

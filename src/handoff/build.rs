@@ -15,12 +15,15 @@ use super::sites::{Cross, Site, crosses, sites};
 use super::structures::{Structure, Structures};
 use super::{fields, front, job, tables, zip};
 use crate::array::PillarArray;
+use crate::cell::{Fidelity, cell_models};
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::layout::{write_apertures, write_layer_properties, write_pillars};
 use crate::phase::RadialPhase;
 use crate::progress::Progress;
 use crate::report::{Verdict, write_json};
+use crate::verify::{verify, write_report};
+use crate::wave::Accuracy;
 
 /// What to hand over, and where to.
 #[derive(Clone, Debug)]
@@ -33,6 +36,10 @@ pub struct HandoffOptions {
     pub out: PathBuf,
     /// The command as it was given, for the manifest.
     pub command: String,
+    /// The cell that the layout is judged by; the published polynomials are shown beside it.
+    pub fidelity: Fidelity,
+    /// How closely the layout is simulated.
+    pub accuracy: Accuracy,
 }
 
 /// What was handed over.
@@ -309,7 +316,12 @@ fn fill(
         let bytes = fs::read(&source).map_err(Error::io("read", &source))?;
         crate::file::WholeFile::write(&target, &bytes)?;
     }
-    let checks = Vec::new();
+    let mut checks = Vec::new();
+    let (check, made) = verification(options, design, &array, &pillars, &at("verification"), progress)?;
+    for (name, purpose) in made {
+        list(format!("verification/{name}"), purpose);
+    }
+    checks.push(check);
     for (name, purpose) in [
         ("index.html", "this page: start here"),
         ("handoff.json", "all numbers of this page for programs"),
@@ -358,6 +370,57 @@ fn fill(
     .sealed();
     manifest.write(folder)?;
     Ok((manifest, contents.checks))
+}
+
+type Reports = [(&'static str, &'static str); 2];
+
+/// Read the pillar layout back, simulate it, and put the report beside it.
+fn verification(
+    options: &HandoffOptions,
+    design: &Design,
+    array: &PillarArray,
+    pillars: &Path,
+    folder: &Path,
+    progress: &dyn Progress,
+) -> Result<(Check, Reports)> {
+    let mut wanted = vec![options.fidelity];
+    if options.fidelity != Fidelity::Published {
+        wanted.push(Fidelity::Published);
+    }
+    let models = cell_models(design, &wanted)?;
+    let models = models.iter().map(AsRef::as_ref).collect::<Vec<_>>();
+    let found = verify(design, array, pillars, &models, options.accuracy, progress)?;
+    write_report(design, array, &found, folder)?;
+    let failed: Vec<_> = found
+        .checks
+        .iter()
+        .filter(|c| !c.passed())
+        .map(|c| c.what.as_str())
+        .collect();
+    let check = Check {
+        name: "read back and simulated".into(),
+        verdict: Verdict::of(failed.is_empty()),
+        words: if failed.is_empty() {
+            format!(
+                "all {} limits of the design hold, by the {} cell",
+                found.checks.len(),
+                found.fidelity
+            )
+        } else {
+            format!(
+                "{} of {} limits do not hold: {}",
+                failed.len(),
+                found.checks.len(),
+                failed.join("; ")
+            )
+        },
+        report: Some("verification/report.html".into()),
+    };
+    let made = [
+        ("report.html", "what was written, read back, compared and simulated"),
+        ("report.json", "all its numbers for programs"),
+    ];
+    Ok((check, made))
 }
 
 /// The design with one hyperbolic lens on a chip of its own, at full size.

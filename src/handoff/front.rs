@@ -172,16 +172,20 @@ fn cells(page: &mut Page, c: &Contents<'_>) {
     for file in &c.census {
         page.details(
             format!(
-                "Cell tree of `{}`: {} cells, {} levels",
+                "Cell tree of `{}`: {}, {}",
                 file.file,
-                file.cells.len(),
-                file.depth + 1
+                counted(file.cells.len(), "cell"),
+                counted(file.depth as usize + 1, "level")
             ),
             |inner| {
                 inner.code(tree(file));
             },
         );
     }
+}
+
+fn counted(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
 /// Cells, those that hold others first, each with what it holds.
@@ -464,7 +468,7 @@ fn checks(page: &mut Page, c: &Contents<'_>) {
             check.name.as_str().into(),
             check.verdict.into(),
             check.words.as_str().into(),
-            check.report.as_deref().map_or_else(Cell::none, Cell::code),
+            check.report.as_deref().map_or_else(Cell::none, Cell::link),
         ]);
     }
     page.table(table);

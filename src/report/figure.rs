@@ -212,7 +212,7 @@ impl Frame {
 }
 
 /// A bar of round length: `x` is its left end, `y` its middle, `longest` the room it has in the drawing.
-/// Classes: `ink` on paper, `over` on images, `plate` on a plate of its own where shapes lie below.
+/// Classes: `ink` on paper, `over` on images.
 pub(super) fn scale_bar(x: f64, y: f64, longest: f64, um_per_unit: f64, class: &str) -> Group {
     let room = longest * um_per_unit;
     let decade = 10f64.powf(room.log10().floor());
@@ -229,11 +229,7 @@ pub(super) fn scale_bar(x: f64, y: f64, longest: f64, um_per_unit: f64, class: &
         format!("{} um", super::sig(length, 1))
     };
     let end = x + length / um_per_unit;
-    let mut group = Group::new();
-    if class == "plate" {
-        group = group.add(rectangle(x - 8.0, y - 20.0, end - x + 16.0, 28.0, "paper"));
-    }
-    group
+    Group::new()
         .add(rectangle(x, y - 2.0, end - x, 4.0, class))
         .add(text((x + end) / 2.0, y - 6.0, Anchor::Middle, label).set("class", class))
 }

@@ -58,7 +58,7 @@ pub use figure::Figure;
 pub use heat::HeatMap;
 pub use images::ImageGrid;
 pub use json::write_json;
-pub use number::{count, fixed, sig};
+pub use number::{count, exact, fixed, sig};
 pub use page::Page;
 pub use plan::{Layer, Plan};
 pub use ranking::Ranking;

@@ -21,6 +21,19 @@ pub fn sig(x: f64, digits: usize) -> String {
     }
 }
 
+/// `x` as it was given: up to nine significant digits, no zeros behind the last that counts. For values
+/// that a person chose, such as `550` or `0.05`.
+pub fn exact(x: f64) -> String {
+    let text = sig(x, 9);
+    match text.split_once('×') {
+        Some((mantissa, power)) if mantissa.contains('.') => {
+            format!("{}×{power}", mantissa.trim_end_matches('0').trim_end_matches('.'))
+        }
+        None if text.contains('.') => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        _ => text,
+    }
+}
+
 /// `x` with so many decimals, thousands grouped, a true minus sign and no minus zero.
 pub fn fixed(x: f64, decimals: usize) -> String {
     if !x.is_finite() {
@@ -116,6 +129,15 @@ mod tests {
             (f64::NAN, 4, "n/a"),
         ] {
             assert_eq!(sig(x, digits), text);
+        }
+        for (x, text) in [
+            (550.0, "550"),
+            (0.05, "0.05"),
+            (-1e-9, "−1×10⁻⁹"),
+            (1_200_000.0, "1,200,000"),
+            (0.0, "0"),
+        ] {
+            assert_eq!(exact(x), text);
         }
         assert_eq!(fixed(-0.001, 2), "0.00");
         assert_eq!(fixed(-1234.5, 1), "−1,234.5");

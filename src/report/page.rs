@@ -196,7 +196,7 @@ pub(super) fn escape(text: &str) -> String {
 }
 
 /// Text in which back quotes set code; one without a partner stands for itself.
-fn inline(text: &str) -> String {
+pub(super) fn inline(text: &str) -> String {
     let parts: Vec<_> = text.split('`').collect();
     let paired = parts.len() - (1 - parts.len() % 2);
     let mut html = String::new();

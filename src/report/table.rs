@@ -1,7 +1,7 @@
 //! Tables: text left, numbers right, units in the head, verdicts in words.
 
-use super::number::{count, fixed, sig};
-use super::page::escape;
+use super::number::{count, exact, fixed, sig};
+use super::page::{escape, inline};
 
 /// How something that was to hold ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,6 +39,9 @@ impl Verdict {
         )
     }
 }
+
+/// Letters of an entry that is not broken over lines.
+const KEPT_WHOLE: usize = 28;
 
 /// What stands above a column.
 #[derive(Clone, Debug)]
@@ -89,9 +92,20 @@ impl Cell {
         Self(fixed(x, decimals))
     }
 
+    /// A number as a person gave it, without zeros behind the last digit that counts.
+    pub fn exact(x: f64) -> Self {
+        Self(exact(x))
+    }
+
     /// No entry.
     pub fn none() -> Self {
         Self("–".into())
+    }
+
+    /// A link to a file beside the page, such as `checks/report.html`.
+    pub fn link(path: impl AsRef<str>) -> Self {
+        let path = escape(path.as_ref());
+        Self(format!("<a href=\"{path}\">{path}</a>"))
     }
 
     /// Words in the type of programs: names of files, cells, keys.
@@ -168,7 +182,7 @@ impl Table {
         self
     }
 
-    /// Words above the table.
+    /// Words above the table; words between back quotes are set as code.
     pub fn caption(mut self, caption: impl Into<String>) -> Self {
         self.caption = caption.into();
         self
@@ -177,7 +191,7 @@ impl Table {
     pub(super) fn html(&self) -> String {
         let mut html = String::from("<div class=\"scroll\"><table>");
         if !self.caption.is_empty() {
-            html.push_str(&format!("<caption>{}</caption>", escape(&self.caption)));
+            html.push_str(&format!("<caption>{}</caption>", inline(&self.caption)));
         }
         html.push_str("<thead><tr>");
         for column in &self.columns {
@@ -192,7 +206,11 @@ impl Table {
         for row in &self.rows {
             html.push_str("<tr>");
             for (cell, column) in row.iter().zip(&self.columns) {
-                let class = if column.number { " class=\"number\"" } else { "" };
+                let class = match (column.number, cell.0.chars().count() <= KEPT_WHOLE) {
+                    (true, _) => " class=\"number\"",
+                    (false, true) => " class=\"short\"",
+                    (false, false) => "",
+                };
                 html.push_str(&format!("<td{class}>{}</td>", cell.0));
             }
             html.push_str("</tr>\n");

@@ -81,7 +81,7 @@ impl From<PillarZoom> for Figure {
         };
         let half = zoom.span_um / 2.0;
         let (cx, cy) = zoom.centre_um;
-        let x = Axis::linear("x from the element's centre", "um").range(cx - half, cx + half);
+        let x = Axis::linear("x", "um").range(cx - half, cx + half);
         let y = Axis::linear("y", "um").range(cy - half, cy + half);
         let x = x.fit([], frame.left, frame.right, false);
         let y = y.fit([], frame.bottom, frame.top, false);
@@ -93,13 +93,8 @@ impl From<PillarZoom> for Figure {
             .set("height", zoom.side)
             .set("viewBox", (-span_nm / 2, -span_nm / 2, span_nm, span_nm))
             .add(Path::new().set("class", "pillar").set("d", zoom.squares));
-        let bar = scale_bar(
-            frame.left + 12.0,
-            frame.bottom - 12.0,
-            zoom.side / 4.0,
-            zoom.span_um / zoom.side,
-            "plate",
-        );
+        let um_per_unit = zoom.span_um / zoom.side;
+        let bar = scale_bar(frame.left, frame.bottom + 46.0, zoom.side / 4.0, um_per_unit, "ink");
         let words = format!(
             "{} pillars to scale; {}, {}.",
             super::count(zoom.pillars),
@@ -107,6 +102,6 @@ impl From<PillarZoom> for Figure {
             y.words()
         );
         let drawing = Group::new().add(squares).add(frame.axes(&x, &y, false)).add(bar);
-        Figure::new(zoom.side + 84.0, zoom.side + 60.0, &zoom.title, &words, drawing)
+        Figure::new(zoom.side + 84.0, zoom.side + 70.0, &zoom.title, &words, drawing)
     }
 }

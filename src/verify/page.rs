@@ -10,7 +10,7 @@ use crate::design::Design;
 use crate::error::Result;
 use crate::phase::{ElementPhase, LensPhase};
 use crate::report::{
-    Axis, Cell, Chart, Column, ImageGrid, Page, PillarZoom, Plan, Table, Verdict, count, sig, write_json,
+    Axis, Cell, Chart, Column, ImageGrid, Page, PillarZoom, Plan, Table, Verdict, count, exact, sig, write_json,
 };
 
 /// Decades of a PSF that are shown: below lies what a camera's noise hides.
@@ -76,7 +76,7 @@ fn limits(page: &mut Page, found: &Verification) {
         table.row([
             Cell::from(check.what.as_str()),
             Cell::sig(check.reached, 4),
-            Cell::from(format!("{sign} {}", sig(check.limit, 4))),
+            Cell::from(format!("{sign} {}", exact(check.limit))),
             Cell::from(Verdict::of(check.passed())),
         ]);
     }
@@ -89,11 +89,11 @@ fn designed(page: &mut Page, design: &Design, array: &PillarArray) {
         "{} x {} elements of {} um, f = {} um, {} um apart, steered by {}° a step at {} nm; pillars on a lattice of {} nm.",
         design.array.count.0,
         design.array.count.1,
-        sig(f64::from(design.lens.diameter_nm) * 1e-3, 6),
-        sig(design.lens.focal_length_um, 6),
-        sig(design.array.spacing_nm as f64 * 1e-3, 6),
+        exact(f64::from(design.lens.diameter_nm) * 1e-3),
+        exact(design.lens.focal_length_um),
+        exact(design.array.spacing_nm as f64 * 1e-3),
         design.array.steering_deg,
-        sig(design.array.wedge_wavelength_um * 1e3, 5),
+        exact(design.array.wedge_wavelength_um * 1e3),
         design.cell.pitch_nm,
     ));
     let zoomed = &array.classes[0].widths;
@@ -259,23 +259,30 @@ fn simulated(page: &mut Page, found: &Verification, element: &DistinctElement) {
         steepness(element),
     ));
     page.table(spot_table(element));
-    let mut images = ImageGrid::new("PSF designed beside extracted", 4)
+    let shown: Vec<_> = element
+        .spots
+        .iter()
+        .filter_map(|spot| Some((spot, spot.images()?)))
+        .collect();
+    // Designed above extracted, a column for each wavelength.
+    let mut images = ImageGrid::new("PSF designed above extracted", shown.len())
         .values("|E|² / |E inc|²", "")
         .log(PSF_DECADES)
-        .side(190.0);
+        .side((760.0 / shown.len().max(1) as f64).min(230.0));
+    for (spot, (designed, _, step_um)) in &shown {
+        images = images.pixel_um(*step_um);
+        images.image(format!("designed, {}", spot.place()), cut(designed, *step_um));
+    }
+    for (spot, (_, extracted, step_um)) in &shown {
+        images.image(format!("extracted, {}", spot.place()), cut(extracted, *step_um));
+    }
     let mut chart = Chart::new(
         "MTF with the sensor's pixel",
         Axis::linear("spatial frequency", "1/mm"),
         Axis::linear("MTF", "").range(0.0, 1.0),
     );
-    for spot in &element.spots {
-        let Some((designed, extracted, step_um)) = spot.images() else {
-            continue;
-        };
-        images = images.pixel_um(step_um);
-        images.image(format!("designed, {}", spot.place()), cut(designed, step_um));
-        images.image(format!("extracted, {}", spot.place()), cut(extracted, step_um));
-        let colour = format!("{} nm", sig(spot.wavelength_um * 1e3, 4));
+    for (spot, _) in &shown {
+        let colour = format!("{} nm", exact(spot.wavelength_um * 1e3));
         chart.line(format!("designed, {colour}"), spot.designed.mtf_curve.iter().copied());
         chart.line(format!("extracted, {colour}"), spot.judged().mtf_curve.iter().copied());
     }
@@ -294,7 +301,7 @@ fn simulated(page: &mut Page, found: &Verification, element: &DistinctElement) {
     ]);
     for entry in &element.orders {
         orders.row([
-            Cell::sig(entry.wavelength_um * 1e3, 5),
+            Cell::exact(entry.wavelength_um * 1e3),
             Cell::from(entry.fidelity.name()),
             Cell::fixed(entry.first * 100.0, 1),
             Cell::fixed(entry.zero * 100.0, 1),
@@ -390,7 +397,7 @@ fn method(page: &mut Page, design: &Design, found: &Verification) {
     page.paragraph(format!(
         "The cell that judges is `{}`; wavelengths {} nm; windows of {} x {} samples of one pitch about the chief ray; sensor pixels of {} um.",
         found.fidelity,
-        design.verify.wavelengths_um.iter().map(|w| sig(w * 1e3, 5)).collect::<Vec<_>>().join(", "),
+        design.verify.wavelengths_um.iter().map(|w| exact(w * 1e3)).collect::<Vec<_>>().join(", "),
         design.verify.window_samples,
         design.verify.window_samples,
         design.verify.pixel_um,
