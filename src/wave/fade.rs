@@ -50,7 +50,7 @@ const FAST_MARGIN: f64 = 1.5;
 /// coming back into the window is within what fast mode may err by, and the period need not hold it.
 const FAST_STRAY: f64 = 2.5e-3;
 /// In fast mode, with a gain that allows it: period in units of lens radius and half the window.
-const FAST_PERIOD: f64 = 1.25;
+const FAST_PERIOD: f64 = 1.19;
 /// More bins an axis than any element of this program needs; beyond it memory is the fault that shows.
 const MOST_BINS: usize = 1 << 16;
 
