@@ -22,10 +22,11 @@ mod wave;
 
 pub use array::{Class, DomainPart, Group, PillarArray, Placed, Symmetry, WidthRule};
 pub use cell::{
-    BadCell, Basis, CellModel, CellStack, CellTable, Fidelity, FittedCell, ForwardFit, ForwardPolynomial, InverseFit,
-    InversePolynomial, MappingError, MappingTable, Material, Origin, PhaseCurve, PointwiseCell, PublishedCell,
-    RampOrders, RigorousCell, TableSpec, bad_cells, cache_folder, cell_models, curves_over, fit_forward, fit_inverse,
-    forward_errors, rcwa, round_trip,
+    BadCell, Basis, CellModel, CellStack, CellStudy, CellTable, Fidelity, FittedCell, ForwardFit, ForwardPolynomial,
+    InverseFit, InversePolynomial, InverseTrial, LED_UM, MappingError, MappingStudy, MappingTable, Material, Origin,
+    PhaseCurve, PointwiseCell, PublishedCell, RampOrders, RigorousCell, StudyOptions, TableSpec, bad_cells,
+    cache_folder, cell_models, curves_over, fit_forward, fit_inverse, forward_errors, rcwa, round_trip,
+    write_cell_report,
 };
 pub use design::{
     ApertureSpec, ArraySpec, CellSpec, ChipSpec, Design, Element, FieldAngle, Hierarchy, Layer, Layers, LayoutSpec,

@@ -41,6 +41,16 @@ impl MappingTable {
         self.widths_nm[((u * n as f64) as usize).min(n - 1)]
     }
 
+    /// The table as text: the phase in the middle of each part [turns] and its width.
+    pub fn to_csv(&self) -> String {
+        let n = self.widths_nm.len() as f64;
+        let mut text = "turns,width_nm\n".to_owned();
+        for (i, width) in self.widths_nm.iter().enumerate() {
+            text += &format!("{:.6},{width}\n", (i as f64 + 0.5) / n);
+        }
+        text
+    }
+
     /// The width whose phase is nearest, of the widths of `curve` that are not in `avoid`. The phase of
     /// the narrowest is zero.
     ///

@@ -8,12 +8,14 @@ mod fit;
 mod material;
 mod model;
 mod models;
+mod page;
 mod pointwise;
 mod polynomial;
 mod published;
 pub mod rcwa;
 mod rigorous;
 mod stack;
+mod study;
 mod table;
 
 pub use cache::cache_folder;
@@ -25,9 +27,11 @@ pub use fit::{
 pub use material::Material;
 pub use model::{CellModel, Fidelity};
 pub use models::cell_models;
+pub use page::write_cell_report;
 pub use pointwise::PointwiseCell;
 pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};
 pub use published::PublishedCell;
 pub use rigorous::RigorousCell;
 pub use stack::CellStack;
+pub use study::{CellStudy, InverseTrial, LED_UM, MappingStudy, StudyOptions};
 pub use table::{CellTable, Origin, TableSpec};

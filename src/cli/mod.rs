@@ -1,5 +1,6 @@
 //! The program: arguments in, exit code out. Everything it does is a call of the library.
 
+mod cells;
 mod handoff;
 mod layout;
 mod psf;
@@ -54,6 +55,7 @@ enum Command {
     Verify(verify::VerifyArgs),
     Psf(psf::PsfArgs),
     Handoff(handoff::HandoffArgs),
+    Cells(cells::CellsArgs),
 }
 
 /// Run the program with the arguments of the process.
@@ -84,6 +86,7 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::Handoff(args) => handoff::run(args, terminal),
         Command::Verify(args) => verify::run(args, terminal),
         Command::Psf(args) => psf::run(args, terminal),
+        Command::Cells(args) => cells::run(args, terminal),
     }
 }
 

@@ -1,0 +1,99 @@
+//! `metalith cells`: the library of a design's cell, its fits, and where its mapping sends the light.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use metalith::report::{fixed, sig};
+use metalith::{
+    CellStudy, CellTable, Design, Origin, Result, RigorousCell, StudyOptions, cache_folder, write_cell_report,
+};
+
+use super::{Outcome, Terminal};
+
+/// Tabulate the cell of a design by rigorous theory, fit it, and report what its mapping does with light.
+#[derive(Args)]
+#[command(after_help = "Example:\n  metalith cells designs/prototype_3x3.toml --out out/cells")]
+pub struct CellsArgs {
+    /// The design file.
+    design: PathBuf,
+
+    /// Folder for `cells.html`, `cells.json` and the mappings; `out/NAME` of the design if left out.
+    #[arg(long, short, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+
+    /// Folder that libraries are kept in; `METALITH_CACHE` or the user's cache folder if left out.
+    #[arg(long, value_name = "FOLDER")]
+    cache: Option<PathBuf>,
+
+    /// Power of the zero order below which a width is bad.
+    #[arg(long, value_name = "SHARE", default_value_t = StudyOptions::default().threshold)]
+    avoid: f64,
+
+    /// Diffraction orders along an axis, odd.
+    #[arg(long, value_name = "N", default_value_t = 13)]
+    orders: usize,
+
+    /// Largest error of the transmission between samples of the library.
+    #[arg(long, value_name = "T", default_value_t = 0.01)]
+    tolerance: f64,
+
+    /// Print `cells.json` to standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Do it.
+pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
+    terminal.stop_on_interrupt();
+    let design = Design::read(&args.design)?;
+    let folder = args
+        .out
+        .clone()
+        .unwrap_or_else(|| PathBuf::from("out").join(&design.name));
+    let mut spec = RigorousCell::table_spec(&design)?;
+    spec.orders = args.orders;
+    spec.tolerance = args.tolerance;
+    let cache = args.cache.clone().or_else(cache_folder);
+    let (table, origin) = CellTable::obtain(&spec, cache.as_deref(), terminal)?;
+    terminal.clear();
+    let study = CellStudy::new(
+        &design,
+        &RigorousCell::new(table),
+        StudyOptions { threshold: args.avoid },
+    )?;
+    write_cell_report(&study, &folder)?;
+    if args.json {
+        println!(
+            "{}",
+            serde_json::to_string_pretty(&study).expect("plain data serialises")
+        );
+        return Ok(Outcome::Fine);
+    }
+    match origin {
+        Origin::Kept(file) => println!("library: {} (kept)", file.display()),
+        Origin::Computed(Some(file)) => println!("library: {} ({} cells solved)", file.display(), study.points),
+        Origin::Computed(None) => println!("library: {} cells solved, not kept", study.points),
+    }
+    println!(
+        "at {} nm the widths span {} turns; the mapping of the design errs by {} rad rms",
+        sig(study.mapping_um * 1e3, 4),
+        fixed(study.span_turns, 2),
+        fixed(study.design_round_trip.rms_rad, 3)
+    );
+    println!("first / zero order            455 nm        530 nm        590 nm        660 nm     band");
+    for mapping in &study.mappings {
+        let led: Vec<_> = mapping
+            .led
+            .iter()
+            .map(|o| format!("{} / {}", fixed(o.first, 3), fixed(o.zero, 3)))
+            .collect();
+        println!(
+            "{:26} {}  {}",
+            mapping.name,
+            led.join(" "),
+            fixed(mapping.mean(|o| o.first), 3)
+        );
+    }
+    println!("report: {}", folder.join("cells.html").display());
+    Ok(Outcome::Fine)
+}
