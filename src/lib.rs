@@ -1,9 +1,79 @@
-//! metalith
+//! From the phase of a metalens array to the layout a cleanroom writes, and back from that file to the
+//! image it makes.
+//!
+//! Data runs one way. The first line makes a file; the second begins at the bytes of that file, so that
+//! what is simulated is what is sent to the writer, never what it was meant to be:
+//!
+//! ```text
+//! design text -> Design -> LensPhase -> WidthRule -> PillarArray -> layout bytes
+//! layout bytes -> Layout -> Extraction -> Field -> Psf -> Verification -> report
+//! ```
+//!
+//! | stage | room | what it is a function of |
+//! | --- | --- | --- |
+//! | [`Design`] | `design` | the text of a TOML file, all its mistakes reported at once |
+//! | [`LensPhase`], [`ElementPhase`] | `phase` | the radial phase of a design and the wedge of an element |
+//! | [`PillarArray`] | `array` | phases, and the mapping from phase to width; copies are proven, not assumed |
+//! | [`write_pillars`], [`write_apertures`] | `layout` | the array; bytes that depend on nothing else |
+//! | [`Layout`], [`extract()`] | `gds`, `extract` | the bytes of any GDSII file |
+//! | [`CellModel`] | `cell` | a pillar's width and a wavelength: published, fitted or rigorous |
+//! | [`Propagator`] | `wave` | transmissions on a lattice: folded, direct, by rings |
+//! | [`Psf`](image::Psf) | `image` | a field; and scenes through it, with noise, restored |
+//! | [`verify()`] | `verify` | a design, its array and the bytes of a layout |
+//! | [`report`] | `report` | anything found: one HTML page and one JSON file |
+//!
+//! Beside the line stand [`optimise`], which finds the radial phase, and the checks, the hand-off and the
+//! calibration, which start from layouts too.
+//!
+//! # Conventions
+//!
+//! **Units.** Optics in micrometres, angles in radians inside the code and in degrees in files, layouts in
+//! whole nanometres. Names carry the unit.
+//!
+//! **Waves.** Time factor exp(-i w t), a forward wave is exp(+i k z), z runs from the lens to the sensor.
+//! A wider pillar is a longer optical path and has a larger phase; the phase of a converging lens falls
+//! with the radius. A plane wave from (theta_x, theta_y) multiplies the aperture by
+//! exp(+i k (x sin theta_x + y sin theta_y)).
+//!
+//! **Light path.** Scene, substrate, pillars, air, sensor. Transmission t is a field ratio: the zero order
+//! in the plane of the pillar tops over the incident wave in the plane of the pillar base. The share of
+//! power in the zero order is |t|^2 over the index of the substrate.
+//!
+//! **Where an element looks.** Its wedge brings to its axis the light that arrives with
+//! sin theta = -sin psi lambda / lambda_w. That is the middle of its field; field angles count from there.
+//!
+//! **Lattice.** An even number of sites an axis, centres at odd multiples of half a pitch, widths even:
+//! every edge is on the 1 nm grid, and a lens has all eight symmetries of the square exactly.
+//!
+//! **The array phase** (Chakravarthula et al. 2023, Eq. 3) is that of the lens plus
+//! 2 pi / lambda_w (x sin psi_x + y sin psi_y), modulo one turn, then mapped to a duty cycle (Eq. 4), the
+//! linear one: width over pitch.
+//!
+//! **Fields.** The element is a lattice of point samples of weight pitch^2. The PSF is |E|^2 / |E_inc|^2,
+//! E_inc in the medium of incidence; Strehl is against the same aperture passing all its power in the zero
+//! order with the perfect phase.
+//!
+//! # Example
+//!
+//! ```no_run
+//! use metalith::{Accuracy, Design, PillarArray, Silent, cell_models, verify, write_pillars};
+//!
+//! # fn main() -> metalith::Result<()> {
+//! let design = Design::read("designs/mini_3x3.toml".as_ref())?;
+//! let array = PillarArray::build(&design, &Silent)?;
+//! let file = "mini.gds".as_ref();
+//! write_pillars(&design, &array, design.layout.hierarchy, file, &Silent)?;
+//! let cells = cell_models(&design, &[metalith::Fidelity::Rigorous])?;
+//! let cells = cells.iter().map(AsRef::as_ref).collect::<Vec<_>>();
+//! let found = verify(&design, &array, file, &cells, Accuracy::Accurate, &Silent)?;
+//! assert!(found.passed());
+//! # Ok(())
+//! # }
+//! ```
 
 mod array;
 mod cell;
 mod design;
-#[allow(dead_code, unused_imports)] // read by the design, the rules and the measurements to come
 mod document;
 mod error;
 mod extract;
