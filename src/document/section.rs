@@ -52,11 +52,6 @@ impl<'d, 't> Section<'d, 't> {
         }
     }
 
-    /// The document that this section is part of.
-    pub fn document(&self) -> &'d Document<'t> {
-        self.document
-    }
-
     /// Record a fault at a key of this section, or at the section itself if the key is absent.
     pub fn fault(&self, key: &str, what: impl Into<String>, hint: impl Into<String>) {
         if !self.vacant {
@@ -138,18 +133,6 @@ impl<'d, 't> Section<'d, 't> {
             _ => {
                 self.wrong_type(key, value, "a text in quotes");
                 Some(String::new())
-            }
-        }
-    }
-
-    /// True or false, with what holds when the key is left out.
-    pub fn boolean(&self, key: &str, default: bool) -> bool {
-        let Some(value) = self.get(key) else { return default };
-        match value.get_ref() {
-            DeValue::Boolean(b) => *b,
-            _ => {
-                self.wrong_type(key, value, "true or false");
-                default
             }
         }
     }
@@ -275,15 +258,6 @@ impl<'d, 't> Section<'d, 't> {
                     None
                 }
             })
-            .collect()
-    }
-
-    /// All keys of this section that are tables, for maps whose keys the user names.
-    pub fn named_sections(&self) -> Vec<(String, Section<'d, 't>)> {
-        self.table
-            .iter()
-            .filter(|(_, v)| matches!(v.get_ref(), DeValue::Table(_)))
-            .filter_map(|(k, _)| Some((k.get_ref().to_string(), self.optional_section(k.get_ref())?)))
             .collect()
     }
 
