@@ -74,7 +74,9 @@
 mod array;
 mod cell;
 mod design;
+pub mod diff;
 mod document;
+pub mod drc;
 mod error;
 mod extract;
 mod file;

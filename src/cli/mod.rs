@@ -1,6 +1,8 @@
 //! The program: arguments in, exit code out. Everything it does is a call of the library.
 
 mod cells;
+mod check;
+mod diff;
 mod handoff;
 mod layout;
 mod psf;
@@ -24,7 +26,6 @@ pub enum Outcome {
     Fine,
     /// Exit code 1: done, but outside the limits.
     OutsideLimits,
-    #[allow(dead_code)] // for checks that could not run
     /// Exit code 3: something that was asked for could not be done.
     NotDone,
 }
@@ -56,6 +57,8 @@ enum Command {
     Psf(psf::PsfArgs),
     Handoff(handoff::HandoffArgs),
     Cells(cells::CellsArgs),
+    Check(check::CheckArgs),
+    Diff(diff::DiffArgs),
 }
 
 /// Run the program with the arguments of the process.
@@ -87,6 +90,8 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::Verify(args) => verify::run(args, terminal),
         Command::Psf(args) => psf::run(args, terminal),
         Command::Cells(args) => cells::run(args, terminal),
+        Command::Check(args) => check::run(args, terminal),
+        Command::Diff(args) => diff::run(args, terminal),
     }
 }
 

@@ -137,6 +137,23 @@ impl<'d, 't> Section<'d, 't> {
         }
     }
 
+    /// A list of texts; an empty one where the key is left out.
+    pub fn texts(&self, key: &str) -> Vec<String> {
+        let Some(value) = self.get(key) else { return Vec::new() };
+        let DeValue::Array(items) = value.get_ref() else {
+            self.wrong_type(key, value, "a list of texts in quotes");
+            return Vec::new();
+        };
+        let text = |item: &Spanned<DeValue<'t>>| match item.get_ref() {
+            DeValue::String(s) => Some(s.to_string()),
+            _ => {
+                self.wrong_type(key, item, "a list of texts in quotes");
+                None
+            }
+        };
+        items.iter().filter_map(text).collect()
+    }
+
     /// One of a few words; the first choice takes the place of a wrong one.
     pub fn choice<T: Copy>(&self, key: &str, choices: &[(&str, T)], default: Option<T>) -> T {
         let words = choices.iter().map(|(w, _)| *w).collect::<Vec<_>>().join(", ");
@@ -259,6 +276,20 @@ impl<'d, 't> Section<'d, 't> {
                 }
             })
             .collect()
+    }
+
+    /// All keys of this section that are tables, for maps whose keys the user names.
+    pub fn named_sections(&self) -> Vec<(String, Section<'d, 't>)> {
+        self.table
+            .iter()
+            .filter(|(_, v)| matches!(v.get_ref(), DeValue::Table(_)))
+            .filter_map(|(k, _)| Some((k.get_ref().to_string(), self.optional_section(k.get_ref())?)))
+            .collect()
+    }
+
+    /// All keys of this section, for maps whose keys the user names.
+    pub fn keys(&self) -> Vec<String> {
+        self.table.keys().map(|k| k.get_ref().to_string()).collect()
     }
 
     /// Report the keys that nobody asked for. Called when all known keys have been read.

@@ -2,10 +2,10 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use super::plan::{ElementSite, ExtractionPlan};
+use super::plan::ElementSite;
 use super::sites::Scale;
 use crate::error::{Error, Result};
-use crate::gds::{Cell, Layout, Rect, Selection, Shape, Transform, Visitor};
+use crate::gds::{Cell, LayerNumber, Layout, Rect, Selection, Shape, Transform, Visitor};
 use crate::lattice::Lattice;
 use crate::progress::Progress;
 
@@ -44,9 +44,10 @@ struct Map {
 }
 
 /// Find the elements of a layout.
-pub(super) fn discover(
+pub(crate) fn discover(
     layout: &Layout,
-    plan: &ExtractionPlan,
+    from: &Selection,
+    layer: LayerNumber,
     scale: Scale,
     progress: &dyn Progress,
 ) -> Result<Vec<ElementSite>> {
@@ -57,9 +58,8 @@ pub(super) fn discover(
         guesses: Vec::new(),
     };
     let selection = Selection {
-        top: plan.top.clone(),
-        layers: Some(vec![plan.pillar_layer]),
-        lenient: false,
+        layers: Some(vec![layer]),
+        ..from.clone()
     };
     layout.visit(&selection, &mut map, progress)?;
     let mut sites = Vec::new();
@@ -70,21 +70,13 @@ pub(super) fn discover(
     }
     if sites.is_empty() {
         return Err(Error::invalid(
-            format!(
-                "no element found on layer {} of {}",
-                plan.pillar_layer,
-                layout.path().display()
-            ),
+            format!("no element found on layer {} of {}", layer, layout.path().display()),
             "name the layer the pillars are on with --layer, or give the design",
         ));
     }
     if sites.len() > MOST_ELEMENTS {
         return Err(Error::invalid(
-            format!(
-                "{} separate groups of squares on layer {}",
-                sites.len(),
-                plan.pillar_layer
-            ),
+            format!("{} separate groups of squares on layer {}", sites.len(), layer),
             format!("up to {MOST_ELEMENTS} elements are read; name the cell of one with --top"),
         ));
     }

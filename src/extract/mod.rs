@@ -16,11 +16,13 @@ pub use plan::{ElementSite, Elements, ExtractedElement, Extraction, ExtractionPl
 pub use survey::{LayerSummary, Survey, TextSummary};
 
 use crate::error::{Error, Result};
-use crate::gds::{Layout, Selection};
-use crate::lattice::WidthMap;
+use crate::gds::Layout;
 use crate::progress::Progress;
 use pillars::Pillars;
-use sites::{Scale, Sites};
+
+pub(crate) use discover::discover;
+pub(crate) use pillars::Filler;
+pub(crate) use sites::Scale;
 
 /// Sites of all elements together: 5 x 5 lenses of 1 mm have 204 million.
 const MOST_SITES: u64 = 1 << 28;
@@ -32,14 +34,11 @@ const MOST_SITES: u64 = 1 << 28;
 /// out of all proportion, or if the file cannot be read.
 pub fn extract(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) -> Result<Extraction> {
     let scale = Scale::of(layout)?;
-    let selection = Selection {
-        top: plan.top.clone(),
-        ..Selection::default()
-    };
+    let selection = plan.selection();
     let roots = layout.roots(&selection)?;
     let sites = match &plan.elements {
         Elements::Given(sites) => sites.clone(),
-        Elements::Discover => discover::discover(layout, plan, scale, progress)?,
+        Elements::Discover => discover(layout, &plan.selection(), plan.pillar_layer, scale, progress)?,
     };
     let total: u64 = sites.iter().map(|s| (s.lattice.sites() as u64).pow(2)).sum();
     if total > MOST_SITES {
@@ -48,22 +47,7 @@ pub fn extract(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) 
             format!("up to {MOST_SITES} sites are held; read part of the layout with --top"),
         ));
     }
-    let mut elements: Vec<ExtractedElement> = sites
-        .iter()
-        .map(|site| ExtractedElement {
-            site: site.clone(),
-            widths: WidthMap::empty(site.lattice),
-        })
-        .collect();
-    let index = Sites::new(&sites, scale);
-    let mut pillars = Pillars::new(plan, scale, index, &mut elements);
+    let mut pillars = Pillars::new(plan, sites, scale);
     layout.visit(&selection, &mut pillars, progress)?;
-    let (oddities, survey, pillars) = pillars.finish();
-    Ok(Extraction {
-        top: layout.cells()[roots[0]].name.clone(),
-        elements,
-        pillars,
-        oddities,
-        survey,
-    })
+    Ok(pillars.finish(layout.cells()[roots[0]].name.clone()))
 }

@@ -1,55 +1,49 @@
 //! The visitor that fills the width maps.
 
 use super::oddity::{Oddities, Oddity, Why};
-use super::plan::{ExtractedElement, ExtractionPlan};
+use super::plan::{ElementSite, ExtractedElement, Extraction, ExtractionPlan};
 use super::sites::{Scale, Sites, Standing};
-use super::survey::{Survey, Surveyor};
+use super::survey::Surveyor;
 use crate::error::Result;
 use crate::gds::{Cell, LayerNumber, Point, Rect, Shape, Text, Transform, Visitor, rectangle_of, simplified};
+use crate::lattice::WidthMap;
 
-/// Fills width maps from the shapes of a layout.
-pub(super) struct Pillars<'a> {
-    layer: LayerNumber,
-    listed: usize,
+/// Puts squares on the sites of elements.
+pub(crate) struct Filler {
     scale: Scale,
     sites: Sites,
-    elements: &'a mut [ExtractedElement],
+    pub elements: Vec<ExtractedElement>,
     /// Element that each placement of the current cell met last.
     guesses: Vec<u32>,
-    oddities: Oddities,
-    surveyor: Surveyor,
-    pillars: u64,
+    pub pillars: u64,
 }
 
-impl<'a> Pillars<'a> {
-    pub fn new(plan: &ExtractionPlan, scale: Scale, sites: Sites, elements: &'a mut [ExtractedElement]) -> Self {
+impl Filler {
+    pub fn new(sites: Vec<ElementSite>, scale: Scale) -> Self {
+        let index = Sites::new(&sites, scale);
+        let empty = |site: ElementSite| ExtractedElement {
+            widths: WidthMap::empty(site.lattice),
+            site,
+        };
         Self {
-            layer: plan.pillar_layer,
-            listed: plan.listed,
             scale,
-            sites,
-            elements,
+            sites: index,
+            elements: sites.into_iter().map(empty).collect(),
             guesses: Vec::new(),
-            oddities: Oddities::default(),
-            surveyor: Surveyor::default(),
             pillars: 0,
         }
     }
 
-    pub fn finish(self) -> (Oddities, Survey, u64) {
-        (self.oddities, self.surveyor.finish(self.scale), self.pillars)
+    /// A cell with so many placements begins.
+    pub fn begin(&mut self, placements: usize) {
+        self.guesses.clear();
+        self.guesses.resize(placements, 0);
     }
 
-    /// An upright rectangle of the layout.
+    /// Put an upright rectangle of the layout on its site if `takes` its width in database units, and say
+    /// whether it was taken, or why it has no site.
     #[inline]
-    fn rectangle(&mut self, r: &Rect, placement: usize, offset: u64) {
-        if let Err(why) = self.pillar(r, placement) {
-            self.odd(why, r, offset);
-        }
-    }
-
-    #[inline]
-    fn pillar(&mut self, r: &Rect, placement: usize) -> Result<(), Why> {
+    pub fn put(&mut self, r: &Rect, placement: usize, takes: impl Fn(i64) -> bool) -> Result<bool, Why> {
         if !self.scale.reaches(r) {
             return Err(Why::OutsideElements);
         }
@@ -66,13 +60,83 @@ impl<'a> Pillars<'a> {
         if width_nm > self.sites.pitch_nm(element) || width_nm > i64::from(u16::MAX) {
             return Err(Why::TooWide);
         }
+        if !takes(r.width()) {
+            return Ok(false);
+        }
         let place = &mut self.elements[element as usize].widths.width_nm[[row, column]];
         if *place != 0 {
             return Err(Why::DuplicateSite);
         }
         *place = width_nm as u16;
         self.pillars += 1;
-        Ok(())
+        Ok(true)
+    }
+}
+
+impl Filler {
+    /// Of a square and the one that is on its site already, leave the wider there; the other, as a
+    /// rectangle about the same site. Both have even widths.
+    pub fn keep_wider(&mut self, r: &Rect, placement: usize) -> Rect {
+        let Standing::Site(element, row, column) = self.sites.stand(r, &mut self.guesses[placement]) else {
+            return *r;
+        };
+        let Some(width_nm) = self.scale.whole_nm(r.width()) else {
+            return *r;
+        };
+        let place = &mut self.elements[element as usize].widths.width_nm[[row, column]];
+        let there = i64::from(*place);
+        if width_nm <= there {
+            return *r;
+        }
+        *place = width_nm as u16;
+        let less = r.width() - there * r.width() / width_nm;
+        Rect {
+            x0: r.x0 + less / 2,
+            y0: r.y0 + less / 2,
+            x1: r.x1 - less / 2,
+            y1: r.y1 - less / 2,
+        }
+    }
+}
+
+/// Fills width maps from the shapes of a layout, and lists what is no pillar.
+pub(super) struct Pillars {
+    layer: LayerNumber,
+    listed: usize,
+    scale: Scale,
+    filler: Filler,
+    oddities: Oddities,
+    surveyor: Surveyor,
+}
+
+impl Pillars {
+    pub fn new(plan: &ExtractionPlan, sites: Vec<ElementSite>, scale: Scale) -> Self {
+        Self {
+            layer: plan.pillar_layer,
+            listed: plan.listed,
+            scale,
+            filler: Filler::new(sites, scale),
+            oddities: Oddities::default(),
+            surveyor: Surveyor::default(),
+        }
+    }
+
+    pub fn finish(self, top: String) -> Extraction {
+        Extraction {
+            top,
+            elements: self.filler.elements,
+            pillars: self.filler.pillars,
+            oddities: self.oddities,
+            survey: self.surveyor.finish(self.scale),
+        }
+    }
+
+    /// An upright rectangle of the layout.
+    #[inline]
+    fn rectangle(&mut self, r: &Rect, placement: usize, offset: u64) {
+        if let Err(why) = self.filler.put(r, placement, |_| true) {
+            self.odd(why, r, offset);
+        }
     }
 
     #[cold]
@@ -101,11 +165,10 @@ impl<'a> Pillars<'a> {
     }
 }
 
-impl Visitor for Pillars<'_> {
+impl Visitor for Pillars {
     fn cell(&mut self, _cell: &Cell, placements: &[Transform]) -> Result<()> {
         self.surveyor.begin(placements);
-        self.guesses.clear();
-        self.guesses.resize(placements.len(), 0);
+        self.filler.begin(placements.len());
         Ok(())
     }
 

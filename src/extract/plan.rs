@@ -2,7 +2,7 @@
 
 use super::oddity::Oddities;
 use super::survey::Survey;
-use crate::gds::LayerNumber;
+use crate::gds::{LayerNumber, Selection};
 use crate::lattice::{Lattice, WidthMap};
 
 /// Where an element is and which lattice its pillars should stand on.
@@ -45,6 +45,14 @@ impl ExtractionPlan {
             elements: Elements::Given(elements),
             top: None,
             listed: 1000,
+        }
+    }
+
+    /// What of the layout is visited.
+    pub(super) fn selection(&self) -> Selection {
+        Selection {
+            top: self.top.clone(),
+            ..Selection::default()
         }
     }
 

@@ -8,7 +8,7 @@ use crate::gds::{Layout, Rect};
 
 /// Database unit as `num / den` nanometres: lengths are compared as `database units * num` and `nm * den`.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Scale {
+pub(crate) struct Scale {
     pub num: i64,
     pub den: i64,
 }

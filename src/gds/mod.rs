@@ -30,6 +30,7 @@ mod walk;
 pub use cell::{Cell, Child, LayerTally};
 pub use layout::{Faulty, Layout};
 pub use limits::ReadLimits;
-pub use shape::{LayerNumber, Point, Rect, Shape, ShapeKind, Text, rectangle_of, simplified};
+pub use shape::{LayerNumber, Point, Rect, Shape, ShapeKind, Text};
+pub(crate) use shape::{rectangle_of, simplified};
 pub use transform::Transform;
 pub use visit::{Selection, Visitor};

@@ -1,0 +1,100 @@
+//! `metalith check`: design rules for a build server.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use metalith::drc::{self, CheckInput, Date, Deck, DrcReport, Waivers};
+use metalith::{Design, Layout, ReadLimits, Result, WholeFile};
+
+use super::{Outcome, Terminal};
+
+/// Check a layout against design rules.
+#[derive(Args)]
+#[command(
+    after_help = "Exit codes: 0 clean or all waived, 1 violations, 2 bad input, 3 a rule did not run.\n\
+    Example:\n  metalith check out/mini_3x3/mini_3x3_pillars.gds --design designs/mini_3x3.toml --sarif check.sarif"
+)]
+pub struct CheckArgs {
+    /// The layout, in any hierarchy, by any tool.
+    layout: PathBuf,
+
+    /// The rules; those of the program (rules/sin_pillars.toml) if left out.
+    #[arg(long, value_name = "RULES.toml")]
+    rules: Option<PathBuf>,
+
+    /// A further layout on the same glass, such as the pillars under the apertures that are checked.
+    #[arg(long, value_name = "FILE.gds")]
+    with: Vec<PathBuf>,
+
+    /// The design that the layout should hold; puts the rules in force that compare with it.
+    #[arg(long, value_name = "DESIGN.toml")]
+    design: Option<PathBuf>,
+
+    /// Violations that have been accepted.
+    #[arg(long, value_name = "WAIVERS.toml")]
+    waivers: Option<PathBuf>,
+
+    /// Most markers that are kept for each rule; all violations are counted.
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    markers: usize,
+
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+
+    /// Write a report database for KLayout's marker browser.
+    #[arg(long, value_name = "FILE.lyrdb")]
+    lyrdb: Option<PathBuf>,
+
+    /// Write the result for build servers that read JUnit.
+    #[arg(long, value_name = "FILE.xml")]
+    junit: Option<PathBuf>,
+
+    /// Write the result as SARIF 2.1.0.
+    #[arg(long, value_name = "FILE.sarif")]
+    sarif: Option<PathBuf>,
+}
+
+pub fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
+    let deck = args.rules.as_deref().map_or_else(|| Ok(Deck::standard()), Deck::read)?;
+    let waivers = args.waivers.as_deref().map(Waivers::read).transpose()?;
+    let design = args.design.as_deref().map(Design::read).transpose()?;
+    terminal.stop_on_interrupt();
+    let open = |path: &PathBuf| Layout::open_with(path, ReadLimits::default(), terminal);
+    let layout = open(&args.layout)?;
+    let with = args.with.iter().map(open).collect::<Result<Vec<_>>>()?;
+    let input = CheckInput {
+        with: with.iter().collect(),
+        design: design.as_ref(),
+        waivers: waivers.as_ref(),
+        today: Date::today(),
+        markers: args.markers,
+    };
+    let report = drc::check(&layout, &deck, &input, terminal)?;
+    terminal.clear();
+    type Form = fn(&DrcReport) -> String;
+    let files: [(&Option<PathBuf>, Form); 3] = [
+        (&args.lyrdb, drc::lyrdb),
+        (&args.junit, drc::junit),
+        (&args.sarif, drc::sarif),
+    ];
+    for (path, form) in files {
+        if let Some(path) = path {
+            write(path, &form(&report))?;
+        }
+    }
+    if args.json {
+        println!("{:#}", serde_json::to_value(&report).expect("a report is plain data"));
+    } else {
+        print!("{}", drc::text(&report));
+    }
+    Ok(match report.exit_code() {
+        0 => Outcome::Fine,
+        1 => Outcome::OutsideLimits,
+        _ => Outcome::NotDone,
+    })
+}
+
+fn write(path: &Path, text: &str) -> Result<()> {
+    WholeFile::write(path, text.as_bytes())
+}

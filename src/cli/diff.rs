@@ -1,0 +1,71 @@
+//! `metalith diff`: what is different between two layouts.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use metalith::diff::{self, DiffPlan};
+use metalith::{Error, LayerNumber, Layout, ReadLimits, Result};
+
+use super::{Outcome, Terminal};
+
+/// Tell two layouts apart: by geometry, whatever their hierarchy.
+#[derive(Args)]
+#[command(after_help = "Exit codes: 0 same geometry, 1 different, 2 bad input.\n\
+    Example:\n  metalith diff golden/lens.gds out/lens_pillars.gds --report diff.html")]
+pub struct DiffArgs {
+    /// The first layout.
+    a: PathBuf,
+
+    /// The second layout.
+    b: PathBuf,
+
+    /// Layer that the pillars are on.
+    #[arg(long, value_name = "LAYER/DATATYPE", default_value = "1/0")]
+    layer: String,
+
+    /// Most changes that are listed; all are counted.
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    listed: usize,
+
+    /// Write a page with a picture of where the changes are.
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &DiffArgs, terminal: &Terminal) -> Result<Outcome> {
+    let numbers: Option<Vec<u16>> = args.layer.split('/').map(|n| n.parse().ok()).collect();
+    let Some(&[layer, datatype]) = numbers.as_deref() else {
+        return Err(Error::invalid(
+            format!("\"{}\" is not a layer", args.layer),
+            "write layer and datatype as 1/0",
+        ));
+    };
+    terminal.stop_on_interrupt();
+    let open = |path: &PathBuf| Layout::open_with(path, ReadLimits::default(), terminal);
+    let plan = DiffPlan {
+        pillar_layer: LayerNumber::new(layer, datatype),
+        listed: args.listed,
+    };
+    let found = diff::diff(&open(&args.a)?, &open(&args.b)?, &plan, terminal)?;
+    terminal.clear();
+    if let Some(path) = &args.report {
+        diff::page(&found).write(path)?;
+    }
+    if args.json {
+        println!(
+            "{:#}",
+            serde_json::to_value(&found).expect("a comparison is plain data")
+        );
+    } else {
+        print!("{}", diff::text(&found));
+    }
+    Ok(if found.same_geometry {
+        Outcome::Fine
+    } else {
+        Outcome::OutsideLimits
+    })
+}
