@@ -70,7 +70,7 @@ mod tests {
     fn lattices_grow_together() {
         let site = |x, sites| ElementSite {
             name: "e".into(),
-            centre_nm: [x, 0],
+            centre_nm: [x, x],
             lattice: Lattice::new(350, sites).unwrap(),
         };
         let mut known = vec![site(0, 10)];

@@ -219,7 +219,7 @@ mod tests {
         for reach in [0, 5, 60] {
             let boxes: Vec<[i32; 4]> = (0..400)
                 .map(|_| {
-                    let (x, y) = (rng.random_range(-3000..3000), rng.random_range(-3000..3000));
+                    let (x, y) = (rng.random_range(-900..900), rng.random_range(-900..900));
                     let size = 1 << rng.random_range(0..10);
                     [x, y, x + rng.random_range(1..=size), y + rng.random_range(1..=size)]
                 })
