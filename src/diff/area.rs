@@ -69,7 +69,7 @@ mod tests {
             .map(|(x, y)| Point::new(x, y))
             .to_vec();
         assert_eq!(
-            same_cover(&[l.clone()], &[rect(0, 0, 10, 5), rect(0, 3, 5, 10)]),
+            same_cover(std::slice::from_ref(&l), &[rect(0, 0, 10, 5), rect(0, 3, 5, 10)]),
             Some(true)
         );
         assert_eq!(same_cover(&[l], &whole), Some(false));

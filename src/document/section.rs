@@ -278,15 +278,6 @@ impl<'d, 't> Section<'d, 't> {
             .collect()
     }
 
-    /// All keys of this section that are tables, for maps whose keys the user names.
-    pub fn named_sections(&self) -> Vec<(String, Section<'d, 't>)> {
-        self.table
-            .iter()
-            .filter(|(_, v)| matches!(v.get_ref(), DeValue::Table(_)))
-            .filter_map(|(k, _)| Some((k.get_ref().to_string(), self.optional_section(k.get_ref())?)))
-            .collect()
-    }
-
     /// All keys of this section, for maps whose keys the user names.
     pub fn keys(&self) -> Vec<String> {
         self.table.keys().map(|k| k.get_ref().to_string()).collect()
