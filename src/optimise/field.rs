@@ -169,7 +169,8 @@ impl FieldProblem {
         self.merit(&fields)
     }
 
-    /// Merit at continuous phases [turns], widths not rounded, and its gradient [1/turn] if asked for.
+    /// Merit at continuous phases [turns], widths not rounded. Its gradient [1/turn] is added to
+    /// `gradient`.
     pub fn merit_of_phases(&self, turns: &[f64], gradient: Option<&mut [f64]>) -> f64 {
         let widths = turns.iter().map(|&t| self.mapping.width_nm(t)).collect::<Vec<_>>();
         let fields = self.fields(|ring| widths[ring]);
@@ -177,7 +178,7 @@ impl FieldProblem {
         if let Some(gradient) = gradient {
             let adjoint = self.field_gradient(&fields);
             for (ring, slope) in gradient.iter_mut().enumerate() {
-                *slope = self.adjoint(ring, widths[ring].0, &adjoint) * widths[ring].1;
+                *slope += self.adjoint(ring, widths[ring].0, &adjoint) * widths[ring].1;
             }
         }
         merit
