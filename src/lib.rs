@@ -102,7 +102,8 @@ pub use cell::{
 };
 pub use design::{
     ApertureSpec, ArraySpec, CellSpec, ChipSpec, Design, Element, FieldAngle, Hierarchy, Layer, Layers, LayoutSpec,
-    LensSpec, LimitSpec, MappingSpec, MarkSpec, VerifySpec,
+    LensSpec, LimitSpec, MappingSpec, MarkSpec, MeritSpec, OptimiseSpec, RobustSpec, SolverSpec, StartSpec, VerifySpec,
+    ViewSpec,
 };
 pub use document::{Fault, Faults};
 pub use error::{Error, Result};

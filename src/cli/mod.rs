@@ -5,6 +5,8 @@ mod check;
 mod diff;
 mod handoff;
 mod layout;
+mod optimize;
+mod photographs;
 mod psf;
 mod run;
 mod terminal;
@@ -53,6 +55,8 @@ struct Arguments {
 enum Command {
     Run(run::RunArgs),
     Layout(layout::LayoutArgs),
+    Optimize(optimize::OptimizeArgs),
+    Photographs(photographs::PhotographsArgs),
     Verify(verify::VerifyArgs),
     Psf(psf::PsfArgs),
     Handoff(handoff::HandoffArgs),
@@ -86,6 +90,8 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
     match command {
         Command::Run(args) => run::run(args, terminal),
         Command::Layout(args) => layout::run(args, terminal),
+        Command::Optimize(args) => optimize::run(args, terminal),
+        Command::Photographs(args) => photographs::run(args, terminal),
         Command::Handoff(args) => handoff::run(args, terminal),
         Command::Verify(args) => verify::run(args, terminal),
         Command::Psf(args) => psf::run(args, terminal),

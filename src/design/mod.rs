@@ -5,6 +5,7 @@ mod cell;
 mod layout;
 mod lens;
 mod mapping;
+mod optimise;
 mod verify;
 
 use std::path::{Path, PathBuf};
@@ -21,6 +22,7 @@ pub use cell::CellSpec;
 pub use layout::{ApertureSpec, ChipSpec, Hierarchy, Layer, Layers, LayoutSpec, MarkSpec};
 pub use lens::LensSpec;
 pub use mapping::MappingSpec;
+pub use optimise::{MeritSpec, OptimiseSpec, RobustSpec, SolverSpec, StartSpec, ViewSpec};
 pub use verify::{FieldAngle, LimitSpec, VerifySpec};
 
 /// Version of the format of design files that this program reads.
@@ -41,6 +43,8 @@ pub struct Design {
     pub mapping: MappingSpec,
     pub layout: LayoutSpec,
     pub verify: VerifySpec,
+    /// How `metalith optimize` finds the phase; decides nothing of the layout.
+    pub optimise: OptimiseSpec,
 }
 
 impl Design {
@@ -73,6 +77,7 @@ impl Design {
         let mapping = MappingSpec::read(&root.section("mapping"), &cell);
         let layout = LayoutSpec::read(root, &lens, &array);
         let verify = VerifySpec::read(&root.section("verify"));
+        let optimise = OptimiseSpec::read(root.optional_section("optimise").as_ref());
         Ok(Self {
             name,
             title,
@@ -83,6 +88,7 @@ impl Design {
             mapping,
             layout,
             verify,
+            optimise,
         })
     }
 

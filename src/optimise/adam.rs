@@ -56,8 +56,8 @@ impl Adam {
     }
 
     /// Go on from a checkpoint: the same result as if never interrupted.
-    pub fn resume(mut self, step: u32, mean: Vec<f64>, square: Vec<f64>) -> Self {
-        (self.step, self.mean, self.square) = (step, mean, square);
+    pub fn resume(mut self, step: u32, turns: Vec<f64>, mean: Vec<f64>, square: Vec<f64>) -> Self {
+        (self.step, self.turns, self.mean, self.square) = (step, turns, mean, square);
         self
     }
 

@@ -24,7 +24,7 @@ pub(crate) struct Imaging<'p> {
 
 /// Transfer function at the frequencies (i, j) / window, i and j from 0 to half the pixels: the others
 /// follow, H(-i, j) = conj H(i, j) since the PSF is real, and H(i, -j) = H(i, j) since it is even in y.
-pub(crate) type Transfer = Vec<Complex32>;
+pub type Transfer = Vec<Complex32>;
 
 impl<'p> Imaging<'p> {
     pub fn new(pupil: &'p Pupil, window: Window) -> Self {
@@ -64,11 +64,10 @@ impl<'p> Imaging<'p> {
         let mut along_y = vec![Complex32::default(); modes * n];
         let mut column = vec![Complex32::default(); n];
         for x in (0..n).step_by(2) {
-            for y in 0..half {
-                let v = self.pupil.weight[y];
-                let a = self.field[x * half + y].norm_sqr() * self.weight_x(x) * v;
-                let b = self.field[(x + 1) * half + y].norm_sqr() * self.weight_x(x + 1) * v;
-                column[y] = Complex32::new(a, b);
+            let (field_a, field_b) = (&self.field[x * half..], &self.field[(x + 1) * half..]);
+            let (v_a, v_b) = (self.weight_x(x), self.weight_x(x + 1));
+            for (y, (entry, v)) in column.iter_mut().zip(&self.pupil.weight).enumerate() {
+                *entry = Complex32::new(field_a[y].norm_sqr() * v_a, field_b[y].norm_sqr() * v_b) * v;
             }
             mirror(&mut column);
             self.forward.process_with_scratch(&mut column, &mut self.scratch);
@@ -116,10 +115,9 @@ impl<'p> Imaging<'p> {
             mirror(&mut column);
             self.forward.process_with_scratch(&mut column, &mut self.scratch);
             let (v_a, v_b) = (self.weight_x(x), self.weight_x(x + 1));
-            for y in 0..half {
-                let v = self.pupil.weight[y];
-                self.field[x * half + y] *= column[y].re * v_a * v;
-                self.field[(x + 1) * half + y] *= column[y].im * v_b * v;
+            for (y, (slope, v)) in column.iter().zip(&self.pupil.weight).enumerate() {
+                self.field[x * half + y] *= slope.re * v_a * v;
+                self.field[(x + 1) * half + y] *= slope.im * v_b * v;
             }
         }
         self.propagate_back(g_re, g_im);
@@ -127,6 +125,7 @@ impl<'p> Imaging<'p> {
 
     /// Intensity at each sample, `[x][y]` with y from 0 to half the size, x from the middle of the window on
     /// and around its end. Their sum over all y is the share of the incident power.
+    #[cfg(test)]
     pub fn intensity(&mut self, t_re: &[f32], t_im: &[f32]) -> Vec<f32> {
         self.propagate(t_re, t_im);
         let (n, half) = (self.pupil.size, self.pupil.size / 2 + 1);

@@ -1,6 +1,6 @@
 //! Phase over the radius of the lens.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
@@ -48,6 +48,16 @@ impl RadialPhase {
             radius_um: Vec::new(),
             phase_rad: Vec::new(),
         }
+    }
+
+    /// Read a table for a lens of this radius.
+    ///
+    /// # Errors
+    /// If the file is not a table of `r_um, phase_rad` that covers the lens.
+    pub fn read_table(file: &Path, interpolation: Interpolation, lens_radius_um: f64) -> Result<Self> {
+        let mut table = Self::table(file.to_owned(), interpolation);
+        table.load(lens_radius_um)?;
+        Ok(table)
     }
 
     /// Load the table, if this is one, for a lens of this radius.

@@ -1,0 +1,290 @@
+//! `metalith optimize`: the radial phase that all elements share.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use metalith::optimise::{
+    Checkpoint, Deconvolution, Findings, Judged, Optimised, OverWavelength, Task, cells_off_height, mean_and_deviation,
+    views, wavelengths, write_phase_table,
+};
+use metalith::report::sig;
+use metalith::{CellModel, Design, Fidelity, Result, RigorousCell, cache_folder, cell_models};
+
+use super::{Outcome, Terminal};
+
+/// Find the phase of every ring that makes the lens work over the whole band, and report what was gained.
+#[derive(Args)]
+#[command(
+    after_help = "The section [optimise] of the design says what is optimised, for how long, and with which cell.\n\
+    Ctrl-C keeps the best so far; the same command goes on where it stopped.\n\n\
+    Example:\n  metalith optimize designs/broadband_3x3.toml --out out/optimised"
+)]
+pub struct OptimizeArgs {
+    /// The design file.
+    design: PathBuf,
+
+    /// Folder for `report.html`, `report.json` and the layout that is read back; `out/NAME/optimize` if left
+    /// out.
+    #[arg(long, short, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+
+    /// Where the phase goes; `phase.csv` in the folder if left out.
+    #[arg(long, value_name = "FILE")]
+    phase: Option<PathBuf>,
+
+    /// Begin anew, whatever an interrupted run has left.
+    #[arg(long)]
+    fresh: bool,
+
+    /// Stop when the phase is written: no report.
+    #[arg(long)]
+    no_report: bool,
+
+    /// Print `report.json` to standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Cells that a design is optimised and judged with.
+struct Cells {
+    /// None if it is the rigorous one.
+    polynomial: Option<Box<dyn CellModel>>,
+    rigorous: RigorousCell,
+    off_height: Vec<RigorousCell>,
+}
+
+impl Cells {
+    fn of(design: &Design, terminal: &Terminal) -> Result<Self> {
+        let cache = cache_folder();
+        let (rigorous, _) = RigorousCell::of_design(design, cache.as_deref(), terminal)?;
+        let own = design.optimise.fidelity;
+        let off_height = match &design.optimise.robust {
+            Some(robust) if own == Fidelity::Rigorous && robust.height > 0.0 => {
+                cells_off_height(&RigorousCell::table_spec(design)?, robust, cache.as_deref(), terminal)?
+            }
+            _ => Vec::new(),
+        };
+        let polynomial = match own {
+            Fidelity::Rigorous => None,
+            Fidelity::Published | Fidelity::Fitted => Some(cell_models(design, &[own])?.remove(0)),
+        };
+        Ok(Self {
+            polynomial,
+            rigorous,
+            off_height,
+        })
+    }
+
+    fn own(&self) -> &dyn CellModel {
+        self.polynomial.as_deref().unwrap_or(&self.rigorous)
+    }
+
+    fn all(&self) -> Vec<&dyn CellModel> {
+        let off_height = self.off_height.iter().map(|c| c as &dyn CellModel);
+        std::iter::once(self.own()).chain(off_height).collect()
+    }
+}
+
+pub fn run(args: &OptimizeArgs, terminal: &Terminal) -> Result<Outcome> {
+    let design = Design::read(&args.design)?;
+    terminal.stop_on_interrupt();
+    let folder = args
+        .out
+        .clone()
+        .unwrap_or_else(|| PathBuf::from("out").join(&design.name).join("optimize"));
+    let phase = args.phase.clone().unwrap_or_else(|| folder.join("phase.csv"));
+    let kept = folder.join("checkpoint.json");
+    let task = Task::of(&design)?;
+    let cells = Cells::of(&design, terminal)?;
+    let checkpoint = if args.fresh {
+        Checkpoint::begin(&design)
+    } else {
+        Checkpoint::load(&kept, &design)?
+    };
+    if checkpoint.begun() {
+        terminal.say(&format!("going on from {}", kept.display()));
+    }
+    let found = task.solve(&cells.all(), checkpoint, terminal)?;
+    terminal.clear();
+    write_phase_table(&phase, &task.lens.rings, &found.turns, &remarks(args, &design))?;
+    if let Some(checkpoint) = &found.interrupted {
+        checkpoint.save(&kept)?;
+        terminal.say(&format!("interrupted; the best so far is in {}", phase.display()));
+        terminal.say("the same command goes on from here");
+        return Ok(Outcome::NotDone);
+    }
+    // Only of use to an interrupted run; there may be none.
+    let _ = std::fs::remove_file(&kept);
+    println!("phase: {}", phase.display());
+    if args.no_report {
+        return Ok(Outcome::Fine);
+    }
+    let findings = findings(args, &design, &task, &cells, &found, &phase, &folder, terminal)?;
+    terminal.clear();
+    findings.write(&folder)?;
+    if args.json {
+        println!(
+            "{}",
+            serde_json::to_string_pretty(&findings).expect("plain data serialises")
+        );
+    } else {
+        summary(&findings);
+        println!("report: {}", folder.join("report.html").display());
+    }
+    Ok(if findings.limit_kept() {
+        Outcome::Fine
+    } else {
+        Outcome::OutsideLimits
+    })
+}
+
+fn remarks(args: &OptimizeArgs, design: &Design) -> Vec<String> {
+    vec![
+        format!(
+            "Phase of each ring of {}, in the middle of the ring; nearest row.",
+            design.name
+        ),
+        format!("Made by: {}", command(args)),
+    ]
+}
+
+fn command(args: &OptimizeArgs) -> String {
+    let mut words = format!("metalith optimize {}", args.design.display());
+    if let Some(phase) = &args.phase {
+        words.push_str(&format!(" --phase {}", phase.display()));
+    }
+    words
+}
+
+#[allow(clippy::too_many_arguments)] // all that a report is about
+fn findings(
+    args: &OptimizeArgs,
+    design: &Design,
+    task: &Task,
+    cells: &Cells,
+    found: &Optimised,
+    phase: &Path,
+    folder: &Path,
+    terminal: &Terminal,
+) -> Result<Findings> {
+    let judge = |turns: &[f64]| -> Result<Vec<Judged>> {
+        Ok(vec![
+            task.judge_rings(turns, cells.own())?,
+            task.judge_rings(turns, &cells.rigorous)?,
+        ])
+    };
+    let (before, mut after) = (judge(&task.reference_turns)?, judge(&found.turns)?);
+    let layout = folder.join("lens.gds");
+    after.push(task.judge_layout(design, phase, &layout, &cells.rigorous, terminal)?);
+    let limits = [0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5];
+    let over_limit = task.merit_over_limit(&cells.all(), &found.turns, &limits, terminal)?;
+    let reference_widths = task.widths_nm(&task.reference_turns);
+    let spectrum = OverWavelength {
+        lens: &task.lens,
+        cell: &cells.rigorous,
+        widths_nm: &[&reference_widths, &found.widths_nm],
+    };
+    let band_nm = (task.spec.band_um.0 * 1e3, task.spec.band_um.1 * 1e3);
+    let spread = |count: f64| wavelengths(band_nm.0, band_nm.1, (band_nm.1 - band_nm.0) / count);
+    let (fine, coarse) = (spread(120.0), spread(15.0));
+    let radii = (0..80).map(|i| 0.5 * f64::from(i)).collect::<Vec<_>>();
+    terminal_step(terminal, "pictures over wavelength");
+    let psf = spectrum.psf(&radii, &fine)?;
+    let window = views(&task.spec, &task.spec.views, 0.0).window;
+    let mtf = spectrum.mtf(window, &coarse)?;
+    let with_errors = match &task.spec.robust {
+        Some(robust) => Some((
+            task.judge_errors(&task.reference_turns, robust, &cells.all(), DRAWS)?,
+            task.judge_errors(&found.turns, robust, &cells.all(), DRAWS)?,
+        )),
+        None => None,
+    };
+    Ok(Findings {
+        design: format!("{}: {}", design.name, design.title),
+        command: command(args),
+        start: found.start.into(),
+        merit: found.merit,
+        step_limit_turns: task.limit().turns(),
+        before,
+        after,
+        merit_over_limit: over_limit,
+        expected_psnr_db: expected_images(task, cells, &reference_widths, &found.widths_nm, terminal)?,
+        with_errors,
+        history: found.history.clone(),
+        rings: (0..task.lens.rings.len())
+            .map(|k| {
+                (
+                    task.lens.rings.middle_um(k),
+                    task.reference_turns[k],
+                    found.turns[k],
+                    found.widths_nm[k],
+                )
+            })
+            .collect(),
+        psf: (fine, 39.5, psf),
+        mtf: (coarse, mtf),
+    })
+}
+
+/// Errors of fabrication that a robust design is judged with.
+const DRAWS: usize = 64;
+
+fn terminal_step(terminal: &Terminal, what: &str) {
+    use metalith::Progress;
+    terminal.begin(what, 1);
+}
+
+/// Expected PSNR at wavelengths half a step off those optimised on, for designs that ask for it.
+fn expected_images(
+    task: &Task,
+    cells: &Cells,
+    before: &[u16],
+    after: &[u16],
+    terminal: &Terminal,
+) -> Result<Vec<(f64, f64, f64)>> {
+    if task.spec.merit.deconvolution == 0.0 {
+        return Ok(Vec::new());
+    }
+    let between = views(&task.spec, &task.spec.views, 0.5);
+    let memory = task.spec.memory_mb << 20;
+    let images = Deconvolution::new(&task.lens, between, cells.own(), task.mapping.clone(), memory, terminal)?;
+    let of = |widths: &[u16]| {
+        images
+            .expected_psnr(&widths.iter().map(|&w| f64::from(w)).collect::<Vec<_>>())
+            .1
+    };
+    let angles = task.spec.views.angles_deg.iter().copied();
+    Ok(angles
+        .zip(of(before))
+        .zip(of(after))
+        .map(|((a, b), c)| (a, b, c))
+        .collect())
+}
+
+fn summary(findings: &Findings) {
+    for (name, list) in [("before", &findings.before), ("after", &findings.after)] {
+        for judged in list {
+            println!(
+                "{name}, {} with the {} cell: Strehl {} (geometric mean), {} smallest, step {:.3} turns",
+                judged.source,
+                judged.fidelity,
+                sig(judged.geometric_mean, 3),
+                sig(judged.smallest, 3),
+                judged.largest_step_turns,
+            );
+        }
+    }
+    for (angle, before, after) in &findings.expected_psnr_db {
+        println!("expected PSNR at {angle} degrees: {before:.2} dB before, {after:.2} dB after");
+    }
+    if let Some((before, after)) = &findings.with_errors {
+        for (name, values) in [("before", before), ("after", after)] {
+            let (mean, deviation) = mean_and_deviation(values);
+            println!(
+                "{name}, with errors of fabrication: Strehl {} +- {}",
+                sig(mean, 4),
+                sig(deviation, 2)
+            );
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! `metalith photographs`: real images through the lens of a design, for several phases of it.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use metalith::optimise::{Camera, Deconvolution, Start, StepLimit, Task, turns_of, views};
+use metalith::{
+    CellModel, Design, Error, Fidelity, Interpolation, RadialPhase, Result, RigorousCell, cache_folder, cell_models,
+};
+use ndarray::Array3;
+
+use super::verify::FidelityArg;
+use super::{Outcome, Terminal};
+
+/// Take photographs of images through a lens with each of several phases, restore them, and print how close
+/// they come, as a table in Markdown.
+///
+/// At each field angle of [optimise.views]; blue, green and red are thirds of the band, lit evenly; noise as
+/// in the merit `deconvolution`; restored by the Wiener filter of each colour's mean blur.
+#[derive(Args)]
+#[command(
+    after_help = "Example:\n  metalith photographs designs/imaging_3x3.toml images/*.png --phase log=designs/phases/broadband.csv"
+)]
+pub struct PhotographsArgs {
+    /// The design file: lens, cell, mapping, views.
+    design: PathBuf,
+
+    /// PNG images, 8 bits a colour.
+    #[arg(required = true)]
+    images: Vec<PathBuf>,
+
+    /// A phase to take them with: NAME=TABLE. A hyperbolic lens and a logarithmic asphere are always there.
+    #[arg(long, value_name = "NAME=FILE")]
+    phase: Vec<String>,
+
+    /// The cell that images are formed with.
+    #[arg(long, value_enum, default_value = "rigorous")]
+    fidelity: FidelityArg,
+}
+
+pub fn run(args: &PhotographsArgs, terminal: &Terminal) -> Result<Outcome> {
+    let design = Design::read(&args.design)?;
+    terminal.stop_on_interrupt();
+    let task = Task::of(&design)?;
+    let images = args
+        .images
+        .iter()
+        .map(|path| read_png(path))
+        .collect::<Result<Vec<_>>>()?;
+    let phases = phases(args, &task)?;
+    let fidelity = Fidelity::from(args.fidelity);
+    let cell: Box<dyn CellModel> = match fidelity {
+        // The table, which a run of many wavelengths repays.
+        Fidelity::Rigorous => Box::new(RigorousCell::of_design(&design, cache_folder().as_deref(), terminal)?.0),
+        Fidelity::Published | Fidelity::Fitted => cell_models(&design, &[fidelity])?.remove(0),
+    };
+    let between = views(&task.spec, &task.spec.views, 0.5);
+    let (window, scene) = (between.window, between.scene);
+    let memory = task.spec.memory_mb << 20;
+    let lens = Deconvolution::new(
+        &task.lens,
+        between,
+        cell.as_ref(),
+        task.mapping.clone(),
+        memory,
+        terminal,
+    )?;
+    terminal.clear();
+    let angles = &task.spec.views.angles_deg;
+    let at = angles.iter().map(|a| format!("{a}°")).collect::<Vec<_>>().join(" / ");
+    println!("| phase | PSNR [dB] at {at} | SSIM at {at} | mean PSNR | mean SSIM | expected PSNR |");
+    println!("| --- | --- | --- | --- | --- | --- |");
+    for (name, turns) in phases {
+        let widths = task.widths_nm(&turns).into_iter().map(f64::from).collect::<Vec<_>>();
+        let transfers = lens.transfers(&widths);
+        let mut means = Vec::new();
+        for at_angle in &transfers {
+            let camera = Camera::new(at_angle, window, scene);
+            let found = images
+                .iter()
+                .enumerate()
+                .map(|(i, image)| camera.photograph(image, i as u64).1)
+                .collect::<Vec<_>>();
+            let mean = |pick: fn(&metalith::optimise::Restored) -> f64| {
+                found.iter().map(pick).sum::<f64>() / found.len() as f64
+            };
+            means.push((mean(|f| f.psnr_db), mean(|f| f.ssim)));
+        }
+        let list = |values: Vec<String>| values.join(" / ");
+        let count = means.len() as f64;
+        println!(
+            "| {name} | {} | {} | {:.2} | {:.3} | {:.2} |",
+            list(means.iter().map(|m| format!("{:.2}", m.0)).collect()),
+            list(means.iter().map(|m| format!("{:.3}", m.1)).collect()),
+            means.iter().map(|m| m.0).sum::<f64>() / count,
+            means.iter().map(|m| m.1).sum::<f64>() / count,
+            lens.expected_psnr(&widths).0,
+        );
+    }
+    Ok(Outcome::Fine)
+}
+
+/// Names and phases [turns], all within the step limit of the design.
+fn phases(args: &PhotographsArgs, task: &Task) -> Result<Vec<(String, Vec<f64>)>> {
+    let band_um = task.spec.band_um;
+    let hyperbolic = Start::Hyperbolic {
+        wavelength_um: 0.5 * (band_um.0 + band_um.1),
+    };
+    let mut phases = vec![
+        ("hyperbolic".to_owned(), hyperbolic.turns(&task.lens, 0)),
+        (
+            "log-asphere".to_owned(),
+            Start::LogAsphere { band_um }.turns(&task.lens, 0),
+        ),
+    ];
+    for phase in &args.phase {
+        let (name, file) = phase
+            .split_once('=')
+            .ok_or_else(|| Error::invalid(format!("`{phase}` names no phase"), "write --phase NAME=FILE"))?;
+        let edge_um = task.lens.rings.middle_um(task.lens.rings.len() - 1);
+        let table = RadialPhase::read_table(Path::new(file), Interpolation::Nearest, edge_um)?;
+        phases.push((name.to_owned(), turns_of(&task.lens.rings, &table)));
+    }
+    let limit: StepLimit = task.limit();
+    for (_, turns) in &mut phases {
+        let chosen = limit.nearest_choices(&task.mapping, turns);
+        *turns = chosen.iter().map(|&c| task.mapping.choices()[c].turns).collect();
+    }
+    Ok(phases)
+}
+
+/// An image as `[row, column, colour]` from 0 to 1; grey ones get three equal colours.
+fn read_png(path: &Path) -> Result<Array3<f64>> {
+    /// Longest side that is read.
+    const LARGEST: u32 = 4096;
+    let fault = |what: String| Error::Table {
+        path: path.to_owned(),
+        line: None,
+        what,
+        hint: "give a PNG of 8 bits a colour, 32 to 4096 pixels a side".into(),
+    };
+    let file = File::open(path).map_err(|e| fault(e.to_string()))?;
+    let mut decoder = png::Decoder::new(BufReader::new(file));
+    decoder.set_transformations(png::Transformations::normalize_to_color8());
+    let mut reader = decoder.read_info().map_err(|e| fault(e.to_string()))?;
+    let (width, height) = (reader.info().width, reader.info().height);
+    if width.min(height) < 32 || width.max(height) > LARGEST {
+        return Err(fault(format!("an image of {width} by {height} pixels")));
+    }
+    let mut bytes = vec![
+        0;
+        reader
+            .output_buffer_size()
+            .ok_or_else(|| fault("the image is too large".into()))?
+    ];
+    let info = reader.next_frame(&mut bytes).map_err(|e| fault(e.to_string()))?;
+    let samples = info.color_type.samples();
+    Ok(Array3::from_shape_fn(
+        (height as usize, width as usize, 3),
+        |(y, x, c)| {
+            let colour = if samples < 3 { 0 } else { c };
+            f64::from(bytes[y * info.line_size + x * samples + colour]) / 255.0
+        },
+    ))
+}
