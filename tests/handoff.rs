@@ -23,6 +23,7 @@ fn options(out: &Path) -> HandoffOptions {
         // What is simulated is not the matter here.
         fidelity: Fidelity::Published,
         accuracy: Accuracy::Fast,
+        waivers: None,
     }
 }
 
@@ -97,6 +98,53 @@ fn a_received_folder_is_whole_or_it_is_said_what_is_wrong() {
     assert!(!verify_handoff(&received, &Silent).unwrap().seal_holds);
     fs::write(&path, "{").unwrap();
     assert!(matches!(verify_handoff(&received, &Silent), Err(Error::Table { .. })));
+}
+
+#[test]
+fn the_program_says_so_by_its_exit_code() {
+    let folder = tempfile::tempdir().unwrap();
+    let received = copy_of_shared(folder.path());
+    let verify = || {
+        let mut command = assert_cmd::Command::new(env!("CARGO_BIN_EXE_metalith"));
+        command.args(["handoff", "--verify"]).arg(&received);
+        command.assert()
+    };
+    verify()
+        .code(0)
+        .stdout(predicates::str::contains("whole and unaltered"));
+    fs::write(received.join("tone.svg"), "<svg/>").unwrap();
+    verify().code(1).stdout(predicates::str::contains("altered: tone.svg"));
+    fs::remove_file(received.join("manifest.json")).unwrap();
+    verify().code(2).stderr(predicates::str::contains("manifest.json"));
+}
+
+#[test]
+fn every_rule_of_both_decks_is_told_and_so_is_the_simulation() {
+    let numbers: serde_json::Value = serde_json::from_slice(&fs::read(shared().join("handoff.json")).unwrap()).unwrap();
+    let page = fs::read_to_string(shared().join("index.html")).unwrap();
+    for name in ["pillars", "apertures"] {
+        let report = fs::read(shared().join(format!("checks/{name}.json"))).unwrap();
+        let report: serde_json::Value = serde_json::from_slice(&report).unwrap();
+        let rules = report["rules"].as_array().unwrap();
+        assert!(rules.len() > 5);
+        for rule in rules {
+            assert!(page.contains(rule["id"].as_str().unwrap()), "{rule}");
+        }
+        assert!(
+            !report["layout"].as_str().unwrap().contains('/'),
+            "no path of this machine"
+        );
+    }
+    let checks = numbers["checks"].as_array().unwrap();
+    assert_eq!(checks.len(), 3);
+    for check in checks {
+        assert!(
+            ["pass", "fail", "not run"].contains(&check["verdict"].as_str().unwrap()),
+            "{check}"
+        );
+        assert!(shared().join(check["report"].as_str().unwrap()).exists());
+    }
+    assert!(shared().join("verification/report.json").exists());
 }
 
 #[cfg(unix)]
@@ -351,7 +399,9 @@ fn a_hand_off_never_replaces_what_it_did_not_make() {
 fn a_process_that_cannot_make_pillars_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let process = folder.path().join("wrong.toml");
-    let text = fs::read_to_string(PROCESS).unwrap();
+    // The decks of rules are named from the folder of the process file.
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/rules");
+    let text = fs::read_to_string(PROCESS).unwrap().replace("../rules", root);
     fs::write(&process, text.replace("\"lift_off\"", "\"direct_etch\"")).unwrap();
     let mut wrong = options(&folder.path().join("out"));
     wrong.process = process.clone();

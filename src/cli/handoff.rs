@@ -42,6 +42,10 @@ pub struct HandoffArgs {
     #[arg(long, value_enum, default_value = "rigorous")]
     fidelity: FidelityArg,
 
+    /// Violations of the design rules that have been accepted.
+    #[arg(long, value_name = "FILE")]
+    waivers: Option<PathBuf>,
+
     /// Print what came out as JSON.
     #[arg(long)]
     json: bool,
@@ -69,6 +73,7 @@ fn make(design: &Path, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcom
             .chain(std::env::args().skip(1))
             .collect::<Vec<_>>()
             .join(" "),
+        waivers: args.waivers.clone(),
         fidelity: args.fidelity.into(),
         accuracy: if args.fast { Accuracy::Fast } else { Accuracy::Accurate },
     };

@@ -11,9 +11,10 @@ use super::drawing::Rect;
 use super::manifest::{self, Manifest, entry_of, files_below};
 use super::matrix::{self, Block};
 use super::process::Process;
+use super::rules::RuleReports;
 use super::sites::{Cross, Site, crosses, sites};
 use super::structures::{Structure, Structures};
-use super::{fields, front, job, tables, zip};
+use super::{fields, front, job, rules, tables, zip};
 use crate::array::PillarArray;
 use crate::cell::{Fidelity, cell_models};
 use crate::design::Design;
@@ -40,6 +41,8 @@ pub struct HandoffOptions {
     pub fidelity: Fidelity,
     /// How closely the layout is simulated.
     pub accuracy: Accuracy,
+    /// Violations of the rules that have been accepted.
+    pub waivers: Option<PathBuf>,
 }
 
 /// What was handed over.
@@ -91,6 +94,8 @@ pub(super) struct Contents<'a> {
     pub sites: Vec<Site>,
     pub crosses: Vec<Cross>,
     pub checks: Vec<Check>,
+    /// What became of each rule, by layout.
+    pub rules: RuleReports,
     /// Path in the folder and what it is for.
     pub files: Vec<(String, String)>,
 }
@@ -311,12 +316,17 @@ fn fill(
         )?;
     }
 
-    for (source, name, purpose) in inputs(options, design) {
+    for (source, name, purpose) in inputs(options, design, process) {
         let target = list(format!("inputs/{name}"), purpose);
         let bytes = fs::read(&source).map_err(Error::io("read", &source))?;
         crate::file::WholeFile::write(&target, &bytes)?;
     }
-    let mut checks = Vec::new();
+    let (mut checks, rules) = rules::check(options, design, process, &pillars, &apertures, &at("checks"), progress)?;
+    for (name, _) in &rules {
+        for (kind, purpose) in rules::FILES {
+            list(format!("checks/{name}.{kind}"), purpose);
+        }
+    }
     let (check, made) = verification(options, design, &array, &pillars, &at("verification"), progress)?;
     for (name, purpose) in made {
         list(format!("verification/{name}"), purpose);
@@ -346,6 +356,7 @@ fn fill(
         sites,
         crosses,
         checks,
+        rules,
         files,
     };
     front::write(folder, &contents)?;
@@ -495,7 +506,7 @@ fn snapping(array: &PillarArray, process: &Process) -> Result<Vec<(Beam, f64)>> 
 }
 
 /// What the hand-off was made from: path, name in the folder, purpose.
-fn inputs(options: &HandoffOptions, design: &Design) -> Vec<(PathBuf, String, &'static str)> {
+fn inputs(options: &HandoffOptions, design: &Design, process: &Process) -> Vec<(PathBuf, String, &'static str)> {
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut inputs = vec![
         (
@@ -509,6 +520,20 @@ fn inputs(options: &HandoffOptions, design: &Design) -> Vec<(PathBuf, String, &'
             "the process values",
         ),
     ];
+    for rules in [&process.checks.pillar_rules, &process.checks.aperture_rules] {
+        inputs.push((
+            rules.clone(),
+            format!("rules_{}", name(rules)),
+            "rules that the layout was checked with",
+        ));
+    }
+    if let Some(waivers) = &options.waivers {
+        inputs.push((
+            waivers.clone(),
+            format!("waivers_{}", name(waivers)),
+            "violations that were accepted",
+        ));
+    }
     if let RadialPhase::Table { file, .. } = &design.lens.phase {
         inputs.push((file.clone(), name(file), "phase of the lens over its radius"));
     }

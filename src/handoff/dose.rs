@@ -142,7 +142,7 @@ mod tests {
 
     fn process() -> Process {
         let text = include_str!("../../processes/jbx6300_zep520a.toml");
-        Process::parse(Path::new("p.toml"), text).unwrap()
+        Process::parse(Path::new("processes/p.toml"), text).unwrap()
     }
 
     /// The known steps of this writer at 280 uC/cm2 and 50 MHz.

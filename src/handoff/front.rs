@@ -387,7 +387,7 @@ fn tests(page: &mut Page, c: &Contents<'_>) {
 fn metrology(page: &mut Page, c: &Contents<'_>) {
     page.section("Where to measure widths");
     page.paragraph(format!(
-        "Sites on the lenses have neighbours of nearly their own width, so that counting wrong by one does little harm. \
+        "Sites on the lenses are those whose neighbours are most like them, so that counting wrong by one does little harm. \
          Expected: drawn width within two standard deviations of {} nm. `metrology/cd_table.csv` has columns to fill in.",
         c.process.metrology.width_tolerance_nm
     ));
@@ -472,4 +472,25 @@ fn checks(page: &mut Page, c: &Contents<'_>) {
         ]);
     }
     page.table(table);
+    for (name, report) in &c.rules {
+        let mut table = Table::new([
+            Column::text("Rule"),
+            Column::text("What must hold"),
+            Column::text("Came out"),
+            Column::number("Violations", ""),
+            Column::number("Waived", ""),
+        ])
+        .caption(format!("Design rules of the {name}: {}", report.deck));
+        for rule in &report.rules {
+            table.row([
+                Cell::code(&rule.id),
+                rule.words.as_str().into(),
+                rule.status.word().into(),
+                rule.violations.into(),
+                rule.waived.into(),
+            ]);
+        }
+        page.table(table);
+        page.list(&report.warnings);
+    }
 }

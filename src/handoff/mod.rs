@@ -16,6 +16,7 @@ mod manifest;
 mod matrix;
 mod pictures;
 mod process;
+mod rules;
 mod sites;
 mod structures;
 mod tables;

@@ -1,6 +1,6 @@
 //! The process file: everything about a lab that a hand-off needs and a design does not know.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
@@ -26,6 +26,7 @@ pub struct Process {
     pub dose_matrix: DoseMatrixSpec,
     pub tests: TestSpec,
     pub metrology: MetrologySpec,
+    pub checks: CheckSpec,
     pub job: JobSpec,
 }
 
@@ -153,6 +154,15 @@ pub struct MetrologySpec {
     pub width_tolerance_nm: f64,
 }
 
+/// The decks of rules that layouts for this process must keep.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CheckSpec {
+    #[serde(skip)]
+    pub pillar_rules: PathBuf,
+    #[serde(skip)]
+    pub aperture_rules: PathBuf,
+}
+
 /// What the draft of the job says and staff must confirm.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct JobSpec {
@@ -187,6 +197,7 @@ impl Process {
                 dose_matrix: DoseMatrixSpec::read(&root.section("dose_matrix")),
                 tests: TestSpec::read(&root.section("tests")),
                 metrology: MetrologySpec::read(&root.section("metrology")),
+                checks: CheckSpec::read(&root.section("checks")),
                 job: JobSpec::read(&root.section("job")),
             }
         })
@@ -376,6 +387,17 @@ impl MetrologySpec {
     }
 }
 
+impl CheckSpec {
+    fn read(s: &Section<'_, '_>) -> Self {
+        let spec = Self {
+            pillar_rules: s.file("pillar_rules"),
+            aperture_rules: s.file("aperture_rules"),
+        };
+        s.finish();
+        spec
+    }
+}
+
 impl JobSpec {
     fn read(s: &Section<'_, '_>) -> Self {
         let spec = Self {
@@ -397,7 +419,7 @@ mod tests {
 
     #[test]
     fn the_shipped_process_is_read_and_exposes_pillars() {
-        let process = Process::parse(Path::new("p.toml"), SHIPPED).unwrap();
+        let process = Process::parse(Path::new("processes/p.toml"), SHIPPED).unwrap();
         assert_eq!(process.resist.dose_uc_cm2, 280.0);
         assert!(process.exposes_pillars());
     }
@@ -408,7 +430,9 @@ mod tests {
             .replace("tone = \"positive\"", "tone = \"possitive\"")
             .replace("field_used_um = 499.8", "field_used_um = 600")
             .replace("dose_uc_cm2 = 280", "dose = 280");
-        let error = Process::parse(Path::new("p.toml"), &text).unwrap_err().to_string();
+        let error = Process::parse(Path::new("processes/p.toml"), &text)
+            .unwrap_err()
+            .to_string();
         for said in [
             "possitive",
             "larger than the field",

@@ -257,6 +257,12 @@ impl From<Chart> for Figure {
 
 fn draw(series: &Series, colour: usize, x: &Fitted, y: &Fitted) -> Group {
     let place = |a: f64, b: f64| Some((x.place(a)?, y.place(b)?));
+    // Many points are a cloud: smaller, so that its grain can be seen.
+    let size = match series.points.len() {
+        0..120 => 3.6,
+        120..400 => 2.4,
+        _ => 1.5,
+    };
     let group = Group::new();
     match series.kind {
         Kind::Line => {
@@ -278,7 +284,7 @@ fn draw(series: &Series, colour: usize, x: &Fitted, y: &Fitted) -> Group {
                         &format!("whisker plain c{colour}"),
                     ));
             }
-            group.add(dot(px, py, colour))
+            group.add(dot(px, py, size, colour))
         }),
         Kind::Bars => series.points.iter().fold(group, |group, &[a, height, b]| {
             let (Some(left), Some(right), Some(top), Some(base)) =
@@ -330,9 +336,8 @@ fn thinned(points: &[Option<(f64, f64)>]) -> Vec<Option<(f64, f64)>> {
 }
 
 /// A mark of another shape for each colour.
-pub(super) fn dot(x: f64, y: f64, colour: usize) -> Group {
+fn dot(x: f64, y: f64, s: f64, colour: usize) -> Group {
     let class = format!("dot f{colour}");
-    let s = 3.6;
     let outline =
         |points: &[(f64, f64)]| -> Path { strokes(points.iter().map(|(a, b)| Some((x + s * a, y + s * b))), &class) };
     let group = Group::new();
@@ -354,7 +359,7 @@ fn swatch(kind: Kind, colour: usize, x: f64, y: f64) -> Group {
     let group = Group::new();
     match kind {
         Kind::Line => group.add(line(x, y, x + 26.0, y, &format!("line c{colour}"))),
-        Kind::Points => group.add(dot(x + 13.0, y, colour)),
+        Kind::Points => group.add(dot(x + 13.0, y, 3.6, colour)),
         Kind::Bars => group.add(rectangle(x + 5.0, y - 6.0, 16.0, 12.0, &format!("bar f{colour}"))),
         Kind::Band => group.add(rectangle(x, y - 6.0, 26.0, 12.0, &format!("band f{colour}"))),
     }

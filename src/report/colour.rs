@@ -5,12 +5,14 @@ pub const SERIES: usize = 7;
 
 /// From a share between 0 and 1 to a colour.
 ///
-/// Both maps are straight in lightness in the Oklab space (B. Ottosson, "A perceptual color space for
+/// The first and the last are straight in lightness in the Oklab space (B. Ottosson, "A perceptual color space for
 /// image processing", 2020), so that equal steps of the value look equally large, also in grey print.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColourMap {
     /// Dark violet through teal to light yellow, for what begins at nothing.
     Sequential,
+    /// Once round the hues at one lightness, for phases: both ends are the same colour.
+    Cyclic,
     /// Blue through near white to red-brown, for what departs from a middle (a share of one half).
     Diverging,
 }
@@ -21,6 +23,7 @@ impl ColourMap {
         let s = if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) };
         let (lightness, chroma, hue_deg) = match self {
             Self::Sequential => (0.20 + 0.74 * s, 0.10 + 0.07 * s, 300.0 - 192.0 * s),
+            Self::Cyclic => (0.72, 0.115, 360.0 * s),
             Self::Diverging => {
                 let d = 2.0 * s - 1.0;
                 let hue = if d < 0.0 { 255.0 } else { 40.0 };
@@ -86,6 +89,16 @@ mod tests {
 
     /// Steps of 1/16 may differ this much from the mean in CIE L*: two lightness scales never agree fully.
     const UNEVEN: f64 = 0.45;
+
+    #[test]
+    fn a_turn_ends_where_it_began() {
+        assert_eq!(ColourMap::Cyclic.rgb(0.0), ColourMap::Cyclic.rgb(1.0));
+        let apart = |a: [u8; 3], b: [u8; 3]| a.iter().zip(b).map(|(&a, b)| a.abs_diff(b)).max().unwrap();
+        for i in 0..4 {
+            let (here, opposite) = (f64::from(i) / 8.0, f64::from(i) / 8.0 + 0.5);
+            assert!(apart(ColourMap::Cyclic.rgb(here), ColourMap::Cyclic.rgb(opposite)) > 60);
+        }
+    }
 
     #[test]
     fn equal_steps_of_value_are_equal_steps_of_lightness() {

@@ -18,6 +18,7 @@ pub(super) const STYLE: &str = include_str!("figure.css");
 pub struct Figure {
     pub(super) svg: SVG,
     pub(super) width: f64,
+    pub(super) title: String,
     pub(super) caption: String,
 }
 
@@ -33,11 +34,12 @@ impl Figure {
         Self {
             svg,
             width,
+            title: title.to_owned(),
             caption: title.to_owned(),
         }
     }
 
-    /// The same drawing with another caption; else its title stands there.
+    /// The same drawing with a caption, which stands behind its title.
     pub fn caption(mut self, caption: impl Into<String>) -> Self {
         self.caption = caption.into();
         self

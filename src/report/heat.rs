@@ -68,6 +68,12 @@ impl HeatMap {
         self
     }
 
+    /// Colours that come round, for phases: give it the range of one turn.
+    pub fn cyclic(mut self) -> Self {
+        self.map = ColourMap::Cyclic;
+        self
+    }
+
     /// Width and height of the drawing; 560 by 400 else.
     pub fn size(mut self, width: f64, height: f64) -> Self {
         self.size = (width.max(240.0), height.max(160.0));

@@ -7,7 +7,7 @@
 //! | --- | --- |
 //! | [`Chart`] | lines, points with error bars, histograms, bands, limits; linear or log [`Axis`] |
 //! | [`Ranking`] | horizontal bars with an interval and a remark each |
-//! | [`HeatMap`] | a matrix over two axes, with colour bar; sequential, logarithmic or diverging |
+//! | [`HeatMap`] | a matrix over two axes, with colour bar; sequential, logarithmic, diverging or cyclic |
 //! | [`ImageGrid`] | images on one common scale, such as PSFs designed beside extracted |
 //! | [`Plan`] | shapes of a layout to scale: circles, rectangles, polygons, crosses |
 //! | [`PillarZoom`] | real pillars of a [`WidthMap`](crate::WidthMap), to scale |

@@ -10,6 +10,12 @@ use crate::file::WholeFile;
 /// Styles of text and tables; those of drawings, and the colours of both, stand beside the drawings.
 const PAGE_STYLE: &str = include_str!("page.css");
 
+/// Letters of a fact that is set in large type.
+const LONGEST_FACT: usize = 20;
+
+/// Closes figures that stand side by side; a figure that follows is put before it.
+const END_OF_ROW: &str = "\n</div>\n";
+
 /// One report, from top to bottom.
 #[derive(Clone, Debug)]
 pub struct Page {
@@ -49,8 +55,13 @@ impl Page {
     pub fn facts(&mut self, facts: &[(&str, String)]) -> &mut Self {
         self.body.push_str("<dl class=\"facts\">\n");
         for (name, value) in facts {
+            // Words instead of a number would shout in the type of numbers.
+            let class = match value.chars().count() > LONGEST_FACT {
+                true => " class=\"words\"",
+                false => "",
+            };
             self.body.push_str(&format!(
-                "<div><dt>{}</dt><dd>{}</dd></div>\n",
+                "<div><dt>{}</dt><dd{class}>{}</dd></div>\n",
                 escape(name),
                 escape(value)
             ));
@@ -110,19 +121,22 @@ impl Page {
         self
     }
 
-    /// A figure over the width of the page, never larger than it was drawn.
+    /// A figure, never larger than it was drawn. Figures that follow one another stand side by side
+    /// where there is room.
     pub fn figure(&mut self, figure: impl Into<Figure>) -> &mut Self {
-        self.put(&figure.into());
-        self
+        self.row([figure.into()])
     }
 
     /// Figures side by side, as many in a row as there is room for.
     pub fn row(&mut self, figures: impl IntoIterator<Item = Figure>) -> &mut Self {
-        self.body.push_str("<div class=\"row\">\n");
+        match self.body.strip_suffix(END_OF_ROW).map(str::len) {
+            Some(length) => self.body.truncate(length),
+            None => self.body.push_str("<div class=\"row\">"),
+        }
         for figure in figures {
             self.put(&figure);
         }
-        self.body.push_str("</div>\n");
+        self.body.push_str(END_OF_ROW);
         self
     }
 
@@ -142,11 +156,15 @@ impl Page {
 
     fn put(&mut self, figure: &Figure) {
         self.body.push_str(&format!(
-            "<figure style=\"max-width:{0}px;flex-basis:{1}px\">\n{2}\n<figcaption>{3}</figcaption></figure>\n",
+            "\n<figure style=\"max-width:{0}px;flex-basis:{1}px\">\n{2}\n<figcaption>{3}{4}</figcaption></figure>",
             figure.width.round(),
             // A figure in a row may shrink this far before it takes a row of its own.
             (0.75 * figure.width).round(),
             figure.svg,
+            match figure.title == figure.caption {
+                true => String::new(),
+                false => format!("<b>{}.</b> ", inline(figure.title.trim_end_matches('.'))),
+            },
             inline(&figure.caption)
         ));
     }
