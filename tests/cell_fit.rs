@@ -7,7 +7,8 @@ use std::sync::Mutex;
 use metalith::rcwa::Orders;
 use metalith::{
     Basis, CellModel, CellStack, Design, Fidelity, FittedCell, ForwardPolynomial, InversePolynomial, MappingTable,
-    PhaseCurve, PublishedCell, Result, bad_cells, curves_over, fit_forward, fit_inverse, forward_errors, round_trip,
+    PhaseCurve, PublishedCell, Result, WidthRule, bad_cells, curves_over, fit_forward, fit_inverse, forward_errors,
+    round_trip,
 };
 use num_complex::Complex64;
 
@@ -170,4 +171,46 @@ fn the_fitted_cell_follows_the_trend_of_the_rigorous_one() {
     // What is left is the resonance that crosses at 200 nm.
     assert!(each[0].1.rms_rad < 0.3 && each[0].1.rms_rad < published[0].1.rms_rad);
     assert_eq!(fitted.full_transmission(0.55).unwrap(), 1.0);
+}
+
+#[test]
+fn mappings_go_through_files_and_bad_ones_name_the_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("mapping.csv");
+    let widths = even_widths();
+    let curve = PhaseCurve::new(&PublishedCell::new(350), 0.452, &widths).unwrap();
+    let exact = MappingTable::nearest(&curve, &[]).unwrap();
+    std::fs::write(&file, exact.to_csv()).unwrap();
+    assert_eq!(MappingTable::read_csv(&file, &widths).unwrap(), exact);
+    for (text, word) in [
+        ("", "header"),
+        ("turns,width_nm\n", "fewer than two"),
+        ("turns,width_nm\n0.25,100\n0.5,102\n", "line 3"),
+        ("turns,width_nm\n0.25,100\n0.75,101\n", "101 nm"),
+        ("turns,width_nm\n0.25,100\n0.75\n", "line 3"),
+        ("turns,width_nm\n0.25,100\nNaN,102\n", "line 3"),
+    ] {
+        std::fs::write(&file, text).unwrap();
+        let error = MappingTable::read_csv(&file, &widths).unwrap_err().to_string();
+        assert!(error.contains(word), "{error}");
+    }
+
+    // A design may take its mapping from such a file; its layout then has just those widths.
+    std::fs::write(&file, exact.to_csv()).unwrap();
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/mini_3x3.toml");
+    let text = std::fs::read_to_string(shipped).unwrap();
+    let kept: Vec<_> = text.lines().filter(|line| !line.starts_with("coefficients")).collect();
+    let text = kept
+        .join("\n")
+        .replace("[mapping]", "[mapping]\ntable = \"mapping.csv\"");
+    let path = folder.path().join("design.toml");
+    std::fs::write(&path, text).unwrap();
+    let design = Design::read(&path).unwrap();
+    assert_eq!(design.mapping.table.as_ref(), Some(&exact));
+    let rule = WidthRule::new(&design.cell, &design.mapping);
+    assert!(
+        (0..1000)
+            .map(|i| f64::from(i) / 1000.0)
+            .all(|u| rule.width_nm(u) == exact.width_nm(u))
+    );
 }

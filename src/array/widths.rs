@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::cell::InversePolynomial;
+use crate::cell::{InversePolynomial, MappingTable};
 use crate::design::{CellSpec, MappingSpec};
 use crate::lattice::WidthMap;
 use crate::phase::ElementPhase;
@@ -11,6 +11,7 @@ use crate::phase::ElementPhase;
 #[derive(Clone, Debug)]
 pub struct WidthRule {
     polynomial: InversePolynomial,
+    table: Option<MappingTable>,
     pitch_nm: f64,
     step_nm: f64,
     range_nm: (f64, f64),
@@ -21,6 +22,7 @@ impl WidthRule {
     pub fn new(cell: &CellSpec, mapping: &MappingSpec) -> Self {
         Self {
             polynomial: mapping.polynomial.clone(),
+            table: mapping.table.clone(),
             pitch_nm: f64::from(cell.pitch_nm),
             step_nm: f64::from(cell.width_step_nm),
             range_nm: (f64::from(cell.width_range_nm.0), f64::from(cell.width_range_nm.1)),
@@ -29,7 +31,10 @@ impl WidthRule {
 
     /// Width before rounding [nm] for a phase of `u` turns, `0 <= u < 1`.
     pub fn unrounded_nm(&self, u: f64) -> f64 {
-        self.pitch_nm * self.polynomial.duty(u)
+        match &self.table {
+            Some(table) => f64::from(table.width_nm(u)),
+            None => self.pitch_nm * self.polynomial.duty(u),
+        }
     }
 
     /// Width to write [nm] for a phase of `u` turns, `0 <= u < 1`.

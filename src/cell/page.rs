@@ -17,7 +17,11 @@ use crate::report::{Axis, Cell, Chart, Column, HeatMap, Page, Table, count, fixe
 pub fn write_cell_report(study: &CellStudy, folder: &Path) -> Result<()> {
     page(study).write(&folder.join("cells.html"))?;
     write_json(&folder.join("cells.json"), "cells", study)?;
-    for mapping in study.mappings.iter().filter(|m| m.coefficients.is_none()) {
+    for mapping in study
+        .mappings
+        .iter()
+        .filter(|m| m.coefficients.is_none() && m.name != "design")
+    {
         let name: String = mapping
             .name
             .chars()

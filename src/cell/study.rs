@@ -22,6 +22,9 @@ const BEST_BAND_UM: (f64, f64, f64) = (0.440, 0.680, 0.008);
 /// Degree of the inverse polynomial that stands for `fitted`.
 const FITTED_DEGREE: usize = 3;
 
+/// Degrees of the inverse fits from which the best polynomial is sought.
+const BEST_DEGREES: [usize; 3] = [2, 3, 5];
+
 /// Highest degrees that are tried.
 const HIGHEST_INVERSE: usize = 6;
 const HIGHEST_FORWARD: usize = 6;
@@ -180,6 +183,7 @@ fn mappings(
     let of_polynomial = |polynomial: &InversePolynomial| {
         let mut mapping = design.mapping.clone();
         mapping.polynomial = polynomial.clone();
+        mapping.table = None;
         let rule = WidthRule::new(&design.cell, &mapping);
         MappingTable::sampled(|u| rule.width_nm(u))
     };
@@ -192,7 +196,9 @@ fn mappings(
     let mut polynomial = |name, polynomial: &InversePolynomial| {
         found.push((name, of_polynomial(polynomial), Some(polynomial.coefficients.clone())));
     };
-    polynomial("design", &design.mapping.polynomial);
+    if design.mapping.table.is_none() {
+        polynomial("design", &design.mapping.polynomial);
+    }
     let published = InversePolynomial::published();
     polynomial("published", &published);
     let fitted = inverse
@@ -201,10 +207,22 @@ fn mappings(
     if let Some(fit) = fitted.and_then(|trial| trial.fit.as_ref()) {
         polynomial("fitted", &fit.polynomial);
     }
-    polynomial(
-        "best polynomial",
-        &MappingTable::best_polynomial(&published, &best_curves, pitch_nm),
-    );
+    let fits = inverse
+        .iter()
+        .filter(|t| t.basis == Basis::AllPowers && BEST_DEGREES.contains(&t.degree));
+    let best = fits
+        .filter_map(|trial| trial.fit.as_ref())
+        .map(|fit| &fit.polynomial)
+        .chain([&published])
+        .map(|start| MappingTable::best_polynomial(start, &best_curves, pitch_nm))
+        .map(|found| (of_polynomial(&found).first_order(&best_curves), found))
+        .reduce(|a, b| if b.0 > a.0 { b } else { a });
+    if let Some((_, best)) = &best {
+        polynomial("best polynomial", best);
+    }
+    if let Some(table) = &design.mapping.table {
+        found.insert(0, ("design", table.clone(), None));
+    }
     let exact = MappingTable::nearest(&curve, &[])?;
     let led_bad = bad_cells(cell, &LED_UM, writable, options.threshold)?;
     let avoid: BTreeSet<u16> = led_bad.iter().map(|b| b.width_nm).collect();

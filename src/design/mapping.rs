@@ -1,11 +1,14 @@
 //! `[mapping]`: from phase to width.
 
+use std::path::PathBuf;
+
 use serde::Serialize;
 
 use super::CellSpec;
 use super::lens::WAVELENGTH;
-use crate::cell::{Basis, InversePolynomial};
+use crate::cell::{Basis, InversePolynomial, MappingTable};
 use crate::document::{Limits, Section};
+use crate::error::Result;
 
 /// How phase becomes width.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -14,6 +17,11 @@ pub struct MappingSpec {
     pub wavelength_um: f64,
     /// Duty cycle over phase.
     pub polynomial: InversePolynomial,
+    /// File of a table that stands in its place, such as `metalith cells` writes.
+    #[serde(skip)]
+    pub table_file: Option<PathBuf>,
+    /// What that file holds.
+    pub table: Option<MappingTable>,
 }
 
 impl MappingSpec {
@@ -49,10 +57,29 @@ impl MappingSpec {
                 format!("the cell allows {narrow} to {wide} nm: change the coefficients or [cell] width_min_nm, width_max_nm"),
             );
         }
+        let table_file = s.has("table").then(|| s.file("table"));
+        if table_file.is_some() && s.has("coefficients") {
+            s.fault(
+                "table",
+                "a mapping that is a table has no coefficients",
+                "keep one of `table` and `coefficients`",
+            );
+        }
         s.finish();
         Self {
             wavelength_um,
             polynomial,
+            table_file,
+            table: None,
         }
+    }
+
+    /// Read the table, if there is one.
+    pub(super) fn load(&mut self, cell: &CellSpec) -> Result<()> {
+        if let Some(file) = &self.table_file {
+            let allowed: Vec<u16> = cell.widths_nm().collect();
+            self.table = Some(MappingTable::read_csv(file, &allowed)?);
+        }
+        Ok(())
     }
 }

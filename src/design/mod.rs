@@ -95,6 +95,7 @@ impl Design {
     /// Read the files that the design names, after all its own mistakes are known to be none.
     fn with_files(mut self) -> Result<Self> {
         self.lens.phase.load(self.lens.radius_um())?;
+        self.mapping.load(&self.cell)?;
         Ok(self)
     }
 

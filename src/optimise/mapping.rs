@@ -123,6 +123,8 @@ pub(crate) mod tests {
         let mapping = MappingSpec {
             wavelength_um: 0.452,
             polynomial,
+            table_file: None,
+            table: None,
         };
         WidthRule::new(&cell, &mapping)
     }

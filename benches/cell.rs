@@ -1,0 +1,51 @@
+//! Cells solved on one thread: `cargo bench --bench cell`.
+
+use std::hint::black_box;
+
+use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use metalith::rcwa::{Incidence, Orders, Side, solve};
+use metalith::{CellStack, Material};
+
+fn stack() -> CellStack {
+    let material = |name: &str| Material::named(name).expect("a known name");
+    CellStack {
+        pitch_nm: 350.0,
+        height_nm: 700.0,
+        film: material("sin_luke_2015"),
+        substrate: material("fused_silica_malitson_1965"),
+        ambient: material("air"),
+        taper: 0.0,
+        corner_radius_nm: 0.0,
+        mask_height_nm: 0.0,
+        mask: material("alumina_zhukovsky_2015"),
+    }
+}
+
+fn cells(c: &mut Criterion) {
+    let mut group = c.benchmark_group("cell");
+    group.sample_size(20);
+    let upright = stack();
+    let leaning = CellStack {
+        taper: 1.0_f64.to_radians(),
+        ..stack()
+    };
+    for along_axis in [9, 13, 17] {
+        let orders = Orders::new(along_axis).expect("odd");
+        group.bench_function(BenchmarkId::new("normal", along_axis), |b| {
+            b.iter(|| black_box(upright.transmission(200.0, 0.452, orders)).expect("a cell"));
+        });
+    }
+    let orders = Orders::new(13).expect("odd");
+    group.bench_function(BenchmarkId::new("leaning, six slices", 13), |b| {
+        b.iter(|| black_box(leaning.transmission(180.0, 0.452, orders)).expect("a cell"));
+    });
+    let layers = upright.layers(200.0, 0.452).expect("a stack");
+    let oblique = Incidence::in_air(0.452, Side::Below, 0.26, 0.0);
+    group.bench_function(BenchmarkId::new("oblique along x, s and p", 13), |b| {
+        b.iter(|| black_box(solve(&layers, &oblique, orders)).expect("a cell"));
+    });
+    group.finish();
+}
+
+criterion_group!(benches, cells);
+criterion_main!(benches);
