@@ -99,6 +99,7 @@ fn maps(page: &mut Page, study: &CellStudy) {
         HeatMap::new("Phase", turns, x(), y())
             .values("phase", "turns")
             .range(0.0, 1.0)
+            .cyclic()
             .caption("Phase of the zero order from the foot of the pillar to its top, modulo one turn."),
     );
 }

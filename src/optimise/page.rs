@@ -229,7 +229,7 @@ impl Findings {
                 .range(most * 1e-5, most)
                 .values("intensity", "of the incident")
                 .size(460.0, 320.0)
-                .caption(format!("{name}: PSF around the axis over wavelength."))
+                .caption("PSF around the axis over wavelength, on one scale for both.")
             })
             .collect()
     }

@@ -13,8 +13,9 @@ const PAGE_STYLE: &str = include_str!("page.css");
 /// Letters of a fact that is set in large type.
 const LONGEST_FACT: usize = 20;
 
-/// Closes figures that stand side by side; a figure that follows is put before it.
-const END_OF_ROW: &str = "\n</div>\n";
+/// Closes figures that followed one another; one more is put before it. A row that was asked for ends
+/// without the first line break, and is left alone.
+const END_OF_FIGURES: &str = "\n</div>\n";
 
 /// One report, from top to bottom.
 #[derive(Clone, Debug)]
@@ -124,19 +125,22 @@ impl Page {
     /// A figure, never larger than it was drawn. Figures that follow one another stand side by side
     /// where there is room.
     pub fn figure(&mut self, figure: impl Into<Figure>) -> &mut Self {
-        self.row([figure.into()])
+        match self.body.strip_suffix(END_OF_FIGURES).map(str::len) {
+            Some(length) => self.body.truncate(length),
+            None => self.body.push_str("<div class=\"row\">"),
+        }
+        self.put(&figure.into());
+        self.body.push_str(END_OF_FIGURES);
+        self
     }
 
     /// Figures side by side, as many in a row as there is room for.
     pub fn row(&mut self, figures: impl IntoIterator<Item = Figure>) -> &mut Self {
-        match self.body.strip_suffix(END_OF_ROW).map(str::len) {
-            Some(length) => self.body.truncate(length),
-            None => self.body.push_str("<div class=\"row\">"),
-        }
+        self.body.push_str("<div class=\"row\">");
         for figure in figures {
             self.put(&figure);
         }
-        self.body.push_str(END_OF_ROW);
+        self.body.push_str("</div>\n");
         self
     }
 
@@ -231,6 +235,19 @@ pub(super) fn inline(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn figures_that_follow_one_another_share_a_row() {
+        let figure = || Figure::new(100.0, 50.0, "t", "w", svg::node::element::Group::new());
+        let rows = |page: &Page| page.html().matches("<div class=\"row\">").count();
+        let mut page = Page::new("", "");
+        page.figure(figure()).figure(figure());
+        assert_eq!(rows(&page), 1);
+        page.row([figure(), figure()]).figure(figure()).row([figure()]);
+        assert_eq!(rows(&page), 4, "rows that were asked for stand alone");
+        page.figure(figure()).paragraph("between").figure(figure());
+        assert_eq!(rows(&page), 6);
+    }
 
     #[test]
     fn text_is_text_whatever_it_holds() {
