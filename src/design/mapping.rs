@@ -21,6 +21,7 @@ pub struct MappingSpec {
     #[serde(skip)]
     pub table_file: Option<PathBuf>,
     /// What that file holds.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<MappingTable>,
 }
 
