@@ -111,7 +111,7 @@ def klayout(path, rule):
         pillars.merged_semantics = True
         return both(pillars.space_check(50, False, db.Region.Euclidian))
     if rule == "overlap":
-        return boxes(pillars.merged(False, 1))
+        return boxes(pillars.merged(False, 2))
     if rule == "grid":
         return both(pillars.grid_check(2, 2)) + both(marks.grid_check(2, 2))
     if rule == "manhattan":
@@ -157,7 +157,7 @@ def compare(program, folder):
         if exact:
             same = same and sorted(map(str, mine)) == sorted(map(str, theirs))
         wrong += not same
-        print(f"{rule:16} ours {len(mine)}  KLayout {len(theirs)}  {'same' if same else f'DIFFERENT: {mine} {theirs}'}")
+        print(f"{rule:16} ours {len(mine)}  KLayout {len(theirs)}  {'same' if same else f'DIFFERENT: {mine[:3]} {theirs[:3]}'}")
     sys.exit(1 if wrong else 0)
 
 
@@ -173,7 +173,8 @@ def klayout_rules(path, deep):
     layout = db.Layout()
     layout.read(str(path))
     shapes = layout.top_cell().begin_shapes_rec(layout.layer(*PILLARS))
-    region = db.Region(shapes, db.DeepShapeStore()) if deep else db.Region(shapes)
+    store = db.DeepShapeStore()
+    region = db.Region(shapes, store) if deep else db.Region(shapes)
     found = [region.width_check(100), region.space_check(50, False, db.Region.Euclidian), region.grid_check(1, 1),
              region.non_rectilinear()]
     print(sum(f.count() for f in found))

@@ -5,6 +5,8 @@
 mod gds;
 #[path = "support/lens.rs"]
 mod lens;
+#[path = "support/mutate.rs"]
+mod mutate;
 
 use std::path::Path;
 
@@ -670,6 +672,27 @@ fn forms_of_the_report() {
     let junit = drc::junit(&report);
     assert!(junit.contains("failures=\"1\"") && junit.contains("errors=\"0\"") && junit.contains("skipped=\"4\""));
     assert!(drc::text(&report).contains("98 nm wide, at least 100 nm"));
+}
+
+/// Damaged layouts that can still be read are judged, whatever is in them.
+#[test]
+fn damaged_layouts_never_panic() {
+    use rand::SeedableRng;
+    let corpus = [gds::everything()];
+    let deck = deck(&[]);
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+    let mut judged = 0;
+    for _ in 0..2000 {
+        let bytes = mutate::mutate(&mut rng, &corpus);
+        let Ok(layout) = Layout::from_bytes("mutant.gds", bytes, mutate::LIMITS) else {
+            continue;
+        };
+        if let Ok(report) = drc::check(&layout, &deck, &input(), &Silent) {
+            judged += 1;
+            assert!(!drc::text(&report).is_empty() && !drc::lyrdb(&report).is_empty());
+        }
+    }
+    assert!(judged > 100, "{judged}");
 }
 
 /// The shipped small design holds what it should, and an altered one does not.

@@ -20,6 +20,7 @@ const TABLE: usize = 4096;
 const MOST_RECTS: usize = 70_000_000;
 /// Vertices of outlines that are not rectangles.
 const MOST_VERTICES: usize = 20_000_000;
+const TOO_FAR: &str = "shapes farther than 2^31 database units from the origin";
 /// Texts that are held.
 const MOST_TEXTS: usize = 100_000;
 /// Lattice sites of all elements together.
@@ -182,7 +183,7 @@ impl Gather<'_> {
     fn keep_rect(&mut self, layer: LayerNumber, r: &Rect) {
         let small = [r.x0, r.y0, r.x1, r.y1].map(i32::try_from);
         let [Ok(x0), Ok(y0), Ok(x1), Ok(y1)] = small else {
-            self.incomplete = Some("shapes farther than 2^31 database units from the origin".into());
+            self.incomplete = Some(TOO_FAR.into());
             return;
         };
         self.rects += 1;
@@ -200,6 +201,11 @@ impl Gather<'_> {
         }
         if let Some(r) = rectangle_of(&corners) {
             self.keep_rect(layer, &r);
+            return;
+        }
+        let range = i64::from(i32::MIN)..=i64::from(i32::MAX);
+        if corners.iter().any(|p| !range.contains(&p.x) || !range.contains(&p.y)) {
+            self.incomplete = Some(TOO_FAR.into());
             return;
         }
         self.vertices += corners.len();

@@ -6,8 +6,8 @@ use super::polygon::{distance, overlap, ring_of};
 use super::scene::{Loose, Scene};
 use crate::gds::{LayerNumber, Point, Rect, simplified};
 
-/// Pairs that are looked at before giving up: a clean layer has none, and ten for each pillar of an array
-/// without a lattice are fewer.
+/// Pairs of sides that are looked at before giving up, two rectangles counting as one: a clean layer has few,
+/// and ten for each pillar of an array without a lattice are fewer.
 const MOST_PAIRS: u64 = 1_000_000_000;
 
 /// One shape of a pair.
@@ -22,6 +22,18 @@ impl Body<'_> {
         match self {
             Self::Rect(r) => *r,
             Self::Ring(p) => Rect::around(p),
+        }
+    }
+
+    /// Pairs of sides that comparing two shapes takes.
+    fn effort(&self, other: &Self) -> u64 {
+        let sides = |body: &Self| match body {
+            Self::Rect(_) => 4,
+            Self::Ring(p) => p.len() as u64,
+        };
+        match (self, other) {
+            (Self::Rect(_), Self::Rect(_)) => 1,
+            _ => sides(self) * sides(other),
         }
     }
 
@@ -118,7 +130,8 @@ pub(super) fn near<'s>(
             .collect()
     };
     let boxes = if bounds.is_empty() { &loose.rects } else { &bounds };
-    sweep(boxes, reach, &mut left, |a, b| f(body(a), body(b)))?;
+    let effort = |a: usize, b: usize| body(a).effort(&body(b));
+    sweep(boxes, reach, effort, &mut left, |a, b| f(body(a), body(b)))?;
     if layer != scene.pillars {
         return Ok(());
     }
@@ -132,8 +145,9 @@ pub(super) fn near<'s>(
         };
         for element in 0..scene.elements.len() {
             for pillar in pillars_in(scene, element, &grown) {
-                left = left.checked_sub(1).ok_or_else(too_many)?;
-                f(body(k), Body::Rect(pillar));
+                let pillar = Body::Rect(pillar);
+                left = left.checked_sub(body(k).effort(&pillar)).ok_or_else(too_many)?;
+                f(body(k), pillar);
             }
         }
     }
@@ -148,7 +162,7 @@ fn body(loose: &Loose, k: usize) -> Body<'_> {
 }
 
 fn too_many() -> String {
-    format!("more than {MOST_PAIRS} pairs of shapes are near one another")
+    format!("more than {MOST_PAIRS} pairs of sides are near one another")
 }
 
 /// Pillars on the lattice of an element that touch a rectangle.
@@ -175,7 +189,13 @@ fn pillars_in<'s>(scene: &'s Scene<'_>, element: usize, r: &Rect) -> impl Iterat
 /// Pairs of boxes at most `reach` apart along x and along y. Boxes are taken from the lowest; those that
 /// still reach up are kept by their left edge in classes of size, so that a search spans little more than
 /// the box itself.
-fn sweep(boxes: &[[i32; 4]], reach: i64, left: &mut u64, mut f: impl FnMut(usize, usize)) -> Result<(), String> {
+fn sweep(
+    boxes: &[[i32; 4]],
+    reach: i64,
+    effort: impl Fn(usize, usize) -> u64,
+    left: &mut u64,
+    mut f: impl FnMut(usize, usize),
+) -> Result<(), String> {
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
     order.sort_unstable_by_key(|&k| (boxes[k as usize][1], k));
     let mut classes: Vec<BTreeSet<(i32, u32)>> = vec![BTreeSet::new(); 33];
@@ -191,7 +211,9 @@ fn sweep(boxes: &[[i32; 4]], reach: i64, left: &mut u64, mut f: impl FnMut(usize
                 if other_y1 + reach < y0 {
                     gone.push((other_x0, other));
                 } else if other_x1 + reach >= x0 {
-                    *left = left.checked_sub(1).ok_or_else(too_many)?;
+                    *left = left
+                        .checked_sub(effort(other as usize, k as usize))
+                        .ok_or_else(too_many)?;
                     f(other as usize, k as usize);
                 }
             }
@@ -226,7 +248,14 @@ mod tests {
                 .collect();
             let mut found = Vec::new();
             let mut left = u64::MAX;
-            sweep(&boxes, reach, &mut left, |a, b| found.push((a.min(b), a.max(b)))).unwrap();
+            sweep(
+                &boxes,
+                reach,
+                |_, _| 1,
+                &mut left,
+                |a, b| found.push((a.min(b), a.max(b))),
+            )
+            .unwrap();
             found.sort_unstable();
             let near = |a: [i32; 4], b: [i32; 4]| {
                 let rect = |r: [i32; 4]| {
