@@ -256,3 +256,67 @@ fn every_figure_says_in_words_what_it_shows() {
     assert_eq!(html.matches("<desc>").count(), figures);
     assert!(html.contains("MTF from 0 to 1.00 over spatial frequency [1/mm] from 0 to 100"));
 }
+
+#[test]
+fn nothing_to_show_and_odd_numbers_still_give_a_page() {
+    let odd = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, -1.0, 1e300, 1e-300];
+    let mut page = Page::new("", "");
+    for axis in [
+        Axis::linear("x", ""),
+        Axis::log("x", ""),
+        Axis::log("x", "").range(0.0, 0.0),
+    ] {
+        page.figure(Chart::new("empty", axis.clone(), axis.clone()));
+        let mut chart = Chart::new("odd", axis.clone(), axis.clone());
+        chart
+            .line("line", odd.map(|x| (x, x)))
+            .band("band", odd.map(|x| (x, x, -x)));
+        chart
+            .points_with_errors("points", odd.map(|x| (x, 1.0, x)))
+            .bars("bars", odd.map(|x| (x, x + 1.0, x)));
+        chart.limit(f64::NAN, "limit").marker(f64::INFINITY, "marker");
+        page.figure(chart);
+        page.figure(Ranking::new("empty", axis.clone()));
+        let mut ranking = Ranking::new("odd", axis);
+        for x in odd {
+            ranking.bar("bar", x, Some((x, -x)), "", false);
+        }
+        page.figure(ranking);
+    }
+    for values in [
+        Array2::zeros((0, 0)),
+        Array2::zeros((1, 1)),
+        Array2::from_shape_fn((2, 3), |(i, j)| odd[i * 3 + j]),
+    ] {
+        let axes = || (Axis::linear("x", "um"), 0.0, 0.0);
+        page.figure(HeatMap::new("linear", values.clone(), axes(), axes()).mark(f64::NAN, 0.0, "m"));
+        page.figure(
+            HeatMap::new("log", values.clone(), axes(), axes())
+                .log()
+                .contour([(f64::NAN, 0.0)]),
+        );
+        page.figure(HeatMap::new("diverging", values.clone(), axes(), axes()).diverging());
+        page.figure(
+            HeatMap::new("cyclic", values.clone(), axes(), axes())
+                .cyclic()
+                .range(1.0, 0.0),
+        );
+        let mut grid = ImageGrid::new("grid", 0).log(3.0).pixel_um(0.0);
+        grid.image("image", values);
+        page.figure(grid);
+    }
+    page.figure(ImageGrid::new("empty", 2));
+    page.figure(Plan::new("empty"));
+    let mut plan = Plan::new("odd");
+    let layer = plan.layer("layer");
+    plan.circle(layer, f64::NAN, 0.0, 1.0)
+        .polygon(layer, [])
+        .rectangle(layer, (0.0, 0.0), (0.0, 0.0));
+    page.figure(plan);
+    page.figure(PillarZoom::new("beside the lens", &lens(), (1e6, -1e6), 1e9));
+    page.table(Table::new([])).facts(&[]).row([]).list(Vec::<String>::new());
+    let html = page.html();
+    for no_number in ["NaN", "inf\"", "inf "] {
+        assert!(!html.contains(no_number), "{no_number} in a drawing");
+    }
+}

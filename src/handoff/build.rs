@@ -8,13 +8,15 @@ use serde::Serialize;
 use super::census::Census;
 use super::dose::{Beam, DoseRow, Exposure, WriteTime, doses};
 use super::drawing::Rect;
-use super::manifest::{self, Manifest, entry_of, files_below};
+use super::exposure::{exposures, snapping};
+use super::guard::{fits, replaceable};
+use super::manifest::{Manifest, entry_of, files_below};
 use super::matrix::{self, Block};
 use super::process::Process;
 use super::rules::RuleReports;
 use super::sites::{Cross, Site, crosses, sites};
 use super::structures::{Structure, Structures};
-use super::{fields, front, job, rules, tables, zip};
+use super::{front, job, rules, tables, zip};
 use crate::array::PillarArray;
 use crate::cell::{Fidelity, cell_models};
 use crate::design::Design;
@@ -85,9 +87,7 @@ pub(super) struct Contents<'a> {
     /// Root mean square change of the widths when snapped to the shots of each beam [nm].
     pub snapping: Vec<(Beam, f64)>,
     pub doses: Vec<DoseRow>,
-    #[serde(skip)]
     pub blocks: Vec<Block>,
-    #[serde(skip)]
     pub structures: Vec<Structure>,
     #[serde(skip)]
     pub tests_frame: (Rect, (i64, i64)),
@@ -150,54 +150,6 @@ pub fn handoff(options: &HandoffOptions, progress: &dyn Progress) -> Result<Hand
         manifest,
         checks,
     })
-}
-
-/// Whether the process can make the design at all.
-fn fits(design: &Design, process: &Process) -> Result<()> {
-    if !process.exposes_pillars() {
-        return Err(Error::invalid(
-            format!(
-                "with this resist and transfer {}: the pillars of the layout would become holes",
-                process.exposed_becomes()
-            ),
-            "a positive resist needs `method = \"lift_off\"`, a negative one `method = \"direct_etch\"`",
-        ));
-    }
-    let taken = design.layout.layers.all();
-    if let Some((key, layer)) = taken.iter().find(|(_, l)| l.layer == process.dose_matrix.layer) {
-        return Err(Error::invalid(
-            format!(
-                "layer {} of the dose matrix is that of `{key}` in the design",
-                layer.layer
-            ),
-            "choose another `layer` in [dose_matrix] of the process file",
-        ));
-    }
-    Ok(())
-}
-
-/// Whether the folder is not there, empty, or holds nothing but an older hand-off.
-fn replaceable(folder: &Path) -> Result<()> {
-    if !folder.exists() {
-        return Ok(());
-    }
-    let (there, other) = files_below(folder)?;
-    let known = if there.contains_key(manifest::NAME) {
-        manifest::listed(folder)?
-    } else {
-        Vec::new()
-    };
-    let strange = there
-        .keys()
-        .chain(&other)
-        .find(|name| *name != manifest::NAME && !known.contains(name));
-    match strange {
-        None => Ok(()),
-        Some(name) => Err(Error::invalid(
-            format!("{} holds {name}, which no hand-off put there", folder.display()),
-            "choose another folder with --out, or move the file away",
-        )),
-    }
 }
 
 fn fill(
@@ -444,65 +396,6 @@ fn reference_design(design: &Design, process: &Process) -> Design {
     let room = room + room % 2;
     reference.layout.chip.size_nm = (room, room);
     reference
-}
-
-/// What each file of the first step exposes, and how long that takes.
-fn exposures(design: &Design, process: &Process, census: &[Census]) -> Result<Vec<(String, Exposure, Vec<WriteTime>)>> {
-    let layers = &design.layout.layers;
-    let mut exposures = Vec::new();
-    for file in census {
-        let exposed = |l: &&super::census::LayerCount| {
-            let number = (i32::from(l.layer), i32::from(l.datatype));
-            let is = |layer: &crate::design::Layer| number == (i32::from(layer.layer), i32::from(layer.datatype));
-            is(&layers.pillars) || is(&layers.pillar_marks) || number.0 == i32::from(process.dose_matrix.layer)
-        };
-        let mut exposure = Exposure::default();
-        let mut bounds: Option<[f64; 4]> = None;
-        for layer in file.layers.iter().filter(exposed) {
-            exposure.area_um2 += layer.area_um2;
-            exposure.shapes += layer.shapes;
-            if let Some(b) = layer.bounds_um {
-                bounds = Some(bounds.map_or(b, |a| [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])]));
-            }
-        }
-        let Some(bounds) = bounds else { continue };
-        exposure.fields = if exposures.is_empty() {
-            fields::of_design(design, process)
-        } else {
-            fields::of_bounds(bounds, process)
-        };
-        let times = process
-            .writer
-            .currents_na
-            .iter()
-            .map(|&i| WriteTime::of(process, &exposure, i))
-            .collect::<Result<Vec<_>>>()?;
-        exposures.push((file.file.clone(), exposure, times));
-    }
-    Ok(exposures)
-}
-
-/// How much the widths of the array change on the shots of each beam, root mean square over all pillars.
-fn snapping(array: &PillarArray, process: &Process) -> Result<Vec<(Beam, f64)>> {
-    let mut counts: Vec<u64> = Vec::new();
-    let histograms: Vec<_> = array.classes.iter().map(|c| c.widths.histogram()).collect();
-    for placed in &array.placed {
-        let histogram = &histograms[placed.class];
-        counts.resize(counts.len().max(histogram.len()), 0);
-        counts.iter_mut().zip(histogram).for_each(|(all, n)| *all += n);
-    }
-    let pillars: u64 = counts.iter().skip(1).sum();
-    process
-        .writer
-        .currents_na
-        .iter()
-        .map(|&current| {
-            let beam = Beam::choose(&process.writer, current, process.resist.dose_uc_cm2)?;
-            let square = |(w, &n): (usize, &u64)| n as f64 * (beam.snapped_nm(w as f64) - w as f64).powi(2);
-            let sum: f64 = counts.iter().enumerate().skip(1).map(square).sum();
-            Ok((beam, (sum / pillars.max(1) as f64).sqrt()))
-        })
-        .collect()
 }
 
 /// What the hand-off was made from: path, name in the folder, purpose.

@@ -22,7 +22,7 @@ pub(super) fn number(layer: &Layer) -> LayerNumber {
 }
 
 /// A rectangle between two corners [nm].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub(super) struct Rect {
     pub x0: i64,
     pub y0: i64,

@@ -17,13 +17,16 @@ const APART: i64 = 20_000;
 const NUMERAL: i64 = 20_000;
 
 /// Where one dose stands.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize)]
 pub(super) struct Block {
     /// 1 to 9; also the datatype.
     pub number: usize,
     /// Centre of the small lens and of the row of pads [nm].
+    #[serde(rename = "lens_nm")]
     pub lens: (i64, i64),
+    #[serde(rename = "pads_nm")]
     pub pads: (i64, i64),
+    #[serde(rename = "bounds_nm")]
     pub bounds: Rect,
 }
 

@@ -20,12 +20,13 @@ const LINES: i64 = 5;
 const BARS: i64 = 10;
 
 /// A structure and what to do with it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize)]
 pub(super) struct Structure {
     pub id: String,
     /// What it is and what it tells.
     pub purpose: String,
     /// On the chip of the test structures, whose lower left corner is the origin [nm].
+    #[serde(rename = "bounds_nm")]
     pub bounds: Rect,
     /// Width drawn, where one is to be measured [nm].
     pub width_nm: Option<i64>,
