@@ -18,6 +18,7 @@ import time
 import numpy as np
 
 PITCH, DIAMETER, FOCAL, WAVELENGTH = 350, 1_000_000, 2400.0, 0.55
+DUTY = [-0.7189, 0.2686, 0.9647, -0.4873, 0.4786, 0.3501]  # of designs/prototype_3x3.toml, highest power first
 
 
 def lens():
@@ -28,7 +29,7 @@ def lens():
     x, y = x[inside], y[inside]
     r2 = (x * x + y * y) * (PITCH * 0.5e-3) ** 2
     u = (-r2 / (np.sqrt(r2 + FOCAL**2) + FOCAL) / WAVELENGTH) % 1.0
-    width = 2 * np.rint(PITCH / 2 * (0.2923 + 0.6809 * u - 0.1484 * u * u)).astype(np.int64)
+    width = 2 * np.rint(PITCH / 2 * np.polyval(DUTY, u)).astype(np.int64)
     return x * (PITCH // 2), y * (PITCH // 2), width
 
 
