@@ -47,36 +47,40 @@ pub struct OptimizeArgs {
 
 /// Cells that a design is optimised and judged with.
 struct Cells {
-    /// None if it is the rigorous one.
-    polynomial: Option<Box<dyn CellModel>>,
-    rigorous: RigorousCell,
+    /// What is optimised with.
+    own: Box<dyn CellModel>,
+    /// What is judged with, if there is a report.
+    judge: Option<Box<dyn CellModel>>,
     off_height: Vec<RigorousCell>,
 }
 
 impl Cells {
-    fn of(design: &Design, terminal: &Terminal) -> Result<Self> {
+    fn of(design: &Design, report: bool, terminal: &Terminal) -> Result<Self> {
         let cache = cache_folder();
-        let (rigorous, _) = RigorousCell::of_design(design, cache.as_deref(), terminal)?;
-        let own = design.optimise.fidelity;
+        let rigorous = || -> Result<Box<dyn CellModel>> {
+            Ok(Box::new(RigorousCell::of_design(design, cache.as_deref(), terminal)?.0))
+        };
+        let fidelity = design.optimise.fidelity;
+        let own = match fidelity {
+            Fidelity::Rigorous => rigorous()?,
+            Fidelity::Published | Fidelity::Fitted => cell_models(design, &[fidelity])?.remove(0),
+        };
+        let judge = (report && fidelity != Fidelity::Rigorous).then(rigorous).transpose()?;
         let off_height = match &design.optimise.robust {
-            Some(robust) if own == Fidelity::Rigorous && robust.height > 0.0 => {
+            Some(robust) if fidelity == Fidelity::Rigorous && robust.height > 0.0 => {
                 cells_off_height(&RigorousCell::table_spec(design)?, robust, cache.as_deref(), terminal)?
             }
             _ => Vec::new(),
         };
-        let polynomial = match own {
-            Fidelity::Rigorous => None,
-            Fidelity::Published | Fidelity::Fitted => Some(cell_models(design, &[own])?.remove(0)),
-        };
-        Ok(Self {
-            polynomial,
-            rigorous,
-            off_height,
-        })
+        Ok(Self { own, judge, off_height })
     }
 
     fn own(&self) -> &dyn CellModel {
-        self.polynomial.as_deref().unwrap_or(&self.rigorous)
+        self.own.as_ref()
+    }
+
+    fn rigorous(&self) -> &dyn CellModel {
+        self.judge.as_deref().unwrap_or(self.own())
     }
 
     fn all(&self) -> Vec<&dyn CellModel> {
@@ -95,7 +99,7 @@ pub fn run(args: &OptimizeArgs, terminal: &Terminal) -> Result<Outcome> {
     let phase = args.phase.clone().unwrap_or_else(|| folder.join("phase.csv"));
     let kept = folder.join("checkpoint.json");
     let task = Task::of(&design)?;
-    let cells = Cells::of(&design, terminal)?;
+    let cells = Cells::of(&design, !args.no_report, terminal)?;
     let checkpoint = if args.fresh {
         Checkpoint::begin(&design)
     } else {
@@ -170,18 +174,18 @@ fn findings(
     let judge = |turns: &[f64]| -> Result<Vec<Judged>> {
         Ok(vec![
             task.judge_rings(turns, cells.own())?,
-            task.judge_rings(turns, &cells.rigorous)?,
+            task.judge_rings(turns, cells.rigorous())?,
         ])
     };
     let (before, mut after) = (judge(&task.reference_turns)?, judge(&found.turns)?);
     let layout = folder.join("lens.gds");
-    after.push(task.judge_layout(design, phase, &layout, &cells.rigorous, terminal)?);
+    after.push(task.judge_layout(design, phase, &layout, cells.rigorous(), terminal)?);
     let limits = [0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5];
     let over_limit = task.merit_over_limit(&cells.all(), &found.turns, &limits, terminal)?;
     let reference_widths = task.widths_nm(&task.reference_turns);
     let spectrum = OverWavelength {
         lens: &task.lens,
-        cell: &cells.rigorous,
+        cell: cells.rigorous(),
         widths_nm: &[&reference_widths, &found.widths_nm],
     };
     let band_nm = (task.spec.band_um.0 * 1e3, task.spec.band_um.1 * 1e3);

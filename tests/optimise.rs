@@ -1,0 +1,190 @@
+//! The optimised phase: kernels against the propagators, going on after an interruption, and the way from
+//! the command to a layout that keeps the limit.
+
+use std::fs;
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use assert_cmd::Command;
+use metalith::optimise::{Checkpoint, Lens, RingField, Rings, Start, Task, largest_step};
+use metalith::{
+    Accuracy, CellModel, Design, Direct, Fold, Lattice, Pillars, PlaneWave, Progress, Propagator, PublishedCell,
+    Scratch, Silent, Window,
+};
+use num_complex::Complex64;
+
+const MINI: &str = "designs/mini_3x3.toml";
+
+/// The kernel at full size, on the axis: a broadband phase, every ring of the 1 mm lens.
+#[test]
+fn the_kernel_agrees_with_direct_sum_and_fold() {
+    /// Of the matched peak. Apertures hold transmissions in single precision.
+    const DIRECT: f64 = 1e-6;
+    /// What the accurate mode is asked for.
+    const FOLD: f64 = 1e-5;
+    let lattice = Lattice::covering(1_000_000, 350).unwrap();
+    let rings = Rings::new(lattice, 1_000_000).unwrap();
+    let lens = Lens { rings, gap_um: 2400.0 };
+    let turns = Start::LogAsphere { band_um: (0.4, 0.7) }.turns(&lens, 0);
+    let widths = turns
+        .iter()
+        .map(|t| 2 * (51.0 + 93.0 * t.rem_euclid(1.0)) as u16)
+        .collect::<Vec<_>>();
+    let map = lens.rings.width_map(&widths);
+    let wavelength = 0.52;
+    let t = PublishedCell::new(350).transmissions(wavelength, 300).unwrap();
+    let field = RingField::new(&lens.rings, wavelength, lens.gap_um);
+    let quick = (0..lens.rings.len())
+        .map(|k| field.on_axis(k) * t[usize::from(widths[k])])
+        .sum::<Complex64>();
+    let pillars = Pillars::new(&map, &t).unwrap();
+    let wave = PlaneWave::normal(wavelength);
+    // The kernel leaves out the phase common to all.
+    let common = Complex64::cis(std::f64::consts::TAU * (lens.gap_um / wavelength).fract());
+    let direct = Direct::at(&pillars, &wave, &[[0.0, 0.0, lens.gap_um]])[0];
+    let error = (quick * common - direct).norm() / field.matched();
+    assert!(error < DIRECT, "{error:e}");
+    let window = Window::about([0.0, 0.0], 0.35, 16, lens.gap_um);
+    let fold = Fold::plan(lattice, 500.0, wavelength, window, Accuracy::Accurate).unwrap();
+    let found = fold.field(&pillars, &wave, &mut Scratch::default()).unwrap().values[[8, 8]];
+    let found = Complex64::new(found.re.into(), found.im.into());
+    let error = (found.norm() - direct.norm()).abs() / field.matched();
+    assert!(error < FOLD, "{error:e}");
+}
+
+/// Says stop once so many steps are done.
+struct StopAfter(AtomicU64, u64);
+
+impl Progress for StopAfter {
+    fn begin(&self, _what: &str, _steps: u64) {
+        self.0.store(0, Ordering::SeqCst);
+    }
+
+    fn advance(&self, steps: u64) {
+        self.0.fetch_add(steps, Ordering::SeqCst);
+    }
+
+    fn stopped(&self) -> bool {
+        self.0.load(Ordering::SeqCst) >= self.1
+    }
+}
+
+/// A design file beside the small one, with a section of its own to optimise it.
+fn design(folder: &Path, optimise: &str) -> std::path::PathBuf {
+    let path = folder.join("lens.toml");
+    let text = fs::read_to_string(MINI).unwrap();
+    fs::write(&path, format!("{text}\n{optimise}")).unwrap();
+    path
+}
+
+const EXCHANGE: &str = "[optimise]\ncell = \"published\"\nstep_nm = 5\nchains = 3\nhot_sweeps = 12\nseed = 4\n";
+const ADAM: &str =
+    "[optimise]\ncell = \"published\"\nstep_nm = 5\nsolver = \"adam\"\nstart = \"hyperbolic\"\nsteps = 40\n";
+
+#[test]
+fn an_interrupted_run_goes_on_to_the_same_end() {
+    for section in [EXCHANGE, ADAM] {
+        let folder = tempfile::tempdir().unwrap();
+        let design = Design::read(&design(folder.path(), section)).unwrap();
+        let (task, cell) = (Task::of(&design).unwrap(), PublishedCell::new(350));
+        let cells: [&dyn CellModel; 1] = [&cell];
+        let begin = || Checkpoint::begin(&design);
+        let whole = task.solve(&cells, begin(), &Silent).unwrap();
+        assert!(whole.interrupted.is_none());
+        assert!(largest_step(&whole.turns) <= 0.2 + 1e-9);
+
+        let stop = StopAfter(AtomicU64::new(0), 7);
+        let part = task.solve(&cells, begin(), &stop).unwrap();
+        assert!(largest_step(&part.turns) <= 0.2 + 1e-9);
+        let kept = folder.path().join("checkpoint.json");
+        part.interrupted.expect("it was stopped").save(&kept).unwrap();
+        let checkpoint = Checkpoint::load(&kept, &design).unwrap();
+        assert!(checkpoint.begun());
+        let rest = task.solve(&cells, checkpoint, &Silent).unwrap();
+        assert_eq!(rest.widths_nm, whole.widths_nm);
+        assert_eq!(rest.merit, whole.merit);
+
+        // A checkpoint of another design is of no use.
+        let other = Design::read(Path::new(MINI)).unwrap();
+        assert!(!Checkpoint::load(&kept, &other).unwrap().begun());
+    }
+}
+
+#[test]
+fn both_solvers_beat_what_they_begin_from_and_exchange_beats_adam() {
+    let folder = tempfile::tempdir().unwrap();
+    let cell = PublishedCell::new(350);
+    let reached = [ADAM, EXCHANGE].map(|section| {
+        let design = Design::read(&design(folder.path(), section)).unwrap();
+        let task = Task::of(&design).unwrap();
+        let found = task.solve(&[&cell], Checkpoint::begin(&design), &Silent).unwrap();
+        let before = task.judge_rings(&task.own_turns, &cell).unwrap();
+        let after = task.judge_rings(&found.turns, &cell).unwrap();
+        assert!(after.geometric_mean > 1.5 * before.geometric_mean);
+        after.geometric_mean
+    });
+    assert!(reached[1] > reached[0], "{reached:?}");
+}
+
+/// From the command to a phase that a design reads, on any number of threads the same, and from there to a
+/// layout whose pillars keep the limit and focus as the rings promise.
+#[test]
+fn the_phase_of_the_command_becomes_a_layout_that_keeps_the_limit() {
+    /// Single sums in another order.
+    const SAME: f64 = 1e-9;
+    let folder = tempfile::tempdir().unwrap();
+    let path = design(folder.path(), EXCHANGE);
+    let phases = ["1", "2"].map(|threads| {
+        let phase = folder.path().join(format!("phase_{threads}.csv"));
+        Command::cargo_bin("metalith")
+            .unwrap()
+            .args(["optimize", "--no-report", "--quiet", "--threads", threads])
+            .arg(&path)
+            .arg("--out")
+            .arg(folder.path())
+            .arg("--phase")
+            .arg(&phase)
+            .assert()
+            .success();
+        phase
+    });
+    let [one, two] = phases.each_ref().map(|p| {
+        let text = fs::read_to_string(p).unwrap();
+        text.lines()
+            .filter(|l| !l.starts_with('#'))
+            .collect::<Vec<_>>()
+            .join("\n")
+    });
+    assert_eq!(one, two);
+    assert!(!folder.path().join("checkpoint.json").exists());
+
+    let text = fs::read_to_string(&path).unwrap();
+    let table = format!(
+        "source = \"table\"\nfile = \"{}\"\ninterpolation = \"nearest\"",
+        phases[0].display()
+    );
+    let text = text.replace("source = \"hyperbola\"\nwavelength_nm = 550", &table);
+    fs::write(&path, text).unwrap();
+    let design = Design::read(&path).unwrap();
+    let (task, cell) = (Task::of(&design).unwrap(), PublishedCell::new(350));
+    let rings = task.judge_rings(&task.own_turns, &cell).unwrap();
+    let layout = folder.path().join("lens.gds");
+    let found = task.judge_layout(&design, &phases[0], &layout, &cell, &Silent).unwrap();
+    assert!(found.largest_step_turns <= 0.2 + 1e-6, "{}", found.largest_step_turns);
+    assert!((found.geometric_mean / rings.geometric_mean - 1.0).abs() < SAME);
+}
+
+#[test]
+fn mistakes_of_the_section_are_found_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let section =
+        "[optimise]\nsolver = \"exchange\"\nstep_limit_turns = 0.7\nseeed = 1\n[optimise.merit]\ndeconvolution = 1\n";
+    let error = Design::read(&design(folder.path(), section)).unwrap_err();
+    let metalith::Error::Text(faults) = error else {
+        panic!("{error}")
+    };
+    let all = format!("{faults:?}");
+    for part in ["step_limit_turns", "seeed", "exchange cannot take"] {
+        assert!(all.contains(part), "{part} in {all}");
+    }
+}
