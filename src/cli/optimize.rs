@@ -196,13 +196,7 @@ fn findings(
     let psf = spectrum.psf(&radii, &fine)?;
     let window = views(&task.spec, &task.spec.views, 0.0).window;
     let mtf = spectrum.mtf(window, &coarse)?;
-    let with_errors = match &task.spec.robust {
-        Some(robust) => Some((
-            task.judge_errors(&task.reference_turns, robust, &cells.all(), DRAWS)?,
-            task.judge_errors(&found.turns, robust, &cells.all(), DRAWS)?,
-        )),
-        None => None,
-    };
+    let with_errors = with_errors(task, cells, found, terminal)?;
     Ok(Findings {
         design: format!("{}: {}", design.name, design.title),
         command: command(args),
@@ -228,6 +222,30 @@ fn findings(
         psf: (fine, 39.5, psf),
         mtf: (coarse, mtf),
     })
+}
+
+/// Of a robust design: what it begins from, what is best without errors in mind, and what was found, each
+/// with the same drawn errors.
+fn with_errors(
+    task: &Task,
+    cells: &Cells,
+    found: &Optimised,
+    terminal: &Terminal,
+) -> Result<Vec<(&'static str, Vec<f64>)>> {
+    let Some(robust) = &task.spec.robust else {
+        return Ok(Vec::new());
+    };
+    let plain = task
+        .regardless_of_errors()
+        .solve(&[cells.own()], Checkpoint::default(), terminal)?;
+    [
+        ("before", &task.reference_turns),
+        ("plain optimum", &plain.turns),
+        ("after", &found.turns),
+    ]
+    .into_iter()
+    .map(|(name, turns)| Ok((name, task.judge_errors(turns, robust, &cells.all(), DRAWS)?)))
+    .collect()
 }
 
 /// Errors of fabrication that a robust design is judged with.
@@ -281,14 +299,12 @@ fn summary(findings: &Findings) {
     for (angle, before, after) in &findings.expected_psnr_db {
         println!("expected PSNR at {angle} degrees: {before:.2} dB before, {after:.2} dB after");
     }
-    if let Some((before, after)) = &findings.with_errors {
-        for (name, values) in [("before", before), ("after", after)] {
-            let (mean, deviation) = mean_and_deviation(values);
-            println!(
-                "{name}, with errors of fabrication: Strehl {} +- {}",
-                sig(mean, 4),
-                sig(deviation, 2)
-            );
-        }
+    for (name, values) in &findings.with_errors {
+        let (mean, deviation) = mean_and_deviation(values);
+        println!(
+            "{name}, with errors of fabrication: Strehl {} +- {}",
+            sig(mean, 4),
+            sig(deviation, 2)
+        );
     }
 }

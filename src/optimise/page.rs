@@ -31,8 +31,8 @@ pub struct Findings {
     pub merit_over_limit: Vec<(f64, f64)>,
     /// Expected PSNR of restored images [dB] at each field angle [degrees], before and after.
     pub expected_psnr_db: Vec<(f64, f64, f64)>,
-    /// Geometric-mean Strehl ratios with drawn errors of fabrication, before and after.
-    pub with_errors: Option<(Vec<f64>, Vec<f64>)>,
+    /// Geometric-mean Strehl ratios with drawn errors of fabrication, one a draw, of several phases by name.
+    pub with_errors: Vec<(&'static str, Vec<f64>)>,
     /// Merit along the way.
     #[serde(skip)]
     pub history: Vec<(u32, f64)>,
@@ -131,18 +131,18 @@ impl Findings {
             page.paragraph("PSNR to be expected after inverse filtering, in closed form, at wavelengths between those optimised on.");
             page.table(table);
         }
-        if let Some((before, after)) = &self.with_errors {
+        if let Some((_, draws)) = self.with_errors.first() {
             let mut table = Table::new([
                 Column::text("Phase"),
                 Column::number("Mean", ""),
                 Column::number("Standard deviation", ""),
                 Column::number("Smallest", ""),
             ]);
-            for (name, values) in [("before", before), ("after", after)] {
+            for (name, values) in &self.with_errors {
                 let (mean, deviation) = mean_and_deviation(values);
                 let least = values.iter().copied().fold(f64::INFINITY, f64::min);
                 table.row([
-                    Cell::from(name),
+                    Cell::from(*name),
                     Cell::sig(mean, 4),
                     Cell::sig(deviation, 3),
                     Cell::sig(least, 3),
@@ -151,7 +151,7 @@ impl Findings {
             page.section("With errors of fabrication");
             page.paragraph(format!(
                 "Geometric-mean Strehl ratio over {} draws of width, film height and gap.",
-                after.len()
+                draws.len()
             ));
             page.table(table);
         }

@@ -94,6 +94,13 @@ impl Task {
         self.limit
     }
 
+    /// The same task without errors of fabrication in mind.
+    pub fn regardless_of_errors(&self) -> Self {
+        let mut plain = self.clone();
+        plain.spec.robust = None;
+        plain
+    }
+
     /// Widths that are made of phases, without any limit on their steps [nm].
     pub fn widths_nm(&self, turns: &[f64]) -> Vec<u16> {
         let choices = self.mapping.choices();
