@@ -295,7 +295,11 @@ fn nothing_to_show_and_odd_numbers_still_give_a_page() {
                 .log()
                 .contour([(f64::NAN, 0.0)]),
         );
-        page.figure(HeatMap::new("diverging", values.clone(), axes(), axes()).diverging());
+        page.figure(
+            HeatMap::new("diverging", values.clone(), axes(), axes())
+                .diverging()
+                .to_scale(),
+        );
         page.figure(
             HeatMap::new("cyclic", values.clone(), axes(), axes())
                 .cyclic()

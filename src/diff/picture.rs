@@ -20,8 +20,8 @@ pub fn page(diff: &LayoutDiff) -> Page {
     page.verdict(Verdict::of(diff.same_geometry), words);
     let changed: u64 = diff.elements.iter().map(super::report::ElementDiff::changed).sum();
     page.facts(&[
-        ("Places that differ", diff.changes.to_string()),
-        ("Pillars that differ", changed.to_string()),
+        ("Places that differ", crate::report::count(diff.changes)),
+        ("Pillars that differ", crate::report::count(changed)),
         ("Elements", diff.elements.len().to_string()),
     ]);
     if diff.changes > 0 {
@@ -48,6 +48,7 @@ fn heat(diff: &LayoutDiff) -> crate::report::Figure {
         (Axis::linear("x", "um"), x0, x1),
         (Axis::linear("y", "um"), y0, y1),
     )
+    .to_scale()
     .values("places that differ in a tile", "")
     .caption("Every change is counted in the tile that holds its middle.")
 }

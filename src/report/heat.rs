@@ -21,6 +21,7 @@ pub struct HeatMap {
     logarithmic: bool,
     map: ColourMap,
     size: (f64, f64),
+    to_scale: bool,
     contours: Vec<Vec<(f64, f64)>>,
     marks: Vec<(f64, f64, String)>,
 }
@@ -39,6 +40,7 @@ impl HeatMap {
             logarithmic: false,
             map: ColourMap::Sequential,
             size: (560.0, 400.0),
+            to_scale: false,
             contours: Vec::new(),
             marks: Vec::new(),
         }
@@ -71,6 +73,12 @@ impl HeatMap {
     /// Colours that come round, for phases: give it the range of one turn.
     pub fn cyclic(mut self) -> Self {
         self.map = ColourMap::Cyclic;
+        self
+    }
+
+    /// Equal lengths along both axes, for maps of a place: the height follows from the width.
+    pub fn to_scale(mut self) -> Self {
+        self.to_scale = true;
         self
     }
 
@@ -152,7 +160,7 @@ pub(super) fn colour_bar(frame: &Frame, axis: &Axis, name: &str, unit: &str, map
         "" => name.to_owned(),
         unit => format!("{name} [{unit}]"),
     };
-    let (x, middle) = (frame.right + 60.0, (frame.top + frame.bottom) / 2.0);
+    let (x, middle) = (frame.right + 67.0, (frame.top + frame.bottom) / 2.0);
     let group = group
         .add(rectangle(frame.left, frame.top, frame.width(), frame.height(), "frame"))
         .add(
@@ -170,11 +178,19 @@ pub(super) fn colour_bar(frame: &Frame, axis: &Axis, name: &str, unit: &str, map
 
 impl From<HeatMap> for Figure {
     fn from(heat: HeatMap) -> Self {
-        let (width, height) = heat.size;
+        let (width, mut height) = heat.size;
+        let (left, right) = (66.0, width - 108.0);
+        if heat.to_scale {
+            let span = |(_, first, last): &(Axis, f64, f64)| (last - first).abs();
+            let ratio = span(&heat.y) / span(&heat.x);
+            if ratio.is_finite() {
+                height = 56.0 + (right - left) * ratio.clamp(0.1, 3.0);
+            }
+        }
         let frame = Frame {
-            left: 66.0,
+            left,
             top: 12.0,
-            right: width - 100.0,
+            right,
             bottom: height - 44.0,
         };
         let (rows, cols) = heat.values.dim();
@@ -213,8 +229,8 @@ impl From<HeatMap> for Figure {
             }
         }
         let side = Frame {
-            left: width - 88.0,
-            right: width - 74.0,
+            left: width - 96.0,
+            right: width - 82.0,
             ..frame
         };
         let (bar, meaning) = colour_bar(&side, &axis, &heat.scale.0, &heat.scale.1, heat.map);

@@ -106,7 +106,7 @@ impl From<ImageGrid> for Figure {
         let (side, tall) = (grid.side, grid.side * ratio.clamp(0.1, 4.0));
         let columns = grid.columns.min(grid.images.len().max(1));
         let rows = grid.images.len().div_ceil(columns).max(1);
-        let width = columns as f64 * (side + GAP) + 100.0;
+        let width = columns as f64 * (side + GAP) + 106.0;
         let height = rows as f64 * (tall + LABEL) + 10.0;
         let mut drawing = Group::new();
         let mut names = Vec::new();
@@ -124,8 +124,8 @@ impl From<ImageGrid> for Figure {
             names.push(label.as_str());
         }
         let frame = Frame {
-            left: width - 94.0,
-            right: width - 80.0,
+            left: width - 100.0,
+            right: width - 86.0,
             top: LABEL,
             bottom: LABEL + tall.max(((rows as f64 * (tall + LABEL)) - LABEL).min(360.0)),
         };
