@@ -41,6 +41,9 @@ impl Default for DiffPlan {
     }
 }
 
+/// Lattice sites of all elements together: those of 5 x 5 lenses of 1 mm, and a quarter more.
+const MOST_SITES: u64 = 1 << 28;
+
 /// Compare two layouts.
 ///
 /// # Errors
@@ -60,6 +63,16 @@ pub fn diff(a: &Layout, b: &Layout, plan: &DiffPlan, progress: &dyn Progress) ->
             Err(Error::Invalid { .. }) => {}
             Err(other) => return Err(other),
         }
+    }
+    let total: u64 = sites.iter().map(|s| (s.lattice.sites() as u64).pow(2)).sum();
+    if total > MOST_SITES {
+        return Err(Error::invalid(
+            format!("{} elements with {total} lattice sites together", sites.len()),
+            format!("up to {MOST_SITES} sites are compared; compare the layouts in parts"),
+        ));
+    }
+    for (k, site) in sites.iter_mut().enumerate() {
+        site.name = format!("element {}", k + 1);
     }
     let content = |layout: &Layout, factor| Content::read(layout, factor, &sites, plan.pillar_layer, progress);
     let (first, second) = (content(a, factors[0])?, content(b, factors[1])?);
