@@ -67,14 +67,17 @@ impl RadialPhase {
     pub(crate) fn load(&mut self, lens_radius_um: f64) -> Result<()> {
         let Self::Table {
             file,
+            interpolation,
             radius_um,
             phase_rad,
-            ..
         } = self
         else {
             return Ok(());
         };
         (*radius_um, *phase_rad) = table::read(file)?;
+        if *interpolation == Interpolation::Nearest {
+            table::unwrap(phase_rad);
+        }
         let (first, last) = (radius_um[0], radius_um[radius_um.len() - 1]);
         // A ring-by-ring table ends in the middle of the last ring.
         let slack = 1.5 * (last - first) / radius_um.len() as f64;

@@ -1,5 +1,6 @@
 //! Tables of phase over radius, from CSV or NPY.
 
+use std::f64::consts::TAU;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
@@ -96,6 +97,15 @@ fn read_npy(path: &Path) -> Result<Vec<(f64, f64)>> {
     Ok(values.chunks_exact(2).map(|row| (row[0], row[1])).collect())
 }
 
+/// Whole turns are added so that no step from row to row is more than half a turn: phases given ring by
+/// ring are known up to whole turns, and steps between neighbours are judged.
+pub(super) fn unwrap(phase_rad: &mut [f64]) {
+    for k in 1..phase_rad.len() {
+        let turns = ((phase_rad[k] - phase_rad[k - 1]) / TAU).round();
+        phase_rad[k] -= turns * TAU;
+    }
+}
+
 /// The phase at radius `r`; beyond the ends of the table, that of the end.
 pub(super) fn at(radius_um: &[f64], phase_rad: &[f64], interpolation: Interpolation, r: f64) -> f64 {
     let above = radius_um.partition_point(|&x| x < r);
@@ -109,5 +119,22 @@ pub(super) fn at(radius_um: &[f64], phase_rad: &[f64], interpolation: Interpolat
     match interpolation {
         Interpolation::Linear => phase_rad[above - 1] + share * (phase_rad[above] - phase_rad[above - 1]),
         Interpolation::Nearest => phase_rad[if share < 0.5 { above - 1 } else { above }],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unwrapping_leaves_small_steps_and_the_same_phases() {
+        let wrapped = [0.1, 6.2, 6.0, 0.2, 3.3, 6.1];
+        let mut phases = wrapped;
+        unwrap(&mut phases);
+        for (now, was) in phases.iter().zip(wrapped) {
+            let turns = (now - was) / TAU;
+            assert!((turns - turns.round()).abs() < 1e-12);
+        }
+        assert!(phases.windows(2).all(|p| (p[1] - p[0]).abs() <= TAU / 2.0));
     }
 }
