@@ -72,6 +72,7 @@
 //! ```
 
 mod array;
+pub mod calibrate;
 mod cell;
 mod design;
 pub mod diff;

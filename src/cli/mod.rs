@@ -1,5 +1,6 @@
 //! The program: arguments in, exit code out. Everything it does is a call of the library.
 
+mod calibrate;
 mod cells;
 mod check;
 mod diff;
@@ -63,6 +64,7 @@ enum Command {
     Cells(cells::CellsArgs),
     Check(check::CheckArgs),
     Diff(diff::DiffArgs),
+    Calibrate(calibrate::CalibrateArgs),
 }
 
 /// Run the program with the arguments of the process.
@@ -98,6 +100,7 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::Cells(args) => cells::run(args, terminal),
         Command::Check(args) => check::run(args, terminal),
         Command::Diff(args) => diff::run(args, terminal),
+        Command::Calibrate(args) => calibrate::run(args, terminal),
     }
 }
 

@@ -1,0 +1,356 @@
+//! What `calibrate` answers: `diagnosis.json`.
+
+use std::path::Path;
+
+use serde::Serialize;
+use serde_json::Value;
+
+use super::attribute::{Finding, RESIDUAL};
+use super::fit::{Fit, Problem};
+use super::heldout::mean as mean_held_out;
+use super::session::Session;
+use super::signature::{names, separate_by};
+use crate::error::Result;
+use crate::file::WholeFile;
+
+/// What a session comes to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SetVerdict {
+    /// The set is what was stated, to within its noise.
+    NoResidual,
+    /// What was found explains it.
+    Explained,
+    /// One of a few effects that this set cannot tell apart.
+    OneOf,
+    /// What was found explains a part.
+    Partly,
+    /// There is something, and it has no name here.
+    Unexplained,
+    /// Too few captures can be used.
+    DataUnfit,
+}
+
+/// One number that was found, or one for each of its axes.
+#[derive(Clone, Debug, Serialize)]
+pub struct FoundEffect {
+    pub name: String,
+    /// In `unit`; a list for an effect along two axes.
+    pub value: Value,
+    pub unit: String,
+    /// 95 % interval; a list of them for an effect along two axes.
+    pub interval: Value,
+    pub confounded_with: Vec<String>,
+    pub separate_by: Option<String>,
+}
+
+/// Fit and held-out error.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct ErrorPair {
+    pub fit: f64,
+    pub held_out: f64,
+}
+
+/// The error before and after.
+#[derive(Clone, Debug, Serialize)]
+pub struct ErrorReport {
+    pub measure: String,
+    pub before: ErrorPair,
+    pub after: ErrorPair,
+    pub noise_floor: f64,
+    pub placebo_held_out: f64,
+}
+
+/// One candidate.
+#[derive(Clone, Debug, Serialize)]
+pub struct Ranked {
+    pub name: String,
+    /// Share of the residual that its signature explains.
+    pub score: f64,
+    pub held_out_gain: Option<f64>,
+    pub held_out_gain_interval: Option<[f64; 2]>,
+    pub value: Option<Value>,
+    pub rejected: Option<String>,
+}
+
+/// A capture that was left out.
+#[derive(Clone, Debug, Serialize)]
+pub struct LeftOut {
+    pub capture: String,
+    pub reason: String,
+}
+
+/// Everything that a program needs to know.
+#[derive(Clone, Debug, Serialize)]
+pub struct Diagnosis {
+    pub set: String,
+    pub verdict: SetVerdict,
+    pub effects: Vec<FoundEffect>,
+    pub error: ErrorReport,
+    pub ranking: Vec<Ranked>,
+    /// Share of the residual's energy above noise that is left.
+    pub unexplained_share: f64,
+    pub left_out: Vec<LeftOut>,
+    /// Held-out error of each capture before and after.
+    pub captures: Vec<CaptureError>,
+    /// Error of the three fidelities of the cell, the nuisances fitted.
+    pub ladder: Vec<Rung>,
+}
+
+/// The error of one capture when it was left out.
+#[derive(Clone, Debug, Serialize)]
+pub struct CaptureError {
+    pub capture: String,
+    pub before: Option<f64>,
+    pub after: Option<f64>,
+}
+
+/// One fidelity of the cell.
+#[derive(Clone, Debug, Serialize)]
+pub struct Rung {
+    pub fidelity: String,
+    pub fit: f64,
+    pub held_out: f64,
+}
+
+/// What is measured.
+const MEASURE: &str = "chi-square a pixel";
+
+/// Share of the residual's energy that may be left of what counts as explained, where much was there.
+const LEFT: f64 = 0.05;
+
+/// Share past which what was found is no explanation.
+const MOSTLY_LEFT: f64 = 0.4;
+
+impl Diagnosis {
+    /// From what was found.
+    pub fn new(session: &Session<'_>, finding: &Finding, left_out: Vec<LeftOut>, ladder: Vec<Rung>) -> Self {
+        let simulator = &session.simulator;
+        let pixels: f64 = (0..session.used.len())
+            .filter(|&c| session.used[c])
+            .map(|c| session.data.pixels(c) as f64)
+            .sum();
+        let pair = |fit: &Fit, held: f64| ErrorPair {
+            fit: fit.chi2 / pixels,
+            held_out: held,
+        };
+        let before = pair(&finding.before, mean_held_out(&finding.held_before));
+        let after = pair(&finding.after, mean_held_out(&finding.held_after));
+        let share = ((after.held_out - 1.0).max(0.0) / (before.held_out - 1.0).max(1e-9)).clamp(0.0, 1.0);
+        let unexplained_share = if before.held_out < RESIDUAL && finding.chosen.is_empty() {
+            0.0
+        } else {
+            share
+        };
+        let many_unfit = 2 * left_out.len() > session.used.len();
+        let fits = after.held_out <= RESIDUAL.max(1.0 + LEFT * (before.held_out - 1.0).min(6.0));
+        let alone = finding.alternatives.iter().all(Vec::is_empty);
+        let verdict = if many_unfit {
+            SetVerdict::DataUnfit
+        } else if finding.chosen.is_empty() {
+            if before.held_out <= RESIDUAL {
+                SetVerdict::NoResidual
+            } else {
+                SetVerdict::Unexplained
+            }
+        } else if !fits && unexplained_share > MOSTLY_LEFT {
+            SetVerdict::Unexplained
+        } else if !fits {
+            SetVerdict::Partly
+        } else if finding.chosen.len() == 1 && !alone {
+            SetVerdict::OneOf
+        } else {
+            SetVerdict::Explained
+        };
+        let mut effects = Vec::new();
+        if !matches!(verdict, SetVerdict::DataUnfit | SetVerdict::Unexplained) {
+            for (&effect, alternatives) in finding.chosen.iter().zip(&finding.alternatives) {
+                let slots = simulator.slots_of(effect);
+                let values: Vec<f64> = slots.iter().map(|&s| finding.after.theta[s]).collect();
+                let widths: Vec<f64> = slots
+                    .iter()
+                    .filter_map(|s| {
+                        finding
+                            .after
+                            .active
+                            .iter()
+                            .position(|a| a == s)
+                            .map(|k| finding.half_widths[k])
+                    })
+                    .collect();
+                let others: Vec<usize> = alternatives.iter().map(|a| a.effect).collect();
+                effects.push(found(session, effect, &values, &widths, &others));
+                if verdict == SetVerdict::OneOf {
+                    for a in alternatives {
+                        let rest: Vec<usize> = others
+                            .iter()
+                            .copied()
+                            .filter(|&o| o != a.effect)
+                            .chain([effect])
+                            .collect();
+                        effects.push(found(session, a.effect, &a.values, &a.half_widths, &rest));
+                    }
+                }
+            }
+        }
+        let ranking = finding
+            .ranking
+            .iter()
+            .map(|t| Ranked {
+                name: simulator.effects[t.effect].name(),
+                score: t.score,
+                held_out_gain: t.gain.map(|g| g.0),
+                held_out_gain_interval: t.gain.map(|g| g.1),
+                value: (!t.values.is_empty()).then(|| listed(&reported(session, t.effect, &t.values))),
+                rejected: if finding.chosen.contains(&t.effect) || t.rejected.is_empty() {
+                    None
+                } else {
+                    Some(t.rejected.clone())
+                },
+            })
+            .collect();
+        Self {
+            set: session.set().title.clone(),
+            verdict,
+            effects,
+            error: ErrorReport {
+                measure: MEASURE.into(),
+                before,
+                after,
+                noise_floor: 1.0,
+                placebo_held_out: finding.placebo_held_out,
+            },
+            ranking,
+            unexplained_share,
+            left_out,
+            captures: session
+                .set()
+                .captures
+                .iter()
+                .enumerate()
+                .map(|(c, capture)| CaptureError {
+                    capture: capture.name.clone(),
+                    before: finding.held_before[c],
+                    after: finding.held_after[c],
+                })
+                .collect(),
+            ladder,
+        }
+    }
+
+    /// Nothing can be said of a set that is mostly unfit.
+    pub fn unfit(session: &Session<'_>, problem: &Problem<'_>, left_out: Vec<LeftOut>, fit: &Fit) -> Self {
+        let error = fit.chi2 / problem.pixels().max(1.0);
+        let pair = ErrorPair {
+            fit: error,
+            held_out: error,
+        };
+        Self {
+            set: session.set().title.clone(),
+            verdict: SetVerdict::DataUnfit,
+            effects: Vec::new(),
+            error: ErrorReport {
+                measure: MEASURE.into(),
+                before: pair,
+                after: pair,
+                noise_floor: 1.0,
+                placebo_held_out: error,
+            },
+            ranking: Vec::new(),
+            unexplained_share: 1.0,
+            left_out,
+            captures: Vec::new(),
+            ladder: Vec::new(),
+        }
+    }
+
+    /// Write it as `diagnosis.json`.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let mut text = serde_json::to_string_pretty(self).expect("plain data serialises");
+        text.push('\n');
+        WholeFile::write(path, text.as_bytes())
+    }
+
+    /// One line for a person.
+    pub fn sentence(&self) -> String {
+        let one = |e: &FoundEffect| {
+            let unit = if e.unit.is_empty() {
+                String::new()
+            } else {
+                format!(" {}", e.unit)
+            };
+            format!(
+                "{} = {}{unit}, interval {}",
+                e.name,
+                rounded(&e.value),
+                rounded(&e.interval)
+            )
+        };
+        let list: Vec<String> = self.effects.iter().map(one).collect();
+        match self.verdict {
+            SetVerdict::NoResidual => "no residual: the captures are what was stated, to within their noise".into(),
+            SetVerdict::Explained => format!("explained by {}", list.join("; ")),
+            SetVerdict::OneOf => format!("one of, which this set cannot tell apart: {}", list.join("; ")),
+            SetVerdict::Partly => format!(
+                "partly explained by {}; {:.0} % of the residual is left",
+                list.join("; "),
+                100.0 * self.unexplained_share
+            ),
+            SetVerdict::Unexplained => "unexplained: there is a residual that no effect known here accounts for".into(),
+            SetVerdict::DataUnfit => format!("data unfit: {} captures cannot be used", self.left_out.len()),
+        }
+    }
+}
+
+/// Numbers of an effect in the unit that it is reported in.
+fn reported(session: &Session<'_>, effect: usize, values: &[f64]) -> Vec<f64> {
+    values
+        .iter()
+        .map(|v| session.simulator.effects[effect].value(*v, session.set()))
+        .collect()
+}
+
+fn found(session: &Session<'_>, effect: usize, values: &[f64], widths: &[f64], others: &[usize]) -> FoundEffect {
+    let simulator = &session.simulator;
+    let own = &simulator.effects[effect];
+    let intervals: Vec<[f64; 2]> = values
+        .iter()
+        .zip(widths)
+        .zip(own.parameters())
+        .map(|((v, w), p)| {
+            let a = own.value((v - w).max(p.range.0), session.set());
+            let b = own.value((v + w).min(p.range.1), session.set());
+            [a.min(b), a.max(b)]
+        })
+        .collect();
+    let interval = match intervals.as_slice() {
+        [one] => serde_json::json!(one),
+        more => serde_json::json!(more),
+    };
+    FoundEffect {
+        name: own.name(),
+        value: listed(&reported(session, effect, values)),
+        unit: own.unit().into(),
+        interval,
+        confounded_with: names(simulator, others),
+        separate_by: separate_by(simulator, effect, others),
+    }
+}
+
+fn listed(values: &[f64]) -> Value {
+    match values {
+        [one] => serde_json::json!(one),
+        more => serde_json::json!(more),
+    }
+}
+
+fn rounded(value: &Value) -> String {
+    match value {
+        Value::Array(items) => format!("[{}]", items.iter().map(rounded).collect::<Vec<_>>().join(", ")),
+        Value::Number(n) => crate::report::sig(n.as_f64().unwrap_or(f64::NAN), 4),
+        other => other.to_string(),
+    }
+}

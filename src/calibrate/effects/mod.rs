@@ -1,0 +1,138 @@
+//! What chips and benches are known to do to light, one file each.
+//!
+//! An effect has a name, a unit, a range that physics allows, and turns one or two numbers of a
+//! [`Departure`]. Adding one touches its file and [`all`].
+
+mod aperture_offset;
+mod cd_bias;
+mod cd_bias_density;
+mod corner_rounding;
+mod film_height;
+mod film_index;
+mod gap;
+mod led_centre;
+mod led_width;
+mod missing_pillars;
+mod pixel_blur;
+mod residual_mask;
+mod sidewall_taper;
+mod source_distance;
+mod source_size;
+mod stray_light;
+mod tilt;
+mod zero_order;
+
+use super::departure::Departure;
+use super::set::MeasuredSet;
+
+/// Where in the model an effect acts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Where pillars and apertures are, and how wide.
+    Geometry,
+    /// What a pillar is: its cell has to be solved again.
+    Stack,
+    /// The way of the light.
+    Diffraction,
+    /// The lamps.
+    Source,
+    /// The camera.
+    Camera,
+}
+
+/// A number that an effect turns. It is chosen so that the image answers to it about linearly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameter {
+    /// What physics allows.
+    pub range: (f64, f64),
+    /// A size that is not unusual.
+    pub typical: f64,
+}
+
+impl Parameter {
+    const fn new(low: f64, high: f64, typical: f64) -> Self {
+        Self {
+            range: (low, high),
+            typical,
+        }
+    }
+
+    /// Whether it can only be positive.
+    pub fn one_sided(&self) -> bool {
+        self.range.0 >= 0.0
+    }
+}
+
+/// Something that a chip or a bench may do.
+pub trait Effect: Send + Sync {
+    /// The name it is reported by.
+    fn name(&self) -> String;
+
+    /// Unit of the value that is reported.
+    fn unit(&self) -> &'static str;
+
+    /// Where it acts.
+    fn stage(&self) -> Stage;
+
+    /// The numbers that it turns; zero for each is no effect.
+    fn parameters(&self) -> Vec<Parameter>;
+
+    /// Set its numbers.
+    fn apply(&self, parameters: &[f64], to: &mut Departure);
+
+    /// The value that is reported for one of its numbers.
+    fn value(&self, parameter: f64, _set: &MeasuredSet) -> f64 {
+        parameter
+    }
+
+    /// Effects that are known to look alike on this kind of data, each with the measurement that tells them
+    /// apart.
+    fn confusions(&self) -> &'static [(&'static str, &'static str)] {
+        &[]
+    }
+}
+
+/// The measurement that would split two effects, as either of them knows it.
+pub fn separate_by(a: &dyn Effect, b: &str) -> Option<&'static str> {
+    let root = |name: &str| {
+        if name.starts_with("led_centre") {
+            "led_centre".to_owned()
+        } else {
+            name.to_owned()
+        }
+    };
+    a.confusions()
+        .iter()
+        .find(|(name, _)| root(name) == root(b))
+        .map(|c| c.1)
+}
+
+/// Every effect that is tried on a set.
+pub fn all(set: &MeasuredSet) -> Vec<Box<dyn Effect>> {
+    let mut effects: Vec<Box<dyn Effect>> = vec![
+        Box::new(cd_bias::CdBias),
+        Box::new(cd_bias_density::CdBiasDensity),
+        Box::new(film_height::FilmHeight),
+        Box::new(film_index::FilmIndex),
+        Box::new(sidewall_taper::SidewallTaper),
+        Box::new(corner_rounding::CornerRounding),
+        Box::new(residual_mask::ResidualMask),
+        Box::new(missing_pillars::MissingPillars),
+        Box::new(gap::Gap),
+        Box::new(tilt::Tilt),
+        Box::new(source_distance::SourceDistance),
+        Box::new(led_width::LedWidth),
+        Box::new(source_size::SourceSize),
+        Box::new(pixel_blur::PixelBlur),
+        Box::new(zero_order::ZeroOrder),
+        Box::new(stray_light::StrayLight),
+        Box::new(aperture_offset::ApertureOffset),
+    ];
+    for (led, lamp) in set.leds.iter().enumerate() {
+        effects.push(Box::new(led_centre::LedCentre {
+            led,
+            name: format!("led_centre_{}", lamp.name()),
+        }));
+    }
+    effects
+}

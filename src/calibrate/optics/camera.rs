@@ -1,0 +1,248 @@
+//! From intensity on fine samples to the pixels of a camera: source disc, blur, pixel area, placement.
+//!
+//! Intensity is band-limited, so all of this happens on its spectrum and is exact; the samples that stand
+//! around the window are faded out towards their border, which keeps its far side from coming in.
+
+use ndarray::{Array2, ArrayView2};
+use num_complex::Complex32;
+use rustfft::FftPlanner;
+
+/// What intensity passes on its way to the pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Optic {
+    /// Edge of a pixel [um].
+    pub pixel_um: f64,
+    /// The images of the source disc's two radii, as the columns of a matrix [um].
+    pub disc_um: [[f64; 2]; 2],
+    /// Standard deviation of a Gaussian blur [um].
+    pub blur_um: f64,
+}
+
+/// The intensity around one window, as a spectrum.
+#[derive(Clone, Debug)]
+pub struct PixelGrid {
+    /// Bins that hold light, shape `[my, 2 mx + 1]`: ky from zero, kx from -mx to mx.
+    re: Array2<f32>,
+    im: Array2<f32>,
+    /// Width of a bin [1/um].
+    cycle: f64,
+    /// From the first sample to the middle of the window [um].
+    middle_um: f64,
+    shape: [usize; 2],
+    pixel_um: f64,
+}
+
+/// Bins below this share of the mean are left out: together they are below any noise.
+const EMPTY: f32 = 1e-6;
+
+/// Share of the samples on each side over which the surroundings are faded out.
+const FADED: f64 = 0.06;
+
+impl PixelGrid {
+    /// The spectrum of `intensity` (a square of samples `step_um` apart) behind `optic`, to be read on
+    /// `rows` x `cols` pixels about its middle.
+    pub fn new(intensity: &[f32], step_um: f64, optic: &Optic, rows: usize, cols: usize) -> Self {
+        let n = (intensity.len() as f64).sqrt().round() as usize;
+        let ramp = ((FADED * n as f64) as usize).max(2);
+        let border: f32 = {
+            let ends = (0..n).flat_map(|i| [i, (n - 1) * n + i, i * n, i * n + n - 1]);
+            ends.map(|i| intensity[i]).sum::<f32>() / (4 * n) as f32
+        };
+        let fade: Vec<f32> = (0..n)
+            .map(|i| {
+                let depth = (i.min(n - 1 - i) as f64 + 0.5) / ramp as f64;
+                (0.5 - 0.5 * (std::f64::consts::PI * depth.min(1.0)).cos()) as f32
+            })
+            .collect();
+        let mut planner = FftPlanner::<f32>::new();
+        let fft = planner.plan_fft_forward(n);
+        let mut rows_of: Vec<Complex32> = intensity
+            .iter()
+            .enumerate()
+            .map(|(i, v)| Complex32::new(border + (v - border) * fade[i / n] * fade[i % n], 0.0))
+            .collect();
+        fft.process(&mut rows_of);
+        let mut columns = vec![Complex32::ZERO; n * n];
+        for y in 0..n {
+            for x in 0..n {
+                columns[x * n + y] = rows_of[y * n + x];
+            }
+        }
+        fft.process(&mut columns);
+        let half = n / 2;
+        let cycle = 1.0 / (n as f64 * step_um);
+        let norm = 1.0 / (n * n) as f64;
+        let bin = |kx: i64, ky: usize| {
+            let weight = if ky == 0 { norm } else { 2.0 * norm };
+            let factor = optic.transfer(kx as f64 * cycle, ky as f64 * cycle) * weight;
+            columns[kx.rem_euclid(n as i64) as usize * n + ky] * factor as f32
+        };
+        let reach = half as i64 - 1;
+        let least = EMPTY * bin(0, 0).norm();
+        let (mut mx, mut my) = (1, 1);
+        let mut bins = Array2::from_elem((half, 2 * reach as usize + 1), Complex32::ZERO);
+        for ((ky, i), value) in bins.indexed_iter_mut() {
+            let kx = i as i64 - reach;
+            *value = bin(kx, ky);
+            if value.norm() > least {
+                (mx, my) = (mx.max(kx.abs()), my.max(ky + 1));
+            }
+        }
+        let kept = bins.slice(ndarray::s![..my, (reach - mx) as usize..=(reach + mx) as usize]);
+        Self {
+            re: kept.mapv(|v| v.re),
+            im: kept.mapv(|v| v.im),
+            cycle,
+            middle_um: 0.5 * (n as f64 - 1.0) * step_um,
+            shape: [rows, cols],
+            pixel_um: optic.pixel_um,
+        }
+    }
+
+    /// The sum of grids, each with its factor. They must be of the same window.
+    pub fn combine(parts: &[(&Self, f32)]) -> Self {
+        let my = parts.iter().map(|(g, _)| g.re.nrows()).max().unwrap_or(0);
+        let mx = parts.iter().map(|(g, _)| g.re.ncols()).max().unwrap_or(0);
+        let (mut re, mut im) = (Array2::zeros((my, mx)), Array2::zeros((my, mx)));
+        for (grid, factor) in parts {
+            let (rows, cols) = grid.re.dim();
+            let from = (mx - cols) / 2;
+            let place = ndarray::s![..rows, from..from + cols];
+            re.slice_mut(place).scaled_add(*factor, &grid.re);
+            im.slice_mut(place).scaled_add(*factor, &grid.im);
+        }
+        Self {
+            re,
+            im,
+            ..*parts.first().expect("a sum has parts").0
+        }
+    }
+
+    /// The pixels of a window whose middle is off by `shift_um` (x, y).
+    pub fn pixels(&self, shift_um: [f64; 2]) -> Array2<f32> {
+        self.read(shift_um, [0, 0])
+    }
+
+    /// Derivative of [`PixelGrid::pixels`] by the shift along x (0) or y (1) [1/um].
+    pub fn slope(&self, shift_um: [f64; 2], axis: usize) -> Array2<f32> {
+        self.read(shift_um, if axis == 0 { [1, 0] } else { [0, 1] })
+    }
+
+    fn read(&self, shift_um: [f64; 2], order: [u32; 2]) -> Array2<f32> {
+        let (half, n) = self.re.dim();
+        let [rows, cols] = self.shape;
+        let (cycle, middle) = (self.cycle, self.middle_um);
+        let wave = |f: f64, x: f64, order: u32| {
+            let phase = std::f64::consts::TAU * f * x;
+            let factor = (std::f64::consts::TAU * f).powi(order as i32);
+            // Each derivative turns by a quarter.
+            let phase = phase + f64::from(order) * std::f64::consts::FRAC_PI_2;
+            ((factor * phase.cos()) as f32, (factor * phase.sin()) as f32)
+        };
+        let place = |i: usize, count: usize, shift: f64| {
+            (i as f64 - 0.5 * (count as f64 - 1.0)) * self.pixel_um + shift + middle
+        };
+        let (mut cx, mut sx) = (Array2::zeros((n, cols)), Array2::zeros((n, cols)));
+        for k in 0..n {
+            let f = (k as f64 - (n / 2) as f64) * cycle;
+            for j in 0..cols {
+                (cx[[k, j]], sx[[k, j]]) = wave(f, place(j, cols, shift_um[0]), order[0]);
+            }
+        }
+        let (mut cy, mut sy) = (Array2::zeros((rows, half)), Array2::zeros((rows, half)));
+        for i in 0..rows {
+            let y = place(i, rows, shift_um[1]);
+            for k in 0..half {
+                (cy[[i, k]], sy[[i, k]]) = wave(k as f64 * cycle, y, order[1]);
+            }
+        }
+        let dot = |a: ArrayView2<'_, f32>, b: &Array2<f32>| a.dot(b);
+        let re = dot(self.re.view(), &cx) - dot(self.im.view(), &sx);
+        let im = dot(self.re.view(), &sx) + dot(self.im.view(), &cx);
+        dot(cy.view(), &re) - dot(sy.view(), &im)
+    }
+}
+
+impl Optic {
+    /// Factor of the intensity's spectrum at a frequency [cycles / um].
+    fn transfer(&self, fx: f64, fy: f64) -> f64 {
+        let [u, v] = self.disc_um;
+        let disc = airy_disc(std::f64::consts::TAU * (fx * u[0] + fy * u[1]).hypot(fx * v[0] + fy * v[1]));
+        let blur = (-2.0 * (std::f64::consts::PI * self.blur_um).powi(2) * (fx * fx + fy * fy)).exp();
+        sinc(fx * self.pixel_um) * sinc(fy * self.pixel_um) * disc * blur
+    }
+}
+
+fn sinc(x: f64) -> f64 {
+    let t = std::f64::consts::PI * x;
+    if t.abs() < 1e-6 { 1.0 } else { t.sin() / t }
+}
+
+/// 2 J1(q) / q, the transform of a uniform disc, by its power series; it is used for q of a few.
+fn airy_disc(q: f64) -> f64 {
+    if q > 20.0 {
+        // Alternating terms of the series would cancel; what is left is below 0.03 and no light has it.
+        return 0.0;
+    }
+    let x = -0.25 * q * q;
+    let (mut term, mut sum) = (1.0, 1.0);
+    for k in 1..60 {
+        term *= x / (f64::from(k) * (f64::from(k) + 1.0));
+        sum += term;
+        if term.abs() < 1e-15 {
+            break;
+        }
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_of_a_gaussian_are_those_of_its_integral() {
+        let (n, step, sigma) = (96, 0.5, 1.3);
+        let at = |i: usize| (i as f64 - 47.5) * step;
+        let gauss = |s: f64, x: f64, y: f64| (-(x * x + y * y) / (2.0 * s * s)).exp();
+        let samples: Vec<f32> = (0..n * n).map(|i| gauss(sigma, at(i % n), at(i / n)) as f32).collect();
+        let optic = Optic {
+            pixel_um: 0.7,
+            disc_um: [[0.0; 2]; 2],
+            blur_um: 0.4,
+        };
+        let grid = PixelGrid::new(&samples, step, &optic, 40, 32);
+        let shift = [0.23, -0.61];
+        let pixels = grid.pixels(shift);
+        // A blurred Gaussian is one of the summed variance; over a pixel by a fine midpoint rule.
+        let total: f64 = sigma * sigma + 0.16;
+        for (row, col) in [(20, 16), (17, 20), (25, 11)] {
+            let x = (col as f64 - 15.5) * 0.7 + shift[0];
+            let y = (row as f64 - 19.5) * 0.7 + shift[1];
+            let fine = (0..40 * 40).map(|k| {
+                let (a, b) = ((k % 40) as f64, (k / 40) as f64);
+                let off = |v: f64| ((v + 0.5) / 40.0 - 0.5) * 0.7;
+                gauss(total.sqrt(), x + off(a), y + off(b)) * sigma * sigma / total / 1600.0
+            });
+            let want: f64 = fine.sum();
+            assert!(
+                (f64::from(pixels[[row, col]]) - want).abs() < 2e-5,
+                "{} {want}",
+                pixels[[row, col]]
+            );
+        }
+        let h = 1e-2;
+        let slope = grid.slope(shift, 0);
+        let numeric =
+            (&grid.pixels([shift[0] + h, shift[1]]) - &grid.pixels([shift[0] - h, shift[1]])) / (2.0 * h as f32);
+        assert!((&slope - &numeric).iter().all(|d| d.abs() < 1e-3));
+    }
+
+    #[test]
+    fn a_disc_blurs_as_bessel_says() {
+        // 2 J1(q) / q at 1, 2 and its first zero.
+        for (q, want) in [(1.0, 0.880_101_171_49), (2.0, 0.576_724_807_76), (3.831_705_970_2, 0.0)] {
+            assert!((airy_disc(q) - want).abs() < 1e-10);
+        }
+    }
+}

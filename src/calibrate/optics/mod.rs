@@ -1,0 +1,11 @@
+//! From the pillars of an element to the pixels of a camera, planned once and run many times.
+
+mod camera;
+mod cis;
+mod planes;
+mod spectrum;
+
+pub use camera::{Optic, PixelGrid};
+pub(super) use cis::cis;
+pub use planes::{Planes, Planned, Scratch};
+pub use spectrum::Quadrature;

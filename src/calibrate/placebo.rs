@@ -1,0 +1,85 @@
+//! Smooth terms that stand for nothing: what a winner must beat.
+
+use nalgebra::DMatrix;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use super::atlas::FREE_PHASES;
+use super::fit::{Fit, Problem};
+use super::heldout::{HeldOut, SEED, held_out, mean};
+use super::nuisance::Block;
+use super::quadratic::sum;
+
+/// Random smooth terms that stand against a winner.
+const PLACEBOS: usize = 60;
+
+/// The forms of the free phases, after the numbers that are active.
+pub fn free_forms(problem: &Problem<'_>, now: &Fit, terms: &[usize]) -> Vec<DMatrix<f64>> {
+    let mut forms: Vec<DMatrix<f64>> = (0..problem.data.signal.len())
+        .into_par_iter()
+        .map(|c| {
+            let shift = now.nuisances.shift_um[c];
+            let grid = problem.grid(&now.theta, c);
+            let lines = [grid.pixels(shift), grid.slope(shift, 0), grid.slope(shift, 1)];
+            let blank = || ndarray::Array2::zeros(lines[0].dim());
+            let more: Vec<_> = now
+                .active
+                .iter()
+                .map(|&s| problem.atlas.slope(&now.theta, s, c).pixels(shift))
+                .chain(terms.iter().map(|&t| {
+                    problem.atlas.free[t][c]
+                        .as_ref()
+                        .map_or_else(blank, |g| g.pixels(shift))
+                }))
+                .collect();
+            Block::new(problem.data, c, &now.nuisances, &lines, &more).reduced()
+        })
+        .collect();
+    let size = forms[0].nrows();
+    // The SEM says nothing of free terms: their rows stay empty.
+    let sem = problem.sem_form(&now.active, &now.theta);
+    let mut wide = DMatrix::zeros(size, size);
+    let inner = sem.nrows() - 1;
+    let place = |i: usize| if i == inner { size - 1 } else { i };
+    for i in 0..=inner {
+        for j in 0..=inner {
+            wide[(place(i), place(j))] = sem[(i, j)];
+        }
+    }
+    forms.push(wide);
+    forms
+}
+
+/// What random smooth terms gain on captures left out: what 95 % of them stay below.
+pub fn placebo_gain(problem: &Problem<'_>, now: &Fit, held_now: &HeldOut, numbers: usize) -> f64 {
+    if problem.atlas.free.len() < FREE_PHASES {
+        return 0.0;
+    }
+    let terms: Vec<usize> = (0..FREE_PHASES).collect();
+    let forms = free_forms(problem, now, &terms);
+    let size = forms[0].nrows();
+    let first = size - 1 - FREE_PHASES;
+    let total = sum(&forms[..problem.used.len()], size);
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    let mut gains: Vec<f64> = (0..PLACEBOS)
+        .map(|_| {
+            let kept = first + numbers + 1;
+            let mut mix = DMatrix::zeros(size, kept);
+            for i in 0..first {
+                mix[(i, i)] = 1.0;
+            }
+            mix[(size - 1, kept - 1)] = 1.0;
+            for k in 0..numbers {
+                for t in 0..FREE_PHASES {
+                    let scale = total[(first + t, first + t)].max(f64::MIN_POSITIVE).sqrt();
+                    mix[(first + t, first + k)] = rng.random_range(-1.0..1.0) / scale;
+                }
+            }
+            let mixed: Vec<DMatrix<f64>> = forms.iter().map(|f| mix.transpose() * f * &mix).collect();
+            mean(held_now) - mean(&held_out(problem, &mixed, now))
+        })
+        .collect();
+    gains.sort_by(f64::total_cmp);
+    gains[(gains.len() - 1) * 95 / 100].max(0.0)
+}

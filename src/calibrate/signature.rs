@@ -1,0 +1,70 @@
+//! What each effect would change, against what is left and against one another.
+
+use nalgebra::DMatrix;
+
+use super::atlas::Simulator;
+use super::effects;
+use super::fit::{Fit, Problem};
+use super::quadratic::minimise;
+
+/// Effects by the share of the residual that their signature explains, nuisances and what is chosen
+/// projected out.
+pub fn screen(problem: &Problem<'_>, now: &Fit, chosen: &[usize]) -> Vec<(usize, f64)> {
+    let simulator = problem.simulator;
+    let slots: Vec<usize> = (0..simulator.slots.len()).collect();
+    let wide = problem.at(&slots, now.theta.clone(), now.nuisances.clone());
+    let form = problem.total(&wide.forms, &wide.nuisances);
+    let shared = problem.shared();
+    let base: Vec<usize> = (0..shared)
+        .chain(chosen.iter().flat_map(|&e| simulator.slots_of(e)).map(|s| shared + s))
+        .collect();
+    let (_, without) = minimise(&form, &base);
+    let mut scores: Vec<(usize, f64)> = (0..simulator.effects.len())
+        .filter(|e| !chosen.contains(e))
+        .map(|e| {
+            let free: Vec<usize> = base
+                .iter()
+                .copied()
+                .chain(simulator.slots_of(e).into_iter().map(|s| shared + s))
+                .collect();
+            let (_, with) = minimise(&form, &free);
+            (e, ((without - with) / without).max(0.0))
+        })
+        .collect();
+    scores.sort_by(|a, b| b.1.total_cmp(&a.1));
+    scores
+}
+
+/// Cosines between the signatures of all numbers, nuisances projected out, weighted by the noise of this set.
+pub fn cosines(problem: &Problem<'_>, at: &Fit) -> DMatrix<f64> {
+    let slots: Vec<usize> = (0..problem.simulator.slots.len()).collect();
+    let wide = problem.at(&slots, at.theta.clone(), at.nuisances.clone());
+    let form = problem.total(&wide.forms, &wide.nuisances);
+    let (shared, n) = (problem.shared(), slots.len());
+    let a = form.view((0, 0), (shared, shared)).into_owned();
+    let cross = form.view((0, shared), (shared, n)).into_owned();
+    let inverse = a.try_inverse().unwrap_or_else(|| DMatrix::zeros(shared, shared));
+    let g = form.view((shared, shared), (n, n)) - cross.transpose() * inverse * &cross;
+    DMatrix::from_fn(n, n, |i, j| {
+        let size = (g[(i, i)] * g[(j, j)]).sqrt();
+        if size > 0.0 { g[(i, j)] / size } else { 0.0 }
+    })
+}
+
+/// Names of effects, for messages.
+pub fn names(simulator: &Simulator<'_>, list: &[usize]) -> Vec<String> {
+    list.iter().map(|&e| simulator.effects[e].name()).collect()
+}
+
+/// The measurement that would tell an effect from others, as far as it is known.
+pub fn separate_by(simulator: &Simulator<'_>, effect: usize, others: &[usize]) -> Option<String> {
+    let own = &simulator.effects[effect];
+    others
+        .iter()
+        .find_map(|&o| {
+            let name = simulator.effects[o].name();
+            effects::separate_by(own.as_ref(), &name)
+                .or_else(|| effects::separate_by(simulator.effects[o].as_ref(), &own.name()))
+        })
+        .map(str::to_owned)
+}
