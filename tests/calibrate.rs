@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use metalith::calibrate::{CalibratedModel, Departure, MeasuredSet, Session, SetVerdict, Settings, Twins, compensate};
+use metalith::calibrate::{MeasuredSet, Session, SetVerdict, Settings, Twins};
 use metalith::calibrate::{OffList, Sampling};
 use metalith::{Design, Hierarchy, PillarArray, Silent, write_pillars};
 use ndarray::Array2;
@@ -212,23 +212,4 @@ fn effects_are_found_and_nothing_is_found_where_nothing_is() {
     let d = diagnose(&dark);
     assert_eq!(d.verdict, SetVerdict::DataUnfit);
     assert!(d.left_out.len() >= 5);
-}
-
-#[test]
-fn a_compensated_layout_comes_out_as_intended() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let design = Design::read(&root.join("designs/mini_3x3.toml")).unwrap();
-    let array = PillarArray::build(&design, &Silent).unwrap();
-    let mut departure = Departure::default();
-    departure.geometry.cd_bias_nm = -10.0;
-    let model = CalibratedModel::new("twin".into(), "cd_bias".into(), departure);
-    let done = compensate(&design, &array, &model).unwrap();
-    // A bias of whole steps is undone by drawing every pillar wider by it.
-    let [before, after] = done.summary.error;
-    assert!(before > 0.05 && after < 0.02, "{before} {after}");
-    assert!(
-        (done.summary.moved_rms_nm - 10.0).abs() < 0.2,
-        "{}",
-        done.summary.moved_rms_nm
-    );
 }

@@ -8,7 +8,6 @@ mod atlas;
 mod attribute;
 mod bench;
 mod cells;
-mod compensate;
 mod density;
 mod departure;
 mod diagnosis;
@@ -34,7 +33,6 @@ mod zernike;
 
 pub use atlas::Atlas;
 pub use bench::Sampling;
-pub use compensate::{Compensated, CompensationSummary, compensate};
 pub use departure::{CameraChange, CellChange, Departure, Geometry, LightChange, PathChange};
 pub use diagnosis::{Diagnosis, ErrorPair, ErrorReport, FoundEffect, LeftOut, Ranked, Rung, SetVerdict};
 pub use model::{CalibratedModel, MadeCell};

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metalith::calibrate::{CalibratedModel, compensate};
 use metalith::{
     Design, Hierarchy, PillarArray, Result, Written, write_apertures, write_layer_properties, write_pillars,
 };
@@ -19,11 +18,6 @@ pub struct LayoutArgs {
 
     #[command(flatten)]
     target: Target,
-
-    /// Draw pillars so that they come out as intended on the line that this model was calibrated on; writes
-    /// `NAME_compensation.html` as well.
-    #[arg(long, value_name = "MODEL")]
-    compensate: Option<PathBuf>,
 
     /// Print what was written as JSON.
     #[arg(long)]
@@ -96,22 +90,7 @@ impl Target {
 pub fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
     let design = Design::read(&args.design)?;
     terminal.stop_on_interrupt();
-    let mut array = PillarArray::build(&design, terminal)?;
-    if let Some(path) = &args.compensate {
-        let model = CalibratedModel::read(path)?;
-        let done = compensate(&design, &array, &model)?;
-        let report = args
-            .target
-            .folder(&design)
-            .join(format!("{}_compensation.html", design.name));
-        done.write_report(&design, &model, &report)?;
-        let [before, after] = done.summary.error;
-        terminal.say(&format!(
-            "compensated: transmission errs by {before:.4} as it would be made, by {after:.4} corrected; {}",
-            report.display()
-        ));
-        array = done.array;
-    }
+    let array = PillarArray::build(&design, terminal)?;
     let written = args.target.write(&design, &array, terminal)?;
     terminal.clear();
     for remark in &written.pillars.remarks {
