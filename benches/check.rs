@@ -7,7 +7,8 @@ mod gds;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use metalith::diff::{DiffPlan, diff};
 use metalith::drc::{self, CheckInput, Deck};
-use metalith::{Layout, ReadLimits, Silent};
+use metalith::gds::ReadLimits;
+use metalith::{Layout, Silent};
 
 const SITES: i32 = 400;
 

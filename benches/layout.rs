@@ -1,7 +1,9 @@
 //! One full-size lens, 6.4 million pillars: widths from the design, and bytes in each hierarchy.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use metalith::{Design, ElementPhase, Hierarchy, LensPhase, PillarArray, Silent, WidthRule, write_pillars};
+use metalith::array::WidthRule;
+use metalith::phase::{ElementPhase, LensPhase};
+use metalith::{Design, Hierarchy, PillarArray, Silent, write_pillars};
 
 fn one_lens() -> Design {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/prototype_3x3.toml");

@@ -2,11 +2,13 @@
 //! the expected image error. The published cell, so that no table is needed.
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use metalith::array::WidthRule;
+use metalith::cell::PublishedCell;
 use metalith::optimise::{
     Exchange, FabricationError, FieldProblem, Kind, Lens, Mapping, Objective, Pupil, Rings, Schedule, Start, StepLimit,
     Window, wavelengths,
 };
-use metalith::{CellModel, Design, Lattice, PublishedCell, WidthRule};
+use metalith::{CellModel, Design, Lattice};
 
 fn optimise(c: &mut Criterion) {
     let design = Design::read("designs/prototype_3x3.toml".as_ref()).expect("a shipped design");

@@ -6,7 +6,9 @@
 mod gds;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use metalith::{ElementSite, ExtractionPlan, Lattice, LayerNumber, Layout, ReadLimits, Silent, extract};
+use metalith::extract::ElementSite;
+use metalith::gds::{LayerNumber, ReadLimits};
+use metalith::{ExtractionPlan, Lattice, Layout, Silent, extract};
 
 const SITES: usize = 400;
 

@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 use std::hint::black_box;
 
 use metalith::image::{Matched, Psf};
-use metalith::{Accuracy, Fold, Lattice, Pillars, PlaneWave, Propagator, Scratch, WidthMap, Window};
+use metalith::wave::{Fold, Pillars, PlaneWave, Propagator, Scratch, Window};
+use metalith::{Accuracy, Lattice, WidthMap};
 use num_complex::Complex64;
 
 /// A hyperbolic lens for 550 nm in widths of 100 to 300 nm.

@@ -3,28 +3,16 @@
 //! The points and conventions are the script's: square pillar of silicon nitride, 700 nm high on a pitch
 //! of 350 nm, from fused silica to air, along the normal. One line of JSON for each number of orders.
 
-use std::path::Path;
 use std::time::Instant;
 
-use metalith::rcwa::Orders;
-use metalith::{CellStack, Material};
+use metalith::cell::CellStack;
+use metalith::cell::rcwa::Orders;
 
 /// Width [nm] and wavelength [um].
 const POINTS: [(f64, f64); 3] = [(200.0, 0.452), (280.0, 0.452), (250.0, 0.525)];
 
 fn main() {
-    let material = |name: &str| Material::resolve(name, Path::new("")).expect("a known name");
-    let stack = CellStack {
-        pitch_nm: 350.0,
-        height_nm: 700.0,
-        film: material("sin_luke_2015"),
-        substrate: material("fused_silica_malitson_1965"),
-        ambient: material("air"),
-        taper: 0.0,
-        corner_radius_nm: 0.0,
-        mask_height_nm: 0.0,
-        mask: material("alumina_zhukovsky_2015"),
-    };
+    let stack = CellStack::paper(350.0, 700.0).expect("materials of the paper");
     for argument in std::env::args().skip(1) {
         let along_axis: usize = argument.parse().expect("a number of orders");
         let orders = Orders::new(along_axis).expect("an odd number of orders");

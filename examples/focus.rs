@@ -7,9 +7,8 @@
 use std::f64::consts::TAU;
 use std::time::Instant;
 
-use metalith::{
-    Accuracy, Aperture, Fold, Lattice, PhaseFunction, Pillars, PlaneWave, Propagator, Scratch, WidthMap, Window,
-};
+use metalith::wave::{Aperture, Fold, PhaseFunction, Pillars, PlaneWave, Propagator, Scratch, Window};
+use metalith::{Accuracy, Lattice, WidthMap};
 use num_complex::Complex64;
 
 fn main() {

@@ -6,10 +6,11 @@
 
 use std::path::Path;
 
-use metalith::{
-    CellModel, Design, ElementPhase, ElementSite, ExtractionPlan, LED_UM, Layout, LensPhase, PillarArray, ReadLimits,
-    Result, RigorousCell, Silent, cache_folder, extract,
-};
+use metalith::cell::{LED_UM, RigorousCell, cache_folder};
+use metalith::extract::ElementSite;
+use metalith::gds::ReadLimits;
+use metalith::phase::{ElementPhase, LensPhase};
+use metalith::{CellModel, Design, ExtractionPlan, Layout, PillarArray, Result, Silent, extract};
 use num_complex::Complex64;
 
 fn main() -> Result<()> {

@@ -4,12 +4,13 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Mutex;
 
-use metalith::rcwa::Orders;
-use metalith::{
-    Basis, CellModel, CellStack, Design, Fidelity, FittedCell, ForwardPolynomial, InversePolynomial, MappingTable,
-    PhaseCurve, PublishedCell, Result, WidthRule, bad_cells, curves_over, fit_forward, fit_inverse, forward_errors,
-    round_trip,
+use metalith::array::WidthRule;
+use metalith::cell::rcwa::Orders;
+use metalith::cell::{
+    Basis, CellStack, FittedCell, ForwardPolynomial, InversePolynomial, MappingTable, PhaseCurve, PublishedCell,
+    bad_cells, curves_over, fit_forward, fit_inverse, forward_errors, round_trip,
 };
+use metalith::{CellModel, Design, Fidelity, Result};
 use num_complex::Complex64;
 
 const PITCH_NM: f64 = 350.0;

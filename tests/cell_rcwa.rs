@@ -1,6 +1,6 @@
 //! The solver against closed forms, reciprocity, itself without symmetry, and tabulated truth.
 
-use metalith::rcwa::{
+use metalith::cell::rcwa::{
     Incidence, Layer, LayerStack, Orders, Outline, Side, converge, solve, solve_without_symmetry, transmit,
 };
 use num_complex::Complex64;

@@ -4,8 +4,9 @@ use std::fs;
 use std::path::Path;
 use std::sync::Mutex;
 
-use metalith::rcwa::Orders;
-use metalith::{CellModel, CellStack, CellTable, Design, Origin, Progress, RigorousCell, Silent, TableSpec};
+use metalith::cell::rcwa::Orders;
+use metalith::cell::{CellStack, CellTable, Origin, RigorousCell, TableSpec};
+use metalith::{CellModel, Design, Progress, Silent};
 
 fn design() -> Design {
     Design::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/prototype_3x3.toml")).unwrap()

@@ -13,7 +13,8 @@ use std::path::Path;
 use gds::Gds;
 use lens::{Chip, site};
 use metalith::drc::{self, CheckInput, Date, Deck, DrcReport, Severity, Status, Waivers};
-use metalith::{Design, Layout, ReadLimits, Silent};
+use metalith::gds::ReadLimits;
+use metalith::{Design, Layout, Silent};
 
 fn layout(bytes: Vec<u8>) -> Layout {
     Layout::from_bytes("chip.gds", bytes, ReadLimits::default()).unwrap()

@@ -6,10 +6,9 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use metalith::{
-    Accuracy, Census, Design, Error, Fidelity, HandoffOptions, Lattice, Layout, Manifest, PillarArray, Progress,
-    Result, Selection, Shape, Silent, Transform, Visitor, handoff, verify_handoff,
-};
+use metalith::gds::{Selection, Shape, Transform, Visitor};
+use metalith::handoff::{Census, HandoffOptions, Manifest, handoff, verify_handoff};
+use metalith::{Accuracy, Design, Error, Fidelity, Lattice, Layout, PillarArray, Progress, Result, Silent};
 
 const DESIGN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/designs/mini_3x3.toml");
 const PROCESS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/processes/jbx6300_zep520a.toml");
@@ -237,7 +236,7 @@ fn at_every_place_to_look_stands_the_pillar_of_the_table() {
     let layout = Layout::open(&shared().join("layout/mini_3x3_pillars.gds")).unwrap();
     let mut squares = Squares::default();
     let selection = Selection {
-        layers: Some(vec![metalith::LayerNumber::new(1, 0)]),
+        layers: Some(vec![metalith::gds::LayerNumber::new(1, 0)]),
         ..Default::default()
     };
     layout.visit(&selection, &mut squares, &Silent).unwrap();

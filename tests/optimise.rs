@@ -6,11 +6,10 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use assert_cmd::Command;
+use metalith::cell::PublishedCell;
 use metalith::optimise::{Checkpoint, Lens, RingField, Rings, Start, Task, largest_step};
-use metalith::{
-    Accuracy, CellModel, Design, Direct, Fold, Lattice, Pillars, PlaneWave, Progress, Propagator, PublishedCell,
-    Scratch, Silent, Window,
-};
+use metalith::wave::{Direct, Fold, Pillars, PlaneWave, Propagator, Scratch, Window};
+use metalith::{Accuracy, CellModel, Design, Lattice, Progress, Silent};
 use num_complex::Complex64;
 
 const MINI: &str = "designs/mini_3x3.toml";

@@ -8,10 +8,9 @@ mod mutate;
 use std::path::PathBuf;
 
 use gds::Gds;
-use metalith::{
-    ElementSite, Error, Extraction, ExtractionPlan, Lattice, LayerNumber, Layout, Point, ReadLimits, Rect, Selection,
-    Shape, Silent, Transform, Visitor, Why, WidthMap, extract,
-};
+use metalith::extract::{ElementSite, Why};
+use metalith::gds::{LayerNumber, Point, ReadLimits, Rect, Selection, Shape, Transform, Visitor};
+use metalith::{Error, Extraction, ExtractionPlan, Lattice, Layout, Silent, WidthMap, extract};
 use proptest::prelude::*;
 use rand::SeedableRng;
 

@@ -1,10 +1,8 @@
 //! The propagators against one another, against the sum over all pillars, and against reference fields.
 
 use metalith::image::{Matched, Psf};
-use metalith::{
-    Accuracy, Aperture, Direct, Fold, Hankel, Lattice, PhaseFunction, Pillars, PlaneWave, Propagator, Scratch,
-    WidthMap, Window,
-};
+use metalith::wave::{Aperture, Direct, Fold, Hankel, PhaseFunction, Pillars, PlaneWave, Propagator, Scratch, Window};
+use metalith::{Accuracy, Lattice, WidthMap};
 use ndarray::Array2;
 use num_complex::{Complex32, Complex64};
 use std::f64::consts::TAU;

@@ -33,6 +33,7 @@ mod zernike;
 
 pub use atlas::Atlas;
 pub use bench::Sampling;
+pub(crate) use density::fill;
 pub use departure::{CameraChange, CellChange, Departure, Geometry, LightChange, PathChange};
 pub use diagnosis::{Diagnosis, ErrorPair, ErrorReport, FoundEffect, LeftOut, Ranked, Rung, SetVerdict};
 pub use model::{CalibratedModel, MadeCell};

@@ -9,11 +9,12 @@ use serde::{Deserialize, Serialize};
 use super::cells::changed;
 use super::departure::Departure;
 use crate::cell::rcwa::Orders;
-use crate::cell::{CellModel, CellStack, Fidelity};
+use crate::cell::{CellModel, CellStack, Fidelity, OBLIQUE_ORDERS, ORDERS, spread};
 use crate::design::Design;
 use crate::document;
 use crate::error::{Error, Result};
 use crate::file::WholeFile;
+use crate::verify::Premise;
 
 /// Version of the format.
 const SCHEMA: u32 = 1;
@@ -80,14 +81,33 @@ impl CalibratedModel {
     /// If a material of the design is not known.
     pub fn cell(&self, design: &Design, fill: f64) -> Result<MadeCell> {
         let folder = design.path.parent().unwrap_or(Path::new(""));
-        let stack = changed(&CellStack::of_spec(&design.cell, folder)?, &self.departure.cell);
+        let stack = CellStack::of_spec(&design.cell, folder)?;
+        Ok(self.cell_of(&stack, design.cell.widths_nm(), fill))
+    }
+
+    /// The same of a stated stack, for these drawn widths [nm].
+    pub fn cell_of(&self, stated: &CellStack, widths_nm: impl IntoIterator<Item = u16>, fill: f64) -> MadeCell {
         let geometry = &self.departure.geometry;
-        Ok(MadeCell {
-            stack,
+        let mut widths_nm = widths_nm.into_iter().filter(|w| *w > 0).collect::<Vec<_>>();
+        widths_nm.sort_unstable();
+        widths_nm.dedup();
+        MadeCell {
+            stack: changed(stated, &self.departure.cell),
             bias_nm: geometry.cd_bias_nm + geometry.cd_bias_density_nm * fill,
-            widths_nm: design.cell.widths_nm().collect(),
+            widths_nm,
             bare_share: geometry.missing_pillars,
-        })
+            unstructured: geometry.zero_order,
+        }
+    }
+
+    /// What a layout made on this line is judged by: its cells, and chip and sensor as they stand. What departs
+    /// in lamps and camera belongs to the bench and is left out.
+    pub fn premise<'a>(&self, cell: &'a MadeCell) -> Premise<'a> {
+        Premise {
+            cell,
+            gap_um: self.departure.path.gap_um,
+            tilt_rad: self.departure.path.tilt_mrad.map(|t| t * 1e-3),
+        }
     }
 }
 
@@ -98,10 +118,9 @@ pub struct MadeCell {
     bias_nm: f64,
     widths_nm: Vec<u16>,
     bare_share: f64,
+    /// Amplitude that passes without seeing pillars.
+    unstructured: f64,
 }
-
-/// Orders along an axis: errs by about 0.005 rad.
-const ORDERS: usize = 13;
 
 impl MadeCell {
     /// Transmission of a pillar drawn this wide [nm].
@@ -118,38 +137,58 @@ impl MadeCell {
     /// As [`CellStack::transmission`].
     pub fn realised(&self, width_nm: f64, wavelength_um: f64) -> Result<Complex64> {
         let orders = Orders::new(ORDERS)?;
+        let of = |width| self.stack.transmission(width, wavelength_um, orders);
+        self.mixed(of(self.possible(width_nm))?, || of(0.0))
+    }
+
+    /// The nearest width that a pillar can have, its foot within the pitch [nm].
+    fn possible(&self, width_nm: f64) -> f64 {
         let foot = (2.0 * self.stack.taper.tan() * self.stack.height_nm).max(0.0);
-        let room = self.stack.pitch_nm - 1.0 - foot;
-        let t = self
-            .stack
-            .transmission(width_nm.clamp(1.0, room), wavelength_um, orders)?;
-        if self.bare_share == 0.0 {
-            return Ok(t);
-        }
-        let bare = self.stack.transmission(0.0, wavelength_um, orders)?;
-        Ok(t + (bare - t) * self.bare_share)
+        width_nm.clamp(1.0, self.stack.pitch_nm - 1.0 - foot)
+    }
+
+    /// A pillar's transmission with the share of pillars that are missing, and with light that sees none.
+    fn mixed(&self, t: Complex64, bare: impl FnOnce() -> Result<Complex64>) -> Result<Complex64> {
+        let mean = if self.bare_share == 0.0 {
+            t
+        } else {
+            t + (bare()? - t) * self.bare_share
+        };
+        Ok(mean + self.unstructured)
     }
 }
 
 impl CellModel for MadeCell {
     fn fidelity(&self) -> Fidelity {
-        Fidelity::Rigorous
+        Fidelity::Calibrated
     }
 
     fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
-        let mut table = vec![Complex64::ZERO; usize::from(max_width_nm) + 1];
-        let solved: Vec<(u16, Complex64)> = self
+        let solved = self
             .widths_nm
             .par_iter()
-            .filter(|w| **w <= max_width_nm)
-            .map(|&w| Ok((w, self.drawn(f64::from(w), wavelength_um)?)))
-            .collect::<Result<_>>()?;
-        // Widths that are not drawn take the nearest that is.
-        for (w, to) in table.iter_mut().enumerate().skip(1) {
-            let nearest = solved.iter().min_by_key(|(known, _)| usize::from(*known).abs_diff(w));
-            *to = nearest.map_or(Complex64::ZERO, |(_, t)| *t);
-        }
-        Ok(table)
+            .map(|&w| self.drawn(f64::from(w), wavelength_um))
+            .collect::<Result<Vec<_>>>()?;
+        Ok(spread(&self.widths_nm, &solved, max_width_nm))
+    }
+
+    fn oblique(&self, wavelength_um: f64, sines: [f64; 2], max_width_nm: u16) -> Result<Option<[Vec<Complex64>; 2]>> {
+        let orders = Orders::new(OBLIQUE_ORDERS)?;
+        let of = |width| self.stack.oblique(width, wavelength_um, sines, orders);
+        let solved = self
+            .widths_nm
+            .par_iter()
+            .map(|&w| {
+                let pillar = of(self.possible(f64::from(w) + self.bias_nm))?;
+                let bare = if self.bare_share == 0.0 { pillar } else { of(0.0)? };
+                let mixed = |k: usize| self.mixed(pillar[k], || Ok(bare[k]));
+                Ok([mixed(0)?, mixed(1)?])
+            })
+            .collect::<Result<Vec<_>>>()?;
+        Ok(Some([0, 1].map(|polarisation| {
+            let own = solved.iter().map(|t| t[polarisation]).collect::<Vec<_>>();
+            spread(&self.widths_nm, &own, max_width_nm)
+        })))
     }
 
     fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {

@@ -18,10 +18,12 @@ pub enum Fidelity {
     Fitted,
     /// Complex transmission of the zero order by rigorous coupled-wave analysis.
     Rigorous,
+    /// The rigorous cell of the pillars as a measured line makes them, by a model that `calibrate` wrote.
+    Calibrated,
 }
 
 impl Fidelity {
-    /// All three, from the least to the most true.
+    /// Those that a design alone has, from the least to the most true.
     pub const ALL: [Self; 3] = [Self::Published, Self::Fitted, Self::Rigorous];
 
     /// The name used in options, files and reports.
@@ -30,6 +32,7 @@ impl Fidelity {
             Self::Published => "published",
             Self::Fitted => "fitted",
             Self::Rigorous => "rigorous",
+            Self::Calibrated => "calibrated",
         }
     }
 }
@@ -68,6 +71,24 @@ pub trait CellModel: Sync {
     /// # Errors
     /// If the wavelength is outside what the model or its materials cover, or a width does not fit.
     fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>>;
+
+    /// The same for light that arrives obliquely: one table for light polarised across the plane of incidence
+    /// (s) and one for light polarised in it (p). `sines` are those of the direction in air along x and y.
+    ///
+    /// Scaled so that |t| of a cell that passes all its power in the zero order is that of
+    /// [`CellModel::full_transmission`], as at normal incidence. What little is turned from one polarisation
+    /// into the other is left out. Nothing if the model knows no angles.
+    ///
+    /// # Errors
+    /// As [`CellModel::transmissions`]; also if no light arrives so steeply.
+    fn oblique(
+        &self,
+        _wavelength_um: f64,
+        _sines: [f64; 2],
+        _max_width_nm: u16,
+    ) -> Result<Option<[Vec<Complex64>; 2]>> {
+        Ok(None)
+    }
 
     /// |t| of a cell that passes all its power in the zero order: sqrt(n) of the substrate for the
     /// rigorous cell, 1 for one without amplitude. Strehl ratios are against this.

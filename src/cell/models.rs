@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{CellModel, CellStack, Fidelity, FittedCell, PointwiseCell, PublishedCell, RigorousCell};
 use crate::design::Design;
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// The cells of a design for a few wavelengths, one for each fidelity asked for.
 ///
@@ -21,6 +21,10 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
                     let stack = CellStack::of_spec(&design.cell, folder)?;
                     Ok(Box::new(PointwiseCell::new(stack, design.cell.widths_nm())))
                 }
+                Fidelity::Calibrated => Err(Error::invalid(
+                    "a calibrated cell without the model it is calibrated by",
+                    "read the model that `metalith calibrate` wrote and take its cell",
+                )),
                 Fidelity::Fitted => {
                     let stack = CellStack::of_spec(&design.cell, folder)?;
                     let band_um = RigorousCell::band_um(design);

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::material::Material;
-use super::rcwa::{Layer, LayerStack, Orders, Outline, Side, transmit};
+use super::rcwa::{Incidence, Layer, LayerStack, Orders, Outline, Side, solve, transmit};
 use crate::design::CellSpec;
 use crate::error::{Error, Result};
 
@@ -51,6 +51,24 @@ impl CellStack {
             film: Material::resolve(&spec.pillar_material, folder)?,
             substrate: Material::resolve(&spec.substrate_material, folder)?,
             ambient: Material::constant(spec.ambient_index, 0.0)?,
+            taper: 0.0,
+            corner_radius_nm: 0.0,
+            mask_height_nm: 0.0,
+            mask: Material::named("alumina_zhukovsky_2015")?,
+        })
+    }
+
+    /// The materials of the paper, silicon nitride on fused silica in air, on a pitch [nm] and so high [nm].
+    ///
+    /// # Errors
+    /// None but those of a program that does not know its own materials.
+    pub fn paper(pitch_nm: f64, height_nm: f64) -> Result<Self> {
+        Ok(Self {
+            pitch_nm,
+            height_nm,
+            film: Material::named("sin_luke_2015")?,
+            substrate: Material::named("fused_silica_malitson_1965")?,
+            ambient: Material::named("air")?,
             taper: 0.0,
             corner_radius_nm: 0.0,
             mask_height_nm: 0.0,
@@ -117,6 +135,35 @@ impl CellStack {
             Side::Below,
             orders,
         )
+    }
+
+    /// Zero-order transmission of light whose direction has these sines in air, along x and y: for light
+    /// polarised across the plane of incidence (s) and in it (p), each into its own kind.
+    ///
+    /// Scaled by the cosines of the ray on both sides, so that the share of power in the zero order follows
+    /// from |t| as it does along the normal.
+    ///
+    /// # Errors
+    /// As [`CellStack::layers`]; also if no light arrives or leaves at that angle.
+    pub fn oblique(
+        &self,
+        width_nm: f64,
+        wavelength_um: f64,
+        sines: [f64; 2],
+        orders: Orders,
+    ) -> Result<[Complex64; 2]> {
+        let layers = self.layers(width_nm, wavelength_um)?;
+        let cosine = |index: Complex64| (1.0 - (sines[0].powi(2) + sines[1].powi(2)) / index.re.powi(2)).sqrt();
+        let (below, above) = (cosine(layers.below), cosine(layers.above));
+        if above.is_nan() || above <= 0.0 {
+            return Err(Error::invalid(
+                format!("light at sines of {:.4}, {:.4} leaves no pillar", sines[0], sines[1]),
+                "use an angle of less than 90 degrees in air",
+            ));
+        }
+        let incidence = Incidence::of_sines(wavelength_um, Side::Below, sines);
+        let jones = solve(&layers, &incidence, orders)?.transmission;
+        Ok([jones[0][0], jones[1][1]].map(|t| t * (above / below).sqrt()))
     }
 
     /// [`CellStack::transmission`] of all pairs of widths [nm] and wavelengths [um], in parallel. Shape
@@ -196,17 +243,7 @@ pub(super) mod tests {
     use super::*;
 
     pub fn paper() -> CellStack {
-        CellStack {
-            pitch_nm: 350.0,
-            height_nm: 700.0,
-            film: Material::named("sin_luke_2015").unwrap(),
-            substrate: Material::named("fused_silica_malitson_1965").unwrap(),
-            ambient: Material::named("air").unwrap(),
-            taper: 0.0,
-            corner_radius_nm: 0.0,
-            mask_height_nm: 0.0,
-            mask: Material::named("alumina_zhukovsky_2015").unwrap(),
-        }
+        CellStack::paper(350.0, 700.0).unwrap()
     }
 
     #[test]

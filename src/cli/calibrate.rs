@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use metalith::calibrate::{Calibration, Extent, MeasuredSet, SetVerdict, Settings, calibrate, prove, summary};
-use metalith::{Result, WholeFile, cache_folder};
+use metalith::cell::cache_folder;
+use metalith::{Result, WholeFile};
 
 use super::{Outcome, Terminal};
 

@@ -3,10 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use metalith::cell::{CellStudy, CellTable, Origin, RigorousCell, StudyOptions, cache_folder, write_cell_report};
 use metalith::report::{fixed, sig};
-use metalith::{
-    CellStudy, CellTable, Design, Origin, Result, RigorousCell, StudyOptions, cache_folder, write_cell_report,
-};
+use metalith::{Design, Result};
 
 use super::{Outcome, Terminal};
 

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::drc::{self, CheckInput, Date, Deck, DrcReport, Waivers};
-use metalith::{Design, Layout, ReadLimits, Result, WholeFile};
+use metalith::gds::ReadLimits;
+use metalith::{Design, Layout, Result, WholeFile};
 
 use super::{Outcome, Terminal};
 

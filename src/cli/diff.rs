@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use metalith::diff::{self, DiffPlan};
-use metalith::{Error, LayerNumber, Layout, ReadLimits, Result};
+use metalith::gds::{LayerNumber, ReadLimits};
+use metalith::{Error, Layout, Result};
 
 use super::{Outcome, Terminal};
 

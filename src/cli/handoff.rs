@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use metalith::handoff::{Handoff, HandoffOptions, Verification as HandoffVerification, handoff, verify_handoff};
 use metalith::report::Verdict;
-use metalith::{Accuracy, Design, Handoff, HandoffOptions, HandoffVerification, Result, handoff, verify_handoff};
+use metalith::{Accuracy, Design, Result};
 
 use super::verify::FidelityArg;
 use super::{Outcome, Terminal};

@@ -3,21 +3,30 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metalith::{
-    Design, Hierarchy, PillarArray, Result, Written, write_apertures, write_layer_properties, write_pillars,
-};
+use metalith::calibrate::CalibratedModel;
+use metalith::compensate::{compensate, write_compensation_report};
+use metalith::layout::Written;
+use metalith::report::{count, sig};
+use metalith::{Design, Hierarchy, PillarArray, Result, write_apertures, write_layer_properties, write_pillars};
 
 use super::{Outcome, Terminal};
 
 /// Write the pillar layout, the aperture layout and the layer colours of a design.
 #[derive(Args)]
-#[command(after_help = "Example:\n  metalith layout designs/mini_3x3.toml --out out/mini --hierarchy flat")]
+#[command(
+    after_help = "Examples:\n  metalith layout designs/mini_3x3.toml --out out/mini --hierarchy flat\n  metalith layout designs/mini_3x3.toml --compensate out/calibrate/session-1/model.toml"
+)]
 pub struct LayoutArgs {
     /// The design file.
     design: PathBuf,
 
     #[command(flatten)]
     target: Target,
+
+    /// Draw pillars that come out as intended on a measured line, by the `model.toml` that `metalith calibrate`
+    /// wrote. The files are named NAME_compensated, with a report beside them.
+    #[arg(long, value_name = "MODEL")]
+    compensate: Option<PathBuf>,
 
     /// Print what was written as JSON.
     #[arg(long)]
@@ -69,6 +78,9 @@ impl Target {
         let pillars = write_pillars(design, array, self.hierarchy(design), &file("_pillars.gds"), terminal)?;
         let apertures = write_apertures(design, &file("_apertures.gds"))?;
         write_layer_properties(design, &properties)?;
+        for remark in &pillars.remarks {
+            terminal.say(&format!("note: {remark}"));
+        }
         Ok(Files {
             pillars,
             apertures,
@@ -88,14 +100,24 @@ impl Target {
 }
 
 pub fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
-    let design = Design::read(&args.design)?;
+    let mut design = Design::read(&args.design)?;
     terminal.stop_on_interrupt();
-    let array = PillarArray::build(&design, terminal)?;
-    let written = args.target.write(&design, &array, terminal)?;
-    terminal.clear();
-    for remark in &written.pillars.remarks {
-        terminal.say(&format!("note: {remark}"));
+    let mut array = PillarArray::build(&design, terminal)?;
+    let mut compensation = None;
+    if let Some(path) = &args.compensate {
+        let model = CalibratedModel::read(path)?;
+        let compensated = compensate(&design, &array, &model, terminal)?;
+        design.name.push_str("_compensated");
+        let intended = std::mem::replace(&mut array, compensated.array.clone());
+        compensation = Some((model, intended, compensated));
     }
+    let written = args.target.write(&design, &array, terminal)?;
+    if let Some((model, intended, compensated)) = &compensation {
+        let folder = args.target.folder(&design);
+        let pillars = &written.pillars.path;
+        write_compensation_report(&design, intended, compensated, model, pillars, &folder, terminal)?;
+    }
+    terminal.clear();
     if args.json {
         let json = serde_json::json!({
             "design": design.name,
@@ -105,6 +127,7 @@ pub fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
             "distinct_elements": array.classes.len(),
             "files": [&written.pillars.path, &written.apertures.path, &written.properties],
             "bytes": [written.pillars.bytes, written.apertures.bytes],
+            "compensation": compensation.as_ref().map(|c| &c.2.summary),
         });
         println!("{json:#}");
     } else {
@@ -121,6 +144,18 @@ pub fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
             array.placed.len(),
             array.classes.len()
         );
+        if let Some((_, _, compensated)) = &compensation {
+            let s = &compensated.summary;
+            println!(
+                "compensated: widths moved by {} nm rms; error as made {} uncorrected, {} corrected; {} pillars newly at an end of the range",
+                sig(s.moved_rms_nm, 3),
+                sig(s.error[0], 3),
+                sig(s.error[1], 3),
+                count(s.at_limit)
+            );
+            let report = args.target.folder(&design).join("compensation.html");
+            println!("{}", report.display());
+        }
     }
     Ok(Outcome::Fine)
 }

@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use metalith::cell::{RigorousCell, cache_folder};
 use metalith::optimise::{
     Checkpoint, Deconvolution, Findings, Judged, Optimised, OverWavelength, Task, cells_off_height, mean_and_deviation,
     views, wavelengths, write_phase_table,
 };
 use metalith::report::sig;
-use metalith::{CellModel, Design, Fidelity, Result, RigorousCell, cache_folder, cell_models};
+use metalith::{CellModel, Design, Fidelity, Result, cell_models};
 
 use super::{Outcome, Terminal};
 
@@ -63,7 +64,7 @@ impl Cells {
         let fidelity = design.optimise.fidelity;
         let own = match fidelity {
             Fidelity::Rigorous => rigorous()?,
-            Fidelity::Published | Fidelity::Fitted => cell_models(design, &[fidelity])?.remove(0),
+            _ => cell_models(design, &[fidelity])?.remove(0),
         };
         let judge = (report && fidelity != Fidelity::Rigorous).then(rigorous).transpose()?;
         let off_height = match &design.optimise.robust {

@@ -5,10 +5,10 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use metalith::cell::{RigorousCell, cache_folder};
 use metalith::optimise::{Camera, Deconvolution, Start, StepLimit, Task, turns_of, views};
-use metalith::{
-    CellModel, Design, Error, Fidelity, Interpolation, RadialPhase, Result, RigorousCell, cache_folder, cell_models,
-};
+use metalith::phase::{Interpolation, RadialPhase};
+use metalith::{CellModel, Design, Error, Fidelity, Result, cell_models};
 use ndarray::Array3;
 
 use super::verify::FidelityArg;
@@ -54,7 +54,7 @@ pub fn run(args: &PhotographsArgs, terminal: &Terminal) -> Result<Outcome> {
     let cell: Box<dyn CellModel> = match fidelity {
         // The table, which a run of many wavelengths repays.
         Fidelity::Rigorous => Box::new(RigorousCell::of_design(&design, cache_folder().as_deref(), terminal)?.0),
-        Fidelity::Published | Fidelity::Fitted => cell_models(&design, &[fidelity])?.remove(0),
+        _ => cell_models(&design, &[fidelity])?.remove(0),
     };
     let between = views(&task.spec, &task.spec.views, 0.5);
     let (window, scene) = (between.window, between.scene);

@@ -3,11 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use metalith::calibrate::CalibratedModel;
+use metalith::cell::{CellStack, FittedCell, PointwiseCell, PublishedCell};
+use metalith::extract::ExtractedElement;
+use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::report::{count, sig};
-use metalith::{
-    Accuracy, CellModel, CellStack, Extraction, ExtractionPlan, LayerNumber, Layout, Lighting, Material, PointwiseCell,
-    PublishedCell, ReadLimits, Result, extract, lone_psfs, write_lone_report,
-};
+use metalith::verify::{Lighting, lone_psfs, write_lone_report};
+use metalith::{Accuracy, CellModel, Extraction, ExtractionPlan, Layout, Result, extract};
 
 use super::verify::FidelityArg;
 use super::{Outcome, Terminal};
@@ -67,6 +69,14 @@ pub struct PsfArgs {
     #[arg(long, value_enum, default_value = "rigorous")]
     fidelity: FidelityArg,
 
+    /// Pillars as a measured line makes them: the `model.toml` that `metalith calibrate` wrote.
+    #[arg(long, value_name = "MODEL", conflicts_with = "fidelity")]
+    model: Option<PathBuf>,
+
+    /// Solve the cell at the angle of incidence, for both polarisations, instead of along the normal.
+    #[arg(long)]
+    as_lit: bool,
+
     /// Simulate with errors of 1e-3 instead of 1e-5 of the peak, several times faster.
     #[arg(long)]
     fast: bool,
@@ -95,22 +105,12 @@ fn layer(text: &str) -> std::result::Result<LayerNumber, String> {
 
 impl PsfArgs {
     /// The cell of the layout's own pitch, materials of the paper.
-    fn cell(&self, found: &Extraction) -> Result<Box<dyn CellModel>> {
+    fn cell(&self, found: &Extraction, model: Option<&CalibratedModel>) -> Result<Box<dyn CellModel>> {
         let pitch_nm = found.elements.first().map_or(350, |e| e.site.lattice.pitch_nm());
-        if matches!(self.fidelity, FidelityArg::Published) {
+        if model.is_none() && matches!(self.fidelity, FidelityArg::Published) {
             return Ok(Box::new(PublishedCell::new(pitch_nm)));
         }
-        let stack = CellStack {
-            pitch_nm: f64::from(pitch_nm),
-            height_nm: self.height_nm,
-            film: Material::named("sin_luke_2015")?,
-            substrate: Material::named("fused_silica_malitson_1965")?,
-            ambient: Material::named("air")?,
-            taper: 0.0,
-            corner_radius_nm: 0.0,
-            mask_height_nm: 0.0,
-            mask: Material::named("alumina_zhukovsky_2015")?,
-        };
+        let stack = CellStack::paper(f64::from(pitch_nm), self.height_nm)?;
         let mut widths = found
             .elements
             .iter()
@@ -118,14 +118,36 @@ impl PsfArgs {
             .collect::<Vec<_>>();
         widths.sort_unstable();
         widths.dedup();
+        if let Some(model) = model {
+            let area = |e: &ExtractedElement| e.widths.width_nm.iter().map(|&w| f64::from(w).powi(2)).sum::<f64>();
+            let pillars = found.pillars.max(1) as f64;
+            let fill = found.elements.iter().map(area).sum::<f64>() / pillars / f64::from(pitch_nm).powi(2);
+            return Ok(Box::new(model.cell_of(&stack, widths, fill)));
+        }
+        if matches!(self.fidelity, FidelityArg::Fitted) {
+            let band_um = self.wavelengths_nm.iter().map(|nm| nm * 1e-3);
+            let (low, high) = band_um.fold((0.4, 0.7), |(a, b), um| (um.min(a), um.max(b)));
+            let range = (
+                *widths.iter().find(|w| **w > 0).unwrap_or(&100),
+                *widths.last().unwrap_or(&300),
+            );
+            return Ok(Box::new(FittedCell::of_stack(&stack, (low, high), range)?));
+        }
         Ok(Box::new(PointwiseCell::new(stack, widths)))
     }
 
-    fn lighting(&self) -> Lighting {
+    fn lighting(&self, model: Option<&CalibratedModel>) -> Lighting {
+        let path = model.map(|m| &m.departure.path);
+        let tilt_mrad = path.map_or([0.0; 2], |p| p.tilt_mrad);
+        let sine = |deg: f64, mrad: f64| (deg.to_radians() + mrad * 1e-3).sin();
         Lighting {
             wavelengths_um: self.wavelengths_nm.iter().map(|nm| nm * 1e-3).collect(),
-            incidence_sin: [self.angle_x_deg, self.angle_y_deg].map(|deg| deg.to_radians().sin()),
-            distance_um: self.distance_um,
+            incidence_sin: [
+                sine(self.angle_x_deg, tilt_mrad[0]),
+                sine(self.angle_y_deg, tilt_mrad[1]),
+            ],
+            cells_as_lit: self.as_lit,
+            distance_um: self.distance_um + path.map_or(0.0, |p| p.gap_um),
             at_um: [self.at_x_um, self.at_y_um],
             samples: self.samples,
             pixel_um: 5.86,
@@ -145,7 +167,9 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     let psfs = if args.extract_only {
         Vec::new()
     } else {
-        lone_psfs(&found, args.cell(&found)?.as_ref(), &args.lighting(), terminal)?
+        let model = args.model.as_deref().map(CalibratedModel::read).transpose()?;
+        let cell = args.cell(&found, model.as_ref())?;
+        lone_psfs(&found, cell.as_ref(), &args.lighting(model.as_ref()), terminal)?
     };
     if let Some(folder) = &args.out {
         let name = args

@@ -30,10 +30,6 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let array = PillarArray::build(&design, terminal)?;
     let written = args.target.write(&design, &array, terminal)?;
-    terminal.clear();
-    for remark in &written.pillars.remarks {
-        terminal.say(&format!("note: {remark}"));
-    }
     args.judging.judge(
         &design,
         &array,

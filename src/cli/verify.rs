@@ -3,8 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use metalith::calibrate::CalibratedModel;
 use metalith::report::sig;
-use metalith::{Accuracy, Design, Fidelity, PillarArray, Result, Verification, cell_models, verify, write_report};
+use metalith::{
+    Accuracy, Design, Fidelity, PillarArray, Premise, Result, Verification, cell_models, verify, write_report,
+};
 
 use super::{Outcome, Terminal};
 
@@ -36,6 +39,11 @@ pub struct Judging {
     /// The cell that the layout is judged by.
     #[arg(long, value_enum, default_value = "rigorous")]
     fidelity: FidelityArg,
+
+    /// Judge by the pillars as a measured line makes them: the `model.toml` that `metalith calibrate` wrote. What
+    /// it says of lamps and camera stays with the bench it was found on.
+    #[arg(long, value_name = "MODEL", conflicts_with = "fidelity")]
+    model: Option<PathBuf>,
 
     /// Print `report.json` to standard output.
     #[arg(long)]
@@ -72,14 +80,20 @@ impl Judging {
         folder: &Path,
         terminal: &Terminal,
     ) -> Result<Outcome> {
+        let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
+        let made = model.as_ref().map(|m| m.cell(design, array.fill())).transpose()?;
         let judge = Fidelity::from(self.fidelity);
         let beside = [Fidelity::Rigorous, Fidelity::Fitted, Fidelity::Published];
         let beside = beside.into_iter().filter(|f| *f != judge);
         let wanted = std::iter::once(judge).chain(beside).collect::<Vec<_>>();
         let models = cell_models(design, &wanted)?;
-        let models = models.iter().map(AsRef::as_ref).collect::<Vec<_>>();
+        let predicted = model.as_ref().zip(made.as_ref()).map(|(m, cell)| m.premise(cell));
+        let premises = predicted
+            .into_iter()
+            .chain(models.iter().map(|m| Premise::from(m.as_ref())))
+            .collect::<Vec<_>>();
         let accuracy = if self.fast { Accuracy::Fast } else { Accuracy::Accurate };
-        let found = verify(design, array, layout, &models, accuracy, terminal)?;
+        let found = verify(design, array, layout, &premises, accuracy, terminal)?;
         write_report(design, array, &found, folder)?;
         terminal.clear();
         if self.json {

@@ -23,7 +23,7 @@ pub use layout::{ApertureSpec, ChipSpec, Hierarchy, Layer, Layers, LayoutSpec, M
 pub use lens::LensSpec;
 pub use mapping::MappingSpec;
 pub use optimise::{MeritSpec, OptimiseSpec, RobustSpec, SolverSpec, StartSpec, ViewSpec};
-pub use verify::{FieldAngle, LimitSpec, VerifySpec};
+pub use verify::{CellIncidence, FieldAngle, LimitSpec, VerifySpec};
 
 /// Version of the format of design files that this program reads.
 const SCHEMA: i64 = 1;

@@ -12,11 +12,24 @@ pub struct VerifySpec {
     pub wavelengths_um: Vec<f64>,
     /// Field angles, counted from where an element looks.
     pub field_angles: Vec<FieldAngle>,
+    /// At which angle light is taken to pass the cells.
+    pub incidence: CellIncidence,
     /// Edge of the square window about the chief ray, in samples of one pitch.
     pub window_samples: usize,
     /// Edge of a sensor pixel [um].
     pub pixel_um: f64,
     pub limits: LimitSpec,
+}
+
+/// The angle of incidence that the cells are solved for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CellIncidence {
+    /// Along the normal, whatever the field angle; the same cell everywhere.
+    Normal,
+    /// As light arrives at each element from each field angle, both polarisations; the cells are solved once
+    /// for each direction and wavelength.
+    AsLit,
 }
 
 /// A direction of light as an element sees it, from the middle of its field.
@@ -76,6 +89,11 @@ impl VerifySpec {
         let spec = Self {
             wavelengths_um: wavelengths_nm.iter().map(|nm| nm * 1e-3).collect(),
             field_angles,
+            incidence: s.choice(
+                "incidence",
+                &[("normal", CellIncidence::Normal), ("as_lit", CellIncidence::AsLit)],
+                Some(CellIncidence::Normal),
+            ),
             window_samples: s
                 .optional_integer("window_samples", 16..=2048, "samples")
                 .unwrap_or(256) as usize,

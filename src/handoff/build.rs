@@ -25,7 +25,7 @@ use crate::layout::{write_apertures, write_layer_properties, write_pillars};
 use crate::phase::RadialPhase;
 use crate::progress::Progress;
 use crate::report::{Verdict, write_json};
-use crate::verify::{verify, write_report};
+use crate::verify::{Premise, verify, write_report};
 use crate::wave::Accuracy;
 
 /// What to hand over, and where to.
@@ -351,8 +351,8 @@ fn verification(
         wanted.push(Fidelity::Published);
     }
     let models = cell_models(design, &wanted)?;
-    let models = models.iter().map(AsRef::as_ref).collect::<Vec<_>>();
-    let found = verify(design, array, pillars, &models, options.accuracy, progress)?;
+    let premises = models.iter().map(|m| Premise::from(m.as_ref())).collect::<Vec<_>>();
+    let found = verify(design, array, pillars, &premises, options.accuracy, progress)?;
     write_report(design, array, &found, folder)?;
     let failed: Vec<_> = found
         .checks
@@ -427,8 +427,18 @@ fn inputs(options: &HandoffOptions, design: &Design, process: &Process) -> Vec<(
             "violations that were accepted",
         ));
     }
+    if let Some(table) = &design.mapping.table_file {
+        inputs.push((table.clone(), name(table), "phase to width, the mapping of the design"));
+    }
     if let RadialPhase::Table { file, .. } = &design.lens.phase {
         inputs.push((file.clone(), name(file), "phase of the lens over its radius"));
+    }
+    let folder = options.design.parent().unwrap_or(Path::new(""));
+    for material in [&design.cell.pillar_material, &design.cell.substrate_material] {
+        let table = folder.join(material);
+        if table.is_file() {
+            inputs.push((table.clone(), name(&table), "index of a material of the cell"));
+        }
     }
     inputs
 }

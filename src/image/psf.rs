@@ -53,6 +53,23 @@ impl Psf {
         }
     }
 
+    /// Mean of PSFs on the same window, as of light that is not polarised.
+    ///
+    /// # Panics
+    /// If there is none, or their windows are of different sizes.
+    pub fn mean(psfs: Vec<Self>) -> Self {
+        let share = 1.0 / psfs.len() as f64;
+        let mut all = psfs.into_iter();
+        let mut sum = all.next().expect("a PSF to take the mean of");
+        for psf in all {
+            sum.values += &psf.values;
+        }
+        if share < 1.0 {
+            sum.values *= share;
+        }
+        sum
+    }
+
     /// All numbers that are reported of a PSF.
     pub fn measures(&self, matched: &Matched, pixel_um: f64) -> PsfMeasures {
         let (peak, peak_um) = self.peak();

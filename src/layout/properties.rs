@@ -7,7 +7,7 @@ use crate::design::Design;
 use crate::error::Result;
 use crate::file::WholeFile;
 
-/// Frame and fill colour and dither pattern of each layer, in the order of [`crate::Layers::all`]:
+/// Frame and fill colour and dither pattern of each layer, in the order of [`crate::design::Layers::all`]:
 /// exposed layers are filled, the others only drawn.
 const LOOKS: [(&str, &str); 6] = [
     ("#0072b2", "I0"),

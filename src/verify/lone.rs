@@ -5,16 +5,18 @@ use std::path::Path;
 
 use ndarray::Array2;
 use npyz::WriterBuilder;
+use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::premise::Cells;
 use crate::cell::{CellModel, Fidelity};
 use crate::error::{Error, Result};
 use crate::extract::{ElementSite, Extraction};
 use crate::file::WholeFile;
 use crate::image::{Matched, Psf, PsfMeasures};
 use crate::lattice::WidthMap;
-use crate::progress::Progress;
+use crate::progress::{Progress, Silent};
 use crate::report::{Cell, Column, ImageGrid, Page, PillarZoom, Table, count, sig, write_json};
 use crate::wave::{Accuracy, Aperture, Fold, Pillars, PlaneWave, Propagator, Scratch, Window};
 
@@ -25,6 +27,8 @@ pub struct Lighting {
     pub wavelengths_um: Vec<f64>,
     /// Direction sines of the incident light, in air.
     pub incidence_sin: [f64; 2],
+    /// Whether cells are solved at that angle, for both polarisations, or along the normal.
+    pub cells_as_lit: bool,
     /// From the pillar tops to the sensor [um].
     pub distance_um: f64,
     /// Middle of the window, from the axis of an element [um].
@@ -71,16 +75,21 @@ pub fn lone_psfs(
         .unwrap_or(0);
     let mut all = Vec::new();
     for &wavelength_um in &light.wavelengths_um {
-        let table = cell.transmissions(wavelength_um, widest)?;
-        let full = cell.full_transmission(wavelength_um)?;
+        let mut cells = Cells::new(cell, wavelength_um, widest)?;
+        let wave = light.wave(wavelength_um);
+        if light.cells_as_lit {
+            cells.look_along(cell, &[wave], widest, &Silent)?;
+        }
+        let full = cells.full;
         let simulated = elements
             .par_iter()
             .map_init(Scratch::default, |scratch, (site, widths)| {
                 if progress.stopped() {
                     return Err(Error::Interrupted);
                 }
-                let aperture = Pillars::new(widths, &table)?;
-                let psf = light.psf(&aperture, wavelength_um, scratch)?;
+                let mut of = |table: &Vec<Complex64>| light.psf(&Pillars::new(widths, table)?, &wave, scratch);
+                let psf = Psf::mean(cells.tables(&wave).iter().map(&mut of).collect::<Result<_>>()?);
+                let aperture = Pillars::new(widths, &cells.normal)?;
                 let focus = [light.at_um[0], light.at_um[1], light.distance_um];
                 let matched = Matched::of(&aperture, focus, wavelength_um, full);
                 progress.advance(1);
@@ -99,16 +108,19 @@ pub fn lone_psfs(
 }
 
 impl Lighting {
-    fn psf(&self, aperture: &Pillars<'_>, wavelength_um: f64, scratch: &mut Scratch) -> Result<Psf> {
-        let lattice = aperture.lattice();
-        let window = Window::about(self.at_um, lattice.pitch_um(), self.samples, self.distance_um);
-        let wave = PlaneWave {
+    fn wave(&self, wavelength_um: f64) -> PlaneWave {
+        PlaneWave {
             wavelength_um,
             sin_x: self.incidence_sin[0],
             sin_y: self.incidence_sin[1],
-        };
-        let fold = Fold::plan(lattice, aperture.radius_um(), wavelength_um, window, self.accuracy)?;
-        Ok(Psf::of(&fold.field(aperture, &wave, scratch)?))
+        }
+    }
+
+    fn psf(&self, aperture: &Pillars<'_>, wave: &PlaneWave, scratch: &mut Scratch) -> Result<Psf> {
+        let lattice = aperture.lattice();
+        let window = Window::about(self.at_um, lattice.pitch_um(), self.samples, self.distance_um);
+        let fold = Fold::plan(lattice, aperture.radius_um(), wave.wavelength_um, window, self.accuracy)?;
+        Ok(Psf::of(&fold.field(aperture, wave, scratch)?))
     }
 }
 

@@ -6,6 +6,8 @@ mod lone;
 mod optics;
 mod page;
 mod phase;
+mod premise;
+mod spot;
 mod widths;
 
 use std::path::Path;
@@ -13,7 +15,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::array::{PillarArray, Placed, WidthRule};
-use crate::cell::{CellModel, Fidelity};
+use crate::cell::Fidelity;
 use crate::design::{Design, Element};
 use crate::error::Result;
 use crate::extract::{ElementSite, ExtractedElement, Extraction, ExtractionPlan, Oddities, Survey, extract};
@@ -26,9 +28,10 @@ use crate::wave::Accuracy;
 
 pub use check::{Check, Sense};
 pub use lone::{Lighting, LonePsf, lone_psfs, write_lone_report};
-pub use optics::{Orders, Spot, SpotPair};
 pub use page::write_report;
 pub use phase::{PhaseError, PhaseErrors};
+pub use premise::Premise;
+pub use spot::{Orders, Spot, SpotPair};
 pub use widths::WidthCheck;
 
 /// Most elements that are simulated because their pillars are not as intended.
@@ -101,7 +104,7 @@ impl Verification {
 
 /// Read the layout at `path` back and hold it to its design.
 ///
-/// The first of `cells` is the one that the layout is judged by; the others are simulated beside it.
+/// The first of `premises` is the one that the layout is judged by; the others are simulated beside it.
 ///
 /// # Errors
 /// If the layout cannot be read, the cell has no answer at a wavelength, or the user stopped it.
@@ -109,7 +112,7 @@ pub fn verify(
     design: &Design,
     array: &PillarArray,
     path: &Path,
-    cells: &[&dyn CellModel],
+    premises: &[Premise<'_>],
     accuracy: Accuracy,
     progress: &dyn Progress,
 ) -> Result<Verification> {
@@ -118,12 +121,14 @@ pub fn verify(
     let elements = compare(array, &extraction);
     let lens = LensPhase::new(array.lattice, design.lens.diameter_nm, &design.lens.phase);
     let rule = WidthRule::new(&design.cell, &design.mapping);
-    let judge = cells[0];
+    let judge = premises[0].cell;
     let mapping_um = design.mapping.wavelength_um;
     let widest = design.cell.pitch_nm as u16;
     let at_mapping = judge.transmissions(mapping_um, widest)?;
-    let bench = optics::Bench::new(design, array.lattice, cells, accuracy)?;
+    let mut bench = optics::Bench::new(design, array.lattice, premises, accuracy)?;
     let chosen = distinct(&elements);
+    let shown = chosen.iter().map(|(k, _)| elements[*k].element).collect::<Vec<_>>();
+    bench.look_along(&shown, progress)?;
     progress.begin("simulating elements", (chosen.len() * bench.spots()) as u64);
     let mut simulated = Vec::new();
     for (k, copies) in chosen {
@@ -156,6 +161,20 @@ pub fn verify(
     };
     verification.checks = check::all(&design.verify.limits, &verification);
     Ok(verification)
+}
+
+/// The pillars of a layout at the elements of a design.
+///
+/// # Errors
+/// If the layout cannot be read, or the user stopped it.
+pub(crate) fn read_back(
+    design: &Design,
+    array: &PillarArray,
+    path: &Path,
+    progress: &dyn Progress,
+) -> Result<Extraction> {
+    let layout = Layout::open_with(path, gds::ReadLimits::default(), progress)?;
+    extract(&layout, &plan(design, array), progress)
 }
 
 /// Where the elements of a design are.

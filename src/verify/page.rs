@@ -6,7 +6,7 @@ use ndarray::Array2;
 
 use super::{DistinctElement, Sense, Spot, Verification};
 use crate::array::PillarArray;
-use crate::design::Design;
+use crate::design::{CellIncidence, Design};
 use crate::error::Result;
 use crate::phase::{ElementPhase, LensPhase};
 use crate::report::{
@@ -269,12 +269,15 @@ fn simulated(page: &mut Page, found: &Verification, element: &DistinctElement) {
         .values("|E|² / |E inc|²", "")
         .log(PSF_DECADES)
         .side((760.0 / shown.len().max(1) as f64).min(230.0));
-    for (spot, (designed, _, step_um)) in &shown {
-        images = images.pixel_um(*step_um);
-        images.image(format!("designed, {}", spot.place()), cut(designed, *step_um));
+    for (spot, seen) in &shown {
+        images = images.pixel_um(seen.step_um);
+        images.image(format!("designed, {}", spot.place()), cut(&seen.designed, seen.step_um));
     }
-    for (spot, (_, extracted, step_um)) in &shown {
-        images.image(format!("extracted, {}", spot.place()), cut(extracted, *step_um));
+    for (spot, seen) in &shown {
+        images.image(
+            format!("extracted, {}", spot.place()),
+            cut(&seen.extracted, seen.step_um),
+        );
     }
     let mut chart = Chart::new(
         "MTF with the sensor's pixel",
@@ -395,8 +398,12 @@ fn method(page: &mut Page, design: &Design, found: &Verification) {
         found.design, found.design_digest, found.accuracy, count(relabelled),
     ));
     page.paragraph(format!(
-        "The cell that judges is `{}`; wavelengths {} nm; windows of {} x {} samples of one pitch about the chief ray; sensor pixels of {} um.",
+        "The cell that judges is `{}`, lit {}; wavelengths {} nm; windows of {} x {} samples of one pitch about the chief ray; sensor pixels of {} um.",
         found.fidelity,
+        match design.verify.incidence {
+            CellIncidence::Normal => "along the normal at all field angles",
+            CellIncidence::AsLit => "at the angle that light arrives at, both polarisations",
+        },
         design.verify.wavelengths_um.iter().map(|w| exact(w * 1e3)).collect::<Vec<_>>().join(", "),
         design.verify.window_samples,
         design.verify.window_samples,

@@ -2,9 +2,8 @@
 
 #![allow(dead_code, reason = "each test uses a part of it")]
 
-use metalith::{
-    Error, ExtractionPlan, LayerNumber, Layout, ReadLimits, Selection, Shape, Silent, Text, Transform, Visitor,
-};
+use metalith::gds::{LayerNumber, ReadLimits, Selection, Shape, Text, Transform, Visitor};
+use metalith::{Error, ExtractionPlan, Layout, Silent};
 use rand::Rng;
 
 /// Limits small enough that the worst a mutant can ask for is done in milliseconds.

@@ -62,12 +62,19 @@ impl Incidence {
     /// At an angle measured in air, the plane of incidence at an azimuth from x [rad].
     pub fn in_air(wavelength_um: f64, side: Side, theta: f64, azimuth: f64) -> Self {
         let sin = theta.sin();
-        let exact = |v: f64| if v.abs() < ALONG_AXIS { 0.0 } else { v };
+        Self {
+            azimuth,
+            ..Self::of_sines(wavelength_um, side, [sin * azimuth.cos(), sin * azimuth.sin()])
+        }
+    }
+
+    /// From the components of the wave vector along x and y over that in vacuum.
+    pub fn of_sines(wavelength_um: f64, side: Side, sines: [f64; 2]) -> Self {
         Self {
             wavelength_um,
             side,
-            sines: [exact(sin * azimuth.cos()), exact(sin * azimuth.sin())],
-            azimuth,
+            sines: sines.map(|v| if v.abs() < ALONG_AXIS { 0.0 } else { v }),
+            azimuth: 0.0,
         }
     }
 
