@@ -87,6 +87,11 @@ impl Chip {
 
 /// An alignment cross on 3/0, drawn counter-clockwise.
 pub fn cross(gds: &mut Gds, x: i32, y: i32, length: i32, width: i32) {
+    cross_on(gds, 3, x, y, length, width);
+}
+
+/// The same on any layer.
+pub fn cross_on(gds: &mut Gds, layer: i16, x: i32, y: i32, length: i32, width: i32) {
     let (l, w) = (length / 2, width / 2);
     let corners = [
         (-w, -l),
@@ -104,5 +109,5 @@ pub fn cross(gds: &mut Gds, x: i32, y: i32, length: i32, width: i32) {
         (-w, -l),
     ];
     let points: Vec<_> = corners.iter().map(|&(dx, dy)| (x + dx, y + dy)).collect();
-    gds.polygon(3, &points);
+    gds.polygon(layer, &points);
 }
