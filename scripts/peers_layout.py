@@ -2,9 +2,11 @@
 user would pick instead. Prints CPU seconds, peak memory and ratios.
 
 usage: peers_layout.py METALITH FOLDER          needs: pip install gdstk klayout numpy
+                                                and cargo build --release --example write_layout
 
-Every tool writes the same pillars: the centre element of prototype_3x3. Peers get them as arrays, ready to be
-written, and their times do not count the making of these; ours does.
+Every tool writes the same pillars: the centre element of prototype_3x3, with a hyperbolic phase. All get them as
+arrays, ready to be written, and no time counts the making of these. "copy" hands the same bytes from memory to
+the same disk.
 """
 
 import json
@@ -95,7 +97,7 @@ def gdstk_read(path):
     from gdstk import read_gds
     start = cpu()
     top = read_gds(path).top_level()[0]
-    boxes = np.array([p.bounding_box() for p in top.polygons])
+    boxes = np.array([p.bounding_box() for p in top.polygons if p.layer == 1])
     check_count(len(boxes))
     return cpu() - start
 
@@ -110,6 +112,18 @@ def klayout_read(path):
         b = shape.bbox()
         boxes.append((b.left, b.bottom, b.width()))
     check_count(len(np.array(boxes)))
+    return cpu() - start
+
+
+def copy(path):
+    """The same bytes, from memory to the same disk, as fast as a program can hand them over."""
+    source = open(path, "rb").read()
+    start = cpu()
+    with open(str(path) + ".copy", "wb", buffering=0) as out:
+        view = memoryview(source)
+        for k in range(0, len(view), 1 << 20):
+            out.write(view[k : k + (1 << 20)])
+        os.fsync(out.fileno())
     return cpu() - start
 
 
@@ -142,16 +156,18 @@ def main(program, folder):
     text = (designs / "prototype_3x3.toml").read_text()
     design.write_text(text.replace("elements = [3, 3]", "elements = [1, 1]").replace('"prototype_3x3"', '"one_lens"')
                       .replace('file = "', f'file = "{designs}/'))
+    writer = pathlib.Path(program).resolve().parent / "examples" / "write_layout"
     ours = {}
     print(f"{'writing one lens, 6.4 million pillars':44} {'CPU s':>7} {'MB':>7}")
     for hierarchy in ("folded", "sref", "flat"):
-        out = folder / hierarchy
-        seconds, _, memory, _ = measure([program, "layout", design, "--hierarchy", hierarchy, "--out", out, "--quiet"])
-        ours[hierarchy] = seconds
-        print(f"{'metalith ' + hierarchy + ', from the design on':44} {seconds:7.2f} {memory:7.0f}")
+        path = folder / f"{hierarchy}.gds"
+        _, _, memory, output = measure([writer, design, path, hierarchy])
+        ours[hierarchy] = json.loads(output)["cpu_s"]
+        print(f"{'metalith ' + hierarchy:44} {ours[hierarchy]:7.2f} {memory:7.0f}")
+        run_peer("copy", path, ours[hierarchy])
     for peer, against in (("gdstk_flat", "flat"), ("gdstk_sref", "sref"), ("gdstk_objects", "flat"), ("klayout_flat", "flat")):
         run_peer(peer, folder / f"{peer}.gds", ours[against])
-    flat = folder / "flat" / "one_lens_pillars.gds"
+    flat = folder / "flat.gds"
     print(f"\n{'reading its flat file':44} {'CPU s':>7} {'MB':>7}")
     seconds, _, memory, _ = measure([program, "psf", flat, "--extract-only", "--json"])
     print(f"{'metalith, every pillar on its site':44} {seconds:7.2f} {memory:7.0f}")

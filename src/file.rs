@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
-/// Large enough that the kernel, not the call, is the cost.
-const BUFFER: usize = 1 << 20;
+/// Large enough that the kernel, not the call, is the cost; what is larger goes to it without a copy.
+const BUFFER: usize = 1 << 17;
 
 /// A file written beside its place and renamed into it when complete.
 ///

@@ -187,3 +187,59 @@ fn mistakes_of_the_section_are_found_together() {
         assert!(all.contains(part), "{part} in {all}");
     }
 }
+
+/// Ctrl-C: the best so far is kept, exit code 3, and the same command goes on.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_program_is_interrupted_and_goes_on() {
+    use std::process::{Command, Stdio};
+    use std::time::Duration;
+    // Long enough to be stopped twice.
+    const LONG: &str = "[optimise]\ncell = \"published\"\nstep_nm = 2\nchains = 1\nhot_sweeps = 100000\nseed = 4\n";
+    let folder = tempfile::tempdir().unwrap();
+    let path = design(folder.path(), LONG);
+    let out = folder.path().join("out");
+    let interrupt = || {
+        let child = Command::new(env!("CARGO_BIN_EXE_metalith"))
+            .arg("optimize")
+            .arg(&path)
+            .args(["--no-report", "--out"])
+            .arg(&out)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        // Until it is known to catch the signal, which is number 2.
+        let status = format!("/proc/{}/status", child.id());
+        let catches = || {
+            let text = fs::read_to_string(&status).unwrap();
+            let mask = text.lines().find_map(|l| l.strip_prefix("SigCgt:")).unwrap();
+            u64::from_str_radix(mask.trim(), 16).unwrap() & 2 != 0
+        };
+        while !catches() {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        std::thread::sleep(Duration::from_millis(700));
+        let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+        assert!(sent.unwrap().success());
+        let ended = child.wait_with_output().unwrap();
+        assert_eq!(ended.status.code(), Some(3));
+        let kept = fs::read_to_string(out.join("checkpoint.json")).unwrap();
+        let kept: serde_json::Value = serde_json::from_str(&kept).unwrap();
+        let rings = fs::read_to_string(out.join("phase.csv")).unwrap();
+        let rows = rings
+            .lines()
+            .filter(|l| l.starts_with(|c: char| c.is_ascii_digit()))
+            .count();
+        assert!(rows > 80, "{rows}");
+        let said = String::from_utf8(ended.stderr).unwrap();
+        (kept["chains"][0]["sweep"].as_u64().unwrap(), said)
+    };
+    let (first, said) = interrupt();
+    assert!(first > 0 && said.contains("interrupted"), "{said}");
+    let (second, said) = interrupt();
+    assert!(
+        second > first && said.contains("going on from"),
+        "{first} {second} {said}"
+    );
+}

@@ -196,22 +196,21 @@ impl Default for OptimiseSpec {
 }
 
 impl SolverSpec {
-    const EXCHANGE: Self = Self::Exchange {
-        chains: 4,
-        hot_sweeps: 60,
-        temperature: (3e-3, 1e-4),
+    /// Chains, hot sweeps and temperatures of an exchange where nothing else is asked for.
+    pub(crate) const ANNEALED: (u32, u32, (f64, f64)) = (4, 60, (3e-3, 1e-4));
+
+    const EXCHANGE: Self = {
+        let (chains, hot_sweeps, temperature) = Self::ANNEALED;
+        Self::Exchange {
+            chains,
+            hot_sweeps,
+            temperature,
+        }
     };
 
     fn read(s: &Section<'_, '_>, images: bool) -> Self {
         let words = [("exchange", false), ("adam", true)];
-        let Self::Exchange {
-            chains,
-            hot_sweeps,
-            temperature,
-        } = Self::EXCHANGE
-        else {
-            unreachable!("it is one")
-        };
+        let (chains, hot_sweeps, temperature) = Self::ANNEALED;
         if s.choice("solver", &words, Some(images)) {
             Self::Adam {
                 steps: s.optional_integer("steps", 1..=1_000_000, "").unwrap_or(400) as u32,

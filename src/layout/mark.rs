@@ -13,9 +13,13 @@ pub(super) fn crosses(marks: &[MarkSpec], layer: &Layer) -> Vec<GdsElement> {
         .collect()
 }
 
-/// Corners of a cross, counter-clockwise from the lower left of its lower arm.
 fn cross(set: &MarkSpec, (x, y): (i64, i64)) -> [(i64, i64); 12] {
-    let (l, w) = (set.length_nm / 2, set.width_nm / 2);
+    cross_corners(set.length_nm / 2, set.width_nm / 2).map(|(dx, dy)| (x + dx, y + dy))
+}
+
+/// Corners of a cross about its middle, counter-clockwise from the lower left of its lower arm, by half the
+/// length `l` and half the width `w` of its arms.
+pub(crate) fn cross_corners<T: Copy + std::ops::Neg<Output = T>>(l: T, w: T) -> [(T, T); 12] {
     [
         (-w, -l),
         (w, -l),
@@ -30,7 +34,6 @@ fn cross(set: &MarkSpec, (x, y): (i64, i64)) -> [(i64, i64); 12] {
         (-l, -w),
         (-w, -w),
     ]
-    .map(|(dx, dy)| (x + dx, y + dy))
 }
 
 /// The edge of the chip.

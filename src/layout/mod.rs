@@ -20,6 +20,7 @@ use crate::error::{Error, Result};
 use crate::file::WholeFile;
 use crate::progress::Progress;
 use frame::Frame;
+pub(crate) use mark::cross_corners;
 use pillars::PillarWriter;
 
 pub use properties::write_layer_properties;

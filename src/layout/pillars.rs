@@ -32,6 +32,17 @@ pub(super) struct PillarWriter<'a> {
     bytes: u64,
     /// References of the top cell, in the order of the elements.
     placed: Vec<GdsElement>,
+    /// What blocks are encoded into: memory that is asked for once.
+    buffers: [Vec<u8>; BLOCKS],
+}
+
+/// One pillar of a lens: its site, its centre from the lens's [nm], its width [nm].
+struct Site {
+    ix: usize,
+    iy: usize,
+    x: i32,
+    y: i32,
+    width: u16,
 }
 
 impl<'a> PillarWriter<'a> {
@@ -44,6 +55,7 @@ impl<'a> PillarWriter<'a> {
             progress,
             bytes: 0,
             placed: Vec::new(),
+            buffers: Default::default(),
         };
         writer.put(frame.head())?;
         Ok(writer)
@@ -62,10 +74,9 @@ impl<'a> PillarWriter<'a> {
                 let name = format!("{lens}_{}", (b'A' + j as u8) as char);
                 let (begin, end) = self.frame.cell(&name, Vec::new())?;
                 self.put(&begin)?;
-                self.rows(&class.widths, |out, ix, iy, width| {
-                    if class.group.holds(part, n, ix, iy) {
-                        let (x, y) = site_nm(&class.widths, ix, iy);
-                        square.append(out, x, y, width);
+                self.rows(&class.widths, |out, s| {
+                    if class.group.holds(part, n, s.ix, s.iy) {
+                        square.append(out, s.x, s.y, s.width);
                     }
                 })?;
                 self.put(&end)?;
@@ -118,10 +129,7 @@ impl<'a> PillarWriter<'a> {
             let widths = array.widths(placed);
             let (begin, end) = self.frame.cell(&name, Vec::new())?;
             self.put(&begin)?;
-            self.rows(&widths, |out, ix, iy, width| {
-                let (x, y) = site_nm(&widths, ix, iy);
-                cells[&width].append(out, x, y);
-            })?;
+            self.rows(&widths, |out, s| cells[&s.width].append(out, s.x, s.y))?;
             self.put(&end)?;
             self.placed
                 .push(reference(&name, Symmetry::IDENTITY, placed.element.centre_nm));
@@ -141,10 +149,7 @@ impl<'a> PillarWriter<'a> {
                 let widths = array.widths(placed);
                 let (cx, cy) = placed.element.centre_nm;
                 let (cx, cy) = (coordinate(cx), coordinate(cy));
-                self.rows(&widths, |out, ix, iy, width| {
-                    let (x, y) = site_nm(&widths, ix, iy);
-                    square.append(out, cx + x, cy + y, width);
-                })?;
+                self.rows(&widths, |out, s| square.append(out, cx + s.x, cy + s.y, s.width))?;
             }
         }
         self.put(&end)?;
@@ -155,33 +160,42 @@ impl<'a> PillarWriter<'a> {
     }
 
     /// Encode the pillars of a lens row by row: blocks side by side on all threads, written in order.
-    fn rows(&mut self, widths: &WidthMap, encode: impl Fn(&mut Vec<u8>, usize, usize, u16) + Sync) -> Result<()> {
+    fn rows(&mut self, widths: &WidthMap, encode: impl Fn(&mut Vec<u8>, Site) + Sync) -> Result<()> {
         let n = widths.lattice.sites();
+        let places = (0..n)
+            .map(|i| coordinate(widths.lattice.coordinate_nm(i)))
+            .collect::<Vec<_>>();
         let all = widths.width_nm.as_slice().expect("rows are contiguous");
         let blocks = all.chunks(n * ROWS).collect::<Vec<_>>();
         for (batch, side_by_side) in blocks.chunks(BLOCKS).enumerate() {
             if self.progress.stopped() {
                 return Err(Error::Interrupted);
             }
-            let encoded = side_by_side
+            let first = batch * BLOCKS * ROWS;
+            let mut buffers = std::mem::take(&mut self.buffers);
+            let pillars = side_by_side
                 .par_iter()
+                .zip(&mut buffers)
                 .enumerate()
-                .map(|(k, block)| {
-                    let mut out = Vec::new();
-                    let first = (batch * BLOCKS + k) * ROWS;
+                .map(|(k, (block, out))| {
+                    out.clear();
+                    let mut pillars = 0;
                     for (row, line) in block.chunks(n).enumerate() {
+                        let iy = first + k * ROWS + row;
                         for (ix, &width) in line.iter().enumerate().filter(|(_, w)| **w != 0) {
-                            encode(&mut out, ix, first + row, width);
+                            let (x, y) = (places[ix], places[iy]);
+                            encode(out, Site { ix, iy, x, y, width });
+                            pillars += 1;
                         }
                     }
-                    out
+                    pillars
                 })
-                .collect::<Vec<_>>();
-            for bytes in &encoded {
+                .sum();
+            for bytes in &buffers[..side_by_side.len()] {
                 self.put(bytes)?;
             }
-            let pillars = side_by_side.iter().flat_map(|b| b.iter()).filter(|w| **w != 0).count();
-            self.progress.advance(pillars as u64);
+            self.buffers = buffers;
+            self.progress.advance(pillars);
         }
         Ok(())
     }
@@ -198,14 +212,6 @@ fn lens_name(class: usize) -> String {
 
 fn width_name(width: usize) -> String {
     format!("W{width}")
-}
-
-fn site_nm(widths: &WidthMap, ix: usize, iy: usize) -> (i32, i32) {
-    let lattice = &widths.lattice;
-    (
-        coordinate(lattice.coordinate_nm(ix)),
-        coordinate(lattice.coordinate_nm(iy)),
-    )
 }
 
 /// A reference with one of the symmetries of the square; a plain one has no STRANS record.

@@ -246,16 +246,18 @@ impl Task {
         let problem = self
             .field_problem(&MeritSpec::LOG, cells)?
             .expect("the weight of `log` is one");
+        let (chains, hot_sweeps, temperature) = SolverSpec::ANNEALED;
         let schedule = Schedule {
-            hot_sweeps: 0,
+            hot_sweeps,
             cold_sweeps: COLD_SWEEPS,
-            temperature: (1.0, 1.0),
+            temperature,
         };
         let start = Start::LogAsphere {
             band_um: self.spec.band_um,
         };
+        let starts = vec![start; chains as usize];
         Ok(self
-            .exchange(&problem, schedule, &[start], Checkpoint::default(), progress)?
+            .exchange(&problem, schedule, &starts, Checkpoint::default(), progress)?
             .turns)
     }
 

@@ -6,6 +6,7 @@ use super::axis::Axis;
 use super::colour::SERIES;
 use super::figure::{Anchor, Figure, Frame, line, rectangle, scale_bar, strokes, text};
 use super::number::short;
+use crate::layout::cross_corners;
 
 /// A layer of a [`Plan`], made by [`Plan::layer`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -88,21 +89,7 @@ impl Plan {
 
     /// An upright cross: centre, length and width of its arms [um].
     pub fn cross(&mut self, layer: Layer, (x, y): (f64, f64), length_um: f64, width_um: f64) -> &mut Self {
-        let (l, w) = (length_um / 2.0, width_um / 2.0);
-        let corners = [
-            (-w, -l),
-            (w, -l),
-            (w, -w),
-            (l, -w),
-            (l, w),
-            (w, w),
-            (w, l),
-            (-w, l),
-            (-w, w),
-            (-l, w),
-            (-l, -w),
-            (-w, -w),
-        ];
+        let corners = cross_corners(length_um / 2.0, width_um / 2.0);
         self.polygon(layer, corners.map(|(a, b)| (x + a, y + b)))
     }
 

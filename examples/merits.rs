@@ -1,0 +1,58 @@
+//! The README's table of optimised phases, made again: `cargo run --release --example merits`
+//!
+//! Geometric mean (smallest) of the Strehl ratio on axis, half way between the wavelengths that were optimised on,
+//! for two focal lengths, two cells and several limits on the phase step. The rigorous cells use the table that
+//! `metalith` keeps, and make it first if there is none.
+
+use std::path::Path;
+use std::time::Instant;
+
+use metalith::cell::{InversePolynomial, PublishedCell, RigorousCell, cache_folder};
+use metalith::design::SolverSpec;
+use metalith::optimise::{Checkpoint, Task};
+use metalith::{CellModel, Design, Fidelity, Result, Silent};
+
+fn main() -> Result<()> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs");
+    let shipped = Design::read(&folder.join("broadband_3x3.toml"))?;
+    println!("focal length  cell       mapping    limit  Strehl (smallest)   wall s");
+    for focal_length_um in [2400.0, 2000.0] {
+        for (fidelity, limits) in [
+            (Fidelity::Rigorous, &[0.15, 0.2, 0.3, 0.5][..]),
+            (Fidelity::Published, &[0.5][..]),
+        ] {
+            for &limit in limits {
+                let mut design = shipped.clone();
+                design.lens.focal_length_um = focal_length_um;
+                design.optimise.fidelity = fidelity;
+                design.optimise.step_limit_turns = limit;
+                let mut mapping = "design's";
+                if fidelity == Fidelity::Published {
+                    // Its merit is smoother: what is hot for the rigorous cell never settles.
+                    design.mapping.polynomial = InversePolynomial::published();
+                    design.optimise.solver = SolverSpec::Exchange {
+                        chains: 4,
+                        hot_sweeps: 150,
+                        temperature: (1e-3, 3e-5),
+                    };
+                    mapping = "published";
+                }
+                let cell: Box<dyn CellModel> = match fidelity {
+                    Fidelity::Published => Box::new(PublishedCell::new(design.cell.pitch_nm)),
+                    _ => Box::new(RigorousCell::of_design(&shipped, cache_folder().as_deref(), &Silent)?.0),
+                };
+                let start = Instant::now();
+                let task = Task::of(&design)?;
+                let found = task.solve(&[cell.as_ref()], Checkpoint::begin(&design), &Silent)?;
+                let judged = task.judge_rings(&found.turns, cell.as_ref())?;
+                println!(
+                    "{focal_length_um:9} um  {fidelity:9}  {mapping:9}  {limit:5}  {:.4} ({:.4})     {:6.1}",
+                    judged.geometric_mean,
+                    judged.smallest,
+                    start.elapsed().as_secs_f64()
+                );
+            }
+        }
+    }
+    Ok(())
+}

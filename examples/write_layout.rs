@@ -1,0 +1,38 @@
+//! CPU time of writing the pillars of a design, for `scripts/peers_layout.py`:
+//! `cargo run --release --example write_layout -- DESIGN.toml OUT.gds folded|sref|flat`
+//!
+//! The widths of all pillars are there before the clock starts, as those of the peers are. One line of JSON.
+
+use metalith::{Design, Hierarchy, PillarArray, Silent, write_pillars};
+
+fn main() -> metalith::Result<()> {
+    let arguments = std::env::args().collect::<Vec<_>>();
+    let [_, design, out, hierarchy] = arguments.as_slice() else {
+        panic!("usage: write_layout DESIGN.toml OUT.gds folded|sref|flat");
+    };
+    let hierarchy = match hierarchy.as_str() {
+        "folded" => Hierarchy::Folded,
+        "sref" => Hierarchy::Sref,
+        _ => Hierarchy::Flat,
+    };
+    let design = Design::read(design.as_ref())?;
+    let array = PillarArray::build(&design, &Silent)?;
+    let before = cpu_seconds();
+    let written = write_pillars(&design, &array, hierarchy, out.as_ref(), &Silent)?;
+    let cpu_s = before.zip(cpu_seconds()).map(|(a, b)| b - a);
+    println!(
+        "{{\"cpu_s\": {:.3}, \"bytes\": {}, \"pillars\": {}}}",
+        cpu_s.unwrap_or(f64::NAN),
+        written.bytes,
+        array.pillars()
+    );
+    Ok(())
+}
+
+/// User and system time of this process so far, where the system tells: fields 14 and 15, in hundredths.
+fn cpu_seconds() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/self/stat").ok()?;
+    let behind_name = text.rsplit_once(')')?.1;
+    let fields = behind_name.split_whitespace().skip(11).take(2);
+    Some(fields.filter_map(|f| f.parse::<f64>().ok()).sum::<f64>() * 0.01)
+}
