@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::calibrate::CalibratedModel;
+use metalith::design::CellIncidence;
 use metalith::report::sig;
 use metalith::{
     Accuracy, Design, Fidelity, PillarArray, Premise, Result, Verification, cell_models, verify, write_report,
@@ -45,6 +46,11 @@ pub struct Judging {
     #[arg(long, value_name = "MODEL", conflicts_with = "fidelity")]
     model: Option<PathBuf>,
 
+    /// Solve the cells at the angles that light arrives at, for both polarisations, as `incidence = "as_lit"` in
+    /// [verify] of the design asks for; else along the normal.
+    #[arg(long)]
+    as_lit: bool,
+
     /// Print `report.json` to standard output.
     #[arg(long)]
     json: bool,
@@ -80,6 +86,11 @@ impl Judging {
         folder: &Path,
         terminal: &Terminal,
     ) -> Result<Outcome> {
+        let mut design = design.clone();
+        if self.as_lit {
+            design.verify.incidence = CellIncidence::AsLit;
+        }
+        let design = &design;
         let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
         let made = model.as_ref().map(|m| m.cell(design, array.fill())).transpose()?;
         let judge = Fidelity::from(self.fidelity);
