@@ -9,10 +9,12 @@ use crate::gds::{LayerNumber, Rect};
 
 enum Layers {
     Whitelist(Vec<LayerNumber>),
-    /// Exposed shapes lie within left, bottom, right, top [um].
+    /// Exposed shapes lie within left, bottom, right, top [um]; where a design is given, so far inside the edge of
+    /// its chip.
     Area {
         layers: Vec<LayerNumber>,
         um: [f64; 4],
+        edge_um: Option<f64>,
     },
     NoText(Vec<LayerNumber>),
 }
@@ -23,6 +25,7 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Optio
         "active_area" => Layers::Area {
             layers: context.some_layers(s),
             um: s.array("um", Limits::new(-1e6..=1e6, "um")),
+            edge_um: s.optional_float("edge_um", Limits::new(0.0..=1e6, "um")),
         },
         "no_text_exposed" => Layers::NoText(context.some_layers(s)),
         _ => return None,
@@ -34,14 +37,14 @@ impl Rule for Layers {
         let list = |l: &[LayerNumber]| l.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
         match self {
             Self::Whitelist(layers) => format!("layers {} and no other", list(layers)),
-            Self::Area { layers, um } => format!(
-                "{} within x {} to {}, y {} to {} um",
-                list(layers),
-                um[0],
-                um[2],
-                um[1],
-                um[3]
-            ),
+            Self::Area { layers, um, edge_um } => {
+                let of_design = edge_um.map_or_else(String::new, |edge| {
+                    format!("; of a design, {edge} um inside the edge of its chip")
+                });
+                let [left, bottom, right, top] = um;
+                let layers = list(layers);
+                format!("{layers} within x {left} to {right}, y {bottom} to {top} um{of_design}")
+            }
             Self::NoText(layers) => format!("no text on the exposed layers {}", list(layers)),
         }
     }
@@ -59,7 +62,15 @@ impl Rule for Layers {
                 }
                 Status::Run
             }
-            Self::Area { layers, um } => {
+            Self::Area { layers, um, edge_um } => {
+                let um = match (scene.design, edge_um) {
+                    (Some(design), Some(edge)) => {
+                        let (width, height) = design.layout.chip.size_nm;
+                        let [x, y] = [width, height].map(|size| size as f64 * 0.5e-3 - *edge);
+                        [-x, -y, x, y]
+                    }
+                    _ => *um,
+                };
                 let [x0, y0, x1, y1] = um.map(|v| scene.units(v * 1e3).round() as i64);
                 let area = Rect { x0, y0, x1, y1 };
                 let out = |r: &Rect| r.x0 < area.x0 || r.y0 < area.y0 || r.x1 > area.x1 || r.y1 > area.y1;

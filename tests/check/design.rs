@@ -100,3 +100,22 @@ fn a_phase_too_steep_for_the_lattice_is_found() {
     // Of nine elements the steered ones.
     assert!(steep.1 >= 4, "{found:?}");
 }
+
+#[test]
+fn the_active_area_is_that_of_the_chip() {
+    // The shipped chip is smaller than the deck's area; its marks reach to 5 um from the edge of this one.
+    let case = Case::new(&[]);
+    let (width, _) = case.design.layout.chip.size_nm;
+    let text = std::fs::read_to_string(case.file.with_file_name("mini.toml")).unwrap();
+    let size = format!("size_um = [{0}, {0}]", width / 1000);
+    assert!(text.contains(&size), "{size}");
+    let reach = case
+        .design
+        .layout
+        .marks
+        .iter()
+        .flat_map(|m| m.centres_nm.iter().map(|c| c.0 + m.length_nm / 2));
+    let tight = 2 * (reach.max().unwrap() / 1000 + 5);
+    let case = Case::new(&[(&size, &format!("size_um = [{tight}, {tight}]"))]);
+    assert!(broken(&case.judge()).iter().any(|f| f.0 == "layer.active_area"));
+}
