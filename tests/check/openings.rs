@@ -186,9 +186,12 @@ fn rules_that_are_broken_together() {
     );
 }
 
+/// A rule, and what is drawn to break it.
+type Outline = (&'static str, fn(&mut Gds));
+
 /// What else is drawn on the layer of the marks is a mark that no one asked for: each breaks its own rule and
 /// that the marks are those of the deck.
-const OUTLINES: &[(&str, fn(&mut Gds))] = &[
+const OUTLINES: &[Outline] = &[
     ("outline.doubled_vertex", |g| {
         mark(g, &[(0, 0), (0, 0), (40, 0), (40, 30), (0, 30), (0, 0)])
     }),
