@@ -1,118 +1,14 @@
 //! Measured sets: what cannot be read is named in one go, what differs is found, what does not is not.
 
+#[path = "support/session.rs"]
+mod session;
+
 use std::fs;
-use std::path::{Path, PathBuf};
 
-use metalith::calibrate::{MeasuredSet, Session, SetVerdict, Settings, Twins};
-use metalith::calibrate::{OffList, Sampling};
-use metalith::{Design, Hierarchy, PillarArray, Silent, write_pillars};
+use metalith::Silent;
+use metalith::calibrate::{Extent, MeasuredSet, OffList, Sampling, Session, SetVerdict, Settings, Twins, prove};
 use ndarray::Array2;
-use npyz::WriterBuilder;
-
-/// Edge of a capture of the small set [pixels].
-const PIXELS: usize = 48;
-
-/// Elements of the small set, with the light that they steer to their axis.
-const BEAMS: [([i64; 2], f64); 2] = [([0, 0], 0.0), ([1, 0], -15.0)];
-
-fn write_npy(path: &Path, values: &Array2<f32>) {
-    let mut bytes = Vec::new();
-    let shape = [values.nrows() as u64, values.ncols() as u64];
-    let mut writer = npyz::WriteOptions::new()
-        .default_dtype()
-        .shape(&shape)
-        .writer(&mut bytes)
-        .begin_nd()
-        .unwrap();
-    writer.extend(values.iter().copied()).unwrap();
-    writer.finish().unwrap();
-    fs::write(path, bytes).unwrap();
-}
-
-/// A bench session with lenses of 60 um: two elements, two colours, two distances.
-fn small_set(folder: &Path) -> PathBuf {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let design = Design::read(&root.join("designs/mini_3x3.toml")).unwrap();
-    let array = PillarArray::build(&design, &Silent).unwrap();
-    write_pillars(&design, &array, Hierarchy::Sref, &folder.join("layout.gds"), &Silent).unwrap();
-    fs::copy(root.join("golden/measured/film_nk.csv"), folder.join("film_nk.csv")).unwrap();
-    let mut text = format!(
-        r#"schema = 1
-title = "small chip"
-layout = "layout.gds"
-
-[layout_layers]
-pillars = [1, 0]
-apertures = [2, 0]
-
-[stack]
-pitch_nm = 350
-pillar_height_nm = 700
-pillar_index = "film_nk.csv"
-substrate = "fused_silica_malitson_1965"
-ambient_index = 1.0
-incidence = "substrate"
-lens_diameter_um = 60.0
-focal_length_um = 144.0
-
-[source]
-kind = "collimated"
-divergence_mrad = 2.35
-divergence_axes = "uniform disc"
-
-[camera]
-pixel_um = 0.5
-rows = {PIXELS}
-cols = {PIXELS}
-black_level_dn = 40.0
-gain_e_per_dn = 5.0
-read_noise_dn = 2.0
-saturation_dn = 4095
-registration_sigma_px = 0.5
-flux_sigma = 0.01
-
-[[led]]
-centre_nm = 500
-fwhm_nm = 6.0
-
-[[led]]
-centre_nm = 560
-fwhm_nm = 6.0
-"#
-    );
-    for (index, _) in BEAMS {
-        text.push_str(&format!(
-            "\n[[element]]\nindex = [{0}, 0]\ncentre_um = [{1}.0, 0.0]\naperture_diameter_um = 60.0\n",
-            index[0],
-            150 * index[0]
-        ));
-    }
-    for (index, aoi) in BEAMS {
-        for led in [500, 560] {
-            // Where the wedge of 550 nm sends this colour.
-            let sine = 0.258_819 * f64::from(led) / 550.0 + aoi.to_radians().sin();
-            let x = if index[0] == 0 {
-                0.0
-            } else {
-                144.0 * sine / (1.0 - sine * sine).sqrt()
-            };
-            for (z, distance) in [139.0, 146.0].into_iter().enumerate() {
-                let name = format!("e{}_{led}_z{z}", index[0]);
-                write_npy(
-                    &folder.join(format!("{name}.npy")),
-                    &Array2::from_elem((PIXELS, PIXELS), 40.0),
-                );
-                text.push_str(&format!(
-                    "\n[[capture]]\nfile = \"{name}.npy\"\nelement = [{}, 0]\nled_nm = {led}\naoi_deg = [{aoi:.1}, 0.0]\ndistance_um = {distance:.1}\nwindow_centre_um = [{x:.3}, 0.0]\nscale_dn = 1.0\nframes = 64\n",
-                    index[0]
-                ));
-            }
-        }
-    }
-    let path = folder.join("measurement.toml");
-    fs::write(&path, text).unwrap();
-    path
-}
+use session::{PIXELS, small_set, write_npy};
 
 #[test]
 fn every_fault_of_a_set_is_named_in_one_go() {
@@ -212,4 +108,40 @@ fn effects_are_found_and_nothing_is_found_where_nothing_is() {
     let d = diagnose(&dark);
     assert_eq!(d.verdict, SetVerdict::DataUnfit);
     assert!(d.left_out.len() >= 5);
+}
+
+#[test]
+fn two_effects_at_once_are_both_found() {
+    let folder = tempfile::tempdir().unwrap();
+    small_set(folder.path());
+    let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
+    let twins = Twins::new(&like, &settings()).unwrap();
+    let both = [vec![("cd_bias", &[6.0][..]), ("gap", &[-4.0][..])]];
+    let exposed = twins.with_effects(&both, &Silent).unwrap().remove(0);
+    let set = twins.draw(&exposed, 21);
+    let mut session = Session::new(&set, settings()).unwrap();
+    let atlas = session.atlas(&Silent).unwrap();
+    let d = session.diagnose(&atlas, &Silent).unwrap().0;
+    let mut found: Vec<&str> = d.effects.iter().map(|e| e.name.as_str()).collect();
+    found.sort_unstable();
+    assert_eq!(found, ["cd_bias", "gap"], "{}", d.sentence());
+    assert_eq!(d.verdict, SetVerdict::Explained);
+}
+
+#[test]
+fn a_proof_counts_what_was_said() {
+    let folder = tempfile::tempdir().unwrap();
+    small_set(folder.path());
+    let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
+    let extent = Extent {
+        nulls: 3,
+        threshold_nulls: 1,
+        effects: vec!["gap".into()],
+        off_list: false,
+    };
+    let proof = prove(&like, &settings(), &extent, &Silent).unwrap();
+    assert_eq!((proof.nulls, proof.false_claims, proof.trials.len()), (3, 0, 6));
+    assert_eq!(proof.limits.len(), 1);
+    assert!(proof.limits[0].named_from.is_some_and(|s| s <= 1.0), "{}", proof.text());
+    assert!(proof.largest_gain_by_chance < proof.least_gain);
 }

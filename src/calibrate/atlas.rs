@@ -4,13 +4,13 @@
 //! polynomial. Changes of different numbers add. That is right where effects are small, and a fit that moves
 //! far is carried on from an atlas about its new place.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
-use super::bench::Bench;
-use super::cells::CellSource;
-use super::departure::Departure;
-use super::effects::{Effect, Parameter, Stage};
+use super::curve::Curve;
 use super::optics::PixelGrid;
+use super::simulator::Simulator;
 use crate::error::Result;
 use crate::progress::Progress;
 
@@ -20,9 +20,8 @@ const TWO_SIDED: [f64; 4] = [-2.5, -1.25, 1.25, 2.5];
 /// And where it can only be positive.
 const ONE_SIDED: [f64; 3] = [0.8, 1.8, 3.5];
 
-/// The same for numbers that every pillar has to be solved again for.
-const TWO_SIDED_STACK: [f64; 2] = [-1.25, 1.25];
-const ONE_SIDED_STACK: [f64; 2] = [1.0, 2.5];
+/// How far beyond what was simulated a fit may look, in reaches.
+const BEYOND: f64 = 1.6;
 
 /// Polynomials of the free phase term: Noll's 5 to 15, through fourth order.
 pub const FREE_PHASES: usize = 11;
@@ -36,132 +35,18 @@ pub const FREE_TRANSMISSIONS: usize = 3;
 /// Size at which one is simulated.
 const FREE_TRANSMISSION: f64 = 0.03;
 
-/// A bench, its cells and the effects that are tried on it.
-pub struct Simulator<'a> {
-    pub bench: Bench<'a>,
-    pub cells: CellSource,
-    pub effects: Vec<Box<dyn Effect>>,
-    pub slots: Vec<Slot>,
-    wavelengths_nm: Vec<f64>,
-    widths_nm: (f64, f64),
-}
-
-/// One number of one effect.
-#[derive(Clone, Copy, Debug)]
-pub struct Slot {
-    /// Index into [`Simulator::effects`].
-    pub effect: usize,
-    /// Which of its numbers.
-    pub index: usize,
-    pub parameter: Parameter,
-}
-
 /// What a set should show, and how every number changes it.
+#[derive(Clone)]
 pub struct Atlas {
     /// The numbers that it is about.
     pub about: Vec<f64>,
-    pub base: Vec<PixelGrid>,
+    pub base: Arc<Vec<PixelGrid>>,
     curves: Vec<Curve>,
     /// Changes for a unit of each free term: phases [1/nm], then transmissions of each LED.
-    pub free: Vec<Vec<Option<PixelGrid>>>,
+    pub free: Arc<Vec<Vec<Option<PixelGrid>>>>,
 }
 
-struct Curve {
-    /// Offsets from the middle, zero left out.
-    nodes: Vec<f64>,
-    /// Changes from the base at each node, `[node][capture]`.
-    grids: Vec<Vec<PixelGrid>>,
-}
-
-/// Widths that a bias may add or take [nm]; cells are tabulated so far beyond the layout.
-pub const WIDTH_ROOM_NM: f64 = 36.0;
-
-impl<'a> Simulator<'a> {
-    /// Everything that is needed to predict a set.
-    pub fn new(bench: Bench<'a>, cells: CellSource, effects: Vec<Box<dyn Effect>>) -> Self {
-        let slots = effects
-            .iter()
-            .enumerate()
-            .flat_map(|(effect, e)| {
-                let parameters = e.parameters().into_iter().enumerate();
-                parameters.map(move |(index, parameter)| Slot {
-                    effect,
-                    index,
-                    parameter,
-                })
-            })
-            .collect();
-        let (low, high) = bench.widths_nm();
-        Self {
-            wavelengths_nm: bench.wavelengths_nm(),
-            widths_nm: (low - WIDTH_ROOM_NM, high + WIDTH_ROOM_NM),
-            bench,
-            cells,
-            effects,
-            slots,
-        }
-    }
-
-    /// The numbers of an effect among all.
-    pub fn slots_of(&self, effect: usize) -> Vec<usize> {
-        (0..self.slots.len())
-            .filter(|&s| self.slots[s].effect == effect)
-            .collect()
-    }
-
-    /// What the numbers mean together.
-    pub fn departure(&self, theta: &[f64]) -> Departure {
-        let mut departure = Departure::default();
-        for (e, effect) in self.effects.iter().enumerate() {
-            let own: Vec<f64> = self.slots_of(e).into_iter().map(|s| theta[s]).collect();
-            effect.apply(&own, &mut departure);
-        }
-        departure
-    }
-
-    /// What each capture should show under each of `departures`; those that differ in lamps and camera alone
-    /// share their light.
-    ///
-    /// # Errors
-    /// If a cell cannot be solved, or the user stopped it.
-    pub fn expose(&self, departures: &[Departure], progress: &dyn Progress) -> Result<Vec<Vec<PixelGrid>>> {
-        let mut out: Vec<Option<Vec<PixelGrid>>> = departures.iter().map(|_| None).collect();
-        let mut steps: Vec<Vec<usize>> = Vec::new();
-        for (i, d) in departures.iter().enumerate() {
-            let same = |j: &usize| {
-                let o = &departures[*j];
-                (&o.geometry, &o.cell, &o.path) == (&d.geometry, &d.cell, &d.path)
-            };
-            match steps.iter_mut().find(|s| same(&s[0])) {
-                Some(step) => step.push(i),
-                None => steps.push(vec![i]),
-            }
-        }
-        // Cells first: they bring their own progress.
-        let tables = steps
-            .iter()
-            .map(|s| {
-                self.cells
-                    .table(&departures[s[0]].cell, &self.wavelengths_nm, self.widths_nm, progress)
-            })
-            .collect::<Result<Vec<_>>>()?;
-        progress.begin("captures as they should be", steps.len() as u64);
-        for (step, table) in steps.iter().zip(tables) {
-            let lights: Vec<_> = step.iter().map(|&i| departures[i].light.clone()).collect();
-            let intensities = self
-                .bench
-                .intensities(&table, &departures[step[0]], &lights, progress)?;
-            for (&i, planes) in step.iter().zip(&intensities) {
-                out[i] = Some(self.bench.grids(planes, &departures[i]));
-            }
-            progress.advance(1);
-        }
-        Ok(out
-            .into_iter()
-            .map(|g| g.expect("every departure is in one step"))
-            .collect())
-    }
-
+impl Simulator<'_> {
     /// Simulate every effect about the numbers `about`.
     ///
     /// # Errors
@@ -171,12 +56,7 @@ impl<'a> Simulator<'a> {
         let mut nodes: Vec<Vec<f64>> = Vec::new();
         for (s, slot) in self.slots.iter().enumerate() {
             let one_sided = slot.parameter.one_sided() && about[s] == 0.0;
-            let multiples: &[f64] = match (self.effects[slot.effect].stage(), one_sided) {
-                (Stage::Stack, false) => &TWO_SIDED_STACK,
-                (Stage::Stack, true) => &ONE_SIDED_STACK,
-                (_, false) => &TWO_SIDED,
-                (_, true) => &ONE_SIDED,
-            };
+            let multiples: &[f64] = if one_sided { &ONE_SIDED } else { &TWO_SIDED };
             let (low, high) = slot.parameter.range;
             let offsets: Vec<f64> = multiples
                 .iter()
@@ -215,9 +95,9 @@ impl<'a> Simulator<'a> {
         };
         let curves = nodes
             .into_iter()
-            .map(|nodes| Curve {
-                grids: exposed.by_ref().take(nodes.len()).map(|g| change(g, 1.0)).collect(),
-                nodes,
+            .map(|nodes| {
+                let grids: Vec<_> = exposed.by_ref().take(nodes.len()).map(|g| change(g, 1.0)).collect();
+                Curve::new(nodes, grids)
             })
             .collect();
         let mut terms = Vec::new();
@@ -246,10 +126,34 @@ impl<'a> Simulator<'a> {
         }
         Ok(Atlas {
             about: about.to_vec(),
-            base,
+            base: Arc::new(base),
             curves,
-            free: terms,
+            free: Arc::new(terms),
         })
+    }
+
+    /// Simulate one number at more sizes, where a fit has gone beyond those that are known.
+    ///
+    /// # Errors
+    /// As [`Simulator::expose`].
+    pub fn extend(&self, atlas: &mut Atlas, slot: usize, values: &[f64], progress: &dyn Progress) -> Result<()> {
+        let departures: Vec<_> = values
+            .iter()
+            .map(|value| {
+                let mut theta = atlas.about.clone();
+                theta[slot] = *value;
+                self.departure(&theta)
+            })
+            .collect();
+        for (grids, value) in self.expose(&departures, progress)?.into_iter().zip(values) {
+            let change = grids
+                .iter()
+                .zip(atlas.base.iter())
+                .map(|(g, b)| PixelGrid::combine(&[(g, 1.0), (b, -1.0)]))
+                .collect();
+            atlas.curves[slot].add(value - atlas.about[slot], change);
+        }
+        Ok(())
     }
 }
 
@@ -258,9 +162,9 @@ impl Atlas {
     pub fn alone(base: Vec<PixelGrid>) -> Self {
         Self {
             about: Vec::new(),
-            base,
+            base: Arc::new(base),
             curves: Vec::new(),
-            free: Vec::new(),
+            free: Arc::default(),
         }
     }
 
@@ -269,9 +173,7 @@ impl Atlas {
         let mut parts = vec![(&self.base[capture], 1.0)];
         for ((curve, t), about) in self.curves.iter().zip(theta).zip(&self.about) {
             if t != about {
-                for (grids, w) in curve.grids.iter().zip(curve.weights(t - about)) {
-                    parts.push((&grids[capture], w as f32));
-                }
+                parts.extend(curve.change(t - about, capture));
             }
         }
         PixelGrid::combine(&parts)
@@ -279,81 +181,27 @@ impl Atlas {
 
     /// Its derivative by one of the numbers.
     pub fn slope(&self, theta: &[f64], slot: usize, capture: usize) -> PixelGrid {
-        let curve = &self.curves[slot];
-        let weights = curve.slopes(theta[slot] - self.about[slot]);
-        let parts: Vec<_> = curve
-            .grids
-            .iter()
-            .zip(weights)
-            .map(|(g, w)| (&g[capture], w as f32))
+        let parts: Vec<_> = self.curves[slot]
+            .slope(theta[slot] - self.about[slot], capture)
             .collect();
         PixelGrid::combine(&parts)
     }
 
-    /// How far from its middle a number may go for the atlas to be trusted.
+    /// The change for a unit of a free term in a capture that shows `grid`; nothing where it does not act.
+    pub fn free_term(&self, term: usize, capture: usize, grid: &PixelGrid) -> PixelGrid {
+        let known = self.free[term][capture].clone();
+        known.unwrap_or_else(|| PixelGrid::combine(&[(grid, 0.0)]))
+    }
+
+    /// Values of a number between which the atlas was simulated.
+    pub fn known(&self, slot: usize) -> (f64, f64) {
+        let (low, high) = self.curves[slot].ends();
+        (self.about[slot] + low, self.about[slot] + high)
+    }
+
+    /// Values of a number that a fit may look at.
     pub fn reach(&self, slot: usize) -> (f64, f64) {
-        let nodes = &self.curves[slot].nodes;
-        let low = nodes.iter().copied().fold(0.0, f64::min);
-        let high = nodes.iter().copied().fold(0.0, f64::max);
-        (self.about[slot] + 1.6 * low, self.about[slot] + 1.6 * high)
-    }
-}
-
-impl Curve {
-    fn ends(&self) -> (f64, f64) {
-        let low = self.nodes.iter().copied().fold(0.0, f64::min);
-        let high = self.nodes.iter().copied().fold(0.0, f64::max);
-        (low, high)
-    }
-
-    /// Weights of the nodes' changes at `u`; straight on beyond the ends.
-    fn weights(&self, u: f64) -> Vec<f64> {
-        let (low, high) = self.ends();
-        let inside = u.clamp(low, high);
-        let beyond = u - inside;
-        (0..self.nodes.len())
-            .map(|i| {
-                self.lagrange(i, inside)
-                    + if beyond == 0.0 {
-                        0.0
-                    } else {
-                        beyond * self.lagrange_slope(i, inside)
-                    }
-            })
-            .collect()
-    }
-
-    fn slopes(&self, u: f64) -> Vec<f64> {
-        let (low, high) = self.ends();
-        (0..self.nodes.len())
-            .map(|i| self.lagrange_slope(i, u.clamp(low, high)))
-            .collect()
-    }
-
-    /// The polynomial that is one at node `i` and zero at the others and in the middle.
-    fn lagrange(&self, i: usize, u: f64) -> f64 {
-        let at = self.nodes[i];
-        let others = self.nodes.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, n)| *n);
-        others.chain([0.0]).map(|n| (u - n) / (at - n)).product()
-    }
-
-    fn lagrange_slope(&self, i: usize, u: f64) -> f64 {
-        let at = self.nodes[i];
-        let roots: Vec<f64> = self
-            .nodes
-            .iter()
-            .enumerate()
-            .filter(|(j, _)| *j != i)
-            .map(|(_, n)| *n)
-            .chain([0.0])
-            .collect();
-        let scale: f64 = roots.iter().map(|n| at - n).product();
-        (0..roots.len())
-            .map(|k| {
-                let rest = roots.iter().enumerate().filter(|(j, _)| *j != k);
-                rest.map(|(_, n)| u - n).product::<f64>()
-            })
-            .sum::<f64>()
-            / scale
+        let (low, high) = self.curves[slot].ends();
+        (self.about[slot] + BEYOND * low, self.about[slot] + BEYOND * high)
     }
 }

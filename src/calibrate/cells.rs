@@ -81,6 +81,7 @@ pub struct RigorousCells {
     widths_nm: (f64, f64),
     fine: usize,
     coarse: usize,
+    coarsest: usize,
     folder: Option<PathBuf>,
     made: Mutex<HashMap<[u64; 6], Arc<CellTable>>>,
 }
@@ -94,30 +95,31 @@ impl RigorousCells {
             widths_nm,
             fine: FINE,
             coarse: COARSE,
+            coarsest: COARSEST,
             folder,
             made: Mutex::default(),
         }
     }
 
     /// The same with other orders: for twins that must not share the truncation of the fit.
-    pub fn with_orders(mut self, fine: usize, coarse: usize) -> Self {
-        (self.fine, self.coarse) = (fine, coarse);
+    pub fn with_orders(mut self, fine: usize, coarse: usize, coarsest: usize) -> Self {
+        (self.fine, self.coarse, self.coarsest) = (fine, coarse, coarsest);
         self
     }
 
-    /// The table of the cell with a change.
+    /// The table of the cell with a change; with `exact`, the changed cell itself with all orders.
     ///
     /// # Errors
     /// If a pillar cannot be (a foot wider than the pitch), or the user stopped it.
-    pub fn table(&self, change: &CellChange, progress: &dyn Progress) -> Result<Arc<CellTable>> {
-        if *change == CellChange::default() || self.coarse >= self.fine {
+    pub fn table(&self, change: &CellChange, exact: bool, progress: &dyn Progress) -> Result<Arc<CellTable>> {
+        let upright = change.taper_deg == 0.0;
+        if *change == CellChange::default() || upright && (exact || self.coarse >= self.fine) {
             return self.solved(change, self.fine, progress);
         }
         let stated = self.solved(&CellChange::default(), self.fine, progress)?;
-        let coarse = if change.taper_deg == 0.0 {
-            self.coarse
-        } else {
-            self.coarse.min(COARSEST)
+        let coarse = match (upright, exact) {
+            (true, _) | (false, true) => self.coarse.min(COARSE),
+            (false, false) => self.coarsest,
         };
         let before = self.solved(&CellChange::default(), coarse, progress)?;
         let after = self.solved(change, coarse, progress)?;
@@ -152,12 +154,14 @@ impl RigorousCells {
                     .map(|k| {
                         let um = wavelength_nm * 1e-3;
                         let width = self.first_nm() + k as f64 * STEP_NM;
-                        let mut layers = self.stack.layers(width, um)?;
-                        for layer in &mut layers.layers {
-                            layer.outline = Outline::rectangle(width + nm, width - nm);
-                        }
-                        let jones = solve(&layers, &Incidence::normal(um, Side::Below), orders)?.transmission;
-                        Ok([jones[0][0], jones[1][1]])
+                        off_cutoff(width, |width| {
+                            let mut layers = self.stack.layers(width, um)?;
+                            for layer in &mut layers.layers {
+                                layer.outline = Outline::rectangle(width + nm, width - nm);
+                            }
+                            let jones = solve(&layers, &Incidence::normal(um, Side::Below), orders)?.transmission;
+                            Ok([jones[0][0], jones[1][1]])
+                        })
                     })
                     .collect()
             })
@@ -231,7 +235,10 @@ impl RigorousCells {
                 // Where leaning walls would meet, the widest pillar that has room stands in.
                 let room = stack.pitch_nm - 1.0 - (2.0 * stack.taper.tan() * stack.height_nm).max(0.0);
                 let row = (0..count)
-                    .map(|k| stack.transmission((self.first_nm() + k as f64 * STEP_NM).min(room), um, orders))
+                    .map(|k| {
+                        let width = (self.first_nm() + k as f64 * STEP_NM).min(room);
+                        off_cutoff(width, |width| stack.transmission(width, um, orders))
+                    })
                     .collect::<Result<Vec<_>>>()?;
                 let bare = stack.transmission(0.0, um, orders)?;
                 progress.advance(1);
@@ -298,6 +305,13 @@ impl RigorousCells {
     }
 }
 
+/// A mode at its very cutoff has no field to solve for; a pillar that is wider by less than anyone can tell has.
+fn off_cutoff<T>(width_nm: f64, solve: impl Fn(f64) -> Result<T>) -> Result<T> {
+    solve(width_nm)
+        .or_else(|_| solve(width_nm - 3e-4))
+        .or_else(|_| solve(width_nm - 1e-3))
+}
+
 /// The stack with a change.
 pub fn changed(stack: &CellStack, change: &CellChange) -> CellStack {
     CellStack {
@@ -331,10 +345,11 @@ impl CellSource {
         change: &CellChange,
         wavelengths_nm: &[f64],
         widths_nm: (f64, f64),
+        exact: bool,
         progress: &dyn Progress,
     ) -> Result<Arc<CellTable>> {
         match self {
-            Self::Rigorous(cells) => cells.table(change, progress),
+            Self::Rigorous(cells) => cells.table(change, exact, progress),
             Self::Model(model) => {
                 let most = widths_nm.1.ceil() as u16 + 1;
                 let first = widths_nm.0.floor().max(1.0);

@@ -1,5 +1,6 @@
 //! What may differ from what is stated: the numbers that every effect turns, all zero for a perfect chip.
 
+use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
 /// How chip and bench depart from what was written and stated. The default departs in nothing.
@@ -25,6 +26,8 @@ pub struct Geometry {
     pub missing_pillars: f64,
     /// Amplitude of light that passes the aperture without seeing pillars, of that which arrives.
     pub zero_order: f64,
+    /// Phase of that light at the top of the pillars, relative to what arrives at their foot [rad].
+    pub zero_order_phase: f64,
     /// From the pillars to their aperture along x and y [um].
     pub aperture_offset_um: [f64; 2],
     /// Free terms, which are no effect: optical path over the lens [nm], by Zernike polynomial from Noll's
@@ -82,6 +85,13 @@ pub struct CameraChange {
     pub pixel_blur_um: f64,
     /// Share of the light of a window that is spread evenly over it.
     pub stray_light: f64,
+}
+
+impl Geometry {
+    /// Light that passes without seeing pillars, over that which arrives.
+    pub fn unstructured(&self) -> Complex64 {
+        Complex64::from_polar(self.zero_order, self.zero_order_phase)
+    }
 }
 
 impl LightChange {

@@ -5,8 +5,9 @@ use std::path::Path;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::attribute::{Finding, RESIDUAL};
+use super::attribute::Finding;
 use super::fit::{Fit, Problem};
+use super::forward::{RESIDUAL, Rejection, Tried};
 use super::heldout::mean as mean_held_out;
 use super::session::Session;
 use super::signature::{names, separate_by};
@@ -71,6 +72,9 @@ pub struct Ranked {
     pub held_out_gain_interval: Option<[f64; 2]>,
     pub value: Option<Value>,
     pub rejected: Option<String>,
+    /// The same in a few words.
+    #[serde(skip)]
+    pub remark: String,
 }
 
 /// A capture that was left out.
@@ -88,6 +92,8 @@ pub struct Diagnosis {
     pub effects: Vec<FoundEffect>,
     pub error: ErrorReport,
     pub ranking: Vec<Ranked>,
+    /// Candidates on top of each effect that was taken.
+    pub later_rankings: Vec<Vec<Ranked>>,
     /// Share of the residual's energy above noise that is left.
     pub unexplained_share: f64,
     pub left_out: Vec<LeftOut>,
@@ -116,6 +122,9 @@ pub struct Rung {
 /// What is measured.
 const MEASURE: &str = "chi-square a pixel";
 
+/// What counts as explained may leave this of chi-square a pixel.
+const EXPLAINED: f64 = 1.2;
+
 /// Share of the residual's energy that may be left of what counts as explained, where much was there.
 const LEFT: f64 = 0.05;
 
@@ -143,7 +152,7 @@ impl Diagnosis {
             share
         };
         let many_unfit = 2 * left_out.len() > session.used.len();
-        let fits = after.held_out <= RESIDUAL.max(1.0 + LEFT * (before.held_out - 1.0).min(6.0));
+        let fits = after.held_out <= EXPLAINED.max(1.0 + LEFT * (before.held_out - 1.0).min(6.0));
         let alone = finding.alternatives.iter().all(Vec::is_empty);
         let verdict = if many_unfit {
             SetVerdict::DataUnfit
@@ -193,22 +202,7 @@ impl Diagnosis {
                 }
             }
         }
-        let ranking = finding
-            .ranking
-            .iter()
-            .map(|t| Ranked {
-                name: simulator.effects[t.effect].name(),
-                score: t.score,
-                held_out_gain: t.gain.map(|g| g.0),
-                held_out_gain_interval: t.gain.map(|g| g.1),
-                value: (!t.values.is_empty()).then(|| listed(&reported(session, t.effect, &t.values))),
-                rejected: if finding.chosen.contains(&t.effect) || t.rejected.is_empty() {
-                    None
-                } else {
-                    Some(t.rejected.clone())
-                },
-            })
-            .collect();
+        let ranked = |tried: &Vec<Tried>| tried.iter().map(|t| Ranked::new(session, finding, t)).collect();
         Self {
             set: session.set().title.clone(),
             verdict,
@@ -220,7 +214,8 @@ impl Diagnosis {
                 noise_floor: 1.0,
                 placebo_held_out: finding.placebo_held_out,
             },
-            ranking,
+            ranking: ranked(&finding.ranking),
+            later_rankings: finding.later.iter().map(ranked).collect(),
             unexplained_share,
             left_out,
             captures: session
@@ -257,6 +252,7 @@ impl Diagnosis {
                 placebo_held_out: error,
             },
             ranking: Vec::new(),
+            later_rankings: Vec::new(),
             unexplained_share: 1.0,
             left_out,
             captures: Vec::new(),
@@ -305,42 +301,50 @@ impl Diagnosis {
     }
 }
 
-/// Numbers of an effect in the unit that it is reported in.
+impl Ranked {
+    fn new(session: &Session<'_>, finding: &Finding, tried: &Tried) -> Self {
+        let rejection = rejection(finding, tried);
+        Self {
+            name: session.simulator.effects[tried.effect].name(),
+            score: tried.score,
+            held_out_gain: tried.gain.map(|g| g.0),
+            held_out_gain_interval: tried.gain.map(|g| g.1),
+            value: (!tried.values.is_empty()).then(|| listed(&reported(session, tried.effect, &tried.values))),
+            rejected: rejection.map(Rejection::sentence),
+            remark: rejection.map_or_else(|| "taken".into(), Rejection::remark),
+        }
+    }
+}
+
+/// Why a candidate was not taken, if it is not among what was found in the end.
+fn rejection(finding: &Finding, tried: &Tried) -> Option<Rejection> {
+    tried.rejected.filter(|_| !finding.chosen.contains(&tried.effect))
+}
+
+/// Numbers of an effect as they are reported.
 fn reported(session: &Session<'_>, effect: usize, values: &[f64]) -> Vec<f64> {
-    values
-        .iter()
-        .map(|v| session.simulator.effects[effect].value(*v, session.set()))
-        .collect()
+    let own = &session.simulator.effects[effect];
+    let none = vec![0.0; values.len()];
+    let all = own.reported(values, &none, session.set());
+    all.into_iter().map(|r| r.0).collect()
 }
 
 fn found(session: &Session<'_>, effect: usize, values: &[f64], widths: &[f64], others: &[usize]) -> FoundEffect {
     let simulator = &session.simulator;
     let own = &simulator.effects[effect];
-    let intervals: Vec<[f64; 2]> = values
-        .iter()
-        .zip(widths)
-        .zip(own.parameters())
-        .map(|((v, w), p)| {
-            let a = own.value((v - w).max(p.range.0), session.set());
-            let b = own.value((v + w).min(p.range.1), session.set());
-            [a.min(b), a.max(b)]
-        })
-        .collect();
-    let interval = match intervals.as_slice() {
-        [one] => serde_json::json!(one),
-        more => serde_json::json!(more),
-    };
+    let (values, intervals): (Vec<f64>, Vec<[f64; 2]>) =
+        own.reported(values, widths, session.set()).into_iter().unzip();
     FoundEffect {
         name: own.name(),
-        value: listed(&reported(session, effect, values)),
+        value: listed(&values),
         unit: own.unit().into(),
-        interval,
+        interval: listed(&intervals),
         confounded_with: names(simulator, others),
         separate_by: separate_by(simulator, effect, others),
     }
 }
 
-fn listed(values: &[f64]) -> Value {
+fn listed<T: Serialize>(values: &[T]) -> Value {
     match values {
         [one] => serde_json::json!(one),
         more => serde_json::json!(more),

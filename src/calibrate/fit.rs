@@ -3,10 +3,11 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::atlas::{Atlas, Simulator};
+use super::atlas::Atlas;
 use super::nuisance::{BLACK_SIGMA_DN, Block, Data, Nuisances};
 use super::optics::PixelGrid;
 use super::quadratic::{held, minimise, sum};
+use super::simulator::Simulator;
 
 /// Most steps of a fit.
 const STEPS: usize = 12;
@@ -17,7 +18,7 @@ const AT_REST: f64 = 1e-5;
 /// Everything that a fit needs to know of a set.
 pub struct Problem<'a> {
     pub simulator: &'a Simulator<'a>,
-    pub atlas: &'a Atlas,
+    pub atlas: Atlas,
     pub data: &'a Data,
     /// Captures that count.
     pub used: Vec<bool>,
@@ -33,6 +34,8 @@ pub struct Fit {
     /// All numbers.
     pub theta: Vec<f64>,
     pub nuisances: Nuisances,
+    /// Of each capture, from which its placement follows.
+    blocks: Vec<Block>,
     /// Forms of each capture, and of the SEM last, over flux, black and the active numbers, at rest.
     pub forms: Vec<DMatrix<f64>>,
     /// Chi-square of all that counts, priors included.
@@ -58,13 +61,19 @@ impl Problem<'_> {
 
     /// The forms at given numbers.
     pub fn at(&self, active: &[usize], theta: Vec<f64>, nuisances: Nuisances) -> Fit {
-        let forms = self.forms(active, &theta, &nuisances);
+        let blocks: Vec<Block> = (0..self.data.signal.len())
+            .into_par_iter()
+            .map(|c| self.block(active, &theta, &nuisances, c))
+            .collect();
+        let mut forms: Vec<_> = blocks.iter().map(Block::reduced).collect();
+        forms.push(self.sem_form(active, &theta));
         let free: Vec<usize> = (0..self.shared()).collect();
         let (_, chi2) = minimise(&self.total(&forms, &nuisances), &free);
         Fit {
             active: active.to_vec(),
             theta,
             nuisances,
+            blocks,
             forms,
             chi2,
         }
@@ -117,12 +126,9 @@ impl Problem<'_> {
         let mut out = now.nuisances.clone();
         let all =
             nalgebra::DVector::from_iterator(shared + moved.len(), step.iter().copied().chain(moved.iter().copied()));
-        let shifts: Vec<[f64; 2]> = (0..out.shift_um.len())
-            .into_par_iter()
-            .map(|c| self.block(&now.active, &now.theta, &now.nuisances, c).placement(&all))
-            .collect();
         let most = 2.0 * self.data.registration_um;
-        for (to, by) in out.shift_um.iter_mut().zip(shifts) {
+        for (to, block) in out.shift_um.iter_mut().zip(&now.blocks) {
+            let by = block.placement(&all);
             for axis in [0, 1] {
                 to[axis] += by[axis].clamp(-most, most);
             }
@@ -144,23 +150,9 @@ impl Problem<'_> {
     }
 
     fn block(&self, active: &[usize], theta: &[f64], nuisances: &Nuisances, c: usize) -> Block {
-        let shift = nuisances.shift_um[c];
         let grid = self.grid(theta, c);
-        let lines = [grid.pixels(shift), grid.slope(shift, 0), grid.slope(shift, 1)];
-        let more: Vec<_> = active
-            .iter()
-            .map(|&s| self.atlas.slope(theta, s, c).pixels(shift))
-            .collect();
-        Block::new(self.data, c, nuisances, &lines, &more)
-    }
-
-    fn forms(&self, active: &[usize], theta: &[f64], nuisances: &Nuisances) -> Vec<DMatrix<f64>> {
-        let mut forms: Vec<_> = (0..self.data.signal.len())
-            .into_par_iter()
-            .map(|c| self.block(active, theta, nuisances, c).reduced())
-            .collect();
-        forms.push(self.sem_form(active, theta));
-        forms
+        let more: Vec<_> = active.iter().map(|&s| self.atlas.slope(theta, s, c)).collect();
+        Block::new(self.data, c, nuisances, &grid, &more)
     }
 
     /// The SEM's widths as a form, their common offset fitted away.

@@ -2,13 +2,16 @@
 
 use ndarray::Array2;
 
-use super::atlas::{Atlas, FREE_PHASES, FREE_TRANSMISSIONS};
+use super::atlas::{FREE_PHASES, FREE_TRANSMISSIONS};
 use super::attribute::Finding;
 use super::bench::legendre;
-use super::placebo::free_forms;
+use super::placebo::forms_with;
 use super::quadratic::{covariance, minimise};
 use super::session::Session;
 use super::zernike;
+
+/// Pairs of axes of the free blur.
+const BLURS: [[usize; 2]; 3] = [[0, 0], [0, 1], [1, 1]];
 
 /// Shapes fitted to what is left, everything found and every nuisance projected out.
 pub struct FreeTerm {
@@ -21,6 +24,8 @@ pub struct FreeTerm {
     pub radius_um: f64,
     /// Relative change of amplitude over width [nm], for each LED.
     pub transmission: Vec<Vec<(f64, f64)>>,
+    /// Covariance of a blur common to all captures, xx, xy and yy, with standard deviations [um^2].
+    pub blur_um2: [(f64, f64); 3],
     /// Chi-square a pixel without and with it.
     pub chi2: (f64, f64),
     /// The path's coefficients by Noll's number [nm], with their standard deviations.
@@ -29,18 +34,22 @@ pub struct FreeTerm {
 
 impl FreeTerm {
     /// Fit it to what a finding leaves; none if the atlas has no free terms.
-    pub fn new(session: &Session<'_>, atlas: &Atlas, finding: &Finding) -> Option<Self> {
+    pub fn new(session: &Session<'_>, finding: &Finding) -> Option<Self> {
         let leds = session.set().leds.len();
+        let atlas = &finding.atlas;
         if atlas.free.len() < FREE_PHASES + FREE_TRANSMISSIONS * leds {
             return None;
         }
         let mut problem = session.problem(atlas);
         problem.exact.clone_from(&finding.exact);
-        let terms: Vec<usize> = (0..atlas.free.len()).collect();
-        let forms = free_forms(&problem, &finding.after, &terms);
+        let simulated = atlas.free.len();
+        let forms = forms_with(&problem, &finding.after, |c, grid| {
+            let terms = (0..simulated).map(|t| atlas.free_term(t, c, grid));
+            terms.chain(BLURS.map(|axes| grid.blur(axes))).collect()
+        });
         let size = forms[0].nrows();
         let total = problem.total(&forms, &finding.after.nuisances);
-        let first = size - 1 - terms.len();
+        let first = size - 1 - simulated - BLURS.len();
         let all: Vec<usize> = (0..size - 1).collect();
         let (_, without) = minimise(&total, &(0..first).collect::<Vec<_>>());
         let (x, with) = minimise(&total, &all);
@@ -86,6 +95,7 @@ impl FreeTerm {
             coefficients_nm: (0..FREE_PHASES)
                 .map(|k| (zernike::FIRST + k as u32, phases[k], sigma(k)))
                 .collect(),
+            blur_um2: [0, 1, 2].map(|k| (x[first + simulated + k], sigma(simulated + k))),
             path_nm,
             radius_um,
             transmission,

@@ -38,7 +38,6 @@ fn families(problem: &Problem<'_>) -> [Vec<usize>; 3] {
 pub fn held_out(problem: &Problem<'_>, forms: &[DMatrix<f64>], fit: &Fit) -> HeldOut {
     let shared = problem.shared();
     let size = forms[0].nrows();
-    let all: Vec<usize> = (0..size - 1).collect();
     let mut sums = vec![(0.0, 0u32); problem.used.len()];
     let whole = problem.total(forms, &fit.nuisances);
     for family in families(problem) {
@@ -57,8 +56,7 @@ pub fn held_out(problem: &Problem<'_>, forms: &[DMatrix<f64>], fit: &Fit) -> Hel
             if (shared..size - 1).any(|k| train[(k, k)] < BLIND * whole[(k, k)]) {
                 continue;
             }
-            let (step, _) = minimise(&train, &all);
-            let at: Vec<(usize, f64)> = (shared..size - 1).map(|k| (k, step[k])).collect();
+            let at = within_range(problem, fit, &train);
             let (own, _) = minimise(&held(&test, &at), &(0..shared).collect::<Vec<_>>());
             let mut full = DVector::zeros(size);
             full[size - 1] = 1.0;
@@ -78,6 +76,35 @@ pub fn held_out(problem: &Problem<'_>, forms: &[DMatrix<f64>], fit: &Fit) -> Hel
     sums.into_iter()
         .map(|(sum, n)| (n > 0).then(|| sum / f64::from(n)))
         .collect()
+}
+
+/// Where the rest puts each number, as steps from the fit, none beyond what physics allows.
+fn within_range(problem: &Problem<'_>, fit: &Fit, train: &DMatrix<f64>) -> Vec<(usize, f64)> {
+    let shared = problem.shared();
+    let count = train.nrows() - 1;
+    let mut at: Vec<(usize, f64)> = Vec::new();
+    loop {
+        let free: Vec<usize> = (0..count).filter(|k| !at.iter().any(|(h, _)| h == k)).collect();
+        let (step, _) = minimise(&held(train, &at), &free);
+        let mut more: Vec<(usize, f64)> = Vec::new();
+        for (&k, &step) in free.iter().zip(step.iter()).filter(|(k, _)| **k >= shared) {
+            let Some(&slot) = fit.active.get(k - shared) else {
+                continue;
+            };
+            let (low, high) = problem.simulator.slots[slot].parameter.range;
+            let wanted = fit.theta[slot] + step;
+            if !(low..=high).contains(&wanted) {
+                more.push((k, wanted.clamp(low, high) - fit.theta[slot]));
+            }
+        }
+        if more.is_empty() {
+            let last = free.iter().zip(step.iter()).filter(|(k, _)| **k >= shared);
+            at.extend(last.map(|(k, s)| (*k, *s)));
+            at.sort_by_key(|a| a.0);
+            return at;
+        }
+        at.extend(more);
+    }
 }
 
 /// Mean over captures.

@@ -4,15 +4,18 @@
 //! from the pillars as written; nuisances of the bench are fitted; what is left is compared with what every
 //! effect in `effects/` would leave, and an effect is named if it predicts captures that were not fitted.
 
+mod approach;
 mod atlas;
 mod attribute;
 mod bench;
 mod cells;
+mod curve;
 mod density;
 mod departure;
 mod diagnosis;
 mod effects;
 mod fit;
+mod forward;
 mod free;
 mod heldout;
 mod model;
@@ -27,6 +30,7 @@ mod run;
 mod session;
 mod set;
 mod signature;
+mod simulator;
 mod twin;
 mod unfit;
 mod zernike;
@@ -37,7 +41,7 @@ pub(crate) use density::fill;
 pub use departure::{CameraChange, CellChange, Departure, Geometry, LightChange, PathChange};
 pub use diagnosis::{Diagnosis, ErrorPair, ErrorReport, FoundEffect, LeftOut, Ranked, Rung, SetVerdict};
 pub use model::{CalibratedModel, MadeCell};
-pub use proof::{Extent, Trial, prove, summary};
+pub use proof::{Extent, Limit, Proof, Trial, prove, write_proof};
 pub use run::{Calibration, calibrate};
 pub use session::{Session, Settings};
 pub use set::{Camera, Capture, Led, MeasuredElement, MeasuredSet, SemSite, Stack};

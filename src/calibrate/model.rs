@@ -96,7 +96,7 @@ impl CalibratedModel {
             bias_nm: geometry.cd_bias_nm + geometry.cd_bias_density_nm * fill,
             widths_nm,
             bare_share: geometry.missing_pillars,
-            unstructured: geometry.zero_order,
+            unstructured: geometry.unstructured(),
         }
     }
 
@@ -119,7 +119,7 @@ pub struct MadeCell {
     widths_nm: Vec<u16>,
     bare_share: f64,
     /// Amplitude that passes without seeing pillars.
-    unstructured: f64,
+    unstructured: Complex64,
 }
 
 impl MadeCell {

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use super::optics::PixelGrid;
+use super::optics::{PixelGrid, Reading};
 use super::set::MeasuredSet;
 
 /// How far the black level may be off [DN], one standard deviation: sensors drift by less over a session.
@@ -101,14 +101,7 @@ impl Nuisances {
         for _ in 0..STEPS {
             let blocks: Vec<Block> = (0..grids.len())
                 .into_par_iter()
-                .map(|c| {
-                    let lines = [
-                        grids[c].pixels(now.shift_um[c]),
-                        grids[c].slope(now.shift_um[c], 0),
-                        grids[c].slope(now.shift_um[c], 1),
-                    ];
-                    Block::new(data, c, &now, &lines, &[])
-                })
+                .map(|c| Block::new(data, c, &now, &grids[c], &[]))
                 .collect();
             let mut normal = DMatrix::<f64>::zeros(shared, shared);
             let mut rhs = DVector::<f64>::zeros(shared);
@@ -184,14 +177,21 @@ fn whitened(data: &Data, c: usize, now: &Nuisances, model: &Array2<f32>) -> Arra
 
 /// Products of the whitened columns of one capture: placement x, y first, then flux of every LED, black,
 /// further columns, and the residual last.
+#[derive(Clone)]
 pub struct Block {
     gram: DMatrix<f64>,
 }
 
 impl Block {
-    /// `lines` are the model and its slopes along x and y; `more` are further columns, as changes of the
-    /// model's intensity.
-    pub fn new(data: &Data, c: usize, now: &Nuisances, lines: &[Array2<f32>; 3], more: &[Array2<f32>]) -> Self {
+    /// Of the model `grid` of a capture; `more` are further columns, as changes of it.
+    pub fn new(data: &Data, c: usize, now: &Nuisances, grid: &PixelGrid, more: &[PixelGrid]) -> Self {
+        let reading = Reading::new(more.iter().chain([grid]), now.shift_um[c]);
+        let lines = [
+            reading.pixels(grid),
+            reading.pixels(&grid.slope(0)),
+            reading.pixels(&grid.slope(1)),
+        ];
+        let more: Vec<_> = more.iter().map(|m| reading.pixels(m)).collect();
         let residual = whitened(data, c, now, &lines[0]);
         let scale = data.scale[c] as f32;
         let scaled = scale * now.flux[data.led[c]] as f32;

@@ -9,31 +9,26 @@ use super::atlas::FREE_PHASES;
 use super::fit::{Fit, Problem};
 use super::heldout::{HeldOut, SEED, held_out, mean};
 use super::nuisance::Block;
+use super::optics::PixelGrid;
 use super::quadratic::sum;
 
 /// Random smooth terms that stand against a winner.
 const PLACEBOS: usize = 60;
 
-/// The forms of the free phases, after the numbers that are active.
-pub fn free_forms(problem: &Problem<'_>, now: &Fit, terms: &[usize]) -> Vec<DMatrix<f64>> {
+/// The forms of further columns, after the numbers that are active; `more` has them for a capture and what it
+/// should show.
+pub fn forms_with(
+    problem: &Problem<'_>,
+    now: &Fit,
+    more: impl Fn(usize, &PixelGrid) -> Vec<PixelGrid> + Sync,
+) -> Vec<DMatrix<f64>> {
     let mut forms: Vec<DMatrix<f64>> = (0..problem.data.signal.len())
         .into_par_iter()
         .map(|c| {
-            let shift = now.nuisances.shift_um[c];
             let grid = problem.grid(&now.theta, c);
-            let lines = [grid.pixels(shift), grid.slope(shift, 0), grid.slope(shift, 1)];
-            let blank = || ndarray::Array2::zeros(lines[0].dim());
-            let more: Vec<_> = now
-                .active
-                .iter()
-                .map(|&s| problem.atlas.slope(&now.theta, s, c).pixels(shift))
-                .chain(terms.iter().map(|&t| {
-                    problem.atlas.free[t][c]
-                        .as_ref()
-                        .map_or_else(blank, |g| g.pixels(shift))
-                }))
-                .collect();
-            Block::new(problem.data, c, &now.nuisances, &lines, &more).reduced()
+            let active = now.active.iter().map(|&s| problem.atlas.slope(&now.theta, s, c));
+            let columns: Vec<_> = active.chain(more(c, &grid)).collect();
+            Block::new(problem.data, c, &now.nuisances, &grid, &columns).reduced()
         })
         .collect();
     let size = forms[0].nrows();
@@ -56,8 +51,9 @@ pub fn placebo_gain(problem: &Problem<'_>, now: &Fit, held_now: &HeldOut, number
     if problem.atlas.free.len() < FREE_PHASES {
         return 0.0;
     }
-    let terms: Vec<usize> = (0..FREE_PHASES).collect();
-    let forms = free_forms(problem, now, &terms);
+    let forms = forms_with(problem, now, |c, grid| {
+        (0..FREE_PHASES).map(|t| problem.atlas.free_term(t, c, grid)).collect()
+    });
     let size = forms[0].nrows();
     let first = size - 1 - FREE_PHASES;
     let total = sum(&forms[..problem.used.len()], size);

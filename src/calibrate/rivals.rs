@@ -1,7 +1,7 @@
 //! What else would explain as much, and what has become needless.
 
-use super::attribute::LEAST_GAIN;
 use super::fit::{Fit, Problem};
+use super::forward::LEAST_GAIN;
 use super::heldout::{HeldOut, gain, half_widths, held_out, mean};
 
 /// Chi-square of the SEM's widths by which one explanation must fit better to speak for it.
@@ -19,14 +19,14 @@ pub struct Alternative {
 }
 
 /// Drop what the others have made needless.
-pub fn prune(problem: &Problem<'_>, chosen: &mut Vec<usize>, now: &mut Fit, held_now: &mut HeldOut, before: &Fit) {
+pub fn prune(problem: &Problem<'_>, chosen: &mut Vec<usize>, now: &mut Fit, held_now: &mut HeldOut) {
     let mut place = 0;
     while chosen.len() > 1 && place < chosen.len() {
         let rest: Vec<usize> = chosen.iter().copied().filter(|&e| e != chosen[place]).collect();
         let active: Vec<usize> = rest.iter().flat_map(|&e| problem.simulator.slots_of(e)).collect();
         let mut from = now.clone();
         for s in problem.simulator.slots_of(chosen[place]) {
-            from.theta[s] = before.theta[s];
+            from.theta[s] = 0.0;
         }
         let fit = problem.fit(&active, &from);
         let held = held_out(problem, &fit.forms, &fit);

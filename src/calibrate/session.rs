@@ -2,17 +2,19 @@
 
 use std::path::PathBuf;
 
-use super::atlas::{Atlas, Simulator, WIDTH_ROOM_NM};
-use super::attribute::{Finding, RESIDUAL, attribute};
+use super::atlas::Atlas;
+use super::attribute::{Finding, attribute};
 use super::bench::{Bench, Sampling};
 use super::cells::{CellSource, RigorousCells};
 use super::departure::Departure;
 use super::diagnosis::{Diagnosis, LeftOut, Rung};
 use super::effects;
 use super::fit::Problem;
+use super::forward::RESIDUAL;
 use super::heldout::{held_out, mean};
 use super::nuisance::Data;
 use super::set::MeasuredSet;
+use super::simulator::{Simulator, WIDTH_ROOM_NM};
 use super::unfit::unfit;
 use crate::cell::{CellStack, FittedCell, Material, PublishedCell};
 use crate::error::Result;
@@ -118,10 +120,10 @@ impl<'a> Session<'a> {
     }
 
     /// A problem over this set's data.
-    pub fn problem<'p>(&'p self, atlas: &'p Atlas) -> Problem<'p> {
+    pub fn problem(&self, atlas: &Atlas) -> Problem<'_> {
         Problem {
             simulator: &self.simulator,
-            atlas,
+            atlas: atlas.clone(),
             data: &self.data,
             used: self.used.clone(),
             exact: None,
@@ -167,8 +169,7 @@ impl<'a> Session<'a> {
             if after >= before {
                 break;
             }
-            // Whoever reads on has the first atlas: what it lacks at the end is kept beside it.
-            finding = next.against(atlas, &nearer);
+            finding = next;
             if before - after < 0.05 * after {
                 break;
             }
@@ -204,10 +205,9 @@ impl<'a> Session<'a> {
                     let bench = Bench::new(self.set(), self.settings.sampling);
                     let simulator = Simulator::new(bench, cells, Vec::new());
                     let exposed = simulator.expose(&[Departure::default()], progress)?.remove(0);
-                    let other = Atlas::alone(exposed);
                     let problem = Problem {
                         simulator: &simulator,
-                        atlas: &other,
+                        atlas: Atlas::alone(exposed),
                         ..self.problem(atlas)
                     };
                     let fit = problem.nothing();

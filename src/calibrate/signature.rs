@@ -2,10 +2,10 @@
 
 use nalgebra::DMatrix;
 
-use super::atlas::Simulator;
 use super::effects;
 use super::fit::{Fit, Problem};
 use super::quadratic::minimise;
+use super::simulator::Simulator;
 
 /// Effects by the share of the residual that their signature explains, nuisances and what is chosen
 /// projected out.

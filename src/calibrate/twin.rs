@@ -1,23 +1,31 @@
 //! Sets of our own, to be judged by: made with another sampling, another number of orders and other draws
 //! than fits use, with whatever is asked to differ.
 
+use std::sync::Arc;
+
 use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::atlas::{Simulator, WIDTH_ROOM_NM};
-use super::bench::{Bench, Sampling};
+use super::bench::{Bench, Lit, Sampling};
 use super::cells::{CellSource, RigorousCells};
 use super::departure::Departure;
 use super::effects;
 use super::optics::PixelGrid;
 use super::session::{Settings, stated_cell};
 use super::set::MeasuredSet;
+use super::simulator::{Simulator, WIDTH_ROOM_NM};
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 
 /// Orders along an axis; fits use others.
 const ORDERS: usize = 11;
+
+/// And what leaning walls change, which takes six layers.
+const LEANING_ORDERS: usize = 9;
+
+/// Seed of the places of missing pillars.
+const MISSING_SEED: u64 = 77;
 
 /// Standard deviation of the black level of a twin [DN].
 const BLACK_DN: f64 = 0.1;
@@ -53,9 +61,9 @@ impl<'a> Twins<'a> {
     pub fn new(like: &'a MeasuredSet, settings: &Settings) -> Result<Self> {
         let s = settings.sampling;
         let sampling = Sampling {
-            spectrum: 0.8 * s.spectrum,
-            step_nm: 0.8 * s.step_nm,
-            step_um: 0.85 * s.step_um,
+            spectrum: 0.85 * s.spectrum,
+            step_nm: 0.85 * s.step_nm,
+            step_um: 0.9 * s.step_um,
             margin: s.margin + 5,
         };
         let bench = Bench::new(like, sampling);
@@ -66,10 +74,11 @@ impl<'a> Twins<'a> {
             (low - WIDTH_ROOM_NM, high + WIDTH_ROOM_NM),
             settings.cache.clone(),
         )
-        .with_orders(ORDERS, ORDERS);
-        Ok(Self {
-            simulator: Simulator::new(bench, CellSource::Rigorous(Box::new(cells)), effects::all(like)),
-        })
+        .with_orders(ORDERS, ORDERS, LEANING_ORDERS);
+        let mut simulator = Simulator::new(bench, CellSource::Rigorous(Box::new(cells)), effects::all(like));
+        // Fits count with the mean of missing pillars; here single ones are gone.
+        simulator.scatter = Some(MISSING_SEED);
+        Ok(Self { simulator })
     }
 
     /// What captures show where an effect has these numbers.
@@ -77,14 +86,35 @@ impl<'a> Twins<'a> {
     /// # Errors
     /// If there is no such effect, or a cell cannot be solved.
     pub fn with_effect(&self, name: &str, numbers: &[f64], progress: &dyn Progress) -> Result<Exposed> {
-        let mut departure = Departure::default();
-        if !name.is_empty() {
-            let effect = self.simulator.effects.iter().find(|e| e.name() == name);
-            effect
-                .ok_or_else(|| Error::invalid(format!("no effect is called {name}"), "use a name of FORMAT.md"))?
-                .apply(numbers, &mut departure);
+        Ok(self.with_effects(&[vec![(name, numbers)]], progress)?.remove(0))
+    }
+
+    /// The same for many chips at once, each with some effects, or none.
+    ///
+    /// # Errors
+    /// As [`Twins::with_effect`].
+    pub fn with_effects(&self, chips: &[Vec<(&str, &[f64])>], progress: &dyn Progress) -> Result<Vec<Exposed>> {
+        let mut departures = Vec::new();
+        for chip in chips {
+            let mut departure = Departure::default();
+            for (name, numbers) in chip.iter().filter(|(name, _)| !name.is_empty()) {
+                let effect = self.simulator.effects.iter().find(|e| e.name() == *name);
+                effect
+                    .ok_or_else(|| Error::invalid(format!("no effect is called {name}"), "use a name of the list"))?
+                    .apply(numbers, &mut departure);
+            }
+            departures.push(departure);
         }
-        self.expose(departure, None, progress)
+        let exposed = self.simulator.expose(&departures, progress)?;
+        Ok(exposed
+            .into_iter()
+            .zip(departures)
+            .map(|(grids, departure)| Exposed {
+                grids,
+                ghost: None,
+                departure,
+            })
+            .collect())
     }
 
     /// What captures show under something that is in no list.
@@ -104,19 +134,16 @@ impl<'a> Twins<'a> {
                     CellSource::Rigorous(cells) => cells.anisotropic(nm, progress)?,
                     CellSource::Model(_) => return Err(Error::invalid("no rigorous cells", "make twins of a set")),
                 };
-                let light = [departure.light.clone()];
-                let mut planes = Vec::new();
-                for table in &tables {
-                    planes.push(
-                        self.simulator
-                            .bench
-                            .intensities(table, &departure, &light, progress)?
-                            .remove(0),
-                    );
-                }
-                let both: Vec<Vec<f32>> = planes[0]
+                let chips = tables.map(|table| Lit {
+                    cells: Arc::new(table),
+                    geometry: &departure.geometry,
+                    lights: vec![&departure.light],
+                    scatter: None,
+                });
+                let planes = self.simulator.bench.intensities(&chips, &departure.path, progress)?;
+                let both: Vec<Vec<f32>> = planes[0][0]
                     .iter()
-                    .zip(&planes[1])
+                    .zip(&planes[1][0])
                     .map(|(x, y)| x.iter().zip(y).map(|(a, b)| 0.5 * (a + b)).collect())
                     .collect();
                 Ok(Exposed {

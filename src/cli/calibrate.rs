@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metalith::calibrate::{Calibration, Extent, MeasuredSet, SetVerdict, Settings, calibrate, prove, summary};
+use metalith::Result;
+use metalith::calibrate::{Calibration, Extent, MeasuredSet, SetVerdict, Settings, calibrate, prove, write_proof};
 use metalith::cell::cache_folder;
-use metalith::{Result, WholeFile};
 
 use super::{Outcome, Terminal};
 
@@ -24,10 +24,18 @@ pub struct CalibrateArgs {
     #[arg(long, short, value_name = "FOLDER")]
     out: Option<PathBuf>,
 
-    /// Judge the calibration itself instead: twins of this set with nothing, with each effect, and with effects
-    /// in no list. Takes half an hour; writes proof.json and proof.txt.
+    /// Try these effects alone, separated by commas; all of them if left out.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    effects: Vec<String>,
+
+    /// Judge the calibration itself instead: twins of this set with nothing, with each effect at three sizes,
+    /// and with effects in no list. Takes half an hour; writes proof.html, proof.json and proof.txt.
     #[arg(long)]
     proof: bool,
+
+    /// Twins without effect that the proof judges.
+    #[arg(long, value_name = "N", default_value_t = 60, requires = "proof")]
+    nulls: u64,
 
     /// Print the diagnosis as JSON.
     #[arg(long)]
@@ -55,17 +63,26 @@ pub fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> {
     };
     let settings = Settings {
         cache: cache_folder(),
+        // A proof makes twins with some effects, but always tries all of them.
+        only: if args.proof { Vec::new() } else { args.effects.clone() },
         ..Settings::default()
     };
     if args.proof {
         let (set, out) = (MeasuredSet::read(&args.sets[0], terminal)?, &outs[0]);
-        let trials = prove(&set, &settings, Extent::default(), terminal)?;
-        let text = summary(&trials);
-        WholeFile::write(&out.join("proof.txt"), text.as_bytes())?;
-        let json = serde_json::to_string_pretty(&trials).unwrap_or_default();
-        WholeFile::write(&out.join("proof.json"), json.as_bytes())?;
+        let extent = Extent {
+            nulls: args.nulls,
+            effects: args.effects.clone(),
+            ..Extent::default()
+        };
+        let proof = prove(&set, &settings, &extent, terminal)?;
+        write_proof(out, &proof)?;
         terminal.clear();
-        print!("{text}");
+        if args.json {
+            println!("{}", serde_json::to_string_pretty(&proof).unwrap_or_default());
+        } else {
+            print!("{}", proof.text());
+            println!("{}", out.join("proof.html").display());
+        }
         return Ok(Outcome::Fine);
     }
     let mut outcome = Outcome::Fine;

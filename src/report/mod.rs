@@ -9,6 +9,7 @@
 //! | [`Ranking`] | horizontal bars with an interval and a remark each |
 //! | [`HeatMap`] | a matrix over two axes, with colour bar; sequential, logarithmic, diverging or cyclic |
 //! | [`ImageGrid`] | images on one common scale, such as PSFs designed beside extracted |
+//! | [`Matrix`] | shares of named rows by named columns, such as what was taken for what |
 //! | [`Plan`] | shapes of a layout to scale: circles, rectangles, polygons, crosses |
 //! | [`PillarZoom`] | real pillars of a [`WidthMap`](crate::WidthMap), to scale |
 //!
@@ -43,6 +44,7 @@ mod figure;
 mod heat;
 mod images;
 mod json;
+mod matrix;
 mod number;
 mod page;
 mod plan;
@@ -58,6 +60,7 @@ pub use figure::Figure;
 pub use heat::HeatMap;
 pub use images::ImageGrid;
 pub use json::write_json;
+pub use matrix::Matrix;
 pub use number::{count, exact, fixed, sig};
 pub use page::Page;
 pub use plan::{Layer, Plan};

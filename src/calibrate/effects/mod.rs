@@ -85,6 +85,22 @@ pub trait Effect: Send + Sync {
         parameter
     }
 
+    /// What is reported, with the ends of its interval: one value for each number, unless several numbers make
+    /// one value. `half_widths` are those of the numbers.
+    fn reported(&self, numbers: &[f64], half_widths: &[f64], set: &MeasuredSet) -> Vec<(f64, [f64; 2])> {
+        let ranges = self.parameters();
+        numbers
+            .iter()
+            .zip(half_widths)
+            .zip(ranges)
+            .map(|((v, w), p)| {
+                let a = self.value((v - w).max(p.range.0), set);
+                let b = self.value((v + w).min(p.range.1), set);
+                (self.value(*v, set), [a.min(b), a.max(b)])
+            })
+            .collect()
+    }
+
     /// Effects that are known to look alike on this kind of data, each with the measurement that tells them
     /// apart.
     fn confusions(&self) -> &'static [(&'static str, &'static str)] {

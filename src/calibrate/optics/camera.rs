@@ -3,9 +3,11 @@
 //! Intensity is band-limited, so all of this happens on its spectrum and is exact; the samples that stand
 //! around the window are faded out towards their border, which keeps its far side from coming in.
 
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array2, ArrayView2, s};
 use num_complex::Complex32;
 use rustfft::FftPlanner;
+
+use super::cis::cis;
 
 /// What intensity passes on its way to the pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,7 +90,7 @@ impl PixelGrid {
                 (mx, my) = (mx.max(kx.abs()), my.max(ky + 1));
             }
         }
-        let kept = bins.slice(ndarray::s![..my, (reach - mx) as usize..=(reach + mx) as usize]);
+        let kept = bins.slice(s![..my, (reach - mx) as usize..=(reach + mx) as usize]);
         Self {
             re: kept.mapv(|v| v.re),
             im: kept.mapv(|v| v.im),
@@ -107,7 +109,7 @@ impl PixelGrid {
         for (grid, factor) in parts {
             let (rows, cols) = grid.re.dim();
             let from = (mx - cols) / 2;
-            let place = ndarray::s![..rows, from..from + cols];
+            let place = s![..rows, from..from + cols];
             re.slice_mut(place).scaled_add(*factor, &grid.re);
             im.slice_mut(place).scaled_add(*factor, &grid.im);
         }
@@ -118,48 +120,69 @@ impl PixelGrid {
         }
     }
 
+    /// Its derivative by the shift along x (0) or y (1) [1/um].
+    pub fn slope(&self, axis: usize) -> Self {
+        let middle = (self.re.ncols() / 2) as f32;
+        let omega = (std::f64::consts::TAU * self.cycle) as f32;
+        let at = |(ky, kx): (usize, usize)| omega * if axis == 0 { kx as f32 - middle } else { ky as f32 };
+        // A derivative turns each wave by a quarter.
+        let (mut re, mut im) = (self.im.clone(), self.re.clone());
+        re.indexed_iter_mut().for_each(|(i, v)| *v *= -at(i));
+        im.indexed_iter_mut().for_each(|(i, v)| *v *= at(i));
+        Self { re, im, ..*self }
+    }
+
+    /// What a blur changes, for a unit of its covariance between two axes [1/um^2].
+    pub fn blur(&self, [a, b]: [usize; 2]) -> Self {
+        let half = if a == b { 0.5 } else { 1.0 };
+        Self::combine(&[(&self.slope(a).slope(b), half)])
+    }
+
     /// The pixels of a window whose middle is off by `shift_um` (x, y).
     pub fn pixels(&self, shift_um: [f64; 2]) -> Array2<f32> {
-        self.read(shift_um, [0, 0])
+        Reading::new([self], shift_um).pixels(self)
     }
+}
 
-    /// Derivative of [`PixelGrid::pixels`] by the shift along x (0) or y (1) [1/um].
-    pub fn slope(&self, shift_um: [f64; 2], axis: usize) -> Array2<f32> {
-        self.read(shift_um, if axis == 0 { [1, 0] } else { [0, 1] })
-    }
+/// How bins become the pixels of one window at one place: worked out once for all grids of the window.
+pub struct Reading {
+    /// Cosine and sine of each bin at each pixel along x, `[kx, col]`, and y, `[row, ky]`.
+    along_x: [Array2<f32>; 2],
+    along_y: [Array2<f32>; 2],
+}
 
-    fn read(&self, shift_um: [f64; 2], order: [u32; 2]) -> Array2<f32> {
-        let (half, n) = self.re.dim();
-        let [rows, cols] = self.shape;
-        let (cycle, middle) = (self.cycle, self.middle_um);
-        let wave = |f: f64, x: f64, order: u32| {
-            let phase = std::f64::consts::TAU * f * x;
-            let factor = (std::f64::consts::TAU * f).powi(order as i32);
-            // Each derivative turns by a quarter.
-            let phase = phase + f64::from(order) * std::f64::consts::FRAC_PI_2;
-            ((factor * phase.cos()) as f32, (factor * phase.sin()) as f32)
-        };
+impl Reading {
+    /// For a window whose middle is off by `shift_um` (x, y), as wide in frequency as the widest of `grids`.
+    pub fn new<'g>(grids: impl IntoIterator<Item = &'g PixelGrid>, shift_um: [f64; 2]) -> Self {
+        let mut grids = grids.into_iter().peekable();
+        let first = *grids.peek().expect("there is something to read");
+        let [rows, cols] = first.shape;
+        let (half, n) = grids.fold((0, 0), |(a, b), g| (a.max(g.re.nrows()), b.max(g.re.ncols())));
         let place = |i: usize, count: usize, shift: f64| {
-            (i as f64 - 0.5 * (count as f64 - 1.0)) * self.pixel_um + shift + middle
+            (i as f64 - 0.5 * (count as f64 - 1.0)) * first.pixel_um + shift + first.middle_um
         };
-        let (mut cx, mut sx) = (Array2::zeros((n, cols)), Array2::zeros((n, cols)));
-        for k in 0..n {
-            let f = (k as f64 - (n / 2) as f64) * cycle;
-            for j in 0..cols {
-                (cx[[k, j]], sx[[k, j]]) = wave(f, place(j, cols, shift_um[0]), order[0]);
-            }
-        }
-        let (mut cy, mut sy) = (Array2::zeros((rows, half)), Array2::zeros((rows, half)));
-        for i in 0..rows {
-            let y = place(i, rows, shift_um[1]);
-            for k in 0..half {
-                (cy[[i, k]], sy[[i, k]]) = wave(k as f64 * cycle, y, order[1]);
-            }
-        }
-        let dot = |a: ArrayView2<'_, f32>, b: &Array2<f32>| a.dot(b);
-        let re = dot(self.re.view(), &cx) - dot(self.im.view(), &sx);
-        let im = dot(self.re.view(), &sx) + dot(self.im.view(), &cx);
-        dot(cy.view(), &re) - dot(sy.view(), &im)
+        let x: Vec<f64> = (0..cols).map(|j| place(j, cols, shift_um[0]) * first.cycle).collect();
+        let y: Vec<f64> = (0..rows).map(|i| place(i, rows, shift_um[1]) * first.cycle).collect();
+        let turns = Array2::from_shape_fn((n, cols), |(k, j)| cis((k as f64 - (n / 2) as f64) * x[j]));
+        let along_x = [turns.mapv(|v| v.re), turns.mapv(|v| v.im)];
+        let turns = Array2::from_shape_fn((rows, half), |(i, k)| cis(k as f64 * y[i]));
+        let along_y = [turns.mapv(|v| v.re), turns.mapv(|v| v.im)];
+        Self { along_x, along_y }
+    }
+
+    /// The pixels.
+    pub fn pixels(&self, grid: &PixelGrid) -> Array2<f32> {
+        self.read(grid.re.view(), grid.im.view())
+    }
+
+    fn read(&self, re: ArrayView2<'_, f32>, im: ArrayView2<'_, f32>) -> Array2<f32> {
+        let (half, n) = re.dim();
+        let from = (self.along_x[0].nrows() - n) / 2;
+        let [cx, sx] = [0, 1].map(|i| self.along_x[i].slice(s![from..from + n, ..]));
+        let [cy, sy] = [0, 1].map(|i| self.along_y[i].slice(s![.., ..half]));
+        let real = re.dot(&cx) - im.dot(&sx);
+        let imaginary = re.dot(&sx) + im.dot(&cx);
+        cy.dot(&real) - sy.dot(&imaginary)
     }
 }
 
@@ -232,10 +255,23 @@ mod tests {
             );
         }
         let h = 1e-2;
-        let slope = grid.slope(shift, 0);
+        let slope = grid.slope(0).pixels(shift);
         let numeric =
             (&grid.pixels([shift[0] + h, shift[1]]) - &grid.pixels([shift[0] - h, shift[1]])) / (2.0 * h as f32);
         assert!((&slope - &numeric).iter().all(|d| d.abs() < 1e-3));
+        // A little more blur, as its term has it.
+        let blurred = PixelGrid::new(&samples, step, &Optic { blur_um: 0.41, ..optic }, 40, 32);
+        let variance = 0.41f32.powi(2) - 0.4f32.powi(2);
+        let both = PixelGrid::combine(&[
+            (&grid, 1.0),
+            (&grid.blur([0, 0]), variance),
+            (&grid.blur([1, 1]), variance),
+        ]);
+        assert!(
+            (&blurred.pixels(shift) - &both.pixels(shift))
+                .iter()
+                .all(|d| d.abs() < 1e-4)
+        );
     }
 
     #[test]

@@ -5,7 +5,7 @@ mod cis;
 mod planes;
 mod spectrum;
 
-pub use camera::{Optic, PixelGrid};
+pub use camera::{Optic, PixelGrid, Reading};
 pub(super) use cis::cis;
-pub use planes::{Planes, Planned, Scratch};
+pub use planes::{Passed, Planes, Planned, Scratch};
 pub use spectrum::Quadrature;

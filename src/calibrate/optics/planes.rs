@@ -54,9 +54,13 @@ pub struct Scratch {
     columns: Vec<Complex32>,
     fft: Vec<Complex32>,
     fz: Vec<f64>,
-    faded: Vec<Complex32>,
+    faded: Vec<f32>,
+    /// What the way to each distance makes of each frequency.
     way: Vec<Complex32>,
 }
+
+/// Fills a row of the lattice with what an element passes; rows are asked for in order.
+pub type Passed<'a> = dyn Fn(usize, &mut [Complex32]) + 'a;
 
 /// Frequencies that are kept, in whole cycles a period.
 #[derive(Clone, Copy)]
@@ -98,21 +102,24 @@ impl Planned {
         self.period_um / self.samples as f64
     }
 
-    /// |field|^2 behind an element, at each of `distances_um`, for a wavelength [um]; `transmission` fills a row
-    /// of the lattice, and is asked for rows in order. Output: one square of `window` x `window` a distance.
+    /// |field|^2 behind some elements at each of `distances_um`, for a wavelength [um]: the way of the light is
+    /// worked out once for all of them. Output, `[element][distance]`: one square of `window` x `window`.
     pub fn intensities(
         &self,
         wavelength_um: f64,
         distances_um: &[f64],
-        transmission: &dyn Fn(usize, &mut [Complex32]),
+        elements: &[&Passed<'_>],
         scratch: &mut Scratch,
-        out: &mut [Vec<f32>],
+        out: &mut [Vec<Vec<f32>>],
     ) {
         let band = self.band(wavelength_um, distances_um);
-        self.transform(&band, transmission, scratch);
-        self.carry(wavelength_um, distances_um, &band, scratch);
-        for (d, out) in out.iter_mut().enumerate() {
-            self.gather(&band, d, scratch, out);
+        self.pave(wavelength_um, distances_um, &band, scratch);
+        for (passed, out) in elements.iter().zip(out) {
+            self.transform(&band, passed, scratch);
+            self.carry(distances_um.len(), &band, scratch);
+            for (d, out) in out.iter_mut().enumerate() {
+                self.gather(&band, d, scratch, out);
+            }
         }
     }
 
@@ -148,7 +155,7 @@ impl Planned {
     }
 
     /// Forward transform of the element, cut to the band: `spectrum[ky][kx]`.
-    fn transform(&self, band: &Band, transmission: &dyn Fn(usize, &mut [Complex32]), scratch: &mut Scratch) {
+    fn transform(&self, band: &Band, passed: &Passed<'_>, scratch: &mut Scratch) {
         let (n, m) = (self.planes.lattice.sites(), self.sites);
         let [kx, ky] = band.count;
         scratch.row.resize(m, Complex32::ZERO);
@@ -156,7 +163,7 @@ impl Planned {
         scratch.lines.resize(n * kx, Complex32::ZERO);
         for iy in 0..n {
             scratch.row.fill(Complex32::ZERO);
-            transmission(iy, &mut scratch.row[..n]);
+            passed(iy, &mut scratch.row[..n]);
             run(&*self.forward, &mut scratch.row, &mut scratch.fft);
             let line = &mut scratch.lines[iy * kx..(iy + 1) * kx];
             let start = band.first[0].rem_euclid(m as i64) as usize;
@@ -186,10 +193,9 @@ impl Planned {
         }
     }
 
-    /// Carry the spectrum to the distances and transform its columns back: `lines[distance][row][kx]`.
-    fn carry(&self, wavelength_um: f64, distances_um: &[f64], band: &Band, scratch: &mut Scratch) {
+    /// What the way to each distance makes of each frequency of the band: `way[distance][kx][ky]`.
+    fn pave(&self, wavelength_um: f64, distances_um: &[f64], band: &Band, scratch: &mut Scratch) {
         let [kx, ky] = band.count;
-        let (samples, window) = (self.samples, self.window);
         let df = 1.0 / self.period_um;
         let [cx, cy] = self.planes.centre_um;
         let x0 = self.planes.lattice.coordinate_um(0);
@@ -201,8 +207,42 @@ impl Planned {
         let slope = 1.0 / (end - full);
         let weight = (self.planes.lattice.pitch_um() * df).powi(2) as f32;
         // The window's first sample; its middle lies between two.
-        let edge = -0.5 * (window as f64 - 1.0) * self.step_um();
+        let edge = -0.5 * (self.window as f64 - 1.0) * self.step_um();
         let (along_x, along_y) = (cx + edge - x0, cy + edge - x0);
+        let Scratch { fz, faded, way, .. } = scratch;
+        fz.resize(ky, 0.0);
+        faded.resize(ky, 0.0);
+        way.resize(distances_um.len() * kx * ky, Complex32::ZERO);
+        let arch = pulp::Arch::new();
+        for k in 0..kx {
+            let fx = (band.first[0] + k as i64) as f64 * df;
+            let rest = wavelength_um.powi(-2) - fx * fx;
+            arch.dispatch(|| {
+                for (i, (fz, faded)) in fz.iter_mut().zip(faded.iter_mut()).enumerate() {
+                    let fy = (band.first[1] + i as i64) as f64 * df;
+                    *fz = (rest - fy * fy).max(1e-12).sqrt();
+                    let reach = middle / *fz;
+                    let (sx, sy) = (reach * fx - cx, reach * fy - cy);
+                    let s = ((sx * sx + sy * sy).sqrt() - full) * slope;
+                    *faded = fade(s) * weight;
+                }
+            });
+            for (d, &z) in distances_um.iter().enumerate() {
+                let way = &mut way[(d * kx + k) * ky..][..ky];
+                arch.dispatch(|| {
+                    for (i, (way, (fz, faded))) in way.iter_mut().zip(fz.iter().zip(faded.iter())).enumerate() {
+                        let fy = (band.first[1] + i as i64) as f64 * df;
+                        *way = cis(z * fz + fx * along_x + fy * along_y) * *faded;
+                    }
+                });
+            }
+        }
+    }
+
+    /// Send the spectrum on its way and transform its columns back: `lines[distance][row][kx]`.
+    fn carry(&self, distances: usize, band: &Band, scratch: &mut Scratch) {
+        let [kx, ky] = band.count;
+        let (samples, window) = (self.samples, self.window);
         let start = band.first[1].rem_euclid(samples as i64) as usize;
         let head = ky.min(samples - start);
         let Scratch {
@@ -210,55 +250,24 @@ impl Planned {
             spectrum,
             columns,
             fft,
-            fz,
-            faded,
             way,
             ..
         } = scratch;
-        lines.resize(distances_um.len() * window * kx, Complex32::ZERO);
-        columns.resize(distances_um.len() * LANES * samples, Complex32::ZERO);
-        fz.resize(ky, 0.0);
-        faded.resize(ky, Complex32::ZERO);
-        way.resize(ky, Complex32::ZERO);
-        let arch = pulp::Arch::new();
-        for from in (0..kx).step_by(LANES) {
-            let lanes = LANES.min(kx - from);
-            for lane in 0..lanes {
-                let k = from + lane;
-                let fx = (band.first[0] + k as i64) as f64 * df;
-                let rest = wavelength_um.powi(-2) - fx * fx;
-                let source = &spectrum[k * ky..(k + 1) * ky];
-                arch.dispatch(|| {
-                    for (i, ((fz, faded), value)) in fz.iter_mut().zip(faded.iter_mut()).zip(source).enumerate() {
-                        let fy = (band.first[1] + i as i64) as f64 * df;
-                        *fz = (rest - fy * fy).max(1e-12).sqrt();
-                        let reach = middle / *fz;
-                        let (sx, sy) = (reach * fx - cx, reach * fy - cy);
-                        let s = ((sx * sx + sy * sy).sqrt() - full) * slope;
-                        *faded = value * (fade(s) * weight);
-                    }
-                });
-                for (d, &z) in distances_um.iter().enumerate() {
-                    arch.dispatch(|| {
-                        for (i, (way, (fz, value))) in way.iter_mut().zip(fz.iter().zip(faded.iter())).enumerate() {
-                            let fy = (band.first[1] + i as i64) as f64 * df;
-                            let turn = cis(z * fz + fx * along_x + fy * along_y);
-                            *way = Complex32::new(
-                                value.re * turn.re - value.im * turn.im,
-                                value.re * turn.im + value.im * turn.re,
-                            );
-                        }
-                    });
-                    let column = &mut columns[(d * LANES + lane) * samples..][..samples];
+        lines.resize(distances * window * kx, Complex32::ZERO);
+        columns.resize(LANES * samples, Complex32::ZERO);
+        for d in 0..distances {
+            let lines = &mut lines[d * window * kx..][..window * kx];
+            for from in (0..kx).step_by(LANES) {
+                let lanes = LANES.min(kx - from);
+                for lane in 0..lanes {
+                    let source = &spectrum[(from + lane) * ky..][..ky];
+                    let way = &way[(d * kx + from + lane) * ky..][..ky];
+                    let column = &mut columns[lane * samples..][..samples];
                     column.fill(Complex32::ZERO);
-                    column[start..start + head].copy_from_slice(&way[..head]);
-                    column[..ky - head].copy_from_slice(&way[head..]);
+                    product(&mut column[start..start + head], &source[..head], &way[..head]);
+                    product(&mut column[..ky - head], &source[head..], &way[head..]);
                 }
-            }
-            for d in 0..distances_um.len() {
-                let columns = &mut columns[d * LANES * samples..][..lanes * samples];
-                run(&*self.inverse, columns, fft);
-                let lines = &mut lines[d * window * kx..][..window * kx];
+                run(&*self.inverse, &mut columns[..lanes * samples], fft);
                 for (iy, line) in lines.chunks_exact_mut(kx).enumerate() {
                     for (lane, to) in line[from..from + lanes].iter_mut().enumerate() {
                         *to = columns[lane * samples + iy];
@@ -296,6 +305,14 @@ fn fade(s: f64) -> f32 {
     let s = s.clamp(0.0, 1.0) as f32;
     let s4 = s * s * s * s;
     1.0 - s4 * (35.0 + s * (-84.0 + s * (70.0 - 20.0 * s)))
+}
+
+fn product(to: &mut [Complex32], a: &[Complex32], b: &[Complex32]) {
+    pulp::Arch::new().dispatch(|| {
+        for (to, (a, b)) in to.iter_mut().zip(a.iter().zip(b)) {
+            *to = Complex32::new(a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re);
+        }
+    });
 }
 
 /// Columns that go through one call of a transform: enough to fill cache lines.
@@ -361,17 +378,17 @@ mod tests {
         };
         let planned = Planned::new(planes, 4);
         let distances = [56.0, 60.0];
-        let mut out = vec![Vec::new(); 2];
+        let mut out = vec![vec![Vec::new(); 2]];
         let fill = |iy: usize, row: &mut [Complex32]| {
             lens.fill_row(iy, row);
             for (ix, t) in row.iter_mut().enumerate() {
                 *t *= cis(wave.turns(lattice.coordinate_um(ix), lattice.coordinate_um(iy)));
             }
         };
-        planned.intensities(um, &distances, &fill, &mut Scratch::default(), &mut out);
+        planned.intensities(um, &distances, &[&fill], &mut Scratch::default(), &mut out);
         let n = planned.window();
         let at = |i: usize| (i as f64 - 0.5 * (n as f64 - 1.0)) * planned.step_um();
-        for (plane, z) in out.iter().zip(distances) {
+        for (plane, z) in out[0].iter().zip(distances) {
             let peak = f64::from(plane.iter().copied().fold(0.0, f32::max));
             let places: Vec<usize> = (0..40).map(|k| (k * 7919) % (n * n)).collect();
             let points: Vec<[f64; 3]> = places.iter().map(|&i| [6.0 + at(i % n), 1.0 + at(i / n), z]).collect();

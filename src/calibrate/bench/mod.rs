@@ -1,0 +1,206 @@
+//! The bench in the computer: from pillars to what each capture should show, whatever departs from what is
+//! stated.
+
+mod light;
+mod sites;
+
+use std::sync::OnceLock;
+
+use rayon::prelude::*;
+
+pub use light::Lit;
+pub use sites::legendre;
+
+use super::departure::Departure;
+use super::optics::{Optic, PixelGrid, Planes, Planned, Quadrature};
+use super::set::{Camera, MeasuredSet};
+
+/// How finely a bench is sampled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sampling {
+    /// Wavelengths are at most this share of a spectrum's full width apart.
+    pub spectrum: f64,
+    /// And at most so far [nm].
+    pub step_nm: f64,
+    /// Distance of the samples of the intensity [um].
+    pub step_um: f64,
+    /// Samples around each window that placement, blur and borders may use up.
+    pub margin: usize,
+}
+
+impl Default for Sampling {
+    fn default() -> Self {
+        Self {
+            spectrum: 0.13,
+            step_nm: 2.5,
+            step_um: 0.5,
+            margin: 22,
+        }
+    }
+}
+
+/// A set, planned.
+pub struct Bench<'a> {
+    set: &'a MeasuredSet,
+    quadratures: Vec<Quadrature>,
+    /// Where the wavelengths of each LED begin among all.
+    first: Vec<usize>,
+    groups: Vec<Group>,
+    /// Area fraction around each site of each element, made when first asked for.
+    fill: Vec<OnceLock<Vec<f32>>>,
+}
+
+/// Captures that differ in their distance alone.
+struct Group {
+    element: usize,
+    led: usize,
+    aoi_rad: [f64; 2],
+    centre_um: [f64; 2],
+    captures: Vec<usize>,
+    plan: Planned,
+}
+
+impl<'a> Bench<'a> {
+    /// Plan a set.
+    pub fn new(set: &'a MeasuredSet, sampling: Sampling) -> Self {
+        let (low, high) = set.stack.film.range_um();
+        let quadratures: Vec<_> = set
+            .leds
+            .iter()
+            .map(|led| {
+                let step = (sampling.spectrum * led.fwhm_nm).min(sampling.step_nm);
+                Quadrature::new(*led, step, (low * 1e3, high * 1e3))
+            })
+            .collect();
+        let first = quadratures
+            .iter()
+            .scan(0, |at, q| {
+                let first = *at;
+                *at += q.wavelengths_nm.len();
+                Some(first)
+            })
+            .collect();
+        let mut groups: Vec<Group> = Vec::new();
+        for (i, c) in set.captures.iter().enumerate() {
+            let same = groups.iter_mut().find(|g| {
+                (g.element, g.led, g.aoi_rad, g.centre_um) == (c.element, c.led, c.aoi_rad, c.window_centre_um)
+            });
+            if let Some(group) = same {
+                group.captures.push(i);
+                continue;
+            }
+            let longest = set.camera.rows.max(set.camera.cols) as f64;
+            let planes = Planes {
+                lattice: set.elements[c.element].pillars.lattice,
+                radius_um: 0.5 * set.elements[c.element].aperture_diameter_um,
+                centre_um: c.window_centre_um,
+                half_width_um: 0.5 * longest * set.camera.pixel_um,
+                step_um: sampling.step_um,
+            };
+            groups.push(Group {
+                element: c.element,
+                led: c.led,
+                aoi_rad: c.aoi_rad,
+                centre_um: c.window_centre_um,
+                captures: vec![i],
+                plan: Planned::new(planes, sampling.margin),
+            });
+        }
+        Self {
+            set,
+            quadratures,
+            first,
+            groups,
+            fill: set.elements.iter().map(|_| OnceLock::new()).collect(),
+        }
+    }
+
+    /// The set that it stands for.
+    pub fn set(&self) -> &'a MeasuredSet {
+        self.set
+    }
+
+    /// All wavelengths that cells are needed at [nm].
+    pub fn wavelengths_nm(&self) -> Vec<f64> {
+        self.quadratures
+            .iter()
+            .flat_map(|q| q.wavelengths_nm.iter().copied())
+            .collect()
+    }
+
+    /// Least and greatest width of the layout [nm].
+    pub fn widths_nm(&self) -> (f64, f64) {
+        let all = self
+            .set
+            .elements
+            .iter()
+            .flat_map(|e| e.pillars.width_nm.iter().filter(|w| **w > 0));
+        all.fold((f64::MAX, 0.0), |(a, b), &w| (a.min(f64::from(w)), b.max(f64::from(w))))
+    }
+
+    /// What the pixels of each capture see, before placement, flux and black level.
+    pub fn grids(&self, intensities: &[Vec<f32>], departure: &Departure) -> Vec<PixelGrid> {
+        let camera = &self.set.camera;
+        let work: Vec<(&Group, usize)> = {
+            let mut work: Vec<_> = self
+                .groups
+                .iter()
+                .flat_map(|g| g.captures.iter().map(move |&c| (g, c)))
+                .collect();
+            work.sort_by_key(|w| w.1);
+            work
+        };
+        work.par_iter()
+            .map(|(group, capture)| {
+                let z = self.set.captures[*capture].distance_um + departure.path.gap_um;
+                let optic = Optic {
+                    pixel_um: camera.pixel_um,
+                    disc_um: self.disc_um(group, z, departure),
+                    blur_um: departure.camera.pixel_blur_um,
+                };
+                let stray = departure.camera.stray_light as f32;
+                let step = group.plan.step_um();
+                if stray == 0.0 {
+                    return PixelGrid::new(&intensities[*capture], step, &optic, camera.rows, camera.cols);
+                }
+                let mean = window_mean(
+                    &intensities[*capture],
+                    group.plan.window(),
+                    self.set.camera.pixel_um / step,
+                    camera,
+                );
+                let veiled: Vec<f32> = intensities[*capture].iter().map(|v| v + stray * (mean - v)).collect();
+                PixelGrid::new(&veiled, step, &optic, camera.rows, camera.cols)
+            })
+            .collect()
+    }
+
+    /// Images of the two radii of the source disc on the sensor [um].
+    fn disc_um(&self, group: &Group, z: f64, departure: &Departure) -> [[f64; 2]; 2] {
+        let [cx, cy] = group.centre_um;
+        let r = (cx * cx + cy * cy + z * z).sqrt();
+        let (sx, sy, sz) = (cx / r, cy / r, z / r);
+        let radius = 0.5 * self.set.divergence_rad * (1.0 + departure.light.source_size);
+        // Landing is z s / sz; sines of incidence change by the cosine of the angle on each axis.
+        let [ax, ay] = group.aoi_rad.map(|a| radius * a.cos());
+        let cross = sx * sy / sz.powi(3);
+        [
+            [z * (1.0 / sz + sx * sx / sz.powi(3)) * ax, z * cross * ax],
+            [z * cross * ay, z * (1.0 / sz + sy * sy / sz.powi(3)) * ay],
+        ]
+    }
+}
+
+/// Mean intensity over the pixels of a window that stands in the middle of `n` x `n` samples.
+fn window_mean(intensity: &[f32], n: usize, samples_per_pixel: f64, camera: &Camera) -> f32 {
+    let range = |pixels: usize| {
+        let wide = ((pixels as f64 * samples_per_pixel).round() as usize).clamp(1, n);
+        (n - wide) / 2..(n + wide) / 2
+    };
+    let (rows, cols) = (range(camera.rows), range(camera.cols));
+    let sum: f32 = rows
+        .clone()
+        .map(|y| intensity[y * n..][cols.clone()].iter().sum::<f32>())
+        .sum();
+    sum / (rows.len() * cols.len()) as f32
+}

@@ -1,0 +1,134 @@
+//! How one number changes every capture: a polynomial through the sizes that were simulated.
+
+use std::sync::Arc;
+
+use super::optics::PixelGrid;
+
+/// Most sizes that a polynomial goes through; beyond, those farthest from where it is wanted are dropped.
+const MOST_NODES: usize = 6;
+
+/// Changes of all captures with one number.
+#[derive(Clone, Default)]
+pub struct Curve {
+    /// Offsets from the middle, zero left out.
+    nodes: Vec<f64>,
+    /// Changes from the base at each node, `[node][capture]`.
+    grids: Vec<Arc<Vec<PixelGrid>>>,
+}
+
+impl Curve {
+    /// Through the changes at some offsets.
+    pub fn new(nodes: Vec<f64>, grids: impl IntoIterator<Item = Vec<PixelGrid>>) -> Self {
+        let grids = grids.into_iter().map(Arc::new).collect();
+        Self { nodes, grids }
+    }
+
+    /// With one more offset, which it is wanted about.
+    pub fn add(&mut self, node: f64, grids: Vec<PixelGrid>) {
+        if self.nodes.len() >= MOST_NODES {
+            let farthest = (0..self.nodes.len())
+                .max_by(|&a, &b| (self.nodes[a] - node).abs().total_cmp(&(self.nodes[b] - node).abs()));
+            if let Some(farthest) = farthest {
+                self.nodes.remove(farthest);
+                self.grids.remove(farthest);
+            }
+        }
+        self.nodes.push(node);
+        self.grids.push(Arc::new(grids));
+    }
+
+    /// The change of one capture at an offset: grids and their factors.
+    pub fn change(&self, u: f64, capture: usize) -> impl Iterator<Item = (&PixelGrid, f32)> {
+        self.grids
+            .iter()
+            .zip(self.weights(u))
+            .map(move |(grids, w)| (&grids[capture], w as f32))
+    }
+
+    /// Its derivative by the offset.
+    pub fn slope(&self, u: f64, capture: usize) -> impl Iterator<Item = (&PixelGrid, f32)> {
+        self.grids
+            .iter()
+            .zip(self.slopes(u))
+            .map(move |(grids, w)| (&grids[capture], w as f32))
+    }
+
+    /// Least and greatest offset that was simulated.
+    pub fn ends(&self) -> (f64, f64) {
+        let low = self.nodes.iter().copied().fold(0.0, f64::min);
+        let high = self.nodes.iter().copied().fold(0.0, f64::max);
+        (low, high)
+    }
+
+    /// Weights of the nodes' changes at `u`; straight on beyond the ends.
+    fn weights(&self, u: f64) -> Vec<f64> {
+        let (low, high) = self.ends();
+        let inside = u.clamp(low, high);
+        let beyond = u - inside;
+        (0..self.nodes.len())
+            .map(|i| {
+                self.lagrange(i, inside)
+                    + if beyond == 0.0 {
+                        0.0
+                    } else {
+                        beyond * self.lagrange_slope(i, inside)
+                    }
+            })
+            .collect()
+    }
+
+    fn slopes(&self, u: f64) -> Vec<f64> {
+        let (low, high) = self.ends();
+        (0..self.nodes.len())
+            .map(|i| self.lagrange_slope(i, u.clamp(low, high)))
+            .collect()
+    }
+
+    /// The polynomial that is one at node `i` and zero at the others and in the middle.
+    fn lagrange(&self, i: usize, u: f64) -> f64 {
+        let at = self.nodes[i];
+        let others = self.nodes.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, n)| *n);
+        others.chain([0.0]).map(|n| (u - n) / (at - n)).product()
+    }
+
+    fn lagrange_slope(&self, i: usize, u: f64) -> f64 {
+        let at = self.nodes[i];
+        let roots: Vec<f64> = self
+            .nodes
+            .iter()
+            .enumerate()
+            .filter(|(j, _)| *j != i)
+            .map(|(_, n)| *n)
+            .chain([0.0])
+            .collect();
+        let scale: f64 = roots.iter().map(|n| at - n).product();
+        (0..roots.len())
+            .map(|k| {
+                let rest = roots.iter().enumerate().filter(|(j, _)| *j != k);
+                rest.map(|(_, n)| u - n).product::<f64>()
+            })
+            .sum::<f64>()
+            / scale
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_polynomial_goes_through_its_nodes_and_straight_on() {
+        let curve = Curve {
+            nodes: vec![-2.0, -1.0, 1.0, 2.0],
+            grids: Vec::new(),
+        };
+        let f = |u: f64| 3.0 * u - 0.5 * u * u + 0.1 * u.powi(4);
+        let slope = |u: f64| 3.0 - u + 0.4 * u.powi(3);
+        let value = |u: f64| -> f64 { curve.weights(u).iter().zip(&curve.nodes).map(|(w, n)| w * f(*n)).sum() };
+        let derivative = |u: f64| -> f64 { curve.slopes(u).iter().zip(&curve.nodes).map(|(w, n)| w * f(*n)).sum() };
+        for u in [-2.0, -0.7, 0.0, 0.3, 1.9] {
+            assert!((value(u) - f(u)).abs() < 1e-12 && (derivative(u) - slope(u)).abs() < 1e-12);
+        }
+        assert!((value(3.0) - f(2.0) - slope(2.0)).abs() < 1e-12);
+    }
+}
