@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use ndarray::Array2;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -117,6 +118,9 @@ pub struct Rung {
     pub fidelity: String,
     pub fit: f64,
     pub held_out: f64,
+    /// Residual of each capture [sigma], nuisances fitted; for pictures.
+    #[serde(skip)]
+    pub residuals: Vec<Array2<f32>>,
 }
 
 /// What is measured.

@@ -9,7 +9,7 @@ use super::cells::{CellSource, RigorousCells};
 use super::departure::Departure;
 use super::diagnosis::{Diagnosis, LeftOut, Rung};
 use super::effects;
-use super::fit::Problem;
+use super::fit::{Fit, Problem};
 use super::forward::RESIDUAL;
 use super::heldout::{held_out, mean};
 use super::nuisance::Data;
@@ -221,10 +221,12 @@ impl<'a> Session<'a> {
     }
 }
 
-fn rung(name: &str, problem: &Problem<'_>, fit: &super::fit::Fit) -> Rung {
+fn rung(name: &str, problem: &Problem<'_>, fit: &Fit) -> Rung {
+    let residual = |c| fit.nuisances.residual(problem.data, &problem.grid(&fit.theta, c), c);
     Rung {
         fidelity: name.into(),
         fit: fit.chi2 / problem.pixels(),
         held_out: mean(&held_out(problem, &fit.forms, fit)),
+        residuals: (0..problem.used.len()).map(residual).collect(),
     }
 }

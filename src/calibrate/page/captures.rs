@@ -9,7 +9,7 @@ use super::super::session::Session;
 use crate::report::{Axis, Chart, ImageGrid, Page, fixed, sig};
 
 /// Colours of residuals reach so many standard deviations of the noise.
-const SIGMAS: f64 = 6.0;
+pub(super) const SIGMAS: f64 = 6.0;
 
 /// Every capture that counts: seen, predicted, and the residual before and after.
 pub(super) fn captures(page: &mut Page, session: &Session<'_>, atlas: &Atlas, finding: &Finding) {

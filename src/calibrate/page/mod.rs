@@ -5,15 +5,16 @@ mod left;
 
 use std::path::Path;
 
-use captures::{captures, widths};
+use captures::{SIGMAS, captures, widths};
 use left::{confusable, free_term, nuisances};
+use ndarray::Array2;
 
 use super::atlas::Atlas;
 use super::attribute::Finding;
-use super::diagnosis::{Diagnosis, SetVerdict};
+use super::diagnosis::{Diagnosis, Ranked, SetVerdict};
 use super::session::Session;
 use crate::error::Result;
-use crate::report::{Axis, Cell, Column, Page, Ranking, Table, Verdict, fixed, sig};
+use crate::report::{Axis, Cell, Column, ImageGrid, Page, Ranking, Table, Verdict, fixed, sig};
 
 /// Write the report of a session.
 ///
@@ -54,7 +55,7 @@ pub fn write_page(
         "Errors are chi-square a pixel: one is noise alone. Held out means predicted by a fit that has not seen the colour, the element or the distance of the capture; its placement, flux and black level alone are adjusted.",
     );
     effects(&mut page, diagnosis);
-    ladder(&mut page, diagnosis);
+    ladder(&mut page, session, diagnosis);
     if let Some(finding) = finding {
         ranking(&mut page, diagnosis);
         captures(&mut page, session, atlas, finding);
@@ -104,7 +105,7 @@ fn effects(page: &mut Page, diagnosis: &Diagnosis) {
     page.table(table);
 }
 
-fn ladder(page: &mut Page, diagnosis: &Diagnosis) {
+fn ladder(page: &mut Page, session: &Session<'_>, diagnosis: &Diagnosis) {
     if diagnosis.ladder.is_empty() {
         return;
     }
@@ -123,6 +124,25 @@ fn ladder(page: &mut Page, diagnosis: &Diagnosis) {
         ]);
     }
     page.table(table);
+    // The capture that the first rung predicts worst.
+    let power = |a: &Array2<f32>| a.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
+    let first = &diagnosis.ladder[0].residuals;
+    let Some(worst) = (0..first.len()).max_by(|&a, &b| power(&first[a]).total_cmp(&power(&first[b]))) else {
+        return;
+    };
+    let mut pictures = ImageGrid::new("Three descriptions of the cell", diagnosis.ladder.len())
+        .pixel_um(session.set().camera.pixel_um)
+        .values("residual", "sigma")
+        .range(-SIGMAS, SIGMAS)
+        .diverging()
+        .side(200.0);
+    for rung in &diagnosis.ladder {
+        pictures.image(rung.fidelity.as_str(), rung.residuals[worst].mapv(f64::from));
+    }
+    page.figure(pictures.caption(format!(
+        "What each leaves of capture `{}`, in standard deviations of the noise.",
+        session.set().captures[worst].name
+    )));
 }
 
 fn ranking(page: &mut Page, diagnosis: &Diagnosis) {
@@ -145,6 +165,17 @@ fn ranking(page: &mut Page, diagnosis: &Diagnosis) {
         );
     }
     page.figure(chart.caption("What each leader gains, with its interval over groups of captures."));
+    page.details("All candidates", |inner| {
+        inner.table(candidates(&diagnosis.ranking));
+    });
+    for (place, ranking) in diagnosis.later_rankings.iter().enumerate() {
+        page.details(&format!("Candidates on top of {}", place + 1), |inner| {
+            inner.table(candidates(ranking));
+        });
+    }
+}
+
+fn candidates(ranking: &[Ranked]) -> Table {
     let mut table = Table::new([
         Column::text("Candidate"),
         Column::number("Explains alone", "%"),
@@ -152,7 +183,7 @@ fn ranking(page: &mut Page, diagnosis: &Diagnosis) {
         Column::text("Value"),
         Column::text("Why not"),
     ]);
-    for r in &diagnosis.ranking {
+    for r in ranking {
         table.row([
             Cell::code(&r.name),
             Cell::sig(100.0 * r.score, 3),
@@ -163,9 +194,7 @@ fn ranking(page: &mut Page, diagnosis: &Diagnosis) {
             r.rejected.as_deref().map_or_else(|| "taken".into(), Cell::from),
         ]);
     }
-    page.details("All candidates", |inner| {
-        inner.table(table);
-    });
+    table
 }
 
 fn capitalised(text: &str) -> String {
