@@ -169,7 +169,7 @@ fn ranking(page: &mut Page, diagnosis: &Diagnosis) {
         inner.table(candidates(&diagnosis.ranking));
     });
     for (place, ranking) in diagnosis.later_rankings.iter().enumerate() {
-        page.details(&format!("Candidates on top of {}", place + 1), |inner| {
+        page.details(format!("Candidates on top of {}", place + 1), |inner| {
             inner.table(candidates(ranking));
         });
     }
