@@ -3,13 +3,12 @@
 use std::path::Path;
 
 use num_complex::Complex64;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::cells::changed;
 use super::departure::Departure;
 use crate::cell::rcwa::Orders;
-use crate::cell::{CellModel, CellStack, Fidelity, OBLIQUE_ORDERS, ORDERS, spread};
+use crate::cell::{CellModel, CellStack, Fidelity, OBLIQUE_ORDERS, ORDERS, tabulate};
 use crate::design::Design;
 use crate::document;
 use crate::error::{Error, Result};
@@ -164,31 +163,21 @@ impl CellModel for MadeCell {
     }
 
     fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
-        let solved = self
-            .widths_nm
-            .par_iter()
-            .map(|&w| self.drawn(f64::from(w), wavelength_um))
-            .collect::<Result<Vec<_>>>()?;
-        Ok(spread(&self.widths_nm, &solved, max_width_nm))
+        let solve = |w| Ok([self.drawn(f64::from(w), wavelength_um)?]);
+        let [table] = tabulate(&self.widths_nm, max_width_nm, solve)?;
+        Ok(table)
     }
 
     fn oblique(&self, wavelength_um: f64, sines: [f64; 2], max_width_nm: u16) -> Result<Option<[Vec<Complex64>; 2]>> {
         let orders = Orders::new(OBLIQUE_ORDERS)?;
         let of = |width| self.stack.oblique(width, wavelength_um, sines, orders);
-        let solved = self
-            .widths_nm
-            .par_iter()
-            .map(|&w| {
-                let pillar = of(self.possible(f64::from(w) + self.bias_nm))?;
-                let bare = if self.bare_share == 0.0 { pillar } else { of(0.0)? };
-                let mixed = |k: usize| self.mixed(pillar[k], || Ok(bare[k]));
-                Ok([mixed(0)?, mixed(1)?])
-            })
-            .collect::<Result<Vec<_>>>()?;
-        Ok(Some([0, 1].map(|polarisation| {
-            let own = solved.iter().map(|t| t[polarisation]).collect::<Vec<_>>();
-            spread(&self.widths_nm, &own, max_width_nm)
-        })))
+        let solve = |w| {
+            let pillar = of(self.possible(f64::from(w) + self.bias_nm))?;
+            let bare = if self.bare_share == 0.0 { pillar } else { of(0.0)? };
+            let mixed = |k: usize| self.mixed(pillar[k], || Ok(bare[k]));
+            Ok([mixed(0)?, mixed(1)?])
+        };
+        tabulate(&self.widths_nm, max_width_nm, solve).map(Some)
     }
 
     fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {

@@ -29,7 +29,7 @@ pub use model::{CellModel, Fidelity};
 pub use models::cell_models;
 pub use page::write_cell_report;
 pub use pointwise::PointwiseCell;
-pub(crate) use pointwise::{OBLIQUE_ORDERS, ORDERS, spread};
+pub(crate) use pointwise::{OBLIQUE_ORDERS, ORDERS, tabulate};
 pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};
 pub use published::PublishedCell;
 pub use rigorous::RigorousCell;

@@ -52,25 +52,15 @@ impl CellModel for PointwiseCell {
     }
 
     fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
-        let solved = self
-            .widths_nm
-            .par_iter()
-            .map(|&w| self.stack.transmission(f64::from(w), wavelength_um, self.orders))
-            .collect::<Result<Vec<_>>>()?;
-        Ok(spread(&self.widths_nm, &solved, max_width_nm))
+        let solve = |w| Ok([self.stack.transmission(f64::from(w), wavelength_um, self.orders)?]);
+        let [table] = tabulate(&self.widths_nm, max_width_nm, solve)?;
+        Ok(table)
     }
 
     fn oblique(&self, wavelength_um: f64, sines: [f64; 2], max_width_nm: u16) -> Result<Option<[Vec<Complex64>; 2]>> {
         let orders = Orders::new(OBLIQUE_ORDERS.min(self.orders.along_axis()))?;
-        let solved = self
-            .widths_nm
-            .par_iter()
-            .map(|&w| self.stack.oblique(f64::from(w), wavelength_um, sines, orders))
-            .collect::<Result<Vec<_>>>()?;
-        Ok(Some([0, 1].map(|polarisation| {
-            let own = solved.iter().map(|t| t[polarisation]).collect::<Vec<_>>();
-            spread(&self.widths_nm, &own, max_width_nm)
-        })))
+        let solve = |w| self.stack.oblique(f64::from(w), wavelength_um, sines, orders);
+        tabulate(&self.widths_nm, max_width_nm, solve).map(Some)
     }
 
     fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {
@@ -78,9 +68,25 @@ impl CellModel for PointwiseCell {
     }
 }
 
-/// A table over all widths [nm] from what was solved for some, in rising order: straight lines between them, the
-/// nearest beyond, nothing at zero.
-pub(crate) fn spread(widths_nm: &[u16], solved: &[Complex64], max_width_nm: u16) -> Vec<Complex64> {
+/// Tables over all widths [nm] of what is solved for some of them, in rising order, each with `N` values.
+///
+/// # Errors
+/// That of the first width that cannot be solved.
+pub(crate) fn tabulate<const N: usize>(
+    widths_nm: &[u16],
+    max_width_nm: u16,
+    solve: impl Fn(u16) -> Result<[Complex64; N]> + Sync,
+) -> Result<[Vec<Complex64>; N]> {
+    let solved = widths_nm.par_iter().map(|&w| solve(w)).collect::<Result<Vec<_>>>()?;
+    Ok(std::array::from_fn(|k| {
+        let own = solved.iter().map(|t| t[k]).collect::<Vec<_>>();
+        spread(widths_nm, &own, max_width_nm)
+    }))
+}
+
+/// A table over all widths [nm]: straight lines between those that were solved, the nearest beyond, nothing at
+/// zero.
+fn spread(widths_nm: &[u16], solved: &[Complex64], max_width_nm: u16) -> Vec<Complex64> {
     let at = |width: u16| {
         let above = widths_nm
             .partition_point(|&w| w < width)

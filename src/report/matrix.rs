@@ -99,6 +99,6 @@ mod tests {
         let mut matrix = Matrix::new("Taken for what", ["gap", "tilt"]).axes("said", "true");
         matrix.row("gap", [1.0]).row("tilt", [0.25, 0.75]);
         let svg = matrix.caption("").to_svg();
-        assert!(svg.contains("tilt as gap 25 %") && svg.contains(">75<") && !svg.contains("gap as tilt"));
+        assert!(svg.contains("tilt as gap 25 %") && svg.contains("tilt as tilt 75 %") && !svg.contains("gap as tilt"));
     }
 }
