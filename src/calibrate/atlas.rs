@@ -95,9 +95,11 @@ impl Simulator<'_> {
         };
         let curves = nodes
             .into_iter()
-            .map(|nodes| {
+            .zip(&self.slots)
+            .map(|(nodes, slot)| {
                 let grids: Vec<_> = exposed.by_ref().take(nodes.len()).map(|g| change(g, 1.0)).collect();
-                Curve::new(nodes, grids)
+                let kinked = self.effects[slot.effect].kinked();
+                Curve::new(nodes, grids, kinked && about.iter().all(|v| *v == 0.0))
             })
             .collect();
         let mut terms = Vec::new();

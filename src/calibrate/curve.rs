@@ -14,13 +14,15 @@ pub struct Curve {
     nodes: Vec<f64>,
     /// Changes from the base at each node, `[node][capture]`.
     grids: Vec<Arc<Vec<PixelGrid>>>,
+    /// Nodes on one side of zero say nothing of the other.
+    kinked: bool,
 }
 
 impl Curve {
     /// Through the changes at some offsets.
-    pub fn new(nodes: Vec<f64>, grids: impl IntoIterator<Item = Vec<PixelGrid>>) -> Self {
+    pub fn new(nodes: Vec<f64>, grids: impl IntoIterator<Item = Vec<PixelGrid>>, kinked: bool) -> Self {
         let grids = grids.into_iter().map(Arc::new).collect();
-        Self { nodes, grids }
+        Self { nodes, grids, kinked }
     }
 
     /// With one more offset, which it is wanted about.
@@ -84,23 +86,31 @@ impl Curve {
             .collect()
     }
 
-    /// The polynomial that is one at node `i` and zero at the others and in the middle.
+    /// Whether a node counts at `u`.
+    fn counts(&self, node: f64, u: f64) -> bool {
+        !self.kinked || (node > 0.0) == (u >= 0.0)
+    }
+
+    /// Where the polynomial that is one at node `i` is zero: at the others and in the middle.
+    fn roots(&self, i: usize, u: f64) -> Vec<f64> {
+        let others = self.nodes.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, n)| *n);
+        others.filter(|n| self.counts(*n, u)).chain([0.0]).collect()
+    }
+
     fn lagrange(&self, i: usize, u: f64) -> f64 {
         let at = self.nodes[i];
-        let others = self.nodes.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, n)| *n);
-        others.chain([0.0]).map(|n| (u - n) / (at - n)).product()
+        if !self.counts(at, u) {
+            return 0.0;
+        }
+        self.roots(i, u).into_iter().map(|n| (u - n) / (at - n)).product()
     }
 
     fn lagrange_slope(&self, i: usize, u: f64) -> f64 {
         let at = self.nodes[i];
-        let roots: Vec<f64> = self
-            .nodes
-            .iter()
-            .enumerate()
-            .filter(|(j, _)| *j != i)
-            .map(|(_, n)| *n)
-            .chain([0.0])
-            .collect();
+        if !self.counts(at, u) {
+            return 0.0;
+        }
+        let roots = self.roots(i, u);
         let scale: f64 = roots.iter().map(|n| at - n).product();
         (0..roots.len())
             .map(|k| {
@@ -121,6 +131,7 @@ mod tests {
         let curve = Curve {
             nodes: vec![-2.0, -1.0, 1.0, 2.0],
             grids: Vec::new(),
+            kinked: false,
         };
         let f = |u: f64| 3.0 * u - 0.5 * u * u + 0.1 * u.powi(4);
         let slope = |u: f64| 3.0 - u + 0.4 * u.powi(3);

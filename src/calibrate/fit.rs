@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::atlas::Atlas;
 use super::nuisance::{BLACK_SIGMA_DN, Block, Data, Nuisances};
 use super::optics::PixelGrid;
+use super::placement::coarse;
 use super::quadratic::{held, minimise, sum};
 use super::simulator::Simulator;
 
@@ -55,7 +56,14 @@ impl Problem<'_> {
             .into_par_iter()
             .map(|c| self.grid(&theta, c))
             .collect();
-        let nuisances = Nuisances::stated(self.data).fit(self.data, &grids, &self.used);
+        let mut nuisances = Nuisances::stated(self.data);
+        let pixel_um = self.simulator.bench.set().camera.pixel_um;
+        nuisances.shift_um = grids
+            .par_iter()
+            .zip(&self.data.signal)
+            .map(|(grid, seen)| coarse(seen, &grid.pixels([0.0; 2])).map(|pixels| pixels * pixel_um))
+            .collect();
+        let nuisances = nuisances.fit(self.data, &grids, &self.used);
         self.at(&[], theta, nuisances)
     }
 

@@ -131,8 +131,13 @@ pub fn forward(
                 .chain([&effect])
                 .flat_map(|&e| problem.simulator.slots_of(e))
                 .collect();
-            let fit = problem.fit(&active, now);
-            candidate.judge(problem, fit, held_now);
+            let fit = starts(problem, effect, now)
+                .iter()
+                .map(|from| problem.fit(&active, from))
+                .min_by(|a, b| a.chi2.total_cmp(&b.chi2));
+            if let Some(fit) = fit {
+                candidate.judge(problem, fit, held_now);
+            }
         }
         candidates.push(candidate);
     }
@@ -200,6 +205,28 @@ pub fn forward(
         taken,
         placebo,
     })
+}
+
+/// Where fits of an effect begin: where one is, or on each side of zero if those know nothing of one another.
+fn starts(problem: &Problem<'_>, effect: usize, now: &Fit) -> Vec<Fit> {
+    if !problem.simulator.effects[effect].kinked() {
+        return vec![now.clone()];
+    }
+    let mut starts = vec![now.clone()];
+    for slot in problem.simulator.slots_of(effect) {
+        let typical = problem.simulator.slots[slot].parameter.typical;
+        starts = starts
+            .into_iter()
+            .flat_map(|start| {
+                [typical, -typical].map(|value| {
+                    let mut start = start.clone();
+                    start.theta[slot] = 0.5 * value;
+                    start
+                })
+            })
+            .collect();
+    }
+    starts
 }
 
 fn sort(candidates: &mut [Candidate]) {

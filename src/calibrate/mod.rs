@@ -23,6 +23,7 @@ mod nuisance;
 mod optics;
 mod page;
 mod placebo;
+mod placement;
 mod proof;
 mod quadratic;
 mod rivals;

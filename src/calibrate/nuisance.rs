@@ -13,8 +13,8 @@ use super::set::MeasuredSet;
 /// How far the black level may be off [DN], one standard deviation: sensors drift by less over a session.
 pub const BLACK_SIGMA_DN: f64 = 0.5;
 
-/// Steps of Gauss and Newton; placement is within a pixel, and three bring it to a thousandth.
-const STEPS: usize = 4;
+/// Steps of Gauss and Newton; within a pixel, three bring placement to a thousandth.
+const STEPS: usize = 6;
 
 /// A set's frames with their noise.
 pub struct Data {

@@ -66,7 +66,8 @@ impl<'a> Twins<'a> {
             step_um: 0.9 * s.step_um,
             margin: s.margin + 5,
         };
-        let bench = Bench::new(like, sampling);
+        let mut bench = Bench::new(like, sampling);
+        bench.follows = false;
         let (low, high) = bench.widths_nm();
         let cells = RigorousCells::new(
             stated_cell(like)?,

@@ -13,13 +13,20 @@ pub fn unfit(problem: &Problem<'_>, nuisances: &Nuisances) -> Vec<(usize, String
         .iter()
         .map(|s| s.map(|v| v / set.camera.pixel_um))
         .collect();
+    // What is common to all windows is the light's doing.
+    let common = [0, 1].map(|axis| {
+        let mut all: Vec<f64> = shifts.iter().map(|s| s[axis]).collect();
+        all.sort_by(f64::total_cmp);
+        all[all.len() / 2]
+    });
     for (c, capture) in set.captures.iter().enumerate() {
         let pixels = capture.dn.len();
         let lost = pixels - problem.data.pixels(c);
         let model = problem.grid(&problem.atlas.about, c).pixels([0.0; 2]);
         let expected = f64::from(model.iter().sum::<f32>()) * capture.scale_dn;
         let seen = f64::from(problem.data.signal[c].iter().sum::<f32>());
-        let beyond = shifts[c].iter().map(|s| s.abs()).fold(0.0, f64::max);
+        let beyond = [0, 1].map(|a| (shifts[c][a] - common[a]).abs());
+        let beyond = beyond[0].max(beyond[1]);
         if lost as f64 > MOST_SATURATED * pixels as f64 {
             out.push((c, format!("{lost} of its {pixels} pixels are saturated")));
         } else if seen < LEAST_LIGHT * expected {

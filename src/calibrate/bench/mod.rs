@@ -48,6 +48,9 @@ pub struct Bench<'a> {
     groups: Vec<Group>,
     /// Area fraction around each site of each element, made when first asked for.
     fill: Vec<OnceLock<Vec<f32>>>,
+    /// Windows follow what tilted light does to the place of an image: placement is a nuisance, and an image
+    /// that moves is no polynomial of the tilt.
+    pub follows: bool,
 }
 
 /// Captures that differ in their distance alone.
@@ -112,6 +115,7 @@ impl<'a> Bench<'a> {
             first,
             groups,
             fill: set.elements.iter().map(|_| OnceLock::new()).collect(),
+            follows: true,
         }
     }
 
@@ -160,8 +164,9 @@ impl<'a> Bench<'a> {
                 };
                 let stray = departure.camera.stray_light as f32;
                 let step = group.plan.step_um();
+                let off = self.off_um(group, z, departure);
                 if stray == 0.0 {
-                    return PixelGrid::new(&intensities[*capture], step, &optic, camera.rows, camera.cols);
+                    return PixelGrid::new(&intensities[*capture], step, &optic, camera.rows, camera.cols).moved(off);
                 }
                 let mean = window_mean(
                     &intensities[*capture],
@@ -170,24 +175,40 @@ impl<'a> Bench<'a> {
                     camera,
                 );
                 let veiled: Vec<f32> = intensities[*capture].iter().map(|v| v + stray * (mean - v)).collect();
-                PixelGrid::new(&veiled, step, &optic, camera.rows, camera.cols)
+                PixelGrid::new(&veiled, step, &optic, camera.rows, camera.cols).moved(off)
             })
             .collect()
     }
 
     /// Images of the two radii of the source disc on the sensor [um].
     fn disc_um(&self, group: &Group, z: f64, departure: &Departure) -> [[f64; 2]; 2] {
+        let radius = 0.5 * self.set.divergence_rad * (1.0 + departure.light.source_size);
+        let [x, y] = self.landing_um(group, z);
+        [x.map(|v| v * radius), y.map(|v| v * radius)]
+    }
+
+    /// How far light lands from where it did for a turn of what arrives by one radian about each axis [um].
+    fn landing_um(&self, group: &Group, z: f64) -> [[f64; 2]; 2] {
         let [cx, cy] = group.centre_um;
         let r = (cx * cx + cy * cy + z * z).sqrt();
         let (sx, sy, sz) = (cx / r, cy / r, z / r);
-        let radius = 0.5 * self.set.divergence_rad * (1.0 + departure.light.source_size);
         // Landing is z s / sz; sines of incidence change by the cosine of the angle on each axis.
-        let [ax, ay] = group.aoi_rad.map(|a| radius * a.cos());
+        let [ax, ay] = group.aoi_rad.map(f64::cos);
         let cross = sx * sy / sz.powi(3);
         [
             [z * (1.0 / sz + sx * sx / sz.powi(3)) * ax, z * cross * ax],
             [z * cross * ay, z * (1.0 / sz + sy * sy / sz.powi(3)) * ay],
         ]
+    }
+
+    /// How far tilted light carries the image off its window, where windows follow it [um].
+    fn off_um(&self, group: &Group, z: f64, departure: &Departure) -> [f64; 2] {
+        if !self.follows {
+            return [0.0; 2];
+        }
+        let [x, y] = self.landing_um(group, z);
+        let [tx, ty] = departure.path.tilt_mrad.map(|t| t * 1e-3);
+        [0, 1].map(|axis| x[axis] * tx + y[axis] * ty)
     }
 }
 

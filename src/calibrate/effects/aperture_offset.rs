@@ -24,6 +24,11 @@ impl Effect for ApertureOffset {
         vec![Parameter::new(-20.0, 20.0, 2.0); 2]
     }
 
+    fn kinked(&self) -> bool {
+        // Which pillars the rim covers: others on either side.
+        true
+    }
+
     fn apply(&self, parameters: &[f64], to: &mut Departure) {
         to.geometry.aperture_offset_um = [parameters[0], parameters[1]];
     }

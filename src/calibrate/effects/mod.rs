@@ -77,6 +77,11 @@ pub trait Effect: Send + Sync {
     /// The numbers that it turns; zero for each is no effect.
     fn parameters(&self) -> Vec<Parameter>;
 
+    /// Whether what it does turns sharply at zero, so that one side tells nothing of the other.
+    fn kinked(&self) -> bool {
+        false
+    }
+
     /// Set its numbers.
     fn apply(&self, parameters: &[f64], to: &mut Departure);
 

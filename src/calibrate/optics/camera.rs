@@ -120,6 +120,20 @@ impl PixelGrid {
         }
     }
 
+    /// The same seen from a window that is off by so much (x, y) [um].
+    pub fn moved(mut self, [x, y]: [f64; 2]) -> Self {
+        if x == 0.0 && y == 0.0 {
+            return self;
+        }
+        let middle = (self.re.ncols() / 2) as f64;
+        for ((ky, kx), re) in self.re.indexed_iter_mut() {
+            let im = &mut self.im[[ky, kx]];
+            let turned = Complex32::new(*re, *im) * cis(self.cycle * ((kx as f64 - middle) * x + ky as f64 * y));
+            (*re, *im) = (turned.re, turned.im);
+        }
+        self
+    }
+
     /// Its derivative by the shift along x (0) or y (1) [1/um].
     pub fn slope(&self, axis: usize) -> Self {
         let middle = (self.re.ncols() / 2) as f32;
@@ -259,6 +273,8 @@ mod tests {
         let numeric =
             (&grid.pixels([shift[0] + h, shift[1]]) - &grid.pixels([shift[0] - h, shift[1]])) / (2.0 * h as f32);
         assert!((&slope - &numeric).iter().all(|d| d.abs() < 1e-3));
+        let moved = grid.clone().moved([0.4, -0.2]).pixels([shift[0] - 0.4, shift[1] + 0.2]);
+        assert!((&moved - &pixels).iter().all(|d| d.abs() < 1e-5));
         // A little more blur, as its term has it.
         let blurred = PixelGrid::new(&samples, step, &Optic { blur_um: 0.41, ..optic }, 40, 32);
         let variance = 0.41f32.powi(2) - 0.4f32.powi(2);
