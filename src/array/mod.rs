@@ -74,11 +74,7 @@ impl PillarArray {
 
     /// Share of the area of the lenses that is pillar, 0 to 1.
     pub fn fill(&self) -> f64 {
-        let pitch2 = f64::from(self.lattice.pitch_nm()).powi(2);
-        let of_class = |c: &Class| {
-            let area = c.widths.width_nm.iter().map(|&w| f64::from(w).powi(2)).sum::<f64>();
-            (area, c.widths.pillars() as f64 * pitch2)
-        };
+        let of_class = |c: &Class| (c.widths.filled_sites(), c.widths.pillars() as f64);
         let of_class = self.classes.iter().map(of_class).collect::<Vec<_>>();
         let pairs = self.placed.iter().map(|p| of_class[p.class]);
         let (pillars, lens) = pairs.fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));

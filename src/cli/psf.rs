@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use clap::Args;
 use metalith::calibrate::CalibratedModel;
 use metalith::cell::{CellStack, FittedCell, PointwiseCell, PublishedCell};
-use metalith::extract::ExtractedElement;
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::report::{count, sig};
 use metalith::verify::{Lighting, lone_psfs, write_lone_report};
@@ -119,9 +118,8 @@ impl PsfArgs {
         widths.sort_unstable();
         widths.dedup();
         if let Some(model) = model {
-            let area = |e: &ExtractedElement| e.widths.width_nm.iter().map(|&w| f64::from(w).powi(2)).sum::<f64>();
-            let pillars = found.pillars.max(1) as f64;
-            let fill = found.elements.iter().map(area).sum::<f64>() / pillars / f64::from(pitch_nm).powi(2);
+            let filled = found.elements.iter().map(|e| e.widths.filled_sites()).sum::<f64>();
+            let fill = filled / found.pillars.max(1) as f64;
             return Ok(Box::new(model.cell_of(&stack, widths, fill)));
         }
         if matches!(self.fidelity, FidelityArg::Fitted) {
