@@ -20,6 +20,7 @@ const LEVEL_NM: f64 = 0.5;
 const MOST_BIAS_NM: u16 = 40;
 
 /// Transmissions at one wavelength.
+#[derive(Clone, Debug)]
 pub struct Colour {
     pub wavelength_um: f64,
     /// |t| of a stated cell that passes everything.
@@ -42,6 +43,7 @@ impl Colour {
 }
 
 /// A line, for the wavelengths that a design is verified at.
+#[derive(Clone, Debug)]
 pub struct Line {
     pub colours: Vec<Colour>,
     /// Widths that may be drawn [nm].

@@ -29,6 +29,8 @@ pub struct Compensated {
     /// Widths to draw.
     pub array: PillarArray,
     pub summary: CompensationSummary,
+    /// The line that it was made for, solved.
+    line: Line,
 }
 
 /// Numbers of a compensation.
@@ -101,5 +103,6 @@ pub fn compensate(
             error,
             at_limit,
         },
+        line,
     })
 }

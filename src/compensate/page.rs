@@ -41,8 +41,7 @@ struct Numbers<'a> {
 /// as stated and as they would be made, and write `compensation.html` and `compensation.json` into a folder.
 ///
 /// # Errors
-/// If the layout is not what was compensated, a cell cannot be solved, a file cannot be written, or the user
-/// stopped it.
+/// If the layout cannot be read, a file cannot be written, or the user stopped it.
 pub fn write_compensation_report(
     design: &Design,
     intended: &PillarArray,
@@ -52,14 +51,14 @@ pub fn write_compensation_report(
     folder: &Path,
     progress: &dyn Progress,
 ) -> Result<()> {
-    let line = Line::new(design, model, progress)?;
+    let line = &compensated.line;
     let found = read_back(design, intended, layout, progress)?;
     let work = intended.classes.len() * line.colours.len();
     progress.begin("simulating elements", work as u64);
     let mut cases = Vec::new();
     let mut figures = Vec::new();
     for class in 0..intended.classes.len() {
-        let of_element = element(design, intended, &found, class, &line, progress)?;
+        let of_element = element(design, intended, &found, class, line, progress)?;
         cases.extend(of_element.0);
         figures.extend(of_element.1);
     }
