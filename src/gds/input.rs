@@ -7,10 +7,14 @@ use std::sync::Arc;
 
 use super::record::{self, Record};
 use crate::error::{Error, Result};
+use crate::file::{Ahead, Block};
 
 /// Bytes read at a time: enough that the kernel's copy is the cost, not the call. No mapping of the file:
 /// mapped pages count as memory of the process.
 const BLOCK: usize = 1 << 20;
+
+/// A file of this size is read past the page cache: it would fill it and be read once.
+const LARGE: u64 = 1 << 28;
 
 /// Longest record: the length field has 16 bits.
 const LONGEST: usize = 1 << 16;
@@ -24,6 +28,11 @@ pub(super) enum Source {
 
 trait ReadSeek: Read + Seek + Send {}
 impl<T: Read + Seek + Send> ReadSeek for T {}
+
+enum Stream {
+    Plain(Box<dyn ReadSeek>),
+    Large(Ahead),
+}
 
 impl Source {
     pub fn file(path: &Path) -> Result<Self> {
@@ -56,7 +65,7 @@ impl Source {
 
     /// Start reading at the first byte.
     pub fn open(&self) -> Result<Input> {
-        let stream: Box<dyn ReadSeek> = match self {
+        let stream = match self {
             Self::File { path, bytes } => {
                 let file = File::open(path).map_err(Error::io("open", path))?;
                 let now = file.metadata().map_err(Error::io("read", path))?.len();
@@ -69,18 +78,19 @@ impl Source {
                         "wait until whoever writes it is done",
                     ));
                 }
-                Box::new(file)
+                let large = (*bytes >= LARGE).then(|| Ahead::open(path, LONGEST)).flatten();
+                large.map_or_else(|| Stream::Plain(Box::new(file)), Stream::Large)
             }
-            Self::Memory { bytes, .. } => Box::new(Cursor::new(bytes.clone())),
+            Self::Memory { bytes, .. } => Stream::Plain(Box::new(Cursor::new(bytes.clone()))),
         };
-        let room = (BLOCK + LONGEST).min(self.bytes() as usize + LONGEST);
+        let block = Block::new(LONGEST, BLOCK.min(self.bytes() as usize + 1));
         Ok(Input {
             stream,
             path: self.path().to_owned(),
-            buffer: vec![0; room],
-            from: 0,
-            to: 0,
-            base: 0,
+            from: block.start,
+            to: block.start,
+            block,
+            begin: 0,
             ended: false,
         })
     }
@@ -88,21 +98,21 @@ impl Source {
 
 /// A place in the bytes, and a buffer that holds at least the record that begins there.
 pub(super) struct Input {
-    stream: Box<dyn ReadSeek>,
+    stream: Stream,
     path: PathBuf,
-    buffer: Vec<u8>,
-    /// The bytes not yet consumed are `buffer[from..to]`.
+    block: Block,
+    /// The bytes not yet consumed are `block.bytes[from..to]`.
     from: usize,
     to: usize,
-    /// Place in the file of `buffer[0]`.
-    base: u64,
+    /// Place in the file of the block's stretch; before it is what was left of the one before.
+    begin: u64,
     ended: bool,
 }
 
 impl Input {
     /// Place of the next byte.
     pub fn offset(&self) -> u64 {
-        self.base + self.from as u64
+        self.place(self.from)
     }
 
     /// An error at a place of this file.
@@ -120,7 +130,7 @@ impl Input {
         if self.to - self.from < LONGEST && !self.ended {
             self.fill()?;
         }
-        Ok(&self.buffer[self.from..self.to])
+        Ok(&self.block.bytes[self.from..self.to])
     }
 
     /// Step over bytes of the window.
@@ -129,35 +139,62 @@ impl Input {
         self.from += count;
     }
 
+    /// Place in the file of a byte of the block.
+    fn place(&self, at: usize) -> u64 {
+        self.begin + at as u64 - self.block.start as u64
+    }
+
     fn fill(&mut self) -> Result<()> {
-        self.buffer.copy_within(self.from..self.to, 0);
-        self.base += self.from as u64;
-        self.to -= self.from;
-        self.from = 0;
-        while self.to < self.buffer.len() {
-            match self.stream.read(&mut self.buffer[self.to..]) {
-                Ok(0) => {
-                    self.ended = true;
-                    break;
+        let (from, to, left) = (self.from, self.to, self.to - self.from);
+        let next = self.place(to);
+        let io = Error::io("read", &self.path);
+        match &mut self.stream {
+            Stream::Plain(stream) => {
+                let block = &mut self.block;
+                block.bytes.copy_within(from..to, block.start - left);
+                let mut held = 0;
+                let room = block.stretch();
+                while held < room.len() && !self.ended {
+                    match stream.read(&mut room[held..]) {
+                        Ok(0) => self.ended = true,
+                        Ok(count) => held += count,
+                        Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
+                        Err(e) => return Err(io(e)),
+                    }
                 }
-                Ok(count) => self.to += count,
-                Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
-                Err(e) => return Err(Error::io("read", &self.path)(e)),
+                self.begin = next;
+                (self.from, self.to) = (block.start - left, block.start + held);
+            }
+            Stream::Large(ahead) => {
+                let done = std::mem::replace(&mut self.block, Block::new(0, 0));
+                (self.from, self.to) = (self.block.start, self.block.start);
+                let keep = |done: &Block, block: &mut Block| {
+                    block.bytes[block.start - left..block.start].copy_from_slice(&done.bytes[from..to]);
+                };
+                let (mut block, begin, held) = ahead.next(next, Some(done), keep).map_err(io)?;
+                // After a leap the stretch begins before the byte that is asked for.
+                let skip = (next - begin) as usize;
+                self.ended = held < block.stretch().len();
+                (self.from, self.to) = (block.start + skip.min(held) - left, block.start + held);
+                (self.begin, self.block) = (begin, block);
             }
         }
         Ok(())
     }
 
-    /// Go to a place of the file; free if it is in the buffer.
+    /// Go to a place of the file; free if it is in the block.
     pub fn seek(&mut self, offset: u64) -> Result<()> {
-        if offset >= self.base && offset <= self.base + self.to as u64 {
-            self.from = (offset - self.base) as usize;
+        let start = self.block.start as u64;
+        if offset >= self.begin && offset <= self.place(self.to) {
+            self.from = (start + offset - self.begin) as usize;
             return Ok(());
         }
-        self.stream
-            .seek(SeekFrom::Start(offset))
-            .map_err(Error::io("read", &self.path))?;
-        (self.base, self.from, self.to, self.ended) = (offset, 0, 0, false);
+        if let Stream::Plain(stream) = &mut self.stream {
+            stream
+                .seek(SeekFrom::Start(offset))
+                .map_err(Error::io("read", &self.path))?;
+        }
+        (self.begin, self.from, self.to, self.ended) = (offset, self.block.start, self.block.start, false);
         Ok(())
     }
 
@@ -216,7 +253,7 @@ impl Input {
 
     /// The bytes of a record read last.
     pub fn body(&self, record: Record) -> &[u8] {
-        &self.buffer[record.from..record.to]
+        &self.block.bytes[record.from..record.to]
     }
 
     /// The body of a record that must have this data type and be a whole number of `unit` bytes long.

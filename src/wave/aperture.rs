@@ -90,6 +90,53 @@ impl Aperture for Pillars<'_> {
     }
 }
 
+/// Pillars whose width is a function of place, formed as rows are asked for: nothing of the size of the
+/// element is held, for sweeps over designs that are never laid out.
+#[derive(Clone, Debug)]
+pub struct PillarFunction<F> {
+    lattice: Lattice,
+    radius_um: f64,
+    table: Vec<Complex32>,
+    width_nm: F,
+}
+
+impl<F: Fn(f64, f64) -> u16 + Sync> PillarFunction<F> {
+    /// `width_nm` at x, y [um] from the element's centre, asked for within the circle; `table` as in
+    /// [`Pillars::new`]. A width beyond the table passes nothing.
+    pub fn new(lattice: Lattice, radius_um: f64, table: &[Complex64], width_nm: F) -> Self {
+        let mut table = table.iter().map(|t| single(*t)).collect::<Vec<_>>();
+        if let Some(none) = table.first_mut() {
+            *none = Complex32::ZERO;
+        }
+        Self {
+            lattice,
+            radius_um,
+            table,
+            width_nm,
+        }
+    }
+}
+
+impl<F: Fn(f64, f64) -> u16 + Sync> Aperture for PillarFunction<F> {
+    fn lattice(&self) -> Lattice {
+        self.lattice
+    }
+
+    fn radius_um(&self) -> f64 {
+        self.radius_um
+    }
+
+    fn fill_row(&self, iy: usize, row: &mut [Complex32]) {
+        let y = self.lattice.coordinate_um(iy);
+        let inside = sites_inside(&self.lattice, self.radius_um, iy);
+        row.fill(Complex32::ZERO);
+        for (ix, t) in inside.clone().zip(&mut row[inside]) {
+            let width = (self.width_nm)(self.lattice.coordinate_um(ix), y);
+            *t = self.table.get(usize::from(width)).copied().unwrap_or_default();
+        }
+    }
+}
+
 /// A phase given as a function of place, such as the design before mapping and rounding, with the same
 /// amplitude everywhere inside a circle.
 #[derive(Clone, Copy, Debug)]

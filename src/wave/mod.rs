@@ -18,7 +18,7 @@ mod hankel;
 mod plane;
 mod zoom;
 
-pub use aperture::{Aperture, PhaseArray, PhaseFunction, Pillars};
+pub use aperture::{Aperture, PhaseArray, PhaseFunction, PillarFunction, Pillars};
 pub use direct::Direct;
 pub use fade::{Accuracy, Fade};
 pub use fold::Fold;

@@ -1,13 +1,14 @@
 //! Files that appear whole or not at all.
 
+mod past_cache;
+
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result};
+pub(crate) use past_cache::{Ahead, Block};
 
-/// Large enough that the kernel, not the call, is the cost; what is larger goes to it without a copy.
-const BUFFER: usize = 1 << 17;
+use crate::error::{Error, Result};
 
 /// A file written beside its place and renamed into it when complete.
 ///
@@ -17,7 +18,7 @@ const BUFFER: usize = 1 << 17;
 pub struct WholeFile {
     target: PathBuf,
     part: PathBuf,
-    out: Option<BufWriter<File>>,
+    out: Option<past_cache::Output>,
 }
 
 impl WholeFile {
@@ -52,8 +53,8 @@ impl WholeFile {
         file.set_len(0).map_err(Error::io("empty", &part))?;
         Ok(Self {
             target: target.to_owned(),
+            out: Some(past_cache::Output::new(file, &part)),
             part,
-            out: Some(BufWriter::with_capacity(BUFFER, file)),
         })
     }
 
@@ -73,9 +74,15 @@ impl WholeFile {
     /// If the disk is full or refuses; the old file is then as it was.
     pub fn commit(mut self) -> Result<()> {
         let out = self.out.take().expect("a file is committed once");
-        let file = out
-            .into_inner()
-            .map_err(|e| Error::io("write", &self.target)(e.into_error()))?;
+        let placed = self.place(out);
+        if placed.is_err() {
+            let _ = fs::remove_file(&self.part);
+        }
+        placed
+    }
+
+    fn place(&self, out: past_cache::Output) -> Result<()> {
+        let file = out.finish().map_err(Error::io("write", &self.target))?;
         file.sync_all().map_err(Error::io("write", &self.target))?;
         fs::rename(&self.part, &self.target).map_err(Error::io("rename to", &self.target))
     }
@@ -94,10 +101,8 @@ impl Write for WholeFile {
 impl Drop for WholeFile {
     fn drop(&mut self) {
         if let Some(out) = self.out.take() {
-            // Not flushed: what is left of an abandoned file is of no use.
-            drop(out.into_parts());
-            let _ = fs::remove_file(&self.part);
-        } else if self.part.exists() {
+            // Not finished: what is left of an abandoned file is of no use.
+            drop(out);
             let _ = fs::remove_file(&self.part);
         }
     }
