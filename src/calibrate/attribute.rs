@@ -36,6 +36,8 @@ pub struct Finding {
     /// The atlas that `after` rests on, and what the exact simulation adds to it.
     pub atlas: Atlas,
     pub exact: Option<Vec<PixelGrid>>,
+    /// Share of missing pillars by the grain that they leave, where that counts as noise.
+    pub by_grain: Option<f64>,
 }
 
 /// Attribute the residual of a set. With `earlier`, go on from there, on an atlas about it. With `exact`, what
@@ -133,6 +135,7 @@ pub fn attribute(
         half_widths: widths,
         exact: problem.exact,
         atlas: problem.atlas,
+        by_grain: None,
     })
 }
 

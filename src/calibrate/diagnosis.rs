@@ -46,6 +46,14 @@ pub struct FoundEffect {
     pub separate_by: Option<String>,
 }
 
+impl FoundEffect {
+    /// Whether the interval of an effect of one number holds a value.
+    pub fn holds(&self, value: f64) -> Option<bool> {
+        let ends = self.interval.as_array()?;
+        Some((ends.first()?.as_f64()?..=ends.get(1)?.as_f64()?).contains(&value))
+    }
+}
+
 /// Fit and held-out error.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct ErrorPair {

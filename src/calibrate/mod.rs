@@ -32,6 +32,7 @@ mod session;
 mod set;
 mod signature;
 mod simulator;
+mod speckle;
 mod twin;
 mod unfit;
 mod zernike;

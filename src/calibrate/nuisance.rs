@@ -17,6 +17,7 @@ pub const BLACK_SIGMA_DN: f64 = 0.5;
 const STEPS: usize = 6;
 
 /// A set's frames with their noise.
+#[derive(Clone)]
 pub struct Data {
     /// One over the standard deviation of each pixel [1 / DN], zero where a pixel does not count.
     pub weight: Vec<Array2<f32>>,

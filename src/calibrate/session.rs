@@ -15,6 +15,7 @@ use super::heldout::{held_out, mean};
 use super::nuisance::Data;
 use super::set::MeasuredSet;
 use super::simulator::{Simulator, WIDTH_ROOM_NM};
+use super::speckle::Speckle;
 use super::unfit::unfit;
 use crate::cell::{CellStack, FittedCell, Material, PublishedCell};
 use crate::error::Result;
@@ -51,6 +52,16 @@ impl Default for Settings {
 
 /// Times that a set far from what was stated is looked at again from where it was found.
 const RECENTRED: usize = 2;
+
+/// Times that effects and grain are fitted in turn.
+const ROUNDS: usize = 4;
+
+/// They have come to rest when the share changes by less than this part of it.
+const SHARE_AT_REST: f64 = 0.05;
+
+/// Mean and grain speak of one share of missing pillars if they differ by less than this part of it: the grain
+/// is known from a few draws, and the mean is seen through the grain.
+const SHARES_AGREE: f64 = 0.3;
 
 /// A set with its simulator and its data.
 pub struct Session<'a> {
@@ -174,8 +185,70 @@ impl<'a> Session<'a> {
                 break;
             }
         }
+        if let Some((data, grained)) = self.grained(atlas, &finding, progress)? {
+            (self.data, finding) = (data, grained);
+        }
         let diagnosis = Diagnosis::new(self, &finding, left_out, ladder);
         Ok((diagnosis, Some(finding)))
+    }
+
+    /// What is found if the grain of missing pillars is counted as noise, where that explains what is left: if
+    /// their mean and their grain speak of the same share.
+    fn grained(&self, atlas: &Atlas, plain: &Finding, progress: &dyn Progress) -> Result<Option<(Data, Finding)>> {
+        let Some(effect) = self.simulator.effects.iter().position(|e| e.random()) else {
+            return Ok(None);
+        };
+        if mean(&plain.held_after) < RESIDUAL {
+            return Ok(None);
+        }
+        let slot = self.simulator.slots_of(effect)[0];
+        let problem = self.problem(atlas);
+        let fit = problem.fit(&[slot], &problem.nothing());
+        let speckle = Speckle::of(self, &fit, slot, progress)?;
+        let mut share = speckle.share(&problem, &fit);
+        let mut data = speckle.counted(&problem, &fit, share);
+        for round in 1.. {
+            let mut found = attribute(
+                &self.simulator,
+                atlas,
+                &data,
+                &self.used,
+                self.settings.exact,
+                None,
+                progress,
+            )?;
+            // Judged by the noise of the camera alone, from which the grain is told.
+            let bare = Problem {
+                atlas: found.atlas.clone(),
+                exact: found.exact.clone(),
+                ..self.problem(atlas)
+            };
+            let next = speckle.share(&bare, &found.after);
+            let settled = (next / share - 1.0).abs() < SHARE_AT_REST;
+            if settled || round == ROUNDS {
+                let by_mean = found.after.theta[slot];
+                let agree = (by_mean - share).abs() <= SHARES_AGREE * share.max(by_mean);
+                let whole = mean(&found.held_after) < RESIDUAL;
+                if std::env::var_os("GRAIN").is_some() {
+                    eprintln!(
+                        "grain: share {share} next {next} by_mean {by_mean} held {} chosen {:?} chi2 {:?}",
+                        mean(&found.held_after),
+                        found.chosen,
+                        found.held_after
+                    );
+                }
+                if !(found.chosen.contains(&effect) && agree && whole) {
+                    return Ok(None);
+                }
+                found.by_grain = Some(share);
+                found.before = plain.before.clone();
+                found.held_before = plain.held_before.clone();
+                return Ok(Some((data, found)));
+            }
+            share = next;
+            data = speckle.counted(&bare, &found.after, share);
+        }
+        Ok(None)
     }
 
     /// The error of each fidelity of the cell, nuisances fitted.

@@ -88,7 +88,7 @@ impl<'a> Simulator<'a> {
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
     pub fn expose(&self, departures: &[Departure], progress: &dyn Progress) -> Result<Vec<Vec<PixelGrid>>> {
-        self.expose_with(departures, false, progress)
+        self.expose_with(departures, false, self.scatter, progress)
     }
 
     /// The same of one departure, its cells solved with as many orders as the stated ones.
@@ -97,13 +97,23 @@ impl<'a> Simulator<'a> {
     /// As [`Simulator::expose`].
     pub fn expose_exactly(&self, departure: &Departure, progress: &dyn Progress) -> Result<Vec<PixelGrid>> {
         let departures = std::slice::from_ref(departure);
-        Ok(self.expose_with(departures, true, progress)?.remove(0))
+        Ok(self.expose_with(departures, true, self.scatter, progress)?.remove(0))
+    }
+
+    /// The same of one departure, the places of missing pillars drawn from a seed.
+    ///
+    /// # Errors
+    /// As [`Simulator::expose`].
+    pub fn expose_drawn(&self, departure: &Departure, seed: u64, progress: &dyn Progress) -> Result<Vec<PixelGrid>> {
+        let departures = std::slice::from_ref(departure);
+        Ok(self.expose_with(departures, false, Some(seed), progress)?.remove(0))
     }
 
     fn expose_with(
         &self,
         departures: &[Departure],
         exact: bool,
+        scatter: Option<u64>,
         progress: &dyn Progress,
     ) -> Result<Vec<Vec<PixelGrid>>> {
         let mut out: Vec<Option<Vec<PixelGrid>>> = departures.iter().map(|_| None).collect();
@@ -151,7 +161,7 @@ impl<'a> Simulator<'a> {
                     cells: Arc::clone(cells),
                     geometry: &departures[step[0]].geometry,
                     lights: step.iter().map(|&i| &departures[i].light).collect(),
-                    scatter: self.scatter,
+                    scatter,
                 })
                 .collect();
             let intensities = self.bench.intensities(&chips, path, progress)?;

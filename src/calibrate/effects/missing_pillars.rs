@@ -23,6 +23,10 @@ impl Effect for MissingPillars {
         vec![Parameter::new(0.0, 0.3, 0.02)]
     }
 
+    fn random(&self) -> bool {
+        true
+    }
+
     fn apply(&self, parameters: &[f64], to: &mut Departure) {
         to.geometry.missing_pillars = parameters[0].max(0.0);
     }

@@ -82,6 +82,11 @@ pub trait Effect: Send + Sync {
         false
     }
 
+    /// Whether it strikes single pillars at random, so that no numbers tell what each capture shows.
+    fn random(&self) -> bool {
+        false
+    }
+
     /// Set its numbers.
     fn apply(&self, parameters: &[f64], to: &mut Departure);
 

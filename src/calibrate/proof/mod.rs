@@ -5,6 +5,7 @@ mod page;
 mod summary;
 
 use ndarray::Array2;
+use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -13,6 +14,7 @@ pub use summary::{Limit, Proof};
 
 use super::attribute::Finding;
 use super::diagnosis::{Diagnosis, SetVerdict};
+use super::effects::Parameter;
 use super::free::FreeTerm;
 use super::session::{Session, Settings};
 use super::set::MeasuredSet;
@@ -22,6 +24,18 @@ use crate::progress::Progress;
 
 /// Sizes that every effect is tried at, in typical sizes.
 pub const SIZES: [f64; 3] = [0.5, 1.0, 2.0];
+
+/// Effects that are tried together, each at its typical size: of one stage and of several, alike and unlike.
+const PAIRS: [(&str, &str); 8] = [
+    ("cd_bias", "gap"),
+    ("cd_bias", "film_index"),
+    ("film_height", "zero_order"),
+    ("sidewall_taper", "pixel_blur"),
+    ("cd_bias_density", "stray_light"),
+    ("tilt", "source_size"),
+    ("missing_pillars", "cd_bias"),
+    ("source_distance", "led_width"),
+];
 
 /// The truth of a set without any effect.
 pub const NOTHING: &str = "nothing";
@@ -39,6 +53,8 @@ pub struct Trial {
     pub truth: String,
     /// Whether that is in no list.
     pub off_list: bool,
+    /// Whether it is two effects at once.
+    pub pair: bool,
     /// Its size in typical sizes.
     pub size: f64,
     /// Its value as it is reported, where it is one number.
@@ -48,11 +64,11 @@ pub struct Trial {
     pub verdict: SetVerdict,
     /// What was claimed.
     pub found: Vec<String>,
-    /// Whether the true effect is among what was found, alone or as one of a set.
+    /// Whether the true effect (both of two) is among what was found, alone or as one of a set.
     pub named: bool,
     pub found_value: Option<Value>,
     pub interval: Option<Value>,
-    /// Whether the interval of the true effect holds its true value, for effects of one number.
+    /// Whether the interval of the true effect (of each of two) holds its true value, for effects of one number.
     pub inside: Option<bool>,
     /// Largest gain of any single effect on captures left out.
     pub largest_gain: f64,
@@ -111,91 +127,143 @@ impl Default for Extent {
 pub fn prove(like: &MeasuredSet, settings: &Settings, extent: &Extent, progress: &dyn Progress) -> Result<Proof> {
     let settings = Settings {
         ladder: false,
-        exact: false,
         ..settings.clone()
     };
     let session = Session::new(like, settings.clone())?;
     let atlas = session.atlas(progress)?;
     let twins = Twins::new(like, &settings)?;
-    let effects: Vec<_> = session
-        .simulator
-        .effects
-        .iter()
-        .filter(|e| extent.effects.is_empty() || extent.effects.contains(&e.name()))
-        .collect();
-    let mut chips = vec![(String::new(), 0.0, Vec::new())];
-    for effect in &effects {
-        for size in SIZES {
-            // Both numbers of an effect along two axes, unequal and of opposite signs.
-            let parameters = effect.parameters();
-            let numbers = parameters.iter().zip([1.0, -0.6]).map(|(p, s)| s * size * p.typical);
-            chips.push((effect.name(), size, numbers.collect()));
-        }
-    }
+    let chips = chips(&session, extent);
     let wanted: Vec<Vec<(&str, &[f64])>> = chips
         .iter()
-        .map(|(name, _, numbers)| vec![(name.as_str(), numbers.as_slice())])
+        .map(|chip| {
+            chip.parts
+                .iter()
+                .map(|(name, n)| (name.as_str(), n.as_slice()))
+                .collect()
+        })
         .collect();
-    let mut exposed = twins.with_effects(&wanted, progress)?.into_iter();
-    let nothing = exposed.next().expect("the first is without effect");
-    let off_list = [
-        ("astigmatism", OffList::Astigmatism(30.0)),
-        ("ghost", OffList::Ghost(0.04, [5.0, -3.0])),
-        ("anisotropy", OffList::Anisotropy(8.0)),
-    ];
+    let exposed = twins.with_effects(&wanted, progress)?;
     let mut odd = Vec::new();
-    for (name, what) in off_list.into_iter().filter(|_| extent.off_list) {
-        odd.push((name, twins.off_list(what, progress)?));
-    }
-    let count = extent.nulls + extent.threshold_nulls + (chips.len() - 1 + odd.len()) as u64;
-    progress.begin("twins diagnosed", count);
-    let diagnose = |exposed: &Exposed, mut trial: Trial| -> Result<Trial> {
-        let set = twins.draw(exposed, trial.seed);
-        let mut twin = Session::new(&set, settings.clone())?;
-        let (diagnosis, finding) = twin.diagnose(&atlas, progress)?;
-        if trial.off_list {
-            trial.left = finding.and_then(|f| Left::new(&twin, &diagnosis, &f));
+    if extent.off_list {
+        for (name, what) in [
+            ("astigmatism", OffList::Astigmatism(30.0)),
+            ("ghost", OffList::Ghost(0.04, [5.0, -3.0])),
+            ("anisotropy", OffList::Anisotropy(8.0)),
+        ] {
+            odd.push((name, twins.off_list(what, progress)?));
         }
-        trial.judge(&diagnosis);
-        progress.advance(1);
-        Ok(trial)
-    };
-    let of_nothing = |first: u64, count: u64| {
-        (first..first + count)
-            .map(|seed| diagnose(&nothing, Trial::new(NOTHING, 0.0, seed)))
-            .collect::<Result<Vec<_>>>()
-    };
-    let thresholds = of_nothing(THRESHOLD_SEED, extent.threshold_nulls)?;
-    let mut trials = of_nothing(JUDGED_SEED, extent.nulls)?;
-    let mut seed = JUDGED_SEED + extent.nulls;
-    for ((name, size, numbers), exposed) in chips.iter().skip(1).zip(exposed) {
-        let mut trial = Trial::new(name, *size, seed);
-        let effect = effects.iter().find(|e| e.name() == *name);
-        if let Some(effect) = effect {
-            trial.unit = effect.unit().into();
-            trial.value = match effect.reported(numbers, &vec![0.0; numbers.len()], like).as_slice() {
-                [(value, _)] => Some(*value),
-                _ => None,
-            };
-        }
-        trials.push(diagnose(&exposed, trial)?);
-        seed += 1;
     }
-    for (name, exposed) in &odd {
-        let mut trial = Trial::new(name, 1.0, seed);
+    // The first chip is without effect.
+    let thresholds = (0..extent.threshold_nulls).map(|k| (&exposed[0], &chips[0], THRESHOLD_SEED + k));
+    let nulls = (0..extent.nulls).map(|k| (&exposed[0], &chips[0], JUDGED_SEED + k));
+    let others = JUDGED_SEED + extent.nulls;
+    let listed = exposed.iter().zip(&chips).skip(1).zip(others..);
+    let mut work: Vec<(&Exposed, Trial, &[Part])> = thresholds
+        .chain(nulls)
+        .chain(listed.map(|((exposed, chip), seed)| (exposed, chip, seed)))
+        .map(|(exposed, chip, seed)| (exposed, Trial::new(chip, seed), chip.parts.as_slice()))
+        .collect();
+    for ((name, exposed), seed) in odd.iter().zip(others + chips.len() as u64 - 1..) {
+        let mut trial = Trial::new(&Chip::single(name, 1.0, Vec::new()), seed);
         trial.off_list = true;
-        trials.push(diagnose(exposed, trial)?);
-        seed += 1;
+        work.push((exposed, trial, &[]));
     }
-    Ok(Proof::new(like.title.clone(), &thresholds, trials))
+    progress.begin("twins diagnosed", work.len() as u64);
+    // Each twin is worked on by itself, and the order of the answers is that of the list.
+    let mut trials = work
+        .into_par_iter()
+        .map(|(exposed, mut trial, parts)| {
+            let set = twins.draw(exposed, trial.seed);
+            let mut twin = Session::new(&set, settings.clone())?;
+            let (diagnosis, finding) = twin.diagnose(&atlas, &Unheard(progress))?;
+            if trial.off_list {
+                trial.left = finding.and_then(|f| Left::new(&twin, &diagnosis, &f));
+            }
+            trial.judge(&diagnosis, parts, &session);
+            progress.advance(1);
+            Ok(trial)
+        })
+        .collect::<Result<Vec<_>>>()?;
+    let judged = trials.split_off(extent.threshold_nulls as usize);
+    Ok(Proof::new(like.title.clone(), &trials, judged))
+}
+
+/// An effect with its numbers.
+type Part = (String, Vec<f64>);
+
+/// A chip or a bench that twins are made of.
+struct Chip {
+    truth: String,
+    size: f64,
+    parts: Vec<Part>,
+}
+
+impl Chip {
+    fn single(name: &str, size: f64, numbers: Vec<f64>) -> Self {
+        Self {
+            truth: name.into(),
+            size,
+            parts: vec![(name.into(), numbers)],
+        }
+    }
+}
+
+/// One chip without effect, one for each effect and size, one for each pair.
+fn chips(session: &Session<'_>, extent: &Extent) -> Vec<Chip> {
+    let wanted = |name: &str| extent.effects.is_empty() || extent.effects.iter().any(|e| e == name);
+    let effects: Vec<_> = session.simulator.effects.iter().filter(|e| wanted(&e.name())).collect();
+    // Both numbers of an effect along two axes, unequal and of opposite signs.
+    let numbers = |parameters: Vec<Parameter>, size: f64| -> Vec<f64> {
+        let parts = parameters.iter().zip([1.0, -0.6]);
+        parts.map(|(p, s)| s * size * p.typical).collect()
+    };
+    let mut chips = vec![Chip {
+        truth: NOTHING.into(),
+        size: 0.0,
+        parts: Vec::new(),
+    }];
+    for effect in &effects {
+        for size in SIZES {
+            chips.push(Chip::single(&effect.name(), size, numbers(effect.parameters(), size)));
+        }
+    }
+    for (a, b) in PAIRS {
+        let both: Vec<Part> = [a, b]
+            .iter()
+            .filter_map(|name| effects.iter().find(|e| e.name() == *name))
+            .map(|e| (e.name(), numbers(e.parameters(), 1.0)))
+            .collect();
+        if both.len() == 2 {
+            chips.push(Chip {
+                truth: format!("{a} + {b}"),
+                size: 1.0,
+                parts: both,
+            });
+        }
+    }
+    chips
+}
+
+/// Passes on that the user wants to stop, and nothing of how far one of many is.
+struct Unheard<'p>(&'p dyn Progress);
+
+impl Progress for Unheard<'_> {
+    fn begin(&self, _: &str, _: u64) {}
+
+    fn advance(&self, _: u64) {}
+
+    fn stopped(&self) -> bool {
+        self.0.stopped()
+    }
 }
 
 impl Trial {
-    fn new(truth: &str, size: f64, seed: u64) -> Self {
+    fn new(chip: &Chip, seed: u64) -> Self {
         Self {
-            truth: truth.into(),
+            truth: chip.truth.clone(),
             off_list: false,
-            size,
+            pair: chip.parts.len() > 1,
+            size: chip.size,
             value: None,
             unit: String::new(),
             seed,
@@ -212,18 +280,32 @@ impl Trial {
         }
     }
 
-    fn judge(&mut self, diagnosis: &Diagnosis) {
+    fn judge(&mut self, diagnosis: &Diagnosis, parts: &[Part], session: &Session<'_>) {
         self.verdict = diagnosis.verdict;
         self.found = diagnosis.effects.iter().map(|e| e.name.clone()).collect();
-        if let Some(own) = diagnosis.effects.iter().find(|e| e.name == self.truth) {
-            self.named = true;
-            self.found_value = Some(own.value.clone());
-            self.interval = Some(own.interval.clone());
-            self.inside = self.value.and_then(|value| {
-                let ends = own.interval.as_array()?;
-                Some((ends.first()?.as_f64()?..=ends.get(1)?.as_f64()?).contains(&value))
-            });
+        self.named = !parts.is_empty() && parts.iter().all(|(name, _)| self.found.contains(name));
+        let mut inside = Vec::new();
+        for (name, numbers) in parts {
+            let Some(effect) = session.simulator.effects.iter().find(|e| e.name() == *name) else {
+                continue;
+            };
+            let value = match effect
+                .reported(numbers, &vec![0.0; numbers.len()], session.set())
+                .as_slice()
+            {
+                [(value, _)] => Some(*value),
+                _ => None,
+            };
+            let own = diagnosis.effects.iter().find(|e| e.name == *name);
+            inside.extend(own.zip(value).and_then(|(own, value)| own.holds(value)));
+            if !self.pair {
+                self.unit = effect.unit().into();
+                self.value = value;
+                self.found_value = own.map(|e| e.value.clone());
+                self.interval = own.map(|e| e.interval.clone());
+            }
         }
+        self.inside = (!inside.is_empty()).then(|| inside.iter().all(|i| *i));
         let gains = diagnosis.ranking.iter().filter_map(|r| r.held_out_gain);
         self.largest_gain = gains.fold(0.0, f64::max);
         self.held_out_before = diagnosis.error.before.held_out;

@@ -57,7 +57,7 @@ impl Proof {
         }
         let mut claimed: Vec<String> = truths
             .iter()
-            .filter(|t| *t != NOTHING && trials.iter().any(|other| other.truth == **t && !other.off_list))
+            .filter(|t| *t != NOTHING && trials.iter().any(|o| o.truth == **t && !o.off_list && !o.pair))
             .cloned()
             .collect();
         for name in trials.iter().flat_map(|t| &t.found) {
@@ -79,7 +79,7 @@ impl Proof {
             .collect();
         let limits = truths
             .iter()
-            .filter(|t| *t != NOTHING && !trials.iter().any(|o| o.truth == **t && o.off_list))
+            .filter(|t| *t != NOTHING && !trials.iter().any(|o| o.truth == **t && (o.off_list || o.pair)))
             .map(|name| Limit::new(name, &trials))
             .collect();
         let inside: Vec<bool> = trials.iter().filter_map(|t| t.inside).collect();
@@ -118,7 +118,7 @@ impl Proof {
                 None => "",
             };
             text.push_str(&format!(
-                "{:18} x{:<4} {:12} {:40} {inside:8} {:10.4} -> {:.4}\n",
+                "{:29} x{:<4} {:12} {:40} {inside:8} {:10.4} -> {:.4}\n",
                 t.truth,
                 t.size,
                 t.verdict_name(),
