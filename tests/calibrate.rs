@@ -128,6 +128,36 @@ fn two_effects_at_once_are_both_found() {
     assert_eq!(d.verdict, SetVerdict::Explained);
 }
 
+/// Single pillars that are gone make a grain that no fit predicts: it is counted as noise, and speaks of the same
+/// share as their mean.
+#[test]
+fn missing_pillars_are_told_by_their_mean_and_by_their_grain() {
+    const SHARE: f64 = 0.04;
+    let folder = tempfile::tempdir().unwrap();
+    small_set(folder.path());
+    let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
+    let settings = Settings {
+        only: ["missing_pillars", "zero_order", "stray_light", "gap"]
+            .map(String::from)
+            .to_vec(),
+        ..settings()
+    };
+    let twins = Twins::new(&like, &settings).unwrap();
+    let exposed = twins.with_effect("missing_pillars", &[SHARE], &Silent).unwrap();
+    let set = twins.draw(&exposed, 31);
+    let mut session = Session::new(&set, settings).unwrap();
+    let atlas = session.atlas(&Silent).unwrap();
+    let d = session.diagnose(&atlas, &Silent).unwrap().0;
+    let found: Vec<&str> = d.effects.iter().map(|e| e.name.as_str()).collect();
+    assert_eq!(found, ["missing_pillars"], "{} {:?}", d.sentence(), d.error);
+    assert_eq!(d.verdict, SetVerdict::Explained);
+    let ends: Vec<f64> = serde_json::from_value(d.effects[0].interval.clone()).unwrap();
+    assert!((ends[0]..=ends[1]).contains(&SHARE), "{ends:?}");
+    let by_grain = d.missing_by_grain.unwrap();
+    // Three thousand grains a capture, and a few draws to tell their size by.
+    assert!((by_grain / SHARE - 1.0).abs() < 0.3, "{by_grain}");
+}
+
 #[test]
 fn a_proof_counts_what_was_said() {
     let folder = tempfile::tempdir().unwrap();

@@ -9,6 +9,8 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::curve::Curve;
+use super::departure::Departure;
+use super::effects::Parameter;
 use super::optics::PixelGrid;
 use super::simulator::Simulator;
 use crate::error::Result;
@@ -19,6 +21,9 @@ const TWO_SIDED: [f64; 4] = [-2.5, -1.25, 1.25, 2.5];
 
 /// And where it can only be positive.
 const ONE_SIDED: [f64; 3] = [0.8, 1.8, 3.5];
+
+/// And about a place that a fit has come to.
+const NEAR: [f64; 4] = [-0.6, -0.3, 0.3, 0.6];
 
 /// How far beyond what was simulated a fit may look, in reaches.
 const BEYOND: f64 = 1.6;
@@ -57,18 +62,7 @@ impl Simulator<'_> {
         for (s, slot) in self.slots.iter().enumerate() {
             let one_sided = slot.parameter.one_sided() && about[s] == 0.0;
             let multiples: &[f64] = if one_sided { &ONE_SIDED } else { &TWO_SIDED };
-            let (low, high) = slot.parameter.range;
-            let offsets: Vec<f64> = multiples
-                .iter()
-                .map(|m| m * slot.parameter.typical)
-                .filter(|o| (low..=high).contains(&(about[s] + o)))
-                .collect();
-            for offset in &offsets {
-                let mut theta = about.to_vec();
-                theta[s] += offset;
-                departures.push(self.departure(&theta));
-            }
-            nodes.push(offsets);
+            nodes.push(self.nodes(about, s, multiples, &mut departures));
         }
         if free {
             for k in 0..FREE_PHASES {
@@ -86,13 +80,7 @@ impl Simulator<'_> {
         }
         let mut exposed = self.expose(&departures, progress)?.into_iter();
         let base = exposed.next().expect("the first is the base");
-        let change = |grids: Vec<PixelGrid>, factor: f32| -> Vec<PixelGrid> {
-            grids
-                .par_iter()
-                .zip(&base)
-                .map(|(g, b)| PixelGrid::combine(&[(g, factor), (b, -factor)]))
-                .collect()
-        };
+        let change = |grids: Vec<PixelGrid>, factor: f32| change(&grids, &base, factor);
         let curves = nodes
             .into_iter()
             .zip(&self.slots)
@@ -134,6 +122,48 @@ impl Simulator<'_> {
         })
     }
 
+    /// Sizes of one number about `about` within what physics allows, with the departures that they are.
+    fn nodes(&self, about: &[f64], s: usize, multiples: &[f64], departures: &mut Vec<Departure>) -> Vec<f64> {
+        let Parameter { typical, range, .. } = self.slots[s].parameter;
+        let offsets = multiples.iter().map(|m| m * typical);
+        let offsets: Vec<f64> = offsets
+            .filter(|o| (range.0..=range.1).contains(&(about[s] + o)))
+            .collect();
+        for offset in &offsets {
+            let mut theta = about.to_vec();
+            theta[s] += offset;
+            departures.push(self.departure(&theta));
+        }
+        offsets
+    }
+
+    /// An atlas about other numbers: those in `slots` are simulated anew close to where they are, the changes of
+    /// all others are taken to add as they did.
+    ///
+    /// # Errors
+    /// As [`Simulator::expose`].
+    pub fn recentred(&self, atlas: &Atlas, about: &[f64], slots: &[usize], progress: &dyn Progress) -> Result<Atlas> {
+        let mut departures = vec![self.departure(about)];
+        let nodes: Vec<Vec<f64>> = slots
+            .iter()
+            .map(|&s| self.nodes(about, s, &NEAR, &mut departures))
+            .collect();
+        let mut exposed = self.expose(&departures, progress)?.into_iter();
+        let base = exposed.next().expect("the first is the base");
+        let mut out = atlas.clone();
+        for (&s, nodes) in slots.iter().zip(nodes) {
+            let grids: Vec<_> = exposed
+                .by_ref()
+                .take(nodes.len())
+                .map(|g| change(&g, &base, 1.0))
+                .collect();
+            out.curves[s] = Curve::new(nodes, grids, false);
+        }
+        out.about = about.to_vec();
+        out.base = Arc::new(base);
+        Ok(out)
+    }
+
     /// Simulate one number at more sizes, where a fit has gone beyond those that are known.
     ///
     /// # Errors
@@ -148,15 +178,18 @@ impl Simulator<'_> {
             })
             .collect();
         for (grids, value) in self.expose(&departures, progress)?.into_iter().zip(values) {
-            let change = grids
-                .iter()
-                .zip(atlas.base.iter())
-                .map(|(g, b)| PixelGrid::combine(&[(g, 1.0), (b, -1.0)]))
-                .collect();
+            let change = change(&grids, &atlas.base, 1.0);
             atlas.curves[slot].add(value - atlas.about[slot], change);
         }
         Ok(())
     }
+}
+
+fn change(grids: &[PixelGrid], base: &[PixelGrid], factor: f32) -> Vec<PixelGrid> {
+    let pairs = grids.par_iter().zip(base);
+    pairs
+        .map(|(g, b)| PixelGrid::combine(&[(g, factor), (b, -factor)]))
+        .collect()
 }
 
 impl Atlas {

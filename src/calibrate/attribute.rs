@@ -74,6 +74,9 @@ pub fn attribute(
         runners.clone_from(&earlier.runners);
         let active: Vec<usize> = chosen.iter().flat_map(|&e| simulator.slots_of(e)).collect();
         now = problem.fit(&active, &now);
+        if exact {
+            now = problem.settle(now, progress)?;
+        }
         held_now = held_out(&problem, &now.forms, &now);
         (before, held_before) = (earlier.before.clone(), earlier.held_before.clone());
         placebo_held_out = earlier.placebo_held_out;

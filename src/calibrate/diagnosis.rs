@@ -105,6 +105,8 @@ pub struct Diagnosis {
     pub later_rankings: Vec<Vec<Ranked>>,
     /// Share of the residual's energy above noise that is left.
     pub unexplained_share: f64,
+    /// Share of missing pillars by the grain that they leave, where that was counted as noise in the error after.
+    pub missing_by_grain: Option<f64>,
     pub left_out: Vec<LeftOut>,
     /// Held-out error of each capture before and after.
     pub captures: Vec<CaptureError>,
@@ -229,6 +231,7 @@ impl Diagnosis {
             ranking: ranked(&finding.ranking),
             later_rankings: finding.later.iter().map(ranked).collect(),
             unexplained_share,
+            missing_by_grain: finding.by_grain,
             left_out,
             captures: session
                 .set()
@@ -266,6 +269,7 @@ impl Diagnosis {
             ranking: Vec::new(),
             later_rankings: Vec::new(),
             unexplained_share: 1.0,
+            missing_by_grain: None,
             left_out,
             captures: Vec::new(),
             ladder: Vec::new(),

@@ -172,9 +172,10 @@ impl<'a> Session<'a> {
                 break;
             }
             let (data, used) = (&self.data, &self.used);
+            let after = &finding.after;
             let nearer = self
                 .simulator
-                .atlas(&finding.after.theta, self.settings.free, progress)?;
+                .recentred(&finding.atlas, &after.theta, &after.active, progress)?;
             let next = attribute(&self.simulator, &nearer, data, used, exact, Some(&finding), progress)?;
             let (before, after) = (mean(&finding.held_after), mean(&next.held_after));
             if after >= before {
@@ -204,19 +205,18 @@ impl<'a> Session<'a> {
         let slot = self.simulator.slots_of(effect)[0];
         let problem = self.problem(atlas);
         let fit = problem.fit(&[slot], &problem.nothing());
+        if fit.theta[slot] <= 0.0 {
+            return Ok(None);
+        }
         let speckle = Speckle::of(self, &fit, slot, progress)?;
         let mut share = speckle.share(&problem, &fit);
         let mut data = speckle.counted(&problem, &fit, share);
-        for round in 1.. {
-            let mut found = attribute(
-                &self.simulator,
-                atlas,
-                &data,
-                &self.used,
-                self.settings.exact,
-                None,
-                progress,
-            )?;
+        for _ in 0..ROUNDS {
+            if !Speckle::conceivable(share) {
+                break;
+            }
+            let exact = self.settings.exact;
+            let mut found = attribute(&self.simulator, atlas, &data, &self.used, exact, None, progress)?;
             // Judged by the noise of the camera alone, from which the grain is told.
             let bare = Problem {
                 atlas: found.atlas.clone(),
@@ -224,25 +224,16 @@ impl<'a> Session<'a> {
                 ..self.problem(atlas)
             };
             let next = speckle.share(&bare, &found.after);
-            let settled = (next / share - 1.0).abs() < SHARE_AT_REST;
-            if settled || round == ROUNDS {
+            if (next / share - 1.0).abs() < SHARE_AT_REST {
                 let by_mean = found.after.theta[slot];
                 let agree = (by_mean - share).abs() <= SHARES_AGREE * share.max(by_mean);
                 let whole = mean(&found.held_after) < RESIDUAL;
-                if std::env::var_os("GRAIN").is_some() {
-                    eprintln!(
-                        "grain: share {share} next {next} by_mean {by_mean} held {} chosen {:?} chi2 {:?}",
-                        mean(&found.held_after),
-                        found.chosen,
-                        found.held_after
-                    );
-                }
                 if !(found.chosen.contains(&effect) && agree && whole) {
-                    return Ok(None);
+                    break;
                 }
                 found.by_grain = Some(share);
                 found.before = plain.before.clone();
-                found.held_before = plain.held_before.clone();
+                found.held_before.clone_from(&plain.held_before);
                 return Ok(Some((data, found)));
             }
             share = next;

@@ -103,6 +103,11 @@ impl Speckle {
         (0.5 * (low + high)).exp()
     }
 
+    /// Whether a share is one that pillars are missing by, and not the end of the search.
+    pub fn conceivable(share: f64) -> bool {
+        share > 2.0 * SHARES.0 && share < 0.9 * SHARES.1
+    }
+
     /// The data with the grain of a share of missing pillars counted as noise.
     pub fn counted(&self, problem: &Problem<'_>, fit: &Fit, share: f64) -> Data {
         let p = (share * (1.0 - share)) as f32;
@@ -142,33 +147,42 @@ impl Speckle {
 }
 
 impl Grain {
-    /// Least squares of squared departures on the light, both relative to it so that dim pixels count.
+    /// What makes the draws most likely: least squares of squared departures on the light, each weighed by its
+    /// own variance, a few times over.
     fn between(light: &Array2<f32>, drawn: &[Array2<f32>], unit: f64) -> Self {
-        let mean = f64::from(light.mean().unwrap_or(0.0)).max(1e-6);
-        let mut sums = [0.0; 5];
-        for own in drawn {
-            for (i, d) in light.iter().zip(own) {
-                let i = f64::from(*i).max(0.0);
-                let square = (f64::from(*d) - i).powi(2) / unit;
-                let weight = (i + mean).powi(-2);
-                let terms = [i * i, i, 1.0, i * square, square];
-                sums.iter_mut().zip(terms).for_each(|(s, t)| *s += weight * t);
+        let mut now = Self {
+            by_light: 1.0,
+            floor: f64::from(light.mean().unwrap_or(0.0)).max(1e-6),
+        };
+        for _ in 0..TURNS {
+            let mut sums = [0.0; 5];
+            for own in drawn {
+                for (i, d) in light.iter().zip(own) {
+                    let i = f64::from(*i).max(0.0);
+                    let square = (f64::from(*d) - i).powi(2) / unit;
+                    let weight = (now.by_light * i + now.floor).powi(-2);
+                    let terms = [i * i, i, 1.0, i * square, square];
+                    sums.iter_mut().zip(terms).for_each(|(s, t)| *s += weight * t);
+                }
             }
-        }
-        let [ii, i, one, is, s] = sums;
-        let determinant = ii * one - i * i;
-        let by_light = ((is * one - i * s) / determinant).max(0.0);
-        let floor = ((ii * s - i * is) / determinant).max(0.0);
-        if by_light.is_finite() && floor.is_finite() {
-            Self { by_light, floor }
-        } else {
-            Self {
-                by_light: 0.0,
-                floor: s / one,
+            let [ii, i, one, is, s] = sums;
+            let by_light = ((is * one - i * s) / (ii * one - i * i)).max(0.0);
+            // No less than a trace, lest dark pixels outweigh all others.
+            let floor = ((s - by_light * i) / one).max(FLOOR * (s / one));
+            if !(by_light.is_finite() && floor.is_finite()) {
+                break;
             }
+            now = Self { by_light, floor };
         }
+        now
     }
 }
+
+/// Turns in which the weights of the pixels settle.
+const TURNS: usize = 5;
+
+/// Least share of the mean variance that a pixel without light has.
+const FLOOR: f64 = 1e-3;
 
 #[cfg(test)]
 mod tests {

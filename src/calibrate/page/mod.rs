@@ -54,6 +54,12 @@ pub fn write_page(
     page.paragraph(
         "Errors are chi-square a pixel: one is noise alone. Held out means predicted by a fit that has not seen the colour, the element or the distance of the capture; its placement, flux and black level alone are adjusted.",
     );
+    if let Some(share) = diagnosis.missing_by_grain {
+        page.paragraph(format!(
+            "Single missing pillars leave a grain that no numbers predict; its variance is known and counts as noise in the errors after. By that grain alone, {} % of the pillars are missing.",
+            sig(100.0 * share, 3)
+        ));
+    }
     effects(&mut page, diagnosis);
     ladder(&mut page, session, diagnosis);
     if let Some(finding) = finding {
