@@ -2,7 +2,8 @@
 //!
 //! Geometric mean (smallest) of the Strehl ratio on axis, half way between the wavelengths that were optimised on,
 //! for two focal lengths, two cells and several limits on the phase step. The rigorous cells use the table that
-//! `metalith` keeps, and make it first if there is none.
+//! `metalith` keeps, and make it first if there is none. A number after `--` is that of blocks after the sweeps
+//! over single rings, 0 for none.
 
 use std::path::Path;
 use std::time::Instant;
@@ -10,11 +11,17 @@ use std::time::Instant;
 use metalith::cell::{InversePolynomial, PublishedCell, RigorousCell, cache_folder};
 use metalith::design::SolverSpec;
 use metalith::optimise::{Checkpoint, Task};
-use metalith::{CellModel, Design, Fidelity, Result, Silent};
+use metalith::{CellModel, Design, Error, Fidelity, Result, Silent};
 
 fn main() -> Result<()> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs");
     let shipped = Design::read(&folder.join("broadband_3x3.toml"))?;
+    let blocks = match std::env::args().nth(1) {
+        Some(number) => number
+            .parse()
+            .map_err(|_| Error::invalid("no number of blocks", "give 0 or more"))?,
+        None => 60,
+    };
     println!("focal length  cell       mapping    limit  Strehl (smallest)   wall s");
     let published = InversePolynomial::published();
     for focal_length_um in [2400.0, 2000.0] {
@@ -37,7 +44,10 @@ fn main() -> Result<()> {
                         chains: 4,
                         hot_sweeps: 150,
                         temperature: (1e-3, 3e-5),
+                        blocks,
                     };
+                } else if let SolverSpec::Exchange { blocks: most, .. } = &mut design.optimise.solver {
+                    *most = blocks;
                 }
                 let cell: Box<dyn CellModel> = match fidelity {
                     Fidelity::Published => Box::new(PublishedCell::new(design.cell.pitch_nm)),
@@ -48,7 +58,7 @@ fn main() -> Result<()> {
                 let found = task.solve(&[cell.as_ref()], Checkpoint::begin(&design), &Silent)?;
                 let judged = task.judge_rings(&found.turns, cell.as_ref())?;
                 println!(
-                    "{focal_length_um:9} um  {:9}  {mapping:9}  {limit:5}  {:.4} ({:.4})     {:6.1}",
+                    "{focal_length_um:9} um  {:9}  {mapping:9}  {limit:5}  {:.5} ({:.4})     {:6.1}",
                     fidelity.name(),
                     judged.geometric_mean,
                     judged.smallest,

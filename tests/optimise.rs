@@ -3,7 +3,7 @@
 
 use std::fs;
 use std::path::Path;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use assert_cmd::Command;
 use metalith::cell::PublishedCell;
@@ -51,20 +51,33 @@ fn the_kernel_agrees_with_direct_sum_and_fold() {
     assert!(error < FOLD, "{error:e}");
 }
 
-/// Says stop once so many steps are done.
-struct StopAfter(AtomicU64, u64);
+/// Says stop once a solver has asked so often.
+struct StopAfter {
+    asked: AtomicU64,
+    often: u64,
+    solving: AtomicBool,
+}
+
+impl StopAfter {
+    fn new(often: u64) -> Self {
+        Self {
+            asked: AtomicU64::new(0),
+            often,
+            solving: AtomicBool::new(false),
+        }
+    }
+}
 
 impl Progress for StopAfter {
-    fn begin(&self, _what: &str, _steps: u64) {
-        self.0.store(0, Ordering::SeqCst);
+    fn begin(&self, what: &str, _steps: u64) {
+        let solving = ["exchange", "exchange of blocks", "Adam"].contains(&what);
+        self.solving.store(solving, Ordering::SeqCst);
     }
 
-    fn advance(&self, steps: u64) {
-        self.0.fetch_add(steps, Ordering::SeqCst);
-    }
+    fn advance(&self, _steps: u64) {}
 
     fn stopped(&self) -> bool {
-        self.0.load(Ordering::SeqCst) >= self.1
+        self.solving.load(Ordering::SeqCst) && self.asked.fetch_add(1, Ordering::SeqCst) >= self.often
     }
 }
 
@@ -79,10 +92,14 @@ fn design(folder: &Path, optimise: &str) -> std::path::PathBuf {
 const EXCHANGE: &str = "[optimise]\ncell = \"published\"\nstep_nm = 5\nchains = 3\nhot_sweeps = 12\nseed = 4\n";
 const ADAM: &str =
     "[optimise]\ncell = \"published\"\nstep_nm = 5\nsolver = \"adam\"\nstart = \"hyperbolic\"\nsteps = 40\n";
+/// Of few views of a small window; two merits in one sum.
+const IMAGES: &str = "[optimise]\ncell = \"published\"\nstep_nm = 5\nstart = \"hyperbolic\"\nblocks = 24\n\
+    [optimise.merit]\ndeconvolution = 1\nlog = 0.01\n\
+    [optimise.views]\nangles_deg = [0, 15]\nstep_nm = 30\npixels = 16\n";
 
 #[test]
 fn an_interrupted_run_goes_on_to_the_same_end() {
-    for section in [EXCHANGE, ADAM] {
+    for section in [EXCHANGE, ADAM, IMAGES] {
         let folder = tempfile::tempdir().unwrap();
         let design = Design::read(&design(folder.path(), section)).unwrap();
         let (task, cell) = (Task::of(&design).unwrap(), PublishedCell::new(350));
@@ -92,14 +109,22 @@ fn an_interrupted_run_goes_on_to_the_same_end() {
         assert!(whole.interrupted.is_none());
         assert!(largest_step(&whole.turns) <= 0.2 + 1e-9);
 
-        let stop = StopAfter(AtomicU64::new(0), 7);
-        let part = task.solve(&cells, begin(), &stop).unwrap();
-        assert!(largest_step(&part.turns) <= 0.2 + 1e-9);
+        // Over and over, in every stage.
         let kept = folder.path().join("checkpoint.json");
-        part.interrupted.expect("it was stopped").save(&kept).unwrap();
-        let checkpoint = Checkpoint::load(&kept, &design).unwrap();
-        assert!(checkpoint.begun());
-        let rest = task.solve(&cells, checkpoint, &Silent).unwrap();
+        let (mut checkpoint, mut interruptions) = (begin(), 0);
+        let rest = loop {
+            let part = task.solve(&cells, checkpoint, &StopAfter::new(14)).unwrap();
+            assert!(largest_step(&part.turns) <= 0.2 + 1e-9);
+            let Some(interrupted) = part.interrupted else {
+                break part;
+            };
+            interruptions += 1;
+            assert!(interruptions < 100);
+            interrupted.save(&kept).unwrap();
+            checkpoint = Checkpoint::load(&kept, &design).unwrap();
+            assert!(checkpoint.begun());
+        };
+        assert!(interruptions > 0);
         assert_eq!(rest.widths_nm, whole.widths_nm);
         assert_eq!(rest.merit, whole.merit);
 
@@ -176,14 +201,13 @@ fn the_phase_of_the_command_becomes_a_layout_that_keeps_the_limit() {
 #[test]
 fn mistakes_of_the_section_are_found_together() {
     let folder = tempfile::tempdir().unwrap();
-    let section =
-        "[optimise]\nsolver = \"exchange\"\nstep_limit_turns = 0.7\nseeed = 1\n[optimise.merit]\ndeconvolution = 1\n";
+    let section = "[optimise]\nsolver = \"exchange\"\nstep_limit_turns = 0.7\nseeed = 1\nblocks = -1\n[optimise.merit]\nlog = 0\n";
     let error = Design::read(&design(folder.path(), section)).unwrap_err();
     let metalith::Error::Text(faults) = error else {
         panic!("{error}")
     };
     let all = format!("{faults:?}");
-    for part in ["step_limit_turns", "seeed", "exchange cannot take"] {
+    for part in ["step_limit_turns", "seeed", "blocks", "weight of zero"] {
         assert!(all.contains(part), "{part} in {all}");
     }
 }

@@ -32,13 +32,16 @@ pub struct OptimiseSpec {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SolverSpec {
-    /// Ring by ring, the best of all widths.
+    /// Ring by ring, the best of all widths, and then blocks of rings. With the merit `deconvolution`, blocks
+    /// alone; chains, sweeps and temperature are those that make the start `log`.
     Exchange {
         /// Exchanges that begin from different phases or seeds.
         chains: u32,
         hot_sweeps: u32,
         /// First and last temperature, in units of the merit.
         temperature: (f64, f64),
+        /// Blocks at most; they end when none promises any gain.
+        blocks: u32,
     },
     /// Up the gradient.
     Adam { steps: u32, rate_turns: f64 },
@@ -158,13 +161,6 @@ impl OptimiseSpec {
                 .optional_integer("memory_mb", 16..=1 << 20, "MB")
                 .map_or(if images { 8192 } else { default.memory_mb }, |m| m as u64),
         };
-        if images && matches!(spec.solver, SolverSpec::Exchange { .. }) {
-            s.fault(
-                "solver",
-                "exchange cannot take the merit `deconvolution`",
-                "use solver = \"adam\", which begins from what exchange makes of `log`",
-            );
-        }
         s.finish();
         spec
     }
@@ -199,19 +195,23 @@ impl SolverSpec {
     /// Chains, hot sweeps and temperatures of an exchange where nothing else is asked for.
     pub(crate) const ANNEALED: (u32, u32, (f64, f64)) = (4, 60, (3e-3, 1e-4));
 
+    /// Blocks after the sweeps, and of image errors: where they commonly gain no more.
+    const BLOCKS: (u32, u32) = (60, 120);
+
     const EXCHANGE: Self = {
         let (chains, hot_sweeps, temperature) = Self::ANNEALED;
         Self::Exchange {
             chains,
             hot_sweeps,
             temperature,
+            blocks: Self::BLOCKS.0,
         }
     };
 
     fn read(s: &Section<'_, '_>, images: bool) -> Self {
         let words = [("exchange", false), ("adam", true)];
         let (chains, hot_sweeps, temperature) = Self::ANNEALED;
-        if s.choice("solver", &words, Some(images)) {
+        if s.choice("solver", &words, Some(false)) {
             Self::Adam {
                 steps: s.optional_integer("steps", 1..=1_000_000, "").unwrap_or(400) as u32,
                 rate_turns: s
@@ -228,6 +228,9 @@ impl SolverSpec {
                     .optional_integer("hot_sweeps", 0..=100_000, "")
                     .map_or(hot_sweeps, |n| n as u32),
                 temperature,
+                blocks: s
+                    .optional_integer("blocks", 0..=1_000_000, "")
+                    .map_or(if images { Self::BLOCKS.1 } else { Self::BLOCKS.0 }, |n| n as u32),
             }
         }
     }

@@ -26,6 +26,15 @@ pub struct Checkpoint {
 pub(crate) struct Chain {
     pub sweep: u32,
     pub turns: Numbers,
+    /// Its blocks, if its sweeps are done.
+    pub blocks: Option<BlockState>,
+}
+
+/// An exchange of blocks between two of them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct BlockState {
+    pub block: u32,
+    pub shares: Numbers,
 }
 
 /// Numbers kept to the last bit, as the text of a decimal fraction need not.

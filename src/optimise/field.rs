@@ -1,5 +1,4 @@
-//! Merits of the field at a few points: linear in the transmission of each ring, and quick to change
-//! one ring at a time.
+//! The field at a few points, linear in the transmission of each ring: kernel and transmissions.
 
 use std::ops::Range;
 
@@ -68,7 +67,7 @@ pub struct FieldProblem {
     kernel: Planes,
     /// Transmission, `[width_nm][row]`, made width taken from the designed one.
     table: Planes,
-    mapping: Mapping,
+    pub(super) mapping: Mapping,
 }
 
 impl FieldProblem {
@@ -162,102 +161,6 @@ impl FieldProblem {
     pub(crate) fn transmission_of(&self, width_nm: u16) -> (&[f32], &[f32]) {
         self.table.row(usize::from(width_nm), self.rows)
     }
-
-    /// Merit if ring `k` has pillars of `width_nm[k]`.
-    pub fn merit_of_widths(&self, width_nm: &[u16]) -> f64 {
-        let fields = self.fields(|ring| (f64::from(width_nm[ring]), 0.0));
-        self.merit(&fields)
-    }
-
-    /// Merit at continuous phases [turns], widths not rounded. Its gradient [1/turn] is added to
-    /// `gradient`.
-    pub fn merit_of_phases(&self, turns: &[f64], gradient: Option<&mut [f64]>) -> f64 {
-        let widths = turns.iter().map(|&t| self.mapping.width_nm(t)).collect::<Vec<_>>();
-        let fields = self.fields(|ring| widths[ring]);
-        let merit = self.merit(&fields);
-        if let Some(gradient) = gradient {
-            let adjoint = self.field_gradient(&fields);
-            for (ring, slope) in gradient.iter_mut().enumerate() {
-                *slope += self.adjoint(ring, widths[ring].0, &adjoint) * widths[ring].1;
-            }
-        }
-        merit
-    }
-
-    /// Fields of all rows, in double precision.
-    pub(crate) fn fields(&self, width_of: impl Fn(usize) -> (f64, f64)) -> Vec<Complex64> {
-        let mut fields = vec![Complex64::ZERO; self.rows];
-        for ring in 0..self.rings {
-            let (k_re, k_im) = self.kernel_of(ring);
-            let (low, high, part) = self.bracket(width_of(ring).0);
-            for (i, field) in fields.iter_mut().enumerate() {
-                let re = low.0[i] + part * (high.0[i] - low.0[i]);
-                let im = low.1[i] + part * (high.1[i] - low.1[i]);
-                field.re += f64::from(k_re[i] * re - k_im[i] * im);
-                field.im += f64::from(k_re[i] * im + k_im[i] * re);
-            }
-        }
-        fields
-    }
-
-    /// The merit of given fields.
-    pub(crate) fn merit(&self, fields: &[Complex64]) -> f64 {
-        self.blocks
-            .iter()
-            .map(|block| {
-                let rows = block.rows.start..block.rows.start + block.live;
-                let sum = match block.kind {
-                    Kind::Log => {
-                        fields[rows].iter().map(|e| (e.norm_sqr() + FLOOR).ln()).sum::<f64>() / block.live as f64
-                    }
-                    Kind::Linear => fields[rows.clone()]
-                        .iter()
-                        .zip(&self.row_weight[rows])
-                        .map(|(e, &w)| f64::from(w) * e.norm_sqr())
-                        .sum(),
-                };
-                block.weight * sum
-            })
-            .sum()
-    }
-
-    /// Derivative of the merit by the conjugate of each field (Wirtinger).
-    fn field_gradient(&self, fields: &[Complex64]) -> Vec<Complex64> {
-        let mut gradient = vec![Complex64::ZERO; self.rows];
-        for block in &self.blocks {
-            for i in block.rows.start..block.rows.start + block.live {
-                let scale = match block.kind {
-                    Kind::Log => 1.0 / (block.live as f64 * (fields[i].norm_sqr() + FLOOR)),
-                    Kind::Linear => f64::from(self.row_weight[i]),
-                };
-                gradient[i] = block.weight * scale * fields[i];
-            }
-        }
-        gradient
-    }
-
-    /// Derivative of the merit by the width of one ring: twice the real part of <field gradient, dE/dw>.
-    fn adjoint(&self, ring: usize, width_nm: f64, field_gradient: &[Complex64]) -> f64 {
-        let (k_re, k_im) = self.kernel_of(ring);
-        let (low, high, _) = self.bracket(width_nm);
-        let mut sum = 0.0;
-        for (i, g) in field_gradient.iter().enumerate() {
-            let (re, im) = (high.0[i] - low.0[i], high.1[i] - low.1[i]);
-            sum += g.re * f64::from(k_re[i] * re - k_im[i] * im) + g.im * f64::from(k_re[i] * im + k_im[i] * re);
-        }
-        2.0 * sum
-    }
-
-    /// The two whole widths about one, and how far it is from the lower to the upper.
-    #[allow(clippy::type_complexity)] // two pairs of planes
-    fn bracket(&self, width_nm: f64) -> ((&[f32], &[f32]), (&[f32], &[f32]), f32) {
-        let low = (width_nm.max(0.0) as u16).min(self.mapping.max_width_nm());
-        (
-            self.transmission_of(low),
-            self.transmission_of(low + 1),
-            (width_nm - f64::from(low)) as f32,
-        )
-    }
 }
 
 /// Transmission of every whole width at every row, with the width's error taken in by interpolation.
@@ -302,7 +205,7 @@ fn transmissions(conditions: &[Option<Condition>], cells: &[&dyn CellModel], wid
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::super::focus::{FabricationError, Lens};
     use super::super::mapping::tests::published;
     use super::super::rings::Rings;
@@ -311,13 +214,13 @@ mod tests {
     use crate::cell::PublishedCell;
     use crate::lattice::Lattice;
 
-    fn lens() -> Lens {
+    pub(crate) fn lens() -> Lens {
         let rings = Rings::new(Lattice::covering(60_000, 350).unwrap(), 60_000).unwrap();
         Lens { rings, gap_um: 144.0 }
     }
 
     /// Two blocks of each kind, one of them made 5 nm too wide.
-    fn problem() -> FieldProblem {
+    pub(crate) fn problem() -> FieldProblem {
         let (lens, cell) = (lens(), PublishedCell::new(350));
         let cells: [&dyn CellModel; 1] = [&cell];
         let wide = FabricationError {
@@ -337,7 +240,7 @@ mod tests {
     }
 
     /// Phases whose widths are half way between whole ones: transmission is a straight line between those.
-    fn start() -> Vec<f64> {
+    pub(crate) fn start() -> Vec<f64> {
         let mapping = published();
         let turns = Start::Hyperbolic { wavelength_um: 0.55 }.turns(&lens(), 0);
         let uneven = turns.iter().enumerate().map(|(i, t)| t + 0.1 * (i as f64 * 1.7).sin());
@@ -347,106 +250,6 @@ mod tests {
                 t + (width.floor() + 0.5 - width) / slope
             })
             .collect()
-    }
-
-    #[test]
-    fn the_gradient_is_that_of_differences() {
-        /// Single precision of the kernel, and the square of the difference, against the largest slope.
-        const TOLERANCE: f64 = 2e-3;
-        let (problem, turns, h) = (problem(), start(), 1e-3);
-        let mut gradient = vec![0.0; problem.rings()];
-        problem.merit_of_phases(&turns, Some(&mut gradient));
-        let largest = gradient.iter().map(|g| g.abs()).fold(0.0, f64::max);
-        for ring in (0..problem.rings()).step_by(7) {
-            let at = |h: f64| {
-                let mut moved = turns.clone();
-                moved[ring] += h;
-                problem.merit_of_phases(&moved, None)
-            };
-            let difference = (at(h) - at(-h)) / (2.0 * h);
-            assert!(
-                (difference - gradient[ring]).abs() < TOLERANCE * largest,
-                "ring {ring}: {difference} {}",
-                gradient[ring]
-            );
-        }
-    }
-
-    /// <g, A d> = <A* g, d> for the derivative A of the fields by the widths.
-    #[test]
-    fn the_adjoint_is_the_adjoint() {
-        /// Sums of some thousand terms of single precision.
-        const TOLERANCE: f64 = 1e-5;
-        let problem = problem();
-        let widths = start()
-            .iter()
-            .map(|&t| problem.mapping().width_nm(t).0)
-            .collect::<Vec<_>>();
-        let (h, d) = (
-            0.45,
-            (0..widths.len()).map(|i| (i as f64 * 0.9).cos()).collect::<Vec<_>>(),
-        );
-        let g = (0..problem.rows())
-            .map(|i| Complex64::cis(i as f64 * 2.3))
-            .collect::<Vec<_>>();
-        // Transmission is a straight line between whole widths: stay between them.
-        let whole = |w: f64| w.floor() + 0.5;
-        let fields = |s: f64| problem.fields(|ring| (whole(widths[ring]) + s * d[ring], 0.0));
-        let (plus, minus) = (fields(h), fields(-h));
-        let inner = |a: &Complex64, b: Complex64| a.re * b.re + a.im * b.im;
-        let left = g
-            .iter()
-            .zip(plus.iter().zip(&minus))
-            .map(|(g, (p, m))| 2.0 * inner(g, (p - m) / (2.0 * h)))
-            .sum::<f64>();
-        let right = d
-            .iter()
-            .enumerate()
-            .map(|(ring, d)| d * problem.adjoint(ring, whole(widths[ring]), &g))
-            .sum::<f64>();
-        let scale = d
-            .iter()
-            .enumerate()
-            .map(|(ring, d)| (d * problem.adjoint(ring, whole(widths[ring]), &g)).abs())
-            .sum::<f64>();
-        assert!((left - right).abs() < TOLERANCE * scale, "{left} {right} of {scale}");
-    }
-
-    /// Scores of candidates against the merit with each of them in place.
-    #[test]
-    fn scores_are_differences_of_the_merit() {
-        /// Single precision over a hundred rows.
-        const TOLERANCE: f64 = 2e-5;
-        let problem = problem();
-        let mapping = problem.mapping();
-        let mut widths = start()
-            .iter()
-            .map(|&t| mapping.choices()[mapping.nearest(t)].width_nm)
-            .collect::<Vec<_>>();
-        let ring = 40;
-        let all = mapping.choices().iter().map(|c| c.width_nm).collect::<Vec<_>>();
-        let (k, t) = (problem.kernel_of(ring), problem.transmission_of(widths[ring]));
-        let exact = problem.fields(|r| (f64::from(widths[r]), 0.0));
-        let mut without = Planes::zeros(problem.rows());
-        let mut one_over_now = vec![0.0; problem.rows()];
-        for (i, e) in exact.iter().enumerate() {
-            without.re[i] = e.re as f32 - (k.0[i] * t.0[i] - k.1[i] * t.1[i]);
-            without.im[i] = e.im as f32 - (k.0[i] * t.1[i] + k.1[i] * t.0[i]);
-            one_over_now[i] = 1.0 / (e.norm_sqr() + FLOOR) as f32;
-        }
-        let mut scores = vec![0.0; all.len()];
-        problem.score(ring, &without, &one_over_now, &all, &mut scores);
-        let merits = all
-            .iter()
-            .map(|&w| {
-                widths[ring] = w;
-                problem.merit_of_widths(&widths)
-            })
-            .collect::<Vec<_>>();
-        for i in 1..all.len() {
-            let (quick, exact) = (scores[i] - scores[0], merits[i] - merits[0]);
-            assert!((quick - exact).abs() < TOLERANCE, "{} nm: {quick} {exact}", all[i]);
-        }
     }
 
     #[test]

@@ -48,6 +48,11 @@ impl Mapping {
         &self.choices
     }
 
+    /// Widths of given choices [nm].
+    pub(crate) fn widths_of(&self, choices: &[usize]) -> Vec<u16> {
+        choices.iter().map(|&c| self.choices[c].width_nm).collect()
+    }
+
     /// Largest width [nm].
     pub fn max_width_nm(&self) -> u16 {
         self.choices.iter().map(|c| c.width_nm).max().unwrap_or(0)

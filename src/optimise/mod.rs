@@ -1,15 +1,18 @@
 //! The radial phase that all elements share, optimised ring by ring.
 //!
 //! ```text
-//! Design -> Task -> (cells) -> kernels -> Exchange or Adam -> Optimised -> phase table, Findings
+//! Design -> Task -> (cells) -> kernels -> Exchange, BlockExchange or Adam -> Optimised -> phase table, Findings
 //! ```
 //!
 //! The field of one lens at one wavelength and angle is linear in the complex transmission of its
 //! [`Rings`]. Two kernels are built once from the real sites of the lattice: that of the field at a few
 //! points on or near the axis ([`Lens::focal_rows`], [`FieldProblem`]) and that of the field over a wide
-//! window about the chief ray ([`Pupil`], [`Deconvolution`]). [`Exchange`] sets one ring after the other to
-//! the best of all widths there are; [`Adam`] climbs an [`Objective`]'s gradient. Both keep the
-//! [`StepLimit`] from ring to ring at all times, since a cell's transmission is that of a lattice of its like.
+//! window about the chief ray ([`Pupil`], [`Deconvolution`]). Both are an [`Objective`].
+//!
+//! [`Exchange`] sets one ring after the other to the best of all widths there are, which takes a merit that
+//! is cheap to change one ring at a time: that of a few points. [`BlockExchange`] moves many rings at once
+//! and takes any objective. [`Adam`] climbs an objective's gradient. All keep the [`StepLimit`] from ring to
+//! ring at all times, since a cell's transmission is that of a lattice of its like.
 //!
 //! Merits are such that larger is better: the mean Strehl ratio (`sum`, the paper's first stage), the mean
 //! of its logarithm (`log`), less the energy in side lobes (`side_lobes`), less the expected error of
@@ -18,11 +21,15 @@
 
 mod adam;
 mod bessel;
+mod blocks;
+mod chain;
 mod checkpoint;
 mod deconvolution;
 mod exchange;
 mod field;
+mod field_merit;
 mod focus;
+mod image_slopes;
 mod imaging;
 mod judge;
 mod kernel;
@@ -38,15 +45,18 @@ mod rings;
 mod robust;
 mod run;
 mod score;
+mod solve;
 mod spectrum;
 mod start;
 mod table;
+mod views;
 mod wiener;
 
 pub use adam::Adam;
 pub use bessel::Bessel;
+pub use blocks::BlockExchange;
 pub use checkpoint::Checkpoint;
-pub use deconvolution::{Deconvolution, Views};
+pub use deconvolution::Deconvolution;
 pub use exchange::{Exchange, Schedule};
 pub use field::{Condition, FieldProblem, Kind, Row};
 pub use focus::{FabricationError, Lens, Strehl, judging_wavelengths, wavelengths};
@@ -66,4 +76,5 @@ pub use run::{Optimised, Task, turns_of};
 pub use spectrum::OverWavelength;
 pub use start::Start;
 pub use table::write_phase_table;
+pub use views::Views;
 pub use wiener::Scene;

@@ -1,33 +1,25 @@
 //! What a gradient climbs.
 
-use super::field::FieldProblem;
-
 /// A merit of the phases of the rings; larger is better.
 pub trait Objective: Sync {
-    /// The merit at phases [turns].
-    fn merit(&self, turns: &[f64]) -> f64;
+    /// The merit with pillars of `widths_nm[k]` in ring `k`.
+    fn merit(&self, widths_nm: &[u16]) -> f64;
 
     /// The merit that step `step` climbs, with its gradient [1/turn] added to `gradient`. Parts that are
     /// drawn afresh for each step depend on the seed and the step alone.
     fn climb(&self, turns: &[f64], seed: u64, step: u32, gradient: &mut [f64]) -> f64;
-}
 
-impl Objective for FieldProblem {
-    fn merit(&self, turns: &[f64]) -> f64 {
-        self.merit_of_phases(turns, None)
-    }
-
-    fn climb(&self, turns: &[f64], _seed: u64, _step: u32, gradient: &mut [f64]) -> f64 {
-        self.merit_of_phases(turns, Some(gradient))
-    }
+    /// The merit with pillars of `widths_nm`, and what each choice in each ring would add to it to first order
+    /// in the ring's transmissions, all resonances in them: added to `gains`, `[ring][choice]`.
+    fn expand(&self, widths_nm: &[u16], gains: &mut [f64]) -> f64;
 }
 
 /// A weighted sum of merits.
 pub struct Sum<'o>(pub Vec<(f64, &'o dyn Objective)>);
 
 impl Objective for Sum<'_> {
-    fn merit(&self, turns: &[f64]) -> f64 {
-        self.0.iter().map(|(weight, part)| weight * part.merit(turns)).sum()
+    fn merit(&self, widths_nm: &[u16]) -> f64 {
+        self.0.iter().map(|(weight, part)| weight * part.merit(widths_nm)).sum()
     }
 
     fn climb(&self, turns: &[f64], seed: u64, step: u32, gradient: &mut [f64]) -> f64 {
@@ -36,6 +28,16 @@ impl Objective for Sum<'_> {
             let mut own = vec![0.0; gradient.len()];
             merit += weight * part.climb(turns, seed, step, &mut own);
             gradient.iter_mut().zip(own).for_each(|(g, o)| *g += weight * o);
+        }
+        merit
+    }
+
+    fn expand(&self, widths_nm: &[u16], gains: &mut [f64]) -> f64 {
+        let mut merit = 0.0;
+        for (weight, part) in &self.0 {
+            let mut own = vec![0.0; gains.len()];
+            merit += weight * part.expand(widths_nm, &mut own);
+            gains.iter_mut().zip(own).for_each(|(g, o)| *g += weight * o);
         }
         merit
     }

@@ -4,13 +4,14 @@ use num_complex::Complex32;
 use rayon::prelude::*;
 
 use super::bessel::Bessel;
-use super::deconvolution::{Deconvolution, Views};
+use super::deconvolution::Deconvolution;
 use super::field::{Condition, FieldProblem, Kind, Row};
 use super::focus::{FabricationError, Lens, wavelengths};
 use super::kernel::RingField;
 use super::mapping::Mapping;
 use super::pupil::Window;
 use super::robust;
+use super::views::Views;
 use super::wiener::Scene;
 use crate::cell::CellModel;
 use crate::design::{MeritSpec, OptimiseSpec, ViewSpec};

@@ -98,3 +98,46 @@ impl Trial<'_> {
         sum.iter().sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::field::tests::{problem, start};
+    use super::*;
+
+    /// Scores of candidates against the merit with each of them in place.
+    #[test]
+    fn scores_are_differences_of_the_merit() {
+        /// Single precision over a hundred rows.
+        const TOLERANCE: f64 = 2e-5;
+        let problem = problem();
+        let mapping = problem.mapping();
+        let mut widths = start()
+            .iter()
+            .map(|&t| mapping.choices()[mapping.nearest(t)].width_nm)
+            .collect::<Vec<_>>();
+        let ring = 40;
+        let all = mapping.choices().iter().map(|c| c.width_nm).collect::<Vec<_>>();
+        let (k, t) = (problem.kernel_of(ring), problem.transmission_of(widths[ring]));
+        let exact = problem.fields(|r| (f64::from(widths[r]), 0.0));
+        let mut without = Planes::zeros(problem.rows());
+        let mut one_over_now = vec![0.0; problem.rows()];
+        for (i, e) in exact.iter().enumerate() {
+            without.re[i] = e.re as f32 - (k.0[i] * t.0[i] - k.1[i] * t.1[i]);
+            without.im[i] = e.im as f32 - (k.0[i] * t.1[i] + k.1[i] * t.0[i]);
+            one_over_now[i] = 1.0 / (e.norm_sqr() + FLOOR) as f32;
+        }
+        let mut scores = vec![0.0; all.len()];
+        problem.score(ring, &without, &one_over_now, &all, &mut scores);
+        let merits = all
+            .iter()
+            .map(|&w| {
+                widths[ring] = w;
+                problem.merit_of_widths(&widths)
+            })
+            .collect::<Vec<_>>();
+        for i in 1..all.len() {
+            let (quick, exact) = (scores[i] - scores[0], merits[i] - merits[0]);
+            assert!((quick - exact).abs() < TOLERANCE, "{} nm: {quick} {exact}", all[i]);
+        }
+    }
+}

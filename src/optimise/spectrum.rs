@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::bessel::Bessel;
 use super::focus::Lens;
-use super::imaging::Imaging;
+use super::imaging::{Imaging, Room};
 use super::kernel::RingField;
 use super::pupil::{Pupil, Window};
 use crate::cell::CellModel;
@@ -74,7 +74,7 @@ impl OverWavelength<'_> {
                         .iter()
                         .map(|&w| (t[usize::from(w)].re as f32, t[usize::from(w)].im as f32))
                         .unzip();
-                    let h = Imaging::new(&pupil, window).transfer(&re, &im);
+                    let h = Imaging::new(&pupil, window, Room::default()).transfer(&re, &im);
                     let ratio = |i: usize| f64::from(h[i].norm() / h[0].norm());
                     (ratio(window.pixels / 4), ratio(window.pixels / 2))
                 });
