@@ -1,163 +1,114 @@
 """The same layouts through `metalith check` and KLayout's region checks: the same shapes must be found.
 
-usage: compare_klayout_drc.py METALITH FOLDER            (one broken layout for each rule that KLayout can express)
+usage: compare_klayout_drc.py METALITH FOLDER            (every rule of both shipped decks, with the table of the README)
        compare_klayout_drc.py METALITH FOLDER --time N   (CPU seconds of both on N clean pillars, the same four rules)
 
 Needs pip install klayout. METALITH is the program, target/release/metalith.
 """
 import json
 import os
+import re
 import subprocess
 import sys
+import tomllib
+from collections import Counter
 from pathlib import Path
 
 import klayout.db as db
 
-PITCH, SITES = 350, 40
-PILLARS, MARKS = (1, 0), (3, 0)
+from klayout_rules import broken, expressions as ask
+from klayout_rules.plate import PILLARS, Plate, clean_openings, clean_pillars
 
-DECK = """schema = 1
-name = "What both can express"
-pillar_height_nm = 700
-[layers]
-pillars = "1/0"
-marks = "3/0"
-"""
-RULES = {
-    "width_min": 'nm = 100',
-    "width_max": 'nm = 300',
-    "square": '',
-    "gap_min": 'nm = 50',
-    "overlap": '',
-    "grid": 'layers = ["pillars", "marks"]\nnm = 2',
-    "manhattan": 'layers = ["pillars", "marks"]',
-    "acute_angle": 'layers = ["marks"]\nmin_deg = 90',
-    "vertices_max": 'layers = ["marks"]\ncount = 20',
-    "no_text_exposed": '',
-}
+DECKS = ["sin_pillars", "sin_apertures"]
+RULES = Path(__file__).parent.parent / "rules"
 
 
-def deck(checks):
-    rule = '\n[[rule]]\nid = "{0}"\ncheck = "{0}"\n{1}\n'
-    return DECK + "".join(rule.format(c, RULES[c]) for c in checks)
+def toml(deck, rules):
+    """The head of a shipped deck, and rules of it."""
+    head = [f"{key} = {json.dumps(deck[key])}" for key in ("schema", "name", "pillar_height_nm")]
+    sections = [("[layers]", deck["layers"])] + [("[[rule]]", rule) for rule in rules]
+    lines = ["\n".join([name] + [f"{k} = {json.dumps(v)}" for k, v in keys.items()]) for name, keys in sections]
+    return "\n\n".join(["\n".join(head)] + lines) + "\n"
 
 
-def square(x, y, w):
-    return db.Box(x - w // 2, y - w // 2, x + w // 2, y + w // 2)
-
-
-def write(path, pillars, extra=(), texts=()):
-    layout = db.Layout()
-    layout.dbu = 0.001
-    top = layout.create_cell("TOP")
-    for x, y, w in pillars:
-        top.shapes(layout.layer(*PILLARS)).insert(square(x, y, w))
-    for layer, shape in extra:
-        top.shapes(layout.layer(*layer)).insert(shape)
-    for text in texts:
-        top.shapes(layout.layer(*PILLARS)).insert(text)
-    layout.write(str(path))
-
-
-def dense():
-    """Pillars of 200 nm, 350 nm apart."""
-    return {(i, j): (PITCH * i, PITCH * j, 200) for i in range(SITES) for j in range(SITES)}
-
-
-def cases():
-    """Rule, layout as (pillars, further shapes, texts)."""
-    def changed(key, value):
-        pillars = dense()
-        pillars[key] = value
-        return pillars.values()
-
-    x, y, w = dense()[(5, 7)]
-    mark = db.Polygon([db.Point(*p) for p in ((0, -90000), (40000, -90000), (0, -50000))])
-    octagon = db.Polygon([db.Point(1000 * a, 1000 * b - 90000)
-                          for a, b in ((-20, -8), (-8, -20), (8, -20), (20, -8), (20, 8), (8, 20), (-8, 20), (-20, 8))])
-    comb = db.Polygon([db.Point(0, -99000)] + [db.Point(1000 * k + 1000 * (s > 1), -98000 + 2000 * (s % 3 > 0))
-                      for k in range(0, 40, 2) for s in (0, 1, 2, 3)] + [db.Point(41000, -98000), db.Point(41000, -99000)])
-    yield "width_min", (changed((5, 7), (x, y, 98)), (), ())
-    yield "width_max", (changed((5, 7), (x, y, 302)), (), ())
-    yield "square", (dense().values(), [(PILLARS, db.Box(-5000, 0, -4800, 202))], ())
-    yield "gap_min", (changed((5, 7), (x + 110, y, w)), (), ())
-    yield "gap_min", (changed((5, 7), (x + 120, y + 120, w)), (), ())
-    yield "gap_min", (dense().values(), [(PILLARS, db.Box(-5000, 0, -4800, 200)), (PILLARS, db.Box(-4770, 230, -4570, 430))], ())
-    yield "overlap", (changed((5, 7), (x + 200, y, w)), (), ())
-    yield "grid", (dense().values(), [(MARKS, db.Box(-5001, 0, -4801, 200))], ())
-    yield "manhattan", (dense().values(), [(MARKS, octagon)], ())
-    yield "acute_angle", (dense().values(), [(MARKS, mark)], ())
-    yield "vertices_max", (dense().values(), [(MARKS, comb)], ())
-    yield "no_text_exposed", (dense().values(), (), [db.Text("exposed", 1000, 2000)])
-
-
-def klayout(path, rule):
-    """Boxes [nm] that KLayout finds."""
-    layout = db.Layout()
-    layout.read(str(path))
-    top = layout.top_cell()
-    pillars = db.Region(top.begin_shapes_rec(layout.layer(*PILLARS)))
-    marks = db.Region(top.begin_shapes_rec(layout.layer(*MARKS)))
-    pillars.merged_semantics = marks.merged_semantics = False
-    boxes = lambda region: [p.bbox() for p in region.each()]
-    both = lambda pairs: [pair.bbox() for pair in pairs.each()]
-    if rule == "width_min":
-        return boxes(pillars.interacting(pillars.width_check(100).polygons()))
-    if rule == "width_max":
-        return boxes(pillars.with_bbox_max(301, None, False))
-    if rule == "square":
-        return boxes(pillars.non_squares())
-    if rule == "gap_min":
-        pillars.merged_semantics = True
-        return both(pillars.space_check(50, False, db.Region.Euclidian))
-    if rule == "overlap":
-        return boxes(pillars.merged(False, 2))
-    if rule == "grid":
-        return both(pillars.grid_check(2, 2)) + both(marks.grid_check(2, 2))
-    if rule == "manhattan":
-        return boxes(pillars.non_rectilinear()) + boxes(marks.non_rectilinear())
-    if rule == "acute_angle":
-        return [p.bbox() for p in marks.each() if not db.Region(p).corners_dots(-179.9, -90.1).is_empty()]
-    if rule == "vertices_max":
-        return [p.bbox() for p in marks.each() if p.num_points() + 1 > 20]
-    texts = db.Texts(top.begin_shapes_rec(layout.layer(*PILLARS)))
-    return [t.bbox() for t in texts.each()]
-
-
-def ours(program, path, rules, rule):
-    out = subprocess.run([program, "check", path, "--rules", rules, "--json", "--markers", "100000"],
-                         stdout=subprocess.PIPE, check=False)
-    report = json.loads(out.stdout)
-    found = next(r for r in report["rules"] if r["id"] == rule)
+def ours(program, path, rules, with_):
+    command = [program, "check", path, "--rules", rules, "--json", "--markers", "100000"]
+    out = subprocess.run(command + (["--with", with_] if with_ else []), stdout=subprocess.PIPE, check=False)
+    found = json.loads(out.stdout)["rules"][0]
     assert found["status"] == "run", found
-    boxes = []
-    for marker in found["markers"]:
-        xs, ys = zip(*marker["outline_nm"])
-        boxes.append(db.Box(round(min(xs)), round(min(ys)), round(max(xs)), round(max(ys))))
-    assert len(boxes) == found["violations"]
-    return boxes, out.returncode
+    assert len(found["markers"]) == found["violations"], found
+    return found, out.returncode
 
 
-def covers(a, b):
-    """Every box of a touches one of b."""
-    return all(any(x.touches(y) for y in b) for x in a)
+def name_in(words):
+    """What a finding without a place is about."""
+    patterns = r"layer (\S+) with", r'cell "(.*)" of', r"refers to (\S+), which", r"(\d+ marks of \S+ um)", r"top cells in \S+: (.*)"
+    return next(m[1] for m in (re.match(".*?" + p, words) for p in patterns) if m)
+
+
+def finding(view, kind, shapes, marker):
+    """A marker of ours in the form that it is compared in."""
+    outline = [tuple(round(v / view.unit_nm) for v in p) for p in marker["outline_nm"]]
+    if not outline:
+        return name_in(marker["words"])
+    box = db.Polygon([db.Point(*p) for p in outline], True).bbox()
+    if kind == ask.LENS:
+        return view.lens_of(box)
+    if kind == ask.PAIR:
+        return view.neighbours(shapes, box)
+    return ask.boxes([db.Polygon(box)])[0] if kind == ask.BOX else ask.ring(outline)
+
+
+def same(rule, found, path, deck, lenses, with_):
+    """Whether both find the same; numbers of findings of both."""
+    kind, _, find = ask.EXPRESSIONS[rule["check"]]
+    try:
+        view = ask.View(path, deck, lenses, with_)
+    except RuntimeError:
+        return kind == ask.REFUSED and found["violations"] > 0, found["violations"], "refused"
+    if kind == ask.REFUSED:
+        return False, found["violations"], "read"
+    theirs = find(view, rule)
+    if kind == ask.NUMBER:
+        value = [v for k, v in found["facts"].items() if "[" not in k][0]
+        return len(found["markers"]) == 1 and abs(value - theirs[0]) < 1e-9 * value, f"{value:.6g}", f"{theirs[0]:.6g}"
+    shapes = view.shapes(rule) if kind == ask.PAIR else None
+    mine = [finding(view, kind, shapes, m) for m in found["markers"]]
+    if kind == ask.NAME:
+        mine = [n for names in mine for n in names.split(", ")]
+    differ = (Counter(mine) - Counter(theirs)) + (Counter(theirs) - Counter(mine))
+    if differ:
+        print(f"{rule['id']}: only one of both has {list(differ)[:4]}")
+    return bool(mine) and not differ, len(mine), len(theirs)
 
 
 def compare(program, folder):
-    wrong = 0
-    for k, (rule, (pillars, extra, texts)) in enumerate(cases()):
-        path, rules = folder / f"{k}_{rule}.gds", folder / f"{k}_{rule}.toml"
-        write(path, pillars, extra, texts)
-        rules.write_text(deck([rule]))
-        theirs = klayout(path, rule)
-        mine, code = ours(program, path, rules, rule)
-        # Gaps and grids are edge pairs there and areas here: one place may be several of them.
-        exact = rule not in ("gap_min", "grid")
-        same = bool(mine) and covers(mine, theirs) and covers(theirs, mine) and code == 1
-        if exact:
-            same = same and sorted(map(str, mine)) == sorted(map(str, theirs))
-        wrong += not same
-        print(f"{rule:16} ours {len(mine)}  KLayout {len(theirs)}  {'same' if same else f'DIFFERENT: {mine[:3]} {theirs[:3]}'}")
+    wrong, asked = 0, set()
+    print(f"{'rule':26} {'KLayout':42} {'compared by':12} ours / KLayout")
+    for name in DECKS:
+        deck = tomllib.loads((RULES / f"{name}.toml").read_text())
+        for rule in deck["rule"]:
+            if rule["check"] in ask.INEXPRESSIBLE:
+                print(f"{rule['id']:26} none: {ask.INEXPRESSIBLE[rule['check']]}")
+                continue
+            for k, breaks in enumerate(broken.BROKEN[rule["id"]]):
+                path = folder / f"{name}_{rule['id']}_{k}.gds"
+                with_, plate = None, clean_pillars()
+                if name == "sin_apertures":
+                    below = clean_pillars(lenses=3)
+                    with_, plate = folder / "pillars.gds", clean_openings(below.lenses)
+                    below.write(with_)
+                rule_here = {**rule, "severity": "error", **(breaks(plate) or {})}
+                plate.write(path)
+                path.with_suffix(".toml").write_text(toml(deck, [rule_here]))
+                found, code = ours(program, path, path.with_suffix(".toml"), with_)
+                alike, mine, theirs = same(rule_here, found, path, deck, plate.lenses, with_)
+                alike = alike and code == 1
+                wrong += not alike
+                kind, words, _ = ask.EXPRESSIONS[rule["check"]]
+                print(f"{rule['id']:26} {words:42} {kind:12} {mine} / {theirs}  {'same' if alike else 'DIFFERENT'}")
+            asked.add(rule["id"])
+    assert asked == set(broken.BROKEN), "a layout for a rule that no deck has"
     sys.exit(1 if wrong else 0)
 
 
@@ -169,23 +120,26 @@ def cpu(command):
 
 
 def klayout_rules(path, deep):
-    """The four rules as KLayout runs them; number of markers."""
+    """Four rules as KLayout runs them; number of markers."""
     layout = db.Layout()
     layout.read(str(path))
-    shapes = layout.top_cell().begin_shapes_rec(layout.layer(*PILLARS))
+    shapes = layout.top_cell().begin_shapes_rec(layout.layer(PILLARS, 0))
     store = db.DeepShapeStore()
     region = db.Region(shapes, store) if deep else db.Region(shapes)
+    region.merged_semantics = False
     found = [region.width_check(100), region.space_check(50, False, db.Region.Euclidian), region.grid_check(1, 1),
              region.non_rectilinear()]
     print(sum(f.count() for f in found))
 
 
 def time(program, folder, count):
+    """Width, gap, grid and angles of a square of clean pillars, ours and KLayout's, each a process of its own."""
     path, rules = folder / "clean.gds", folder / "timed.toml"
     side = round(count ** 0.5)
-    made = [sys.executable, __file__, "make", path, str(side)]
-    subprocess.run(made, check=True)
-    rules.write_text(deck(["width_min", "gap_min", "grid", "manhattan"]).replace("nm = 2\n", "nm = 1\n"))
+    subprocess.run([sys.executable, __file__, "make", path, str(side)], check=True)
+    deck = tomllib.loads((RULES / "sin_pillars.toml").read_text())
+    four = [r for r in deck["rule"] if r["check"] in ("width_min", "gap_min", "grid", "manhattan")]
+    rules.write_text(toml(deck, four))
     seconds, memory, last, code = cpu([program, "check", path, "--rules", rules])
     print(f"{side * side} pillars: ours {seconds:.2f} CPU s {memory:.0f} MB, exit {code}: {last}")
     for mode in ("flat", "deep"):
@@ -195,8 +149,9 @@ def time(program, folder, count):
 
 def main():
     if sys.argv[1] == "make":
-        n = int(sys.argv[3])
-        write(sys.argv[2], ((PITCH * i, PITCH * j, 200 + 2 * ((7 * i + 11 * j) % 41)) for j in range(n) for i in range(n)))
+        plate, n = Plate(PILLARS, None), int(sys.argv[3])
+        plate.lens(0, 0, n, n)
+        plate.write(Path(sys.argv[2]))
     elif sys.argv[1] == "klayout":
         klayout_rules(sys.argv[2], sys.argv[3] == "deep")
     else:

@@ -16,7 +16,7 @@ const PROCESS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/processes/jbx6300_ze
 fn options(out: &Path) -> HandoffOptions {
     HandoffOptions {
         design: DESIGN.into(),
-        process: PROCESS.into(),
+        process: Some(PROCESS.into()),
         out: out.to_owned(),
         command: "metalith handoff designs/mini_3x3.toml".into(),
         // What is simulated is not the matter here.
@@ -121,7 +121,15 @@ fn the_program_says_so_by_its_exit_code() {
 fn every_rule_of_both_decks_is_told_and_so_is_the_simulation() {
     let numbers: serde_json::Value = serde_json::from_slice(&fs::read(shared().join("handoff.json")).unwrap()).unwrap();
     let page = fs::read_to_string(shared().join("index.html")).unwrap();
-    for name in ["pillars", "apertures"] {
+    for name in [
+        "pillars",
+        "apertures",
+        "dose_matrix",
+        "tests_pillars",
+        "tests_apertures",
+        "reference_pillars",
+        "reference_apertures",
+    ] {
         let report = fs::read(shared().join(format!("checks/{name}.json"))).unwrap();
         let report: serde_json::Value = serde_json::from_slice(&report).unwrap();
         let rules = report["rules"].as_array().unwrap();
@@ -135,12 +143,14 @@ fn every_rule_of_both_decks_is_told_and_so_is_the_simulation() {
         );
     }
     let checks = numbers["checks"].as_array().unwrap();
-    assert_eq!(checks.len(), 3);
+    assert_eq!(checks.len(), 8);
     for check in checks {
         assert!(
             ["pass", "fail", "not run"].contains(&check["verdict"].as_str().unwrap()),
             "{check}"
         );
+        let rules = check["name"].as_str().unwrap().starts_with("design rules");
+        assert!(!rules || check["verdict"] == "pass", "{check}");
         assert!(shared().join(check["report"].as_str().unwrap()).exists());
     }
     assert!(shared().join("verification/report.json").exists());
@@ -403,7 +413,7 @@ fn a_process_that_cannot_make_pillars_is_refused() {
     let text = fs::read_to_string(PROCESS).unwrap().replace("../rules", root);
     fs::write(&process, text.replace("\"lift_off\"", "\"direct_etch\"")).unwrap();
     let mut wrong = options(&folder.path().join("out"));
-    wrong.process = process.clone();
+    wrong.process = Some(process.clone());
     let error = handoff(&wrong, &Silent).unwrap_err().to_string();
     assert!(error.contains("become holes"), "{error}");
     fs::write(&process, text.replace("layer = 20", "layer = 1")).unwrap();

@@ -23,9 +23,10 @@ pub struct HandoffArgs {
     #[arg(required_unless_present = "verify", conflicts_with = "verify")]
     design: Option<PathBuf>,
 
-    /// The process file: writer, resist, doses, currents, overheads.
-    #[arg(long, value_name = "FILE", default_value = "processes/jbx6300_zep520a.toml")]
-    process: PathBuf,
+    /// The process file: writer, resist, doses, currents, overheads. The program's own, which the hand-off then holds
+    /// in `inputs/`, if left out.
+    #[arg(long, value_name = "FILE")]
+    process: Option<PathBuf>,
 
     /// Folder to make; `out/NAME_handoff` if left out. The archive stands beside it.
     #[arg(long, short, value_name = "FOLDER")]

@@ -64,6 +64,11 @@ impl<'d, 't> Section<'d, 't> {
         self.table.contains_key(key)
     }
 
+    /// Whether the key holds a list.
+    pub fn is_list(&self, key: &str) -> bool {
+        matches!(self.table.get(key).map(Spanned::get_ref), Some(DeValue::Array(_)))
+    }
+
     /// A number that must be there.
     pub fn float(&self, key: &str, limits: Limits) -> f64 {
         match self.optional_float(key, limits.clone()) {

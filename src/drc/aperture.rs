@@ -1,5 +1,7 @@
 //! Openings in the metal against the lenses under them.
 
+use ndarray::{ArrayView1, Axis};
+
 use super::deck::Context;
 use super::found::Found;
 use super::polygon::{inside, point_segment, ring_of};
@@ -35,17 +37,25 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Optio
     }))
 }
 
-/// Corners of the outermost pillars of each row: their hull is that of the lens.
+/// Corners of the outermost pillars of each row and each column: their hull is that of the lens.
 fn rim(scene: &Scene<'_>, element: usize) -> Vec<Point> {
-    let mut corners = Vec::new();
-    for (row, widths) in scene.elements[element].widths.width_nm.outer_iter().enumerate() {
-        let first = widths.iter().position(|&w| w != 0);
-        let last = widths.iter().rposition(|&w| w != 0);
-        for column in [first, last].into_iter().flatten() {
-            corners.extend_from_slice(&ring_of(&scene.pillar(element, row, column))[..4]);
-        }
-    }
-    corners
+    let widths = &scene.elements[element].widths.width_nm;
+    let ends = |line: ArrayView1<'_, u16>| {
+        let first = line.iter().position(|&w| w != 0);
+        let last = line.iter().rposition(|&w| w != 0);
+        first.into_iter().chain(last)
+    };
+    let rows = widths.outer_iter().enumerate();
+    let columns = widths.axis_iter(Axis(1)).enumerate();
+    let at_ends = rows
+        .flat_map(|(row, line)| ends(line).map(move |column| (row, column)))
+        .chain(columns.flat_map(|(column, line)| ends(line).map(move |row| (row, column))));
+    at_ends
+        .flat_map(|(row, column)| {
+            let [a, b, c, d, _] = ring_of(&scene.pillar(element, row, column));
+            [a, b, c, d]
+        })
+        .collect()
 }
 
 impl Rule for Aperture {

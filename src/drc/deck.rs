@@ -9,8 +9,14 @@ use crate::document::{Document, Limits, Section, load};
 use crate::error::Result;
 use crate::gds::LayerNumber;
 
-/// The rules that ship with the program, for this process.
-const DEFAULT: &str = include_str!("../../rules/sin_pillars.toml");
+/// The decks that ship with the program, by the names of their files; the first is the standard one.
+const SHIPPED: [(&str, &str); 5] = [
+    ("sin_pillars.toml", include_str!("../../rules/sin_pillars.toml")),
+    ("sin_apertures.toml", include_str!("../../rules/sin_apertures.toml")),
+    ("dose_matrix.toml", include_str!("../../rules/dose_matrix.toml")),
+    ("test_structures.toml", include_str!("../../rules/test_structures.toml")),
+    ("test_openings.toml", include_str!("../../rules/test_openings.toml")),
+];
 
 /// Version of the format of rule files that this program reads.
 const SCHEMA: i64 = 1;
@@ -19,8 +25,8 @@ const SCHEMA: i64 = 1;
 #[derive(Clone, Debug)]
 pub struct Deck {
     pub name: String,
-    /// Layer that the pillars are on.
-    pub pillars: LayerNumber,
+    /// Layers that the pillars are on: one, or several where the datatype is a dose. They count as one.
+    pub pillars: Vec<LayerNumber>,
     path: std::path::PathBuf,
     text: String,
 }
@@ -58,13 +64,25 @@ impl Deck {
     /// # Panics
     /// Never: it is tested.
     pub fn standard() -> Self {
-        Self::parse(Path::new("rules/sin_pillars.toml"), DEFAULT.to_owned()).expect("the deck of the program is sound")
+        Self::shipped(Path::new(SHIPPED[0].0)).expect("it is the first of the list")
+    }
+
+    /// The deck of the program whose file has the name at the end of `path`, if there is one.
+    pub(crate) fn shipped(path: &Path) -> Option<Self> {
+        let (name, text) = SHIPPED.iter().find(|(name, _)| path.ends_with(name))?;
+        let deck = Self::parse(&Path::new("rules").join(name), (*text).to_owned());
+        Some(deck.expect("the decks of the program are sound"))
+    }
+
+    /// Name and text of the file that it was read from.
+    pub(crate) fn source(&self) -> (&Path, &str) {
+        (&self.path, &self.text)
     }
 
     fn parse(path: &Path, text: String) -> Result<Self> {
         let mut deck = Self {
             name: String::new(),
-            pillars: LayerNumber::default(),
+            pillars: Vec::new(),
             path: path.to_owned(),
             text,
         };
@@ -81,31 +99,42 @@ impl Deck {
     }
 }
 
-fn read(root: &Section<'_, '_>) -> ((String, LayerNumber), Vec<ActiveRule>) {
+fn read(root: &Section<'_, '_>) -> ((String, Vec<LayerNumber>), Vec<ActiveRule>) {
     root.integer("schema", SCHEMA..=SCHEMA, "");
     let name = root.text("name");
     let section = root.section("layers");
     let mut layers = BTreeMap::new();
-    for key in section.keys() {
-        let text = section.text(&key);
-        let layer = parse_layer(&text).unwrap_or_else(|| {
+    let mut pillars = Vec::new();
+    let number = |key: &str, text: &str| {
+        parse_layer(text).unwrap_or_else(|| {
             section.fault(
-                &key,
+                key,
                 format!("\"{text}\" is not a layer"),
                 "write layer and datatype as \"1/0\"",
             );
             LayerNumber::default()
-        });
-        layers.insert(key, layer);
+        })
+    };
+    for key in section.keys() {
+        if key == "pillars" && section.is_list(&key) {
+            pillars = section.texts(&key).iter().map(|text| number(&key, text)).collect();
+        } else {
+            layers.insert(key.clone(), number(&key, &section.text(&key)));
+        }
     }
-    section.text("pillars");
+    match pillars.first() {
+        Some(&first) => drop(layers.insert("pillars".into(), first)),
+        None => {
+            section.text("pillars");
+            pillars.extend(layers.get("pillars"));
+        }
+    }
     section.finish();
-    let pillars = layers.get("pillars").copied().unwrap_or_default();
     let height_nm = root.float("pillar_height_nm", Limits::new(1.0..=100_000.0, "nm"));
     let sections = root.sections("rule");
     let mut context = Context {
         layers,
-        pillars,
+        pillars: pillars.first().copied().unwrap_or_default(),
         height_nm,
         covered: Vec::new(),
     };
@@ -230,7 +259,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_standard_deck_is_sound() {
+    fn the_decks_of_the_program_are_sound() {
+        for (name, _) in SHIPPED {
+            assert!(!Deck::shipped(Path::new(name)).unwrap().rules(true).unwrap().is_empty());
+        }
         let deck = Deck::standard();
         assert!(deck.rules(true).unwrap().len() > 30);
         assert!(deck.rules(true).unwrap().iter().all(|r| r.in_force));

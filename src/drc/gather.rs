@@ -41,10 +41,13 @@ pub(super) fn gather<'a>(
     };
     let (sites, no_elements) = sites(layout, deck, input, &selection, progress)?;
     let unit_nm = layout.unit_nm();
+    let (pillars, doses) = deck.pillars.split_first().expect("a deck names a layer of pillars");
+    let pillars = *pillars;
     let mut visit = Gather {
-        pillars: deck.pillars,
+        pillars,
+        doses,
         unit_nm,
-        passes: pass_table(deck.pillars, unit_nm, rules),
+        passes: pass_table(pillars, unit_nm, rules),
         filler: Filler::new(sites, Scale::of(layout)?),
         loose: BTreeMap::new(),
         vertices: 0,
@@ -67,14 +70,14 @@ pub(super) fn gather<'a>(
         }
     }
     if visit.pillar_shapes > 0 {
-        *visit.counts.entry(deck.pillars).or_default() += visit.pillar_shapes;
+        *visit.counts.entry(pillars).or_default() += visit.pillar_shapes;
     }
     Ok(Scene {
         layout,
         with: input.with.clone(),
         design: input.design,
         unit_nm,
-        pillars: deck.pillars,
+        pillars,
         elements: visit.filler.elements,
         no_elements,
         loose: visit.loose,
@@ -107,7 +110,7 @@ fn sites(
     // The pillars may be in a companion, where the apertures are what is checked.
     let mut why = String::new();
     for file in std::iter::once(&layout).chain(&input.with) {
-        match discover(file, selection, deck.pillars, Scale::of(file)?, progress) {
+        match discover(file, selection, &deck.pillars, Scale::of(file)?, progress) {
             Ok(sites) => {
                 let total: u64 = sites.iter().map(|s| (s.lattice.sites() as u64).pow(2)).sum();
                 if total <= MOST_SITES {
@@ -138,6 +141,8 @@ fn pass_table(pillars: LayerNumber, unit_nm: f64, rules: &[ActiveRule]) -> [Vec<
 
 struct Gather<'r> {
     pillars: LayerNumber,
+    /// Further layers whose shapes count as if they were on that one.
+    doses: &'r [LayerNumber],
     unit_nm: f64,
     passes: [Vec<bool>; 2],
     filler: Filler,
@@ -156,6 +161,16 @@ struct Gather<'r> {
 }
 
 impl Gather<'_> {
+    /// The layer that rules know a shape by.
+    #[inline]
+    fn known_as(&self, layer: LayerNumber) -> LayerNumber {
+        if self.doses.contains(&layer) {
+            self.pillars
+        } else {
+            layer
+        }
+    }
+
     /// Show an outline to the rules that look at its layer.
     fn show(&mut self, shape: &Shape<'_>, placements: &[Transform]) {
         let outline = Outline::new(shape, placements, self.unit_nm);
@@ -225,6 +240,10 @@ impl Visitor for Gather<'_> {
 
     #[inline]
     fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> Result<()> {
+        let shape = &Shape {
+            layer: self.known_as(shape.layer),
+            ..*shape
+        };
         let square = placements.iter().all(Transform::is_square);
         if let (Some(rect), true) = (&shape.rect, square)
             && shape.layer == self.pillars
@@ -250,7 +269,7 @@ impl Visitor for Gather<'_> {
             self.text_count += 1;
             if self.texts.len() < MOST_TEXTS {
                 self.texts.push(PlacedText {
-                    layer: text.layer,
+                    layer: self.known_as(text.layer),
                     string: String::from_utf8_lossy(text.string).into_owned(),
                     at: placement.apply(text.at),
                 });

@@ -9,14 +9,19 @@ use crate::gds::{LayerNumber, Rect};
 
 enum Layers {
     Whitelist(Vec<LayerNumber>),
-    /// Exposed shapes lie within left, bottom, right, top [um]; where a design is given, so far inside the edge of
-    /// its chip.
+    /// Exposed shapes lie within an area.
     Area {
         layers: Vec<LayerNumber>,
-        um: [f64; 4],
-        edge_um: Option<f64>,
+        within: Within,
     },
     NoText(Vec<LayerNumber>),
+}
+
+enum Within {
+    /// Left, bottom, right, top [um]; where a design is given, so far inside the edge of its chip.
+    Edges { um: [f64; 4], edge_um: Option<f64> },
+    /// The box of what is drawn on a layer.
+    Drawn(LayerNumber),
 }
 
 pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Option<Box<dyn Rule>> {
@@ -24,8 +29,14 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Optio
         "layers_known" => Layers::Whitelist(context.some_layers(s)),
         "active_area" => Layers::Area {
             layers: context.some_layers(s),
-            um: s.array("um", Limits::new(-1e6..=1e6, "um")),
-            edge_um: s.optional_float("edge_um", Limits::new(0.0..=1e6, "um")),
+            within: if s.has("inside") {
+                Within::Drawn(context.layer(s, "inside"))
+            } else {
+                Within::Edges {
+                    um: s.array("um", Limits::new(-1e6..=1e6, "um")),
+                    edge_um: s.optional_float("edge_um", Limits::new(0.0..=1e6, "um")),
+                }
+            },
         },
         "no_text_exposed" => Layers::NoText(context.some_layers(s)),
         _ => return None,
@@ -37,7 +48,14 @@ impl Rule for Layers {
         let list = |l: &[LayerNumber]| l.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
         match self {
             Self::Whitelist(layers) => format!("layers {} and no other", list(layers)),
-            Self::Area { layers, um, edge_um } => {
+            Self::Area {
+                layers,
+                within: Within::Drawn(frame),
+            } => format!("{} within what is drawn on {frame}", list(layers)),
+            Self::Area {
+                layers,
+                within: Within::Edges { um, edge_um },
+            } => {
                 let of_design = edge_um.map_or_else(String::new, |edge| {
                     format!("; of a design, {edge} um inside the edge of its chip")
                 });
@@ -62,17 +80,10 @@ impl Rule for Layers {
                 }
                 Status::Run
             }
-            Self::Area { layers, um, edge_um } => {
-                let um = match (scene.design, edge_um) {
-                    (Some(design), Some(edge)) => {
-                        let (width, height) = design.layout.chip.size_nm;
-                        let [x, y] = [width, height].map(|size| size as f64 * 0.5e-3 - *edge);
-                        [-x, -y, x, y]
-                    }
-                    _ => *um,
+            Self::Area { layers, within } => {
+                let Some(area) = within.area(scene) else {
+                    return Status::Skipped("nothing is drawn on the layer of the frame".into());
                 };
-                let [x0, y0, x1, y1] = um.map(|v| scene.units(v * 1e3).round() as i64);
-                let area = Rect { x0, y0, x1, y1 };
                 let out = |r: &Rect| r.x0 < area.x0 || r.y0 < area.y0 || r.x1 > area.x1 || r.y1 > area.y1;
                 for layer in layers.iter() {
                     for r in scene
@@ -99,6 +110,30 @@ impl Rule for Layers {
                 Status::Run
             }
         }
+    }
+}
+
+impl Within {
+    /// In database units; none if nothing is drawn there.
+    fn area(&self, scene: &Scene<'_>) -> Option<Rect> {
+        let um = match self {
+            Self::Drawn(frame) => {
+                return scene.loose(*frame)?.bounds().reduce(|mut all, r| {
+                    all.unite(&r);
+                    all
+                });
+            }
+            Self::Edges { um, edge_um } => match (scene.design, edge_um) {
+                (Some(design), Some(edge)) => {
+                    let (width, height) = design.layout.chip.size_nm;
+                    let [x, y] = [width, height].map(|size| size as f64 * 0.5e-3 - *edge);
+                    [-x, -y, x, y]
+                }
+                _ => *um,
+            },
+        };
+        let [x0, y0, x1, y1] = um.map(|v| scene.units(v * 1e3).round() as i64);
+        Some(Rect { x0, y0, x1, y1 })
     }
 }
 

@@ -33,7 +33,7 @@ pub use export::{junit, lyrdb, sarif, text};
 pub use found::Marker;
 pub use report::{DrcReport, RuleReport};
 pub use rule::{Severity, Status};
-pub use waiver::{Date, Waivers};
+pub use waiver::{Date, Waiver, Waivers};
 
 use crate::design::Design;
 use crate::error::{Error, Result};

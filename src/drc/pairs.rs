@@ -37,7 +37,8 @@ impl Body<'_> {
         }
     }
 
-    fn ring(&self) -> Vec<Point> {
+    /// Its corners, closed.
+    pub fn ring(&self) -> Vec<Point> {
         match self {
             Self::Rect(r) => ring_of(r).to_vec(),
             Self::Ring(p) => p.to_vec(),

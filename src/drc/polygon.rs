@@ -110,7 +110,8 @@ fn cross(a: Point, b: Point, c: Point, d: Point) -> bool {
     s1 * s2 < 0 && s3 * s4 < 0
 }
 
-/// Whether a closed ring of corners meets itself, by comparing sides that overlap along x.
+/// Whether a closed ring of corners crosses or overlaps itself. One that only touches itself does not: a hole
+/// drawn with a slit is a good outline.
 fn crosses_itself(ring: &[Point]) -> bool {
     if ring.len() < 5 {
         return false;
@@ -120,18 +121,87 @@ fn crosses_itself(ring: &[Point]) -> bool {
     let left = |k: usize| ring[k].x.min(ring[k + 1].x);
     let right = |k: usize| ring[k].x.max(ring[k + 1].x);
     sides.sort_unstable_by_key(|&k| left(k));
+    let mut touches = false;
     for (at, &i) in sides.iter().enumerate() {
         for &j in sides[at + 1..].iter().take_while(|&&j| left(j) <= right(i)) {
             let neighbours = (i + 1) % n == j || (j + 1) % n == i;
-            let met = meet(ring[i], ring[i + 1], ring[j], ring[j + 1]);
-            // Neighbours share their corner; corners are never on the way, so nothing else unless a spike.
-            if met && !neighbours {
+            if !neighbours && cross(ring[i], ring[i + 1], ring[j], ring[j + 1]) {
                 return true;
             }
+            touches |= !neighbours && meet(ring[i], ring[i + 1], ring[j], ring[j + 1]);
         }
     }
-    false
+    touches && winds_twice(ring)
 }
+
+/// Whether a closed ring whose sides meet at vertices alone goes round some place twice, or round one place
+/// to the left and round another to the right. Between two neighbouring heights of vertices its sides keep
+/// their order, and the turns about each place are counted from the left.
+fn winds_twice(ring: &[Point]) -> bool {
+    let mut heights: Vec<i64> = ring.iter().map(|p| p.y).collect();
+    heights.sort_unstable();
+    heights.dedup();
+    let (mut least, mut most) = (0, 0);
+    for slab in heights.windows(2) {
+        let twice_y = slab[0] + slab[1];
+        let mut sides: Vec<(Fraction, i32)> = ring
+            .windows(2)
+            .filter(|s| s[0].y.min(s[1].y) <= slab[0] && s[0].y.max(s[1].y) >= slab[1])
+            .map(|s| {
+                let rise = 2 * i128::from(s[1].y - s[0].y);
+                let x = i128::from(s[0].x) * rise + i128::from(s[1].x - s[0].x) * i128::from(twice_y - 2 * s[0].y);
+                (Fraction::new(x, rise), if rise > 0 { -1 } else { 1 })
+            })
+            .collect();
+        sides.sort_unstable_by(|a, b| a.0.cmp(&b.0));
+        let mut turns = 0;
+        for sides_at_one_place in sides.chunk_by(|a, b| a.0 == b.0) {
+            turns += sides_at_one_place.iter().map(|s| s.1).sum::<i32>();
+            (least, most) = (least.min(turns), most.max(turns));
+        }
+    }
+    most - least > 1
+}
+
+/// An exact place on a level line: a whole number and a proper fraction.
+#[derive(Clone, Copy)]
+struct Fraction {
+    whole: i128,
+    over: i128,
+    under: i128,
+}
+
+impl Fraction {
+    fn new(over: i128, under: i128) -> Self {
+        let (over, under) = (over * under.signum(), under.abs());
+        Self {
+            whole: over.div_euclid(under),
+            over: over.rem_euclid(under),
+            under,
+        }
+    }
+}
+
+impl Ord for Fraction {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        let proper = || (self.over * other.under).cmp(&(other.over * self.under));
+        self.whole.cmp(&other.whole).then_with(proper)
+    }
+}
+
+impl PartialOrd for Fraction {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Fraction {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Fraction {}
 
 /// Whether a point is inside a closed ring (not on its edge).
 pub(super) fn inside(ring: &[Point], p: Point) -> bool {
@@ -233,6 +303,28 @@ mod tests {
         let square = ring(&[(0, 0), (10, 0), (10, 10), (0, 10)]);
         let bow = ring(&[(0, 0), (10, 10), (10, 0), (0, 20)]);
         assert!(!crosses_itself(&square) && crosses_itself(&bow));
+        // A hole with a slit, two squares that share a corner, and a spike touch; a loop and the same square
+        // twice go round a place twice.
+        let slit = [
+            (0, 0),
+            (9, 0),
+            (9, 9),
+            (0, 9),
+            (0, 5),
+            (4, 5),
+            (4, 6),
+            (6, 6),
+            (6, 4),
+            (4, 4),
+            (4, 5),
+            (0, 5),
+        ];
+        let corner = [(0, 0), (5, 0), (5, 5), (9, 5), (9, 9), (5, 9), (5, 5), (0, 5)];
+        let eight = [(0, 0), (5, 0), (5, 5), (5, 9), (9, 9), (9, 5), (5, 5), (0, 5)];
+        let spiral = [(0, 0), (9, 0), (9, 9), (0, 9), (0, 3), (6, 3), (6, 6), (0, 6)];
+        let twice = [(0, 0), (9, 0), (9, 9), (0, 9), (0, 0), (9, 0), (9, 9), (0, 9)];
+        assert!(!crosses_itself(&ring(&slit)) && !crosses_itself(&ring(&corner)) && crosses_itself(&ring(&eight)));
+        assert!(crosses_itself(&ring(&spiral)) && crosses_itself(&ring(&twice)));
         assert!(inside(&square, Point::new(5, 5)) && !inside(&square, Point::new(10, 5)));
         let beside = ring(&[(13, 14), (20, 14), (20, 20), (13, 20)]);
         assert_eq!(distance(&square, &beside), 5.0);

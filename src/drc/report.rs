@@ -53,6 +53,12 @@ pub struct DrcReport {
     pub rules: Vec<RuleReport>,
     /// What was odd about the check itself: waivers that cover nothing or have expired.
     pub warnings: Vec<String>,
+    /// For each of them the hash of its waiver.
+    #[serde(skip)]
+    pub(crate) warned: Vec<String>,
+    /// Hashes of the waivers that cover something.
+    #[serde(skip)]
+    pub(crate) covered: Vec<String>,
 }
 
 impl DrcReport {
@@ -86,7 +92,8 @@ pub(super) fn assemble(
     found: Vec<Found>,
     input: &CheckInput<'_>,
 ) -> DrcReport {
-    let warnings = waiver_warnings(&found, input);
+    let (covered, stale) = waivers(&found, input);
+    let (warned, warnings) = stale.into_iter().unzip();
     let rules = rules
         .into_iter()
         .zip(statuses)
@@ -119,28 +126,31 @@ pub(super) fn assemble(
         pillars_on_lattices: scene.pillars_on_lattices(),
         rules,
         warnings,
+        warned,
+        covered,
     }
 }
 
-fn waiver_warnings(found: &[Found], input: &CheckInput<'_>) -> Vec<String> {
-    let Some(waivers) = input.waivers else {
-        return Vec::new();
-    };
-    let mut covered = vec![None; waivers.list.len()];
+/// Hashes of the waivers that cover something, and what is wrong with others.
+fn waivers(found: &[Found], input: &CheckInput<'_>) -> (Vec<String>, Vec<(String, String)>) {
+    let list = input.waivers.map_or(&[][..], |w| &w.list);
+    let mut counts = vec![None; list.len()];
     for (index, count) in found.iter().flat_map(Found::tried) {
-        covered[index] = Some(count);
+        counts[index] = Some(count);
     }
-    let mut warnings = Vec::new();
-    for (waiver, covered) in waivers.list.iter().zip(covered) {
+    let (mut covered, mut warnings) = (Vec::new(), Vec::new());
+    for (waiver, count) in list.iter().zip(counts) {
         let who = format!("waiver {} of {} by {}", waiver.hash, waiver.rule, waiver.author);
-        match covered {
-            _ if waiver.expires < input.today => warnings.push(format!("{who} expired on {}", waiver.expires)),
-            None => warnings.push(format!("{who} is for a rule that is not in the deck")),
-            Some(0) => warnings.push(format!(
-                "{who} covers nothing: the violation is gone, or the geometry changed"
-            )),
-            Some(_) => {}
-        }
+        let words = match count {
+            _ if waiver.expires < input.today => format!("{who} expired on {}", waiver.expires),
+            None => format!("{who} is for a rule that is not in the deck"),
+            Some(0) => format!("{who} covers nothing: the violation is gone, or the geometry changed"),
+            Some(_) => {
+                covered.push(waiver.hash.clone());
+                continue;
+            }
+        };
+        warnings.push((waiver.hash.clone(), words));
     }
-    warnings
+    (covered, warnings)
 }

@@ -79,7 +79,7 @@ impl Rule for Spacing {
             }
             Want::NoDuplicate => {
                 if a.equals(&b) {
-                    found.rect(&a.bounds(), || "the same shape twice".into());
+                    found.at(&a.ring(), || "the same shape twice".into());
                 }
             }
         });

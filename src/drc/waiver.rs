@@ -73,7 +73,7 @@ pub struct Waiver {
     /// Last day on which it holds.
     pub expires: Date,
     #[serde(skip)]
-    pub(super) index: usize,
+    pub(crate) index: usize,
 }
 
 /// The waivers of one file.
@@ -107,7 +107,24 @@ impl Waivers {
     }
 }
 
+impl Waivers {
+    /// These and those of another file.
+    pub(crate) fn and(mut self, other: &Self) -> Self {
+        self.list.extend(other.list.iter().cloned());
+        self.list.iter_mut().enumerate().for_each(|(k, w)| w.index = k);
+        self
+    }
+}
+
 impl Waiver {
+    /// As a section of a file of waivers.
+    pub(crate) fn text(&self) -> String {
+        format!(
+            "[[waiver]]\nrule = {:?}\nhash = {:?}\nreason = {:?}\nauthor = {:?}\nexpires = \"{}\"\n",
+            self.rule, self.hash, self.reason, self.author, self.expires
+        )
+    }
+
     fn read(s: &Section<'_, '_>, index: usize) -> Self {
         let expires = s.text("expires");
         let date = Date::parse(&expires).unwrap_or_else(|| {

@@ -43,11 +43,11 @@ struct Map {
     guesses: Vec<u32>,
 }
 
-/// Find the elements of a layout.
+/// Find the elements of a layout whose pillars are on these layers.
 pub(crate) fn discover(
     layout: &Layout,
     from: &Selection,
-    layer: LayerNumber,
+    layers: &[LayerNumber],
     scale: Scale,
     progress: &dyn Progress,
 ) -> Result<Vec<ElementSite>> {
@@ -58,10 +58,11 @@ pub(crate) fn discover(
         guesses: Vec::new(),
     };
     let selection = Selection {
-        layers: Some(vec![layer]),
+        layers: Some(layers.to_vec()),
         ..from.clone()
     };
     layout.visit(&selection, &mut map, progress)?;
+    let layer = layers.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
     let mut sites = Vec::new();
     for cluster in map.clusters() {
         if let Some(site) = map.element(&cluster)? {

@@ -38,7 +38,7 @@ pub fn extract(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) 
     let roots = layout.roots(&selection)?;
     let sites = match &plan.elements {
         Elements::Given(sites) => sites.clone(),
-        Elements::Discover => discover(layout, &plan.selection(), plan.pillar_layer, scale, progress)?,
+        Elements::Discover => discover(layout, &plan.selection(), &[plan.pillar_layer], scale, progress)?,
     };
     let total: u64 = sites.iter().map(|s| (s.lattice.sites() as u64).pow(2)).sum();
     if total > MOST_SITES {

@@ -13,16 +13,15 @@ use super::guard::{fits, replaceable};
 use super::manifest::{Manifest, entry_of, files_below};
 use super::matrix::{self, Block};
 use super::process::Process;
-use super::rules::RuleReports;
+use super::rules::{RuleReports, Subject};
 use super::sites::{Cross, Site, crosses, sites};
 use super::structures::{Structure, Structures};
-use super::{front, job, rules, tables, zip};
+use super::{front, inputs, job, rules, tables, zip};
 use crate::array::PillarArray;
 use crate::cell::{Fidelity, cell_models};
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::layout::{write_apertures, write_layer_properties, write_pillars};
-use crate::phase::RadialPhase;
 use crate::progress::Progress;
 use crate::report::{Verdict, write_json};
 use crate::verify::{Premise, verify, write_report};
@@ -33,8 +32,8 @@ use crate::wave::Accuracy;
 pub struct HandoffOptions {
     /// The design file.
     pub design: PathBuf,
-    /// The process file.
-    pub process: PathBuf,
+    /// The process file; the program's own if left out.
+    pub process: Option<PathBuf>,
     /// Folder to make; the archive stands beside it, with `.zip` behind its name.
     pub out: PathBuf,
     /// The command as it was given, for the manifest.
@@ -110,7 +109,10 @@ pub(super) struct Contents<'a> {
 /// stopped it.
 pub fn handoff(options: &HandoffOptions, progress: &dyn Progress) -> Result<Handoff> {
     let design = Design::read(&options.design)?;
-    let process = Process::read(&options.process)?;
+    let process = options
+        .process
+        .as_deref()
+        .map_or_else(|| Ok(Process::standard()), Process::read)?;
     fits(&design, &process)?;
     replaceable(&options.out)?;
     let name = options.out.file_name().ok_or_else(|| {
@@ -214,13 +216,11 @@ fn fill(
         "hyperbolic reference lens, step 1",
     );
     write_pillars(&reference, &single, reference.layout.hierarchy, &lens, progress)?;
-    write_apertures(
-        &reference,
-        &list(
-            named("tests", "reference_apertures.gds"),
-            "hyperbolic reference lens, step 2",
-        ),
-    )?;
+    let lens2 = list(
+        named("tests", "reference_apertures.gds"),
+        "hyperbolic reference lens, step 2",
+    );
+    write_apertures(&reference, &lens2)?;
 
     let sites = sites(design, process, &array, &structures);
     let cd = list(
@@ -268,17 +268,53 @@ fn fill(
         )?;
     }
 
-    for (source, name, purpose) in inputs(options, design, process) {
-        let target = list(format!("inputs/{name}"), purpose);
-        let bytes = fs::read(&source).map_err(Error::io("read", &source))?;
-        crate::file::WholeFile::write(&target, &bytes)?;
+    for (name, purpose) in inputs::keep(options, design, process, &at("inputs"))? {
+        list(format!("inputs/{name}"), purpose);
     }
-    let (mut checks, rules) = rules::check(options, design, process, &pillars, &apertures, &at("checks"), progress)?;
-    for (name, _) in &rules {
-        for (kind, purpose) in rules::FILES {
-            list(format!("checks/{name}.{kind}"), purpose);
-        }
+    let decks = &process.checks;
+    let subject = |name, layout, rules, with, design| Subject {
+        name,
+        layout,
+        rules,
+        with,
+        design,
+        structures: &[],
+    };
+    let subjects = [
+        subject("pillars", &pillars, &decks.pillar_rules, None, Some(design)),
+        subject(
+            "apertures",
+            &apertures,
+            &decks.aperture_rules,
+            Some(&pillars),
+            Some(design),
+        ),
+        subject("dose_matrix", &matrix_file, &decks.dose_rules, None, None),
+        Subject {
+            structures: &structures,
+            ..subject("tests_pillars", &tests, &decks.test_rules, None, None)
+        },
+        subject(
+            "tests_apertures",
+            &tests2,
+            &decks.test_opening_rules,
+            Some(&tests),
+            None,
+        ),
+        subject("reference_pillars", &lens, &decks.pillar_rules, None, Some(&reference)),
+        subject(
+            "reference_apertures",
+            &lens2,
+            &decks.aperture_rules,
+            Some(&lens),
+            Some(&reference),
+        ),
+    ];
+    let checked = rules::check(&subjects, process, options.waivers.as_deref(), &at("checks"), progress)?;
+    for (name, purpose) in &checked.files {
+        list(format!("checks/{name}"), purpose);
     }
+    let mut checks = checked.checks;
     let (check, made) = verification(options, design, &array, &pillars, &at("verification"), progress)?;
     for (name, purpose) in made {
         list(format!("verification/{name}"), purpose);
@@ -308,7 +344,7 @@ fn fill(
         sites,
         crosses,
         checks,
-        rules,
+        rules: checked.reports,
         files,
     };
     front::write(folder, &contents)?;
@@ -386,61 +422,19 @@ fn verification(
     Ok((check, made))
 }
 
+/// From the opening over the reference lens to the edge of its chip [nm]: decks ask for room there.
+const BESIDE_REFERENCE: i64 = 50_000;
+
 /// The design with one hyperbolic lens on a chip of its own, at full size.
 fn reference_design(design: &Design, process: &Process) -> Design {
     let mut reference = matrix::hyperbolic(design, process.tests.reference_wavelength_nm);
     reference.name = "reference_lens".into();
     reference.title = "Hyperbolic reference lens".into();
     reference.layout.marks.clear();
-    let room = i64::from(design.lens.diameter_nm) + 4 * design.layout.apertures.margin_nm + 20_000;
+    let room = i64::from(design.lens.diameter_nm) + 2 * (design.layout.apertures.margin_nm + BESIDE_REFERENCE);
     let room = room + room % 2;
     reference.layout.chip.size_nm = (room, room);
     reference
-}
-
-/// What the hand-off was made from: path, name in the folder, purpose.
-fn inputs(options: &HandoffOptions, design: &Design, process: &Process) -> Vec<(PathBuf, String, &'static str)> {
-    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let mut inputs = vec![
-        (
-            options.design.clone(),
-            format!("design_{}", name(&options.design)),
-            "the design",
-        ),
-        (
-            options.process.clone(),
-            format!("process_{}", name(&options.process)),
-            "the process values",
-        ),
-    ];
-    for rules in [&process.checks.pillar_rules, &process.checks.aperture_rules] {
-        inputs.push((
-            rules.clone(),
-            format!("rules_{}", name(rules)),
-            "rules that the layout was checked with",
-        ));
-    }
-    if let Some(waivers) = &options.waivers {
-        inputs.push((
-            waivers.clone(),
-            format!("waivers_{}", name(waivers)),
-            "violations that were accepted",
-        ));
-    }
-    if let Some(table) = &design.mapping.table_file {
-        inputs.push((table.clone(), name(table), "phase to width, the mapping of the design"));
-    }
-    if let RadialPhase::Table { file, .. } = &design.lens.phase {
-        inputs.push((file.clone(), name(file), "phase of the lens over its radius"));
-    }
-    let folder = options.design.parent().unwrap_or(Path::new(""));
-    for material in [&design.cell.pillar_material, &design.cell.substrate_material] {
-        let table = folder.join(material);
-        if table.is_file() {
-            inputs.push((table.clone(), name(&table), "index of a material of the cell"));
-        }
-    }
-    inputs
 }
 
 fn write_text(path: &Path, text: &str) -> Result<()> {

@@ -138,11 +138,9 @@ pub fn doses(process: &Process) -> Vec<DoseRow> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
 
     fn process() -> Process {
-        let text = include_str!("../../processes/jbx6300_zep520a.toml");
-        Process::parse(Path::new("processes/p.toml"), text).unwrap()
+        Process::standard()
     }
 
     /// The known steps of this writer at 280 uC/cm2 and 50 MHz.

@@ -30,10 +30,13 @@ pub(super) struct Block {
     pub bounds: Rect,
 }
 
-/// The blocks of a dose matrix, base dose in the middle of the file.
+/// The blocks of a dose matrix, base dose in the middle of the file, each in the middle of a field of its own: a
+/// dose is not to be judged across a seam.
 pub(super) fn blocks(process: &Process) -> Vec<Block> {
     let size = Sizes::of(process);
-    let step = (size.width + size.gap, size.height + size.gap);
+    let field = nm(process.writer.field_used_um);
+    let fields = |length: i64| (length + size.gap).div_euclid(field) * field + field;
+    let step = (fields(size.width), fields(size.height));
     (0..9)
         .map(|k| {
             // Row by row from the upper left, as one reads.

@@ -13,6 +13,7 @@ mod exposure;
 mod fields;
 mod front;
 mod guard;
+mod inputs;
 mod job;
 mod manifest;
 mod matrix;

@@ -30,6 +30,8 @@ pub(super) struct Structure {
     pub bounds: Rect,
     /// Width drawn, where one is to be measured [nm].
     pub width_nm: Option<i64>,
+    /// Why borders of fields may run through it.
+    pub crosses_fields: Option<&'static str>,
 }
 
 /// Everything of the two files of test structures.
@@ -94,6 +96,7 @@ impl Structures {
             right = right.max(row.x1);
             y = row.y1 + APART;
         }
+        y = clear_of_borders(y, nm(process.tests.etch_pad_um), field);
         let row = it.large(process, &layers, y);
         right = right.max(row.x1);
         let top = it.field_verniers(process, &layers, right + APART).max(row.y1);
@@ -111,7 +114,15 @@ impl Structures {
             purpose: purpose.into(),
             bounds,
             width_nm,
+            crosses_fields: None,
         });
+    }
+
+    /// Borders of fields may run through the structure recorded last.
+    fn crossed(&mut self, why: &'static str) {
+        if let Some(last) = self.list.last_mut() {
+            last.crosses_fields = Some(why);
+        }
     }
 
     fn pillar(&mut self, width: i64) -> String {
@@ -249,6 +260,7 @@ impl Structures {
             film,
             None,
         );
+        self.crossed("solid, and its thickness is the same on both sides of a seam");
         let mut row = pad.united(&film);
         let (pitch, step) = (
             nm(process.tests.overlay_vernier_pitch_um),
@@ -335,6 +347,7 @@ impl Structures {
                 bounds,
                 None,
             );
+            self.crossed("it tells how two fields meet");
             highest = highest.max(bounds.y1);
         }
         highest
