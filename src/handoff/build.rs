@@ -255,7 +255,7 @@ fn fill(
     )?;
     let snapping = snapping(&array, process)?;
     for (beam, _) in &snapping {
-        let name = |kind: &str| format!("job/{}_{}nA.{kind}", design.name, beam.current_na);
+        let name = |kind: &str| format!("job/{}.{kind}", job::stem(design, beam));
         let deck = job::job_deck(design, process, &crosses, beam);
         let schedule = job::schedule(design, process, beam);
         write_text(

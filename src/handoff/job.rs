@@ -13,15 +13,23 @@ const WARNING: &str = "\
 ; calibration, path, marks, slot and offsets follow the habits of each lab.
 ";
 
-/// Name of a job: nine capitals or digits.
+/// Longest name of a job or magazine that all versions take.
+const LONGEST_NAME: usize = 8;
+
+/// Name of a job: capitals and digits, a letter first.
 fn job_name(design: &Design) -> String {
-    design
-        .name
-        .chars()
-        .filter(char::is_ascii_alphanumeric)
-        .map(|c| c.to_ascii_uppercase())
-        .take(9)
-        .collect()
+    let name = design.name.chars().filter(char::is_ascii_alphanumeric);
+    let name = name.map(|c| c.to_ascii_uppercase());
+    let name = name
+        .skip_while(char::is_ascii_digit)
+        .take(LONGEST_NAME)
+        .collect::<String>();
+    if name.is_empty() { "CHIP".into() } else { name }
+}
+
+/// Name of the job deck and of the schedule for a beam, without its ending: one dot is enough for a file.
+pub(super) fn stem(design: &Design, beam: &Beam) -> String {
+    format!("{}_{}nA", design.name, beam.current_na).replace('.', "p")
 }
 
 /// The job deck: marks, where each pattern stands, doses.
@@ -57,7 +65,11 @@ pub(super) fn job_deck(design: &Design, process: &Process, crosses: &[Cross], be
         );
     }
     let _ = writeln!(text, "PATH {}", process.job.path);
-    text.push_str("; One chip in the middle of the substrate. Repeat it by count and pitch: (first,count,pitch)/(first,count,pitch)\n");
+    text.push_str(
+        "; One chip in the middle of the substrate. Repeat it by count and pitch: (first,count,pitch)/(first,count,pitch),\n\
+         ; x to the right, rows downwards. The origin of a chip is the middle of its pattern: convert the GDSII file with a\n\
+         ; chip size that has (0, 0) in its middle.\n",
+    );
     text.push_str(" ARRAY (0,1,0)/(0,1,0)\n");
     let corners: Vec<_> = ["M1", "M2", "M3", "M4"]
         .iter()
@@ -99,17 +111,18 @@ pub(super) fn job_deck(design: &Design, process: &Process, crosses: &[Cross], be
 pub(super) fn schedule(design: &Design, process: &Process, beam: &Beam) -> String {
     let name = job_name(design);
     format!(
-        "{WARNING}; shot step {} nm at {:.3} MHz gives {} uC/cm2 at {} nA\nMAGAZIN '{name}'\n#1\n%{}\nJDF '{}',{}\nACC {}\n\
-         ; CALPRM '...'               ; beam and aperture of {} nA: the lab's name for it\n\
+        "{WARNING}; base dose, current and shot step belong together: shot step {} nm at {:.3} MHz gives {} uC/cm2 at {} nA\nMAGAZIN '{name}'\n#1\n%{}\nJDF '{}',{}\nACC {}\n\
+         ; CALPRM '...'               ; or EOS mode,'...': lens mode ({}) and condition file of {} nA, the lab's names\n\
          DEFMODE 2                    ; two-stage deflection: check\nRESIST {}\nSHOT A,{}\nOFFSET(0,0)\nEND\n",
         beam.shot_step_nm,
         beam.clock_mhz,
         process.resist.dose_uc_cm2,
         beam.current_na,
         process.job.cassette_slot,
-        design.name,
+        stem(design, beam),
         process.job.layer_step1,
         process.writer.acceleration_kv,
+        process.writer.mode,
         beam.current_na,
         process.resist.dose_uc_cm2,
         (beam.shot_step_nm / process.writer.grid_nm).round(),

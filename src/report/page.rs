@@ -160,10 +160,8 @@ impl Page {
 
     fn put(&mut self, figure: &Figure) {
         self.body.push_str(&format!(
-            "\n<figure style=\"max-width:{0}px;flex-basis:{1}px\">\n{2}\n<figcaption>{3}{4}</figcaption></figure>",
+            "\n<figure style=\"--width:{}px\">\n{}\n<figcaption>{}{}</figcaption></figure>",
             figure.width.round(),
-            // A figure in a row may shrink this far before it takes a row of its own.
-            (0.75 * figure.width).round(),
             figure.svg,
             match figure.title == figure.caption {
                 true => String::new(),
