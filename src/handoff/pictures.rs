@@ -192,9 +192,19 @@ pub(super) fn dose_matrix(process: &Process, blocks: &[Block], doses: &[super::d
     let bounds = plan.outlines("block");
     let lens = plan.layer("small lens");
     let pad = plan.layer("uniform pads");
+    let field = plan.outlines("write field");
     for (block, dose) in blocks.iter().zip(doses) {
         let (a, b) = corners(block.bounds);
         plan.rectangle(bounds, a, b);
+        let (middle, half) = (
+            ((a.0 + b.0) / 2.0, (a.1 + b.1) / 2.0),
+            process.writer.field_used_um / 2.0,
+        );
+        plan.rectangle(
+            field,
+            (middle.0 - half, middle.1 - half),
+            (middle.0 + half, middle.1 + half),
+        );
         let at = |(x, y): (i64, i64)| (x as f64 * 1e-3, y as f64 * 1e-3);
         let (x, y) = at(block.lens);
         plan.circle(lens, x, y, spec.lens_diameter_um / 2.0);
@@ -214,13 +224,11 @@ pub(super) fn dose_matrix(process: &Process, blocks: &[Block], doses: &[super::d
             format!("{}: {:.0} uC/cm2", dose.number, dose.dose_uc_cm2),
         );
     }
-    plan.reach(
-        0.0,
-        blocks.iter().map(|b| b.bounds.y1).max().unwrap_or(0) as f64 * 1e-3 + 40.0,
-    );
     plan.caption(format!(
-        "Block n is on layer {}, datatype n, and has its number beside its lens. Pads from the left: {} nm.",
+        "Block n is on layer {}, datatype n, and has its number beside its lens. Each stands in the middle of a field of \
+         {} um, if a field is about the origin. Pads from the left: {} nm.",
         spec.layer,
+        process.writer.field_used_um,
         spec.pad_widths_nm
             .iter()
             .map(f64::to_string)

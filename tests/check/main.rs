@@ -8,6 +8,7 @@ mod lens;
 #[path = "../support/mutate.rs"]
 mod mutate;
 
+mod decks;
 mod design;
 mod forms;
 mod openings;

@@ -223,7 +223,7 @@ impl Visitor for Crosses {
     }
 }
 
-fn visit(file: &str, layer: LayerNumber, visitor: &mut dyn Visitor) {
+fn visit<V: Visitor>(file: &str, layer: LayerNumber, visitor: &mut V) {
     let selection = Selection {
         layers: Some(vec![layer]),
         ..Selection::default()
