@@ -15,7 +15,7 @@ use super::matrix::{self, Block};
 use super::process::Process;
 use super::rules::{RuleReports, Subject};
 use super::sites::{Cross, Site, crosses, sites};
-use super::structures::{Structure, Structures};
+use super::structures::{Structure, Structures, middle_of_reference};
 use super::{front, inputs, job, rules, tables, zip};
 use crate::array::PillarArray;
 use crate::cell::{Fidelity, cell_models};
@@ -280,6 +280,7 @@ fn fill(
         design,
         structures: &[],
     };
+    let in_reference = [middle_of_reference()];
     let subjects = [
         subject("pillars", &pillars, &decks.pillar_rules, None, Some(design)),
         subject(
@@ -301,7 +302,10 @@ fn fill(
             Some(&tests),
             None,
         ),
-        subject("reference_pillars", &lens, &decks.pillar_rules, None, Some(&reference)),
+        Subject {
+            structures: &in_reference,
+            ..subject("reference_pillars", &lens, &decks.pillar_rules, None, Some(&reference))
+        },
         subject(
             "reference_apertures",
             &lens2,

@@ -86,9 +86,12 @@ pub(super) fn check(
             drc::check(&layouts[subject.layout], &deck, &input, progress)
         };
         let mut waivers = accepted.clone();
-        if subject.structures.iter().any(|s| s.crosses_fields.is_some()) {
+        let meant = match subject.structures.is_empty() {
+            true => Vec::new(),
+            false => on_purpose(subject.structures, &judge(None, MARKERS_ON_PURPOSE)?),
+        };
+        if !meant.is_empty() {
             let name = format!("{}_waivers.toml", subject.name);
-            let meant = on_purpose(subject.structures, &judge(None, MARKERS_ON_PURPOSE)?);
             WholeFile::write(&folder.join(&name), text(&meant).as_bytes())?;
             files.push((
                 name.clone(),
@@ -125,25 +128,29 @@ pub(super) fn check(
     })
 }
 
-/// Waivers for what crosses fields inside a structure that is there to do so, or that does not mind.
+/// Waivers for what lies inside a structure that breaks the rule because it is what it is.
 fn on_purpose(structures: &[Structure], report: &DrcReport) -> Vec<Waiver> {
     let mut waivers = Vec::new();
-    for rule in report.rules.iter().filter(|r| r.check == "field_cut") {
-        for marker in &rule.markers {
+    for rule in &report.rules {
+        for marker in rule.markers.iter().filter(|m| !m.outline_nm.is_empty()) {
             let within = |s: &&Structure| {
                 let b = s.bounds;
                 let inside = |p: &[f64; 2]| {
                     (b.x0 as f64..=b.x1 as f64).contains(&p[0]) && (b.y0 as f64..=b.y1 as f64).contains(&p[1])
                 };
-                s.crosses_fields.is_some() && marker.outline_nm.iter().all(inside)
+                marker.outline_nm.iter().all(inside)
             };
-            let Some(structure) = structures.iter().find(within) else {
+            let reason = |s: &Structure| {
+                let of_check = s.on_purpose.iter().find(|(check, _)| *check == rule.check);
+                of_check.map(|(_, why)| format!("{}: {why}", s.id))
+            };
+            let Some(reason) = structures.iter().filter(within).find_map(reason) else {
                 continue;
             };
             waivers.push(Waiver {
                 rule: rule.id.clone(),
                 hash: marker.hash.clone(),
-                reason: format!("{}: {}", structure.id, structure.crosses_fields.unwrap_or_default()),
+                reason,
                 author: concat!("metalith ", env!("CARGO_PKG_VERSION"), ", which drew it").into(),
                 expires: Date::parse(NO_END).expect("a date"),
                 index: waivers.len(),
@@ -155,8 +162,7 @@ fn on_purpose(structures: &[Structure], report: &DrcReport) -> Vec<Waiver> {
 
 fn text(waivers: &[Waiver]) -> String {
     let mut text =
-        "# What test structures break on purpose. Made with the structures; tests/structures.csv says what each is.\n"
-            .to_owned();
+        "# What structures break on purpose, made with them; tests/structures.csv says what each is.\n".to_owned();
     waivers.iter().for_each(|w| text.push_str(&format!("\n{}", w.text())));
     text
 }

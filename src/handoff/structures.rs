@@ -16,6 +16,8 @@ const NUMERAL: i64 = 15_000;
 const BESIDE: i64 = 8_000;
 /// Lines of a dense CD group; odd, so that the middle one is as dense as lines get.
 const LINES: i64 = 5;
+/// How far from the middle of the reference lens its phase is level [nm]: a window of density and its neighbours.
+const LEVEL_REACH: i64 = 50_000;
 /// Bars of a vernier on each side of its middle.
 const BARS: i64 = 10;
 
@@ -30,8 +32,8 @@ pub(super) struct Structure {
     pub bounds: Rect,
     /// Width drawn, where one is to be measured [nm].
     pub width_nm: Option<i64>,
-    /// Why borders of fields may run through it.
-    pub crosses_fields: Option<&'static str>,
+    /// Checks that it breaks because it is what it is, each with the reason.
+    pub on_purpose: &'static [(&'static str, &'static str)],
 }
 
 /// Everything of the two files of test structures.
@@ -114,14 +116,14 @@ impl Structures {
             purpose: purpose.into(),
             bounds,
             width_nm,
-            crosses_fields: None,
+            on_purpose: &[],
         });
     }
 
-    /// Borders of fields may run through the structure recorded last.
-    fn crossed(&mut self, why: &'static str) {
+    /// What the structure recorded last breaks on purpose.
+    fn breaks(&mut self, on_purpose: &'static [(&'static str, &'static str)]) {
         if let Some(last) = self.list.last_mut() {
-            last.crosses_fields = Some(why);
+            last.on_purpose = on_purpose;
         }
     }
 
@@ -260,7 +262,10 @@ impl Structures {
             film,
             None,
         );
-        self.crossed("solid, and its thickness is the same on both sides of a seam");
+        self.breaks(&[(
+            "field_cut",
+            "solid, and its thickness is the same on both sides of a seam",
+        )]);
         let mut row = pad.united(&film);
         let (pitch, step) = (
             nm(process.tests.overlay_vernier_pitch_um),
@@ -347,7 +352,7 @@ impl Structures {
                 bounds,
                 None,
             );
-            self.crossed("it tells how two fields meet");
+            self.breaks(&[("field_cut", "it tells how two fields meet")]);
             highest = highest.max(bounds.y1);
         }
         highest
@@ -369,6 +374,18 @@ impl Structures {
         drawing.add(self.step2);
         drawing.write(step2)?;
         Ok(self.list)
+    }
+}
+
+/// The middle of the hyperbolic reference lens, which is a file of its own with its origin there.
+pub(super) fn middle_of_reference() -> Structure {
+    const LEVEL: &str = "the phase of a hyperbola is level in its middle, and so all pillars there are about as wide";
+    Structure {
+        id: "REFERENCE".into(),
+        purpose: "hyperbolic lens to compare the elements with".into(),
+        bounds: Rect::new(-LEVEL_REACH, -LEVEL_REACH, LEVEL_REACH, LEVEL_REACH),
+        width_nm: None,
+        on_purpose: &[("fill", LEVEL), ("fill_gradient", LEVEL)],
     }
 }
 
