@@ -153,7 +153,7 @@ fn winds_twice(ring: &[Point]) -> bool {
                 (Fraction::new(x, rise), if rise > 0 { -1 } else { 1 })
             })
             .collect();
-        sides.sort_unstable_by(|a, b| a.0.cmp(&b.0));
+        sides.sort_unstable_by_key(|side| side.0);
         let mut turns = 0;
         for sides_at_one_place in sides.chunk_by(|a, b| a.0 == b.0) {
             turns += sides_at_one_place.iter().map(|s| s.1).sum::<i32>();
