@@ -13,6 +13,7 @@ use super::departure::Departure;
 use super::effects::Parameter;
 use super::optics::PixelGrid;
 use super::simulator::Simulator;
+use super::speckle::Speckle;
 use crate::error::Result;
 use crate::progress::Progress;
 
@@ -49,6 +50,8 @@ pub struct Atlas {
     curves: Vec<Curve>,
     /// Changes for a unit of each free term: phases [1/nm], then transmissions of each LED.
     pub free: Arc<Vec<Vec<Option<PixelGrid>>>>,
+    /// The grain of what strikes single pillars at random, if that is among the effects.
+    pub grain: Option<Arc<Speckle>>,
 }
 
 impl Simulator<'_> {
@@ -114,11 +117,17 @@ impl Simulator<'_> {
                 }
             }
         }
+        let random = self.slots.iter().position(|s| self.effects[s.effect].random());
+        let grain = match random {
+            Some(slot) => Some(Arc::new(Speckle::of(self, about, slot, progress)?)),
+            None => None,
+        };
         Ok(Atlas {
             about: about.to_vec(),
             base: Arc::new(base),
             curves,
             free: Arc::new(terms),
+            grain,
         })
     }
 
@@ -200,6 +209,7 @@ impl Atlas {
             base: Arc::new(base),
             curves: Vec::new(),
             free: Arc::default(),
+            grain: None,
         }
     }
 

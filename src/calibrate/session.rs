@@ -33,8 +33,11 @@ pub struct Settings {
     pub ladder: bool,
     /// Simulate the free terms, which placebos are made of as well.
     pub free: bool,
-    /// Bring what is found to rest on exact simulations.
+    /// Bring what is found to rest on simulations of the very chip, where the atlas adds up polynomials.
     pub exact: bool,
+    /// And solve the cells of that chip with as many orders as the stated ones, instead of adding what a change
+    /// of the pillar moves with fewer: a third of the time of a session, all of that of a proof.
+    pub fine: bool,
 }
 
 impl Default for Settings {
@@ -46,6 +49,7 @@ impl Default for Settings {
             ladder: true,
             free: true,
             exact: true,
+            fine: true,
         }
     }
 }
@@ -58,6 +62,9 @@ const ROUNDS: usize = 4;
 
 /// They have come to rest when the share changes by less than this part of it.
 const SHARE_AT_REST: f64 = 0.05;
+
+/// Before other effects are known, they may differ by this factor.
+const SHARES_ALIKE: f64 = 4.0;
 
 /// Mean and grain speak of one share of missing pillars if they differ by less than this part of it: the grain
 /// is known from a few draws, and the mean is seen through the grain.
@@ -108,8 +115,10 @@ impl<'a> Session<'a> {
         if !settings.only.is_empty() {
             tried.retain(|e| settings.only.contains(&e.name()));
         }
+        let mut simulator = Simulator::new(bench, CellSource::Rigorous(Box::new(cells)), tried);
+        simulator.fine = settings.fine;
         Ok(Self {
-            simulator: Simulator::new(bench, CellSource::Rigorous(Box::new(cells)), tried),
+            simulator,
             data: Data::new(set),
             used: vec![true; set.captures.len()],
             settings,
@@ -196,20 +205,29 @@ impl<'a> Session<'a> {
     /// What is found if the grain of missing pillars is counted as noise, where that explains what is left: if
     /// their mean and their grain speak of the same share.
     fn grained(&self, atlas: &Atlas, plain: &Finding, progress: &dyn Progress) -> Result<Option<(Data, Finding)>> {
-        let Some(effect) = self.simulator.effects.iter().position(|e| e.random()) else {
+        let random = self.simulator.effects.iter().position(|e| e.random());
+        let Some((effect, speckle)) = random.zip(atlas.grain.as_ref()) else {
             return Ok(None);
         };
         if mean(&plain.held_after) < RESIDUAL {
             return Ok(None);
         }
         let slot = self.simulator.slots_of(effect)[0];
-        let problem = self.problem(atlas);
-        let fit = problem.fit(&[slot], &problem.nothing());
-        if fit.theta[slot] <= 0.0 {
+        let problem = Problem {
+            atlas: plain.atlas.clone(),
+            exact: plain.exact.clone(),
+            ..self.problem(atlas)
+        };
+        let mut active = plain.after.active.clone();
+        if !active.contains(&slot) {
+            active.push(slot);
+        }
+        let fit = problem.fit(&active, &plain.after);
+        let mut share = speckle.share(&problem, &fit);
+        // Whatever else is there, a share of the kind is in the mean before it is looked for in earnest.
+        if fit.theta[slot] < share / SHARES_ALIKE {
             return Ok(None);
         }
-        let speckle = Speckle::of(self, &fit, slot, progress)?;
-        let mut share = speckle.share(&problem, &fit);
         let mut data = speckle.counted(&problem, &fit, share);
         for _ in 0..ROUNDS {
             if !Speckle::conceivable(share) {

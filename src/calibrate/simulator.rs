@@ -24,6 +24,8 @@ pub struct Simulator<'a> {
     pub slots: Vec<Slot>,
     /// Draw the pillars that are missing from this seed, instead of counting with their mean.
     pub scatter: Option<u64>,
+    /// Solve the cells of exact simulations with as many orders as the stated ones.
+    pub fine: bool,
     wavelengths_nm: Vec<f64>,
     widths_nm: (f64, f64),
 }
@@ -62,6 +64,7 @@ impl<'a> Simulator<'a> {
             effects,
             slots,
             scatter: None,
+            fine: true,
         }
     }
 
@@ -91,13 +94,15 @@ impl<'a> Simulator<'a> {
         self.expose_with(departures, false, self.scatter, progress)
     }
 
-    /// The same of one departure, its cells solved with as many orders as the stated ones.
+    /// The same of one departure, its cells solved with as many orders as the stated ones if those are wanted.
     ///
     /// # Errors
     /// As [`Simulator::expose`].
     pub fn expose_exactly(&self, departure: &Departure, progress: &dyn Progress) -> Result<Vec<PixelGrid>> {
         let departures = std::slice::from_ref(departure);
-        Ok(self.expose_with(departures, true, self.scatter, progress)?.remove(0))
+        Ok(self
+            .expose_with(departures, self.fine, self.scatter, progress)?
+            .remove(0))
     }
 
     /// The same of one departure, the places of missing pillars drawn from a seed.

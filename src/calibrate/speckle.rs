@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::fit::{Fit, Problem};
 use super::nuisance::Data;
-use super::session::Session;
+use super::simulator::Simulator;
 use crate::error::Result;
 use crate::progress::Progress;
 
@@ -38,14 +38,13 @@ pub struct Speckle {
 }
 
 impl Speckle {
-    /// From draws of the places of a share of missing pillars, number `slot`, about a fit.
+    /// From draws of the places of missing pillars, number `slot`, about the numbers `about`.
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
-    pub fn of(session: &Session<'_>, fit: &Fit, slot: usize, progress: &dyn Progress) -> Result<Self> {
-        let simulator = &session.simulator;
+    pub fn of(simulator: &Simulator<'_>, about: &[f64], slot: usize, progress: &dyn Progress) -> Result<Self> {
         let share = simulator.slots[slot].parameter.typical;
-        let mut theta = fit.theta.clone();
+        let mut theta = about.to_vec();
         theta[slot] = share;
         let departure = simulator.departure(&theta);
         let mean = simulator.expose(std::slice::from_ref(&departure), progress)?.remove(0);
@@ -56,9 +55,8 @@ impl Speckle {
         let grains = (0..mean.len())
             .into_par_iter()
             .map(|c| {
-                let at = fit.nuisances.shift_um[c];
-                let light = mean[c].pixels(at);
-                let own: Vec<Array2<f32>> = drawn.iter().map(|grids| grids[c].pixels(at)).collect();
+                let light = mean[c].pixels([0.0; 2]);
+                let own: Vec<Array2<f32>> = drawn.iter().map(|grids| grids[c].pixels([0.0; 2])).collect();
                 Grain::between(&light, &own, share * (1.0 - share))
             })
             .collect();
