@@ -33,7 +33,7 @@ pub struct OptimiseSpec {
 #[serde(rename_all = "snake_case")]
 pub enum SolverSpec {
     /// Ring by ring, the best of all widths, and then blocks of rings. With the merit `deconvolution`, blocks
-    /// alone; chains, sweeps and temperature are those that make the start `log`.
+    /// alone, one chain, from the first start; chains, sweeps and temperature then make the start `log`.
     Exchange {
         /// Exchanges that begin from different phases or seeds.
         chains: u32,
@@ -120,6 +120,7 @@ impl OptimiseSpec {
                 }
                 (b[0] * 1e-3, b[1] * 1e-3)
             });
+        let solver = SolverSpec::read(s, images);
         let spec = Self {
             fidelity: s.choice(
                 "cell",
@@ -130,7 +131,7 @@ impl OptimiseSpec {
                 ],
                 Some(default.fidelity),
             ),
-            solver: SolverSpec::read(s, images),
+            solver,
             band_um: (short, long),
             step_um: s
                 .optional_float("step_nm", Limits::new(0.1..=50.0, "nm"))
@@ -149,7 +150,10 @@ impl OptimiseSpec {
                     ("previous", StartSpec::Previous),
                     ("log", StartSpec::Log),
                 ],
-                Some(if images { StartSpec::Log } else { default.start }),
+                Some(match solver {
+                    SolverSpec::Adam { .. } if images => StartSpec::Log,
+                    _ => default.start,
+                }),
             ),
             seed: s.optional_integer("seed", 0..=i64::MAX, "").unwrap_or(1) as u64,
             merit,
