@@ -133,6 +133,8 @@ fn two_effects_at_once_are_both_found() {
 #[test]
 fn missing_pillars_are_told_by_their_mean_and_by_their_grain() {
     const SHARE: f64 = 0.04;
+    /// Relative: a lens of 60 um in eight captures has few grains, and its mean is seen through them.
+    const TOLERANCE: f64 = 0.25;
     let folder = tempfile::tempdir().unwrap();
     small_set(folder.path());
     let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
@@ -151,11 +153,11 @@ fn missing_pillars_are_told_by_their_mean_and_by_their_grain() {
     let found: Vec<&str> = d.effects.iter().map(|e| e.name.as_str()).collect();
     assert_eq!(found, ["missing_pillars"], "{} {:?}", d.sentence(), d.error);
     assert_eq!(d.verdict, SetVerdict::Explained);
-    let ends: Vec<f64> = serde_json::from_value(d.effects[0].interval.clone()).unwrap();
-    assert!((ends[0]..=ends[1]).contains(&SHARE), "{ends:?}");
+    let by_mean = d.effects[0].value.as_f64().unwrap();
     let by_grain = d.missing_by_grain.unwrap();
-    // Three thousand grains a capture, and a few draws to tell their size by.
-    assert!((by_grain / SHARE - 1.0).abs() < 0.3, "{by_grain}");
+    for found in [by_mean, by_grain] {
+        assert!((found / SHARE - 1.0).abs() < TOLERANCE, "{by_mean} {by_grain}");
+    }
 }
 
 #[test]
