@@ -40,8 +40,7 @@ impl FreeTerm {
         if atlas.free.len() < FREE_PHASES + FREE_TRANSMISSIONS * leds {
             return None;
         }
-        let mut problem = session.problem(atlas);
-        problem.exact.clone_from(&finding.exact);
+        let problem = session.problem_of(finding);
         let simulated = atlas.free.len();
         let forms = forms_with(&problem, &finding.after, |c, grid| {
             let terms = (0..simulated).map(|t| atlas.free_term(t, c, grid));

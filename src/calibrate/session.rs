@@ -150,6 +150,14 @@ impl<'a> Session<'a> {
         }
     }
 
+    /// The same, resting on what a finding rests on.
+    pub fn problem_of(&self, finding: &Finding) -> Problem<'_> {
+        Problem {
+            exact: finding.exact.clone(),
+            ..self.problem(&finding.atlas)
+        }
+    }
+
     /// The answer for the set, and what it rests on where there is a finding.
     ///
     /// # Errors
@@ -213,11 +221,7 @@ impl<'a> Session<'a> {
             return Ok(None);
         }
         let slot = self.simulator.slots_of(effect)[0];
-        let problem = Problem {
-            atlas: plain.atlas.clone(),
-            exact: plain.exact.clone(),
-            ..self.problem(atlas)
-        };
+        let problem = self.problem_of(plain);
         let mut active = plain.after.active.clone();
         if !active.contains(&slot) {
             active.push(slot);
@@ -236,11 +240,7 @@ impl<'a> Session<'a> {
             let exact = self.settings.exact;
             let mut found = attribute(&self.simulator, atlas, &data, &self.used, exact, None, progress)?;
             // Judged by the noise of the camera alone, from which the grain is told.
-            let bare = Problem {
-                atlas: found.atlas.clone(),
-                exact: found.exact.clone(),
-                ..self.problem(atlas)
-            };
+            let bare = self.problem_of(&found);
             let next = speckle.share(&bare, &found.after);
             if (next / share - 1.0).abs() < SHARE_AT_REST {
                 let by_mean = found.after.theta[slot];

@@ -21,9 +21,9 @@ const DRAWS: u64 = 4;
 const SEED: u64 = 5000;
 const SEEDS_APART: u64 = 64;
 
-/// Shares that are thought of, and steps of the search between them.
+/// Shares that are thought of, and how near the search between them comes, relative.
 const SHARES: (f64, f64) = (1e-4, 0.3);
-const STEPS: usize = 48;
+const NEAR: f64 = 1e-4;
 
 /// Variance of the intensity at a pixel that should show `i`, for a unit of p (1 - p): `by_light * i + floor`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -87,15 +87,12 @@ impl Speckle {
         // Golden section over the logarithm.
         let golden = 0.5 * (5f64.sqrt() - 1.0);
         let (mut low, mut high) = (SHARES.0.ln(), SHARES.1.ln());
-        for _ in 0..STEPS {
+        while high - low >= NEAR {
             let (a, b) = (high - golden * (high - low), low + golden * (high - low));
             if unlikely(a.exp()) < unlikely(b.exp()) {
                 high = b;
             } else {
                 low = a;
-            }
-            if high - low < 1e-4 {
-                break;
             }
         }
         (0.5 * (low + high)).exp()

@@ -17,6 +17,7 @@ const PAGE: usize = 4096;
 const BLOCK: usize = 1 << 20;
 
 /// Memory for a stretch of a file, which begins on a page, with room before it for what was left of the last.
+#[derive(Default)]
 pub(crate) struct Block {
     pub bytes: Vec<u8>,
     /// Where in `bytes` the stretch begins.

@@ -166,7 +166,7 @@ impl Input {
                 (self.from, self.to) = (block.start - left, block.start + held);
             }
             Stream::Large(ahead) => {
-                let done = std::mem::replace(&mut self.block, Block::new(0, 0));
+                let done = std::mem::take(&mut self.block);
                 (self.from, self.to) = (self.block.start, self.block.start);
                 let keep = |done: &Block, block: &mut Block| {
                     block.bytes[block.start - left..block.start].copy_from_slice(&done.bytes[from..to]);

@@ -29,14 +29,7 @@ pub(super) fn keep(
     // The process and its decks may be those of the program, which are no files.
     let (path, text) = process.source();
     put(format!("process_{}", name(path)), "the process values", text.as_bytes())?;
-    let checks = &process.checks;
-    for rules in [
-        &checks.pillar_rules,
-        &checks.aperture_rules,
-        &checks.dose_rules,
-        &checks.test_rules,
-        &checks.test_opening_rules,
-    ] {
+    for rules in process.checks.decks() {
         let deck = process.deck(rules)?;
         let (path, text) = deck.source();
         put(

@@ -103,7 +103,7 @@ impl<'p> BlockExchange<'p> {
 
     /// Phase of each ring [turns]; every step keeps the limit.
     pub fn turns(&self) -> Vec<f64> {
-        self.choices.iter().map(|&c| self.mapping.choices()[c].turns).collect()
+        self.mapping.turns_of(&self.choices)
     }
 
     /// Width of the pillars of each ring [nm].

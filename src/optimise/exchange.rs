@@ -86,14 +86,12 @@ impl<'p> Exchange<'p> {
 
     /// Phase of each ring [turns].
     pub fn turns(&self) -> Vec<f64> {
-        let choices = self.problem.mapping().choices();
-        self.choices.iter().map(|&c| choices[c].turns).collect()
+        self.problem.mapping().turns_of(&self.choices)
     }
 
     /// Width of the pillars of each ring [nm].
     pub fn widths_nm(&self) -> Vec<u16> {
-        let choices = self.problem.mapping().choices();
-        self.choices.iter().map(|&c| choices[c].width_nm).collect()
+        self.problem.mapping().widths_of(&self.choices)
     }
 
     /// Visit every ring once, in random order. The generator depends on the seed and the sweep alone.

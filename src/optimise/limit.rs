@@ -195,7 +195,7 @@ mod tests {
         ) {
             let (mapping, limit) = (published(), StepLimit::new(limit).unwrap());
             let chosen = limit.nearest_choices(&mapping, &turns);
-            let turns = chosen.iter().map(|&c| mapping.choices()[c].turns).collect::<Vec<_>>();
+            let turns = mapping.turns_of(&chosen);
             prop_assert!(largest_step(&turns) <= limit.turns() + ROUNDING);
         }
     }

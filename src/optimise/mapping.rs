@@ -48,6 +48,11 @@ impl Mapping {
         &self.choices
     }
 
+    /// Phases of given choices [turns].
+    pub(crate) fn turns_of(&self, choices: &[usize]) -> Vec<f64> {
+        choices.iter().map(|&c| self.choices[c].turns).collect()
+    }
+
     /// Widths of given choices [nm].
     pub(crate) fn widths_of(&self, choices: &[usize]) -> Vec<u16> {
         choices.iter().map(|&c| self.choices[c].width_nm).collect()

@@ -188,8 +188,7 @@ impl Task {
             ..checkpoint
         });
         let chosen = self.limit.nearest_choices(&self.mapping, adam.turns());
-        let choices = chosen.iter().map(|&c| self.mapping.choices()[c]).collect::<Vec<_>>();
-        let widths_nm = choices.iter().map(|c| c.width_nm).collect::<Vec<_>>();
+        let widths_nm = self.mapping.widths_of(&chosen);
         let merit = if interrupted.is_some() {
             smooth.unwrap_or(f64::NAN)
         } else {
@@ -198,7 +197,7 @@ impl Task {
         Ok(Optimised {
             merit,
             widths_nm,
-            turns: choices.iter().map(|c| c.turns).collect(),
+            turns: self.mapping.turns_of(&chosen),
             start: name,
             history,
             interrupted,

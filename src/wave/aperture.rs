@@ -64,11 +64,9 @@ impl<'a> Pillars<'a> {
                 "make the table up to the widest pillar of the layout",
             ));
         }
-        let mut table: Vec<Complex32> = table.iter().map(|t| single(*t)).collect();
-        table[0] = Complex32::ZERO;
         Ok(Self {
             widths,
-            table,
+            table: by_width(table),
             radius_um: (radius2 as f64).sqrt() * 0.5 * widths.lattice.pitch_um(),
         })
     }
@@ -90,6 +88,15 @@ impl Aperture for Pillars<'_> {
     }
 }
 
+/// A table of what each width transmits in single precision; without a pillar, nothing.
+fn by_width(table: &[Complex64]) -> Vec<Complex32> {
+    let mut table = table.iter().map(|t| single(*t)).collect::<Vec<_>>();
+    if let Some(none) = table.first_mut() {
+        *none = Complex32::ZERO;
+    }
+    table
+}
+
 /// Pillars whose width is a function of place, formed as rows are asked for: nothing of the size of the
 /// element is held, for sweeps over designs that are never laid out.
 #[derive(Clone, Debug)]
@@ -104,14 +111,10 @@ impl<F: Fn(f64, f64) -> u16 + Sync> PillarFunction<F> {
     /// `width_nm` at x, y [um] from the element's centre, asked for within the circle; `table` as in
     /// [`Pillars::new`]. A width beyond the table passes nothing.
     pub fn new(lattice: Lattice, radius_um: f64, table: &[Complex64], width_nm: F) -> Self {
-        let mut table = table.iter().map(|t| single(*t)).collect::<Vec<_>>();
-        if let Some(none) = table.first_mut() {
-            *none = Complex32::ZERO;
-        }
         Self {
             lattice,
             radius_um,
-            table,
+            table: by_width(table),
             width_nm,
         }
     }

@@ -18,8 +18,7 @@ pub(super) fn captures(page: &mut Page, session: &Session<'_>, atlas: &Atlas, fi
         "Each row: what the camera saw, what the model predicts, and the residual in standard deviations of the noise, before and after.",
     );
     let set = session.set();
-    let mut problem = session.problem(&finding.atlas);
-    problem.exact.clone_from(&finding.exact);
+    let problem = session.problem_of(finding);
     let plain = session.problem(atlas);
     let wide = |a: &Array2<f32>| a.mapv(f64::from);
     for (place, group) in groups(&problem).iter().enumerate() {

@@ -319,7 +319,7 @@ impl Left {
         let free = FreeTerm::new(session, finding)?;
         let error = |c: &usize| diagnosis.captures[*c].after.unwrap_or(0.0);
         let worst = (0..diagnosis.captures.len()).max_by(|a, b| error(a).total_cmp(&error(b)))?;
-        let grid = finding.atlas.grid(&finding.after.theta, worst);
+        let grid = session.problem_of(finding).grid(&finding.after.theta, worst);
         let residual = finding.after.nuisances.residual(&session.data, &grid, worst);
         Some(Self {
             path_nm: free.coefficients_nm,

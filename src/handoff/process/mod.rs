@@ -192,6 +192,19 @@ pub struct JobSpec {
     pub layer_step1: i64,
 }
 
+impl CheckSpec {
+    /// The decks of rules, each once.
+    pub(super) fn decks(&self) -> [&Path; 5] {
+        [
+            &self.pillar_rules,
+            &self.aperture_rules,
+            &self.dose_rules,
+            &self.test_rules,
+            &self.test_opening_rules,
+        ]
+    }
+}
+
 impl Process {
     /// Read the process file at `path`.
     ///
@@ -254,14 +267,7 @@ mod tests {
     #[test]
     fn the_shipped_process_is_read_and_exposes_pillars() {
         let process = Process::standard();
-        let checks = &process.checks;
-        for rules in [
-            &checks.pillar_rules,
-            &checks.aperture_rules,
-            &checks.dose_rules,
-            &checks.test_rules,
-            &checks.test_opening_rules,
-        ] {
+        for rules in process.checks.decks() {
             // The same deck, built in and from its file.
             let name = |deck: Deck| deck.name;
             let file = Path::new(env!("CARGO_MANIFEST_DIR"))
