@@ -1,5 +1,6 @@
 //! Fits that go farther than the atlas was simulated, or nearer to the truth than its polynomials.
 
+use super::effects::Stage;
 use super::fit::{Fit, Problem};
 use super::optics::PixelGrid;
 use crate::error::Result;
@@ -13,6 +14,9 @@ const FARTHER: f64 = 1.4;
 
 /// Exact simulations that a fit is brought to rest with.
 const EXACT_STEPS: usize = 3;
+
+/// Cells are solved at multiples of this share of a typical size; the atlas goes the rest of the way.
+const CELLS_APART: f64 = 1.0 / 16.0;
 
 /// It has come to rest when no number moves by more than this share of its typical size.
 const AT_REST: f64 = 2e-2;
@@ -68,18 +72,19 @@ impl Problem<'_> {
         Ok(fit)
     }
 
-    /// Bring a fit to rest on exact simulations of where it is.
+    /// Bring a fit to rest on exact simulations of where it is, or close by.
     ///
     /// # Errors
     /// As [`Problem::stretch`].
     pub fn settle(&mut self, mut fit: Fit, progress: &dyn Progress) -> Result<Fit> {
         for _ in 0..EXACT_STEPS {
             fit = self.stretch(fit, progress)?;
-            let departure = self.simulator.departure(&fit.theta);
-            let exposed = self.simulator.expose_exactly(&departure, progress)?;
+            let at = self.rounded(&fit.theta);
+            let departure = self.simulator.departure(&at);
+            let exposed = self.simulator.expose(&[departure], progress)?.remove(0);
             let offset = exposed
                 .iter()
-                .zip(self.looked_up(&fit.theta))
+                .zip(self.looked_up(&at))
                 .map(|(made, looked_up)| PixelGrid::combine(&[(made, 1.0), (&looked_up, -1.0)]))
                 .collect();
             self.exact = Some(offset);
@@ -95,6 +100,21 @@ impl Problem<'_> {
             }
         }
         Ok(fit)
+    }
+
+    /// Numbers close by whose cells are likely to be known already.
+    fn rounded(&self, theta: &[f64]) -> Vec<f64> {
+        let slots = self.simulator.slots.iter().zip(theta);
+        slots
+            .map(|(slot, value)| {
+                if self.simulator.effects[slot.effect].stage() != Stage::Stack {
+                    return *value;
+                }
+                let step = CELLS_APART * slot.parameter.typical;
+                let (low, high) = slot.parameter.range;
+                ((value / step).round() * step).clamp(low, high)
+            })
+            .collect()
     }
 
     fn looked_up(&self, theta: &[f64]) -> Vec<PixelGrid> {

@@ -2,12 +2,13 @@
 //! seen, and say where two cannot be told apart.
 
 use super::atlas::Atlas;
+use super::couple::couple;
 use super::fit::{Fit, Problem};
-use super::forward::{LEAST_GAIN, Tried, forward};
+use super::forward::{LEAST_GAIN, RESIDUAL, Tried, forward};
 use super::heldout::{HeldOut, half_widths, held_out, mean};
 use super::nuisance::Data;
 use super::optics::PixelGrid;
-use super::rivals::{Alternative, prune, rivals};
+use super::rivals::{Alternative, Found, prune, rivals};
 use super::simulator::Simulator;
 use crate::error::Result;
 use crate::progress::Progress;
@@ -92,17 +93,31 @@ pub fn attribute(
         } else {
             later.push(step.tried);
         }
-        let Some((tried, fit, held)) = step.taken else { break };
-        runners.push(step.leaders);
-        if let Some(known) = ranking.iter_mut().find(|t| t.effect == tried.effect) {
-            let score = known.score;
-            *known = Tried { score, ..tried.clone() };
+        let mut taken = Vec::new();
+        if let Some((tried, fit, held)) = step.taken {
+            runners.push(step.leaders);
+            taken.push(tried);
+            (now, held_now) = (fit, held);
+            if exact {
+                now = problem.settle(now, progress)?;
+                held_now = held_out(&problem, &now.forms, &now);
+            }
+        } else if mean(&held_now) > RESIDUAL && chosen.len() + 2 <= MOST_EFFECTS {
+            let Some(both) = couple(&problem, &chosen, &now, &held_now, exact, progress)? else {
+                break;
+            };
+            runners.extend([both.runners.clone(), both.runners]);
+            taken.extend(both.tried);
+            (now, held_now, problem) = (both.fit, both.held, both.problem);
+        } else {
+            break;
         }
-        chosen.push(tried.effect);
-        (now, held_now) = (fit, held);
-        if exact {
-            now = problem.settle(now, progress)?;
-            held_now = held_out(&problem, &now.forms, &now);
+        for tried in taken {
+            if let Some(known) = ranking.iter_mut().find(|t| t.effect == tried.effect) {
+                let score = known.score;
+                *known = Tried { score, ..tried.clone() };
+            }
+            chosen.push(tried.effect);
         }
         if mean(&held_now) < 1.0 + LEAST_GAIN {
             break;
@@ -110,11 +125,17 @@ pub fn attribute(
     }
     let found = chosen.clone();
     prune(&problem, &mut chosen, &mut now, &mut held_now);
-    let mut alternatives = rivals(&problem, &mut chosen, &runners, &mut now, &mut held_now);
     if exact && chosen != found {
         now = problem.settle(now, progress)?;
         held_now = held_out(&problem, &now.forms, &now);
     }
+    let mut found = Found {
+        now: &mut now,
+        held: &mut held_now,
+        before: &held_before,
+        exact,
+    };
+    let mut alternatives = rivals(&mut problem, &mut chosen, &runners, &mut found, progress)?;
     let mut widths = half_widths(&problem, &now);
     for (w, &s) in widths.iter_mut().zip(&now.active) {
         *w = w.max(MODEL_SHARE * simulator.slots[s].parameter.typical);

@@ -43,10 +43,21 @@ pub struct Fit {
     pub chi2: f64,
 }
 
-impl Problem<'_> {
+impl<'a> Problem<'a> {
     /// Number of shared nuisances.
     pub fn shared(&self) -> usize {
         self.data.leds + 1
+    }
+
+    /// The same problem, to be carried on by itself.
+    pub fn branch(&self) -> Self {
+        Self {
+            simulator: self.simulator,
+            atlas: self.atlas.clone(),
+            data: self.data,
+            used: self.used.clone(),
+            exact: self.exact.clone(),
+        }
     }
 
     /// A fit of the nuisances alone.

@@ -105,8 +105,9 @@ pub struct Step {
     pub placebo: f64,
 }
 
-struct Candidate {
-    tried: Tried,
+/// An effect on trial.
+pub struct Candidate {
+    pub tried: Tried,
     fitted: Option<(Fit, HeldOut)>,
 }
 
@@ -207,8 +208,17 @@ pub fn forward(
     })
 }
 
+/// Whether numbers lie within what physics allows, not at its ends.
+pub fn physical(problem: &Problem<'_>, fit: &Fit, slots: &[usize]) -> bool {
+    slots.iter().all(|&s| {
+        let (a, b) = problem.simulator.slots[s].parameter.range;
+        let room = 1e-6 * (b - a);
+        fit.theta[s] > a + room && fit.theta[s] < b - room || fit.theta[s] == 0.0
+    })
+}
+
 /// Where fits of an effect begin: where one is, or on each side of zero if those know nothing of one another.
-fn starts(problem: &Problem<'_>, effect: usize, now: &Fit) -> Vec<Fit> {
+pub fn starts(problem: &Problem<'_>, effect: usize, now: &Fit) -> Vec<Fit> {
     if !problem.simulator.effects[effect].kinked() {
         return vec![now.clone()];
     }
@@ -237,7 +247,8 @@ fn sort(candidates: &mut [Candidate]) {
 }
 
 impl Candidate {
-    fn new(effect: usize, score: f64) -> Self {
+    /// Not fitted yet.
+    pub fn new(effect: usize, score: f64) -> Self {
         Self {
             tried: Tried {
                 effect,
@@ -250,7 +261,8 @@ impl Candidate {
         }
     }
 
-    fn judge(&mut self, problem: &Problem<'_>, fit: Fit, held_now: &HeldOut) {
+    /// With a fit that it is part of.
+    pub fn judge(&mut self, problem: &Problem<'_>, fit: Fit, held_now: &HeldOut) {
         let held = held_out(problem, &fit.forms, &fit);
         self.tried.gain = Some(gain(problem, held_now, &held));
         let slots = problem.simulator.slots_of(self.tried.effect);
@@ -263,16 +275,11 @@ impl Candidate {
     }
 
     /// Why it cannot be what is there, whatever others do.
-    fn fault(&self, problem: &Problem<'_>, held_now: &HeldOut) -> Option<Rejection> {
+    pub fn fault(&self, problem: &Problem<'_>, held_now: &HeldOut) -> Option<Rejection> {
         let (value, [low, _]) = self.tried.gain?;
         let (fit, _) = self.fitted.as_ref()?;
         let above_noise = (mean(held_now) - 1.0).max(1e-6);
         let slots = problem.simulator.slots_of(self.tried.effect);
-        let inside = slots.iter().all(|&s| {
-            let (a, b) = problem.simulator.slots[s].parameter.range;
-            let room = 1e-6 * (b - a);
-            fit.theta[s] > a + room && fit.theta[s] < b - room || fit.theta[s] == 0.0
-        });
         if value < LEAST_GAIN {
             return Some(Rejection::Little(value));
         }
@@ -282,7 +289,7 @@ impl Candidate {
         if value < LEAST_SHARE * above_noise {
             return Some(Rejection::Part(value / above_noise));
         }
-        if !inside {
+        if !physical(problem, fit, &slots) {
             return Some(Rejection::Unphysical);
         }
         let widths = half_widths(problem, fit);

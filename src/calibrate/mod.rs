@@ -9,6 +9,7 @@ mod atlas;
 mod attribute;
 mod bench;
 mod cells;
+mod couple;
 mod curve;
 mod density;
 mod departure;

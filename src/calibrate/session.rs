@@ -35,9 +35,6 @@ pub struct Settings {
     pub free: bool,
     /// Bring what is found to rest on simulations of the very chip, where the atlas adds up polynomials.
     pub exact: bool,
-    /// And solve the cells of that chip with as many orders as the stated ones, instead of adding what a change
-    /// of the pillar moves with fewer: a third of the time of a session, all of that of a proof.
-    pub fine: bool,
 }
 
 impl Default for Settings {
@@ -49,7 +46,6 @@ impl Default for Settings {
             ladder: true,
             free: true,
             exact: true,
-            fine: true,
         }
     }
 }
@@ -115,8 +111,7 @@ impl<'a> Session<'a> {
         if !settings.only.is_empty() {
             tried.retain(|e| settings.only.contains(&e.name()));
         }
-        let mut simulator = Simulator::new(bench, CellSource::Rigorous(Box::new(cells)), tried);
-        simulator.fine = settings.fine;
+        let simulator = Simulator::new(bench, CellSource::Rigorous(Box::new(cells)), tried);
         Ok(Self {
             simulator,
             data: Data::new(set),
@@ -250,6 +245,11 @@ impl<'a> Session<'a> {
                     break;
                 }
                 found.by_grain = Some(share);
+                // Two answers to one question: the interval holds both.
+                let own = found.after.active.iter().position(|s| *s == slot);
+                if let Some(width) = own.and_then(|k| found.half_widths.get_mut(k)) {
+                    *width = width.max((by_mean - share).abs());
+                }
                 found.before = plain.before.clone();
                 found.held_before.clone_from(&plain.held_before);
                 return Ok(Some((data, found)));

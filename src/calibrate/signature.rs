@@ -10,6 +10,33 @@ use super::simulator::Simulator;
 /// Effects by the share of the residual that their signature explains, nuisances and what is chosen
 /// projected out.
 pub fn screen(problem: &Problem<'_>, now: &Fit, chosen: &[usize]) -> Vec<(usize, f64)> {
+    let sets = others(problem, chosen).into_iter().map(|e| [e]).collect();
+    let scores = explained(problem, now, chosen, sets);
+    scores.into_iter().map(|([e], score)| (e, score)).collect()
+}
+
+/// The same for all pairs of effects.
+pub fn screen_pairs(problem: &Problem<'_>, now: &Fit, chosen: &[usize]) -> Vec<([usize; 2], f64)> {
+    let others = others(problem, chosen);
+    let pairs = others
+        .iter()
+        .enumerate()
+        .flat_map(|(k, &a)| others[k + 1..].iter().map(move |&b| [a, b]));
+    explained(problem, now, chosen, pairs.collect())
+}
+
+fn others(problem: &Problem<'_>, chosen: &[usize]) -> Vec<usize> {
+    (0..problem.simulator.effects.len())
+        .filter(|e| !chosen.contains(e))
+        .collect()
+}
+
+fn explained<const N: usize>(
+    problem: &Problem<'_>,
+    now: &Fit,
+    chosen: &[usize],
+    sets: Vec<[usize; N]>,
+) -> Vec<([usize; N], f64)> {
     let simulator = problem.simulator;
     let slots: Vec<usize> = (0..simulator.slots.len()).collect();
     let wide = problem.at(&slots, now.theta.clone(), now.nuisances.clone());
@@ -19,16 +46,13 @@ pub fn screen(problem: &Problem<'_>, now: &Fit, chosen: &[usize]) -> Vec<(usize,
         .chain(chosen.iter().flat_map(|&e| simulator.slots_of(e)).map(|s| shared + s))
         .collect();
     let (_, without) = minimise(&form, &base);
-    let mut scores: Vec<(usize, f64)> = (0..simulator.effects.len())
-        .filter(|e| !chosen.contains(e))
-        .map(|e| {
-            let free: Vec<usize> = base
-                .iter()
-                .copied()
-                .chain(simulator.slots_of(e).into_iter().map(|s| shared + s))
-                .collect();
+    let mut scores: Vec<([usize; N], f64)> = sets
+        .into_iter()
+        .map(|set| {
+            let own = set.iter().flat_map(|&e| simulator.slots_of(e));
+            let free: Vec<usize> = base.iter().copied().chain(own.map(|s| shared + s)).collect();
             let (_, with) = minimise(&form, &free);
-            (e, ((without - with) / without).max(0.0))
+            (set, ((without - with) / without).max(0.0))
         })
         .collect();
     scores.sort_by(|a, b| b.1.total_cmp(&a.1));

@@ -24,8 +24,6 @@ pub struct Simulator<'a> {
     pub slots: Vec<Slot>,
     /// Draw the pillars that are missing from this seed, instead of counting with their mean.
     pub scatter: Option<u64>,
-    /// Solve the cells of exact simulations with as many orders as the stated ones.
-    pub fine: bool,
     wavelengths_nm: Vec<f64>,
     widths_nm: (f64, f64),
 }
@@ -64,7 +62,6 @@ impl<'a> Simulator<'a> {
             effects,
             slots,
             scatter: None,
-            fine: true,
         }
     }
 
@@ -91,18 +88,7 @@ impl<'a> Simulator<'a> {
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
     pub fn expose(&self, departures: &[Departure], progress: &dyn Progress) -> Result<Vec<Vec<PixelGrid>>> {
-        self.expose_with(departures, false, self.scatter, progress)
-    }
-
-    /// The same of one departure, its cells solved with as many orders as the stated ones if those are wanted.
-    ///
-    /// # Errors
-    /// As [`Simulator::expose`].
-    pub fn expose_exactly(&self, departure: &Departure, progress: &dyn Progress) -> Result<Vec<PixelGrid>> {
-        let departures = std::slice::from_ref(departure);
-        Ok(self
-            .expose_with(departures, self.fine, self.scatter, progress)?
-            .remove(0))
+        self.expose_with(departures, self.scatter, progress)
     }
 
     /// The same of one departure, the places of missing pillars drawn from a seed.
@@ -111,13 +97,12 @@ impl<'a> Simulator<'a> {
     /// As [`Simulator::expose`].
     pub fn expose_drawn(&self, departure: &Departure, seed: u64, progress: &dyn Progress) -> Result<Vec<PixelGrid>> {
         let departures = std::slice::from_ref(departure);
-        Ok(self.expose_with(departures, false, Some(seed), progress)?.remove(0))
+        Ok(self.expose_with(departures, Some(seed), progress)?.remove(0))
     }
 
     fn expose_with(
         &self,
         departures: &[Departure],
-        exact: bool,
         scatter: Option<u64>,
         progress: &dyn Progress,
     ) -> Result<Vec<Vec<PixelGrid>>> {
@@ -140,7 +125,6 @@ impl<'a> Simulator<'a> {
                 &departures[step[0]].cell,
                 &self.wavelengths_nm,
                 self.widths_nm,
-                exact,
                 progress,
             )?;
             work.push((step, cells));

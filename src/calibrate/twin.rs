@@ -75,7 +75,7 @@ impl<'a> Twins<'a> {
             (low - WIDTH_ROOM_NM, high + WIDTH_ROOM_NM),
             settings.cache.clone(),
         )
-        .with_orders(ORDERS, ORDERS, LEANING_ORDERS);
+        .with_orders(ORDERS, LEANING_ORDERS);
         let mut simulator = Simulator::new(bench, CellSource::Rigorous(Box::new(cells)), effects::all(like));
         // Fits count with the mean of missing pillars; here single ones are gone.
         simulator.scatter = Some(MISSING_SEED);

@@ -5,6 +5,7 @@ use ndarray::Array2;
 use super::super::atlas::Atlas;
 use super::super::attribute::Finding;
 use super::super::heldout::{HeldOut, groups};
+use super::super::nuisance::Data;
 use super::super::session::Session;
 use crate::report::{Axis, Chart, ImageGrid, Page, fixed, sig};
 
@@ -20,6 +21,8 @@ pub(super) fn captures(page: &mut Page, session: &Session<'_>, atlas: &Atlas, fi
     let set = session.set();
     let problem = session.problem_of(finding);
     let plain = session.problem(atlas);
+    // Before anything was found, nothing but the camera was noise.
+    let camera_alone = Data::new(set);
     let wide = |a: &Array2<f32>| a.mapv(f64::from);
     for (place, group) in groups(&problem).iter().enumerate() {
         let first = &set.captures[group[0]];
@@ -59,7 +62,7 @@ pub(super) fn captures(page: &mut Page, session: &Session<'_>, atlas: &Atlas, fi
                 let before = finding
                     .before
                     .nuisances
-                    .residual(&session.data, &plain.grid(&finding.before.theta, c), c);
+                    .residual(&camera_alone, &plain.grid(&finding.before.theta, c), c);
                 let after = finding
                     .after
                     .nuisances

@@ -127,7 +127,6 @@ impl Default for Extent {
 pub fn prove(like: &MeasuredSet, settings: &Settings, extent: &Extent, progress: &dyn Progress) -> Result<Proof> {
     let settings = Settings {
         ladder: false,
-        fine: false,
         ..settings.clone()
     };
     let session = Session::new(like, settings.clone())?;

@@ -1,18 +1,23 @@
 //! Transmission of pillars of any width, as etched, at the wavelengths of a set.
 //!
-//! The stated cell is solved with many orders. How a change of the pillar (height, index, walls, corners,
-//! mask) moves it is solved with fewer, before and after, and the difference added: what truncation errs by
-//! is common to both.
+//! The stated cell is solved with many orders. A change of the pillar (height, index, walls, corners, mask) is
+//! solved with fewer, and corrected by what they err by on the stated pillar that it is most like.
+
+mod carry;
+mod table;
 
 use std::collections::HashMap;
 use std::fs;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use num_complex::{Complex32, Complex64};
+use num_complex::Complex64;
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
+pub use table::CellTable;
+
+use self::carry::{Carried, carried_over};
 use super::departure::CellChange;
 use crate::cell::rcwa::{Incidence, Orders, Outline, Side, solve};
 use crate::cell::{CellModel, CellStack};
@@ -23,48 +28,17 @@ use crate::progress::Progress;
 /// Orders along an axis for the stated cell: errs by about 0.005 rad.
 const FINE: usize = 13;
 
-/// Orders along an axis for what a change of the pillar moves.
+/// Orders along an axis for what a change of the pillar makes of it.
 const COARSE: usize = 9;
 
-/// The same for leaning walls, which take six layers.
-const COARSEST: usize = 7;
+/// The same for leaning walls, which take six layers; they are very like upright ones.
+const LEANING: usize = 7;
+
+/// And for pillars that are wider one way, which twins alone are made of.
+const ANISOTROPIC: usize = 9;
 
 /// Widths are tabulated this far apart [nm]; resonances are a few nanometres wide.
 const STEP_NM: f64 = 2.0;
-
-/// Transmission over wavelength and width.
-#[derive(Clone, Debug)]
-pub struct CellTable {
-    first_nm: f64,
-    step_nm: f64,
-    /// For each wavelength, the transmissions of all widths.
-    t: Vec<Vec<Complex64>>,
-    /// For each wavelength, that of a site without pillar.
-    bare: Vec<Complex64>,
-}
-
-impl CellTable {
-    /// Transmission of a pillar of any width [nm] at one of the wavelengths, by cubics through the table.
-    pub fn at(&self, wavelength: usize, width_nm: f64) -> Complex32 {
-        let row = &self.t[wavelength];
-        let x = ((width_nm - self.first_nm) / self.step_nm).clamp(0.0, (row.len() - 1) as f64);
-        let i = (x.floor() as usize).clamp(1, row.len() - 3);
-        let u = x - i as f64;
-        let [a, b, c, d] = [row[i - 1], row[i], row[i + 1], row[i + 2]];
-        // Lagrange through the four neighbours.
-        let value = a * (-u * (u - 1.0) * (u - 2.0) / 6.0)
-            + b * ((u + 1.0) * (u - 1.0) * (u - 2.0) / 2.0)
-            + c * (-(u + 1.0) * u * (u - 2.0) / 2.0)
-            + d * ((u + 1.0) * u * (u - 1.0) / 6.0);
-        Complex32::new(value.re as f32, value.im as f32)
-    }
-
-    /// Transmission of a site without pillar.
-    pub fn bare(&self, wavelength: usize) -> Complex32 {
-        let value = self.bare[wavelength];
-        Complex32::new(value.re as f32, value.im as f32)
-    }
-}
 
 /// Where tables come from.
 pub enum CellSource {
@@ -81,7 +55,7 @@ pub struct RigorousCells {
     widths_nm: (f64, f64),
     fine: usize,
     coarse: usize,
-    coarsest: usize,
+    leaning: usize,
     folder: Option<PathBuf>,
     made: Mutex<HashMap<[u64; 6], Arc<CellTable>>>,
 }
@@ -95,44 +69,74 @@ impl RigorousCells {
             widths_nm,
             fine: FINE,
             coarse: COARSE,
-            coarsest: COARSEST,
+            leaning: LEANING,
             folder,
             made: Mutex::default(),
         }
     }
 
-    /// The same with other orders: for twins that must not share the truncation of the fit.
-    pub fn with_orders(mut self, fine: usize, coarse: usize, coarsest: usize) -> Self {
-        (self.fine, self.coarse, self.coarsest) = (fine, coarse, coarsest);
+    /// The same with other orders, for upright pillars in full: for twins that must not share what fits are
+    /// short of. Leaning walls take six layers, and fewer orders.
+    pub fn with_orders(mut self, fine: usize, leaning: usize) -> Self {
+        (self.fine, self.coarse, self.leaning) = (fine, fine, leaning);
         self
     }
 
-    /// The table of the cell with a change; with `exact`, the changed cell itself with all orders.
+    /// The table of the cell with a change.
     ///
     /// # Errors
     /// If a pillar cannot be (a foot wider than the pitch), or the user stopped it.
-    pub fn table(&self, change: &CellChange, exact: bool, progress: &dyn Progress) -> Result<Arc<CellTable>> {
-        let upright = change.taper_deg == 0.0;
-        if *change == CellChange::default() || upright && (exact || self.coarse >= self.fine) {
+    pub fn table(&self, change: &CellChange, progress: &dyn Progress) -> Result<Arc<CellTable>> {
+        let stated = CellChange::default();
+        let (alike, coarse) = if change.taper_deg == 0.0 {
+            (stated, self.coarse)
+        } else {
+            let upright = CellChange {
+                taper_deg: 0.0,
+                ..*change
+            };
+            (upright, self.leaning)
+        };
+        if *change == stated || coarse >= self.fine {
             return self.solved(change, self.fine, progress);
         }
-        let stated = self.solved(&CellChange::default(), self.fine, progress)?;
-        let coarse = match (upright, exact) {
-            (true, _) | (false, true) => self.coarse.min(COARSE),
-            (false, false) => self.coarsest,
-        };
-        let before = self.solved(&CellChange::default(), coarse, progress)?;
-        let after = self.solved(change, coarse, progress)?;
-        let mut table = (*stated).clone();
-        for (to, (from, new)) in table.t.iter_mut().zip(before.t.iter().zip(&after.t)) {
-            for (t, (a, b)) in to.iter_mut().zip(from.iter().zip(new)) {
-                *t += b - a;
-            }
-        }
-        for (t, (a, b)) in table.bare.iter_mut().zip(before.bare.iter().zip(&after.bare)) {
-            *t += b - a;
-        }
-        Ok(Arc::new(table))
+        self.kept(change, -(coarse as f64), || {
+            self.carried(change, &alike, coarse, progress)
+        })
+    }
+
+    /// What a change makes of `alike`, solved with fewer orders.
+    fn carried(
+        &self,
+        change: &CellChange,
+        alike: &CellChange,
+        coarse: usize,
+        progress: &dyn Progress,
+    ) -> Result<CellTable> {
+        let stated = self.table(alike, progress)?;
+        let before = self.solved(alike, coarse, progress)?;
+        let after = self.solve(change, coarse, progress)?;
+        let stack = changed(&self.stack, change);
+        let orders = Orders::new(self.fine)?;
+        let t = (0..self.wavelengths_nm.len())
+            .into_par_iter()
+            .map(|l| {
+                let Carried { mut t, resonant } = carried_over(&stated.t[l], &before.t[l], &after.t[l]);
+                if progress.stopped() {
+                    return Err(Error::Interrupted);
+                }
+                for k in resonant {
+                    t[k] = self.solve_one(&stack, l, k, orders)?;
+                }
+                Ok(t)
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let bare = stated.bare.iter().zip(before.bare.iter().zip(&after.bare));
+        Ok(CellTable {
+            bare: bare.map(|(t, (a, b))| t + b - a).collect(),
+            t,
+            ..(*stated).clone()
+        })
     }
 
     /// Tables for light polarised along x and along y, of pillars that are `nm` wider along x and narrower
@@ -141,7 +145,7 @@ impl RigorousCells {
     /// # Errors
     /// As [`RigorousCells::table`].
     pub fn anisotropic(&self, nm: f64, progress: &dyn Progress) -> Result<[CellTable; 2]> {
-        let orders = Orders::new(self.coarse.min(COARSE))?;
+        let orders = Orders::new(ANISOTROPIC)?;
         let count = self.count();
         let rows: Vec<Vec<[Complex64; 2]>> = self
             .wavelengths_nm
@@ -174,13 +178,18 @@ impl RigorousCells {
     }
 
     fn solved(&self, change: &CellChange, orders: usize, progress: &dyn Progress) -> Result<Arc<CellTable>> {
+        self.kept(change, orders as f64, || self.solve(change, orders, progress))
+    }
+
+    /// A table as it was made before, or made now; `how` tells ways of making it apart.
+    fn kept(&self, change: &CellChange, how: f64, make: impl FnOnce() -> Result<CellTable>) -> Result<Arc<CellTable>> {
         let key = [
             change.height_nm,
             change.index,
             change.taper_deg,
             change.corner_rounding_nm,
             change.residual_mask_nm,
-            orders as f64,
+            how,
         ]
         .map(f64::to_bits);
         let known =
@@ -192,13 +201,17 @@ impl RigorousCells {
             .folder
             .as_ref()
             .map(|f| f.join(format!("{}.cells", self.digest(&key))));
-        let table = match path.as_deref().and_then(|p| self.load(p)) {
+        let (wavelengths, count) = (self.wavelengths_nm.len(), self.count());
+        let load = |path: &std::path::Path| {
+            CellTable::from_bytes(&fs::read(path).ok()?, wavelengths, count, self.first_nm(), STEP_NM)
+        };
+        let table = match path.as_deref().and_then(load) {
             Some(table) => table,
             None => {
-                let table = self.solve(change, orders, progress)?;
+                let table = make()?;
                 if let Some(path) = &path {
                     // A cache that cannot be written costs time, not correctness.
-                    let _ = WholeFile::write(path, &bytes(&table));
+                    let _ = WholeFile::write(path, &table.bytes());
                 }
                 table
             }
@@ -227,20 +240,15 @@ impl RigorousCells {
         let rows: Vec<(Vec<Complex64>, Complex64)> = self
             .wavelengths_nm
             .par_iter()
-            .map(|nm| {
+            .enumerate()
+            .map(|(l, nm)| {
                 if progress.stopped() {
                     return Err(Error::Interrupted);
                 }
-                let um = nm * 1e-3;
-                // Where leaning walls would meet, the widest pillar that has room stands in.
-                let room = stack.pitch_nm - 1.0 - (2.0 * stack.taper.tan() * stack.height_nm).max(0.0);
                 let row = (0..count)
-                    .map(|k| {
-                        let width = (self.first_nm() + k as f64 * STEP_NM).min(room);
-                        off_cutoff(width, |width| stack.transmission(width, um, orders))
-                    })
+                    .map(|k| self.solve_one(&stack, l, k, orders))
                     .collect::<Result<Vec<_>>>()?;
-                let bare = stack.transmission(0.0, um, orders)?;
+                let bare = stack.transmission(0.0, nm * 1e-3, orders)?;
                 progress.advance(1);
                 Ok((row, bare))
             })
@@ -251,6 +259,16 @@ impl RigorousCells {
             step_nm: STEP_NM,
             t,
             bare,
+        })
+    }
+
+    /// Transmission of entry `k` at wavelength `l`.
+    fn solve_one(&self, stack: &CellStack, l: usize, k: usize, orders: Orders) -> Result<Complex64> {
+        // Where leaning walls would meet, the widest pillar that has room stands in.
+        let room = stack.pitch_nm - 1.0 - (2.0 * stack.taper.tan() * stack.height_nm).max(0.0);
+        let width = (self.first_nm() + k as f64 * STEP_NM).min(room);
+        off_cutoff(width, |width| {
+            stack.transmission(width, self.wavelengths_nm[l] * 1e-3, orders)
         })
     }
 
@@ -275,34 +293,6 @@ impl RigorousCells {
         }
         hash.finalize().iter().take(16).map(|b| format!("{b:02x}")).collect()
     }
-
-    fn load(&self, path: &std::path::Path) -> Option<CellTable> {
-        let bytes = fs::read(path).ok()?;
-        let (wavelengths, count) = (self.wavelengths_nm.len(), self.count());
-        if bytes.len() != wavelengths * (count + 1) * 16 {
-            return None;
-        }
-        let mut numbers = bytes
-            .chunks_exact(8)
-            .map(|b| f64::from_le_bytes(b.try_into().expect("eight bytes")));
-        let mut next = || Some(Complex64::new(numbers.next()?, numbers.next()?));
-        let (mut t, mut bare) = (Vec::new(), Vec::new());
-        for _ in 0..wavelengths {
-            t.push((0..count).map(|_| next()).collect::<Option<Vec<_>>>()?);
-            bare.push(next()?);
-        }
-        let sound = t
-            .iter()
-            .flatten()
-            .chain(&bare)
-            .all(|z| z.re.is_finite() && z.im.is_finite());
-        sound.then_some(CellTable {
-            first_nm: self.first_nm(),
-            step_nm: STEP_NM,
-            t,
-            bare,
-        })
-    }
 }
 
 /// A mode at its very cutoff has no field to solve for; a pillar that is wider by less than anyone can tell has.
@@ -324,17 +314,6 @@ pub fn changed(stack: &CellStack, change: &CellChange) -> CellStack {
     }
 }
 
-fn bytes(table: &CellTable) -> Vec<u8> {
-    let mut out = Vec::new();
-    for (row, bare) in table.t.iter().zip(&table.bare) {
-        for z in row.iter().chain([bare]) {
-            out.extend_from_slice(&z.re.to_le_bytes());
-            out.extend_from_slice(&z.im.to_le_bytes());
-        }
-    }
-    out
-}
-
 impl CellSource {
     /// The table at `wavelengths_nm` of the cell with a change.
     ///
@@ -345,11 +324,10 @@ impl CellSource {
         change: &CellChange,
         wavelengths_nm: &[f64],
         widths_nm: (f64, f64),
-        exact: bool,
         progress: &dyn Progress,
     ) -> Result<Arc<CellTable>> {
         match self {
-            Self::Rigorous(cells) => cells.table(change, exact, progress),
+            Self::Rigorous(cells) => cells.table(change, progress),
             Self::Model(model) => {
                 let most = widths_nm.1.ceil() as u16 + 1;
                 let first = widths_nm.0.floor().max(1.0);
@@ -367,6 +345,69 @@ impl CellSource {
                     t,
                 }))
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cell::Material;
+    use crate::progress::Silent;
+
+    /// Root mean square of t over widths and three colours, resonances among them: what the orders of the
+    /// stated cell err by themselves.
+    const TOLERANCE: f64 = 0.005;
+
+    #[test]
+    fn a_change_solved_with_few_orders_is_that_with_many() {
+        let constant = |n| Material::constant(n, 0.0).unwrap();
+        let stack = CellStack {
+            pitch_nm: 350.0,
+            height_nm: 700.0,
+            film: constant(2.02),
+            substrate: constant(1.46),
+            ambient: constant(1.0),
+            taper: 0.0,
+            corner_radius_nm: 0.0,
+            mask_height_nm: 0.0,
+            mask: constant(1.7),
+        };
+        let cells = RigorousCells::new(stack, vec![460.0, 531.0, 660.0], (100.0, 240.0), None);
+        let stated = CellChange::default();
+        for change in [
+            CellChange {
+                taper_deg: 0.6,
+                ..stated
+            },
+            CellChange {
+                taper_deg: -1.0,
+                ..stated
+            },
+            CellChange {
+                corner_rounding_nm: 25.0,
+                ..stated
+            },
+            CellChange { index: 0.02, ..stated },
+            CellChange {
+                height_nm: -24.0,
+                ..stated
+            },
+            CellChange {
+                height_nm: 10.0,
+                ..stated
+            },
+            CellChange {
+                residual_mask_nm: 15.0,
+                ..stated
+            },
+        ] {
+            let made = cells.table(&change, &Silent).unwrap();
+            let truth = cells.solved(&change, FINE, &Silent).unwrap();
+            let pairs = made.t.iter().flatten().zip(truth.t.iter().flatten());
+            let squares: Vec<f64> = pairs.map(|(a, b)| (a - b).norm_sqr()).collect();
+            let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+            assert!(rms < TOLERANCE, "{change:?}: {rms}");
         }
     }
 }

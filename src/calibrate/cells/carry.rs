@@ -1,0 +1,65 @@
+//! What a change of the pillar does, solved with few orders, corrected to what many would give.
+//!
+//! A changed pillar is like some upright one of the stated film: wider where its walls lean out, narrower where
+//! its corners are round, a turn of phase apart where it is higher. What truncation errs by, as a factor, is
+//! nearly the same in both. Beside narrow resonances nothing is alike; those few widths are to be solved in full.
+
+use num_complex::Complex64;
+
+/// Steps of the table within which the stated pillar is sought that a changed one is most like.
+const MOST_ALIKE: isize = 14;
+
+/// Where the ratio of two pillars bends by so much within a step of the table, there is a resonance.
+const BENT: f64 = 0.06;
+
+/// Few orders put a resonance within so many steps of where it is.
+const BESIDE: usize = 1;
+
+/// Transmissions over width at one wavelength.
+pub struct Carried {
+    pub t: Vec<Complex64>,
+    /// Widths that have to be solved in full.
+    pub resonant: Vec<usize>,
+}
+
+/// `fine` and `coarse` are those of the stated pillar with many and few orders, `changed` those of the changed
+/// one with few.
+pub fn carried_over(fine: &[Complex64], coarse: &[Complex64], changed: &[Complex64]) -> Carried {
+    let last = fine.len() - 1;
+    let shift = most_alike(coarse, changed);
+    let like = |k: usize| k.saturating_add_signed(shift).min(last);
+    let by_change: Vec<Complex64> = (0..=last).map(|k| changed[k] / coarse[like(k)]).collect();
+    let by_orders: Vec<Complex64> = (0..=last).map(|k| fine[like(k)] / coarse[like(k)]).collect();
+    let bends = |ratio: &[Complex64], k: usize| {
+        let beside = (ratio[k.saturating_sub(1)] + ratio[(k + 1).min(last)]) * 0.5;
+        // Where light all but vanishes, a ratio is no number.
+        let bend = (ratio[k] - beside).norm();
+        !bend.is_finite() || bend > BENT
+    };
+    let sharp: Vec<bool> = (0..=last)
+        .map(|k| bends(&by_change, k) || bends(&by_orders, k))
+        .collect();
+    let resonant = (0..=last).filter(|&k| {
+        let beside = k.saturating_sub(BESIDE)..=(k + BESIDE).min(last);
+        sharp[beside].contains(&true)
+    });
+    Carried {
+        t: changed.iter().zip(&by_orders).map(|(t, ratio)| t * ratio).collect(),
+        resonant: resonant.collect(),
+    }
+}
+
+/// Steps to the stated pillar that a changed one is most like, but for one phase.
+fn most_alike(stated: &[Complex64], changed: &[Complex64]) -> isize {
+    let last = stated.len() - 1;
+    let unlike = |shift: isize| -> f64 {
+        let pairs = changed.iter().enumerate();
+        let pairs = pairs.map(|(k, t)| (t, stated[k.saturating_add_signed(shift).min(last)]));
+        let sum: Complex64 = pairs.clone().map(|(t, s)| t * s.conj()).sum();
+        let turn = Complex64::cis(sum.arg());
+        // Moduli, not their squares: resonances shall not decide.
+        pairs.map(|(t, s)| (t - turn * s).norm()).sum()
+    };
+    let shifts = -MOST_ALIKE..=MOST_ALIKE;
+    shifts.min_by(|a, b| unlike(*a).total_cmp(&unlike(*b))).unwrap_or(0)
+}
