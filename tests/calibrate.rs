@@ -6,7 +6,9 @@ mod session;
 use std::fs;
 
 use metalith::Silent;
-use metalith::calibrate::{Extent, MeasuredSet, OffList, Sampling, Session, SetVerdict, Settings, Twins, prove};
+use metalith::calibrate::{
+    Diagnosis, Extent, MeasuredSet, OffList, Sampling, Session, SetVerdict, Settings, Twins, prove,
+};
 use ndarray::Array2;
 use session::{PIXELS, small_set, write_npy};
 
@@ -110,22 +112,59 @@ fn effects_are_found_and_nothing_is_found_where_nothing_is() {
     assert!(d.left_out.len() >= 5);
 }
 
-#[test]
-fn two_effects_at_once_are_both_found() {
+/// What is said of a small chip with some effects, where those in `only` are tried.
+fn diagnosed(parts: &[(&str, &[f64])], only: &[&str], seed: u64) -> Diagnosis {
     let folder = tempfile::tempdir().unwrap();
     small_set(folder.path());
     let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
-    let twins = Twins::new(&like, &settings()).unwrap();
-    let both = [vec![("cd_bias", &[6.0][..]), ("gap", &[-4.0][..])]];
-    let exposed = twins.with_effects(&both, &Silent).unwrap().remove(0);
-    let set = twins.draw(&exposed, 21);
-    let mut session = Session::new(&set, settings()).unwrap();
+    let settings = Settings {
+        only: only.iter().map(|s| (*s).to_owned()).collect(),
+        ..settings()
+    };
+    let twins = Twins::new(&like, &settings).unwrap();
+    let exposed = twins.with_effects(&[parts.to_vec()], &Silent).unwrap().remove(0);
+    let set = twins.draw(&exposed, seed);
+    let mut session = Session::new(&set, settings).unwrap();
     let atlas = session.atlas(&Silent).unwrap();
-    let d = session.diagnose(&atlas, &Silent).unwrap().0;
+    session.diagnose(&atlas, &Silent).unwrap().0
+}
+
+/// The names of what was found, in order of the alphabet.
+fn names(d: &Diagnosis) -> Vec<&str> {
     let mut found: Vec<&str> = d.effects.iter().map(|e| e.name.as_str()).collect();
     found.sort_unstable();
-    assert_eq!(found, ["cd_bias", "gap"], "{}", d.sentence());
+    found
+}
+
+#[test]
+fn two_effects_at_once_are_both_found() {
+    let only: Vec<String> = settings().only;
+    let only: Vec<&str> = only.iter().map(String::as_str).collect();
+    let d = diagnosed(&[("cd_bias", &[6.0]), ("gap", &[-4.0])], &only, 21);
+    assert_eq!(names(&d), ["cd_bias", "gap"], "{}", d.sentence());
     assert_eq!(d.verdict, SetVerdict::Explained);
+}
+
+/// A bias and another index pull the phase of blue and green their own ways: a fit of either alone fails on captures
+/// left out.
+#[test]
+fn a_pair_is_found_where_neither_of_the_two_helps() {
+    /// Two colours of a coarse spectrum through lenses of 60 um; twins have another sampling.
+    const TOLERANCE: f64 = 0.08;
+    let truth = [("cd_bias", -12.0), ("film_index", 0.06)];
+    let only = ["cd_bias", "film_index", "zero_order", "gap"];
+    let d = diagnosed(&[("cd_bias", &[-12.0]), ("film_index", &[0.06])], &only, 22);
+    assert_eq!(names(&d), ["cd_bias", "film_index"], "{}", d.sentence());
+    assert_eq!(d.verdict, SetVerdict::Explained);
+    let mut gains = Vec::new();
+    for (name, value) in truth {
+        let own = d.effects.iter().find(|e| e.name == name).unwrap();
+        let found = own.value.as_f64().unwrap();
+        assert!((found / value - 1.0).abs() < TOLERANCE, "{}", d.sentence());
+        gains.extend(d.ranking.iter().find(|r| r.name == name).map(|r| r.held_out_gain));
+    }
+    // They were taken in one step.
+    assert_eq!(gains[0], gains[1]);
 }
 
 /// Single pillars that are gone make a grain that no fit predicts: it is counted as noise, and speaks of the same

@@ -5,11 +5,12 @@ use super::atlas::Atlas;
 use super::couple::couple;
 use super::fit::{Fit, Problem};
 use super::forward::{LEAST_GAIN, RESIDUAL, Tried, forward};
-use super::heldout::{HeldOut, half_widths, held_out, mean};
+use super::heldout::{HeldOut, half_widths, mean};
 use super::nuisance::Data;
 use super::optics::PixelGrid;
-use super::rivals::{Alternative, Found, prune, rivals};
+use super::rivals::{Alternative, prune, rivals};
 use super::simulator::Simulator;
+use super::standing::Standing;
 use crate::error::Result;
 use crate::progress::Progress;
 
@@ -41,6 +42,65 @@ pub struct Finding {
     pub by_grain: Option<f64>,
 }
 
+/// What a search has been through.
+struct Trail {
+    chosen: Vec<usize>,
+    before: Fit,
+    held_before: HeldOut,
+    placebo_held_out: f64,
+    ranking: Vec<Tried>,
+    later: Vec<Vec<Tried>>,
+    runners: Vec<Vec<usize>>,
+}
+
+impl Trail {
+    /// From where nothing is found.
+    fn from(start: &Standing<'_>) -> Self {
+        Self {
+            chosen: Vec::new(),
+            before: start.fit.clone(),
+            held_before: start.held.clone(),
+            placebo_held_out: start.error(),
+            ranking: Vec::new(),
+            later: Vec::new(),
+            runners: Vec::new(),
+        }
+    }
+
+    /// That which led to an earlier finding.
+    fn of(earlier: &Finding) -> Self {
+        Self {
+            chosen: earlier.chosen.clone(),
+            before: earlier.before.clone(),
+            held_before: earlier.held_before.clone(),
+            placebo_held_out: earlier.placebo_held_out,
+            ranking: earlier.ranking.clone(),
+            later: earlier.later.clone(),
+            runners: earlier.runners.clone(),
+        }
+    }
+
+    /// Keep what was tried in a step, at which random terms gained `placebo`.
+    fn keep(&mut self, tried: Vec<Tried>, placebo: f64) {
+        if self.chosen.is_empty() {
+            self.placebo_held_out = mean(&self.held_before) - placebo;
+            self.ranking = tried;
+        } else {
+            self.later.push(tried);
+        }
+    }
+
+    /// Take an effect, with who else was fitted.
+    fn take(&mut self, tried: &Tried, runners: Vec<usize>) {
+        if let Some(known) = self.ranking.iter_mut().find(|t| t.effect == tried.effect) {
+            let score = known.score;
+            *known = Tried { score, ..tried.clone() };
+        }
+        self.chosen.push(tried.effect);
+        self.runners.push(runners);
+    }
+}
+
 /// Attribute the residual of a set. With `earlier`, go on from there, on an atlas about it. With `exact`, what
 /// is found is brought to rest on exact simulations.
 ///
@@ -55,110 +115,79 @@ pub fn attribute(
     earlier: Option<&Finding>,
     progress: &dyn Progress,
 ) -> Result<Finding> {
-    let mut problem = Problem {
+    let problem = Problem {
         simulator,
         atlas: atlas.clone(),
         data,
         used: used.to_vec(),
         exact: None,
     };
-    let mut now = problem.nothing();
-    let mut held_now = held_out(&problem, &now.forms, &now);
-    let (mut chosen, mut ranking, mut runners) = (Vec::new(), Vec::new(), Vec::new());
-    let mut later: Vec<Vec<Tried>> = Vec::new();
-    let (before, held_before, mut placebo_held_out);
-    if let Some(earlier) = earlier {
+    let nothing = problem.nothing();
+    let mut now = Standing::new(problem, nothing);
+    let mut trail = earlier.map_or_else(|| Trail::from(&now), Trail::of);
+    if earlier.is_some() {
         // What was found is kept and fitted again from the atlas about it.
-        chosen.clone_from(&earlier.chosen);
-        ranking.clone_from(&earlier.ranking);
-        later.clone_from(&earlier.later);
-        runners.clone_from(&earlier.runners);
-        let active: Vec<usize> = chosen.iter().flat_map(|&e| simulator.slots_of(e)).collect();
-        now = problem.fit(&active, &now);
+        let fit = now.problem.fit(&now.slots(&trail.chosen), &now.fit);
+        now.go(fit);
         if exact {
-            now = problem.settle(now, progress)?;
+            now.settle(progress)?;
         }
-        held_now = held_out(&problem, &now.forms, &now);
-        (before, held_before) = (earlier.before.clone(), earlier.held_before.clone());
-        placebo_held_out = earlier.placebo_held_out;
-    } else {
-        (before, held_before) = (now.clone(), held_now.clone());
-        placebo_held_out = mean(&held_now);
     }
-    while chosen.len() < MOST_EFFECTS {
-        let step = forward(&mut problem, &chosen, &now, &held_now, exact, progress)?;
-        if chosen.is_empty() {
-            placebo_held_out = mean(&held_now) - step.placebo;
-            ranking = step.tried;
-        } else {
-            later.push(step.tried);
-        }
-        let mut taken = Vec::new();
+    while trail.chosen.len() < MOST_EFFECTS {
+        let step = forward(&mut now, &trail.chosen, exact, progress)?;
+        trail.keep(step.tried, step.placebo);
         if let Some((tried, fit, held)) = step.taken {
-            runners.push(step.leaders);
-            taken.push(tried);
-            (now, held_now) = (fit, held);
+            trail.take(&tried, step.leaders);
+            (now.fit, now.held) = (fit, held);
             if exact {
-                now = problem.settle(now, progress)?;
-                held_now = held_out(&problem, &now.forms, &now);
+                now.settle(progress)?;
             }
-        } else if mean(&held_now) > RESIDUAL && chosen.len() + 2 <= MOST_EFFECTS {
-            let Some(both) = couple(&problem, &chosen, &now, &held_now, exact, progress)? else {
+        } else if now.error() > RESIDUAL && trail.chosen.len() + 2 <= MOST_EFFECTS {
+            let Some(both) = couple(&now, &trail.chosen, exact, progress)? else {
                 break;
             };
-            runners.extend([both.runners.clone(), both.runners]);
-            taken.extend(both.tried);
-            (now, held_now, problem) = (both.fit, both.held, both.problem);
+            for tried in &both.tried {
+                trail.take(tried, both.runners.clone());
+            }
+            now = both.standing;
         } else {
             break;
         }
-        for tried in taken {
-            if let Some(known) = ranking.iter_mut().find(|t| t.effect == tried.effect) {
-                let score = known.score;
-                *known = Tried { score, ..tried.clone() };
-            }
-            chosen.push(tried.effect);
-        }
-        if mean(&held_now) < 1.0 + LEAST_GAIN {
+        if now.error() < 1.0 + LEAST_GAIN {
             break;
         }
     }
-    let found = chosen.clone();
-    prune(&problem, &mut chosen, &mut now, &mut held_now);
-    if exact && chosen != found {
-        now = problem.settle(now, progress)?;
-        held_now = held_out(&problem, &now.forms, &now);
+    let found = trail.chosen.len();
+    prune(&mut now, &mut trail.chosen, &mut trail.runners);
+    if exact && trail.chosen.len() < found {
+        now.settle(progress)?;
     }
-    let mut found = Found {
-        now: &mut now,
-        held: &mut held_now,
-        before: &held_before,
-        exact,
-    };
-    let mut alternatives = rivals(&mut problem, &mut chosen, &runners, &mut found, progress)?;
-    let mut widths = half_widths(&problem, &now);
-    for (w, &s) in widths.iter_mut().zip(&now.active) {
-        *w = w.max(MODEL_SHARE * simulator.slots[s].parameter.typical);
+    let (runners, before) = (&trail.runners, &trail.held_before);
+    let mut alternatives = rivals(&mut now, &mut trail.chosen, runners, before, exact, progress)?;
+    let least = |slot: usize| MODEL_SHARE * simulator.slots[slot].parameter.typical;
+    let mut widths = half_widths(&now.problem, &now.fit);
+    for (w, &s) in widths.iter_mut().zip(&now.fit.active) {
+        *w = w.max(least(s));
     }
     for a in alternatives.iter_mut().flatten() {
         for (w, s) in a.half_widths.iter_mut().zip(simulator.slots_of(a.effect)) {
-            *w = w.max(MODEL_SHARE * simulator.slots[s].parameter.typical);
+            *w = w.max(least(s));
         }
     }
     Ok(Finding {
-        chosen,
+        chosen: trail.chosen,
         alternatives,
-        before,
-        after: now,
-        held_before,
-        held_after: held_now,
-        placebo_held_out,
-        ranking,
-        later,
-        runners,
+        before: trail.before,
+        after: now.fit,
+        held_before: trail.held_before,
+        held_after: now.held,
+        placebo_held_out: trail.placebo_held_out,
+        ranking: trail.ranking,
+        later: trail.later,
+        runners: trail.runners,
         half_widths: widths,
-        exact: problem.exact,
-        atlas: problem.atlas,
+        exact: now.problem.exact,
+        atlas: now.problem.atlas,
         by_grain: None,
     })
 }

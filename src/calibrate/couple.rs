@@ -4,11 +4,11 @@
 //! of them predicts alone: a fit of one takes up part of the other, and fails on captures left out. Such a pair is
 //! taken only if the two together leave next to nothing.
 
-use super::fit::{Fit, Problem};
 use super::forward::{Candidate, Tried, starts};
-use super::heldout::{HeldOut, held_out, mean};
+use super::heldout::{held_out, mean};
 use super::placebo::placebo_gain;
 use super::signature::screen_pairs;
+use super::standing::Standing;
 use crate::error::Result;
 use crate::progress::Progress;
 
@@ -31,10 +31,7 @@ const LEAST_LEFT: f64 = 0.05;
 /// A pair that explains a residual.
 pub struct Couple<'a> {
     pub tried: [Tried; 2],
-    pub fit: Fit,
-    pub held: HeldOut,
-    /// The problem where the fit rests.
-    pub problem: Problem<'a>,
+    pub standing: Standing<'a>,
     /// Effects of all pairs that were fitted.
     pub runners: Vec<usize>,
 }
@@ -45,26 +42,24 @@ pub struct Couple<'a> {
 /// # Errors
 /// If a cell cannot be solved, or the user stopped it.
 pub fn couple<'a>(
-    problem: &Problem<'a>,
+    now: &Standing<'a>,
     chosen: &[usize],
-    now: &Fit,
-    held_now: &HeldOut,
     exact: bool,
     progress: &dyn Progress,
 ) -> Result<Option<Couple<'a>>> {
-    let above_noise = mean(held_now) - 1.0;
+    let problem = &now.problem;
+    let above_noise = now.error() - 1.0;
     let mut fits = Vec::new();
-    for (pair, score) in screen_pairs(problem, now, chosen).into_iter().take(FITTED) {
-        let both = chosen.iter().chain(&pair);
-        let active: Vec<usize> = both.flat_map(|&e| problem.simulator.slots_of(e)).collect();
-        let firsts = starts(problem, pair[0], now);
+    for (pair, score) in screen_pairs(problem, &now.fit, chosen).into_iter().take(FITTED) {
+        let active = [now.slots(chosen), now.slots(&pair)].concat();
+        let firsts = starts(problem, pair[0], &now.fit);
         let all = firsts.iter().flat_map(|start| starts(problem, pair[1], start));
         let fit = all
             .map(|from| problem.fit(&active, &from))
             .min_by(|a, b| a.chi2.total_cmp(&b.chi2));
         if let Some(fit) = fit {
-            let held = held_out(problem, &fit.forms, &fit);
-            fits.push((pair, score, fit, mean(&held)));
+            let error = mean(&held_out(problem, &fit.forms, &fit));
+            fits.push((pair, score, fit, error));
         }
     }
     let mut runners: Vec<usize> = fits.iter().flat_map(|f| f.0).collect();
@@ -72,32 +67,28 @@ pub fn couple<'a>(
     runners.dedup();
     fits.sort_by(|a, b| a.3.total_cmp(&b.3));
     fits.retain(|f| f.3 - 1.0 < PROMISING * above_noise);
-    for (pair, score, mut fit, _) in fits.into_iter().take(SETTLED) {
-        let mut own = problem.branch();
+    for (pair, score, fit, _) in fits.into_iter().take(SETTLED) {
+        let mut standing = Standing::new(problem.branch(), fit);
         if exact {
-            fit = own.stretch(fit, progress)?;
-            fit = own.settle(fit, progress)?;
+            standing.settle(progress)?;
         }
-        let held = held_out(&own, &fit.forms, &fit);
         let both = pair.map(|effect| {
             let mut candidate = Candidate::new(effect, score);
-            candidate.judge(&own, fit.clone(), held_now);
+            candidate.judge(&standing.problem, standing.fit.clone(), &now.held);
             candidate
         });
-        let whole = mean(&held) - 1.0 < LEAST_LEFT.max(MAY_LEAVE * above_noise);
-        let sound = both.iter().all(|c| c.fault(&own, held_now).is_none());
-        let numbers = fit.active.len() - now.active.len();
-        let gain = mean(held_now) - mean(&held);
-        if whole && sound && gain > placebo_gain(problem, now, held_now, numbers) {
+        let whole = standing.error() - 1.0 < LEAST_LEFT.max(MAY_LEAVE * above_noise);
+        let sound = both.iter().all(|c| c.fault(&standing.problem, &now.held).is_none());
+        let numbers = standing.fit.active.len() - now.fit.active.len();
+        let gain = now.error() - standing.error();
+        if whole && sound && gain > placebo_gain(problem, &now.fit, &now.held, numbers) {
             // Others that do as well in the place of either are found by their rivalry.
             return Ok(Some(Couple {
                 tried: both.map(|c| Tried {
                     rejected: None,
                     ..c.tried
                 }),
-                fit,
-                held,
-                problem: own,
+                standing,
                 runners,
             }));
         }

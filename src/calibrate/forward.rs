@@ -4,6 +4,7 @@ use super::fit::{Fit, Problem};
 use super::heldout::{HeldOut, gain, half_widths, held_out, mean};
 use super::placebo::placebo_gain;
 use super::signature::screen;
+use super::standing::Standing;
 use crate::error::Result;
 use crate::progress::Progress;
 
@@ -115,14 +116,12 @@ pub struct Candidate {
 ///
 /// # Errors
 /// If a cell cannot be solved, or the user stopped it.
-pub fn forward(
-    problem: &mut Problem<'_>,
-    chosen: &[usize],
-    now: &Fit,
-    held_now: &HeldOut,
-    far: bool,
-    progress: &dyn Progress,
-) -> Result<Step> {
+pub fn forward(standing: &mut Standing<'_>, chosen: &[usize], far: bool, progress: &dyn Progress) -> Result<Step> {
+    let Standing {
+        problem,
+        fit: now,
+        held: held_now,
+    } = standing;
     let mut candidates = Vec::new();
     for (rank, (effect, score)) in screen(problem, now, chosen).into_iter().enumerate() {
         let mut candidate = Candidate::new(effect, score);

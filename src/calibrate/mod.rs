@@ -34,6 +34,7 @@ mod set;
 mod signature;
 mod simulator;
 mod speckle;
+mod standing;
 mod twin;
 mod unfit;
 mod zernike;

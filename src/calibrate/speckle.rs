@@ -84,15 +84,18 @@ impl Speckle {
                 .collect();
             sums.iter().sum::<f64>()
         };
-        // Golden section over the logarithm.
+        // Golden section over the logarithm: of two places in the middle, one is known from the step before.
         let golden = 0.5 * (5f64.sqrt() - 1.0);
         let (mut low, mut high) = (SHARES.0.ln(), SHARES.1.ln());
+        let at = |x: f64| (x, unlikely(x.exp()));
+        let (mut a, mut b) = (at(high - golden * (high - low)), at(low + golden * (high - low)));
         while high - low >= NEAR {
-            let (a, b) = (high - golden * (high - low), low + golden * (high - low));
-            if unlikely(a.exp()) < unlikely(b.exp()) {
-                high = b;
+            if a.1 < b.1 {
+                (high, b) = (b.0, a);
+                a = at(high - golden * (high - low));
             } else {
-                low = a;
+                (low, a) = (a.0, b);
+                b = at(low + golden * (high - low));
             }
         }
         (0.5 * (low + high)).exp()

@@ -1,0 +1,60 @@
+//! Where a search for what a set shows stands.
+
+use super::fit::{Fit, Problem};
+use super::heldout::{HeldOut, held_out, mean};
+use crate::error::Result;
+use crate::progress::Progress;
+
+/// A fit with the problem that it is at rest in.
+pub struct Standing<'a> {
+    pub problem: Problem<'a>,
+    pub fit: Fit,
+    /// The error of the fit on captures left out.
+    pub held: HeldOut,
+}
+
+impl<'a> Standing<'a> {
+    /// At a fit.
+    pub fn new(problem: Problem<'a>, fit: Fit) -> Self {
+        let held = held_out(&problem, &fit.forms, &fit);
+        Self { problem, fit, held }
+    }
+
+    /// The same, to go another way from.
+    pub fn branch(&self) -> Self {
+        Self {
+            problem: self.problem.branch(),
+            fit: self.fit.clone(),
+            held: self.held.clone(),
+        }
+    }
+
+    /// Chi-square a pixel on captures left out; 1 is noise alone.
+    pub fn error(&self) -> f64 {
+        mean(&self.held)
+    }
+
+    /// The numbers of some effects.
+    pub fn slots(&self, effects: &[usize]) -> Vec<usize> {
+        effects
+            .iter()
+            .flat_map(|&e| self.problem.simulator.slots_of(e))
+            .collect()
+    }
+
+    /// Stand at another fit.
+    pub fn go(&mut self, fit: Fit) {
+        self.held = held_out(&self.problem, &fit.forms, &fit);
+        self.fit = fit;
+    }
+
+    /// Bring the fit to rest on exact simulations.
+    ///
+    /// # Errors
+    /// As [`Problem::settle`].
+    pub fn settle(&mut self, progress: &dyn Progress) -> Result<()> {
+        let fit = self.problem.settle(self.fit.clone(), progress)?;
+        self.go(fit);
+        Ok(())
+    }
+}
