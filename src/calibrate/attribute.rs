@@ -127,7 +127,7 @@ pub fn attribute(
     let mut trail = earlier.map_or_else(|| Trail::from(&now), Trail::of);
     if earlier.is_some() {
         // What was found is kept and fitted again from the atlas about it.
-        let fit = now.problem.fit(&now.slots(&trail.chosen), &now.fit);
+        let fit = now.problem.fit(&simulator.slots_of_all(&trail.chosen), &now.fit);
         now.go(fit);
         if exact {
             now.settle(progress)?;

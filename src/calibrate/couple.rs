@@ -4,7 +4,7 @@
 //! of them predicts alone: a fit of one takes up part of the other, and fails on captures left out. Such a pair is
 //! taken only if the two together leave next to nothing.
 
-use super::forward::{Candidate, Tried, starts};
+use super::forward::{Candidate, Tried, fit_with};
 use super::heldout::{held_out, mean};
 use super::placebo::placebo_gain;
 use super::signature::screen_pairs;
@@ -51,37 +51,33 @@ pub fn couple<'a>(
     let above_noise = now.error() - 1.0;
     let mut fits = Vec::new();
     for (pair, score) in screen_pairs(problem, &now.fit, chosen).into_iter().take(FITTED) {
-        let active = [now.slots(chosen), now.slots(&pair)].concat();
-        let firsts = starts(problem, pair[0], &now.fit);
-        let all = firsts.iter().flat_map(|start| starts(problem, pair[1], start));
-        let fit = all
-            .map(|from| problem.fit(&active, &from))
-            .min_by(|a, b| a.chi2.total_cmp(&b.chi2));
-        if let Some(fit) = fit {
-            let error = mean(&held_out(problem, &fit.forms, &fit));
-            fits.push((pair, score, fit, error));
+        if let Some(fit) = fit_with(problem, &now.fit, chosen, &pair) {
+            let held = held_out(problem, &fit.forms, &fit);
+            fits.push((pair, score, fit, held));
         }
     }
     let mut runners: Vec<usize> = fits.iter().flat_map(|f| f.0).collect();
     runners.sort_unstable();
     runners.dedup();
-    fits.sort_by(|a, b| a.3.total_cmp(&b.3));
-    fits.retain(|f| f.3 - 1.0 < PROMISING * above_noise);
-    for (pair, score, fit, _) in fits.into_iter().take(SETTLED) {
-        let mut standing = Standing::new(problem.branch(), fit);
+    fits.sort_by(|a, b| mean(&a.3).total_cmp(&mean(&b.3)));
+    fits.retain(|f| mean(&f.3) - 1.0 < PROMISING * above_noise);
+    for (pair, score, fit, held) in fits.into_iter().take(SETTLED) {
+        let problem = problem.clone();
+        let mut standing = Standing { problem, fit, held };
         if exact {
             standing.settle(progress)?;
         }
         let both = pair.map(|effect| {
             let mut candidate = Candidate::new(effect, score);
-            candidate.judge(&standing.problem, standing.fit.clone(), &now.held);
+            let Standing { problem, fit, held } = &standing;
+            candidate.judge(problem, fit.clone(), held.clone(), &now.held);
             candidate
         });
         let whole = standing.error() - 1.0 < LEAST_LEFT.max(MAY_LEAVE * above_noise);
         let sound = both.iter().all(|c| c.fault(&standing.problem, &now.held).is_none());
         let numbers = standing.fit.active.len() - now.fit.active.len();
         let gain = now.error() - standing.error();
-        if whole && sound && gain > placebo_gain(problem, &now.fit, &now.held, numbers) {
+        if whole && sound && gain > placebo_gain(&now.problem, &now.fit, &now.held, numbers) {
             // Others that do as well in the place of either are found by their rivalry.
             return Ok(Some(Couple {
                 tried: both.map(|c| Tried {

@@ -190,17 +190,7 @@ impl Diagnosis {
             for (&effect, alternatives) in finding.chosen.iter().zip(&finding.alternatives) {
                 let slots = simulator.slots_of(effect);
                 let values: Vec<f64> = slots.iter().map(|&s| finding.after.theta[s]).collect();
-                let widths: Vec<f64> = slots
-                    .iter()
-                    .filter_map(|s| {
-                        finding
-                            .after
-                            .active
-                            .iter()
-                            .position(|a| a == s)
-                            .map(|k| finding.half_widths[k])
-                    })
-                    .collect();
+                let widths = finding.after.pick(&slots, &finding.half_widths);
                 let others: Vec<usize> = alternatives.iter().map(|a| a.effect).collect();
                 effects.push(found(session, effect, &values, &widths, &others));
                 if verdict == SetVerdict::OneOf {

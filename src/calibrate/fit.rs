@@ -17,6 +17,7 @@ const STEPS: usize = 12;
 const AT_REST: f64 = 1e-5;
 
 /// Everything that a fit needs to know of a set.
+#[derive(Clone)]
 pub struct Problem<'a> {
     pub simulator: &'a Simulator<'a>,
     pub atlas: Atlas,
@@ -43,21 +44,23 @@ pub struct Fit {
     pub chi2: f64,
 }
 
-impl<'a> Problem<'a> {
+impl Fit {
+    /// Which of the active numbers is that of a slot.
+    pub fn place(&self, slot: usize) -> Option<usize> {
+        self.active.iter().position(|s| *s == slot)
+    }
+
+    /// Of `values`, one for each active number, those of some slots.
+    pub fn pick(&self, slots: &[usize], values: &[f64]) -> Vec<f64> {
+        let places = slots.iter().filter_map(|&s| self.place(s));
+        places.map(|k| values[k]).collect()
+    }
+}
+
+impl Problem<'_> {
     /// Number of shared nuisances.
     pub fn shared(&self) -> usize {
         self.data.leds + 1
-    }
-
-    /// The same problem, to be carried on by itself.
-    pub fn branch(&self) -> Self {
-        Self {
-            simulator: self.simulator,
-            atlas: self.atlas.clone(),
-            data: self.data,
-            used: self.used.clone(),
-            exact: self.exact.clone(),
-        }
     }
 
     /// A fit of the nuisances alone.

@@ -125,19 +125,11 @@ pub fn forward(standing: &mut Standing<'_>, chosen: &[usize], far: bool, progres
     let mut candidates = Vec::new();
     for (rank, (effect, score)) in screen(problem, now, chosen).into_iter().enumerate() {
         let mut candidate = Candidate::new(effect, score);
-        if rank < LEADERS {
-            let active: Vec<usize> = chosen
-                .iter()
-                .chain([&effect])
-                .flat_map(|&e| problem.simulator.slots_of(e))
-                .collect();
-            let fit = starts(problem, effect, now)
-                .iter()
-                .map(|from| problem.fit(&active, from))
-                .min_by(|a, b| a.chi2.total_cmp(&b.chi2));
-            if let Some(fit) = fit {
-                candidate.judge(problem, fit, held_now);
-            }
+        if rank < LEADERS
+            && let Some(fit) = fit_with(problem, now, chosen, &[effect])
+        {
+            let held = held_out(problem, &fit.forms, &fit);
+            candidate.judge(problem, fit, held, held_now);
         }
         candidates.push(candidate);
     }
@@ -157,7 +149,8 @@ pub fn forward(standing: &mut Standing<'_>, chosen: &[usize], far: bool, progres
             }
             if let Some((fit, _)) = candidate.fitted.take() {
                 let fit = problem.stretch(fit, progress)?;
-                candidate.judge(problem, fit, held_now);
+                let held = held_out(problem, &fit.forms, &fit);
+                candidate.judge(problem, fit, held, held_now);
             }
         }
         sort(&mut candidates);
@@ -216,8 +209,17 @@ pub fn physical(problem: &Problem<'_>, fit: &Fit, slots: &[usize]) -> bool {
     })
 }
 
+/// The best fit of some effects on top of what is `chosen`, from wherever fits of theirs begin.
+pub fn fit_with(problem: &Problem<'_>, now: &Fit, chosen: &[usize], effects: &[usize]) -> Option<Fit> {
+    let active = problem.simulator.slots_of_all(&[chosen, effects].concat());
+    let begin = |from: Vec<Fit>, effect: &usize| from.iter().flat_map(|f| starts(problem, *effect, f)).collect();
+    let fits = effects.iter().fold(vec![now.clone()], begin).into_iter();
+    fits.map(|from| problem.fit(&active, &from))
+        .min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+}
+
 /// Where fits of an effect begin: where one is, or on each side of zero if those know nothing of one another.
-pub fn starts(problem: &Problem<'_>, effect: usize, now: &Fit) -> Vec<Fit> {
+fn starts(problem: &Problem<'_>, effect: usize, now: &Fit) -> Vec<Fit> {
     if !problem.simulator.effects[effect].kinked() {
         return vec![now.clone()];
     }
@@ -260,9 +262,8 @@ impl Candidate {
         }
     }
 
-    /// With a fit that it is part of.
-    pub fn judge(&mut self, problem: &Problem<'_>, fit: Fit, held_now: &HeldOut) {
-        let held = held_out(problem, &fit.forms, &fit);
+    /// With a fit that it is part of, and the error of that on captures left out.
+    pub fn judge(&mut self, problem: &Problem<'_>, fit: Fit, held: HeldOut, held_now: &HeldOut) {
         self.tried.gain = Some(gain(problem, held_now, &held));
         let slots = problem.simulator.slots_of(self.tried.effect);
         self.tried.values = slots.iter().map(|&s| fit.theta[s]).collect();
@@ -292,10 +293,9 @@ impl Candidate {
             return Some(Rejection::Unphysical);
         }
         let widths = half_widths(problem, fit);
-        let sure = slots.iter().any(|s| {
-            let place = fit.active.iter().position(|a| a == s);
-            place.is_some_and(|k| fit.theta[*s].abs() > widths[k])
-        });
+        let sure = slots
+            .iter()
+            .any(|&s| fit.place(s).is_some_and(|k| fit.theta[s].abs() > widths[k]));
         (!sure).then_some(Rejection::Nothing)
     }
 }

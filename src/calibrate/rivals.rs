@@ -30,7 +30,7 @@ pub fn prune(now: &mut Standing<'_>, chosen: &mut Vec<usize>, runners: &mut Vec<
     let mut place = 0;
     while chosen.len() > 1 && place < chosen.len() {
         let rest: Vec<usize> = chosen.iter().copied().filter(|&e| e != chosen[place]).collect();
-        let fit = now.problem.fit(&now.slots(&rest), &without(now, chosen[place]));
+        let fit = refit(now, chosen[place], &rest);
         let held = held_out(&now.problem, &fit.forms, &fit);
         let (loss, [low, _]) = gain(&now.problem, &held, &now.held);
         if loss < LEAST_GAIN || low <= 0.0 {
@@ -70,21 +70,21 @@ pub fn rivals(
         let far = mean(before) - now.error();
         let mut best = Rival {
             effect: chosen[place],
-            standing: now.branch(),
+            standing: now.clone(),
         };
         let mut others = Vec::new();
         for &other in runners.into_iter().flatten().filter(|o| !chosen.contains(o)) {
             let mut set = chosen.to_vec();
             set[place] = other;
-            let rival = Rival::new(now, chosen[place], other, &set);
+            let mut rival = Rival::new(now, chosen[place], other, &set);
             let behind = rival.standing.error() - now.error();
             if behind > ALIKE_WITHIN.max(WORTH_SETTLING * far) || !rival.physical() {
                 continue;
             }
-            others.push(rival);
-            if let Some(rival) = others.last_mut().filter(|_| exact) {
+            if exact {
                 rival.standing.settle(progress)?;
             }
+            others.push(rival);
         }
         for other in &mut others {
             if other.beats(&best) {
@@ -99,13 +99,14 @@ pub fn rivals(
     Ok(out)
 }
 
-/// Where a fit goes on from when an effect is gone.
-fn without(now: &Standing<'_>, effect: usize) -> Fit {
+/// The fit of a set of effects when one is `gone`.
+fn refit(now: &Standing<'_>, gone: usize, set: &[usize]) -> Fit {
+    let simulator = now.problem.simulator;
     let mut from = now.fit.clone();
-    for s in now.problem.simulator.slots_of(effect) {
+    for s in simulator.slots_of(gone) {
         from.theta[s] = 0.0;
     }
-    from
+    now.problem.fit(&simulator.slots_of_all(set), &from)
 }
 
 /// An explanation with a certain effect in the place of one that was found.
@@ -117,10 +118,9 @@ struct Rival<'a> {
 impl<'a> Rival<'a> {
     /// With an effect in the place of one that is `gone`, which makes `set` the whole.
     fn new(now: &Standing<'a>, gone: usize, effect: usize, set: &[usize]) -> Self {
-        let fit = now.problem.fit(&now.slots(set), &without(now, gone));
         Self {
             effect,
-            standing: Standing::new(now.problem.branch(), fit),
+            standing: Standing::new(now.problem.clone(), refit(now, gone, set)),
         }
     }
 
@@ -158,10 +158,7 @@ impl Alternative {
         Self {
             effect: rival.effect,
             values: own.iter().map(|&s| fit.theta[s]).collect(),
-            half_widths: own
-                .iter()
-                .filter_map(|s| fit.active.iter().position(|a| a == s).map(|k| widths[k]))
-                .collect(),
+            half_widths: fit.pick(&own, &widths),
         }
     }
 }

@@ -246,8 +246,8 @@ impl<'a> Session<'a> {
                 }
                 found.by_grain = Some(share);
                 // Two answers to one question: the interval holds both.
-                let own = found.after.active.iter().position(|s| *s == slot);
-                if let Some(width) = own.and_then(|k| found.half_widths.get_mut(k)) {
+                if let Some(k) = found.after.place(slot) {
+                    let width = &mut found.half_widths[k];
                     *width = width.max((by_mean - share).abs());
                 }
                 found.before = plain.before.clone();

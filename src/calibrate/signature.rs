@@ -43,13 +43,13 @@ fn explained<const N: usize>(
     let form = problem.total(&wide.forms, &wide.nuisances);
     let shared = problem.shared();
     let base: Vec<usize> = (0..shared)
-        .chain(chosen.iter().flat_map(|&e| simulator.slots_of(e)).map(|s| shared + s))
+        .chain(simulator.slots_of_all(chosen).into_iter().map(|s| shared + s))
         .collect();
     let (_, without) = minimise(&form, &base);
     let mut scores: Vec<([usize; N], f64)> = sets
         .into_iter()
         .map(|set| {
-            let own = set.iter().flat_map(|&e| simulator.slots_of(e));
+            let own = simulator.slots_of_all(&set).into_iter();
             let free: Vec<usize> = base.iter().copied().chain(own.map(|s| shared + s)).collect();
             let (_, with) = minimise(&form, &free);
             (set, ((without - with) / without).max(0.0))

@@ -72,6 +72,11 @@ impl<'a> Simulator<'a> {
             .collect()
     }
 
+    /// The numbers of some effects, in the order of these.
+    pub fn slots_of_all(&self, effects: &[usize]) -> Vec<usize> {
+        effects.iter().flat_map(|&e| self.slots_of(e)).collect()
+    }
+
     /// What the numbers mean together.
     pub fn departure(&self, theta: &[f64]) -> Departure {
         let mut departure = Departure::default();

@@ -6,6 +6,7 @@ use crate::error::Result;
 use crate::progress::Progress;
 
 /// A fit with the problem that it is at rest in.
+#[derive(Clone)]
 pub struct Standing<'a> {
     pub problem: Problem<'a>,
     pub fit: Fit,
@@ -20,26 +21,9 @@ impl<'a> Standing<'a> {
         Self { problem, fit, held }
     }
 
-    /// The same, to go another way from.
-    pub fn branch(&self) -> Self {
-        Self {
-            problem: self.problem.branch(),
-            fit: self.fit.clone(),
-            held: self.held.clone(),
-        }
-    }
-
     /// Chi-square a pixel on captures left out; 1 is noise alone.
     pub fn error(&self) -> f64 {
         mean(&self.held)
-    }
-
-    /// The numbers of some effects.
-    pub fn slots(&self, effects: &[usize]) -> Vec<usize> {
-        effects
-            .iter()
-            .flat_map(|&e| self.problem.simulator.slots_of(e))
-            .collect()
     }
 
     /// Stand at another fit.

@@ -157,8 +157,7 @@ impl RigorousCells {
                 (0..count)
                     .map(|k| {
                         let um = wavelength_nm * 1e-3;
-                        let width = self.first_nm() + k as f64 * STEP_NM;
-                        off_cutoff(width, |width| {
+                        off_cutoff(self.width_nm(k), |width| {
                             let mut layers = self.stack.layers(width, um)?;
                             for layer in &mut layers.layers {
                                 layer.outline = Outline::rectangle(width + nm, width - nm);
@@ -228,6 +227,11 @@ impl RigorousCells {
         (self.widths_nm.0 / STEP_NM).floor() * STEP_NM
     }
 
+    /// Width of entry `k`.
+    fn width_nm(&self, k: usize) -> f64 {
+        self.first_nm() + k as f64 * STEP_NM
+    }
+
     fn count(&self) -> usize {
         ((self.widths_nm.1 - self.first_nm()) / STEP_NM).ceil() as usize + 1
     }
@@ -266,8 +270,7 @@ impl RigorousCells {
     fn solve_one(&self, stack: &CellStack, l: usize, k: usize, orders: Orders) -> Result<Complex64> {
         // Where leaning walls would meet, the widest pillar that has room stands in.
         let room = stack.pitch_nm - 1.0 - (2.0 * stack.taper.tan() * stack.height_nm).max(0.0);
-        let width = (self.first_nm() + k as f64 * STEP_NM).min(room);
-        off_cutoff(width, |width| {
+        off_cutoff(self.width_nm(k).min(room), |width| {
             stack.transmission(width, self.wavelengths_nm[l] * 1e-3, orders)
         })
     }
