@@ -1,8 +1,5 @@
 //! A calibration's parts on a small session: `cargo bench --bench calibrate`.
 
-#[path = "../tests/support/session.rs"]
-mod session;
-
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -11,7 +8,7 @@ use metalith::calibrate::{MeasuredSet, Sampling, Session, Settings, Twins};
 
 fn calibration(c: &mut Criterion) {
     let folder = tempfile::tempdir().expect("a folder");
-    session::small_set(folder.path());
+    metalith_testing::session::small_set(folder.path());
     let like = MeasuredSet::read(folder.path(), &Silent).expect("a set");
     let settings = Settings {
         sampling: Sampling {

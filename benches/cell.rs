@@ -3,8 +3,8 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use metalith::cell::rcwa::{Incidence, Orders, Side, solve};
 use metalith::cell::{CellStack, Material};
+use metalith::rcwa::{Incidence, Orders, Side, solve};
 
 fn stack() -> CellStack {
     let material = |name: &str| Material::named(name).expect("a known name");

@@ -1,9 +1,6 @@
 //! Design rules and differences on one 140 um lens, from memory. Full-size figures and KLayout beside:
 //! `scripts/compare_klayout_drc.py METALITH FOLDER --time 1000000`.
 
-#[path = "../tests/support/gds.rs"]
-mod gds;
-
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use metalith::diff::{DiffPlan, diff};
 use metalith::drc::{self, CheckInput, Deck};
@@ -14,7 +11,7 @@ const SITES: i32 = 400;
 
 /// A flat lens on its lattice, or with every second row shifted by half a pitch, so that there is none.
 fn lens(on_lattice: bool) -> Vec<u8> {
-    let mut gds = gds::Gds::library();
+    let mut gds = metalith_testing::gds::Gds::library();
     gds.cell("TOP");
     for iy in 0..SITES {
         for ix in 0..SITES {

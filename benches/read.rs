@@ -2,9 +2,6 @@
 //!
 //! Full-size files and the peers are timed by `scripts/time_readers.py`.
 
-#[path = "../tests/support/gds.rs"]
-mod gds;
-
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use metalith::extract::ElementSite;
 use metalith::gds::{LayerNumber, ReadLimits};
@@ -14,7 +11,7 @@ const SITES: usize = 400;
 
 fn lens(referenced: bool) -> (Vec<u8>, ElementSite) {
     let lattice = Lattice::new(350, SITES).expect("a lattice");
-    let mut gds = gds::Gds::library();
+    let mut gds = metalith_testing::gds::Gds::library();
     if referenced {
         for w in 0..100 {
             gds.cell(&format!("W{w}")).square(1, 0, 0, 100 + 2 * w).end_cell();

@@ -6,7 +6,7 @@
 use std::time::Instant;
 
 use metalith::cell::CellStack;
-use metalith::cell::rcwa::Orders;
+use metalith::rcwa::Orders;
 
 /// Width [nm] and wavelength [um].
 const POINTS: [(f64, f64); 3] = [(200.0, 0.452), (280.0, 0.452), (250.0, 0.525)];

@@ -6,7 +6,8 @@
 
 use std::path::Path;
 
-use metalith::cell::{LED_UM, RigorousCell, cache_folder};
+use metalith::cell::{RigorousCell, cache_folder};
+use metalith::cell_study::LED_UM;
 use metalith::extract::ElementSite;
 use metalith::gds::ReadLimits;
 use metalith::phase::{ElementPhase, LensPhase};
@@ -29,7 +30,7 @@ fn main() -> Result<()> {
     let layout = Layout::open_with(Path::new(layout), ReadLimits::default(), &Silent)?;
     let extraction = extract(&layout, &plan, &Silent)?;
     let lens = LensPhase::new(array.lattice, design.lens.diameter_nm, &design.lens.phase);
-    let (cell, _) = RigorousCell::of_design(&design, cache_folder().as_deref(), &Silent)?;
+    let (cell, _) = RigorousCell::obtain(&design.table_spec()?, cache_folder().as_deref(), &Silent)?;
     let tables = LED_UM
         .iter()
         .map(|&l| {

@@ -51,7 +51,7 @@ fn main() -> Result<()> {
                 }
                 let cell: Box<dyn CellModel> = match fidelity {
                     Fidelity::Published => Box::new(PublishedCell::new(design.cell.pitch_nm)),
-                    _ => Box::new(RigorousCell::of_design(&shipped, cache_folder().as_deref(), &Silent)?.0),
+                    _ => Box::new(RigorousCell::obtain(&shipped.table_spec()?, cache_folder().as_deref(), &Silent)?.0),
                 };
                 let start = Instant::now();
                 let task = Task::of(&design)?;

@@ -73,42 +73,30 @@
 //! # }
 //! ```
 
-// Units stand in brackets all over the documentation, and `[nm]` is no link.
-#![allow(rustdoc::broken_intra_doc_links)]
+pub use metalith_calibrate as calibrate;
+pub use metalith_cell as cell;
+pub use metalith_cell_study as cell_study;
+pub use metalith_compensate as compensate;
+pub use metalith_design as design;
+pub use metalith_design::{array, phase};
+pub use metalith_drc as drc;
+pub use metalith_drc::diff;
+pub use metalith_gds as gds;
+pub use metalith_gds::extract;
+pub use metalith_handoff as handoff;
+pub use metalith_layout as layout;
+pub use metalith_optimise as optimise;
+pub use metalith_rcwa as rcwa;
+pub use metalith_report as report;
+pub use metalith_verify as verify;
+pub use metalith_wave as wave;
+pub use metalith_wave::image;
 
-pub mod array;
-pub mod calibrate;
-pub mod cell;
-pub mod compensate;
-pub mod design;
-pub mod diff;
-mod document;
-pub mod drc;
-mod error;
-pub mod extract;
-mod file;
-pub mod gds;
-pub mod handoff;
-pub mod image;
-mod lattice;
-pub mod layout;
-pub mod optimise;
-pub mod phase;
-mod progress;
-pub mod report;
-pub mod verify;
-pub mod wave;
-
-pub use array::PillarArray;
-pub use cell::{CellModel, Fidelity, cell_models};
-pub use design::{Design, Hierarchy};
-pub use document::{Fault, Faults};
-pub use error::{Error, Result};
-pub use extract::{Extraction, ExtractionPlan, extract};
-pub use file::WholeFile;
-pub use gds::Layout;
-pub use lattice::{Lattice, WidthMap};
-pub use layout::{write_apertures, write_layer_properties, write_pillars};
-pub use progress::{Progress, Silent};
-pub use verify::{Premise, Verification, verify, write_report};
-pub use wave::Accuracy;
+pub use metalith_cell::{CellModel, Fidelity};
+pub use metalith_core::{Error, Fault, Faults, Lattice, Progress, Result, Silent, WholeFile, WidthMap};
+pub use metalith_design::{Design, Hierarchy, PillarArray, cell_models};
+pub use metalith_gds::Layout;
+pub use metalith_gds::extract::{Extraction, ExtractionPlan, extract};
+pub use metalith_layout::{write_apertures, write_layer_properties, write_pillars};
+pub use metalith_verify::{Premise, Verification, verify, write_report};
+pub use metalith_wave::Accuracy;

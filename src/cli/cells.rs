@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metalith::cell::{CellStudy, CellTable, Origin, RigorousCell, StudyOptions, cache_folder, write_cell_report};
+use metalith::cell::{CellTable, Origin, RigorousCell, cache_folder};
+use metalith::cell_study::{CellStudy, StudyOptions, write_cell_report};
 use metalith::report::{fixed, sig};
 use metalith::{Design, Result};
 
@@ -49,7 +50,7 @@ pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
         .out
         .clone()
         .unwrap_or_else(|| PathBuf::from("out").join(&design.name));
-    let mut spec = RigorousCell::table_spec(&design)?;
+    let mut spec = design.table_spec()?;
     spec.orders = args.orders;
     spec.tolerance = args.tolerance;
     let cache = args.cache.clone().or_else(cache_folder);

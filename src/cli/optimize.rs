@@ -59,7 +59,9 @@ impl Cells {
     fn of(design: &Design, report: bool, terminal: &Terminal) -> Result<Self> {
         let cache = cache_folder();
         let rigorous = || -> Result<Box<dyn CellModel>> {
-            Ok(Box::new(RigorousCell::of_design(design, cache.as_deref(), terminal)?.0))
+            Ok(Box::new(
+                RigorousCell::obtain(&design.table_spec()?, cache.as_deref(), terminal)?.0,
+            ))
         };
         let fidelity = design.optimise.fidelity;
         let own = match fidelity {
@@ -69,7 +71,7 @@ impl Cells {
         let judge = (report && fidelity != Fidelity::Rigorous).then(rigorous).transpose()?;
         let off_height = match &design.optimise.robust {
             Some(robust) if fidelity == Fidelity::Rigorous && robust.height > 0.0 => {
-                cells_off_height(&RigorousCell::table_spec(design)?, robust, cache.as_deref(), terminal)?
+                cells_off_height(&design.table_spec()?, robust, cache.as_deref(), terminal)?
             }
             _ => Vec::new(),
         };

@@ -53,7 +53,9 @@ pub fn run(args: &PhotographsArgs, terminal: &Terminal) -> Result<Outcome> {
     let fidelity = Fidelity::from(args.fidelity);
     let cell: Box<dyn CellModel> = match fidelity {
         // The table, which a run of many wavelengths repays.
-        Fidelity::Rigorous => Box::new(RigorousCell::of_design(&design, cache_folder().as_deref(), terminal)?.0),
+        Fidelity::Rigorous => {
+            Box::new(RigorousCell::obtain(&design.table_spec()?, cache_folder().as_deref(), terminal)?.0)
+        }
         _ => cell_models(&design, &[fidelity])?.remove(0),
     };
     let between = views(&task.spec, &task.spec.views, 0.5);

@@ -1,0 +1,414 @@
+//! Transmission of pillars of any width, as etched, at the wavelengths of a set.
+//!
+//! The stated cell is solved with many orders. A change of the pillar (height, index, walls, corners, mask) is
+//! solved with fewer, and corrected by what they err by on the stated pillar that it is most like.
+
+mod carry;
+mod table;
+
+use std::collections::HashMap;
+use std::fs;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+use sha2::{Digest, Sha256};
+
+pub use table::CellTable;
+
+use self::carry::{Carried, carried_over};
+use super::departure::CellChange;
+use metalith_cell::{CellModel, CellStack};
+use metalith_core::{Error, Progress, Result, WholeFile};
+use metalith_rcwa::{Incidence, Orders, Outline, Side, solve};
+
+/// Orders along an axis for the stated cell: errs by about 0.005 rad.
+const FINE: usize = 13;
+
+/// Orders along an axis for what a change of the pillar makes of it.
+const COARSE: usize = 9;
+
+/// The same for leaning walls, which take six layers; they are very like upright ones.
+const LEANING: usize = 7;
+
+/// And for pillars that are wider one way, which twins alone are made of.
+const ANISOTROPIC: usize = 9;
+
+/// Widths are tabulated this far apart [nm]; resonances are a few nanometres wide.
+const STEP_NM: f64 = 2.0;
+
+/// Where tables come from.
+pub enum CellSource {
+    /// The rigorous cell and its changes.
+    Rigorous(Box<RigorousCells>),
+    /// A model of fewer virtues; it knows no changes of the pillar.
+    Model(Box<dyn CellModel + Send>),
+}
+
+/// Tables of the rigorous cell at the wavelengths of a set, made when first asked for.
+pub struct RigorousCells {
+    stack: CellStack,
+    wavelengths_nm: Vec<f64>,
+    widths_nm: (f64, f64),
+    fine: usize,
+    coarse: usize,
+    leaning: usize,
+    folder: Option<PathBuf>,
+    made: Mutex<HashMap<[u64; 6], Arc<CellTable>>>,
+}
+
+impl RigorousCells {
+    /// Tables of `stack` for widths within a range. They are kept in `folder` for the next run, if there is one.
+    pub fn new(stack: CellStack, wavelengths_nm: Vec<f64>, widths_nm: (f64, f64), folder: Option<PathBuf>) -> Self {
+        Self {
+            stack,
+            wavelengths_nm,
+            widths_nm,
+            fine: FINE,
+            coarse: COARSE,
+            leaning: LEANING,
+            folder,
+            made: Mutex::default(),
+        }
+    }
+
+    /// The same with other orders, for upright pillars in full: for twins that must not share what fits are
+    /// short of. Leaning walls take six layers, and fewer orders.
+    pub fn with_orders(mut self, fine: usize, leaning: usize) -> Self {
+        (self.fine, self.coarse, self.leaning) = (fine, fine, leaning);
+        self
+    }
+
+    /// The table of the cell with a change.
+    ///
+    /// # Errors
+    /// If a pillar cannot be (a foot wider than the pitch), or the user stopped it.
+    pub fn table(&self, change: &CellChange, progress: &dyn Progress) -> Result<Arc<CellTable>> {
+        let stated = CellChange::default();
+        let (alike, coarse) = if change.taper_deg == 0.0 {
+            (stated, self.coarse)
+        } else {
+            let upright = CellChange {
+                taper_deg: 0.0,
+                ..*change
+            };
+            (upright, self.leaning)
+        };
+        if *change == stated || coarse >= self.fine {
+            return self.solved(change, self.fine, progress);
+        }
+        self.kept(change, -(coarse as f64), || {
+            self.carried(change, &alike, coarse, progress)
+        })
+    }
+
+    /// What a change makes of `alike`, solved with fewer orders.
+    fn carried(
+        &self,
+        change: &CellChange,
+        alike: &CellChange,
+        coarse: usize,
+        progress: &dyn Progress,
+    ) -> Result<CellTable> {
+        let stated = self.table(alike, progress)?;
+        let before = self.solved(alike, coarse, progress)?;
+        let after = self.solve(change, coarse, progress)?;
+        let stack = changed(&self.stack, change);
+        let orders = Orders::new(self.fine)?;
+        let t = (0..self.wavelengths_nm.len())
+            .into_par_iter()
+            .map(|l| {
+                let Carried { mut t, resonant } = carried_over(&stated.t[l], &before.t[l], &after.t[l]);
+                if progress.stopped() {
+                    return Err(Error::Interrupted);
+                }
+                for k in resonant {
+                    t[k] = self.solve_one(&stack, l, k, orders)?;
+                }
+                Ok(t)
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let bare = stated.bare.iter().zip(before.bare.iter().zip(&after.bare));
+        Ok(CellTable {
+            bare: bare.map(|(t, (a, b))| t + b - a).collect(),
+            t,
+            ..(*stated).clone()
+        })
+    }
+
+    /// Tables for light polarised along x and along y, of pillars that are `nm` wider along x and narrower
+    /// along y than drawn.
+    ///
+    /// # Errors
+    /// As [`RigorousCells::table`].
+    pub fn anisotropic(&self, nm: f64, progress: &dyn Progress) -> Result<[CellTable; 2]> {
+        let orders = Orders::new(ANISOTROPIC)?;
+        let count = self.count();
+        let rows: Vec<Vec<[Complex64; 2]>> = self
+            .wavelengths_nm
+            .par_iter()
+            .map(|wavelength_nm| {
+                if progress.stopped() {
+                    return Err(Error::Interrupted);
+                }
+                (0..count)
+                    .map(|k| {
+                        let um = wavelength_nm * 1e-3;
+                        off_cutoff(self.width_nm(k), |width| {
+                            let mut layers = self.stack.layers(width, um)?;
+                            for layer in &mut layers.layers {
+                                layer.outline = Outline::rectangle(width + nm, width - nm);
+                            }
+                            let jones = solve(&layers, &Incidence::normal(um, Side::Below), orders)?.transmission;
+                            Ok([jones[0][0], jones[1][1]])
+                        })
+                    })
+                    .collect()
+            })
+            .collect::<Result<_>>()?;
+        let stated = self.solved(&CellChange::default(), self.fine, progress)?;
+        Ok([0, 1].map(|axis| CellTable {
+            t: rows.iter().map(|row| row.iter().map(|t| t[axis]).collect()).collect(),
+            ..(*stated).clone()
+        }))
+    }
+
+    fn solved(&self, change: &CellChange, orders: usize, progress: &dyn Progress) -> Result<Arc<CellTable>> {
+        self.kept(change, orders as f64, || self.solve(change, orders, progress))
+    }
+
+    /// A table as it was made before, or made now; `how` tells ways of making it apart.
+    fn kept(&self, change: &CellChange, how: f64, make: impl FnOnce() -> Result<CellTable>) -> Result<Arc<CellTable>> {
+        let key = [
+            change.height_nm,
+            change.index,
+            change.taper_deg,
+            change.corner_rounding_nm,
+            change.residual_mask_nm,
+            how,
+        ]
+        .map(f64::to_bits);
+        let known =
+            |made: &Mutex<HashMap<_, _>>| made.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
+        if let Some(table) = known(&self.made) {
+            return Ok(table);
+        }
+        let path = self
+            .folder
+            .as_ref()
+            .map(|f| f.join(format!("{}.cells", self.digest(&key))));
+        let (wavelengths, count) = (self.wavelengths_nm.len(), self.count());
+        let load = |path: &std::path::Path| {
+            CellTable::from_bytes(&fs::read(path).ok()?, wavelengths, count, self.first_nm(), STEP_NM)
+        };
+        let table = match path.as_deref().and_then(load) {
+            Some(table) => table,
+            None => {
+                let table = make()?;
+                if let Some(path) = &path {
+                    // A cache that cannot be written costs time, not correctness.
+                    let _ = WholeFile::write(path, &table.bytes());
+                }
+                table
+            }
+        };
+        let table = Arc::new(table);
+        self.made
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .insert(key, Arc::clone(&table));
+        Ok(table)
+    }
+
+    fn first_nm(&self) -> f64 {
+        (self.widths_nm.0 / STEP_NM).floor() * STEP_NM
+    }
+
+    /// Width of entry `k`.
+    fn width_nm(&self, k: usize) -> f64 {
+        self.first_nm() + k as f64 * STEP_NM
+    }
+
+    fn count(&self) -> usize {
+        ((self.widths_nm.1 - self.first_nm()) / STEP_NM).ceil() as usize + 1
+    }
+
+    fn solve(&self, change: &CellChange, orders: usize, progress: &dyn Progress) -> Result<CellTable> {
+        let orders = Orders::new(orders)?;
+        let stack = changed(&self.stack, change);
+        let count = self.count();
+        progress.begin("cells as etched", self.wavelengths_nm.len() as u64);
+        let rows: Vec<(Vec<Complex64>, Complex64)> = self
+            .wavelengths_nm
+            .par_iter()
+            .enumerate()
+            .map(|(l, nm)| {
+                if progress.stopped() {
+                    return Err(Error::Interrupted);
+                }
+                let row = (0..count)
+                    .map(|k| self.solve_one(&stack, l, k, orders))
+                    .collect::<Result<Vec<_>>>()?;
+                let bare = stack.transmission(0.0, nm * 1e-3, orders)?;
+                progress.advance(1);
+                Ok((row, bare))
+            })
+            .collect::<Result<_>>()?;
+        let (t, bare) = rows.into_iter().unzip();
+        Ok(CellTable {
+            first_nm: self.first_nm(),
+            step_nm: STEP_NM,
+            t,
+            bare,
+        })
+    }
+
+    /// Transmission of entry `k` at wavelength `l`.
+    fn solve_one(&self, stack: &CellStack, l: usize, k: usize, orders: Orders) -> Result<Complex64> {
+        // Where leaning walls would meet, the widest pillar that has room stands in.
+        let room = stack.pitch_nm - 1.0 - (2.0 * stack.taper.tan() * stack.height_nm).max(0.0);
+        off_cutoff(self.width_nm(k).min(room), |width| {
+            stack.transmission(width, self.wavelengths_nm[l] * 1e-3, orders)
+        })
+    }
+
+    /// Names a table by everything that decides it.
+    fn digest(&self, key: &[u64; 6]) -> String {
+        let mut hash = Sha256::new();
+        hash.update(env!("CARGO_PKG_VERSION"));
+        hash.update(serde_json::to_vec(&self.stack).expect("plain data serialises"));
+        let numbers = self
+            .wavelengths_nm
+            .iter()
+            .copied()
+            .chain([self.first_nm(), STEP_NM, self.count() as f64]);
+        for bits in numbers.map(f64::to_bits).chain(key.iter().copied()) {
+            hash.update(bits.to_le_bytes());
+        }
+        // Materials serialise by content; indices are sampled as well, so that a table of the same name differs.
+        for nm in &self.wavelengths_nm {
+            let index = self.stack.film.index(nm * 1e-3).unwrap_or_default();
+            hash.update(index.re.to_le_bytes());
+            hash.update(index.im.to_le_bytes());
+        }
+        hash.finalize().iter().take(16).map(|b| format!("{b:02x}")).collect()
+    }
+}
+
+/// A mode at its very cutoff has no field to solve for; a pillar that is wider by less than anyone can tell has.
+fn off_cutoff<T>(width_nm: f64, solve: impl Fn(f64) -> Result<T>) -> Result<T> {
+    solve(width_nm)
+        .or_else(|_| solve(width_nm - 3e-4))
+        .or_else(|_| solve(width_nm - 1e-3))
+}
+
+/// The stack with a change.
+pub fn changed(stack: &CellStack, change: &CellChange) -> CellStack {
+    CellStack {
+        height_nm: stack.height_nm + change.height_nm,
+        film: stack.film.shifted(change.index),
+        taper: stack.taper + change.taper_deg.to_radians(),
+        corner_radius_nm: stack.corner_radius_nm + change.corner_rounding_nm,
+        mask_height_nm: stack.mask_height_nm + change.residual_mask_nm,
+        ..stack.clone()
+    }
+}
+
+impl CellSource {
+    /// The table at `wavelengths_nm` of the cell with a change.
+    ///
+    /// # Errors
+    /// As [`RigorousCells::table`]; for a model, if it does not cover a wavelength.
+    pub fn table(
+        &self,
+        change: &CellChange,
+        wavelengths_nm: &[f64],
+        widths_nm: (f64, f64),
+        progress: &dyn Progress,
+    ) -> Result<Arc<CellTable>> {
+        match self {
+            Self::Rigorous(cells) => cells.table(change, progress),
+            Self::Model(model) => {
+                let most = widths_nm.1.ceil() as u16 + 1;
+                let first = widths_nm.0.floor().max(1.0);
+                let t = wavelengths_nm
+                    .iter()
+                    .map(|nm| {
+                        let row = model.transmissions(nm * 1e-3, most)?;
+                        Ok(row[first as usize..].to_vec())
+                    })
+                    .collect::<Result<Vec<_>>>()?;
+                Ok(Arc::new(CellTable {
+                    first_nm: first,
+                    step_nm: 1.0,
+                    bare: vec![Complex64::new(1.0, 0.0); t.len()],
+                    t,
+                }))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metalith_cell::Material;
+    use metalith_core::Silent;
+
+    /// Root mean square of t over widths and three colours, resonances among them: what the orders of the
+    /// stated cell err by themselves.
+    const TOLERANCE: f64 = 0.005;
+
+    #[test]
+    fn a_change_solved_with_few_orders_is_that_with_many() {
+        let constant = |n| Material::constant(n, 0.0).unwrap();
+        let stack = CellStack {
+            pitch_nm: 350.0,
+            height_nm: 700.0,
+            film: constant(2.02),
+            substrate: constant(1.46),
+            ambient: constant(1.0),
+            taper: 0.0,
+            corner_radius_nm: 0.0,
+            mask_height_nm: 0.0,
+            mask: constant(1.7),
+        };
+        let cells = RigorousCells::new(stack, vec![460.0, 531.0, 660.0], (100.0, 240.0), None);
+        let stated = CellChange::default();
+        for change in [
+            CellChange {
+                taper_deg: 0.6,
+                ..stated
+            },
+            CellChange {
+                taper_deg: -1.0,
+                ..stated
+            },
+            CellChange {
+                corner_rounding_nm: 25.0,
+                ..stated
+            },
+            CellChange { index: 0.02, ..stated },
+            CellChange {
+                height_nm: -24.0,
+                ..stated
+            },
+            CellChange {
+                height_nm: 10.0,
+                ..stated
+            },
+            CellChange {
+                residual_mask_nm: 15.0,
+                ..stated
+            },
+        ] {
+            let made = cells.table(&change, &Silent).unwrap();
+            let truth = cells.solved(&change, FINE, &Silent).unwrap();
+            let pairs = made.t.iter().flatten().zip(truth.t.iter().flatten());
+            let squares: Vec<f64> = pairs.map(|(a, b)| (a - b).norm_sqr()).collect();
+            let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+            assert!(rms < TOLERANCE, "{change:?}: {rms}");
+        }
+    }
+}

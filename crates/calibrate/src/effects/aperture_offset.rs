@@ -1,0 +1,39 @@
+//! The aperture is not where the pillars are: overlay of the second exposure.
+
+use super::{Effect, Parameter, Stage};
+use crate::departure::Departure;
+
+/// From the pillars to their aperture along x and y. Light through the crescent that opens on the far side is
+/// not deflected and left out.
+pub struct ApertureOffset;
+
+impl Effect for ApertureOffset {
+    fn name(&self) -> String {
+        "aperture_offset".into()
+    }
+
+    fn unit(&self) -> &'static str {
+        "um"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Geometry
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        vec![Parameter::new(-20.0, 20.0, 2.0); 2]
+    }
+
+    fn kinked(&self) -> bool {
+        // Which pillars the rim covers: others on either side.
+        true
+    }
+
+    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+        to.geometry.aperture_offset_um = [parameters[0], parameters[1]];
+    }
+
+    fn confusions(&self) -> &'static [(&'static str, &'static str)] {
+        &[("tilt", "a micrograph of the aperture's rim")]
+    }
+}

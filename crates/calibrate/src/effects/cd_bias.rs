@@ -1,0 +1,47 @@
+//! Every pillar is wider or narrower than drawn by the same amount.
+
+use super::{Effect, Parameter, Stage};
+use crate::departure::Departure;
+
+/// Width added to every pillar.
+pub struct CdBias;
+
+impl Effect for CdBias {
+    fn name(&self) -> String {
+        "cd_bias".into()
+    }
+
+    fn unit(&self) -> &'static str {
+        "nm"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Geometry
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        vec![Parameter::new(-30.0, 30.0, 5.0)]
+    }
+
+    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+        to.geometry.cd_bias_nm = parameters[0];
+    }
+
+    fn confusions(&self) -> &'static [(&'static str, &'static str)] {
+        &[
+            (
+                "corner_rounding",
+                "widths by SEM, from above, with an offset known to better than the bias",
+            ),
+            (
+                "sidewall_taper",
+                "widths by SEM, from above, with an offset known to better than the bias",
+            ),
+            ("film_index", "ellipsometry of the film on the chip, or widths by SEM"),
+            (
+                "cd_bias_density",
+                "widths by SEM in the middle and at the rim of a lens",
+            ),
+        ]
+    }
+}

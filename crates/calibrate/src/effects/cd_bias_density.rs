@@ -1,0 +1,33 @@
+//! Pillars are wider where more is exposed around them: backscattered electrons, or loading of the etch.
+
+use super::{Effect, Parameter, Stage};
+use crate::departure::Departure;
+
+/// Width added for each unit of area fraction, averaged over the range of the backscatter.
+pub struct CdBiasDensity;
+
+impl Effect for CdBiasDensity {
+    fn name(&self) -> String {
+        "cd_bias_density".into()
+    }
+
+    fn unit(&self) -> &'static str {
+        "nm"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Geometry
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        vec![Parameter::new(-80.0, 80.0, 15.0)]
+    }
+
+    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+        to.geometry.cd_bias_density_nm = parameters[0];
+    }
+
+    fn confusions(&self) -> &'static [(&'static str, &'static str)] {
+        &[("cd_bias", "widths by SEM in the middle and at the rim of a lens")]
+    }
+}

@@ -1,0 +1,48 @@
+//! The film, and so every pillar, is thicker or thinner than stated.
+
+use super::{Effect, Parameter, Stage};
+use crate::departure::Departure;
+use crate::set::MeasuredSet;
+
+/// Added to the height; the height itself is reported.
+pub struct FilmHeight;
+
+impl Effect for FilmHeight {
+    fn name(&self) -> String {
+        "film_height".into()
+    }
+
+    fn unit(&self) -> &'static str {
+        "nm"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Stack
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        vec![Parameter::new(-60.0, 60.0, 10.0)]
+    }
+
+    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+        to.cell.height_nm = parameters[0];
+    }
+
+    fn value(&self, parameter: f64, set: &MeasuredSet) -> f64 {
+        set.stack.pillar_height_nm + parameter
+    }
+
+    fn confusions(&self) -> &'static [(&'static str, &'static str)] {
+        &[
+            (
+                "residual_mask",
+                "a height by profilometer or AFM, before and after stripping the mask",
+            ),
+            ("film_index", "ellipsometry of the film on the chip"),
+            (
+                "cd_bias",
+                "widths by SEM, from above, with an offset known to better than the bias",
+            ),
+        ]
+    }
+}

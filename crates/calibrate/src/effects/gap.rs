@@ -1,0 +1,36 @@
+//! The camera's plane is farther from the chip than stated.
+
+use super::{Effect, Parameter, Stage};
+use crate::departure::Departure;
+
+/// Added to every distance.
+pub struct Gap;
+
+impl Effect for Gap {
+    fn name(&self) -> String {
+        "gap".into()
+    }
+
+    fn unit(&self) -> &'static str {
+        "um"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Diffraction
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        vec![Parameter::new(-60.0, 60.0, 4.0)]
+    }
+
+    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+        to.path.gap_um = parameters[0];
+    }
+
+    fn confusions(&self) -> &'static [(&'static str, &'static str)] {
+        &[
+            ("source_distance", "a capture at another distance of the source"),
+            ("led_centre", "the spectrum of the LED"),
+        ]
+    }
+}

@@ -1,0 +1,38 @@
+//! The spectrum of one LED is centred elsewhere than stated: temperature, current, or the batch.
+
+use super::{Effect, Parameter, Stage};
+use crate::departure::Departure;
+
+/// Added to the centre of one LED.
+pub struct LedCentre {
+    /// Its place in the set.
+    pub led: usize,
+    /// `led_centre_` and its stated centre.
+    pub name: String,
+}
+
+impl Effect for LedCentre {
+    fn name(&self) -> String {
+        self.name.clone()
+    }
+
+    fn unit(&self) -> &'static str {
+        "nm"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Source
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        vec![Parameter::new(-12.0, 12.0, 2.0)]
+    }
+
+    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+        *to.light.shift_mut(self.led) = parameters[0];
+    }
+
+    fn confusions(&self) -> &'static [(&'static str, &'static str)] {
+        &[("gap", "the spectrum of the LED")]
+    }
+}

@@ -1,0 +1,41 @@
+//! Spectra are wider or narrower than stated.
+
+use super::{Effect, Parameter, Stage};
+use crate::departure::Departure;
+use crate::set::MeasuredSet;
+
+/// Width of all spectra over what is stated; less one is fitted.
+pub struct LedWidth;
+
+impl Effect for LedWidth {
+    fn name(&self) -> String {
+        "led_width".into()
+    }
+
+    fn unit(&self) -> &'static str {
+        ""
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Source
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        vec![Parameter::new(-0.6, 1.5, 0.15)]
+    }
+
+    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+        to.light.led_width = parameters[0];
+    }
+
+    fn value(&self, parameter: f64, _set: &MeasuredSet) -> f64 {
+        1.0 + parameter
+    }
+
+    fn confusions(&self) -> &'static [(&'static str, &'static str)] {
+        &[
+            ("pixel_blur", "the spectra of the LEDs"),
+            ("source_size", "the spectra of the LEDs"),
+        ]
+    }
+}

@@ -1,0 +1,41 @@
+//! The camera blurs: its relay, or charge that diffuses.
+
+use super::{Effect, Parameter, Stage};
+use crate::departure::Departure;
+use crate::set::MeasuredSet;
+
+/// Standard deviation of a Gaussian; its square is what is fitted.
+pub struct PixelBlur;
+
+impl Effect for PixelBlur {
+    fn name(&self) -> String {
+        "pixel_blur".into()
+    }
+
+    fn unit(&self) -> &'static str {
+        "um"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Camera
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        vec![Parameter::new(0.0, 9.0, 0.09)]
+    }
+
+    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+        to.camera.pixel_blur_um = parameters[0].max(0.0).sqrt();
+    }
+
+    fn value(&self, parameter: f64, _set: &MeasuredSet) -> f64 {
+        parameter.max(0.0).sqrt()
+    }
+
+    fn confusions(&self) -> &'static [(&'static str, &'static str)] {
+        &[
+            ("source_size", "a capture with the source stopped down"),
+            ("led_width", "the spectra of the LEDs"),
+        ]
+    }
+}

@@ -1,0 +1,39 @@
+//! Alumina of the etch mask was left on the pillars.
+
+use super::{Effect, Parameter, Stage};
+use crate::departure::Departure;
+
+/// Thickness of what is left.
+pub struct ResidualMask;
+
+impl Effect for ResidualMask {
+    fn name(&self) -> String {
+        "residual_mask".into()
+    }
+
+    fn unit(&self) -> &'static str {
+        "nm"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Stack
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        vec![Parameter::new(0.0, 80.0, 15.0)]
+    }
+
+    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+        to.cell.residual_mask_nm = parameters[0].max(0.0);
+    }
+
+    fn confusions(&self) -> &'static [(&'static str, &'static str)] {
+        &[
+            (
+                "film_height",
+                "a height by profilometer or AFM, before and after stripping the mask",
+            ),
+            ("film_index", "ellipsometry of the film on the chip"),
+        ]
+    }
+}

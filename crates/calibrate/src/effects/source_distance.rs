@@ -1,0 +1,39 @@
+//! The source is not at infinity: light arrives as a sphere.
+
+use super::{Effect, Parameter, Stage};
+use crate::departure::Departure;
+use crate::set::MeasuredSet;
+
+/// One over its distance is fitted [1/m], the distance itself is reported.
+pub struct SourceDistance;
+
+impl Effect for SourceDistance {
+    fn name(&self) -> String {
+        "source_distance".into()
+    }
+
+    fn unit(&self) -> &'static str {
+        "um"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Diffraction
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        vec![Parameter::new(0.0, 200.0, 25.0)]
+    }
+
+    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+        to.path.source_per_m = parameters[0].max(0.0);
+    }
+
+    fn value(&self, parameter: f64, _set: &MeasuredSet) -> f64 {
+        // 1e6 um to the metre; collimated light comes from infinitely far.
+        1e6 / parameter.max(1e-6)
+    }
+
+    fn confusions(&self) -> &'static [(&'static str, &'static str)] {
+        &[("gap", "captures at two distances of the source")]
+    }
+}

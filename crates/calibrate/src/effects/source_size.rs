@@ -1,0 +1,41 @@
+//! The source is larger or smaller than stated.
+
+use super::{Effect, Parameter, Stage};
+use crate::departure::Departure;
+use crate::set::MeasuredSet;
+
+/// Diameter over what is stated; less one is fitted.
+pub struct SourceSize;
+
+impl Effect for SourceSize {
+    fn name(&self) -> String {
+        "source_size".into()
+    }
+
+    fn unit(&self) -> &'static str {
+        ""
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Source
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        vec![Parameter::new(-1.0, 6.0, 0.5)]
+    }
+
+    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+        to.light.source_size = parameters[0];
+    }
+
+    fn value(&self, parameter: f64, _set: &MeasuredSet) -> f64 {
+        1.0 + parameter
+    }
+
+    fn confusions(&self) -> &'static [(&'static str, &'static str)] {
+        &[
+            ("pixel_blur", "a capture with the source stopped down"),
+            ("led_width", "the spectra of the LEDs"),
+        ]
+    }
+}

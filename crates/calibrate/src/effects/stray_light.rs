@@ -1,0 +1,33 @@
+//! A share of the light is spread evenly: scatter in the relay.
+
+use super::{Effect, Parameter, Stage};
+use crate::departure::Departure;
+
+/// Share of the light of a window that is spread over it.
+pub struct StrayLight;
+
+impl Effect for StrayLight {
+    fn name(&self) -> String {
+        "stray_light".into()
+    }
+
+    fn unit(&self) -> &'static str {
+        ""
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Camera
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        vec![Parameter::new(0.0, 0.6, 0.02)]
+    }
+
+    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+        to.camera.stray_light = parameters[0];
+    }
+
+    fn confusions(&self) -> &'static [(&'static str, &'static str)] {
+        &[("missing_pillars", "light beside the window, or a dark-field micrograph")]
+    }
+}

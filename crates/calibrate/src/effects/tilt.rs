@@ -1,0 +1,33 @@
+//! Light arrives at another angle than stated, the same for every capture.
+
+use super::{Effect, Parameter, Stage};
+use crate::departure::Departure;
+
+/// Added to the angle of incidence along x and y.
+pub struct Tilt;
+
+impl Effect for Tilt {
+    fn name(&self) -> String {
+        "tilt".into()
+    }
+
+    fn unit(&self) -> &'static str {
+        "mrad"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Diffraction
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        vec![Parameter::new(-40.0, 40.0, 3.0); 2]
+    }
+
+    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+        to.path.tilt_mrad = [parameters[0], parameters[1]];
+    }
+
+    fn confusions(&self) -> &'static [(&'static str, &'static str)] {
+        &[("aperture_offset", "a micrograph of the aperture's rim")]
+    }
+}

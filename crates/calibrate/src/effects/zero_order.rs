@@ -1,0 +1,46 @@
+//! Light passes the aperture without seeing pillars.
+
+use super::{Effect, Parameter, Stage};
+use crate::departure::Departure;
+use crate::set::MeasuredSet;
+
+/// Amplitude of that light over what arrives.
+pub struct ZeroOrder;
+
+impl Effect for ZeroOrder {
+    fn name(&self) -> String {
+        "zero_order".into()
+    }
+
+    fn unit(&self) -> &'static str {
+        ""
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Geometry
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        // In phase with what arrives, and a quarter ahead of it: by which way that light comes is not known.
+        vec![Parameter::new(-0.6, 0.6, 0.05); 2]
+    }
+
+    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+        to.geometry.zero_order = parameters[0].hypot(parameters[1]);
+        to.geometry.zero_order_phase = parameters[1].atan2(parameters[0]);
+    }
+
+    fn reported(&self, numbers: &[f64], half_widths: &[f64], _set: &MeasuredSet) -> Vec<(f64, [f64; 2])> {
+        let amplitude = numbers[0].hypot(numbers[1]);
+        let along = numbers.iter().zip(half_widths).map(|(n, w)| n * w);
+        let width = along.fold(0.0, f64::hypot) / amplitude.max(f64::MIN_POSITIVE);
+        vec![(amplitude, [(amplitude - width).max(0.0), amplitude + width])]
+    }
+
+    fn confusions(&self) -> &'static [(&'static str, &'static str)] {
+        &[(
+            "missing_pillars",
+            "a dark-field micrograph, which shows single missing pillars",
+        )]
+    }
+}

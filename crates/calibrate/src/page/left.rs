@@ -1,0 +1,139 @@
+//! What the effects leave, what looks alike, and the nuisances.
+
+use super::super::atlas::Atlas;
+use super::super::attribute::Finding;
+use super::super::free::FreeTerm;
+use super::super::nuisance::Nuisances;
+use super::super::session::Session;
+use super::super::signature::{cosines, separate_by};
+use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, Table, fixed, sig};
+
+/// Cosines between signatures above this are named.
+const ALIKE: f64 = 0.9;
+
+/// The free term, as pictures with units.
+pub(super) fn free_term(page: &mut Page, session: &Session<'_>, finding: &Finding) {
+    let Some(free) = FreeTerm::new(session, finding) else {
+        return;
+    };
+    page.section("What is left");
+    page.paragraph(format!(
+        "Smooth shapes fitted to what the effects leave; they go by no name. They take chi-square a pixel from {} to {}. The path over the lens is {} nm rms, with a noise of {} nm.",
+        sig(free.chi2.0, 4),
+        sig(free.chi2.1, 4),
+        sig(free.path_rms_nm.0, 3),
+        sig(free.path_rms_nm.1, 2)
+    ));
+    let mut strong: Vec<String> = free
+        .coefficients_nm
+        .iter()
+        .filter(|(_, c, sigma)| c.abs() > 3.0 * sigma)
+        .map(|(j, c, sigma)| format!("Noll {j}: {} +- {} nm", sig(*c, 3), sig(*sigma, 1)))
+        .collect();
+    let blurs = ["along x", "across", "along y"].into_iter().zip(&free.blur_um2);
+    strong.extend(
+        blurs
+            .filter(|(_, (v, sigma))| v.abs() > 3.0 * sigma)
+            .map(|(axis, (v, sigma))| format!("Blur {axis}: {} +- {} um^2", sig(*v, 3), sig(*sigma, 1))),
+    );
+    if !strong.is_empty() {
+        page.list(strong);
+    }
+    let r = free.radius_um;
+    let map = HeatMap::new(
+        "Path over the lens",
+        free.path_nm.clone(),
+        (Axis::linear("x", "um"), -r, r),
+        (Axis::linear("y", "um"), -r, r),
+    )
+    .values("optical path", "nm")
+    .diverging()
+    .to_scale()
+    .size(400.0, 360.0);
+    let mut curves = Chart::new(
+        "Transmission over width",
+        Axis::linear("width", "nm"),
+        Axis::linear("relative change of amplitude", ""),
+    )
+    .size(460.0, 360.0);
+    for (led, curve) in session.set().leds.iter().zip(&free.transmission) {
+        curves.line(format!("{} nm", led.name()), curve.iter().copied());
+    }
+    page.row([
+        map.caption("Optical path common to all colours and elements; tilts and defocus are nuisances or effects."),
+        curves.caption("Change of amplitude over width that each colour asks for."),
+    ]);
+}
+
+/// Pairs of effects that these captures hardly tell apart.
+pub(super) fn confusable(page: &mut Page, session: &Session<'_>, atlas: &Atlas, finding: &Finding) {
+    page.section("What looks alike");
+    let problem = session.problem(atlas);
+    let c = cosines(&problem, &finding.before);
+    let names: Vec<String> = session
+        .simulator
+        .slots
+        .iter()
+        .map(|s| {
+            let e = &session.simulator.effects[s.effect];
+            if e.parameters().len() > 1 {
+                format!("{} {}", e.name(), ["x", "y"][s.index])
+            } else {
+                e.name()
+            }
+        })
+        .collect();
+    let mut table = Table::new([
+        Column::text("Effect"),
+        Column::text("and"),
+        Column::number("Cosine", ""),
+        Column::text("What would tell them apart"),
+    ])
+    .caption("Signatures of this layout in these captures, nuisances projected out, weighted by noise.");
+    let mut pairs: Vec<(usize, usize)> = (0..names.len()).flat_map(|i| (0..i).map(move |j| (j, i))).collect();
+    pairs.retain(|&(i, j)| c[(i, j)].abs() > ALIKE);
+    pairs.sort_by(|a, b| c[*b].abs().total_cmp(&c[*a].abs()));
+    for (i, j) in pairs {
+        let [a, b] = [i, j].map(|k| session.simulator.slots[k].effect);
+        let how = separate_by(&session.simulator, a, &[b]);
+        table.row([
+            Cell::code(&names[i]),
+            Cell::code(&names[j]),
+            Cell::fixed(c[(i, j)], 3),
+            how.as_deref().map_or_else(Cell::none, Cell::from),
+        ]);
+    }
+    page.table(table);
+}
+
+/// Placement, flux and black level as fitted.
+pub(super) fn nuisances(page: &mut Page, session: &Session<'_>, found: &Nuisances) {
+    page.details("Nuisances: placement, flux, black level", |inner| {
+        let mut table = Table::new([
+            Column::text("Capture"),
+            Column::number("Off in x", "pixels"),
+            Column::number("Off in y", "pixels"),
+        ]);
+        let pixel = session.set().camera.pixel_um;
+        for (capture, shift) in session.set().captures.iter().zip(&found.shift_um) {
+            table.row([
+                Cell::code(&capture.name),
+                Cell::fixed(shift[0] / pixel, 3),
+                Cell::fixed(shift[1] / pixel, 3),
+            ]);
+        }
+        inner.table(table);
+        let flux: Vec<String> = session
+            .set()
+            .leds
+            .iter()
+            .zip(&found.flux)
+            .map(|(led, f)| format!("{} nm: {}", led.name(), fixed(*f, 4)))
+            .collect();
+        inner.paragraph(format!(
+            "Flux over what is stated: {}. Black level off by {} DN.",
+            flux.join(", "),
+            fixed(found.black_dn, 3)
+        ));
+    });
+}

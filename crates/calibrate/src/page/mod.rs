@@ -1,0 +1,222 @@
+//! The report of a session for people.
+
+mod captures;
+mod left;
+
+use std::path::Path;
+
+use captures::{SIGMAS, captures, widths};
+use left::{confusable, free_term, nuisances};
+use ndarray::Array2;
+
+use super::atlas::Atlas;
+use super::attribute::Finding;
+use super::diagnosis::{Diagnosis, Ranked, SetVerdict};
+use super::session::Session;
+use metalith_core::Result;
+use metalith_report::{Axis, Cell, Column, ImageGrid, Page, Ranking, Table, Verdict, fixed, sig};
+
+/// Write the report of a session.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write_page(
+    path: &Path,
+    session: &Session<'_>,
+    atlas: &Atlas,
+    diagnosis: &Diagnosis,
+    finding: Option<&Finding>,
+) -> Result<()> {
+    let mut page = Page::new(
+        format!("Calibration: {}", diagnosis.set),
+        format!(
+            "{} captures of `{}`",
+            session.set().captures.len(),
+            session.set().path.display()
+        ),
+    );
+    let holds = matches!(diagnosis.verdict, SetVerdict::NoResidual | SetVerdict::Explained);
+    page.verdict(
+        if holds { Verdict::Pass } else { Verdict::Fail },
+        capitalised(&diagnosis.sentence()),
+    );
+    let error = &diagnosis.error;
+    page.facts(&[
+        ("Before, held out", sig(error.before.held_out, 4)),
+        ("After, held out", sig(error.after.held_out, 4)),
+        ("Noise floor", sig(error.noise_floor, 3)),
+        ("Placebo, held out", sig(error.placebo_held_out, 4)),
+        (
+            "Left unexplained",
+            format!("{} %", fixed(100.0 * diagnosis.unexplained_share, 1)),
+        ),
+    ]);
+    page.paragraph(
+        "Errors are chi-square a pixel: one is noise alone. Held out means predicted by a fit that has not seen the colour, the element or the distance of the capture; its placement, flux and black level alone are adjusted.",
+    );
+    if let Some(share) = diagnosis.missing_by_grain {
+        page.paragraph(format!(
+            "Single missing pillars leave a grain that no numbers predict; its variance is known and counts as noise in the errors after. By that grain alone, {} % of the pillars are missing.",
+            sig(100.0 * share, 3)
+        ));
+    }
+    effects(&mut page, diagnosis);
+    ladder(&mut page, session, diagnosis);
+    if let Some(finding) = finding {
+        ranking(&mut page, diagnosis);
+        captures(&mut page, session, atlas, finding);
+        widths(&mut page, session, finding);
+        free_term(&mut page, session, finding);
+        confusable(&mut page, session, atlas, finding);
+        nuisances(&mut page, session, &finding.after.nuisances);
+    }
+    if !diagnosis.left_out.is_empty() {
+        page.section("Captures left out");
+        page.list(
+            diagnosis
+                .left_out
+                .iter()
+                .map(|l| format!("`{}`: {}", l.capture, l.reason)),
+        );
+    }
+    page.write(path)
+}
+
+fn effects(page: &mut Page, diagnosis: &Diagnosis) {
+    if diagnosis.effects.is_empty() {
+        return;
+    }
+    page.section("What was found");
+    let mut table = Table::new([
+        Column::text("Effect"),
+        Column::text("Value"),
+        Column::text("95 % interval"),
+        Column::text("Not told apart from"),
+        Column::text("What would tell"),
+    ]);
+    for e in &diagnosis.effects {
+        let shown = |v: &serde_json::Value| round_json(v);
+        table.row([
+            Cell::code(&e.name),
+            format!("{} {}", shown(&e.value), e.unit).as_str().into(),
+            shown(&e.interval).as_str().into(),
+            if e.confounded_with.is_empty() {
+                Cell::none()
+            } else {
+                e.confounded_with.join(", ").as_str().into()
+            },
+            e.separate_by.as_deref().map_or_else(Cell::none, Cell::from),
+        ]);
+    }
+    page.table(table);
+}
+
+fn ladder(page: &mut Page, session: &Session<'_>, diagnosis: &Diagnosis) {
+    if diagnosis.ladder.is_empty() {
+        return;
+    }
+    page.section("How truly the cell is described");
+    let mut table = Table::new([
+        Column::text("Cell"),
+        Column::number("Chi-square a pixel", "fitted"),
+        Column::number("Chi-square a pixel", "held out"),
+    ])
+    .caption("Nuisances fitted, nothing else. What the polynomials lack is amplitude and resonances.");
+    for rung in &diagnosis.ladder {
+        table.row([
+            Cell::code(&rung.fidelity),
+            Cell::sig(rung.fit, 4),
+            Cell::sig(rung.held_out, 4),
+        ]);
+    }
+    page.table(table);
+    // The capture that the first rung predicts worst.
+    let power = |a: &Array2<f32>| a.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
+    let first = &diagnosis.ladder[0].residuals;
+    let Some(worst) = (0..first.len()).max_by(|&a, &b| power(&first[a]).total_cmp(&power(&first[b]))) else {
+        return;
+    };
+    let mut pictures = ImageGrid::new("Three descriptions of the cell", diagnosis.ladder.len())
+        .pixel_um(session.set().camera.pixel_um)
+        .values("residual", "sigma")
+        .range(-SIGMAS, SIGMAS)
+        .diverging()
+        .side(200.0);
+    for rung in &diagnosis.ladder {
+        pictures.image(rung.fidelity.as_str(), rung.residuals[worst].mapv(f64::from));
+    }
+    page.figure(pictures.caption(format!(
+        "What each leaves of capture `{}`, in standard deviations of the noise.",
+        session.set().captures[worst].name
+    )));
+}
+
+fn ranking(page: &mut Page, diagnosis: &Diagnosis) {
+    page.section("Candidates");
+    page.paragraph(
+        "Every effect is scored by the share of the residual that its signature explains; the leaders are fitted in full, and judged by what they gain on captures left out.",
+    );
+    let mut chart = Ranking::new(
+        "Candidates",
+        Axis::linear("gain on captures left out", "chi-square a pixel"),
+    );
+    for r in diagnosis.ranking.iter().filter(|r| r.held_out_gain.is_some()) {
+        let interval = r.held_out_gain_interval.map(|[a, b]| (a, b));
+        chart.bar(
+            r.name.as_str(),
+            r.held_out_gain.unwrap_or(0.0),
+            interval,
+            r.remark.as_str(),
+            r.rejected.is_none(),
+        );
+    }
+    page.figure(chart.caption("What each leader gains, with its interval over groups of captures."));
+    page.details("All candidates", |inner| {
+        inner.table(candidates(&diagnosis.ranking));
+    });
+    for (place, ranking) in diagnosis.later_rankings.iter().enumerate() {
+        page.details(format!("Candidates on top of {}", place + 1), |inner| {
+            inner.table(candidates(ranking));
+        });
+    }
+}
+
+fn candidates(ranking: &[Ranked]) -> Table {
+    let mut table = Table::new([
+        Column::text("Candidate"),
+        Column::number("Explains alone", "%"),
+        Column::number("Gain, held out", ""),
+        Column::text("Value"),
+        Column::text("Why not"),
+    ]);
+    for r in ranking {
+        table.row([
+            Cell::code(&r.name),
+            Cell::sig(100.0 * r.score, 3),
+            r.held_out_gain.map_or_else(Cell::none, |g| Cell::sig(g, 3)),
+            r.value
+                .as_ref()
+                .map_or_else(Cell::none, |v| round_json(v).as_str().into()),
+            r.rejected.as_deref().map_or_else(|| "taken".into(), Cell::from),
+        ]);
+    }
+    table
+}
+
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters
+        .next()
+        .map_or_else(String::new, |c| c.to_uppercase().chain(letters).collect())
+}
+
+/// Numbers of a JSON value to four digits.
+pub fn round_json(value: &serde_json::Value) -> String {
+    match value {
+        serde_json::Value::Array(items) => {
+            format!("[{}]", items.iter().map(round_json).collect::<Vec<_>>().join(", "))
+        }
+        serde_json::Value::Number(n) => sig(n.as_f64().unwrap_or(f64::NAN), 4),
+        other => other.to_string(),
+    }
+}

@@ -1,0 +1,331 @@
+//! How far `calibrate` can be trusted, by twins: false claims, what is found at which size, what is
+//! taken for what.
+
+mod page;
+mod summary;
+
+use ndarray::Array2;
+use rayon::prelude::*;
+use serde::Serialize;
+use serde_json::Value;
+
+pub use page::write_proof;
+pub use summary::{Limit, Proof};
+
+use super::attribute::Finding;
+use super::diagnosis::{Diagnosis, SetVerdict};
+use super::effects::Parameter;
+use super::free::FreeTerm;
+use super::session::{Session, Settings};
+use super::set::MeasuredSet;
+use super::twin::{Exposed, OffList, Twins};
+use metalith_core::{Progress, Result};
+
+/// Sizes that every effect is tried at, in typical sizes.
+pub const SIZES: [f64; 3] = [0.5, 1.0, 2.0];
+
+/// Effects that are tried together, each at its typical size: of one stage and of several, alike and unlike.
+const PAIRS: [(&str, &str); 8] = [
+    ("cd_bias", "gap"),
+    ("cd_bias", "film_index"),
+    ("film_height", "zero_order"),
+    ("sidewall_taper", "pixel_blur"),
+    ("cd_bias_density", "stray_light"),
+    ("tilt", "source_size"),
+    ("missing_pillars", "cd_bias"),
+    ("source_distance", "led_width"),
+];
+
+/// The truth of a set without any effect.
+pub const NOTHING: &str = "nothing";
+
+/// Seeds of sets that thresholds are held against, apart from all that are judged.
+const THRESHOLD_SEED: u64 = 900_000;
+
+/// Seeds of sets that are judged.
+const JUDGED_SEED: u64 = 1000;
+
+/// One twin and what was said of it.
+#[derive(Clone, Debug, Serialize)]
+pub struct Trial {
+    /// What differed; [`NOTHING`] for a set without effect.
+    pub truth: String,
+    /// Whether that is in no list.
+    pub off_list: bool,
+    /// Whether it is two effects at once.
+    pub pair: bool,
+    /// Its size in typical sizes.
+    pub size: f64,
+    /// Its value as it is reported, where it is one number.
+    pub value: Option<f64>,
+    pub unit: String,
+    pub seed: u64,
+    pub verdict: SetVerdict,
+    /// What was claimed.
+    pub found: Vec<String>,
+    /// Whether the true effect (both of two) is among what was found, alone or as one of a set.
+    pub named: bool,
+    pub found_value: Option<Value>,
+    pub interval: Option<Value>,
+    /// Whether the interval of the true effect (of each of two) holds its true value, for effects of one number.
+    pub inside: Option<bool>,
+    /// Largest gain of any single effect on captures left out.
+    pub largest_gain: f64,
+    pub held_out_before: f64,
+    pub held_out_after: f64,
+    /// What is left, for what is in no list.
+    pub left: Option<Left>,
+}
+
+/// What a diagnosis could not name, as a person is shown it.
+#[derive(Clone, Debug, Serialize)]
+pub struct Left {
+    /// Coefficients of the free path by Noll's number, with standard deviations [nm].
+    pub path_nm: Vec<(u32, f64, f64)>,
+    /// Covariance of the free blur, xx, xy, yy, with standard deviations [um^2].
+    pub blur_um2: [(f64, f64); 3],
+    /// Capture whose residual is shown.
+    pub capture: String,
+    #[serde(skip)]
+    pub path: Array2<f64>,
+    #[serde(skip)]
+    pub radius_um: f64,
+    /// Residual of that capture [sigma].
+    #[serde(skip)]
+    pub residual: Array2<f64>,
+}
+
+/// What the proof runs.
+#[derive(Clone, Debug)]
+pub struct Extent {
+    /// Sets without any effect that are judged.
+    pub nulls: u64,
+    /// Other sets without effect, which thresholds are held against.
+    pub threshold_nulls: u64,
+    /// Effects that twins are made with; all if empty.
+    pub effects: Vec<String>,
+    /// Whether effects in no list are tried.
+    pub off_list: bool,
+}
+
+impl Default for Extent {
+    fn default() -> Self {
+        Self {
+            nulls: 60,
+            threshold_nulls: 10,
+            effects: Vec::new(),
+            off_list: true,
+        }
+    }
+}
+
+/// Judge `calibrate` on twins of a set.
+///
+/// # Errors
+/// If a cell cannot be solved, or the user stopped it.
+pub fn prove(like: &MeasuredSet, settings: &Settings, extent: &Extent, progress: &dyn Progress) -> Result<Proof> {
+    let settings = Settings {
+        ladder: false,
+        ..settings.clone()
+    };
+    let session = Session::new(like, settings.clone())?;
+    let atlas = session.atlas(progress)?;
+    let twins = Twins::new(like, &settings)?;
+    let chips = chips(&session, extent);
+    let wanted: Vec<Vec<(&str, &[f64])>> = chips
+        .iter()
+        .map(|chip| {
+            chip.parts
+                .iter()
+                .map(|(name, n)| (name.as_str(), n.as_slice()))
+                .collect()
+        })
+        .collect();
+    let exposed = twins.with_effects(&wanted, progress)?;
+    let mut odd = Vec::new();
+    if extent.off_list {
+        for (name, what) in [
+            ("astigmatism", OffList::Astigmatism(30.0)),
+            ("ghost", OffList::Ghost(0.04, [5.0, -3.0])),
+            ("anisotropy", OffList::Anisotropy(8.0)),
+        ] {
+            odd.push((name, twins.off_list(what, progress)?));
+        }
+    }
+    // The first chip is without effect.
+    let thresholds = (0..extent.threshold_nulls).map(|k| (&exposed[0], &chips[0], THRESHOLD_SEED + k));
+    let nulls = (0..extent.nulls).map(|k| (&exposed[0], &chips[0], JUDGED_SEED + k));
+    let others = JUDGED_SEED + extent.nulls;
+    let listed = exposed.iter().zip(&chips).skip(1).zip(others..);
+    let mut work: Vec<(&Exposed, Trial, &[Part])> = thresholds
+        .chain(nulls)
+        .chain(listed.map(|((exposed, chip), seed)| (exposed, chip, seed)))
+        .map(|(exposed, chip, seed)| (exposed, Trial::new(chip, seed), chip.parts.as_slice()))
+        .collect();
+    for ((name, exposed), seed) in odd.iter().zip(others + chips.len() as u64 - 1..) {
+        let mut trial = Trial::new(&Chip::single(name, 1.0, Vec::new()), seed);
+        trial.off_list = true;
+        work.push((exposed, trial, &[]));
+    }
+    progress.begin("twins diagnosed", work.len() as u64);
+    // Each twin is worked on by itself, and the order of the answers is that of the list.
+    let mut trials = work
+        .into_par_iter()
+        .map(|(exposed, mut trial, parts)| {
+            let set = twins.draw(exposed, trial.seed);
+            let mut twin = Session::new(&set, settings.clone())?;
+            let (diagnosis, finding) = twin.diagnose(&atlas, &Unheard(progress))?;
+            if trial.off_list {
+                trial.left = finding.and_then(|f| Left::new(&twin, &diagnosis, &f));
+            }
+            trial.judge(&diagnosis, parts, &session);
+            progress.advance(1);
+            Ok(trial)
+        })
+        .collect::<Result<Vec<_>>>()?;
+    let judged = trials.split_off(extent.threshold_nulls as usize);
+    Ok(Proof::new(like.title.clone(), &trials, judged))
+}
+
+/// An effect with its numbers.
+type Part = (String, Vec<f64>);
+
+/// A chip or a bench that twins are made of.
+struct Chip {
+    truth: String,
+    size: f64,
+    parts: Vec<Part>,
+}
+
+impl Chip {
+    fn single(name: &str, size: f64, numbers: Vec<f64>) -> Self {
+        Self {
+            truth: name.into(),
+            size,
+            parts: vec![(name.into(), numbers)],
+        }
+    }
+}
+
+/// One chip without effect, one for each effect and size, one for each pair.
+fn chips(session: &Session<'_>, extent: &Extent) -> Vec<Chip> {
+    let wanted = |name: &str| extent.effects.is_empty() || extent.effects.iter().any(|e| e == name);
+    let effects: Vec<_> = session.simulator.effects.iter().filter(|e| wanted(&e.name())).collect();
+    // Both numbers of an effect along two axes, unequal and of opposite signs.
+    let numbers = |parameters: Vec<Parameter>, size: f64| -> Vec<f64> {
+        let parts = parameters.iter().zip([1.0, -0.6]);
+        parts.map(|(p, s)| s * size * p.typical).collect()
+    };
+    let mut chips = vec![Chip {
+        truth: NOTHING.into(),
+        size: 0.0,
+        parts: Vec::new(),
+    }];
+    for effect in &effects {
+        for size in SIZES {
+            chips.push(Chip::single(&effect.name(), size, numbers(effect.parameters(), size)));
+        }
+    }
+    for (a, b) in PAIRS {
+        let both: Vec<Part> = [a, b]
+            .iter()
+            .filter_map(|name| effects.iter().find(|e| e.name() == *name))
+            .map(|e| (e.name(), numbers(e.parameters(), 1.0)))
+            .collect();
+        if both.len() == 2 {
+            chips.push(Chip {
+                truth: format!("{a} + {b}"),
+                size: 1.0,
+                parts: both,
+            });
+        }
+    }
+    chips
+}
+
+/// Passes on that the user wants to stop, and nothing of how far one of many is.
+struct Unheard<'p>(&'p dyn Progress);
+
+impl Progress for Unheard<'_> {
+    fn begin(&self, _: &str, _: u64) {}
+
+    fn advance(&self, _: u64) {}
+
+    fn stopped(&self) -> bool {
+        self.0.stopped()
+    }
+}
+
+impl Trial {
+    fn new(chip: &Chip, seed: u64) -> Self {
+        Self {
+            truth: chip.truth.clone(),
+            off_list: false,
+            pair: chip.parts.len() > 1,
+            size: chip.size,
+            value: None,
+            unit: String::new(),
+            seed,
+            verdict: SetVerdict::DataUnfit,
+            found: Vec::new(),
+            named: false,
+            found_value: None,
+            interval: None,
+            inside: None,
+            largest_gain: 0.0,
+            held_out_before: 0.0,
+            held_out_after: 0.0,
+            left: None,
+        }
+    }
+
+    fn judge(&mut self, diagnosis: &Diagnosis, parts: &[Part], session: &Session<'_>) {
+        self.verdict = diagnosis.verdict;
+        self.found = diagnosis.effects.iter().map(|e| e.name.clone()).collect();
+        self.named = !parts.is_empty() && parts.iter().all(|(name, _)| self.found.contains(name));
+        let mut inside = Vec::new();
+        for (name, numbers) in parts {
+            let Some(effect) = session.simulator.effects.iter().find(|e| e.name() == *name) else {
+                continue;
+            };
+            let value = match effect
+                .reported(numbers, &vec![0.0; numbers.len()], session.set())
+                .as_slice()
+            {
+                [(value, _)] => Some(*value),
+                _ => None,
+            };
+            let own = diagnosis.effects.iter().find(|e| e.name == *name);
+            inside.extend(own.zip(value).and_then(|(own, value)| own.holds(value)));
+            if !self.pair {
+                self.unit = effect.unit().into();
+                self.value = value;
+                self.found_value = own.map(|e| e.value.clone());
+                self.interval = own.map(|e| e.interval.clone());
+            }
+        }
+        self.inside = (!inside.is_empty()).then(|| inside.iter().all(|i| *i));
+        let gains = diagnosis.ranking.iter().filter_map(|r| r.held_out_gain);
+        self.largest_gain = gains.fold(0.0, f64::max);
+        self.held_out_before = diagnosis.error.before.held_out;
+        self.held_out_after = diagnosis.error.after.held_out;
+    }
+}
+
+impl Left {
+    fn new(session: &Session<'_>, diagnosis: &Diagnosis, finding: &Finding) -> Option<Self> {
+        let free = FreeTerm::new(session, finding)?;
+        let error = |c: &usize| diagnosis.captures[*c].after.unwrap_or(0.0);
+        let worst = (0..diagnosis.captures.len()).max_by(|a, b| error(a).total_cmp(&error(b)))?;
+        let grid = session.problem_of(finding).grid(&finding.after.theta, worst);
+        let residual = finding.after.nuisances.residual(&session.data, &grid, worst);
+        Some(Self {
+            path_nm: free.coefficients_nm,
+            blur_um2: free.blur_um2,
+            capture: diagnosis.captures[worst].capture.clone(),
+            path: free.path_nm,
+            radius_um: free.radius_um,
+            residual: residual.mapv(f64::from),
+        })
+    }
+}

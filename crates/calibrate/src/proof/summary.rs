@@ -1,0 +1,170 @@
+//! What the trials come to: shares, what is taken for what, the least size that is found.
+
+use serde::Serialize;
+
+use super::{NOTHING, Trial};
+use crate::diagnosis::SetVerdict;
+use crate::forward::LEAST_GAIN;
+use metalith_report::sig;
+
+/// What a set is counted under when no effect is claimed.
+const UNEXPLAINED: &str = "unexplained";
+
+/// Trials and what they come to.
+#[derive(Clone, Debug, Serialize)]
+pub struct Proof {
+    /// The set that twins are made of.
+    pub like: String,
+    /// Sets without effect that were judged, and how many of them an effect was claimed in.
+    pub nulls: usize,
+    pub false_claims: usize,
+    /// Sets without effect, other than those, that thresholds are held against; the largest gain in them, and
+    /// the gain that a claim takes.
+    pub threshold_nulls: usize,
+    pub largest_gain_by_chance: f64,
+    pub least_gain: f64,
+    /// Names of the columns of `confusion`.
+    pub claimed: Vec<String>,
+    /// For each truth: shares of its trials in which each column was claimed.
+    pub confusion: Vec<(String, Vec<f64>)>,
+    pub limits: Vec<Limit>,
+    /// Effects of one number that were named, and how many of their intervals hold the true value.
+    pub intervals: usize,
+    pub intervals_inside: usize,
+    pub trials: Vec<Trial>,
+}
+
+/// From which size on an effect is found.
+#[derive(Clone, Debug, Serialize)]
+pub struct Limit {
+    pub name: String,
+    /// The least size tried from which on it was named at all sizes [typical sizes]; none if not at the largest.
+    pub named_from: Option<f64>,
+    /// Size at which a residual would reach the gain that a claim takes, by its square law from the smallest
+    /// size tried [typical sizes].
+    pub estimate: Option<f64>,
+}
+
+impl Proof {
+    /// Count.
+    pub(super) fn new(like: String, thresholds: &[Trial], trials: Vec<Trial>) -> Self {
+        let nulls: Vec<&Trial> = trials.iter().filter(|t| t.truth == NOTHING).collect();
+        let mut truths: Vec<String> = Vec::new();
+        for t in &trials {
+            if !truths.contains(&t.truth) {
+                truths.push(t.truth.clone());
+            }
+        }
+        let mut claimed: Vec<String> = truths
+            .iter()
+            .filter(|t| *t != NOTHING && trials.iter().any(|o| o.truth == **t && !o.off_list && !o.pair))
+            .cloned()
+            .collect();
+        for name in trials.iter().flat_map(|t| &t.found) {
+            if !claimed.contains(name) {
+                claimed.push(name.clone());
+            }
+        }
+        claimed.extend([UNEXPLAINED.to_owned(), NOTHING.to_owned()]);
+        let confusion = truths
+            .iter()
+            .map(|truth| {
+                let own: Vec<&Trial> = trials.iter().filter(|t| t.truth == *truth).collect();
+                let shares = claimed.iter().map(|column| {
+                    let sum: f64 = own.iter().map(|t| t.share(column)).sum();
+                    sum / own.len() as f64
+                });
+                (truth.clone(), shares.collect())
+            })
+            .collect();
+        let limits = truths
+            .iter()
+            .filter(|t| *t != NOTHING && !trials.iter().any(|o| o.truth == **t && (o.off_list || o.pair)))
+            .map(|name| Limit::new(name, &trials))
+            .collect();
+        let inside: Vec<bool> = trials.iter().filter_map(|t| t.inside).collect();
+        Self {
+            like,
+            nulls: nulls.len(),
+            false_claims: nulls.iter().filter(|t| !t.found.is_empty()).count(),
+            threshold_nulls: thresholds.len(),
+            largest_gain_by_chance: thresholds.iter().map(|t| t.largest_gain).fold(0.0, f64::max),
+            least_gain: LEAST_GAIN,
+            claimed,
+            confusion,
+            limits,
+            intervals: inside.len(),
+            intervals_inside: inside.iter().filter(|i| **i).count(),
+            trials,
+        }
+    }
+
+    /// In words: shares, then one line for each trial.
+    pub fn text(&self) -> String {
+        let mut text = format!(
+            "{} false claims in {} sets without effect\nlargest gain by chance in {} others {}, a claim takes {}\n{} of {} intervals hold the true value\n\n",
+            self.false_claims,
+            self.nulls,
+            self.threshold_nulls,
+            sig(self.largest_gain_by_chance, 2),
+            self.least_gain,
+            self.intervals_inside,
+            self.intervals
+        );
+        for t in self.trials.iter().filter(|t| t.truth != NOTHING) {
+            let inside = match t.inside {
+                Some(true) => "inside",
+                Some(false) => "OUTSIDE",
+                None => "",
+            };
+            text.push_str(&format!(
+                "{:29} x{:<4} {:12} {:40} {inside:8} {:10.4} -> {:.4}\n",
+                t.truth,
+                t.size,
+                t.verdict_name(),
+                t.found.join(", "),
+                t.held_out_before,
+                t.held_out_after
+            ));
+        }
+        text
+    }
+}
+
+impl Trial {
+    /// The verdict as it is written.
+    pub fn verdict_name(&self) -> String {
+        let value = serde_json::to_value(self.verdict).ok();
+        value.and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
+    }
+
+    /// How much of this trial counts for a column: members of a set that cannot be told apart share it.
+    fn share(&self, column: &str) -> f64 {
+        if self.found.is_empty() {
+            let said = if self.verdict == SetVerdict::NoResidual {
+                NOTHING
+            } else {
+                UNEXPLAINED
+            };
+            return f64::from(u8::from(said == column));
+        }
+        let hits = self.found.iter().filter(|f| *f == column).count();
+        hits as f64 / self.found.len() as f64
+    }
+}
+
+impl Limit {
+    fn new(name: &str, trials: &[Trial]) -> Self {
+        let own: Vec<&Trial> = trials.iter().filter(|t| t.truth == name).collect();
+        let named_from = own.iter().rev().take_while(|t| t.named).last().map(|t| t.size);
+        let estimate = own.first().and_then(|t| {
+            let above = t.held_out_before - 1.0;
+            (above > LEAST_GAIN).then(|| t.size * (LEAST_GAIN / above).sqrt())
+        });
+        Self {
+            name: name.into(),
+            named_from,
+            estimate,
+        }
+    }
+}

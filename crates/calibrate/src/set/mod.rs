@@ -1,0 +1,138 @@
+//! A measured set: what was written, what the bench recorded, and what the lab believes of both.
+
+mod frame;
+mod read;
+mod sem;
+
+use std::path::PathBuf;
+
+use ndarray::Array2;
+
+pub use sem::SemSite;
+
+use metalith_cell::Material;
+use metalith_core::WidthMap;
+
+/// One bench session, read and checked.
+#[derive(Clone, Debug)]
+pub struct MeasuredSet {
+    /// Where `measurement.toml` is.
+    pub path: PathBuf,
+    /// One line for people.
+    pub title: String,
+    /// The layout that was written.
+    pub layout: PathBuf,
+    pub stack: Stack,
+    /// Full angle of the uniform disc that the source is [rad].
+    pub divergence_rad: f64,
+    pub camera: Camera,
+    pub leds: Vec<Led>,
+    pub elements: Vec<MeasuredElement>,
+    pub captures: Vec<Capture>,
+    /// Widths seen from above; empty where none were taken.
+    pub sem: Vec<SemSite>,
+    /// Standard deviation of the offset common to all widths of the SEM [nm].
+    pub sem_offset_sigma_nm: f64,
+}
+
+impl MeasuredSet {
+    /// Whether the same chip was to be seen in the same way: all but light levels, noise and frames.
+    pub fn same_plan(&self, other: &Self) -> bool {
+        let camera = |c: &Camera| (c.pixel_um, c.rows, c.cols);
+        let captures = |set: &Self| -> Vec<_> {
+            let of = |c: &Capture| (c.element, c.led, c.aoi_rad, c.distance_um, c.window_centre_um);
+            set.captures.iter().map(of).collect()
+        };
+        let elements = |set: &Self| -> Vec<_> {
+            set.elements
+                .iter()
+                .map(|e| (e.index, e.aperture_diameter_um, e.pillars.clone()))
+                .collect()
+        };
+        self.stack == other.stack
+            && self.divergence_rad == other.divergence_rad
+            && camera(&self.camera) == camera(&other.camera)
+            && self.leds == other.leds
+            && captures(self) == captures(other)
+            && elements(self) == elements(other)
+    }
+}
+
+/// The cell and the lens as the lab believes them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stack {
+    pub pitch_nm: u32,
+    pub pillar_height_nm: f64,
+    /// Index of the film that the pillars are etched from.
+    pub film: Material,
+    pub ambient_index: f64,
+    pub lens_diameter_um: f64,
+    pub focal_length_um: f64,
+}
+
+/// The camera behind its relay, in units of the sensor plane.
+#[derive(Clone, Copy, Debug)]
+pub struct Camera {
+    pub pixel_um: f64,
+    pub rows: usize,
+    pub cols: usize,
+    pub black_level_dn: f64,
+    pub gain_e_per_dn: f64,
+    pub read_noise_dn: f64,
+    pub saturation_dn: f64,
+    /// Standard deviation of where a window is, along each axis [pixels].
+    pub registration_sigma_px: f64,
+    /// Relative standard deviation of the DN scale of each LED.
+    pub flux_sigma: f64,
+}
+
+/// A Gaussian spectrum.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Led {
+    pub centre_nm: f64,
+    pub fwhm_nm: f64,
+}
+
+impl Led {
+    /// Standard deviation [nm].
+    pub fn sigma_nm(&self) -> f64 {
+        self.fwhm_nm / (8.0 * 2f64.ln()).sqrt()
+    }
+
+    /// The name it goes by: its stated centre in whole nanometres.
+    pub fn name(&self) -> String {
+        format!("{:.0}", self.centre_nm)
+    }
+}
+
+/// A lens of the chip.
+#[derive(Clone, Debug)]
+pub struct MeasuredElement {
+    pub index: [i64; 2],
+    pub centre_um: [f64; 2],
+    pub aperture_diameter_um: f64,
+    /// Pillars as the layout has them.
+    pub pillars: WidthMap,
+}
+
+/// A window of the camera's mean frame.
+#[derive(Clone, Debug)]
+pub struct Capture {
+    /// File name without folder and ending.
+    pub name: String,
+    /// Index into [`MeasuredSet::elements`].
+    pub element: usize,
+    /// Index into [`MeasuredSet::leds`].
+    pub led: usize,
+    /// Angle of incidence in air along x and y [rad].
+    pub aoi_rad: [f64; 2],
+    /// From the pillar tops to the sensor [um].
+    pub distance_um: f64,
+    /// Middle of the window from the element's axis [um].
+    pub window_centre_um: [f64; 2],
+    /// DN for |E|^2 / |E_inc|^2 = 1.
+    pub scale_dn: f64,
+    pub frames: u32,
+    /// Raw DN. Shape `[rows, cols]`, row index along +y, column index along +x.
+    pub dn: Array2<f32>,
+}

@@ -1,0 +1,77 @@
+//! Widths seen from above, and the plain CSV that they come in.
+
+use std::path::Path;
+
+use metalith_core::{Error, Result, document};
+
+/// The width of one pillar by scanning electron microscope.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SemSite {
+    /// Element by its place in the array.
+    pub element: [i64; 2],
+    /// Place of the pillar from the element's centre [um].
+    pub at_um: [f64; 2],
+    pub designed_nm: f64,
+    pub measured_nm: f64,
+    /// Standard deviation of the single measurement [nm].
+    pub sigma_nm: f64,
+}
+
+const COLUMNS: &str = "element_m,element_n,x_um,y_um,designed_nm,measured_nm,sigma_nm";
+
+/// Read the widths of a set.
+///
+/// # Errors
+/// If the file cannot be read or a line is not what its columns say.
+pub fn read(path: &Path) -> Result<Vec<SemSite>> {
+    let text = document::load(path)?;
+    let fault = |line: usize, what: String| Error::Table {
+        path: path.to_owned(),
+        line: Some(line),
+        what,
+        hint: format!("the columns are `{COLUMNS}`"),
+    };
+    rows(&text, COLUMNS)
+        .map_err(|(at, what)| fault(at, what))?
+        .into_iter()
+        .map(|(at, line)| {
+            let wrong = || fault(at, format!("`{line}` is no width of a pillar"));
+            let [m, n, x, y, designed, measured, sigma] = numbers(line).ok_or_else(wrong)?;
+            if sigma <= 0.0 || measured <= 0.0 || m.fract() != 0.0 || n.fract() != 0.0 {
+                return Err(wrong());
+            }
+            Ok(SemSite {
+                element: [m as i64, n as i64],
+                at_um: [x, y],
+                designed_nm: designed,
+                measured_nm: measured,
+                sigma_nm: sigma,
+            })
+        })
+        .collect()
+}
+
+/// Lines of a CSV file behind its header, with their numbers; empty lines and comments are left out.
+fn rows<'t>(text: &'t str, columns: &str) -> Result<Vec<(usize, &'t str)>, (usize, String)> {
+    let mut lines = text
+        .lines()
+        .enumerate()
+        .map(|(k, line)| (k + 1, line.trim()))
+        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+    match lines.next() {
+        None => Err((1, "the file is empty".into())),
+        Some((at, head)) if head.split(',').map(str::trim).ne(columns.split(',')) => {
+            Err((at, format!("the columns are `{head}`")))
+        }
+        Some(_) => Ok(lines.collect()),
+    }
+}
+
+/// Exactly `N` finite numbers.
+fn numbers<const N: usize>(line: &str) -> Option<[f64; N]> {
+    let fields: Vec<f64> = line
+        .split(',')
+        .map(|f| f.trim().parse::<f64>().ok().filter(|v| v.is_finite()))
+        .collect::<Option<_>>()?;
+    fields.try_into().ok()
+}

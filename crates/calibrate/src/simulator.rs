@@ -1,0 +1,173 @@
+//! A bench in the computer, with the numbers of every effect to turn.
+
+use std::sync::Arc;
+
+use super::bench::{Bench, Lit};
+use super::cells::CellSource;
+use super::departure::Departure;
+use super::effects::{Effect, Parameter};
+use super::optics::PixelGrid;
+use metalith_core::{Progress, Result};
+
+/// Widths that a bias may add or take [nm]; cells are tabulated so far beyond the layout.
+pub const WIDTH_ROOM_NM: f64 = 36.0;
+
+/// Chips that are sent along one path at once; each takes a few megabytes.
+const TOGETHER: usize = 8;
+
+/// A bench, its cells and the effects that are tried on it.
+pub struct Simulator<'a> {
+    pub bench: Bench<'a>,
+    pub cells: CellSource,
+    pub effects: Vec<Box<dyn Effect>>,
+    pub slots: Vec<Slot>,
+    /// Draw the pillars that are missing from this seed, instead of counting with their mean.
+    pub scatter: Option<u64>,
+    wavelengths_nm: Vec<f64>,
+    widths_nm: (f64, f64),
+}
+
+/// One number of one effect.
+#[derive(Clone, Copy, Debug)]
+pub struct Slot {
+    /// Index into [`Simulator::effects`].
+    pub effect: usize,
+    /// Which of its numbers.
+    pub index: usize,
+    pub parameter: Parameter,
+}
+
+impl<'a> Simulator<'a> {
+    /// Everything that is needed to predict a set.
+    pub fn new(bench: Bench<'a>, cells: CellSource, effects: Vec<Box<dyn Effect>>) -> Self {
+        let slots = effects
+            .iter()
+            .enumerate()
+            .flat_map(|(effect, e)| {
+                let parameters = e.parameters().into_iter().enumerate();
+                parameters.map(move |(index, parameter)| Slot {
+                    effect,
+                    index,
+                    parameter,
+                })
+            })
+            .collect();
+        let (low, high) = bench.widths_nm();
+        Self {
+            wavelengths_nm: bench.wavelengths_nm(),
+            widths_nm: (low - WIDTH_ROOM_NM, high + WIDTH_ROOM_NM),
+            bench,
+            cells,
+            effects,
+            slots,
+            scatter: None,
+        }
+    }
+
+    /// The numbers of an effect among all.
+    pub fn slots_of(&self, effect: usize) -> Vec<usize> {
+        (0..self.slots.len())
+            .filter(|&s| self.slots[s].effect == effect)
+            .collect()
+    }
+
+    /// The numbers of some effects, in the order of these.
+    pub fn slots_of_all(&self, effects: &[usize]) -> Vec<usize> {
+        effects.iter().flat_map(|&e| self.slots_of(e)).collect()
+    }
+
+    /// What the numbers mean together.
+    pub fn departure(&self, theta: &[f64]) -> Departure {
+        let mut departure = Departure::default();
+        for (e, effect) in self.effects.iter().enumerate() {
+            let own: Vec<f64> = self.slots_of(e).into_iter().map(|s| theta[s]).collect();
+            effect.apply(&own, &mut departure);
+        }
+        departure
+    }
+
+    /// What each capture should show under each of `departures`; those that differ in lamps and camera alone
+    /// share their light.
+    ///
+    /// # Errors
+    /// If a cell cannot be solved, or the user stopped it.
+    pub fn expose(&self, departures: &[Departure], progress: &dyn Progress) -> Result<Vec<Vec<PixelGrid>>> {
+        self.expose_with(departures, self.scatter, progress)
+    }
+
+    /// The same of one departure, the places of missing pillars drawn from a seed.
+    ///
+    /// # Errors
+    /// As [`Simulator::expose`].
+    pub fn expose_drawn(&self, departure: &Departure, seed: u64, progress: &dyn Progress) -> Result<Vec<PixelGrid>> {
+        let departures = std::slice::from_ref(departure);
+        Ok(self.expose_with(departures, Some(seed), progress)?.remove(0))
+    }
+
+    fn expose_with(
+        &self,
+        departures: &[Departure],
+        scatter: Option<u64>,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Vec<PixelGrid>>> {
+        let mut out: Vec<Option<Vec<PixelGrid>>> = departures.iter().map(|_| None).collect();
+        let mut steps: Vec<Vec<usize>> = Vec::new();
+        for (i, d) in departures.iter().enumerate() {
+            let same = |j: &usize| {
+                let o = &departures[*j];
+                (&o.geometry, &o.cell, &o.path) == (&d.geometry, &d.cell, &d.path)
+            };
+            match steps.iter_mut().find(|s| same(&s[0])) {
+                Some(step) => step.push(i),
+                None => steps.push(vec![i]),
+            }
+        }
+        // Cells first: they bring their own progress.
+        let mut work = Vec::new();
+        for step in steps {
+            let cells = self.cells.table(
+                &departures[step[0]].cell,
+                &self.wavelengths_nm,
+                self.widths_nm,
+                progress,
+            )?;
+            work.push((step, cells));
+        }
+        progress.begin("captures as they should be", work.len() as u64);
+        while !work.is_empty() {
+            // Those on one path go together, as many as memory likes.
+            let path = &departures[work[0].0[0]].path;
+            let mut together = Vec::new();
+            work = work
+                .into_iter()
+                .filter_map(|(step, cells)| {
+                    if together.len() < TOGETHER && departures[step[0]].path == *path {
+                        together.push((step, cells));
+                        return None;
+                    }
+                    Some((step, cells))
+                })
+                .collect();
+            let chips: Vec<Lit<'_>> = together
+                .iter()
+                .map(|(step, cells)| Lit {
+                    cells: Arc::clone(cells),
+                    geometry: &departures[step[0]].geometry,
+                    lights: step.iter().map(|&i| &departures[i].light).collect(),
+                    scatter,
+                })
+                .collect();
+            let intensities = self.bench.intensities(&chips, path, progress)?;
+            for ((step, _), of_lights) in together.iter().zip(&intensities) {
+                for (&i, planes) in step.iter().zip(of_lights) {
+                    out[i] = Some(self.bench.grids(planes, &departures[i]));
+                }
+            }
+            progress.advance(together.len() as u64);
+        }
+        Ok(out
+            .into_iter()
+            .map(|g| g.expect("every departure is in one step"))
+            .collect())
+    }
+}

@@ -1,0 +1,212 @@
+//! The grain that pillars leave which are missing at random places.
+//!
+//! Their mean is an effect like any other. What single ones scatter is no function of a few numbers: no fit
+//! finds their places. Its variance is known, though: it grows with the light it interferes with, in a measure
+//! that the coherence of each capture sets and that a few draws of the places tell. Counted as noise, it lets
+//! everything else be judged as before, and it yields the share of missing pillars a second time.
+
+use ndarray::Array2;
+use rayon::prelude::*;
+
+use super::fit::{Fit, Problem};
+use super::nuisance::Data;
+use super::simulator::Simulator;
+use metalith_core::{Progress, Result};
+
+/// Draws of the places: each has thousands of grains in every capture.
+const DRAWS: u64 = 4;
+
+/// Seeds of the draws; elements take the numbers after each.
+const SEED: u64 = 5000;
+const SEEDS_APART: u64 = 64;
+
+/// Shares that are thought of, and how near the search between them comes, relative.
+const SHARES: (f64, f64) = (1e-4, 0.3);
+const NEAR: f64 = 1e-4;
+
+/// Variance of the intensity at a pixel that should show `i`, for a unit of p (1 - p): `by_light * i + floor`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Grain {
+    by_light: f64,
+    floor: f64,
+}
+
+/// The grain of each capture.
+pub struct Speckle {
+    grains: Vec<Grain>,
+}
+
+impl Speckle {
+    /// From draws of the places of missing pillars, number `slot`, about the numbers `about`.
+    ///
+    /// # Errors
+    /// If a cell cannot be solved, or the user stopped it.
+    pub fn of(simulator: &Simulator<'_>, about: &[f64], slot: usize, progress: &dyn Progress) -> Result<Self> {
+        let share = simulator.slots[slot].parameter.typical;
+        let mut theta = about.to_vec();
+        theta[slot] = share;
+        let departure = simulator.departure(&theta);
+        let mean = simulator.expose(std::slice::from_ref(&departure), progress)?.remove(0);
+        let mut drawn = Vec::new();
+        for k in 0..DRAWS {
+            drawn.push(simulator.expose_drawn(&departure, SEED + k * SEEDS_APART, progress)?);
+        }
+        let grains = (0..mean.len())
+            .into_par_iter()
+            .map(|c| {
+                let light = mean[c].pixels([0.0; 2]);
+                let own: Vec<Array2<f32>> = drawn.iter().map(|grids| grids[c].pixels([0.0; 2])).collect();
+                Grain::between(&light, &own, share * (1.0 - share))
+            })
+            .collect();
+        Ok(Self { grains })
+    }
+
+    /// The share of missing pillars under which the residual of a fit is most likely.
+    pub fn share(&self, problem: &Problem<'_>, fit: &Fit) -> f64 {
+        let captures: Vec<Vec<[f32; 3]>> = (0..self.grains.len())
+            .into_par_iter()
+            .filter(|&c| problem.used[c])
+            .map(|c| self.spread(problem, fit, c))
+            .collect();
+        let unlikely = |share: f64| {
+            let p = (share * (1.0 - share)) as f32;
+            let sums: Vec<f64> = captures
+                .par_iter()
+                .map(|pixels| {
+                    let one = |[square, noise, grain]: &[f32; 3]| {
+                        let variance = noise + p * grain;
+                        f64::from(square / variance + variance.ln())
+                    };
+                    pixels.iter().map(one).sum()
+                })
+                .collect();
+            sums.iter().sum::<f64>()
+        };
+        // Golden section over the logarithm: of two places in the middle, one is known from the step before.
+        let golden = 0.5 * (5f64.sqrt() - 1.0);
+        let (mut low, mut high) = (SHARES.0.ln(), SHARES.1.ln());
+        let at = |x: f64| (x, unlikely(x.exp()));
+        let (mut a, mut b) = (at(high - golden * (high - low)), at(low + golden * (high - low)));
+        while high - low >= NEAR {
+            if a.1 < b.1 {
+                (high, b) = (b.0, a);
+                a = at(high - golden * (high - low));
+            } else {
+                (low, a) = (a.0, b);
+                b = at(low + golden * (high - low));
+            }
+        }
+        (0.5 * (low + high)).exp()
+    }
+
+    /// Whether a share is one that pillars are missing by, and not the end of the search.
+    pub fn conceivable(share: f64) -> bool {
+        share > 2.0 * SHARES.0 && share < 0.9 * SHARES.1
+    }
+
+    /// The data with the grain of a share of missing pillars counted as noise.
+    pub fn counted(&self, problem: &Problem<'_>, fit: &Fit, share: f64) -> Data {
+        let p = (share * (1.0 - share)) as f32;
+        let mut data = problem.data.clone();
+        data.weight = (0..self.grains.len())
+            .into_par_iter()
+            .map(|c| {
+                let pixels = self.spread(problem, fit, c);
+                let mut pixels = pixels.iter();
+                problem.data.weight[c].mapv(|w| match (w > 0.0).then(|| pixels.next()).flatten() {
+                    Some([_, noise, grain]) => (noise + p * grain).sqrt().recip(),
+                    None => 0.0,
+                })
+            })
+            .collect();
+        data
+    }
+
+    /// Of each pixel that counts: the square of the residual, the variance of the camera, that of a unit of
+    /// grain [DN^2].
+    fn spread(&self, problem: &Problem<'_>, fit: &Fit, c: usize) -> Vec<[f32; 3]> {
+        let data = problem.data;
+        let grid = problem.grid(&fit.theta, c);
+        let light = grid.pixels(fit.nuisances.shift_um[c]);
+        let residual = fit.nuisances.residual(data, &grid, c);
+        let scale = (data.scale[c] * fit.nuisances.flux[data.led[c]]) as f32;
+        let Grain { by_light, floor } = self.grains[c];
+        let pixels = light.iter().zip(&residual).zip(&data.weight[c]);
+        pixels
+            .filter(|(_, w)| **w > 0.0)
+            .map(|((i, r), w)| {
+                let grain = by_light as f32 * i.max(0.0) + floor as f32;
+                [(r / w).powi(2), w.powi(-2), scale * scale * grain]
+            })
+            .collect()
+    }
+}
+
+impl Grain {
+    /// What makes the draws most likely: least squares of squared departures on the light, each weighed by its
+    /// own variance, a few times over.
+    fn between(light: &Array2<f32>, drawn: &[Array2<f32>], unit: f64) -> Self {
+        let mut now = Self {
+            by_light: 1.0,
+            floor: f64::from(light.mean().unwrap_or(0.0)).max(1e-6),
+        };
+        for _ in 0..TURNS {
+            let mut sums = [0.0; 5];
+            for own in drawn {
+                for (i, d) in light.iter().zip(own) {
+                    let i = f64::from(*i).max(0.0);
+                    let square = (f64::from(*d) - i).powi(2) / unit;
+                    let weight = (now.by_light * i + now.floor).powi(-2);
+                    let terms = [i * i, i, 1.0, i * square, square];
+                    sums.iter_mut().zip(terms).for_each(|(s, t)| *s += weight * t);
+                }
+            }
+            let [ii, i, one, is, s] = sums;
+            let by_light = ((is * one - i * s) / (ii * one - i * i)).max(0.0);
+            // No less than a trace, lest dark pixels outweigh all others.
+            let floor = ((s - by_light * i) / one).max(FLOOR * (s / one));
+            if !(by_light.is_finite() && floor.is_finite()) {
+                break;
+            }
+            now = Self { by_light, floor };
+        }
+        now
+    }
+}
+
+/// Turns in which the weights of the pixels settle.
+const TURNS: usize = 5;
+
+/// Least share of the mean variance that a pixel without light has.
+const FLOOR: f64 = 1e-3;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn grain_is_what_was_put_in() {
+        /// Of 4 x 4096 squares of uniform numbers, twice over.
+        const TOLERANCE: f64 = 0.06;
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let light = Array2::from_shape_fn((64, 64), |(y, x)| 0.2 + ((x * y) % 37) as f32);
+        let truth = Grain {
+            by_light: 0.3,
+            floor: 0.5,
+        };
+        let drawn: Vec<Array2<f32>> = (0..4)
+            .map(|_| {
+                light.mapv(|i| {
+                    let sigma = (0.02 * (truth.by_light * f64::from(i) + truth.floor)).sqrt();
+                    i + (sigma * 12f64.sqrt() * (rng.random::<f64>() - 0.5)) as f32
+                })
+            })
+            .collect();
+        let found = Grain::between(&light, &drawn, 0.02);
+        assert!((found.by_light / truth.by_light - 1.0).abs() < TOLERANCE, "{found:?}");
+        assert!((found.floor / truth.floor - 1.0).abs() < TOLERANCE, "{found:?}");
+    }
+}

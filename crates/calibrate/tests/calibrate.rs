@@ -1,0 +1,215 @@
+//! Measured sets: what cannot be read is named in one go, what differs is found, what does not is not.
+
+use std::fs;
+
+use metalith_calibrate::{
+    Diagnosis, Extent, MeasuredSet, OffList, Sampling, Session, SetVerdict, Settings, Twins, prove,
+};
+use metalith_core::Silent;
+use metalith_testing::session::{PIXELS, small_set, write_npy};
+use ndarray::Array2;
+
+#[test]
+fn every_fault_of_a_set_is_named_in_one_go() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = small_set(folder.path());
+    assert!(MeasuredSet::read(folder.path(), &Silent).is_ok());
+    fs::remove_file(folder.path().join("e0_500_z0.npy")).unwrap();
+    write_npy(
+        &folder.path().join("e0_500_z1.npy"),
+        &Array2::zeros((PIXELS, PIXELS - 1)),
+    );
+    let mut holed = Array2::zeros((PIXELS, PIXELS));
+    holed[[3, 4]] = f32::NAN;
+    write_npy(&folder.path().join("e0_560_z0.npy"), &holed);
+    fs::write(folder.path().join("e0_560_z1.npy"), b"not an array").unwrap();
+    let text = fs::read_to_string(&path).unwrap();
+    let text = text
+        .replace("centre_nm = 560\nfwhm_nm = 6.0", "centre_nm = 710\nfwhm_nm = 30.0")
+        .replace("led_nm = 560", "led_nm = 710")
+        .replace("centre_um = [150.0, 0.0]", "centre_um = [1500.0, 0.0]")
+        .replace("index = [1, 0]\n", "index = [1, 0]\ncolour = \"red\"\n")
+        .replacen("element = [1, 0]", "element = [7, 0]", 1);
+    fs::write(&path, text).unwrap();
+    let error = MeasuredSet::read(folder.path(), &Silent).unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+    let error = error.to_string();
+    for fault in [
+        "there is no file",
+        "[48, 47], the camera says [48, 48]",
+        "1 of its 2304 pixels are not finite",
+        "no NPY file",
+        "is outside the film's table",
+        "the layout has no pillars of element [1, 0]",
+        "no [[element]] has the index [7, 0]",
+        "unknown key `colour`",
+    ] {
+        assert!(error.contains(fault), "{fault} is not in:\n{error}");
+    }
+}
+
+fn settings() -> Settings {
+    Settings {
+        sampling: Sampling {
+            spectrum: 0.34,
+            ..Sampling::default()
+        },
+        // Those whose cells need not be solved again.
+        only: ["cd_bias", "gap", "tilt", "led_width", "zero_order", "pixel_blur"]
+            .map(String::from)
+            .to_vec(),
+        ladder: false,
+        exact: true,
+        ..Settings::default()
+    }
+}
+
+#[test]
+fn effects_are_found_and_nothing_is_found_where_nothing_is() {
+    let folder = tempfile::tempdir().unwrap();
+    small_set(folder.path());
+    let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
+    let session = Session::new(&like, settings()).unwrap();
+    let atlas = session.atlas(&Silent).unwrap();
+    let twins = Twins::new(&like, &settings()).unwrap();
+    let diagnose = |set: &MeasuredSet| {
+        let mut session = Session::new(set, settings()).unwrap();
+        session.diagnose(&atlas, &Silent).unwrap().0
+    };
+    let nothing = twins.with_effect("", &[], &Silent).unwrap();
+    for seed in 1..=3 {
+        let d = diagnose(&twins.draw(&nothing, seed));
+        assert_eq!(d.verdict, SetVerdict::NoResidual, "{}: {:?}", d.sentence(), d.error);
+        assert!(d.effects.is_empty());
+    }
+    for (name, number) in [("cd_bias", -8.0), ("gap", 5.0)] {
+        let exposed = twins.with_effect(name, &[number], &Silent).unwrap();
+        let d = diagnose(&twins.draw(&exposed, 11));
+        let found = d.effects.iter().find(|e| e.name == name);
+        let found = found.unwrap_or_else(|| panic!("{name}: {} {:?}", d.sentence(), d.error));
+        let ends: Vec<f64> = serde_json::from_value(found.interval.clone()).unwrap();
+        assert!((ends[0]..=ends[1]).contains(&number), "{name}: {ends:?}");
+        assert!(d.error.after.held_out < 1.3 && d.error.before.held_out > d.error.after.held_out);
+    }
+    // In no list: whatever is said, it is not said that a known effect explains it.
+    let exposed = twins.off_list(OffList::Ghost(0.1, [4.0, -3.0]), &Silent).unwrap();
+    let d = diagnose(&twins.draw(&exposed, 12));
+    assert!(
+        matches!(d.verdict, SetVerdict::Unexplained | SetVerdict::Partly),
+        "{}",
+        d.sentence()
+    );
+    // Frames that were lost: the set is mostly unfit, and says which.
+    let mut dark = twins.draw(&nothing, 13);
+    for capture in dark.captures.iter_mut().take(5) {
+        capture.dn.fill(40.0);
+    }
+    let d = diagnose(&dark);
+    assert_eq!(d.verdict, SetVerdict::DataUnfit);
+    assert!(d.left_out.len() >= 5);
+}
+
+/// What is said of a small chip with some effects.
+fn diagnosed(parts: &[(&str, &[f64])], settings: Settings, seed: u64) -> Diagnosis {
+    let folder = tempfile::tempdir().unwrap();
+    small_set(folder.path());
+    let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
+    let twins = Twins::new(&like, &settings).unwrap();
+    let exposed = twins.with_effects(&[parts.to_vec()], &Silent).unwrap().remove(0);
+    let set = twins.draw(&exposed, seed);
+    let mut session = Session::new(&set, settings).unwrap();
+    let atlas = session.atlas(&Silent).unwrap();
+    session.diagnose(&atlas, &Silent).unwrap().0
+}
+
+/// The names of what was found, in order of the alphabet.
+fn names(d: &Diagnosis) -> Vec<&str> {
+    let mut found: Vec<&str> = d.effects.iter().map(|e| e.name.as_str()).collect();
+    found.sort_unstable();
+    found
+}
+
+#[test]
+fn two_effects_at_once_are_both_found() {
+    let d = diagnosed(&[("cd_bias", &[6.0]), ("gap", &[-4.0])], settings(), 21);
+    assert_eq!(names(&d), ["cd_bias", "gap"], "{}", d.sentence());
+    assert_eq!(d.verdict, SetVerdict::Explained);
+}
+
+/// A bias and another index pull the phase of blue and green their own ways: a fit of either alone fails on captures
+/// left out.
+#[test]
+fn a_pair_is_found_where_neither_of_the_two_helps() {
+    /// Two colours of a coarse spectrum through lenses of 60 um; twins have another sampling.
+    const TOLERANCE: f64 = 0.08;
+    let truth = [("cd_bias", -12.0), ("film_index", 0.06)];
+    let settings = Settings {
+        only: ["cd_bias", "film_index", "zero_order", "gap"]
+            .map(String::from)
+            .to_vec(),
+        ..settings()
+    };
+    let d = diagnosed(&[("cd_bias", &[-12.0]), ("film_index", &[0.06])], settings, 22);
+    assert_eq!(names(&d), ["cd_bias", "film_index"], "{}", d.sentence());
+    assert_eq!(d.verdict, SetVerdict::Explained);
+    let mut gains = Vec::new();
+    for (name, value) in truth {
+        let own = d.effects.iter().find(|e| e.name == name).unwrap();
+        let found = own.value.as_f64().unwrap();
+        assert!((found / value - 1.0).abs() < TOLERANCE, "{}", d.sentence());
+        gains.extend(d.ranking.iter().find(|r| r.name == name).map(|r| r.held_out_gain));
+    }
+    // They were taken in one step.
+    assert_eq!(gains[0], gains[1]);
+}
+
+/// Single pillars that are gone make a grain that no fit predicts: it is counted as noise, and speaks of the same
+/// share as their mean.
+#[test]
+fn missing_pillars_are_told_by_their_mean_and_by_their_grain() {
+    const SHARE: f64 = 0.04;
+    /// Relative: a lens of 60 um in eight captures has few grains, and its mean is seen through them.
+    const TOLERANCE: f64 = 0.25;
+    let folder = tempfile::tempdir().unwrap();
+    small_set(folder.path());
+    let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
+    let settings = Settings {
+        only: ["missing_pillars", "zero_order", "stray_light", "gap"]
+            .map(String::from)
+            .to_vec(),
+        ..settings()
+    };
+    let twins = Twins::new(&like, &settings).unwrap();
+    let exposed = twins.with_effect("missing_pillars", &[SHARE], &Silent).unwrap();
+    let set = twins.draw(&exposed, 31);
+    let mut session = Session::new(&set, settings).unwrap();
+    let atlas = session.atlas(&Silent).unwrap();
+    let d = session.diagnose(&atlas, &Silent).unwrap().0;
+    let found: Vec<&str> = d.effects.iter().map(|e| e.name.as_str()).collect();
+    assert_eq!(found, ["missing_pillars"], "{} {:?}", d.sentence(), d.error);
+    assert_eq!(d.verdict, SetVerdict::Explained);
+    let by_mean = d.effects[0].value.as_f64().unwrap();
+    let by_grain = d.missing_by_grain.unwrap();
+    assert_eq!(d.effects[0].holds(SHARE), Some(true), "{}", d.sentence());
+    for found in [by_mean, by_grain] {
+        assert!((found / SHARE - 1.0).abs() < TOLERANCE, "{by_mean} {by_grain}");
+    }
+}
+
+#[test]
+fn a_proof_counts_what_was_said() {
+    let folder = tempfile::tempdir().unwrap();
+    small_set(folder.path());
+    let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
+    let extent = Extent {
+        nulls: 3,
+        threshold_nulls: 1,
+        effects: vec!["gap".into()],
+        off_list: false,
+    };
+    let proof = prove(&like, &settings(), &extent, &Silent).unwrap();
+    assert_eq!((proof.nulls, proof.false_claims, proof.trials.len()), (3, 0, 6));
+    assert_eq!(proof.limits.len(), 1);
+    assert!(proof.limits[0].named_from.is_some_and(|s| s <= 1.0), "{}", proof.text());
+    assert!(proof.largest_gain_by_chance < proof.least_gain);
+}

@@ -1,0 +1,311 @@
+//! The report on a cell.
+
+use std::path::Path;
+
+use ndarray::Array2;
+
+use super::study::{CellStudy, LED_UM, MappingStudy};
+use metalith_cell::{Basis, MappingError};
+use metalith_core::{Result, WholeFile};
+use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, Table, count, fixed, sig, write_json};
+
+/// Writes `cells.html`, `cells.json` and the mappings that are not polynomials as CSV into a folder.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn write_cell_report(study: &CellStudy, folder: &Path) -> Result<()> {
+    page(study).write(&folder.join("cells.html"))?;
+    write_json(&folder.join("cells.json"), "cells", study)?;
+    for mapping in study
+        .mappings
+        .iter()
+        .filter(|m| m.coefficients.is_none() && m.name != "design")
+    {
+        let name: String = mapping
+            .name
+            .chars()
+            .filter(|c| *c != ',')
+            .map(|c| if c == ' ' { '_' } else { c })
+            .collect();
+        WholeFile::write(
+            &folder.join(format!("mapping_{name}.csv")),
+            mapping.table.to_csv().as_bytes(),
+        )?;
+    }
+    Ok(())
+}
+
+fn page(study: &CellStudy) -> Page {
+    let mut page = Page::new(
+        format!("The cell of {}", study.design),
+        "Transmission by rigorous coupled-wave analysis, and what polynomials make of it",
+    );
+    page.facts(&[
+        ("Film", study.film.clone()),
+        ("Substrate", study.substrate.clone()),
+        ("Diffraction orders", format!("{0} x {0}", study.orders)),
+        ("Cells solved", count(study.points as u64)),
+        (
+            "Wavelength of the mapping",
+            format!("{} nm", sig(study.mapping_um * 1e3, 4)),
+        ),
+        (
+            "Phase between the ends there",
+            format!("{} turns", fixed(study.span_turns, 2)),
+        ),
+    ]);
+    maps(&mut page, study);
+    mappings(&mut page, study);
+    inverse(&mut page, study);
+    forward(&mut page, study);
+    bad(&mut page, study);
+    page
+}
+
+fn maps(page: &mut Page, study: &CellStudy) {
+    let curves = &study.curves;
+    let widths = &curves[0].widths_nm;
+    let shape = (curves.len(), widths.len());
+    let (first, last) = (widths[0], widths[widths.len() - 1]);
+    let (short, long) = (
+        curves[0].wavelength_um * 1e3,
+        curves[curves.len() - 1].wavelength_um * 1e3,
+    );
+    let x = || (Axis::linear("width", "nm"), f64::from(first), f64::from(last));
+    let y = || (Axis::linear("wavelength", "nm"), short, long);
+    let power = Array2::from_shape_fn(shape, |(i, j)| curves[i].t[j].norm_sqr());
+    let turns = Array2::from_shape_fn(shape, |(i, j)| {
+        (curves[i].t[j].arg() / std::f64::consts::TAU).rem_euclid(1.0)
+    });
+    page.section("Over width and wavelength");
+    page.paragraph(
+        "Light comes along the normal through the substrate. What the zero order does not carry leaves in \
+         the orders of the lattice within the glass, below the wavelength at which they vanish there, or \
+         is reflected. The narrow dark lines are guided-mode resonances: there the phase turns by up to a \
+         whole turn within a few nanometres of width or wavelength.",
+    );
+    let mut zero = HeatMap::new("Power of the zero order", power, x(), y())
+        .values("zero order", "of the incident")
+        .range(0.0, 1.0);
+    for dip in dips(study) {
+        zero = zero.mark(dip.0, dip.1, dip.2);
+    }
+    page.figure(zero.caption(
+        "Share of the incident power that goes straight on. Marked: the deepest point of each dip below \
+         the threshold, by its width.",
+    ));
+    page.figure(
+        HeatMap::new("Phase", turns, x(), y())
+            .values("phase", "turns")
+            .range(0.0, 1.0)
+            .cyclic()
+            .caption("Phase of the zero order from the foot of the pillar to its top, modulo one turn."),
+    );
+}
+
+/// Where a resonance takes most light: width, wavelength [nm], label. Local minima in width every 20 nm
+/// of wavelength.
+fn dips(study: &CellStudy) -> Vec<(f64, f64, String)> {
+    let mut found = Vec::new();
+    for curve in study.curves.iter().step_by(10) {
+        let powers: Vec<f64> = curve.zero_order().collect();
+        for j in 2..powers.len().saturating_sub(2) {
+            let least = powers[j - 2..=j + 2].iter().copied().fold(f64::INFINITY, f64::min);
+            let around = powers[j.saturating_sub(8)].min(powers[(j + 8).min(powers.len() - 1)]);
+            // A line, not the slow fall of power below the diffraction edge of the glass.
+            if powers[j] == least && powers[j] < study.options.threshold && around > 2.0 * powers[j] {
+                found.push((f64::from(curve.widths_nm[j]), curve.wavelength_um * 1e3, String::new()));
+            }
+        }
+    }
+    found
+}
+
+fn mappings(page: &mut Page, study: &CellStudy) {
+    page.section("Where a mapping sends the light");
+    page.paragraph(
+        "A lens is nearly everywhere a ramp on which all phases occur alike. The first order of that ramp \
+         makes the image, the zero order is haze. Powers are of the incident light, by rigorous theory. \
+         `fitted` is the inverse polynomial of degree three, `exact` the width whose phase is nearest, \
+         `most light` the mapping of any form with the most first order from 440 to 680 nm.",
+    );
+    let mut columns = vec![Column::text("Mapping"), Column::number("Phase error, rms", "rad")];
+    for l in LED_UM {
+        columns.push(Column::number(format!("First at {:.0} nm", l * 1e3), ""));
+    }
+    for l in LED_UM {
+        columns.push(Column::number(format!("Zero at {:.0} nm", l * 1e3), ""));
+    }
+    columns.push(Column::number("First, mean of the band", ""));
+    let mut table = Table::new(columns);
+    for m in &study.mappings {
+        let mut row = vec![Cell::from(m.name), Cell::fixed(m.phase.rms_rad, 3)];
+        row.extend(m.led.iter().map(|o| Cell::fixed(o.first, 3)));
+        row.extend(m.led.iter().map(|o| Cell::fixed(o.zero, 3)));
+        row.push(Cell::fixed(m.mean(|o| o.first), 3));
+        table.row(row);
+    }
+    page.table(table);
+    for (title, of) in [
+        (
+            "First order over the band",
+            (|o| o.first) as fn(&metalith_cell::RampOrders) -> f64,
+        ),
+        ("Zero order over the band", |o| o.zero),
+    ] {
+        let mut chart = Chart::new(
+            title,
+            Axis::linear("wavelength", "nm"),
+            Axis::linear("share of the incident power", "").range(0.0, 1.0),
+        );
+        for m in study
+            .mappings
+            .iter()
+            .filter(|m| m.name != "design" || !same_as_published(study))
+        {
+            chart.line(m.name, m.band.iter().map(|o| (o.wavelength_um * 1e3, of(o))));
+        }
+        page.figure(chart.caption("By rigorous theory, for the widths as they are written."));
+    }
+    avoidance(page, study);
+    for m in &study.mappings {
+        if let Some(c) = &m.coefficients {
+            let list: Vec<_> = c.iter().map(|v| format!("{v:.4}")).collect();
+            page.paragraph(format!("Coefficients of `{}`, lowest power first:", m.name));
+            page.code(format!("coefficients = [{}]", list.join(", ")));
+        }
+    }
+}
+
+fn named<'a>(study: &'a CellStudy, name: &str) -> Option<&'a MappingStudy> {
+    study.mappings.iter().find(|m| m.name == name)
+}
+
+fn same_as_published(study: &CellStudy) -> bool {
+    match (named(study, "design"), named(study, "published")) {
+        (Some(a), Some(b)) => a.table == b.table,
+        _ => false,
+    }
+}
+
+fn avoidance(page: &mut Page, study: &CellStudy) {
+    if let (Some(exact), Some(wary)) = (named(study, "exact"), named(study, "exact, bad widths avoided")) {
+        page.note(format!(
+            "Staying away from widths that are bad at {} nm costs {} rad of phase error (rms {} instead of {}) \
+             and changes the first order, on the mean of the band, from {} to {}.",
+            LED_UM.map(|l| format!("{:.0}", l * 1e3)).join(", "),
+            fixed(wary.phase.rms_rad - exact.phase.rms_rad, 3),
+            fixed(wary.phase.rms_rad, 3),
+            fixed(exact.phase.rms_rad, 3),
+            fixed(exact.mean(|o| o.first), 3),
+            fixed(wary.mean(|o| o.first), 3),
+        ));
+    }
+}
+
+fn error_cells(error: &MappingError) -> [Cell; 2] {
+    [Cell::fixed(error.rms_rad, 3), Cell::fixed(error.worst_rad, 3)]
+}
+
+fn inverse(page: &mut Page, study: &CellStudy) {
+    page.section("Phase to width");
+    page.paragraph(
+        "Duty cycle over phase by least squares, on widths whose phase rises. The error is that of the \
+         rigorous phase of the width the polynomial asks for, with a constant taken off.",
+    );
+    let mut table = Table::new([
+        Column::text("Powers"),
+        Column::number("Degree", ""),
+        Column::number("rms", "rad"),
+        Column::number("worst", "rad"),
+        Column::text("Coefficients"),
+    ]);
+    let mut row = |powers: &str, degree: Cell, error: Option<&MappingError>, coefficients: &[f64]| {
+        let list: Vec<_> = coefficients.iter().map(|v| format!("{v:.4}")).collect();
+        let [rms, worst] = error.map_or_else(|| [Cell::none(), Cell::none()], error_cells);
+        table.row([Cell::from(powers), degree, rms, worst, Cell::from(list.join(", "))]);
+    };
+    let published = named(study, "design")
+        .and_then(|m| m.coefficients.clone())
+        .unwrap_or_default();
+    row(
+        "of the design",
+        Cell::none(),
+        Some(&study.design_round_trip),
+        &published,
+    );
+    for trial in &study.inverse {
+        let powers = match trial.basis {
+            Basis::AllPowers => "all",
+            Basis::EvenPowers => "even",
+        };
+        let fit = trial.fit.as_ref();
+        row(
+            powers,
+            Cell::fixed(trial.degree as f64, 0),
+            fit.map(|f| &f.round_trip),
+            fit.map_or(&[], |f| f.polynomial.coefficients.as_slice()),
+        );
+    }
+    page.table(table.caption("No numbers: no polynomial of that degree stays within the widths of the cell."));
+}
+
+fn forward(page: &mut Page, study: &CellStudy) {
+    page.section("Width to phase");
+    let mut table = Table::new([
+        Column::text("Polynomial"),
+        Column::number("rms over the band", "rad"),
+        Column::number("worst", "rad"),
+    ]);
+    let mut lines = Chart::new(
+        "Error of the forward polynomials",
+        Axis::linear("wavelength", "nm"),
+        Axis::linear("rms phase error", "rad"),
+    );
+    let mut add = |name: String, each: &[(f64, MappingError)], overall: &MappingError| {
+        let [rms, worst] = error_cells(overall);
+        table.row([Cell::from(name.clone()), rms, worst]);
+        lines.line(name, each.iter().map(|(l, e)| (l * 1e3, e.rms_rad)));
+    };
+    add(
+        "published".into(),
+        &study.forward_published.0,
+        &study.forward_published.1,
+    );
+    for (i, fit) in study.forward.iter().enumerate() {
+        add(format!("degree {}", i + 2), &fit.errors, &fit.overall);
+    }
+    page.table(table);
+    page.figure(lines.caption(
+        "Rigorous phase against a polynomial in duty cycle and wavelength, each wavelength with its own \
+         constant taken off. What no degree follows are the resonances.",
+    ));
+}
+
+fn bad(page: &mut Page, study: &CellStudy) {
+    page.section("Widths to stay away from");
+    page.paragraph(format!(
+        "Zero order below {}, or a phase that falls with the width; every 10 nm.",
+        sig(study.options.threshold, 2)
+    ));
+    let mut table = Table::new([Column::number("Wavelength", "nm"), Column::text("Widths [nm]")]);
+    for cells in study.bad.chunk_by(|a, b| a.wavelength_um == b.wavelength_um) {
+        let widths: Vec<_> = cells
+            .iter()
+            .map(|b| {
+                if b.backwards {
+                    format!("{} (backwards)", b.width_nm)
+                } else {
+                    b.width_nm.to_string()
+                }
+            })
+            .collect();
+        table.row([
+            Cell::fixed(cells[0].wavelength_um * 1e3, 0),
+            Cell::from(widths.join(", ")),
+        ]);
+    }
+    page.details("All bad widths", |page| {
+        page.table(table);
+    });
+}

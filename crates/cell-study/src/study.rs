@@ -1,0 +1,261 @@
+//! All that the library of a design says about its cell and its mapping.
+
+use std::collections::BTreeSet;
+
+use serde::Serialize;
+
+use metalith_cell::{
+    BadCell, Basis, CellModel, ForwardFit, ForwardPolynomial, InverseFit, InversePolynomial, MappingError,
+    MappingTable, PhaseCurve, RampOrders, RigorousCell, bad_cells, curves_over, fit_forward, fit_inverse,
+    forward_errors, round_trip,
+};
+use metalith_core::{Error, Result};
+use metalith_design::Design;
+use metalith_design::array::WidthRule;
+
+/// Wavelengths that mappings are compared at [um]: LEDs of a colour camera.
+pub const LED_UM: [f64; 4] = [0.455, 0.530, 0.590, 0.660];
+
+/// Band that the best mapping sends light to the first order in [um], and its step.
+const BEST_BAND_UM: (f64, f64, f64) = (0.440, 0.680, 0.008);
+
+/// Degree of the inverse polynomial that stands for `fitted`.
+const FITTED_DEGREE: usize = 3;
+
+/// Degrees of the inverse fits from which the best polynomial is sought.
+const BEST_DEGREES: [usize; 3] = [2, 3, 5];
+
+/// Highest degrees that are tried.
+const HIGHEST_INVERSE: usize = 6;
+const HIGHEST_FORWARD: usize = 6;
+
+/// What [`CellStudy::new`] is asked.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct StudyOptions {
+    /// Power of the zero order below which a width is bad.
+    pub threshold: f64,
+}
+
+impl Default for StudyOptions {
+    fn default() -> Self {
+        Self { threshold: 0.3 }
+    }
+}
+
+/// A mapping and what it does with light.
+#[derive(Clone, Debug, Serialize)]
+pub struct MappingStudy {
+    pub name: &'static str,
+    /// Against rigorous phase at the wavelength of the mapping.
+    pub phase: MappingError,
+    /// At the wavelengths of [`LED_UM`].
+    pub led: Vec<RampOrders>,
+    /// Over the band.
+    pub band: Vec<RampOrders>,
+    /// Coefficients, of a mapping that is a polynomial.
+    pub coefficients: Option<Vec<f64>>,
+    #[serde(skip)]
+    pub table: MappingTable,
+}
+
+impl MappingStudy {
+    /// Mean power of an order over the band.
+    pub fn mean(&self, of: impl Fn(&RampOrders) -> f64) -> f64 {
+        self.band.iter().map(of).sum::<f64>() / self.band.len() as f64
+    }
+}
+
+/// The inverse polynomials that were fitted, and why a degree has none.
+#[derive(Clone, Debug, Serialize)]
+pub struct InverseTrial {
+    pub basis: Basis,
+    pub degree: usize,
+    /// None where no polynomial of this degree stays within the widths of the cell.
+    pub fit: Option<InverseFit>,
+}
+
+/// Fits, bad widths and mappings of a design's cell.
+#[derive(Clone, Debug, Serialize)]
+pub struct CellStudy {
+    pub design: String,
+    pub film: String,
+    pub substrate: String,
+    pub orders: usize,
+    pub tolerance: f64,
+    /// Cells solved for the library.
+    pub points: usize,
+    /// Wavelength of the mapping [um].
+    pub mapping_um: f64,
+    /// Turns between the narrowest and the widest pillar at that wavelength.
+    pub span_turns: f64,
+    pub options: StudyOptions,
+    /// The mapping of the design, by rigorous theory.
+    pub design_round_trip: MappingError,
+    pub inverse: Vec<InverseTrial>,
+    /// Published forward polynomial, at each wavelength and overall.
+    pub forward_published: (Vec<(f64, MappingError)>, MappingError),
+    /// Degrees from 2.
+    pub forward: Vec<ForwardFit>,
+    /// Every 10 nm.
+    pub bad: Vec<BadCell>,
+    pub mappings: Vec<MappingStudy>,
+    /// Every 2 nm of the band and of the widths, for the maps.
+    #[serde(skip)]
+    pub curves: Vec<PhaseCurve>,
+}
+
+impl CellStudy {
+    /// Study the cell of a design.
+    ///
+    /// # Errors
+    /// If the threshold is not a share of power, or the widths of the design are too few.
+    pub fn new(design: &Design, cell: &RigorousCell, options: StudyOptions) -> Result<Self> {
+        if !(0.0..1.0).contains(&options.threshold) {
+            return Err(Error::invalid(
+                format!("widths are bad below a zero order of {}", options.threshold),
+                "give a share of the incident power, such as 0.3",
+            ));
+        }
+        let spec = cell.table().spec();
+        let pitch_nm = f64::from(design.cell.pitch_nm);
+        let (low, high) = design.cell.width_range_nm;
+        let every_nm: Vec<u16> = (low..=high).collect();
+        let mapping_um = design.mapping.wavelength_um;
+        let fine = PhaseCurve::new(cell, mapping_um, &every_nm)?;
+        let inverse: Vec<_> = [Basis::AllPowers, Basis::EvenPowers]
+            .into_iter()
+            .flat_map(|basis| (1..=HIGHEST_INVERSE).map(move |degree| (basis, degree)))
+            .map(|(basis, degree)| InverseTrial {
+                basis,
+                degree,
+                fit: fit_inverse(&fine, pitch_nm, basis, degree, options.threshold).ok(),
+            })
+            .collect();
+        let forward_curves = curves_over(cell, spec.band_um, (low, high))?;
+        let forward = (2..=HIGHEST_FORWARD)
+            .map(|degree| fit_forward(&forward_curves, pitch_nm, degree))
+            .collect::<Result<Vec<_>>>()?;
+        let writable: Vec<u16> = design.cell.widths_nm().collect();
+        let bad = bad_cells(cell, &steps(spec.band_um, 0.010), &writable, options.threshold)?;
+        let mappings = mappings(design, cell, &inverse, &writable, options)?;
+        let curves = steps(spec.band_um, 0.002)
+            .into_iter()
+            .map(|wavelength_um| PhaseCurve::new(cell, wavelength_um, &writable))
+            .collect::<Result<Vec<_>>>()?;
+        Ok(Self {
+            design: design.name.clone(),
+            film: spec.stack.film.source().to_owned(),
+            substrate: spec.stack.substrate.source().to_owned(),
+            orders: spec.orders,
+            tolerance: spec.tolerance,
+            points: cell.table().points(),
+            mapping_um,
+            span_turns: fine.turns[fine.turns.len() - 1] - fine.turns[0],
+            options,
+            design_round_trip: round_trip(&design.mapping.polynomial, &fine, pitch_nm),
+            inverse,
+            forward_published: forward_errors(&ForwardPolynomial::published(), &forward_curves, pitch_nm),
+            forward,
+            bad,
+            mappings,
+            curves,
+        })
+    }
+}
+
+/// Wavelengths of a band at about this step [um], both ends included.
+fn steps(band_um: (f64, f64), step_um: f64) -> Vec<f64> {
+    let count = ((band_um.1 - band_um.0) / step_um).round().max(1.0) as usize;
+    (0..=count)
+        .map(|i| band_um.0 + (band_um.1 - band_um.0) * i as f64 / count as f64)
+        .collect()
+}
+
+/// The mapping of the design beside the published, fitted, exact and best ones.
+fn mappings(
+    design: &Design,
+    cell: &RigorousCell,
+    inverse: &[InverseTrial],
+    writable: &[u16],
+    options: StudyOptions,
+) -> Result<Vec<MappingStudy>> {
+    let pitch_nm = f64::from(design.cell.pitch_nm);
+    let of_polynomial = |polynomial: &InversePolynomial| {
+        let mut mapping = design.mapping.clone();
+        mapping.polynomial = polynomial.clone();
+        mapping.table = None;
+        let rule = WidthRule::new(&design.cell, &mapping);
+        MappingTable::sampled(|u| rule.width_nm(u))
+    };
+    let curve = PhaseCurve::new(cell, design.mapping.wavelength_um, writable)?;
+    let best_curves = steps((BEST_BAND_UM.0, BEST_BAND_UM.1), BEST_BAND_UM.2)
+        .into_iter()
+        .map(|l| PhaseCurve::new(cell, l, writable))
+        .collect::<Result<Vec<_>>>()?;
+    let mut found: Vec<(&'static str, MappingTable, Option<Vec<f64>>)> = Vec::new();
+    let mut polynomial = |name, polynomial: &InversePolynomial| {
+        found.push((name, of_polynomial(polynomial), Some(polynomial.coefficients.clone())));
+    };
+    if design.mapping.table.is_none() {
+        polynomial("design", &design.mapping.polynomial);
+    }
+    let published = InversePolynomial::published();
+    polynomial("published", &published);
+    let fitted = inverse
+        .iter()
+        .find(|trial| trial.basis == Basis::AllPowers && trial.degree == FITTED_DEGREE);
+    if let Some(fit) = fitted.and_then(|trial| trial.fit.as_ref()) {
+        polynomial("fitted", &fit.polynomial);
+    }
+    let fits = inverse
+        .iter()
+        .filter(|t| t.basis == Basis::AllPowers && BEST_DEGREES.contains(&t.degree));
+    let best = fits
+        .filter_map(|trial| trial.fit.as_ref())
+        .map(|fit| &fit.polynomial)
+        .chain([&published])
+        .map(|start| MappingTable::best_polynomial(start, &best_curves, pitch_nm))
+        .map(|found| (of_polynomial(&found).first_order(&best_curves), found))
+        .reduce(|a, b| if b.0 > a.0 { b } else { a });
+    if let Some((_, best)) = &best {
+        polynomial("best polynomial", best);
+    }
+    if let Some(table) = &design.mapping.table {
+        found.insert(0, ("design", table.clone(), None));
+    }
+    let exact = MappingTable::nearest(&curve, &[])?;
+    let led_bad = bad_cells(cell, &LED_UM, writable, options.threshold)?;
+    let avoid: BTreeSet<u16> = led_bad.iter().map(|b| b.width_nm).collect();
+    let avoid: Vec<u16> = avoid.into_iter().collect();
+    let exchanged = exact.exchanged(&best_curves);
+    found.push(("exact", exact, None));
+    if avoid.len() < writable.len() {
+        found.push((
+            "exact, bad widths avoided",
+            MappingTable::nearest(&curve, &avoid)?,
+            None,
+        ));
+    }
+    found.push(("most light", exchanged, None));
+
+    let band = steps(cell.table().spec().band_um, 0.005);
+    found
+        .into_iter()
+        .map(|(name, table, coefficients)| {
+            let orders = |wavelengths: &[f64]| -> Result<Vec<RampOrders>> {
+                wavelengths
+                    .iter()
+                    .map(|&l| table.orders(cell as &dyn CellModel, l))
+                    .collect()
+            };
+            Ok(MappingStudy {
+                name,
+                phase: table.phase_error(&curve),
+                led: orders(&LED_UM)?,
+                band: orders(&band)?,
+                coefficients,
+                table,
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,148 @@
+//! Cell libraries on the disk.
+//!
+//! A file is, in this order, little-endian: eight bytes of magic; the length (u32) and text of the inputs
+//! as JSON; the number of columns (u32); for each its width [nm] (u16), its number of samples (u32) and
+//! for each sample wavelength [um], Re t, Im t (f64); SHA-256 of all before. Inputs or checksum that do
+//! not agree mean that the file is not what is needed; it is then made again.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use num_complex::Complex64;
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use super::column::Column;
+use super::table::TableSpec;
+use metalith_core::{Result, WholeFile};
+
+const MAGIC: &[u8; 8] = b"MLCELL\0\x01";
+
+/// Raised whenever the solver or the sampling changes what it answers: kept tables are then of no use.
+const SOLVER: u32 = 1;
+
+/// Longest file that is read [bytes]: ten times the library of the shipped designs at a tenth of its
+/// tolerance.
+const LONGEST: u64 = 256 << 20;
+
+/// The folder that libraries are kept in: `METALITH_CACHE` if set, else `metalith` in `XDG_CACHE_HOME` or
+/// in `~/.cache`; none where there is no home.
+pub fn cache_folder() -> Option<PathBuf> {
+    let variable = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
+    variable("METALITH_CACHE").or_else(|| {
+        let base = variable("XDG_CACHE_HOME").or_else(|| variable("HOME").map(|home| home.join(".cache")))?;
+        Some(base.join("metalith"))
+    })
+}
+
+/// The inputs as text: equal if and only if the table is the same.
+pub(super) fn inputs(spec: &TableSpec) -> Vec<u8> {
+    #[derive(Serialize)]
+    struct Inputs<'a> {
+        solver: u32,
+        spec: &'a TableSpec,
+    }
+    serde_json::to_vec(&Inputs { solver: SOLVER, spec }).expect("plain data serialises")
+}
+
+/// Name of the file for these inputs.
+pub(super) fn file_name(inputs: &[u8]) -> String {
+    let digest = Sha256::digest(inputs);
+    let short: String = digest.iter().take(8).map(|b| format!("{b:02x}")).collect();
+    format!("cell-{short}.bin")
+}
+
+pub(super) fn write(file: &Path, inputs: &[u8], widths: &[u16], columns: &[Column]) -> Result<()> {
+    let mut bytes = MAGIC.to_vec();
+    bytes.extend((inputs.len() as u32).to_le_bytes());
+    bytes.extend(inputs);
+    bytes.extend((columns.len() as u32).to_le_bytes());
+    for (width, column) in widths.iter().zip(columns) {
+        bytes.extend(width.to_le_bytes());
+        bytes.extend((column.t.len() as u32).to_le_bytes());
+        for (wavelength, t) in column.wavelengths_um.iter().zip(&column.t) {
+            for value in [*wavelength, t.re, t.im] {
+                bytes.extend(value.to_le_bytes());
+            }
+        }
+    }
+    let digest = Sha256::digest(&bytes);
+    bytes.extend(digest);
+    WholeFile::write(file, &bytes)
+}
+
+/// The columns kept in a file; none if there is no such file, a reason if it cannot be trusted.
+pub(super) fn read(file: &Path, inputs: &[u8], widths: &[u16]) -> std::result::Result<Option<Vec<Column>>, String> {
+    match fs::metadata(file) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(error.to_string()),
+        Ok(metadata) if metadata.len() > LONGEST => return Err("it is too long to be a cell library".into()),
+        Ok(_) => {}
+    }
+    let bytes = fs::read(file).map_err(|e| e.to_string())?;
+    let body = bytes.len().checked_sub(32).ok_or("it is cut short")?;
+    let (body, digest) = bytes.split_at(body);
+    if Sha256::digest(body).as_slice() != digest {
+        return Err("its checksum does not hold".into());
+    }
+    let mut rest = Reader(body);
+    if rest.take(MAGIC.len()) != Some(MAGIC) {
+        return Err("it is not a cell library of this version".into());
+    }
+    let parsed = (|| {
+        let length = rest.u32()? as usize;
+        if rest.take(length)? != inputs {
+            return None;
+        }
+        rest.columns(widths)
+    })();
+    parsed.map(Some).ok_or_else(|| "it was made from other inputs".into())
+}
+
+/// What is left to read.
+struct Reader<'a>(&'a [u8]);
+
+impl<'a> Reader<'a> {
+    fn take(&mut self, count: usize) -> Option<&'a [u8]> {
+        let (head, tail) = self.0.split_at_checked(count)?;
+        self.0 = tail;
+        Some(head)
+    }
+
+    fn u32(&mut self) -> Option<u32> {
+        Some(u32::from_le_bytes(self.take(4)?.try_into().ok()?))
+    }
+
+    fn f64(&mut self) -> Option<f64> {
+        let value = f64::from_le_bytes(self.take(8)?.try_into().ok()?);
+        value.is_finite().then_some(value)
+    }
+
+    fn columns(&mut self, widths: &[u16]) -> Option<Vec<Column>> {
+        if self.u32()? as usize != widths.len() {
+            return None;
+        }
+        let columns = widths
+            .iter()
+            .map(|width| {
+                if self.take(2)? != width.to_le_bytes() {
+                    return None;
+                }
+                let samples = self.u32()? as usize;
+                // Before memory is set aside, the samples must be there.
+                if samples == 0 || self.0.len() / 24 < samples {
+                    return None;
+                }
+                let (mut wavelengths_um, mut t) = (Vec::with_capacity(samples), Vec::with_capacity(samples));
+                for _ in 0..samples {
+                    wavelengths_um.push(self.f64()?);
+                    t.push(Complex64::new(self.f64()?, self.f64()?));
+                }
+                wavelengths_um
+                    .is_sorted_by(|a, b| a < b)
+                    .then_some(Column { wavelengths_um, t })
+            })
+            .collect::<Option<Vec<_>>>()?;
+        self.0.is_empty().then_some(columns)
+    }
+}

@@ -1,0 +1,30 @@
+//! The cell: a square pillar on its lattice site, and how light passes it.
+
+mod cache;
+mod column;
+mod curve;
+mod exact;
+mod fit;
+mod model;
+mod pointwise;
+mod polynomial;
+mod published;
+mod rigorous;
+mod stack;
+mod table;
+
+pub use cache::cache_folder;
+pub use curve::{BadCell, PhaseCurve, bad_cells};
+pub use exact::{MappingTable, RampOrders};
+pub use fit::{
+    FittedCell, ForwardFit, InverseFit, MappingError, curves_over, fit_forward, fit_inverse, forward_errors, round_trip,
+};
+pub use metalith_rcwa::Material;
+pub use model::{CellModel, Fidelity};
+pub use pointwise::PointwiseCell;
+pub use pointwise::{OBLIQUE_ORDERS, ORDERS, tabulate};
+pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};
+pub use published::PublishedCell;
+pub use rigorous::RigorousCell;
+pub use stack::CellStack;
+pub use table::{CellTable, Origin, TableSpec};

@@ -1,0 +1,112 @@
+//! What the rest of the program knows of a cell: complex transmission by width.
+
+use std::fmt;
+use std::str::FromStr;
+
+use num_complex::Complex64;
+use serde::{Deserialize, Serialize};
+
+use metalith_core::{Error, Result};
+
+/// How truly a cell is described. Every result names the one it was made with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Fidelity {
+    /// Phase polynomials with the published coefficients; no amplitude.
+    Published,
+    /// Polynomials of the same form fitted to the rigorous cell; no amplitude.
+    Fitted,
+    /// Complex transmission of the zero order by rigorous coupled-wave analysis.
+    Rigorous,
+    /// The rigorous cell of the pillars as a measured line makes them, by a model that `calibrate` wrote.
+    Calibrated,
+}
+
+impl Fidelity {
+    /// Those that a design alone has, from the least to the most true.
+    pub const ALL: [Self; 3] = [Self::Published, Self::Fitted, Self::Rigorous];
+
+    /// The name used in options, files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Published => "published",
+            Self::Fitted => "fitted",
+            Self::Rigorous => "rigorous",
+            Self::Calibrated => "calibrated",
+        }
+    }
+}
+
+impl fmt::Display for Fidelity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Fidelity {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        Self::ALL.into_iter().find(|f| f.name() == text).ok_or_else(|| {
+            Error::invalid(
+                format!("`{text}` is not a fidelity of the cell"),
+                "use published, fitted or rigorous",
+            )
+        })
+    }
+}
+
+/// How a cell of the lattice passes light into its zero order, by the width of its pillar.
+pub trait CellModel: Sync {
+    /// What the model is.
+    fn fidelity(&self) -> Fidelity;
+
+    /// Complex transmission of the zero order at one wavelength, with the width [nm] as index from zero
+    /// to `max_width_nm`.
+    ///
+    /// A field ratio, from a plane wave in the substrate at the plane of the pillar base to air at the
+    /// plane of the pillar tops; exp(-i w t), so that a wider pillar has a larger phase. Entry 0 stands
+    /// for a site without pillar, where the layout is blocked: it is 0.
+    ///
+    /// # Errors
+    /// If the wavelength is outside what the model or its materials cover, or a width does not fit.
+    fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>>;
+
+    /// The same for light that arrives obliquely: one table for light polarised across the plane of incidence
+    /// (s) and one for light polarised in it (p). `sines` are those of the direction in air along x and y.
+    ///
+    /// Scaled so that |t| of a cell that passes all its power in the zero order is that of
+    /// [`CellModel::full_transmission`], as at normal incidence. What little is turned from one polarisation
+    /// into the other is left out. Nothing if the model knows no angles.
+    ///
+    /// # Errors
+    /// As [`CellModel::transmissions`]; also if no light arrives so steeply.
+    fn oblique(
+        &self,
+        _wavelength_um: f64,
+        _sines: [f64; 2],
+        _max_width_nm: u16,
+    ) -> Result<Option<[Vec<Complex64>; 2]>> {
+        Ok(None)
+    }
+
+    /// |t| of a cell that passes all its power in the zero order: sqrt(n) of the substrate for the
+    /// rigorous cell, 1 for one without amplitude. Strehl ratios are against this.
+    ///
+    /// # Errors
+    /// As [`CellModel::transmissions`].
+    fn full_transmission(&self, wavelength_um: f64) -> Result<f64>;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_read_back() {
+        for fidelity in Fidelity::ALL {
+            assert_eq!(fidelity.to_string().parse::<Fidelity>().unwrap(), fidelity);
+        }
+        assert!("exact".parse::<Fidelity>().is_err());
+    }
+}

@@ -1,0 +1,4 @@
+//! Fits and tables of the cell.
+
+mod fit;
+mod table;

@@ -1,0 +1,107 @@
+//! The layout whose pillars, as a measured line makes them, do what was intended.
+//!
+//! Each intended width is exchanged for the drawn one whose pillar, as made, transmits most like the intended
+//! pillar as stated, at the design's wavelengths together. A phase common to all pillars of a wavelength is
+//! free: it moves no light. Bias that follows density is looked up site by site, of the layout as drawn.
+
+mod choose;
+mod line;
+mod page;
+
+use serde::Serialize;
+
+use choose::Kinds;
+use line::Line;
+use metalith_calibrate::CalibratedModel;
+use metalith_core::{Error, Progress, Result};
+use metalith_design::Design;
+use metalith_design::array::{Group, PillarArray};
+
+pub use page::write_compensation_report;
+
+/// Passes over the layout: the second sees the density of what the first has drawn.
+const PASSES: usize = 2;
+
+/// A compensated array and what it is worth.
+#[derive(Clone, Debug)]
+pub struct Compensated {
+    /// Widths to draw.
+    pub array: PillarArray,
+    pub summary: CompensationSummary,
+    /// The line that it was made for, solved.
+    line: Line,
+}
+
+/// Numbers of a compensation.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CompensationSummary {
+    /// Root mean square of how far drawn widths moved [nm].
+    pub moved_rms_nm: f64,
+    /// Root mean square error of the complex transmission over the pillars and wavelengths, made against
+    /// intended, over the root mean square of the intended one: of the layout as it was, and compensated.
+    pub error: [f64; 2],
+    /// Pillars that now have the least or greatest width of the design and had not before: the range ends there.
+    pub at_limit: u64,
+}
+
+/// Compensate the pillars of a design for what a model says of the line.
+///
+/// # Errors
+/// If a cell cannot be solved, or the user stopped it.
+pub fn compensate(
+    design: &Design,
+    array: &PillarArray,
+    model: &CalibratedModel,
+    progress: &dyn Progress,
+) -> Result<Compensated> {
+    let line = Line::new(design, model, progress)?;
+    let copies = |class: usize| array.placed.iter().filter(|p| p.class == class).count() as u64;
+    let mut drawn = array.clone();
+    let mut error = [0.0; 2];
+    for pass in 0..PASSES {
+        if progress.stopped() {
+            return Err(Error::Interrupted);
+        }
+        let levels: Vec<Vec<i32>> = drawn.classes.iter().map(|c| line.levels(&c.widths)).collect();
+        let mut kinds = Kinds::default();
+        for (k, (class, levels)) in array.classes.iter().zip(&levels).enumerate() {
+            kinds.count(&class.widths, levels, copies(k));
+        }
+        let choice = kinds.choose(&line);
+        if pass == 0 {
+            error[0] = choice.before;
+        }
+        error[1] = choice.after;
+        for ((to, class), levels) in drawn.classes.iter_mut().zip(&array.classes).zip(&levels) {
+            for ((to, &w), &level) in to.widths.width_nm.iter_mut().zip(&class.widths.width_nm).zip(levels) {
+                if w > 0 {
+                    *to = choice.drawn[&(w, level)];
+                }
+            }
+        }
+        if !line.follows_density() {
+            break;
+        }
+    }
+    let (narrow, wide) = design.cell.width_range_nm;
+    let (mut moved, mut pillars, mut at_limit) = (0.0, 0, 0);
+    for (k, (new, old)) in drawn.classes.iter_mut().zip(&array.classes).enumerate() {
+        for (&d, &w) in new.widths.width_nm.iter().zip(&old.widths.width_nm) {
+            if w > 0 {
+                moved += copies(k) as f64 * (f64::from(d) - f64::from(w)).powi(2);
+                pillars += copies(k);
+                at_limit += copies(k) * u64::from(d != w && (d == narrow || d == wide));
+            }
+        }
+        new.group = Group::of(&new.widths);
+    }
+    Ok(Compensated {
+        array: drawn,
+        summary: CompensationSummary {
+            moved_rms_nm: (moved / pillars.max(1) as f64).sqrt(),
+            error,
+            at_limit,
+        },
+        line,
+    })
+}

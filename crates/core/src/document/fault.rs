@@ -1,0 +1,121 @@
+//! Mistakes in a text file, each with its place and remedy.
+
+use std::fmt;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
+
+/// One mistake: what, where in the text (bytes), and what to do.
+#[derive(Clone, Debug)]
+pub struct Fault {
+    pub span: Range<usize>,
+    pub what: String,
+    pub hint: String,
+}
+
+/// All mistakes of one file. Its `Display` is one line for each with file, line and column;
+/// as a [`miette::Diagnostic`] it shows the text with each place marked.
+#[derive(Debug)]
+pub struct Faults {
+    path: PathBuf,
+    source: NamedSource<String>,
+    faults: Vec<Fault>,
+    single: Vec<Mark>,
+}
+
+/// One fault as a diagnostic of its own, shown with the text around it.
+#[derive(Debug)]
+struct Mark {
+    span: Range<usize>,
+    what: String,
+    hint: String,
+}
+
+impl Faults {
+    pub fn new(path: &Path, text: &str, faults: Vec<Fault>) -> Self {
+        let single = faults
+            .iter()
+            .map(|f| Mark {
+                span: f.span.clone(),
+                what: f.what.clone(),
+                hint: f.hint.clone(),
+            })
+            .collect();
+        Self {
+            path: path.to_owned(),
+            source: NamedSource::new(path.display().to_string(), text.to_owned()),
+            faults,
+            single,
+        }
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The mistakes, in the order of the file.
+    pub fn faults(&self) -> &[Fault] {
+        &self.faults
+    }
+
+    /// Line and column, both from one, of a byte of the text.
+    pub fn line_column(&self, byte: usize) -> (usize, usize) {
+        let text = self.source.inner();
+        let before = &text[..text.floor_char_boundary(byte.min(text.len()))];
+        let line = before.matches('\n').count() + 1;
+        let column = before.rsplit('\n').next().unwrap_or("").chars().count() + 1;
+        (line, column)
+    }
+}
+
+impl fmt::Display for Faults {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (k, fault) in self.faults.iter().enumerate() {
+            let (line, column) = self.line_column(fault.span.start);
+            if k > 0 {
+                writeln!(f)?;
+            }
+            write!(
+                f,
+                "{}:{line}:{column}: {}\n  help: {}",
+                self.path.display(),
+                fault.what,
+                fault.hint
+            )?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for Faults {}
+
+impl Diagnostic for Faults {
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        Some(&self.source)
+    }
+
+    fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
+        Some(Box::new(self.single.iter().map(|m| m as &dyn Diagnostic)))
+    }
+}
+
+impl fmt::Display for Mark {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.what)
+    }
+}
+
+impl std::error::Error for Mark {}
+
+impl Diagnostic for Mark {
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        Some(Box::new(&self.hint))
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        let label = LabeledSpan::new_with_span(Some("here".into()), self.span.clone());
+        Some(Box::new(std::iter::once(label)))
+    }
+}

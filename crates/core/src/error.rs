@@ -1,0 +1,91 @@
+//! Everything that can go wrong, in one enum. Each variant says what, where, and what to do.
+
+use std::path::{Path, PathBuf};
+
+/// Result of every fallible operation of this crate.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// What went wrong. The text of each variant names the place and the remedy.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// One or more mistakes in a text file that a person wrote (design, rules, process, measurement).
+    #[error("{0}")]
+    Text(Box<crate::document::Faults>),
+
+    /// A layout file breaks the GDSII format, or a limit that keeps reading it bounded.
+    #[error("{}, byte {offset}: {what}\n  help: {hint}", path.display())]
+    Layout {
+        path: PathBuf,
+        /// Offset of the record at fault from the start of the file.
+        offset: u64,
+        what: String,
+        hint: String,
+    },
+
+    /// The operating system refused.
+    #[error("cannot {action} {}: {source}{}", path.display(), io_hint(source))]
+    Io {
+        action: &'static str,
+        path: PathBuf,
+        source: std::io::Error,
+    },
+
+    /// A file of numbers (CSV, NPY) that does not hold what was expected.
+    #[error("{}{}: {what}\n  help: {hint}", path.display(), at_line(*line))]
+    Table {
+        path: PathBuf,
+        /// Line of a text file, counted from one; none for a binary one.
+        line: Option<usize>,
+        what: String,
+        hint: String,
+    },
+
+    /// A value that cannot be: out of range, inconsistent, not physical.
+    #[error("{what}\n  help: {hint}")]
+    Invalid { what: String, hint: String },
+
+    /// The user asked to stop. What was complete has been kept, nothing is half written.
+    #[error("interrupted; files written before this run are unchanged")]
+    Interrupted,
+}
+
+impl Error {
+    /// A value that cannot be, with the remedy.
+    pub fn invalid(what: impl Into<String>, hint: impl Into<String>) -> Self {
+        Self::Invalid {
+            what: what.into(),
+            hint: hint.into(),
+        }
+    }
+
+    /// An operating-system error with what was attempted: `Error::io("write", path)`.
+    pub fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::Io { action, path, source }
+    }
+
+    /// Exit code of the program: 2 for bad input, 3 for what could not be done.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Text(_) | Self::Layout { .. } | Self::Table { .. } | Self::Invalid { .. } => 2,
+            Self::Io { source, .. } if source.kind() == std::io::ErrorKind::NotFound => 2,
+            Self::Io { .. } | Self::Interrupted => 3,
+        }
+    }
+}
+
+fn at_line(line: Option<usize>) -> String {
+    line.map_or_else(String::new, |line| format!(", line {line}"))
+}
+
+fn io_hint(source: &std::io::Error) -> &'static str {
+    match source.kind() {
+        std::io::ErrorKind::NotFound => "\n  help: check the path; relative paths count from the file that names them",
+        std::io::ErrorKind::PermissionDenied => "\n  help: choose a folder that you may write to with --out",
+        std::io::ErrorKind::StorageFull => {
+            "\n  help: free space or choose another folder with --out; nothing was replaced"
+        }
+        _ => "",
+    }
+}

@@ -1,0 +1,21 @@
+//! What every room of the project stands on: errors, progress, whole files, documents with spans, the lattice.
+
+mod cross;
+pub mod document;
+mod error;
+pub mod file;
+mod lattice;
+mod layer;
+mod plane;
+mod progress;
+mod wedge;
+
+pub use cross::cross_corners;
+pub use document::{Fault, Faults};
+pub use error::{Error, Result};
+pub use file::WholeFile;
+pub use lattice::{Lattice, WidthMap};
+pub use layer::LayerNumber;
+pub use plane::part;
+pub use progress::{Progress, Silent};
+pub use wedge::Wedge;

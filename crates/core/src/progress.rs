@@ -1,0 +1,29 @@
+//! How long work tells whoever waits for it how far it is, and hears that it should stop.
+
+/// What a caller may watch of a long piece of work. The library prints nothing itself.
+pub trait Progress: Sync {
+    /// A piece of work of `steps` equal steps begins; it ends where the next one begins.
+    fn begin(&self, what: &str, steps: u64);
+
+    /// So many steps more are done. Called from any thread.
+    fn advance(&self, steps: u64);
+
+    /// A word on the state of the work, such as the best merit so far.
+    fn note(&self, _text: &str) {}
+
+    /// Whether the user asked to stop; long work looks here between steps and then returns
+    /// [`crate::error::Error::Interrupted`], or the best it has where that is of use.
+    fn stopped(&self) -> bool {
+        false
+    }
+}
+
+/// Nobody watches.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Silent;
+
+impl Progress for Silent {
+    fn begin(&self, _what: &str, _steps: u64) {}
+
+    fn advance(&self, _steps: u64) {}
+}

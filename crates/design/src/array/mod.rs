@@ -1,0 +1,105 @@
+//! From phase to pillars: the widths of every element, and which of them are copies of one another.
+
+mod symmetry;
+mod widths;
+
+pub use symmetry::{DomainPart, Group, Symmetry};
+pub use widths::WidthRule;
+
+use crate::phase::{ElementPhase, LensPhase};
+use crate::{Design, Element};
+use metalith_core::Progress;
+use metalith_core::{Error, Result};
+use metalith_core::{Lattice, WidthMap};
+
+/// Elements that are the same pillars up to a symmetry of the square.
+#[derive(Clone, Debug)]
+pub struct Class {
+    /// Pillars of the first element of the class.
+    pub widths: WidthMap,
+    /// The symmetries of those pillars, each proven by comparing every site.
+    pub group: Group,
+}
+
+/// One element, as a copy of a class.
+#[derive(Clone, Copy, Debug)]
+pub struct Placed {
+    pub element: Element,
+    /// Index into [`PillarArray::classes`].
+    pub class: usize,
+    /// What turns the pillars of the class into those of the element.
+    pub symmetry: Symmetry,
+}
+
+/// All pillars of the array, each distinct lens once.
+#[derive(Clone, Debug)]
+pub struct PillarArray {
+    pub lattice: Lattice,
+    pub classes: Vec<Class>,
+    pub placed: Vec<Placed>,
+}
+
+impl PillarArray {
+    /// Compute the widths of every element of a design and prove which of them are copies.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] if the user stopped it.
+    pub fn build(design: &Design, progress: &dyn Progress) -> Result<Self> {
+        let lattice = design.lattice();
+        let lens = LensPhase::new(lattice, design.lens.diameter_nm, &design.lens.phase);
+        let rule = WidthRule::new(&design.cell, &design.mapping);
+        let elements = design.elements();
+        progress.begin("widths of the elements", elements.len() as u64);
+        let mut array = Self {
+            lattice,
+            classes: Vec::new(),
+            placed: Vec::new(),
+        };
+        for element in elements {
+            if progress.stopped() {
+                return Err(Error::Interrupted);
+            }
+            let widths = rule.widths(&ElementPhase::new(&lens, &element.wedge));
+            array.place(element, widths);
+            progress.advance(1);
+        }
+        Ok(array)
+    }
+
+    /// Number of pillars of all elements.
+    pub fn pillars(&self) -> u64 {
+        let of_class = self.classes.iter().map(|c| c.widths.pillars()).collect::<Vec<_>>();
+        self.placed.iter().map(|p| of_class[p.class]).sum()
+    }
+
+    /// Share of the area of the lenses that is pillar, 0 to 1.
+    pub fn fill(&self) -> f64 {
+        let of_class = |c: &Class| (c.widths.filled_sites(), c.widths.pillars() as f64);
+        let of_class = self.classes.iter().map(of_class).collect::<Vec<_>>();
+        let pairs = self.placed.iter().map(|p| of_class[p.class]);
+        let (pillars, lens) = pairs.fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+        if lens > 0.0 { pillars / lens } else { 0.0 }
+    }
+
+    /// The pillars of one element.
+    pub fn widths(&self, placed: &Placed) -> WidthMap {
+        placed.symmetry.apply(&self.classes[placed.class].widths)
+    }
+
+    fn place(&mut self, element: Element, widths: WidthMap) {
+        let copy = self.classes.iter().enumerate().find_map(|(class, known)| {
+            let symmetry = Symmetry::ALL.into_iter().find(|s| s.maps(&known.widths, &widths))?;
+            Some((class, symmetry))
+        });
+        let (class, symmetry) = copy.unwrap_or_else(|| {
+            let group = Group::of(&widths);
+            self.classes.push(Class { widths, group });
+            (self.classes.len() - 1, Symmetry::IDENTITY)
+        });
+        self.placed.push(Placed {
+            element,
+            class,
+            symmetry,
+        });
+    }
+}

@@ -1,0 +1,261 @@
+//! The eight symmetries of the square, and the part of a lens that they leave unique.
+
+use metalith_core::WidthMap;
+
+/// One of the eight symmetries of the square, as GDSII writes it: mirrored about the x axis first
+/// (y to -y), then turned counter-clockwise.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Symmetry {
+    pub mirrored: bool,
+    /// Quarter turns counter-clockwise, 0 to 3.
+    pub quarter_turns: u8,
+}
+
+impl Symmetry {
+    pub const IDENTITY: Self = Self {
+        mirrored: false,
+        quarter_turns: 0,
+    };
+
+    /// All eight, the identity first.
+    pub const ALL: [Self; 8] = {
+        let mut all = [Self::IDENTITY; 8];
+        let mut k = 0;
+        while k < 8 {
+            all[k] = Self {
+                mirrored: k >= 4,
+                quarter_turns: k as u8 % 4,
+            };
+            k += 1;
+        }
+        all
+    };
+
+    /// Where a point goes.
+    pub fn point(self, x: i64, y: i64) -> (i64, i64) {
+        let y = if self.mirrored { -y } else { y };
+        match self.quarter_turns {
+            0 => (x, y),
+            1 => (-y, x),
+            2 => (-x, -y),
+            _ => (y, -x),
+        }
+    }
+
+    /// Where a site of a lattice of `n` sites an axis goes.
+    fn site(self, n: usize, ix: usize, iy: usize) -> (usize, usize) {
+        let last = n as i64 - 1;
+        let (x, y) = self.point(2 * ix as i64 - last, 2 * iy as i64 - last);
+        (((x + last) / 2) as usize, ((y + last) / 2) as usize)
+    }
+
+    /// The pillars after this symmetry.
+    pub fn apply(self, widths: &WidthMap) -> WidthMap {
+        let n = widths.lattice.sites();
+        let mut moved = WidthMap::empty(widths.lattice);
+        for ((iy, ix), &w) in widths.width_nm.indexed_iter() {
+            let (jx, jy) = self.site(n, ix, iy);
+            moved.width_nm[[jy, jx]] = w;
+        }
+        moved
+    }
+
+    /// Whether this symmetry turns the pillars `from` into `to`, every site compared.
+    pub fn maps(self, from: &WidthMap, to: &WidthMap) -> bool {
+        let n = from.lattice.sites();
+        // From the middle outwards: sites that differ are found at once there, the rim is mostly empty.
+        let rows = (0..n).map(|k| if k % 2 == 0 { n / 2 + k / 2 } else { n / 2 - 1 - k / 2 });
+        from.lattice == to.lattice
+            && rows.filter(|&iy| iy < n).all(|iy| {
+                (0..n).all(|ix| {
+                    let (jx, jy) = self.site(n, ix, iy);
+                    from.width_nm[[iy, ix]] == to.width_nm[[jy, jx]]
+                })
+            })
+    }
+}
+
+/// The symmetries that leave a lens as it is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Group {
+    members: Vec<Symmetry>,
+}
+
+/// A part of a fundamental domain that the same copies cover the lens with.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DomainPart {
+    /// Which symmetries of the group leave the sites of this part where they are.
+    stabiliser: Stabiliser,
+    /// The symmetries that, applied to the part, give all its copies, each once.
+    pub copies: Vec<Symmetry>,
+    /// Number of pillars of the part.
+    pub pillars: u64,
+}
+
+/// Bit `k` is set if member `k` of the group leaves a site where it is.
+type Stabiliser = u8;
+
+impl Group {
+    /// The group of a lens: each symmetry is tried on every site.
+    pub fn of(widths: &WidthMap) -> Self {
+        Self {
+            members: Symmetry::ALL.into_iter().filter(|s| s.maps(widths, widths)).collect(),
+        }
+    }
+
+    /// No symmetry but the identity: nothing is folded.
+    pub fn trivial() -> Self {
+        Self {
+            members: vec![Symmetry::IDENTITY],
+        }
+    }
+
+    /// The symmetries, the identity first.
+    pub fn members(&self) -> &[Symmetry] {
+        &self.members
+    }
+
+    /// The pillars that the group leaves unique, in parts of equally many copies: inside a lens with
+    /// all eight symmetries an octant with eight copies and its diagonal with four.
+    pub fn domain(&self, widths: &WidthMap) -> Vec<DomainPart> {
+        let n = widths.lattice.sites();
+        let mut parts: Vec<DomainPart> = Vec::new();
+        for ((iy, ix), _) in widths.width_nm.indexed_iter().filter(|(_, w)| **w != 0) {
+            let Some(stabiliser) = self.stabiliser(n, ix, iy) else {
+                continue;
+            };
+            match parts.iter_mut().find(|part| part.stabiliser == stabiliser) {
+                Some(part) => part.pillars += 1,
+                None => parts.push(DomainPart {
+                    stabiliser,
+                    copies: self.copies(n, ix, iy),
+                    pillars: 1,
+                }),
+            }
+        }
+        parts
+    }
+
+    /// Whether a site of a lattice of `n` sites an axis belongs to a part of the domain.
+    pub fn holds(&self, part: &DomainPart, n: usize, ix: usize, iy: usize) -> bool {
+        self.stabiliser(n, ix, iy) == Some(part.stabiliser)
+    }
+
+    /// What leaves a site where it is; none if another copy of the site, the first in reading order,
+    /// stands for it.
+    fn stabiliser(&self, n: usize, ix: usize, iy: usize) -> Option<Stabiliser> {
+        let mut stays = 0;
+        for (k, member) in self.members.iter().enumerate() {
+            let (jx, jy) = member.site(n, ix, iy);
+            match (jy, jx).cmp(&(iy, ix)) {
+                std::cmp::Ordering::Less => return None,
+                std::cmp::Ordering::Equal => stays |= 1 << k,
+                std::cmp::Ordering::Greater => {}
+            }
+        }
+        Some(stays)
+    }
+
+    /// One symmetry for each distinct place that the group moves a site to.
+    fn copies(&self, n: usize, ix: usize, iy: usize) -> Vec<Symmetry> {
+        let mut seen = Vec::new();
+        let mut copies = Vec::new();
+        for member in &self.members {
+            let place = member.site(n, ix, iy);
+            if !seen.contains(&place) {
+                seen.push(place);
+                copies.push(*member);
+            }
+        }
+        copies
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metalith_core::Lattice;
+
+    fn lens(f: impl Fn(i64, i64) -> u16) -> WidthMap {
+        let lattice = Lattice::new(350, 12).unwrap();
+        let mut map = WidthMap::empty(lattice);
+        for iy in 0..12 {
+            for ix in 0..12 {
+                let (x, y) = (lattice.half_index(ix), lattice.half_index(iy));
+                if x * x + y * y <= 121 {
+                    map.width_nm[[iy, ix]] = f(x, y);
+                }
+            }
+        }
+        map
+    }
+
+    /// The domain's copies give every pillar of the lens once.
+    fn unfold(map: &WidthMap, group: &Group) {
+        let n = map.lattice.sites();
+        let mut seen = WidthMap::empty(map.lattice);
+        for part in group.domain(map) {
+            for (iy, ix) in (0..n * n).map(|k| (k / n, k % n)) {
+                if map.width_nm[[iy, ix]] == 0 || !group.holds(&part, n, ix, iy) {
+                    continue;
+                }
+                for s in &part.copies {
+                    let (jx, jy) = s.site(n, ix, iy);
+                    assert_eq!(seen.width_nm[[jy, jx]], 0, "a site covered twice");
+                    seen.width_nm[[jy, jx]] = map.width_nm[[iy, ix]];
+                }
+            }
+        }
+        assert_eq!(&seen, map);
+    }
+
+    #[test]
+    fn a_round_lens_folds_to_an_octant() {
+        let map = lens(|x, y| (100 + x * x + y * y) as u16);
+        let group = Group::of(&map);
+        assert_eq!(group.members().len(), 8);
+        let counts = group
+            .domain(&map)
+            .iter()
+            .map(|p| (p.pillars, p.copies.len() as u64))
+            .collect::<Vec<_>>();
+        assert_eq!(counts.iter().map(|(s, c)| s * c).sum::<u64>(), map.pillars());
+        assert!(counts.iter().any(|c| c.1 == 8) && counts.iter().any(|c| c.1 == 4));
+        unfold(&map, &group);
+    }
+
+    #[test]
+    fn a_wedge_leaves_one_mirror() {
+        for map in [
+            lens(|x, y| (500 + x * x + y * y + 2 * x) as u16),
+            lens(|x, y| (500 + x * x + y * y + 2 * (x + y)) as u16),
+            lens(|x, y| (500 + x * x + y * y - 2 * y) as u16),
+        ] {
+            let group = Group::of(&map);
+            assert_eq!(group.members().len(), 2);
+            unfold(&map, &group);
+        }
+    }
+
+    #[test]
+    fn one_pillar_that_differs_breaks_the_symmetry() {
+        let mut map = lens(|x, y| (100 + x * x + y * y) as u16);
+        map.width_nm[[3, 4]] += 2;
+        let group = Group::of(&map);
+        assert_eq!(group, Group::trivial());
+        unfold(&map, &group);
+    }
+
+    #[test]
+    fn symmetries_move_points_as_gdsii_says() {
+        let mirror_then_turn = Symmetry {
+            mirrored: true,
+            quarter_turns: 1,
+        };
+        assert_eq!(mirror_then_turn.point(3, 1), (1, 3));
+        for s in Symmetry::ALL {
+            let map = lens(|x, y| (400 + 7 * x + 3 * y) as u16);
+            assert!(s.maps(&map, &s.apply(&map)));
+        }
+    }
+}

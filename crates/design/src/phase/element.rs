@@ -1,0 +1,166 @@
+//! The phase of every site of an element.
+
+use super::RadialPhase;
+use metalith_core::{Lattice, Wedge};
+
+/// The radial phase on the sites of a lattice, tabulated once for all elements.
+///
+/// The square of a site's radius is a whole number of squared half pitches, and squares of odd numbers
+/// are one more than a multiple of eight: so one entry for each eighth serves all sites, and sites at
+/// the same radius have the same phase to the last bit.
+#[derive(Clone, Debug)]
+pub struct LensPhase {
+    lattice: Lattice,
+    /// Greatest squared radius inside the lens, in squared half pitches.
+    limit: i64,
+    turns: Vec<f64>,
+    stride: i64,
+    offset: i64,
+}
+
+impl LensPhase {
+    /// Tabulate `radial` for a lens of this diameter on this lattice.
+    pub fn new(lattice: Lattice, diameter_nm: u32, radial: &RadialPhase) -> Self {
+        // r^2 <= R^2 in half pitches: (2 R / p)^2, floored; exact in integers.
+        let (d, p) = (i128::from(diameter_nm), i128::from(lattice.pitch_nm()));
+        let limit = (d * d / (p * p)) as i64;
+        let (stride, offset) = if lattice.sites().is_multiple_of(2) {
+            (8, 2)
+        } else {
+            (4, 0)
+        };
+        let half_pitch_um = lattice.pitch_um() / 2.0;
+        let entries = if limit < offset {
+            0
+        } else {
+            (limit - offset) / stride + 1
+        };
+        let turns = (0..entries)
+            .map(|k| radial.turns((k * stride + offset) as f64 * half_pitch_um * half_pitch_um))
+            .collect();
+        Self {
+            lattice,
+            limit,
+            turns,
+            stride,
+            offset,
+        }
+    }
+
+    /// The lattice that it is tabulated on.
+    pub fn lattice(&self) -> Lattice {
+        self.lattice
+    }
+
+    /// Phase at a site [turns], not reduced; none outside the lens.
+    pub fn turns(&self, ix: usize, iy: usize) -> Option<f64> {
+        let r2 = self.lattice.half_radius2(ix, iy);
+        (r2 <= self.limit).then(|| self.turns[((r2 - self.offset) / self.stride) as usize])
+    }
+}
+
+/// The phase of one element: that of the lens and its wedge.
+#[derive(Clone, Copy, Debug)]
+pub struct ElementPhase<'a> {
+    lens: &'a LensPhase,
+    /// Turns a half pitch along x and y.
+    step: (f64, f64),
+}
+
+impl<'a> ElementPhase<'a> {
+    /// The lens with a wedge on it.
+    pub fn new(lens: &'a LensPhase, wedge: &Wedge) -> Self {
+        let half_pitch_turns = lens.lattice.pitch_um() / 2.0 / wedge.wavelength_um;
+        Self {
+            lens,
+            step: (half_pitch_turns * wedge.sin_x, half_pitch_turns * wedge.sin_y),
+        }
+    }
+
+    /// The lattice that it is tabulated on.
+    pub fn lattice(&self) -> Lattice {
+        self.lens.lattice
+    }
+
+    /// Phase at a site [turns], not reduced; none outside the lens.
+    pub fn turns(&self, ix: usize, iy: usize) -> Option<f64> {
+        let radial = self.lens.turns(ix, iy)?;
+        let (x, y) = (
+            self.lens.lattice.half_index(ix) as f64,
+            self.lens.lattice.half_index(iy) as f64,
+        );
+        // The two parts of the wedge are added first: exchanging x and y then gives the same sum.
+        Some(radial + (x * self.step.0 + y * self.step.1))
+    }
+
+    /// Phase at a site modulo one turn, in [0, 1); none outside the lens.
+    pub fn wrapped(&self, ix: usize, iy: usize) -> Option<f64> {
+        self.turns(ix, iy).map(|turns| {
+            let u = turns - turns.floor();
+            // A tiny negative phase rounds up to one whole turn.
+            if u < 1.0 { u } else { 0.0 }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lens_of_one_millimetre_has_the_sites_of_the_truth_data() {
+        let lattice = Lattice::covering(1_000_000, 350).unwrap();
+        let radial = RadialPhase::Hyperbola {
+            wavelength_um: 0.55,
+            focal_length_um: 2400.0,
+        };
+        let lens = LensPhase::new(lattice, 1_000_000, &radial);
+        let n = lattice.sites();
+        let inside = (0..n)
+            .flat_map(|iy| (0..n).map(move |ix| (ix, iy)))
+            .filter(|&(x, y)| lens.turns(x, y).is_some());
+        assert_eq!((n, inside.count()), (2858, 6_411_448));
+    }
+
+    #[test]
+    fn mirrored_elements_have_mirrored_phases_to_the_last_bit() {
+        let lattice = Lattice::covering(20_000, 350).unwrap();
+        let radial = RadialPhase::Hyperbola {
+            wavelength_um: 0.55,
+            focal_length_um: 30.0,
+        };
+        let lens = LensPhase::new(lattice, 20_000, &radial);
+        let n = lattice.sites();
+        let wedge = |sin_x, sin_y| Wedge {
+            wavelength_um: 0.55,
+            sin_x,
+            sin_y,
+        };
+        let (s, t) = (0.25881904510252074, 0.49999999999999994);
+        let (a, b, c) = (wedge(s, t), wedge(-s, t), wedge(t, s));
+        let (a, b, c) = (
+            ElementPhase::new(&lens, &a),
+            ElementPhase::new(&lens, &b),
+            ElementPhase::new(&lens, &c),
+        );
+        for iy in 0..n {
+            for ix in 0..n {
+                assert_eq!(a.turns(ix, iy), b.turns(n - 1 - ix, iy));
+                assert_eq!(a.turns(ix, iy), c.turns(iy, ix));
+            }
+        }
+    }
+
+    #[test]
+    fn odd_lattices_have_a_site_in_the_centre() {
+        let lattice = Lattice::new(350, 5).unwrap();
+        let radial = RadialPhase::EvenPowers {
+            coefficients_rad: vec![1.0],
+            normalisation_um: 1.0,
+        };
+        let lens = LensPhase::new(lattice, 1_500, &radial);
+        assert_eq!(lens.turns(2, 2), Some(0.0));
+        assert!(lens.turns(3, 2).is_some());
+        assert_eq!(lens.turns(0, 0), None);
+    }
+}

@@ -1,0 +1,9 @@
+//! From a design to the phase of every site: the radial phase that all elements share, and the wedge
+//! that steers each of them. Phases are kept in turns, so that the modulo is exact.
+
+mod element;
+mod radial;
+mod table;
+
+pub use element::{ElementPhase, LensPhase};
+pub use radial::{Interpolation, RadialPhase};

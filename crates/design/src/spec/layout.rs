@@ -1,0 +1,315 @@
+//! `[layout]`, `[layers]`, `[apertures]`, `[chip]`, `[[mark]]`: how the design is written to files.
+
+use chrono::NaiveDateTime;
+use serde::Serialize;
+
+use super::{ArraySpec, LensSpec};
+use metalith_core::LayerNumber;
+use metalith_core::document::{Limits, Section};
+
+/// How the geometry is nested in the file. All three hold the same geometry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Hierarchy {
+    /// The smallest part that symmetry leaves unique, referenced with mirrors and rotations.
+    Folded,
+    /// One reference for each pillar to a cell for each width.
+    Sref,
+    /// One square for each pillar, all in the top cell.
+    Flat,
+}
+
+/// A GDSII layer, and what it is for.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Layer {
+    pub layer: i16,
+    pub datatype: i16,
+    /// For people: shown in the viewer and in the hand-off.
+    pub purpose: String,
+}
+
+impl Layer {
+    /// Its number as readers of layouts know it.
+    pub fn number(&self) -> LayerNumber {
+        // Both are 0 to 255, checked when the design was read.
+        LayerNumber::new(self.layer as u16, self.datatype as u16)
+    }
+}
+
+/// The layers of both files.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Layers {
+    /// Pillars: exposed in the first step.
+    pub pillars: Layer,
+    /// Openings of the metal: exposed in the second step.
+    pub apertures: Layer,
+    /// Marks written with the pillars.
+    pub pillar_marks: Layer,
+    /// Marks written with the apertures.
+    pub aperture_marks: Layer,
+    /// Outline of the chip; not exposed.
+    pub outline: Layer,
+    /// Text for people; not exposed.
+    pub label: Layer,
+}
+
+/// Circular openings in the metal, one round each lens.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ApertureSpec {
+    /// Distance from the rim of the lens to the metal [nm].
+    pub margin_nm: i64,
+    /// Largest distance between a circle and its polygon [nm].
+    pub chord_error_nm: f64,
+    /// Most vertices of a polygon, the closing one counted.
+    pub max_vertices: usize,
+}
+
+/// The piece of glass.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ChipSpec {
+    /// Edges along x and y [nm]; the centre element is in its middle.
+    pub size_nm: (i64, i64),
+}
+
+/// A set of equal crosses for alignment, in both steps.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MarkSpec {
+    /// What the set is for, such as "global".
+    pub name: String,
+    /// Length of an arm from tip to tip [nm].
+    pub length_nm: i64,
+    /// Width of an arm [nm].
+    pub width_nm: i64,
+    /// Centres on the chip [nm].
+    pub centres_nm: Vec<(i64, i64)>,
+}
+
+/// Everything about the files that is not the pillars themselves.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LayoutSpec {
+    pub hierarchy: Hierarchy,
+    /// The date in the headers of the file. One fixed date, so that equal designs give equal bytes.
+    pub timestamp: NaiveTimestamp,
+    pub layers: Layers,
+    pub apertures: ApertureSpec,
+    pub chip: ChipSpec,
+    pub marks: Vec<MarkSpec>,
+}
+
+/// `YYYY-MM-DDThh:mm:ss`.
+pub type NaiveTimestamp = String;
+
+/// A valid date for every reader of the format, and not "now".
+const FIXED_TIMESTAMP: &str = "2000-01-01T00:00:00";
+
+impl LayoutSpec {
+    pub fn read(root: &Section<'_, '_>, lens: &LensSpec, array: &ArraySpec) -> Self {
+        let layout = root.optional_section("layout");
+        let (mut hierarchy, mut timestamp) = (Hierarchy::Folded, FIXED_TIMESTAMP.to_owned());
+        if let Some(s) = &layout {
+            let choices = [
+                ("folded", Hierarchy::Folded),
+                ("sref", Hierarchy::Sref),
+                ("flat", Hierarchy::Flat),
+            ];
+            hierarchy = s.choice("hierarchy", &choices, Some(Hierarchy::Folded));
+            if let Some(text) = s.optional_text("timestamp") {
+                if text.parse::<NaiveDateTime>().is_err() {
+                    s.fault(
+                        "timestamp",
+                        format!("\"{text}\" is not a date and time"),
+                        "write it as \"2026-01-31T12:00:00\"",
+                    );
+                }
+                timestamp = text;
+            }
+            s.finish();
+        }
+        let layers = Layers::read(&root.section("layers"));
+        let apertures = ApertureSpec::read(&root.section("apertures"), lens);
+        let chip = ChipSpec::read(&root.section("chip"), lens, array);
+        let marks = root.sections("mark").iter().map(|s| MarkSpec::read(s, &chip)).collect();
+        Self {
+            hierarchy,
+            timestamp,
+            layers,
+            apertures,
+            chip,
+            marks,
+        }
+    }
+}
+
+impl Layers {
+    /// All layers with their key in the design file, in the order of both steps.
+    pub fn all(&self) -> [(&'static str, &Layer); 6] {
+        [
+            ("pillars", &self.pillars),
+            ("pillar_marks", &self.pillar_marks),
+            ("apertures", &self.apertures),
+            ("aperture_marks", &self.aperture_marks),
+            ("outline", &self.outline),
+            ("label", &self.label),
+        ]
+    }
+
+    fn read(s: &Section<'_, '_>) -> Self {
+        let one = |key: &str| {
+            let layer = s.section(key);
+            let read = Layer {
+                layer: layer.integer("layer", 0..=255, "") as i16,
+                datatype: layer.integer("datatype", 0..=255, "") as i16,
+                purpose: layer.text("purpose"),
+            };
+            layer.finish();
+            read
+        };
+        let layers = Self {
+            pillars: one("pillars"),
+            apertures: one("apertures"),
+            pillar_marks: one("pillar_marks"),
+            aperture_marks: one("aperture_marks"),
+            outline: one("outline"),
+            label: one("label"),
+        };
+        let all = layers.all();
+        for (k, (key, layer)) in all.iter().enumerate() {
+            let number = |l: &Layer| (l.layer, l.datatype);
+            if let Some((other, _)) = all[..k].iter().find(|(_, l)| number(l) == number(layer))
+                && s.has(key)
+                && s.has(other)
+            {
+                s.fault(
+                    key,
+                    format!(
+                        "`{key}` is on the layer of `{other}`, {}/{}",
+                        layer.layer, layer.datatype
+                    ),
+                    "give each purpose a layer or datatype of its own",
+                );
+            }
+        }
+        s.finish();
+        layers
+    }
+}
+
+impl ApertureSpec {
+    fn read(s: &Section<'_, '_>, lens: &LensSpec) -> Self {
+        let spec = Self {
+            margin_nm: nanometres(s, "margin_um", s.float("margin_um", Limits::new(0.2..=1000.0, "um"))),
+            chord_error_nm: s.float("chord_error_nm", Limits::new(0.5..=10_000.0, "nm")),
+            max_vertices: s.optional_integer("max_vertices", 16..=8191, "vertices").unwrap_or(200) as usize,
+        };
+        let radius_nm = f64::from(lens.diameter_nm) / 2.0 + spec.margin_nm as f64;
+        if spec.vertices(radius_nm) + 1 > spec.max_vertices {
+            s.fault(
+                "chord_error_nm",
+                format!(
+                    "this takes {} vertices, `max_vertices` is {}",
+                    spec.vertices(radius_nm) + 1,
+                    spec.max_vertices
+                ),
+                format!(
+                    "allow at least {:.1} nm, or more vertices (readers of old take 200, the format 8191)",
+                    spec.error_nm(radius_nm)
+                ),
+            );
+        }
+        s.finish();
+        spec
+    }
+
+    /// Corners of the polygon round a circle of this radius, so that it keeps to the chord error: a
+    /// multiple of eight, so that it has the symmetries of the square.
+    pub fn vertices(&self, radius_nm: f64) -> usize {
+        let half_angle = (radius_nm / (radius_nm + self.chord_error_nm)).acos();
+        ((std::f64::consts::PI / half_angle / 8.0).ceil() as usize).max(2) * 8
+    }
+
+    /// Chord error that the most vertices allowed reach [nm].
+    fn error_nm(&self, radius_nm: f64) -> f64 {
+        let corners = ((self.max_vertices - 1) / 8 * 8).max(8) as f64;
+        radius_nm * (1.0 / (std::f64::consts::PI / corners).cos() - 1.0)
+    }
+}
+
+impl ChipSpec {
+    fn read(s: &Section<'_, '_>, lens: &LensSpec, array: &ArraySpec) -> Self {
+        let size_um = s.array::<2>("size_um", Limits::new(10.0..=300_000.0, "um"));
+        let size_nm = (
+            nanometres(s, "size_um", size_um[0]),
+            nanometres(s, "size_um", size_um[1]),
+        );
+        let needed = |count: u32| i64::from(count - 1) * array.spacing_nm + i64::from(lens.diameter_nm);
+        let (x, y) = (needed(array.count.0.max(1)), needed(array.count.1.max(1)));
+        if s.has("size_um") && (size_nm.0 < x || size_nm.1 < y) {
+            s.fault(
+                "size_um",
+                "the elements reach beyond the chip",
+                format!("use at least {} by {} um", x as f64 * 1e-3, y as f64 * 1e-3),
+            );
+        }
+        s.finish();
+        Self { size_nm }
+    }
+}
+
+impl MarkSpec {
+    fn read(s: &Section<'_, '_>, chip: &ChipSpec) -> Self {
+        let xs = s.floats("x_um", PLACE);
+        let ys = s.floats("y_um", PLACE);
+        if xs.len() != ys.len() || xs.is_empty() {
+            s.fault(
+                "y_um",
+                format!("{} places along x, {} along y", xs.len(), ys.len()),
+                "give one entry of `x_um` and one of `y_um` for each cross",
+            );
+        }
+        let spec = Self {
+            name: s.text("name"),
+            length_nm: nanometres(s, "length_um", s.float("length_um", Limits::new(0.1..=10_000.0, "um"))),
+            width_nm: nanometres(s, "width_um", s.float("width_um", Limits::new(0.01..=1_000.0, "um"))),
+            centres_nm: xs
+                .iter()
+                .zip(&ys)
+                .map(|(&x, &y)| (nanometres(s, "x_um", x), nanometres(s, "y_um", y)))
+                .collect(),
+        };
+        if spec.length_nm % 2 != 0 || spec.width_nm % 2 != 0 || spec.width_nm >= spec.length_nm {
+            s.fault(
+                "width_um",
+                "the arms of the cross are not centred or wider than long",
+                "use even numbers of nanometres, the width below the length",
+            );
+        }
+        let reach = spec.length_nm / 2;
+        if spec
+            .centres_nm
+            .iter()
+            .any(|c| c.0.abs() + reach > chip.size_nm.0 / 2 || c.1.abs() + reach > chip.size_nm.1 / 2)
+        {
+            s.fault(
+                "x_um",
+                format!("a cross of the set \"{}\" reaches beyond the chip", spec.name),
+                "move it inwards or enlarge [chip]",
+            );
+        }
+        s.finish();
+        spec
+    }
+}
+
+const PLACE: Limits = Limits {
+    range: -150_000.0..=150_000.0,
+    unit: "um",
+};
+
+/// Micrometres in the file to nanometres of the layout; anything between two nanometres is a fault.
+fn nanometres(s: &Section<'_, '_>, key: &str, um: f64) -> i64 {
+    let nm = (um * 1e3).round();
+    if (um * 1e3 - nm).abs() > 1e-6 * nm.abs().max(1.0) {
+        s.fault(key, format!("{um} um is not whole nanometres"), "round it to 0.001 um");
+    }
+    nm as i64
+}

@@ -1,0 +1,17 @@
+//! The sections of a design file, one module each.
+
+mod array;
+mod cell;
+mod layout;
+mod lens;
+mod mapping;
+mod optimise;
+mod verify;
+
+pub use array::{ArraySpec, Element};
+pub use cell::CellSpec;
+pub use layout::{ApertureSpec, ChipSpec, Hierarchy, Layer, Layers, LayoutSpec, MarkSpec};
+pub use lens::LensSpec;
+pub use mapping::MappingSpec;
+pub use optimise::{MeritSpec, OptimiseSpec, RobustSpec, SolverSpec, StartSpec, ViewSpec};
+pub use verify::{CellIncidence, FieldAngle, LimitSpec, VerifySpec};

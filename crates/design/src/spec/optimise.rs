@@ -1,0 +1,315 @@
+//! `[optimise]`: how `metalith optimize` finds the radial phase.
+
+use serde::Serialize;
+
+use super::lens::WAVELENGTH;
+use metalith_cell::Fidelity;
+use metalith_core::document::{Limits, Section};
+
+/// How the radial phase is optimised. Every key has a default: an empty section asks for the largest mean
+/// logarithm of the Strehl ratio from 400 to 700 nm with the rigorous cell.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OptimiseSpec {
+    /// The cell that phases are optimised with.
+    pub fidelity: Fidelity,
+    pub solver: SolverSpec,
+    /// First and last wavelength [um], and their distance.
+    pub band_um: (f64, f64),
+    pub step_um: f64,
+    /// Largest wrapped phase step from ring to ring [turns]; 0.5 is no limit.
+    pub step_limit_turns: f64,
+    pub start: StartSpec,
+    /// Decides all that is random.
+    pub seed: u64,
+    pub merit: MeritSpec,
+    pub robust: Option<RobustSpec>,
+    pub views: ViewSpec,
+    /// Bound of all kernels together [MB].
+    pub memory_mb: u64,
+}
+
+/// Which solver, and for how long.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SolverSpec {
+    /// Ring by ring, the best of all widths, and then blocks of rings. With the merit `deconvolution`, blocks
+    /// alone, one chain, from the first start; chains, sweeps and temperature then make the start `log`.
+    Exchange {
+        /// Exchanges that begin from different phases or seeds.
+        chains: u32,
+        hot_sweeps: u32,
+        /// First and last temperature, in units of the merit.
+        temperature: (f64, f64),
+        /// Blocks at most; they end when none promises any gain.
+        blocks: u32,
+    },
+    /// Up the gradient.
+    Adam { steps: u32, rate_turns: f64 },
+}
+
+/// Phases to begin from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StartSpec {
+    /// One chain after the other takes the next of all below.
+    All,
+    LogAsphere,
+    Hyperbolic,
+    Random,
+    /// The `[phase]` of the design.
+    Previous,
+    /// What exchange makes of a logarithmic asphere for the merit `log`.
+    Log,
+}
+
+/// Weights of the merits in their sum.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct MeritSpec {
+    pub sum: f64,
+    pub log: f64,
+    pub deconvolution: f64,
+    pub side_lobes: f64,
+    /// Energy beyond this is side lobe [um].
+    pub side_lobe_radius_um: f64,
+}
+
+/// Errors of fabrication that merits are taken in expectation over, as standard deviations.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct RobustSpec {
+    pub width_bias_nm: f64,
+    /// Film height, of itself.
+    pub height: f64,
+    pub gap_um: f64,
+    /// Errors drawn to optimise over.
+    pub draws: u32,
+}
+
+/// What image errors are expected over.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ViewSpec {
+    pub angles_deg: Vec<f64>,
+    /// Distance of wavelengths [um].
+    pub step_um: f64,
+    /// Pixels along a side of the window, even.
+    pub pixels: usize,
+    pub pixel_um: f64,
+    /// Weight of the error with one filter for all wavelengths of a colour channel.
+    pub shared_filter: f64,
+    /// Wavelengths of each channel that a step draws.
+    pub drawn: usize,
+}
+
+impl OptimiseSpec {
+    /// Read the section, or take the defaults where there is none.
+    pub fn read(s: Option<&Section<'_, '_>>) -> Self {
+        let Some(s) = s else { return Self::default() };
+        let default = Self::default();
+        let merit = s
+            .optional_section("merit")
+            .map_or(default.merit, |m| MeritSpec::read(&m));
+        let images = merit.deconvolution != 0.0;
+        let (short, long) = s
+            .optional_array::<2>("band_nm", WAVELENGTH)
+            .map_or(default.band_um, |b| {
+                if b[0] >= b[1] {
+                    s.fault(
+                        "band_nm",
+                        "the band ends before it begins",
+                        "give the shorter wavelength first",
+                    );
+                }
+                (b[0] * 1e-3, b[1] * 1e-3)
+            });
+        let solver = SolverSpec::read(s, images);
+        let spec = Self {
+            fidelity: s.choice(
+                "cell",
+                &[
+                    ("rigorous", Fidelity::Rigorous),
+                    ("fitted", Fidelity::Fitted),
+                    ("published", Fidelity::Published),
+                ],
+                Some(default.fidelity),
+            ),
+            solver,
+            band_um: (short, long),
+            step_um: s
+                .optional_float("step_nm", Limits::new(0.1..=50.0, "nm"))
+                .unwrap_or(1.0)
+                * 1e-3,
+            step_limit_turns: s
+                .optional_float("step_limit_turns", Limits::new(0.01..=0.5, "turns; 0.5 is no limit"))
+                .unwrap_or(default.step_limit_turns),
+            start: s.choice(
+                "start",
+                &[
+                    ("all", StartSpec::All),
+                    ("log_asphere", StartSpec::LogAsphere),
+                    ("hyperbolic", StartSpec::Hyperbolic),
+                    ("random", StartSpec::Random),
+                    ("previous", StartSpec::Previous),
+                    ("log", StartSpec::Log),
+                ],
+                Some(match solver {
+                    SolverSpec::Adam { .. } if images => StartSpec::Log,
+                    _ => default.start,
+                }),
+            ),
+            seed: s.optional_integer("seed", 0..=i64::MAX, "").unwrap_or(1) as u64,
+            merit,
+            robust: s.optional_section("robust").map(|r| RobustSpec::read(&r)),
+            views: s
+                .optional_section("views")
+                .map_or_else(|| default.views.clone(), |v| ViewSpec::read(&v)),
+            memory_mb: s
+                .optional_integer("memory_mb", 16..=1 << 20, "MB")
+                .map_or(if images { 8192 } else { default.memory_mb }, |m| m as u64),
+        };
+        s.finish();
+        spec
+    }
+}
+
+impl Default for OptimiseSpec {
+    fn default() -> Self {
+        Self {
+            fidelity: Fidelity::Rigorous,
+            solver: SolverSpec::EXCHANGE,
+            band_um: (0.4, 0.7),
+            step_um: 1e-3,
+            step_limit_turns: 0.2,
+            start: StartSpec::All,
+            seed: 1,
+            merit: MeritSpec::LOG,
+            robust: None,
+            views: ViewSpec {
+                angles_deg: vec![0.0, 15.0, 30.0],
+                step_um: 0.01,
+                pixels: 160,
+                pixel_um: 5.86,
+                shared_filter: 0.5,
+                drawn: 3,
+            },
+            memory_mb: 1024,
+        }
+    }
+}
+
+impl SolverSpec {
+    /// Chains, hot sweeps and temperatures of an exchange where nothing else is asked for.
+    pub const ANNEALED: (u32, u32, (f64, f64)) = (4, 60, (3e-3, 1e-4));
+
+    /// Blocks after the sweeps, and of image errors: where they commonly gain no more.
+    const BLOCKS: (u32, u32) = (60, 120);
+
+    const EXCHANGE: Self = {
+        let (chains, hot_sweeps, temperature) = Self::ANNEALED;
+        Self::Exchange {
+            chains,
+            hot_sweeps,
+            temperature,
+            blocks: Self::BLOCKS.0,
+        }
+    };
+
+    fn read(s: &Section<'_, '_>, images: bool) -> Self {
+        let words = [("exchange", false), ("adam", true)];
+        let (chains, hot_sweeps, temperature) = Self::ANNEALED;
+        if s.choice("solver", &words, Some(false)) {
+            Self::Adam {
+                steps: s.optional_integer("steps", 1..=1_000_000, "").unwrap_or(400) as u32,
+                rate_turns: s
+                    .optional_float("rate_turns", Limits::new(1e-6..=0.5, "turns"))
+                    .unwrap_or(0.01),
+            }
+        } else {
+            let temperature = s
+                .optional_array::<2>("temperature", Limits::new(1e-12..=1e3, ""))
+                .map_or(temperature, |t| (t[0], t[1]));
+            Self::Exchange {
+                chains: s.optional_integer("chains", 1..=1024, "").map_or(chains, |c| c as u32),
+                hot_sweeps: s
+                    .optional_integer("hot_sweeps", 0..=100_000, "")
+                    .map_or(hot_sweeps, |n| n as u32),
+                temperature,
+                blocks: s
+                    .optional_integer("blocks", 0..=1_000_000, "")
+                    .map_or(if images { Self::BLOCKS.1 } else { Self::BLOCKS.0 }, |n| n as u32),
+            }
+        }
+    }
+}
+
+impl MeritSpec {
+    /// The mean logarithm of the Strehl ratio alone.
+    pub const LOG: Self = Self {
+        sum: 0.0,
+        log: 1.0,
+        deconvolution: 0.0,
+        side_lobes: 0.0,
+        side_lobe_radius_um: 10.0,
+    };
+
+    fn read(s: &Section<'_, '_>) -> Self {
+        let weight = |key| s.optional_float(key, Limits::new(0.0..=1e9, "")).unwrap_or(0.0);
+        let merit = Self {
+            sum: weight("sum"),
+            log: weight("log"),
+            deconvolution: weight("deconvolution"),
+            side_lobes: weight("side_lobes"),
+            side_lobe_radius_um: s
+                .optional_float("side_lobe_radius_um", Limits::new(0.5..=80.0, "um"))
+                .unwrap_or(Self::LOG.side_lobe_radius_um),
+        };
+        if merit.sum + merit.log + merit.deconvolution + merit.side_lobes == 0.0 {
+            s.fault(
+                "log",
+                "all merits have a weight of zero",
+                "give one of sum, log, deconvolution, side_lobes a weight",
+            );
+        }
+        s.finish();
+        merit
+    }
+}
+
+impl RobustSpec {
+    fn read(s: &Section<'_, '_>) -> Self {
+        let float = |key, most, unit, default| s.optional_float(key, Limits::new(0.0..=most, unit)).unwrap_or(default);
+        let spec = Self {
+            width_bias_nm: float("width_bias_nm", 50.0, "nm", 6.0),
+            height: float("height_percent", 20.0, "%", 2.0) * 1e-2,
+            gap_um: float("gap_um", 1000.0, "um", 10.0),
+            draws: s.optional_integer("draws", 1..=256, "").unwrap_or(16) as u32,
+        };
+        s.finish();
+        spec
+    }
+}
+
+impl ViewSpec {
+    fn read(s: &Section<'_, '_>) -> Self {
+        let default = OptimiseSpec::default().views;
+        let angles = s.floats("angles_deg", Limits::new(-60.0..=60.0, "degrees"));
+        let spec = Self {
+            angles_deg: if angles.is_empty() { default.angles_deg } else { angles },
+            step_um: s
+                .optional_float("step_nm", Limits::new(1.0..=50.0, "nm"))
+                .map_or(default.step_um, |v| v * 1e-3),
+            pixels: s
+                .optional_integer("pixels", 8..=1024, "")
+                .map_or(default.pixels, |v| v as usize & !1),
+            pixel_um: s
+                .optional_float("pixel_um", Limits::new(0.5..=50.0, "um"))
+                .unwrap_or(default.pixel_um),
+            shared_filter: s
+                .optional_float("shared_filter", Limits::new(0.0..=1.0, ""))
+                .unwrap_or(default.shared_filter),
+            drawn: s
+                .optional_integer("drawn", 1..=100, "")
+                .map_or(default.drawn, |v| v as usize),
+        };
+        s.finish();
+        spec
+    }
+}

@@ -1,0 +1,143 @@
+//! `[verify]`: what is computed from the written file, and what must hold of it.
+
+use serde::Serialize;
+
+use super::lens::WAVELENGTH;
+use metalith_core::document::{Limits, Section};
+
+/// What is simulated from the layout that was read back, and the limits it is held to.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct VerifySpec {
+    /// Wavelengths of the PSFs [um].
+    pub wavelengths_um: Vec<f64>,
+    /// Field angles, counted from where an element looks.
+    pub field_angles: Vec<FieldAngle>,
+    /// At which angle light is taken to pass the cells.
+    pub incidence: CellIncidence,
+    /// Edge of the square window about the chief ray, in samples of one pitch.
+    pub window_samples: usize,
+    /// Edge of a sensor pixel [um].
+    pub pixel_um: f64,
+    pub limits: LimitSpec,
+}
+
+/// The angle of incidence that the cells are solved for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CellIncidence {
+    /// Along the normal, whatever the field angle; the same cell everywhere.
+    Normal,
+    /// As light arrives at each element from each field angle, both polarisations; the cells are solved once
+    /// for each direction and wavelength.
+    AsLit,
+}
+
+/// A direction of light as an element sees it, from the middle of its field.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct FieldAngle {
+    pub x_deg: f64,
+    pub y_deg: f64,
+}
+
+/// Limits past which a layout is not what was designed. All differences are extracted against designed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LimitSpec {
+    /// Pillars whose width differs from the intended one, and pillars missing or extra.
+    pub wrong_widths_max: u64,
+    /// Shapes on the pillar layer that are not a pillar on the lattice.
+    pub foreign_shapes_max: u64,
+    /// Root mean square phase error of rounding widths to the step [rad].
+    pub rounding_phase_rms_max_rad: f64,
+    /// Strehl of the layout over that of the unrounded design phase.
+    pub strehl_ratio_min: f64,
+    /// Distance of the centroids [um].
+    pub centroid_shift_max_um: f64,
+    /// Largest difference of the MTF at 42.7 and 85.3 line pairs a millimetre.
+    pub mtf_difference_max: f64,
+    /// Root mean square difference of the PSFs over that of the designed one.
+    pub psf_difference_max: f64,
+}
+
+impl VerifySpec {
+    pub(crate) fn read(s: &Section<'_, '_>) -> Self {
+        let wavelengths_nm = s.floats("wavelengths_nm", WAVELENGTH);
+        if wavelengths_nm.is_empty() {
+            s.fault(
+                "wavelengths_nm",
+                "no wavelength to verify at",
+                "add `wavelengths_nm`: a list of numbers in nm",
+            );
+        }
+        let x = s.floats("field_x_deg", ANGLE);
+        let mut y = s.floats("field_y_deg", ANGLE);
+        y.resize(y.len().max(x.len()), 0.0);
+        if y.len() != x.len() {
+            s.fault(
+                "field_y_deg",
+                "more angles along y than along x",
+                "give one entry for each of `field_x_deg`",
+            );
+        }
+        let mut field_angles: Vec<_> = x
+            .iter()
+            .zip(&y)
+            .map(|(&x_deg, &y_deg)| FieldAngle { x_deg, y_deg })
+            .collect();
+        if field_angles.is_empty() {
+            field_angles.push(FieldAngle { x_deg: 0.0, y_deg: 0.0 });
+        }
+        let spec = Self {
+            wavelengths_um: wavelengths_nm.iter().map(|nm| nm * 1e-3).collect(),
+            field_angles,
+            incidence: s.choice(
+                "incidence",
+                &[("normal", CellIncidence::Normal), ("as_lit", CellIncidence::AsLit)],
+                Some(CellIncidence::Normal),
+            ),
+            window_samples: s
+                .optional_integer("window_samples", 16..=2048, "samples")
+                .unwrap_or(256) as usize,
+            pixel_um: s
+                .optional_float("pixel_um", Limits::new(0.1..=100.0, "um"))
+                .unwrap_or(5.86),
+            limits: LimitSpec::read(s.optional_section("limits").as_ref()),
+        };
+        s.finish();
+        spec
+    }
+}
+
+impl LimitSpec {
+    fn read(section: Option<&Section<'_, '_>>) -> Self {
+        let mut limits = Self {
+            wrong_widths_max: 0,
+            foreign_shapes_max: 0,
+            rounding_phase_rms_max_rad: 0.05,
+            strehl_ratio_min: 0.0,
+            centroid_shift_max_um: f64::MAX,
+            mtf_difference_max: f64::MAX,
+            psf_difference_max: f64::MAX,
+        };
+        let Some(s) = section else { return limits };
+        let count = |key, default: u64| s.optional_integer(key, 0..=i64::MAX, "").map_or(default, |v| v as u64);
+        let real = |key, unit, default: f64| {
+            s.optional_float(key, Limits::new(0.0..=f64::MAX, unit))
+                .unwrap_or(default)
+        };
+        limits.wrong_widths_max = count("wrong_widths_max", limits.wrong_widths_max);
+        limits.foreign_shapes_max = count("foreign_shapes_max", limits.foreign_shapes_max);
+        limits.rounding_phase_rms_max_rad =
+            real("rounding_phase_rms_max_rad", "rad", limits.rounding_phase_rms_max_rad);
+        limits.strehl_ratio_min = real("strehl_ratio_min", "", limits.strehl_ratio_min);
+        limits.centroid_shift_max_um = real("centroid_shift_max_um", "um", limits.centroid_shift_max_um);
+        limits.mtf_difference_max = real("mtf_difference_max", "", limits.mtf_difference_max);
+        limits.psf_difference_max = real("psf_difference_max", "", limits.psf_difference_max);
+        s.finish();
+        limits
+    }
+}
+
+const ANGLE: Limits = Limits {
+    range: -89.0..=89.0,
+    unit: "degrees",
+};

@@ -1,0 +1,262 @@
+//! Two contents side by side.
+
+use super::DiffPlan;
+use super::area::same_cover;
+use super::content::{Content, Outlines, Ring, area2};
+use super::report::{Change, ChangeMap, ElementDiff, LayerDiff, LayoutDiff, TextAt, TreeDiff};
+use metalith_gds::extract::ExtractedElement;
+use metalith_gds::{LayerNumber, Point, Rect};
+
+/// Tiles along the longer side of the map of changes.
+const TILES: usize = 128;
+
+/// Everything that differs; `unit_nm` is the common unit.
+pub(super) fn compare(a: Content, b: Content, unit_nm: f64, plan: &DiffPlan) -> LayoutDiff {
+    let mut changes = Changes {
+        plan: *plan,
+        total: 0,
+        listed: Vec::new(),
+        map: map_over(&a, &b, unit_nm),
+    };
+    let elements: Vec<ElementDiff> = a
+        .elements
+        .iter()
+        .zip(&b.elements)
+        .map(|(a, b)| element(a, b, &mut changes))
+        .collect();
+    let mut numbers: Vec<LayerNumber> = a.counts.keys().chain(b.counts.keys()).copied().collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    let nothing = Outlines::default();
+    let layers: Vec<LayerDiff> = numbers
+        .into_iter()
+        .map(|number| {
+            let outlines = |c: &'_ Content| c.outlines.contains_key(&number);
+            let of_a = if outlines(&a) { &a.outlines[&number] } else { &nothing };
+            let of_b = if outlines(&b) { &b.outlines[&number] } else { &nothing };
+            let count = |c: &Content| c.counts.get(&number).copied().unwrap_or(0);
+            layer(number, [count(&a), count(&b)], of_a, of_b, unit_nm, &mut changes)
+        })
+        .collect();
+    let (texts_a, texts_b) = apart(&a.texts, &b.texts);
+    let texts = |list: Vec<&(LayerNumber, String, Point)>| -> Vec<TextAt> {
+        let at = |p: Point| [p.x as f64 * unit_nm, p.y as f64 * unit_nm];
+        let text = |t: &(LayerNumber, String, Point)| TextAt {
+            layer: t.0,
+            string: t.1.clone(),
+            at_nm: at(t.2),
+        };
+        list.into_iter().map(text).collect()
+    };
+    let (texts_only_in_a, texts_only_in_b) = (texts(texts_a), texts(texts_b));
+    let same = |l: &LayerDiff| l.same_area || l.only_in_a + l.only_in_b == 0;
+    LayoutDiff {
+        a: String::new(),
+        b: String::new(),
+        same_bytes: false,
+        same_geometry: elements.iter().all(|e| e.changed() == 0)
+            && layers.iter().all(same)
+            && texts_only_in_a.is_empty()
+            && texts_only_in_b.is_empty(),
+        tree: TreeDiff::default(),
+        elements,
+        layers,
+        texts_only_in_a,
+        texts_only_in_b,
+        changes: changes.total,
+        listed: changes.listed,
+        map: changes.map,
+    }
+}
+
+struct Changes {
+    plan: DiffPlan,
+    total: u64,
+    listed: Vec<Change>,
+    map: ChangeMap,
+}
+
+impl Changes {
+    fn add(&mut self, what: &'static str, layer: LayerNumber, bounds_nm: [f64; 4], width_nm: Option<[u16; 2]>) {
+        self.total += 1;
+        let map = &mut self.map;
+        if map.counts.is_empty() {
+            map.counts = vec![0; map.columns * map.rows];
+        }
+        let [x0, y0, x1, y1] = map.bounds_nm;
+        let tile = |low: f64, high: f64, from: f64, to: f64, n: usize| {
+            let share = ((low + high) / 2.0 - from) / (to - from).max(f64::MIN_POSITIVE);
+            ((share * n as f64) as usize).min(n - 1)
+        };
+        let column = tile(bounds_nm[0], bounds_nm[2], x0, x1, map.columns);
+        let row = tile(bounds_nm[1], bounds_nm[3], y0, y1, map.rows);
+        map.counts[row * map.columns + column] += 1;
+        if self.listed.len() < self.plan.listed {
+            self.listed.push(Change {
+                what,
+                layer,
+                bounds_nm,
+                width_nm,
+            });
+        }
+    }
+}
+
+/// Tiles over everything that either layout holds.
+fn map_over(a: &Content, b: &Content, unit_nm: f64) -> ChangeMap {
+    let mut all = Rect::EMPTY;
+    for content in [a, b] {
+        for outlines in content.outlines.values() {
+            for r in &outlines.rects {
+                let [x0, y0, x1, y1] = r.map(i64::from);
+                all.unite(&Rect { x0, y0, x1, y1 });
+            }
+            outlines.rings.iter().for_each(|ring| all.unite(&Rect::around(ring)));
+        }
+    }
+    let mut bounds = if all.is_empty() {
+        [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY]
+    } else {
+        [all.x0, all.y0, all.x1, all.y1].map(|v| v as f64 * unit_nm)
+    };
+    for e in &a.elements {
+        let half = (e.site.lattice.coordinate_nm(0).abs() + i64::from(e.site.lattice.pitch_nm())) as f64;
+        for axis in 0..2 {
+            let centre = e.site.centre_nm[axis] as f64;
+            bounds[axis] = bounds[axis].min(centre - half);
+            bounds[axis + 2] = bounds[axis + 2].max(centre + half);
+        }
+    }
+    if !bounds.iter().all(|v| v.is_finite()) {
+        bounds = [0.0, 0.0, 1.0, 1.0];
+    }
+    let (width, height) = ((bounds[2] - bounds[0]).max(1.0), (bounds[3] - bounds[1]).max(1.0));
+    let tile = width.max(height) / TILES as f64;
+    let tiles = |length: f64| ((length / tile).ceil() as usize).clamp(1, TILES);
+    ChangeMap {
+        bounds_nm: bounds,
+        columns: tiles(width),
+        rows: tiles(height),
+        counts: Vec::new(),
+    }
+}
+
+fn element(a: &ExtractedElement, b: &ExtractedElement, changes: &mut Changes) -> ElementDiff {
+    let lattice = a.site.lattice;
+    let mut diff = ElementDiff {
+        name: a.site.name.clone(),
+        centre_nm: a.site.centre_nm,
+        sites: lattice.sites(),
+        pitch_nm: lattice.pitch_nm(),
+        pillars: [a.widths.pillars(), b.widths.pillars()],
+        added: 0,
+        removed: 0,
+        widened: 0,
+        narrowed: 0,
+        largest_change_nm: 0,
+        rms_change_nm: 0.0,
+    };
+    let (mut both, mut squares) = (0u64, 0u64);
+    let layer = changes.plan.pillar_layer;
+    for ((row, column), &from) in a.widths.width_nm.indexed_iter() {
+        let to = b.widths.width_nm[[row, column]];
+        both += u64::from(from != 0 && to != 0);
+        if from == to {
+            continue;
+        }
+        let (count, what) = match (from, to) {
+            (0, _) => (&mut diff.added, "added"),
+            (_, 0) => (&mut diff.removed, "removed"),
+            _ if to > from => (&mut diff.widened, "widened"),
+            _ => (&mut diff.narrowed, "narrowed"),
+        };
+        *count += 1;
+        if from != 0 && to != 0 {
+            let change = from.abs_diff(to);
+            diff.largest_change_nm = diff.largest_change_nm.max(change);
+            squares += u64::from(change) * u64::from(change);
+        }
+        let x = (a.site.centre_nm[0] + lattice.coordinate_nm(column)) as f64;
+        let y = (a.site.centre_nm[1] + lattice.coordinate_nm(row)) as f64;
+        let half = f64::from(from.max(to)) / 2.0;
+        changes.add(what, layer, [x - half, y - half, x + half, y + half], Some([from, to]));
+    }
+    diff.rms_change_nm = (squares as f64 / both.max(1) as f64).sqrt();
+    diff
+}
+
+fn layer(
+    number: LayerNumber,
+    shapes: [u64; 2],
+    a: &Outlines,
+    b: &Outlines,
+    unit_nm: f64,
+    changes: &mut Changes,
+) -> LayerDiff {
+    let (rects_a, rects_b) = apart(&a.rects, &b.rects);
+    let (rings_a, rings_b) = apart(&a.rings, &b.rings);
+    let (only_in_a, only_in_b) = (rects_a.len() + rings_a.len(), rects_b.len() + rings_b.len());
+    let mut diff = LayerDiff {
+        layer: number,
+        shapes,
+        only_in_a: only_in_a as u64,
+        only_in_b: only_in_b as u64,
+        same_area: false,
+    };
+    if only_in_a + only_in_b == 0 {
+        diff.same_area = true;
+        return diff;
+    }
+    let corners = |r: &[i32; 4]| {
+        let [x0, y0, x1, y1] = r.map(i64::from);
+        [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
+            .map(|(x, y)| Point::new(x, y))
+            .to_vec()
+    };
+    // Only a few outlines can be compared by area, so only a few are copied for it.
+    if only_in_a.max(only_in_b) < 1 << 16 {
+        let gather = |rects: &[&[i32; 4]], rings: &[&Ring]| -> Vec<Vec<Point>> {
+            let rects = rects.iter().map(|r| corners(r));
+            rects.chain(rings.iter().map(|r| r.to_vec())).collect()
+        };
+        let (cover_a, cover_b) = (gather(&rects_a, &rings_a), gather(&rects_b, &rings_b));
+        // Equal sums as well: what overlaps is exposed twice.
+        let sum = |rings: &[Vec<Point>]| rings.iter().map(|r| area2(r).abs()).sum::<i128>();
+        diff.same_area = sum(&cover_a) == sum(&cover_b) && same_cover(&cover_a, &cover_b) == Some(true);
+    }
+    if !diff.same_area {
+        for (what, rects, rings) in [("only in a", rects_a, rings_a), ("only in b", rects_b, rings_b)] {
+            let boxes = rects.iter().map(|r| r.map(|v| f64::from(v) * unit_nm));
+            let around = |ring: &&Ring| {
+                let r = Rect::around(ring);
+                [r.x0, r.y0, r.x1, r.y1].map(|v| v as f64 * unit_nm)
+            };
+            for bounds in boxes.chain(rings.iter().map(around)) {
+                changes.add(what, number, bounds, None);
+            }
+        }
+    }
+    diff
+}
+
+/// What only one of two sorted lists has, equal items counted.
+fn apart<'a, T: Ord>(a: &'a [T], b: &'a [T]) -> (Vec<&'a T>, Vec<&'a T>) {
+    let (mut only_a, mut only_b) = (Vec::new(), Vec::new());
+    let (mut i, mut j) = (0, 0);
+    while i < a.len() && j < b.len() {
+        match a[i].cmp(&b[j]) {
+            std::cmp::Ordering::Equal => (i, j) = (i + 1, j + 1),
+            std::cmp::Ordering::Less => {
+                only_a.push(&a[i]);
+                i += 1;
+            }
+            std::cmp::Ordering::Greater => {
+                only_b.push(&b[j]);
+                j += 1;
+            }
+        }
+    }
+    only_a.extend(&a[i..]);
+    only_b.extend(&b[j..]);
+    (only_a, only_b)
+}

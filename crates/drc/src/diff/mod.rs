@@ -1,0 +1,119 @@
+//! Two layouts -> what is different, whatever their cells are called and however they are nested.
+//!
+//! Pillars on the lattice of an element are compared site by site as width maps; everything else, on every
+//! layer, as sorted lists of outlines, and where those differ in how they are cut up, by the area they
+//! cover. Nothing is sampled: the answer is exact to the database unit.
+
+mod area;
+mod compare;
+mod content;
+mod picture;
+mod report;
+mod sites;
+mod tree;
+
+pub use picture::page;
+pub use report::{Change, ElementDiff, LayerDiff, LayoutDiff, TextAt, TreeDiff, text};
+
+use std::io::Read;
+
+use content::Content;
+use metalith_core::{Error, Progress, Result};
+use metalith_gds::extract::{Scale, discover};
+use metalith_gds::{LayerNumber, Layout, Selection};
+
+/// What to compare by.
+#[derive(Clone, Copy, Debug)]
+pub struct DiffPlan {
+    /// Layer that the pillars are on.
+    pub pillar_layer: LayerNumber,
+    /// Most changes that are listed; all are counted.
+    pub listed: usize,
+}
+
+impl Default for DiffPlan {
+    fn default() -> Self {
+        Self {
+            pillar_layer: LayerNumber::new(1, 0),
+            listed: 1000,
+        }
+    }
+}
+
+/// Lattice sites of all elements together: those of 5 x 5 lenses of 1 mm, and a quarter more.
+const MOST_SITES: u64 = 1 << 28;
+
+/// Compare two layouts.
+///
+/// # Errors
+/// If a layout has no single top cell or references that lead nowhere, or cannot be read again.
+pub fn diff(a: &Layout, b: &Layout, plan: &DiffPlan, progress: &dyn Progress) -> Result<LayoutDiff> {
+    let identical = same_bytes(a, b)?;
+    let everything = Selection::default();
+    // One unit for both: a whole fraction of a nanometre, and whole factors to it.
+    let ((num_a, den_a), (num_b, den_b)) = (a.unit_ratio_nm()?, b.unit_ratio_nm()?);
+    let den = den_a / gcd(den_a, den_b) * den_b;
+    let factors = [num_a * (den / den_a), num_b * (den / den_b)];
+    let mut sites = Vec::new();
+    for layout in [a, b] {
+        match discover(layout, &everything, &[plan.pillar_layer], Scale::of(layout)?, progress) {
+            Ok(found) => sites::unite(&mut sites, found),
+            // Without elements, all shapes are compared as outlines.
+            Err(Error::Invalid { .. }) => {}
+            Err(other) => return Err(other),
+        }
+    }
+    let total: u64 = sites.iter().map(|s| (s.lattice.sites() as u64).pow(2)).sum();
+    if total > MOST_SITES {
+        return Err(Error::invalid(
+            format!("{} elements with {total} lattice sites together", sites.len()),
+            format!("up to {MOST_SITES} sites are compared; compare the layouts in parts"),
+        ));
+    }
+    for (k, site) in sites.iter_mut().enumerate() {
+        site.name = format!("element {}", k + 1);
+    }
+    let content = |layout: &Layout, factor| Content::read(layout, factor, &sites, plan.pillar_layer, progress);
+    let (first, second) = (content(a, factors[0])?, content(b, factors[1])?);
+    let mut report = compare::compare(first, second, 1.0 / den as f64, plan);
+    report.a = a.path().display().to_string();
+    report.b = b.path().display().to_string();
+    report.same_bytes = identical;
+    report.tree = tree::compare(a, b, plan.listed);
+    Ok(report)
+}
+
+fn gcd(a: i64, b: i64) -> i64 {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+/// Whether two files are the same, byte by byte.
+fn same_bytes(a: &Layout, b: &Layout) -> Result<bool> {
+    if a.bytes() != b.bytes() {
+        return Ok(false);
+    }
+    let open = |layout: &Layout| std::fs::File::open(layout.path()).map_err(Error::io("open", layout.path()));
+    let (mut one, mut other) = (open(a)?, open(b)?);
+    let (mut x, mut y) = (vec![0; 1 << 18], vec![0; 1 << 18]);
+    loop {
+        let n = fill(&mut one, &mut x).map_err(Error::io("read", a.path()))?;
+        let m = fill(&mut other, &mut y).map_err(Error::io("read", b.path()))?;
+        if x[..n] != y[..m] {
+            return Ok(false);
+        }
+        if n == 0 {
+            return Ok(true);
+        }
+    }
+}
+
+fn fill(file: &mut std::fs::File, buffer: &mut [u8]) -> std::io::Result<usize> {
+    let mut held = 0;
+    while held < buffer.len() {
+        match file.read(&mut buffer[held..])? {
+            0 => break,
+            n => held += n,
+        }
+    }
+    Ok(held)
+}

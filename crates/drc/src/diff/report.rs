@@ -1,0 +1,199 @@
+//! What is different.
+
+use std::fmt::Write;
+
+use serde::Serialize;
+
+use metalith_gds::LayerNumber;
+
+/// Pillars of one element in both layouts.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ElementDiff {
+    pub name: String,
+    pub centre_nm: [i64; 2],
+    /// Sites an axis and their distance: the frame of the counts.
+    pub sites: usize,
+    pub pitch_nm: u32,
+    pub pillars: [u64; 2],
+    /// Sites with a pillar in the second layout alone.
+    pub added: u64,
+    /// Sites with a pillar in the first layout alone.
+    pub removed: u64,
+    pub widened: u64,
+    pub narrowed: u64,
+    /// Largest change of width where both have a pillar [nm].
+    pub largest_change_nm: u16,
+    /// Root of the mean squared change over all sites where both have a pillar [nm].
+    pub rms_change_nm: f64,
+}
+
+impl ElementDiff {
+    /// Sites that differ.
+    pub fn changed(&self) -> u64 {
+        self.added + self.removed + self.widened + self.narrowed
+    }
+}
+
+/// One layer in both layouts, pillars on lattices left out of the outlines.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LayerDiff {
+    pub layer: LayerNumber,
+    /// All areas, references followed.
+    pub shapes: [u64; 2],
+    /// Outlines that only one of the layouts has.
+    pub only_in_a: u64,
+    pub only_in_b: u64,
+    /// Whether the outlines that differ cover the same area, only cut up differently.
+    pub same_area: bool,
+}
+
+/// One text.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TextAt {
+    pub layer: LayerNumber,
+    pub string: String,
+    pub at_nm: [f64; 2],
+}
+
+/// One place that differs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Change {
+    /// `added`, `removed`, `widened`, `narrowed` for pillars; `only in a`, `only in b` for other outlines.
+    pub what: &'static str,
+    pub layer: LayerNumber,
+    /// Left, bottom, right, top [nm].
+    pub bounds_nm: [f64; 4],
+    /// Widths of a pillar [nm], zero where there is none.
+    pub width_nm: Option<[u16; 2]>,
+}
+
+/// References of one cell to another, arrays counted out.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ReferenceChange {
+    pub cell: String,
+    pub child: String,
+    pub a: u64,
+    pub b: u64,
+}
+
+/// How both are nested.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct TreeDiff {
+    /// Whether both have the same cells and as many references of each to each.
+    pub same: bool,
+    pub cells: [usize; 2],
+    pub levels: [u32; 2],
+    pub tops: [String; 2],
+    pub cells_only_in_a: Vec<String>,
+    pub cells_only_in_b: Vec<String>,
+    pub references_changed: usize,
+    pub references: Vec<ReferenceChange>,
+}
+
+/// Where changes are: counts in a grid of square tiles.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ChangeMap {
+    /// Left, bottom, right, top of all geometry [nm].
+    pub bounds_nm: [f64; 4],
+    pub columns: usize,
+    pub rows: usize,
+    /// Changes in each tile, row by row from the bottom; empty if there are none.
+    pub counts: Vec<u64>,
+}
+
+/// What is different between two layouts.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LayoutDiff {
+    pub a: String,
+    pub b: String,
+    pub same_bytes: bool,
+    /// Every layer covers the same area with as many exposures, and all texts are the same.
+    pub same_geometry: bool,
+    pub tree: TreeDiff,
+    pub elements: Vec<ElementDiff>,
+    pub layers: Vec<LayerDiff>,
+    pub texts_only_in_a: Vec<TextAt>,
+    pub texts_only_in_b: Vec<TextAt>,
+    /// Places that differ, all of them.
+    pub changes: u64,
+    /// The first of them.
+    pub listed: Vec<Change>,
+    pub map: ChangeMap,
+}
+
+/// For people.
+pub fn text(diff: &LayoutDiff) -> String {
+    const SHOWN: usize = 10;
+    let mut out = String::new();
+    let yes = |b: bool| if b { "same" } else { "different" };
+    let _ = writeln!(out, "a: {}\nb: {}\n", diff.a, diff.b);
+    let _ = writeln!(
+        out,
+        "bytes {}, hierarchy {}, geometry {}",
+        yes(diff.same_bytes),
+        yes(diff.tree.same),
+        yes(diff.same_geometry)
+    );
+    for e in &diff.elements {
+        if e.changed() == 0 {
+            continue;
+        }
+        let _ = writeln!(
+            out,
+            "{} at ({:.1}, {:.1}) um: {} added, {} removed, {} widened, {} narrowed of {}; largest change {} nm, rms {:.4} nm",
+            e.name,
+            e.centre_nm[0] as f64 * 1e-3,
+            e.centre_nm[1] as f64 * 1e-3,
+            e.added,
+            e.removed,
+            e.widened,
+            e.narrowed,
+            e.pillars[0],
+            e.largest_change_nm,
+            e.rms_change_nm
+        );
+    }
+    for l in diff.layers.iter().filter(|l| l.only_in_a + l.only_in_b > 0) {
+        let _ = writeln!(
+            out,
+            "layer {}: {} outlines only in a, {} only in b{}",
+            l.layer,
+            l.only_in_a,
+            l.only_in_b,
+            if l.same_area { ", which cover the same area" } else { "" }
+        );
+    }
+    for (which, texts) in [("a", &diff.texts_only_in_a), ("b", &diff.texts_only_in_b)] {
+        for t in texts.iter().take(SHOWN) {
+            let [x, y] = t.at_nm.map(|v| v * 1e-3);
+            let _ = writeln!(
+                out,
+                "text only in {which}: \"{}\" on {} at ({x:.3}, {y:.3}) um",
+                t.string, t.layer
+            );
+        }
+    }
+    for c in diff.listed.iter().take(SHOWN) {
+        let b = c.bounds_nm.map(|v| v * 1e-3);
+        let widths = c
+            .width_nm
+            .map_or_else(String::new, |[a, b]| format!(", {a} to {b} nm wide"));
+        let _ = writeln!(
+            out,
+            "  {} on {}: ({:.3}, {:.3}) to ({:.3}, {:.3}) um{widths}",
+            c.what, c.layer, b[0], b[1], b[2], b[3]
+        );
+    }
+    if diff.changes > SHOWN as u64 {
+        let _ = writeln!(out, "  and {} more", diff.changes - SHOWN as u64);
+    }
+    if !diff.tree.same {
+        let t = &diff.tree;
+        let _ = writeln!(
+            out,
+            "cells: {} in {} levels, {} in {} levels; {} pairs of cells with another number of references",
+            t.cells[0], t.levels[0], t.cells[1], t.levels[1], t.references_changed
+        );
+    }
+    out
+}

@@ -1,0 +1,84 @@
+//! The elements of both layouts on common lattices.
+
+use metalith_core::Lattice;
+use metalith_gds::extract::ElementSite;
+
+/// Add the elements of a second layout to those of a first: an element on the lattice of one that is known
+/// extends it; one that overlaps a known one on another lattice is left out, and its pillars are compared
+/// as outlines.
+pub(super) fn unite(known: &mut Vec<ElementSite>, more: Vec<ElementSite>) {
+    let before = known.len();
+    for site in more {
+        match known[..before].iter().position(|k| overlap(k, &site)) {
+            None => known.push(site),
+            Some(k) => {
+                if let Some(both) = cover(&known[k], &site) {
+                    known[k] = both;
+                }
+            }
+        }
+    }
+}
+
+/// Outermost sites along an axis [nm].
+fn ends(site: &ElementSite, axis: usize) -> (i64, i64) {
+    let last = site.lattice.sites() - 1;
+    let at = |k| site.centre_nm[axis] + site.lattice.coordinate_nm(k);
+    (at(0), at(last))
+}
+
+fn overlap(a: &ElementSite, b: &ElementSite) -> bool {
+    (0..2).all(|axis| {
+        let ((a0, a1), (b0, b1)) = (ends(a, axis), ends(b, axis));
+        a0 <= b1 && b0 <= a1
+    })
+}
+
+/// The smallest square lattice with the sites of both, if they are on one.
+fn cover(a: &ElementSite, b: &ElementSite) -> Option<ElementSite> {
+    let pitch = i64::from(a.lattice.pitch_nm());
+    if a.lattice.pitch_nm() != b.lattice.pitch_nm() {
+        return None;
+    }
+    let mut first = [0; 2];
+    let mut sites = 0;
+    for (axis, first) in first.iter_mut().enumerate() {
+        let ((a0, a1), (b0, b1)) = (ends(a, axis), ends(b, axis));
+        if (a0 - b0) % pitch != 0 {
+            return None;
+        }
+        *first = a0.min(b0);
+        sites = sites.max((a1.max(b1) - *first) / pitch + 1);
+    }
+    let half = (sites - 1) * pitch;
+    // The middle of an odd number of half nanometres is none.
+    if half % 2 != 0 {
+        return None;
+    }
+    Some(ElementSite {
+        name: a.name.clone(),
+        centre_nm: first.map(|f| f + half / 2),
+        lattice: Lattice::new(a.lattice.pitch_nm(), sites as usize).ok()?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lattices_grow_together() {
+        let site = |x, sites| ElementSite {
+            name: "e".into(),
+            centre_nm: [x, x],
+            lattice: Lattice::new(350, sites).unwrap(),
+        };
+        let mut known = vec![site(0, 10)];
+        unite(&mut known, vec![site(175, 11), site(100_000, 4)]);
+        assert_eq!(known.len(), 2);
+        assert_eq!((known[0].centre_nm[0], known[0].lattice.sites()), (175, 11));
+        // Another phase is another lattice.
+        unite(&mut known, vec![site(1, 10)]);
+        assert_eq!((known.len(), known[0].lattice.sites()), (2, 11));
+    }
+}

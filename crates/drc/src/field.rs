@@ -1,0 +1,162 @@
+//! The writer's fields: what is cut by a boundary is exposed in two parts, some nanometres apart.
+
+use super::deck::Context;
+use super::found::Found;
+use super::rule::{Rule, Status};
+use super::scene::Scene;
+use metalith_core::document::{Limits, Section};
+use metalith_gds::Rect;
+
+/// Fields of one size, in a grid about the centre of each element or of the layout.
+struct Field {
+    size_nm: f64,
+    offset_nm: [f64; 2],
+    about_elements: bool,
+    want: Want,
+}
+
+#[derive(PartialEq)]
+enum Want {
+    NoCut,
+    NoBoundary,
+}
+
+pub(super) fn read(check: &str, s: &Section<'_, '_>, _context: &Context) -> Option<Box<dyn Rule>> {
+    let want = match check {
+        "field_cut" => Want::NoCut,
+        "field_in_lens" => Want::NoBoundary,
+        _ => return None,
+    };
+    let offset = s
+        .optional_array("offset_um", Limits::new(-1e5..=1e5, "um"))
+        .unwrap_or([0.0; 2]);
+    Some(Box::new(Field {
+        size_nm: 1e3 * s.float("field_um", Limits::new(1.0..=1e5, "um")),
+        offset_nm: offset.map(|v| v * 1e3),
+        about_elements: s.choice("about", &[("elements", true), ("layout", false)], Some(true)),
+        want,
+    }))
+}
+
+impl Field {
+    /// Boundaries between two places of an axis [nm], the middle of a field being at `centre`.
+    fn boundaries(&self, axis: usize, centre: f64, from: f64, to: f64) -> impl Iterator<Item = f64> + use<> {
+        let first = centre + self.offset_nm[axis] + self.size_nm / 2.0;
+        let size = self.size_nm;
+        let (low, high) = (
+            ((from - first) / size).floor() as i64,
+            ((to - first) / size).ceil() as i64,
+        );
+        (low..=high)
+            .map(move |k| first + k as f64 * size)
+            .filter(move |&b| b > from && b < to)
+    }
+
+    fn centre(&self, centre_nm: [i64; 2]) -> [f64; 2] {
+        if self.about_elements {
+            centre_nm.map(|c| c as f64)
+        } else {
+            [0.0; 2]
+        }
+    }
+
+    /// Rows or columns whose pillars could reach over a boundary, with the boundary's distance from them.
+    fn lines(&self, scene: &Scene<'_>, element: usize, axis: usize) -> Vec<(usize, f64)> {
+        let site = &scene.elements[element].site;
+        let (lattice, centre) = (site.lattice, self.centre(site.centre_nm));
+        let pitch = f64::from(lattice.pitch_nm());
+        let first = (site.centre_nm[axis] + lattice.coordinate_nm(0)) as f64;
+        let last = first + (lattice.sites() - 1) as f64 * pitch;
+        self.boundaries(axis, centre[axis], first - pitch / 2.0, last + pitch / 2.0)
+            .map(|b| {
+                let site = ((b - first) / pitch).round().clamp(0.0, (lattice.sites() - 1) as f64);
+                (site as usize, (b - first - site * pitch).abs())
+            })
+            .collect()
+    }
+
+    fn cut_on_lattices(&self, scene: &Scene<'_>, found: &mut Found) {
+        for (k, e) in scene.elements.iter().enumerate() {
+            let columns = self.lines(scene, k, 0);
+            let rows = self.lines(scene, k, 1);
+            let w = &e.widths.width_nm;
+            let cut = |w: u16, distance: f64| w != 0 && distance < f64::from(w) / 2.0 - 1e-9;
+            let words = || "cut by a field boundary".to_owned();
+            for &(column, distance) in &columns {
+                for (row, _) in w.column(column).iter().enumerate().filter(|(_, w)| cut(**w, distance)) {
+                    found.rect(&scene.pillar(k, row, column), words);
+                }
+            }
+            for &(row, distance) in &rows {
+                for (column, &w) in w.row(row).iter().enumerate().filter(|(_, w)| cut(**w, distance)) {
+                    if !columns.iter().any(|&(c, d)| c == column && cut(w, d)) {
+                        found.rect(&scene.pillar(k, row, column), words);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Shapes off every lattice, by the fields of the nearest element.
+    fn cut_loose(&self, scene: &Scene<'_>, found: &mut Found) {
+        let Some(loose) = scene.loose(scene.pillars) else {
+            return;
+        };
+        for r in loose.bounds() {
+            let nm = |v: i64| v as f64 * scene.unit_nm;
+            let middle = [nm(r.x0 + r.x1) / 2.0, nm(r.y0 + r.y1) / 2.0];
+            let nearest = scene.elements.iter().min_by(|a, b| {
+                let far = |e: &metalith_gds::extract::ExtractedElement| {
+                    let c = e.site.centre_nm;
+                    (c[0] as f64 - middle[0]).hypot(c[1] as f64 - middle[1])
+                };
+                far(a).total_cmp(&far(b))
+            });
+            let centre = nearest.map_or([0.0; 2], |e| self.centre(e.site.centre_nm));
+            let cut = self.boundaries(0, centre[0], nm(r.x0), nm(r.x1)).next().is_some()
+                || self.boundaries(1, centre[1], nm(r.y0), nm(r.y1)).next().is_some();
+            if cut {
+                found.rect(&r, || "cut by a field boundary".into());
+            }
+        }
+    }
+}
+
+impl Rule for Field {
+    fn words(&self) -> String {
+        let um = self.size_nm * 1e-3;
+        match self.want {
+            Want::NoCut => format!("no pillar is cut by a boundary of the {um} um fields"),
+            Want::NoBoundary => format!("no boundary of the {um} um fields runs through a lens"),
+        }
+    }
+
+    fn judge(&mut self, scene: &Scene<'_>, found: &mut Found) -> Status {
+        if scene.elements.is_empty() && (self.about_elements || self.want == Want::NoBoundary) {
+            return Status::Skipped(scene.no_elements.clone());
+        }
+        if self.want == Want::NoCut {
+            self.cut_on_lattices(scene, found);
+            self.cut_loose(scene, found);
+            return Status::Run;
+        }
+        for (k, e) in scene.elements.iter().enumerate() {
+            let lines = self.lines(scene, k, 0).len() + self.lines(scene, k, 1).len();
+            if lines > 0 {
+                let half = (e.site.lattice.coordinate_nm(0).abs() + i64::from(e.site.lattice.pitch_nm()) / 2) as f64;
+                let unit = |nm: f64| scene.units(nm).round() as i64;
+                let c = e.site.centre_nm.map(|c| c as f64);
+                let lens = Rect {
+                    x0: unit(c[0] - half),
+                    y0: unit(c[1] - half),
+                    x1: unit(c[0] + half),
+                    y1: unit(c[1] + half),
+                };
+                found.rect(&lens, || {
+                    format!("{lines} field boundaries run through {}", e.site.name)
+                });
+            }
+        }
+        Status::Run
+    }
+}

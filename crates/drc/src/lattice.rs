@@ -1,0 +1,189 @@
+//! Grids: the lattice of the element, the grid of the database, and the steps of the beam.
+
+use super::deck::Context;
+use super::found::Found;
+use super::rule::{Rule, Status};
+use super::scene::Scene;
+use metalith_core::document::{Limits, Section};
+use metalith_gds::{LayerNumber, Point};
+
+pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Option<Box<dyn Rule>> {
+    let nm = || Limits::new(0.001..=1e6, "nm");
+    Some(match check {
+        "on_lattice" => Box::new(OnLattice {
+            pitch_nm: s.float("pitch_nm", nm()),
+        }),
+        "grid" => Box::new(Grid {
+            layers: context.some_layers(s),
+            step_nm: s.float("nm", nm()),
+        }),
+        "exposure_grid" => Box::new(ExposureGrid {
+            step_nm: s.float("beam_step_nm", nm()),
+        }),
+        _ => return None,
+    })
+}
+
+/// Squares in an element stand on its sites.
+struct OnLattice {
+    pitch_nm: f64,
+}
+
+impl Rule for OnLattice {
+    fn words(&self) -> String {
+        format!("pillars of an element stand on one lattice of {} nm", self.pitch_nm)
+    }
+
+    fn judge(&mut self, scene: &Scene<'_>, found: &mut Found) -> Status {
+        if scene.elements.is_empty() {
+            return Status::Skipped(scene.no_elements.clone());
+        }
+        for e in &scene.elements {
+            let pitch = e.site.lattice.pitch_nm();
+            if f64::from(pitch) != self.pitch_nm {
+                found.plain(&format!("{} {pitch}", e.site.name), || {
+                    format!("{} has a pitch of {pitch} nm, not {}", e.site.name, self.pitch_nm)
+                });
+            }
+        }
+        for r in &scene.off_lattice {
+            found.rect(r, || "a square between the sites of its element".into());
+        }
+        Status::Run
+    }
+}
+
+/// Vertices are on multiples of a step.
+struct Grid {
+    layers: Vec<LayerNumber>,
+    step_nm: f64,
+}
+
+impl Grid {
+    fn off(&self, p: Point, unit_nm: f64) -> bool {
+        let off = |v: i64| {
+            let steps = v as f64 * unit_nm / self.step_nm;
+            (steps - steps.round()).abs() * self.step_nm > 1e-6
+        };
+        off(p.x) || off(p.y)
+    }
+}
+
+impl Rule for Grid {
+    fn words(&self) -> String {
+        format!("vertices are on a grid of {} nm", self.step_nm)
+    }
+
+    fn judge(&mut self, scene: &Scene<'_>, found: &mut Found) -> Status {
+        // Every place in database units is on the grid if the unit is a multiple of its step.
+        let per_step = scene.unit_nm / self.step_nm;
+        if (per_step - per_step.round()).abs() < 1e-9 && per_step >= 0.5 {
+            return Status::Run;
+        }
+        for layer in &self.layers {
+            if *layer == scene.pillars {
+                self.pillars(scene, found);
+            }
+            let Some(loose) = scene.loose(*layer) else { continue };
+            for k in 0..loose.rects.len() {
+                let r = loose.rect(k);
+                if self.off(Point::new(r.x0, r.y0), scene.unit_nm) || self.off(Point::new(r.x1, r.y1), scene.unit_nm) {
+                    found.rect(&r, || format!("a corner off the grid of {} nm", self.step_nm));
+                }
+            }
+            for p in &loose.polygons {
+                if p.iter().any(|&v| self.off(v, scene.unit_nm)) {
+                    found.at(p, || format!("a vertex off the grid of {} nm", self.step_nm));
+                }
+            }
+        }
+        Status::Run
+    }
+}
+
+impl Grid {
+    fn pillars(&self, scene: &Scene<'_>, found: &mut Found) {
+        for (k, e) in scene.elements.iter().enumerate() {
+            for ((row, column), _) in e.widths.width_nm.indexed_iter().filter(|(_, w)| **w != 0) {
+                let r = scene.pillar(k, row, column);
+                if self.off(Point::new(r.x0, r.y0), scene.unit_nm) || self.off(Point::new(r.x1, r.y1), scene.unit_nm) {
+                    found.rect(&r, || format!("a corner off the grid of {} nm", self.step_nm));
+                }
+            }
+        }
+    }
+}
+
+/// The writer fills a pillar with whole steps of its beam, and goes from pillar to pillar in whole steps.
+struct ExposureGrid {
+    step_nm: f64,
+}
+
+impl ExposureGrid {
+    fn remainder(&self, nm: f64) -> f64 {
+        let steps = nm / self.step_nm;
+        (steps - steps.round()) * self.step_nm
+    }
+}
+
+impl Rule for ExposureGrid {
+    fn words(&self) -> String {
+        format!("pitch and widths are whole steps of a beam of {} nm", self.step_nm)
+    }
+
+    fn judge(&mut self, scene: &Scene<'_>, found: &mut Found) -> Status {
+        if scene.elements.is_empty() {
+            return Status::Skipped(scene.no_elements.clone());
+        }
+        let (mut squares, mut sum) = (0u64, 0.0);
+        let mut count = |width_nm: f64, pillars: u64| {
+            squares += pillars;
+            sum += pillars as f64 * self.remainder(width_nm).powi(2);
+        };
+        for (k, e) in scene.elements.iter().enumerate() {
+            let pitch = f64::from(e.site.lattice.pitch_nm());
+            if self.remainder(pitch).abs() > 1e-9 {
+                found.plain(&format!("{} pitch", e.site.name), || {
+                    format!(
+                        "{}: a pitch of {pitch} nm is no multiple of {} nm",
+                        e.site.name, self.step_nm
+                    )
+                });
+            }
+            let histogram = e.widths.histogram();
+            let off: Vec<bool> = (0..histogram.len())
+                .map(|w| w > 0 && self.remainder(w as f64).abs() > 1e-9)
+                .collect();
+            for (w, &pillars) in histogram.iter().enumerate().skip(1) {
+                count(w as f64, pillars);
+            }
+            if !off.iter().any(|&o| o) {
+                continue;
+            }
+            for ((row, column), &w) in e.widths.width_nm.indexed_iter() {
+                if off[usize::from(w)] {
+                    found.rect(&scene.pillar(k, row, column), || {
+                        format!("{w} nm wide is no multiple of {} nm", self.step_nm)
+                    });
+                }
+            }
+        }
+        if let Some(loose) = scene.loose(scene.pillars) {
+            for k in 0..loose.rects.len() {
+                let r = loose.rect(k);
+                let width = r.width() as f64 * scene.unit_nm;
+                count(width, 1);
+                if self.remainder(width).abs() > 1e-6 {
+                    found.rect(&r, || format!("{width} nm wide is no multiple of {} nm", self.step_nm));
+                }
+            }
+        }
+        let rms = if squares == 0 {
+            0.0
+        } else {
+            (sum / squares as f64).sqrt()
+        };
+        found.facts.push(("rms change of width if snapped [nm]".into(), rms));
+        Status::Run
+    }
+}

@@ -1,0 +1,156 @@
+//! Alignment marks: all there, and nothing near them.
+
+use super::deck::Context;
+use super::found::Found;
+use super::rule::{Rule, Status};
+use super::scene::Scene;
+use metalith_core::document::{Limits, Section};
+use metalith_design::MarkSpec;
+use metalith_gds::{LayerNumber, Point, Rect};
+
+enum Marks {
+    /// Nothing on `others` within a distance of a mark [nm].
+    KeepOut {
+        marks: LayerNumber,
+        others: Vec<LayerNumber>,
+        nm: f64,
+    },
+    /// So many marks of each size [nm]; those of the design where one is given.
+    Complete { marks: LayerNumber, sets: Vec<(f64, u64)> },
+}
+
+pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Option<Box<dyn Rule>> {
+    Some(Box::new(match check {
+        "mark_keep_out" => Marks::KeepOut {
+            marks: context.layer(s, "layer"),
+            others: context.some_layers(s),
+            nm: 1e3 * s.float("um", Limits::new(0.0..=1e5, "um")),
+        },
+        "marks_complete" => {
+            let sizes = s.floats("length_um", Limits::new(0.001..=1e5, "um"));
+            let counts = s.floats("count", Limits::new(1.0..=1000.0, "marks"));
+            if sizes.len() != counts.len() || sizes.is_empty() {
+                s.fault(
+                    "count",
+                    "as many counts as lengths are needed",
+                    "give one count for each length",
+                );
+            }
+            Marks::Complete {
+                marks: context.layer(s, "layer"),
+                sets: sizes
+                    .iter()
+                    .map(|l| l * 1e3)
+                    .zip(counts.iter().map(|&c| c as u64))
+                    .collect(),
+            }
+        }
+        _ => return None,
+    }))
+}
+
+impl Rule for Marks {
+    fn words(&self) -> String {
+        match self {
+            Self::KeepOut { nm, .. } => format!("nothing within {} um of a mark", nm * 1e-3),
+            Self::Complete { sets, .. } => {
+                let set = |(nm, count): &(f64, u64)| format!("{count} of {} um", nm * 1e-3);
+                format!(
+                    "marks are complete: {}",
+                    sets.iter().map(set).collect::<Vec<_>>().join(", ")
+                )
+            }
+        }
+    }
+
+    fn judge(&mut self, scene: &Scene<'_>, found: &mut Found) -> Status {
+        match self {
+            Self::KeepOut { marks, others, nm } => keep_out(scene, *marks, others, *nm, found),
+            Self::Complete { marks, sets } => {
+                if let Some(design) = scene.design {
+                    let set = |m: &MarkSpec| (m.length_nm as f64, m.centres_nm.len() as u64);
+                    *sets = design.layout.marks.iter().map(set).collect();
+                }
+                complete(scene, *marks, sets, found)
+            }
+        }
+    }
+}
+
+fn keep_out(scene: &Scene<'_>, marks: LayerNumber, others: &[LayerNumber], nm: f64, found: &mut Found) -> Status {
+    let Some(loose) = scene.loose(marks) else {
+        // A design that asks for none has nothing to keep away from.
+        return match scene.design {
+            Some(design) if design.layout.marks.is_empty() => Status::Run,
+            _ => Status::Skipped(format!("no marks on layer {marks}")),
+        };
+    };
+    let reach = scene.units(nm).round() as i64;
+    for mark in loose.bounds() {
+        let zone = Rect {
+            x0: mark.x0 - reach,
+            y0: mark.y0 - reach,
+            x1: mark.x1 + reach,
+            y1: mark.y1 + reach,
+        };
+        let near = |r: &Rect| r.x0 < zone.x1 && zone.x0 < r.x1 && r.y0 < zone.y1 && zone.y0 < r.y1;
+        for layer in others {
+            let shapes = scene.loose(*layer).into_iter().flat_map(|l| l.bounds());
+            for r in shapes.filter(|r| near(r) && (*layer != marks || *r != mark)) {
+                found.rect(&r, || format!("within {} um of a mark", nm * 1e-3));
+            }
+            if *layer == scene.pillars {
+                pillars_near(scene, &zone, found);
+            }
+        }
+    }
+    Status::Run
+}
+
+fn pillars_near(scene: &Scene<'_>, zone: &Rect, found: &mut Found) {
+    for (k, e) in scene.elements.iter().enumerate() {
+        let n = e.site.lattice.sites() - 1;
+        let mut lens = scene.pillar(k, 0, 0);
+        lens.unite(&scene.pillar(k, n, n));
+        let margin = i64::from(e.site.lattice.pitch_nm());
+        let apart = lens.x0 - margin > zone.x1
+            || lens.x1 + margin < zone.x0
+            || lens.y0 - margin > zone.y1
+            || lens.y1 + margin < zone.y0;
+        if apart {
+            continue;
+        }
+        for ((row, column), _) in e.widths.width_nm.indexed_iter().filter(|(_, w)| **w != 0) {
+            let r = scene.pillar(k, row, column);
+            if r.x0 < zone.x1 && zone.x0 < r.x1 && r.y0 < zone.y1 && zone.y0 < r.y1 {
+                found.rect(&r, || "a pillar too near to a mark".into());
+            }
+        }
+    }
+}
+
+fn complete(scene: &Scene<'_>, marks: LayerNumber, sets: &[(f64, u64)], found: &mut Found) -> Status {
+    let bounds: Vec<Rect> = scene.loose(marks).into_iter().flat_map(|l| l.bounds()).collect();
+    let mut known = vec![false; bounds.len()];
+    for &(nm, count) in sets {
+        let size = scene.units(nm);
+        let mut there = 0;
+        for (r, known) in bounds.iter().zip(&mut known) {
+            if r.width() == r.height() && (r.width() as f64 - size).abs() < 0.5 {
+                there += 1;
+                *known = true;
+            }
+        }
+        if there != count {
+            let um = nm * 1e-3;
+            found.plain(&format!("{um} {there}"), || {
+                format!("{there} marks of {um} um, not {count}")
+            });
+        }
+    }
+    for (r, _) in bounds.iter().zip(&known).filter(|(_, known)| !**known) {
+        let ring = [Point::new(r.x0, r.y0), Point::new(r.x1, r.y1)];
+        found.at(&ring, || "a shape among the marks that is none".into());
+    }
+    Status::Run
+}

@@ -1,0 +1,156 @@
+//! The result of a check.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::CheckInput;
+use super::deck::{ActiveRule, Deck};
+use super::found::{Found, Marker};
+use super::rule::{Severity, Status};
+use super::scene::Scene;
+
+/// What became of one rule.
+#[derive(Clone, Debug, Serialize)]
+pub struct RuleReport {
+    pub id: String,
+    pub check: String,
+    pub severity: Severity,
+    /// What must hold.
+    pub words: String,
+    #[serde(flatten)]
+    pub status: Status,
+    /// Places where it does not, all of them.
+    pub violations: u64,
+    /// Those of them that a waiver covers.
+    pub waived: u64,
+    /// The first of them.
+    pub markers: Vec<Marker>,
+    /// Numbers worth knowing, within limits or not.
+    pub facts: BTreeMap<String, f64>,
+}
+
+impl RuleReport {
+    /// Violations that count against the layout.
+    pub fn open(&self) -> u64 {
+        self.violations - self.waived
+    }
+}
+
+/// What a check found.
+#[derive(Clone, Debug, Serialize)]
+pub struct DrcReport {
+    pub layout: String,
+    pub with: Vec<String>,
+    pub deck: String,
+    pub top: String,
+    pub bytes: u64,
+    /// Shapes with all references followed.
+    pub shapes: u64,
+    pub elements: usize,
+    pub pillars_on_lattices: u64,
+    /// Every rule of the deck, in its order.
+    pub rules: Vec<RuleReport>,
+    /// What was odd about the check itself: waivers that cover nothing or have expired.
+    pub warnings: Vec<String>,
+    /// For each of them the hash of its waiver.
+    #[serde(skip)]
+    pub warned: Vec<String>,
+    /// Hashes of the waivers that cover something.
+    #[serde(skip)]
+    pub covered: Vec<String>,
+}
+
+impl DrcReport {
+    /// Rules in force that did not run.
+    pub fn not_run(&self) -> usize {
+        let not_run = |r: &&RuleReport| matches!(r.status, Status::Skipped(_) | Status::Failed(_));
+        self.rules.iter().filter(not_run).count()
+    }
+
+    /// Violations of errors and warnings that no waiver covers.
+    pub fn open(&self) -> u64 {
+        let counts = |r: &&RuleReport| r.severity > Severity::Note;
+        self.rules.iter().filter(counts).map(RuleReport::open).sum()
+    }
+
+    /// Exit code of the program: 0 clean, 1 violations, 3 a rule did not run.
+    pub fn exit_code(&self) -> u8 {
+        match (self.not_run(), self.open()) {
+            (0, 0) => 0,
+            (0, _) => 1,
+            _ => 3,
+        }
+    }
+}
+
+pub(super) fn assemble(
+    scene: &Scene<'_>,
+    deck: &Deck,
+    rules: Vec<ActiveRule>,
+    statuses: Vec<Status>,
+    found: Vec<Found>,
+    input: &CheckInput<'_>,
+) -> DrcReport {
+    let (covered, stale) = waivers(&found, input);
+    let (warned, warnings) = stale.into_iter().unzip();
+    let rules = rules
+        .into_iter()
+        .zip(statuses)
+        .zip(found)
+        .map(|((rule, status), found)| RuleReport {
+            words: rule.rule.words(),
+            id: rule.id,
+            check: rule.check,
+            severity: rule.severity,
+            status,
+            violations: found.total,
+            waived: found.waived,
+            markers: found.markers,
+            facts: found.facts.into_iter().collect(),
+        })
+        .collect();
+    let layout = scene.layout;
+    let name = |l: &metalith_gds::Layout| l.path().display().to_string();
+    DrcReport {
+        layout: name(layout),
+        with: scene.with.iter().map(|l| name(l)).collect(),
+        deck: deck.name.clone(),
+        top: layout
+            .tops()
+            .first()
+            .map_or_else(String::new, |&t| layout.cells()[t].name.clone()),
+        bytes: layout.bytes(),
+        shapes: layout.flat_shapes(),
+        elements: scene.elements.len(),
+        pillars_on_lattices: scene.pillars_on_lattices(),
+        rules,
+        warnings,
+        warned,
+        covered,
+    }
+}
+
+/// Hashes of the waivers that cover something, and what is wrong with others.
+fn waivers(found: &[Found], input: &CheckInput<'_>) -> (Vec<String>, Vec<(String, String)>) {
+    let list = input.waivers.map_or(&[][..], |w| &w.list);
+    let mut counts = vec![None; list.len()];
+    for (index, count) in found.iter().flat_map(Found::tried) {
+        counts[index] = Some(count);
+    }
+    let (mut covered, mut warnings) = (Vec::new(), Vec::new());
+    for (waiver, count) in list.iter().zip(counts) {
+        let who = format!("waiver {} of {} by {}", waiver.hash, waiver.rule, waiver.author);
+        let words = match count {
+            _ if waiver.expires < input.today => format!("{who} expired on {}", waiver.expires),
+            None => format!("{who} is for a rule that is not in the deck"),
+            Some(0) => format!("{who} covers nothing: the violation is gone, or the geometry changed"),
+            Some(_) => {
+                covered.push(waiver.hash.clone());
+                continue;
+            }
+        };
+        warnings.push((waiver.hash.clone(), words));
+    }
+    (covered, warnings)
+}

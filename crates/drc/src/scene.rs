@@ -1,0 +1,94 @@
+//! A layout as rules see it, with all references followed.
+
+use std::collections::BTreeMap;
+
+use metalith_design::Design;
+use metalith_gds::extract::ExtractedElement;
+use metalith_gds::{LayerNumber, Layout, Point, Rect};
+
+/// Everything on one layer that is not a pillar on the lattice of an element.
+#[derive(Default)]
+pub(super) struct Loose {
+    /// Upright rectangles: left, bottom, right, top [database units].
+    pub rects: Vec<[i32; 4]>,
+    /// Other closed outlines, without corners that are none.
+    pub polygons: Vec<Box<[Point]>>,
+}
+
+impl Loose {
+    pub fn rect(&self, k: usize) -> Rect {
+        let [x0, y0, x1, y1] = self.rects[k].map(i64::from);
+        Rect { x0, y0, x1, y1 }
+    }
+
+    /// Bounding boxes of all, rectangles first.
+    pub fn bounds(&self) -> impl Iterator<Item = Rect> + '_ {
+        (0..self.rects.len())
+            .map(|k| self.rect(k))
+            .chain(self.polygons.iter().map(|p| Rect::around(p)))
+    }
+}
+
+/// One text.
+pub(super) struct PlacedText {
+    pub layer: LayerNumber,
+    pub string: String,
+    pub at: Point,
+}
+
+/// What rules look at.
+pub(super) struct Scene<'a> {
+    pub layout: &'a Layout,
+    pub with: Vec<&'a Layout>,
+    pub design: Option<&'a Design>,
+    pub unit_nm: f64,
+    pub pillars: LayerNumber,
+    /// Elements with the pillars on their lattices.
+    pub elements: Vec<ExtractedElement>,
+    /// Why there are none, if there are none.
+    pub no_elements: String,
+    pub loose: BTreeMap<LayerNumber, Loose>,
+    /// Squares inside an element that stand between its sites.
+    pub off_lattice: Vec<Rect>,
+    /// Squares of odd width on a site: kept with the loose ones, because their edges are not symmetric.
+    pub odd_on_lattice: u64,
+    pub texts: Vec<PlacedText>,
+    pub text_count: u64,
+    /// Areas by layer, references followed.
+    pub counts: BTreeMap<LayerNumber, u64>,
+    /// Why the layout was not read to its end, if it was not.
+    pub unread: Option<String>,
+    /// Why not all geometry is here, if it is not.
+    pub incomplete: Option<String>,
+}
+
+impl Scene<'_> {
+    /// A length in database units.
+    pub fn units(&self, nm: f64) -> f64 {
+        nm / self.unit_nm
+    }
+
+    /// The rectangle of the pillar at a site, in database units.
+    pub fn pillar(&self, element: usize, row: usize, column: usize) -> Rect {
+        let e = &self.elements[element];
+        let half = f64::from(e.widths.width_nm[[row, column]]) / 2.0;
+        let x = (e.site.centre_nm[0] + e.site.lattice.coordinate_nm(column)) as f64;
+        let y = (e.site.centre_nm[1] + e.site.lattice.coordinate_nm(row)) as f64;
+        let unit = |nm: f64| self.units(nm).round() as i64;
+        Rect {
+            x0: unit(x - half),
+            y0: unit(y - half),
+            x1: unit(x + half),
+            y1: unit(y + half),
+        }
+    }
+
+    /// Pillars on lattices.
+    pub fn pillars_on_lattices(&self) -> u64 {
+        self.elements.iter().map(|e| e.widths.pillars()).sum::<u64>() + self.odd_on_lattice
+    }
+
+    pub fn loose(&self, layer: LayerNumber) -> Option<&Loose> {
+        self.loose.get(&layer)
+    }
+}

@@ -1,0 +1,144 @@
+//! Widths of pillars: between limits, in proportion to their height, and of the cell library.
+
+use super::deck::Context;
+use super::found::Found;
+use super::polygon::Outline;
+use super::rule::Rule;
+use metalith_core::document::{Limits, Section};
+use metalith_gds::LayerNumber;
+
+/// What must hold of the smaller and the larger side of a pillar [nm].
+enum Want {
+    Min(f64),
+    Max(f64),
+    /// Height over width.
+    Aspect {
+        height_nm: f64,
+        most: f64,
+    },
+    /// Widths from first to last in steps, but for forbidden ranges.
+    Library {
+        first: f64,
+        last: f64,
+        step: f64,
+        forbidden: Vec<(f64, f64)>,
+    },
+}
+
+struct Width {
+    layers: Vec<LayerNumber>,
+    want: Want,
+}
+
+pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Option<Box<dyn Rule>> {
+    let nm = || Limits::new(0.0..=1e9, "nm");
+    let want = match check {
+        "width_min" => Want::Min(s.float("nm", nm())),
+        "width_max" => Want::Max(s.float("nm", nm())),
+        "aspect_max" => Want::Aspect {
+            height_nm: context.height_nm,
+            most: s.float("ratio", Limits::new(0.01..=1000.0, "")),
+        },
+        "width_library" => {
+            let [first, last] = s.array("range_nm", nm());
+            let forbidden = s.floats("forbidden_nm", nm());
+            if forbidden.len() % 2 == 1 {
+                s.fault(
+                    "forbidden_nm",
+                    "a range without an end",
+                    "give first and last width of each range",
+                );
+            }
+            Want::Library {
+                first,
+                last,
+                step: s.float("step_nm", Limits::new(0.001..=1e6, "nm")),
+                forbidden: forbidden.chunks_exact(2).map(|r| (r[0], r[1])).collect(),
+            }
+        }
+        _ => return None,
+    };
+    Some(Box::new(Width {
+        layers: context.some_layers(s),
+        want,
+    }))
+}
+
+/// Lengths closer than this are equal: database units are converted in double precision [nm].
+const EQUAL_NM: f64 = 1e-6;
+
+impl Width {
+    fn wrong(&self, small: f64, large: f64) -> Option<String> {
+        match &self.want {
+            Want::Min(nm) if small < nm - EQUAL_NM => Some(format!("{small} nm wide, at least {nm} nm")),
+            Want::Max(nm) if large > nm + EQUAL_NM => Some(format!("{large} nm wide, at most {nm} nm")),
+            Want::Aspect { height_nm, most } if height_nm / small > most + 1e-12 => Some(format!(
+                "{small} nm wide and {height_nm} nm high, 1 : {:.2}, at most 1 : {most}",
+                height_nm / small
+            )),
+            Want::Library {
+                first,
+                last,
+                step,
+                forbidden,
+            } if small >= *first && small <= *last => {
+                let steps = (small - first) / step;
+                if (steps - steps.round()).abs() * step > EQUAL_NM {
+                    return Some(format!(
+                        "{small} nm wide, the library has {first} nm and steps of {step} nm"
+                    ));
+                }
+                let range = forbidden
+                    .iter()
+                    .find(|(a, b)| small >= a - EQUAL_NM && small <= b + EQUAL_NM)?;
+                Some(format!("{small} nm wide, {} to {} nm are forbidden", range.0, range.1))
+            }
+            _ => None,
+        }
+    }
+}
+
+impl Rule for Width {
+    fn words(&self) -> String {
+        match &self.want {
+            Want::Min(nm) => format!("pillars at least {nm} nm wide"),
+            Want::Max(nm) => format!("pillars at most {nm} nm wide"),
+            Want::Aspect { most, .. } => format!("pillars at most {most} times as high as wide"),
+            Want::Library {
+                first,
+                last,
+                step,
+                forbidden,
+            } => {
+                let but: Vec<String> = forbidden.iter().map(|(a, b)| format!(", not {a} to {b} nm")).collect();
+                format!(
+                    "widths of the cell library: {first} to {last} nm in steps of {step} nm{}",
+                    but.concat()
+                )
+            }
+        }
+    }
+
+    fn outlines(&self) -> &[LayerNumber] {
+        &self.layers
+    }
+
+    fn passes_square(&self, width_nm: f64, _clockwise: bool) -> bool {
+        self.wrong(width_nm, width_nm).is_none()
+    }
+
+    fn outline(&mut self, outline: &Outline<'_>, found: &mut Found) {
+        let bounds = outline.bounds();
+        let (a, b) = (
+            bounds.width() as f64 * outline.unit_nm,
+            bounds.height() as f64 * outline.unit_nm,
+        );
+        // Without area there is no width; that has a rule of its own.
+        if outline.twice_area() == 0 {
+            return;
+        }
+        if let Some(words) = self.wrong(a.min(b), a.max(b)) {
+            found.copies(outline.points, outline.placements, || words.clone());
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! Telling layouts apart: the same geometry in any hierarchy is the same, and one nanometre is a difference.
+
+use std::path::{Path, PathBuf};
+
+use metalith_core::Silent;
+use metalith_design::{Design, Hierarchy, PillarArray};
+use metalith_drc::diff::{DiffPlan, LayoutDiff, diff, page, text};
+use metalith_gds::Layout;
+use metalith_layout::write_pillars;
+use metalith_testing::gds::Gds;
+use metalith_testing::lens::Chip;
+
+fn write(folder: &Path, name: &str, bytes: Vec<u8>) -> PathBuf {
+    let path = folder.join(name);
+    std::fs::write(&path, bytes).unwrap();
+    path
+}
+
+fn compare(a: &Path, b: &Path) -> LayoutDiff {
+    let open = |path| Layout::open(path).unwrap();
+    diff(&open(a), &open(b), &DiffPlan::default(), &Silent).unwrap()
+}
+
+fn of_chips(a: &Chip, b: &Chip) -> LayoutDiff {
+    let folder = tempfile::tempdir().unwrap();
+    let a = write(folder.path(), "a.gds", a.bytes());
+    let b = write(folder.path(), "b.gds", b.bytes());
+    compare(&a, &b)
+}
+
+#[test]
+fn hierarchies_of_one_design_are_the_same_geometry() {
+    let root = metalith_testing::root();
+    let design = Design::read(&root.join("designs/mini_3x3.toml")).unwrap();
+    let array = PillarArray::build(&design, &Silent).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, hierarchy| {
+        let path = folder.path().join(name);
+        write_pillars(&design, &array, hierarchy, &path, &Silent).unwrap();
+        path
+    };
+    let folded = file("folded.gds", Hierarchy::Folded);
+    for other in [file("sref.gds", Hierarchy::Sref), file("flat.gds", Hierarchy::Flat)] {
+        let found = compare(&folded, &other);
+        assert!(found.same_geometry && !found.same_bytes && !found.tree.same);
+        assert_eq!((found.changes, found.elements.len()), (0, 9));
+    }
+    let again = compare(&folded, &file("again.gds", Hierarchy::Folded));
+    assert!(again.same_bytes && again.tree.same && again.same_geometry);
+}
+
+#[test]
+fn files_of_other_tools_are_the_same_geometry() {
+    let folder = metalith_testing::root().join("golden/foreign");
+    let flat = folder.join("klayout_flat.gds");
+    for other in [
+        "gdstk_octants.gds",
+        "gdstk_magnified.gds",
+        "klayout_paths.gds",
+        "gdstk_half_nm.gds",
+    ] {
+        let found = compare(&flat, &folder.join(other));
+        assert!(found.same_geometry, "{other}: {}", text(&found));
+    }
+}
+
+#[test]
+fn pillars_added_removed_widened_narrowed() {
+    let a = Chip::clean();
+    let mut b = Chip::clean();
+    b.at(3, 4).4 += 6;
+    b.at(5, 6).4 -= 8;
+    b.at(7, 8).4 -= 2;
+    b.pillars.retain(|p| (p.0, p.1) != (60, 60));
+    b.pillars.push((125, 60, 0, 0, 200));
+    let found = of_chips(&a, &b);
+    assert!(!found.same_geometry);
+    let e = &found.elements[0];
+    assert_eq!((e.added, e.removed, e.widened, e.narrowed), (1, 1, 1, 2));
+    assert_eq!(e.largest_change_nm, 8);
+    let squares = f64::from(6 * 6 + 8 * 8 + 2 * 2);
+    assert!((e.rms_change_nm - (squares / 14_399.0).sqrt()).abs() < 1e-12);
+    assert_eq!((found.changes, found.listed.len()), (5, 5));
+    assert_eq!(found.map.counts.iter().sum::<u64>(), 5);
+    let html = page(&found).html();
+    assert!(html.contains("The geometry differs") && html.contains("<svg"));
+    assert!(text(&found).contains("1 added, 1 removed, 1 widened, 2 narrowed"));
+    // The other way round, what was added is removed.
+    let back = of_chips(&b, &a);
+    assert_eq!((back.elements[0].added, back.elements[0].widened), (1, 2));
+}
+
+#[test]
+fn one_nanometre_and_one_letter_are_differences() {
+    let a = Chip::clean();
+    let shifted = |dx| {
+        let mut b = Chip::clean();
+        b.at(60, 60).2 = dx;
+        b
+    };
+    let found = of_chips(&a, &shifted(1));
+    assert_eq!((found.elements[0].removed, found.changes), (1, 2));
+    let with_text = |string: &str| {
+        let mut b = Chip::clean();
+        b.extra.text(11, string, 0, 0);
+        b
+    };
+    let found = of_chips(&with_text("rev A"), &with_text("rev B"));
+    assert!(!found.same_geometry && found.changes == 0);
+    assert_eq!(found.texts_only_in_b[0].string, "rev B");
+    // Twice exposed is not once exposed.
+    let mut doubled = Chip::clean();
+    doubled.extra.square(
+        1,
+        metalith_testing::lens::site(3),
+        metalith_testing::lens::site(3),
+        metalith_testing::lens::width(3, 3),
+    );
+    assert!(!of_chips(&a, &doubled).same_geometry);
+}
+
+#[test]
+fn areas_cut_up_differently_are_the_same() {
+    let chip = |draw: &dyn Fn(&mut Gds)| {
+        let mut c = Chip::clean();
+        draw(&mut c.extra);
+        c
+    };
+    let whole = chip(&|g| {
+        g.rect(10, 0, 100_000, 1000, 101_000);
+    });
+    let halves = chip(&|g| {
+        g.rect(10, 0, 100_000, 400, 101_000)
+            .rect(10, 400, 100_000, 1000, 101_000);
+    });
+    let found = of_chips(&whole, &halves);
+    assert!(found.same_geometry, "{}", text(&found));
+    assert_eq!((found.changes, found.layers.len()), (0, 3));
+    let gap = chip(&|g| {
+        g.rect(10, 0, 100_000, 400, 101_000)
+            .rect(10, 401, 100_000, 1000, 101_000);
+    });
+    assert!(!of_chips(&whole, &gap).same_geometry);
+}

@@ -1,0 +1,293 @@
+//! One element, decoded by the grammar alone. What [`super::fast`] recognises is tested against this.
+
+use super::input::Input;
+use super::limits::ReadLimits;
+use super::record::{self, Record, data, kind};
+use super::shape::Point;
+use super::transform::Transform;
+use metalith_core::{LayerNumber, Result};
+
+/// Which element the records between a head and ENDEL make.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ElementKind {
+    Boundary,
+    Box,
+    Path,
+    Text,
+    Node,
+    Reference,
+    Array,
+}
+
+impl ElementKind {
+    /// The element that a record begins, if it begins one.
+    pub fn of(record_kind: u8) -> Option<Self> {
+        Some(match record_kind {
+            kind::BOUNDARY => Self::Boundary,
+            kind::BOX => Self::Box,
+            kind::PATH => Self::Path,
+            kind::TEXT => Self::Text,
+            kind::NODE => Self::Node,
+            kind::SREF => Self::Reference,
+            kind::AREF => Self::Array,
+            _ => return None,
+        })
+    }
+}
+
+/// The content of one element. Kept and filled again, so that reading allocates nothing.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Element {
+    pub offset: u64,
+    pub kind: ElementKind,
+    pub layer: LayerNumber,
+    pub points: Vec<Point>,
+    /// Name of the cell referred to.
+    pub name: Vec<u8>,
+    pub string: Vec<u8>,
+    pub mirror: bool,
+    pub magnification: f64,
+    pub angle_deg: f64,
+    pub columns: u16,
+    pub rows: u16,
+    /// Of a path; negative if magnification leaves it alone.
+    pub width: i32,
+    pub path_type: i16,
+    pub extensions: [i32; 2],
+    pub properties: u32,
+    absolute: bool,
+}
+
+impl Default for Element {
+    fn default() -> Self {
+        Self {
+            offset: 0,
+            kind: ElementKind::Boundary,
+            layer: LayerNumber::default(),
+            points: Vec::new(),
+            name: Vec::new(),
+            string: Vec::new(),
+            mirror: false,
+            magnification: 1.0,
+            angle_deg: 0.0,
+            columns: 0,
+            rows: 0,
+            width: 0,
+            path_type: 0,
+            extensions: [0; 2],
+            properties: 0,
+            absolute: false,
+        }
+    }
+}
+
+impl Element {
+    /// Forget the last element.
+    pub fn begin(&mut self, offset: u64, kind: ElementKind) {
+        let (mut points, mut name, mut string) = (
+            std::mem::take(&mut self.points),
+            std::mem::take(&mut self.name),
+            std::mem::take(&mut self.string),
+        );
+        points.clear();
+        name.clear();
+        string.clear();
+        *self = Self {
+            offset,
+            kind,
+            points,
+            name,
+            string,
+            ..Self::default()
+        };
+    }
+
+    /// Read the records after the head up to ENDEL, in any order.
+    pub fn read(&mut self, input: &mut Input, head: Record, kind: ElementKind, limits: &ReadLimits) -> Result<()> {
+        self.begin(head.offset, kind);
+        let (mut has_layer, mut has_datatype) = (false, false);
+        loop {
+            let record = input.next()?;
+            match record.kind {
+                kind::ENDEL => break,
+                kind::XY => self.extend_points(input, record, limits)?,
+                kind::LAYER => {
+                    self.layer.layer = input.int2(record)? as u16;
+                    has_layer = true;
+                }
+                kind::DATATYPE | kind::TEXTTYPE | kind::BOXTYPE | kind::NODETYPE => {
+                    self.layer.datatype = input.int2(record)? as u16;
+                    has_datatype = true;
+                }
+                kind::SNAME => {
+                    let name = input.text(record)?;
+                    if name.is_empty() || name.len() > limits.name_bytes {
+                        let what = format!("a reference to a cell whose name has {} bytes", name.len());
+                        return Err(input.fault(record.offset, what, "give cells names of 1 to 32 characters"));
+                    }
+                    self.name.clear();
+                    self.name.extend_from_slice(name);
+                }
+                kind::STRING => {
+                    self.string.clear();
+                    self.string.extend_from_slice(input.text(record)?);
+                }
+                kind::STRANS => {
+                    let body = input.checked(record, data::BITS, 2)?;
+                    let bits = u16::from_be_bytes([body[0], body[1]]);
+                    self.mirror = bits & 0x8000 != 0;
+                    self.absolute = bits & 6 != 0;
+                }
+                kind::MAG => self.magnification = input.real8(record, 0)?,
+                kind::ANGLE => self.angle_deg = input.real8(record, 0)?,
+                kind::COLROW => {
+                    let body = input.checked(record, data::INT2, 4)?;
+                    self.columns = u16::from_be_bytes([body[0], body[1]]);
+                    self.rows = u16::from_be_bytes([body[2], body[3]]);
+                }
+                kind::WIDTH => self.width = input.int4(record)?,
+                kind::PATHTYPE => self.path_type = input.int2(record)?,
+                kind::BGNEXTN => self.extensions[0] = input.int4(record)?,
+                kind::ENDEXTN => self.extensions[1] = input.int4(record)?,
+                kind::PROPATTR => self.properties += 1,
+                kind::ENDSTR | kind::ENDLIB | kind::BGNSTR | kind::BGNLIB | kind::HEADER => {
+                    return Err(self.unended(input, record));
+                }
+                other if ElementKind::of(other).is_some() => return Err(self.unended(input, record)),
+                _ => {}
+            }
+        }
+        self.check(input, has_layer, has_datatype)
+    }
+
+    fn extend_points(&mut self, input: &Input, record: Record, limits: &ReadLimits) -> Result<()> {
+        let body = input.checked(record, data::INT4, 8)?;
+        if self.points.len() + body.len() / 8 > limits.vertices {
+            let what = format!("an element of more than {} vertices", limits.vertices);
+            return Err(input.fault(record.offset, what, "split the polygon; the format says 8191 at most"));
+        }
+        self.points.extend(body.chunks_exact(8).map(|xy| {
+            Point::new(
+                i64::from(i32::from_be_bytes([xy[0], xy[1], xy[2], xy[3]])),
+                i64::from(i32::from_be_bytes([xy[4], xy[5], xy[6], xy[7]])),
+            )
+        }));
+        Ok(())
+    }
+
+    fn unended(&self, input: &Input, record: Record) -> metalith_core::Error {
+        input.fault(
+            record.offset,
+            format!(
+                "a {} record inside the element that begins at byte {}: ENDEL is missing",
+                record::name(record.kind),
+                self.offset
+            ),
+            "the file is damaged here: write it again",
+        )
+    }
+
+    /// Whether everything that this element needs was there.
+    fn check(&self, input: &Input, has_layer: bool, has_datatype: bool) -> Result<()> {
+        let (noun, points) = match self.kind {
+            ElementKind::Boundary => ("BOUNDARY", 3..=usize::MAX),
+            ElementKind::Box => ("BOX", 3..=usize::MAX),
+            ElementKind::Path => ("PATH", 1..=usize::MAX),
+            ElementKind::Text => ("TEXT", 1..=1),
+            ElementKind::Node => ("NODE", 1..=usize::MAX),
+            ElementKind::Reference => ("SREF", 1..=1),
+            ElementKind::Array => ("AREF", 3..=3),
+        };
+        let fail = |what: String| {
+            Err(input.fault(
+                self.offset,
+                what,
+                "the tool that wrote this file breaks the format: report it there",
+            ))
+        };
+        if !points.contains(&self.points.len()) {
+            return fail(format!("a {noun} with {} points", self.points.len()));
+        }
+        if matches!(self.kind, ElementKind::Reference | ElementKind::Array) {
+            if self.name.is_empty() {
+                return fail(format!("a {noun} without SNAME"));
+            }
+            if self.kind == ElementKind::Array && (self.columns as i16 <= 0 || self.rows as i16 <= 0) {
+                return fail(format!("an AREF of {} x {}", self.columns as i16, self.rows as i16));
+            }
+            if self.absolute && (self.magnification != 1.0 || self.angle_deg != 0.0) {
+                return Err(input.fault(
+                    self.offset,
+                    format!("a {noun} with absolute magnification or angle"),
+                    "few tools agree on what this means: write the reference with relative ones",
+                ));
+            }
+            if self.transform().is_none() {
+                return Err(input.fault(
+                    self.offset,
+                    format!(
+                        "a {noun} with magnification {:e}, angle {}",
+                        self.magnification, self.angle_deg
+                    ),
+                    "magnifications from 1e-6 to 1e6 are read",
+                ));
+            }
+        } else if !has_layer || !has_datatype {
+            return fail(format!(
+                "a {noun} without {}",
+                if has_layer { "its datatype" } else { "LAYER" }
+            ));
+        }
+        Ok(())
+    }
+
+    /// Where the first copy of the cell referred to stands.
+    pub fn transform(&self) -> Option<Transform> {
+        let at = self.points.first().copied().unwrap_or_default();
+        Transform::of_reference(self.mirror, self.magnification, self.angle_deg, at)
+    }
+
+    /// Copies of the cell referred to.
+    pub fn copies(&self) -> u64 {
+        match self.kind {
+            ElementKind::Array => u64::from(self.columns) * u64::from(self.rows),
+            _ => 1,
+        }
+    }
+
+    /// Where copy `k` of an array stands: columns first. Distances that do not divide are rounded a copy,
+    /// so that the last one is where the file says.
+    pub fn origin(&self, k: u64) -> Point {
+        if self.kind != ElementKind::Array {
+            return self.points[0];
+        }
+        let (column, row) = (
+            (k % u64::from(self.columns)) as i64,
+            (k / u64::from(self.columns)) as i64,
+        );
+        let [at, along, up] = [self.points[0], self.points[1], self.points[2]];
+        let part =
+            |from: i64, to: i64, k: i64, n: u16| (2 * k * (to - from) + i64::from(n)).div_euclid(2 * i64::from(n));
+        Point::new(
+            at.x + part(at.x, along.x, column, self.columns) + part(at.x, up.x, row, self.rows),
+            at.y + part(at.y, along.y, column, self.columns) + part(at.y, up.y, row, self.rows),
+        )
+    }
+
+    /// Where copy `k` of the cell referred to stands.
+    pub fn copy(&self, k: u64) -> Transform {
+        let origin = self.origin(k);
+        match self.transform().unwrap_or(Transform::IDENTITY) {
+            Transform::Square { orientation, .. } => Transform::Square {
+                orientation,
+                dx: origin.x,
+                dy: origin.y,
+            },
+            Transform::General { matrix, .. } => Transform::General {
+                matrix,
+                dx: origin.x as f64,
+                dy: origin.y as f64,
+            },
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! Layout bytes -> the pillars of each element, and everything on the pillar layer that is not one.
+//!
+//! Nothing here knows how the file was written: pillars are what stands on the pillar layer with every
+//! reference followed. Elements stand where a design says ([`Elements::Given`]), or where clusters of
+//! squares on a common lattice are found ([`Elements::Discover`]).
+
+mod discover;
+mod oddity;
+mod pillars;
+mod plan;
+mod sites;
+mod survey;
+
+pub use oddity::{Oddities, Oddity, Why};
+pub use plan::{ElementSite, Elements, ExtractedElement, Extraction, ExtractionPlan};
+pub use survey::{LayerSummary, Survey, TextSummary};
+
+use crate::Layout;
+use metalith_core::{Error, Progress, Result};
+use pillars::Pillars;
+
+pub use discover::discover;
+pub use pillars::Filler;
+pub use sites::Scale;
+
+/// Sites of all elements together: 5 x 5 lenses of 1 mm have 204 million.
+const MOST_SITES: u64 = 1 << 28;
+
+/// Read the pillars of every element out of a layout.
+///
+/// # Errors
+/// If the layout has no single top cell, dangling or circular references, if no element is found or one is
+/// out of all proportion, or if the file cannot be read.
+pub fn extract(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) -> Result<Extraction> {
+    let scale = Scale::of(layout)?;
+    let selection = plan.selection();
+    let roots = layout.roots(&selection)?;
+    let sites = match &plan.elements {
+        Elements::Given(sites) => sites.clone(),
+        Elements::Discover => discover(layout, &plan.selection(), &[plan.pillar_layer], scale, progress)?,
+    };
+    let total: u64 = sites.iter().map(|s| (s.lattice.sites() as u64).pow(2)).sum();
+    if total > MOST_SITES {
+        return Err(Error::invalid(
+            format!("{} elements with {total} lattice sites together", sites.len()),
+            format!("up to {MOST_SITES} sites are held; read part of the layout with --top"),
+        ));
+    }
+    let mut pillars = Pillars::new(plan, sites, scale);
+    layout.visit(&selection, &mut pillars, progress)?;
+    Ok(pillars.finish(layout.cells()[roots[0]].name.clone()))
+}

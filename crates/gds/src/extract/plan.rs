@@ -1,0 +1,87 @@
+//! What to read out of a layout, and what was read.
+
+use super::oddity::Oddities;
+use super::survey::Survey;
+use crate::{LayerNumber, Selection};
+use metalith_core::{Lattice, WidthMap};
+
+/// Where an element is and which lattice its pillars should stand on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ElementSite {
+    /// For messages and reports.
+    pub name: String,
+    /// Centre of the lattice in the layout [nm].
+    pub centre_nm: [i64; 2],
+    pub lattice: Lattice,
+}
+
+/// Where the elements are.
+#[derive(Clone, Debug)]
+pub enum Elements {
+    /// As a design says.
+    Given(Vec<ElementSite>),
+    /// Wherever clusters of squares are: pitch and phase of the lattice from their distances, its centre
+    /// from the middle of the outermost. Elements less than 8 um apart count as one.
+    Discover,
+}
+
+/// What to read out of a layout.
+#[derive(Clone, Debug)]
+pub struct ExtractionPlan {
+    /// Layer that the pillars are on.
+    pub pillar_layer: LayerNumber,
+    pub elements: Elements,
+    /// Cell to start from; the top cell if there is one only.
+    pub top: Option<String>,
+    /// Most oddities and texts that are listed; all are counted.
+    pub listed: usize,
+}
+
+impl ExtractionPlan {
+    /// The elements of a design.
+    pub fn given(pillar_layer: LayerNumber, elements: Vec<ElementSite>) -> Self {
+        Self {
+            pillar_layer,
+            elements: Elements::Given(elements),
+            top: None,
+            listed: 1000,
+        }
+    }
+
+    /// What of the layout is visited.
+    pub(super) fn selection(&self) -> Selection {
+        Selection {
+            top: self.top.clone(),
+            ..Selection::default()
+        }
+    }
+
+    /// A layout from anywhere.
+    pub fn discover(pillar_layer: LayerNumber) -> Self {
+        Self {
+            elements: Elements::Discover,
+            ..Self::given(pillar_layer, Vec::new())
+        }
+    }
+}
+
+/// The pillars of one element as the layout has them.
+#[derive(Clone, Debug)]
+pub struct ExtractedElement {
+    pub site: ElementSite,
+    pub widths: WidthMap,
+}
+
+/// What a layout holds.
+#[derive(Clone, Debug)]
+pub struct Extraction {
+    /// Name of the cell that was read.
+    pub top: String,
+    pub elements: Vec<ExtractedElement>,
+    /// Squares on a lattice, over all elements.
+    pub pillars: u64,
+    /// Everything on the pillar layer that is not a square on the lattice of an element.
+    pub oddities: Oddities,
+    /// All layers and texts.
+    pub survey: Survey,
+}

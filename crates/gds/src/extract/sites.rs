@@ -1,0 +1,226 @@
+//! From a place in the layout to a site of an element, in whole numbers.
+
+use std::collections::HashMap;
+
+use super::plan::ElementSite;
+use crate::{Layout, Rect};
+use metalith_core::Result;
+
+/// Database unit as `num / den` nanometres: lengths are compared as `database units * num` and `nm * den`.
+#[derive(Clone, Copy, Debug)]
+pub struct Scale {
+    pub num: i64,
+    pub den: i64,
+}
+
+/// Farthest coordinate at which a pillar is looked for [database units]: products with [`Scale`] fit.
+const REACH: i64 = 1 << 40;
+
+impl Scale {
+    pub fn of(layout: &Layout) -> Result<Self> {
+        let (num, den) = layout.unit_ratio_nm()?;
+        Ok(Self { num, den })
+    }
+
+    /// Database units as nanometres.
+    pub fn nm(self, value: f64) -> f64 {
+        value * self.num as f64 / self.den as f64
+    }
+
+    /// A length in whole nanometres, if it is one.
+    #[inline]
+    pub fn whole_nm(self, value: i64) -> Option<i64> {
+        if self.den == 1 {
+            return Some(value * self.num);
+        }
+        let scaled = value * self.num;
+        (scaled % self.den == 0).then_some(scaled / self.den)
+    }
+
+    /// Whether a rectangle is near enough for arithmetic.
+    #[inline]
+    pub fn reaches(self, r: &Rect) -> bool {
+        r.x0 > -REACH && r.y0 > -REACH && r.x1 < REACH && r.y1 < REACH
+    }
+}
+
+/// Where a square stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Standing {
+    /// On site (row, column) of an element.
+    Site(u32, usize, usize),
+    /// In this element, between sites.
+    Between(u32),
+    Outside,
+}
+
+/// One element in scaled units (nm * den), doubled so that the middle between two grid lines is whole.
+#[derive(Clone, Copy, Debug)]
+struct Grid {
+    first: [i64; 2],
+    step: i64,
+    inverse: f64,
+    sites: i64,
+    pitch_nm: i64,
+}
+
+impl Grid {
+    fn new(site: &ElementSite, scale: Scale) -> Self {
+        let pitch = i64::from(site.lattice.pitch_nm());
+        let sites = site.lattice.sites() as i64;
+        let step = 2 * pitch * scale.den;
+        Self {
+            first: site.centre_nm.map(|c| (2 * c - (sites - 1) * pitch) * scale.den),
+            step,
+            inverse: 1.0 / step as f64,
+            sites,
+            pitch_nm: pitch,
+        }
+    }
+
+    /// Nearest site along an axis and the distance from it.
+    #[inline]
+    fn nearest(&self, axis: usize, place: i64) -> (i64, i64) {
+        let from_first = place - self.first[axis];
+        let site = (from_first as f64 * self.inverse).round() as i64;
+        (site, from_first - site * self.step)
+    }
+
+    #[inline]
+    fn holds(&self, site: i64) -> bool {
+        (0..self.sites).contains(&site)
+    }
+}
+
+/// All elements, and which of them is where.
+pub(super) struct Sites {
+    grids: Vec<Grid>,
+    scale: Scale,
+    /// Elements by tile, a tile being as large as the largest of them.
+    tiles: HashMap<(i64, i64), Vec<u32>>,
+    tile: i64,
+}
+
+impl Sites {
+    pub fn new(sites: &[ElementSite], scale: Scale) -> Self {
+        let grids: Vec<Grid> = sites.iter().map(|s| Grid::new(s, scale)).collect();
+        let tile = grids.iter().map(|g| g.step * g.sites).max().unwrap_or(1).max(1);
+        let mut tiles: HashMap<(i64, i64), Vec<u32>> = HashMap::new();
+        for (k, g) in grids.iter().enumerate() {
+            let from = g.first.map(|f| (f - g.step / 2).div_euclid(tile));
+            let to = g.first.map(|f| (f + g.step * g.sites).div_euclid(tile));
+            for y in from[1]..=to[1] {
+                for x in from[0]..=to[0] {
+                    tiles.entry((x, y)).or_default().push(k as u32);
+                }
+            }
+        }
+        Self {
+            grids,
+            scale,
+            tiles,
+            tile,
+        }
+    }
+
+    /// Pitch of an element [nm].
+    #[inline]
+    pub fn pitch_nm(&self, element: u32) -> i64 {
+        self.grids[element as usize].pitch_nm
+    }
+
+    /// Where a square stands. `guess` is the element to try first, and is set to the one found.
+    #[inline]
+    pub fn stand(&self, square: &Rect, guess: &mut u32) -> Standing {
+        let x = (square.x0 + square.x1) * self.scale.num;
+        let y = (square.y0 + square.y1) * self.scale.num;
+        // Half a database unit, doubled and scaled.
+        let slack = if (square.x1 - square.x0) % 2 == 0 {
+            0
+        } else {
+            self.scale.num
+        };
+        if let Some(standing) = self.try_element(*guess, x, y, slack) {
+            return standing;
+        }
+        let tile = (x.div_euclid(self.tile), y.div_euclid(self.tile));
+        for &element in self.tiles.get(&tile).map_or(&[][..], Vec::as_slice) {
+            if let Some(standing) = self.try_element(element, x, y, slack) {
+                *guess = element;
+                return standing;
+            }
+        }
+        Standing::Outside
+    }
+
+    #[inline]
+    fn try_element(&self, element: u32, x: i64, y: i64, slack: i64) -> Option<Standing> {
+        let grid = self.grids.get(element as usize)?;
+        let (column, dx) = grid.nearest(0, x);
+        let (row, dy) = grid.nearest(1, y);
+        if !grid.holds(column) || !grid.holds(row) {
+            return None;
+        }
+        Some(if dx.abs() <= slack && dy.abs() <= slack {
+            Standing::Site(element, row as usize, column as usize)
+        } else {
+            Standing::Between(element)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metalith_core::Lattice;
+
+    fn square(x: i64, y: i64, w: i64) -> Rect {
+        Rect {
+            x0: x - w / 2,
+            y0: y - w / 2,
+            x1: x - w / 2 + w,
+            y1: y - w / 2 + w,
+        }
+    }
+
+    #[test]
+    fn sites_of_two_elements() {
+        let lattice = Lattice::new(350, 4).unwrap();
+        let site = |x| ElementSite {
+            name: String::new(),
+            centre_nm: [x, 0],
+            lattice,
+        };
+        let sites = Sites::new(&[site(0), site(10_000)], Scale { num: 1, den: 1 });
+        let mut guess = 0;
+        assert_eq!(
+            sites.stand(&square(175, -525, 100), &mut guess),
+            Standing::Site(0, 0, 2)
+        );
+        assert_eq!(
+            sites.stand(&square(10_525, 175, 100), &mut guess),
+            Standing::Site(1, 2, 3)
+        );
+        assert_eq!(guess, 1);
+        assert_eq!(sites.stand(&square(176, 175, 100), &mut guess), Standing::Between(0));
+        assert_eq!(sites.stand(&square(5_000, 175, 100), &mut guess), Standing::Outside);
+        // 101 nm about a whole centre cannot be nearer than half a unit.
+        assert_eq!(sites.stand(&square(175, 175, 101), &mut guess), Standing::Site(0, 2, 2));
+    }
+
+    /// A database unit of 0.5 nm and one of 5 nm see the same sites.
+    #[test]
+    fn other_units() {
+        let site = ElementSite {
+            name: String::new(),
+            centre_nm: [0, 0],
+            lattice: Lattice::new(350, 4).unwrap(),
+        };
+        let mut guess = 0;
+        let fine = Sites::new(std::slice::from_ref(&site), Scale { num: 1, den: 2 });
+        assert_eq!(fine.stand(&square(350, 350, 200), &mut guess), Standing::Site(0, 2, 2));
+        let coarse = Sites::new(&[site], Scale { num: 5, den: 1 });
+        assert_eq!(coarse.stand(&square(35, 35, 20), &mut guess), Standing::Site(0, 2, 2));
+        assert_eq!(coarse.stand(&square(36, 35, 20), &mut guess), Standing::Between(0));
+    }
+}

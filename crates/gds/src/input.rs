@@ -1,0 +1,309 @@
+//! Where the bytes come from: a file read through one buffer, or bytes in memory.
+
+use std::fs::File;
+use std::io::{Cursor, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::record::{self, Record};
+use metalith_core::file::{Ahead, Block};
+use metalith_core::{Error, Result};
+
+/// Bytes read at a time: enough that the kernel's copy is the cost, not the call. No mapping of the file:
+/// mapped pages count as memory of the process.
+const BLOCK: usize = 1 << 20;
+
+/// A file of this size is read past the page cache: it would fill it and be read once.
+const LARGE: u64 = 1 << 28;
+
+/// Longest record: the length field has 16 bits.
+const LONGEST: usize = 1 << 16;
+
+/// A layout that can be read again and again.
+#[derive(Clone, Debug)]
+pub(super) enum Source {
+    File { path: PathBuf, bytes: u64 },
+    Memory { name: PathBuf, bytes: Arc<[u8]> },
+}
+
+trait ReadSeek: Read + Seek + Send {}
+impl<T: Read + Seek + Send> ReadSeek for T {}
+
+enum Stream {
+    Plain(Box<dyn ReadSeek>),
+    Large(Ahead),
+}
+
+impl Source {
+    pub fn file(path: &Path) -> Result<Self> {
+        let meta = std::fs::metadata(path).map_err(Error::io("read", path))?;
+        if !meta.is_file() {
+            return Err(Error::invalid(
+                format!("{} is not a file", path.display()),
+                "name a GDSII file (.gds)",
+            ));
+        }
+        Ok(Self::File {
+            path: path.to_owned(),
+            bytes: meta.len(),
+        })
+    }
+
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::File { path, .. } => path,
+            Self::Memory { name, .. } => name,
+        }
+    }
+
+    pub fn bytes(&self) -> u64 {
+        match self {
+            Self::File { bytes, .. } => *bytes,
+            Self::Memory { bytes, .. } => bytes.len() as u64,
+        }
+    }
+
+    /// Start reading at the first byte.
+    pub fn open(&self) -> Result<Input> {
+        let stream = match self {
+            Self::File { path, bytes } => {
+                let file = File::open(path).map_err(Error::io("open", path))?;
+                let now = file.metadata().map_err(Error::io("read", path))?.len();
+                if now != *bytes {
+                    return Err(Error::invalid(
+                        format!(
+                            "{} changed from {bytes} to {now} bytes while it was read",
+                            path.display()
+                        ),
+                        "wait until whoever writes it is done",
+                    ));
+                }
+                let large = (*bytes >= LARGE).then(|| Ahead::open(path, LONGEST)).flatten();
+                large.map_or_else(|| Stream::Plain(Box::new(file)), Stream::Large)
+            }
+            Self::Memory { bytes, .. } => Stream::Plain(Box::new(Cursor::new(bytes.clone()))),
+        };
+        let block = Block::new(LONGEST, BLOCK.min(self.bytes() as usize + 1));
+        Ok(Input {
+            stream,
+            path: self.path().to_owned(),
+            from: block.start,
+            to: block.start,
+            block,
+            begin: 0,
+            ended: false,
+        })
+    }
+}
+
+/// A place in the bytes, and a buffer that holds at least the record that begins there.
+pub(super) struct Input {
+    stream: Stream,
+    path: PathBuf,
+    block: Block,
+    /// The bytes not yet consumed are `block.bytes[from..to]`.
+    from: usize,
+    to: usize,
+    /// Place in the file of the block's stretch; before it is what was left of the one before.
+    begin: u64,
+    ended: bool,
+}
+
+impl Input {
+    /// Place of the next byte.
+    pub fn offset(&self) -> u64 {
+        self.place(self.from)
+    }
+
+    /// An error at a place of this file.
+    pub fn fault(&self, offset: u64, what: impl Into<String>, hint: impl Into<String>) -> Error {
+        Error::Layout {
+            path: self.path.clone(),
+            offset,
+            what: what.into(),
+            hint: hint.into(),
+        }
+    }
+
+    /// The bytes at hand: at least one whole record, unless the file ends before.
+    pub fn window(&mut self) -> Result<&[u8]> {
+        if self.to - self.from < LONGEST && !self.ended {
+            self.fill()?;
+        }
+        Ok(&self.block.bytes[self.from..self.to])
+    }
+
+    /// Step over bytes of the window.
+    pub fn consume(&mut self, count: usize) {
+        debug_assert!(self.from + count <= self.to);
+        self.from += count;
+    }
+
+    /// Place in the file of a byte of the block.
+    fn place(&self, at: usize) -> u64 {
+        self.begin + at as u64 - self.block.start as u64
+    }
+
+    fn fill(&mut self) -> Result<()> {
+        let (from, to, left) = (self.from, self.to, self.to - self.from);
+        let next = self.place(to);
+        let io = Error::io("read", &self.path);
+        match &mut self.stream {
+            Stream::Plain(stream) => {
+                let block = &mut self.block;
+                block.bytes.copy_within(from..to, block.start - left);
+                let mut held = 0;
+                let room = block.stretch();
+                while held < room.len() && !self.ended {
+                    match stream.read(&mut room[held..]) {
+                        Ok(0) => self.ended = true,
+                        Ok(count) => held += count,
+                        Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
+                        Err(e) => return Err(io(e)),
+                    }
+                }
+                self.begin = next;
+                (self.from, self.to) = (block.start - left, block.start + held);
+            }
+            Stream::Large(ahead) => {
+                let done = std::mem::take(&mut self.block);
+                (self.from, self.to) = (self.block.start, self.block.start);
+                let keep = |done: &Block, block: &mut Block| {
+                    block.bytes[block.start - left..block.start].copy_from_slice(&done.bytes[from..to]);
+                };
+                let (mut block, begin, held) = ahead.next(next, Some(done), keep).map_err(io)?;
+                // After a leap the stretch begins before the byte that is asked for.
+                let skip = (next - begin) as usize;
+                self.ended = held < block.stretch().len();
+                (self.from, self.to) = (block.start + skip.min(held) - left, block.start + held);
+                (self.begin, self.block) = (begin, block);
+            }
+        }
+        Ok(())
+    }
+
+    /// Go to a place of the file; free if it is in the block.
+    pub fn seek(&mut self, offset: u64) -> Result<()> {
+        let start = self.block.start as u64;
+        if offset >= self.begin && offset <= self.place(self.to) {
+            self.from = (start + offset - self.begin) as usize;
+            return Ok(());
+        }
+        if let Stream::Plain(stream) = &mut self.stream {
+            stream
+                .seek(SeekFrom::Start(offset))
+                .map_err(Error::io("read", &self.path))?;
+        }
+        (self.begin, self.from, self.to, self.ended) = (offset, self.block.start, self.block.start, false);
+        Ok(())
+    }
+
+    /// The next record.
+    ///
+    /// # Errors
+    /// If the file ends before it is complete, or its length is impossible.
+    pub fn next(&mut self) -> Result<Record> {
+        let offset = self.offset();
+        let window = self.window()?;
+        let &[high, low, kind, data, ..] = window else {
+            let left = window.len();
+            let what = format!("the file ends {left} bytes into a record, before ENDLIB");
+            return Err(self.fault(offset, what, "the file is cut short: copy or write it again"));
+        };
+        let length = usize::from(u16::from_be_bytes([high, low]));
+        let held = window.len();
+        if length < 4 || length % 2 != 0 {
+            return Err(self.fault(
+                offset,
+                format!("a record of length {length}; it must be even and at least 4"),
+                if offset == 0 {
+                    "this does not begin like GDSII; is it another format, or compressed?"
+                } else {
+                    "the file is damaged from here on, or was changed by a text tool: write it again"
+                },
+            ));
+        }
+        if length > held {
+            return Err(self.fault(
+                offset,
+                format!(
+                    "the file ends inside a {} record of {length} bytes, {held} of them there",
+                    record::name(kind)
+                ),
+                "the file is cut short: copy or write it again",
+            ));
+        }
+        if kind > record::kind::LAST {
+            return Err(self.fault(
+                offset,
+                format!("record type 0x{kind:02X} is not GDSII"),
+                "the file is damaged from here on, or is another format",
+            ));
+        }
+        let from = self.from + 4;
+        self.from += length;
+        Ok(Record {
+            offset,
+            kind,
+            data,
+            from,
+            to: self.from,
+        })
+    }
+
+    /// The bytes of a record read last.
+    pub fn body(&self, record: Record) -> &[u8] {
+        &self.block.bytes[record.from..record.to]
+    }
+
+    /// The body of a record that must have this data type and be a whole number of `unit` bytes long.
+    pub fn checked(&self, record: Record, data: u8, unit: usize) -> Result<&[u8]> {
+        let body = self.body(record);
+        if record.data != data || body.is_empty() || !body.len().is_multiple_of(unit) {
+            return Err(self.fault(
+                record.offset,
+                format!(
+                    "a {} record of data type {} and {} bytes; it must be of type {data} in steps of {unit} bytes",
+                    record::name(record.kind),
+                    record.data,
+                    body.len()
+                ),
+                "the tool that wrote this file breaks the format: report it there",
+            ));
+        }
+        Ok(body)
+    }
+
+    /// The one two-byte integer of a record.
+    pub fn int2(&self, record: Record) -> Result<i16> {
+        let body = self.checked(record, record::data::INT2, 2)?;
+        Ok(i16::from_be_bytes([body[0], body[1]]))
+    }
+
+    /// The one four-byte integer of a record.
+    pub fn int4(&self, record: Record) -> Result<i32> {
+        let body = self.checked(record, record::data::INT4, 4)?;
+        Ok(i32::from_be_bytes([body[0], body[1], body[2], body[3]]))
+    }
+
+    /// Real number `k` of a record that has at least `k + 1`.
+    pub fn real8(&self, record: Record, k: usize) -> Result<f64> {
+        let body = self.checked(record, record::data::REAL8, 8 * (k + 1))?;
+        let bytes = body[8 * k..8 * k + 8].try_into().expect("eight bytes");
+        Ok(super::real::decode(bytes))
+    }
+
+    /// The text of a record without the zero that pads it to an even length.
+    pub fn text(&self, record: Record) -> Result<&[u8]> {
+        let body = self.body(record);
+        if record.data != record::data::ASCII {
+            return Err(self.fault(
+                record.offset,
+                format!("a {} record of data type {}", record::name(record.kind), record.data),
+                "it must be text (data type 6): the tool that wrote this file breaks the format",
+            ));
+        }
+        let end = body.iter().rposition(|&b| b != 0).map_or(0, |last| last + 1);
+        Ok(&body[..end])
+    }
+}

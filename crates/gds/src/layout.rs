@@ -1,0 +1,310 @@
+//! A layout file after its first reading.
+
+use std::path::{Path, PathBuf};
+
+use super::cell::Cell;
+use super::input::{Input, Source};
+use super::limits::ReadLimits;
+use super::names::Names;
+use super::record::kind;
+use super::scan::{Scan, scan};
+use super::tree::{self, Tree};
+use super::visit::Selection;
+use metalith_core::{Error, Progress, Result, Silent};
+
+/// A GDSII file of which every byte has been looked at once: cells in number, their tree, their faults.
+/// Shapes are not held; [`Layout::visit`] reads them again.
+pub struct Layout {
+    source: Source,
+    limits: ReadLimits,
+    title: String,
+    units: [f64; 2],
+    cells: Vec<Cell>,
+    names: Names,
+    tree: Tree,
+    trailing: (u64, bool),
+}
+
+/// A reference that leads nowhere or round in a circle, or a second cell of the same name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Faulty {
+    /// Cell that holds the reference, or whose name is not its own.
+    pub cell: String,
+    /// Name referred to.
+    pub name: String,
+    /// Place in the file of the first such reference, or of the second cell.
+    pub offset: u64,
+}
+
+impl Layout {
+    /// Read the file at `path` once.
+    ///
+    /// # Errors
+    /// If it cannot be read, is not GDSII, or is beyond [`ReadLimits::default`].
+    pub fn open(path: &Path) -> Result<Self> {
+        Self::open_with(path, ReadLimits::default(), &Silent)
+    }
+
+    /// Read the file at `path` once, within `limits`.
+    ///
+    /// # Errors
+    /// As [`Layout::open`].
+    pub fn open_with(path: &Path, limits: ReadLimits, progress: &dyn Progress) -> Result<Self> {
+        Self::of(Source::file(path)?, limits, progress)
+    }
+
+    /// A layout from bytes in memory; `name` stands for the path in messages.
+    ///
+    /// # Errors
+    /// As [`Layout::open`].
+    pub fn from_bytes(name: &str, bytes: impl Into<std::sync::Arc<[u8]>>, limits: ReadLimits) -> Result<Self> {
+        let source = Source::Memory {
+            name: PathBuf::from(name),
+            bytes: bytes.into(),
+        };
+        Self::of(source, limits, &Silent)
+    }
+
+    fn of(source: Source, limits: ReadLimits, progress: &dyn Progress) -> Result<Self> {
+        let scan = scan(&source, &limits, progress)?;
+        Ok(Self::from_scan(source, limits, scan))
+    }
+
+    pub(super) fn from_scan(source: Source, limits: ReadLimits, mut scan: Scan) -> Self {
+        let tree = tree::resolve(&mut scan.cells, &scan.names, &scan.numbers);
+        Self {
+            source,
+            limits,
+            title: scan.title,
+            units: scan.units,
+            cells: scan.cells,
+            names: scan.names,
+            tree,
+            trailing: scan.trailing,
+        }
+    }
+
+    /// Where it was read from.
+    pub fn path(&self) -> &Path {
+        self.source.path()
+    }
+
+    /// Size of the file.
+    pub fn bytes(&self) -> u64 {
+        self.source.bytes()
+    }
+
+    /// Bytes behind ENDLIB, and whether any of them is not zero.
+    pub fn trailing(&self) -> (u64, bool) {
+        self.trailing
+    }
+
+    /// Name of the library.
+    pub fn library(&self) -> &str {
+        &self.title
+    }
+
+    /// Database unit [nm].
+    pub fn unit_nm(&self) -> f64 {
+        let nm = self.units[1] * 1e9;
+        // The format's reals are not decimal: one nanometre comes back as 1 to within 1e-16.
+        if (nm - nm.round()).abs() < 1e-9 * nm {
+            nm.round()
+        } else {
+            nm
+        }
+    }
+
+    /// Database unit in user units; 0.001 for a user unit of 1 um.
+    pub fn user_unit(&self) -> f64 {
+        self.units[0]
+    }
+
+    /// Database unit in nanometres as a ratio of whole numbers.
+    ///
+    /// # Errors
+    /// If it is none, as with units of an inch.
+    pub fn unit_ratio_nm(&self) -> Result<(i64, i64)> {
+        let nm = self.unit_nm();
+        (1..=10_000i64)
+            .map(|den| (nm * den as f64, den))
+            .find(|(num, _)| num.round() >= 1.0 && (num - num.round()).abs() < 1e-9 * num)
+            .map(|(num, den)| (num.round() as i64, den))
+            .ok_or_else(|| {
+                self.fault(
+                    0,
+                    format!("a database unit of {nm} nm is no ratio of whole nanometres"),
+                    "write the layout with a database unit of 1 nm",
+                )
+            })
+    }
+
+    /// Cells in the order of the file.
+    pub fn cells(&self) -> &[Cell] {
+        &self.cells
+    }
+
+    /// Indices of cells that no other refers to.
+    pub fn tops(&self) -> &[usize] {
+        &self.tree.tops
+    }
+
+    /// Index of the cell with this name.
+    pub fn cell_index(&self, name: &str) -> Option<usize> {
+        self.tree.definitions[self.names.find(name.as_bytes())? as usize]
+    }
+
+    /// Longest chain of references.
+    pub fn depth(&self) -> u32 {
+        self.cells.iter().map(|c| c.depth).max().unwrap_or(0)
+    }
+
+    /// Shapes with all references followed, from all top cells; at most `u64::MAX`.
+    pub fn flat_shapes(&self) -> u64 {
+        let placements: Vec<u64> = self.cells.iter().map(|c| c.placements).collect();
+        tree::flat_shapes(&self.cells, &placements)
+    }
+
+    /// References to cells that are not in the file.
+    pub fn dangling(&self) -> Vec<Faulty> {
+        self.faulty(&self.tree.dangling)
+    }
+
+    /// References by which a cell contains itself.
+    pub fn circles(&self) -> Vec<Faulty> {
+        self.faulty(&self.tree.circles)
+    }
+
+    /// Cells with the name of a cell before them; references go to the first.
+    pub fn doubled(&self) -> Vec<Faulty> {
+        let faulty = |&c: &usize| Faulty {
+            cell: self.cells[c].name.clone(),
+            name: self.cells[c].name.clone(),
+            offset: self.cells[c].bytes.start,
+        };
+        self.tree.doubled.iter().map(faulty).collect()
+    }
+
+    fn faulty(&self, places: &[(usize, usize)]) -> Vec<Faulty> {
+        let faulty = |&(cell, child): &(usize, usize)| Faulty {
+            cell: self.cells[cell].name.clone(),
+            name: self.cells[cell].children[child].name.clone(),
+            offset: self.cells[cell].children[child].offset,
+        };
+        places.iter().map(faulty).collect()
+    }
+
+    /// The limits it was read with.
+    pub fn limits(&self) -> &ReadLimits {
+        &self.limits
+    }
+
+    /// Indices of the cells a visit starts from.
+    ///
+    /// # Errors
+    /// If there is no such cell, more than one to choose from, or a fault in the tree, unless lenient.
+    pub fn roots(&self, selection: &Selection) -> Result<Vec<usize>> {
+        if !selection.lenient {
+            self.sound()?;
+        }
+        if let Some(name) = &selection.top {
+            let index = self.cell_index(name).ok_or_else(|| {
+                self.fault(
+                    0,
+                    format!("there is no cell {name}"),
+                    format!("cells at the top: {}", self.top_names()),
+                )
+            })?;
+            return Ok(vec![index]);
+        }
+        match self.tree.tops.as_slice() {
+            [] if !selection.lenient => Err(self.fault(0, "there is no cell in the file", "is this the right file?")),
+            [_] => Ok(self.tree.tops.clone()),
+            all if selection.lenient => Ok(all.to_vec()),
+            _ => Err(self.fault(
+                self.cells[self.tree.tops[1]].bytes.start,
+                format!("{} cells at the top: {}", self.tree.tops.len(), self.top_names()),
+                "say which with --top",
+            )),
+        }
+    }
+
+    /// Whether every reference leads to a cell, and none round in a circle.
+    fn sound(&self) -> Result<()> {
+        if let Some(f) = self.circles().first() {
+            let what = format!("cell {} refers to {}, which contains it", f.cell, f.name);
+            return Err(self.fault(f.offset, what, "remove the reference: a cell cannot contain itself"));
+        }
+        if let Some(f) = self.dangling().first() {
+            let what = format!("cell {} refers to {}, which is not in the file", f.cell, f.name);
+            return Err(self.fault(f.offset, what, "write the file with all cells that it needs"));
+        }
+        if let Some(f) = self.doubled().first() {
+            let what = format!("a second cell with the name {}", f.name);
+            return Err(self.fault(
+                f.offset,
+                what,
+                "rename one of them: references cannot tell which is meant",
+            ));
+        }
+        Ok(())
+    }
+
+    fn top_names(&self) -> String {
+        let mut names: Vec<&str> = self
+            .tree
+            .tops
+            .iter()
+            .take(8)
+            .map(|&t| self.cells[t].name.as_str())
+            .collect();
+        if self.tree.tops.len() > 8 {
+            names.push("...");
+        }
+        names.join(", ")
+    }
+
+    pub fn fault(&self, offset: u64, what: impl Into<String>, hint: impl Into<String>) -> Error {
+        Error::Layout {
+            path: self.path().to_owned(),
+            offset,
+            what: what.into(),
+            hint: hint.into(),
+        }
+    }
+
+    pub(super) fn source(&self) -> &Source {
+        &self.source
+    }
+
+    pub(super) fn tree(&self) -> &Tree {
+        &self.tree
+    }
+
+    pub(super) fn names(&self) -> &Names {
+        &self.names
+    }
+
+    /// Index of the inline cell with this name, or `u32::MAX`.
+    pub(super) fn inline_cell(&self, name: &[u8]) -> u32 {
+        self.names
+            .find(name)
+            .and_then(|number| self.tree.definitions[number as usize])
+            .filter(|&index| self.cells[index].inline)
+            .map_or(u32::MAX, |index| index as u32)
+    }
+
+    /// Go to the first element of a cell.
+    pub(super) fn seek_cell(&self, input: &mut Input, index: usize) -> Result<()> {
+        input.seek(self.cells[index].bytes.start)?;
+        let (begin, name) = (input.next()?, input.next()?);
+        if begin.kind != kind::BGNSTR || name.kind != kind::STRNAME {
+            return Err(input.fault(
+                begin.offset,
+                "the file changed while it was read",
+                "wait until whoever writes it is done",
+            ));
+        }
+        Ok(())
+    }
+}

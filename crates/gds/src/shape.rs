@@ -1,0 +1,155 @@
+//! What stands on a layer.
+
+use metalith_core::LayerNumber;
+
+/// A place in database units.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Point {
+    pub x: i64,
+    pub y: i64,
+}
+
+impl Point {
+    pub fn new(x: i64, y: i64) -> Self {
+        Self { x, y }
+    }
+}
+
+/// An upright rectangle in database units; `x0 <= x1`, `y0 <= y1`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
+pub struct Rect {
+    pub x0: i64,
+    pub y0: i64,
+    pub x1: i64,
+    pub y1: i64,
+}
+
+impl Rect {
+    /// Contains nothing; grows by [`Rect::include`].
+    pub const EMPTY: Self = Self {
+        x0: i64::MAX,
+        y0: i64::MAX,
+        x1: i64::MIN,
+        y1: i64::MIN,
+    };
+
+    pub fn is_empty(&self) -> bool {
+        self.x0 > self.x1
+    }
+
+    /// Extent along x; zero if empty.
+    pub fn width(&self) -> i64 {
+        if self.is_empty() { 0 } else { self.x1 - self.x0 }
+    }
+
+    /// Extent along y; zero if empty.
+    pub fn height(&self) -> i64 {
+        if self.is_empty() { 0 } else { self.y1 - self.y0 }
+    }
+
+    /// Grow to hold a point.
+    pub fn include(&mut self, p: Point) {
+        self.x0 = self.x0.min(p.x);
+        self.y0 = self.y0.min(p.y);
+        self.x1 = self.x1.max(p.x);
+        self.y1 = self.y1.max(p.y);
+    }
+
+    /// Grow to hold another rectangle.
+    pub fn unite(&mut self, other: &Rect) {
+        if !other.is_empty() {
+            self.include(Point::new(other.x0, other.y0));
+            self.include(Point::new(other.x1, other.y1));
+        }
+    }
+
+    /// The smallest rectangle around points.
+    pub fn around(points: &[Point]) -> Self {
+        let mut rect = Self::EMPTY;
+        points.iter().for_each(|&p| rect.include(p));
+        rect
+    }
+}
+
+/// Which element of the format a shape was.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ShapeKind {
+    Boundary,
+    Box,
+    /// Drawn with a pen; `points` are the outline of what it leaves.
+    Path,
+}
+
+/// One area on a layer, in the coordinates of the cell it is drawn in.
+#[derive(Clone, Copy, Debug)]
+pub struct Shape<'a> {
+    pub kind: ShapeKind,
+    pub layer: LayerNumber,
+    /// The outline as the file has it: the last point repeats the first where the format is kept.
+    pub points: &'a [Point],
+    /// The same as an upright rectangle, if it is one, with area and with five points.
+    pub rect: Option<Rect>,
+    /// Place of the element in the file.
+    pub offset: u64,
+}
+
+/// A label: no area, no exposure.
+#[derive(Clone, Copy, Debug)]
+pub struct Text<'a> {
+    pub layer: LayerNumber,
+    pub string: &'a [u8],
+    pub at: Point,
+    pub offset: u64,
+}
+
+/// The upright rectangle that a closed outline of five points is, if it has area.
+#[inline]
+pub fn rectangle_of(points: &[Point]) -> Option<Rect> {
+    let &[a, b, c, d, e] = points else { return None };
+    let upright = (a.x == b.x && b.y == c.y && c.x == d.x && d.y == a.y)
+        || (a.y == b.y && b.x == c.x && c.y == d.y && d.x == a.x);
+    if a != e || !upright || a.x == c.x || a.y == c.y {
+        return None;
+    }
+    Some(Rect {
+        x0: a.x.min(c.x),
+        y0: a.y.min(c.y),
+        x1: a.x.max(c.x),
+        y1: a.y.max(c.y),
+    })
+}
+
+/// The outline, closed, without doubled points and without points on the way from one to the next: what
+/// decides whether an outline with more vertices than it needs is a rectangle.
+pub fn simplified(points: &[Point]) -> Vec<Point> {
+    let mut ring: Vec<Point> = points.to_vec();
+    ring.dedup();
+    while ring.len() > 1 && ring.first() == ring.last() {
+        ring.pop();
+    }
+    // A point is needed unless it lies between its neighbours; dropping one may free another.
+    let between = |a: Point, b: Point, c: Point| {
+        let (ux, uy) = (i128::from(b.x - a.x), i128::from(b.y - a.y));
+        let (vx, vy) = (i128::from(c.x - b.x), i128::from(c.y - b.y));
+        ux * vy == uy * vx && ux * vx + uy * vy >= 0
+    };
+    let mut kept: Vec<Point> = Vec::with_capacity(ring.len() + 1);
+    for &p in &ring {
+        while kept.len() >= 2 && between(kept[kept.len() - 2], kept[kept.len() - 1], p) {
+            kept.pop();
+        }
+        kept.push(p);
+    }
+    while kept.len() >= 3 && between(kept[kept.len() - 2], kept[kept.len() - 1], kept[0]) {
+        kept.pop();
+    }
+    let mut first = 0;
+    while kept.len() - first >= 3 && between(kept[kept.len() - 1], kept[first], kept[first + 1]) {
+        first += 1;
+    }
+    kept.drain(..first);
+    if let Some(&start) = kept.first() {
+        kept.push(start);
+    }
+    kept
+}

@@ -1,0 +1,315 @@
+//! The second reading: every shape once, with all places it stands at.
+
+use super::cell::Cell;
+use super::element::{Element, ElementKind};
+use super::input::Input;
+use super::layout::Layout;
+use super::names::Recent;
+use super::outline::outline;
+use super::place::{self, magnified};
+use super::shape::{Point, Rect, Shape, ShapeKind, Text, rectangle_of};
+use super::transform::Transform;
+use super::tree;
+use super::walk::{Sink, Walk};
+use metalith_core::{LayerNumber, Progress, Result, Silent};
+
+/// What takes the shapes of a layout.
+pub trait Visitor {
+    /// A cell begins whose shapes, up to the next call, stand at `placements`. Small cells without
+    /// references are not announced: their shapes come as if drawn in the cells that refer to them.
+    ///
+    /// # Errors
+    /// Any error ends the visit.
+    fn cell(&mut self, _cell: &Cell, _placements: &[Transform]) -> Result<()> {
+        Ok(())
+    }
+
+    /// An area, in the coordinates of the cell.
+    ///
+    /// # Errors
+    /// Any error ends the visit.
+    fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> Result<()>;
+
+    /// A text, in the coordinates of the cell.
+    ///
+    /// # Errors
+    /// Any error ends the visit.
+    fn text(&mut self, _text: &Text<'_>, _placements: &[Transform]) -> Result<()> {
+        Ok(())
+    }
+}
+
+/// What of a layout is visited.
+#[derive(Clone, Debug, Default)]
+pub struct Selection {
+    /// Name of the cell to start from; the top cell if there is one only.
+    pub top: Option<String>,
+    /// Layers of shapes and texts; all if left out.
+    pub layers: Option<Vec<LayerNumber>>,
+    /// Go round circles and dangling references, and start from every top cell, instead of an error: for
+    /// rules that report these faults themselves.
+    pub lenient: bool,
+}
+
+impl Layout {
+    /// Hand every shape and text of the selection to `visitor`, cells in the order of the file.
+    ///
+    /// # Errors
+    /// If the layout has faults and the selection is not lenient, if it is beyond the limits of reading,
+    /// if the file cannot be read again, and what the visitor returns.
+    pub fn visit<V: Visitor>(&self, selection: &Selection, visitor: &mut V, progress: &dyn Progress) -> Result<()> {
+        self.visit_by(Walk::new(self.limits(), progress), selection, visitor)
+    }
+
+    /// As [`Layout::visit`] by the grammar alone.
+    #[cfg(test)]
+    pub(super) fn visit_slowly<V: Visitor>(
+        &self,
+        selection: &Selection,
+        visitor: &mut V,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        self.visit_by(Walk::new(self.limits(), progress).slowly(), selection, visitor)
+    }
+
+    fn visit_by<V: Visitor>(&self, mut walk: Walk<'_>, selection: &Selection, visitor: &mut V) -> Result<()> {
+        let roots = self.roots(selection)?;
+        let (counts, depths) = tree::count(self.cells(), &self.tree().order, &roots);
+        if let Some(what) = tree::beyond(self.cells(), &counts, &depths, self.limits()) {
+            return Err(self.fault(0, what, "write the layout with fewer levels or in parts"));
+        }
+        let mut input = self.source().open()?;
+        let placed = place::placements(self, &mut input, &roots)?;
+        let mut own_input = self.source().open()?;
+        let small = self.inline_shapes(&mut own_input, &counts)?;
+        drop(own_input);
+        let wanted = |layer: LayerNumber| selection.layers.as_ref().is_none_or(|l| l.contains(&layer));
+        let has = |cell: &Cell| cell.layers.iter().any(|(l, _)| wanted(*l));
+        let worth = |cell: &Cell| {
+            has(cell) || tree::followed(cell).any(|(t, _)| self.cells()[t].inline && has(&self.cells()[t]))
+        };
+        let chosen: Vec<usize> = (0..self.cells().len())
+            .filter(|&k| !placed[k].is_empty() && worth(&self.cells()[k]))
+            .collect();
+        let bytes = |k: &usize| self.cells()[*k].bytes.end - self.cells()[*k].bytes.start;
+        walk.progress.begin("reading shapes", chosen.iter().map(bytes).sum());
+        let mut spread = Spread {
+            layout: self,
+            visitor,
+            layers: selection.layers.as_deref(),
+            placements: &[],
+            small: &small,
+            recent: Recent::new(),
+            path: Vec::new(),
+            moved: Vec::new(),
+            chains: Vec::new(),
+        };
+        for index in chosen {
+            spread.placements = &placed[index];
+            spread.visitor.cell(&self.cells()[index], &placed[index])?;
+            self.seek_cell(&mut input, index)?;
+            walk.start_at(input.offset());
+            walk.cell(&mut input, &mut spread)?;
+        }
+        Ok(())
+    }
+
+    /// Decode the cells that are placed shape by shape.
+    fn inline_shapes(&self, input: &mut Input, counts: &[u64]) -> Result<Vec<Vec<Kept>>> {
+        let mut small = vec![Vec::new(); self.cells().len()];
+        let mut walk = Walk::new(self.limits(), &Silent);
+        for (index, cell) in self.cells().iter().enumerate() {
+            if cell.inline && counts[index] > 0 {
+                let mut keep = Keep::default();
+                self.seek_cell(input, index)?;
+                walk.cell(input, &mut keep)?;
+                small[index] = keep.0;
+            }
+        }
+        Ok(small)
+    }
+}
+
+/// A shape of an inline cell.
+#[derive(Clone, Debug)]
+struct Kept {
+    kind: ShapeKind,
+    layer: LayerNumber,
+    points: Vec<Point>,
+    rect: Option<Rect>,
+}
+
+#[derive(Default)]
+struct Keep(Vec<Kept>);
+
+impl Sink for Keep {
+    fn five_points(&mut self, _offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<()> {
+        self.0.push(Kept {
+            kind: ShapeKind::Boundary,
+            layer,
+            points: points.to_vec(),
+            rect: rectangle_of(points),
+        });
+        Ok(())
+    }
+
+    fn plain_reference(&mut self, _offset: u64, _key: u64, _at: Point) -> Result<()> {
+        Ok(())
+    }
+
+    fn element(&mut self, _input: &Input, element: &Element) -> Result<()> {
+        let mut points = Vec::new();
+        if let Some(kind) = outline_of(element, &mut points) {
+            self.0.push(Kept {
+                kind,
+                layer: element.layer,
+                rect: rectangle_of(&points),
+                points,
+            });
+        }
+        Ok(())
+    }
+}
+
+/// The area an element covers, if it covers any.
+fn outline_of(element: &Element, points: &mut Vec<Point>) -> Option<ShapeKind> {
+    let kind = match element.kind {
+        ElementKind::Boundary => ShapeKind::Boundary,
+        ElementKind::Box => ShapeKind::Box,
+        ElementKind::Path => {
+            let width = i64::from(element.width);
+            outline(&element.points, width, element.path_type, element.extensions, points);
+            return Some(ShapeKind::Path);
+        }
+        _ => return None,
+    };
+    points.clone_from(&element.points);
+    Some(kind)
+}
+
+/// Hands the elements of a cell to the visitor.
+struct Spread<'a, V> {
+    layout: &'a Layout,
+    visitor: &'a mut V,
+    layers: Option<&'a [LayerNumber]>,
+    placements: &'a [Transform],
+    small: &'a [Vec<Kept>],
+    recent: Recent,
+    path: Vec<Point>,
+    moved: Vec<Point>,
+    chains: Vec<Transform>,
+}
+
+impl<V: Visitor> Spread<'_, V> {
+    #[inline]
+    fn wants(&self, layer: LayerNumber) -> bool {
+        self.layers.is_none_or(|layers| layers.contains(&layer))
+    }
+
+    /// One copy of an inline cell.
+    #[inline]
+    fn copy(&mut self, cell: usize, own: Transform, offset: u64) -> Result<()> {
+        let small = self.small;
+        if !own.is_square() {
+            self.chains.clear();
+            for placement in self.placements {
+                let chain = placement.after(&own).ok_or_else(|| magnified(self.layout, offset))?;
+                self.chains.push(chain);
+            }
+        }
+        for kept in &small[cell] {
+            if !self.wants(kept.layer) {
+                continue;
+            }
+            let mut shape = Shape {
+                kind: kept.kind,
+                layer: kept.layer,
+                points: &kept.points,
+                rect: kept.rect,
+                offset,
+            };
+            // Rounding happens once, at the end of the chain: only exact transforms are applied here.
+            if own.is_square() {
+                self.moved.clear();
+                self.moved.extend(kept.points.iter().map(|&p| own.apply(p)));
+                shape.points = &self.moved;
+                shape.rect = kept.rect.and_then(|r| own.apply_rect(&r));
+                self.visitor.shape(&shape, self.placements)?;
+            } else {
+                self.visitor.shape(&shape, &self.chains)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<V: Visitor> Sink for Spread<'_, V> {
+    #[inline]
+    fn five_points(&mut self, offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<()> {
+        if !self.wants(layer) {
+            return Ok(());
+        }
+        let shape = Shape {
+            kind: ShapeKind::Boundary,
+            layer,
+            points,
+            rect: rectangle_of(points),
+            offset,
+        };
+        self.visitor.shape(&shape, self.placements)
+    }
+
+    #[inline]
+    fn plain_reference(&mut self, offset: u64, key: u64, at: Point) -> Result<()> {
+        let layout = self.layout;
+        let inline = self.recent.number(key, |name| layout.inline_cell(name));
+        if inline == u32::MAX {
+            return Ok(());
+        }
+        let own = Transform::Square {
+            orientation: 0,
+            dx: at.x,
+            dy: at.y,
+        };
+        self.copy(inline as usize, own, offset)
+    }
+
+    fn element(&mut self, _input: &Input, element: &Element) -> Result<()> {
+        match element.kind {
+            ElementKind::Reference | ElementKind::Array => {
+                let inline = self.layout.inline_cell(&element.name);
+                if inline != u32::MAX {
+                    for k in 0..element.copies() {
+                        self.copy(inline as usize, element.copy(k), element.offset)?;
+                    }
+                }
+                Ok(())
+            }
+            ElementKind::Text if self.wants(element.layer) => {
+                let text = Text {
+                    layer: element.layer,
+                    string: &element.string,
+                    at: element.points[0],
+                    offset: element.offset,
+                };
+                self.visitor.text(&text, self.placements)
+            }
+            _ if self.wants(element.layer) => {
+                let mut points = std::mem::take(&mut self.path);
+                if let Some(kind) = outline_of(element, &mut points) {
+                    let shape = Shape {
+                        kind,
+                        layer: element.layer,
+                        rect: rectangle_of(&points),
+                        points: &points,
+                        offset: element.offset,
+                    };
+                    self.visitor.shape(&shape, self.placements)?;
+                }
+                self.path = points;
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+}

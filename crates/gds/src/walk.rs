@@ -1,0 +1,119 @@
+//! The elements of one cell, one after the other.
+
+use super::element::{Element, ElementKind};
+use super::fast;
+use super::input::Input;
+use super::limits::ReadLimits;
+use super::record::{self, kind};
+use super::shape::Point;
+use metalith_core::{Error, LayerNumber, Progress, Result};
+
+/// What takes the elements of a cell.
+pub(super) trait Sink {
+    /// A BOUNDARY of five points; most of them are upright squares.
+    fn five_points(&mut self, offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<()>;
+
+    /// A plain reference, the name by its key.
+    fn plain_reference(&mut self, offset: u64, key: u64, at: Point) -> Result<()>;
+
+    /// Any other element.
+    fn element(&mut self, input: &Input, element: &Element) -> Result<()>;
+}
+
+/// Reads elements from behind STRNAME to behind ENDSTR.
+pub(super) struct Walk<'a> {
+    pub limits: &'a ReadLimits,
+    pub progress: &'a dyn Progress,
+    element: Element,
+    /// Whether [`super::fast`] may be used: tests read with and without.
+    fast: bool,
+    reported: u64,
+}
+
+impl<'a> Walk<'a> {
+    pub fn new(limits: &'a ReadLimits, progress: &'a dyn Progress) -> Self {
+        Self {
+            limits,
+            progress,
+            element: Element::default(),
+            fast: true,
+            reported: 0,
+        }
+    }
+
+    /// Use the grammar for every element.
+    #[cfg(test)]
+    pub fn slowly(mut self) -> Self {
+        self.fast = false;
+        self
+    }
+
+    /// Tell how far reading is.
+    ///
+    /// # Errors
+    /// If the user asked to stop.
+    pub fn report(&mut self, offset: u64) -> Result<()> {
+        self.progress.advance(offset.saturating_sub(self.reported));
+        self.reported = offset;
+        if self.progress.stopped() {
+            return Err(Error::Interrupted);
+        }
+        Ok(())
+    }
+
+    /// Start counting bytes of progress at a place.
+    pub fn start_at(&mut self, offset: u64) {
+        self.reported = offset;
+    }
+
+    /// Hand the elements up to ENDSTR to `sink`.
+    pub fn cell<S: Sink>(&mut self, input: &mut Input, sink: &mut S) -> Result<()> {
+        loop {
+            if self.fast {
+                self.fast_run(input, sink)?;
+            }
+            let record = input.next()?;
+            if let Some(kind) = ElementKind::of(record.kind) {
+                self.element.read(input, record, kind, self.limits)?;
+                sink.element(input, &self.element)?;
+            } else if record.kind == kind::ENDSTR {
+                return self.report(input.offset());
+            } else if matches!(record.kind, kind::BGNSTR | kind::ENDLIB | kind::BGNLIB | kind::HEADER) {
+                return Err(input.fault(
+                    record.offset,
+                    format!(
+                        "a {} record inside a cell: ENDSTR is missing",
+                        record::name(record.kind)
+                    ),
+                    "the file is damaged here: write it again",
+                ));
+            }
+        }
+    }
+
+    /// As many of the two common elements as follow one another.
+    fn fast_run<S: Sink>(&mut self, input: &mut Input, sink: &mut S) -> Result<()> {
+        loop {
+            let base = input.offset();
+            self.report(base)?;
+            let window = input.window()?;
+            let mut at = 0;
+            while let Some(bytes) = window.get(at..).and_then(<[u8]>::first_chunk) {
+                if let Some((layer, points)) = fast::boundary(bytes) {
+                    sink.five_points(base + at as u64, layer, &points)?;
+                    at += fast::BOUNDARY_BYTES;
+                } else if let Some(reference) = bytes.first_chunk().and_then(fast::reference) {
+                    sink.plain_reference(base + at as u64, reference.key, reference.at)?;
+                    at += reference.bytes;
+                } else {
+                    break;
+                }
+            }
+            let more = window.len() - at < fast::BOUNDARY_BYTES && at > 0;
+            input.consume(at);
+            if !more {
+                return Ok(());
+            }
+        }
+    }
+}

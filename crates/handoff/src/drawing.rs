@@ -1,0 +1,289 @@
+//! Cells of rectangles, references and labels in whole nanometres, written through gds21.
+
+use std::path::Path;
+
+use chrono::NaiveDateTime;
+use gds21::{
+    GdsArrayRef, GdsBoundary, GdsDateTimes, GdsElement, GdsLibrary, GdsPoint, GdsStrans, GdsStruct, GdsStructRef,
+    GdsTextElem, GdsUnits,
+};
+
+use metalith_core::WholeFile;
+use metalith_core::{Error, Result};
+use metalith_design::Layer;
+use metalith_design::array::{Class, Symmetry};
+
+/// Layer and datatype.
+pub(super) type LayerNumber = (i16, i16);
+
+/// Layer and datatype of a layer of the design.
+pub(super) fn number(layer: &Layer) -> LayerNumber {
+    (layer.layer, layer.datatype)
+}
+
+/// A rectangle between two corners [nm].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub(super) struct Rect {
+    pub x0: i64,
+    pub y0: i64,
+    pub x1: i64,
+    pub y1: i64,
+}
+
+impl Rect {
+    pub fn new(x0: i64, y0: i64, x1: i64, y1: i64) -> Self {
+        Self { x0, y0, x1, y1 }
+    }
+
+    /// A rectangle of this size with its lower left corner at a place.
+    pub fn at(x: i64, y: i64, width: i64, height: i64) -> Self {
+        Self::new(x, y, x + width, y + height)
+    }
+
+    /// The rectangle with all edges moved outwards.
+    pub fn grown(self, by: i64) -> Self {
+        Self::new(self.x0 - by, self.y0 - by, self.x1 + by, self.y1 + by)
+    }
+
+    pub fn centre(&self) -> (i64, i64) {
+        ((self.x0 + self.x1) / 2, (self.y0 + self.y1) / 2)
+    }
+
+    pub fn united(&self, other: &Self) -> Self {
+        Self::new(
+            self.x0.min(other.x0),
+            self.y0.min(other.y0),
+            self.x1.max(other.x1),
+            self.y1.max(other.y1),
+        )
+    }
+}
+
+/// One cell.
+pub(super) struct Sheet {
+    name: String,
+    elements: Vec<GdsElement>,
+}
+
+impl Sheet {
+    pub fn new(name: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            elements: Vec::new(),
+        }
+    }
+
+    pub fn rectangle(&mut self, layer: LayerNumber, r: Rect) {
+        let corners = [(r.x0, r.y0), (r.x1, r.y0), (r.x1, r.y1), (r.x0, r.y1), (r.x0, r.y0)];
+        let boundary = GdsBoundary {
+            layer: layer.0,
+            datatype: layer.1,
+            xy: corners.iter().map(|&(x, y)| point(x, y)).collect(),
+            ..Default::default()
+        };
+        self.elements.push(boundary.into());
+    }
+
+    /// A square of even width about a place.
+    pub fn square(&mut self, layer: LayerNumber, (x, y): (i64, i64), width: i64) {
+        self.rectangle(layer, Rect::at(x - width / 2, y - width / 2, width, width));
+    }
+
+    pub fn text(&mut self, layer: LayerNumber, (x, y): (i64, i64), words: impl Into<String>) {
+        let text = GdsTextElem {
+            string: words.into(),
+            layer: layer.0,
+            texttype: layer.1,
+            xy: point(x, y),
+            ..Default::default()
+        };
+        self.elements.push(text.into());
+    }
+
+    pub fn place(&mut self, cell: &str, (x, y): (i64, i64), symmetry: Symmetry) {
+        let strans = (symmetry != Symmetry::IDENTITY).then(|| GdsStrans {
+            reflected: symmetry.mirrored,
+            angle: (symmetry.quarter_turns > 0).then(|| 90.0 * f64::from(symmetry.quarter_turns)),
+            ..Default::default()
+        });
+        let reference = GdsStructRef {
+            name: cell.to_owned(),
+            xy: point(x, y),
+            strans,
+            ..Default::default()
+        };
+        self.elements.push(reference.into());
+    }
+
+    /// So many copies along x and y, the first at a place.
+    pub fn array(&mut self, cell: &str, (x, y): (i64, i64), (columns, rows): (i16, i16), pitch: i64) {
+        let reference = GdsArrayRef {
+            name: cell.to_owned(),
+            xy: [
+                point(x, y),
+                point(x + i64::from(columns) * pitch, y),
+                point(x, y + i64::from(rows) * pitch),
+            ],
+            cols: columns,
+            rows,
+            ..Default::default()
+        };
+        self.elements.push(reference.into());
+    }
+
+    /// A number or word in blocks, its lower left corner at a place. Characters: digits and a few capitals.
+    pub fn numerals(&mut self, layer: LayerNumber, (x, y): (i64, i64), height: i64, words: &str) {
+        let block = height / 5;
+        for (k, c) in words.chars().enumerate() {
+            let left = x + 4 * block * k as i64;
+            for (row, bits) in glyph(c).iter().enumerate() {
+                let bottom = y + block * (4 - row as i64);
+                for (first, last) in runs(*bits) {
+                    self.rectangle(
+                        layer,
+                        Rect::new(left + block * first, bottom, left + block * last, bottom + block),
+                    );
+                }
+            }
+        }
+    }
+
+    /// Width of [`Sheet::numerals`].
+    pub fn numerals_width(height: i64, words: &str) -> i64 {
+        let block = height / 5;
+        (4 * words.chars().count() as i64 - 1).max(0) * block
+    }
+}
+
+/// Five rows of three blocks, from above; the highest bit is the left block.
+fn glyph(c: char) -> [u8; 5] {
+    match c {
+        '0' => [0b111, 0b101, 0b101, 0b101, 0b111],
+        '1' => [0b010, 0b110, 0b010, 0b010, 0b111],
+        '2' => [0b111, 0b001, 0b111, 0b100, 0b111],
+        '3' => [0b111, 0b001, 0b111, 0b001, 0b111],
+        '4' => [0b101, 0b101, 0b111, 0b001, 0b001],
+        '5' => [0b111, 0b100, 0b111, 0b001, 0b111],
+        '6' => [0b111, 0b100, 0b111, 0b101, 0b111],
+        '7' => [0b111, 0b001, 0b010, 0b010, 0b010],
+        '8' => [0b111, 0b101, 0b111, 0b101, 0b111],
+        '9' => [0b111, 0b101, 0b111, 0b001, 0b111],
+        'D' => [0b110, 0b101, 0b101, 0b101, 0b110],
+        'S' => [0b111, 0b100, 0b111, 0b001, 0b111],
+        'X' => [0b101, 0b101, 0b010, 0b101, 0b101],
+        'Y' => [0b101, 0b101, 0b010, 0b010, 0b010],
+        _ => [0; 5],
+    }
+}
+
+/// Runs of set blocks of a row, as first and one past the last.
+fn runs(bits: u8) -> Vec<(i64, i64)> {
+    let set: Vec<i64> = (0..3).filter(|k| bits & (0b100 >> k) != 0).collect();
+    set.chunk_by(|a, b| a + 1 == *b)
+        .map(|run| (run[0], run[run.len() - 1] + 1))
+        .collect()
+}
+
+/// Cells of a file to be.
+pub(super) struct Drawing {
+    tree: GdsLibrary,
+}
+
+impl Drawing {
+    /// An empty drawing. The date stands in its headers, checked when the design was read.
+    pub fn new(name: &str, timestamp: &str) -> Self {
+        let date = timestamp.parse::<NaiveDateTime>().unwrap_or_default();
+        let mut library = GdsLibrary::new(name);
+        library.units = GdsUnits::new(1e-3, 1e-9);
+        library.dates = GdsDateTimes {
+            modified: date,
+            accessed: date,
+        };
+        Self { tree: library }
+    }
+
+    /// Add a cell; cells come before those that refer to them.
+    pub fn add(&mut self, sheet: Sheet) {
+        self.tree.structs.push(GdsStruct {
+            name: sheet.name,
+            dates: self.tree.dates.clone(),
+            elems: sheet.elements,
+        });
+    }
+
+    /// Add a cell of one square, for arrays of it.
+    pub fn add_pillar(&mut self, name: &str, layer: LayerNumber, width: i64) {
+        let mut sheet = Sheet::new(name);
+        sheet.square(layer, (0, 0), width);
+        self.add(sheet);
+    }
+
+    /// Add the pillars of a lens as a cell of this name, folded by its symmetries.
+    pub fn add_lens(&mut self, name: &str, layer: LayerNumber, class: &Class) {
+        let lattice = class.widths.lattice;
+        let n = lattice.sites();
+        let mut whole = Sheet::new(name);
+        for (j, part) in class.group.domain(&class.widths).iter().enumerate() {
+            let mut sheet = Sheet::new(format!("{name}_{}", (b'A' + j as u8) as char));
+            for ((iy, ix), &width) in class.widths.width_nm.indexed_iter() {
+                if width != 0 && class.group.holds(part, n, ix, iy) {
+                    let at = (lattice.coordinate_nm(ix), lattice.coordinate_nm(iy));
+                    sheet.square(layer, at, i64::from(width));
+                }
+            }
+            for symmetry in &part.copies {
+                whole.place(&sheet.name, (0, 0), *symmetry);
+            }
+            self.add(sheet);
+        }
+        self.add(whole);
+    }
+
+    /// Write the file.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let mut bytes = Vec::new();
+        self.tree.write(&mut bytes).map_err(|e| {
+            Error::invalid(
+                format!("{} cannot be encoded: {e:?}", path.display()),
+                "please report this with the design and the process file",
+            )
+        })?;
+        WholeFile::write(path, &bytes)
+    }
+}
+
+/// A point of the layout; sizes in process and design files keep far below 2.1 m.
+fn point(x_nm: i64, y_nm: i64) -> GdsPoint {
+    let coordinate = |nm: i64| i32::try_from(nm).expect("sizes are limited when they are read");
+    GdsPoint::new(coordinate(x_nm), coordinate(y_nm))
+}
+
+/// Whole nanometres.
+pub(super) fn nm(um: f64) -> i64 {
+    (um * 1e3).round() as i64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numerals_touch_but_never_overlap() {
+        for c in "0123456789DSXY".chars() {
+            let rows = glyph(c);
+            assert!(rows.iter().any(|&r| r != 0), "{c} is drawn");
+            for row in rows {
+                let runs = runs(row);
+                let blocks: i64 = runs.iter().map(|(a, b)| b - a).sum();
+                assert_eq!(blocks, i64::from(row.count_ones()));
+                assert!(
+                    runs.windows(2).all(|w| w[0].1 < w[1].0),
+                    "{c}: runs of a row stay apart"
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! What the first step exposes, how long that takes, and what its shots do to the widths.
+
+use super::census::Census;
+use super::dose::{Beam, Exposure, WriteTime};
+use super::fields;
+use super::process::Process;
+use metalith_core::Result;
+use metalith_design::Design;
+use metalith_design::array::PillarArray;
+
+/// What each file of the first step exposes, and how long that takes.
+pub(super) fn exposures(
+    design: &Design,
+    process: &Process,
+    census: &[Census],
+) -> Result<Vec<(String, Exposure, Vec<WriteTime>)>> {
+    let layers = &design.layout.layers;
+    let mut exposures = Vec::new();
+    for file in census {
+        let exposed = |l: &&super::census::LayerCount| {
+            let number = (i32::from(l.layer), i32::from(l.datatype));
+            let is = |layer: &metalith_design::Layer| number == (i32::from(layer.layer), i32::from(layer.datatype));
+            is(&layers.pillars) || is(&layers.pillar_marks) || number.0 == i32::from(process.dose_matrix.layer)
+        };
+        let mut exposure = Exposure::default();
+        let mut bounds: Option<[f64; 4]> = None;
+        for layer in file.layers.iter().filter(exposed) {
+            exposure.area_um2 += layer.area_um2;
+            exposure.shapes += layer.shapes;
+            if let Some(b) = layer.bounds_um {
+                bounds = Some(bounds.map_or(b, |a| [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])]));
+            }
+        }
+        let Some(bounds) = bounds else { continue };
+        exposure.fields = if exposures.is_empty() {
+            fields::of_design(design, process)
+        } else {
+            fields::of_bounds(bounds, process)
+        };
+        let times = process
+            .writer
+            .currents_na
+            .iter()
+            .map(|&i| WriteTime::of(process, &exposure, i))
+            .collect::<Result<Vec<_>>>()?;
+        exposures.push((file.file.clone(), exposure, times));
+    }
+    Ok(exposures)
+}
+
+/// How much the widths of the array change on the shots of each beam, root mean square over all pillars.
+pub(super) fn snapping(array: &PillarArray, process: &Process) -> Result<Vec<(Beam, f64)>> {
+    let mut counts: Vec<u64> = Vec::new();
+    let histograms: Vec<_> = array.classes.iter().map(|c| c.widths.histogram()).collect();
+    for placed in &array.placed {
+        let histogram = &histograms[placed.class];
+        counts.resize(counts.len().max(histogram.len()), 0);
+        counts.iter_mut().zip(histogram).for_each(|(all, n)| *all += n);
+    }
+    let pillars: u64 = counts.iter().skip(1).sum();
+    process
+        .writer
+        .currents_na
+        .iter()
+        .map(|&current| {
+            let beam = Beam::choose(&process.writer, current, process.resist.dose_uc_cm2)?;
+            let square = |(w, &n): (usize, &u64)| n as f64 * (beam.snapped_nm(w as f64) - w as f64).powi(2);
+            let sum: f64 = counts.iter().enumerate().skip(1).map(square).sum();
+            Ok((beam, (sum / pillars.max(1) as f64).sqrt()))
+        })
+        .collect()
+}

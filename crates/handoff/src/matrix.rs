@@ -1,0 +1,175 @@
+//! The dose matrix: nine blocks of equal geometry, one for each dose.
+
+use std::path::Path;
+
+use super::dose::doses;
+use super::drawing::{Drawing, LayerNumber, Rect, Sheet, nm, number};
+use super::process::Process;
+use metalith_core::{Result, Silent};
+use metalith_design::Design;
+use metalith_design::array::{Class, PillarArray, Symmetry};
+use metalith_design::phase::RadialPhase;
+
+/// Room between the parts of a block [nm].
+const APART: i64 = 20_000;
+/// Height of the number of a block [nm].
+const NUMERAL: i64 = 20_000;
+
+/// Where one dose stands.
+#[derive(Clone, Copy, Debug, serde::Serialize)]
+pub(super) struct Block {
+    /// 1 to 9; also the datatype.
+    pub number: usize,
+    /// Centre of the small lens and of the row of pads [nm].
+    #[serde(rename = "lens_nm")]
+    pub lens: (i64, i64),
+    #[serde(rename = "pads_nm")]
+    pub pads: (i64, i64),
+    #[serde(rename = "bounds_nm")]
+    pub bounds: Rect,
+}
+
+/// The blocks of a dose matrix, base dose in the middle of the file, each in the middle of a field of its own: a
+/// dose is not to be judged across a seam.
+pub(super) fn blocks(process: &Process) -> Vec<Block> {
+    let size = Sizes::of(process);
+    let field = nm(process.writer.field_used_um);
+    let fields = |length: i64| (length + size.gap).div_euclid(field) * field + field;
+    let step = (fields(size.width), fields(size.height));
+    (0..9)
+        .map(|k| {
+            // Row by row from the upper left, as one reads.
+            let (column, row) = (k % 3 - 1, 1 - k / 3);
+            let (x, y) = (column * step.0, row * step.1);
+            let bounds = Rect::at(x - size.width / 2, y - size.height / 2, size.width, size.height);
+            Block {
+                number: k as usize + 1,
+                lens: (x, bounds.y1 - size.lens / 2),
+                pads: (x, bounds.y0 + size.pad / 2),
+                bounds,
+            }
+        })
+        .collect()
+}
+
+struct Sizes {
+    lens: i64,
+    pad: i64,
+    gap: i64,
+    width: i64,
+    height: i64,
+}
+
+impl Sizes {
+    fn of(process: &Process) -> Self {
+        let spec = &process.dose_matrix;
+        let (lens, pad, gap) = (nm(spec.lens_diameter_um), nm(spec.pad_um), nm(spec.gap_um));
+        let pads = spec.pad_widths_nm.len() as i64;
+        let beside = lens + 2 * (APART + NUMERAL);
+        Self {
+            lens,
+            pad,
+            gap,
+            width: even((pads * pad + (pads - 1) * APART).max(beside)),
+            height: even(lens + APART + pad),
+        }
+    }
+}
+
+fn even(n: i64) -> i64 {
+    n + n % 2
+}
+
+/// A small hyperbolic lens of the design's cell, mapping and F-number.
+///
+/// # Errors
+/// If the user stopped it.
+pub(super) fn small_lens(design: &Design, diameter_um: f64, wavelength_nm: f64) -> Result<Class> {
+    let mut small = hyperbolic(design, wavelength_nm);
+    let share = diameter_um / (2.0 * design.lens.radius_um());
+    small.lens.diameter_nm = (diameter_um * 1e3).round() as u32;
+    small.lens.focal_length_um = design.lens.focal_length_um * share;
+    small.lens.phase = RadialPhase::Hyperbola {
+        wavelength_um: wavelength_nm * 1e-3,
+        focal_length_um: small.lens.focal_length_um,
+    };
+    let mut array = PillarArray::build(&small, &Silent)?;
+    Ok(array.classes.swap_remove(0))
+}
+
+/// The design with one element, not steered, hyperbolic for a wavelength.
+pub(super) fn hyperbolic(design: &Design, wavelength_nm: f64) -> Design {
+    let mut single = design.clone();
+    single.array.count = (1, 1);
+    single.array.steering_deg = 0.0;
+    single.lens.phase = RadialPhase::Hyperbola {
+        wavelength_um: wavelength_nm * 1e-3,
+        focal_length_um: design.lens.focal_length_um,
+    };
+    single
+}
+
+/// Write the dose matrix.
+///
+/// # Errors
+/// If the file cannot be written.
+pub(super) fn write(path: &Path, design: &Design, process: &Process) -> Result<Vec<Block>> {
+    let spec = &process.dose_matrix;
+    let lens = small_lens(design, spec.lens_diameter_um, process.tests.reference_wavelength_nm)?;
+    let pitch = i64::from(design.cell.pitch_nm);
+    let (label, marks) = (
+        number(&design.layout.layers.label),
+        number(&design.layout.layers.pillar_marks),
+    );
+    let blocks = blocks(process);
+    let mut drawing = Drawing::new("DOSE_MATRIX", &design.layout.timestamp);
+    let mut top = Sheet::new("DOSE_MATRIX");
+    for (block, dose) in blocks.iter().zip(doses(process)) {
+        let layer: LayerNumber = (spec.layer, block.number as i16);
+        let lens_name = format!("D{}_LENS", block.number);
+        drawing.add_lens(&lens_name, layer, &lens);
+        top.place(&lens_name, block.lens, Symmetry::IDENTITY);
+        let count = spec.pad_widths_nm.len() as i64;
+        let span = (nm(spec.pad_um) + APART) * (count - 1);
+        for (k, &width_nm) in spec.pad_widths_nm.iter().enumerate() {
+            let width = legal_width(design, width_nm);
+            let cell = format!("D{}_W{width}", block.number);
+            drawing.add_pillar(&cell, layer, width);
+            let x = block.pads.0 - span / 2 + k as i64 * (nm(spec.pad_um) + APART);
+            top_pad(&mut top, &cell, (x, block.pads.1), nm(spec.pad_um), pitch);
+        }
+        let left = block.lens.0 - nm(spec.lens_diameter_um) / 2 - APART - NUMERAL * 3 / 5;
+        top.numerals(marks, (left, block.lens.1), NUMERAL, &block.number.to_string());
+        top.text(
+            label,
+            (block.bounds.x0, block.bounds.y1),
+            format!(
+                "dose {} x {:.2} = {:.1} uC/cm2",
+                block.number, dose.factor, dose.dose_uc_cm2
+            ),
+        );
+    }
+    drawing.add(top);
+    drawing.write(path)?;
+    Ok(blocks)
+}
+
+/// A square pad of pillars about a place.
+pub(super) fn top_pad(sheet: &mut Sheet, pillar: &str, (x, y): (i64, i64), side: i64, pitch: i64) {
+    let n = (side / pitch).max(1);
+    let first = -(n - 1) * pitch / 2;
+    sheet.array(pillar, (x + first, y + first), (n as i16, n as i16), pitch);
+}
+
+/// The width that the design may write nearest to one that is asked for [nm].
+pub(super) fn legal_width(design: &Design, width_nm: f64) -> i64 {
+    let nearest = design
+        .cell
+        .widths_nm()
+        .min_by(|a, b| {
+            let off = |w: &u16| (f64::from(*w) - width_nm).abs();
+            off(a).total_cmp(&off(b))
+        })
+        .unwrap_or(design.cell.width_range_nm.0);
+    i64::from(nearest)
+}

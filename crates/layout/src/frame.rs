@@ -1,0 +1,66 @@
+//! The bytes of a GDSII library around its pillars, encoded by gds21.
+
+use chrono::NaiveDateTime;
+use gds21::{GdsDateTimes, GdsElement, GdsLibrary, GdsStruct, GdsUnits};
+
+use super::{encoding, top_cell};
+use metalith_core::Result;
+use metalith_design::Design;
+
+/// Length of the records ENDSTR and ENDLIB.
+const END: usize = 4;
+
+/// Head and tail of a library, and cells cut so that more records fit before their end.
+pub(super) struct Frame {
+    empty: GdsLibrary,
+    bytes: Vec<u8>,
+}
+
+impl Frame {
+    /// The empty library of a design: database unit 1 nm, user unit 1 um, one date for everything.
+    pub fn new(design: &Design) -> Result<Self> {
+        let date = design
+            .layout
+            .timestamp
+            .parse::<NaiveDateTime>()
+            .expect("checked when the design was read");
+        let mut library = GdsLibrary::new(top_cell(design));
+        library.units = GdsUnits::new(1e-3, 1e-9);
+        library.dates = GdsDateTimes {
+            modified: date,
+            accessed: date,
+        };
+        let bytes = encode(&library)?;
+        Ok(Self { empty: library, bytes })
+    }
+
+    /// The records before the first cell.
+    pub fn head(&self) -> &[u8] {
+        &self.bytes[..self.bytes.len() - END]
+    }
+
+    /// The record after the last cell.
+    pub fn tail(&self) -> &[u8] {
+        &self.bytes[self.bytes.len() - END..]
+    }
+
+    /// A cell with these elements, cut before its end.
+    pub fn cell(&self, name: &str, elements: Vec<GdsElement>) -> Result<(Vec<u8>, Vec<u8>)> {
+        let mut library = self.empty.clone();
+        library.structs.push(GdsStruct {
+            name: name.to_owned(),
+            dates: self.empty.dates.clone(),
+            elems: elements,
+        });
+        let bytes = encode(&library)?;
+        let cell = &bytes[self.head().len()..bytes.len() - END];
+        let (begin, end) = cell.split_at(cell.len() - END);
+        Ok((begin.to_vec(), end.to_vec()))
+    }
+}
+
+fn encode(library: &GdsLibrary) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    library.write(&mut bytes).map_err(encoding)?;
+    Ok(bytes)
+}

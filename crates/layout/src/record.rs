@@ -1,0 +1,114 @@
+//! The two records that a layout has millions of, byte for byte as gds21 would write them.
+
+use metalith_design::Layer;
+
+/// Length of a BOUNDARY of five points.
+pub(super) const SQUARE_BYTES: usize = 64;
+
+/// A square on one layer, ready but for its corners.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SquareRecord([u8; SQUARE_BYTES]);
+
+impl SquareRecord {
+    pub fn on(layer: &Layer) -> Self {
+        let mut record = [0; SQUARE_BYTES];
+        let [l1, l0] = layer.layer.to_be_bytes();
+        let [d1, d0] = layer.datatype.to_be_bytes();
+        let (boundary, end) = ([0, 4, 0x08, 0], [0, 4, 0x11, 0]);
+        record[..4].copy_from_slice(&boundary);
+        record[4..10].copy_from_slice(&[0, 6, 0x0d, 2, l1, l0]);
+        record[10..16].copy_from_slice(&[0, 6, 0x0e, 2, d1, d0]);
+        record[16..20].copy_from_slice(&[0, 44, 0x10, 3]);
+        record[60..].copy_from_slice(&end);
+        Self(record)
+    }
+
+    /// Append the square of this width about a centre [nm], corners counter-clockwise from the lower left.
+    pub fn append(&self, out: &mut Vec<u8>, x: i32, y: i32, width: u16) {
+        let half = i32::from(width) / 2;
+        let (left, low, right, high) = (x - half, y - half, x + half, y + half);
+        let corners = [left, low, right, low, right, high, left, high, left, low];
+        let mut record = self.0;
+        for (bytes, corner) in record[20..60].chunks_exact_mut(4).zip(corners) {
+            bytes.copy_from_slice(&corner.to_be_bytes());
+        }
+        out.extend_from_slice(&record);
+    }
+}
+
+/// A plain reference (SREF) to one cell, ready but for its place.
+#[derive(Clone, Debug)]
+pub(super) struct ReferenceRecord {
+    record: Vec<u8>,
+    place: usize,
+}
+
+impl ReferenceRecord {
+    pub fn to(cell: &str) -> Self {
+        let mut record = vec![0, 4, 0x0a, 0];
+        // Strings are padded to an even length.
+        let length = (cell.len() + cell.len() % 2 + 4) as u16;
+        record.extend(length.to_be_bytes());
+        record.extend([0x12, 6]);
+        record.extend(cell.bytes());
+        record.resize(4 + usize::from(length), 0);
+        record.extend([0, 12, 0x10, 3]);
+        let place = record.len();
+        record.extend([0; 8]);
+        record.extend([0, 4, 0x11, 0]);
+        Self { record, place }
+    }
+
+    /// Append the reference at a place [nm].
+    pub fn append(&self, out: &mut Vec<u8>, x: i32, y: i32) {
+        let start = out.len() + self.place;
+        out.extend_from_slice(&self.record);
+        out[start..start + 4].copy_from_slice(&x.to_be_bytes());
+        out[start + 4..start + 8].copy_from_slice(&y.to_be_bytes());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::polygon;
+    use super::*;
+    use gds21::{GdsElement, GdsLibrary, GdsPoint, GdsStruct, GdsStructRef};
+    use proptest::prelude::*;
+
+    /// The bytes of one element as gds21 writes it.
+    fn by_gds21(element: GdsElement) -> Vec<u8> {
+        let encode = |elems| {
+            let mut library = GdsLibrary::new("L");
+            library.structs.push(GdsStruct {
+                elems,
+                ..GdsStruct::new("C")
+            });
+            let mut bytes = Vec::new();
+            library.write(&mut bytes).unwrap();
+            bytes
+        };
+        let (empty, full) = (encode(vec![]), encode(vec![element]));
+        let tail = 8;
+        full[empty.len() - tail..full.len() - tail].to_vec()
+    }
+
+    proptest! {
+        #[test]
+        fn squares_are_those_of_gds21(x in -2_000_000_000..2_000_000_000, y in -2_000_000_000..2_000_000_000, half in 1u16..30_000, layer in 0i16..256, datatype in 0i16..256) {
+            let layer = Layer { layer, datatype, purpose: String::new() };
+            let mut ours = Vec::new();
+            SquareRecord::on(&layer).append(&mut ours, x, y, 2 * half);
+            let (x, y, h) = (i64::from(x), i64::from(y), i64::from(half));
+            let corners = [(x - h, y - h), (x + h, y - h), (x + h, y + h), (x - h, y + h)];
+            prop_assert_eq!(ours, by_gds21(polygon(&layer, &corners)));
+        }
+
+        #[test]
+        fn references_are_those_of_gds21(x: i32, y: i32, name in "[A-Za-z0-9_?$]{1,32}") {
+            let mut ours = Vec::new();
+            ReferenceRecord::to(&name).append(&mut ours, x, y);
+            let reference = GdsStructRef { name, xy: GdsPoint::new(x, y), ..Default::default() };
+            prop_assert_eq!(ours, by_gds21(reference.into()));
+        }
+    }
+}

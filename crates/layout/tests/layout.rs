@@ -1,0 +1,147 @@
+//! Layouts: the bytes they were, on any number of threads, readable by a reader that is not ours.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use metalith_core::{Silent, WholeFile};
+use metalith_design::{Design, Hierarchy, PillarArray};
+use metalith_layout::{write_apertures, write_pillars};
+use metalith_testing::{design, golden};
+use serde_json::json;
+use sha2::{Digest, Sha256};
+
+const HIERARCHIES: [(&str, Hierarchy); 3] = [
+    ("folded", Hierarchy::Folded),
+    ("sref", Hierarchy::Sref),
+    ("flat", Hierarchy::Flat),
+];
+
+fn layout_bytes(design: &Design, hierarchy: Hierarchy, folder: &Path) -> Vec<u8> {
+    let array = PillarArray::build(design, &Silent).unwrap();
+    let path = folder.join("pillars.gds");
+    write_pillars(design, &array, hierarchy, &path, &Silent).unwrap();
+    fs::read(path).unwrap()
+}
+
+#[test]
+fn golden_bytes_of_the_mini_design() {
+    let folder = tempfile::tempdir().unwrap();
+    let mini = Design::read(&design("mini_3x3")).unwrap();
+    for (name, hierarchy) in HIERARCHIES {
+        golden(
+            &format!("mini_3x3/{name}.gds.gz"),
+            &layout_bytes(&mini, hierarchy, folder.path()),
+        );
+    }
+    let apertures = folder.path().join("apertures.gds");
+    write_apertures(&mini, &apertures).unwrap();
+    golden("mini_3x3/apertures.gds.gz", &fs::read(apertures).unwrap());
+}
+
+/// The main job at full size: 57.7 and 160.3 million pillars.
+#[test]
+fn golden_digests_of_the_full_size_designs() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut all = BTreeMap::new();
+    for name in ["prototype_3x3", "wide_5x5"] {
+        let full = Design::read(&design(name)).unwrap();
+        let array = PillarArray::build(&full, &Silent).unwrap();
+        let path = folder.path().join(name);
+        let written = write_pillars(&full, &array, Hierarchy::Folded, &path, &Silent).unwrap();
+        let mut sha = Sha256::new();
+        std::io::copy(&mut fs::File::open(&path).unwrap(), &mut sha).unwrap();
+        let mut histogram = vec![0; 301];
+        for placed in &array.placed {
+            let counts = array.classes[placed.class].widths.histogram();
+            histogram.iter_mut().zip(counts).for_each(|(sum, c)| *sum += c);
+        }
+        let widths = (1..)
+            .zip(&histogram[1..])
+            .filter(|(_, c)| **c > 0)
+            .collect::<BTreeMap<u16, _>>();
+        all.insert(
+            name,
+            json!({
+                "design_digest": full.digest(),
+                "pillars": array.pillars(),
+                "elements": array.placed.len(),
+                "distinct_elements": array.classes.len(),
+                "bytes": written.bytes,
+                "sha256": format!("{:x}", sha.finalize()),
+                "widths_nm": widths,
+            }),
+        );
+        fs::remove_file(path).unwrap();
+    }
+    golden("full_size.json", format!("{:#}\n", json!(all)).as_bytes());
+}
+
+#[test]
+fn the_same_bytes_on_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let mini = Design::read(&design("mini_3x3")).unwrap();
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| layout_bytes(&mini, Hierarchy::Folded, folder.path()))
+    };
+    let one = on(1);
+    assert!(one == on(2) && one == on(5));
+}
+
+#[test]
+fn another_reader_finds_every_pillar() {
+    let folder = tempfile::tempdir().unwrap();
+    let mini = Design::read(&design("mini_3x3")).unwrap();
+    let expected = PillarArray::build(&mini, &Silent).unwrap().pillars();
+    for (name, hierarchy) in HIERARCHIES {
+        let bytes = layout_bytes(&mini, hierarchy, folder.path());
+        let library = gds21::GdsLibrary::from_bytes(bytes).unwrap();
+        let cells = library
+            .structs
+            .iter()
+            .map(|s| (s.name.as_str(), s))
+            .collect::<BTreeMap<_, _>>();
+        assert_eq!(count(&cells, "MINI_3X3"), expected, "{name}");
+    }
+}
+
+/// Squares on the pillar layer in a cell and all it refers to.
+fn count(cells: &BTreeMap<&str, &gds21::GdsStruct>, name: &str) -> u64 {
+    let mut below = BTreeMap::new();
+    let mut sum = 0;
+    for element in &cells[name].elems {
+        match element {
+            gds21::GdsElement::GdsBoundary(b) => sum += u64::from(b.layer == 1),
+            gds21::GdsElement::GdsStructRef(r) => *below.entry(r.name.as_str()).or_insert(0) += 1,
+            _ => {}
+        }
+    }
+    sum + below
+        .iter()
+        .map(|(child, times)| times * count(cells, child))
+        .sum::<u64>()
+}
+
+#[test]
+fn an_unfinished_file_replaces_nothing() {
+    use std::io::Write;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("kept.gds");
+    fs::write(&path, "old").unwrap();
+    let mut file = WholeFile::create(&path).unwrap();
+    file.write_all(&[0; 3_000_000]).unwrap();
+    assert!(WholeFile::create(&path).is_err(), "two writers of one file");
+    drop(file);
+    assert_eq!(fs::read(&path).unwrap(), b"old");
+    assert_eq!(
+        fs::read_dir(folder.path()).unwrap().count(),
+        1,
+        "nothing is left beside it"
+    );
+    // What a killed run leaves is overwritten by the next.
+    fs::write(folder.path().join(".kept.gds.part"), [7; 100]).unwrap();
+    WholeFile::write(&path, b"new").unwrap();
+    assert_eq!(fs::read(&path).unwrap(), b"new");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+}

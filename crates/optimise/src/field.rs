@@ -1,0 +1,265 @@
+//! The field at a few points, linear in the transmission of each ring: kernel and transmissions.
+
+use std::ops::Range;
+
+use num_complex::{Complex32, Complex64};
+use rayon::prelude::*;
+
+use super::mapping::Mapping;
+use super::planes::Planes;
+use metalith_cell::CellModel;
+use metalith_core::{Error, Result};
+
+/// Rows are padded to whole groups of this many, so that inner loops have no ends to tidy.
+pub const LANES: usize = 32;
+/// Added to every intensity under a logarithm, in units of the matched peak: keeps a field of zero finite
+/// and is a thousandth of a hyperbolic lens at its worst wavelength.
+pub const FLOOR: f64 = 1e-9;
+
+/// What a cell is asked for at one row: a wavelength and an error of fabrication.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Condition {
+    /// Vacuum wavelength [um].
+    pub wavelength_um: f64,
+    /// Which of the cells given: they differ in height.
+    pub cell: usize,
+    /// Made width less designed width [nm].
+    pub width_bias_nm: f64,
+}
+
+/// A point of the field: its condition, what each ring contributes, and its weight in the merit.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// Wavelength and fabrication error.
+    pub condition: Condition,
+    /// Field of each ring of unit transmission, in units of the matched peak at full transmission.
+    pub kernel: Vec<Complex32>,
+    /// Weight within its block; logarithms take them all as one.
+    pub weight: f32,
+}
+
+/// How the intensities of a block make a merit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Mean of the logarithms.
+    Log,
+    /// Weighted sum; the weights may be negative.
+    Linear,
+}
+
+/// Rows that are summed up in one way.
+#[derive(Clone, Debug)]
+pub(super) struct Block {
+    pub kind: Kind,
+    pub weight: f64,
+    /// Padded to `LANES`.
+    pub rows: Range<usize>,
+    pub live: usize,
+}
+
+/// A merit of the field as a function of the phases of the rings. Larger is better.
+pub struct FieldProblem {
+    rings: usize,
+    rows: usize,
+    pub(super) blocks: Vec<Block>,
+    pub(super) row_weight: Vec<f32>,
+    /// `[ring][row]`.
+    kernel: Planes,
+    /// Transmission, `[width_nm][row]`, made width taken from the designed one.
+    table: Planes,
+    pub(super) mapping: Mapping,
+}
+
+impl FieldProblem {
+    /// A merit that is the sum of `weight` times each block of rows.
+    ///
+    /// `cells` are what [`Condition::cell`] counts. `memory_bytes` bounds the kernel.
+    ///
+    /// # Errors
+    /// If there are no rows, the rows disagree in the number of rings, the kernel would not fit, or a cell
+    /// does not cover a wavelength.
+    pub fn new(
+        blocks: Vec<(Kind, f64, Vec<Row>)>,
+        cells: &[&dyn CellModel],
+        mapping: Mapping,
+        memory_bytes: u64,
+    ) -> Result<Self> {
+        let rings = blocks
+            .iter()
+            .flat_map(|b| &b.2)
+            .map(|r| r.kernel.len())
+            .max()
+            .unwrap_or(0);
+        if rings == 0 || blocks.iter().flat_map(|b| &b.2).any(|r| r.kernel.len() != rings) {
+            return Err(Error::invalid(
+                "the rows of a merit are empty or differ in the number of rings",
+                "give every row one number a ring",
+            ));
+        }
+        let mut layout = Vec::new();
+        let mut all = Vec::<Option<Row>>::new();
+        for (kind, weight, rows) in blocks {
+            let (start, live) = (all.len(), rows.len());
+            all.extend(rows.into_iter().map(Some));
+            all.resize_with(all.len().next_multiple_of(LANES), || None);
+            layout.push(Block {
+                kind,
+                weight,
+                rows: start..all.len(),
+                live,
+            });
+        }
+        let rows = all.len();
+        let widths = usize::from(mapping.max_width_nm()) + 2;
+        let bytes = 8 * (rings as u64 + widths as u64) * rows as u64;
+        if bytes > memory_bytes {
+            return Err(Error::invalid(
+                format!("the kernel of {rows} rows by {rings} rings takes {bytes} bytes, more than {memory_bytes}"),
+                "take fewer wavelengths, errors or window points, or raise `memory_mb`",
+            ));
+        }
+        let mut kernel = Planes::zeros(rings * rows);
+        let mut row_weight = vec![0.0; rows];
+        for (i, row) in all.iter().enumerate().filter_map(|(i, row)| Some((i, row.as_ref()?))) {
+            row_weight[i] = row.weight;
+            for (ring, value) in row.kernel.iter().enumerate() {
+                kernel.re[ring * rows + i] = value.re;
+                kernel.im[ring * rows + i] = value.im;
+            }
+        }
+        let conditions = all.iter().map(|r| r.as_ref().map(|r| r.condition)).collect::<Vec<_>>();
+        let table = transmissions(&conditions, cells, widths)?;
+        Ok(Self {
+            rings,
+            rows,
+            blocks: layout,
+            row_weight,
+            kernel,
+            table,
+            mapping,
+        })
+    }
+
+    /// Number of rings.
+    pub fn rings(&self) -> usize {
+        self.rings
+    }
+
+    /// The mapping from phase to width.
+    pub fn mapping(&self) -> &Mapping {
+        &self.mapping
+    }
+
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    pub fn kernel_of(&self, ring: usize) -> (&[f32], &[f32]) {
+        self.kernel.row(ring, self.rows)
+    }
+
+    pub fn transmission_of(&self, width_nm: u16) -> (&[f32], &[f32]) {
+        self.table.row(usize::from(width_nm), self.rows)
+    }
+}
+
+/// Transmission of every whole width at every row, with the width's error taken in by interpolation.
+fn transmissions(conditions: &[Option<Condition>], cells: &[&dyn CellModel], widths: usize) -> Result<Planes> {
+    let columns = conditions
+        .par_iter()
+        .map(|condition| {
+            let Some(condition) = condition else {
+                return Ok(vec![Complex64::ZERO; widths]);
+            };
+            let cell = cells.get(condition.cell).ok_or_else(|| {
+                Error::invalid(
+                    format!("there is no cell {}", condition.cell),
+                    "name one of the cells given",
+                )
+            })?;
+            let margin = condition.width_bias_nm.abs().ceil() as usize + 1;
+            let pure = cell.transmissions(condition.wavelength_um, (widths + margin) as u16)?;
+            let column = (0..widths)
+                .map(|width| {
+                    let made = (width as f64 + condition.width_bias_nm).max(0.0);
+                    let (low, part) = (made as usize, made.fract());
+                    if part == 0.0 {
+                        pure[low]
+                    } else {
+                        pure[low] * (1.0 - part) + pure[low + 1] * part
+                    }
+                })
+                .collect();
+            Ok(column)
+        })
+        .collect::<Result<Vec<Vec<Complex64>>>>()?;
+    let rows = conditions.len();
+    let mut table = Planes::zeros(widths * rows);
+    for (row, column) in columns.iter().enumerate() {
+        for (width, t) in column.iter().enumerate() {
+            table.re[width * rows + row] = t.re as f32;
+            table.im[width * rows + row] = t.im as f32;
+        }
+    }
+    Ok(table)
+}
+
+#[cfg(test)]
+pub mod tests {
+    use super::super::focus::{FabricationError, Lens};
+    use super::super::mapping::tests::published;
+    use super::super::rings::Rings;
+    use super::super::{Start, wavelengths};
+    use super::*;
+    use metalith_cell::PublishedCell;
+    use metalith_core::Lattice;
+
+    pub fn lens() -> Lens {
+        let rings = Rings::new(Lattice::covering(60_000, 350).unwrap(), 60_000).unwrap();
+        Lens { rings, gap_um: 144.0 }
+    }
+
+    /// Two blocks of each kind, one of them made 5 nm too wide.
+    pub fn problem() -> FieldProblem {
+        let (lens, cell) = (lens(), PublishedCell::new(350));
+        let cells: [&dyn CellModel; 1] = [&cell];
+        let wide = FabricationError {
+            width_bias_nm: 5.0,
+            ..FabricationError::default()
+        };
+        let rows = |step, error| {
+            lens.focal_rows(&wavelengths(400.0, 700.0, step), error, &cells)
+                .unwrap()
+        };
+        let blocks = vec![
+            (Kind::Log, 0.7, rows(10.0, FabricationError::default())),
+            (Kind::Log, 0.3, rows(20.0, wide)),
+            (Kind::Linear, 25.0, rows(50.0, FabricationError::default())),
+        ];
+        FieldProblem::new(blocks, &cells, published(), 1 << 24).unwrap()
+    }
+
+    /// Phases whose widths are half way between whole ones: transmission is a straight line between those.
+    pub fn start() -> Vec<f64> {
+        let mapping = published();
+        let turns = Start::Hyperbolic { wavelength_um: 0.55 }.turns(&lens(), 0);
+        let uneven = turns.iter().enumerate().map(|(i, t)| t + 0.1 * (i as f64 * 1.7).sin());
+        uneven
+            .map(|t| {
+                let (width, slope) = mapping.width_nm(t);
+                t + (width.floor() + 0.5 - width) / slope
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_kernel_beyond_its_memory_is_refused() {
+        let (lens, cell) = (lens(), PublishedCell::new(350));
+        let cells: [&dyn CellModel; 1] = [&cell];
+        let rows = lens
+            .focal_rows(&[0.5, 0.6], FabricationError::default(), &cells)
+            .unwrap();
+        assert!(FieldProblem::new(vec![(Kind::Log, 1.0, rows)], &cells, published(), 1000).is_err());
+        assert!(FieldProblem::new(vec![(Kind::Log, 1.0, Vec::new())], &cells, published(), 1000).is_err());
+    }
+}

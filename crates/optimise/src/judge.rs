@@ -1,0 +1,123 @@
+//! What was gained: Strehl ratios off the grid that was optimised on, three ways.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::focus::{Strehl, judging_wavelengths};
+use super::limit::{largest_step, largest_step_in_layout};
+use super::robust;
+use super::run::Task;
+use metalith_cell::{CellModel, Fidelity};
+use metalith_core::{Progress, Result};
+use metalith_design::array::PillarArray;
+use metalith_design::phase::{Interpolation, RadialPhase};
+use metalith_design::{Design, Hierarchy};
+use metalith_gds::Layout;
+use metalith_gds::extract::{ElementSite, ExtractionPlan, extract};
+use metalith_layout::write_pillars;
+
+/// Strehl ratio over wavelength of one phase, judged in one way.
+#[derive(Clone, Debug, Serialize)]
+pub struct Judged {
+    /// `rings` or `layout`: from the widths of the rings, or of all pillars read back from a file.
+    pub source: &'static str,
+    /// The cell that it was judged with.
+    pub fidelity: Fidelity,
+    /// Geometric mean over 0.5 nm steps between the wavelengths optimised on.
+    pub geometric_mean: f64,
+    /// Arithmetic mean.
+    pub mean: f64,
+    /// Smallest.
+    pub smallest: f64,
+    /// Largest wrapped phase step between neighbours [turns].
+    pub largest_step_turns: f64,
+    #[serde(skip)]
+    pub strehl: Strehl,
+}
+
+impl Judged {
+    fn new(source: &'static str, fidelity: Fidelity, strehl: Strehl, largest_step_turns: f64) -> Self {
+        Self {
+            source,
+            fidelity,
+            geometric_mean: strehl.geometric_mean(),
+            mean: strehl.mean(),
+            smallest: strehl.smallest(),
+            largest_step_turns,
+            strehl,
+        }
+    }
+}
+
+impl Task {
+    fn judging_wavelengths(&self) -> Vec<f64> {
+        judging_wavelengths(self.spec.band_um.0 * 1e3, self.spec.band_um.1 * 1e3)
+    }
+
+    /// From the widths that phases [turns] make, with one cell.
+    ///
+    /// # Errors
+    /// If the cell does not cover the band.
+    pub fn judge_rings(&self, turns: &[f64], cell: &dyn CellModel) -> Result<Judged> {
+        let widths = self.widths_nm(turns);
+        let strehl = self.lens.strehl_of_rings(&widths, cell, &self.judging_wavelengths())?;
+        Ok(Judged::new("rings", cell.fidelity(), strehl, largest_step(turns)))
+    }
+
+    /// From a layout: the lens is written as the design's array of one element, read back, and summed over
+    /// every pillar. `layout` is where the file goes; `table` is the phase file that its design reads.
+    ///
+    /// # Errors
+    /// If a file cannot be written or read, or the cell does not cover the band.
+    pub fn judge_layout(
+        &self,
+        design: &Design,
+        table: &Path,
+        layout: &Path,
+        cell: &dyn CellModel,
+        progress: &dyn Progress,
+    ) -> Result<Judged> {
+        let mut alone = design.clone();
+        alone.lens.phase = RadialPhase::read_table(table, Interpolation::Nearest, design.lens.radius_um())?;
+        alone.array.count = (1, 1);
+        let array = PillarArray::build(&alone, progress)?;
+        write_pillars(&alone, &array, Hierarchy::Folded, layout, progress)?;
+        let sites = array.placed.iter().map(|placed| ElementSite {
+            name: placed.element.label(),
+            centre_nm: [placed.element.centre_nm.0, placed.element.centre_nm.1],
+            lattice: array.lattice,
+        });
+        let plan = ExtractionPlan::given(alone.layout.layers.pillars.number(), sites.collect());
+        let found = extract(&Layout::open(layout)?, &plan, progress)?;
+        let widths = &found.elements[0].widths;
+        let strehl = self.lens.strehl_of_layout(widths, cell, &self.judging_wavelengths())?;
+        let step = largest_step_in_layout(widths, &self.mapping)?;
+        Ok(Judged::new("layout", cell.fidelity(), strehl, step))
+    }
+
+    /// Geometric-mean Strehl ratio of phases [turns] for errors of fabrication drawn afresh: one for each
+    /// draw. `cells` as in [`Task::solve`].
+    ///
+    /// # Errors
+    /// If a cell does not cover the band.
+    pub fn judge_errors(
+        &self,
+        turns: &[f64],
+        robust: &metalith_design::RobustSpec,
+        cells: &[&dyn CellModel],
+        draws: usize,
+    ) -> Result<Vec<f64>> {
+        let widths = self.widths_nm(turns);
+        let band = self.judging_wavelengths().into_iter().step_by(4).collect::<Vec<_>>();
+        robust::draw(robust, draws, cells.len(), self.spec.seed ^ 0x0dd)
+            .into_iter()
+            .map(|error| {
+                let rows = self.lens.focal_rows(&band, error, cells)?;
+                let blocks = vec![(super::Kind::Log, 1.0, rows)];
+                let problem = super::FieldProblem::new(blocks, cells, self.mapping.clone(), 1 << 30)?;
+                Ok(problem.merit_of_widths(&widths).exp())
+            })
+            .collect()
+    }
+}

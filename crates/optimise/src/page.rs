@@ -1,0 +1,290 @@
+//! The report of an optimisation: phase, PSF, Strehl and MTF before and after.
+
+use std::path::Path;
+
+use ndarray::Array2;
+use serde::Serialize;
+
+use super::judge::Judged;
+use super::mapping::step;
+use metalith_core::Result;
+use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, Table, Verdict, sig, write_json};
+
+/// All that is reported.
+#[derive(Clone, Debug, Serialize)]
+pub struct Findings {
+    /// Name and title of the design.
+    pub design: String,
+    /// Commands that made the phase.
+    pub command: String,
+    /// Phases that the best chain began from.
+    pub start: String,
+    /// Merit, as optimised.
+    pub merit: f64,
+    /// Limit on the step [turns].
+    pub step_limit_turns: f64,
+    /// The design's own phase before, judged in each way.
+    pub before: Vec<Judged>,
+    /// The optimised phase.
+    pub after: Vec<Judged>,
+    /// Geometric-mean Strehl ratio that exchange reaches for other limits [turns].
+    pub merit_over_limit: Vec<(f64, f64)>,
+    /// Expected PSNR of restored images [dB] at each field angle [degrees], before and after.
+    pub expected_psnr_db: Vec<(f64, f64, f64)>,
+    /// Geometric-mean Strehl ratios with drawn errors of fabrication, one a draw, of several phases by name.
+    pub with_errors: Vec<(&'static str, Vec<f64>)>,
+    /// Merit along the way.
+    #[serde(skip)]
+    pub history: Vec<(u32, f64)>,
+    /// Radius [um], phase before and after [turns], width after [nm] of each ring.
+    #[serde(skip)]
+    pub rings: Vec<(f64, f64, f64, u16)>,
+    /// Wavelengths of the pictures [um], their greatest radius [um], and PSFs before and after.
+    #[serde(skip)]
+    pub psf: (Vec<f64>, f64, Vec<Array2<f64>>),
+    /// Wavelengths [um], and MTF at half and all of Nyquist, before and after.
+    #[serde(skip)]
+    pub mtf: (Vec<f64>, Vec<Vec<(f64, f64)>>),
+}
+
+impl Findings {
+    /// Whether every step of the optimised phase keeps the limit, rings and layout.
+    pub fn limit_kept(&self) -> bool {
+        self.after
+            .iter()
+            .all(|j| j.largest_step_turns <= self.step_limit_turns + 1e-6)
+    }
+
+    /// Write `report.html` and `report.json` into a folder.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<()> {
+        write_json(&folder.join("report.json"), "optimize", self)?;
+        self.page().write(&folder.join("report.html"))
+    }
+
+    fn page(&self) -> Page {
+        let mut page = Page::new("Optimised radial phase", &self.design);
+        let kept = self.limit_kept();
+        let words = if kept {
+            format!(
+                "Every phase step, of the rings and of the layout, is within {} turns.",
+                self.step_limit_turns
+            )
+        } else {
+            format!("A phase step is beyond the limit of {} turns.", self.step_limit_turns)
+        };
+        page.verdict(Verdict::of(kept), words);
+        if let (Some(before), Some(after)) = (self.before.first(), self.after.first()) {
+            page.facts(&[
+                ("Geometric-mean Strehl before", sig(before.geometric_mean, 3)),
+                ("after", sig(after.geometric_mean, 3)),
+                ("Smallest after", sig(after.smallest, 3)),
+                ("Began from", self.start.clone()),
+            ]);
+        }
+        page.code(&self.command);
+        page.section("Strehl ratio");
+        page.paragraph(
+            "On a grid of 0.5 nm between the wavelengths that were optimised on, against the same aperture \
+             passing all its power in the zero order with the perfect phase.",
+        );
+        page.table(self.table());
+        page.figure(self.strehl());
+        page.section("PSF over wavelength");
+        page.row(self.psfs());
+        page.section("MTF over wavelength");
+        page.figure(self.mtfs());
+        page.section("Phase and width");
+        page.figure(self.phase());
+        page.figure(self.width());
+        self.rest(&mut page);
+        page
+    }
+
+    /// What not every optimisation has.
+    fn rest(&self, page: &mut Page) {
+        if !self.merit_over_limit.is_empty() {
+            let mut chart = Chart::new(
+                "What the limit costs",
+                Axis::linear("limit on the phase step", "turns").range(0.0, 0.5),
+                Axis::linear("geometric-mean Strehl ratio", ""),
+            );
+            chart.line("reached by exchange", self.merit_over_limit.iter().copied());
+            chart.marker(self.step_limit_turns, "this design");
+            page.section("Merit against limit");
+            page.figure(
+                chart.caption("Exchange at temperature zero from the optimised phase; on the grid optimised on."),
+            );
+        }
+        if !self.expected_psnr_db.is_empty() {
+            let mut table = Table::new([
+                Column::number("Field angle", "deg"),
+                Column::number("Before", "dB"),
+                Column::number("After", "dB"),
+            ]);
+            for &(angle, before, after) in &self.expected_psnr_db {
+                table.row([Cell::fixed(angle, 1), Cell::fixed(before, 2), Cell::fixed(after, 2)]);
+            }
+            page.section("Expected images");
+            page.paragraph("PSNR to be expected after inverse filtering, in closed form, at wavelengths between those optimised on.");
+            page.table(table);
+        }
+        if let Some((_, draws)) = self.with_errors.first() {
+            let mut table = Table::new([
+                Column::text("Phase"),
+                Column::number("Mean", ""),
+                Column::number("Standard deviation", ""),
+                Column::number("Smallest", ""),
+            ]);
+            for (name, values) in &self.with_errors {
+                let (mean, deviation) = mean_and_deviation(values);
+                let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+                table.row([
+                    Cell::from(*name),
+                    Cell::sig(mean, 4),
+                    Cell::sig(deviation, 3),
+                    Cell::sig(least, 3),
+                ]);
+            }
+            page.section("With errors of fabrication");
+            page.paragraph(format!(
+                "Geometric-mean Strehl ratio over {} draws of width, film height and gap.",
+                draws.len()
+            ));
+            page.table(table);
+        }
+        if self.history.len() > 1 {
+            let mut chart = Chart::new(
+                "The way there",
+                Axis::linear("sweep or step", ""),
+                Axis::linear("merit", ""),
+            );
+            chart.line("best chain", self.history.iter().map(|&(i, m)| (f64::from(i), m)));
+            page.section("Progress");
+            page.figure(chart.caption("Merit as optimised: larger is better."));
+        }
+    }
+
+    fn table(&self) -> Table {
+        let mut table = Table::new([
+            Column::text("Phase"),
+            Column::text("From"),
+            Column::text("Cell"),
+            Column::number("Geometric mean", ""),
+            Column::number("Mean", ""),
+            Column::number("Smallest", ""),
+            Column::number("Largest step", "turns"),
+        ]);
+        for (name, list) in [("before", &self.before), ("after", &self.after)] {
+            for judged in list {
+                table.row([
+                    Cell::from(name),
+                    Cell::from(judged.source),
+                    Cell::from(judged.fidelity.name()),
+                    Cell::sig(judged.geometric_mean, 3),
+                    Cell::sig(judged.mean, 3),
+                    Cell::sig(judged.smallest, 3),
+                    Cell::fixed(judged.largest_step_turns, 3),
+                ]);
+            }
+        }
+        table
+    }
+
+    fn strehl(&self) -> metalith_report::Figure {
+        let mut chart = Chart::new(
+            "Strehl ratio on the axis",
+            Axis::linear("wavelength", "nm"),
+            Axis::log("Strehl ratio", ""),
+        );
+        for (name, list) in [("before", &self.before), ("after", &self.after)] {
+            if let Some(judged) = list.iter().rev().find(|j| j.source == "rings") {
+                let points = judged.strehl.wavelength_um.iter().zip(&judged.strehl.ratio);
+                let floored = points.map(|(l, s)| (l * 1e3, s.max(1e-7)));
+                chart.line(format!("{name}, {} cell", judged.fidelity.name()), floored);
+            }
+        }
+        chart.caption("Before and after.")
+    }
+
+    fn psfs(&self) -> Vec<metalith_report::Figure> {
+        let (lengths, radius, maps) = &self.psf;
+        let (Some(first), Some(last)) = (lengths.first(), lengths.last()) else {
+            return Vec::new();
+        };
+        let most = maps.iter().flat_map(|m| m.iter()).copied().fold(0.0, f64::max);
+        ["Before", "After"]
+            .iter()
+            .zip(maps)
+            .map(|(name, map)| {
+                HeatMap::new(
+                    *name,
+                    map.mapv(|v| v.max(most * 1e-6)),
+                    (Axis::linear("wavelength", "nm"), first * 1e3, last * 1e3),
+                    (Axis::linear("distance from the axis", "um"), 0.0, *radius),
+                )
+                .log()
+                .range(most * 1e-5, most)
+                .values("intensity", "of the incident")
+                .size(460.0, 320.0)
+                .caption("PSF around the axis over wavelength, on one scale for both.")
+            })
+            .collect()
+    }
+
+    fn mtfs(&self) -> metalith_report::Figure {
+        let mut chart = Chart::new(
+            "MTF on the axis",
+            Axis::linear("wavelength", "nm"),
+            Axis::linear("MTF", "").range(0.0, 1.0),
+        );
+        for (name, pairs) in ["before", "after"].iter().zip(&self.mtf.1) {
+            let points = |pick: fn(&(f64, f64)) -> f64| {
+                self.mtf
+                    .0
+                    .iter()
+                    .zip(pairs)
+                    .map(move |(l, p)| (l * 1e3, pick(p)))
+                    .collect::<Vec<_>>()
+            };
+            chart.line(format!("{name}, half Nyquist"), points(|p| p.0));
+            chart.line(format!("{name}, Nyquist"), points(|p| p.1));
+        }
+        chart.caption("At half and at all of the Nyquist frequency of the pixels, pixel included.")
+    }
+
+    fn phase(&self) -> metalith_report::Figure {
+        let mut chart = Chart::new("Phase", Axis::linear("radius", "um"), Axis::linear("phase", "turns"));
+        for (name, pick) in [("before", 0), ("after", 1)] {
+            let (mut sum, mut last) = (0.0, None);
+            let points = self.rings.iter().map(|&(r, a, b, _)| {
+                let t = if pick == 0 { a } else { b };
+                sum += last.map_or(0.0, |l| step(l, t));
+                last = Some(t);
+                (r, sum)
+            });
+            chart.line(name, points.collect::<Vec<_>>());
+        }
+        chart.caption("Phase with the wrapped steps from ring to ring added up.")
+    }
+
+    fn width(&self) -> metalith_report::Figure {
+        let mut chart = Chart::new(
+            "Pillar width",
+            Axis::linear("radius", "um"),
+            Axis::linear("width", "nm"),
+        );
+        chart.points("after", self.rings.iter().map(|&(r, _, _, w)| (r, f64::from(w))));
+        chart.caption("Width of the pillars of each ring.")
+    }
+}
+
+/// Mean and standard deviation.
+pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+    (mean, variance.sqrt())
+}

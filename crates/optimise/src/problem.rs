@@ -1,0 +1,153 @@
+//! The merit that a design asks for.
+
+use num_complex::Complex32;
+use rayon::prelude::*;
+
+use super::bessel::Bessel;
+use super::deconvolution::Deconvolution;
+use super::field::{Condition, FieldProblem, Kind, Row};
+use super::focus::{FabricationError, Lens, wavelengths};
+use super::kernel::RingField;
+use super::mapping::Mapping;
+use super::pupil::Window;
+use super::robust;
+use super::views::Views;
+use super::wiener::Scene;
+use metalith_cell::CellModel;
+use metalith_core::{Progress, Result};
+use metalith_design::{MeritSpec, OptimiseSpec, ViewSpec};
+
+/// Radii at which side lobes are sampled, out to four times the radius where they begin.
+const SIDE_LOBE_POINTS: usize = 48;
+/// Distance of wavelengths at which side lobes are sampled [nm]: haze is smooth in wavelength.
+const SIDE_LOBE_STEP_NM: f64 = 15.0;
+
+/// Wavelengths of a design's merit [um].
+pub fn band(spec: &OptimiseSpec) -> Vec<f64> {
+    wavelengths(spec.band_um.0 * 1e3, spec.band_um.1 * 1e3, spec.step_um * 1e3)
+}
+
+/// The part of the merit that is a function of the field at a few points: `sum`, `log` and `side_lobes`, in
+/// expectation over errors where that is asked for. None if their weights are zero.
+///
+/// # Errors
+/// If the kernel does not fit, or the cell does not cover the band.
+pub fn field_problem(
+    lens: &Lens,
+    spec: &OptimiseSpec,
+    merit: &MeritSpec,
+    cells: &[&dyn CellModel],
+    mapping: &Mapping,
+) -> Result<Option<FieldProblem>> {
+    let band = band(spec);
+    let draws = match &spec.robust {
+        Some(robust) => robust::draw(robust, robust.draws as usize, cells.len(), spec.seed ^ 0x5eed),
+        None => vec![FabricationError::default()],
+    };
+    let share = 1.0 / draws.len() as f64;
+    let mut blocks = Vec::new();
+    for (i, &error) in draws.iter().enumerate() {
+        // Many errors need few wavelengths each: those of one lie between those of the others.
+        let stride = draws.len().min(4);
+        let some = band
+            .iter()
+            .copied()
+            .skip(i % stride)
+            .step_by(stride)
+            .collect::<Vec<_>>();
+        for (kind, weight) in [(Kind::Log, merit.log), (Kind::Linear, merit.sum)] {
+            if weight != 0.0 {
+                blocks.push((kind, weight * share, lens.focal_rows(&some, error, cells)?));
+            }
+        }
+        if merit.side_lobes != 0.0 {
+            let rows = side_lobe_rows(lens, spec, merit.side_lobe_radius_um, error, cells)?;
+            blocks.push((Kind::Linear, -merit.side_lobes * share, rows));
+        }
+    }
+    if blocks.is_empty() {
+        return Ok(None);
+    }
+    FieldProblem::new(blocks, cells, mapping.clone(), spec.memory_mb << 20).map(Some)
+}
+
+/// Rows whose weighted intensities sum up to the mean share of the incident power that arrives between
+/// `radius_um` and four times that.
+fn side_lobe_rows(
+    lens: &Lens,
+    spec: &OptimiseSpec,
+    radius_um: f64,
+    error: FabricationError,
+    cells: &[&dyn CellModel],
+) -> Result<Vec<Row>> {
+    let lengths = wavelengths(spec.band_um.0 * 1e3, spec.band_um.1 * 1e3, SIDE_LOBE_STEP_NM);
+    let area = lens.rings.sites() as f64 * lens.rings.lattice().pitch_um().powi(2);
+    let width = 3.0 * radius_um / SIDE_LOBE_POINTS as f64;
+    let edge = 0.5e-3 * f64::from(lens.rings.diameter_nm());
+    let largest = std::f64::consts::TAU / spec.band_um.0 * edge * 4.0 * radius_um / lens.gap_um;
+    let bessel = Bessel::up_to(largest);
+    let points = lengths
+        .iter()
+        .flat_map(|&l| (0..SIDE_LOBE_POINTS).map(move |i| (l, radius_um + (i as f64 + 0.5) * width)))
+        .collect::<Vec<_>>();
+    points
+        .into_par_iter()
+        .map(|(wavelength_um, rho)| {
+            let full = cells[error.cell].full_transmission(wavelength_um)?;
+            let field = RingField::new(&lens.rings, wavelength_um, lens.gap_um + error.gap_error_um);
+            // Each ring around the axis with its power, so that all rows are of like size.
+            let scale = (std::f64::consts::TAU * rho * width / area).sqrt() / full;
+            let kernel = (0..lens.rings.len())
+                .map(|ring| {
+                    let e = field.at_radius(ring, rho, &bessel) * scale;
+                    Complex32::new(e.re as f32, e.im as f32)
+                })
+                .collect();
+            Ok(Row {
+                condition: Condition {
+                    wavelength_um,
+                    cell: error.cell,
+                    width_bias_nm: error.width_bias_nm,
+                },
+                kernel,
+                weight: 1.0 / lengths.len() as f32,
+            })
+        })
+        .collect()
+}
+
+/// Views of a design, at wavelengths `shift` of their distance off.
+pub fn views(spec: &OptimiseSpec, views: &ViewSpec, shift: f64) -> Views {
+    let step_nm = views.step_um * 1e3;
+    let (first, last) = (spec.band_um.0 * 1e3 + shift * step_nm, spec.band_um.1 * 1e3);
+    Views {
+        wavelengths_um: wavelengths(first, last, step_nm),
+        angles_rad: views.angles_deg.iter().map(|a| a.to_radians()).collect(),
+        channels: 3,
+        window: Window {
+            pixels: views.pixels,
+            pixel_um: views.pixel_um,
+        },
+        shared_filter: views.shared_filter,
+        drawn: views.drawn,
+        scene: Scene::default(),
+    }
+}
+
+/// The merit `deconvolution` of a design, if it has a weight.
+///
+/// # Errors
+/// As [`Deconvolution::new`].
+pub fn deconvolution(
+    lens: &Lens,
+    spec: &OptimiseSpec,
+    cell: &dyn CellModel,
+    mapping: &Mapping,
+    progress: &dyn Progress,
+) -> Result<Option<Deconvolution>> {
+    if spec.merit.deconvolution == 0.0 {
+        return Ok(None);
+    }
+    let views = views(spec, &spec.views, 0.0);
+    Deconvolution::new(lens, views, cell, mapping.clone(), spec.memory_mb << 20, progress).map(Some)
+}

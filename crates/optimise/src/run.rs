@@ -1,0 +1,139 @@
+//! From a design to its optimised phase.
+
+use super::checkpoint::Checkpoint;
+use super::field::FieldProblem;
+use super::focus::Lens;
+use super::limit::StepLimit;
+use super::mapping::Mapping;
+use super::problem;
+use super::rings::Rings;
+use super::start::Start;
+use metalith_cell::CellModel;
+use metalith_core::{Error, Result};
+use metalith_design::array::WidthRule;
+use metalith_design::phase::RadialPhase;
+use metalith_design::{Design, MeritSpec, OptimiseSpec, StartSpec};
+
+/// What an optimisation found.
+#[derive(Clone, Debug)]
+pub struct Optimised {
+    /// Phase of each ring [turns], in [0, 1).
+    pub turns: Vec<f64>,
+    /// Width of the pillars of each ring [nm].
+    pub widths_nm: Vec<u16>,
+    /// The merit, as it was optimised.
+    pub merit: f64,
+    /// Name of the phases it began from.
+    pub start: &'static str,
+    /// Merit at every fiftieth part of the way.
+    pub history: Vec<(u32, f64)>,
+    /// Where to go on if it was interrupted.
+    pub interrupted: Option<Checkpoint>,
+}
+
+/// The lens and the mapping of a design, ring by ring.
+#[derive(Clone, Debug)]
+pub struct Task {
+    /// The rings and the distance to the sensor.
+    pub lens: Lens,
+    /// From phase to width.
+    pub mapping: Mapping,
+    /// How it is to be optimised.
+    pub spec: OptimiseSpec,
+    /// The design's own phase [turns].
+    pub own_turns: Vec<f64>,
+    /// What gains are counted from: the design's own phase, or where that is a table, which may well be an
+    /// optimised one, a hyperbolic lens for the middle of the band.
+    pub reference_turns: Vec<f64>,
+    pub(super) limit: StepLimit,
+}
+
+impl Task {
+    /// The task that a design sets.
+    ///
+    /// # Errors
+    /// If its lens has no rings.
+    pub fn of(design: &Design) -> Result<Self> {
+        let rings = Rings::new(design.lattice(), design.lens.diameter_nm)?;
+        let own_turns = turns_of(&rings, &design.lens.phase);
+        let lens = Lens {
+            rings,
+            gap_um: design.lens.focal_length_um,
+        };
+        let band_um = design.optimise.band_um;
+        let hyperbolic = Start::Hyperbolic {
+            wavelength_um: 0.5 * (band_um.0 + band_um.1),
+        };
+        let reference_turns = match design.lens.phase {
+            RadialPhase::Table { .. } => hyperbolic.turns(&lens, 0),
+            _ => own_turns.clone(),
+        };
+        Ok(Self {
+            lens,
+            reference_turns,
+            mapping: Mapping::new(&WidthRule::new(&design.cell, &design.mapping)),
+            spec: design.optimise.clone(),
+            own_turns,
+            limit: StepLimit::new(design.optimise.step_limit_turns)?,
+        })
+    }
+
+    /// The limit on the step from ring to ring.
+    pub fn limit(&self) -> StepLimit {
+        self.limit
+    }
+
+    /// The same task without errors of fabrication in mind.
+    pub fn regardless_of_errors(&self) -> Self {
+        let mut plain = self.clone();
+        plain.spec.robust = None;
+        plain
+    }
+
+    /// Widths that are made of phases, without any limit on their steps [nm].
+    pub fn widths_nm(&self, turns: &[f64]) -> Vec<u16> {
+        let choices = self.mapping.choices();
+        turns
+            .iter()
+            .map(|&t| choices[self.mapping.nearest(t)].width_nm)
+            .collect()
+    }
+
+    pub(super) fn field_problem(&self, merit: &MeritSpec, cells: &[&dyn CellModel]) -> Result<Option<FieldProblem>> {
+        problem::field_problem(&self.lens, &self.spec, merit, cells, &self.mapping)
+    }
+
+    /// The start of one chain of several.
+    pub(super) fn start(&self, chain: u32) -> Result<Start> {
+        let band_um = self.spec.band_um;
+        let log_asphere = Start::LogAsphere { band_um };
+        let hyperbolic = Start::Hyperbolic {
+            wavelength_um: 0.5 * (band_um.0 + band_um.1),
+        };
+        Ok(match self.spec.start {
+            StartSpec::All => match chain % 4 {
+                0 => log_asphere,
+                1 => Start::Previous(self.own_turns.clone()),
+                2 => Start::Random,
+                _ => hyperbolic,
+            },
+            StartSpec::LogAsphere => log_asphere,
+            StartSpec::Hyperbolic => hyperbolic,
+            StartSpec::Random => Start::Random,
+            StartSpec::Previous => Start::Previous(self.own_turns.clone()),
+            StartSpec::Log => {
+                return Err(Error::invalid(
+                    "the merit `log` cannot begin with its own result",
+                    "use start = \"all\" or \"log_asphere\"; \"log\" is for Adam, and for the merit `deconvolution`",
+                ));
+            }
+        })
+    }
+}
+
+/// Phase in the middle of each ring [turns].
+pub fn turns_of(rings: &Rings, phase: &RadialPhase) -> Vec<f64> {
+    (0..rings.len())
+        .map(|ring| phase.turns(rings.middle_um(ring).powi(2)))
+        .collect()
+}

@@ -1,0 +1,163 @@
+//! The optimised phase: kernels against the propagators, going on after an interruption, and the way from
+//! the command to a layout that keeps the limit.
+
+use std::fs;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use metalith_cell::{CellModel, PublishedCell};
+use metalith_core::{Lattice, Progress, Silent};
+use metalith_design::Design;
+use metalith_optimise::{Checkpoint, Lens, RingField, Rings, Start, Task, largest_step};
+use metalith_wave::{Accuracy, Direct, Fold, Pillars, PlaneWave, Propagator, Scratch, Window};
+use num_complex::Complex64;
+
+/// The kernel at full size, on the axis: a broadband phase, every ring of the 1 mm lens.
+#[test]
+fn the_kernel_agrees_with_direct_sum_and_fold() {
+    /// Of the matched peak. Apertures hold transmissions in single precision.
+    const DIRECT: f64 = 1e-6;
+    /// What the accurate mode is asked for.
+    const FOLD: f64 = 1e-5;
+    let lattice = Lattice::covering(1_000_000, 350).unwrap();
+    let rings = Rings::new(lattice, 1_000_000).unwrap();
+    let lens = Lens { rings, gap_um: 2400.0 };
+    let turns = Start::LogAsphere { band_um: (0.4, 0.7) }.turns(&lens, 0);
+    let widths = turns
+        .iter()
+        .map(|t| 2 * (51.0 + 93.0 * t.rem_euclid(1.0)) as u16)
+        .collect::<Vec<_>>();
+    let map = lens.rings.width_map(&widths);
+    let wavelength = 0.52;
+    let t = PublishedCell::new(350).transmissions(wavelength, 300).unwrap();
+    let field = RingField::new(&lens.rings, wavelength, lens.gap_um);
+    let quick = (0..lens.rings.len())
+        .map(|k| field.on_axis(k) * t[usize::from(widths[k])])
+        .sum::<Complex64>();
+    let pillars = Pillars::new(&map, &t).unwrap();
+    let wave = PlaneWave::normal(wavelength);
+    // The kernel leaves out the phase common to all.
+    let common = Complex64::cis(std::f64::consts::TAU * (lens.gap_um / wavelength).fract());
+    let direct = Direct::at(&pillars, &wave, &[[0.0, 0.0, lens.gap_um]])[0];
+    let error = (quick * common - direct).norm() / field.matched();
+    assert!(error < DIRECT, "{error:e}");
+    let window = Window::about([0.0, 0.0], 0.35, 16, lens.gap_um);
+    let fold = Fold::plan(lattice, 500.0, wavelength, window, Accuracy::Accurate).unwrap();
+    let found = fold.field(&pillars, &wave, &mut Scratch::default()).unwrap().values[[8, 8]];
+    let found = Complex64::new(found.re.into(), found.im.into());
+    let error = (found.norm() - direct.norm()).abs() / field.matched();
+    assert!(error < FOLD, "{error:e}");
+}
+
+/// Says stop once a solver has asked so often.
+struct StopAfter {
+    asked: AtomicU64,
+    often: u64,
+    solving: AtomicBool,
+}
+
+impl StopAfter {
+    fn new(often: u64) -> Self {
+        Self {
+            asked: AtomicU64::new(0),
+            often,
+            solving: AtomicBool::new(false),
+        }
+    }
+}
+
+impl Progress for StopAfter {
+    fn begin(&self, what: &str, _steps: u64) {
+        let solving = ["exchange", "exchange of blocks", "Adam"].contains(&what);
+        self.solving.store(solving, Ordering::SeqCst);
+    }
+
+    fn advance(&self, _steps: u64) {}
+
+    fn stopped(&self) -> bool {
+        self.solving.load(Ordering::SeqCst) && self.asked.fetch_add(1, Ordering::SeqCst) >= self.often
+    }
+}
+
+/// A design file beside the small one, with a section of its own to optimise it.
+fn design(folder: &Path, optimise: &str) -> std::path::PathBuf {
+    let path = folder.join("lens.toml");
+    let text = fs::read_to_string(metalith_testing::design("mini_3x3")).unwrap();
+    fs::write(&path, format!("{text}\n{optimise}")).unwrap();
+    path
+}
+
+const EXCHANGE: &str = "[optimise]\ncell = \"published\"\nstep_nm = 5\nchains = 3\nhot_sweeps = 12\nseed = 4\n";
+const ADAM: &str =
+    "[optimise]\ncell = \"published\"\nstep_nm = 5\nsolver = \"adam\"\nstart = \"hyperbolic\"\nsteps = 40\n";
+/// Of few views of a small window; two merits in one sum.
+const IMAGES: &str = "[optimise]\ncell = \"published\"\nstep_nm = 5\nstart = \"hyperbolic\"\nblocks = 24\n\
+    [optimise.merit]\ndeconvolution = 1\nlog = 0.01\n\
+    [optimise.views]\nangles_deg = [0, 15]\nstep_nm = 30\npixels = 16\n";
+
+#[test]
+fn an_interrupted_run_goes_on_to_the_same_end() {
+    for section in [EXCHANGE, ADAM, IMAGES] {
+        let folder = tempfile::tempdir().unwrap();
+        let design = Design::read(&design(folder.path(), section)).unwrap();
+        let (task, cell) = (Task::of(&design).unwrap(), PublishedCell::new(350));
+        let cells: [&dyn CellModel; 1] = [&cell];
+        let begin = || Checkpoint::begin(&design);
+        let whole = task.solve(&cells, begin(), &Silent).unwrap();
+        assert!(whole.interrupted.is_none());
+        assert!(largest_step(&whole.turns) <= 0.2 + 1e-9);
+
+        // Over and over, in every stage.
+        let kept = folder.path().join("checkpoint.json");
+        let (mut checkpoint, mut interruptions) = (begin(), 0);
+        let rest = loop {
+            let part = task.solve(&cells, checkpoint, &StopAfter::new(14)).unwrap();
+            assert!(largest_step(&part.turns) <= 0.2 + 1e-9);
+            let Some(interrupted) = part.interrupted else {
+                break part;
+            };
+            interruptions += 1;
+            assert!(interruptions < 100);
+            interrupted.save(&kept).unwrap();
+            checkpoint = Checkpoint::load(&kept, &design).unwrap();
+            assert!(checkpoint.begun());
+        };
+        assert!(interruptions > 0);
+        assert_eq!(rest.widths_nm, whole.widths_nm);
+        assert_eq!(rest.merit, whole.merit);
+
+        // A checkpoint of another design is of no use.
+        let other = Design::read(&metalith_testing::design("mini_3x3")).unwrap();
+        assert!(!Checkpoint::load(&kept, &other).unwrap().begun());
+    }
+}
+
+#[test]
+fn both_solvers_beat_what_they_begin_from_and_exchange_beats_adam() {
+    let folder = tempfile::tempdir().unwrap();
+    let cell = PublishedCell::new(350);
+    let reached = [ADAM, EXCHANGE].map(|section| {
+        let design = Design::read(&design(folder.path(), section)).unwrap();
+        let task = Task::of(&design).unwrap();
+        let found = task.solve(&[&cell], Checkpoint::begin(&design), &Silent).unwrap();
+        let before = task.judge_rings(&task.own_turns, &cell).unwrap();
+        let after = task.judge_rings(&found.turns, &cell).unwrap();
+        assert!(after.geometric_mean > 1.5 * before.geometric_mean);
+        after.geometric_mean
+    });
+    assert!(reached[1] > reached[0], "{reached:?}");
+}
+
+#[test]
+fn mistakes_of_the_section_are_found_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let section = "[optimise]\nsolver = \"exchange\"\nstep_limit_turns = 0.7\nseeed = 1\nblocks = -1\n[optimise.merit]\nlog = 0\n";
+    let error = Design::read(&design(folder.path(), section)).unwrap_err();
+    let metalith_core::Error::Text(faults) = error else {
+        panic!("{error}")
+    };
+    let all = format!("{faults:?}");
+    for part in ["step_limit_turns", "seeed", "blocks", "weight of zero"] {
+        assert!(all.contains(part), "{part} in {all}");
+    }
+}

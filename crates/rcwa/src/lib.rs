@@ -1,0 +1,303 @@
+//! Rigorous coupled-wave analysis of a pillar on a square lattice.
+//!
+//! exp(-i w t); z runs from the half-space below to the one above, the lateral reference is the pillar's
+//! centre. Transmission relates the field at the plane where the stack ends to the incident field at
+//! the plane where it begins, reflection both at the latter.
+
+mod basis;
+mod layer;
+mod material;
+mod outline;
+mod propagate;
+mod response;
+mod scalar;
+mod stack;
+
+use std::f64::consts::TAU;
+
+use faer::Mat;
+use num_complex::Complex64;
+
+use basis::{Basis, Space};
+use layer::{Medium, Modes, Section};
+pub use material::Material;
+pub use outline::Outline;
+use propagate::{Ends, Slab, propagate};
+pub use response::{Convergence, DiffractionOrder, Response, converge};
+pub use stack::{Layer, LayerStack, Orders};
+
+use metalith_core::{Error, Result};
+
+/// Where a wave comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Side {
+    /// From below: the substrate of the cell.
+    Below,
+    /// From above: the air over the pillars.
+    Above,
+}
+
+/// A plane wave that arrives at the stack.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Incidence {
+    /// Wavelength in vacuum [um].
+    pub wavelength_um: f64,
+    /// Half-space it comes from.
+    pub side: Side,
+    /// Components of the wave vector along x and y over that in vacuum: the sines of the angles in air.
+    pub sines: [f64; 2],
+    /// Azimuth of the plane of incidence [rad] where the sines are zero; else their direction counts.
+    azimuth: f64,
+}
+
+impl Incidence {
+    /// Along the normal, p along x and s along y.
+    pub fn normal(wavelength_um: f64, side: Side) -> Self {
+        Self {
+            wavelength_um,
+            side,
+            sines: [0.0, 0.0],
+            azimuth: 0.0,
+        }
+    }
+
+    /// At an angle measured in air, the plane of incidence at an azimuth from x [rad].
+    pub fn in_air(wavelength_um: f64, side: Side, theta: f64, azimuth: f64) -> Self {
+        let sin = theta.sin();
+        Self {
+            azimuth,
+            ..Self::of_sines(wavelength_um, side, [sin * azimuth.cos(), sin * azimuth.sin()])
+        }
+    }
+
+    /// From the components of the wave vector along x and y over that in vacuum.
+    pub fn of_sines(wavelength_um: f64, side: Side, sines: [f64; 2]) -> Self {
+        Self {
+            wavelength_um,
+            side,
+            sines: sines.map(|v| if v.abs() < ALONG_AXIS { 0.0 } else { v }),
+            azimuth: 0.0,
+        }
+    }
+
+    /// Unit vector of the plane of incidence.
+    fn direction(&self) -> [f64; 2] {
+        let [x, y] = self.sines;
+        let length = x.hypot(y);
+        if length > 0.0 {
+            [x / length, y / length]
+        } else {
+            [self.azimuth.cos(), self.azimuth.sin()]
+        }
+    }
+
+    fn check(&self) -> Result<()> {
+        if !(self.wavelength_um.is_finite() && self.wavelength_um > 0.0) {
+            return Err(Error::invalid(
+                format!("light of a wavelength of {} um", self.wavelength_um),
+                "use a positive number of micrometres",
+            ));
+        }
+        if !self.sines.iter().all(|s| s.is_finite()) {
+            return Err(Error::invalid(
+                "an angle of incidence that is not a number",
+                "give it in degrees",
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// Sines below this are zero: so close to an axis of symmetry the modes come in pairs of equal constants,
+/// and their vectors lose half their digits. The field changes by about as much as the sine.
+const ALONG_AXIS: f64 = 1e-6;
+
+/// Largest number of unknown field components; a complex matrix of this size takes half a gigabyte.
+const MOST_UNKNOWNS: usize = 6000;
+
+/// Everything known of how the stack answers a plane wave.
+///
+/// At normal incidence, and where the plane of incidence is along an axis, only fields of the symmetry
+/// of the incident one are solved for: matrices a quarter or half as wide.
+///
+/// # Errors
+/// If a number of the stack or the incidence is not physical, the incident wave does not propagate in
+/// a medium without loss, or the problem is too large.
+pub fn solve(stack: &LayerStack, incidence: &Incidence, orders: Orders) -> Result<Response> {
+    solve_with(stack, incidence, orders, true)
+}
+
+/// Without use of symmetry: the slow way, which the fast one is tested against. A wave along the normal
+/// is turned off it by a millionth, where the modes still differ.
+#[doc(hidden)]
+pub fn solve_without_symmetry(stack: &LayerStack, incidence: &Incidence, orders: Orders) -> Result<Response> {
+    solve_with(stack, incidence, orders, false)
+}
+
+fn solve_with(stack: &LayerStack, incidence: &Incidence, orders: Orders, symmetric: bool) -> Result<Response> {
+    let mut problem = Problem::new(stack, incidence, orders)?;
+    let [kx, ky] = incidence.sines;
+    if !symmetric && kx == 0.0 && ky == 0.0 {
+        problem.k[0] = ALONG_AXIS;
+    }
+    let unit = [[Complex64::ONE, Complex64::ZERO], [Complex64::ZERO, Complex64::ONE]];
+    let parts = match (symmetric && kx == 0.0, symmetric && ky == 0.0) {
+        (false, false) => vec![problem.part(Space::Full, Space::Full, &unit)?],
+        (split_x, split_y) => {
+            let space = |split: bool, even: bool| match (split, even) {
+                (false, _) => Space::Full,
+                (true, true) => Space::Even,
+                (true, false) => Space::Odd,
+            };
+            // A wave polarised along x has Ex even about both axes; along y, Ey is, and Ex is odd.
+            let along_x = problem.part(space(split_x, true), space(split_y, true), &unit[..1])?;
+            let along_y = if split_x && split_y && problem.stack.is_square() {
+                along_x.turned()
+            } else {
+                problem.part(space(split_x, false), space(split_y, false), &unit[1..])?
+            };
+            vec![along_x, along_y]
+        }
+    };
+    Response::new(&problem, incidence, parts)
+}
+
+/// Zero-order transmission of a square cell along the normal: Ex where the stack ends over the incident
+/// Ex where it begins. One polarisation is solved for, the other is alike.
+///
+/// # Errors
+/// As [`solve`]; also if the cell tells x from y.
+pub fn transmit(stack: &LayerStack, wavelength_um: f64, side: Side, orders: Orders) -> Result<Complex64> {
+    if !stack.is_square() {
+        return Err(Error::invalid(
+            "a cell whose transmission depends on polarisation",
+            "solve for its Jones matrix instead",
+        ));
+    }
+    let problem = Problem::new(stack, &Incidence::normal(wavelength_um, side), orders)?;
+    let part = problem.part(Space::Even, Space::Even, &[[Complex64::ONE, Complex64::ZERO]])?;
+    response::finite(part.amplitude(&part.ends.transmitted, 0, 0, 0)[0])
+}
+
+/// A checked stack with the wave's side below, and the lengths over 1 / k0.
+struct Problem {
+    stack: LayerStack,
+    orders: Orders,
+    k: [f64; 2],
+    /// Wavelength over pitch: the lattice vector over k0.
+    step: f64,
+    k0_per_nm: f64,
+}
+
+/// The fields of one symmetry.
+struct Part {
+    basis: Basis,
+    ends: Ends,
+    /// Transverse amplitudes of the incident zero order, for each column.
+    incident: Vec<[Complex64; 2]>,
+    /// Whether x and y are exchanged.
+    turned: bool,
+}
+
+impl Problem {
+    fn new(stack: &LayerStack, incidence: &Incidence, orders: Orders) -> Result<Self> {
+        stack.check()?;
+        incidence.check()?;
+        let stack = match incidence.side {
+            Side::Below => stack.clone(),
+            Side::Above => stack.flipped(),
+        };
+        let transverse = incidence.sines[0].hypot(incidence.sines[1]);
+        if stack.below.im != 0.0 || transverse >= stack.below.re {
+            return Err(Error::invalid(
+                format!(
+                    "no wave arrives at a sine of {transverse:.4} through a medium of index {} + {} i",
+                    stack.below.re, stack.below.im
+                ),
+                "use a medium without loss on the side of the light, and an angle that exists in it",
+            ));
+        }
+        let wavelength_nm = incidence.wavelength_um * 1e3;
+        Ok(Self {
+            k: incidence.sines,
+            step: wavelength_nm / stack.pitch_nm,
+            k0_per_nm: TAU / wavelength_nm,
+            stack,
+            orders,
+        })
+    }
+
+    fn part(&self, x: Space, y: Space, incident: &[[Complex64; 2]]) -> Result<Part> {
+        let basis = Basis::new(self.orders.highest(), x, y, self.k, self.step);
+        if basis.len() > MOST_UNKNOWNS {
+            return Err(Error::invalid(
+                format!(
+                    "{} x {} orders without symmetry are {} unknowns",
+                    self.orders.along_axis(),
+                    self.orders.along_axis(),
+                    basis.len()
+                ),
+                format!("use fewer orders: at most {MOST_UNKNOWNS} unknowns are solved for"),
+            ));
+        }
+        let below = Medium::new(self.stack.below * self.stack.below, &basis);
+        let above = Medium::new(self.stack.above * self.stack.above, &basis);
+        let slabs = self
+            .stack
+            .layers
+            .iter()
+            .map(|layer| {
+                let section = Section {
+                    outline: &layer.outline,
+                    inside: layer.inside * layer.inside,
+                    outside: layer.outside * layer.outside,
+                    pitch_nm: self.stack.pitch_nm,
+                };
+                Ok(Slab {
+                    modes: Modes::of(&section, &basis)?,
+                    depth: layer.height_nm * self.k0_per_nm,
+                })
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let mut arriving = Mat::zeros(basis.len(), incident.len());
+        for (column, amplitudes) in incident.iter().enumerate() {
+            for (component, amplitude) in amplitudes.iter().enumerate() {
+                if let Some((row, factor)) = basis.plane_wave(component, 0, 0) {
+                    arriving[(row, column)] = amplitude / factor;
+                }
+            }
+        }
+        let ends = propagate(&basis, &below, &slabs, &above, &arriving);
+        Ok(Part {
+            basis,
+            ends,
+            incident: incident.to_vec(),
+            turned: false,
+        })
+    }
+}
+
+impl Part {
+    /// The answer to the same wave polarised along the other axis, of a cell that is alike along both.
+    fn turned(&self) -> Self {
+        Self {
+            basis: self.basis.clone(),
+            ends: Ends {
+                transmitted: self.ends.transmitted.clone(),
+                reflected: self.ends.reflected.clone(),
+            },
+            incident: self.incident.iter().map(|&[x, y]| [y, x]).collect(),
+            turned: !self.turned,
+        }
+    }
+
+    /// Plane-wave amplitudes along x and y of an order of a field.
+    fn amplitude(&self, field: &Mat<Complex64>, column: usize, m: i32, n: i32) -> [Complex64; 2] {
+        if self.turned {
+            let [x, y] = self.basis.amplitude(field, column, n, m);
+            [y, x]
+        } else {
+            self.basis.amplitude(field, column, m, n)
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! Real pillars, seen from above.
+
+use svg::node::element::{Group, Path, SVG};
+
+use super::axis::Axis;
+use super::figure::{Figure, Frame, scale_bar};
+use metalith_core::WidthMap;
+
+/// More pillars an axis than this would be dust.
+const MOST: f64 = 80.0;
+
+/// A cut-out of an element, each pillar at its true place and width.
+#[derive(Clone, Debug)]
+pub struct PillarZoom {
+    title: String,
+    squares: String,
+    pillars: u64,
+    centre_um: (f64, f64),
+    span_um: f64,
+    side: f64,
+}
+
+impl PillarZoom {
+    /// Pillars of `map` in a square of `span_um` about a place counted from the element's centre [um].
+    /// The span is held to 80 pitches, so that pillars can be seen.
+    pub fn new(title: impl Into<String>, map: &WidthMap, centre_um: (f64, f64), span_um: f64) -> Self {
+        let lattice = map.lattice;
+        let span_um = span_um.clamp(lattice.pitch_um(), MOST * lattice.pitch_um());
+        let half = (span_um + lattice.pitch_um()) / 2.0;
+        let near =
+            |centre: f64| (0..lattice.sites()).filter(move |&i| (lattice.coordinate_um(i) - centre).abs() <= half);
+        let mut squares = String::new();
+        let mut pillars = 0;
+        let origin = (nm(centre_um.0), nm(centre_um.1));
+        for iy in near(centre_um.1) {
+            for ix in near(centre_um.0) {
+                let width = i64::from(map.width_nm[[iy, ix]]);
+                if width == 0 {
+                    continue;
+                }
+                pillars += 1;
+                // The drawing counts nanometres from its middle, y downwards.
+                let x = lattice.coordinate_nm(ix) - origin.0 - width / 2;
+                let y = origin.1 - lattice.coordinate_nm(iy) - width / 2;
+                squares.push_str(&format!("M{x} {y}h{width}v{width}h-{width}z"));
+            }
+        }
+        Self {
+            title: title.into(),
+            squares,
+            pillars,
+            centre_um,
+            span_um,
+            side: 380.0,
+        }
+    }
+
+    /// Width of the square in the drawing; 380 else.
+    pub fn side(mut self, side: f64) -> Self {
+        self.side = side.max(100.0);
+        self
+    }
+
+    /// The finished drawing, with a caption.
+    pub fn caption(self, caption: impl Into<String>) -> Figure {
+        Figure::from(self).caption(caption)
+    }
+}
+
+fn nm(um: f64) -> i64 {
+    (um * 1e3).round() as i64
+}
+
+impl From<PillarZoom> for Figure {
+    fn from(zoom: PillarZoom) -> Self {
+        let frame = Frame {
+            left: 66.0,
+            top: 12.0,
+            right: 66.0 + zoom.side,
+            bottom: 12.0 + zoom.side,
+        };
+        let half = zoom.span_um / 2.0;
+        let (cx, cy) = zoom.centre_um;
+        let x = Axis::linear("x", "um").range(cx - half, cx + half);
+        let y = Axis::linear("y", "um").range(cy - half, cy + half);
+        let x = x.fit([], frame.left, frame.right, false);
+        let y = y.fit([], frame.bottom, frame.top, false);
+        let span_nm = nm(zoom.span_um);
+        let squares = SVG::new()
+            .set("x", frame.left)
+            .set("y", frame.top)
+            .set("width", zoom.side)
+            .set("height", zoom.side)
+            .set("viewBox", (-span_nm / 2, -span_nm / 2, span_nm, span_nm))
+            .add(Path::new().set("class", "pillar").set("d", zoom.squares));
+        let um_per_unit = zoom.span_um / zoom.side;
+        let bar = scale_bar(frame.left, frame.bottom + 46.0, zoom.side / 4.0, um_per_unit, "ink");
+        let words = format!(
+            "{} pillars to scale; {}, {}.",
+            super::count(zoom.pillars),
+            x.words(),
+            y.words()
+        );
+        let drawing = Group::new().add(squares).add(frame.axes(&x, &y, false)).add(bar);
+        Figure::new(zoom.side + 84.0, zoom.side + 70.0, &zoom.title, &words, drawing)
+    }
+}

@@ -1,0 +1,79 @@
+//! Golden files: what was right once is held to, byte for byte, until someone says otherwise.
+
+use std::fs;
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+
+use flate2::read::GzDecoder;
+use flate2::write::GzEncoder;
+
+/// The root of the project.
+pub fn root() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+}
+
+/// A design that is shipped.
+pub fn design(name: &str) -> PathBuf {
+    root().join("designs").join(format!("{name}.toml"))
+}
+
+/// Compare with `golden/NAME`, kept compressed if the name ends in `.gz`. With `METALITH_GOLDEN=renew` in
+/// the environment the file is written instead, and what changed is printed.
+pub fn golden(name: &str, found: &[u8]) {
+    let path = root().join("golden").join(name);
+    let expected = read(&path);
+    if expected.as_deref() == Some(found) {
+        return;
+    }
+    let change = describe(expected.as_deref(), found);
+    if std::env::var_os("METALITH_GOLDEN").is_some_and(|v| v == "renew") {
+        println!("golden/{name}: {change}");
+        write(&path, found);
+        return;
+    }
+    panic!("golden/{name}: {change}\nIf this is meant, renew it as golden/README.md says and look at what changed.");
+}
+
+fn read(path: &Path) -> Option<Vec<u8>> {
+    let bytes = fs::read(path).ok()?;
+    if path.extension().is_none_or(|e| e != "gz") {
+        return Some(bytes);
+    }
+    let mut plain = Vec::new();
+    GzDecoder::new(&bytes[..]).read_to_end(&mut plain).ok()?;
+    Some(plain)
+}
+
+fn write(path: &Path, bytes: &[u8]) {
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    if path.extension().is_none_or(|e| e != "gz") {
+        return fs::write(path, bytes).unwrap();
+    }
+    let mut out = GzEncoder::new(fs::File::create(path).unwrap(), flate2::Compression::best());
+    out.write_all(bytes).unwrap();
+    out.finish().unwrap();
+}
+
+/// Where two files part, in lines if they are text.
+fn describe(expected: Option<&[u8]>, found: &[u8]) -> String {
+    let Some(expected) = expected else {
+        return format!("new, {} bytes", found.len());
+    };
+    if let (Ok(old), Ok(new)) = (std::str::from_utf8(expected), std::str::from_utf8(found)) {
+        let pairs = old.lines().zip(new.lines());
+        return pairs.enumerate().find(|(_, (a, b))| a != b).map_or_else(
+            || format!("{} lines instead of {}", new.lines().count(), old.lines().count()),
+            |(k, (a, b))| format!("line {}:\n  - {a}\n  + {b}", k + 1),
+        );
+    }
+    let at = expected
+        .iter()
+        .zip(found)
+        .position(|(a, b)| a != b)
+        .unwrap_or(expected.len().min(found.len()));
+    format!(
+        "{} bytes instead of {}, the first difference at byte {at}",
+        found.len(),
+        expected.len()
+    )
+}

@@ -1,0 +1,10 @@
+//! What the tests of several crates stand on: golden files, layouts made byte by byte, small measured sets.
+
+pub mod gds;
+mod golden;
+pub mod lens;
+pub mod mutate;
+#[cfg(feature = "session")]
+pub mod session;
+
+pub use golden::{design, golden, root};

@@ -1,0 +1,121 @@
+//! Damage to layouts, and the reading that must survive it.
+
+use metalith_core::{Error, Silent};
+use metalith_gds::extract::ExtractionPlan;
+use metalith_gds::{LayerNumber, Layout, ReadLimits, Selection, Shape, Text, Transform, Visitor};
+use rand::Rng;
+
+/// Limits small enough that the worst a mutant can ask for is done in milliseconds.
+pub const LIMITS: ReadLimits = ReadLimits {
+    cells: 1 << 10,
+    name_bytes: 64,
+    all_name_bytes: 1 << 16,
+    tallies: 1 << 12,
+    vertices: 1 << 12,
+    depth: 32,
+    placements: 1 << 12,
+    flat_shapes: 1 << 14,
+};
+
+/// Change a few bytes, cut, repeat or move a piece, or splice in a piece of another file.
+pub fn mutate<R: Rng>(rng: &mut R, corpus: &[Vec<u8>]) -> Vec<u8> {
+    let mut bytes = corpus[rng.random_range(0..corpus.len())].clone();
+    for _ in 0..rng.random_range(1..=4) {
+        if bytes.is_empty() {
+            break;
+        }
+        let at = rng.random_range(0..bytes.len());
+        match rng.random_range(0..8) {
+            0 => bytes[at] = rng.random(),
+            1 => bytes[at] ^= 1 << rng.random_range(0..8),
+            2 => bytes.truncate(at),
+            3 => {
+                let end = (at + rng.random_range(1..128)).min(bytes.len());
+                bytes.drain(at..end);
+            }
+            4 => {
+                let end = (at + rng.random_range(1..256)).min(bytes.len());
+                let piece = bytes[at..end].to_vec();
+                let to = rng.random_range(0..=bytes.len());
+                bytes.splice(to..to, piece);
+            }
+            5 => {
+                let other = &corpus[rng.random_range(0..corpus.len())];
+                let from = rng.random_range(0..other.len());
+                let end = (from + rng.random_range(1..512)).min(other.len());
+                bytes.splice(at..at, other[from..end].iter().copied());
+            }
+            6 => {
+                // Numbers at the ends of their ranges, where arithmetic goes wrong.
+                let extreme = [0, 1, 0x7FFF_FFFFu32, 0x8000_0000, 0xFFFF_FFFF][rng.random_range(0..5)];
+                for (k, b) in extreme.to_be_bytes().into_iter().enumerate() {
+                    if let Some(place) = bytes.get_mut(at / 4 * 4 + k) {
+                        *place = b;
+                    }
+                }
+            }
+            _ => {
+                // Another record type or length where one begins.
+                let kinds = [
+                    0x04, 0x05, 0x07, 0x08, 0x09, 0x0A, 0x0B, 0x0C, 0x11, 0x13, 0x1A, 0x1B, 0x1C, 0x2D,
+                ];
+                let at = at / 2 * 2;
+                if at + 3 < bytes.len() {
+                    bytes[at + 2] = kinds[rng.random_range(0..kinds.len())];
+                }
+            }
+        }
+    }
+    bytes
+}
+
+struct Count(u64);
+
+impl Visitor for Count {
+    fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> metalith_core::Result<()> {
+        for placement in placements {
+            self.0 += u64::from(shape.points.iter().any(|&p| placement.apply(p).x > 0));
+        }
+        Ok(())
+    }
+
+    fn text(&mut self, _text: &Text<'_>, placements: &[Transform]) -> metalith_core::Result<()> {
+        self.0 += placements.len() as u64;
+        Ok(())
+    }
+}
+
+/// Read bytes in every way there is. Whether they can be read; an error must name a place in the file.
+pub fn survives(bytes: &[u8]) -> bool {
+    let length = bytes.len() as u64;
+    let located = |error: &Error| {
+        if let Error::Layout { offset, what, hint, .. } = error {
+            assert!(*offset <= length, "{what}: byte {offset} of {length}");
+            assert!(!what.is_empty() && !hint.is_empty());
+        }
+    };
+    let layout = match Layout::from_bytes("mutant.gds", bytes, LIMITS) {
+        Ok(layout) => layout,
+        Err(error) => {
+            assert!(matches!(error, Error::Layout { .. } | Error::Invalid { .. }), "{error}");
+            located(&error);
+            return false;
+        }
+    };
+    let lenient = Selection {
+        lenient: true,
+        ..Selection::default()
+    };
+    for selection in [&Selection::default(), &lenient] {
+        if let Err(error) = layout.visit(selection, &mut Count(0), &Silent) {
+            located(&error);
+        }
+    }
+    match metalith_gds::extract::extract(&layout, &ExtractionPlan::discover(LayerNumber::new(1, 0)), &Silent) {
+        Ok(extraction) => extraction.oddities.total() < u64::MAX,
+        Err(error) => {
+            located(&error);
+            false
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! The limits of a design, each held or not.
+
+use serde::Serialize;
+
+use super::{SpotPair, Verification};
+use metalith_design::LimitSpec;
+
+/// One limit and what was reached.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Check {
+    /// What is limited, in words, with where the worst of it is.
+    pub what: String,
+    /// Key of the limit in the design file.
+    pub key: &'static str,
+    pub reached: f64,
+    pub limit: f64,
+    /// Whether the limit is the least or the most that is allowed.
+    pub sense: Sense,
+}
+
+/// Which side of a limit is the right one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sense {
+    AtMost,
+    AtLeast,
+}
+
+impl Check {
+    /// Whether the limit holds; what is not a number holds no limit.
+    pub fn passed(&self) -> bool {
+        match self.sense {
+            Sense::AtMost => self.reached <= self.limit,
+            Sense::AtLeast => self.reached >= self.limit,
+        }
+    }
+}
+
+/// All limits, each with the worst over elements, wavelengths and field angles. Limits that a design does
+/// not set are not listed.
+pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
+    let at_most = |what: String, key, reached, limit| Check {
+        what,
+        key,
+        reached,
+        limit,
+        sense: Sense::AtMost,
+    };
+    let wrong: u64 = found.elements.iter().map(|e| e.widths.faults()).sum();
+    let mut checks = vec![
+        at_most(
+            "pillars that are wrong, missing or extra".into(),
+            "wrong_widths_max",
+            wrong as f64,
+            limits.wrong_widths_max as f64,
+        ),
+        at_most(
+            "shapes on the pillar layer that are no pillar".into(),
+            "foreign_shapes_max",
+            found.foreign.total() as f64,
+            limits.foreign_shapes_max as f64,
+        ),
+    ];
+    let rounding = worst(
+        found
+            .distinct
+            .iter()
+            .map(|d| (d.element.label(), d.phase.rounding.rms_rad)),
+    );
+    if let Some((place, reached)) = rounding {
+        let what = format!("rms phase error of rounding, element {place} [rad]");
+        checks.push(at_most(
+            what,
+            "rounding_phase_rms_max_rad",
+            reached,
+            limits.rounding_phase_rms_max_rad,
+        ));
+    }
+    let spots = || {
+        found
+            .distinct
+            .iter()
+            .flat_map(|d| d.spots.iter().map(move |s| (s.label(&d.element), s)))
+    };
+    let optical: [Optical<'_>; 3] = [
+        (
+            "distance of the centroids [um]",
+            "centroid_shift_max_um",
+            limits.centroid_shift_max_um,
+            &|s| s.centroid_shift_um(),
+        ),
+        (
+            "difference of the MTF",
+            "mtf_difference_max",
+            limits.mtf_difference_max,
+            &|s| s.mtf_difference(),
+        ),
+        (
+            "rms difference of the PSF",
+            "psf_difference_max",
+            limits.psf_difference_max,
+            &|s| s.psf_difference,
+        ),
+    ];
+    for (name, key, limit, reached) in optical {
+        if limit == f64::MAX {
+            continue;
+        }
+        if let Some((place, reached)) = worst(spots().map(|(place, s)| (place, reached(s)))) {
+            checks.push(at_most(format!("{name}, {place}"), key, reached, limit));
+        }
+    }
+    if limits.strehl_ratio_min > 0.0
+        && let Some((place, least)) = worst(spots().map(|(place, s)| (place, -s.strehl_ratio())))
+    {
+        checks.push(Check {
+            what: format!("Strehl of the layout over that of the design phase, {place}"),
+            key: "strehl_ratio_min",
+            reached: -least,
+            limit: limits.strehl_ratio_min,
+            sense: Sense::AtLeast,
+        });
+    }
+    checks
+}
+
+/// Name, key and limit of what is measured of a spot.
+type Optical<'a> = (&'static str, &'static str, f64, &'a dyn Fn(&SpotPair) -> f64);
+
+/// The greatest value with its place; one that is not a number is greater than all.
+fn worst(values: impl Iterator<Item = (String, f64)>) -> Option<(String, f64)> {
+    values.reduce(|a, b| if b.1 > a.1 || b.1.is_nan() { b } else { a })
+}

@@ -1,0 +1,242 @@
+//! From the bytes of a layout to a verdict: what was written is read back, compared with what was meant,
+//! and simulated.
+
+mod check;
+mod lone;
+mod optics;
+mod page;
+mod phase;
+mod premise;
+mod spot;
+mod widths;
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use metalith_cell::Fidelity;
+use metalith_core::{Progress, Result, WidthMap};
+use metalith_design::array::{PillarArray, Placed, WidthRule};
+use metalith_design::phase::{ElementPhase, LensPhase};
+use metalith_design::{Design, Element};
+use metalith_gds::extract::{ElementSite, ExtractedElement, Extraction, ExtractionPlan, Oddities, Survey, extract};
+use metalith_gds::{self, Layout};
+use metalith_wave::Accuracy;
+use metalith_wave::image::Steepness;
+
+pub use check::{Check, Sense};
+pub use lone::{Lighting, LonePsf, lone_psfs, write_lone_report};
+pub use page::write_report;
+pub use phase::{PhaseError, PhaseErrors};
+pub use premise::Premise;
+pub use spot::{Orders, Spot, SpotPair};
+pub use widths::WidthCheck;
+
+/// Most elements that are simulated because their pillars are not as intended.
+const MOST_FAULTY: usize = 4;
+
+/// What the file is, in number.
+#[derive(Clone, Debug, Serialize)]
+pub struct LayoutFacts {
+    pub file: String,
+    pub bytes: u64,
+    pub top_cell: String,
+    pub cells: usize,
+    pub depth: u32,
+    /// Shapes with all references followed.
+    pub shapes: u64,
+    pub pillars: u64,
+    pub survey: Survey,
+}
+
+/// The pillars of one element of the array.
+#[derive(Clone, Debug, Serialize)]
+pub struct ElementCheck {
+    pub element: Element,
+    pub widths: WidthCheck,
+    /// Index into [`Verification::distinct`] of the element that it is a copy of, if it is as intended.
+    pub copy_of: Option<usize>,
+}
+
+/// One element that differs from all before it by more than a symmetry, simulated.
+#[derive(Clone, Debug, Serialize)]
+pub struct DistinctElement {
+    pub element: Element,
+    /// Number of elements that it stands for.
+    pub copies: usize,
+    pub phase: PhaseErrors,
+    /// Where the design phase is too steep for the lattice.
+    pub steepness: Steepness,
+    /// Where light goes by the mapping's own account, one entry a wavelength.
+    pub orders: Vec<Orders>,
+    /// One entry for each wavelength and field angle.
+    pub spots: Vec<SpotPair>,
+    /// The pillars that were read back, for pictures.
+    #[serde(skip)]
+    pub widths: WidthMap,
+}
+
+/// All that was found about a layout.
+#[derive(Clone, Debug, Serialize)]
+pub struct Verification {
+    pub design: String,
+    pub design_digest: String,
+    /// The cell that the layout is judged by.
+    pub fidelity: Fidelity,
+    /// `accurate` or `fast`.
+    pub accuracy: &'static str,
+    pub layout: LayoutFacts,
+    pub elements: Vec<ElementCheck>,
+    pub foreign: Oddities,
+    pub distinct: Vec<DistinctElement>,
+    /// Every limit of the design, held or not.
+    pub checks: Vec<Check>,
+}
+
+impl Verification {
+    /// Whether all limits hold.
+    pub fn passed(&self) -> bool {
+        self.checks.iter().all(Check::passed)
+    }
+}
+
+/// Read the layout at `path` back and hold it to its design.
+///
+/// The first of `premises` is the one that the layout is judged by; the others are simulated beside it.
+///
+/// # Errors
+/// If the layout cannot be read, the cell has no answer at a wavelength, or the user stopped it.
+pub fn verify(
+    design: &Design,
+    array: &PillarArray,
+    path: &Path,
+    premises: &[Premise<'_>],
+    accuracy: Accuracy,
+    progress: &dyn Progress,
+) -> Result<Verification> {
+    let layout = Layout::open_with(path, metalith_gds::ReadLimits::default(), progress)?;
+    let mut extraction = extract(&layout, &plan(design, array), progress)?;
+    let elements = compare(array, &extraction);
+    let lens = LensPhase::new(array.lattice, design.lens.diameter_nm, &design.lens.phase);
+    let rule = WidthRule::new(&design.cell, &design.mapping);
+    let judge = premises[0].cell;
+    let mapping_um = design.mapping.wavelength_um;
+    let widest = design.cell.pitch_nm as u16;
+    let at_mapping = judge.transmissions(mapping_um, widest)?;
+    let mut bench = optics::Bench::new(design, array.lattice, premises, accuracy)?;
+    let chosen = distinct(&elements);
+    let shown = chosen.iter().map(|(k, _)| elements[*k].element).collect::<Vec<_>>();
+    bench.look_along(&shown, progress)?;
+    progress.begin("simulating elements", (chosen.len() * bench.spots()) as u64);
+    let mut simulated = Vec::new();
+    for (k, copies) in chosen {
+        let element = elements[k].element;
+        let widths = std::mem::replace(&mut extraction.elements[k].widths, WidthMap::empty(array.lattice));
+        let phase = ElementPhase::new(&lens, &element.wedge);
+        simulated.push(DistinctElement {
+            element,
+            copies,
+            phase: PhaseErrors::of(&widths, &phase, &rule, mapping_um, &at_mapping),
+            steepness: Steepness::of(array.lattice.sites(), |ix, iy| phase.turns(ix, iy)),
+            orders: bench.orders(&rule),
+            spots: bench.simulate(&element, &phase, &widths, progress)?,
+            widths,
+        });
+    }
+    let mut verification = Verification {
+        design: design.name.clone(),
+        design_digest: design.digest(),
+        fidelity: judge.fidelity(),
+        accuracy: match accuracy {
+            Accuracy::Accurate => "accurate",
+            Accuracy::Fast => "fast",
+        },
+        layout: facts(&layout, &extraction, path),
+        elements,
+        foreign: extraction.oddities,
+        distinct: simulated,
+        checks: Vec::new(),
+    };
+    verification.checks = check::all(&design.verify.limits, &verification);
+    Ok(verification)
+}
+
+/// The pillars of a layout at the elements of a design.
+///
+/// # Errors
+/// If the layout cannot be read, or the user stopped it.
+pub fn read_back(design: &Design, array: &PillarArray, path: &Path, progress: &dyn Progress) -> Result<Extraction> {
+    let layout = Layout::open_with(path, metalith_gds::ReadLimits::default(), progress)?;
+    extract(&layout, &plan(design, array), progress)
+}
+
+/// Where the elements of a design are.
+fn plan(design: &Design, array: &PillarArray) -> ExtractionPlan {
+    let site = |placed: &Placed| ElementSite {
+        name: placed.element.label(),
+        centre_nm: [placed.element.centre_nm.0, placed.element.centre_nm.1],
+        lattice: array.lattice,
+    };
+    let sites = array.placed.iter().map(site).collect();
+    ExtractionPlan::given(design.layout.layers.pillars.number(), sites)
+}
+
+fn compare(array: &PillarArray, extraction: &Extraction) -> Vec<ElementCheck> {
+    let mut first_of_class = vec![None; array.classes.len()];
+    let mut distinct = 0;
+    let mut check = |(placed, found): (&Placed, &ExtractedElement)| {
+        let widths = WidthCheck::compare(&array.widths(placed), &found.widths);
+        let copy_of = if widths.faults() == 0 {
+            let place = &mut first_of_class[placed.class];
+            if place.is_none() {
+                *place = Some(distinct);
+                distinct += 1;
+            }
+            *place
+        } else {
+            None
+        };
+        ElementCheck {
+            element: placed.element,
+            widths,
+            copy_of,
+        }
+    };
+    array.placed.iter().zip(&extraction.elements).map(&mut check).collect()
+}
+
+/// Which elements are simulated, and for how many each stands: one of each kind, and the first of those
+/// that are not as intended.
+fn distinct(elements: &[ElementCheck]) -> Vec<(usize, usize)> {
+    let mut chosen: Vec<(usize, usize, Option<usize>)> = Vec::new();
+    let mut faulty = 0;
+    for (k, check) in elements.iter().enumerate() {
+        match check.copy_of {
+            Some(class) => match chosen.iter_mut().find(|c| c.2 == Some(class)) {
+                Some(known) => known.1 += 1,
+                None => chosen.push((k, 1, Some(class))),
+            },
+            None if faulty < MOST_FAULTY => {
+                faulty += 1;
+                chosen.push((k, 1, None));
+            }
+            None => {}
+        }
+    }
+    chosen.into_iter().map(|(k, copies, _)| (k, copies)).collect()
+}
+
+fn facts(layout: &Layout, extraction: &Extraction, path: &Path) -> LayoutFacts {
+    LayoutFacts {
+        file: path
+            .file_name()
+            .map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
+        bytes: layout.bytes(),
+        top_cell: extraction.top.clone(),
+        cells: layout.cells().len(),
+        depth: layout.depth(),
+        shapes: layout.flat_shapes(),
+        pillars: extraction.pillars,
+        survey: extraction.survey.clone(),
+    }
+}

@@ -1,0 +1,151 @@
+//! What is measured of the PSFs of one element: designed beside extracted, and where light goes.
+
+use ndarray::Array2;
+use num_complex::Complex64;
+use serde::Serialize;
+
+use metalith_cell::Fidelity;
+use metalith_design::array::WidthRule;
+use metalith_design::{Element, FieldAngle};
+use metalith_wave::image::{Matched, Psf, PsfMeasures, order_shares, pixel_mtf};
+
+/// Greatest frequency of an MTF curve [line pairs a millimetre], and its points.
+const CURVE_END_LP_MM: f64 = 120.0;
+const CURVE_POINTS: u32 = 60;
+/// Samples of the phase that the orders of a mapping are computed from: many times the number of widths.
+const ORDER_SAMPLES: usize = 4096;
+
+/// What one PSF is worth to the sensor.
+#[derive(Clone, Debug, Serialize)]
+pub struct Spot {
+    #[serde(flatten)]
+    pub measures: PsfMeasures,
+    /// Line pairs a millimetre and MTF, pixel included, mean of x and y, for pictures.
+    #[serde(skip)]
+    pub mtf_curve: Vec<(f64, f64)>,
+}
+
+impl Spot {
+    pub fn of(psf: &Psf, matched: &Matched, pixel_um: f64) -> Self {
+        let frequencies = (0..=CURVE_POINTS)
+            .map(|k| CURVE_END_LP_MM * f64::from(k) / f64::from(CURVE_POINTS))
+            .collect::<Vec<_>>();
+        let [x, y] = [0, 1].map(|axis| psf.mtf_curve(axis, &frequencies));
+        let mean = |k: usize| 0.5 * (x[k] + y[k]) * pixel_mtf(pixel_um, frequencies[k]);
+        Self {
+            measures: psf.measures(matched, pixel_um),
+            mtf_curve: frequencies.iter().enumerate().map(|(k, f)| (*f, mean(k))).collect(),
+        }
+    }
+
+    /// MTF with the pixel at 42.7 and at 85.3 line pairs a millimetre, mean of x and y.
+    pub fn mtf(&self) -> [f64; 2] {
+        [self.measures.mtf_half_nyquist_pixel, self.measures.mtf_nyquist_pixel].map(|m| 0.5 * (m[0] + m[1]))
+    }
+}
+
+/// Design and layout side by side, for one wavelength and field angle.
+#[derive(Clone, Debug, Serialize)]
+pub struct SpotPair {
+    pub wavelength_um: f64,
+    /// Counted from where the element looks.
+    pub field: FieldAngle,
+    /// Direction sines of the light as it arrives at the chip.
+    pub incidence_sin: [f64; 2],
+    /// Where the chief ray meets the sensor, from the element's axis [um].
+    pub chief_ray_um: [f64; 2],
+    /// Frequency bins that had to be relabelled towards the mean ray.
+    pub relabelled: u64,
+    /// Of the unrounded design phase.
+    pub designed: Spot,
+    /// Of the pillars that were read back, by each cell; the first one judges.
+    pub extracted: Vec<(Fidelity, Spot)>,
+    /// Rms difference of the judged PSF from the designed one, both of the same energy in the window, over the
+    /// rms of the designed one.
+    pub psf_difference: f64,
+    #[serde(skip)]
+    pub(super) images: Option<Box<Images>>,
+}
+
+/// Per unit of arriving power, so that cells with and without amplitude share one scale.
+#[derive(Clone, Debug)]
+pub(super) struct Images {
+    pub designed: Array2<f32>,
+    pub extracted: Array2<f32>,
+    pub step_um: f64,
+}
+
+impl SpotPair {
+    /// Wavelength and field angle in words.
+    pub fn place(&self) -> String {
+        let nm = self.wavelength_um * 1e3;
+        match self.field {
+            FieldAngle { x_deg, y_deg: 0.0 } => format!("{nm:.0} nm, {x_deg}°"),
+            FieldAngle { x_deg, y_deg } => format!("{nm:.0} nm, ({x_deg}, {y_deg})°"),
+        }
+    }
+
+    pub(super) fn label(&self, element: &Element) -> String {
+        format!("element {}, {}", element.label(), self.place())
+    }
+
+    /// The spot of the cell that judges.
+    pub fn judged(&self) -> &Spot {
+        &self.extracted[0].1
+    }
+
+    /// Strehl of the layout over that of the design phase.
+    pub fn strehl_ratio(&self) -> f64 {
+        self.judged().measures.strehl / self.designed.measures.strehl
+    }
+
+    /// Distance of the two centroids [um].
+    pub fn centroid_shift_um(&self) -> f64 {
+        let (a, b) = (self.judged().measures.centroid_um, self.designed.measures.centroid_um);
+        (a[0] - b[0]).hypot(a[1] - b[1])
+    }
+
+    /// Largest difference of the MTF at the two frequencies.
+    pub fn mtf_difference(&self) -> f64 {
+        let (a, b) = (self.judged().mtf(), self.designed.mtf());
+        (a[0] - b[0]).abs().max((a[1] - b[1]).abs())
+    }
+
+    pub(super) fn images(&self) -> Option<&Images> {
+        self.images.as_deref()
+    }
+}
+
+/// Where light goes by the mapping's own account, at one wavelength, by one cell.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Orders {
+    pub wavelength_um: f64,
+    pub fidelity: Fidelity,
+    /// Share of the arriving light in the first order, which makes the image.
+    pub first: f64,
+    /// Share in the zero order, which passes as if there were no phase.
+    pub zero: f64,
+    /// Share in the second order.
+    pub second: f64,
+    /// Share in all orders of the mapping: the rest is reflected, absorbed or diffracted by the lattice itself.
+    pub transmitted: f64,
+}
+
+impl Orders {
+    /// Of a mapping, by the table of a cell at one wavelength; `full` is |t| of a cell that passes everything.
+    pub(super) fn of(rule: &WidthRule, wavelength_um: f64, fidelity: Fidelity, full: f64, table: &[Complex64]) -> Self {
+        let u = |i: usize| (i as f64 + 0.5) / ORDER_SAMPLES as f64;
+        let t = (0..ORDER_SAMPLES)
+            .map(|i| table[usize::from(rule.width_nm(u(i)))])
+            .collect::<Vec<_>>();
+        let shares = order_shares(&t, full, &[0, 1, 2]);
+        Self {
+            wavelength_um,
+            fidelity,
+            zero: shares[0],
+            first: shares[1],
+            second: shares[2],
+            transmitted: t.iter().map(Complex64::norm_sqr).sum::<f64>() / (full * full * t.len() as f64),
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! What the best element of the same shape would do.
+
+use num_complex::Complex32;
+
+use crate::Aperture;
+
+/// The same aperture passing all its power in the zero order with the perfect phase: what a Strehl ratio and a
+/// share of energy are against.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Matched {
+    /// |E|^2 / |E_inc|^2 where all sites arrive in phase.
+    pub peak: f64,
+    /// |E|^2 / |E_inc|^2 behind the aperture, summed over its area [um^2].
+    pub power_um2: f64,
+}
+
+impl Matched {
+    /// For the sites of `aperture` that pass anything, each with |t| = `full_transmission`, in focus at `focus_um`,
+    /// x, y and z from the element's centre.
+    ///
+    /// In phase, moduli add: the Rayleigh-Sommerfeld sum of p^2 Z / (2 pi R^2) |1/R - i k|.
+    pub fn of(aperture: &dyn Aperture, focus_um: [f64; 3], wavelength_um: f64, full_transmission: f64) -> Self {
+        let lattice = aperture.lattice();
+        let n = lattice.sites();
+        let [px, py, z] = focus_um;
+        let k = std::f64::consts::TAU / wavelength_um;
+        let x2: Vec<f64> = (0..n).map(|i| (lattice.coordinate_um(i) - px).powi(2)).collect();
+        let mut row = vec![Complex32::ZERO; n];
+        let (mut sum, mut sites) = (0.0, 0u64);
+        for iy in 0..n {
+            aperture.fill_row(iy, &mut row);
+            let rest = (lattice.coordinate_um(iy) - py).powi(2) + z * z;
+            let mut line = 0.0;
+            for (_, x2) in row.iter().zip(&x2).filter(|(t, _)| **t != Complex32::ZERO) {
+                let r2 = x2 + rest;
+                line += (k * k + 1.0 / r2).sqrt() / r2;
+                sites += 1;
+            }
+            sum += line;
+        }
+        let site_um2 = lattice.pitch_um().powi(2);
+        let amplitude = full_transmission * site_um2 * z / std::f64::consts::TAU * sum;
+        Self {
+            peak: amplitude * amplitude,
+            power_um2: full_transmission * full_transmission * site_um2 * sites as f64,
+        }
+    }
+}

@@ -1,0 +1,9 @@
+//! The program as a person or a build server calls it.
+
+mod broken_designs;
+mod cells;
+mod check;
+mod handoff;
+mod optimise;
+mod predict;
+mod run;

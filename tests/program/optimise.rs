@@ -1,0 +1,123 @@
+//! `metalith optimize`, interrupted and continued.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use metalith::cell::PublishedCell;
+use metalith::optimise::Task;
+use metalith::{Design, Silent};
+
+const EXCHANGE: &str = "[optimise]\ncell = \"published\"\nstep_nm = 5\nchains = 3\nhot_sweeps = 12\nseed = 4\n";
+
+/// From the command to a phase that a design reads, on any number of threads the same, and from there to a
+/// layout whose pillars keep the limit and focus as the rings promise.
+#[test]
+fn the_phase_of_the_command_becomes_a_layout_that_keeps_the_limit() {
+    /// Single sums in another order.
+    const SAME: f64 = 1e-9;
+    let folder = tempfile::tempdir().unwrap();
+    let path = design(folder.path(), EXCHANGE);
+    let phases = ["1", "2"].map(|threads| {
+        let phase = folder.path().join(format!("phase_{threads}.csv"));
+        Command::cargo_bin("metalith")
+            .unwrap()
+            .args(["optimize", "--no-report", "--quiet", "--threads", threads])
+            .arg(&path)
+            .arg("--out")
+            .arg(folder.path())
+            .arg("--phase")
+            .arg(&phase)
+            .assert()
+            .success();
+        phase
+    });
+    let [one, two] = phases.each_ref().map(|p| {
+        let text = fs::read_to_string(p).unwrap();
+        text.lines()
+            .filter(|l| !l.starts_with('#'))
+            .collect::<Vec<_>>()
+            .join("\n")
+    });
+    assert_eq!(one, two);
+    assert!(!folder.path().join("checkpoint.json").exists());
+
+    let text = fs::read_to_string(&path).unwrap();
+    let table = format!(
+        "source = \"table\"\nfile = \"{}\"\ninterpolation = \"nearest\"",
+        phases[0].display()
+    );
+    let text = text.replace("source = \"hyperbola\"\nwavelength_nm = 550", &table);
+    fs::write(&path, text).unwrap();
+    let design = Design::read(&path).unwrap();
+    let (task, cell) = (Task::of(&design).unwrap(), PublishedCell::new(350));
+    let rings = task.judge_rings(&task.own_turns, &cell).unwrap();
+    let layout = folder.path().join("lens.gds");
+    let found = task.judge_layout(&design, &phases[0], &layout, &cell, &Silent).unwrap();
+    assert!(found.largest_step_turns <= 0.2 + 1e-6, "{}", found.largest_step_turns);
+    assert!((found.geometric_mean / rings.geometric_mean - 1.0).abs() < SAME);
+}
+
+/// Ctrl-C: the best so far is kept, exit code 3, and the same command goes on.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_program_is_interrupted_and_goes_on() {
+    use std::process::{Command, Stdio};
+    use std::time::Duration;
+    // Long enough to be stopped twice.
+    const LONG: &str = "[optimise]\ncell = \"published\"\nstep_nm = 2\nchains = 1\nhot_sweeps = 100000\nseed = 4\n";
+    let folder = tempfile::tempdir().unwrap();
+    let path = design(folder.path(), LONG);
+    let out = folder.path().join("out");
+    let interrupt = || {
+        let child = Command::new(env!("CARGO_BIN_EXE_metalith"))
+            .arg("optimize")
+            .arg(&path)
+            .args(["--no-report", "--out"])
+            .arg(&out)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        // Until it is known to catch the signal, which is number 2.
+        let status = format!("/proc/{}/status", child.id());
+        let catches = || {
+            let text = fs::read_to_string(&status).unwrap();
+            let mask = text.lines().find_map(|l| l.strip_prefix("SigCgt:")).unwrap();
+            u64::from_str_radix(mask.trim(), 16).unwrap() & 2 != 0
+        };
+        while !catches() {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        std::thread::sleep(Duration::from_millis(700));
+        let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+        assert!(sent.unwrap().success());
+        let ended = child.wait_with_output().unwrap();
+        assert_eq!(ended.status.code(), Some(3));
+        let kept = fs::read_to_string(out.join("checkpoint.json")).unwrap();
+        let kept: serde_json::Value = serde_json::from_str(&kept).unwrap();
+        let rings = fs::read_to_string(out.join("phase.csv")).unwrap();
+        let rows = rings
+            .lines()
+            .filter(|l| l.starts_with(|c: char| c.is_ascii_digit()))
+            .count();
+        assert!(rows > 80, "{rows}");
+        let said = String::from_utf8(ended.stderr).unwrap();
+        (kept["chains"][0]["sweep"].as_u64().unwrap(), said)
+    };
+    let (first, said) = interrupt();
+    assert!(first > 0 && said.contains("interrupted"), "{said}");
+    let (second, said) = interrupt();
+    assert!(
+        second > first && said.contains("going on from"),
+        "{first} {second} {said}"
+    );
+}
+
+/// A design file beside the small one, with a section of its own to optimise it.
+fn design(folder: &Path, optimise: &str) -> std::path::PathBuf {
+    let path = folder.join("lens.toml");
+    let text = fs::read_to_string(metalith_testing::design("mini_3x3")).unwrap();
+    fs::write(&path, format!("{text}\n{optimise}")).unwrap();
+    path
+}

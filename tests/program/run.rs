@@ -1,0 +1,189 @@
+//! The main job through the program: what a design asks for is written, read back, simulated and judged.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use metalith_testing::{design, golden};
+use serde_json::{Value, json};
+
+fn metalith(args: &[&str], paths: &[&Path]) -> std::process::Output {
+    Command::cargo_bin("metalith")
+        .unwrap()
+        .args(args)
+        .args(paths)
+        .output()
+        .unwrap()
+}
+
+fn report(folder: &Path) -> Value {
+    serde_json::from_slice(&fs::read(folder.join("report.json")).unwrap()).unwrap()
+}
+
+/// Numbers that must not change unnoticed, to as many digits as hold on every machine.
+fn numbers(report: &Value) -> Value {
+    const DIGITS: i32 = 4;
+    let round = |v: &Value| {
+        let x = v.as_f64().unwrap();
+        let scale = 10f64.powi(DIGITS - 1 - x.abs().max(1e-300).log10().floor() as i32);
+        (x * scale).round() / scale
+    };
+    let spots = |element: &Value| {
+        let of = |spot: &Value| {
+            json!({
+                "wavelength_um": spot["wavelength_um"],
+                "field": spot["field"],
+                "designed_strehl": round(&spot["designed"]["strehl"]),
+                "extracted_strehl": spot["extracted"].as_array().unwrap().iter()
+                    .map(|pair| json!([pair[0], round(&pair[1]["strehl"])])).collect::<Vec<_>>(),
+                "energy_1_pixel": round(&spot["extracted"][0][1]["energy_1_pixel"]),
+                "psf_difference": round(&spot["psf_difference"]),
+            })
+        };
+        element["spots"].as_array().unwrap().iter().map(of).collect::<Vec<_>>()
+    };
+    let element = |e: &Value| {
+        json!({
+            "index": e["element"]["index"],
+            "copies": e["copies"],
+            "rounding_rms_rad": round(&e["phase"]["rounding"]["rms_rad"]),
+            "mapping_rms_rad": round(&e["phase"]["mapping"]["rms_rad"]),
+            "spots": spots(e),
+        })
+    };
+    let found = &report["verification"];
+    let found = if found.is_null() { report } else { found };
+    json!({
+        "pillars": found["layout"]["pillars"],
+        "distinct": found["distinct"].as_array().unwrap().iter().map(element).collect::<Vec<_>>(),
+    })
+}
+
+#[test]
+fn golden_numbers_of_the_mini_design() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = metalith(&["run", "--out"], &[folder.path(), &design("mini_3x3")]);
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let numbers = numbers(&report(folder.path()));
+    golden("mini_3x3/report.json", format!("{numbers:#}\n").as_bytes());
+    let html = fs::read_to_string(folder.path().join("report.html")).unwrap();
+    assert!(html.contains("all 3 limits hold"));
+    assert!(
+        !html.contains("src=\"http") && !html.contains("href=\"http"),
+        "the page needs a network"
+    );
+}
+
+#[test]
+fn one_wrong_pillar_fails_the_run_that_finds_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let mini = design("mini_3x3");
+    let output = metalith(&["layout", "--hierarchy", "flat", "--out"], &[folder.path(), &mini]);
+    assert_eq!(output.status.code(), Some(0));
+    let layout = folder.path().join("mini_3x3_pillars.gds");
+    let mut bytes = fs::read(&layout).unwrap();
+    // The last pillar of the file: its record ends before ENDSTR and ENDLIB. Two of its corners move by 2 nm,
+    // so that it is a rectangle, no longer a pillar.
+    let record = bytes.len() - 8 - 64;
+    let (lower_right_x, upper_right_x) = (2, 4);
+    for corner in [lower_right_x, upper_right_x] {
+        let at = record + 20 + 4 * corner;
+        let x = i32::from_be_bytes(bytes[at..at + 4].try_into().unwrap()) + 2;
+        bytes[at..at + 4].copy_from_slice(&x.to_be_bytes());
+    }
+    fs::write(&layout, &bytes).unwrap();
+    let output = metalith(&["verify", "--fast", "--fidelity", "published"], &[&mini, &layout]);
+    assert_eq!(
+        output.status.code(),
+        Some(1),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        said.contains("FAILS: pillars that are wrong, missing or extra: 1"),
+        "{said}"
+    );
+    assert!(
+        said.contains("FAILS: shapes on the pillar layer that are no pillar: 1"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_layout_from_anywhere_is_found_and_simulated() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = metalith(
+        &["layout", "--hierarchy", "sref", "--out"],
+        &[folder.path(), &design("mini_3x3")],
+    );
+    assert_eq!(output.status.code(), Some(0));
+    let layout = folder.path().join("mini_3x3_pillars.gds");
+    let args = [
+        "psf",
+        "--distance-um",
+        "144",
+        "--wavelength-nm",
+        "530",
+        "--samples",
+        "64",
+        "--json",
+    ];
+    let output = metalith(&args, &[&layout]);
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let elements = found["elements"].as_array().unwrap();
+    assert_eq!(elements.len(), 9);
+    assert!(elements.iter().all(|e| e["pitch_nm"] == 350 && e["pillars"] == 23_092));
+    // The centre element, in light along the normal, is what `run` simulates too.
+    let centre = elements.iter().find(|e| e["centre_nm"] == json!([0, 0])).unwrap();
+    let psf = found["psfs"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|p| p["element"] == centre["name"])
+        .unwrap();
+    let golden: Value =
+        serde_json::from_slice(&fs::read(metalith_testing::root().join("golden/mini_3x3/report.json")).unwrap())
+            .unwrap();
+    let run = golden["distinct"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|d| d["index"] == json!([0, 0]))
+        .unwrap();
+    let spot = &run["spots"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|s| s["wavelength_um"] == 0.53)
+        .unwrap();
+    let (here, there) = (
+        psf["strehl"].as_f64().unwrap(),
+        spot["extracted_strehl"][0][1].as_f64().unwrap(),
+    );
+    // Both sample the peak on the same lattice of samples; the rest is rounding to four digits.
+    assert!((here / there - 1.0).abs() < 1e-3, "{here} against {there}");
+}
+
+#[test]
+fn what_cannot_be_read_is_bad_input() {
+    let folder = tempfile::tempdir().unwrap();
+    let junk = folder.path().join("junk.gds");
+    fs::write(&junk, b"this is no layout").unwrap();
+    let output = metalith(&["psf"], &[&junk]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("byte 0"));
+    let output = metalith(&["run"], &[&folder.path().join("nowhere.toml")]);
+    assert_eq!(output.status.code(), Some(2));
+}
