@@ -49,7 +49,7 @@ def main():
         design = design.replace("\nlog = 1.0", "\nsum = 1.0").replace("hot_sweeps", "hot_sweeps = 0 #")
         (folder / "sum.toml").write_text(design)
         subprocess.run(
-            [METALITH, "optimize", folder / "sum.toml", "--no-report", "--out", folder, "--phase", folder / "sum.csv"],
+            [METALITH, "optimise", folder / "sum.toml", "--no-report", "--out", folder, "--phase", folder / "sum.csv"],
             check=True, stdout=subprocess.DEVNULL,
         )
         chosen = {

@@ -7,7 +7,7 @@ use metalith::Result;
 use metalith::calibrate::{Calibration, Extent, MeasuredSet, SetVerdict, Settings, calibrate, prove, write_proof};
 use metalith::cell::cache_folder;
 
-use super::{Outcome, Terminal};
+use super::{Outcome, Terminal, print_line};
 
 /// Find what a measured set tells that the model does not know.
 #[derive(Args)]
@@ -78,10 +78,10 @@ pub fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> {
         write_proof(out, &proof)?;
         terminal.clear();
         if args.json {
-            println!("{}", serde_json::to_string_pretty(&proof).unwrap_or_default());
+            print_line!("{}", serde_json::to_string_pretty(&proof).unwrap_or_default());
         } else {
-            print!("{}", proof.text());
-            println!("{}", out.join("proof.html").display());
+            print_line!("{}", proof.text().trim_end());
+            print_line!("{}", out.join("proof.html").display());
         }
         return Ok(Outcome::Fine);
     }
@@ -89,7 +89,7 @@ pub fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> {
     for done in calibrate(&args.sets, &outs, &settings, terminal)? {
         terminal.clear();
         if args.json {
-            println!("{}", serde_json::to_string_pretty(&done.diagnosis).unwrap_or_default());
+            print_line!("{}", serde_json::to_string_pretty(&done.diagnosis).unwrap_or_default());
         } else {
             describe(&done);
         }
@@ -102,14 +102,16 @@ pub fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> {
 
 fn describe(done: &Calibration) {
     let error = &done.diagnosis.error;
-    println!("{}: {}", done.diagnosis.set, done.diagnosis.sentence());
-    println!(
+    print_line!("{}: {}", done.diagnosis.set, done.diagnosis.sentence());
+    print_line!(
         "{} on captures left out: {:.4} before, {:.4} after; 1 is noise alone",
-        error.measure, error.before.held_out, error.after.held_out
+        error.measure,
+        error.before.held_out,
+        error.after.held_out
     );
-    println!("{}", done.answer.display());
-    println!("{}", done.report.display());
+    print_line!("{}", done.answer.display());
+    print_line!("{}", done.report.display());
     if let Some(model) = &done.model {
-        println!("{}", model.display());
+        print_line!("{}", model.display());
     }
 }

@@ -8,7 +8,7 @@ use metalith::cell_study::{CellStudy, StudyOptions, write_cell_report};
 use metalith::report::{fixed, sig};
 use metalith::{Design, Result};
 
-use super::{Outcome, Terminal};
+use super::{Outcome, Terminal, print_json, print_line};
 
 /// Tabulate the cell of a design by rigorous theory, fit it, and report what its mapping does with light.
 #[derive(Args)]
@@ -63,37 +63,34 @@ pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
     )?;
     write_cell_report(&study, &folder)?;
     if args.json {
-        println!(
-            "{}",
-            serde_json::to_string_pretty(&study).expect("plain data serialises")
-        );
+        print_json(&study);
         return Ok(Outcome::Fine);
     }
     match origin {
-        Origin::Kept(file) => println!("library: {} (kept)", file.display()),
-        Origin::Computed(Some(file)) => println!("library: {} ({} cells solved)", file.display(), study.points),
-        Origin::Computed(None) => println!("library: {} cells solved, not kept", study.points),
+        Origin::Kept(file) => print_line!("library: {} (kept)", file.display()),
+        Origin::Computed(Some(file)) => print_line!("library: {} ({} cells solved)", file.display(), study.points),
+        Origin::Computed(None) => print_line!("library: {} cells solved, not kept", study.points),
     }
-    println!(
+    print_line!(
         "at {} nm the widths span {} turns; the mapping of the design errs by {} rad rms",
         sig(study.mapping_um * 1e3, 4),
         fixed(study.span_turns, 2),
         fixed(study.design_round_trip.rms_rad, 3)
     );
-    println!("first / zero order            455 nm        530 nm        590 nm        660 nm     band");
+    print_line!("first / zero order            455 nm        530 nm        590 nm        660 nm     band");
     for mapping in &study.mappings {
         let led: Vec<_> = mapping
             .led
             .iter()
             .map(|o| format!("{} / {}", fixed(o.first, 3), fixed(o.zero, 3)))
             .collect();
-        println!(
+        print_line!(
             "{:26} {}  {}",
             mapping.name,
             led.join(" "),
             fixed(mapping.mean(|o| o.first), 3)
         );
     }
-    println!("report: {}", folder.join("cells.html").display());
+    print_line!("report: {}", folder.join("cells.html").display());
     Ok(Outcome::Fine)
 }

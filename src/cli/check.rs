@@ -7,7 +7,7 @@ use metalith::drc::{self, CheckInput, Date, Deck, DrcReport, Waivers};
 use metalith::gds::ReadLimits;
 use metalith::{Design, Layout, Result, WholeFile};
 
-use super::{Outcome, Terminal};
+use super::{Outcome, Terminal, print_line};
 
 /// Check a layout against design rules.
 #[derive(Args)]
@@ -85,9 +85,9 @@ pub fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
         }
     }
     if args.json {
-        println!("{:#}", serde_json::to_value(&report).expect("a report is plain data"));
+        print_line!("{:#}", serde_json::to_value(&report).expect("a report is plain data"));
     } else {
-        print!("{}", drc::text(&report));
+        print_line!("{}", drc::text(&report).trim_end());
     }
     Ok(match report.exit_code() {
         0 => Outcome::Fine,

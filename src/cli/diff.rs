@@ -7,7 +7,7 @@ use metalith::diff::{self, DiffPlan};
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::{Error, Layout, Result};
 
-use super::{Outcome, Terminal};
+use super::{Outcome, Terminal, print_line};
 
 /// Tell two layouts apart: by geometry, whatever their hierarchy.
 #[derive(Args)]
@@ -57,12 +57,12 @@ pub fn run(args: &DiffArgs, terminal: &Terminal) -> Result<Outcome> {
         diff::page(&found).write(path)?;
     }
     if args.json {
-        println!(
+        print_line!(
             "{:#}",
             serde_json::to_value(&found).expect("a comparison is plain data")
         );
     } else {
-        print!("{}", diff::text(&found));
+        print_line!("{}", diff::text(&found).trim_end());
     }
     Ok(if found.same_geometry {
         Outcome::Fine

@@ -8,7 +8,7 @@ use metalith::report::Verdict;
 use metalith::{Accuracy, Design, Result};
 
 use super::verify::FidelityArg;
-use super::{Outcome, Terminal};
+use super::{Outcome, Terminal, print_line};
 
 /// Make the folder and the archive that a cleanroom starts from, or look whether a received one is whole.
 #[derive(Args)]
@@ -82,7 +82,7 @@ fn make(design: &Path, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcom
     let made = handoff(&options, terminal)?;
     terminal.clear();
     if args.json {
-        println!(
+        print_line!(
             "{:#}",
             serde_json::json!({
                 "folder": made.folder,
@@ -109,12 +109,12 @@ fn outcome(made: &Handoff) -> Outcome {
 }
 
 fn tell(made: &Handoff) {
-    println!("{}  start with index.html", made.folder.display());
-    println!("{}  the same, packed", made.archive.display());
+    print_line!("{}  start with index.html", made.folder.display());
+    print_line!("{}  the same, packed", made.archive.display());
     for check in &made.checks {
-        println!("{}: {}: {}", check.verdict.word(), check.name, check.words);
+        print_line!("{}: {}: {}", check.verdict.word(), check.name, check.words);
     }
-    println!("{} files, seal {}", made.manifest.files.len(), made.manifest.seal);
+    print_line!("{} files, seal {}", made.manifest.files.len(), made.manifest.seal);
 }
 
 fn look(folder: &Path, json: bool, terminal: &Terminal) -> Result<Outcome> {
@@ -123,7 +123,7 @@ fn look(folder: &Path, json: bool, terminal: &Terminal) -> Result<Outcome> {
     if json {
         let mut value = serde_json::to_value(&found).expect("plain data serialises");
         value["whole_and_unaltered"] = found.holds().into();
-        println!("{value:#}");
+        print_line!("{value:#}");
     } else {
         describe(&found);
     }
@@ -136,29 +136,31 @@ fn look(folder: &Path, json: bool, terminal: &Terminal) -> Result<Outcome> {
 
 fn describe(found: &HandoffVerification) {
     let m = &found.manifest;
-    println!(
+    print_line!(
         "hand-off of {}, process {}, made by metalith {}",
-        m.design, m.process, m.metalith
+        m.design,
+        m.process,
+        m.metalith
     );
-    println!("seal {}", m.seal);
+    print_line!("seal {}", m.seal);
     for (what, names) in [
         ("missing", &found.missing),
         ("altered", &found.altered),
         ("not in the manifest", &found.unknown),
     ] {
         for name in names {
-            println!("{what}: {name}");
+            print_line!("{what}: {name}");
         }
     }
     if !found.seal_holds {
-        println!("altered: the manifest itself, its seal does not match");
+        print_line!("altered: the manifest itself, its seal does not match");
     }
     if found.holds() {
-        println!(
+        print_line!(
             "whole and unaltered: {} files. Compare the seal with the sender's.",
             m.files.len()
         );
     } else {
-        println!("not as it was sent: ask the sender for it again");
+        print_line!("not as it was sent: ask the sender for it again");
     }
 }

@@ -9,7 +9,7 @@ use metalith::layout::Written;
 use metalith::report::{count, sig};
 use metalith::{Design, Hierarchy, PillarArray, Result, write_apertures, write_layer_properties, write_pillars};
 
-use super::{Outcome, Terminal};
+use super::{Outcome, Terminal, print_line};
 
 /// Write the pillar layout, the aperture layout and the layer colours of a design.
 #[derive(Args)]
@@ -129,16 +129,16 @@ pub fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
             "bytes": [written.pillars.bytes, written.apertures.bytes],
             "compensation": compensation.as_ref().map(|c| &c.2.summary),
         });
-        println!("{json:#}");
+        print_line!("{json:#}");
     } else {
         for file in [&written.pillars, &written.apertures] {
-            println!("{}  {:.3} MB", file.path.display(), file.bytes as f64 * 1e-6);
+            print_line!("{}  {:.3} MB", file.path.display(), file.bytes as f64 * 1e-6);
         }
-        println!(
+        print_line!(
             "{}  for KLayout: names and colours of the layers",
             written.properties.display()
         );
-        println!(
+        print_line!(
             "{} pillars in {} elements, {} of them distinct",
             array.pillars(),
             array.placed.len(),
@@ -146,7 +146,7 @@ pub fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
         );
         if let Some((_, _, compensated)) = &compensation {
             let s = &compensated.summary;
-            println!(
+            print_line!(
                 "compensated: widths moved by {} nm rms; error as made {} uncorrected, {} corrected; {} pillars newly at an end of the range",
                 sig(s.moved_rms_nm, 3),
                 sig(s.error[0], 3),
@@ -154,7 +154,7 @@ pub fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
                 count(s.at_limit)
             );
             let report = args.target.folder(&design).join("compensation.html");
-            println!("{}", report.display());
+            print_line!("{}", report.display());
         }
     }
     Ok(Outcome::Fine)

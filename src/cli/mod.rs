@@ -3,10 +3,12 @@
 mod calibrate;
 mod cells;
 mod check;
+mod completions;
 mod diff;
 mod handoff;
 mod layout;
-mod optimize;
+mod optimise;
+mod output;
 mod photographs;
 mod psf;
 mod run;
@@ -20,6 +22,7 @@ use clap::{Parser, Subcommand};
 use miette::{Diagnostic, GraphicalReportHandler, SourceCode};
 
 use metalith::{Error, Faults};
+use output::{print_json, print_line};
 pub use terminal::Terminal;
 
 /// What every command answers with when it did its work.
@@ -33,6 +36,9 @@ pub enum Outcome {
     NotDone,
 }
 
+/// More threads than any machine here has cores; each takes memory of its own.
+const MOST_THREADS: i64 = 512;
+
 /// From the phase of a metalens array to the layout a cleanroom writes, and back from that file to the
 /// image it makes.
 #[derive(Parser)]
@@ -43,8 +49,8 @@ struct Arguments {
     command: Command,
 
     /// Threads to use; all cores if left out. The answer does not depend on it.
-    #[arg(long, global = true, value_name = "N")]
-    threads: Option<usize>,
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=MOST_THREADS))]
+    threads: Option<u16>,
 
     /// Print nothing but errors and what was asked for.
     #[arg(long, short, global = true)]
@@ -56,7 +62,8 @@ struct Arguments {
 enum Command {
     Run(run::RunArgs),
     Layout(layout::LayoutArgs),
-    Optimize(optimize::OptimizeArgs),
+    #[command(visible_alias = "optimize")]
+    Optimise(optimise::OptimiseArgs),
     Photographs(photographs::PhotographsArgs),
     Verify(verify::VerifyArgs),
     Psf(psf::PsfArgs),
@@ -65,18 +72,30 @@ enum Command {
     Check(check::CheckArgs),
     Diff(diff::DiffArgs),
     Calibrate(calibrate::CalibrateArgs),
+    Completions(completions::CompletionsArgs),
+    #[command(hide = true)]
+    Manual(completions::ManualArgs),
 }
 
 /// Run the program with the arguments of the process.
 pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     if let Some(threads) = arguments.threads {
-        // A pool that exists already (it cannot, this early) would only cost speed.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads.into())
+            .build_global();
+        if let Err(error) = pool {
+            eprintln!("error: {threads} threads cannot be started: {error}\n  help: use fewer with --threads");
+            return ExitCode::from(2);
+        }
     }
     let terminal = Terminal::new(arguments.quiet);
     let outcome = dispatch(&arguments.command, &terminal);
     terminal.clear();
+    if let Some(reason) = output::failure() {
+        eprintln!("error: cannot write to standard output: {reason}");
+        return ExitCode::from(3);
+    }
     match outcome {
         Ok(Outcome::Fine) => ExitCode::SUCCESS,
         Ok(Outcome::OutsideLimits) => ExitCode::from(1),
@@ -92,7 +111,7 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
     match command {
         Command::Run(args) => run::run(args, terminal),
         Command::Layout(args) => layout::run(args, terminal),
-        Command::Optimize(args) => optimize::run(args, terminal),
+        Command::Optimise(args) => optimise::run(args, terminal),
         Command::Photographs(args) => photographs::run(args, terminal),
         Command::Handoff(args) => handoff::run(args, terminal),
         Command::Verify(args) => verify::run(args, terminal),
@@ -101,6 +120,8 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::Check(args) => check::run(args, terminal),
         Command::Diff(args) => diff::run(args, terminal),
         Command::Calibrate(args) => calibrate::run(args, terminal),
+        Command::Completions(args) => completions::run(args, terminal),
+        Command::Manual(args) => completions::manual(args, terminal),
     }
 }
 

@@ -12,7 +12,7 @@ use metalith::{CellModel, Design, Error, Fidelity, Result, cell_models};
 use ndarray::Array3;
 
 use super::verify::FidelityArg;
-use super::{Outcome, Terminal};
+use super::{Outcome, Terminal, print_line};
 
 /// Take photographs of images through a lens with each of several phases, restore them, and print how close
 /// they come, as a table in Markdown.
@@ -72,8 +72,8 @@ pub fn run(args: &PhotographsArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.clear();
     let angles = &task.spec.views.angles_deg;
     let at = angles.iter().map(|a| format!("{a}°")).collect::<Vec<_>>().join(" / ");
-    println!("| phase | PSNR [dB] at {at} | SSIM at {at} | mean PSNR | mean SSIM | expected PSNR |");
-    println!("| --- | --- | --- | --- | --- | --- |");
+    print_line!("| phase | PSNR [dB] at {at} | SSIM at {at} | mean PSNR | mean SSIM | expected PSNR |");
+    print_line!("| --- | --- | --- | --- | --- | --- |");
     for (name, turns) in phases {
         let widths = task.widths_nm(&turns).into_iter().map(f64::from).collect::<Vec<_>>();
         let transfers = lens.transfers(&widths);
@@ -92,7 +92,7 @@ pub fn run(args: &PhotographsArgs, terminal: &Terminal) -> Result<Outcome> {
         }
         let list = |values: Vec<String>| values.join(" / ");
         let count = means.len() as f64;
-        println!(
+        print_line!(
             "| {name} | {} | {} | {:.2} | {:.3} | {:.2} |",
             list(means.iter().map(|m| format!("{:.2}", m.0)).collect()),
             list(means.iter().map(|m| format!("{:.3}", m.1)).collect()),

@@ -11,7 +11,7 @@ use metalith::verify::{Lighting, lone_psfs, write_lone_report};
 use metalith::{Accuracy, CellModel, Extraction, ExtractionPlan, Layout, Result, extract};
 
 use super::verify::FidelityArg;
-use super::{Outcome, Terminal};
+use super::{Outcome, Terminal, print_line};
 
 /// Find the elements of any GDSII layout, read their pillars, and simulate their PSFs.
 #[derive(Args)]
@@ -193,12 +193,12 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             "other_shapes": found.oddities,
             "psfs": psfs,
         });
-        println!("{json:#}");
+        print_line!("{json:#}");
         return Ok(Outcome::Fine);
     }
     for element in &found.elements {
         let (site, lattice) = (&element.site, element.site.lattice);
-        println!(
+        print_line!(
             "{} at ({}, {}) um: {} pillars on {} x {} sites of {} nm",
             site.name,
             sig(site.centre_nm[0] as f64 * 1e-3, 8),
@@ -209,9 +209,9 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             lattice.pitch_nm(),
         );
     }
-    println!("{} other shapes on layer {}", count(found.oddities.total()), args.layer);
+    print_line!("{} other shapes on layer {}", count(found.oddities.total()), args.layer);
     for psf in &psfs {
-        println!(
+        print_line!(
             "{}, {} nm: Strehl {}, {} % in a pixel of 5.86 um, peak at ({}, {}) um",
             psf.element,
             sig(psf.wavelength_um * 1e3, 4),
@@ -222,7 +222,7 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
         );
     }
     if let Some(folder) = &args.out {
-        println!("report: {}", folder.join("report.html").display());
+        print_line!("report: {}", folder.join("report.html").display());
     }
     Ok(Outcome::Fine)
 }

@@ -1,9 +1,10 @@
 //! `metalith run`: from a design file to a folder that a cleanroom can take.
 
-use std::path::PathBuf;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::{Design, PillarArray, Result};
+use metalith::{Design, Error, PillarArray, Result};
 
 use super::layout::Target;
 use super::verify::Judging;
@@ -29,12 +30,28 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
     let design = Design::read(&args.design)?;
     terminal.stop_on_interrupt();
     let array = PillarArray::build(&design, terminal)?;
+    let folder = args.target.folder(&design);
+    // A report speaks of the layout beside it: the old one must not stand beside a new layout, whatever happens.
+    discard(&folder.join("report.html"))?;
+    discard(&folder.join("report.json"))?;
     let written = args.target.write(&design, &array, terminal)?;
-    args.judging.judge(
-        &design,
-        &array,
-        &written.pillars.path,
-        &args.target.folder(&design),
-        terminal,
-    )
+    let judged = args
+        .judging
+        .judge(&design, &array, &written.pillars.path, &folder, terminal);
+    if let Err(Error::Interrupted) = &judged {
+        terminal.clear();
+        terminal.say(&format!(
+            "the layouts in {} are new and whole; there is no report on them yet",
+            folder.display()
+        ));
+    }
+    judged
+}
+
+/// Remove a file, if it is there.
+fn discard(path: &Path) -> Result<()> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(Error::io("replace", path)(error)),
+        _ => Ok(()),
+    }
 }

@@ -10,7 +10,7 @@ use metalith::{
     Accuracy, Design, Fidelity, PillarArray, Premise, Result, Verification, cell_models, verify, write_report,
 };
 
-use super::{Outcome, Terminal};
+use super::{Outcome, Terminal, print_json, print_line};
 
 /// Read a layout back, compare every pillar with its design, simulate it, and write the report.
 #[derive(Args)]
@@ -108,10 +108,7 @@ impl Judging {
         write_report(design, array, &found, folder)?;
         terminal.clear();
         if self.json {
-            println!(
-                "{}",
-                serde_json::to_string_pretty(&found).expect("plain data serialises")
-            );
+            print_json(&found);
         } else {
             summary(&found, folder);
         }
@@ -126,7 +123,7 @@ impl Judging {
 fn summary(found: &Verification, folder: &Path) {
     for element in &found.distinct {
         for spot in &element.spots {
-            println!(
+            print_line!(
                 "element {}, {}: Strehl {} ({}), {} designed",
                 element.element.label(),
                 spot.place(),
@@ -138,7 +135,7 @@ fn summary(found: &Verification, folder: &Path) {
     }
     for check in &found.checks {
         let verdict = if check.passed() { "holds" } else { "FAILS" };
-        println!(
+        print_line!(
             "{verdict}: {}: {} (limit {}, `{}`)",
             check.what,
             sig(check.reached, 4),
@@ -146,7 +143,7 @@ fn summary(found: &Verification, folder: &Path) {
             check.key
         );
     }
-    println!("report: {}", folder.join("report.html").display());
+    print_line!("report: {}", folder.join("report.html").display());
 }
 
 pub fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {

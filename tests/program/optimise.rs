@@ -1,4 +1,4 @@
-//! `metalith optimize`, interrupted and continued.
+//! `metalith optimise`, interrupted and continued.
 
 use std::fs;
 use std::path::Path;
@@ -22,7 +22,7 @@ fn the_phase_of_the_command_becomes_a_layout_that_keeps_the_limit() {
         let phase = folder.path().join(format!("phase_{threads}.csv"));
         Command::cargo_bin("metalith")
             .unwrap()
-            .args(["optimize", "--no-report", "--quiet", "--threads", threads])
+            .args(["optimise", "--no-report", "--quiet", "--threads", threads])
             .arg(&path)
             .arg("--out")
             .arg(folder.path())
@@ -71,7 +71,7 @@ fn the_program_is_interrupted_and_goes_on() {
     let out = folder.path().join("out");
     let interrupt = || {
         let child = Command::new(env!("CARGO_BIN_EXE_metalith"))
-            .arg("optimize")
+            .arg("optimise")
             .arg(&path)
             .args(["--no-report", "--out"])
             .arg(&out)

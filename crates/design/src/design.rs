@@ -8,7 +8,9 @@ use sha2::{Digest, Sha256};
 use metalith_core::document::{Document, Section, load};
 use metalith_core::{Lattice, Result};
 
-use crate::spec::{ArraySpec, CellSpec, Element, LayoutSpec, LensSpec, MappingSpec, OptimiseSpec, VerifySpec};
+use crate::spec::{
+    ArraySpec, CellSpec, Element, FieldAngle, LayoutSpec, LensSpec, MappingSpec, OptimiseSpec, VerifySpec,
+};
 
 /// Version of the format of design files that this program reads.
 const SCHEMA: i64 = 1;
@@ -28,7 +30,7 @@ pub struct Design {
     pub mapping: MappingSpec,
     pub layout: LayoutSpec,
     pub verify: VerifySpec,
-    /// How `metalith optimize` finds the phase; decides nothing of the layout.
+    /// How `metalith optimise` finds the phase; decides nothing of the layout.
     pub optimise: OptimiseSpec,
 }
 
@@ -58,10 +60,12 @@ impl Design {
         let title = root.optional_text("title").unwrap_or_else(|| name.clone());
         let cell = CellSpec::read(&root.section("cell"));
         let lens = LensSpec::read(&root.section("lens"), &root.section("phase"), &cell);
-        let array = ArraySpec::read(&root.section("array"), &lens);
+        let array_section = root.section("array");
+        let array = ArraySpec::read(&array_section, &lens);
         let mapping = MappingSpec::read(&root.section("mapping"), &cell);
         let layout = LayoutSpec::read(root, &lens, &array);
         let verify = VerifySpec::read(&root.section("verify"));
+        check_directions(&array_section, &array, &verify);
         let optimise = OptimiseSpec::read(root.optional_section("optimise").as_ref());
         Ok(Self {
             name,
@@ -81,6 +85,12 @@ impl Design {
     fn with_files(mut self) -> Result<Self> {
         self.lens.phase.load(self.lens.radius_um())?;
         self.mapping.load(&self.cell)?;
+        // Unknown materials and wavelengths that they are not known at are mistakes of the design, whoever asks first.
+        let stack = self.cell_stack()?;
+        for um in self.verify.wavelengths_um.iter().chain([&self.mapping.wavelength_um]) {
+            stack.full_transmission(*um)?;
+            stack.film.index(*um)?;
+        }
         Ok(self)
     }
 
@@ -116,6 +126,34 @@ impl Design {
         );
         let bytes = serde_json::to_vec(&decisive).expect("plain data serialises");
         Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect()
+    }
+}
+
+/// Every element must have light to look at, at each wavelength and field angle that it is simulated for, and send it to
+/// the sensor: else only the simulation would find out, after the layout is written.
+fn check_directions(section: &Section<'_, '_>, array: &ArraySpec, verify: &VerifySpec) {
+    for element in array.elements() {
+        for &wavelength_um in &verify.wavelengths_um {
+            let (x, y) = element.wedge.looks_at(wavelength_um);
+            let arrives = |angle: &FieldAngle| {
+                let sine = |looks: f64, deg: f64| (looks.asin() + deg.to_radians()).sin();
+                sine(x, angle.x_deg).hypot(sine(y, angle.y_deg)) < 1.0
+            };
+            if let Some(angle) = verify.field_angles.iter().find(|a| !arrives(a)) {
+                section.fault(
+                    "steering_deg",
+                    format!(
+                        "element {} has no light at {:.0} nm from the field angle ({}, {}) degrees",
+                        element.label(),
+                        wavelength_um * 1e3,
+                        angle.x_deg,
+                        angle.y_deg
+                    ),
+                    "steer less, or take shorter wavelengths or smaller field angles in [verify]",
+                );
+                return;
+            }
+        }
     }
 }
 

@@ -60,7 +60,7 @@ impl Findings {
     /// # Errors
     /// If they cannot be written.
     pub fn write(&self, folder: &Path) -> Result<()> {
-        write_json(&folder.join("report.json"), "optimize", self)?;
+        write_json(&folder.join("report.json"), "optimise", self)?;
         self.page().write(&folder.join("report.html"))
     }
 

@@ -16,6 +16,7 @@ mod fade;
 mod fold;
 mod hankel;
 pub mod image;
+mod landing;
 mod plane;
 mod zoom;
 
@@ -24,5 +25,6 @@ pub use direct::Direct;
 pub use fade::{Accuracy, Fade};
 pub use fold::Fold;
 pub use hankel::Hankel;
+pub use landing::{Landing, LandingGrid};
 pub use plane::{Field, PlaneWave, Propagator, Scratch, Window};
 pub use zoom::fft_size;

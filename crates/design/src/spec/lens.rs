@@ -72,7 +72,7 @@ fn read_phase(s: &Section<'_, '_>, focal_length_um: f64, radius_um: f64) -> Radi
                 .unwrap_or(focal_length_um),
         },
         Source::EvenPowers => {
-            let coefficients_rad = s.floats("coefficients_rad", Limits::new(f64::MIN..=f64::MAX, "rad"));
+            let coefficients_rad = s.floats("coefficients_rad", COEFFICIENT);
             if coefficients_rad.is_empty() {
                 s.fault(
                     "coefficients_rad",
@@ -99,6 +99,12 @@ fn read_phase(s: &Section<'_, '_>, focal_length_um: f64, radius_um: f64) -> Radi
     s.finish();
     phase
 }
+
+/// A hundred million turns: beyond it the fraction of a turn has fewer digits in double precision than a layout needs.
+const COEFFICIENT: Limits = Limits {
+    range: -6e8..=6e8,
+    unit: "rad",
+};
 
 /// Wavelengths from the ultraviolet to the thermal infrared: a value in um instead of nm falls outside.
 pub(super) const WAVELENGTH: Limits = Limits {

@@ -41,6 +41,13 @@ impl MappingSpec {
         } else {
             published.coefficients
         };
+        if coefficients.is_empty() {
+            s.fault(
+                "coefficients",
+                "a mapping of no coefficients gives no width",
+                "list those of u^0, u^1, ..., or leave `coefficients` out for the published ones",
+            );
+        }
         let polynomial = InversePolynomial {
             wavelength_um,
             basis,

@@ -1,4 +1,4 @@
-//! `[optimise]`: how `metalith optimize` finds the radial phase.
+//! `[optimise]`: how `metalith optimise` finds the radial phase.
 
 use serde::Serialize;
 

@@ -70,14 +70,14 @@ impl VerifySpec {
         }
         let x = s.floats("field_x_deg", ANGLE);
         let mut y = s.floats("field_y_deg", ANGLE);
-        y.resize(y.len().max(x.len()), 0.0);
-        if y.len() != x.len() {
+        if s.has("field_y_deg") && y.len() != x.len() {
             s.fault(
                 "field_y_deg",
-                "more angles along y than along x",
+                format!("{} angles along y for {} along x", y.len(), x.len()),
                 "give one entry for each of `field_x_deg`",
             );
         }
+        y.resize(x.len(), 0.0);
         let mut field_angles: Vec<_> = x
             .iter()
             .zip(&y)

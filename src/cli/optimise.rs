@@ -1,4 +1,4 @@
-//! `metalith optimize`: the radial phase that all elements share.
+//! `metalith optimise`: the radial phase that all elements share.
 
 use std::path::{Path, PathBuf};
 
@@ -11,20 +11,20 @@ use metalith::optimise::{
 use metalith::report::sig;
 use metalith::{CellModel, Design, Fidelity, Result, cell_models};
 
-use super::{Outcome, Terminal};
+use super::{Outcome, Terminal, print_json, print_line};
 
 /// Find the phase of every ring that makes the lens work over the whole band, and report what was gained.
 #[derive(Args)]
 #[command(
     after_help = "The section [optimise] of the design says what is optimised, for how long, and with which cell.\n\
     Ctrl-C keeps the best so far; the same command goes on where it stopped.\n\n\
-    Example:\n  metalith optimize designs/broadband_3x3.toml --out out/optimised"
+    Example:\n  metalith optimise designs/broadband_3x3.toml --out out/optimised"
 )]
-pub struct OptimizeArgs {
+pub struct OptimiseArgs {
     /// The design file.
     design: PathBuf,
 
-    /// Folder for `report.html`, `report.json` and the layout that is read back; `out/NAME/optimize` if left
+    /// Folder for `report.html`, `report.json` and the layout that is read back; `out/NAME/optimise` if left
     /// out.
     #[arg(long, short, value_name = "FOLDER")]
     out: Option<PathBuf>,
@@ -92,13 +92,13 @@ impl Cells {
     }
 }
 
-pub fn run(args: &OptimizeArgs, terminal: &Terminal) -> Result<Outcome> {
+pub fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
     let design = Design::read(&args.design)?;
     terminal.stop_on_interrupt();
     let folder = args
         .out
         .clone()
-        .unwrap_or_else(|| PathBuf::from("out").join(&design.name).join("optimize"));
+        .unwrap_or_else(|| PathBuf::from("out").join(&design.name).join("optimise"));
     let phase = args.phase.clone().unwrap_or_else(|| folder.join("phase.csv"));
     let kept = folder.join("checkpoint.json");
     let task = Task::of(&design)?;
@@ -122,7 +122,9 @@ pub fn run(args: &OptimizeArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     // Only of use to an interrupted run; there may be none.
     let _ = std::fs::remove_file(&kept);
-    println!("phase: {}", phase.display());
+    if !args.json {
+        print_line!("phase: {}", phase.display());
+    }
     if args.no_report {
         return Ok(Outcome::Fine);
     }
@@ -130,13 +132,10 @@ pub fn run(args: &OptimizeArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.clear();
     findings.write(&folder)?;
     if args.json {
-        println!(
-            "{}",
-            serde_json::to_string_pretty(&findings).expect("plain data serialises")
-        );
+        print_json(&findings);
     } else {
         summary(&findings);
-        println!("report: {}", folder.join("report.html").display());
+        print_line!("report: {}", folder.join("report.html").display());
     }
     Ok(if findings.limit_kept() {
         Outcome::Fine
@@ -145,7 +144,7 @@ pub fn run(args: &OptimizeArgs, terminal: &Terminal) -> Result<Outcome> {
     })
 }
 
-fn remarks(args: &OptimizeArgs, design: &Design) -> Vec<String> {
+fn remarks(args: &OptimiseArgs, design: &Design) -> Vec<String> {
     vec![
         format!(
             "Phase of each ring of {}, in the middle of the ring; nearest row.",
@@ -155,8 +154,8 @@ fn remarks(args: &OptimizeArgs, design: &Design) -> Vec<String> {
     ]
 }
 
-fn command(args: &OptimizeArgs) -> String {
-    let mut words = format!("metalith optimize {}", args.design.display());
+fn command(args: &OptimiseArgs) -> String {
+    let mut words = format!("metalith optimise {}", args.design.display());
     if let Some(phase) = &args.phase {
         words.push_str(&format!(" --phase {}", phase.display()));
     }
@@ -165,7 +164,7 @@ fn command(args: &OptimizeArgs) -> String {
 
 #[allow(clippy::too_many_arguments)] // all that a report is about
 fn findings(
-    args: &OptimizeArgs,
+    args: &OptimiseArgs,
     design: &Design,
     task: &Task,
     cells: &Cells,
@@ -289,7 +288,7 @@ fn expected_images(
 fn summary(findings: &Findings) {
     for (name, list) in [("before", &findings.before), ("after", &findings.after)] {
         for judged in list {
-            println!(
+            print_line!(
                 "{name}, {} with the {} cell: Strehl {} (geometric mean), {} smallest, step {:.3} turns",
                 judged.source,
                 judged.fidelity,
@@ -300,11 +299,11 @@ fn summary(findings: &Findings) {
         }
     }
     for (angle, before, after) in &findings.expected_psnr_db {
-        println!("expected PSNR at {angle} degrees: {before:.2} dB before, {after:.2} dB after");
+        print_line!("expected PSNR at {angle} degrees: {before:.2} dB before, {after:.2} dB after");
     }
     for (name, values) in &findings.with_errors {
         let (mean, deviation) = mean_and_deviation(values);
-        println!(
+        print_line!(
             "{name}, with errors of fabrication: Strehl {} +- {}",
             sig(mean, 4),
             sig(deviation, 2)

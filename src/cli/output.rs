@@ -1,0 +1,41 @@
+//! Standard output: answers go there, and whoever reads them may stop reading.
+
+use std::fmt::Arguments;
+use std::io::{ErrorKind, Write, stdout};
+use std::sync::OnceLock;
+
+use serde::Serialize;
+
+/// Why standard output took no more, if not because its reader had enough.
+static FAILED: OnceLock<String> = OnceLock::new();
+
+/// Write one line to standard output, as `println!` does, but without a panic where nobody reads it any more.
+macro_rules! print_line {
+    ($($part:tt)*) => { $crate::cli::output::line(format_args!($($part)*)) };
+}
+pub(super) use print_line;
+
+/// Write a value as indented JSON and a line break.
+pub fn print_json(value: &impl Serialize) {
+    let text = serde_json::to_string_pretty(value).expect("plain data serialises");
+    line(format_args!("{text}"));
+}
+
+/// What [`print_line!`] calls.
+pub fn line(text: Arguments<'_>) {
+    let mut out = stdout().lock();
+    let written = out
+        .write_fmt(text)
+        .and_then(|()| out.write_all(b"\n"))
+        .and_then(|()| out.flush());
+    if let Err(error) = written
+        && error.kind() != ErrorKind::BrokenPipe
+    {
+        let _ = FAILED.set(error.to_string());
+    }
+}
+
+/// Why something that was to be printed is not, if so. A closed pipe is no failure.
+pub fn failure() -> Option<&'static str> {
+    FAILED.get().map(String::as_str)
+}
