@@ -4,7 +4,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use metalith::Silent;
-use metalith::calibrate::{MeasuredSet, Sampling, Session, Settings, Twins};
+use metalith::calibrate::{MeasuredSet, Sampling, Session, Settings, Synthesizer};
 
 fn calibration(c: &mut Criterion) {
     let folder = tempfile::tempdir().expect("a folder");
@@ -20,7 +20,7 @@ fn calibration(c: &mut Criterion) {
         exact: false,
         ..Settings::default()
     };
-    let twins = Twins::new(&like, &settings).expect("twins");
+    let twins = Synthesizer::new(&like, &settings).expect("twins");
     let mut group = c.benchmark_group("calibrate");
     group.sample_size(10);
     // Cells are solved once and kept: what is timed is light through pillars to eight captures.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use metalith::Result;
-use metalith::calibrate::{Calibration, Extent, MeasuredSet, SetVerdict, Settings, calibrate, prove, write_proof};
+use metalith::calibrate::{Calibration, ValidationPlan, MeasuredSet, SetVerdict, Settings, calibrate, validate, write_validation};
 use metalith::cell::cache_folder;
 
 use super::{Outcome, Terminal, print_line};
@@ -33,7 +33,7 @@ pub struct CalibrateArgs {
     #[arg(long)]
     proof: bool,
 
-    /// Twins without effect that the proof judges.
+    /// Synthesizer without effect that the proof judges.
     #[arg(long, value_name = "N", default_value_t = 60, requires = "proof")]
     nulls: u64,
 
@@ -69,13 +69,13 @@ pub fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> {
     };
     if args.proof {
         let (set, out) = (MeasuredSet::read(&args.sets[0], terminal)?, &outs[0]);
-        let extent = Extent {
+        let extent = ValidationPlan {
             nulls: args.nulls,
             effects: args.effects.clone(),
-            ..Extent::default()
+            ..ValidationPlan::default()
         };
-        let proof = prove(&set, &settings, &extent, terminal)?;
-        write_proof(out, &proof)?;
+        let proof = validate(&set, &settings, &extent, terminal)?;
+        write_validation(out, &proof)?;
         terminal.clear();
         if args.json {
             print_line!("{}", serde_json::to_string_pretty(&proof).unwrap_or_default());

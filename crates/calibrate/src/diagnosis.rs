@@ -6,12 +6,12 @@ use ndarray::Array2;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::attribute::Finding;
-use super::fit::{Fit, Problem};
-use super::forward::{RESIDUAL, Rejection, Tried};
-use super::heldout::mean as mean_held_out;
-use super::session::Session;
-use super::signature::{names, separate_by};
+use crate::fit::cross_validation::mean as mean_held_out;
+use crate::fit::problem::{Fit, Problem};
+use crate::search::attribution::Finding;
+use crate::search::signatures::{names, separate_by};
+use crate::search::stepwise::{RESIDUAL, Rejection, TriedEffect};
+use crate::session::Session;
 use metalith_core::{Result, WholeFile};
 
 /// What a session comes to.
@@ -205,7 +205,7 @@ impl Diagnosis {
                 }
             }
         }
-        let ranked = |tried: &Vec<Tried>| tried.iter().map(|t| Ranked::new(session, finding, t)).collect();
+        let ranked = |tried: &Vec<TriedEffect>| tried.iter().map(|t| Ranked::new(session, finding, t)).collect();
         Self {
             set: session.set().title.clone(),
             verdict,
@@ -238,7 +238,7 @@ impl Diagnosis {
     }
 
     /// Nothing can be said of a set that is mostly unfit.
-    pub fn unfit(session: &Session<'_>, problem: &Problem<'_>, left_out: Vec<LeftOut>, fit: &Fit) -> Self {
+    pub fn data_unfit(session: &Session<'_>, problem: &Problem<'_>, left_out: Vec<LeftOut>, fit: &Fit) -> Self {
         let error = fit.chi2 / problem.pixels().max(1.0);
         let pair = ErrorPair {
             fit: error,
@@ -307,7 +307,7 @@ impl Diagnosis {
 }
 
 impl Ranked {
-    fn new(session: &Session<'_>, finding: &Finding, tried: &Tried) -> Self {
+    fn new(session: &Session<'_>, finding: &Finding, tried: &TriedEffect) -> Self {
         let rejection = rejection(finding, tried);
         Self {
             name: session.simulator.effects[tried.effect].name(),
@@ -322,7 +322,7 @@ impl Ranked {
 }
 
 /// Why a candidate was not taken, if it is not among what was found in the end.
-fn rejection(finding: &Finding, tried: &Tried) -> Option<Rejection> {
+fn rejection(finding: &Finding, tried: &TriedEffect) -> Option<Rejection> {
     tried.rejected.filter(|_| !finding.chosen.contains(&tried.effect))
 }
 

@@ -4,49 +4,33 @@
 //! from the pillars as written; nuisances of the bench are fitted; what is left is compared with what every
 //! effect in `effects/` would leave, and an effect is named if it predicts captures that were not fitted.
 
-mod approach;
-mod atlas;
-mod attribute;
 mod bench;
 mod cells;
-mod couple;
-mod curve;
 mod density;
 mod departure;
 mod diagnosis;
 mod effects;
 mod fit;
-mod forward;
-mod free;
-mod heldout;
 mod model;
-mod nuisance;
 mod optics;
 mod page;
-mod placebo;
-mod placement;
-mod proof;
-mod quadratic;
-mod rivals;
 mod run;
+mod search;
 mod session;
 mod set;
-mod signature;
 mod simulator;
-mod speckle;
-mod standing;
-mod twin;
-mod unfit;
+mod surrogate;
+mod validate;
 mod zernike;
 
-pub use atlas::Atlas;
 pub use bench::Sampling;
 pub use density::fill;
 pub use departure::{CameraChange, CellChange, Departure, Geometry, LightChange, PathChange};
 pub use diagnosis::{Diagnosis, ErrorPair, ErrorReport, FoundEffect, LeftOut, Ranked, Rung, SetVerdict};
 pub use model::{CalibratedModel, MadeCell};
-pub use proof::{Extent, Limit, Proof, Trial, prove, write_proof};
 pub use run::{Calibration, calibrate};
 pub use session::{Session, Settings};
 pub use set::{Camera, Capture, Led, MeasuredElement, MeasuredSet, SemSite, Stack};
-pub use twin::{Exposed, OffList, Twins};
+pub use surrogate::Surrogate;
+pub use validate::synthetic::{Synthesizer, SyntheticImages, UnlistedEffect};
+pub use validate::{DetectionLimit, Trial, Validation, ValidationPlan, validate, write_validation};

@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use super::atlas::Atlas;
-use super::diagnosis::{Diagnosis, SetVerdict};
-use super::model::CalibratedModel;
-use super::page::write_page;
-use super::session::{Session, Settings};
-use super::set::MeasuredSet;
+use crate::diagnosis::{Diagnosis, SetVerdict};
+use crate::model::CalibratedModel;
+use crate::page::write_page;
+use crate::session::{Session, Settings};
+use crate::set::MeasuredSet;
+use crate::surrogate::Surrogate;
 use metalith_core::{Progress, Result};
 
 /// What a calibration leaves.
@@ -38,7 +38,7 @@ pub fn calibrate(
         .iter()
         .map(|p| MeasuredSet::read(p, progress))
         .collect::<Result<Vec<_>>>()?;
-    let mut known: Option<(usize, Atlas)> = None;
+    let mut known: Option<(usize, Surrogate)> = None;
     let mut done = Vec::new();
     for (place, (set, out)) in sets.iter().zip(outs).enumerate() {
         let mut session = Session::new(set, settings.clone())?;
@@ -57,7 +57,12 @@ pub fn calibrate(
 ///
 /// # Errors
 /// As [`calibrate`].
-pub fn finish(session: &mut Session<'_>, atlas: &Atlas, out: &Path, progress: &dyn Progress) -> Result<Calibration> {
+pub fn finish(
+    session: &mut Session<'_>,
+    atlas: &Surrogate,
+    out: &Path,
+    progress: &dyn Progress,
+) -> Result<Calibration> {
     let (diagnosis, finding) = session.diagnose(atlas, progress)?;
     let answer = out.join("diagnosis.json");
     let report = out.join("report.html");

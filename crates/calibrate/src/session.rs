@@ -2,21 +2,21 @@
 
 use std::path::PathBuf;
 
-use super::atlas::Atlas;
-use super::attribute::{Finding, attribute};
-use super::bench::{Bench, Sampling};
-use super::cells::{CellSource, RigorousCells};
-use super::departure::Departure;
-use super::diagnosis::{Diagnosis, LeftOut, Rung};
-use super::effects;
-use super::fit::{Fit, Problem};
-use super::forward::RESIDUAL;
-use super::heldout::{held_out, mean};
-use super::nuisance::Data;
-use super::set::MeasuredSet;
-use super::simulator::{Simulator, WIDTH_ROOM_NM};
-use super::speckle::Speckle;
-use super::unfit::unfit;
+use crate::bench::{Bench, Sampling};
+use crate::cells::{CellSource, RigorousCells};
+use crate::departure::Departure;
+use crate::diagnosis::{Diagnosis, LeftOut, Rung};
+use crate::effects;
+use crate::fit::capture_screening::unusable_captures;
+use crate::fit::cross_validation::{held_out, mean};
+use crate::fit::defect_noise::DefectNoise;
+use crate::fit::nuisances::Data;
+use crate::fit::problem::{Fit, Problem};
+use crate::search::attribution::{Finding, attribute};
+use crate::search::stepwise::RESIDUAL;
+use crate::set::MeasuredSet;
+use crate::simulator::{Simulator, WIDTH_ROOM_NM};
+use crate::surrogate::Surrogate;
 use metalith_cell::{CellStack, FittedCell, Material, PublishedCell};
 use metalith_core::{Progress, Result};
 
@@ -128,13 +128,13 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
-    pub fn atlas(&self, progress: &dyn Progress) -> Result<Atlas> {
+    pub fn atlas(&self, progress: &dyn Progress) -> Result<Surrogate> {
         let nothing = vec![0.0; self.simulator.slots.len()];
         self.simulator.atlas(&nothing, self.settings.free, progress)
     }
 
     /// A problem over this set's data.
-    pub fn problem(&self, atlas: &Atlas) -> Problem<'_> {
+    pub fn problem(&self, atlas: &Surrogate) -> Problem<'_> {
         Problem {
             simulator: &self.simulator,
             atlas: atlas.clone(),
@@ -156,10 +156,10 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
-    pub fn diagnose(&mut self, atlas: &Atlas, progress: &dyn Progress) -> Result<(Diagnosis, Option<Finding>)> {
+    pub fn diagnose(&mut self, atlas: &Surrogate, progress: &dyn Progress) -> Result<(Diagnosis, Option<Finding>)> {
         let mut left_out = Vec::new();
         let nothing = self.problem(atlas).nothing();
-        for (c, reason) in unfit(&self.problem(atlas), &nothing.nuisances) {
+        for (c, reason) in unusable_captures(&self.problem(atlas), &nothing.nuisances) {
             self.used[c] = false;
             left_out.push(LeftOut {
                 capture: self.set().captures[c].name.clone(),
@@ -168,7 +168,7 @@ impl<'a> Session<'a> {
         }
         if 2 * left_out.len() > self.used.len() {
             let problem = self.problem(atlas);
-            return Ok((Diagnosis::unfit(self, &problem, left_out, &nothing), None));
+            return Ok((Diagnosis::data_unfit(self, &problem, left_out, &nothing), None));
         }
         let ladder = if self.settings.ladder {
             self.ladder(atlas, progress)?
@@ -206,7 +206,7 @@ impl<'a> Session<'a> {
 
     /// What is found if the grain of missing pillars is counted as noise, where that explains what is left: if
     /// their mean and their grain speak of the same share.
-    fn grained(&self, atlas: &Atlas, plain: &Finding, progress: &dyn Progress) -> Result<Option<(Data, Finding)>> {
+    fn grained(&self, atlas: &Surrogate, plain: &Finding, progress: &dyn Progress) -> Result<Option<(Data, Finding)>> {
         let random = self.simulator.effects.iter().position(|e| e.random());
         let Some((effect, speckle)) = random.zip(atlas.grain.as_ref()) else {
             return Ok(None);
@@ -228,7 +228,7 @@ impl<'a> Session<'a> {
         }
         let mut data = speckle.counted(&problem, &fit, share);
         for _ in 0..ROUNDS {
-            if !Speckle::conceivable(share) {
+            if !DefectNoise::conceivable(share) {
                 break;
             }
             let exact = self.settings.exact;
@@ -260,7 +260,7 @@ impl<'a> Session<'a> {
     }
 
     /// The error of each fidelity of the cell, nuisances fitted.
-    fn ladder(&self, atlas: &Atlas, progress: &dyn Progress) -> Result<Vec<Rung>> {
+    fn ladder(&self, atlas: &Surrogate, progress: &dyn Progress) -> Result<Vec<Rung>> {
         let mut rungs = Vec::new();
         let published = CellSource::Model(Box::new(PublishedCell::new(self.set().stack.pitch_nm)));
         let wavelengths = self.simulator.bench.wavelengths_nm();
@@ -288,7 +288,7 @@ impl<'a> Session<'a> {
                     let exposed = simulator.expose(&[Departure::default()], progress)?.remove(0);
                     let problem = Problem {
                         simulator: &simulator,
-                        atlas: Atlas::alone(exposed),
+                        atlas: Surrogate::alone(exposed),
                         ..self.problem(atlas)
                     };
                     let fit = problem.nothing();

@@ -3,7 +3,8 @@
 use std::fs;
 
 use metalith_calibrate::{
-    Diagnosis, Extent, MeasuredSet, OffList, Sampling, Session, SetVerdict, Settings, Twins, prove,
+    Diagnosis, MeasuredSet, Sampling, Session, SetVerdict, Settings, Synthesizer, UnlistedEffect, ValidationPlan,
+    validate,
 };
 use metalith_core::Silent;
 use metalith_testing::session::{PIXELS, small_set, write_npy};
@@ -71,7 +72,7 @@ fn effects_are_found_and_nothing_is_found_where_nothing_is() {
     let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
     let session = Session::new(&like, settings()).unwrap();
     let atlas = session.atlas(&Silent).unwrap();
-    let twins = Twins::new(&like, &settings()).unwrap();
+    let twins = Synthesizer::new(&like, &settings()).unwrap();
     let diagnose = |set: &MeasuredSet| {
         let mut session = Session::new(set, settings()).unwrap();
         session.diagnose(&atlas, &Silent).unwrap().0
@@ -92,7 +93,9 @@ fn effects_are_found_and_nothing_is_found_where_nothing_is() {
         assert!(d.error.after.held_out < 1.3 && d.error.before.held_out > d.error.after.held_out);
     }
     // In no list: whatever is said, it is not said that a known effect explains it.
-    let exposed = twins.off_list(OffList::Ghost(0.1, [4.0, -3.0]), &Silent).unwrap();
+    let exposed = twins
+        .off_list(UnlistedEffect::Ghost(0.1, [4.0, -3.0]), &Silent)
+        .unwrap();
     let d = diagnose(&twins.draw(&exposed, 12));
     assert!(
         matches!(d.verdict, SetVerdict::Unexplained | SetVerdict::Partly),
@@ -114,7 +117,7 @@ fn diagnosed(parts: &[(&str, &[f64])], settings: Settings, seed: u64) -> Diagnos
     let folder = tempfile::tempdir().unwrap();
     small_set(folder.path());
     let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
-    let twins = Twins::new(&like, &settings).unwrap();
+    let twins = Synthesizer::new(&like, &settings).unwrap();
     let exposed = twins.with_effects(&[parts.to_vec()], &Silent).unwrap().remove(0);
     let set = twins.draw(&exposed, seed);
     let mut session = Session::new(&set, settings).unwrap();
@@ -179,7 +182,7 @@ fn missing_pillars_are_told_by_their_mean_and_by_their_grain() {
             .to_vec(),
         ..settings()
     };
-    let twins = Twins::new(&like, &settings).unwrap();
+    let twins = Synthesizer::new(&like, &settings).unwrap();
     let exposed = twins.with_effect("missing_pillars", &[SHARE], &Silent).unwrap();
     let set = twins.draw(&exposed, 31);
     let mut session = Session::new(&set, settings).unwrap();
@@ -201,13 +204,13 @@ fn a_proof_counts_what_was_said() {
     let folder = tempfile::tempdir().unwrap();
     small_set(folder.path());
     let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
-    let extent = Extent {
+    let extent = ValidationPlan {
         nulls: 3,
         threshold_nulls: 1,
         effects: vec!["gap".into()],
         off_list: false,
     };
-    let proof = prove(&like, &settings(), &extent, &Silent).unwrap();
+    let proof = validate(&like, &settings(), &extent, &Silent).unwrap();
     assert_eq!((proof.nulls, proof.false_claims, proof.trials.len()), (3, 0, 6));
     assert_eq!(proof.limits.len(), 1);
     assert!(proof.limits[0].named_from.is_some_and(|s| s <= 1.0), "{}", proof.text());

@@ -2,18 +2,18 @@
 
 use ndarray::Array2;
 
-use super::super::atlas::Atlas;
-use super::super::attribute::Finding;
-use super::super::heldout::{HeldOut, groups};
-use super::super::nuisance::Data;
-use super::super::session::Session;
+use crate::fit::cross_validation::{HeldOutErrors, groups};
+use crate::fit::nuisances::Data;
+use crate::search::attribution::Finding;
+use crate::session::Session;
+use crate::surrogate::Surrogate;
 use metalith_report::{Axis, Chart, ImageGrid, Page, fixed, sig};
 
 /// Colours of residuals reach so many standard deviations of the noise.
 pub(super) const SIGMAS: f64 = 6.0;
 
 /// Every capture that counts: seen, predicted, and the residual before and after.
-pub(super) fn captures(page: &mut Page, session: &Session<'_>, atlas: &Atlas, finding: &Finding) {
+pub(super) fn captures(page: &mut Page, session: &Session<'_>, atlas: &Surrogate, finding: &Finding) {
     page.section("Captures");
     page.paragraph(
         "Each row: what the camera saw, what the model predicts, and the residual in standard deviations of the noise, before and after.",
@@ -67,7 +67,7 @@ pub(super) fn captures(page: &mut Page, session: &Session<'_>, atlas: &Atlas, fi
                     .after
                     .nuisances
                     .residual(&session.data, &problem.grid(&finding.after.theta, c), c);
-                let error = |h: &HeldOut| h[c].map_or_else(String::new, |e| sig(e, 3));
+                let error = |h: &HeldOutErrors| h[c].map_or_else(String::new, |e| sig(e, 3));
                 left.image(
                     format!("before, {name}: {}", error(&finding.held_before)),
                     wide(&before),

@@ -1,11 +1,11 @@
 //! What the effects leave, what looks alike, and the nuisances.
 
-use super::super::atlas::Atlas;
-use super::super::attribute::Finding;
-use super::super::free::FreeTerm;
-use super::super::nuisance::Nuisances;
-use super::super::session::Session;
-use super::super::signature::{cosines, separate_by};
+use crate::fit::free_terms::FreeTerm;
+use crate::fit::nuisances::Nuisances;
+use crate::search::attribution::Finding;
+use crate::search::signatures::{cosines, separate_by};
+use crate::session::Session;
+use crate::surrogate::Surrogate;
 use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, Table, fixed, sig};
 
 /// Cosines between signatures above this are named.
@@ -66,7 +66,7 @@ pub(super) fn free_term(page: &mut Page, session: &Session<'_>, finding: &Findin
 }
 
 /// Pairs of effects that these captures hardly tell apart.
-pub(super) fn confusable(page: &mut Page, session: &Session<'_>, atlas: &Atlas, finding: &Finding) {
+pub(super) fn confusable(page: &mut Page, session: &Session<'_>, atlas: &Surrogate, finding: &Finding) {
     page.section("What looks alike");
     let problem = session.problem(atlas);
     let c = cosines(&problem, &finding.before);

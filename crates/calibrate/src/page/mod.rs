@@ -9,10 +9,10 @@ use captures::{SIGMAS, captures, widths};
 use left::{confusable, free_term, nuisances};
 use ndarray::Array2;
 
-use super::atlas::Atlas;
-use super::attribute::Finding;
-use super::diagnosis::{Diagnosis, Ranked, SetVerdict};
-use super::session::Session;
+use crate::diagnosis::{Diagnosis, Ranked, SetVerdict};
+use crate::search::attribution::Finding;
+use crate::session::Session;
+use crate::surrogate::Surrogate;
 use metalith_core::Result;
 use metalith_report::{Axis, Cell, Column, ImageGrid, Page, Ranking, Table, Verdict, fixed, sig};
 
@@ -23,7 +23,7 @@ use metalith_report::{Axis, Cell, Column, ImageGrid, Page, Ranking, Table, Verdi
 pub fn write_page(
     path: &Path,
     session: &Session<'_>,
-    atlas: &Atlas,
+    atlas: &Surrogate,
     diagnosis: &Diagnosis,
     finding: Option<&Finding>,
 ) -> Result<()> {

@@ -4,11 +4,11 @@
 //! of them predicts alone: a fit of one takes up part of the other, and fails on captures left out. Such a pair is
 //! taken only if the two together leave next to nothing.
 
-use super::forward::{Candidate, Tried, fit_with};
-use super::heldout::{held_out, mean};
-use super::placebo::placebo_gain;
-use super::signature::screen_pairs;
-use super::standing::Standing;
+use crate::fit::cross_validation::{held_out, mean};
+use crate::fit::null_test::null_gain;
+use crate::search::signatures::score_pairs;
+use crate::search::state::SearchState;
+use crate::search::stepwise::{Candidate, TriedEffect, fit_with};
 use metalith_core::{Progress, Result};
 
 /// Pairs that are fitted on the atlas.
@@ -28,9 +28,9 @@ const MAY_LEAVE: f64 = 0.05;
 const LEAST_LEFT: f64 = 0.05;
 
 /// A pair that explains a residual.
-pub struct Couple<'a> {
-    pub tried: [Tried; 2],
-    pub standing: Standing<'a>,
+pub struct FoundPair<'a> {
+    pub tried: [TriedEffect; 2],
+    pub standing: SearchState<'a>,
     /// Effects of all pairs that were fitted.
     pub runners: Vec<usize>,
 }
@@ -40,16 +40,16 @@ pub struct Couple<'a> {
 ///
 /// # Errors
 /// If a cell cannot be solved, or the user stopped it.
-pub fn couple<'a>(
-    now: &Standing<'a>,
+pub fn find_pair<'a>(
+    now: &SearchState<'a>,
     chosen: &[usize],
     exact: bool,
     progress: &dyn Progress,
-) -> Result<Option<Couple<'a>>> {
+) -> Result<Option<FoundPair<'a>>> {
     let problem = &now.problem;
     let above_noise = now.error() - 1.0;
     let mut fits = Vec::new();
-    for (pair, score) in screen_pairs(problem, &now.fit, chosen).into_iter().take(FITTED) {
+    for (pair, score) in score_pairs(problem, &now.fit, chosen).into_iter().take(FITTED) {
         if let Some(fit) = fit_with(problem, &now.fit, chosen, &pair) {
             let held = held_out(problem, &fit.forms, &fit);
             fits.push((pair, score, fit, held));
@@ -62,13 +62,13 @@ pub fn couple<'a>(
     fits.retain(|f| mean(&f.3) - 1.0 < PROMISING * above_noise);
     for (pair, score, fit, held) in fits.into_iter().take(SETTLED) {
         let problem = problem.clone();
-        let mut standing = Standing { problem, fit, held };
+        let mut standing = SearchState { problem, fit, held };
         if exact {
-            standing.settle(progress)?;
+            standing.refine(progress)?;
         }
         let both = pair.map(|effect| {
             let mut candidate = Candidate::new(effect, score);
-            let Standing { problem, fit, held } = &standing;
+            let SearchState { problem, fit, held } = &standing;
             candidate.judge(problem, fit.clone(), held.clone(), &now.held);
             candidate
         });
@@ -76,10 +76,10 @@ pub fn couple<'a>(
         let sound = both.iter().all(|c| c.fault(&standing.problem, &now.held).is_none());
         let numbers = standing.fit.active.len() - now.fit.active.len();
         let gain = now.error() - standing.error();
-        if whole && sound && gain > placebo_gain(&now.problem, &now.fit, &now.held, numbers) {
+        if whole && sound && gain > null_gain(&now.problem, &now.fit, &now.held, numbers) {
             // Others that do as well in the place of either are found by their rivalry.
-            return Ok(Some(Couple {
-                tried: both.map(|c| Tried {
+            return Ok(Some(FoundPair {
+                tried: both.map(|c| TriedEffect {
                     rejected: None,
                     ..c.tried
                 }),

@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, DVector};
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use super::optics::{PixelGrid, Reading};
-use super::set::MeasuredSet;
+use crate::optics::{PixelGrid, Reading};
+use crate::set::MeasuredSet;
 
 /// How far the black level may be off [DN], one standard deviation: sensors drift by less over a session.
 pub const BLACK_SIGMA_DN: f64 = 0.5;
@@ -100,9 +100,9 @@ impl Nuisances {
         let mut now = self.clone();
         let shared = data.leds + 1;
         for _ in 0..STEPS {
-            let blocks: Vec<Block> = (0..grids.len())
+            let blocks: Vec<CaptureEquations> = (0..grids.len())
                 .into_par_iter()
-                .map(|c| Block::new(data, c, &now, &grids[c], &[]))
+                .map(|c| CaptureEquations::new(data, c, &now, &grids[c], &[]))
                 .collect();
             let mut normal = DMatrix::<f64>::zeros(shared, shared);
             let mut rhs = DVector::<f64>::zeros(shared);
@@ -179,11 +179,11 @@ fn whitened(data: &Data, c: usize, now: &Nuisances, model: &Array2<f32>) -> Arra
 /// Products of the whitened columns of one capture: placement x, y first, then flux of every LED, black,
 /// further columns, and the residual last.
 #[derive(Clone)]
-pub struct Block {
+pub struct CaptureEquations {
     gram: DMatrix<f64>,
 }
 
-impl Block {
+impl CaptureEquations {
     /// Of the model `grid` of a capture; `more` are further columns, as changes of it.
     pub fn new(data: &Data, c: usize, now: &Nuisances, grid: &PixelGrid, more: &[PixelGrid]) -> Self {
         let reading = Reading::new(more.iter().chain([grid]), now.shift_um[c]);

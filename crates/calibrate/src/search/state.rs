@@ -1,19 +1,19 @@
 //! Where a search for what a set shows stands.
 
-use super::fit::{Fit, Problem};
-use super::heldout::{HeldOut, held_out, mean};
+use crate::fit::cross_validation::{HeldOutErrors, held_out, mean};
+use crate::fit::problem::{Fit, Problem};
 use metalith_core::{Progress, Result};
 
 /// A fit with the problem that it is at rest in.
 #[derive(Clone)]
-pub struct Standing<'a> {
+pub struct SearchState<'a> {
     pub problem: Problem<'a>,
     pub fit: Fit,
     /// The error of the fit on captures left out.
-    pub held: HeldOut,
+    pub held: HeldOutErrors,
 }
 
-impl<'a> Standing<'a> {
+impl<'a> SearchState<'a> {
     /// At a fit.
     pub fn new(problem: Problem<'a>, fit: Fit) -> Self {
         let held = held_out(&problem, &fit.forms, &fit);
@@ -34,9 +34,9 @@ impl<'a> Standing<'a> {
     /// Bring the fit to rest on exact simulations.
     ///
     /// # Errors
-    /// As [`Problem::settle`].
-    pub fn settle(&mut self, progress: &dyn Progress) -> Result<()> {
-        let fit = self.problem.settle(self.fit.clone(), progress)?;
+    /// As [`Problem::refine`].
+    pub fn refine(&mut self, progress: &dyn Progress) -> Result<()> {
+        let fit = self.problem.refine(self.fit.clone(), progress)?;
         self.go(fit);
         Ok(())
     }

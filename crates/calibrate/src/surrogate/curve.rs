@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::optics::PixelGrid;
+use crate::optics::PixelGrid;
 
 /// Most sizes that a polynomial goes through; beyond, those farthest from where it is wanted are dropped.
 const MOST_NODES: usize = 6;

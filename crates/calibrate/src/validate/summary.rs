@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::{NOTHING, Trial};
 use crate::diagnosis::SetVerdict;
-use crate::forward::LEAST_GAIN;
+use crate::search::stepwise::LEAST_GAIN;
 use metalith_report::sig;
 
 /// What a set is counted under when no effect is claimed.
@@ -12,7 +12,7 @@ const UNEXPLAINED: &str = "unexplained";
 
 /// Trials and what they come to.
 #[derive(Clone, Debug, Serialize)]
-pub struct Proof {
+pub struct Validation {
     /// The set that twins are made of.
     pub like: String,
     /// Sets without effect that were judged, and how many of them an effect was claimed in.
@@ -27,7 +27,7 @@ pub struct Proof {
     pub claimed: Vec<String>,
     /// For each truth: shares of its trials in which each column was claimed.
     pub confusion: Vec<(String, Vec<f64>)>,
-    pub limits: Vec<Limit>,
+    pub limits: Vec<DetectionLimit>,
     /// Effects of one number that were named, and how many of their intervals hold the true value.
     pub intervals: usize,
     pub intervals_inside: usize,
@@ -36,7 +36,7 @@ pub struct Proof {
 
 /// From which size on an effect is found.
 #[derive(Clone, Debug, Serialize)]
-pub struct Limit {
+pub struct DetectionLimit {
     pub name: String,
     /// The least size tried from which on it was named at all sizes [typical sizes]; none if not at the largest.
     pub named_from: Option<f64>,
@@ -45,7 +45,7 @@ pub struct Limit {
     pub estimate: Option<f64>,
 }
 
-impl Proof {
+impl Validation {
     /// Count.
     pub(super) fn new(like: String, thresholds: &[Trial], trials: Vec<Trial>) -> Self {
         let nulls: Vec<&Trial> = trials.iter().filter(|t| t.truth == NOTHING).collect();
@@ -80,7 +80,7 @@ impl Proof {
         let limits = truths
             .iter()
             .filter(|t| *t != NOTHING && !trials.iter().any(|o| o.truth == **t && (o.off_list || o.pair)))
-            .map(|name| Limit::new(name, &trials))
+            .map(|name| DetectionLimit::new(name, &trials))
             .collect();
         let inside: Vec<bool> = trials.iter().filter_map(|t| t.inside).collect();
         Self {
@@ -153,7 +153,7 @@ impl Trial {
     }
 }
 
-impl Limit {
+impl DetectionLimit {
     fn new(name: &str, trials: &[Trial]) -> Self {
         let own: Vec<&Trial> = trials.iter().filter(|t| t.truth == name).collect();
         let named_from = own.iter().rev().take_while(|t| t.named).last().map(|t| t.size);

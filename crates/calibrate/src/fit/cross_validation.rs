@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, DVector};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::fit::{Fit, Problem};
-use super::quadratic::{held, minimise, sum};
+use crate::fit::normal_equations::{held, minimise, sum};
+use crate::fit::problem::{Fit, Problem};
 
 /// A number that the rest tells so much less of than the whole is not predicted from it.
 const BLIND: f64 = 1e-3;
@@ -18,7 +18,7 @@ const DRAWS: usize = 400;
 
 /// Chi-square a pixel of each capture when it was left out; none for captures that do not count, or that
 /// nothing could be learned about.
-pub type HeldOut = Vec<Option<f64>>;
+pub type HeldOutErrors = Vec<Option<f64>>;
 
 /// Which captures belong together, in three ways.
 fn families(problem: &Problem<'_>) -> [Vec<usize>; 3] {
@@ -35,7 +35,7 @@ fn families(problem: &Problem<'_>) -> [Vec<usize>; 3] {
 }
 
 /// The error on captures left out, of a fit or of anything that has its forms.
-pub fn held_out(problem: &Problem<'_>, forms: &[DMatrix<f64>], fit: &Fit) -> HeldOut {
+pub fn held_out(problem: &Problem<'_>, forms: &[DMatrix<f64>], fit: &Fit) -> HeldOutErrors {
     let shared = problem.shared();
     let size = forms[0].nrows();
     let mut sums = vec![(0.0, 0u32); problem.used.len()];
@@ -108,14 +108,14 @@ fn within_range(problem: &Problem<'_>, fit: &Fit, train: &DMatrix<f64>) -> Vec<(
 }
 
 /// Mean over captures.
-pub fn mean(held_out: &HeldOut) -> f64 {
+pub fn mean(held_out: &HeldOutErrors) -> f64 {
     let known: Vec<f64> = held_out.iter().flatten().copied().collect();
     known.iter().sum::<f64>() / known.len().max(1) as f64
 }
 
 /// How much lower one error is than another, with a 95 % interval over captures that share element,
 /// direction and colour: pixels are no independent witnesses, nor are distances of one beam.
-pub fn gain(problem: &Problem<'_>, before: &HeldOut, after: &HeldOut) -> (f64, [f64; 2]) {
+pub fn gain(problem: &Problem<'_>, before: &HeldOutErrors, after: &HeldOutErrors) -> (f64, [f64; 2]) {
     let groups = groups(problem);
     let differences: Vec<(f64, f64)> = groups
         .iter()
@@ -182,7 +182,7 @@ pub fn half_widths(problem: &Problem<'_>, fit: &Fit) -> Vec<f64> {
         }
     }
     let whole = problem.total(&fit.forms, &fit.nuisances);
-    let covariance = super::quadratic::covariance(&whole, &all);
+    let covariance = crate::fit::normal_equations::covariance(&whole, &all);
     let excess = (fit.chi2 / problem.pixels()).max(1.0);
     draws
         .iter_mut()

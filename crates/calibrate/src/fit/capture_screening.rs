@@ -1,10 +1,10 @@
 //! Captures that nothing can be learned from.
 
-use super::fit::Problem;
-use super::nuisance::Nuisances;
+use crate::fit::nuisances::Nuisances;
+use crate::fit::problem::Problem;
 
 /// Captures that cannot be used, with the reason.
-pub fn unfit(problem: &Problem<'_>, nuisances: &Nuisances) -> Vec<(usize, String)> {
+pub fn unusable_captures(problem: &Problem<'_>, nuisances: &Nuisances) -> Vec<(usize, String)> {
     let set = problem.simulator.bench.set();
     let mut out = Vec::new();
     let registration = set.camera.registration_sigma_px;

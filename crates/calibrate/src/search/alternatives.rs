@@ -1,9 +1,9 @@
 //! What else would explain as much, and what has become needless.
 
-use super::fit::Fit;
-use super::forward::{LEAST_GAIN, physical};
-use super::heldout::{HeldOut, gain, half_widths, held_out, mean};
-use super::standing::Standing;
+use crate::fit::cross_validation::{HeldOutErrors, gain, half_widths, held_out, mean};
+use crate::fit::problem::Fit;
+use crate::search::state::SearchState;
+use crate::search::stepwise::{LEAST_GAIN, physical};
 use metalith_core::{Progress, Result};
 
 /// Chi-square of the SEM's widths by which one explanation must fit better to speak for it.
@@ -25,7 +25,7 @@ pub struct Alternative {
 }
 
 /// Drop what the others have made needless, with its runners.
-pub fn prune(now: &mut Standing<'_>, chosen: &mut Vec<usize>, runners: &mut Vec<Vec<usize>>) {
+pub fn drop_redundant(now: &mut SearchState<'_>, chosen: &mut Vec<usize>, runners: &mut Vec<Vec<usize>>) {
     let mut place = 0;
     while chosen.len() > 1 && place < chosen.len() {
         let rest: Vec<usize> = chosen.iter().copied().filter(|&e| e != chosen[place]).collect();
@@ -49,11 +49,11 @@ pub fn prune(now: &mut Standing<'_>, chosen: &mut Vec<usize>, runners: &mut Vec<
 ///
 /// # Errors
 /// If a cell cannot be solved, or the user stopped it.
-pub fn rivals(
-    now: &mut Standing<'_>,
+pub fn alternatives(
+    now: &mut SearchState<'_>,
     chosen: &mut [usize],
     runners: &[Vec<usize>],
-    before: &HeldOut,
+    before: &HeldOutErrors,
     exact: bool,
     progress: &dyn Progress,
 ) -> Result<Vec<Vec<Alternative>>> {
@@ -67,7 +67,7 @@ pub fn rivals(
             runners.get(place)
         };
         let far = mean(before) - now.error();
-        let mut best = Rival {
+        let mut best = Substitute {
             effect: chosen[place],
             standing: now.clone(),
         };
@@ -75,13 +75,13 @@ pub fn rivals(
         for &other in runners.into_iter().flatten().filter(|o| !chosen.contains(o)) {
             let mut set = chosen.to_vec();
             set[place] = other;
-            let mut rival = Rival::new(now, chosen[place], other, &set);
+            let mut rival = Substitute::new(now, chosen[place], other, &set);
             let behind = rival.standing.error() - now.error();
             if behind > ALIKE_WITHIN.max(WORTH_SETTLING * far) || !rival.physical() {
                 continue;
             }
             if exact {
-                rival.standing.settle(progress)?;
+                rival.standing.refine(progress)?;
             }
             others.push(rival);
         }
@@ -99,7 +99,7 @@ pub fn rivals(
 }
 
 /// The fit of a set of effects when one is `gone`.
-fn refit(now: &Standing<'_>, gone: usize, set: &[usize]) -> Fit {
+fn refit(now: &SearchState<'_>, gone: usize, set: &[usize]) -> Fit {
     let simulator = now.problem.simulator;
     let mut from = now.fit.clone();
     for s in simulator.slots_of(gone) {
@@ -109,22 +109,22 @@ fn refit(now: &Standing<'_>, gone: usize, set: &[usize]) -> Fit {
 }
 
 /// An explanation with a certain effect in the place of one that was found.
-struct Rival<'a> {
+struct Substitute<'a> {
     effect: usize,
-    standing: Standing<'a>,
+    standing: SearchState<'a>,
 }
 
-impl<'a> Rival<'a> {
+impl<'a> Substitute<'a> {
     /// With an effect in the place of one that is `gone`, which makes `set` the whole.
-    fn new(now: &Standing<'a>, gone: usize, effect: usize, set: &[usize]) -> Self {
+    fn new(now: &SearchState<'a>, gone: usize, effect: usize, set: &[usize]) -> Self {
         Self {
             effect,
-            standing: Standing::new(now.problem.clone(), refit(now, gone, set)),
+            standing: SearchState::new(now.problem.clone(), refit(now, gone, set)),
         }
     }
 
     fn physical(&self) -> bool {
-        let Standing { problem, fit, .. } = &self.standing;
+        let SearchState { problem, fit, .. } = &self.standing;
         physical(problem, fit, &problem.simulator.slots_of(self.effect))
     }
 
@@ -150,8 +150,8 @@ impl<'a> Rival<'a> {
 }
 
 impl Alternative {
-    fn new(rival: &Rival<'_>) -> Self {
-        let Standing { problem, fit, .. } = &rival.standing;
+    fn new(rival: &Substitute<'_>) -> Self {
+        let SearchState { problem, fit, .. } = &rival.standing;
         let widths = half_widths(problem, fit);
         let own = problem.simulator.slots_of(rival.effect);
         Self {

@@ -1,10 +1,10 @@
 //! One step towards an explanation: every effect that is not yet taken is tried, and at most one is taken.
 
-use super::fit::{Fit, Problem};
-use super::heldout::{HeldOut, gain, half_widths, held_out, mean};
-use super::placebo::placebo_gain;
-use super::signature::screen;
-use super::standing::Standing;
+use crate::fit::cross_validation::{HeldOutErrors, gain, half_widths, held_out, mean};
+use crate::fit::null_test::null_gain;
+use crate::fit::problem::{Fit, Problem};
+use crate::search::signatures::score_effects;
+use crate::search::state::SearchState;
 use metalith_core::{Progress, Result};
 
 /// Candidates that are fitted in full at each step.
@@ -29,7 +29,7 @@ const WORTH_COMPARING: f64 = 0.95;
 
 /// A candidate as it was tried.
 #[derive(Clone, Debug)]
-pub struct Tried {
+pub struct TriedEffect {
     pub effect: usize,
     /// Share of the residual that its signature explains on its own, nuisances projected out.
     pub score: f64,
@@ -96,33 +96,38 @@ impl Rejection {
 
 /// What a step came to.
 pub struct Step {
-    pub tried: Vec<Tried>,
+    pub tried: Vec<TriedEffect>,
     /// Effects that were fitted in full.
     pub leaders: Vec<usize>,
     /// The effect that was taken, with the fit that it is part of.
-    pub taken: Option<(Tried, Fit, HeldOut)>,
+    pub taken: Option<(TriedEffect, Fit, HeldOutErrors)>,
     /// What 95 % of random smooth terms with as many numbers as the best gain less than.
     pub placebo: f64,
 }
 
 /// An effect on trial.
 pub struct Candidate {
-    pub tried: Tried,
-    fitted: Option<(Fit, HeldOut)>,
+    pub tried: TriedEffect,
+    fitted: Option<(Fit, HeldOutErrors)>,
 }
 
 /// Try every effect on top of what is `chosen`. With `far`, fits may go where the atlas has yet to be simulated.
 ///
 /// # Errors
 /// If a cell cannot be solved, or the user stopped it.
-pub fn forward(standing: &mut Standing<'_>, chosen: &[usize], far: bool, progress: &dyn Progress) -> Result<Step> {
-    let Standing {
+pub fn step_forward(
+    standing: &mut SearchState<'_>,
+    chosen: &[usize],
+    far: bool,
+    progress: &dyn Progress,
+) -> Result<Step> {
+    let SearchState {
         problem,
         fit: now,
         held: held_now,
     } = standing;
     let mut candidates = Vec::new();
-    for (rank, (effect, score)) in screen(problem, now, chosen).into_iter().enumerate() {
+    for (rank, (effect, score)) in score_effects(problem, now, chosen).into_iter().enumerate() {
         let mut candidate = Candidate::new(effect, score);
         if rank < LEADERS
             && let Some(fit) = fit_with(problem, now, chosen, &[effect])
@@ -147,7 +152,7 @@ pub fn forward(standing: &mut Standing<'_>, chosen: &[usize], far: bool, progres
                 continue;
             }
             if let Some((fit, _)) = candidate.fitted.take() {
-                let fit = problem.stretch(fit, progress)?;
+                let fit = problem.extend_and_fit(fit, progress)?;
                 let held = held_out(problem, &fit.forms, &fit);
                 candidate.judge(problem, fit, held, held_now);
             }
@@ -167,7 +172,7 @@ pub fn forward(standing: &mut Standing<'_>, chosen: &[usize], far: bool, progres
             Some(Rejection::Second)
         } else {
             let numbers = candidate.tried.values.len();
-            let chance = placebo_gain(problem, now, held_now, numbers);
+            let chance = null_gain(problem, now, held_now, numbers);
             placebo.get_or_insert(chance);
             if candidate.gain() <= chance {
                 Some(Rejection::Placebo)
@@ -179,7 +184,7 @@ pub fn forward(standing: &mut Standing<'_>, chosen: &[usize], far: bool, progres
     }
     let placebo = match placebo {
         Some(placebo) => placebo,
-        None => placebo_gain(problem, now, held_now, numbers),
+        None => null_gain(problem, now, held_now, numbers),
     };
     let leaders = candidates
         .iter()
@@ -250,7 +255,7 @@ impl Candidate {
     /// Not fitted yet.
     pub fn new(effect: usize, score: f64) -> Self {
         Self {
-            tried: Tried {
+            tried: TriedEffect {
                 effect,
                 score,
                 gain: None,
@@ -262,7 +267,7 @@ impl Candidate {
     }
 
     /// With a fit that it is part of, and the error of that on captures left out.
-    pub fn judge(&mut self, problem: &Problem<'_>, fit: Fit, held: HeldOut, held_now: &HeldOut) {
+    pub fn judge(&mut self, problem: &Problem<'_>, fit: Fit, held: HeldOutErrors, held_now: &HeldOutErrors) {
         self.tried.gain = Some(gain(problem, held_now, &held));
         let slots = problem.simulator.slots_of(self.tried.effect);
         self.tried.values = slots.iter().map(|&s| fit.theta[s]).collect();
@@ -274,7 +279,7 @@ impl Candidate {
     }
 
     /// Why it cannot be what is there, whatever others do.
-    pub fn fault(&self, problem: &Problem<'_>, held_now: &HeldOut) -> Option<Rejection> {
+    pub fn fault(&self, problem: &Problem<'_>, held_now: &HeldOutErrors) -> Option<Rejection> {
         let (value, [low, _]) = self.tried.gain?;
         let (fit, _) = self.fitted.as_ref()?;
         let above_noise = (mean(held_now) - 1.0).max(1e-6);

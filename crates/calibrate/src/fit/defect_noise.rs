@@ -8,9 +8,9 @@
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use super::fit::{Fit, Problem};
-use super::nuisance::Data;
-use super::simulator::Simulator;
+use crate::fit::nuisances::Data;
+use crate::fit::problem::{Fit, Problem};
+use crate::simulator::Simulator;
 use metalith_core::{Progress, Result};
 
 /// Draws of the places: each has thousands of grains in every capture.
@@ -32,11 +32,11 @@ struct Grain {
 }
 
 /// The grain of each capture.
-pub struct Speckle {
+pub struct DefectNoise {
     grains: Vec<Grain>,
 }
 
-impl Speckle {
+impl DefectNoise {
     /// From draws of the places of missing pillars, number `slot`, about the numbers `about`.
     ///
     /// # Errors

@@ -3,12 +3,12 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::atlas::Atlas;
-use super::nuisance::{BLACK_SIGMA_DN, Block, Data, Nuisances};
-use super::optics::PixelGrid;
-use super::placement::coarse;
-use super::quadratic::{held, minimise, sum};
-use super::simulator::Simulator;
+use crate::fit::normal_equations::{held, minimise, sum};
+use crate::fit::nuisances::{BLACK_SIGMA_DN, CaptureEquations, Data, Nuisances};
+use crate::fit::registration::whole_pixel_shift;
+use crate::optics::PixelGrid;
+use crate::simulator::Simulator;
+use crate::surrogate::Surrogate;
 
 /// Most steps of a fit.
 const STEPS: usize = 12;
@@ -20,7 +20,7 @@ const AT_REST: f64 = 1e-5;
 #[derive(Clone)]
 pub struct Problem<'a> {
     pub simulator: &'a Simulator<'a>,
-    pub atlas: Atlas,
+    pub atlas: Surrogate,
     pub data: &'a Data,
     /// Captures that count.
     pub used: Vec<bool>,
@@ -37,7 +37,7 @@ pub struct Fit {
     pub theta: Vec<f64>,
     pub nuisances: Nuisances,
     /// Of each capture, from which its placement follows.
-    blocks: Vec<Block>,
+    blocks: Vec<CaptureEquations>,
     /// Forms of each capture, and of the SEM last, over flux, black and the active numbers, at rest.
     pub forms: Vec<DMatrix<f64>>,
     /// Chi-square of all that counts, priors included.
@@ -75,7 +75,7 @@ impl Problem<'_> {
         nuisances.shift_um = grids
             .par_iter()
             .zip(&self.data.signal)
-            .map(|(grid, seen)| coarse(seen, &grid.pixels([0.0; 2])).map(|pixels| pixels * pixel_um))
+            .map(|(grid, seen)| whole_pixel_shift(seen, &grid.pixels([0.0; 2])).map(|pixels| pixels * pixel_um))
             .collect();
         let nuisances = nuisances.fit(self.data, &grids, &self.used);
         self.at(&[], theta, nuisances)
@@ -83,11 +83,11 @@ impl Problem<'_> {
 
     /// The forms at given numbers.
     pub fn at(&self, active: &[usize], theta: Vec<f64>, nuisances: Nuisances) -> Fit {
-        let blocks: Vec<Block> = (0..self.data.signal.len())
+        let blocks: Vec<CaptureEquations> = (0..self.data.signal.len())
             .into_par_iter()
             .map(|c| self.block(active, &theta, &nuisances, c))
             .collect();
-        let mut forms: Vec<_> = blocks.iter().map(Block::reduced).collect();
+        let mut forms: Vec<_> = blocks.iter().map(CaptureEquations::reduced).collect();
         forms.push(self.sem_form(active, &theta));
         let free: Vec<usize> = (0..self.shared()).collect();
         let (_, chi2) = minimise(&self.total(&forms, &nuisances), &free);
@@ -171,10 +171,10 @@ impl Problem<'_> {
         }
     }
 
-    fn block(&self, active: &[usize], theta: &[f64], nuisances: &Nuisances, c: usize) -> Block {
+    fn block(&self, active: &[usize], theta: &[f64], nuisances: &Nuisances, c: usize) -> CaptureEquations {
         let grid = self.grid(theta, c);
         let more: Vec<_> = active.iter().map(|&s| self.atlas.slope(theta, s, c)).collect();
-        Block::new(self.data, c, nuisances, &grid, &more)
+        CaptureEquations::new(self.data, c, nuisances, &grid, &more)
     }
 
     /// The SEM's widths as a form, their common offset fitted away.

@@ -3,22 +3,23 @@
 
 mod page;
 mod summary;
+pub mod synthetic;
 
 use ndarray::Array2;
 use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::Value;
 
-pub use page::write_proof;
-pub use summary::{Limit, Proof};
+pub use page::write_validation;
+pub use summary::{DetectionLimit, Validation};
 
-use super::attribute::Finding;
-use super::diagnosis::{Diagnosis, SetVerdict};
-use super::effects::Parameter;
-use super::free::FreeTerm;
-use super::session::{Session, Settings};
-use super::set::MeasuredSet;
-use super::twin::{Exposed, OffList, Twins};
+use crate::diagnosis::{Diagnosis, SetVerdict};
+use crate::effects::Parameter;
+use crate::fit::free_terms::FreeTerm;
+use crate::search::attribution::Finding;
+use crate::session::{Session, Settings};
+use crate::set::MeasuredSet;
+use crate::validate::synthetic::{Synthesizer, SyntheticImages, UnlistedEffect};
 use metalith_core::{Progress, Result};
 
 /// Sizes that every effect is tried at, in typical sizes.
@@ -97,7 +98,7 @@ pub struct Left {
 
 /// What the proof runs.
 #[derive(Clone, Debug)]
-pub struct Extent {
+pub struct ValidationPlan {
     /// Sets without any effect that are judged.
     pub nulls: u64,
     /// Other sets without effect, which thresholds are held against.
@@ -108,7 +109,7 @@ pub struct Extent {
     pub off_list: bool,
 }
 
-impl Default for Extent {
+impl Default for ValidationPlan {
     fn default() -> Self {
         Self {
             nulls: 60,
@@ -123,14 +124,19 @@ impl Default for Extent {
 ///
 /// # Errors
 /// If a cell cannot be solved, or the user stopped it.
-pub fn prove(like: &MeasuredSet, settings: &Settings, extent: &Extent, progress: &dyn Progress) -> Result<Proof> {
+pub fn validate(
+    like: &MeasuredSet,
+    settings: &Settings,
+    extent: &ValidationPlan,
+    progress: &dyn Progress,
+) -> Result<Validation> {
     let settings = Settings {
         ladder: false,
         ..settings.clone()
     };
     let session = Session::new(like, settings.clone())?;
     let atlas = session.atlas(progress)?;
-    let twins = Twins::new(like, &settings)?;
+    let twins = Synthesizer::new(like, &settings)?;
     let chips = chips(&session, extent);
     let wanted: Vec<Vec<(&str, &[f64])>> = chips
         .iter()
@@ -145,9 +151,9 @@ pub fn prove(like: &MeasuredSet, settings: &Settings, extent: &Extent, progress:
     let mut odd = Vec::new();
     if extent.off_list {
         for (name, what) in [
-            ("astigmatism", OffList::Astigmatism(30.0)),
-            ("ghost", OffList::Ghost(0.04, [5.0, -3.0])),
-            ("anisotropy", OffList::Anisotropy(8.0)),
+            ("astigmatism", UnlistedEffect::Astigmatism(30.0)),
+            ("ghost", UnlistedEffect::Ghost(0.04, [5.0, -3.0])),
+            ("anisotropy", UnlistedEffect::Anisotropy(8.0)),
         ] {
             odd.push((name, twins.off_list(what, progress)?));
         }
@@ -157,7 +163,7 @@ pub fn prove(like: &MeasuredSet, settings: &Settings, extent: &Extent, progress:
     let nulls = (0..extent.nulls).map(|k| (&exposed[0], &chips[0], JUDGED_SEED + k));
     let others = JUDGED_SEED + extent.nulls;
     let listed = exposed.iter().zip(&chips).skip(1).zip(others..);
-    let mut work: Vec<(&Exposed, Trial, &[Part])> = thresholds
+    let mut work: Vec<(&SyntheticImages, Trial, &[Part])> = thresholds
         .chain(nulls)
         .chain(listed.map(|((exposed, chip), seed)| (exposed, chip, seed)))
         .map(|(exposed, chip, seed)| (exposed, Trial::new(chip, seed), chip.parts.as_slice()))
@@ -174,7 +180,7 @@ pub fn prove(like: &MeasuredSet, settings: &Settings, extent: &Extent, progress:
         .map(|(exposed, mut trial, parts)| {
             let set = twins.draw(exposed, trial.seed);
             let mut twin = Session::new(&set, settings.clone())?;
-            let (diagnosis, finding) = twin.diagnose(&atlas, &Unheard(progress))?;
+            let (diagnosis, finding) = twin.diagnose(&atlas, &StopOnly(progress))?;
             if trial.off_list {
                 trial.left = finding.and_then(|f| Left::new(&twin, &diagnosis, &f));
             }
@@ -184,7 +190,7 @@ pub fn prove(like: &MeasuredSet, settings: &Settings, extent: &Extent, progress:
         })
         .collect::<Result<Vec<_>>>()?;
     let judged = trials.split_off(extent.threshold_nulls as usize);
-    Ok(Proof::new(like.title.clone(), &trials, judged))
+    Ok(Validation::new(like.title.clone(), &trials, judged))
 }
 
 /// An effect with its numbers.
@@ -208,7 +214,7 @@ impl Chip {
 }
 
 /// One chip without effect, one for each effect and size, one for each pair.
-fn chips(session: &Session<'_>, extent: &Extent) -> Vec<Chip> {
+fn chips(session: &Session<'_>, extent: &ValidationPlan) -> Vec<Chip> {
     let wanted = |name: &str| extent.effects.is_empty() || extent.effects.iter().any(|e| e == name);
     let effects: Vec<_> = session.simulator.effects.iter().filter(|e| wanted(&e.name())).collect();
     // Both numbers of an effect along two axes, unequal and of opposite signs.
@@ -244,9 +250,9 @@ fn chips(session: &Session<'_>, extent: &Extent) -> Vec<Chip> {
 }
 
 /// Passes on that the user wants to stop, and nothing of how far one of many is.
-struct Unheard<'p>(&'p dyn Progress);
+struct StopOnly<'p>(&'p dyn Progress);
 
-impl Progress for Unheard<'_> {
+impl Progress for StopOnly<'_> {
     fn begin(&self, _: &str, _: u64) {}
 
     fn advance(&self, _: u64) {}

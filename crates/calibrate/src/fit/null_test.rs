@@ -5,12 +5,12 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::atlas::FREE_PHASES;
-use super::fit::{Fit, Problem};
-use super::heldout::{HeldOut, SEED, held_out, mean};
-use super::nuisance::Block;
-use super::optics::PixelGrid;
-use super::quadratic::sum;
+use crate::fit::cross_validation::{HeldOutErrors, SEED, held_out, mean};
+use crate::fit::normal_equations::sum;
+use crate::fit::nuisances::CaptureEquations;
+use crate::fit::problem::{Fit, Problem};
+use crate::optics::PixelGrid;
+use crate::surrogate::FREE_PHASES;
 
 /// Random smooth terms that stand against a winner.
 const PLACEBOS: usize = 60;
@@ -28,7 +28,7 @@ pub fn forms_with(
             let grid = problem.grid(&now.theta, c);
             let active = now.active.iter().map(|&s| problem.atlas.slope(&now.theta, s, c));
             let columns: Vec<_> = active.chain(more(c, &grid)).collect();
-            Block::new(problem.data, c, &now.nuisances, &grid, &columns).reduced()
+            CaptureEquations::new(problem.data, c, &now.nuisances, &grid, &columns).reduced()
         })
         .collect();
     let size = forms[0].nrows();
@@ -47,7 +47,7 @@ pub fn forms_with(
 }
 
 /// What random smooth terms gain on captures left out: what 95 % of them stay below.
-pub fn placebo_gain(problem: &Problem<'_>, now: &Fit, held_now: &HeldOut, numbers: usize) -> f64 {
+pub fn null_gain(problem: &Problem<'_>, now: &Fit, held_now: &HeldOutErrors, numbers: usize) -> f64 {
     if problem.atlas.free.len() < FREE_PHASES {
         return 0.0;
     }

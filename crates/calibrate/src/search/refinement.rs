@@ -1,8 +1,8 @@
 //! Fits that go farther than the atlas was simulated, or nearer to the truth than its polynomials.
 
-use super::effects::Stage;
-use super::fit::{Fit, Problem};
-use super::optics::PixelGrid;
+use crate::effects::Stage;
+use crate::fit::problem::{Fit, Problem};
+use crate::optics::PixelGrid;
 use metalith_core::{Progress, Result};
 
 /// Times that the atlas is carried on towards where a fit went.
@@ -36,7 +36,7 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
-    pub fn stretch(&mut self, mut fit: Fit, progress: &dyn Progress) -> Result<Fit> {
+    pub fn extend_and_fit(&mut self, mut fit: Fit, progress: &dyn Progress) -> Result<Fit> {
         for _ in 0..STRETCHES {
             let far: Vec<usize> = fit
                 .active
@@ -74,10 +74,10 @@ impl Problem<'_> {
     /// Bring a fit to rest on exact simulations of where it is, or close by.
     ///
     /// # Errors
-    /// As [`Problem::stretch`].
-    pub fn settle(&mut self, mut fit: Fit, progress: &dyn Progress) -> Result<Fit> {
+    /// As [`Problem::extend_and_fit`].
+    pub fn refine(&mut self, mut fit: Fit, progress: &dyn Progress) -> Result<Fit> {
         for _ in 0..EXACT_STEPS {
-            fit = self.stretch(fit, progress)?;
+            fit = self.extend_and_fit(fit, progress)?;
             let at = self.rounded(&fit.theta);
             let departure = self.simulator.departure(&at);
             let exposed = self.simulator.expose(&[departure], progress)?.remove(0);

@@ -1,16 +1,16 @@
 //! From a residual to a name: score every effect, fit the leaders, keep what predicts captures it has not
 //! seen, and say where two cannot be told apart.
 
-use super::atlas::Atlas;
-use super::couple::couple;
-use super::fit::{Fit, Problem};
-use super::forward::{LEAST_GAIN, RESIDUAL, Tried, forward};
-use super::heldout::{HeldOut, half_widths, mean};
-use super::nuisance::Data;
-use super::optics::PixelGrid;
-use super::rivals::{Alternative, prune, rivals};
-use super::simulator::Simulator;
-use super::standing::Standing;
+use crate::fit::cross_validation::{HeldOutErrors, half_widths, mean};
+use crate::fit::nuisances::Data;
+use crate::fit::problem::{Fit, Problem};
+use crate::optics::PixelGrid;
+use crate::search::alternatives::{Alternative, alternatives, drop_redundant};
+use crate::search::pairs::find_pair;
+use crate::search::state::SearchState;
+use crate::search::stepwise::{LEAST_GAIN, RESIDUAL, TriedEffect, step_forward};
+use crate::simulator::Simulator;
+use crate::surrogate::Surrogate;
 use metalith_core::{Progress, Result};
 
 /// Most effects that one session is taken to show at once.
@@ -24,37 +24,37 @@ pub struct Finding {
     pub alternatives: Vec<Vec<Alternative>>,
     pub before: Fit,
     pub after: Fit,
-    pub held_before: HeldOut,
-    pub held_after: HeldOut,
+    pub held_before: HeldOutErrors,
+    pub held_after: HeldOutErrors,
     pub placebo_held_out: f64,
-    pub ranking: Vec<Tried>,
+    pub ranking: Vec<TriedEffect>,
     /// What was tried on top of each effect that was taken.
-    pub later: Vec<Vec<Tried>>,
+    pub later: Vec<Vec<TriedEffect>>,
     /// Who else was fitted at each step.
     runners: Vec<Vec<usize>>,
     /// 95 % half-widths of the numbers of `after`.
     pub half_widths: Vec<f64>,
     /// The atlas that `after` rests on, and what the exact simulation adds to it.
-    pub atlas: Atlas,
+    pub atlas: Surrogate,
     pub exact: Option<Vec<PixelGrid>>,
     /// Share of missing pillars by the grain that they leave, where that counts as noise.
     pub by_grain: Option<f64>,
 }
 
 /// What a search has been through.
-struct Trail {
+struct SearchHistory {
     chosen: Vec<usize>,
     before: Fit,
-    held_before: HeldOut,
+    held_before: HeldOutErrors,
     placebo_held_out: f64,
-    ranking: Vec<Tried>,
-    later: Vec<Vec<Tried>>,
+    ranking: Vec<TriedEffect>,
+    later: Vec<Vec<TriedEffect>>,
     runners: Vec<Vec<usize>>,
 }
 
-impl Trail {
+impl SearchHistory {
     /// From where nothing is found.
-    fn from(start: &Standing<'_>) -> Self {
+    fn from(start: &SearchState<'_>) -> Self {
         Self {
             chosen: Vec::new(),
             before: start.fit.clone(),
@@ -80,7 +80,7 @@ impl Trail {
     }
 
     /// Keep what was tried in a step, at which random terms gained `placebo`.
-    fn keep(&mut self, tried: Vec<Tried>, placebo: f64) {
+    fn keep(&mut self, tried: Vec<TriedEffect>, placebo: f64) {
         if self.chosen.is_empty() {
             self.placebo_held_out = mean(&self.held_before) - placebo;
             self.ranking = tried;
@@ -90,10 +90,10 @@ impl Trail {
     }
 
     /// Take an effect, with who else was fitted.
-    fn take(&mut self, tried: &Tried, runners: Vec<usize>) {
+    fn take(&mut self, tried: &TriedEffect, runners: Vec<usize>) {
         if let Some(known) = self.ranking.iter_mut().find(|t| t.effect == tried.effect) {
             let score = known.score;
-            *known = Tried { score, ..tried.clone() };
+            *known = TriedEffect { score, ..tried.clone() };
         }
         self.chosen.push(tried.effect);
         self.runners.push(runners);
@@ -107,7 +107,7 @@ impl Trail {
 /// If a cell cannot be solved, or the user stopped it.
 pub fn attribute(
     simulator: &Simulator<'_>,
-    atlas: &Atlas,
+    atlas: &Surrogate,
     data: &Data,
     used: &[bool],
     exact: bool,
@@ -122,27 +122,27 @@ pub fn attribute(
         exact: None,
     };
     let nothing = problem.nothing();
-    let mut now = Standing::new(problem, nothing);
-    let mut trail = earlier.map_or_else(|| Trail::from(&now), Trail::of);
+    let mut now = SearchState::new(problem, nothing);
+    let mut trail = earlier.map_or_else(|| SearchHistory::from(&now), SearchHistory::of);
     if earlier.is_some() {
         // What was found is kept and fitted again from the atlas about it.
         let fit = now.problem.fit(&simulator.slots_of_all(&trail.chosen), &now.fit);
         now.go(fit);
         if exact {
-            now.settle(progress)?;
+            now.refine(progress)?;
         }
     }
     while trail.chosen.len() < MOST_EFFECTS {
-        let step = forward(&mut now, &trail.chosen, exact, progress)?;
+        let step = step_forward(&mut now, &trail.chosen, exact, progress)?;
         trail.keep(step.tried, step.placebo);
         if let Some((tried, fit, held)) = step.taken {
             trail.take(&tried, step.leaders);
             (now.fit, now.held) = (fit, held);
             if exact {
-                now.settle(progress)?;
+                now.refine(progress)?;
             }
         } else if now.error() > RESIDUAL && trail.chosen.len() + 2 <= MOST_EFFECTS {
-            let Some(both) = couple(&now, &trail.chosen, exact, progress)? else {
+            let Some(both) = find_pair(&now, &trail.chosen, exact, progress)? else {
                 break;
             };
             for tried in &both.tried {
@@ -157,12 +157,12 @@ pub fn attribute(
         }
     }
     let found = trail.chosen.len();
-    prune(&mut now, &mut trail.chosen, &mut trail.runners);
+    drop_redundant(&mut now, &mut trail.chosen, &mut trail.runners);
     if exact && trail.chosen.len() < found {
-        now.settle(progress)?;
+        now.refine(progress)?;
     }
     let (runners, before) = (&trail.runners, &trail.held_before);
-    let mut alternatives = rivals(&mut now, &mut trail.chosen, runners, before, exact, progress)?;
+    let mut alternatives = alternatives(&mut now, &mut trail.chosen, runners, before, exact, progress)?;
     let least = |slot: usize| MODEL_SHARE * simulator.slots[slot].parameter.typical;
     let mut widths = half_widths(&now.problem, &now.fit);
     for (w, &s) in widths.iter_mut().zip(&now.fit.active) {

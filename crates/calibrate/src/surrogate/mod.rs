@@ -4,16 +4,18 @@
 //! polynomial. Changes of different numbers add. That is right where effects are small, and a fit that moves
 //! far is carried on from an atlas about its new place.
 
+mod curve;
+
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::curve::Curve;
-use super::departure::Departure;
-use super::effects::Parameter;
-use super::optics::PixelGrid;
-use super::simulator::Simulator;
-use super::speckle::Speckle;
+use crate::departure::Departure;
+use crate::effects::Parameter;
+use crate::fit::defect_noise::DefectNoise;
+use crate::optics::PixelGrid;
+use crate::simulator::Simulator;
+use curve::Curve;
 use metalith_core::{Progress, Result};
 
 /// Multiples of the typical size that a number is simulated at, on both sides.
@@ -42,7 +44,7 @@ const FREE_TRANSMISSION: f64 = 0.03;
 
 /// What a set should show, and how every number changes it.
 #[derive(Clone)]
-pub struct Atlas {
+pub struct Surrogate {
     /// The numbers that it is about.
     pub about: Vec<f64>,
     pub base: Arc<Vec<PixelGrid>>,
@@ -50,7 +52,7 @@ pub struct Atlas {
     /// Changes for a unit of each free term: phases [1/nm], then transmissions of each LED.
     pub free: Arc<Vec<Vec<Option<PixelGrid>>>>,
     /// The grain of what strikes single pillars at random, if that is among the effects.
-    pub grain: Option<Arc<Speckle>>,
+    pub grain: Option<Arc<DefectNoise>>,
 }
 
 impl Simulator<'_> {
@@ -58,7 +60,7 @@ impl Simulator<'_> {
     ///
     /// # Errors
     /// As [`Simulator::expose`].
-    pub fn atlas(&self, about: &[f64], free: bool, progress: &dyn Progress) -> Result<Atlas> {
+    pub fn atlas(&self, about: &[f64], free: bool, progress: &dyn Progress) -> Result<Surrogate> {
         let mut departures = vec![self.departure(about)];
         let mut nodes: Vec<Vec<f64>> = Vec::new();
         for (s, slot) in self.slots.iter().enumerate() {
@@ -118,10 +120,10 @@ impl Simulator<'_> {
         }
         let random = self.slots.iter().position(|s| self.effects[s.effect].random());
         let grain = match random {
-            Some(slot) => Some(Arc::new(Speckle::of(self, about, slot, progress)?)),
+            Some(slot) => Some(Arc::new(DefectNoise::of(self, about, slot, progress)?)),
             None => None,
         };
-        Ok(Atlas {
+        Ok(Surrogate {
             about: about.to_vec(),
             base: Arc::new(base),
             curves,
@@ -150,7 +152,13 @@ impl Simulator<'_> {
     ///
     /// # Errors
     /// As [`Simulator::expose`].
-    pub fn recentred(&self, atlas: &Atlas, about: &[f64], slots: &[usize], progress: &dyn Progress) -> Result<Atlas> {
+    pub fn recentred(
+        &self,
+        atlas: &Surrogate,
+        about: &[f64],
+        slots: &[usize],
+        progress: &dyn Progress,
+    ) -> Result<Surrogate> {
         let mut departures = vec![self.departure(about)];
         let nodes: Vec<Vec<f64>> = slots
             .iter()
@@ -176,7 +184,7 @@ impl Simulator<'_> {
     ///
     /// # Errors
     /// As [`Simulator::expose`].
-    pub fn extend(&self, atlas: &mut Atlas, slot: usize, values: &[f64], progress: &dyn Progress) -> Result<()> {
+    pub fn extend(&self, atlas: &mut Surrogate, slot: usize, values: &[f64], progress: &dyn Progress) -> Result<()> {
         let departures: Vec<_> = values
             .iter()
             .map(|value| {
@@ -200,7 +208,7 @@ fn change(grids: &[PixelGrid], base: &[PixelGrid], factor: f32) -> Vec<PixelGrid
         .collect()
 }
 
-impl Atlas {
+impl Surrogate {
     /// Captures without any effect.
     pub fn alone(base: Vec<PixelGrid>) -> Self {
         Self {

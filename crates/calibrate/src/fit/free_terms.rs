@@ -2,13 +2,13 @@
 
 use ndarray::Array2;
 
-use super::atlas::{FREE_PHASES, FREE_TRANSMISSIONS};
-use super::attribute::Finding;
-use super::bench::legendre;
-use super::placebo::forms_with;
-use super::quadratic::{covariance, minimise};
-use super::session::Session;
-use super::zernike;
+use crate::bench::legendre;
+use crate::fit::normal_equations::{covariance, minimise};
+use crate::fit::null_test::forms_with;
+use crate::search::attribution::Finding;
+use crate::session::Session;
+use crate::surrogate::{FREE_PHASES, FREE_TRANSMISSIONS};
+use crate::zernike;
 
 /// Pairs of axes of the free blur.
 const BLURS: [[usize; 2]; 3] = [[0, 0], [0, 1], [1, 1]];

@@ -11,7 +11,7 @@ const REACH: i64 = 16;
 const BETTER: f32 = 1.02;
 
 /// Whole pixels (x, y) by which a window seems to be off: where `seen` and `expected` correlate best.
-pub fn coarse(seen: &Array2<f32>, expected: &Array2<f32>) -> [f64; 2] {
+pub fn whole_pixel_shift(seen: &Array2<f32>, expected: &Array2<f32>) -> [f64; 2] {
     let (rows, cols) = seen.dim();
     let mut planner = FftPlanner::new();
     let along_x = planner.plan_fft_forward(cols);
@@ -68,7 +68,7 @@ mod tests {
             })
         };
         // A window that is off by (5, -3) sees the spot at the opposite side.
-        assert_eq!(coarse(&spot(27.0, 27.0), &spot(32.0, 24.0)), [5.0, -3.0]);
-        assert_eq!(coarse(&spot(32.2, 24.0), &spot(32.0, 24.0)), [0.0, 0.0]);
+        assert_eq!(whole_pixel_shift(&spot(27.0, 27.0), &spot(32.0, 24.0)), [5.0, -3.0]);
+        assert_eq!(whole_pixel_shift(&spot(32.2, 24.0), &spot(32.0, 24.0)), [0.0, 0.0]);
     }
 }

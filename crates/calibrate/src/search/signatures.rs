@@ -2,21 +2,21 @@
 
 use nalgebra::DMatrix;
 
-use super::effects;
-use super::fit::{Fit, Problem};
-use super::quadratic::minimise;
-use super::simulator::Simulator;
+use crate::effects;
+use crate::fit::normal_equations::minimise;
+use crate::fit::problem::{Fit, Problem};
+use crate::simulator::Simulator;
 
 /// Effects by the share of the residual that their signature explains, nuisances and what is chosen
 /// projected out.
-pub fn screen(problem: &Problem<'_>, now: &Fit, chosen: &[usize]) -> Vec<(usize, f64)> {
+pub fn score_effects(problem: &Problem<'_>, now: &Fit, chosen: &[usize]) -> Vec<(usize, f64)> {
     let sets = others(problem, chosen).into_iter().map(|e| [e]).collect();
     let scores = explained(problem, now, chosen, sets);
     scores.into_iter().map(|([e], score)| (e, score)).collect()
 }
 
 /// The same for all pairs of effects.
-pub fn screen_pairs(problem: &Problem<'_>, now: &Fit, chosen: &[usize]) -> Vec<([usize; 2], f64)> {
+pub fn score_pairs(problem: &Problem<'_>, now: &Fit, chosen: &[usize]) -> Vec<([usize; 2], f64)> {
     let others = others(problem, chosen);
     let pairs = others
         .iter()

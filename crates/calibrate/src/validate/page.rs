@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{NOTHING, Proof, Trial};
+use super::{NOTHING, Trial, Validation};
 use crate::page::round_json;
 use metalith_core::{Result, WholeFile};
 use metalith_report::{Axis, Cell, Column, HeatMap, ImageGrid, Matrix, Page, Table, Verdict, sig, write_json};
@@ -17,12 +17,12 @@ const SIGMAS: f64 = 6.0;
 ///
 /// # Errors
 /// If a file cannot be written.
-pub fn write_proof(folder: &Path, proof: &Proof) -> Result<()> {
+pub fn write_validation(folder: &Path, proof: &Validation) -> Result<()> {
     WholeFile::write(&folder.join("proof.txt"), proof.text().as_bytes())?;
     write_json(&folder.join("proof.json"), "calibrate --proof", proof)?;
     let mut page = Page::new(
         "How far calibration can be trusted",
-        format!("Twins of `{}`, of our own making", proof.like),
+        format!("Synthesizer of `{}`, of our own making", proof.like),
     );
     let share = proof.false_claims as f64 / proof.nulls.max(1) as f64;
     page.verdict(
@@ -71,7 +71,7 @@ pub fn write_proof(folder: &Path, proof: &Proof) -> Result<()> {
     page.write(&folder.join("proof.html"))
 }
 
-fn limits(page: &mut Page, proof: &Proof) {
+fn limits(page: &mut Page, proof: &Validation) {
     page.section("From which size on");
     let mut table = Table::new([
         Column::text("Effect"),
@@ -103,7 +103,7 @@ fn limits(page: &mut Page, proof: &Proof) {
     page.table(table);
 }
 
-fn off_list(page: &mut Page, proof: &Proof) {
+fn off_list(page: &mut Page, proof: &Validation) {
     let odd: Vec<&Trial> = proof.trials.iter().filter(|t| t.off_list).collect();
     if odd.is_empty() {
         return;
@@ -156,7 +156,7 @@ fn off_list(page: &mut Page, proof: &Proof) {
     }
 }
 
-fn trials(proof: &Proof) -> Table {
+fn trials(proof: &Validation) -> Table {
     let mut table = Table::new([
         Column::text("True"),
         Column::number("Size", "typical"),

@@ -7,14 +7,14 @@ use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::bench::{Bench, Lit, Sampling};
-use super::cells::{CellSource, RigorousCells};
-use super::departure::Departure;
-use super::effects;
-use super::optics::PixelGrid;
-use super::session::{Settings, stated_cell};
-use super::set::MeasuredSet;
-use super::simulator::{Simulator, WIDTH_ROOM_NM};
+use crate::bench::{Bench, Lit, Sampling};
+use crate::cells::{CellSource, RigorousCells};
+use crate::departure::Departure;
+use crate::effects;
+use crate::optics::PixelGrid;
+use crate::session::{Settings, stated_cell};
+use crate::set::MeasuredSet;
+use crate::simulator::{Simulator, WIDTH_ROOM_NM};
 use metalith_core::{Error, Progress, Result};
 
 /// Orders along an axis; fits use others.
@@ -31,7 +31,7 @@ const BLACK_DN: f64 = 0.1;
 
 /// What no list of effects knows.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum OffList {
+pub enum UnlistedEffect {
     /// A bowed substrate: astigmatism along the axes [nm rms of path].
     Astigmatism(f64),
     /// A second image, this bright and so far off [um].
@@ -41,19 +41,19 @@ pub enum OffList {
 }
 
 /// Makes sets like one that is given.
-pub struct Twins<'a> {
+pub struct Synthesizer<'a> {
     simulator: Simulator<'a>,
 }
 
 /// What the captures of a twin show before noise, and what its widths are.
-pub struct Exposed {
+pub struct SyntheticImages {
     grids: Vec<PixelGrid>,
     ghost: Option<(f64, [f64; 2])>,
     departure: Departure,
 }
 
-impl<'a> Twins<'a> {
-    /// Twins of `like`: its layout, captures and noise.
+impl<'a> Synthesizer<'a> {
+    /// Synthesizer of `like`: its layout, captures and noise.
     ///
     /// # Errors
     /// If a material is not known.
@@ -85,15 +85,15 @@ impl<'a> Twins<'a> {
     ///
     /// # Errors
     /// If there is no such effect, or a cell cannot be solved.
-    pub fn with_effect(&self, name: &str, numbers: &[f64], progress: &dyn Progress) -> Result<Exposed> {
+    pub fn with_effect(&self, name: &str, numbers: &[f64], progress: &dyn Progress) -> Result<SyntheticImages> {
         Ok(self.with_effects(&[vec![(name, numbers)]], progress)?.remove(0))
     }
 
     /// The same for many chips at once, each with some effects, or none.
     ///
     /// # Errors
-    /// As [`Twins::with_effect`].
-    pub fn with_effects(&self, chips: &[Vec<(&str, &[f64])>], progress: &dyn Progress) -> Result<Vec<Exposed>> {
+    /// As [`Synthesizer::with_effect`].
+    pub fn with_effects(&self, chips: &[Vec<(&str, &[f64])>], progress: &dyn Progress) -> Result<Vec<SyntheticImages>> {
         let mut departures = Vec::new();
         for chip in chips {
             let mut departure = Departure::default();
@@ -109,7 +109,7 @@ impl<'a> Twins<'a> {
         Ok(exposed
             .into_iter()
             .zip(departures)
-            .map(|(grids, departure)| Exposed {
+            .map(|(grids, departure)| SyntheticImages {
                 grids,
                 ghost: None,
                 departure,
@@ -121,15 +121,15 @@ impl<'a> Twins<'a> {
     ///
     /// # Errors
     /// If a cell cannot be solved.
-    pub fn off_list(&self, what: OffList, progress: &dyn Progress) -> Result<Exposed> {
+    pub fn off_list(&self, what: UnlistedEffect, progress: &dyn Progress) -> Result<SyntheticImages> {
         let mut departure = Departure::default();
         match what {
-            OffList::Astigmatism(nm) => {
+            UnlistedEffect::Astigmatism(nm) => {
                 departure.geometry.wavefront_nm = vec![0.0, nm];
                 self.expose(departure, None, progress)
             }
-            OffList::Ghost(share, at) => self.expose(departure, Some((share, at)), progress),
-            OffList::Anisotropy(nm) => {
+            UnlistedEffect::Ghost(share, at) => self.expose(departure, Some((share, at)), progress),
+            UnlistedEffect::Anisotropy(nm) => {
                 let tables = match &self.simulator.cells {
                     CellSource::Rigorous(cells) => cells.anisotropic(nm, progress)?,
                     CellSource::Model(_) => return Err(Error::invalid("no rigorous cells", "make twins of a set")),
@@ -146,7 +146,7 @@ impl<'a> Twins<'a> {
                     .zip(&planes[1][0])
                     .map(|(x, y)| x.iter().zip(y).map(|(a, b)| 0.5 * (a + b)).collect())
                     .collect();
-                Ok(Exposed {
+                Ok(SyntheticImages {
                     grids: self.simulator.bench.grids(&both, &departure),
                     ghost: None,
                     departure,
@@ -155,12 +155,17 @@ impl<'a> Twins<'a> {
         }
     }
 
-    fn expose(&self, departure: Departure, ghost: Option<(f64, [f64; 2])>, progress: &dyn Progress) -> Result<Exposed> {
+    fn expose(
+        &self,
+        departure: Departure,
+        ghost: Option<(f64, [f64; 2])>,
+        progress: &dyn Progress,
+    ) -> Result<SyntheticImages> {
         let grids = self
             .simulator
             .expose(std::slice::from_ref(&departure), progress)?
             .remove(0);
-        Ok(Exposed {
+        Ok(SyntheticImages {
             grids,
             ghost,
             departure,
@@ -168,7 +173,7 @@ impl<'a> Twins<'a> {
     }
 
     /// A set with placement, flux, black level and noise drawn from `seed`.
-    pub fn draw(&self, exposed: &Exposed, seed: u64) -> MeasuredSet {
+    pub fn draw(&self, exposed: &SyntheticImages, seed: u64) -> MeasuredSet {
         let like = self.simulator.bench.set();
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut set = like.clone();
