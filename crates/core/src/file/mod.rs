@@ -4,12 +4,38 @@ mod part;
 mod past_cache;
 
 use std::fs;
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 pub use past_cache::{Ahead, Block};
 
 use crate::error::{Error, Result};
+
+/// The bytes of an ordinary file of at most `most` bytes; `what` says what it should be.
+///
+/// # Errors
+/// If it cannot be read, is a device or a pipe, or is longer.
+pub fn read_at_most(path: &Path, most: u64, what: &str) -> Result<Vec<u8>> {
+    let found = fs::metadata(path).map_err(Error::io("read", path))?;
+    let refused = |why: String| {
+        let hint = format!("{what} of up to {most} bytes is read; is this the right file?");
+        Err(Error::invalid(format!("{} {why}", path.display()), hint))
+    };
+    if !found.is_file() {
+        return refused("is not an ordinary file".into());
+    }
+    if found.len() > most {
+        return refused(format!("is {} bytes long", found.len()));
+    }
+    let mut bytes = Vec::with_capacity(found.len() as usize);
+    let file = fs::File::open(path).map_err(Error::io("read", path))?;
+    // The file may grow while it is read.
+    file.take(most + 1).read_to_end(&mut bytes).map_err(Error::io("read", path))?;
+    if bytes.len() as u64 > most {
+        return refused("grows while it is read".into());
+    }
+    Ok(bytes)
+}
 
 /// A file written beside its place and renamed into it when complete.
 ///
