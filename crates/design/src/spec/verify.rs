@@ -72,7 +72,8 @@ impl VerifySpec {
         let mut y = s.floats("field_y_deg", ANGLE);
         y.resize(y.len().max(x.len()), 0.0);
         if y.len() != x.len() {
-            s.fault(
+            s.fault_given(
+                &["verify.field_x_deg"],
                 "field_y_deg",
                 "more angles along y than along x",
                 "give one entry for each of `field_x_deg`",
