@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use metalith::Result;
-use metalith::calibrate::{Calibration, ValidationPlan, MeasuredSet, SetVerdict, Settings, calibrate, validate, write_validation};
+use metalith::calibrate::{
+    Calibration, MeasuredSet, SetVerdict, Settings, ValidationPlan, calibrate, validate, write_validation,
+};
 use metalith::cell::cache_folder;
 
 use super::{Outcome, Terminal, print_line};

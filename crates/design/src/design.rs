@@ -140,7 +140,8 @@ fn check_directions(section: &Section<'_, '_>, array: &ArraySpec, verify: &Verif
                 sine(x, angle.x_deg).hypot(sine(y, angle.y_deg)) < 1.0
             };
             if let Some(angle) = verify.field_angles.iter().find(|a| !arrives(a)) {
-                section.fault(
+                section.fault_given(
+                    &["verify.wavelengths_nm", "verify.field_x_deg", "verify.field_y_deg"],
                     "steering_deg",
                     format!(
                         "element {} has no light at {:.0} nm from the field angle ({}, {}) degrees",

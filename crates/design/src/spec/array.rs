@@ -51,7 +51,8 @@ impl ArraySpec {
         let spacing_um = s.float("spacing_um", Limits::new(1.0..=100_000.0, "um"));
         let spacing_nm = (spacing_um * 1e3).round() as i64;
         if count.iter().any(|&c| c > 1.0) && spacing_nm < i64::from(lens.diameter_nm) && s.has("spacing_um") {
-            s.fault(
+            s.fault_given(
+                &["lens.diameter_um", "array.elements"],
                 "spacing_um",
                 "neighbouring lenses overlap",
                 format!(
@@ -77,7 +78,8 @@ impl ArraySpec {
         };
         let outermost = f64::from(spec.count.0.max(spec.count.1) / 2) * spec.steering_deg;
         if outermost >= 90.0 {
-            s.fault(
+            s.fault_given(
+                &["array.elements"],
                 "steering_deg",
                 format!("the outermost element would steer by {outermost} degrees"),
                 "keep it below 90",

@@ -23,9 +23,12 @@ pub struct CellSpec {
     pub ambient_index: f64,
 }
 
+/// Longest pitch [nm].
+const WIDEST_PITCH_NM: u32 = 2000;
+
 impl CellSpec {
     pub(crate) fn read(s: &Section<'_, '_>) -> Self {
-        let pitch_nm = s.integer("pitch_nm", 100..=2000, "nm") as u32;
+        let pitch_nm = s.integer("pitch_nm", 100..=i64::from(WIDEST_PITCH_NM), "nm") as u32;
         if !pitch_nm.is_multiple_of(2) {
             s.fault(
                 "pitch_nm",
@@ -41,11 +44,18 @@ impl CellSpec {
                 "use an even number, so that all edges are on the 1 nm grid",
             );
         }
-        let low = s.integer("width_min_nm", 10..=i64::from(pitch_nm), "nm") as u16;
-        let high = s.integer("width_max_nm", 10..=i64::from(pitch_nm), "nm") as u16;
+        // A pitch with a fault bounds nothing.
+        let widest = if s.sound(&["cell.pitch_nm"]) {
+            pitch_nm
+        } else {
+            WIDEST_PITCH_NM
+        };
+        let low = s.integer("width_min_nm", 10..=i64::from(widest), "nm") as u16;
+        let high = s.integer("width_max_nm", 10..=i64::from(widest), "nm") as u16;
         for (key, width) in [("width_min_nm", low), ("width_max_nm", high)] {
             if step > 0 && width % step != 0 {
-                s.fault(
+                s.fault_given(
+                    &["cell.width_step_nm"],
                     key,
                     format!("{width} nm is not a multiple of the width step"),
                     format!("use a multiple of {step} nm"),
@@ -53,7 +63,8 @@ impl CellSpec {
             }
         }
         if low > high {
-            s.fault(
+            s.fault_given(
+                &["cell.width_min_nm"],
                 "width_max_nm",
                 "the widest pillar is narrower than the narrowest",
                 "exchange the two",

@@ -179,7 +179,10 @@ impl Layers {
                 && s.has(key)
                 && s.has(other)
             {
-                s.fault(
+                let numbers =
+                    [*key, *other].map(|layer| [format!("layers.{layer}.layer"), format!("layers.{layer}.datatype")]);
+                s.fault_given(
+                    &numbers.iter().flatten().map(String::as_str).collect::<Vec<_>>(),
                     key,
                     format!(
                         "`{key}` is on the layer of `{other}`, {}/{}",
@@ -203,7 +206,8 @@ impl ApertureSpec {
         };
         let radius_nm = f64::from(lens.diameter_nm) / 2.0 + spec.margin_nm as f64;
         if spec.vertices(radius_nm) + 1 > spec.max_vertices {
-            s.fault(
+            s.fault_given(
+                &["lens.diameter_um", "apertures.margin_um", "apertures.max_vertices"],
                 "chord_error_nm",
                 format!(
                     "this takes {} vertices, `max_vertices` is {}",
@@ -244,7 +248,8 @@ impl ChipSpec {
         let needed = |count: u32| i64::from(count - 1) * array.spacing_nm + i64::from(lens.diameter_nm);
         let (x, y) = (needed(array.count.0.max(1)), needed(array.count.1.max(1)));
         if s.has("size_um") && (size_nm.0 < x || size_nm.1 < y) {
-            s.fault(
+            s.fault_given(
+                &["lens.diameter_um", "array.elements", "array.spacing_um"],
                 "size_um",
                 "the elements reach beyond the chip",
                 format!("use at least {} by {} um", x as f64 * 1e-3, y as f64 * 1e-3),
@@ -260,7 +265,8 @@ impl MarkSpec {
         let xs = s.floats("x_um", PLACE);
         let ys = s.floats("y_um", PLACE);
         if xs.len() != ys.len() || xs.is_empty() {
-            s.fault(
+            s.fault_given(
+                &["mark.x_um"],
                 "y_um",
                 format!("{} places along x, {} along y", xs.len(), ys.len()),
                 "give one entry of `x_um` and one of `y_um` for each cross",
@@ -277,7 +283,8 @@ impl MarkSpec {
                 .collect(),
         };
         if spec.length_nm % 2 != 0 || spec.width_nm % 2 != 0 || spec.width_nm >= spec.length_nm {
-            s.fault(
+            s.fault_given(
+                &["mark.length_um"],
                 "width_um",
                 "the arms of the cross are not centred or wider than long",
                 "use even numbers of nanometres, the width below the length",
@@ -289,7 +296,8 @@ impl MarkSpec {
             .iter()
             .any(|c| c.0.abs() + reach > chip.size_nm.0 / 2 || c.1.abs() + reach > chip.size_nm.1 / 2)
         {
-            s.fault(
+            s.fault_given(
+                &["chip.size_um", "mark.y_um", "mark.length_um"],
                 "x_um",
                 format!("a cross of the set \"{}\" reaches beyond the chip", spec.name),
                 "move it inwards or enlarge [chip]",

@@ -30,7 +30,8 @@ impl LensSpec {
             );
         }
         if Lattice::covering(diameter_nm, cell.pitch_nm).is_err() {
-            lens.fault(
+            lens.fault_given(
+                &["cell.pitch_nm"],
                 "diameter_um",
                 "the lens has no sites on this lattice",
                 "make it larger than the pitch",

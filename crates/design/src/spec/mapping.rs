@@ -59,7 +59,8 @@ impl MappingSpec {
         let half_step = f64::from(cell.width_step_nm) / 2.0;
         let fits = low * pitch >= f64::from(narrow) - half_step && high * pitch <= f64::from(wide) + half_step;
         if !fits && !polynomial.coefficients.is_empty() {
-            s.fault(
+            s.fault_given(
+                &["cell.pitch_nm", "cell.width_min_nm", "cell.width_max_nm", "cell.width_step_nm", "mapping.basis"],
                 "coefficients",
                 format!("this mapping asks for widths from {:.1} to {:.1} nm", low * pitch, high * pitch),
                 format!("the cell allows {narrow} to {wide} nm: change the coefficients or [cell] width_min_nm, width_max_nm"),

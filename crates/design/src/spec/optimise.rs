@@ -262,7 +262,12 @@ impl MeritSpec {
                 .unwrap_or(Self::LOG.side_lobe_radius_um),
         };
         if merit.sum + merit.log + merit.deconvolution + merit.side_lobes == 0.0 {
-            s.fault(
+            s.fault_given(
+                &[
+                    "optimise.merit.sum",
+                    "optimise.merit.deconvolution",
+                    "optimise.merit.side_lobes",
+                ],
                 "log",
                 "all merits have a weight of zero",
                 "give one of sum, log, deconvolution, side_lobes a weight",

@@ -71,7 +71,8 @@ impl VerifySpec {
         let x = s.floats("field_x_deg", ANGLE);
         let mut y = s.floats("field_y_deg", ANGLE);
         if s.has("field_y_deg") && y.len() != x.len() {
-            s.fault(
+            s.fault_given(
+                &["verify.field_x_deg"],
                 "field_y_deg",
                 format!("{} angles along y for {} along x", y.len(), x.len()),
                 "give one entry for each of `field_x_deg`",

@@ -56,7 +56,7 @@ pub fn diff(a: &Layout, b: &Layout, plan: &DiffPlan, progress: &dyn Progress) ->
     let factors = [num_a * (den / den_a), num_b * (den / den_b)];
     let mut sites = Vec::new();
     for layout in [a, b] {
-        match discover(layout, &everything, &[plan.pillar_layer], Scale::of(layout)?, progress) {
+        match discover(layout, &everything, &[plan.pillar_layer], Scale::of(layout)?, progress).map_err(Error::from) {
             Ok(found) => sites::unite(&mut sites, found),
             // Without elements, all shapes are compared as outlines.
             Err(Error::Invalid { .. }) => {}
