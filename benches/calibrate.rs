@@ -20,19 +20,19 @@ fn calibration(c: &mut Criterion) {
         exact: false,
         ..Settings::default()
     };
-    let twins = Synthesizer::new(&like, &settings).expect("twins");
+    let synthesizer = Synthesizer::new(&like, &settings).expect("a synthesizer");
     let mut group = c.benchmark_group("calibrate");
     group.sample_size(10);
-    // Cells are solved once and kept: what is timed is light through pillars to eight captures.
-    group.bench_function("captures of a chip", |b| {
-        b.iter(|| black_box(twins.with_effect("cd_bias", &[-8.0], &Silent)).expect("captures"));
+    // Cells are solved once and kept: the time is that of light through pillars to eight captures.
+    group.bench_function("images of a chip", |b| {
+        b.iter(|| black_box(synthesizer.with_effect("cd_bias", &[-8.0], &Silent)).expect("captures"));
     });
-    let exposed = twins.with_effect("gap", &[5.0], &Silent).expect("captures");
-    let set = twins.draw(&exposed, 1);
-    let mut session = Session::new(&set, settings).expect("a session");
-    let atlas = session.atlas(&Silent).expect("an atlas");
-    group.bench_function("a diagnosis, simulations known", |b| {
-        b.iter(|| black_box(session.diagnose(&atlas, &Silent)).expect("a diagnosis"));
+    let exposed = synthesizer.with_effect("gap", &[5.0], &Silent).expect("captures");
+    let set = synthesizer.draw(&exposed, 1);
+    let session = Session::new(&set, settings).expect("a session");
+    let simulations = session.simulate(&Silent).expect("simulations");
+    group.bench_function("a diagnosis with known simulations", |b| {
+        b.iter(|| black_box(session.diagnose(&simulations, &Silent)).expect("a diagnosis"));
     });
     group.finish();
 }

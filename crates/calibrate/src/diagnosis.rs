@@ -2,37 +2,36 @@
 
 use std::path::Path;
 
-use ndarray::Array2;
+use metalith_core::{Result, WholeFile};
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::fit::cross_validation::mean as mean_held_out;
-use crate::fit::problem::{Fit, Problem};
-use crate::search::attribution::Finding;
-use crate::search::signatures::{names, separate_by};
-use crate::search::stepwise::{RESIDUAL, Rejection, TriedEffect};
-use crate::session::Session;
-use metalith_core::{Result, WholeFile};
+use crate::fidelity::Rung;
+use crate::fit::{Fit, HeldOutErrors, mean_error};
+use crate::search::{Evidence, Finding, RESIDUAL, Rejection, TriedEffect, UnusableCapture};
+use crate::set::MeasuredSet;
+use crate::simulator::Simulator;
+use crate::simulator_model::separating_measurement;
 
-/// What a session comes to.
+/// The verdict on a set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SetVerdict {
-    /// The set is what was stated, to within its noise.
+    /// The captures agree with what was stated, to within their noise.
     NoResidual,
-    /// What was found explains it.
+    /// The effects that were found explain the residual.
     Explained,
-    /// One of a few effects that this set cannot tell apart.
+    /// One of a few effects that this set cannot distinguish.
     OneOf,
-    /// What was found explains a part.
+    /// The effects that were found explain a part of the residual.
     Partly,
-    /// There is something, and it has no name here.
+    /// There is a residual that no known effect explains.
     Unexplained,
-    /// Too few captures can be used.
+    /// More than half of the captures cannot be used.
     DataUnfit,
 }
 
-/// One number that was found, or one for each of its axes.
+/// An effect that was found.
 #[derive(Clone, Debug, Serialize)]
 pub struct FoundEffect {
     pub name: String,
@@ -46,7 +45,7 @@ pub struct FoundEffect {
 }
 
 impl FoundEffect {
-    /// Whether the interval of an effect of one number holds a value.
+    /// Whether the interval of an effect with one value contains this value; none for an effect along two axes.
     pub fn holds(&self, value: f64) -> Option<bool> {
         let ends = self.interval.as_array()?;
         Some((ends.first()?.as_f64()?..=ends.get(1)?.as_f64()?).contains(&value))
@@ -70,17 +69,17 @@ pub struct ErrorReport {
     pub placebo_held_out: f64,
 }
 
-/// One candidate.
+/// A candidate that was tried.
 #[derive(Clone, Debug, Serialize)]
 pub struct Ranked {
     pub name: String,
-    /// Share of the residual that its signature explains.
+    /// Share of the residual that its signature alone explains, nuisances projected out.
     pub score: f64,
     pub held_out_gain: Option<f64>,
     pub held_out_gain_interval: Option<[f64; 2]>,
     pub value: Option<Value>,
     pub rejected: Option<String>,
-    /// The same in a few words.
+    /// The reason for the rejection in a few words.
     #[serde(skip)]
     pub remark: String,
 }
@@ -92,7 +91,7 @@ pub struct LeftOut {
     pub reason: String,
 }
 
-/// Everything that a program needs to know.
+/// The answer for a set.
 #[derive(Clone, Debug, Serialize)]
 pub struct Diagnosis {
     pub set: String,
@@ -102,14 +101,14 @@ pub struct Diagnosis {
     pub ranking: Vec<Ranked>,
     /// Candidates on top of each effect that was taken.
     pub later_rankings: Vec<Vec<Ranked>>,
-    /// Share of the residual's energy above noise that is left.
+    /// Share of the error above noise that is left.
     pub unexplained_share: f64,
-    /// Share of missing pillars by the grain that they leave, where that was counted as noise in the error after.
+    /// Share of missing pillars by their speckle, where the speckle counts as noise in the error after.
     pub missing_by_grain: Option<f64>,
     pub left_out: Vec<LeftOut>,
     /// Held-out error of each capture before and after.
     pub captures: Vec<CaptureError>,
-    /// Error of the three fidelities of the cell, the nuisances fitted.
+    /// The three fidelities of the cell, nuisances fitted.
     pub ladder: Vec<Rung>,
 }
 
@@ -121,131 +120,75 @@ pub struct CaptureError {
     pub after: Option<f64>,
 }
 
-/// One fidelity of the cell.
-#[derive(Clone, Debug, Serialize)]
-pub struct Rung {
-    pub fidelity: String,
-    pub fit: f64,
-    pub held_out: f64,
-    /// Residual of each capture [sigma], nuisances fitted; for pictures.
-    #[serde(skip)]
-    pub residuals: Vec<Array2<f32>>,
-}
+/// The measure of error.
+const MEASURE: &str = "reduced chi-square per pixel";
 
-/// What is measured.
-const MEASURE: &str = "chi-square a pixel";
-
-/// What counts as explained may leave this of chi-square a pixel.
+/// A residual is explained if this reduced chi-square per pixel is left, or less.
 const EXPLAINED: f64 = 1.2;
 
-/// Share of the residual's energy that may be left of what counts as explained, where much was there.
+/// Or if this share of the error above noise is left, where the error was large; and the error that this share is
+/// relative to at most.
 const LEFT: f64 = 0.05;
+const MUCH: f64 = 6.0;
 
-/// Share past which what was found is no explanation.
+/// If a larger share is left, the residual is unexplained.
 const MOSTLY_LEFT: f64 = 0.4;
 
+/// Least error above noise that shares are relative to, where there is none.
+const LEAST_ABOVE_NOISE: f64 = 1e-9;
+
 impl Diagnosis {
-    /// From what was found.
-    pub fn new(session: &Session<'_>, finding: &Finding, left_out: Vec<LeftOut>, ladder: Vec<Rung>) -> Self {
-        let simulator = &session.simulator;
-        let pixels: f64 = (0..session.used.len())
-            .filter(|&c| session.used[c])
-            .map(|c| session.data.pixels(c) as f64)
-            .sum();
-        let pair = |fit: &Fit, held: f64| ErrorPair {
+    /// From the evidence of a search.
+    pub fn new(
+        simulator: &Simulator<'_>,
+        evidence: &Evidence,
+        unusable: &[UnusableCapture],
+        ladder: Vec<Rung>,
+    ) -> Self {
+        let (set, finding) = (simulator.bench.set(), &evidence.finding);
+        let pixels = evidence.problem(simulator).pixels();
+        let pair = |fit: &Fit, held: &HeldOutErrors| ErrorPair {
             fit: fit.chi2 / pixels,
-            held_out: held,
+            held_out: mean_error(held),
         };
-        let before = pair(&finding.before, mean_held_out(&finding.held_before));
-        let after = pair(&finding.after, mean_held_out(&finding.held_after));
-        let share = ((after.held_out - 1.0).max(0.0) / (before.held_out - 1.0).max(1e-9)).clamp(0.0, 1.0);
-        let unexplained_share = if before.held_out < RESIDUAL && finding.chosen.is_empty() {
-            0.0
-        } else {
-            share
+        let error = ErrorReport {
+            measure: MEASURE.into(),
+            before: pair(&finding.before, &finding.held_before),
+            after: pair(&finding.after, &finding.held_after),
+            noise_floor: 1.0,
+            placebo_held_out: finding.null_held_out,
         };
-        let many_unfit = 2 * left_out.len() > session.used.len();
-        let fits = after.held_out <= EXPLAINED.max(1.0 + LEFT * (before.held_out - 1.0).min(6.0));
-        let alone = finding.alternatives.iter().all(Vec::is_empty);
-        let verdict = if many_unfit {
-            SetVerdict::DataUnfit
-        } else if finding.chosen.is_empty() {
-            if before.held_out <= RESIDUAL {
-                SetVerdict::NoResidual
-            } else {
-                SetVerdict::Unexplained
-            }
-        } else if !fits && unexplained_share > MOSTLY_LEFT {
-            SetVerdict::Unexplained
-        } else if !fits {
-            SetVerdict::Partly
-        } else if finding.chosen.len() == 1 && !alone {
-            SetVerdict::OneOf
-        } else {
-            SetVerdict::Explained
-        };
-        let mut effects = Vec::new();
-        if !matches!(verdict, SetVerdict::DataUnfit | SetVerdict::Unexplained) {
-            for (&effect, alternatives) in finding.chosen.iter().zip(&finding.alternatives) {
-                let slots = simulator.slots_of(effect);
-                let values: Vec<f64> = slots.iter().map(|&s| finding.after.theta[s]).collect();
-                let widths = finding.after.pick(&slots, &finding.half_widths);
-                let others: Vec<usize> = alternatives.iter().map(|a| a.effect).collect();
-                effects.push(found(session, effect, &values, &widths, &others));
-                if verdict == SetVerdict::OneOf {
-                    for a in alternatives {
-                        let rest: Vec<usize> = others
-                            .iter()
-                            .copied()
-                            .filter(|&o| o != a.effect)
-                            .chain([effect])
-                            .collect();
-                        effects.push(found(session, a.effect, &a.values, &a.half_widths, &rest));
-                    }
-                }
-            }
-        }
-        let ranked = |tried: &Vec<TriedEffect>| tried.iter().map(|t| Ranked::new(session, finding, t)).collect();
+        let unexplained_share = unexplained_share(&error, finding);
+        let verdict = verdict(&error, finding, unexplained_share);
+        let ranked = |tried: &Vec<TriedEffect>| tried.iter().map(|t| Ranked::new(simulator, finding, t)).collect();
+        let captures = set.captures.iter_enumerated().map(|(c, capture)| CaptureError {
+            capture: capture.name.clone(),
+            before: finding.held_before[c],
+            after: finding.held_after[c],
+        });
         Self {
-            set: session.set().title.clone(),
+            set: set.title.clone(),
             verdict,
-            effects,
-            error: ErrorReport {
-                measure: MEASURE.into(),
-                before,
-                after,
-                noise_floor: 1.0,
-                placebo_held_out: finding.placebo_held_out,
-            },
+            effects: found_effects(simulator, finding, verdict),
+            error,
             ranking: ranked(&finding.ranking),
             later_rankings: finding.later.iter().map(ranked).collect(),
             unexplained_share,
-            missing_by_grain: finding.by_grain,
-            left_out,
-            captures: session
-                .set()
-                .captures
-                .iter()
-                .enumerate()
-                .map(|(c, capture)| CaptureError {
-                    capture: capture.name.clone(),
-                    before: finding.held_before[c],
-                    after: finding.held_after[c],
-                })
-                .collect(),
+            missing_by_grain: evidence.missing_by_speckle,
+            left_out: left_out(set, unusable),
+            captures: captures.collect(),
             ladder,
         }
     }
 
-    /// Nothing can be said of a set that is mostly unfit.
-    pub fn data_unfit(session: &Session<'_>, problem: &Problem<'_>, left_out: Vec<LeftOut>, fit: &Fit) -> Self {
-        let error = fit.chi2 / problem.pixels().max(1.0);
+    /// Of a set most of whose captures cannot be used; `error` is that of the nuisances alone.
+    pub fn data_unfit(set: &MeasuredSet, error: f64, unusable: &[UnusableCapture]) -> Self {
         let pair = ErrorPair {
             fit: error,
             held_out: error,
         };
         Self {
-            set: session.set().title.clone(),
+            set: set.title.clone(),
             verdict: SetVerdict::DataUnfit,
             effects: Vec::new(),
             error: ErrorReport {
@@ -259,7 +202,7 @@ impl Diagnosis {
             later_rankings: Vec::new(),
             unexplained_share: 1.0,
             missing_by_grain: None,
-            left_out,
+            left_out: left_out(set, unusable),
             captures: Vec::new(),
             ladder: Vec::new(),
         }
@@ -292,29 +235,93 @@ impl Diagnosis {
         };
         let list: Vec<String> = self.effects.iter().map(one).collect();
         match self.verdict {
-            SetVerdict::NoResidual => "no residual: the captures are what was stated, to within their noise".into(),
+            SetVerdict::NoResidual => {
+                "no residual: the captures agree with what was stated, to within their noise".into()
+            }
             SetVerdict::Explained => format!("explained by {}", list.join("; ")),
-            SetVerdict::OneOf => format!("one of, which this set cannot tell apart: {}", list.join("; ")),
+            SetVerdict::OneOf => format!("one of these, which this set cannot distinguish: {}", list.join("; ")),
             SetVerdict::Partly => format!(
-                "partly explained by {}; {:.0} % of the residual is left",
+                "partly explained by {}; {:.0} % of the error above noise is left",
                 list.join("; "),
                 100.0 * self.unexplained_share
             ),
-            SetVerdict::Unexplained => "unexplained: there is a residual that no effect known here accounts for".into(),
+            SetVerdict::Unexplained => "unexplained: there is a residual that no known effect explains".into(),
             SetVerdict::DataUnfit => format!("data unfit: {} captures cannot be used", self.left_out.len()),
         }
     }
 }
 
+/// Share of the error above noise that the finding leaves.
+fn unexplained_share(error: &ErrorReport, finding: &Finding) -> f64 {
+    if error.before.held_out < RESIDUAL && finding.chosen.is_empty() {
+        return 0.0;
+    }
+    let above = (error.before.held_out - 1.0).max(LEAST_ABOVE_NOISE);
+    ((error.after.held_out - 1.0).max(0.0) / above).clamp(0.0, 1.0)
+}
+
+fn verdict(error: &ErrorReport, finding: &Finding, unexplained_share: f64) -> SetVerdict {
+    if finding.chosen.is_empty() {
+        return if error.before.held_out <= RESIDUAL {
+            SetVerdict::NoResidual
+        } else {
+            SetVerdict::Unexplained
+        };
+    }
+    let may_be_left = 1.0 + LEFT * (error.before.held_out - 1.0).min(MUCH);
+    let fits = error.after.held_out <= EXPLAINED.max(may_be_left);
+    let unambiguous = finding.alternatives.iter().all(Vec::is_empty);
+    if !fits && unexplained_share > MOSTLY_LEFT {
+        SetVerdict::Unexplained
+    } else if !fits {
+        SetVerdict::Partly
+    } else if finding.chosen.len() == 1 && !unambiguous {
+        SetVerdict::OneOf
+    } else {
+        SetVerdict::Explained
+    }
+}
+
+/// What is claimed: the effects that were chosen, and their alternatives where the set cannot distinguish them.
+fn found_effects(simulator: &Simulator<'_>, finding: &Finding, verdict: SetVerdict) -> Vec<FoundEffect> {
+    let mut effects = Vec::new();
+    if verdict == SetVerdict::Unexplained {
+        return effects;
+    }
+    for (&effect, alternatives) in finding.chosen.iter().zip(&finding.alternatives) {
+        let slots = simulator.slots_of(effect);
+        let values: Vec<f64> = slots.iter().map(|&s| finding.after.theta[s]).collect();
+        let widths = finding.after.pick(&slots, &finding.half_widths);
+        let others: Vec<usize> = alternatives.iter().map(|a| a.effect).collect();
+        effects.push(found(simulator, effect, &values, &widths, &others));
+        if verdict == SetVerdict::OneOf {
+            for a in alternatives {
+                let rest = others.iter().copied().filter(|&o| o != a.effect);
+                let rest: Vec<usize> = rest.chain([effect]).collect();
+                effects.push(found(simulator, a.effect, &a.values, &a.half_widths, &rest));
+            }
+        }
+    }
+    effects
+}
+
+fn left_out(set: &MeasuredSet, unusable: &[UnusableCapture]) -> Vec<LeftOut> {
+    let named = unusable.iter().map(|u| LeftOut {
+        capture: set.captures[u.capture].name.clone(),
+        reason: u.reason.clone(),
+    });
+    named.collect()
+}
+
 impl Ranked {
-    fn new(session: &Session<'_>, finding: &Finding, tried: &TriedEffect) -> Self {
+    fn new(simulator: &Simulator<'_>, finding: &Finding, tried: &TriedEffect) -> Self {
         let rejection = rejection(finding, tried);
         Self {
-            name: session.simulator.effects[tried.effect].name(),
+            name: simulator.effects[tried.effect].name(),
             score: tried.score,
-            held_out_gain: tried.gain.map(|g| g.0),
-            held_out_gain_interval: tried.gain.map(|g| g.1),
-            value: (!tried.values.is_empty()).then(|| listed(&reported(session, tried.effect, &tried.values))),
+            held_out_gain: tried.gain.map(|g| g.value),
+            held_out_gain_interval: tried.gain.map(|g| g.interval),
+            value: (!tried.values.is_empty()).then(|| listed(&reported(simulator, tried.effect, &tried.values))),
             rejected: rejection.map(Rejection::sentence),
             remark: rejection.map_or_else(|| "taken".into(), Rejection::remark),
         }
@@ -327,25 +334,24 @@ fn rejection(finding: &Finding, tried: &TriedEffect) -> Option<Rejection> {
 }
 
 /// Numbers of an effect as they are reported.
-fn reported(session: &Session<'_>, effect: usize, values: &[f64]) -> Vec<f64> {
-    let own = &session.simulator.effects[effect];
+fn reported(simulator: &Simulator<'_>, effect: usize, values: &[f64]) -> Vec<f64> {
+    let own = &simulator.effects[effect];
     let none = vec![0.0; values.len()];
-    let all = own.reported(values, &none, session.set());
+    let all = own.reported(values, &none, simulator.bench.set());
     all.into_iter().map(|r| r.0).collect()
 }
 
-fn found(session: &Session<'_>, effect: usize, values: &[f64], widths: &[f64], others: &[usize]) -> FoundEffect {
-    let simulator = &session.simulator;
+fn found(simulator: &Simulator<'_>, effect: usize, values: &[f64], widths: &[f64], others: &[usize]) -> FoundEffect {
     let own = &simulator.effects[effect];
     let (values, intervals): (Vec<f64>, Vec<[f64; 2]>) =
-        own.reported(values, widths, session.set()).into_iter().unzip();
+        own.reported(values, widths, simulator.bench.set()).into_iter().unzip();
     FoundEffect {
         name: own.name(),
         value: listed(&values),
         unit: own.unit().into(),
         interval: listed(&intervals),
-        confounded_with: names(simulator, others),
-        separate_by: separate_by(simulator, effect, others),
+        confounded_with: others.iter().map(|&o| simulator.effects[o].name()).collect(),
+        separate_by: separating_measurement(simulator, effect, others),
     }
 }
 

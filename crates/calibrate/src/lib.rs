@@ -1,8 +1,20 @@
-//! From what the bench recorded to what the model lacks.
+//! Calibration: from what the bench recorded to what the model lacks.
 //!
-//! A [`MeasuredSet`] is read and checked, its layout extracted. A bench in the computer predicts each capture
-//! from the pillars as written; nuisances of the bench are fitted; what is left is compared with what every
-//! effect in `effects/` would leave, and an effect is named if it predicts captures that were not fitted.
+//! A [`MeasuredSet`] is read and checked, and its layout extracted. A simulated bench predicts each capture from
+//! the pillars as written; nuisances of the bench are fitted; the residual is compared with what each effect in
+//! `effects/` would leave, and an effect is named if it predicts captures that were not fitted.
+//!
+//! | folder | holds | may use |
+//! | --- | --- | --- |
+//! | `set` | the measured set and its files | |
+//! | `effects` | what chips and benches are known to do to light, one file each | `set` |
+//! | `bench`, `cells`, `optics`, `simulator` | the simulated bench | `set`, `effects` |
+//! | `forward_model` | what the statistics know of the simulator | |
+//! | `surrogate` | the forward model, interpolated | `forward_model` |
+//! | `fit` | least squares, cross-validation, null test | `surrogate` |
+//! | `search` | which effects explain a residual | `fit` |
+//! | `session`, `diagnosis`, `page`, `run` | a set from its files to its answer | all above |
+//! | `validate` | the calibration judged on synthetic sets | all above |
 
 mod bench;
 mod cells;
@@ -10,8 +22,11 @@ mod density;
 mod departure;
 mod diagnosis;
 mod effects;
+mod fidelity;
 mod fit;
+mod forward_model;
 mod model;
+mod names;
 mod optics;
 mod page;
 mod run;
@@ -19,6 +34,8 @@ mod search;
 mod session;
 mod set;
 mod simulator;
+mod simulator_model;
+mod smooth_residual;
 mod surrogate;
 mod validate;
 mod zernike;
@@ -26,11 +43,12 @@ mod zernike;
 pub use bench::Sampling;
 pub use density::fill;
 pub use departure::{CameraChange, CellChange, Departure, Geometry, LightChange, PathChange};
-pub use diagnosis::{Diagnosis, ErrorPair, ErrorReport, FoundEffect, LeftOut, Ranked, Rung, SetVerdict};
+pub use diagnosis::{Diagnosis, ErrorPair, ErrorReport, FoundEffect, LeftOut, Ranked, SetVerdict};
+pub use fidelity::Rung;
 pub use model::{CalibratedModel, MadeCell};
 pub use run::{Calibration, calibrate};
-pub use session::{Session, Settings};
+pub use session::{Screening, Session, Settings, Simulations};
 pub use set::{Camera, Capture, Led, MeasuredElement, MeasuredSet, SemSite, Stack};
-pub use surrogate::Surrogate;
+pub use set::{CaptureIndex, ElementIndex, LedIndex, PerCapture, PerElement, PerLed};
 pub use validate::synthetic::{Synthesizer, SyntheticImages, UnlistedEffect};
 pub use validate::{DetectionLimit, Trial, Validation, ValidationPlan, validate, write_validation};

@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use crate::diagnosis::{Diagnosis, SetVerdict};
+use crate::effects;
 use crate::model::CalibratedModel;
 use crate::page::write_page;
-use crate::session::{Session, Settings};
+use crate::session::{Session, Settings, Simulations, check_effects};
 use crate::set::MeasuredSet;
-use crate::surrogate::Surrogate;
 use metalith_core::{Progress, Result};
 
-/// What a calibration leaves.
+/// The files of a calibration.
 #[derive(Clone, Debug)]
 pub struct Calibration {
     pub diagnosis: Diagnosis,
@@ -18,16 +18,16 @@ pub struct Calibration {
     pub answer: PathBuf,
     /// `report.html`.
     pub report: PathBuf,
-    /// `model.toml`, where the set has taught something or nothing had to be learned.
+    /// `model.toml`; none where the residual is unexplained or the captures cannot be used.
     pub model: Option<PathBuf>,
 }
 
 /// Read the sets at `paths`, find what the model lacks, and write diagnosis, report and model of each to its
-/// folder of `outs`. Sessions that were planned alike share their simulations.
+/// folder of `outs`. Sessions of one plan share their simulations.
 ///
 /// # Errors
-/// Every fault of a set at once; else if a cell cannot be solved, a file cannot be written, or the user
-/// stopped it.
+/// Every fault of a set at once, and all unknown names of effects; else if a cell cannot be solved, a file
+/// cannot be written, or the user stopped it.
 pub fn calibrate(
     paths: &[PathBuf],
     outs: &[PathBuf],
@@ -38,44 +38,47 @@ pub fn calibrate(
         .iter()
         .map(|p| MeasuredSet::read(p, progress))
         .collect::<Result<Vec<_>>>()?;
-    let mut known: Option<(usize, Surrogate)> = None;
+    for set in &sets {
+        check_effects(&effects::all(set), &settings.only)?;
+    }
+    let mut known: Option<(usize, Simulations)> = None;
     let mut done = Vec::new();
     for (place, (set, out)) in sets.iter().zip(outs).enumerate() {
-        let mut session = Session::new(set, settings.clone())?;
+        let session = Session::new(set, settings.clone())?;
         let shared = known.take().filter(|(other, _)| sets[*other].same_plan(set));
-        let (other, atlas) = match shared {
+        let (other, simulations) = match shared {
             Some(known) => known,
-            None => (place, session.atlas(progress)?),
+            None => (place, session.simulate(progress)?),
         };
-        done.push(finish(&mut session, &atlas, out, progress)?);
-        known = Some((other, atlas));
+        done.push(finish(&session, &simulations, out, progress)?);
+        known = Some((other, simulations));
     }
     Ok(done)
 }
 
-/// Diagnose a session whose atlas is made, and write what it comes to.
+/// Diagnose a session with its simulations, and write the answer.
 ///
 /// # Errors
 /// As [`calibrate`].
-pub fn finish(
-    session: &mut Session<'_>,
-    atlas: &Surrogate,
+fn finish(
+    session: &Session<'_>,
+    simulations: &Simulations,
     out: &Path,
     progress: &dyn Progress,
 ) -> Result<Calibration> {
-    let (diagnosis, finding) = session.diagnose(atlas, progress)?;
+    let (diagnosis, evidence) = session.diagnose(simulations, progress)?;
     let answer = out.join("diagnosis.json");
     let report = out.join("report.html");
     diagnosis.write(&answer)?;
-    write_page(&report, session, atlas, &diagnosis, finding.as_ref())?;
+    write_page(&report, session, simulations, &diagnosis, evidence.as_ref())?;
     let learned = matches!(
         diagnosis.verdict,
         SetVerdict::NoResidual | SetVerdict::Explained | SetVerdict::OneOf | SetVerdict::Partly
     );
-    let model = match finding.filter(|_| learned) {
+    let model = match evidence.filter(|_| learned) {
         None => None,
-        Some(finding) => {
-            let departure = session.simulator.departure(&finding.after.theta);
+        Some(evidence) => {
+            let departure = session.simulator.departure(&evidence.finding.after.theta);
             let path = out.join("model.toml");
             CalibratedModel::new(diagnosis.set.clone(), diagnosis.sentence(), departure).write(&path)?;
             Some(path)

@@ -1,24 +1,21 @@
-//! One set from its files to its diagnosis.
+//! One set from its captures to its diagnosis, in stages. Each is a function of the former's result:
+//! simulate, screen the captures, compare the fidelities of the cell, attribute the residual, diagnose.
 
 use std::path::PathBuf;
 
+use metalith_core::{Error, Progress, Result};
+
 use crate::bench::{Bench, Sampling};
 use crate::cells::{CellSource, RigorousCells};
-use crate::departure::Departure;
-use crate::diagnosis::{Diagnosis, LeftOut, Rung};
-use crate::effects;
-use crate::fit::capture_screening::unusable_captures;
-use crate::fit::cross_validation::{held_out, mean};
-use crate::fit::defect_noise::DefectNoise;
-use crate::fit::nuisances::Data;
-use crate::fit::problem::{Fit, Problem};
-use crate::search::attribution::{Finding, attribute};
-use crate::search::stepwise::RESIDUAL;
-use crate::set::MeasuredSet;
+use crate::diagnosis::Diagnosis;
+use crate::effects::{self, Effect};
+use crate::fidelity::compare_fidelities;
+use crate::fit::{Data, Fit, Problem};
+use crate::names::unknown_names;
+use crate::search::{DefectNoise, Evidence, UnusableCapture, attribute_set, unusable_captures};
+use crate::set::{MeasuredSet, PerCapture};
 use crate::simulator::{Simulator, WIDTH_ROOM_NM};
 use crate::surrogate::Surrogate;
-use metalith_cell::{CellStack, FittedCell, Material, PublishedCell};
-use metalith_core::{Progress, Result};
 
 /// How a set is worked on.
 #[derive(Clone, Debug)]
@@ -30,9 +27,9 @@ pub struct Settings {
     pub only: Vec<String>,
     /// Compare the three fidelities of the cell first.
     pub ladder: bool,
-    /// Simulate the free terms, which placebos are made of as well.
+    /// Simulate smooth terms, which null tests are made of as well.
     pub free: bool,
-    /// Bring what is found to rest on simulations of the very chip, where the atlas adds up polynomials.
+    /// Refine what is found with full simulations, where the surrogate adds up polynomials.
     pub exact: bool,
 }
 
@@ -49,72 +46,54 @@ impl Default for Settings {
     }
 }
 
-/// Times that a set far from what was stated is looked at again from where it was found.
-const RECENTRED: usize = 2;
+/// Simulations that depend on the plan of a session, and not on what it measured: sessions of one plan share
+/// them.
+pub struct Simulations {
+    pub surrogate: Surrogate,
+    /// The noise of the effect that strikes single pillars at random, if it is among the effects.
+    pub defects: Option<(usize, DefectNoise)>,
+}
 
-/// Times that effects and grain are fitted in turn.
-const ROUNDS: usize = 4;
+/// Which captures can be used.
+pub struct Screening {
+    pub used: PerCapture<bool>,
+    pub unusable: Vec<UnusableCapture>,
+    /// The nuisances fitted to all captures, nothing else.
+    pub fit: Fit,
+}
 
-/// They have come to rest when the share changes by less than this part of it.
-const SHARE_AT_REST: f64 = 0.05;
-
-/// Before other effects are known, they may differ by this factor.
-const SHARES_ALIKE: f64 = 4.0;
-
-/// Mean and grain speak of one share of missing pillars if they differ by less than this part of it: the grain
-/// is known from a few draws, and the mean is seen through the grain.
-const SHARES_AGREE: f64 = 0.3;
+impl Screening {
+    /// Whether more than half of the captures cannot be used.
+    pub fn is_data_unfit(&self) -> bool {
+        2 * self.unusable.len() > self.used.len()
+    }
+}
 
 /// A set with its simulator and its data.
 pub struct Session<'a> {
     pub simulator: Simulator<'a>,
     pub data: Data,
-    /// Captures that count.
-    pub used: Vec<bool>,
     pub settings: Settings,
-}
-
-/// The cell as a set states it.
-///
-/// # Errors
-/// If a material is not known.
-pub fn stated_cell(set: &MeasuredSet) -> Result<CellStack> {
-    Ok(CellStack {
-        pitch_nm: f64::from(set.stack.pitch_nm),
-        height_nm: set.stack.pillar_height_nm,
-        film: set.stack.film.clone(),
-        substrate: Material::named("fused_silica_malitson_1965")?,
-        ambient: Material::constant(set.stack.ambient_index, 0.0)?,
-        taper: 0.0,
-        corner_radius_nm: 0.0,
-        mask_height_nm: 0.0,
-        mask: Material::named("alumina_zhukovsky_2015")?,
-    })
 }
 
 impl<'a> Session<'a> {
     /// Plan the work on a set.
     ///
     /// # Errors
-    /// If a material is not known.
+    /// If an effect or a material is not known.
     pub fn new(set: &'a MeasuredSet, settings: Settings) -> Result<Self> {
+        let tried = tried_effects(set, &settings.only)?;
         let bench = Bench::new(set, settings.sampling);
         let (low, high) = bench.widths_nm();
         let cells = RigorousCells::new(
-            stated_cell(set)?,
+            set.stated_cell()?,
             bench.wavelengths_nm(),
             (low - WIDTH_ROOM_NM, high + WIDTH_ROOM_NM),
             settings.cache.clone(),
         );
-        let mut tried = effects::all(set);
-        if !settings.only.is_empty() {
-            tried.retain(|e| settings.only.contains(&e.name()));
-        }
-        let simulator = Simulator::new(bench, CellSource::Rigorous(Box::new(cells)), tried);
         Ok(Self {
-            simulator,
+            simulator: Simulator::new(bench, CellSource::Rigorous(Box::new(cells)), tried),
             data: Data::new(set),
-            used: vec![true; set.captures.len()],
             settings,
         })
     }
@@ -128,186 +107,105 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
-    pub fn atlas(&self, progress: &dyn Progress) -> Result<Surrogate> {
+    pub fn simulate(&self, progress: &dyn Progress) -> Result<Simulations> {
         let nothing = vec![0.0; self.simulator.slots.len()];
-        self.simulator.atlas(&nothing, self.settings.free, progress)
+        let led = self.data.led_of_captures();
+        let smooth = self.settings.free.then_some((&led, self.data.leds));
+        let surrogate = Surrogate::simulate(&self.simulator, &nothing, smooth, progress)?;
+        let random = self.simulator.effects.iter().position(|e| e.random());
+        let defects = match random {
+            None => None,
+            Some(effect) => {
+                let slot = self.simulator.slots_of(effect)[0];
+                Some((effect, DefectNoise::of(&self.simulator, &nothing, slot, progress)?))
+            }
+        };
+        Ok(Simulations { surrogate, defects })
     }
 
-    /// A problem over this set's data.
-    pub fn problem(&self, atlas: &Surrogate) -> Problem<'_> {
-        Problem {
-            simulator: &self.simulator,
-            atlas: atlas.clone(),
-            data: &self.data,
-            used: self.used.clone(),
-            exact: None,
+    /// The set as stated, all captures counted.
+    pub fn problem(&self, simulations: &Simulations) -> Problem<'_> {
+        Problem::new(&self.simulator, simulations.surrogate.clone(), &self.data)
+    }
+
+    /// Find the captures that cannot be used.
+    pub fn screen(&self, simulations: &Simulations) -> Screening {
+        let problem = self.problem(simulations);
+        let fit = problem.nuisance_fit();
+        let unusable = unusable_captures(self.set(), &problem, &fit.nuisances);
+        let mut used = problem.used;
+        for u in &unusable {
+            used[u.capture] = false;
         }
+        Screening { used, unusable, fit }
     }
 
-    /// The same, resting on what a finding rests on.
-    pub fn problem_of(&self, finding: &Finding) -> Problem<'_> {
-        Problem {
-            exact: finding.exact.clone(),
-            ..self.problem(&finding.atlas)
-        }
-    }
-
-    /// The answer for the set, and what it rests on where there is a finding.
+    /// Attribute the residual of the captures that can be used.
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
-    pub fn diagnose(&mut self, atlas: &Surrogate, progress: &dyn Progress) -> Result<(Diagnosis, Option<Finding>)> {
-        let mut left_out = Vec::new();
-        let nothing = self.problem(atlas).nothing();
-        for (c, reason) in unusable_captures(&self.problem(atlas), &nothing.nuisances) {
-            self.used[c] = false;
-            left_out.push(LeftOut {
-                capture: self.set().captures[c].name.clone(),
-                reason,
-            });
-        }
-        if 2 * left_out.len() > self.used.len() {
-            let problem = self.problem(atlas);
-            return Ok((Diagnosis::data_unfit(self, &problem, left_out, &nothing), None));
+    pub fn attribute(
+        &self,
+        simulations: &Simulations,
+        screening: &Screening,
+        progress: &dyn Progress,
+    ) -> Result<Evidence> {
+        let problem = self.screened(simulations, screening);
+        let defects = simulations.defects.as_ref().map(|(effect, noise)| (*effect, noise));
+        attribute_set(&problem, self.settings.exact, defects, progress)
+    }
+
+    /// The answer for the set, and the evidence for it where there was enough to search in.
+    ///
+    /// # Errors
+    /// If a cell cannot be solved, or the user stopped it.
+    pub fn diagnose(
+        &self,
+        simulations: &Simulations,
+        progress: &dyn Progress,
+    ) -> Result<(Diagnosis, Option<Evidence>)> {
+        let screening = self.screen(simulations);
+        if screening.is_data_unfit() {
+            let error = screening.fit.chi2 / self.screened(simulations, &screening).pixels().max(1.0);
+            return Ok((Diagnosis::data_unfit(self.set(), error, &screening.unusable), None));
         }
         let ladder = if self.settings.ladder {
-            self.ladder(atlas, progress)?
+            let problem = self.screened(simulations, &screening);
+            compare_fidelities(self.set(), self.settings.sampling, &problem, progress)?
         } else {
             Vec::new()
         };
-        let exact = self.settings.exact;
-        let mut finding = attribute(&self.simulator, atlas, &self.data, &self.used, exact, None, progress)?;
-        // What is far from what was stated is looked at again from where it was found.
-        for _ in 0..RECENTRED {
-            if !exact || finding.chosen.is_empty() || mean(&finding.held_after) < RESIDUAL {
-                break;
-            }
-            let (data, used) = (&self.data, &self.used);
-            let after = &finding.after;
-            let nearer = self
-                .simulator
-                .recentred(&finding.atlas, &after.theta, &after.active, progress)?;
-            let next = attribute(&self.simulator, &nearer, data, used, exact, Some(&finding), progress)?;
-            let (before, after) = (mean(&finding.held_after), mean(&next.held_after));
-            if after >= before {
-                break;
-            }
-            finding = next;
-            if before - after < 0.05 * after {
-                break;
-            }
-        }
-        if let Some((data, grained)) = self.grained(atlas, &finding, progress)? {
-            (self.data, finding) = (data, grained);
-        }
-        let diagnosis = Diagnosis::new(self, &finding, left_out, ladder);
-        Ok((diagnosis, Some(finding)))
+        let evidence = self.attribute(simulations, &screening, progress)?;
+        let diagnosis = Diagnosis::new(&self.simulator, &evidence, &screening.unusable, ladder);
+        Ok((diagnosis, Some(evidence)))
     }
 
-    /// What is found if the grain of missing pillars is counted as noise, where that explains what is left: if
-    /// their mean and their grain speak of the same share.
-    fn grained(&self, atlas: &Surrogate, plain: &Finding, progress: &dyn Progress) -> Result<Option<(Data, Finding)>> {
-        let random = self.simulator.effects.iter().position(|e| e.random());
-        let Some((effect, speckle)) = random.zip(atlas.grain.as_ref()) else {
-            return Ok(None);
-        };
-        if mean(&plain.held_after) < RESIDUAL {
-            return Ok(None);
+    fn screened(&self, simulations: &Simulations, screening: &Screening) -> Problem<'_> {
+        Problem {
+            used: screening.used.clone(),
+            ..self.problem(simulations)
         }
-        let slot = self.simulator.slots_of(effect)[0];
-        let problem = self.problem_of(plain);
-        let mut active = plain.after.active.clone();
-        if !active.contains(&slot) {
-            active.push(slot);
-        }
-        let fit = problem.fit(&active, &plain.after);
-        let mut share = speckle.share(&problem, &fit);
-        // Whatever else is there, a share of the kind is in the mean before it is looked for in earnest.
-        if fit.theta[slot] < share / SHARES_ALIKE {
-            return Ok(None);
-        }
-        let mut data = speckle.counted(&problem, &fit, share);
-        for _ in 0..ROUNDS {
-            if !DefectNoise::conceivable(share) {
-                break;
-            }
-            let exact = self.settings.exact;
-            let mut found = attribute(&self.simulator, atlas, &data, &self.used, exact, None, progress)?;
-            // Judged by the noise of the camera alone, from which the grain is told.
-            let bare = self.problem_of(&found);
-            let next = speckle.share(&bare, &found.after);
-            if (next / share - 1.0).abs() < SHARE_AT_REST {
-                let by_mean = found.after.theta[slot];
-                let agree = (by_mean - share).abs() <= SHARES_AGREE * share.max(by_mean);
-                let whole = mean(&found.held_after) < RESIDUAL;
-                if !(found.chosen.contains(&effect) && agree && whole) {
-                    break;
-                }
-                found.by_grain = Some(share);
-                // Two answers to one question: the interval holds both.
-                if let Some(k) = found.after.place(slot) {
-                    let width = &mut found.half_widths[k];
-                    *width = width.max((by_mean - share).abs());
-                }
-                found.before = plain.before.clone();
-                found.held_before.clone_from(&plain.held_before);
-                return Ok(Some((data, found)));
-            }
-            share = next;
-            data = speckle.counted(&bare, &found.after, share);
-        }
-        Ok(None)
-    }
-
-    /// The error of each fidelity of the cell, nuisances fitted.
-    fn ladder(&self, atlas: &Surrogate, progress: &dyn Progress) -> Result<Vec<Rung>> {
-        let mut rungs = Vec::new();
-        let published = CellSource::Model(Box::new(PublishedCell::new(self.set().stack.pitch_nm)));
-        let wavelengths = self.simulator.bench.wavelengths_nm();
-        let ends = wavelengths
-            .iter()
-            .fold((f64::MAX, 0.0f64), |(a, b), &l| (a.min(l), b.max(l)));
-        let (low, high) = self.simulator.bench.widths_nm();
-        let fitted = FittedCell::of_stack(
-            &stated_cell(self.set())?,
-            (ends.0 * 1e-3, ends.1 * 1e-3),
-            (low as u16, high as u16),
-        )?;
-        let fitted = CellSource::Model(Box::new(fitted));
-        for (name, cells) in [
-            ("published", Some(published)),
-            ("fitted", Some(fitted)),
-            ("rigorous", None),
-        ] {
-            let problem = self.problem(atlas);
-            let fit = match cells {
-                None => problem.nothing(),
-                Some(cells) => {
-                    let bench = Bench::new(self.set(), self.settings.sampling);
-                    let simulator = Simulator::new(bench, cells, Vec::new());
-                    let exposed = simulator.expose(&[Departure::default()], progress)?.remove(0);
-                    let problem = Problem {
-                        simulator: &simulator,
-                        atlas: Surrogate::alone(exposed),
-                        ..self.problem(atlas)
-                    };
-                    let fit = problem.nothing();
-                    rungs.push(rung(name, &problem, &fit));
-                    continue;
-                }
-            };
-            rungs.push(rung(name, &problem, &fit));
-        }
-        Ok(rungs)
     }
 }
 
-fn rung(name: &str, problem: &Problem<'_>, fit: &Fit) -> Rung {
-    let residual = |c| fit.nuisances.residual(problem.data, &problem.grid(&fit.theta, c), c);
-    Rung {
-        fidelity: name.into(),
-        fit: fit.chi2 / problem.pixels(),
-        held_out: mean(&held_out(problem, &fit.forms, fit)),
-        residuals: (0..problem.used.len()).map(residual).collect(),
+/// The effects of a set that are called `only`; all if none are named.
+fn tried_effects(set: &MeasuredSet, only: &[String]) -> Result<Vec<Box<dyn Effect>>> {
+    let mut tried = effects::all(set);
+    check_effects(&tried, only)?;
+    if !only.is_empty() {
+        tried.retain(|e| only.contains(&e.name()));
     }
+    Ok(tried)
+}
+
+/// Refuse names that no effect of a set has.
+///
+/// # Errors
+/// With all unknown names at once, the nearest known names and the list of these.
+pub fn check_effects(known: &[Box<dyn Effect>], wanted: &[String]) -> Result<()> {
+    let known: Vec<String> = known.iter().map(|e| e.name()).collect();
+    unknown_names(&known, wanted).map_or(Ok(()), |what| {
+        let hint = format!("known effects are {}", known.join(", "));
+        Err(Error::invalid(what, hint))
+    })
 }

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use super::bench::{Bench, Lit};
 use super::cells::CellSource;
 use super::departure::Departure;
-use super::effects::{Effect, Parameter};
+use super::effects::Effect;
+use super::forward_model::Slot;
 use super::optics::PixelGrid;
 use metalith_core::{Progress, Result};
 
@@ -25,16 +26,6 @@ pub struct Simulator<'a> {
     pub scatter: Option<u64>,
     wavelengths_nm: Vec<f64>,
     widths_nm: (f64, f64),
-}
-
-/// One number of one effect.
-#[derive(Clone, Copy, Debug)]
-pub struct Slot {
-    /// Index into [`Simulator::effects`].
-    pub effect: usize,
-    /// Which of its numbers.
-    pub index: usize,
-    pub parameter: Parameter,
 }
 
 impl<'a> Simulator<'a> {
@@ -69,11 +60,6 @@ impl<'a> Simulator<'a> {
         (0..self.slots.len())
             .filter(|&s| self.slots[s].effect == effect)
             .collect()
-    }
-
-    /// The numbers of some effects, in the order of these.
-    pub fn slots_of_all(&self, effects: &[usize]) -> Vec<usize> {
-        effects.iter().flat_map(|&e| self.slots_of(e)).collect()
     }
 
     /// What the numbers mean together.

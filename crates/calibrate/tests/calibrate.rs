@@ -71,21 +71,21 @@ fn effects_are_found_and_nothing_is_found_where_nothing_is() {
     small_set(folder.path());
     let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
     let session = Session::new(&like, settings()).unwrap();
-    let atlas = session.atlas(&Silent).unwrap();
-    let twins = Synthesizer::new(&like, &settings()).unwrap();
+    let simulations = session.simulate(&Silent).unwrap();
+    let synthesizer = Synthesizer::new(&like, &settings()).unwrap();
     let diagnose = |set: &MeasuredSet| {
-        let mut session = Session::new(set, settings()).unwrap();
-        session.diagnose(&atlas, &Silent).unwrap().0
+        let session = Session::new(set, settings()).unwrap();
+        session.diagnose(&simulations, &Silent).unwrap().0
     };
-    let nothing = twins.with_effect("", &[], &Silent).unwrap();
+    let nothing = synthesizer.with_effect("", &[], &Silent).unwrap();
     for seed in 1..=3 {
-        let d = diagnose(&twins.draw(&nothing, seed));
+        let d = diagnose(&synthesizer.draw(&nothing, seed));
         assert_eq!(d.verdict, SetVerdict::NoResidual, "{}: {:?}", d.sentence(), d.error);
         assert!(d.effects.is_empty());
     }
     for (name, number) in [("cd_bias", -8.0), ("gap", 5.0)] {
-        let exposed = twins.with_effect(name, &[number], &Silent).unwrap();
-        let d = diagnose(&twins.draw(&exposed, 11));
+        let exposed = synthesizer.with_effect(name, &[number], &Silent).unwrap();
+        let d = diagnose(&synthesizer.draw(&exposed, 11));
         let found = d.effects.iter().find(|e| e.name == name);
         let found = found.unwrap_or_else(|| panic!("{name}: {} {:?}", d.sentence(), d.error));
         let ends: Vec<f64> = serde_json::from_value(found.interval.clone()).unwrap();
@@ -93,17 +93,17 @@ fn effects_are_found_and_nothing_is_found_where_nothing_is() {
         assert!(d.error.after.held_out < 1.3 && d.error.before.held_out > d.error.after.held_out);
     }
     // In no list: whatever is said, it is not said that a known effect explains it.
-    let exposed = twins
+    let exposed = synthesizer
         .off_list(UnlistedEffect::Ghost(0.1, [4.0, -3.0]), &Silent)
         .unwrap();
-    let d = diagnose(&twins.draw(&exposed, 12));
+    let d = diagnose(&synthesizer.draw(&exposed, 12));
     assert!(
         matches!(d.verdict, SetVerdict::Unexplained | SetVerdict::Partly),
         "{}",
         d.sentence()
     );
     // Frames that were lost: the set is mostly unfit, and says which.
-    let mut dark = twins.draw(&nothing, 13);
+    let mut dark = synthesizer.draw(&nothing, 13);
     for capture in dark.captures.iter_mut().take(5) {
         capture.dn.fill(40.0);
     }
@@ -117,12 +117,12 @@ fn diagnosed(parts: &[(&str, &[f64])], settings: Settings, seed: u64) -> Diagnos
     let folder = tempfile::tempdir().unwrap();
     small_set(folder.path());
     let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
-    let twins = Synthesizer::new(&like, &settings).unwrap();
-    let exposed = twins.with_effects(&[parts.to_vec()], &Silent).unwrap().remove(0);
-    let set = twins.draw(&exposed, seed);
-    let mut session = Session::new(&set, settings).unwrap();
-    let atlas = session.atlas(&Silent).unwrap();
-    session.diagnose(&atlas, &Silent).unwrap().0
+    let synthesizer = Synthesizer::new(&like, &settings).unwrap();
+    let exposed = synthesizer.with_effects(&[parts.to_vec()], &Silent).unwrap().remove(0);
+    let set = synthesizer.draw(&exposed, seed);
+    let session = Session::new(&set, settings).unwrap();
+    let simulations = session.simulate(&Silent).unwrap();
+    session.diagnose(&simulations, &Silent).unwrap().0
 }
 
 /// The names of what was found, in order of the alphabet.
@@ -182,12 +182,12 @@ fn missing_pillars_are_told_by_their_mean_and_by_their_grain() {
             .to_vec(),
         ..settings()
     };
-    let twins = Synthesizer::new(&like, &settings).unwrap();
-    let exposed = twins.with_effect("missing_pillars", &[SHARE], &Silent).unwrap();
-    let set = twins.draw(&exposed, 31);
-    let mut session = Session::new(&set, settings).unwrap();
-    let atlas = session.atlas(&Silent).unwrap();
-    let d = session.diagnose(&atlas, &Silent).unwrap().0;
+    let synthesizer = Synthesizer::new(&like, &settings).unwrap();
+    let exposed = synthesizer.with_effect("missing_pillars", &[SHARE], &Silent).unwrap();
+    let set = synthesizer.draw(&exposed, 31);
+    let session = Session::new(&set, settings).unwrap();
+    let simulations = session.simulate(&Silent).unwrap();
+    let d = session.diagnose(&simulations, &Silent).unwrap().0;
     let found: Vec<&str> = d.effects.iter().map(|e| e.name.as_str()).collect();
     assert_eq!(found, ["missing_pillars"], "{} {:?}", d.sentence(), d.error);
     assert_eq!(d.verdict, SetVerdict::Explained);

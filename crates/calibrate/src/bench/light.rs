@@ -10,6 +10,7 @@ use super::{Bench, Group};
 use crate::cells::CellTable;
 use crate::departure::{Geometry, LightChange, PathChange};
 use crate::optics::{Passed, Scratch, cis};
+use crate::set::{ElementIndex, PerCapture};
 use crate::zernike;
 use metalith_core::{Error, Lattice, Progress, Result};
 
@@ -31,7 +32,7 @@ struct Element {
 
 impl Bench<'_> {
     /// Intensity around the window of each capture, for each chip and each of its lamps:
-    /// `[chip][light][capture][sample]`. Chips on one path share the work of carrying light along it.
+    /// by chip, light and capture, each a square of samples. Chips on one path share the work of carrying light along it.
     ///
     /// # Errors
     /// If the user stopped it.
@@ -40,10 +41,10 @@ impl Bench<'_> {
         chips: &[Lit<'_>],
         path: &PathChange,
         progress: &dyn Progress,
-    ) -> Result<Vec<Vec<Vec<Vec<f32>>>>> {
+    ) -> Result<Vec<Vec<PerCapture<Vec<f32>>>>> {
         let elements: Vec<Vec<Element>> = (0..self.set.elements.len())
             .into_par_iter()
-            .map(|e| chips.iter().map(|chip| self.element(e, chip)).collect())
+            .map(|e| chips.iter().map(|chip| self.element(e.into(), chip)).collect())
             .collect();
         let tasks: Vec<_> = self
             .groups
@@ -52,12 +53,12 @@ impl Bench<'_> {
                 if progress.stopped() {
                     return Err(Error::Interrupted);
                 }
-                Ok(self.group(group, chips, &elements[group.element], path))
+                Ok(self.group(group, chips, &elements[usize::from(group.element)], path))
             })
             .collect::<Result<_>>()?;
         let mut out: Vec<_> = chips
             .iter()
-            .map(|chip| vec![vec![Vec::new(); self.set.captures.len()]; chip.lights.len()])
+            .map(|chip| vec![PerCapture::from(vec![Vec::new(); self.set.captures.len()]); chip.lights.len()])
             .collect();
         for (group, of_chips) in self.groups.iter().zip(tasks) {
             for (out, of_lights) in out.iter_mut().zip(of_chips) {
@@ -71,7 +72,7 @@ impl Bench<'_> {
         Ok(out)
     }
 
-    fn element(&self, element: usize, chip: &Lit<'_>) -> Element {
+    fn element(&self, element: ElementIndex, chip: &Lit<'_>) -> Element {
         let geometry = chip.geometry;
         let measured = &self.set.elements[element];
         let path_um = if geometry.wavefront_nm.is_empty() {
@@ -82,7 +83,7 @@ impl Bench<'_> {
         };
         let mut sites = self.sites(element, geometry);
         if let Some(seed) = chip.scatter {
-            sites.fell(geometry.missing_pillars, seed + element as u64);
+            sites.fell(geometry.missing_pillars, seed + usize::from(element) as u64);
         }
         Element { sites, path_um }
     }
@@ -106,7 +107,7 @@ impl Bench<'_> {
         let weights: Vec<Vec<Vec<f64>>> = chips
             .iter()
             .map(|chip| {
-                let of = |l: &&LightChange| quadrature.weights(l.shift_nm(group.led), 1.0 + l.led_width);
+                let of = |l: &&LightChange| quadrature.weights(l.shift_nm(group.led.into()), 1.0 + l.led_width);
                 chip.lights.iter().map(of).collect()
             })
             .collect();

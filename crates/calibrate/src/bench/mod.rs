@@ -13,7 +13,7 @@ pub use sites::legendre;
 
 use super::departure::Departure;
 use super::optics::{Optic, PixelGrid, Planes, Planned, Quadrature};
-use super::set::{Camera, MeasuredSet};
+use super::set::{Camera, CaptureIndex, ElementIndex, LedIndex, MeasuredSet, PerCapture, PerElement, PerLed};
 
 /// How finely a bench is sampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,12 +42,12 @@ impl Default for Sampling {
 /// A set, planned.
 pub struct Bench<'a> {
     set: &'a MeasuredSet,
-    quadratures: Vec<Quadrature>,
+    quadratures: PerLed<Quadrature>,
     /// Where the wavelengths of each LED begin among all.
-    first: Vec<usize>,
+    first: PerLed<usize>,
     groups: Vec<Group>,
     /// Area fraction around each site of each element, made when first asked for.
-    fill: Vec<OnceLock<Vec<f32>>>,
+    fill: PerElement<OnceLock<Vec<f32>>>,
     /// Windows follow what tilted light does to the place of an image: placement is a nuisance, and an image
     /// that moves is no polynomial of the tilt.
     pub follows: bool,
@@ -55,11 +55,11 @@ pub struct Bench<'a> {
 
 /// Captures that differ in their distance alone.
 struct Group {
-    element: usize,
-    led: usize,
+    element: ElementIndex,
+    led: LedIndex,
     aoi_rad: [f64; 2],
     centre_um: [f64; 2],
-    captures: Vec<usize>,
+    captures: Vec<CaptureIndex>,
     plan: Planned,
 }
 
@@ -67,7 +67,7 @@ impl<'a> Bench<'a> {
     /// Plan a set.
     pub fn new(set: &'a MeasuredSet, sampling: Sampling) -> Self {
         let (low, high) = set.stack.film.range_um();
-        let quadratures: Vec<_> = set
+        let quadratures: PerLed<_> = set
             .leds
             .iter()
             .map(|led| {
@@ -84,7 +84,7 @@ impl<'a> Bench<'a> {
             })
             .collect();
         let mut groups: Vec<Group> = Vec::new();
-        for (i, c) in set.captures.iter().enumerate() {
+        for (i, c) in set.captures.iter_enumerated() {
             let same = groups.iter_mut().find(|g| {
                 (g.element, g.led, g.aoi_rad, g.centre_um) == (c.element, c.led, c.aoi_rad, c.window_centre_um)
             });
@@ -143,9 +143,9 @@ impl<'a> Bench<'a> {
     }
 
     /// What the pixels of each capture see, before placement, flux and black level.
-    pub fn grids(&self, intensities: &[Vec<f32>], departure: &Departure) -> Vec<PixelGrid> {
+    pub fn grids(&self, intensities: &PerCapture<Vec<f32>>, departure: &Departure) -> Vec<PixelGrid> {
         let camera = &self.set.camera;
-        let work: Vec<(&Group, usize)> = {
+        let work: Vec<(&Group, CaptureIndex)> = {
             let mut work: Vec<_> = self
                 .groups
                 .iter()

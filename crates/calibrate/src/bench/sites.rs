@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use super::Bench;
 use crate::density;
 use crate::departure::Geometry;
+use crate::set::ElementIndex;
 
 /// Local biases that differ by less than this share a table entry [nm]; it is 3 mrad of phase.
 const BIAS_STEP_NM: f64 = 0.1;
@@ -39,7 +40,7 @@ impl Sites {
 
 impl Bench<'_> {
     /// Width added to the pillar at a site by bias and density [nm].
-    pub fn bias_nm(&self, element: usize, site: usize, geometry: &Geometry) -> f64 {
+    pub fn bias_nm(&self, element: ElementIndex, site: usize, geometry: &Geometry) -> f64 {
         let density = if geometry.cd_bias_density_nm == 0.0 {
             0.0
         } else {
@@ -49,7 +50,7 @@ impl Bench<'_> {
     }
 
     /// Which pillars of an element stand, and how wide.
-    pub(super) fn sites(&self, element: usize, geometry: &Geometry) -> Sites {
+    pub(super) fn sites(&self, element: ElementIndex, geometry: &Geometry) -> Sites {
         let measured = &self.set.elements[element];
         let lattice = measured.pillars.lattice;
         let n = lattice.sites();
@@ -97,7 +98,7 @@ impl Bench<'_> {
     }
 
     /// Area fraction around each site.
-    fn fill(&self, element: usize) -> &[f32] {
+    fn fill(&self, element: ElementIndex) -> &[f32] {
         self.fill[element].get_or_init(|| density::fill(&self.set.elements[element].pillars))
     }
 }

@@ -1,73 +1,72 @@
-//! How well a fit predicts captures that it has not seen.
+//! Cross-validation: how well a fit predicts captures that it has not seen.
 //!
 //! A colour, an element, a distance is left out in turn; the rest is fitted, and what was left out is
-//! predicted, with nothing but its own placement, flux and black level to adjust.
+//! predicted, with nothing but its own registration, flux and black level adjusted.
 
 use nalgebra::{DMatrix, DVector};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::fit::normal_equations::{held, minimise, sum};
-use crate::fit::problem::{Fit, Problem};
+use super::data::{Beam, Data};
+use super::normal_equations::{NormalEquations, covariance, hold, minimise};
+use super::problem::{Fit, Problem};
+use crate::set::{CaptureIndex, PerCapture};
 
-/// A number that the rest tells so much less of than the whole is not predicted from it.
-const BLIND: f64 = 1e-3;
+/// A parameter is not predicted from a training set that holds less than this share of the information on it.
+const UNINFORMED: f64 = 1e-3;
 
 /// Draws of a bootstrap; enough for the ends of a 95 % interval.
 const DRAWS: usize = 400;
 
-/// Chi-square a pixel of each capture when it was left out; none for captures that do not count, or that
-/// nothing could be learned about.
-pub type HeldOutErrors = Vec<Option<f64>>;
+/// Half of a 95 % interval in standard deviations, as it is rounded in reports.
+pub const SIGMAS_95: f64 = 2.0;
 
-/// Which captures belong together, in three ways.
-fn families(problem: &Problem<'_>) -> [Vec<usize>; 3] {
-    let captures = &problem.simulator.bench.set().captures;
-    let mut distances: Vec<f64> = captures.iter().map(|c| c.distance_um).collect();
+/// Seed of all draws: every run gives the same answer.
+pub const SEED: u64 = 0x6d65_7461;
+
+/// Reduced chi-square per pixel of each capture when it was left out; none for captures that do not count, or
+/// that nothing could be learned about.
+pub type HeldOutErrors = PerCapture<Option<f64>>;
+
+/// How much lower one error is than another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gain {
+    /// Mean difference of reduced chi-square per pixel; positive is better.
+    pub value: f64,
+    /// Ends of its 95 % confidence interval.
+    pub interval: [f64; 2],
+}
+
+/// Group number of each capture in the three ways in which captures are left out.
+fn partitions(data: &Data) -> [PerCapture<usize>; 3] {
+    let mut distances: Vec<f64> = data.beam.iter().map(|b| b.distance_um).collect();
     distances.sort_by(f64::total_cmp);
     distances.dedup();
-    let distance = |d: f64| distances.iter().position(|x| *x == d).unwrap_or(0);
+    let distance = |b: &Beam| distances.iter().position(|d| *d == b.distance_um).unwrap_or(0);
     [
-        captures.iter().map(|c| c.led).collect(),
-        captures.iter().map(|c| c.element).collect(),
-        captures.iter().map(|c| distance(c.distance_um)).collect(),
+        data.beam.iter().map(|b| b.led.into()).collect(),
+        data.beam.iter().map(|b| b.element.into()).collect(),
+        data.beam.iter().map(distance).collect(),
     ]
 }
 
-/// The error on captures left out, of a fit or of anything that has its forms.
-pub fn held_out(problem: &Problem<'_>, forms: &[DMatrix<f64>], fit: &Fit) -> HeldOutErrors {
-    let shared = problem.shared();
-    let size = forms[0].nrows();
-    let mut sums = vec![(0.0, 0u32); problem.used.len()];
-    let whole = problem.total(forms, &fit.nuisances);
-    for family in families(problem) {
-        let groups = family.iter().max().map_or(0, |m| m + 1);
+/// The error on captures left out, of a fit or of anything that has normal equations about it.
+pub fn held_out(problem: &Problem<'_>, equations: &NormalEquations, fit: &Fit) -> HeldOutErrors {
+    let mut sums: PerCapture<(f64, u32)> = vec![(0.0, 0); problem.used.len()].into();
+    let whole = problem.total(equations, &fit.nuisances);
+    for partition in partitions(problem.data) {
+        let groups = partition.iter().max().map_or(0, |m| m + 1);
         if groups < 2 {
             continue;
         }
         for group in 0..groups {
-            let out = |c: usize| problem.used[c] && family[c] == group;
-            let left: Vec<usize> = (0..problem.used.len()).filter(|&c| out(c)).collect();
-            if left.is_empty() {
+            let out = |c: &CaptureIndex| problem.used[*c] && partition[*c] == group;
+            let left: Vec<CaptureIndex> = problem.data.captures().filter(out).collect();
+            let Some(at) = predicted(problem, equations, fit, &whole, &left) else {
                 continue;
-            }
-            let test = sum(left.iter().map(|&c| &forms[c]), size) + problem.prior(&fit.nuisances, size);
-            let train = &whole - sum(left.iter().map(|&c| &forms[c]), size);
-            if (shared..size - 1).any(|k| train[(k, k)] < BLIND * whole[(k, k)]) {
-                continue;
-            }
-            let at = within_range(problem, fit, &train);
-            let (own, _) = minimise(&held(&test, &at), &(0..shared).collect::<Vec<_>>());
-            let mut full = DVector::zeros(size);
-            full[size - 1] = 1.0;
-            for k in 0..shared {
-                full[k] = -own[k];
-            }
-            for (k, v) in at {
-                full[k] = -v;
-            }
+            };
             for &c in &left {
-                let chi2 = (&forms[c] * &full).dot(&full);
+                let chi2 = (&equations.captures[c] * &at).dot(&at);
                 sums[c].0 += chi2 / problem.data.pixels(c).max(1) as f64;
                 sums[c].1 += 1;
             }
@@ -78,20 +77,52 @@ pub fn held_out(problem: &Problem<'_>, forms: &[DMatrix<f64>], fit: &Fit) -> Hel
         .collect()
 }
 
-/// Where the rest puts each number, as steps from the fit, none beyond what physics allows.
-fn within_range(problem: &Problem<'_>, fit: &Fit, train: &DMatrix<f64>) -> Vec<(usize, f64)> {
+/// The coefficients of all columns that predict the captures in `left` from all others; one for the residual.
+/// None if there is nothing to predict, or not enough to predict it from.
+fn predicted(
+    problem: &Problem<'_>,
+    equations: &NormalEquations,
+    fit: &Fit,
+    whole: &DMatrix<f64>,
+    left: &[CaptureIndex],
+) -> Option<DVector<f64>> {
+    if left.is_empty() {
+        return None;
+    }
+    let (shared, size) = (problem.shared(), equations.size());
+    let own = equations.sum_of(left);
+    let test = &own + fit.nuisances.prior(problem.data, size);
+    let train = whole - own;
+    if (shared..size - 1).any(|k| train[(k, k)] < UNINFORMED * whole[(k, k)]) {
+        return None;
+    }
+    let at = trained(problem, fit, &train);
+    let (nuisances, _) = minimise(&hold(&test, &at), &(0..shared).collect::<Vec<_>>());
+    let mut all = DVector::zeros(size);
+    all[size - 1] = 1.0;
+    for k in 0..shared {
+        all[k] = -nuisances[k];
+    }
+    for (k, v) in at {
+        all[k] = -v;
+    }
+    Some(all)
+}
+
+/// The parameters that the training data ask for, as steps from the fit, none beyond what physics allows.
+fn trained(problem: &Problem<'_>, fit: &Fit, train: &DMatrix<f64>) -> Vec<(usize, f64)> {
     let shared = problem.shared();
     let count = train.nrows() - 1;
     let mut at: Vec<(usize, f64)> = Vec::new();
     loop {
         let free: Vec<usize> = (0..count).filter(|k| !at.iter().any(|(h, _)| h == k)).collect();
-        let (step, _) = minimise(&held(train, &at), &free);
+        let (step, _) = minimise(&hold(train, &at), &free);
         let mut more: Vec<(usize, f64)> = Vec::new();
         for (&k, &step) in free.iter().zip(step.iter()).filter(|(k, _)| **k >= shared) {
             let Some(&slot) = fit.active.get(k - shared) else {
                 continue;
             };
-            let (low, high) = problem.simulator.slots[slot].parameter.range;
+            let (low, high) = problem.model.slots()[slot].parameter.range;
             let wanted = fit.theta[slot] + step;
             if !(low..=high).contains(&wanted) {
                 more.push((k, wanted.clamp(low, high) - fit.theta[slot]));
@@ -108,16 +139,15 @@ fn within_range(problem: &Problem<'_>, fit: &Fit, train: &DMatrix<f64>) -> Vec<(
 }
 
 /// Mean over captures.
-pub fn mean(held_out: &HeldOutErrors) -> f64 {
-    let known: Vec<f64> = held_out.iter().flatten().copied().collect();
+pub fn mean_error(errors: &HeldOutErrors) -> f64 {
+    let known: Vec<f64> = errors.iter().flatten().copied().collect();
     known.iter().sum::<f64>() / known.len().max(1) as f64
 }
 
-/// How much lower one error is than another, with a 95 % interval over captures that share element,
-/// direction and colour: pixels are no independent witnesses, nor are distances of one beam.
-pub fn gain(problem: &Problem<'_>, before: &HeldOutErrors, after: &HeldOutErrors) -> (f64, [f64; 2]) {
-    let groups = groups(problem);
-    let differences: Vec<(f64, f64)> = groups
+/// How much lower the error `after` is than that `before`, with a 95 % interval by a bootstrap over captures
+/// that share element, direction and colour: pixels are not independent, nor are distances of one beam.
+pub fn gain(problem: &Problem<'_>, before: &HeldOutErrors, after: &HeldOutErrors) -> Gain {
+    let differences: Vec<(f64, f64)> = beam_groups(problem)
         .iter()
         .map(|g| {
             let own: Vec<f64> = g.iter().filter_map(|&c| Some(before[c]? - after[c]?)).collect();
@@ -129,27 +159,30 @@ pub fn gain(problem: &Problem<'_>, before: &HeldOutErrors, after: &HeldOutErrors
         let (sum, n) = picked.fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
         if n > 0.0 { sum / n } else { 0.0 }
     };
-    let value = mean(&mut differences.iter().copied());
     if differences.is_empty() {
-        return (0.0, [0.0, 0.0]);
+        return Gain {
+            value: 0.0,
+            interval: [0.0, 0.0],
+        };
     }
+    let value = mean(&mut differences.iter().copied());
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
     let mut draws: Vec<f64> = (0..DRAWS)
         .map(|_| mean(&mut (0..differences.len()).map(|_| differences[rng.random_range(0..differences.len())])))
         .collect();
-    (value, ends(&mut draws))
+    Gain {
+        value,
+        interval: ends_95(&mut draws),
+    }
 }
 
 /// The captures of each element, direction and colour that count.
-pub fn groups(problem: &Problem<'_>) -> Vec<Vec<usize>> {
-    let captures = &problem.simulator.bench.set().captures;
-    let mut groups: Vec<Vec<usize>> = Vec::new();
-    for (c, capture) in captures.iter().enumerate().filter(|(c, _)| problem.used[*c]) {
-        let same = |g: &&mut Vec<usize>| {
-            let o = &captures[g[0]];
-            (o.element, o.led, o.aoi_rad) == (capture.element, capture.led, capture.aoi_rad)
-        };
-        match groups.iter_mut().find(same) {
+pub fn beam_groups(problem: &Problem<'_>) -> Vec<Vec<CaptureIndex>> {
+    let beam = &problem.data.beam;
+    let mut groups: Vec<Vec<CaptureIndex>> = Vec::new();
+    for c in problem.data.captures().filter(|&c| problem.used[c]) {
+        let key = |c: CaptureIndex| (beam[c].element, beam[c].led, beam[c].aoi_rad);
+        match groups.iter_mut().find(|g| key(g[0]) == key(c)) {
             Some(group) => group.push(c),
             None => groups.push(vec![c]),
         }
@@ -157,18 +190,14 @@ pub fn groups(problem: &Problem<'_>) -> Vec<Vec<usize>> {
     groups
 }
 
-/// How far each number of a fit moves when groups of captures are drawn anew: 95 % half-widths, never less
-/// than what the noise alone gives.
+/// 95 % half-widths of the active parameters of a fit: by a bootstrap over groups of captures, and never less
+/// than the noise alone gives.
 pub fn half_widths(problem: &Problem<'_>, fit: &Fit) -> Vec<f64> {
     let shared = problem.shared();
-    let size = fit.forms[0].nrows();
-    let all: Vec<usize> = (0..size - 1).collect();
-    let groups = groups(problem);
-    let of_group: Vec<DMatrix<f64>> = groups
-        .iter()
-        .map(|g| sum(g.iter().map(|&c| &fit.forms[c]), size))
-        .collect();
-    let rest = problem.prior(&fit.nuisances, size) + &fit.forms[problem.used.len()];
+    let all: Vec<usize> = (0..fit.equations.size() - 1).collect();
+    let groups = beam_groups(problem);
+    let of_group: Vec<DMatrix<f64>> = groups.iter().map(|g| fit.equations.sum_of(g)).collect();
+    let rest = fit.nuisances.prior(problem.data, fit.equations.size()) + &fit.equations.widths;
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
     let mut draws: Vec<Vec<f64>> = vec![Vec::new(); fit.active.len()];
     for _ in 0..DRAWS {
@@ -181,25 +210,22 @@ pub fn half_widths(problem: &Problem<'_>, fit: &Fit) -> Vec<f64> {
             d.push(step[shared + k]);
         }
     }
-    let whole = problem.total(&fit.forms, &fit.nuisances);
-    let covariance = crate::fit::normal_equations::covariance(&whole, &all);
+    let whole = problem.total(&fit.equations, &fit.nuisances);
+    let covariance = covariance(&whole, &all);
     let excess = (fit.chi2 / problem.pixels()).max(1.0);
     draws
         .iter_mut()
         .enumerate()
         .map(|(k, d)| {
-            let [low, high] = ends(d);
-            let noise = 2.0 * (covariance[(shared + k, shared + k)] * excess).sqrt();
+            let [low, high] = ends_95(d);
+            let noise = SIGMAS_95 * (covariance[(shared + k, shared + k)] * excess).sqrt();
             (0.5 * (high - low)).max(low.abs()).max(high.abs()).max(noise)
         })
         .collect()
 }
 
-fn ends(draws: &mut [f64]) -> [f64; 2] {
+fn ends_95(draws: &mut [f64]) -> [f64; 2] {
     draws.sort_by(f64::total_cmp);
     let at = |share: f64| draws[((draws.len() - 1) as f64 * share).round() as usize];
     [at(0.025), at(0.975)]
 }
-
-/// Draws are the same in every run.
-pub const SEED: u64 = 0x6d65_7461;

@@ -1,11 +1,22 @@
 //! Least squares on captures: data, nuisances, the fit, and how far a fit can be trusted.
+//!
+//! Nothing here knows optics: predictions come from a [`ForwardModel`](crate::forward_model::ForwardModel)
+//! through a [`Surrogate`](crate::surrogate::Surrogate).
 
-pub mod capture_screening;
-pub mod cross_validation;
-pub mod defect_noise;
-pub mod free_terms;
-pub mod normal_equations;
-pub mod nuisances;
-pub mod null_test;
-pub mod problem;
-pub mod registration;
+mod capture_equations;
+mod cross_validation;
+mod data;
+mod normal_equations;
+mod nuisances;
+mod null_test;
+mod problem;
+mod registration;
+
+mod widths;
+
+pub use cross_validation::{Gain, HeldOutErrors, beam_groups, gain, half_widths, held_out, mean_error};
+pub use data::Data;
+pub use normal_equations::{covariance, minimise};
+pub use nuisances::Nuisances;
+pub use null_test::null_gain;
+pub use problem::{Fit, Problem};

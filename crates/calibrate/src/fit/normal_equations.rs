@@ -1,17 +1,62 @@
-//! Chi-square as a quadratic form, summed over captures.
+//! Normal equations of linear least squares: chi-square as a quadratic form, summed over captures.
 //!
-//! A form over parameters p is kept as the products of whitened columns and of the residual r, which stands
-//! last: chi2(p) = r r - 2 p . (C r) + p (C C) p.
+//! With whitened columns C and residual r, a form is the matrix of inner products of [C r]; the residual stands
+//! last: chi2(p) = r.r - 2 p.(C'r) + p.(C'C)p. Forms of independent data add.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Sum of some of the forms.
-pub fn sum<'a>(forms: impl IntoIterator<Item = &'a DMatrix<f64>>, size: usize) -> DMatrix<f64> {
+use crate::set::PerCapture;
+
+/// The forms of all data over the same columns: flux of each LED, black level, further parameters, residual.
+#[derive(Clone)]
+pub struct NormalEquations {
+    /// Of each capture, registration eliminated.
+    pub captures: PerCapture<DMatrix<f64>>,
+    /// Of the widths by SEM, their common offset eliminated.
+    pub widths: DMatrix<f64>,
+}
+
+impl NormalEquations {
+    /// Rows of a form: the number of columns and one for the residual.
+    pub fn size(&self) -> usize {
+        self.widths.nrows()
+    }
+
+    /// Sum over the captures in `used` and the widths.
+    pub fn sum(&self, used: &PerCapture<bool>) -> DMatrix<f64> {
+        let counted = self.captures.iter().zip(used).filter(|(_, used)| **used);
+        sum(counted.map(|(f, _)| f).chain([&self.widths]), self.size())
+    }
+
+    /// Sum over some captures.
+    pub fn sum_of<'a, I>(&self, captures: I) -> DMatrix<f64>
+    where
+        I: IntoIterator<Item = &'a crate::set::CaptureIndex>,
+    {
+        sum(captures.into_iter().map(|c| &self.captures[*c]), self.size())
+    }
+
+    /// The forms over other columns: each new column is a combination of old ones, the columns of `mix`.
+    pub fn mixed(&self, mix: &DMatrix<f64>) -> Self {
+        let mixed = |f: &DMatrix<f64>| mix.transpose() * f * mix;
+        Self {
+            captures: self.captures.iter().map(mixed).collect(),
+            widths: mixed(&self.widths),
+        }
+    }
+
+    /// Chi-square of the widths at the present parameters.
+    pub fn widths_chi2(&self) -> f64 {
+        let last = self.size() - 1;
+        self.widths[(last, last)]
+    }
+}
+
+fn sum<'a>(forms: impl IntoIterator<Item = &'a DMatrix<f64>>, size: usize) -> DMatrix<f64> {
     forms.into_iter().fold(DMatrix::zeros(size, size), |sum, f| sum + f)
 }
 
-/// The minimum over the parameters in `free`, all others zero: their values, in that order, and chi-square
-/// there.
+/// The minimum over the parameters in `free`, all others zero: their values in that order, and chi-square there.
 pub fn minimise(form: &DMatrix<f64>, free: &[usize]) -> (DVector<f64>, f64) {
     let last = form.nrows() - 1;
     let n = free.len();
@@ -22,8 +67,8 @@ pub fn minimise(form: &DMatrix<f64>, free: &[usize]) -> (DVector<f64>, f64) {
     (x, chi2)
 }
 
-/// The form with some parameters held at values: their columns move into the residual.
-pub fn held(form: &DMatrix<f64>, at: &[(usize, f64)]) -> DMatrix<f64> {
+/// The form with some parameters held at given values: their columns move into the residual.
+pub fn hold(form: &DMatrix<f64>, at: &[(usize, f64)]) -> DMatrix<f64> {
     let last = form.nrows() - 1;
     let mut move_by = DVector::zeros(form.nrows());
     move_by[last] = 1.0;
@@ -41,7 +86,7 @@ pub fn held(form: &DMatrix<f64>, at: &[(usize, f64)]) -> DMatrix<f64> {
     out
 }
 
-/// Inverse of the products of the parameters in `free`: their covariance where the noise is as stated.
+/// Covariance of the parameters in `free` where the noise is as stated: the inverse of their inner products.
 pub fn covariance(form: &DMatrix<f64>, free: &[usize]) -> DMatrix<f64> {
     let n = free.len();
     let a = DMatrix::from_fn(n, n, |i, j| form[(free[i], free[j])]);
@@ -53,7 +98,11 @@ pub fn covariance(form: &DMatrix<f64>, free: &[usize]) -> DMatrix<f64> {
     out
 }
 
-/// Solves by Cholesky with columns brought to one size; what is singular is held by a trace of ridge.
+/// Ridge that keeps a singular system solvable, relative to columns of norm one; far below any precision of the
+/// data.
+const RIDGE: f64 = 1e-12;
+
+/// Cholesky decomposition with columns normalised; a ridge is added, and raised while the system is singular.
 fn solve(mut a: DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
     let n = b.len();
     let size: Vec<f64> = (0..n).map(|i| a[(i, i)].max(f64::MIN_POSITIVE).sqrt()).collect();
@@ -63,7 +112,7 @@ fn solve(mut a: DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
         }
     }
     let rhs = DVector::from_fn(n, |i, _| b[i] / size[i]);
-    let mut ridge = 1e-12;
+    let mut ridge = RIDGE;
     loop {
         let mut held = a.clone();
         for i in 0..n {
@@ -92,7 +141,7 @@ mod tests {
         let (x, chi2) = minimise(&form, &[0, 1]);
         assert!((x[0] - 2.0).abs() < 1e-9 && (x[1] - 3.0).abs() < 1e-9 && chi2.abs() < 1e-9);
         // With the slope held, the intercept is what is left.
-        let (x, chi2) = minimise(&held(&form, &[(1, 3.0)]), &[0]);
+        let (x, chi2) = minimise(&hold(&form, &[(1, 3.0)]), &[0]);
         assert!((x[0] - 2.0).abs() < 1e-9 && chi2.abs() < 1e-9);
     }
 }

@@ -1,81 +1,92 @@
-//! Smooth terms that stand for nothing: what a winner must beat.
+//! Null test: what random smooth terms, which stand for no effect, gain on captures left out.
 
 use nalgebra::DMatrix;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 
-use crate::fit::cross_validation::{HeldOutErrors, SEED, held_out, mean};
-use crate::fit::normal_equations::sum;
-use crate::fit::nuisances::CaptureEquations;
-use crate::fit::problem::{Fit, Problem};
+use super::capture_equations::CaptureEquations;
+use super::cross_validation::{HeldOutErrors, SEED, held_out, mean_error};
+use super::normal_equations::NormalEquations;
+use super::problem::{Fit, Problem};
+use crate::forward_model::PATH_TERMS;
 use crate::optics::PixelGrid;
-use crate::surrogate::FREE_PHASES;
+use crate::set::CaptureIndex;
 
-/// Random smooth terms that stand against a winner.
-const PLACEBOS: usize = 60;
+/// Random smooth terms that an effect is compared with.
+const DRAWS: usize = 60;
 
-/// The forms of further columns, after the numbers that are active; `more` has them for a capture and what it
-/// should show.
-pub fn forms_with(
-    problem: &Problem<'_>,
-    now: &Fit,
-    more: impl Fn(usize, &PixelGrid) -> Vec<PixelGrid> + Sync,
-) -> Vec<DMatrix<f64>> {
-    let mut forms: Vec<DMatrix<f64>> = (0..problem.data.signal.len())
-        .into_par_iter()
-        .map(|c| {
-            let grid = problem.grid(&now.theta, c);
-            let active = now.active.iter().map(|&s| problem.atlas.slope(&now.theta, s, c));
-            let columns: Vec<_> = active.chain(more(c, &grid)).collect();
-            CaptureEquations::new(problem.data, c, &now.nuisances, &grid, &columns).reduced()
-        })
-        .collect();
-    let size = forms[0].nrows();
-    // The SEM says nothing of free terms: their rows stay empty.
-    let sem = problem.sem_form(&now.active, &now.theta);
-    let mut wide = DMatrix::zeros(size, size);
-    let inner = sem.nrows() - 1;
-    let place = |i: usize| if i == inner { size - 1 } else { i };
-    for i in 0..=inner {
-        for j in 0..=inner {
-            wide[(place(i), place(j))] = sem[(i, j)];
+/// An effect must gain more than this percentage of them.
+const PERCENTILE: usize = 95;
+
+impl Problem<'_> {
+    /// Normal equations with further columns after those of the active parameters; `more` gives the changes for
+    /// a unit of each in a capture, from its predicted image.
+    pub fn equations_with(
+        &self,
+        now: &Fit,
+        more: impl Fn(CaptureIndex, &PixelGrid) -> Vec<PixelGrid> + Sync + Send,
+    ) -> NormalEquations {
+        let captures = self.data.for_captures(|c| {
+            let image = self.image(&now.theta, c);
+            let active = now.active.iter().map(|&s| self.surrogate.slope(&now.theta, s, c));
+            let columns: Vec<_> = active.chain(more(c, &image)).collect();
+            CaptureEquations::new(self.data, c, &now.nuisances, &image, &columns).reduced()
+        });
+        let size = captures.first().map_or(0, DMatrix::nrows);
+        // Widths do not depend on the further columns: their rows stay empty.
+        let own = self.width_form(&now.active, &now.theta);
+        let mut widths = DMatrix::zeros(size, size);
+        let last = own.nrows() - 1;
+        let place = |i: usize| if i == last { size - 1 } else { i };
+        for i in 0..=last {
+            for j in 0..=last {
+                widths[(place(i), place(j))] = own[(i, j)];
+            }
         }
+        NormalEquations { captures, widths }
     }
-    forms.push(wide);
-    forms
 }
 
-/// What random smooth terms gain on captures left out: what 95 % of them stay below.
-pub fn null_gain(problem: &Problem<'_>, now: &Fit, held_now: &HeldOutErrors, numbers: usize) -> f64 {
-    if problem.atlas.free.len() < FREE_PHASES {
+/// The gain on captures left out that 95 % of random smooth terms with so many parameters stay below; zero if
+/// no smooth terms were simulated.
+pub fn null_gain(problem: &Problem<'_>, now: &Fit, errors_now: &HeldOutErrors, parameters: usize) -> f64 {
+    let mut gains = null_gains(problem, now, errors_now, parameters);
+    if gains.is_empty() {
         return 0.0;
     }
-    let forms = forms_with(problem, now, |c, grid| {
-        (0..FREE_PHASES).map(|t| problem.atlas.free_term(t, c, grid)).collect()
+    gains.sort_by(f64::total_cmp);
+    gains[(gains.len() - 1) * PERCENTILE / 100].max(0.0)
+}
+
+/// The gain of each random term.
+pub(super) fn null_gains(problem: &Problem<'_>, now: &Fit, errors_now: &HeldOutErrors, parameters: usize) -> Vec<f64> {
+    if !problem.surrogate.has_paths() {
+        return Vec::new();
+    }
+    let wide = problem.equations_with(now, |c, image| {
+        let terms = 0..PATH_TERMS;
+        terms.map(|t| problem.surrogate.smooth_term(t, c, image)).collect()
     });
-    let size = forms[0].nrows();
-    let first = size - 1 - FREE_PHASES;
-    let total = sum(&forms[..problem.used.len()], size);
+    let size = wide.size();
+    let first = size - 1 - PATH_TERMS;
+    let all: Vec<CaptureIndex> = problem.data.captures().collect();
+    let total = wide.sum_of(&all);
+    let kept = first + parameters + 1;
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
-    let mut gains: Vec<f64> = (0..PLACEBOS)
+    (0..DRAWS)
         .map(|_| {
-            let kept = first + numbers + 1;
             let mut mix = DMatrix::zeros(size, kept);
             for i in 0..first {
                 mix[(i, i)] = 1.0;
             }
             mix[(size - 1, kept - 1)] = 1.0;
-            for k in 0..numbers {
-                for t in 0..FREE_PHASES {
+            for k in 0..parameters {
+                for t in 0..PATH_TERMS {
                     let scale = total[(first + t, first + t)].max(f64::MIN_POSITIVE).sqrt();
                     mix[(first + t, first + k)] = rng.random_range(-1.0..1.0) / scale;
                 }
             }
-            let mixed: Vec<DMatrix<f64>> = forms.iter().map(|f| mix.transpose() * f * &mix).collect();
-            mean(held_now) - mean(&held_out(problem, &mixed, now))
+            mean_error(errors_now) - mean_error(&held_out(problem, &wide.mixed(&mix), now))
         })
-        .collect();
-    gains.sort_by(f64::total_cmp);
-    gains[(gains.len() - 1) * 95 / 100].max(0.0)
+        .collect()
 }

@@ -1,137 +1,148 @@
-//! Levenberg and Marquardt over any of the numbers, with the nuisances alongside.
+//! Nonlinear least squares (Levenberg-Marquardt) over any of the parameters, with the nuisances alongside.
 
-use nalgebra::DMatrix;
-use rayon::prelude::*;
+use metalith_core::{Progress, Result};
+use nalgebra::{DMatrix, DVector};
 
-use crate::fit::normal_equations::{held, minimise, sum};
-use crate::fit::nuisances::{BLACK_SIGMA_DN, CaptureEquations, Data, Nuisances};
-use crate::fit::registration::whole_pixel_shift;
+use super::capture_equations::CaptureEquations;
+use super::data::Data;
+use super::normal_equations::{NormalEquations, hold, minimise};
+use super::nuisances::Nuisances;
+use super::registration::whole_pixel_shift;
+use crate::forward_model::{ForwardModel, Point};
 use crate::optics::PixelGrid;
-use crate::simulator::Simulator;
+use crate::set::{CaptureIndex, PerCapture};
 use crate::surrogate::Surrogate;
 
 /// Most steps of a fit.
 const STEPS: usize = 12;
 
-/// A fit has come to rest when chi-square falls by less than this share.
-const AT_REST: f64 = 1e-5;
+/// A fit has converged when a step lowers chi-square by less than this share.
+const CONVERGED: f64 = 1e-5;
 
-/// Everything that a fit needs to know of a set.
+/// Damping at the start, relative to the diagonal of the normal equations; its factors after a good and after
+/// a bad step; its bounds.
+const DAMPING: f64 = 1e-4;
+const EASE: f64 = 0.2;
+const STIFFEN: f64 = 20.0;
+const LEAST_DAMPING: f64 = 1e-9;
+const LEAST_AFTER_FAILURE: f64 = 1e-2;
+const MOST_DAMPING: f64 = 1e6;
+
+/// A set of captures with a model of them.
 #[derive(Clone)]
 pub struct Problem<'a> {
-    pub simulator: &'a Simulator<'a>,
-    pub atlas: Surrogate,
+    pub model: &'a dyn ForwardModel,
+    pub surrogate: Surrogate,
     pub data: &'a Data,
-    /// Captures that count.
-    pub used: Vec<bool>,
-    /// What the exact simulation adds to the atlas, for each capture; none where the atlas stands alone.
-    pub exact: Option<Vec<PixelGrid>>,
+    /// Whether each capture counts.
+    pub used: PerCapture<bool>,
+    /// What a full simulation adds to the surrogate; none where the surrogate is used alone.
+    pub correction: Option<PerCapture<PixelGrid>>,
 }
 
-/// Where a fit came to rest.
+/// A fit of some parameters.
 #[derive(Clone)]
 pub struct Fit {
-    /// Numbers that were free.
+    /// Slots of the parameters that were free.
     pub active: Vec<usize>,
-    /// All numbers.
+    /// All parameters, by slot.
     pub theta: Vec<f64>,
     pub nuisances: Nuisances,
-    /// Of each capture, from which its placement follows.
-    blocks: Vec<CaptureEquations>,
-    /// Forms of each capture, and of the SEM last, over flux, black and the active numbers, at rest.
-    pub forms: Vec<DMatrix<f64>>,
-    /// Chi-square of all that counts, priors included.
+    /// Of each capture, from which its registration follows.
+    captures: PerCapture<CaptureEquations>,
+    /// Over flux, black level and the active parameters, at the fit.
+    pub equations: NormalEquations,
+    /// Chi-square of all data that count, priors included.
     pub chi2: f64,
 }
 
 impl Fit {
-    /// Which of the active numbers is that of a slot.
-    pub fn place(&self, slot: usize) -> Option<usize> {
+    /// Position of a slot among the active ones.
+    pub fn position(&self, slot: usize) -> Option<usize> {
         self.active.iter().position(|s| *s == slot)
     }
 
-    /// Of `values`, one for each active number, those of some slots.
+    /// Of `values`, one for each active parameter, those of some slots.
     pub fn pick(&self, slots: &[usize], values: &[f64]) -> Vec<f64> {
-        let places = slots.iter().filter_map(|&s| self.place(s));
+        let places = slots.iter().filter_map(|&s| self.position(s));
         places.map(|k| values[k]).collect()
     }
 }
 
+impl<'a> Problem<'a> {
+    /// All captures count, and the surrogate is used alone.
+    pub fn new(model: &'a dyn ForwardModel, surrogate: Surrogate, data: &'a Data) -> Self {
+        Self {
+            model,
+            surrogate,
+            data,
+            used: vec![true; data.signal.len()].into(),
+            correction: None,
+        }
+    }
+}
+
 impl Problem<'_> {
-    /// Number of shared nuisances.
+    /// Number of shared nuisances: flux of each LED, and black level.
     pub fn shared(&self) -> usize {
         self.data.leds + 1
     }
 
     /// A fit of the nuisances alone.
-    pub fn nothing(&self) -> Fit {
-        let theta = self.atlas.about.clone();
-        let grids: Vec<_> = (0..self.data.signal.len())
-            .into_par_iter()
-            .map(|c| self.grid(&theta, c))
-            .collect();
+    pub fn nuisance_fit(&self) -> Fit {
+        let theta = self.surrogate.about.clone();
+        let images = self.data.for_captures(|c| self.image(&theta, c));
         let mut nuisances = Nuisances::stated(self.data);
-        let pixel_um = self.simulator.bench.set().camera.pixel_um;
-        nuisances.shift_um = grids
-            .par_iter()
-            .zip(&self.data.signal)
-            .map(|(grid, seen)| whole_pixel_shift(seen, &grid.pixels([0.0; 2])).map(|pixels| pixels * pixel_um))
-            .collect();
-        let nuisances = nuisances.fit(self.data, &grids, &self.used);
+        nuisances.shift_um = self.data.for_captures(|c| {
+            let shift = whole_pixel_shift(&self.data.signal[c], &images[c].pixels([0.0; 2]));
+            shift.map(|pixels| pixels * self.data.pixel_um)
+        });
+        let nuisances = nuisances.fit(self.data, &images, &self.used);
         self.at(&[], theta, nuisances)
     }
 
-    /// The forms at given numbers.
+    /// The normal equations at given parameters.
     pub fn at(&self, active: &[usize], theta: Vec<f64>, nuisances: Nuisances) -> Fit {
-        let blocks: Vec<CaptureEquations> = (0..self.data.signal.len())
-            .into_par_iter()
-            .map(|c| self.block(active, &theta, &nuisances, c))
-            .collect();
-        let mut forms: Vec<_> = blocks.iter().map(CaptureEquations::reduced).collect();
-        forms.push(self.sem_form(active, &theta));
+        let captures = self.data.for_captures(|c| {
+            let image = self.image(&theta, c);
+            let slopes: Vec<_> = active.iter().map(|&s| self.surrogate.slope(&theta, s, c)).collect();
+            CaptureEquations::new(self.data, c, &nuisances, &image, &slopes)
+        });
+        let equations = NormalEquations {
+            captures: captures.iter().map(CaptureEquations::reduced).collect(),
+            widths: self.width_form(active, &theta),
+        };
         let free: Vec<usize> = (0..self.shared()).collect();
-        let (_, chi2) = minimise(&self.total(&forms, &nuisances), &free);
+        let (_, chi2) = minimise(&self.total(&equations, &nuisances), &free);
         Fit {
             active: active.to_vec(),
             theta,
             nuisances,
-            blocks,
-            forms,
+            captures,
+            equations,
             chi2,
         }
     }
 
-    /// Fit some numbers, starting from where another fit rests.
+    /// Fit the parameters in `active`, starting from another fit.
     pub fn fit(&self, active: &[usize], from: &Fit) -> Fit {
         let mut now = self.at(active, from.theta.clone(), from.nuisances.clone());
-        let (mut damping, shared) = (1e-4, self.shared());
-        let free: Vec<usize> = (0..shared + active.len()).collect();
+        let mut damping = DAMPING;
         for _ in 0..STEPS {
-            let mut form = self.total(&now.forms, &now.nuisances);
-            let size = form.nrows();
-            for k in shared..size - 1 {
-                form[(k, k)] *= 1.0 + damping;
-            }
-            let (step, _) = minimise(&form, &free);
-            let mut theta = now.theta.clone();
-            for (i, &slot) in active.iter().enumerate() {
-                let (low, high) = self.atlas.reach(slot);
-                let range = self.simulator.slots[slot].parameter.range;
-                theta[slot] = (theta[slot] + step[shared + i]).clamp(low.max(range.0), high.min(range.1));
-            }
+            let theta = self.damped_step(&now, damping);
             let moved: Vec<f64> = active.iter().map(|&s| theta[s] - now.theta[s]).collect();
             let nuisances = self.follow(&now, &moved);
             let next = self.at(active, theta, nuisances);
             if next.chi2 < now.chi2 {
                 let gain = now.chi2 - next.chi2;
                 now = next;
-                damping = (damping * 0.2).max(1e-9);
-                if gain < AT_REST * now.chi2 {
+                damping = (damping * EASE).max(LEAST_DAMPING);
+                if gain < CONVERGED * now.chi2 {
                     break;
                 }
             } else {
-                damping = (damping * 20.0).max(1e-2);
-                if damping > 1e6 {
+                damping = (damping * STIFFEN).max(LEAST_AFTER_FAILURE);
+                if damping > MOST_DAMPING {
                     break;
                 }
             }
@@ -139,130 +150,72 @@ impl Problem<'_> {
         now
     }
 
-    /// Nuisances after the numbers have moved: shared ones refitted for that move, placement after them.
+    /// All parameters after one damped step, within the search range and what physics allows.
+    fn damped_step(&self, now: &Fit, damping: f64) -> Vec<f64> {
+        let mut form = self.total(&now.equations, &now.nuisances);
+        let (size, shared) = (form.nrows(), self.shared());
+        for k in shared..size - 1 {
+            form[(k, k)] *= 1.0 + damping;
+        }
+        let free: Vec<usize> = (0..size - 1).collect();
+        let (step, _) = minimise(&form, &free);
+        let mut theta = now.theta.clone();
+        for (i, &slot) in now.active.iter().enumerate() {
+            let (low, high) = self.surrogate.search_range(slot);
+            let range = self.model.slots()[slot].parameter.range;
+            theta[slot] = (theta[slot] + step[shared + i]).clamp(low.max(range.0), high.min(range.1));
+        }
+        theta
+    }
+
+    /// Nuisances after the parameters have moved: shared ones refitted for this move, then registration.
     fn follow(&self, now: &Fit, moved: &[f64]) -> Nuisances {
         let shared = self.shared();
         let at: Vec<(usize, f64)> = moved.iter().enumerate().map(|(i, m)| (shared + i, *m)).collect();
-        let form = held(&self.total(&now.forms, &now.nuisances), &at);
+        let form = hold(&self.total(&now.equations, &now.nuisances), &at);
         let (step, _) = minimise(&form, &(0..shared).collect::<Vec<_>>());
+        let all = step.iter().copied().chain(moved.iter().copied());
+        let all = DVector::from_iterator(shared + moved.len(), all);
         let mut out = now.nuisances.clone();
-        let all =
-            nalgebra::DVector::from_iterator(shared + moved.len(), step.iter().copied().chain(moved.iter().copied()));
-        let most = 2.0 * self.data.registration_um;
-        for (to, block) in out.shift_um.iter_mut().zip(&now.blocks) {
-            let by = block.placement(&all);
-            for axis in [0, 1] {
-                to[axis] += by[axis].clamp(-most, most);
-            }
-        }
-        for l in 0..self.data.leds {
-            out.flux[l] += step[l];
-        }
-        out.black_dn += step[self.data.leds];
+        out.advance(self.data, &now.captures, &all);
         out
     }
 
-    /// What a capture should show.
-    pub fn grid(&self, theta: &[f64], capture: usize) -> PixelGrid {
-        let grid = self.atlas.grid(theta, capture);
-        match &self.exact {
-            None => grid,
-            Some(exact) => PixelGrid::combine(&[(&grid, 1.0), (&exact[capture], 1.0)]),
+    /// Predicted image of a capture.
+    pub fn image(&self, theta: &[f64], capture: CaptureIndex) -> PixelGrid {
+        let image = self.surrogate.image(theta, capture);
+        match &self.correction {
+            None => image,
+            Some(correction) => PixelGrid::combine(&[(&image, 1.0), (&correction[capture], 1.0)]),
         }
     }
 
-    fn block(&self, active: &[usize], theta: &[f64], nuisances: &Nuisances, c: usize) -> CaptureEquations {
-        let grid = self.grid(theta, c);
-        let more: Vec<_> = active.iter().map(|&s| self.atlas.slope(theta, s, c)).collect();
-        CaptureEquations::new(self.data, c, nuisances, &grid, &more)
+    /// Images of all captures by the surrogate alone.
+    pub fn surrogate_images(&self, theta: &[f64]) -> PerCapture<PixelGrid> {
+        self.data.captures().map(|c| self.surrogate.image(theta, c)).collect()
     }
 
-    /// The SEM's widths as a form, their common offset fitted away.
-    pub fn sem_form(&self, active: &[usize], theta: &[f64]) -> DMatrix<f64> {
-        let set = self.simulator.bench.set();
-        let shared = self.shared();
-        let size = shared + active.len() + 1;
-        if set.sem.is_empty() {
-            return DMatrix::zeros(size, size);
-        }
-        let geometry = self.simulator.departure(theta).geometry;
-        // Widths are linear in what moves them: a unit of each number on top.
-        let ahead: Vec<_> = active
-            .iter()
-            .map(|&s| {
-                let mut more = theta.to_vec();
-                more[s] += 1.0;
-                self.simulator.departure(&more).geometry
-            })
-            .collect();
-        let mut gram = DMatrix::<f64>::zeros(active.len() + 2, active.len() + 2);
-        for site in &set.sem {
-            let Some(element) = set.elements.iter().position(|e| e.index == site.element) else {
-                continue;
-            };
-            let lattice = set.elements[element].pillars.lattice;
-            let index = |x_um: f64| (x_um / lattice.pitch_um() + 0.5 * (lattice.sites() as f64 - 1.0)).round();
-            let (ix, iy) = (index(site.at_um[0]), index(site.at_um[1]));
-            let inside = 0.0..lattice.sites() as f64;
-            if !inside.contains(&ix) || !inside.contains(&iy) {
-                continue;
-            }
-            let at = iy as usize * lattice.sites() + ix as usize;
-            let bias = self.simulator.bench.bias_nm(element, at, &geometry);
-            let mut row = vec![1.0 / site.sigma_nm];
-            row.extend(
-                ahead
-                    .iter()
-                    .map(|g| (self.simulator.bench.bias_nm(element, at, g) - bias) / site.sigma_nm),
-            );
-            row.push((site.measured_nm - site.designed_nm - bias) / site.sigma_nm);
-            for (i, a) in row.iter().enumerate() {
-                for (j, b) in row.iter().enumerate() {
-                    gram[(i, j)] += a * b;
-                }
-            }
-        }
-        gram[(0, 0)] += set.sem_offset_sigma_nm.powi(-2);
-        let n = active.len() + 1;
-        let cross = gram.view((0, 1), (1, n)).into_owned();
-        let inner = gram.view((1, 1), (n, n)) - cross.transpose() * &cross / gram[(0, 0)];
-        let mut form = DMatrix::zeros(size, size);
-        form.view_mut((shared, shared), (n, n)).copy_from(&inner);
-        form
+    /// Correct the surrogate by a full simulation at these parameters.
+    ///
+    /// # Errors
+    /// As [`ForwardModel::images`].
+    pub fn correct_at(&mut self, theta: &[f64], progress: &dyn Progress) -> Result<()> {
+        let simulated = self.model.images(&[Point::new(theta.to_vec())], progress)?.remove(0);
+        let interpolated = self.surrogate_images(theta);
+        let pairs = simulated.iter().zip(&interpolated);
+        let difference = pairs.map(|(s, i)| PixelGrid::combine(&[(s, 1.0), (i, -1.0)]));
+        self.correction = Some(difference.collect());
+        Ok(())
     }
 
-    /// What is known of flux and black beforehand, as a form about where they are now.
-    pub fn prior(&self, nuisances: &Nuisances, size: usize) -> DMatrix<f64> {
-        let mut form = DMatrix::zeros(size, size);
-        let last = size - 1;
-        let mut hold = |k: usize, off: f64, sigma: f64| {
-            let weight = sigma.powi(-2);
-            form[(k, k)] = weight;
-            form[(k, last)] = -off * weight;
-            form[(last, k)] = -off * weight;
-            form[(last, last)] += off * off * weight;
-        };
-        for (l, flux) in nuisances.flux.iter().enumerate() {
-            hold(l, flux - 1.0, self.data.flux_sigma);
-        }
-        hold(self.data.leds, nuisances.black_dn, BLACK_SIGMA_DN);
-        form
-    }
-
-    /// All that counts.
-    pub fn total(&self, forms: &[DMatrix<f64>], nuisances: &Nuisances) -> DMatrix<f64> {
-        let size = forms[0].nrows();
-        let counted = forms
-            .iter()
-            .enumerate()
-            .filter(|(c, _)| self.used.get(*c).copied().unwrap_or(true))
-            .map(|(_, f)| f);
-        sum(counted, size) + self.prior(nuisances, size)
+    /// Sum of all that counts, with the prior of the shared nuisances.
+    pub fn total(&self, equations: &NormalEquations, nuisances: &Nuisances) -> DMatrix<f64> {
+        equations.sum(&self.used) + nuisances.prior(self.data, equations.size())
     }
 
     /// Pixels of the captures that count.
     pub fn pixels(&self) -> f64 {
-        let counted = (0..self.used.len()).filter(|&c| self.used[c]);
+        let counted = self.data.captures().filter(|&c| self.used[c]);
         counted.map(|c| self.data.pixels(c) as f64).sum()
     }
 }

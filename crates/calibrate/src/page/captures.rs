@@ -1,30 +1,28 @@
-//! Captures beside their prediction and what is left between them; widths by SEM.
+//! Captures beside their predictions and residuals; widths by SEM.
 
 use ndarray::Array2;
 
-use crate::fit::cross_validation::{HeldOutErrors, groups};
-use crate::fit::nuisances::Data;
-use crate::search::attribution::Finding;
-use crate::session::Session;
-use crate::surrogate::Surrogate;
+use crate::fit::{HeldOutErrors, beam_groups};
+use crate::search::{Evidence, Finding};
+use crate::session::{Session, Simulations};
 use metalith_report::{Axis, Chart, ImageGrid, Page, fixed, sig};
 
-/// Colours of residuals reach so many standard deviations of the noise.
+/// Range of the colours of residuals [standard deviations of the noise].
 pub(super) const SIGMAS: f64 = 6.0;
 
-/// Every capture that counts: seen, predicted, and the residual before and after.
-pub(super) fn captures(page: &mut Page, session: &Session<'_>, atlas: &Surrogate, finding: &Finding) {
+/// Every capture that counts: measured, predicted, and the residual before and after.
+pub(super) fn captures(page: &mut Page, session: &Session<'_>, simulations: &Simulations, evidence: &Evidence) {
     page.section("Captures");
     page.paragraph(
-        "Each row: what the camera saw, what the model predicts, and the residual in standard deviations of the noise, before and after.",
+        "Each row: the camera, the model, and the residual in standard deviations of the noise, before and after.",
     );
     let set = session.set();
-    let problem = session.problem_of(finding);
-    let plain = session.problem(atlas);
-    // Before anything was found, nothing but the camera was noise.
-    let camera_alone = Data::new(set);
+    let (finding, data) = (&evidence.finding, &evidence.data);
+    let problem = evidence.problem(&session.simulator);
+    // Before anything was found, the camera was the only noise.
+    let plain = session.problem(simulations);
     let wide = |a: &Array2<f32>| a.mapv(f64::from);
-    for (place, group) in groups(&problem).iter().enumerate() {
+    for (place, group) in beam_groups(&problem).iter().enumerate() {
         let first = &set.captures[group[0]];
         let words = format!(
             "Element ({}, {}), {} nm, light at {} degrees",
@@ -47,26 +45,24 @@ pub(super) fn captures(page: &mut Page, session: &Session<'_>, atlas: &Surrogate
                 .side(180.0);
             for &c in group {
                 let name = format!("{} um", fixed(set.captures[c].distance_um, 0));
-                let factor = session.data.scale[c] * finding.after.nuisances.flux[session.data.led[c]];
+                let factor = data.scale[c] * finding.after.nuisances.flux[data.beam[c].led];
                 let model = problem
-                    .grid(&finding.after.theta, c)
+                    .image(&finding.after.theta, c)
                     .pixels(finding.after.nuisances.shift_um[c]);
-                seen.image(
-                    format!("camera, {name}"),
-                    wide(&session.data.signal[c]).mapv(|v| v.max(0.1)),
-                );
+                seen.image(format!("camera, {name}"), wide(&data.signal[c]).mapv(|v| v.max(0.1)));
                 seen.image(
                     format!("model, {name}"),
                     model.mapv(|v| (f64::from(v) * factor).max(0.1)),
                 );
-                let before = finding
-                    .before
-                    .nuisances
-                    .residual(&camera_alone, &plain.grid(&finding.before.theta, c), c);
+                let before =
+                    finding
+                        .before
+                        .nuisances
+                        .residual(&session.data, &plain.image(&finding.before.theta, c), c);
                 let after = finding
                     .after
                     .nuisances
-                    .residual(&session.data, &problem.grid(&finding.after.theta, c), c);
+                    .residual(data, &problem.image(&finding.after.theta, c), c);
                 let error = |h: &HeldOutErrors| h[c].map_or_else(String::new, |e| sig(e, 3));
                 left.image(
                     format!("before, {name}: {}", error(&finding.held_before)),
@@ -76,7 +72,7 @@ pub(super) fn captures(page: &mut Page, session: &Session<'_>, atlas: &Surrogate
             }
             page.row([
                 seen.caption("Camera and model on one logarithmic scale."),
-                left.caption("Residual; the number is chi-square a pixel when the capture was left out."),
+                left.caption("Residual; the number is the reduced chi-square per pixel when the capture was left out."),
             ]);
         };
         if place == 0 {
@@ -88,7 +84,7 @@ pub(super) fn captures(page: &mut Page, session: &Session<'_>, atlas: &Surrogate
     }
 }
 
-/// Widths by SEM against the bias that was found.
+/// Widths by SEM and the fitted bias.
 pub(super) fn widths(page: &mut Page, session: &Session<'_>, finding: &Finding) {
     let set = session.set();
     if set.sem.is_empty() {
@@ -104,7 +100,7 @@ pub(super) fn widths(page: &mut Page, session: &Session<'_>, finding: &Finding) 
     );
     let (low, high) = session.simulator.bench.widths_nm();
     chart.band(
-        "found, with the SEM's own offset",
+        "fitted bias, +- 2 sigma of the SEM offset",
         [low, high].map(|w| {
             (
                 w,
@@ -120,5 +116,5 @@ pub(super) fn widths(page: &mut Page, session: &Session<'_>, finding: &Finding) 
             own.map(|s| (s.designed_nm, s.measured_nm - s.designed_nm, s.sigma_nm)),
         );
     }
-    page.figure(chart.caption("Widths seen from above, one standard deviation each, against the bias that was found."));
+    page.figure(chart.caption("Widths by SEM with one standard deviation, and the fitted bias."));
 }

@@ -1,18 +1,17 @@
 //! The report of a session for people.
 
 mod captures;
-mod left;
+mod residual;
 
 use std::path::Path;
 
 use captures::{SIGMAS, captures, widths};
-use left::{confusable, free_term, nuisances};
 use ndarray::Array2;
+use residual::{confusable, nuisances, smooth_residual};
 
 use crate::diagnosis::{Diagnosis, Ranked, SetVerdict};
-use crate::search::attribution::Finding;
-use crate::session::Session;
-use crate::surrogate::Surrogate;
+use crate::search::Evidence;
+use crate::session::{Session, Simulations};
 use metalith_core::Result;
 use metalith_report::{Axis, Cell, Column, ImageGrid, Page, Ranking, Table, Verdict, fixed, sig};
 
@@ -23,9 +22,9 @@ use metalith_report::{Axis, Cell, Column, ImageGrid, Page, Ranking, Table, Verdi
 pub fn write_page(
     path: &Path,
     session: &Session<'_>,
-    atlas: &Surrogate,
+    simulations: &Simulations,
     diagnosis: &Diagnosis,
-    finding: Option<&Finding>,
+    evidence: Option<&Evidence>,
 ) -> Result<()> {
     let mut page = Page::new(
         format!("Calibration: {}", diagnosis.set),
@@ -42,33 +41,33 @@ pub fn write_page(
     );
     let error = &diagnosis.error;
     page.facts(&[
-        ("Before, held out", sig(error.before.held_out, 4)),
-        ("After, held out", sig(error.after.held_out, 4)),
+        ("Held out, before", sig(error.before.held_out, 4)),
+        ("Held out, after", sig(error.after.held_out, 4)),
         ("Noise floor", sig(error.noise_floor, 3)),
-        ("Placebo, held out", sig(error.placebo_held_out, 4)),
+        ("Held out, null test", sig(error.placebo_held_out, 4)),
         (
-            "Left unexplained",
+            "Unexplained",
             format!("{} %", fixed(100.0 * diagnosis.unexplained_share, 1)),
         ),
     ]);
     page.paragraph(
-        "Errors are chi-square a pixel: one is noise alone. Held out means predicted by a fit that has not seen the colour, the element or the distance of the capture; its placement, flux and black level alone are adjusted.",
+        "Errors are reduced chi-square per pixel: noise alone gives 1. Held out: predicted by a fit to captures of other colours, elements or distances; only registration, flux and black level are adjusted. Null test: the error that random smooth terms leave.",
     );
     if let Some(share) = diagnosis.missing_by_grain {
         page.paragraph(format!(
-            "Single missing pillars leave a grain that no numbers predict; its variance is known and counts as noise in the errors after. By that grain alone, {} % of the pillars are missing.",
+            "Pillars that are missing at random places make a speckle that no fit can predict; its variance is known and counts as noise in the errors after. By the speckle alone, {} % of the pillars are missing.",
             sig(100.0 * share, 3)
         ));
     }
     effects(&mut page, diagnosis);
     ladder(&mut page, session, diagnosis);
-    if let Some(finding) = finding {
+    if let Some(evidence) = evidence {
         ranking(&mut page, diagnosis);
-        captures(&mut page, session, atlas, finding);
-        widths(&mut page, session, finding);
-        free_term(&mut page, session, finding);
-        confusable(&mut page, session, atlas, finding);
-        nuisances(&mut page, session, &finding.after.nuisances);
+        captures(&mut page, session, simulations, evidence);
+        widths(&mut page, session, &evidence.finding);
+        smooth_residual(&mut page, session, evidence);
+        confusable(&mut page, session, simulations, evidence);
+        nuisances(&mut page, session, &evidence.finding.after.nuisances);
     }
     if !diagnosis.left_out.is_empty() {
         page.section("Captures left out");
@@ -86,13 +85,13 @@ fn effects(page: &mut Page, diagnosis: &Diagnosis) {
     if diagnosis.effects.is_empty() {
         return;
     }
-    page.section("What was found");
+    page.section("Effects found");
     let mut table = Table::new([
         Column::text("Effect"),
         Column::text("Value"),
         Column::text("95 % interval"),
-        Column::text("Not told apart from"),
-        Column::text("What would tell"),
+        Column::text("Cannot be distinguished from"),
+        Column::text("Measurement that would distinguish"),
     ]);
     for e in &diagnosis.effects {
         let shown = |v: &serde_json::Value| round_json(v);
@@ -115,13 +114,13 @@ fn ladder(page: &mut Page, session: &Session<'_>, diagnosis: &Diagnosis) {
     if diagnosis.ladder.is_empty() {
         return;
     }
-    page.section("How truly the cell is described");
+    page.section("Fidelity of the cell");
     let mut table = Table::new([
         Column::text("Cell"),
-        Column::number("Chi-square a pixel", "fitted"),
-        Column::number("Chi-square a pixel", "held out"),
+        Column::number("Reduced chi-square per pixel", "fitted"),
+        Column::number("Reduced chi-square per pixel", "held out"),
     ])
-    .caption("Nuisances fitted, nothing else. What the polynomials lack is amplitude and resonances.");
+    .caption("Nuisances fitted, nothing else. The polynomials lack amplitude and resonances.");
     for rung in &diagnosis.ladder {
         table.row([
             Cell::code(&rung.fidelity),
@@ -130,13 +129,16 @@ fn ladder(page: &mut Page, session: &Session<'_>, diagnosis: &Diagnosis) {
         ]);
     }
     page.table(table);
-    // The capture that the first rung predicts worst.
+    // The capture with the largest residual under the first fidelity.
     let power = |a: &Array2<f32>| a.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
     let first = &diagnosis.ladder[0].residuals;
-    let Some(worst) = (0..first.len()).max_by(|&a, &b| power(&first[a]).total_cmp(&power(&first[b]))) else {
+    let Some(worst) = first
+        .keys()
+        .max_by(|&a, &b| power(&first[a]).total_cmp(&power(&first[b])))
+    else {
         return;
     };
-    let mut pictures = ImageGrid::new("Three descriptions of the cell", diagnosis.ladder.len())
+    let mut pictures = ImageGrid::new("Residual under three fidelities of the cell", diagnosis.ladder.len())
         .pixel_um(session.set().camera.pixel_um)
         .values("residual", "sigma")
         .range(-SIGMAS, SIGMAS)
@@ -146,7 +148,7 @@ fn ladder(page: &mut Page, session: &Session<'_>, diagnosis: &Diagnosis) {
         pictures.image(rung.fidelity.as_str(), rung.residuals[worst].mapv(f64::from));
     }
     page.figure(pictures.caption(format!(
-        "What each leaves of capture `{}`, in standard deviations of the noise.",
+        "Residual of capture `{}`, in standard deviations of the noise.",
         session.set().captures[worst].name
     )));
 }
@@ -154,11 +156,11 @@ fn ladder(page: &mut Page, session: &Session<'_>, diagnosis: &Diagnosis) {
 fn ranking(page: &mut Page, diagnosis: &Diagnosis) {
     page.section("Candidates");
     page.paragraph(
-        "Every effect is scored by the share of the residual that its signature explains; the leaders are fitted in full, and judged by what they gain on captures left out.",
+        "Every effect is scored by the share of the residual that its signature explains; the leaders are fitted, and judged by what they gain on captures left out.",
     );
     let mut chart = Ranking::new(
         "Candidates",
-        Axis::linear("gain on captures left out", "chi-square a pixel"),
+        Axis::linear("gain on captures left out", "reduced chi-square per pixel"),
     );
     for r in diagnosis.ranking.iter().filter(|r| r.held_out_gain.is_some()) {
         let interval = r.held_out_gain_interval.map(|[a, b]| (a, b));
@@ -170,12 +172,12 @@ fn ranking(page: &mut Page, diagnosis: &Diagnosis) {
             r.rejected.is_none(),
         );
     }
-    page.figure(chart.caption("What each leader gains, with its interval over groups of captures."));
+    page.figure(chart.caption("Gain of each leader, with its 95 % confidence interval over groups of captures."));
     page.details("All candidates", |inner| {
         inner.table(candidates(&diagnosis.ranking));
     });
     for (place, ranking) in diagnosis.later_rankings.iter().enumerate() {
-        page.details(format!("Candidates on top of {}", place + 1), |inner| {
+        page.details(format!("Candidates in step {}", place + 2), |inner| {
             inner.table(candidates(ranking));
         });
     }
@@ -187,7 +189,7 @@ fn candidates(ranking: &[Ranked]) -> Table {
         Column::number("Explains alone", "%"),
         Column::number("Gain, held out", ""),
         Column::text("Value"),
-        Column::text("Why not"),
+        Column::text("Reason for rejection"),
     ]);
     for r in ranking {
         table.row([

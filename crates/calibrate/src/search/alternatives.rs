@@ -1,20 +1,20 @@
-//! What else would explain as much, and what has become needless.
+//! Alternatives: what else would explain as much, and what has become redundant.
 
-use crate::fit::cross_validation::{HeldOutErrors, gain, half_widths, held_out, mean};
-use crate::fit::problem::Fit;
-use crate::search::state::SearchState;
-use crate::search::stepwise::{LEAST_GAIN, physical};
 use metalith_core::{Progress, Result};
 
-/// Chi-square of the SEM's widths by which one explanation must fit better to speak for it.
-const SEM_SPEAKS: f64 = 9.0;
+use super::state::SearchState;
+use super::stepwise::{LEAST_GAIN, physical};
+use crate::fit::{Fit, Gain, HeldOutErrors, gain, half_widths, held_out, mean_error};
 
-/// Errors on captures left out that differ by more than this are not alike, however wide the interval.
+/// Difference in the chi-square of the SEM widths that decides between two explanations: three sigma.
+const SEM_DECIDES: f64 = 9.0;
+
+/// Errors on captures left out that differ by more than this are not equal, however wide the interval.
 const ALIKE_WITHIN: f64 = 0.02;
 
-/// An explanation that leaves so much more on the atlas, as a part of what the best takes away, is not brought
-/// to rest to be compared.
-const WORTH_SETTLING: f64 = 0.1;
+/// An explanation that leaves so much more on the surrogate, relative to what the best removes, is not refined
+/// for the comparison.
+const WORTH_REFINING: f64 = 0.1;
 
 /// Another effect that explains as much.
 #[derive(Clone, Debug)]
@@ -24,18 +24,21 @@ pub struct Alternative {
     pub half_widths: Vec<f64>,
 }
 
-/// Drop what the others have made needless, with its runners.
-pub fn drop_redundant(now: &mut SearchState<'_>, chosen: &mut Vec<usize>, runners: &mut Vec<Vec<usize>>) {
+/// Drop effects that the others have made redundant, with their runners-up.
+pub fn drop_redundant(now: &mut SearchState<'_>, chosen: &mut Vec<usize>, runners_up: &mut Vec<Vec<usize>>) {
     let mut place = 0;
     while chosen.len() > 1 && place < chosen.len() {
         let rest: Vec<usize> = chosen.iter().copied().filter(|&e| e != chosen[place]).collect();
         let fit = refit(now, chosen[place], &rest);
-        let held = held_out(&now.problem, &fit.forms, &fit);
-        let (loss, [low, _]) = gain(&now.problem, &held, &now.held);
+        let held = held_out(&now.problem, &fit.equations, &fit);
+        let Gain {
+            value: loss,
+            interval: [low, _],
+        } = gain(&now.problem, &held, &now.held_out);
         if loss < LEAST_GAIN || low <= 0.0 {
             *chosen = rest;
-            runners.remove(place);
-            (now.fit, now.held) = (fit, held);
+            runners_up.remove(place);
+            (now.fit, now.held_out) = (fit, held);
             place = 0;
         } else {
             place += 1;
@@ -43,119 +46,124 @@ pub fn drop_redundant(now: &mut SearchState<'_>, chosen: &mut Vec<usize>, runner
     }
 }
 
-/// For each effect found: the others that would do as well in its place. Where one does better, or the SEM's
-/// widths prefer it among those that captures do not tell apart, it takes the place. `before` is the error when
-/// nothing was found; with `exact`, rivals are brought to rest on exact simulations.
+/// For each effect found: the others that explain as much in its place. Where one explains more, or the SEM
+/// widths prefer it among those that captures cannot distinguish, it takes the place. `before` is the error when
+/// nothing was found; with `full`, all are refined with full simulations before they are compared.
 ///
 /// # Errors
-/// If a cell cannot be solved, or the user stopped it.
+/// If a simulation fails, or the user stopped it.
 pub fn alternatives(
     now: &mut SearchState<'_>,
     chosen: &mut [usize],
-    runners: &[Vec<usize>],
+    runners_up: &[Vec<usize>],
     before: &HeldOutErrors,
-    exact: bool,
+    full: bool,
     progress: &dyn Progress,
 ) -> Result<Vec<Vec<Alternative>>> {
     let mut out = Vec::new();
     for place in 0..chosen.len() {
-        // Where something is left, whoever was screened out early may be who was there.
-        let all: Vec<usize> = (0..now.problem.simulator.effects.len()).collect();
-        let runners = if now.error() > 1.0 + ALIKE_WITHIN {
+        // Where a residual is left, the true effect may have been screened out early.
+        let all: Vec<usize> = (0..now.problem.model.effects()).collect();
+        let runners_up = if now.error() > 1.0 + ALIKE_WITHIN {
             Some(&all)
         } else {
-            runners.get(place)
+            runners_up.get(place)
         };
-        let far = mean(before) - now.error();
+        let far = mean_error(before) - now.error();
         let mut best = Substitute {
             effect: chosen[place],
-            standing: now.clone(),
+            state: now.clone(),
         };
         let mut others = Vec::new();
-        for &other in runners.into_iter().flatten().filter(|o| !chosen.contains(o)) {
+        for &other in runners_up.into_iter().flatten().filter(|o| !chosen.contains(o)) {
             let mut set = chosen.to_vec();
             set[place] = other;
-            let mut rival = Substitute::new(now, chosen[place], other, &set);
-            let behind = rival.standing.error() - now.error();
-            if behind > ALIKE_WITHIN.max(WORTH_SETTLING * far) || !rival.physical() {
+            let mut substitute = Substitute::new(now, chosen[place], other, &set);
+            let behind = substitute.state.error() - now.error();
+            if behind > ALIKE_WITHIN.max(WORTH_REFINING * far) || !substitute.physical() {
                 continue;
             }
-            if exact {
-                rival.standing.refine(progress)?;
+            if full {
+                substitute.state.refine(progress)?;
             }
-            others.push(rival);
+            others.push(substitute);
         }
         for other in &mut others {
             if other.beats(&best) {
                 std::mem::swap(other, &mut best);
             }
         }
-        others.retain(|o| o.is_as_good(&best) && o.sem_chi2() - best.sem_chi2() <= SEM_SPEAKS);
+        others.retain(|o| o.is_as_good(&best) && o.sem_chi2() - best.sem_chi2() <= SEM_DECIDES);
         out.push(others.iter().map(Alternative::new).collect());
         chosen[place] = best.effect;
-        *now = best.standing;
+        *now = best.state;
     }
     Ok(out)
 }
 
-/// The fit of a set of effects when one is `gone`.
-fn refit(now: &SearchState<'_>, gone: usize, set: &[usize]) -> Fit {
-    let simulator = now.problem.simulator;
+/// The fit of a set of effects after one was `removed`.
+fn refit(now: &SearchState<'_>, removed: usize, set: &[usize]) -> Fit {
+    let model = now.problem.model;
     let mut from = now.fit.clone();
-    for s in simulator.slots_of(gone) {
+    for s in model.slots_of(removed) {
         from.theta[s] = 0.0;
     }
-    now.problem.fit(&simulator.slots_of_all(set), &from)
+    now.problem.fit(&model.slots_of_all(set), &from)
 }
 
 /// An explanation with a certain effect in the place of one that was found.
 struct Substitute<'a> {
     effect: usize,
-    standing: SearchState<'a>,
+    state: SearchState<'a>,
 }
 
 impl<'a> Substitute<'a> {
-    /// With an effect in the place of one that is `gone`, which makes `set` the whole.
-    fn new(now: &SearchState<'a>, gone: usize, effect: usize, set: &[usize]) -> Self {
+    /// With an effect in the place of one that is `removed`; `set` are all effects then.
+    fn new(now: &SearchState<'a>, removed: usize, effect: usize, set: &[usize]) -> Self {
         Self {
             effect,
-            standing: SearchState::new(now.problem.clone(), refit(now, gone, set)),
+            state: SearchState::new(now.problem.clone(), refit(now, removed, set)),
         }
     }
 
     fn physical(&self) -> bool {
-        let SearchState { problem, fit, .. } = &self.standing;
-        physical(problem, fit, &problem.simulator.slots_of(self.effect))
+        let SearchState { problem, fit, .. } = &self.state;
+        physical(problem, fit, &problem.model.slots_of(self.effect))
     }
 
-    /// Chi-square of the SEM's widths.
+    /// Chi-square of the SEM widths.
     fn sem_chi2(&self) -> f64 {
-        let form = &self.standing.fit.forms[self.standing.problem.used.len()];
-        form[(form.nrows() - 1, form.nrows() - 1)]
+        self.state.fit.equations.widths_chi2()
     }
 
-    /// Whether captures left out do not tell it apart from the best.
+    /// Whether captures left out cannot distinguish it from the best.
     fn is_as_good(&self, best: &Self) -> bool {
-        let (own, best) = (&self.standing, &best.standing);
-        let (worse, [low, _]) = gain(&own.problem, &own.held, &best.held);
+        let (own, best) = (&self.state, &best.state);
+        let Gain {
+            value: worse,
+            interval: [low, _],
+        } = gain(&own.problem, &own.held_out, &best.held_out);
         (worse < LEAST_GAIN || low <= 0.0) && own.error() < best.error() + ALIKE_WITHIN
     }
 
     fn beats(&self, best: &Self) -> bool {
-        let problem = &self.standing.problem;
-        let (better, [low, _]) = gain(problem, &best.standing.held, &self.standing.held);
+        let problem = &self.state.problem;
+        let Gain {
+            value: better,
+            interval: [low, _],
+        } = gain(problem, &best.state.held_out, &self.state.held_out);
         let by_sem = best.sem_chi2() - self.sem_chi2();
-        better >= LEAST_GAIN && low > 0.0 && by_sem > -SEM_SPEAKS || self.is_as_good(best) && by_sem > SEM_SPEAKS
+        better >= LEAST_GAIN && low > 0.0 && by_sem > -SEM_DECIDES || self.is_as_good(best) && by_sem > SEM_DECIDES
     }
 }
 
 impl Alternative {
-    fn new(rival: &Substitute<'_>) -> Self {
-        let SearchState { problem, fit, .. } = &rival.standing;
+    fn new(substitute: &Substitute<'_>) -> Self {
+        let SearchState { problem, fit, .. } = &substitute.state;
         let widths = half_widths(problem, fit);
-        let own = problem.simulator.slots_of(rival.effect);
+        let own = problem.model.slots_of(substitute.effect);
         Self {
-            effect: rival.effect,
+            effect: substitute.effect,
             values: own.iter().map(|&s| fit.theta[s]).collect(),
             half_widths: fit.pick(&own, &widths),
         }

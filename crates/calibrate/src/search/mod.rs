@@ -1,9 +1,19 @@
 //! Which effects explain a residual: stepwise selection, pair search, refinement and alternatives.
 
-pub mod alternatives;
-pub mod attribution;
-pub mod pairs;
-pub mod refinement;
-pub mod signatures;
-pub mod state;
-pub mod stepwise;
+mod alternatives;
+mod attribution;
+mod capture_screening;
+mod defect_noise;
+mod evidence;
+mod pairs;
+mod refinement;
+mod signatures;
+mod state;
+mod stepwise;
+
+pub use attribution::Finding;
+pub use capture_screening::{UnusableCapture, unusable_captures};
+pub use defect_noise::DefectNoise;
+pub use evidence::{Evidence, attribute_set};
+pub use signatures::cosines;
+pub use stepwise::{LEAST_GAIN, RESIDUAL, Rejection, TriedEffect};

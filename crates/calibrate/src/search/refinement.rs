@@ -1,43 +1,43 @@
-//! Fits that go farther than the atlas was simulated, or nearer to the truth than its polynomials.
+//! Refinement: fits that continue beyond the simulated range, and that converge on full simulations.
 
-use crate::effects::Stage;
-use crate::fit::problem::{Fit, Problem};
-use crate::optics::PixelGrid;
 use metalith_core::{Progress, Result};
 
-/// Times that the atlas is carried on towards where a fit went.
-const STRETCHES: usize = 3;
+use crate::fit::{Fit, Problem};
+use crate::optics::PixelGrid;
 
-/// Where a fit came to a new place, the atlas is simulated there and so much farther from its middle.
+/// Times that the surrogate is extended towards where a fit goes.
+const EXTENSIONS: usize = 3;
+
+/// A parameter that left the simulated range is simulated where it went, and so much farther from the base.
 const FARTHER: f64 = 1.4;
 
-/// Exact simulations that a fit is brought to rest with.
-const EXACT_STEPS: usize = 3;
+/// Most full simulations of a refinement.
+const FULL_SIMULATIONS: usize = 3;
 
-/// Cells are solved at multiples of this share of a typical size; the atlas goes the rest of the way.
-const CELLS_APART: f64 = 1.0 / 16.0;
+/// A refinement has converged when no parameter moves by more than this share of its typical size.
+const CONVERGED: f64 = 2e-2;
 
-/// It has come to rest when no number moves by more than this share of its typical size.
-const AT_REST: f64 = 2e-2;
+/// Room at the ends of a simulated range, relative to it: rounding.
+const ROUNDING: f64 = 1e-9;
 
 impl Problem<'_> {
-    /// Whether a fit went beyond what was simulated.
-    pub fn beyond(&self, fit: &Fit) -> bool {
+    /// Whether a fit left the simulated range.
+    pub fn extrapolates(&self, fit: &Fit) -> bool {
         fit.active.iter().any(|&s| self.is_beyond(s, fit.theta[s]))
     }
 
     fn is_beyond(&self, slot: usize, value: f64) -> bool {
-        let (low, high) = self.atlas.known(slot);
-        let room = 1e-9 * (high - low);
+        let (low, high) = self.surrogate.simulated_range(slot);
+        let room = ROUNDING * (high - low);
         value < low - room || value > high + room
     }
 
-    /// Follow a fit to where it wants to go, simulating the atlas farther on.
+    /// Follow a fit to where it goes: extend the surrogate and fit again.
     ///
     /// # Errors
-    /// If a cell cannot be solved, or the user stopped it.
+    /// If a simulation fails, or the user stopped it.
     pub fn extend_and_fit(&mut self, mut fit: Fit, progress: &dyn Progress) -> Result<Fit> {
-        for _ in 0..STRETCHES {
+        for _ in 0..EXTENSIONS {
             let far: Vec<usize> = fit
                 .active
                 .iter()
@@ -48,22 +48,7 @@ impl Problem<'_> {
                 break;
             }
             for slot in far {
-                let (low, high) = self.simulator.slots[slot].parameter.range;
-                let (value, about) = (fit.theta[slot], self.atlas.about[slot]);
-                let mut values = vec![value, (about + FARTHER * (value - about)).clamp(low, high)];
-                values.dedup();
-                let looked_up = self.exact.is_some().then(|| self.looked_up(&fit.theta));
-                self.simulator.extend(&mut self.atlas, slot, &values, progress)?;
-                // What the exact simulation added was counted from the atlas as it was.
-                if let Some((exact, before)) = self.exact.take().zip(looked_up) {
-                    let after = self.looked_up(&fit.theta);
-                    let parts = exact.iter().zip(before.iter().zip(&after));
-                    self.exact = Some(
-                        parts
-                            .map(|(e, (b, a))| PixelGrid::combine(&[(e, 1.0), (b, 1.0), (a, -1.0)]))
-                            .collect(),
-                    );
-                }
+                self.extend(&fit, slot, progress)?;
             }
             let active = fit.active.clone();
             fit = self.fit(&active, &fit);
@@ -71,52 +56,58 @@ impl Problem<'_> {
         Ok(fit)
     }
 
-    /// Bring a fit to rest on exact simulations of where it is, or close by.
+    /// Simulate one parameter at the value of a fit, and farther on.
+    fn extend(&mut self, fit: &Fit, slot: usize, progress: &dyn Progress) -> Result<()> {
+        let (low, high) = self.model.slots()[slot].parameter.range;
+        let (value, about) = (fit.theta[slot], self.surrogate.about[slot]);
+        let mut values = vec![value, (about + FARTHER * (value - about)).clamp(low, high)];
+        values.dedup();
+        let before = self.correction.is_some().then(|| self.surrogate_images(&fit.theta));
+        self.surrogate.extend(self.model, slot, &values, progress)?;
+        // The correction is relative to the surrogate as it was.
+        if let Some((correction, before)) = self.correction.take().zip(before) {
+            let after = self.surrogate_images(&fit.theta);
+            let parts = correction.iter().zip(before.iter().zip(&after));
+            let moved = parts.map(|(c, (b, a))| PixelGrid::combine(&[(c, 1.0), (b, 1.0), (a, -1.0)]));
+            self.correction = Some(moved.collect());
+        }
+        Ok(())
+    }
+
+    /// Refine a fit with full simulations, at its parameters or close by, until it has converged.
     ///
     /// # Errors
     /// As [`Problem::extend_and_fit`].
     pub fn refine(&mut self, mut fit: Fit, progress: &dyn Progress) -> Result<Fit> {
-        for _ in 0..EXACT_STEPS {
+        for _ in 0..FULL_SIMULATIONS {
             fit = self.extend_and_fit(fit, progress)?;
-            let at = self.rounded(&fit.theta);
-            let departure = self.simulator.departure(&at);
-            let exposed = self.simulator.expose(&[departure], progress)?.remove(0);
-            let offset = exposed
-                .iter()
-                .zip(self.looked_up(&at))
-                .map(|(made, looked_up)| PixelGrid::combine(&[(made, 1.0), (&looked_up, -1.0)]))
-                .collect();
-            self.exact = Some(offset);
+            self.correct_at(&self.cheap_point(&fit.theta), progress)?;
             let next = self.fit(&fit.active, &fit);
+            let slots = self.model.slots();
             let moved = fit
                 .active
                 .iter()
-                .map(|&s| (next.theta[s] - fit.theta[s]).abs() / self.simulator.slots[s].parameter.typical)
+                .map(|&s| (next.theta[s] - fit.theta[s]).abs() / slots[s].parameter.typical)
                 .fold(0.0, f64::max);
             fit = next;
-            if moved < AT_REST {
+            if moved < CONVERGED {
                 break;
             }
         }
         Ok(fit)
     }
 
-    /// Numbers close by whose cells are likely to be known already.
-    fn rounded(&self, theta: &[f64]) -> Vec<f64> {
-        let slots = self.simulator.slots.iter().zip(theta);
+    /// Parameters close by at which a full simulation is likely to be cheap.
+    fn cheap_point(&self, theta: &[f64]) -> Vec<f64> {
+        let slots = self.model.slots().iter().enumerate().zip(theta);
         slots
-            .map(|(slot, value)| {
-                if self.simulator.effects[slot.effect].stage() != Stage::Stack {
+            .map(|((s, slot), value)| {
+                let Some(step) = self.model.cheap_step(s) else {
                     return *value;
-                }
-                let step = CELLS_APART * slot.parameter.typical;
+                };
                 let (low, high) = slot.parameter.range;
                 ((value / step).round() * step).clamp(low, high)
             })
             .collect()
-    }
-
-    fn looked_up(&self, theta: &[f64]) -> Vec<PixelGrid> {
-        (0..self.data.signal.len()).map(|c| self.atlas.grid(theta, c)).collect()
     }
 }

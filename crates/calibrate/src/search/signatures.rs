@@ -1,14 +1,11 @@
-//! What each effect would change, against what is left and against one another.
+//! Signatures: what each effect changes, compared with the residual and with one another.
 
 use nalgebra::DMatrix;
 
-use crate::effects;
-use crate::fit::normal_equations::minimise;
-use crate::fit::problem::{Fit, Problem};
-use crate::simulator::Simulator;
+use crate::fit::{Fit, Problem, minimise};
 
-/// Effects by the share of the residual that their signature explains, nuisances and what is chosen
-/// projected out.
+/// Effects by the share of the residual that their signature explains, highest first; nuisances and what is
+/// chosen are projected out.
 pub fn score_effects(problem: &Problem<'_>, now: &Fit, chosen: &[usize]) -> Vec<(usize, f64)> {
     let sets = others(problem, chosen).into_iter().map(|e| [e]).collect();
     let scores = explained(problem, now, chosen, sets);
@@ -26,9 +23,7 @@ pub fn score_pairs(problem: &Problem<'_>, now: &Fit, chosen: &[usize]) -> Vec<([
 }
 
 fn others(problem: &Problem<'_>, chosen: &[usize]) -> Vec<usize> {
-    (0..problem.simulator.effects.len())
-        .filter(|e| !chosen.contains(e))
-        .collect()
+    (0..problem.model.effects()).filter(|e| !chosen.contains(e)).collect()
 }
 
 fn explained<const N: usize>(
@@ -37,19 +32,16 @@ fn explained<const N: usize>(
     chosen: &[usize],
     sets: Vec<[usize; N]>,
 ) -> Vec<([usize; N], f64)> {
-    let simulator = problem.simulator;
-    let slots: Vec<usize> = (0..simulator.slots.len()).collect();
-    let wide = problem.at(&slots, now.theta.clone(), now.nuisances.clone());
-    let form = problem.total(&wide.forms, &wide.nuisances);
+    let form = form_of_all(problem, now);
     let shared = problem.shared();
     let base: Vec<usize> = (0..shared)
-        .chain(simulator.slots_of_all(chosen).into_iter().map(|s| shared + s))
+        .chain(problem.model.slots_of_all(chosen).into_iter().map(|s| shared + s))
         .collect();
     let (_, without) = minimise(&form, &base);
     let mut scores: Vec<([usize; N], f64)> = sets
         .into_iter()
         .map(|set| {
-            let own = simulator.slots_of_all(&set).into_iter();
+            let own = problem.model.slots_of_all(&set).into_iter();
             let free: Vec<usize> = base.iter().copied().chain(own.map(|s| shared + s)).collect();
             let (_, with) = minimise(&form, &free);
             (set, ((without - with) / without).max(0.0))
@@ -59,12 +51,17 @@ fn explained<const N: usize>(
     scores
 }
 
-/// Cosines between the signatures of all numbers, nuisances projected out, weighted by the noise of this set.
+/// Normal equations over all parameters of all effects.
+fn form_of_all(problem: &Problem<'_>, now: &Fit) -> DMatrix<f64> {
+    let slots: Vec<usize> = (0..problem.model.slots().len()).collect();
+    let wide = problem.at(&slots, now.theta.clone(), now.nuisances.clone());
+    problem.total(&wide.equations, &wide.nuisances)
+}
+
+/// Cosines between the signatures of all parameters, nuisances projected out, weighted by the noise of this set.
 pub fn cosines(problem: &Problem<'_>, at: &Fit) -> DMatrix<f64> {
-    let slots: Vec<usize> = (0..problem.simulator.slots.len()).collect();
-    let wide = problem.at(&slots, at.theta.clone(), at.nuisances.clone());
-    let form = problem.total(&wide.forms, &wide.nuisances);
-    let (shared, n) = (problem.shared(), slots.len());
+    let form = form_of_all(problem, at);
+    let (shared, n) = (problem.shared(), problem.model.slots().len());
     let a = form.view((0, 0), (shared, shared)).into_owned();
     let cross = form.view((0, shared), (shared, n)).into_owned();
     let inverse = a.try_inverse().unwrap_or_else(|| DMatrix::zeros(shared, shared));
@@ -73,22 +70,4 @@ pub fn cosines(problem: &Problem<'_>, at: &Fit) -> DMatrix<f64> {
         let size = (g[(i, i)] * g[(j, j)]).sqrt();
         if size > 0.0 { g[(i, j)] / size } else { 0.0 }
     })
-}
-
-/// Names of effects, for messages.
-pub fn names(simulator: &Simulator<'_>, list: &[usize]) -> Vec<String> {
-    list.iter().map(|&e| simulator.effects[e].name()).collect()
-}
-
-/// The measurement that would tell an effect from others, as far as it is known.
-pub fn separate_by(simulator: &Simulator<'_>, effect: usize, others: &[usize]) -> Option<String> {
-    let own = &simulator.effects[effect];
-    others
-        .iter()
-        .find_map(|&o| {
-            let name = simulator.effects[o].name();
-            effects::separate_by(own.as_ref(), &name)
-                .or_else(|| effects::separate_by(simulator.effects[o].as_ref(), &own.name()))
-        })
-        .map(str::to_owned)
 }

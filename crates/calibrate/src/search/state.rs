@@ -1,43 +1,43 @@
-//! Where a search for what a set shows stands.
+//! Where a search stands.
 
-use crate::fit::cross_validation::{HeldOutErrors, held_out, mean};
-use crate::fit::problem::{Fit, Problem};
 use metalith_core::{Progress, Result};
 
-/// A fit with the problem that it is at rest in.
+use crate::fit::{Fit, HeldOutErrors, Problem, held_out, mean_error};
+
+/// A fit with the problem that it solves.
 #[derive(Clone)]
 pub struct SearchState<'a> {
     pub problem: Problem<'a>,
     pub fit: Fit,
     /// The error of the fit on captures left out.
-    pub held: HeldOutErrors,
+    pub held_out: HeldOutErrors,
 }
 
 impl<'a> SearchState<'a> {
     /// At a fit.
     pub fn new(problem: Problem<'a>, fit: Fit) -> Self {
-        let held = held_out(&problem, &fit.forms, &fit);
-        Self { problem, fit, held }
+        let held_out = held_out(&problem, &fit.equations, &fit);
+        Self { problem, fit, held_out }
     }
 
-    /// Chi-square a pixel on captures left out; 1 is noise alone.
+    /// Reduced chi-square per pixel on captures left out; noise alone gives 1.
     pub fn error(&self) -> f64 {
-        mean(&self.held)
+        mean_error(&self.held_out)
     }
 
-    /// Stand at another fit.
-    pub fn go(&mut self, fit: Fit) {
-        self.held = held_out(&self.problem, &fit.forms, &fit);
+    /// Move to another fit.
+    pub fn move_to(&mut self, fit: Fit) {
+        self.held_out = held_out(&self.problem, &fit.equations, &fit);
         self.fit = fit;
     }
 
-    /// Bring the fit to rest on exact simulations.
+    /// Refine the fit with full simulations.
     ///
     /// # Errors
     /// As [`Problem::refine`].
     pub fn refine(&mut self, progress: &dyn Progress) -> Result<()> {
         let fit = self.problem.refine(self.fit.clone(), progress)?;
-        self.go(fit);
+        self.move_to(fit);
         Ok(())
     }
 }

@@ -1,27 +1,26 @@
-//! One step towards an explanation: every effect that is not yet taken is tried, and at most one is taken.
+//! Stepwise selection: every effect that is not yet chosen is tried, and at most one is taken.
 
-use crate::fit::cross_validation::{HeldOutErrors, gain, half_widths, held_out, mean};
-use crate::fit::null_test::null_gain;
-use crate::fit::problem::{Fit, Problem};
-use crate::search::signatures::score_effects;
-use crate::search::state::SearchState;
 use metalith_core::{Progress, Result};
+
+use super::signatures::score_effects;
+use super::state::SearchState;
+use crate::fit::{Fit, Gain, HeldOutErrors, Problem, gain, half_widths, held_out, mean_error, null_gain};
 
 /// Candidates that are fitted in full at each step.
 const LEADERS: usize = 6;
 
-/// Less than this of chi-square a pixel is what the forward model itself may err by: two programs that share
-/// nothing differ by 0.005 on a chip without effects.
+/// Smaller gains of reduced chi-square per pixel are within the error of the forward model itself: two
+/// independent programs differ by 0.005 on a chip without effects.
 pub const LEAST_GAIN: f64 = 0.006;
 
-/// Share of the error above noise that a step must take away to be worth a name.
+/// Share of the error above noise that an effect must remove.
 const LEAST_SHARE: f64 = 0.15;
 
-/// Above this, chi-square a pixel says that something is there.
+/// Above this, the reduced chi-square per pixel shows a residual.
 pub const RESIDUAL: f64 = 1.1;
 
-/// A leader that wants to go where nothing was simulated is followed there if it gains this share of what the
-/// best does, while the best leaves a residual.
+/// A leader that leaves the simulated range is followed if it gains this share of what the best gains, while
+/// the best leaves a residual.
 const WORTH_FOLLOWING: f64 = 0.7;
 
 /// And this share where the best leaves none.
@@ -31,49 +30,49 @@ const WORTH_COMPARING: f64 = 0.95;
 #[derive(Clone, Debug)]
 pub struct TriedEffect {
     pub effect: usize,
-    /// Share of the residual that its signature explains on its own, nuisances projected out.
+    /// Share of the residual that its signature alone explains, nuisances projected out.
     pub score: f64,
-    /// What a full fit gains on captures left out, with its interval; none where it did not come so far.
-    pub gain: Option<(f64, [f64; 2])>,
-    /// Its numbers.
+    /// What a full fit gains on captures left out; none where it was not fitted.
+    pub gain: Option<Gain>,
+    /// Its parameters.
     pub values: Vec<f64>,
-    /// Why it was not taken; none for what was.
+    /// Why it was not taken; none if it was.
     pub rejected: Option<Rejection>,
 }
 
 /// Why a candidate is not taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rejection {
-    /// Others explain more; it was not fitted in full.
+    /// Others explain more; it was not fitted.
     Screened,
-    /// Gains no more than the model itself may err by.
+    /// Its gain is within the error of the forward model.
     Little(f64),
-    /// The interval of its gain holds zero.
+    /// The confidence interval of its gain includes zero.
     Unsure,
-    /// Share of what is above noise that it takes away.
+    /// It removes only this share of the error above noise.
     Part(f64),
-    /// At the end of what physics allows.
+    /// Its value is at the end of the physical range.
     Unphysical,
-    /// The interval of its value holds no effect.
+    /// The confidence interval of its value includes zero.
     Nothing,
     /// Another explains more.
     Second,
-    /// Random smooth terms do as well.
-    Placebo,
+    /// Random smooth terms gain as much.
+    NullTest,
 }
 
 impl Rejection {
-    /// In a few words, for a drawing.
+    /// In a few words, for a chart.
     pub fn remark(self) -> String {
         match self {
             Self::Screened => "not fitted".into(),
-            Self::Little(_) => "within the model's own error".into(),
-            Self::Unsure => "gain not sure".into(),
+            Self::Little(_) => "within model error".into(),
+            Self::Unsure => "gain not significant".into(),
             Self::Part(share) => format!("explains {:.0} %", 100.0 * share),
-            Self::Unphysical => "beyond physics".into(),
-            Self::Nothing => "interval holds no effect".into(),
+            Self::Unphysical => "not physical".into(),
+            Self::Nothing => "interval includes zero".into(),
             Self::Second => "another explains more".into(),
-            Self::Placebo => "random terms do as well".into(),
+            Self::NullTest => "random terms gain as much".into(),
         }
     }
 
@@ -82,110 +81,53 @@ impl Rejection {
         match self {
             Self::Screened => "explains less of the residual than others".into(),
             Self::Little(gain) => {
-                format!("gains {gain:.4} of chi-square a pixel on captures left out; the model itself errs by as much")
+                format!(
+                    "its gain of {gain:.4} in reduced chi-square per pixel is within the error of the forward model"
+                )
             }
-            Self::Unsure => "its gain on captures left out is not sure to be one".into(),
-            Self::Part(share) => format!("explains {:.0} % of what is above noise", 100.0 * share),
-            Self::Unphysical => "its value would lie at the end of what physics allows".into(),
-            Self::Nothing => "its interval holds no effect".into(),
+            Self::Unsure => "the 95 % confidence interval of its gain on captures left out includes zero".into(),
+            Self::Part(share) => format!("explains only {:.0} % of the error above noise", 100.0 * share),
+            Self::Unphysical => "its fitted value is at the end of its physical range".into(),
+            Self::Nothing => "the 95 % confidence interval of its value includes zero".into(),
             Self::Second => "another explains more".into(),
-            Self::Placebo => "a random smooth term with as many numbers explains as much".into(),
+            Self::NullTest => "random smooth terms with as many parameters gain as much".into(),
         }
     }
 }
 
-/// What a step came to.
+/// The outcome of a step.
 pub struct Step {
     pub tried: Vec<TriedEffect>,
     /// Effects that were fitted in full.
     pub leaders: Vec<usize>,
     /// The effect that was taken, with the fit that it is part of.
     pub taken: Option<(TriedEffect, Fit, HeldOutErrors)>,
-    /// What 95 % of random smooth terms with as many numbers as the best gain less than.
-    pub placebo: f64,
+    /// Gain that 95 % of random smooth terms with as many parameters as the best stay below.
+    pub null_gain: f64,
 }
 
-/// An effect on trial.
+/// An effect that is being tried.
 pub struct Candidate {
     pub tried: TriedEffect,
     fitted: Option<(Fit, HeldOutErrors)>,
 }
 
-/// Try every effect on top of what is `chosen`. With `far`, fits may go where the atlas has yet to be simulated.
+/// Try every effect on top of those in `chosen`. With `extend`, fits may leave the simulated range, and the
+/// surrogate is extended.
 ///
 /// # Errors
-/// If a cell cannot be solved, or the user stopped it.
+/// If a simulation fails, or the user stopped it.
 pub fn step_forward(
-    standing: &mut SearchState<'_>,
+    state: &mut SearchState<'_>,
     chosen: &[usize],
-    far: bool,
+    extend: bool,
     progress: &dyn Progress,
 ) -> Result<Step> {
-    let SearchState {
-        problem,
-        fit: now,
-        held: held_now,
-    } = standing;
-    let mut candidates = Vec::new();
-    for (rank, (effect, score)) in score_effects(problem, now, chosen).into_iter().enumerate() {
-        let mut candidate = Candidate::new(effect, score);
-        if rank < LEADERS
-            && let Some(fit) = fit_with(problem, now, chosen, &[effect])
-        {
-            let held = held_out(problem, &fit.forms, &fit);
-            candidate.judge(problem, fit, held, held_now);
-        }
-        candidates.push(candidate);
+    let mut candidates = fitted_candidates(state, chosen);
+    if extend {
+        follow_leaders(state, &mut candidates, progress)?;
     }
-    sort(&mut candidates);
-    if far {
-        for place in 0..LEADERS.min(candidates.len()) {
-            let best = candidates[0].gain();
-            let worth = if mean(held_now) - best > RESIDUAL {
-                WORTH_FOLLOWING
-            } else {
-                WORTH_COMPARING
-            };
-            let candidate = &mut candidates[place];
-            let wants = candidate.fitted.as_ref().is_some_and(|(fit, _)| problem.beyond(fit));
-            if !wants || candidate.gain() < LEAST_GAIN.max(worth * best) {
-                continue;
-            }
-            if let Some((fit, _)) = candidate.fitted.take() {
-                let fit = problem.extend_and_fit(fit, progress)?;
-                let held = held_out(problem, &fit.forms, &fit);
-                candidate.judge(problem, fit, held, held_now);
-            }
-        }
-        sort(&mut candidates);
-    }
-    let numbers = candidates.first().map_or(1, |c| c.tried.values.len().max(1));
-    let mut placebo = None;
-    let mut taken = None;
-    for (place, candidate) in candidates.iter_mut().enumerate() {
-        if candidate.fitted.is_none() {
-            continue;
-        }
-        candidate.tried.rejected = if let Some(fault) = candidate.fault(problem, held_now) {
-            Some(fault)
-        } else if taken.is_some() {
-            Some(Rejection::Second)
-        } else {
-            let numbers = candidate.tried.values.len();
-            let chance = null_gain(problem, now, held_now, numbers);
-            placebo.get_or_insert(chance);
-            if candidate.gain() <= chance {
-                Some(Rejection::Placebo)
-            } else {
-                taken = Some(place);
-                None
-            }
-        };
-    }
-    let placebo = match placebo {
-        Some(placebo) => placebo,
-        None => null_gain(problem, now, held_now, numbers),
-    };
+    let (taken, null_gain) = select(state, &mut candidates);
     let leaders = candidates
         .iter()
         .filter(|c| c.fitted.is_some())
@@ -200,36 +142,126 @@ pub fn step_forward(
         tried,
         leaders,
         taken,
-        placebo,
+        null_gain,
     })
 }
 
-/// Whether numbers lie within what physics allows, not at its ends.
+/// All effects that are not chosen, those with the highest scores fitted; best first.
+fn fitted_candidates(state: &SearchState<'_>, chosen: &[usize]) -> Vec<Candidate> {
+    let SearchState { problem, fit: now, .. } = state;
+    let mut candidates = Vec::new();
+    for (rank, (effect, score)) in score_effects(problem, now, chosen).into_iter().enumerate() {
+        let mut candidate = Candidate::new(effect, score);
+        if rank < LEADERS
+            && let Some(fit) = fit_with(problem, now, chosen, &[effect])
+        {
+            let held = held_out(problem, &fit.equations, &fit);
+            candidate.judge(problem, fit, held, &state.held_out);
+        }
+        candidates.push(candidate);
+    }
+    sort(&mut candidates);
+    candidates
+}
+
+/// Follow leaders that left the simulated range, where that may change which one is best.
+fn follow_leaders(state: &mut SearchState<'_>, candidates: &mut [Candidate], progress: &dyn Progress) -> Result<()> {
+    let SearchState {
+        problem,
+        held_out: errors_now,
+        ..
+    } = state;
+    for place in 0..LEADERS.min(candidates.len()) {
+        let best = candidates[0].gain();
+        let worth = if mean_error(errors_now) - best > RESIDUAL {
+            WORTH_FOLLOWING
+        } else {
+            WORTH_COMPARING
+        };
+        let candidate = &mut candidates[place];
+        let leaves = candidate
+            .fitted
+            .as_ref()
+            .is_some_and(|(fit, _)| problem.extrapolates(fit));
+        if !leaves || candidate.gain() < LEAST_GAIN.max(worth * best) {
+            continue;
+        }
+        if let Some((fit, _)) = candidate.fitted.take() {
+            let fit = problem.extend_and_fit(fit, progress)?;
+            let held = held_out(problem, &fit.equations, &fit);
+            candidate.judge(problem, fit, held, errors_now);
+        }
+    }
+    sort(candidates);
+    Ok(())
+}
+
+/// The position of the candidate that is taken, if any, and the gain of random smooth terms. Every candidate is
+/// told why it is not taken.
+fn select(state: &SearchState<'_>, candidates: &mut [Candidate]) -> (Option<usize>, f64) {
+    let SearchState {
+        problem,
+        fit: now,
+        held_out: errors_now,
+    } = state;
+    let null = |parameters: usize| null_gain(problem, now, errors_now, parameters);
+    let mut first_null = None;
+    let mut taken = None;
+    for (place, candidate) in candidates.iter_mut().enumerate() {
+        if candidate.fitted.is_none() {
+            continue;
+        }
+        candidate.tried.rejected = if let Some(fault) = candidate.fault(problem, errors_now) {
+            Some(fault)
+        } else if taken.is_some() {
+            Some(Rejection::Second)
+        } else {
+            let chance = null(candidate.tried.values.len());
+            first_null.get_or_insert(chance);
+            if candidate.gain() <= chance {
+                Some(Rejection::NullTest)
+            } else {
+                taken = Some(place);
+                None
+            }
+        };
+    }
+    let of_best = || null(candidates.first().map_or(1, |c| c.tried.values.len().max(1)));
+    (taken, first_null.unwrap_or_else(of_best))
+}
+
+/// Least error above noise that shares are relative to, where there is none.
+const LEAST_ERROR: f64 = 1e-6;
+
+/// A parameter this near to an end of its range, relative to the range, is at the end.
+const AT_END: f64 = 1e-6;
+
+/// Whether the parameters lie within their physical ranges, not at the ends.
 pub fn physical(problem: &Problem<'_>, fit: &Fit, slots: &[usize]) -> bool {
     slots.iter().all(|&s| {
-        let (a, b) = problem.simulator.slots[s].parameter.range;
-        let room = 1e-6 * (b - a);
+        let (a, b) = problem.model.slots()[s].parameter.range;
+        let room = AT_END * (b - a);
         fit.theta[s] > a + room && fit.theta[s] < b - room || fit.theta[s] == 0.0
     })
 }
 
-/// The best fit of some effects on top of what is `chosen`, from wherever fits of theirs begin.
+/// The best fit of some effects on top of those in `chosen`, over all starting points.
 pub fn fit_with(problem: &Problem<'_>, now: &Fit, chosen: &[usize], effects: &[usize]) -> Option<Fit> {
-    let active = problem.simulator.slots_of_all(&[chosen, effects].concat());
+    let active = problem.model.slots_of_all(&[chosen, effects].concat());
     let begin = |from: Vec<Fit>, effect: &usize| from.iter().flat_map(|f| starts(problem, *effect, f)).collect();
     let fits = effects.iter().fold(vec![now.clone()], begin).into_iter();
     fits.map(|from| problem.fit(&active, &from))
         .min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }
 
-/// Where fits of an effect begin: where one is, or on each side of zero if those know nothing of one another.
+/// Starting points for fits of an effect: the present fit, or both sides of a kink at zero.
 fn starts(problem: &Problem<'_>, effect: usize, now: &Fit) -> Vec<Fit> {
-    if !problem.simulator.effects[effect].kinked() {
+    if !problem.model.kinked(effect) {
         return vec![now.clone()];
     }
     let mut starts = vec![now.clone()];
-    for slot in problem.simulator.slots_of(effect) {
-        let typical = problem.simulator.slots[slot].parameter.typical;
+    for slot in problem.model.slots_of(effect) {
+        let typical = problem.model.slots()[slot].parameter.typical;
         starts = starts
             .into_iter()
             .flat_map(|start| {
@@ -266,24 +298,27 @@ impl Candidate {
         }
     }
 
-    /// With a fit that it is part of, and the error of that on captures left out.
-    pub fn judge(&mut self, problem: &Problem<'_>, fit: Fit, held: HeldOutErrors, held_now: &HeldOutErrors) {
-        self.tried.gain = Some(gain(problem, held_now, &held));
-        let slots = problem.simulator.slots_of(self.tried.effect);
+    /// By a fit that it is part of, and the error of this fit on captures left out.
+    pub fn judge(&mut self, problem: &Problem<'_>, fit: Fit, held: HeldOutErrors, errors_now: &HeldOutErrors) {
+        self.tried.gain = Some(gain(problem, errors_now, &held));
+        let slots = problem.model.slots_of(self.tried.effect);
         self.tried.values = slots.iter().map(|&s| fit.theta[s]).collect();
         self.fitted = Some((fit, held));
     }
 
     fn gain(&self) -> f64 {
-        self.tried.gain.map_or(f64::MIN, |g| g.0)
+        self.tried.gain.map_or(f64::MIN, |g| g.value)
     }
 
-    /// Why it cannot be what is there, whatever others do.
-    pub fn fault(&self, problem: &Problem<'_>, held_now: &HeldOutErrors) -> Option<Rejection> {
-        let (value, [low, _]) = self.tried.gain?;
+    /// Why it cannot be taken, whatever others do.
+    pub fn fault(&self, problem: &Problem<'_>, errors_now: &HeldOutErrors) -> Option<Rejection> {
+        let Gain {
+            value,
+            interval: [low, _],
+        } = self.tried.gain?;
         let (fit, _) = self.fitted.as_ref()?;
-        let above_noise = (mean(held_now) - 1.0).max(1e-6);
-        let slots = problem.simulator.slots_of(self.tried.effect);
+        let above_noise = (mean_error(errors_now) - 1.0).max(LEAST_ERROR);
+        let slots = problem.model.slots_of(self.tried.effect);
         if value < LEAST_GAIN {
             return Some(Rejection::Little(value));
         }
@@ -299,7 +334,7 @@ impl Candidate {
         let widths = half_widths(problem, fit);
         let sure = slots
             .iter()
-            .any(|&s| fit.place(s).is_some_and(|k| fit.theta[s].abs() > widths[k]));
+            .any(|&s| fit.position(s).is_some_and(|k| fit.theta[s].abs() > widths[k]));
         (!sure).then_some(Rejection::Nothing)
     }
 }

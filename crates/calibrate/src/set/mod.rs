@@ -1,6 +1,7 @@
 //! A measured set: what was written, what the bench recorded, and what the lab believes of both.
 
 mod frame;
+mod index;
 mod read;
 mod sem;
 
@@ -8,10 +9,11 @@ use std::path::PathBuf;
 
 use ndarray::Array2;
 
+pub use index::{CaptureIndex, ElementIndex, LedIndex, PerCapture, PerElement, PerLed};
 pub use sem::SemSite;
 
-use metalith_cell::Material;
-use metalith_core::WidthMap;
+use metalith_cell::{CellStack, Material};
+use metalith_core::{Result, WidthMap};
 
 /// One bench session, read and checked.
 #[derive(Clone, Debug)]
@@ -26,9 +28,9 @@ pub struct MeasuredSet {
     /// Full angle of the uniform disc that the source is [rad].
     pub divergence_rad: f64,
     pub camera: Camera,
-    pub leds: Vec<Led>,
-    pub elements: Vec<MeasuredElement>,
-    pub captures: Vec<Capture>,
+    pub leds: PerLed<Led>,
+    pub elements: PerElement<MeasuredElement>,
+    pub captures: PerCapture<Capture>,
     /// Widths seen from above; empty where none were taken.
     pub sem: Vec<SemSite>,
     /// Standard deviation of the offset common to all widths of the SEM [nm].
@@ -36,7 +38,36 @@ pub struct MeasuredSet {
 }
 
 impl MeasuredSet {
-    /// Whether the same chip was to be seen in the same way: all but light levels, noise and frames.
+    /// The cell as stated.
+    ///
+    /// # Errors
+    /// If a material is not known.
+    pub fn stated_cell(&self) -> Result<CellStack> {
+        Ok(CellStack {
+            pitch_nm: f64::from(self.stack.pitch_nm),
+            height_nm: self.stack.pillar_height_nm,
+            film: self.stack.film.clone(),
+            substrate: Material::named("fused_silica_malitson_1965")?,
+            ambient: Material::constant(self.stack.ambient_index, 0.0)?,
+            taper: 0.0,
+            corner_radius_nm: 0.0,
+            mask_height_nm: 0.0,
+            mask: Material::named("alumina_zhukovsky_2015")?,
+        })
+    }
+
+    /// The element and the lattice site of a width by SEM; none if it is on no lattice.
+    pub fn site_of(&self, site: &SemSite) -> Option<(ElementIndex, usize)> {
+        let (index, element) = self.elements.iter_enumerated().find(|(_, e)| e.index == site.element)?;
+        let lattice = element.pillars.lattice;
+        let along = |x_um: f64| (x_um / lattice.pitch_um() + 0.5 * (lattice.sites() as f64 - 1.0)).round();
+        let (ix, iy) = (along(site.at_um[0]), along(site.at_um[1]));
+        let inside = 0.0..lattice.sites() as f64;
+        let is_inside = inside.contains(&ix) && inside.contains(&iy);
+        is_inside.then(|| (index, iy as usize * lattice.sites() + ix as usize))
+    }
+
+    /// Whether two sessions have one plan: all is equal but light levels, noise and frames.
     pub fn same_plan(&self, other: &Self) -> bool {
         let camera = |c: &Camera| (c.pixel_um, c.rows, c.cols);
         let captures = |set: &Self| -> Vec<_> {
@@ -120,10 +151,8 @@ pub struct MeasuredElement {
 pub struct Capture {
     /// File name without folder and ending.
     pub name: String,
-    /// Index into [`MeasuredSet::elements`].
-    pub element: usize,
-    /// Index into [`MeasuredSet::leds`].
-    pub led: usize,
+    pub element: ElementIndex,
+    pub led: LedIndex,
     /// Angle of incidence in air along x and y [rad].
     pub aoi_rad: [f64; 2],
     /// From the pillar tops to the sensor [um].

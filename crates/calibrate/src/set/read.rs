@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::{Camera, Capture, Led, MeasuredElement, MeasuredSet, Stack, frame, sem};
+use super::{ElementIndex, LedIndex, PerElement, PerLed};
 use metalith_cell::Material;
 use metalith_core::document::{Document, Limits, Section, load};
 use metalith_core::{Lattice, Progress, Result, WidthMap};
@@ -51,9 +52,9 @@ fn sections(path: &Path, root: &Section<'_, '_>, progress: &dyn Progress) -> Mea
     let (stack, film_is_known) = stack(&root.section("stack"));
     let divergence_rad = source(&root.section("source"));
     let camera = camera(&root.section("camera"));
-    let leds = leds(root, film_is_known.then_some(&stack.film));
+    let leds: PerLed<_> = leds(root, film_is_known.then_some(&stack.film)).into();
     let layout = root.file("layout");
-    let elements = elements(root, &stack, &layout, pillar_layer, progress);
+    let elements: PerElement<_> = elements(root, &stack, &layout, pillar_layer, progress).into();
     let captures = captures(root, &camera, &leds, &elements);
     let (sem, sem_offset_sigma_nm) = widths(root, &elements);
     MeasuredSet {
@@ -65,7 +66,7 @@ fn sections(path: &Path, root: &Section<'_, '_>, progress: &dyn Progress) -> Mea
         camera,
         leds,
         elements,
-        captures,
+        captures: captures.into(),
         sem,
         sem_offset_sigma_nm,
     }
@@ -240,29 +241,36 @@ fn elements(
     elements
 }
 
-fn captures(root: &Section<'_, '_>, camera: &Camera, leds: &[Led], elements: &[MeasuredElement]) -> Vec<Capture> {
+fn captures(
+    root: &Section<'_, '_>,
+    camera: &Camera,
+    leds: &PerLed<Led>,
+    elements: &PerElement<MeasuredElement>,
+) -> Vec<Capture> {
     let mut captures = Vec::new();
     for s in root.sections("capture") {
         let path = s.file("file");
         let index = s
             .array::<2>("element", Limits::new(-1000.0..=1000.0, ""))
             .map(|v| v as i64);
-        let element = elements.iter().position(|e| e.index == index).unwrap_or_else(|| {
+        let known = elements.iter_enumerated().find(|(_, e)| e.index == index);
+        let element = known.map(|(e, _)| e).unwrap_or_else(|| {
             s.fault(
                 "element",
                 format!("no [[element]] has the index {index:?}"),
                 "add it, or correct the index",
             );
-            0
+            ElementIndex::from(0)
         });
         let led_nm = s.float("led_nm", Limits::new(200.0..=3000.0, "nm"));
-        let led = leds.iter().position(|l| l.centre_nm == led_nm).unwrap_or_else(|| {
+        let known = leds.iter_enumerated().find(|(_, l)| l.centre_nm == led_nm);
+        let led = known.map(|(l, _)| l).unwrap_or_else(|| {
             s.fault(
                 "led_nm",
                 format!("no [[led]] has its centre at {led_nm} nm"),
                 "add it, or correct the wavelength",
             );
-            0
+            LedIndex::from(0)
         });
         let aoi_deg: [f64; 2] = s.array("aoi_deg", Limits::new(-80.0..=80.0, "degrees"));
         let distance_um = s.float("distance_um", Limits::new(1.0..=100_000.0, "um"));
@@ -304,7 +312,7 @@ fn captures(root: &Section<'_, '_>, camera: &Camera, leds: &[Led], elements: &[M
     captures
 }
 
-fn widths(root: &Section<'_, '_>, elements: &[MeasuredElement]) -> (Vec<super::SemSite>, f64) {
+fn widths(root: &Section<'_, '_>, elements: &PerElement<MeasuredElement>) -> (Vec<super::SemSite>, f64) {
     let Some(s) = root.optional_section("cd_sem") else {
         return (Vec::new(), 1.0);
     };

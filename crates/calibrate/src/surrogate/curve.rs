@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::optics::PixelGrid;
+use crate::set::{CaptureIndex, PerCapture};
 
 /// Most sizes that a polynomial goes through; beyond, those farthest from where it is wanted are dropped.
 const MOST_NODES: usize = 6;
@@ -12,21 +13,21 @@ const MOST_NODES: usize = 6;
 pub struct Curve {
     /// Offsets from the middle, zero left out.
     nodes: Vec<f64>,
-    /// Changes from the base at each node, `[node][capture]`.
-    grids: Vec<Arc<Vec<PixelGrid>>>,
+    /// Changes from the base at each node, `by node and capture`.
+    grids: Vec<Arc<PerCapture<PixelGrid>>>,
     /// Nodes on one side of zero say nothing of the other.
     kinked: bool,
 }
 
 impl Curve {
     /// Through the changes at some offsets.
-    pub fn new(nodes: Vec<f64>, grids: impl IntoIterator<Item = Vec<PixelGrid>>, kinked: bool) -> Self {
+    pub fn new(nodes: Vec<f64>, grids: impl IntoIterator<Item = PerCapture<PixelGrid>>, kinked: bool) -> Self {
         let grids = grids.into_iter().map(Arc::new).collect();
         Self { nodes, grids, kinked }
     }
 
     /// With one more offset, which it is wanted about.
-    pub fn add(&mut self, node: f64, grids: Vec<PixelGrid>) {
+    pub fn add(&mut self, node: f64, grids: PerCapture<PixelGrid>) {
         if self.nodes.len() >= MOST_NODES {
             let farthest = (0..self.nodes.len())
                 .max_by(|&a, &b| (self.nodes[a] - node).abs().total_cmp(&(self.nodes[b] - node).abs()));
@@ -40,7 +41,7 @@ impl Curve {
     }
 
     /// The change of one capture at an offset: grids and their factors.
-    pub fn change(&self, u: f64, capture: usize) -> impl Iterator<Item = (&PixelGrid, f32)> {
+    pub fn change(&self, u: f64, capture: CaptureIndex) -> impl Iterator<Item = (&PixelGrid, f32)> {
         self.grids
             .iter()
             .zip(self.weights(u))
@@ -48,7 +49,7 @@ impl Curve {
     }
 
     /// Its derivative by the offset.
-    pub fn slope(&self, u: f64, capture: usize) -> impl Iterator<Item = (&PixelGrid, f32)> {
+    pub fn slope(&self, u: f64, capture: CaptureIndex) -> impl Iterator<Item = (&PixelGrid, f32)> {
         self.grids
             .iter()
             .zip(self.slopes(u))

@@ -1,227 +1,176 @@
-//! What every effect would do to every capture, simulated once and then looked up.
+//! A surrogate of the forward model: every parameter simulated at a few values, and interpolated between them.
 //!
-//! Each number of each effect is simulated at a few sizes; between them the change of an image is a
-//! polynomial. Changes of different numbers add. That is right where effects are small, and a fit that moves
-//! far is carried on from an atlas about its new place.
+//! Between the simulated values of a parameter, the change of an image is a polynomial. Changes of different
+//! parameters add. This holds where effects are small; a fit that moves far continues on a surrogate that is
+//! centred on its new position.
 
 mod curve;
 
 use std::sync::Arc;
 
+use metalith_core::{Progress, Result};
 use rayon::prelude::*;
 
-use crate::departure::Departure;
 use crate::effects::Parameter;
-use crate::fit::defect_noise::DefectNoise;
+use crate::forward_model::{ForwardModel, PATH_TERMS, Point, SmoothTerm};
 use crate::optics::PixelGrid;
-use crate::simulator::Simulator;
+use crate::set::{CaptureIndex, LedIndex, PerCapture};
 use curve::Curve;
-use metalith_core::{Progress, Result};
 
-/// Multiples of the typical size that a number is simulated at, on both sides.
+/// Multiples of the typical size at which a parameter is simulated, on both sides.
 const TWO_SIDED: [f64; 4] = [-2.5, -1.25, 1.25, 2.5];
 
 /// And where it can only be positive.
 const ONE_SIDED: [f64; 3] = [0.8, 1.8, 3.5];
 
-/// And about a place that a fit has come to.
+/// And about a position that a fit has come to.
 const NEAR: [f64; 4] = [-0.6, -0.3, 0.3, 0.6];
 
-/// How far beyond what was simulated a fit may look, in reaches.
-const BEYOND: f64 = 1.6;
+/// How far a fit may extrapolate, as a multiple of the simulated range.
+const EXTRAPOLATION: f64 = 1.6;
 
-/// Polynomials of the free phase term: Noll's 5 to 15, through fourth order.
-pub const FREE_PHASES: usize = 11;
-
-/// Size at which a polynomial of the free phase is simulated [nm of path]: small enough to be linear.
-const FREE_PHASE_NM: f64 = 8.0;
-
-/// Polynomials of the free transmission over width, for each LED.
-pub const FREE_TRANSMISSIONS: usize = 3;
-
-/// Size at which one is simulated.
-const FREE_TRANSMISSION: f64 = 0.03;
-
-/// What a set should show, and how every number changes it.
+/// Images at a base point, and how every parameter changes them.
 #[derive(Clone)]
 pub struct Surrogate {
-    /// The numbers that it is about.
+    /// Value of each parameter at the base point, by slot.
     pub about: Vec<f64>,
-    pub base: Arc<Vec<PixelGrid>>,
+    /// Images there.
+    pub base: Arc<PerCapture<PixelGrid>>,
+    /// Changes with each parameter, by slot.
     curves: Vec<Curve>,
-    /// Changes for a unit of each free term: phases [1/nm], then transmissions of each LED.
-    pub free: Arc<Vec<Vec<Option<PixelGrid>>>>,
-    /// The grain of what strikes single pillars at random, if that is among the effects.
-    pub grain: Option<Arc<DefectNoise>>,
+    /// Changes for a unit of each smooth term: paths [1/nm], then transmissions of each LED.
+    smooth: Arc<Vec<SmoothChange>>,
 }
 
-impl Simulator<'_> {
-    /// Simulate every effect about the numbers `about`.
+/// Change of the images for a unit of a smooth term; none where it does not act.
+type SmoothChange = PerCapture<Option<PixelGrid>>;
+
+impl Surrogate {
+    /// Simulate every parameter about the values `about`. With `smooth` (the LED of each capture, and the
+    /// number of LEDs), the smooth terms as well.
     ///
     /// # Errors
-    /// As [`Simulator::expose`].
-    pub fn atlas(&self, about: &[f64], free: bool, progress: &dyn Progress) -> Result<Surrogate> {
-        let mut departures = vec![self.departure(about)];
+    /// As [`ForwardModel::images`].
+    pub fn simulate(
+        model: &dyn ForwardModel,
+        about: &[f64],
+        smooth: Option<(&PerCapture<LedIndex>, usize)>,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let mut points = vec![Point::new(about.to_vec())];
         let mut nodes: Vec<Vec<f64>> = Vec::new();
-        for (s, slot) in self.slots.iter().enumerate() {
+        for (s, slot) in model.slots().iter().enumerate() {
             let one_sided = slot.parameter.one_sided() && about[s] == 0.0;
             let multiples: &[f64] = if one_sided { &ONE_SIDED } else { &TWO_SIDED };
-            nodes.push(self.nodes(about, s, multiples, &mut departures));
+            nodes.push(add_nodes(model, about, s, multiples, &mut points));
         }
-        if free {
-            for k in 0..FREE_PHASES {
-                let mut d = departures[0].clone();
-                d.geometry.wavefront_nm = vec![0.0; FREE_PHASES];
-                d.geometry.wavefront_nm[k] = FREE_PHASE_NM;
-                departures.push(d);
-            }
-            for k in 0..FREE_TRANSMISSIONS {
-                let mut d = departures[0].clone();
-                d.geometry.transmission = vec![0.0; FREE_TRANSMISSIONS];
-                d.geometry.transmission[k] = FREE_TRANSMISSION;
-                departures.push(d);
-            }
+        if smooth.is_some() {
+            points.extend(SmoothTerm::all().map(|term| Point::with(about, term)));
         }
-        let mut exposed = self.expose(&departures, progress)?.into_iter();
-        let base = exposed.next().expect("the first is the base");
-        let change = |grids: Vec<PixelGrid>, factor: f32| change(&grids, &base, factor);
+        let mut images = model.images(&points, progress)?.into_iter();
+        let base = images.next().expect("the first point is the base");
         let curves = nodes
             .into_iter()
-            .zip(&self.slots)
+            .zip(model.slots())
             .map(|(nodes, slot)| {
-                let grids: Vec<_> = exposed.by_ref().take(nodes.len()).map(|g| change(g, 1.0)).collect();
-                let kinked = self.effects[slot.effect].kinked();
-                Curve::new(nodes, grids, kinked && about.iter().all(|v| *v == 0.0))
+                let changes: Vec<_> = images
+                    .by_ref()
+                    .take(nodes.len())
+                    .map(|i| change(&i, &base, 1.0))
+                    .collect();
+                let kinked = model.kinked(slot.effect) && about.iter().all(|v| *v == 0.0);
+                Curve::new(nodes, changes, kinked)
             })
             .collect();
         let mut terms = Vec::new();
-        let leds = self.bench.set().leds.len();
-        for (k, grids) in exposed.enumerate() {
-            if k < FREE_PHASES {
-                terms.push(
-                    change(grids, 1.0 / FREE_PHASE_NM as f32)
-                        .into_iter()
-                        .map(Some)
-                        .collect(),
-                );
-            } else {
-                let grids = change(grids, 1.0 / FREE_TRANSMISSION as f32);
-                for led in 0..leds {
-                    let own = |c: usize| self.bench.set().captures[c].led == led;
-                    terms.push(
-                        grids
-                            .iter()
-                            .enumerate()
-                            .map(|(c, g)| own(c).then(|| g.clone()))
-                            .collect(),
-                    );
+        if let Some((led, leds)) = smooth {
+            for (images, term) in images.zip(SmoothTerm::all()) {
+                let changes = change(&images, &base, 1.0 / term.step() as f32);
+                match term {
+                    SmoothTerm::Path(_) => terms.push(changes.into_iter().map(Some).collect()),
+                    SmoothTerm::Transmission(_) => terms.extend(by_led(&changes, led, leds)),
                 }
             }
         }
-        let random = self.slots.iter().position(|s| self.effects[s.effect].random());
-        let grain = match random {
-            Some(slot) => Some(Arc::new(DefectNoise::of(self, about, slot, progress)?)),
-            None => None,
-        };
-        Ok(Surrogate {
+        Ok(Self {
             about: about.to_vec(),
             base: Arc::new(base),
             curves,
-            free: Arc::new(terms),
-            grain,
+            smooth: Arc::new(terms),
         })
     }
 
-    /// Sizes of one number about `about` within what physics allows, with the departures that they are.
-    fn nodes(&self, about: &[f64], s: usize, multiples: &[f64], departures: &mut Vec<Departure>) -> Vec<f64> {
-        let Parameter { typical, range, .. } = self.slots[s].parameter;
-        let offsets = multiples.iter().map(|m| m * typical);
-        let offsets: Vec<f64> = offsets
-            .filter(|o| (range.0..=range.1).contains(&(about[s] + o)))
-            .collect();
-        for offset in &offsets {
-            let mut theta = about.to_vec();
-            theta[s] += offset;
-            departures.push(self.departure(&theta));
-        }
-        offsets
-    }
-
-    /// An atlas about other numbers: those in `slots` are simulated anew close to where they are, the changes of
-    /// all others are taken to add as they did.
+    /// A surrogate about other values: parameters in `slots` are simulated anew close to these, the changes of
+    /// all others are taken to add as before.
     ///
     /// # Errors
-    /// As [`Simulator::expose`].
+    /// As [`ForwardModel::images`].
     pub fn recentred(
         &self,
-        atlas: &Surrogate,
+        model: &dyn ForwardModel,
         about: &[f64],
         slots: &[usize],
         progress: &dyn Progress,
-    ) -> Result<Surrogate> {
-        let mut departures = vec![self.departure(about)];
+    ) -> Result<Self> {
+        let mut points = vec![Point::new(about.to_vec())];
         let nodes: Vec<Vec<f64>> = slots
             .iter()
-            .map(|&s| self.nodes(about, s, &NEAR, &mut departures))
+            .map(|&s| add_nodes(model, about, s, &NEAR, &mut points))
             .collect();
-        let mut exposed = self.expose(&departures, progress)?.into_iter();
-        let base = exposed.next().expect("the first is the base");
-        let mut out = atlas.clone();
+        let mut images = model.images(&points, progress)?.into_iter();
+        let base = images.next().expect("the first point is the base");
+        let mut out = self.clone();
         for (&s, nodes) in slots.iter().zip(nodes) {
-            let grids: Vec<_> = exposed
+            let changes: Vec<_> = images
                 .by_ref()
                 .take(nodes.len())
-                .map(|g| change(&g, &base, 1.0))
+                .map(|i| change(&i, &base, 1.0))
                 .collect();
-            out.curves[s] = Curve::new(nodes, grids, false);
+            out.curves[s] = Curve::new(nodes, changes, false);
         }
         out.about = about.to_vec();
         out.base = Arc::new(base);
         Ok(out)
     }
 
-    /// Simulate one number at more sizes, where a fit has gone beyond those that are known.
+    /// Simulate one parameter at more values, where a fit has left the simulated range.
     ///
     /// # Errors
-    /// As [`Simulator::expose`].
-    pub fn extend(&self, atlas: &mut Surrogate, slot: usize, values: &[f64], progress: &dyn Progress) -> Result<()> {
-        let departures: Vec<_> = values
+    /// As [`ForwardModel::images`].
+    pub fn extend(
+        &mut self,
+        model: &dyn ForwardModel,
+        slot: usize,
+        values: &[f64],
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let points: Vec<_> = values
             .iter()
             .map(|value| {
-                let mut theta = atlas.about.clone();
+                let mut theta = self.about.clone();
                 theta[slot] = *value;
-                self.departure(&theta)
+                Point::new(theta)
             })
             .collect();
-        for (grids, value) in self.expose(&departures, progress)?.into_iter().zip(values) {
-            let change = change(&grids, &atlas.base, 1.0);
-            atlas.curves[slot].add(value - atlas.about[slot], change);
+        for (images, value) in model.images(&points, progress)?.into_iter().zip(values) {
+            let change = change(&images, &self.base, 1.0);
+            self.curves[slot].add(value - self.about[slot], change);
         }
         Ok(())
     }
-}
 
-fn change(grids: &[PixelGrid], base: &[PixelGrid], factor: f32) -> Vec<PixelGrid> {
-    let pairs = grids.par_iter().zip(base);
-    pairs
-        .map(|(g, b)| PixelGrid::combine(&[(g, factor), (b, -factor)]))
-        .collect()
-}
-
-impl Surrogate {
-    /// Captures without any effect.
-    pub fn alone(base: Vec<PixelGrid>) -> Self {
+    /// Images that no parameter changes.
+    pub fn constant(base: PerCapture<PixelGrid>) -> Self {
         Self {
             about: Vec::new(),
             base: Arc::new(base),
             curves: Vec::new(),
-            free: Arc::default(),
-            grain: None,
+            smooth: Arc::default(),
         }
     }
 
-    /// What a capture should show for these numbers.
-    pub fn grid(&self, theta: &[f64], capture: usize) -> PixelGrid {
+    /// The image of a capture at these parameters.
+    pub fn image(&self, theta: &[f64], capture: CaptureIndex) -> PixelGrid {
         let mut parts = vec![(&self.base[capture], 1.0)];
         for ((curve, t), about) in self.curves.iter().zip(theta).zip(&self.about) {
             if t != about {
@@ -231,29 +180,83 @@ impl Surrogate {
         PixelGrid::combine(&parts)
     }
 
-    /// Its derivative by one of the numbers.
-    pub fn slope(&self, theta: &[f64], slot: usize, capture: usize) -> PixelGrid {
+    /// Its derivative by one of the parameters.
+    pub fn slope(&self, theta: &[f64], slot: usize, capture: CaptureIndex) -> PixelGrid {
         let parts: Vec<_> = self.curves[slot]
             .slope(theta[slot] - self.about[slot], capture)
             .collect();
         PixelGrid::combine(&parts)
     }
 
-    /// The change for a unit of a free term in a capture that shows `grid`; nothing where it does not act.
-    pub fn free_term(&self, term: usize, capture: usize, grid: &PixelGrid) -> PixelGrid {
-        let known = self.free[term][capture].clone();
-        known.unwrap_or_else(|| PixelGrid::combine(&[(grid, 0.0)]))
+    /// Number of smooth terms that were simulated: the paths, then the transmissions of each LED.
+    pub fn smooth_terms(&self) -> usize {
+        self.smooth.len()
     }
 
-    /// Values of a number between which the atlas was simulated.
-    pub fn known(&self, slot: usize) -> (f64, f64) {
+    /// Whether smooth paths were simulated.
+    pub fn has_paths(&self) -> bool {
+        self.smooth.len() >= PATH_TERMS
+    }
+
+    /// The change for a unit of a smooth term in a capture that shows `image`; zero where it does not act.
+    pub fn smooth_term(&self, term: usize, capture: CaptureIndex, image: &PixelGrid) -> PixelGrid {
+        let known = self.smooth[term][capture].clone();
+        known.unwrap_or_else(|| PixelGrid::combine(&[(image, 0.0)]))
+    }
+
+    /// Range of a parameter that was simulated.
+    pub fn simulated_range(&self, slot: usize) -> (f64, f64) {
         let (low, high) = self.curves[slot].ends();
         (self.about[slot] + low, self.about[slot] + high)
     }
 
-    /// Values of a number that a fit may look at.
-    pub fn reach(&self, slot: usize) -> (f64, f64) {
+    /// Range of a parameter in which a fit may search.
+    pub fn search_range(&self, slot: usize) -> (f64, f64) {
         let (low, high) = self.curves[slot].ends();
-        (self.about[slot] + BEYOND * low, self.about[slot] + BEYOND * high)
+        (
+            self.about[slot] + EXTRAPOLATION * low,
+            self.about[slot] + EXTRAPOLATION * high,
+        )
     }
+}
+
+/// Offsets of one parameter from `about` within its physical range; their points are added to `points`.
+fn add_nodes(
+    model: &dyn ForwardModel,
+    about: &[f64],
+    s: usize,
+    multiples: &[f64],
+    points: &mut Vec<Point>,
+) -> Vec<f64> {
+    let Parameter { typical, range, .. } = model.slots()[s].parameter;
+    let offsets = multiples.iter().map(|m| m * typical);
+    let offsets: Vec<f64> = offsets
+        .filter(|o| (range.0..=range.1).contains(&(about[s] + o)))
+        .collect();
+    for offset in &offsets {
+        let mut theta = about.to_vec();
+        theta[s] += offset;
+        points.push(Point::new(theta));
+    }
+    offsets
+}
+
+fn change(images: &PerCapture<PixelGrid>, base: &PerCapture<PixelGrid>, factor: f32) -> PerCapture<PixelGrid> {
+    let pairs = images.raw.par_iter().zip(&base.raw);
+    let changes: Vec<PixelGrid> = pairs
+        .map(|(i, b)| PixelGrid::combine(&[(i, factor), (b, -factor)]))
+        .collect();
+    changes.into()
+}
+
+/// One change for each LED, which acts in the captures of this LED alone.
+fn by_led<'a>(
+    changes: &'a PerCapture<PixelGrid>,
+    led: &'a PerCapture<LedIndex>,
+    leds: usize,
+) -> impl Iterator<Item = SmoothChange> + 'a {
+    (0..leds).map(LedIndex::from).map(move |own| {
+        let pairs = changes.iter().zip(led);
+        pairs.map(|(c, l)| (*l == own).then(|| c.clone())).collect()
+    })
 }

@@ -1,5 +1,4 @@
-//! How far `calibrate` can be trusted, by twins: false claims, what is found at which size, what is
-//! taken for what.
+//! Validation of the calibration on synthetic sets: false claims, detection limits, confusions.
 
 mod page;
 mod summary;
@@ -15,14 +14,14 @@ pub use summary::{DetectionLimit, Validation};
 
 use crate::diagnosis::{Diagnosis, SetVerdict};
 use crate::effects::Parameter;
-use crate::fit::free_terms::FreeTerm;
-use crate::search::attribution::Finding;
-use crate::session::{Session, Settings};
-use crate::set::MeasuredSet;
-use crate::validate::synthetic::{Synthesizer, SyntheticImages, UnlistedEffect};
+use crate::search::Evidence;
+use crate::session::{Session, Settings, check_effects};
+use crate::set::{CaptureIndex, MeasuredSet};
+use crate::smooth_residual::SmoothResidual;
 use metalith_core::{Progress, Result};
+use synthetic::{Synthesizer, SyntheticImages, UnlistedEffect};
 
-/// Sizes that every effect is tried at, in typical sizes.
+/// Sizes at which every effect is tried [typical sizes].
 pub const SIZES: [f64; 3] = [0.5, 1.0, 2.0];
 
 /// Effects that are tried together, each at its typical size: of one stage and of several, alike and unlike.
@@ -40,50 +39,50 @@ const PAIRS: [(&str, &str); 8] = [
 /// The truth of a set without any effect.
 pub const NOTHING: &str = "nothing";
 
-/// Seeds of sets that thresholds are held against, apart from all that are judged.
+/// First seed of the sets that thresholds are compared with; none of these is judged.
 const THRESHOLD_SEED: u64 = 900_000;
 
-/// Seeds of sets that are judged.
+/// First seed of the sets that are judged.
 const JUDGED_SEED: u64 = 1000;
 
-/// One twin and what was said of it.
+/// One synthetic set and its diagnosis.
 #[derive(Clone, Debug, Serialize)]
 pub struct Trial {
     /// What differed; [`NOTHING`] for a set without effect.
     pub truth: String,
-    /// Whether that is in no list.
+    /// Whether it is no known effect.
     pub off_list: bool,
     /// Whether it is two effects at once.
     pub pair: bool,
     /// Its size in typical sizes.
     pub size: f64,
-    /// Its value as it is reported, where it is one number.
+    /// Its value as it is reported, for effects of one value.
     pub value: Option<f64>,
     pub unit: String,
     pub seed: u64,
     pub verdict: SetVerdict,
     /// What was claimed.
     pub found: Vec<String>,
-    /// Whether the true effect (both of two) is among what was found, alone or as one of a set.
+    /// Whether the true effect (both of two) is among the effects found, alone or as one of several alternatives.
     pub named: bool,
     pub found_value: Option<Value>,
     pub interval: Option<Value>,
-    /// Whether the interval of the true effect (of each of two) holds its true value, for effects of one number.
+    /// Whether the interval of the true effect (of each of two) includes its true value, for effects of one value.
     pub inside: Option<bool>,
     /// Largest gain of any single effect on captures left out.
     pub largest_gain: f64,
     pub held_out_before: f64,
     pub held_out_after: f64,
-    /// What is left, for what is in no list.
-    pub left: Option<Left>,
+    /// What is left of an effect that is not listed.
+    pub left: Option<UnexplainedResidual>,
 }
 
-/// What a diagnosis could not name, as a person is shown it.
+/// What a diagnosis could not name, for people.
 #[derive(Clone, Debug, Serialize)]
-pub struct Left {
-    /// Coefficients of the free path by Noll's number, with standard deviations [nm].
+pub struct UnexplainedResidual {
+    /// Coefficients of the smooth path by Noll's number, with standard deviations [nm].
     pub path_nm: Vec<(u32, f64, f64)>,
-    /// Covariance of the free blur, xx, xy, yy, with standard deviations [um^2].
+    /// Covariance of the smooth blur, xx, xy, yy, with standard deviations [um^2].
     pub blur_um2: [(f64, f64); 3],
     /// Capture whose residual is shown.
     pub capture: String,
@@ -96,16 +95,16 @@ pub struct Left {
     pub residual: Array2<f64>,
 }
 
-/// What the proof runs.
+/// What a validation runs.
 #[derive(Clone, Debug)]
 pub struct ValidationPlan {
     /// Sets without any effect that are judged.
     pub nulls: u64,
-    /// Other sets without effect, which thresholds are held against.
+    /// Other sets without effect, which thresholds are compared with.
     pub threshold_nulls: u64,
-    /// Effects that twins are made with; all if empty.
+    /// Effects that sets are made with; all if empty.
     pub effects: Vec<String>,
-    /// Whether effects in no list are tried.
+    /// Whether effects that are not listed are tried.
     pub off_list: bool,
 }
 
@@ -120,14 +119,14 @@ impl Default for ValidationPlan {
     }
 }
 
-/// Judge `calibrate` on twins of a set.
+/// Judge the calibration on synthetic sets like a measured one.
 ///
 /// # Errors
-/// If a cell cannot be solved, or the user stopped it.
+/// If an effect is not known, a cell cannot be solved, or the user stopped it.
 pub fn validate(
     like: &MeasuredSet,
     settings: &Settings,
-    extent: &ValidationPlan,
+    plan: &ValidationPlan,
     progress: &dyn Progress,
 ) -> Result<Validation> {
     let settings = Settings {
@@ -135,9 +134,10 @@ pub fn validate(
         ..settings.clone()
     };
     let session = Session::new(like, settings.clone())?;
-    let atlas = session.atlas(progress)?;
-    let twins = Synthesizer::new(like, &settings)?;
-    let chips = chips(&session, extent);
+    check_effects(&session.simulator.effects, &plan.effects)?;
+    let simulations = session.simulate(progress)?;
+    let synthesizer = Synthesizer::new(like, &settings)?;
+    let chips = chips(&session, plan);
     let wanted: Vec<Vec<(&str, &[f64])>> = chips
         .iter()
         .map(|chip| {
@@ -147,21 +147,21 @@ pub fn validate(
                 .collect()
         })
         .collect();
-    let exposed = twins.with_effects(&wanted, progress)?;
+    let exposed = synthesizer.with_effects(&wanted, progress)?;
     let mut odd = Vec::new();
-    if extent.off_list {
+    if plan.off_list {
         for (name, what) in [
             ("astigmatism", UnlistedEffect::Astigmatism(30.0)),
             ("ghost", UnlistedEffect::Ghost(0.04, [5.0, -3.0])),
             ("anisotropy", UnlistedEffect::Anisotropy(8.0)),
         ] {
-            odd.push((name, twins.off_list(what, progress)?));
+            odd.push((name, synthesizer.off_list(what, progress)?));
         }
     }
     // The first chip is without effect.
-    let thresholds = (0..extent.threshold_nulls).map(|k| (&exposed[0], &chips[0], THRESHOLD_SEED + k));
-    let nulls = (0..extent.nulls).map(|k| (&exposed[0], &chips[0], JUDGED_SEED + k));
-    let others = JUDGED_SEED + extent.nulls;
+    let thresholds = (0..plan.threshold_nulls).map(|k| (&exposed[0], &chips[0], THRESHOLD_SEED + k));
+    let nulls = (0..plan.nulls).map(|k| (&exposed[0], &chips[0], JUDGED_SEED + k));
+    let others = JUDGED_SEED + plan.nulls;
     let listed = exposed.iter().zip(&chips).skip(1).zip(others..);
     let mut work: Vec<(&SyntheticImages, Trial, &[Part])> = thresholds
         .chain(nulls)
@@ -173,30 +173,30 @@ pub fn validate(
         trial.off_list = true;
         work.push((exposed, trial, &[]));
     }
-    progress.begin("twins diagnosed", work.len() as u64);
-    // Each twin is worked on by itself, and the order of the answers is that of the list.
+    progress.begin("synthetic sets diagnosed", work.len() as u64);
+    // Sets are independent of one another, and the answers are in the order of the list.
     let mut trials = work
         .into_par_iter()
         .map(|(exposed, mut trial, parts)| {
-            let set = twins.draw(exposed, trial.seed);
-            let mut twin = Session::new(&set, settings.clone())?;
-            let (diagnosis, finding) = twin.diagnose(&atlas, &StopOnly(progress))?;
+            let set = synthesizer.draw(exposed, trial.seed);
+            let own = Session::new(&set, settings.clone())?;
+            let (diagnosis, evidence) = own.diagnose(&simulations, &StopOnly(progress))?;
             if trial.off_list {
-                trial.left = finding.and_then(|f| Left::new(&twin, &diagnosis, &f));
+                trial.left = evidence.and_then(|e| UnexplainedResidual::new(&own, &diagnosis, &e));
             }
             trial.judge(&diagnosis, parts, &session);
             progress.advance(1);
             Ok(trial)
         })
         .collect::<Result<Vec<_>>>()?;
-    let judged = trials.split_off(extent.threshold_nulls as usize);
+    let judged = trials.split_off(plan.threshold_nulls as usize);
     Ok(Validation::new(like.title.clone(), &trials, judged))
 }
 
-/// An effect with its numbers.
+/// An effect with its parameters.
 type Part = (String, Vec<f64>);
 
-/// A chip or a bench that twins are made of.
+/// A chip and a bench that sets are made of.
 struct Chip {
     truth: String,
     size: f64,
@@ -214,10 +214,10 @@ impl Chip {
 }
 
 /// One chip without effect, one for each effect and size, one for each pair.
-fn chips(session: &Session<'_>, extent: &ValidationPlan) -> Vec<Chip> {
-    let wanted = |name: &str| extent.effects.is_empty() || extent.effects.iter().any(|e| e == name);
+fn chips(session: &Session<'_>, plan: &ValidationPlan) -> Vec<Chip> {
+    let wanted = |name: &str| plan.effects.is_empty() || plan.effects.iter().any(|e| e == name);
     let effects: Vec<_> = session.simulator.effects.iter().filter(|e| wanted(&e.name())).collect();
-    // Both numbers of an effect along two axes, unequal and of opposite signs.
+    // The two parameters of an effect along two axes are unequal and of opposite signs.
     let numbers = |parameters: Vec<Parameter>, size: f64| -> Vec<f64> {
         let parts = parameters.iter().zip([1.0, -0.6]);
         parts.map(|(p, s)| s * size * p.typical).collect()
@@ -249,7 +249,7 @@ fn chips(session: &Session<'_>, extent: &ValidationPlan) -> Vec<Chip> {
     chips
 }
 
-/// Passes on that the user wants to stop, and nothing of how far one of many is.
+/// Passes on that the user wants to stop, but not the progress of each of many sets.
 struct StopOnly<'p>(&'p dyn Progress);
 
 impl Progress for StopOnly<'_> {
@@ -318,19 +318,20 @@ impl Trial {
     }
 }
 
-impl Left {
-    fn new(session: &Session<'_>, diagnosis: &Diagnosis, finding: &Finding) -> Option<Self> {
-        let free = FreeTerm::new(session, finding)?;
-        let error = |c: &usize| diagnosis.captures[*c].after.unwrap_or(0.0);
-        let worst = (0..diagnosis.captures.len()).max_by(|a, b| error(a).total_cmp(&error(b)))?;
-        let grid = session.problem_of(finding).grid(&finding.after.theta, worst);
-        let residual = finding.after.nuisances.residual(&session.data, &grid, worst);
+impl UnexplainedResidual {
+    fn new(session: &Session<'_>, diagnosis: &Diagnosis, evidence: &Evidence) -> Option<Self> {
+        let (problem, fit) = (evidence.problem(&session.simulator), &evidence.finding.after);
+        let smooth = SmoothResidual::new(&session.simulator, &problem, fit)?;
+        let error = |c: &CaptureIndex| diagnosis.captures[usize::from(*c)].after.unwrap_or(0.0);
+        let worst = problem.data.captures().max_by(|a, b| error(a).total_cmp(&error(b)))?;
+        let image = problem.image(&fit.theta, worst);
+        let residual = fit.nuisances.residual(problem.data, &image, worst);
         Some(Self {
-            path_nm: free.coefficients_nm,
-            blur_um2: free.blur_um2,
-            capture: diagnosis.captures[worst].capture.clone(),
-            path: free.path_nm,
-            radius_um: free.radius_um,
+            path_nm: smooth.coefficients_nm,
+            blur_um2: smooth.blur_um2,
+            capture: diagnosis.captures[usize::from(worst)].capture.clone(),
+            path: smooth.path_nm,
+            radius_um: smooth.radius_um,
             residual: residual.mapv(f64::from),
         })
     }

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::{NOTHING, Trial};
 use crate::diagnosis::SetVerdict;
-use crate::search::stepwise::LEAST_GAIN;
+use crate::search::LEAST_GAIN;
 use metalith_report::sig;
 
 /// What a set is counted under when no effect is claimed.

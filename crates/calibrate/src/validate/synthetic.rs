@@ -1,5 +1,5 @@
-//! Sets of our own, to be judged by: made with another sampling, another number of orders and other draws
-//! than fits use, with whatever is asked to differ.
+//! Synthetic sets: made with another sampling, another number of orders and other draws than fits use, with any
+//! effects, listed or not.
 
 use std::sync::Arc;
 
@@ -12,42 +12,42 @@ use crate::cells::{CellSource, RigorousCells};
 use crate::departure::Departure;
 use crate::effects;
 use crate::optics::PixelGrid;
-use crate::session::{Settings, stated_cell};
-use crate::set::MeasuredSet;
+use crate::session::{Settings, check_effects};
+use crate::set::{MeasuredSet, PerCapture, PerLed};
 use crate::simulator::{Simulator, WIDTH_ROOM_NM};
 use metalith_core::{Error, Progress, Result};
 
-/// Orders along an axis; fits use others.
+/// Diffraction orders along an axis; fits use others.
 const ORDERS: usize = 11;
 
-/// And what leaning walls change, which takes six layers.
-const LEANING_ORDERS: usize = 9;
+/// And for the change by tapered walls, which takes six layers.
+const TAPER_ORDERS: usize = 9;
 
 /// Seed of the places of missing pillars.
 const MISSING_SEED: u64 = 77;
 
-/// Standard deviation of the black level of a twin [DN].
+/// Standard deviation of the black level of a synthetic set [DN].
 const BLACK_DN: f64 = 0.1;
 
-/// What no list of effects knows.
+/// Effects that are not listed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum UnlistedEffect {
     /// A bowed substrate: astigmatism along the axes [nm rms of path].
     Astigmatism(f64),
-    /// A second image, this bright and so far off [um].
+    /// A second image: its brightness, relative to the first, and its offset [um].
     Ghost(f64, [f64; 2]),
     /// Pillars wider along x and narrower along y [nm].
     Anisotropy(f64),
 }
 
-/// Makes sets like one that is given.
+/// Makes sets like a measured one.
 pub struct Synthesizer<'a> {
     simulator: Simulator<'a>,
 }
 
-/// What the captures of a twin show before noise, and what its widths are.
+/// The images of a synthetic set before noise, and what its widths follow from.
 pub struct SyntheticImages {
-    grids: Vec<PixelGrid>,
+    images: Vec<PixelGrid>,
     ghost: Option<(f64, [f64; 2])>,
     departure: Departure,
 }
@@ -69,27 +69,27 @@ impl<'a> Synthesizer<'a> {
         bench.follows = false;
         let (low, high) = bench.widths_nm();
         let cells = RigorousCells::new(
-            stated_cell(like)?,
+            like.stated_cell()?,
             bench.wavelengths_nm(),
             (low - WIDTH_ROOM_NM, high + WIDTH_ROOM_NM),
             settings.cache.clone(),
         )
-        .with_orders(ORDERS, LEANING_ORDERS);
+        .with_orders(ORDERS, TAPER_ORDERS);
         let mut simulator = Simulator::new(bench, CellSource::Rigorous(Box::new(cells)), effects::all(like));
-        // Fits count with the mean of missing pillars; here single ones are gone.
+        // Fits use the mean of missing pillars; here single ones are missing.
         simulator.scatter = Some(MISSING_SEED);
         Ok(Self { simulator })
     }
 
-    /// What captures show where an effect has these numbers.
+    /// Images with one effect; no effect if its name is empty.
     ///
     /// # Errors
-    /// If there is no such effect, or a cell cannot be solved.
+    /// If the effect is not known, or a cell cannot be solved.
     pub fn with_effect(&self, name: &str, numbers: &[f64], progress: &dyn Progress) -> Result<SyntheticImages> {
         Ok(self.with_effects(&[vec![(name, numbers)]], progress)?.remove(0))
     }
 
-    /// The same for many chips at once, each with some effects, or none.
+    /// The same for many chips at once, each with any number of effects.
     ///
     /// # Errors
     /// As [`Synthesizer::with_effect`].
@@ -98,26 +98,26 @@ impl<'a> Synthesizer<'a> {
         for chip in chips {
             let mut departure = Departure::default();
             for (name, numbers) in chip.iter().filter(|(name, _)| !name.is_empty()) {
-                let effect = self.simulator.effects.iter().find(|e| e.name() == *name);
-                effect
-                    .ok_or_else(|| Error::invalid(format!("no effect is called {name}"), "use a name of the list"))?
-                    .apply(numbers, &mut departure);
+                check_effects(&self.simulator.effects, &[(*name).to_owned()])?;
+                if let Some(effect) = self.simulator.effects.iter().find(|e| e.name() == *name) {
+                    effect.apply(numbers, &mut departure);
+                }
             }
             departures.push(departure);
         }
-        let exposed = self.simulator.expose(&departures, progress)?;
-        Ok(exposed
+        let images = self.simulator.expose(&departures, progress)?;
+        Ok(images
             .into_iter()
             .zip(departures)
-            .map(|(grids, departure)| SyntheticImages {
-                grids,
+            .map(|(images, departure)| SyntheticImages {
+                images,
                 ghost: None,
                 departure,
             })
             .collect())
     }
 
-    /// What captures show under something that is in no list.
+    /// Images with an effect that is not listed.
     ///
     /// # Errors
     /// If a cell cannot be solved.
@@ -132,7 +132,12 @@ impl<'a> Synthesizer<'a> {
             UnlistedEffect::Anisotropy(nm) => {
                 let tables = match &self.simulator.cells {
                     CellSource::Rigorous(cells) => cells.anisotropic(nm, progress)?,
-                    CellSource::Model(_) => return Err(Error::invalid("no rigorous cells", "make twins of a set")),
+                    CellSource::Model(_) => {
+                        return Err(Error::invalid(
+                            "no rigorous cells",
+                            "synthetic sets are made with rigorous cells",
+                        ));
+                    }
                 };
                 let chips = tables.map(|table| Lit {
                     cells: Arc::new(table),
@@ -141,13 +146,13 @@ impl<'a> Synthesizer<'a> {
                     scatter: None,
                 });
                 let planes = self.simulator.bench.intensities(&chips, &departure.path, progress)?;
-                let both: Vec<Vec<f32>> = planes[0][0]
+                let both: PerCapture<Vec<f32>> = planes[0][0]
                     .iter()
                     .zip(&planes[1][0])
                     .map(|(x, y)| x.iter().zip(y).map(|(a, b)| 0.5 * (a + b)).collect())
                     .collect();
                 Ok(SyntheticImages {
-                    grids: self.simulator.bench.grids(&both, &departure),
+                    images: self.simulator.bench.grids(&both, &departure),
                     ghost: None,
                     departure,
                 })
@@ -161,31 +166,31 @@ impl<'a> Synthesizer<'a> {
         ghost: Option<(f64, [f64; 2])>,
         progress: &dyn Progress,
     ) -> Result<SyntheticImages> {
-        let grids = self
+        let images = self
             .simulator
             .expose(std::slice::from_ref(&departure), progress)?
             .remove(0);
         Ok(SyntheticImages {
-            grids,
+            images,
             ghost,
             departure,
         })
     }
 
-    /// A set with placement, flux, black level and noise drawn from `seed`.
+    /// A set with registration, flux, black level and noise drawn from `seed`.
     pub fn draw(&self, exposed: &SyntheticImages, seed: u64) -> MeasuredSet {
         let like = self.simulator.bench.set();
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut set = like.clone();
         let camera = like.camera;
-        let flux: Vec<f64> = like
+        let flux: PerLed<f64> = like
             .leds
             .iter()
             .map(|_| 1.0 + camera.flux_sigma * normal(&mut rng))
             .collect();
         let black = camera.black_level_dn + BLACK_DN * normal(&mut rng);
         let reach = camera.registration_sigma_px * camera.pixel_um;
-        for (capture, grid) in set.captures.iter_mut().zip(&exposed.grids) {
+        for (capture, grid) in set.captures.iter_mut().zip(&exposed.images) {
             let shift = [reach * normal(&mut rng), reach * normal(&mut rng)];
             let mut light: Array2<f32> = grid.pixels(shift);
             if let Some((share, at)) = exposed.ghost {
@@ -201,12 +206,9 @@ impl<'a> Synthesizer<'a> {
         }
         let offset = like.sem_offset_sigma_nm * normal(&mut rng);
         for site in &mut set.sem {
-            let Some(element) = like.elements.iter().position(|e| e.index == site.element) else {
+            let Some((element, at)) = like.site_of(site) else {
                 continue;
             };
-            let lattice = like.elements[element].pillars.lattice;
-            let index = |x: f64| (x / lattice.pitch_um() + 0.5 * (lattice.sites() as f64 - 1.0)).round() as usize;
-            let at = index(site.at_um[1]) * lattice.sites() + index(site.at_um[0]);
             let bias = self.simulator.bench.bias_nm(element, at, &exposed.departure.geometry);
             site.measured_nm = site.designed_nm + bias + offset + site.sigma_nm * normal(&mut rng);
         }

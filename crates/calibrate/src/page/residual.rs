@@ -1,24 +1,25 @@
-//! What the effects leave, what looks alike, and the nuisances.
+//! What the effects leave, which effects are hard to distinguish, and the nuisances.
 
-use crate::fit::free_terms::FreeTerm;
-use crate::fit::nuisances::Nuisances;
-use crate::search::attribution::Finding;
-use crate::search::signatures::{cosines, separate_by};
-use crate::session::Session;
-use crate::surrogate::Surrogate;
+use crate::fit::{Nuisances, Problem};
+use crate::search::{Evidence, cosines};
+use crate::session::{Session, Simulations};
+use crate::simulator_model::separating_measurement;
+use crate::smooth_residual::SmoothResidual;
 use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, Table, fixed, sig};
 
-/// Cosines between signatures above this are named.
+/// Pairs of signatures with a cosine above this are listed.
 const ALIKE: f64 = 0.9;
 
-/// The free term, as pictures with units.
-pub(super) fn free_term(page: &mut Page, session: &Session<'_>, finding: &Finding) {
-    let Some(free) = FreeTerm::new(session, finding) else {
+/// The smooth residual, as pictures with units.
+pub(super) fn smooth_residual(page: &mut Page, session: &Session<'_>, evidence: &Evidence) {
+    let simulator = &session.simulator;
+    let problem = evidence.problem(simulator);
+    let Some(free) = SmoothResidual::new(simulator, &problem, &evidence.finding.after) else {
         return;
     };
-    page.section("What is left");
+    page.section("Smooth residual");
     page.paragraph(format!(
-        "Smooth shapes fitted to what the effects leave; they go by no name. They take chi-square a pixel from {} to {}. The path over the lens is {} nm rms, with a noise of {} nm.",
+        "Smooth shapes, which stand for no effect, fitted to what the effects leave. They lower the reduced chi-square per pixel from {} to {}. The path over the lens is {} nm rms, with a noise of {} nm.",
         sig(free.chi2.0, 4),
         sig(free.chi2.1, 4),
         sig(free.path_rms_nm.0, 3),
@@ -61,15 +62,19 @@ pub(super) fn free_term(page: &mut Page, session: &Session<'_>, finding: &Findin
     }
     page.row([
         map.caption("Optical path common to all colours and elements; tilts and defocus are nuisances or effects."),
-        curves.caption("Change of amplitude over width that each colour asks for."),
+        curves.caption("Change of amplitude over width, fitted for each colour."),
     ]);
 }
 
-/// Pairs of effects that these captures hardly tell apart.
-pub(super) fn confusable(page: &mut Page, session: &Session<'_>, atlas: &Surrogate, finding: &Finding) {
-    page.section("What looks alike");
-    let problem = session.problem(atlas);
-    let c = cosines(&problem, &finding.before);
+/// Pairs of effects that these captures can hardly distinguish.
+pub(super) fn confusable(page: &mut Page, session: &Session<'_>, simulations: &Simulations, evidence: &Evidence) {
+    page.section("Effects that are hard to distinguish");
+    let problem = Problem {
+        used: evidence.used.clone(),
+        data: &evidence.data,
+        ..session.problem(simulations)
+    };
+    let c = cosines(&problem, &evidence.finding.before);
     let names: Vec<String> = session
         .simulator
         .slots
@@ -87,15 +92,17 @@ pub(super) fn confusable(page: &mut Page, session: &Session<'_>, atlas: &Surroga
         Column::text("Effect"),
         Column::text("and"),
         Column::number("Cosine", ""),
-        Column::text("What would tell them apart"),
+        Column::text("Measurement that would distinguish them"),
     ])
-    .caption("Signatures of this layout in these captures, nuisances projected out, weighted by noise.");
+    .caption(
+        "Cosines between the signatures of this layout in these captures, nuisances projected out, weighted by noise.",
+    );
     let mut pairs: Vec<(usize, usize)> = (0..names.len()).flat_map(|i| (0..i).map(move |j| (j, i))).collect();
     pairs.retain(|&(i, j)| c[(i, j)].abs() > ALIKE);
     pairs.sort_by(|a, b| c[*b].abs().total_cmp(&c[*a].abs()));
     for (i, j) in pairs {
         let [a, b] = [i, j].map(|k| session.simulator.slots[k].effect);
-        let how = separate_by(&session.simulator, a, &[b]);
+        let how = separating_measurement(&session.simulator, a, &[b]);
         table.row([
             Cell::code(&names[i]),
             Cell::code(&names[j]),
@@ -106,9 +113,9 @@ pub(super) fn confusable(page: &mut Page, session: &Session<'_>, atlas: &Surroga
     page.table(table);
 }
 
-/// Placement, flux and black level as fitted.
+/// Registration, flux and black level as fitted.
 pub(super) fn nuisances(page: &mut Page, session: &Session<'_>, found: &Nuisances) {
-    page.details("Nuisances: placement, flux, black level", |inner| {
+    page.details("Nuisances: registration, flux, black level", |inner| {
         let mut table = Table::new([
             Column::text("Capture"),
             Column::number("Off in x", "pixels"),

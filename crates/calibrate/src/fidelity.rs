@@ -1,0 +1,79 @@
+//! The three fidelities of the cell, compared on a set: nuisances fitted, nothing else.
+
+use metalith_cell::{FittedCell, PublishedCell};
+use metalith_core::{Progress, Result};
+use ndarray::Array2;
+use serde::Serialize;
+
+use crate::bench::{Bench, Sampling};
+use crate::cells::CellSource;
+use crate::departure::Departure;
+use crate::fit::{Problem, held_out, mean_error};
+use crate::set::{MeasuredSet, PerCapture};
+use crate::simulator::Simulator;
+use crate::surrogate::Surrogate;
+
+/// The error of one fidelity of the cell.
+#[derive(Clone, Debug, Serialize)]
+pub struct Rung {
+    pub fidelity: String,
+    /// Reduced chi-square per pixel of the fit.
+    pub fit: f64,
+    /// The same on captures left out.
+    pub held_out: f64,
+    /// Residual of each capture [sigma], nuisances fitted; for pictures.
+    #[serde(skip)]
+    pub residuals: PerCapture<Array2<f32>>,
+}
+
+/// The error of each fidelity. `problem` is that of the rigorous cell.
+///
+/// # Errors
+/// If a cell cannot be fitted or simulated, or the user stopped it.
+pub fn compare_fidelities(
+    set: &MeasuredSet,
+    sampling: Sampling,
+    problem: &Problem<'_>,
+    progress: &dyn Progress,
+) -> Result<Vec<Rung>> {
+    let bench = Bench::new(set, sampling);
+    let published = CellSource::Model(Box::new(PublishedCell::new(set.stack.pitch_nm)));
+    let ends = bench
+        .wavelengths_nm()
+        .iter()
+        .fold((f64::MAX, 0.0f64), |(a, b), &l| (a.min(l), b.max(l)));
+    let (low, high) = bench.widths_nm();
+    let fitted = FittedCell::of_stack(
+        &set.stated_cell()?,
+        (ends.0 * 1e-3, ends.1 * 1e-3),
+        (low as u16, high as u16),
+    )?;
+    let fitted = CellSource::Model(Box::new(fitted));
+    let mut rungs = Vec::new();
+    for (name, cells) in [("published", published), ("fitted", fitted)] {
+        let simulator = Simulator::new(Bench::new(set, sampling), cells, Vec::new());
+        let images = simulator.expose(&[Departure::default()], progress)?.remove(0);
+        let of_model = Problem {
+            model: &simulator,
+            surrogate: Surrogate::constant(images.into()),
+            ..problem.clone()
+        };
+        rungs.push(rung(name, &of_model));
+    }
+    rungs.push(rung("rigorous", problem));
+    Ok(rungs)
+}
+
+fn rung(name: &str, problem: &Problem<'_>) -> Rung {
+    let fit = problem.nuisance_fit();
+    let residual = |c| {
+        let image = problem.image(&fit.theta, c);
+        fit.nuisances.residual(problem.data, &image, c)
+    };
+    Rung {
+        fidelity: name.into(),
+        fit: fit.chi2 / problem.pixels(),
+        held_out: mean_error(&held_out(problem, &fit.equations, &fit)),
+        residuals: problem.data.captures().map(residual).collect(),
+    }
+}

@@ -1,0 +1,100 @@
+//! The normal equations of one capture, its registration eliminated.
+
+use nalgebra::{DMatrix, DVector};
+use ndarray::Array2;
+
+use super::data::Data;
+use super::nuisances::Nuisances;
+use crate::optics::{PixelGrid, Reading};
+use crate::set::CaptureIndex;
+
+/// Inner products of the whitened columns of one capture, in this order: registration along x and y, flux of
+/// every LED, black level, further parameters, and the residual last.
+#[derive(Clone)]
+pub struct CaptureEquations {
+    gram: DMatrix<f64>,
+}
+
+impl CaptureEquations {
+    /// For a capture whose predicted image is `grid`; `more` are the derivatives of the image by further
+    /// parameters.
+    pub fn new(data: &Data, c: CaptureIndex, now: &Nuisances, grid: &PixelGrid, more: &[PixelGrid]) -> Self {
+        let reading = Reading::new(more.iter().chain([grid]), now.shift_um[c]);
+        let lines = [
+            reading.pixels(grid),
+            reading.pixels(&grid.slope(0)),
+            reading.pixels(&grid.slope(1)),
+        ];
+        let more: Vec<_> = more.iter().map(|m| reading.pixels(m)).collect();
+        let residual = now.whitened(data, c, &lines[0]);
+        let led = data.beam[c].led;
+        let scale = data.scale[c] as f32;
+        let scaled = scale * now.flux[led] as f32;
+        let weight = &data.weight[c];
+        let column =
+            |a: &Array2<f32>, factor: f32| -> Vec<f32> { a.iter().zip(weight).map(|(v, w)| factor * v * w).collect() };
+        let mut columns = vec![column(&lines[1], scaled), column(&lines[2], scaled)];
+        columns.push(column(&lines[0], scale));
+        columns.push(weight.iter().copied().collect());
+        columns.extend(more.iter().map(|m| column(m, scaled)));
+        columns.push(residual.iter().copied().collect());
+        // Where each column goes: only this capture's own LED has a flux column.
+        let size = 2 + data.leds + 1 + more.len() + 1;
+        let place: Vec<usize> = [0, 1, 2 + usize::from(led)]
+            .into_iter()
+            .chain(2 + data.leds..size)
+            .collect();
+        let mut gram = DMatrix::zeros(size, size);
+        for (i, a) in columns.iter().enumerate() {
+            for (j, b) in columns.iter().enumerate().take(i + 1) {
+                let dot = dot(a, b);
+                gram[(place[i], place[j])] = dot;
+                gram[(place[j], place[i])] = dot;
+            }
+        }
+        let prior = data.registration_um.powi(-2);
+        let last = size - 1;
+        for axis in [0, 1] {
+            gram[(axis, axis)] += prior;
+            let pull = -now.shift_um[c][axis] * prior;
+            gram[(axis, last)] += pull;
+            gram[(last, axis)] += pull;
+            gram[(last, last)] += now.shift_um[c][axis].powi(2) * prior;
+        }
+        Self { gram }
+    }
+
+    /// The products after registration has been eliminated: flux, black level, further parameters, residual.
+    pub fn reduced(&self) -> DMatrix<f64> {
+        let n = self.gram.nrows() - 2;
+        let inner = self.inner();
+        let cross = self.gram.view((0, 2), (2, n));
+        self.gram.view((2, 2), (n, n)) - cross.transpose() * inner * cross
+    }
+
+    /// The best step of registration [um] after the others have moved by `step` (flux, black level, further).
+    pub fn registration(&self, step: &DVector<f64>) -> [f64; 2] {
+        let last = self.gram.ncols() - 1;
+        let mut rhs = self.gram.view((0, last), (2, 1)).into_owned();
+        for (j, s) in step.iter().enumerate() {
+            for axis in [0, 1] {
+                rhs[axis] -= self.gram[(axis, 2 + j)] * s;
+            }
+        }
+        let step = self.inner() * rhs;
+        [step[0], step[1]]
+    }
+
+    fn inner(&self) -> DMatrix<f64> {
+        let a = self.gram.view((0, 0), (2, 2)).into_owned();
+        a.try_inverse().unwrap_or_else(|| DMatrix::zeros(2, 2))
+    }
+}
+
+fn dot(a: &[f32], b: &[f32]) -> f64 {
+    // Short partial sums in single precision, their total in double.
+    a.chunks(64)
+        .zip(b.chunks(64))
+        .map(|(a, b)| f64::from(a.iter().zip(b).map(|(x, y)| x * y).sum::<f32>()))
+        .sum()
+}

@@ -1,0 +1,59 @@
+//! Capture screening: frames that nothing can be learned from.
+
+use crate::fit::{Nuisances, Problem};
+use crate::set::{CaptureIndex, MeasuredSet};
+
+/// Share of saturated pixels past which a capture has lost what matters: its peak.
+const MOST_SATURATED: f64 = 2e-4;
+
+/// Share of the expected light below which a shutter was closed or a lamp off.
+const LEAST_LIGHT: f64 = 0.1;
+
+/// A window this many standard deviations away was moved.
+const MOST_SIGMAS: f64 = 8.0;
+
+/// A capture that cannot be used.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UnusableCapture {
+    pub capture: CaptureIndex,
+    /// Why, for people.
+    pub reason: String,
+}
+
+/// Captures that cannot be used, by a fit of the nuisances to the set as stated.
+pub fn unusable_captures(set: &MeasuredSet, problem: &Problem<'_>, nuisances: &Nuisances) -> Vec<UnusableCapture> {
+    let mut out = Vec::new();
+    let registration = set.camera.registration_sigma_px;
+    let beyond = window_offsets(nuisances, set.camera.pixel_um);
+    for ((c, capture), beyond) in set.captures.iter_enumerated().zip(beyond) {
+        let pixels = capture.dn.len();
+        let lost = pixels - problem.data.pixels(c);
+        let model = problem.image(&problem.surrogate.about, c).pixels([0.0; 2]);
+        let expected = f64::from(model.iter().sum::<f32>()) * capture.scale_dn;
+        let seen = f64::from(problem.data.signal[c].iter().sum::<f32>());
+        let reason = if lost as f64 > MOST_SATURATED * pixels as f64 {
+            format!("{lost} of its {pixels} pixels are saturated")
+        } else if seen < LEAST_LIGHT * expected {
+            format!("it holds {:.1} % of the expected light", 100.0 * seen / expected)
+        } else if beyond > MOST_SIGMAS * registration {
+            format!("its window is {beyond:.1} pixels off; the stated standard deviation is {registration} pixels")
+        } else {
+            continue;
+        };
+        out.push(UnusableCapture { capture: c, reason });
+    }
+    out
+}
+
+/// How far each window is off, along the worse axis [pixels]. What all windows share is an effect of the light,
+/// and is taken out.
+fn window_offsets(nuisances: &Nuisances, pixel_um: f64) -> Vec<f64> {
+    let shifts: Vec<[f64; 2]> = nuisances.shift_um.iter().map(|s| s.map(|v| v / pixel_um)).collect();
+    let median = [0, 1].map(|axis| {
+        let mut all: Vec<f64> = shifts.iter().map(|s| s[axis]).collect();
+        all.sort_by(f64::total_cmp);
+        all[all.len() / 2]
+    });
+    let off = |s: &[f64; 2]| (s[0] - median[0]).abs().max((s[1] - median[1]).abs());
+    shifts.iter().map(off).collect()
+}

@@ -1,0 +1,81 @@
+//! The optical simulator as a [`ForwardModel`].
+
+use metalith_core::{Progress, Result};
+
+use crate::departure::Departure;
+use crate::effects::{Stage, separate_by};
+use crate::forward_model::{ForwardModel, PATH_TERMS, Point, Slot, SmoothTerm, TRANSMISSION_TERMS};
+use crate::optics::PixelGrid;
+use crate::set::PerCapture;
+use crate::simulator::Simulator;
+
+/// Cells are solved at multiples of this share of a typical size; the surrogate covers the difference.
+const CELL_STEP: f64 = 1.0 / 16.0;
+
+impl Simulator<'_> {
+    fn departure_at(&self, point: &Point) -> Departure {
+        let mut departure = self.departure(&point.theta);
+        match point.smooth {
+            None => {}
+            Some(term @ SmoothTerm::Path(k)) => {
+                departure.geometry.wavefront_nm = vec![0.0; PATH_TERMS];
+                departure.geometry.wavefront_nm[k] = term.step();
+            }
+            Some(term @ SmoothTerm::Transmission(k)) => {
+                departure.geometry.transmission = vec![0.0; TRANSMISSION_TERMS];
+                departure.geometry.transmission[k] = term.step();
+            }
+        }
+        departure
+    }
+}
+
+impl ForwardModel for Simulator<'_> {
+    fn effects(&self) -> usize {
+        self.effects.len()
+    }
+
+    fn slots(&self) -> &[Slot] {
+        &self.slots
+    }
+
+    fn kinked(&self, effect: usize) -> bool {
+        self.effects[effect].kinked()
+    }
+
+    fn cheap_step(&self, slot: usize) -> Option<f64> {
+        let slot = &self.slots[slot];
+        let solved = self.effects[slot.effect].stage() == Stage::Stack;
+        solved.then(|| CELL_STEP * slot.parameter.typical)
+    }
+
+    fn images(&self, points: &[Point], progress: &dyn Progress) -> Result<Vec<PerCapture<PixelGrid>>> {
+        let departures: Vec<_> = points.iter().map(|p| self.departure_at(p)).collect();
+        let exposed = self.expose(&departures, progress)?;
+        Ok(exposed.into_iter().map(PerCapture::from).collect())
+    }
+
+    fn width_biases_nm(&self, theta: &[f64]) -> Vec<Option<f64>> {
+        let geometry = self.departure(theta).geometry;
+        let set = self.bench.set();
+        set.sem
+            .iter()
+            .map(|site| {
+                let (element, at) = set.site_of(site)?;
+                Some(self.bench.bias_nm(element, at, &geometry))
+            })
+            .collect()
+    }
+}
+
+/// The measurement that would distinguish an effect from others, as far as it is known.
+pub fn separating_measurement(simulator: &Simulator<'_>, effect: usize, others: &[usize]) -> Option<String> {
+    let own = &simulator.effects[effect];
+    others
+        .iter()
+        .find_map(|&o| {
+            let other = &simulator.effects[o];
+            separate_by(own.as_ref(), &other.name()).or_else(|| separate_by(other.as_ref(), &own.name()))
+        })
+        .map(str::to_owned)
+}
