@@ -79,7 +79,7 @@ impl Problem<'_> {
         for _ in 0..EXACT_STEPS {
             fit = self.stretch(fit, progress)?;
             let at = self.rounded(&fit.theta);
-            let departure = self.simulator.departure(&at);
+            let departure = self.simulator.perturbation(&at);
             let exposed = self.simulator.expose(&[departure], progress)?.remove(0);
             let offset = exposed
                 .iter()

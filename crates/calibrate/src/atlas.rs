@@ -9,12 +9,12 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::curve::Curve;
-use super::departure::Departure;
 use super::effects::Parameter;
 use super::optics::PixelGrid;
 use super::simulator::Simulator;
 use super::speckle::Speckle;
 use metalith_core::{Progress, Result};
+use metalith_made::Perturbation;
 
 /// Multiples of the typical size that a number is simulated at, on both sides.
 const TWO_SIDED: [f64; 4] = [-2.5, -1.25, 1.25, 2.5];
@@ -59,7 +59,7 @@ impl Simulator<'_> {
     /// # Errors
     /// As [`Simulator::expose`].
     pub fn atlas(&self, about: &[f64], free: bool, progress: &dyn Progress) -> Result<Atlas> {
-        let mut departures = vec![self.departure(about)];
+        let mut departures = vec![self.perturbation(about)];
         let mut nodes: Vec<Vec<f64>> = Vec::new();
         for (s, slot) in self.slots.iter().enumerate() {
             let one_sided = slot.parameter.one_sided() && about[s] == 0.0;
@@ -77,6 +77,7 @@ impl Simulator<'_> {
                 let mut d = departures[0].clone();
                 d.geometry.transmission = vec![0.0; FREE_TRANSMISSIONS];
                 d.geometry.transmission[k] = FREE_TRANSMISSION;
+                d.geometry.transmission_range_nm = self.bench.widths_nm().into();
                 departures.push(d);
             }
         }
@@ -131,7 +132,7 @@ impl Simulator<'_> {
     }
 
     /// Sizes of one number about `about` within what physics allows, with the departures that they are.
-    fn nodes(&self, about: &[f64], s: usize, multiples: &[f64], departures: &mut Vec<Departure>) -> Vec<f64> {
+    fn nodes(&self, about: &[f64], s: usize, multiples: &[f64], departures: &mut Vec<Perturbation>) -> Vec<f64> {
         let Parameter { typical, range, .. } = self.slots[s].parameter;
         let offsets = multiples.iter().map(|m| m * typical);
         let offsets: Vec<f64> = offsets
@@ -140,7 +141,7 @@ impl Simulator<'_> {
         for offset in &offsets {
             let mut theta = about.to_vec();
             theta[s] += offset;
-            departures.push(self.departure(&theta));
+            departures.push(self.perturbation(&theta));
         }
         offsets
     }
@@ -151,7 +152,7 @@ impl Simulator<'_> {
     /// # Errors
     /// As [`Simulator::expose`].
     pub fn recentred(&self, atlas: &Atlas, about: &[f64], slots: &[usize], progress: &dyn Progress) -> Result<Atlas> {
-        let mut departures = vec![self.departure(about)];
+        let mut departures = vec![self.perturbation(about)];
         let nodes: Vec<Vec<f64>> = slots
             .iter()
             .map(|&s| self.nodes(about, s, &NEAR, &mut departures))
@@ -182,7 +183,7 @@ impl Simulator<'_> {
             .map(|value| {
                 let mut theta = atlas.about.clone();
                 theta[slot] = *value;
-                self.departure(&theta)
+                self.perturbation(&theta)
             })
             .collect();
         for (grids, value) in self.expose(&departures, progress)?.into_iter().zip(values) {

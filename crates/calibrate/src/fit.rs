@@ -185,14 +185,14 @@ impl Problem<'_> {
         if set.sem.is_empty() {
             return DMatrix::zeros(size, size);
         }
-        let geometry = self.simulator.departure(theta).geometry;
+        let geometry = self.simulator.perturbation(theta).geometry;
         // Widths are linear in what moves them: a unit of each number on top.
         let ahead: Vec<_> = active
             .iter()
             .map(|&s| {
                 let mut more = theta.to_vec();
                 more[s] += 1.0;
-                self.simulator.departure(&more).geometry
+                self.simulator.perturbation(&more).geometry
             })
             .collect();
         let mut gram = DMatrix::<f64>::zeros(active.len() + 2, active.len() + 2);

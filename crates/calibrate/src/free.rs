@@ -4,11 +4,10 @@ use ndarray::Array2;
 
 use super::atlas::{FREE_PHASES, FREE_TRANSMISSIONS};
 use super::attribute::Finding;
-use super::bench::legendre;
 use super::placebo::forms_with;
 use super::quadratic::{covariance, minimise};
 use super::session::Session;
-use super::zernike;
+use metalith_made::{legendre, zernike};
 
 /// Pairs of axes of the free blur.
 const BLURS: [[usize; 2]; 3] = [[0, 0], [0, 1], [1, 1]];

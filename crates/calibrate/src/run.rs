@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use super::atlas::Atlas;
 use super::diagnosis::{Diagnosis, SetVerdict};
-use super::model::CalibratedModel;
 use super::page::write_page;
 use super::session::{Session, Settings};
 use super::set::MeasuredSet;
 use metalith_core::{Progress, Result};
+use metalith_made::CalibratedModel;
 
 /// What a calibration leaves.
 #[derive(Clone, Debug)]
@@ -70,9 +70,9 @@ pub fn finish(session: &mut Session<'_>, atlas: &Atlas, out: &Path, progress: &d
     let model = match finding.filter(|_| learned) {
         None => None,
         Some(finding) => {
-            let departure = session.simulator.departure(&finding.after.theta);
+            let perturbation = session.simulator.perturbation(&finding.after.theta);
             let path = out.join("model.toml");
-            CalibratedModel::new(diagnosis.set.clone(), diagnosis.sentence(), departure).write(&path)?;
+            CalibratedModel::new(diagnosis.set.clone(), diagnosis.sentence(), perturbation).write(&path)?;
             Some(path)
         }
     };

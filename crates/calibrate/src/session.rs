@@ -6,7 +6,6 @@ use super::atlas::Atlas;
 use super::attribute::{Finding, attribute};
 use super::bench::{Bench, Sampling};
 use super::cells::{CellSource, RigorousCells};
-use super::departure::Departure;
 use super::diagnosis::{Diagnosis, LeftOut, Rung};
 use super::effects;
 use super::fit::{Fit, Problem};
@@ -19,6 +18,7 @@ use super::speckle::Speckle;
 use super::unfit::unfit;
 use metalith_cell::{CellStack, FittedCell, Material, PublishedCell};
 use metalith_core::{Progress, Result};
+use metalith_made::Perturbation;
 
 /// How a set is worked on.
 #[derive(Clone, Debug)]
@@ -285,7 +285,7 @@ impl<'a> Session<'a> {
                 Some(cells) => {
                     let bench = Bench::new(self.set(), self.settings.sampling);
                     let simulator = Simulator::new(bench, cells, Vec::new());
-                    let exposed = simulator.expose(&[Departure::default()], progress)?.remove(0);
+                    let exposed = simulator.expose(&[Perturbation::default()], progress)?.remove(0);
                     let problem = Problem {
                         simulator: &simulator,
                         atlas: Atlas::alone(exposed),

@@ -45,7 +45,7 @@ impl Speckle {
         let share = simulator.slots[slot].parameter.typical;
         let mut theta = about.to_vec();
         theta[slot] = share;
-        let departure = simulator.departure(&theta);
+        let departure = simulator.perturbation(&theta);
         let mean = simulator.expose(std::slice::from_ref(&departure), progress)?.remove(0);
         let mut drawn = Vec::new();
         for k in 0..DRAWS {

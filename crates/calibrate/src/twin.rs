@@ -9,13 +9,13 @@ use rand_chacha::ChaCha8Rng;
 
 use super::bench::{Bench, Lit, Sampling};
 use super::cells::{CellSource, RigorousCells};
-use super::departure::Departure;
 use super::effects;
 use super::optics::PixelGrid;
 use super::session::{Settings, stated_cell};
 use super::set::MeasuredSet;
 use super::simulator::{Simulator, WIDTH_ROOM_NM};
 use metalith_core::{Error, Progress, Result};
+use metalith_made::Perturbation;
 
 /// Orders along an axis; fits use others.
 const ORDERS: usize = 11;
@@ -49,7 +49,7 @@ pub struct Twins<'a> {
 pub struct Exposed {
     grids: Vec<PixelGrid>,
     ghost: Option<(f64, [f64; 2])>,
-    departure: Departure,
+    departure: Perturbation,
 }
 
 impl<'a> Twins<'a> {
@@ -96,7 +96,7 @@ impl<'a> Twins<'a> {
     pub fn with_effects(&self, chips: &[Vec<(&str, &[f64])>], progress: &dyn Progress) -> Result<Vec<Exposed>> {
         let mut departures = Vec::new();
         for chip in chips {
-            let mut departure = Departure::default();
+            let mut departure = Perturbation::default();
             for (name, numbers) in chip.iter().filter(|(name, _)| !name.is_empty()) {
                 let effect = self.simulator.effects.iter().find(|e| e.name() == *name);
                 effect
@@ -122,7 +122,7 @@ impl<'a> Twins<'a> {
     /// # Errors
     /// If a cell cannot be solved.
     pub fn off_list(&self, what: OffList, progress: &dyn Progress) -> Result<Exposed> {
-        let mut departure = Departure::default();
+        let mut departure = Perturbation::default();
         match what {
             OffList::Astigmatism(nm) => {
                 departure.geometry.wavefront_nm = vec![0.0, nm];
@@ -155,7 +155,12 @@ impl<'a> Twins<'a> {
         }
     }
 
-    fn expose(&self, departure: Departure, ghost: Option<(f64, [f64; 2])>, progress: &dyn Progress) -> Result<Exposed> {
+    fn expose(
+        &self,
+        departure: Perturbation,
+        ghost: Option<(f64, [f64; 2])>,
+        progress: &dyn Progress,
+    ) -> Result<Exposed> {
         let grids = self
             .simulator
             .expose(std::slice::from_ref(&departure), progress)?

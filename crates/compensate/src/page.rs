@@ -2,19 +2,17 @@
 
 use std::path::Path;
 
-use num_complex::Complex64;
-
-use super::line::{Line, bias_of};
+use super::line::Line;
 use super::{Compensated, CompensationSummary};
-use metalith_calibrate::CalibratedModel;
-use metalith_core::{Error, Progress, Result, WidthMap};
-use metalith_design::Design;
+use metalith_core::{Error, Progress, Result};
 use metalith_design::array::PillarArray;
+use metalith_design::{CellIncidence, Design};
 use metalith_gds::extract::Extraction;
+use metalith_made::{CalibratedModel, DrawnElement, NotApplied};
 use metalith_report::{Axis, Cell, Chart, Column, Figure, ImageGrid, Page, Table, count, sig, write_json};
-use metalith_verify::{Spot, read_back};
-use metalith_wave::image::{Matched, Psf, incident, landing_um};
-use metalith_wave::{Accuracy, Fold, PhaseFunction, Pillars, Propagator, Scratch, Window};
+use metalith_verify::{PsfMetrics, read_back};
+use metalith_wave::image::{Matched, incident, landing_um};
+use metalith_wave::{Accuracy, PhaseFunction, Scratch, Window};
 
 /// Decades of a PSF that are shown.
 const DECADES: f64 = 4.0;
@@ -25,13 +23,17 @@ struct Case {
     element: String,
     wavelength_um: f64,
     pillars: &'static str,
-    spot: Spot,
+    /// Metrics of the PSF.
+    spot: PsfMetrics,
 }
 
 #[derive(serde::Serialize)]
 struct Numbers<'a> {
     model: &'a CalibratedModel,
     summary: &'a CompensationSummary,
+    /// What the model says that was not simulated.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    not_applied: Vec<NotApplied>,
     cases: &'a [Case],
 }
 
@@ -74,6 +76,12 @@ pub fn write_compensation_report(
     page.paragraph(
         "Error: rms difference of the complex transmission of the pillars as made from that intended, over the rms of the latter, at all wavelengths of the design together, one phase a wavelength free. Corrected pillars are those of the file that was read back.",
     );
+    page.paragraph(
+        "Made elements have all that the model says of pillars, apertures, light and sensor; widths can correct the pillars alone.",
+    );
+    for quantity in line.chip.statement().not_applied {
+        page.note(quantity.to_string());
+    }
     page.section("In the middle of the field").table(table(&cases));
     for row in figures.chunks(2) {
         page.row(row.iter().cloned());
@@ -81,6 +89,7 @@ pub fn write_compensation_report(
     let numbers = Numbers {
         model,
         summary: s,
+        not_applied: line.chip.statement().not_applied,
         cases: &cases,
     };
     write_json(&folder.join("compensation.json"), "compensation", &numbers)?;
@@ -131,6 +140,18 @@ fn element(
         amplitude: 1.0,
         phase_rad: |_, _| 0.0,
     };
+    let shown = [
+        ("intended", &line.stated, plain),
+        ("made, uncorrected", &line.chip, plain),
+        ("made, corrected", &line.chip, corrected),
+    ]
+    .into_iter()
+    .map(|(pillars, chip, widths)| {
+        let element = chip.element(&DrawnElement::new(widths, line.aperture_radius_um))?;
+        Ok((pillars, chip, element))
+    })
+    .collect::<Result<Vec<_>>>()?;
+    let as_lit = design.verify.incidence == CellIncidence::AsLit;
     let mut scratch = Scratch::default();
     let (mut cases, mut figures) = (Vec::new(), Vec::new());
     for colour in 0..line.colours.len() {
@@ -146,7 +167,6 @@ fn element(
             design.verify.window_samples,
             lens.focal_length_um,
         );
-        let fold = Fold::plan(plain.lattice, lens.radius_um(), um, window, Accuracy::Accurate)?;
         let full = line.colours[colour].full;
         let matched = Matched::of(&open, [0.0, 0.0, lens.focal_length_um], um, full);
         let title = format!("element {}, {:.0} nm", element.label(), um * 1e3);
@@ -159,16 +179,12 @@ fn element(
             Axis::linear("spatial frequency", "1/mm"),
             Axis::linear("MTF", "").range(0.0, 1.0),
         );
-        for (pillars, widths, as_made) in [
-            ("intended", plain, false),
-            ("made, uncorrected", plain, true),
-            ("made, corrected", corrected, true),
-        ] {
-            let (kinds, table) = realised(line, colour, widths, as_made);
-            let psf = Psf::of(&fold.field(&Pillars::new(&kinds, &table)?, &wave, &mut scratch)?);
-            let spot = Spot::of(&psf, &matched, design.verify.pixel_um);
-            curves.line(pillars, spot.mtf_curve.iter().copied());
-            images.image(pillars, psf.values);
+        for (pillars, chip, made) in &shown {
+            let view = chip.view(made, &wave, as_lit, progress)?;
+            let psf = view.psf(window, Accuracy::Accurate, &mut scratch)?;
+            let spot = PsfMetrics::of(&psf, &matched, design.verify.pixel_um);
+            curves.line(*pillars, spot.mtf_curve.iter().copied());
+            images.image(*pillars, psf.values);
             cases.push(Case {
                 element: element.label(),
                 wavelength_um: um,
@@ -181,24 +197,4 @@ fn element(
         progress.advance(1);
     }
     Ok((cases, figures))
-}
-
-/// Pillars as a map of kinds, and the transmission of each kind.
-fn realised(line: &Line, colour: usize, widths: &WidthMap, as_made: bool) -> (WidthMap, Vec<Complex64>) {
-    let colour = &line.colours[colour];
-    if !as_made {
-        return (widths.clone(), colour.stated.clone());
-    }
-    let mut table = vec![Complex64::ZERO];
-    let mut known = std::collections::BTreeMap::new();
-    let mut kinds = widths.clone();
-    for (w, level) in kinds.width_nm.iter_mut().zip(line.levels(widths)) {
-        if *w > 0 {
-            *w = *known.entry((*w, level)).or_insert_with(|| {
-                table.push(colour.made(f64::from(*w) + bias_of(level)));
-                (table.len() - 1) as u16
-            });
-        }
-    }
-    (kinds, table)
 }

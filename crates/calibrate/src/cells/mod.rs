@@ -18,9 +18,9 @@ use sha2::{Digest, Sha256};
 pub use table::CellTable;
 
 use self::carry::{Carried, carried_over};
-use super::departure::CellChange;
 use metalith_cell::{CellModel, CellStack};
 use metalith_core::{Error, Progress, Result, WholeFile};
+use metalith_made::{CellChange, off_cutoff, perturbed, possible_width_nm};
 use metalith_rcwa::{Incidence, Orders, Outline, Side, solve};
 
 /// Orders along an axis for the stated cell: errs by about 0.005 rad.
@@ -114,7 +114,7 @@ impl RigorousCells {
         let stated = self.table(alike, progress)?;
         let before = self.solved(alike, coarse, progress)?;
         let after = self.solve(change, coarse, progress)?;
-        let stack = changed(&self.stack, change);
+        let stack = perturbed(&self.stack, change);
         let orders = Orders::new(self.fine)?;
         let t = (0..self.wavelengths_nm.len())
             .into_par_iter()
@@ -236,7 +236,7 @@ impl RigorousCells {
 
     fn solve(&self, change: &CellChange, orders: usize, progress: &dyn Progress) -> Result<CellTable> {
         let orders = Orders::new(orders)?;
-        let stack = changed(&self.stack, change);
+        let stack = perturbed(&self.stack, change);
         let count = self.count();
         progress.begin("cells as etched", self.wavelengths_nm.len() as u64);
         let rows: Vec<(Vec<Complex64>, Complex64)> = self
@@ -267,8 +267,7 @@ impl RigorousCells {
     /// Transmission of entry `k` at wavelength `l`.
     fn solve_one(&self, stack: &CellStack, l: usize, k: usize, orders: Orders) -> Result<Complex64> {
         // Where leaning walls would meet, the widest pillar that has room stands in.
-        let room = stack.pitch_nm - 1.0 - (2.0 * stack.taper.tan() * stack.height_nm).max(0.0);
-        off_cutoff(self.width_nm(k).min(room), |width| {
+        off_cutoff(possible_width_nm(stack, self.width_nm(k)), |width| {
             stack.transmission(width, self.wavelengths_nm[l] * 1e-3, orders)
         })
     }
@@ -293,25 +292,6 @@ impl RigorousCells {
             hash.update(index.im.to_le_bytes());
         }
         hash.finalize().iter().take(16).map(|b| format!("{b:02x}")).collect()
-    }
-}
-
-/// A mode at its very cutoff has no field to solve for; a pillar that is wider by less than anyone can tell has.
-fn off_cutoff<T>(width_nm: f64, solve: impl Fn(f64) -> Result<T>) -> Result<T> {
-    solve(width_nm)
-        .or_else(|_| solve(width_nm - 3e-4))
-        .or_else(|_| solve(width_nm - 1e-3))
-}
-
-/// The stack with a change.
-pub fn changed(stack: &CellStack, change: &CellChange) -> CellStack {
-    CellStack {
-        height_nm: stack.height_nm + change.height_nm,
-        film: stack.film.shifted(change.index),
-        taper: stack.taper + change.taper_deg.to_radians(),
-        corner_radius_nm: stack.corner_radius_nm + change.corner_rounding_nm,
-        mask_height_nm: stack.mask_height_nm + change.residual_mask_nm,
-        ..stack.clone()
     }
 }
 

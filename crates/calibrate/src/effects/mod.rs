@@ -1,7 +1,7 @@
 //! What chips and benches are known to do to light, one file each.
 //!
 //! An effect has a name, a unit, a range that physics allows, and turns one or two numbers of a
-//! [`Departure`]. Adding one touches its file and [`all`].
+//! [`Perturbation`]. Adding one touches its file and [`all`].
 
 mod aperture_offset;
 mod cd_bias;
@@ -22,8 +22,8 @@ mod stray_light;
 mod tilt;
 mod zero_order;
 
-use super::departure::Departure;
 use super::set::MeasuredSet;
+use metalith_made::Perturbation;
 
 /// Where in the model an effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -88,7 +88,7 @@ pub trait Effect: Send + Sync {
     }
 
     /// Set its numbers.
-    fn apply(&self, parameters: &[f64], to: &mut Departure);
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation);
 
     /// The value that is reported for one of its numbers.
     fn value(&self, parameter: f64, _set: &MeasuredSet) -> f64 {
