@@ -36,8 +36,9 @@ mod twin;
 mod unfit;
 
 pub use atlas::Atlas;
-pub use bench::Sampling;
+pub use bench::{Bench, Sampling};
 pub use diagnosis::{Diagnosis, ErrorPair, ErrorReport, FoundEffect, LeftOut, Ranked, Rung, SetVerdict};
+pub use effects::{Effect, Parameter, Stage, all as all_effects};
 pub use proof::{Extent, Limit, Proof, Trial, prove, write_proof};
 pub use run::{Calibration, calibrate};
 pub use session::{Session, Settings};

@@ -1,4 +1,4 @@
-//! A bench in the computer, with the numbers of every effect to turn.
+//! A bench in the computer, with the numbers of every effect to set.
 
 use std::sync::Arc;
 

@@ -4,6 +4,7 @@
 //! pillar as stated, at the design's wavelengths together. A phase common to all pillars of a wavelength is
 //! free: it moves no light. Bias that follows density is looked up site by site, of the layout as drawn.
 
+mod cases;
 mod choose;
 mod line;
 mod page;
@@ -17,6 +18,7 @@ use metalith_design::Design;
 use metalith_design::array::{Group, PillarArray};
 use metalith_made::{CalibratedModel, NotApplied};
 
+pub use cases::{CompensationCase, compensation_cases};
 pub use page::write_compensation_report;
 
 /// Passes over the layout: the second sees the density of what the first has drawn.

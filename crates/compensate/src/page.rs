@@ -2,30 +2,16 @@
 
 use std::path::Path;
 
-use super::line::Line;
+use super::cases::{CHIPS, CompensationCase, compensation_cases};
 use super::{Compensated, CompensationSummary};
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Progress, Result};
+use metalith_design::Design;
 use metalith_design::array::PillarArray;
-use metalith_design::{CellIncidence, Design};
-use metalith_gds::extract::Extraction;
-use metalith_made::{CalibratedModel, DrawnElement, NotApplied};
+use metalith_made::{CalibratedModel, NotApplied};
 use metalith_report::{Axis, Cell, Chart, Column, Figure, ImageGrid, Page, Table, count, sig, write_json};
-use metalith_verify::{PsfMetrics, read_back};
-use metalith_wave::image::{Matched, incident, landing_um};
-use metalith_wave::{Accuracy, PhaseFunction, Scratch, Window};
 
 /// Decades of a PSF that are shown.
 const DECADES: f64 = 4.0;
-
-/// One case at one wavelength.
-#[derive(serde::Serialize)]
-struct Case {
-    element: String,
-    wavelength_um: f64,
-    pillars: &'static str,
-    /// Metrics of the PSF.
-    spot: PsfMetrics,
-}
 
 #[derive(serde::Serialize)]
 struct Numbers<'a> {
@@ -34,7 +20,7 @@ struct Numbers<'a> {
     /// What the model says that was not simulated.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     not_applied: Vec<NotApplied>,
-    cases: &'a [Case],
+    cases: &'a [CompensationCase],
 }
 
 /// Read the compensated layout at `layout` back, simulate it as it would be made, beside the intended pillars
@@ -52,16 +38,7 @@ pub fn write_compensation_report(
     progress: &dyn Progress,
 ) -> Result<()> {
     let line = &compensated.line;
-    let found = read_back(design, intended, layout, progress)?;
-    let work = intended.classes.len() * line.colours.len();
-    progress.begin("simulating elements", work as u64);
-    let mut cases = Vec::new();
-    let mut figures = Vec::new();
-    for class in 0..intended.classes.len() {
-        let of_element = element(design, intended, &found, class, line, progress)?;
-        cases.extend(of_element.0);
-        figures.extend(of_element.1);
-    }
+    let cases = compensation_cases(design, intended, compensated, layout, progress)?;
     let mut page = Page::new(
         format!("{}, compensated", design.title),
         format!("for {}: {}", model.set, model.finding),
@@ -83,8 +60,8 @@ pub fn write_compensation_report(
         page.note(quantity.to_string());
     }
     page.section("In the middle of the field").table(table(&cases));
-    for row in figures.chunks(2) {
-        page.row(row.iter().cloned());
+    for row in cases.chunks(CHIPS).filter_map(figures) {
+        page.row(row);
     }
     let numbers = Numbers {
         model,
@@ -96,7 +73,7 @@ pub fn write_compensation_report(
     page.write(&folder.join("compensation.html"))
 }
 
-fn table(cases: &[Case]) -> Table {
+fn table(cases: &[CompensationCase]) -> Table {
     let mut table = Table::new([
         Column::text("Element"),
         Column::number("Wavelength", "nm"),
@@ -121,80 +98,25 @@ fn table(cases: &[Case]) -> Table {
     table
 }
 
-/// The first element of a class, at all wavelengths.
-fn element(
-    design: &Design,
-    intended: &PillarArray,
-    found: &Extraction,
-    class: usize,
-    line: &Line,
-    progress: &dyn Progress,
-) -> Result<(Vec<Case>, Vec<Figure>)> {
-    let place = intended.placed.iter().position(|p| p.class == class).unwrap_or(0);
-    let element = intended.placed[place].element;
-    let (plain, corrected) = (&intended.widths(&intended.placed[place]), &found.elements[place].widths);
-    let lens = &design.lens;
-    let open = PhaseFunction {
-        lattice: plain.lattice,
-        radius_um: lens.radius_um(),
-        amplitude: 1.0,
-        phase_rad: |_, _| 0.0,
-    };
-    let shown = [
-        ("intended", &line.stated, plain),
-        ("made, uncorrected", &line.chip, plain),
-        ("made, corrected", &line.chip, corrected),
-    ]
-    .into_iter()
-    .map(|(pillars, chip, widths)| {
-        let element = chip.element(&DrawnElement::new(widths, line.aperture_radius_um))?;
-        Ok((pillars, chip, element))
-    })
-    .collect::<Result<Vec<_>>>()?;
-    let as_lit = design.verify.incidence == CellIncidence::AsLit;
-    let mut scratch = Scratch::default();
-    let (mut cases, mut figures) = (Vec::new(), Vec::new());
-    for colour in 0..line.colours.len() {
-        if progress.stopped() {
-            return Err(Error::Interrupted);
-        }
-        let um = line.colours[colour].wavelength_um;
-        let wave = incident(&element.wedge, um, [0.0, 0.0])?;
-        let chief = landing_um(&element.wedge, &wave, lens.focal_length_um)?;
-        let window = Window::about(
-            chief,
-            plain.lattice.pitch_um(),
-            design.verify.window_samples,
-            lens.focal_length_um,
-        );
-        let full = line.colours[colour].full;
-        let matched = Matched::of(&open, [0.0, 0.0, lens.focal_length_um], um, full);
-        let title = format!("element {}, {:.0} nm", element.label(), um * 1e3);
-        let mut images = ImageGrid::new(format!("PSF, {title}"), 3)
-            .pixel_um(window.step_um)
-            .values("|E|² / |E inc|²", "")
-            .log(DECADES);
-        let mut curves = Chart::new(
-            format!("MTF with the sensor's pixel, {title}"),
-            Axis::linear("spatial frequency", "1/mm"),
-            Axis::linear("MTF", "").range(0.0, 1.0),
-        );
-        for (pillars, chip, made) in &shown {
-            let view = chip.view(made, &wave, as_lit, progress)?;
-            let psf = view.psf(window, Accuracy::Accurate, &mut scratch)?;
-            let spot = PsfMetrics::of(&psf, &matched, design.verify.pixel_um);
-            curves.line(*pillars, spot.mtf_curve.iter().copied());
-            images.image(*pillars, psf.values);
-            cases.push(Case {
-                element: element.label(),
-                wavelength_um: um,
-                pillars,
-                spot,
-            });
-        }
-        figures.push(images.caption("About the chief ray, one logarithmic scale."));
-        figures.push(curves.caption("Mean of x and y."));
-        progress.advance(1);
+/// PSFs and contrast of one element at one wavelength, the three chips side by side.
+fn figures(of_one: &[CompensationCase]) -> Option<[Figure; 2]> {
+    let first = of_one.first()?;
+    let title = format!("element {}, {:.0} nm", first.element, first.wavelength_um * 1e3);
+    let mut images = ImageGrid::new(format!("PSF, {title}"), of_one.len())
+        .pixel_um(first.psf.window.step_um)
+        .values("|E|² / |E inc|²", "")
+        .log(DECADES);
+    let mut curves = Chart::new(
+        format!("MTF with the sensor's pixel, {title}"),
+        Axis::linear("spatial frequency", "1/mm"),
+        Axis::linear("MTF", "").range(0.0, 1.0),
+    );
+    for case in of_one {
+        curves.line(case.pillars, case.spot.mtf_curve.iter().copied());
+        images.image(case.pillars, case.psf.values.clone());
     }
-    Ok((cases, figures))
+    Some([
+        images.caption("About the chief ray, one logarithmic scale."),
+        curves.caption("Mean of x and y."),
+    ])
 }

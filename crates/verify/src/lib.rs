@@ -30,7 +30,7 @@ pub use case::{SimulationCase, SimulationCases};
 pub use check::{Check, Sense};
 pub use page::write_report;
 pub use phase::{PhaseError, PhaseErrors};
-pub use psf_metrics::{Orders, PsfMetrics, PsfPair};
+pub use psf_metrics::{Orders, PsfImages, PsfMetrics, PsfPair};
 pub use single::{Lighting, SinglePsf, SinglePsfReport, single_psfs, write_single_psf_report};
 pub use widths::WidthCheck;
 

@@ -5,7 +5,7 @@ use num_complex::{Complex32, Complex64};
 use rayon::prelude::*;
 
 use super::case::{SimulationCase, SimulationCases, TransmissionTables};
-use super::psf_metrics::{Images, Orders, PsfMetrics, PsfPair};
+use super::psf_metrics::{Orders, PsfImages, PsfMetrics, PsfPair};
 use metalith_cell::Fidelity;
 use metalith_core::Progress;
 use metalith_core::{Error, Result};
@@ -263,7 +263,7 @@ impl<'a> ElementSimulator<'a> {
         }
         let judged = judged.expect("the case that judges is the first");
         let images = (field.x_deg == 0.0 && field.y_deg == 0.0).then(|| {
-            Box::new(Images {
+            Box::new(PsfImages {
                 designed: picture(&designed, 1.0),
                 extracted: picture(&judged, colour.cases[0].full),
                 step_um: window.step_um,

@@ -64,14 +64,18 @@ pub struct PsfPair {
     /// rms of the designed one.
     pub psf_difference: f64,
     #[serde(skip)]
-    pub(super) images: Option<Box<Images>>,
+    pub(super) images: Option<Box<PsfImages>>,
 }
 
-/// Per unit of arriving power, so that cells with and without amplitude share one scale.
+/// Two PSFs on the window about the chief ray, per unit of arriving power, so that cells with and without amplitude
+/// share one scale. Row index along +y.
 #[derive(Clone, Debug)]
-pub(super) struct Images {
+pub struct PsfImages {
+    /// Of the unrounded design phase.
     pub designed: Array2<f32>,
+    /// Of the layout, in the case that judges.
     pub extracted: Array2<f32>,
+    /// Distance of the samples [um].
     pub step_um: f64,
 }
 
@@ -111,7 +115,8 @@ impl PsfPair {
         (a[0] - b[0]).abs().max((a[1] - b[1]).abs())
     }
 
-    pub(super) fn images(&self) -> Option<&Images> {
+    /// The PSFs themselves, kept for the middle of the field.
+    pub fn images(&self) -> Option<&PsfImages> {
         self.images.as_deref()
     }
 }

@@ -6,7 +6,7 @@ use num_complex::Complex32;
 use rayon::prelude::*;
 
 use super::{Bench, Group};
-use crate::cells::CellTable;
+use crate::cells::PillarTable;
 use crate::optics::{Passed, Scratch};
 use metalith_core::{Error, Lattice, Progress, Result};
 use metalith_made::{ArrivingLight, ClassTable, GeometryChange, LightChange, MadeElement, PathChange, spread};
@@ -14,7 +14,7 @@ use metalith_wave::{Aperture, PlaneWave};
 
 /// A chip as it may be, and the lamps that it is seen by.
 pub struct Lit<'a> {
-    pub cells: Arc<CellTable>,
+    pub cells: Arc<PillarTable>,
     pub geometry: &'a GeometryChange,
     pub lights: Vec<&'a LightChange>,
     /// Seed of the places of missing pillars; without one, they count with their mean.

@@ -1,6 +1,7 @@
 //! The bench in the computer: from pillars to what each capture should show, under any perturbation.
 
 mod light;
+mod view;
 
 use rayon::prelude::*;
 

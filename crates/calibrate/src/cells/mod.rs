@@ -15,7 +15,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
-pub use table::CellTable;
+pub use table::PillarTable;
 
 use self::carry::{Carried, carried_over};
 use metalith_cell::{CellModel, CellStack};
@@ -55,7 +55,7 @@ pub struct RigorousCells {
     coarse: usize,
     leaning: usize,
     folder: Option<PathBuf>,
-    made: Mutex<HashMap<[u64; 6], Arc<CellTable>>>,
+    made: Mutex<HashMap<[u64; 6], Arc<PillarTable>>>,
 }
 
 impl RigorousCells {
@@ -84,7 +84,7 @@ impl RigorousCells {
     ///
     /// # Errors
     /// If a pillar cannot be (a foot wider than the pitch), or the user stopped it.
-    pub fn table(&self, change: &CellChange, progress: &dyn Progress) -> Result<Arc<CellTable>> {
+    pub fn table(&self, change: &CellChange, progress: &dyn Progress) -> Result<Arc<PillarTable>> {
         let stated = CellChange::default();
         let (alike, coarse) = if change.taper_deg == 0.0 {
             (stated, self.coarse)
@@ -110,7 +110,7 @@ impl RigorousCells {
         alike: &CellChange,
         coarse: usize,
         progress: &dyn Progress,
-    ) -> Result<CellTable> {
+    ) -> Result<PillarTable> {
         let stated = self.table(alike, progress)?;
         let before = self.solved(alike, coarse, progress)?;
         let after = self.solve(change, coarse, progress)?;
@@ -130,7 +130,7 @@ impl RigorousCells {
             })
             .collect::<Result<Vec<_>>>()?;
         let bare = stated.bare.iter().zip(before.bare.iter().zip(&after.bare));
-        Ok(CellTable {
+        Ok(PillarTable {
             bare: bare.map(|(t, (a, b))| t + b - a).collect(),
             t,
             ..(*stated).clone()
@@ -142,7 +142,7 @@ impl RigorousCells {
     ///
     /// # Errors
     /// As [`RigorousCells::table`].
-    pub fn anisotropic(&self, nm: f64, progress: &dyn Progress) -> Result<[CellTable; 2]> {
+    pub fn anisotropic(&self, nm: f64, progress: &dyn Progress) -> Result<[PillarTable; 2]> {
         let orders = Orders::new(ANISOTROPIC)?;
         let count = self.count();
         let rows: Vec<Vec<[Complex64; 2]>> = self
@@ -168,18 +168,23 @@ impl RigorousCells {
             })
             .collect::<Result<_>>()?;
         let stated = self.solved(&CellChange::default(), self.fine, progress)?;
-        Ok([0, 1].map(|axis| CellTable {
+        Ok([0, 1].map(|axis| PillarTable {
             t: rows.iter().map(|row| row.iter().map(|t| t[axis]).collect()).collect(),
             ..(*stated).clone()
         }))
     }
 
-    fn solved(&self, change: &CellChange, orders: usize, progress: &dyn Progress) -> Result<Arc<CellTable>> {
+    fn solved(&self, change: &CellChange, orders: usize, progress: &dyn Progress) -> Result<Arc<PillarTable>> {
         self.kept(change, orders as f64, || self.solve(change, orders, progress))
     }
 
     /// A table as it was made before, or made now; `how` tells ways of making it apart.
-    fn kept(&self, change: &CellChange, how: f64, make: impl FnOnce() -> Result<CellTable>) -> Result<Arc<CellTable>> {
+    fn kept(
+        &self,
+        change: &CellChange,
+        how: f64,
+        make: impl FnOnce() -> Result<PillarTable>,
+    ) -> Result<Arc<PillarTable>> {
         let key = [
             change.height_nm,
             change.index,
@@ -200,7 +205,7 @@ impl RigorousCells {
             .map(|f| f.join(format!("{}.cells", self.digest(&key))));
         let (wavelengths, count) = (self.wavelengths_nm.len(), self.count());
         let load = |path: &std::path::Path| {
-            CellTable::from_bytes(&fs::read(path).ok()?, wavelengths, count, self.first_nm(), STEP_NM)
+            PillarTable::from_bytes(&fs::read(path).ok()?, wavelengths, count, self.first_nm(), STEP_NM)
         };
         let table = match path.as_deref().and_then(load) {
             Some(table) => table,
@@ -234,7 +239,7 @@ impl RigorousCells {
         ((self.widths_nm.1 - self.first_nm()) / STEP_NM).ceil() as usize + 1
     }
 
-    fn solve(&self, change: &CellChange, orders: usize, progress: &dyn Progress) -> Result<CellTable> {
+    fn solve(&self, change: &CellChange, orders: usize, progress: &dyn Progress) -> Result<PillarTable> {
         let orders = Orders::new(orders)?;
         let stack = perturbed(&self.stack, change);
         let count = self.count();
@@ -256,7 +261,7 @@ impl RigorousCells {
             })
             .collect::<Result<_>>()?;
         let (t, bare) = rows.into_iter().unzip();
-        Ok(CellTable {
+        Ok(PillarTable {
             first_nm: self.first_nm(),
             step_nm: STEP_NM,
             t,
@@ -306,7 +311,7 @@ impl CellSource {
         wavelengths_nm: &[f64],
         widths_nm: (f64, f64),
         progress: &dyn Progress,
-    ) -> Result<Arc<CellTable>> {
+    ) -> Result<Arc<PillarTable>> {
         match self {
             Self::Rigorous(cells) => cells.table(change, progress),
             Self::Model(model) => {
@@ -319,7 +324,7 @@ impl CellSource {
                         Ok(row[first as usize..].to_vec())
                     })
                     .collect::<Result<Vec<_>>>()?;
-                Ok(Arc::new(CellTable {
+                Ok(Arc::new(PillarTable {
                     first_nm: first,
                     step_nm: 1.0,
                     bare: vec![Complex64::new(1.0, 0.0); t.len()],

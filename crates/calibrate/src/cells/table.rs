@@ -5,7 +5,7 @@ use num_complex::Complex64;
 
 /// Transmission over wavelength and width.
 #[derive(Clone, Debug)]
-pub struct CellTable {
+pub struct PillarTable {
     pub first_nm: f64,
     pub step_nm: f64,
     /// For each wavelength, the transmissions of all widths.
@@ -14,7 +14,7 @@ pub struct CellTable {
     pub bare: Vec<Complex64>,
 }
 
-impl CellTable {
+impl PillarTable {
     /// Transmission of a pillar of any width [nm] at one of the wavelengths, by cubics through the table; beyond
     /// its ends, that of the end.
     pub fn at(&self, wavelength: usize, width_nm: f64) -> Complex64 {
