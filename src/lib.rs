@@ -58,7 +58,7 @@
 //! # Example
 //!
 //! ```no_run
-//! use metalith::{Accuracy, Design, PillarArray, Premise, Silent, cell_models, verify, write_pillars};
+//! use metalith::{Accuracy, Design, PillarArray, Silent, SimulationCases, cell_models, verify, write_pillars};
 //!
 //! # fn main() -> metalith::Result<()> {
 //! let design = Design::read("designs/mini_3x3.toml".as_ref())?;
@@ -66,8 +66,8 @@
 //! let file = "mini.gds".as_ref();
 //! write_pillars(&design, &array, design.layout.hierarchy, file, &Silent)?;
 //! let cells = cell_models(&design, &[metalith::Fidelity::Rigorous])?;
-//! let judges = cells.iter().map(|c| Premise::from(c.as_ref())).collect::<Vec<_>>();
-//! let found = verify(&design, &array, file, &judges, Accuracy::Accurate, &Silent)?;
+//! let cases = SimulationCases::of_cells(&cells)?;
+//! let found = verify(&design, &array, file, &cases, Accuracy::Accurate, &Silent)?;
 //! assert!(found.passed());
 //! # Ok(())
 //! # }
@@ -85,6 +85,7 @@ pub use metalith_gds as gds;
 pub use metalith_gds::extract;
 pub use metalith_handoff as handoff;
 pub use metalith_layout as layout;
+pub use metalith_made as made;
 pub use metalith_optimise as optimise;
 pub use metalith_rcwa as rcwa;
 pub use metalith_report as report;
@@ -98,5 +99,6 @@ pub use metalith_design::{Design, Hierarchy, PillarArray, cell_models};
 pub use metalith_gds::Layout;
 pub use metalith_gds::extract::{Extraction, ExtractionPlan, extract};
 pub use metalith_layout::{write_apertures, write_layer_properties, write_pillars};
-pub use metalith_verify::{Premise, Verification, verify, write_report};
+pub use metalith_made::{CalibratedModel, MadeChip};
+pub use metalith_verify::{SimulationCase, SimulationCases, Verification, verify, write_report};
 pub use metalith_wave::Accuracy;

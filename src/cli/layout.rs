@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metalith::calibrate::CalibratedModel;
+use metalith::CalibratedModel;
 use metalith::compensate::{compensate, write_compensation_report};
 use metalith::layout::Written;
 use metalith::report::{count, sig};
@@ -153,6 +153,9 @@ pub fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
                 sig(s.error[1], 3),
                 count(s.at_limit)
             );
+            for quantity in compensated.not_applied() {
+                print_line!("{quantity}");
+            }
             let report = args.target.folder(&design).join("compensation.html");
             print_line!("{}", report.display());
         }

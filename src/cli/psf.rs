@@ -3,12 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metalith::calibrate::CalibratedModel;
 use metalith::cell::{CellStack, FittedCell, PointwiseCell, PublishedCell};
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::report::{count, sig};
-use metalith::verify::{Lighting, lone_psfs, write_lone_report};
-use metalith::{Accuracy, CellModel, Extraction, ExtractionPlan, Layout, Result, extract};
+use metalith::verify::{Lighting, SimulationCase, SinglePsfReport, single_psfs, write_single_psf_report};
+use metalith::{Accuracy, CalibratedModel, CellModel, Extraction, ExtractionPlan, Layout, MadeChip, Result, extract};
 
 use super::verify::FidelityArg;
 use super::{Outcome, Terminal, print_line};
@@ -68,9 +67,15 @@ pub struct PsfArgs {
     #[arg(long, value_enum, default_value = "rigorous")]
     fidelity: FidelityArg,
 
-    /// Pillars as a measured line makes them: the `model.toml` that `metalith calibrate` wrote.
+    /// The chip as a measured line and bench make it: the `model.toml` that `metalith calibrate` wrote. Distance and
+    /// angles are those stated; what the model adds to them is added.
     #[arg(long, value_name = "MODEL", conflicts_with = "fidelity")]
     model: Option<PathBuf>,
+
+    /// Diameter of the openings in the metal [um], for a model whose aperture is off its place; that of the circle
+    /// around the pillars if left out.
+    #[arg(long)]
+    aperture_um: Option<f64>,
 
     /// Solve the cell at the angle of incidence, for both polarisations, instead of along the normal.
     #[arg(long)]
@@ -104,12 +109,17 @@ fn layer(text: &str) -> std::result::Result<LayerNumber, String> {
 
 impl PsfArgs {
     /// The cell of the layout's own pitch, materials of the paper.
-    fn cell(&self, found: &Extraction, model: Option<&CalibratedModel>) -> Result<Box<dyn CellModel>> {
+    fn stack(&self, found: &Extraction) -> Result<CellStack> {
         let pitch_nm = found.elements.first().map_or(350, |e| e.site.lattice.pitch_nm());
-        if model.is_none() && matches!(self.fidelity, FidelityArg::Published) {
-            return Ok(Box::new(PublishedCell::new(pitch_nm)));
+        CellStack::paper(f64::from(pitch_nm), self.height_nm)
+    }
+
+    /// What solves it for the pillars as drawn.
+    fn cell(&self, found: &Extraction) -> Result<Box<dyn CellModel>> {
+        let stack = self.stack(found)?;
+        if matches!(self.fidelity, FidelityArg::Published) {
+            return Ok(Box::new(PublishedCell::new(stack.pitch_nm as u32)));
         }
-        let stack = CellStack::paper(f64::from(pitch_nm), self.height_nm)?;
         let mut widths = found
             .elements
             .iter()
@@ -117,11 +127,6 @@ impl PsfArgs {
             .collect::<Vec<_>>();
         widths.sort_unstable();
         widths.dedup();
-        if let Some(model) = model {
-            let filled = found.elements.iter().map(|e| e.widths.filled_sites()).sum::<f64>();
-            let fill = filled / found.pillars.max(1) as f64;
-            return Ok(Box::new(model.cell_of(&stack, widths, fill)));
-        }
         if matches!(self.fidelity, FidelityArg::Fitted) {
             let band_um = self.wavelengths_nm.iter().map(|nm| nm * 1e-3);
             let (low, high) = band_um.fold((0.4, 0.7), |(a, b), um| (um.min(a), um.max(b)));
@@ -134,21 +139,16 @@ impl PsfArgs {
         Ok(Box::new(PointwiseCell::new(stack, widths)))
     }
 
-    fn lighting(&self, model: Option<&CalibratedModel>) -> Lighting {
-        let path = model.map(|m| &m.departure.path);
-        let tilt_mrad = path.map_or([0.0; 2], |p| p.tilt_mrad);
-        let sine = |deg: f64, mrad: f64| (deg.to_radians() + mrad * 1e-3).sin();
+    fn lighting(&self) -> Lighting {
         Lighting {
             wavelengths_um: self.wavelengths_nm.iter().map(|nm| nm * 1e-3).collect(),
-            incidence_sin: [
-                sine(self.angle_x_deg, tilt_mrad[0]),
-                sine(self.angle_y_deg, tilt_mrad[1]),
-            ],
+            incidence_sin: [self.angle_x_deg, self.angle_y_deg].map(|deg| deg.to_radians().sin()),
             cells_as_lit: self.as_lit,
-            distance_um: self.distance_um + path.map_or(0.0, |p| p.gap_um),
+            distance_um: self.distance_um,
             at_um: [self.at_x_um, self.at_y_um],
             samples: self.samples,
             pixel_um: 5.86,
+            aperture_radius_um: self.aperture_um.map(|d| 0.5 * d),
             accuracy: if self.fast { Accuracy::Fast } else { Accuracy::Accurate },
         }
     }
@@ -162,19 +162,31 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
         ..ExtractionPlan::discover(args.layer)
     };
     let found = extract(&layout, &plan, terminal)?;
-    let psfs = if args.extract_only {
-        Vec::new()
-    } else {
-        let model = args.model.as_deref().map(CalibratedModel::read).transpose()?;
-        let cell = args.cell(&found, model.as_ref())?;
-        lone_psfs(&found, cell.as_ref(), &args.lighting(model.as_ref()), terminal)?
+    let made = match &args.model {
+        Some(path) => Some(MadeChip::new(&args.stack(&found)?, &CalibratedModel::read(path)?)?),
+        None => None,
     };
+    let psfs = match &made {
+        _ if args.extract_only => Vec::new(),
+        Some(chip) => single_psfs(&found, SimulationCase::Made(chip), &args.lighting(), terminal)?,
+        None => {
+            let cell = args.cell(&found)?;
+            single_psfs(&found, SimulationCase::Cell(cell.as_ref()), &args.lighting(), terminal)?
+        }
+    };
+    let model = made.as_ref().map(MadeChip::statement);
     if let Some(folder) = &args.out {
         let name = args
             .layout
             .file_name()
             .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        write_lone_report(&name, &found, &psfs, folder)?;
+        let report = SinglePsfReport {
+            file: &name,
+            found: &found,
+            psfs: &psfs,
+            model: model.as_ref(),
+        };
+        write_single_psf_report(&report, folder)?;
     }
     terminal.clear();
     if args.json {
@@ -192,6 +204,7 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             "elements": elements.collect::<Vec<_>>(),
             "other_shapes": found.oddities,
             "psfs": psfs,
+            "model": model,
         });
         print_line!("{json:#}");
         return Ok(Outcome::Fine);
@@ -210,6 +223,9 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
         );
     }
     print_line!("{} other shapes on layer {}", count(found.oddities.total()), args.layer);
+    for quantity in model.iter().flat_map(|m| &m.not_applied) {
+        print_line!("{quantity}");
+    }
     for psf in &psfs {
         print_line!(
             "{}, {} nm: Strehl {}, {} % in a pixel of 5.86 um, peak at ({}, {}) um",

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::calibrate::CalibratedModel;
 use metalith::design::CellIncidence;
 use metalith::report::sig;
 use metalith::{
-    Accuracy, Design, Fidelity, PillarArray, Premise, Result, Verification, cell_models, verify, write_report,
+    Accuracy, CalibratedModel, Design, Fidelity, MadeChip, PillarArray, Result, SimulationCases, Verification,
+    cell_models, verify, write_report,
 };
 
 use super::{Outcome, Terminal, print_json, print_line};
@@ -41,8 +41,8 @@ pub struct Judging {
     #[arg(long, value_enum, default_value = "rigorous")]
     fidelity: FidelityArg,
 
-    /// Judge by the pillars as a measured line makes them: the `model.toml` that `metalith calibrate` wrote. What
-    /// it says of lamps and camera stays with the bench it was found on.
+    /// Judge the chip as a measured line and bench make it: the `model.toml` that `metalith calibrate` wrote. What
+    /// it says of lamps cannot be applied to PSFs of one wavelength and point, and is listed.
     #[arg(long, value_name = "MODEL", conflicts_with = "fidelity")]
     model: Option<PathBuf>,
 
@@ -92,19 +92,21 @@ impl Judging {
         }
         let design = &design;
         let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
-        let made = model.as_ref().map(|m| m.cell(design, array.fill())).transpose()?;
+        let made = match &model {
+            Some(model) => Some(MadeChip::new(&design.cell_stack()?, model)?),
+            None => None,
+        };
         let judge = Fidelity::from(self.fidelity);
         let beside = [Fidelity::Rigorous, Fidelity::Fitted, Fidelity::Published];
         let beside = beside.into_iter().filter(|f| *f != judge);
         let wanted = std::iter::once(judge).chain(beside).collect::<Vec<_>>();
         let models = cell_models(design, &wanted)?;
-        let predicted = model.as_ref().zip(made.as_ref()).map(|(m, cell)| m.premise(cell));
-        let premises = predicted
-            .into_iter()
-            .chain(models.iter().map(|m| Premise::from(m.as_ref())))
-            .collect::<Vec<_>>();
+        let cases = match &made {
+            Some(chip) => SimulationCases::judged_by(chip).with_cells(&models),
+            None => SimulationCases::of_cells(&models)?,
+        };
         let accuracy = if self.fast { Accuracy::Fast } else { Accuracy::Accurate };
-        let found = verify(design, array, layout, &premises, accuracy, terminal)?;
+        let found = verify(design, array, layout, &cases, accuracy, terminal)?;
         write_report(design, array, &found, folder)?;
         terminal.clear();
         if self.json {
@@ -132,6 +134,9 @@ fn summary(found: &Verification, folder: &Path) {
                 sig(spot.designed.measures.strehl, 3),
             );
         }
+    }
+    for quantity in found.model.iter().flat_map(|m| &m.not_applied) {
+        print_line!("{quantity}");
     }
     for check in &found.checks {
         let verdict = if check.passed() { "holds" } else { "FAILS" };

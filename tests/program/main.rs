@@ -4,6 +4,7 @@ mod broken_designs;
 mod cells;
 mod check;
 mod handoff;
+mod made;
 mod optimise;
 mod predict;
 mod run;

@@ -4,12 +4,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
-use metalith::calibrate::{CalibratedModel, Departure};
 use metalith::cell::CellStack;
 use metalith::compensate::compensate;
+use metalith::made::{CalibratedModel, Perturbation};
 use metalith::{
-    Accuracy, Design, Extraction, ExtractionPlan, Fidelity, Layout, PillarArray, Premise, Silent, cell_models, extract,
-    verify, write_pillars,
+    Accuracy, Design, Extraction, ExtractionPlan, Fidelity, Layout, PillarArray, Silent, SimulationCases, cell_models,
+    extract, verify, write_pillars,
 };
 use serde_json::Value;
 
@@ -23,10 +23,10 @@ fn mini() -> Design {
     design
 }
 
-fn model(change: impl FnOnce(&mut Departure)) -> CalibratedModel {
-    let mut departure = Departure::default();
-    change(&mut departure);
-    CalibratedModel::new("twin".into(), "as made".into(), departure)
+fn model(change: impl FnOnce(&mut Perturbation)) -> CalibratedModel {
+    let mut perturbation = Perturbation::default();
+    change(&mut perturbation);
+    CalibratedModel::new("twin".into(), "as made".into(), perturbation)
 }
 
 fn metalith() -> Command {
@@ -188,9 +188,9 @@ fn a_design_may_ask_for_cells_as_they_are_lit() {
     let file = folder.path().join("lit.gds");
     write_pillars(&design, &array, design.layout.hierarchy, &file, &Silent).unwrap();
     let cells = cell_models(&design, &[Fidelity::Rigorous]).unwrap();
-    let premises = [Premise::from(cells[0].as_ref())];
+    let cases = SimulationCases::of_cells(&cells).unwrap();
     let strehls = |design: &Design| -> Vec<(bool, f64)> {
-        let found = verify(design, &array, &file, &premises, Accuracy::Fast, &Silent).unwrap();
+        let found = verify(design, &array, &file, &cases, Accuracy::Fast, &Silent).unwrap();
         let spots = found.distinct.iter().flat_map(|d| &d.spots);
         spots
             .map(|s| (s.incidence_sin == [0.0; 2], s.judged().measures.strehl))

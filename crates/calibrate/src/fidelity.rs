@@ -7,11 +7,11 @@ use serde::Serialize;
 
 use crate::bench::{Bench, Sampling};
 use crate::cells::CellSource;
-use crate::departure::Departure;
 use crate::fit::{Problem, held_out, mean_error};
 use crate::set::{MeasuredSet, PerCapture};
 use crate::simulator::Simulator;
 use crate::surrogate::Surrogate;
+use metalith_made::Perturbation;
 
 /// The error of one fidelity of the cell.
 #[derive(Clone, Debug, Serialize)]
@@ -52,7 +52,7 @@ pub fn compare_fidelities(
     let mut rungs = Vec::new();
     for (name, cells) in [("published", published), ("fitted", fitted)] {
         let simulator = Simulator::new(Bench::new(set, sampling), cells, Vec::new());
-        let images = simulator.expose(&[Departure::default()], progress)?.remove(0);
+        let images = simulator.expose(&[Perturbation::default()], progress)?.remove(0);
         let of_model = Problem {
             model: &simulator,
             surrogate: Surrogate::constant(images.into()),

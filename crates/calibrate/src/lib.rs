@@ -18,14 +18,11 @@
 
 mod bench;
 mod cells;
-mod density;
-mod departure;
 mod diagnosis;
 mod effects;
 mod fidelity;
 mod fit;
 mod forward_model;
-mod model;
 mod names;
 mod optics;
 mod page;
@@ -38,14 +35,11 @@ mod simulator_model;
 mod smooth_residual;
 mod surrogate;
 mod validate;
-mod zernike;
 
-pub use bench::Sampling;
-pub use density::fill;
-pub use departure::{CameraChange, CellChange, Departure, Geometry, LightChange, PathChange};
+pub use bench::{Bench, Sampling};
+pub use effects::{Effect, Parameter, Stage, all as all_effects};
 pub use diagnosis::{Diagnosis, ErrorPair, ErrorReport, FoundEffect, LeftOut, Ranked, SetVerdict};
 pub use fidelity::Rung;
-pub use model::{CalibratedModel, MadeCell};
 pub use run::{Calibration, calibrate};
 pub use session::{Screening, Session, Settings, Simulations};
 pub use set::{Camera, Capture, Led, MeasuredElement, MeasuredSet, SemSite, Stack};

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use crate::diagnosis::{Diagnosis, SetVerdict};
 use crate::effects;
-use crate::model::CalibratedModel;
 use crate::page::write_page;
 use crate::session::{Session, Settings, Simulations, check_effects};
 use crate::set::MeasuredSet;
 use metalith_core::{Progress, Result};
+use metalith_made::CalibratedModel;
 
 /// The files of a calibration.
 #[derive(Clone, Debug)]
@@ -78,9 +78,9 @@ fn finish(
     let model = match evidence.filter(|_| learned) {
         None => None,
         Some(evidence) => {
-            let departure = session.simulator.departure(&evidence.finding.after.theta);
+            let perturbation = session.simulator.perturbation(&evidence.finding.after.theta);
             let path = out.join("model.toml");
-            CalibratedModel::new(diagnosis.set.clone(), diagnosis.sentence(), departure).write(&path)?;
+            CalibratedModel::new(diagnosis.set.clone(), diagnosis.sentence(), perturbation).write(&path)?;
             Some(path)
         }
     };

@@ -1,14 +1,14 @@
-//! A bench in the computer, with the numbers of every effect to turn.
+//! A bench in the computer, with the numbers of every effect to set.
 
 use std::sync::Arc;
 
 use super::bench::{Bench, Lit};
 use super::cells::CellSource;
-use super::departure::Departure;
 use super::effects::Effect;
 use super::forward_model::Slot;
 use super::optics::PixelGrid;
 use metalith_core::{Progress, Result};
+use metalith_made::Perturbation;
 
 /// Widths that a bias may add or take [nm]; cells are tabulated so far beyond the layout.
 pub const WIDTH_ROOM_NM: f64 = 36.0;
@@ -63,44 +63,49 @@ impl<'a> Simulator<'a> {
     }
 
     /// What the numbers mean together.
-    pub fn departure(&self, theta: &[f64]) -> Departure {
-        let mut departure = Departure::default();
+    pub fn perturbation(&self, theta: &[f64]) -> Perturbation {
+        let mut perturbation = Perturbation::default();
         for (e, effect) in self.effects.iter().enumerate() {
             let own: Vec<f64> = self.slots_of(e).into_iter().map(|s| theta[s]).collect();
-            effect.apply(&own, &mut departure);
+            effect.apply(&own, &mut perturbation);
         }
-        departure
+        perturbation
     }
 
-    /// What each capture should show under each of `departures`; those that differ in lamps and camera alone
+    /// What each capture should show under each of `perturbations`; those that differ in lamps and camera alone
     /// share their light.
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
-    pub fn expose(&self, departures: &[Departure], progress: &dyn Progress) -> Result<Vec<Vec<PixelGrid>>> {
-        self.expose_with(departures, self.scatter, progress)
+    pub fn expose(&self, perturbations: &[Perturbation], progress: &dyn Progress) -> Result<Vec<Vec<PixelGrid>>> {
+        self.expose_with(perturbations, self.scatter, progress)
     }
 
-    /// The same of one departure, the places of missing pillars drawn from a seed.
+    /// The same of one perturbation, the places of missing pillars drawn from a seed.
     ///
     /// # Errors
     /// As [`Simulator::expose`].
-    pub fn expose_drawn(&self, departure: &Departure, seed: u64, progress: &dyn Progress) -> Result<Vec<PixelGrid>> {
-        let departures = std::slice::from_ref(departure);
-        Ok(self.expose_with(departures, Some(seed), progress)?.remove(0))
+    pub fn expose_drawn(
+        &self,
+        perturbation: &Perturbation,
+        seed: u64,
+        progress: &dyn Progress,
+    ) -> Result<Vec<PixelGrid>> {
+        let perturbations = std::slice::from_ref(perturbation);
+        Ok(self.expose_with(perturbations, Some(seed), progress)?.remove(0))
     }
 
     fn expose_with(
         &self,
-        departures: &[Departure],
+        perturbations: &[Perturbation],
         scatter: Option<u64>,
         progress: &dyn Progress,
     ) -> Result<Vec<Vec<PixelGrid>>> {
-        let mut out: Vec<Option<Vec<PixelGrid>>> = departures.iter().map(|_| None).collect();
+        let mut out: Vec<Option<Vec<PixelGrid>>> = perturbations.iter().map(|_| None).collect();
         let mut steps: Vec<Vec<usize>> = Vec::new();
-        for (i, d) in departures.iter().enumerate() {
+        for (i, d) in perturbations.iter().enumerate() {
             let same = |j: &usize| {
-                let o = &departures[*j];
+                let o = &perturbations[*j];
                 (&o.geometry, &o.cell, &o.path) == (&d.geometry, &d.cell, &d.path)
             };
             match steps.iter_mut().find(|s| same(&s[0])) {
@@ -112,7 +117,7 @@ impl<'a> Simulator<'a> {
         let mut work = Vec::new();
         for step in steps {
             let cells = self.cells.table(
-                &departures[step[0]].cell,
+                &perturbations[step[0]].cell,
                 &self.wavelengths_nm,
                 self.widths_nm,
                 progress,
@@ -122,12 +127,12 @@ impl<'a> Simulator<'a> {
         progress.begin("captures as they should be", work.len() as u64);
         while !work.is_empty() {
             // Those on one path go together, as many as memory likes.
-            let path = &departures[work[0].0[0]].path;
+            let path = &perturbations[work[0].0[0]].path;
             let mut together = Vec::new();
             work = work
                 .into_iter()
                 .filter_map(|(step, cells)| {
-                    if together.len() < TOGETHER && departures[step[0]].path == *path {
+                    if together.len() < TOGETHER && perturbations[step[0]].path == *path {
                         together.push((step, cells));
                         return None;
                     }
@@ -138,22 +143,22 @@ impl<'a> Simulator<'a> {
                 .iter()
                 .map(|(step, cells)| Lit {
                     cells: Arc::clone(cells),
-                    geometry: &departures[step[0]].geometry,
-                    lights: step.iter().map(|&i| &departures[i].light).collect(),
+                    geometry: &perturbations[step[0]].geometry,
+                    lights: step.iter().map(|&i| &perturbations[i].light).collect(),
                     scatter,
                 })
                 .collect();
             let intensities = self.bench.intensities(&chips, path, progress)?;
             for ((step, _), of_lights) in together.iter().zip(&intensities) {
                 for (&i, planes) in step.iter().zip(of_lights) {
-                    out[i] = Some(self.bench.grids(planes, &departures[i]));
+                    out[i] = Some(self.bench.grids(planes, &perturbations[i]));
                 }
             }
             progress.advance(together.len() as u64);
         }
         Ok(out
             .into_iter()
-            .map(|g| g.expect("every departure is in one step"))
+            .map(|g| g.expect("every perturbation is in one step"))
             .collect())
     }
 }

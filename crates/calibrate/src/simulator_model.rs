@@ -2,31 +2,31 @@
 
 use metalith_core::{Progress, Result};
 
-use crate::departure::Departure;
 use crate::effects::{Stage, separate_by};
 use crate::forward_model::{ForwardModel, PATH_TERMS, Point, Slot, SmoothTerm, TRANSMISSION_TERMS};
 use crate::optics::PixelGrid;
 use crate::set::PerCapture;
 use crate::simulator::Simulator;
+use metalith_made::Perturbation;
 
 /// Cells are solved at multiples of this share of a typical size; the surrogate covers the difference.
 const CELL_STEP: f64 = 1.0 / 16.0;
 
 impl Simulator<'_> {
-    fn departure_at(&self, point: &Point) -> Departure {
-        let mut departure = self.departure(&point.theta);
+    fn departure_at(&self, point: &Point) -> Perturbation {
+        let mut perturbation = self.perturbation(&point.theta);
         match point.smooth {
             None => {}
             Some(term @ SmoothTerm::Path(k)) => {
-                departure.geometry.wavefront_nm = vec![0.0; PATH_TERMS];
-                departure.geometry.wavefront_nm[k] = term.step();
+                perturbation.geometry.wavefront_nm = vec![0.0; PATH_TERMS];
+                perturbation.geometry.wavefront_nm[k] = term.step();
             }
             Some(term @ SmoothTerm::Transmission(k)) => {
-                departure.geometry.transmission = vec![0.0; TRANSMISSION_TERMS];
-                departure.geometry.transmission[k] = term.step();
+                perturbation.geometry.transmission = vec![0.0; TRANSMISSION_TERMS];
+                perturbation.geometry.transmission[k] = term.step();
             }
         }
-        departure
+        perturbation
     }
 }
 
@@ -50,13 +50,13 @@ impl ForwardModel for Simulator<'_> {
     }
 
     fn images(&self, points: &[Point], progress: &dyn Progress) -> Result<Vec<PerCapture<PixelGrid>>> {
-        let departures: Vec<_> = points.iter().map(|p| self.departure_at(p)).collect();
-        let exposed = self.expose(&departures, progress)?;
+        let perturbations: Vec<_> = points.iter().map(|p| self.departure_at(p)).collect();
+        let exposed = self.expose(&perturbations, progress)?;
         Ok(exposed.into_iter().map(PerCapture::from).collect())
     }
 
     fn width_biases_nm(&self, theta: &[f64]) -> Vec<Option<f64>> {
-        let geometry = self.departure(theta).geometry;
+        let geometry = self.perturbation(theta).geometry;
         let set = self.bench.set();
         set.sem
             .iter()

@@ -2,11 +2,11 @@
 
 use ndarray::Array2;
 
-use crate::bench::legendre;
 use crate::fit::{Fit, Problem, covariance, minimise};
 use crate::forward_model::{PATH_TERMS, TRANSMISSION_TERMS};
 use crate::simulator::Simulator;
-use crate::zernike;
+use metalith_made::legendre;
+use metalith_made::zernike;
 
 /// Pairs of axes of the smooth blur.
 const BLURS: [[usize; 2]; 3] = [[0, 0], [0, 1], [1, 1]];

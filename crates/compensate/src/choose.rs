@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 
 use num_complex::Complex64;
+use rayon::prelude::*;
 
-use super::line::{Colour, Line, bias_of};
+use super::line::{Colour, Line};
 use metalith_core::WidthMap;
 
-/// Rounds of choosing widths and then the free phases; both come to rest in a few.
+/// Rounds of choosing widths and then the free phases; both converge in a few.
 const ROUNDS: usize = 6;
 
 /// Free phases that the search starts from, as optical paths common to all pillars: every 20 nm over so many to
@@ -16,7 +17,7 @@ const ROUNDS: usize = 6;
 const STARTS: i32 = 12;
 const START_STEP_UM: f64 = 0.02;
 
-/// Pillars that are alike: intended width [nm] and level of bias, with their number.
+/// Pillars that are alike: intended width [nm] and step of density, with their number.
 #[derive(Default)]
 pub struct Kinds(BTreeMap<(u16, i32), u64>);
 
@@ -31,18 +32,24 @@ pub struct Choice {
 
 impl Kinds {
     /// Count the pillars of an element that stands for `copies`.
-    pub fn count(&mut self, widths: &WidthMap, levels: &[i32], copies: u64) {
-        for (&w, &level) in widths.width_nm.iter().zip(levels) {
+    pub fn count(&mut self, widths: &WidthMap, steps: &[i32], copies: u64) {
+        for (&w, &step) in widths.width_nm.iter().zip(steps) {
             if w > 0 {
-                *self.0.entry((w, level)).or_default() += copies;
+                *self.0.entry((w, step)).or_default() += copies;
             }
         }
     }
 
-    /// Choose among all widths that may be drawn.
+    /// Least and greatest step of density; zeros without pillars.
+    pub fn steps(&self) -> (i32, i32) {
+        let all = self.0.keys().map(|k| k.1);
+        (all.clone().min().unwrap_or(0), all.max().unwrap_or(0))
+    }
+
+    /// Choose among all widths that may be drawn, for a line that was solved for the steps of density.
     pub fn choose(&self, line: &Line) -> Choice {
-        let same: BTreeMap<_, _> = self.0.keys().map(|&(w, l)| ((w, l), w)).collect();
-        let (before, own) = self.agreement(&line.colours, &same);
+        let same: BTreeMap<_, _> = self.0.keys().map(|&(w, step)| ((w, step), w)).collect();
+        let (before, own) = self.agreement(line, &same);
         let by_path = |path_um: f64| -> Vec<Complex64> {
             let turn = |c: &Colour| Complex64::cis(std::f64::consts::TAU * path_um / c.wavelength_um);
             line.colours.iter().map(turn).collect()
@@ -57,7 +64,7 @@ impl Kinds {
             let mut found = (BTreeMap::new(), f64::INFINITY);
             for _ in 0..ROUNDS {
                 let drawn = self.nearest(line, &pistons);
-                let (error, next) = self.agreement(&line.colours, &drawn);
+                let (error, next) = self.agreement(line, &drawn);
                 pistons = next;
                 if error >= found.1 {
                     break;
@@ -73,30 +80,31 @@ impl Kinds {
 
     /// For each kind the width whose made pillar is nearest to the intended one, at given free phases.
     fn nearest(&self, line: &Line, pistons: &[Complex64]) -> BTreeMap<(u16, i32), u16> {
-        let of = |&(w, level): &(u16, i32)| {
-            let miss = |drawn: u16| -> f64 {
-                let width_nm = f64::from(drawn) + bias_of(level);
+        let kinds: Vec<_> = self.0.keys().copied().collect();
+        let of = |&(w, step): &(u16, i32)| {
+            let miss = |place: usize| -> f64 {
                 let pairs = line.colours.iter().zip(pistons);
                 pairs
-                    .map(|(c, p)| (c.made(width_nm) * p - c.stated[usize::from(w)]).norm_sqr())
+                    .map(|(c, p)| (line.made(c, place, step) * p - c.stated[usize::from(w)]).norm_sqr())
                     .sum()
             };
-            let all = line.drawn_nm.iter().map(|&d| (miss(d), d));
+            let all = line.drawn_nm.iter().enumerate().map(|(place, &d)| (miss(place), d));
             let best = all.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(w, |b| b.1);
-            ((w, level), best)
+            ((w, step), best)
         };
-        self.0.keys().map(of).collect()
+        let chosen: Vec<_> = kinds.par_iter().map(of).collect();
+        chosen.into_iter().collect()
     }
 
     /// How far made pillars miss intended ones, relative, and the free phases at which they miss them least.
-    fn agreement(&self, colours: &[Colour], drawn: &BTreeMap<(u16, i32), u16>) -> (f64, Vec<Complex64>) {
+    fn agreement(&self, line: &Line, drawn: &BTreeMap<(u16, i32), u16>) -> (f64, Vec<Complex64>) {
         let (mut miss, mut size) = (0.0, 0.0);
         let mut of = |c: &Colour| {
             let pairs = || {
                 let kinds = self.0.iter().zip(drawn.values());
-                kinds.map(|((&(w, level), &n), &d)| {
-                    let made = c.made(f64::from(d) + bias_of(level));
-                    (made, c.stated[usize::from(w)], n as f64)
+                kinds.filter_map(|((&(w, step), &n), d)| {
+                    let place = line.drawn_nm.binary_search(d).ok()?;
+                    Some((line.made(c, place, step), c.stated[usize::from(w)], n as f64))
                 })
             };
             let overlap: Complex64 = pairs().map(|(made, stated, n)| stated * made.conj() * n).sum();
@@ -111,7 +119,7 @@ impl Kinds {
             }
             piston
         };
-        let pistons = colours.iter().map(&mut of).collect();
+        let pistons = line.colours.iter().map(&mut of).collect();
         ((miss / size).sqrt(), pistons)
     }
 }

@@ -4,6 +4,7 @@
 //! pillar as stated, at the design's wavelengths together. A phase common to all pillars of a wavelength is
 //! free: it moves no light. Bias that follows density is looked up site by site, of the layout as drawn.
 
+mod cases;
 mod choose;
 mod line;
 mod page;
@@ -12,24 +13,31 @@ use serde::Serialize;
 
 use choose::Kinds;
 use line::Line;
-use metalith_calibrate::CalibratedModel;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
 use metalith_design::array::{Group, PillarArray};
+use metalith_made::{CalibratedModel, NotApplied};
 
+pub use cases::{CompensationCase, compensation_cases};
 pub use page::write_compensation_report;
 
 /// Passes over the layout: the second sees the density of what the first has drawn.
 const PASSES: usize = 2;
 
 /// A compensated array and what it is worth.
-#[derive(Clone, Debug)]
 pub struct Compensated {
     /// Widths to draw.
     pub array: PillarArray,
     pub summary: CompensationSummary,
     /// The line that it was made for, solved.
     line: Line,
+}
+
+impl Compensated {
+    /// What the model says that neither the compensation nor its report applies.
+    pub fn not_applied(&self) -> Vec<NotApplied> {
+        self.line.chip.perturbation().not_applied()
+    }
 }
 
 /// Numbers of a compensation.
@@ -54,7 +62,7 @@ pub fn compensate(
     model: &CalibratedModel,
     progress: &dyn Progress,
 ) -> Result<Compensated> {
-    let line = Line::new(design, model, progress)?;
+    let mut line = Line::new(design, model)?;
     let copies = |class: usize| array.placed.iter().filter(|p| p.class == class).count() as u64;
     let mut drawn = array.clone();
     let mut error = [0.0; 2];
@@ -62,20 +70,22 @@ pub fn compensate(
         if progress.stopped() {
             return Err(Error::Interrupted);
         }
-        let levels: Vec<Vec<i32>> = drawn.classes.iter().map(|c| line.levels(&c.widths)).collect();
+        let steps: Vec<Vec<i32>> = drawn.classes.iter().map(|c| line.steps(&c.widths)).collect();
         let mut kinds = Kinds::default();
-        for (k, (class, levels)) in array.classes.iter().zip(&levels).enumerate() {
-            kinds.count(&class.widths, levels, copies(k));
+        for (k, (class, steps)) in array.classes.iter().zip(&steps).enumerate() {
+            kinds.count(&class.widths, steps, copies(k));
         }
+        let (least, most) = kinds.steps();
+        line.solve(least, most, progress)?;
         let choice = kinds.choose(&line);
         if pass == 0 {
             error[0] = choice.before;
         }
         error[1] = choice.after;
-        for ((to, class), levels) in drawn.classes.iter_mut().zip(&array.classes).zip(&levels) {
-            for ((to, &w), &level) in to.widths.width_nm.iter_mut().zip(&class.widths.width_nm).zip(levels) {
+        for ((to, class), steps) in drawn.classes.iter_mut().zip(&array.classes).zip(&steps) {
+            for ((to, &w), &step) in to.widths.width_nm.iter_mut().zip(&class.widths.width_nm).zip(steps) {
                 if w > 0 {
-                    *to = choice.drawn[&(w, level)];
+                    *to = choice.drawn[&(w, step)];
                 }
             }
         }

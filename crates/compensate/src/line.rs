@@ -1,20 +1,11 @@
-//! How a line makes pillars: transmission as stated and as made, and the bias at each site.
+//! How a line makes pillars: transmission as stated and as made, and what density adds at each site.
 
 use num_complex::Complex64;
-use rayon::prelude::*;
 
-use metalith_calibrate::{CalibratedModel, MadeCell, fill};
 use metalith_cell::{CellModel, PointwiseCell};
-use metalith_core::{Error, Result};
-use metalith_core::{Progress, WidthMap};
+use metalith_core::{Progress, Result, WidthMap};
 use metalith_design::Design;
-
-/// Biases are told apart to this [nm]: a quarter of a step of the widths, 10 mrad of phase.
-const LEVEL_NM: f64 = 0.5;
-
-/// Realised widths are tabulated so far beyond the range of the design [nm]; a bias greater than this is no
-/// bias any more.
-const MOST_BIAS_NM: u16 = 40;
+use metalith_made::{CalibratedModel, DrawnElement, MadeChip, Perturbation};
 
 /// Transmissions at one wavelength.
 #[derive(Clone, Debug)]
@@ -24,91 +15,92 @@ pub struct Colour {
     pub full: f64,
     /// Of intended pillars as stated, by width [nm].
     pub stated: Vec<Complex64>,
-    /// Of made pillars, by realised width from `least` on [nm].
-    made: Vec<Complex64>,
-    least_nm: f64,
-}
-
-impl Colour {
-    /// A pillar realised this wide [nm].
-    pub fn made(&self, width_nm: f64) -> Complex64 {
-        let x = (width_nm - self.least_nm).clamp(0.0, (self.made.len() - 1) as f64);
-        let below = (x.floor() as usize).min(self.made.len() - 2);
-        let share = x - below as f64;
-        self.made[below] * (1.0 - share) + self.made[below + 1] * share
-    }
+    /// Of made pillars, by the place of the drawn width in [`Line::drawn_nm`] and then by step of density.
+    made: Vec<Vec<Complex64>>,
 }
 
 /// A line, for the wavelengths that a design is verified at.
-#[derive(Clone, Debug)]
 pub struct Line {
+    /// Chips as they would be if nothing differed from what is stated.
+    pub stated: MadeChip,
+    /// Chips as they are made.
+    pub chip: MadeChip,
     pub colours: Vec<Colour>,
     /// Widths that may be drawn [nm].
     pub drawn_nm: Vec<u16>,
-    bias_nm: f64,
-    density_nm: f64,
+    /// Radius of the openings in the metal [um].
+    pub aperture_radius_um: f64,
+    /// The least step of density that transmissions are known for.
+    first_step: i32,
 }
 
 impl Line {
-    /// Solve the cells as stated and as made.
+    /// Solve the cells as stated; those as made are solved once the steps of density are known.
     ///
     /// # Errors
-    /// If a cell cannot be solved, or the user stopped it.
-    pub fn new(design: &Design, model: &CalibratedModel, progress: &dyn Progress) -> Result<Self> {
+    /// If a cell cannot be solved, or a number of the model cannot be.
+    pub fn new(design: &Design, model: &CalibratedModel) -> Result<Self> {
         let drawn_nm: Vec<u16> = design.cell.widths_nm().collect();
-        let (narrow, wide) = design.cell.width_range_nm;
+        let (_, wide) = design.cell.width_range_nm;
         let stack = design.cell_stack()?;
+        let chip = MadeChip::new(&stack, model)?;
+        let nothing = CalibratedModel::new(String::new(), String::new(), Perturbation::default());
+        let as_stated = MadeChip::new(&stack, &nothing)?;
         let stated = PointwiseCell::new(stack, drawn_nm.iter().copied());
-        let made: MadeCell = model.cell(design, 0.0)?;
-        let realised: Vec<u16> = (narrow.saturating_sub(MOST_BIAS_NM).max(1)..=wide + MOST_BIAS_NM).collect();
-        let wavelengths = &design.verify.wavelengths_um;
-        progress.begin("pillars as they are made", (wavelengths.len() * realised.len()) as u64);
         let colour = |&wavelength_um: &f64| {
-            let one = |&w: &u16| {
-                if progress.stopped() {
-                    return Err(Error::Interrupted);
-                }
-                let t = made.realised(f64::from(w), wavelength_um);
-                progress.advance(1);
-                t
-            };
             Ok(Colour {
                 wavelength_um,
                 full: stated.full_transmission(wavelength_um)?,
                 stated: stated.transmissions(wavelength_um, wide)?,
-                made: realised.par_iter().map(one).collect::<Result<_>>()?,
-                least_nm: f64::from(realised[0]),
+                made: Vec::new(),
             })
         };
-        let geometry = &model.departure.geometry;
         Ok(Self {
-            colours: wavelengths.iter().map(colour).collect::<Result<_>>()?,
+            stated: as_stated,
+            chip,
+            colours: design.verify.wavelengths_um.iter().map(colour).collect::<Result<_>>()?,
             drawn_nm,
-            bias_nm: geometry.cd_bias_nm,
-            density_nm: geometry.cd_bias_density_nm,
+            aperture_radius_um: design.aperture_radius_um(),
+            first_step: 0,
         })
     }
 
-    /// Whether a pillar's bias depends on what is drawn around it.
+    /// Whether the width of a pillar depends on what is drawn around it.
     pub fn follows_density(&self) -> bool {
-        self.density_nm != 0.0
+        self.chip.perturbation().geometry.follows_density()
     }
 
-    /// The bias of every site of a layout as drawn, row by row, in steps of [`bias_of`].
-    pub fn levels(&self, drawn: &WidthMap) -> Vec<i32> {
-        if !self.follows_density() {
-            return vec![level(self.bias_nm); drawn.width_nm.len()];
+    /// Steps that density adds to the width at every site of a layout as drawn, row by row.
+    pub fn steps(&self, drawn: &WidthMap) -> Vec<i32> {
+        let element = DrawnElement::new(drawn, self.aperture_radius_um);
+        let steps = element.density_steps(&self.chip.perturbation().geometry);
+        steps.unwrap_or_else(|| vec![0; drawn.width_nm.len()])
+    }
+
+    /// Solve all drawn widths as made, for these steps of density at the least and at the most.
+    ///
+    /// # Errors
+    /// If a cell cannot be solved, or the user stopped it.
+    pub fn solve(&mut self, least: i32, most: i32, progress: &dyn Progress) -> Result<()> {
+        let steps: Vec<i32> = (least..=most).collect();
+        progress.begin("pillars as they are made", (self.colours.len() * steps.len()) as u64);
+        self.first_step = least;
+        for colour in &mut self.colours {
+            colour.made = vec![Vec::new(); self.drawn_nm.len()];
+            for &step in &steps {
+                let row = self
+                    .chip
+                    .drawn_widths(&self.drawn_nm, step, colour.wavelength_um, progress)?;
+                colour.made.iter_mut().zip(row).for_each(|(to, t)| to.push(t));
+                progress.advance(1);
+            }
         }
-        let at = |f: &f32| level(self.bias_nm + self.density_nm * f64::from(*f));
-        fill(drawn).iter().map(at).collect()
+        Ok(())
     }
-}
 
-fn level(bias_nm: f64) -> i32 {
-    (bias_nm / LEVEL_NM).round() as i32
-}
-
-/// The bias of a level [nm].
-pub fn bias_of(level: i32) -> f64 {
-    f64::from(level) * LEVEL_NM
+    /// What a pillar transmits at one of the colours, drawn at a place of [`Line::drawn_nm`], at a step of density
+    /// that was solved for.
+    pub fn made(&self, colour: &Colour, place: usize, step: i32) -> Complex64 {
+        colour.made[place][(step - self.first_step) as usize]
+    }
 }

@@ -2,37 +2,25 @@
 
 use std::path::Path;
 
-use num_complex::Complex64;
-
-use super::line::{Line, bias_of};
+use super::cases::{CHIPS, CompensationCase, compensation_cases};
 use super::{Compensated, CompensationSummary};
-use metalith_calibrate::CalibratedModel;
-use metalith_core::{Error, Progress, Result, WidthMap};
+use metalith_core::{Progress, Result};
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
-use metalith_gds::extract::Extraction;
+use metalith_made::{CalibratedModel, NotApplied};
 use metalith_report::{Axis, Cell, Chart, Column, Figure, ImageGrid, Page, Table, count, sig, write_json};
-use metalith_verify::{Spot, read_back};
-use metalith_wave::image::{Matched, Psf, incident, landing_um};
-use metalith_wave::{Accuracy, Fold, PhaseFunction, Pillars, Propagator, Scratch, Window};
 
 /// Decades of a PSF that are shown.
 const DECADES: f64 = 4.0;
-
-/// One case at one wavelength.
-#[derive(serde::Serialize)]
-struct Case {
-    element: String,
-    wavelength_um: f64,
-    pillars: &'static str,
-    spot: Spot,
-}
 
 #[derive(serde::Serialize)]
 struct Numbers<'a> {
     model: &'a CalibratedModel,
     summary: &'a CompensationSummary,
-    cases: &'a [Case],
+    /// What the model says that was not simulated.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    not_applied: Vec<NotApplied>,
+    cases: &'a [CompensationCase],
 }
 
 /// Read the compensated layout at `layout` back, simulate it as it would be made, beside the intended pillars
@@ -50,16 +38,7 @@ pub fn write_compensation_report(
     progress: &dyn Progress,
 ) -> Result<()> {
     let line = &compensated.line;
-    let found = read_back(design, intended, layout, progress)?;
-    let work = intended.classes.len() * line.colours.len();
-    progress.begin("simulating elements", work as u64);
-    let mut cases = Vec::new();
-    let mut figures = Vec::new();
-    for class in 0..intended.classes.len() {
-        let of_element = element(design, intended, &found, class, line, progress)?;
-        cases.extend(of_element.0);
-        figures.extend(of_element.1);
-    }
+    let cases = compensation_cases(design, intended, compensated, layout, progress)?;
     let mut page = Page::new(
         format!("{}, compensated", design.title),
         format!("for {}: {}", model.set, model.finding),
@@ -74,20 +53,27 @@ pub fn write_compensation_report(
     page.paragraph(
         "Error: rms difference of the complex transmission of the pillars as made from that intended, over the rms of the latter, at all wavelengths of the design together, one phase a wavelength free. Corrected pillars are those of the file that was read back.",
     );
+    page.paragraph(
+        "Made elements have all that the model says of pillars, apertures, light and sensor; widths can correct the pillars alone.",
+    );
+    for quantity in line.chip.statement().not_applied {
+        page.note(quantity.to_string());
+    }
     page.section("In the middle of the field").table(table(&cases));
-    for row in figures.chunks(2) {
-        page.row(row.iter().cloned());
+    for row in cases.chunks(CHIPS).filter_map(figures) {
+        page.row(row);
     }
     let numbers = Numbers {
         model,
         summary: s,
+        not_applied: line.chip.statement().not_applied,
         cases: &cases,
     };
     write_json(&folder.join("compensation.json"), "compensation", &numbers)?;
     page.write(&folder.join("compensation.html"))
 }
 
-fn table(cases: &[Case]) -> Table {
+fn table(cases: &[CompensationCase]) -> Table {
     let mut table = Table::new([
         Column::text("Element"),
         Column::number("Wavelength", "nm"),
@@ -112,93 +98,25 @@ fn table(cases: &[Case]) -> Table {
     table
 }
 
-/// The first element of a class, at all wavelengths.
-fn element(
-    design: &Design,
-    intended: &PillarArray,
-    found: &Extraction,
-    class: usize,
-    line: &Line,
-    progress: &dyn Progress,
-) -> Result<(Vec<Case>, Vec<Figure>)> {
-    let place = intended.placed.iter().position(|p| p.class == class).unwrap_or(0);
-    let element = intended.placed[place].element;
-    let (plain, corrected) = (&intended.widths(&intended.placed[place]), &found.elements[place].widths);
-    let lens = &design.lens;
-    let open = PhaseFunction {
-        lattice: plain.lattice,
-        radius_um: lens.radius_um(),
-        amplitude: 1.0,
-        phase_rad: |_, _| 0.0,
-    };
-    let mut scratch = Scratch::default();
-    let (mut cases, mut figures) = (Vec::new(), Vec::new());
-    for colour in 0..line.colours.len() {
-        if progress.stopped() {
-            return Err(Error::Interrupted);
-        }
-        let um = line.colours[colour].wavelength_um;
-        let wave = incident(&element.wedge, um, [0.0, 0.0])?;
-        let chief = landing_um(&element.wedge, &wave, lens.focal_length_um)?;
-        let window = Window::about(
-            chief,
-            plain.lattice.pitch_um(),
-            design.verify.window_samples,
-            lens.focal_length_um,
-        );
-        let fold = Fold::plan(plain.lattice, lens.radius_um(), um, window, Accuracy::Accurate)?;
-        let full = line.colours[colour].full;
-        let matched = Matched::of(&open, [0.0, 0.0, lens.focal_length_um], um, full);
-        let title = format!("element {}, {:.0} nm", element.label(), um * 1e3);
-        let mut images = ImageGrid::new(format!("PSF, {title}"), 3)
-            .pixel_um(window.step_um)
-            .values("|E|² / |E inc|²", "")
-            .log(DECADES);
-        let mut curves = Chart::new(
-            format!("MTF with the sensor's pixel, {title}"),
-            Axis::linear("spatial frequency", "1/mm"),
-            Axis::linear("MTF", "").range(0.0, 1.0),
-        );
-        for (pillars, widths, as_made) in [
-            ("intended", plain, false),
-            ("made, uncorrected", plain, true),
-            ("made, corrected", corrected, true),
-        ] {
-            let (kinds, table) = realised(line, colour, widths, as_made);
-            let psf = Psf::of(&fold.field(&Pillars::new(&kinds, &table)?, &wave, &mut scratch)?);
-            let spot = Spot::of(&psf, &matched, design.verify.pixel_um);
-            curves.line(pillars, spot.mtf_curve.iter().copied());
-            images.image(pillars, psf.values);
-            cases.push(Case {
-                element: element.label(),
-                wavelength_um: um,
-                pillars,
-                spot,
-            });
-        }
-        figures.push(images.caption("About the chief ray, one logarithmic scale."));
-        figures.push(curves.caption("Mean of x and y."));
-        progress.advance(1);
+/// PSFs and contrast of one element at one wavelength, the three chips side by side.
+fn figures(of_one: &[CompensationCase]) -> Option<[Figure; 2]> {
+    let first = of_one.first()?;
+    let title = format!("element {}, {:.0} nm", first.element, first.wavelength_um * 1e3);
+    let mut images = ImageGrid::new(format!("PSF, {title}"), of_one.len())
+        .pixel_um(first.psf.window.step_um)
+        .values("|E|² / |E inc|²", "")
+        .log(DECADES);
+    let mut curves = Chart::new(
+        format!("MTF with the sensor's pixel, {title}"),
+        Axis::linear("spatial frequency", "1/mm"),
+        Axis::linear("MTF", "").range(0.0, 1.0),
+    );
+    for case in of_one {
+        curves.line(case.pillars, case.spot.mtf_curve.iter().copied());
+        images.image(case.pillars, case.psf.values.clone());
     }
-    Ok((cases, figures))
-}
-
-/// Pillars as a map of kinds, and the transmission of each kind.
-fn realised(line: &Line, colour: usize, widths: &WidthMap, as_made: bool) -> (WidthMap, Vec<Complex64>) {
-    let colour = &line.colours[colour];
-    if !as_made {
-        return (widths.clone(), colour.stated.clone());
-    }
-    let mut table = vec![Complex64::ZERO];
-    let mut known = std::collections::BTreeMap::new();
-    let mut kinds = widths.clone();
-    for (w, level) in kinds.width_nm.iter_mut().zip(line.levels(widths)) {
-        if *w > 0 {
-            *w = *known.entry((*w, level)).or_insert_with(|| {
-                table.push(colour.made(f64::from(*w) + bias_of(level)));
-                (table.len() - 1) as u16
-            });
-        }
-    }
-    (kinds, table)
+    Some([
+        images.caption("About the chief ray, one logarithmic scale."),
+        curves.caption("Mean of x and y."),
+    ])
 }

@@ -111,12 +111,6 @@ impl WidthMap {
         self.width_nm.iter().filter(|&&w| w != 0).count() as u64
     }
 
-    /// Area of all pillars, in units of a site's.
-    pub fn filled_sites(&self) -> f64 {
-        let pitch2 = f64::from(self.lattice.pitch_nm()).powi(2);
-        self.width_nm.iter().map(|&w| f64::from(w).powi(2)).sum::<f64>() / pitch2
-    }
-
     /// Number of pillars of each width; index is the width [nm], the first entry counts empty sites.
     pub fn histogram(&self) -> Vec<u64> {
         let mut counts = Vec::new();

@@ -71,7 +71,7 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
                 }
                 Fidelity::Calibrated => Err(Error::invalid(
                     "a calibrated cell without the model it is calibrated by",
-                    "read the model that `metalith calibrate` wrote and take its cell",
+                    "read the model that `metalith calibrate` wrote and make a `MadeChip` of it",
                 )),
                 Fidelity::Fitted => {
                     let stack = design.cell_stack()?;

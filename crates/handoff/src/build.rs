@@ -23,7 +23,7 @@ use metalith_design::array::PillarArray;
 use metalith_design::{Design, cell_models};
 use metalith_layout::{write_apertures, write_layer_properties, write_pillars};
 use metalith_report::{Verdict, write_json};
-use metalith_verify::{Premise, verify, write_report};
+use metalith_verify::{SimulationCases, verify, write_report};
 use metalith_wave::Accuracy;
 
 /// What to hand over, and where to.
@@ -390,8 +390,8 @@ fn verification(
         wanted.push(Fidelity::Published);
     }
     let models = cell_models(design, &wanted)?;
-    let premises = models.iter().map(|m| Premise::from(m.as_ref())).collect::<Vec<_>>();
-    let found = verify(design, array, pillars, &premises, options.accuracy, progress)?;
+    let cases = SimulationCases::of_cells(&models)?;
+    let found = verify(design, array, pillars, &cases, options.accuracy, progress)?;
     write_report(design, array, &found, folder)?;
     let failed: Vec<_> = found
         .checks

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{SpotPair, Verification};
+use super::{PsfPair, Verification};
 use metalith_design::LimitSpec;
 
 /// One limit and what was reached.
@@ -125,7 +125,7 @@ pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
 }
 
 /// Name, key and limit of what is measured of a spot.
-type Optical<'a> = (&'static str, &'static str, f64, &'a dyn Fn(&SpotPair) -> f64);
+type Optical<'a> = (&'static str, &'static str, f64, &'a dyn Fn(&PsfPair) -> f64);
 
 /// The greatest value with its place; one that is not a number is greater than all.
 fn worst(values: impl Iterator<Item = (String, f64)>) -> Option<(String, f64)> {

@@ -1,17 +1,18 @@
 //! From the bytes of a layout to a verdict: what was written is read back, compared with what was meant,
 //! and simulated.
 
+mod case;
 mod check;
-mod lone;
 mod optics;
 mod page;
 mod phase;
-mod premise;
-mod spot;
+mod psf_metrics;
+mod single;
 mod widths;
 
 use std::path::Path;
 
+use num_complex::Complex64;
 use serde::Serialize;
 
 use metalith_cell::Fidelity;
@@ -21,15 +22,16 @@ use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, Element};
 use metalith_gds::extract::{ElementSite, ExtractedElement, Extraction, ExtractionPlan, Oddities, Survey, extract};
 use metalith_gds::{self, Layout};
-use metalith_wave::Accuracy;
+use metalith_made::{MadeChip, ModelStatement};
 use metalith_wave::image::Steepness;
+use metalith_wave::{Accuracy, PlaneWave};
 
+pub use case::{SimulationCase, SimulationCases};
 pub use check::{Check, Sense};
-pub use lone::{Lighting, LonePsf, lone_psfs, write_lone_report};
 pub use page::write_report;
 pub use phase::{PhaseError, PhaseErrors};
-pub use premise::Premise;
-pub use spot::{Orders, Spot, SpotPair};
+pub use psf_metrics::{Orders, PsfImages, PsfMetrics, PsfPair};
+pub use single::{Lighting, SinglePsf, SinglePsfReport, single_psfs, write_single_psf_report};
 pub use widths::WidthCheck;
 
 /// Most elements that are simulated because their pillars are not as intended.
@@ -70,7 +72,7 @@ pub struct DistinctElement {
     /// Where light goes by the mapping's own account, one entry a wavelength.
     pub orders: Vec<Orders>,
     /// One entry for each wavelength and field angle.
-    pub spots: Vec<SpotPair>,
+    pub spots: Vec<PsfPair>,
     /// The pillars that were read back, for pictures.
     #[serde(skip)]
     pub widths: WidthMap,
@@ -83,6 +85,9 @@ pub struct Verification {
     pub design_digest: String,
     /// The cell that the layout is judged by.
     pub fidelity: Fidelity,
+    /// The calibrated model that the layout is judged by, if it is judged as made.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub model: Option<ModelStatement>,
     /// `accurate` or `fast`.
     pub accuracy: &'static str,
     pub layout: LayoutFacts,
@@ -117,15 +122,13 @@ pub fn fits(design: &Design, path: &Path) -> Result<()> {
 
 /// Read the layout at `path` back and hold it to its design.
 ///
-/// The first of `premises` is the one that the layout is judged by; the others are simulated beside it.
-///
 /// # Errors
-/// If the layout cannot be read, the cell has no answer at a wavelength, or the user stopped it.
+/// If the layout cannot be read, a cell has no answer at a wavelength, or the user stopped it.
 pub fn verify(
     design: &Design,
     array: &PillarArray,
     path: &Path,
-    premises: &[Premise<'_>],
+    cases: &SimulationCases<'_>,
     accuracy: Accuracy,
     progress: &dyn Progress,
 ) -> Result<Verification> {
@@ -135,34 +138,36 @@ pub fn verify(
     let elements = compare(array, &extraction);
     let lens = LensPhase::new(array.lattice, design.lens.diameter_nm, &design.lens.phase);
     let rule = WidthRule::new(&design.cell, &design.mapping);
-    let judge = premises[0].cell;
-    let mapping_um = design.mapping.wavelength_um;
-    let widest = design.cell.pitch_nm as u16;
-    let at_mapping = judge.transmissions(mapping_um, widest)?;
-    let mut bench = optics::Bench::new(design, array.lattice, premises, accuracy)?;
+    let responses = MappingResponse::new(design, cases.judge)?;
+    let mut simulator = optics::ElementSimulator::new(design, array.lattice, cases, accuracy)?;
     let chosen = distinct(&elements);
     let shown = chosen.iter().map(|(k, _)| elements[*k].element).collect::<Vec<_>>();
-    bench.look_along(&shown, progress)?;
-    progress.begin("simulating elements", (chosen.len() * bench.spots()) as u64);
+    simulator.add_directions(&shown, progress)?;
+    progress.begin("simulating elements", (chosen.len() * simulator.psfs()) as u64);
     let mut simulated = Vec::new();
     for (k, copies) in chosen {
         let element = elements[k].element;
         let widths = std::mem::replace(&mut extraction.elements[k].widths, WidthMap::empty(array.lattice));
         let phase = ElementPhase::new(&lens, &element.wedge);
+        let read = simulator.read(&widths)?;
         simulated.push(DistinctElement {
             element,
             copies,
-            phase: PhaseErrors::of(&widths, &phase, &rule, mapping_um, &at_mapping),
+            phase: responses.errors(&read, &phase, &rule, progress)?,
             steepness: Steepness::of(array.lattice.sites(), |ix, iy| phase.turns(ix, iy)),
-            orders: bench.orders(&rule),
-            spots: bench.simulate(&element, &phase, &widths, progress)?,
+            orders: simulator.orders(&rule, &read, progress)?,
+            spots: simulator.simulate(&element, &phase, &read, progress)?,
             widths,
         });
     }
     let mut verification = Verification {
         design: design.name.clone(),
         design_digest: design.digest(),
-        fidelity: judge.fidelity(),
+        fidelity: cases.judge.fidelity(),
+        model: match cases.judge {
+            SimulationCase::Made(chip) => Some(chip.statement()),
+            SimulationCase::Cell(_) => None,
+        },
         accuracy: match accuracy {
             Accuracy::Accurate => "accurate",
             Accuracy::Fast => "fast",
@@ -175,6 +180,48 @@ pub fn verify(
     };
     verification.checks = check::all(&design.verify.limits, &verification);
     Ok(verification)
+}
+
+/// What pillars transmit at the wavelength of the mapping, in the case that judges.
+enum MappingResponse<'a> {
+    ByWidth(f64, Vec<Complex64>),
+    Made(f64, &'a MadeChip),
+}
+
+impl<'a> MappingResponse<'a> {
+    fn new(design: &Design, judge: SimulationCase<'a>) -> Result<Self> {
+        let um = design.mapping.wavelength_um;
+        Ok(match judge {
+            SimulationCase::Cell(cell) => Self::ByWidth(um, cell.transmissions(um, design.cell.pitch_nm as u16)?),
+            SimulationCase::Made(chip) => Self::Made(um, chip),
+        })
+    }
+
+    /// Phase errors of an element's pillars.
+    fn errors(
+        &self,
+        read: &optics::ReadElement<'_>,
+        phase: &ElementPhase<'_>,
+        rule: &WidthRule,
+        progress: &dyn Progress,
+    ) -> Result<PhaseErrors> {
+        let widths = read.drawn.pillars();
+        match (self, &read.made[0]) {
+            (Self::Made(um, chip), Some(made)) => {
+                let view = chip.view(made, &PlaneWave::normal(*um), false, progress)?;
+                let of = |pillar: phase::Pillar| {
+                    let t = view.tables[0].t[usize::from(made.classes()[pillar.site])];
+                    Complex64::new(f64::from(t.re), f64::from(t.im))
+                };
+                Ok(PhaseErrors::of(widths, phase, rule, *um, &of))
+            }
+            (Self::ByWidth(um, table), _) => {
+                let of = |pillar: phase::Pillar| table[usize::from(pillar.width_nm)];
+                Ok(PhaseErrors::of(widths, phase, rule, *um, &of))
+            }
+            (Self::Made(..), None) => unreachable!("a made chip has made elements"),
+        }
+    }
 }
 
 /// The pillars of a layout at the elements of a design.

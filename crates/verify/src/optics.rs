@@ -1,17 +1,19 @@
-//! The PSFs of one element: of its unrounded design phase, and of its pillars by each cell.
+//! The PSFs of one element: of its unrounded design phase, and of its pillars in each case.
 
 use ndarray::Array2;
 use num_complex::{Complex32, Complex64};
 use rayon::prelude::*;
 
-use super::premise::{Cells, Premise};
-use super::spot::{Images, Orders, Spot, SpotPair};
+use super::case::{SimulationCase, SimulationCases, TransmissionTables};
+use super::psf_metrics::{Orders, PsfImages, PsfMetrics, PsfPair};
+use metalith_cell::Fidelity;
 use metalith_core::Progress;
 use metalith_core::{Error, Result};
 use metalith_core::{Lattice, WidthMap};
 use metalith_design::array::WidthRule;
 use metalith_design::phase::ElementPhase;
 use metalith_design::{CellIncidence, Design, Element, FieldAngle};
+use metalith_made::{DrawnElement, MadeChip, MadeElement, MadeView};
 use metalith_wave::image::{Matched, Psf, incident, landing_um};
 use metalith_wave::{Accuracy, Aperture, Fold, PhaseFunction, Pillars, PlaneWave, Propagator, Scratch, Window};
 
@@ -20,44 +22,69 @@ struct Colour {
     wavelength_um: f64,
     /// The lens with the perfect phase, all sites of modulus one.
     perfect: Matched,
-    /// Of each premise.
-    cells: Vec<Cells>,
+    /// Of each case.
+    cases: Vec<CaseAt>,
+}
+
+/// One case at one wavelength.
+struct CaseAt {
+    fidelity: Fidelity,
+    /// |t| of a cell that passes everything.
+    full: f64,
+    /// Of a cell, by drawn width; a chip as made has its own by site.
+    tables: Option<TransmissionTables>,
 }
 
 /// What the elements of a design are simulated with.
-pub(super) struct Bench<'a> {
+pub(super) struct ElementSimulator<'a> {
     design: &'a Design,
     lattice: Lattice,
-    premises: &'a [Premise<'a>],
+    cases: Vec<SimulationCase<'a>>,
     accuracy: Accuracy,
     colours: Vec<Colour>,
 }
 
-impl<'a> Bench<'a> {
+/// An element as read from a layout, and as made in each case that is a made chip.
+pub(super) struct ReadElement<'a> {
+    pub drawn: DrawnElement<'a>,
+    pub made: Vec<Option<MadeElement>>,
+}
+
+impl<'a> ElementSimulator<'a> {
     /// Look up the cells at all wavelengths.
-    pub fn new(design: &'a Design, lattice: Lattice, premises: &'a [Premise<'a>], accuracy: Accuracy) -> Result<Self> {
+    pub fn new(design: &'a Design, lattice: Lattice, cases: &SimulationCases<'a>, accuracy: Accuracy) -> Result<Self> {
         let open = PhaseFunction {
             lattice,
             radius_um: design.lens.radius_um(),
             amplitude: 1.0,
             phase_rad: |_, _| 0.0,
         };
+        let cases: Vec<_> = cases.iter().collect();
         let colour = |&wavelength_um: &f64| {
+            let at = |case: &SimulationCase<'_>| {
+                Ok(CaseAt {
+                    fidelity: case.fidelity(),
+                    full: case.full_transmission(wavelength_um)?,
+                    tables: match case {
+                        SimulationCase::Made(_) => None,
+                        SimulationCase::Cell(cell) => {
+                            Some(TransmissionTables::new(*cell, wavelength_um, widest_nm(design))?)
+                        }
+                    },
+                })
+            };
             Ok(Colour {
                 wavelength_um,
                 perfect: Matched::of(&open, [0.0, 0.0, design.lens.focal_length_um], wavelength_um, 1.0),
-                cells: premises
-                    .iter()
-                    .map(|p| Cells::new(p.cell, wavelength_um, widest_nm(design)))
-                    .collect::<Result<_>>()?,
+                cases: cases.iter().map(at).collect::<Result<_>>()?,
             })
         };
         Ok(Self {
             design,
             lattice,
-            premises,
             accuracy,
             colours: design.verify.wavelengths_um.iter().map(colour).collect::<Result<_>>()?,
+            cases,
         })
     }
 
@@ -65,12 +92,17 @@ impl<'a> Bench<'a> {
     ///
     /// # Errors
     /// If a cell has no answer, or the user stopped it.
-    pub fn look_along(&mut self, elements: &[Element], progress: &dyn Progress) -> Result<()> {
+    pub fn add_directions(&mut self, elements: &[Element], progress: &dyn Progress) -> Result<()> {
         let spec = &self.design.verify;
-        if spec.incidence == CellIncidence::Normal {
+        let cells = self
+            .cases
+            .iter()
+            .filter(|c| matches!(c, SimulationCase::Cell(_)))
+            .count();
+        if !self.as_lit() || cells == 0 {
             return Ok(());
         }
-        let solves = elements.len() * spec.field_angles.len() * self.colours.len() * self.premises.len();
+        let solves = elements.len() * spec.field_angles.len() * self.colours.len() * cells;
         progress.begin("solving cells as they are lit", solves as u64);
         for colour in &mut self.colours {
             let wavelength_um = colour.wavelength_um;
@@ -78,116 +110,204 @@ impl<'a> Bench<'a> {
                 .iter()
                 .flat_map(|e| spec.field_angles.iter().map(move |a| arriving(e, wavelength_um, *a)))
                 .collect::<Result<Vec<_>>>()?;
-            for (cells, premise) in colour.cells.iter_mut().zip(self.premises) {
-                let seen = waves.iter().map(|w| premise.tilted(w)).collect::<Vec<_>>();
-                cells.look_along(premise.cell, &seen, widest_nm(self.design), progress)?;
+            for (at, case) in colour.cases.iter_mut().zip(&self.cases) {
+                if let (Some(tables), SimulationCase::Cell(cell)) = (&mut at.tables, case) {
+                    tables.add_directions(*cell, &waves, widest_nm(self.design), progress)?;
+                }
             }
         }
         Ok(())
     }
 
     /// Number of wavelengths and angles of one element.
-    pub fn spots(&self) -> usize {
+    pub fn psfs(&self) -> usize {
         self.colours.len() * self.design.verify.field_angles.len()
     }
 
-    /// Where light goes, at each wavelength by each cell, along the normal.
-    pub fn orders(&self, rule: &WidthRule) -> Vec<Orders> {
-        let of = |colour: &Colour| {
-            let at = |c: &Cells| Orders::of(rule, colour.wavelength_um, c.fidelity, c.full, &c.normal);
-            colour.cells.iter().map(at).collect::<Vec<_>>()
+    fn as_lit(&self) -> bool {
+        self.design.verify.incidence == CellIncidence::AsLit
+    }
+
+    /// An element as read, with what each made chip makes of it.
+    ///
+    /// # Errors
+    /// As [`MadeElement::new`].
+    pub fn read<'w>(&self, widths: &'w WidthMap) -> Result<ReadElement<'w>> {
+        let drawn = DrawnElement::new(widths, self.design.aperture_radius_um());
+        let made = |case: &SimulationCase<'_>| match case {
+            SimulationCase::Cell(_) => Ok(None),
+            SimulationCase::Made(chip) => chip.element(&drawn).map(Some),
         };
-        self.colours.iter().flat_map(of).collect()
+        Ok(ReadElement {
+            made: self.cases.iter().map(made).collect::<Result<_>>()?,
+            drawn,
+        })
+    }
+
+    /// Where light goes, at each wavelength in each case, along the normal. Where widths follow density, their
+    /// mean over the element counts.
+    ///
+    /// # Errors
+    /// If a cell cannot be solved, or the user stopped it.
+    pub fn orders(&self, rule: &WidthRule, element: &ReadElement<'_>, progress: &dyn Progress) -> Result<Vec<Orders>> {
+        let mut all = Vec::new();
+        for colour in &self.colours {
+            for (at, case) in colour.cases.iter().zip(&self.cases) {
+                let made;
+                let table = match (&at.tables, case) {
+                    (Some(tables), _) => &tables.normal,
+                    (None, SimulationCase::Made(chip)) => {
+                        made = by_drawn_width(chip, rule, &element.drawn, colour.wavelength_um, progress)?;
+                        &made
+                    }
+                    (None, SimulationCase::Cell(_)) => unreachable!("every cell has its tables"),
+                };
+                all.push(Orders::of(rule, colour.wavelength_um, at.fidelity, at.full, table));
+            }
+        }
+        Ok(all)
     }
 
     /// All wavelengths and field angles of one element.
+    ///
+    /// # Errors
+    /// If a cell cannot be solved, a direction is too steep, or the user stopped it.
     pub fn simulate(
         &self,
         element: &Element,
         phase: &ElementPhase<'_>,
-        widths: &WidthMap,
+        read: &ReadElement<'_>,
         progress: &dyn Progress,
-    ) -> Result<Vec<SpotPair>> {
+    ) -> Result<Vec<PsfPair>> {
         let angles = &self.design.verify.field_angles;
-        let tasks = self
-            .colours
-            .iter()
-            .flat_map(|c| angles.iter().map(move |a| (c, *a)))
-            .collect::<Vec<_>>();
+        let mut tasks = Vec::new();
+        for colour in &self.colours {
+            for field in angles {
+                let wave = arriving(element, colour.wavelength_um, *field)?;
+                let views = self.views(read, &wave, progress)?;
+                tasks.push(Task {
+                    colour,
+                    field: *field,
+                    wave,
+                    views,
+                });
+            }
+        }
         tasks
             .into_par_iter()
-            .map_init(Scratch::default, |scratch, (colour, angle)| {
+            .map_init(Scratch::default, |scratch, task| {
                 if progress.stopped() {
                     return Err(Error::Interrupted);
                 }
-                let pair = self.pair(colour, angle, element, phase, widths, scratch);
+                let pair = self.pair(&task, element, phase, read.drawn.pillars(), scratch);
                 progress.advance(1);
                 pair
             })
             .collect()
     }
 
+    /// A read element as each made chip has it in the light of a wave; nothing for the cells.
+    fn views<'r>(
+        &self,
+        read: &'r ReadElement<'_>,
+        wave: &PlaneWave,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Option<MadeView<'r>>>> {
+        let pairs = self.cases.iter().zip(&read.made);
+        pairs
+            .map(|(case, made)| match (case, made) {
+                (SimulationCase::Made(chip), Some(made)) => chip.view(made, wave, self.as_lit(), progress).map(Some),
+                _ => Ok(None),
+            })
+            .collect()
+    }
+
     fn pair(
         &self,
-        colour: &Colour,
-        field: FieldAngle,
+        task: &Task<'_>,
         element: &Element,
         phase: &ElementPhase<'_>,
         widths: &WidthMap,
         scratch: &mut Scratch,
-    ) -> Result<SpotPair> {
+    ) -> Result<PsfPair> {
         let (lens, spec) = (&self.design.lens, &self.design.verify);
+        let Task {
+            colour, field, wave, ..
+        } = task;
         let wavelength_um = colour.wavelength_um;
-        let wave = arriving(element, wavelength_um, field)?;
-        let chief = landing_um(&element.wedge, &wave, lens.focal_length_um)?;
-        let plan = |distance_um| {
-            let window = Window::about(chief, self.lattice.pitch_um(), spec.window_samples, distance_um);
-            Fold::plan(self.lattice, lens.radius_um(), wavelength_um, window, self.accuracy)
-        };
-        let fold = plan(lens.focal_length_um)?;
-        let window = *fold.window();
-        let designed = Psf::of(&fold.field(&DesignPhase(phase, lens.radius_um()), &wave, scratch)?);
+        let chief = landing_um(&element.wedge, wave, lens.focal_length_um)?;
+        let window = Window::about(
+            chief,
+            self.lattice.pitch_um(),
+            spec.window_samples,
+            lens.focal_length_um,
+        );
+        let fold = Fold::plan(self.lattice, lens.radius_um(), wavelength_um, window, self.accuracy)?;
+        let designed = Psf::of(&fold.field(&DesignPhase(phase, lens.radius_um()), wave, scratch)?);
         let mut extracted = Vec::new();
         let mut judged = None;
-        for (premise, cells) in self.premises.iter().zip(&colour.cells) {
-            let moved = if premise.in_place() {
-                None
-            } else {
-                Some(plan(lens.focal_length_um + premise.gap_um)?)
+        for (at, view) in colour.cases.iter().zip(&task.views) {
+            let found = match (&at.tables, view) {
+                (_, Some(view)) => view.psf(window, self.accuracy, scratch)?,
+                (Some(tables), None) => {
+                    let mut of = |table: &Vec<Complex64>| {
+                        Ok::<_, Error>(Psf::of(&fold.field(&Pillars::new(widths, table)?, wave, scratch)?))
+                    };
+                    Psf::mean(tables.of(wave).iter().map(&mut of).collect::<Result<_>>()?)
+                }
+                (None, None) => unreachable!("a case is a cell or a made chip"),
             };
-            let (fold, wave) = (moved.as_ref().unwrap_or(&fold), premise.tilted(&wave));
-            let mut of = |table: &Vec<Complex64>| {
-                Ok::<_, Error>(Psf::of(&fold.field(&Pillars::new(widths, table)?, &wave, scratch)?))
-            };
-            // The sensor's samples are where they were; only how far it is has changed.
-            let found = Psf {
-                window,
-                ..Psf::mean(cells.tables(&wave).iter().map(&mut of).collect::<Result<_>>()?)
-            };
-            let matched = scaled(&colour.perfect, cells.full);
-            extracted.push((cells.fidelity, Spot::of(&found, &matched, spec.pixel_um)));
+            let matched = scaled(&colour.perfect, at.full);
+            extracted.push((at.fidelity, PsfMetrics::of(&found, &matched, spec.pixel_um)));
             judged.get_or_insert(found);
         }
-        let judged = judged.expect("there is a cell that judges");
+        let judged = judged.expect("the case that judges is the first");
         let images = (field.x_deg == 0.0 && field.y_deg == 0.0).then(|| {
-            Box::new(Images {
+            Box::new(PsfImages {
                 designed: picture(&designed, 1.0),
-                extracted: picture(&judged, colour.cells[0].full),
+                extracted: picture(&judged, colour.cases[0].full),
                 step_um: window.step_um,
             })
         });
-        Ok(SpotPair {
+        Ok(PsfPair {
             wavelength_um,
-            field,
+            field: *field,
             incidence_sin: [wave.sin_x, wave.sin_y],
             chief_ray_um: chief,
             relabelled: fold.fade().relabelled,
             psf_difference: judged.shape_difference(&designed)?,
-            designed: Spot::of(&designed, &colour.perfect, spec.pixel_um),
+            designed: PsfMetrics::of(&designed, &colour.perfect, spec.pixel_um),
             extracted,
             images,
         })
     }
+}
+
+/// One wavelength and field angle of one element.
+struct Task<'a> {
+    colour: &'a Colour,
+    field: FieldAngle,
+    wave: PlaneWave,
+    /// Of each case that is a made chip.
+    views: Vec<Option<MadeView<'a>>>,
+}
+
+/// Transmissions with the drawn width [nm] as index, for the widths that a rule draws.
+fn by_drawn_width(
+    chip: &MadeChip,
+    rule: &WidthRule,
+    drawn: &DrawnElement<'_>,
+    wavelength_um: f64,
+    progress: &dyn Progress,
+) -> Result<Vec<Complex64>> {
+    let widths = Orders::drawn_nm(rule);
+    let steps = drawn.mean_density_steps(&chip.perturbation().geometry);
+    let t = chip.drawn_widths(&widths, steps, wavelength_um, progress)?;
+    let mut table = vec![Complex64::ZERO; usize::from(widths.last().copied().unwrap_or(0)) + 1];
+    for (w, t) in widths.iter().zip(t) {
+        table[usize::from(*w)] = t;
+    }
+    Ok(table)
 }
 
 /// The wave that arrives at an element from one of its field angles.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use ndarray::Array2;
 
-use super::{DistinctElement, Sense, Spot, Verification};
+use super::{DistinctElement, PsfMetrics, Sense, Verification};
 use metalith_core::Result;
 use metalith_design::array::PillarArray;
 use metalith_design::phase::{ElementPhase, LensPhase};
@@ -347,7 +347,7 @@ fn spot_table(element: &DistinctElement) -> Table {
         Column::number("PSF difference", ""),
     ]);
     for spot in &element.spots {
-        let mut row = |of: String, spot_of: &Spot, difference: Cell| {
+        let mut row = |of: String, spot_of: &PsfMetrics, difference: Cell| {
             let (m, [half, nyquist]) = (&spot_of.measures, spot_of.mtf());
             table.row([
                 Cell::from(spot.place()),
@@ -385,6 +385,15 @@ fn cut(values: &Array2<f32>, step_um: f64) -> Array2<f64> {
 
 fn method(page: &mut Page, design: &Design, found: &Verification) {
     page.section("How it was computed");
+    if let Some(model) = &found.model {
+        page.paragraph(format!(
+            "Pillars, apertures, light and sensor are those of the calibrated model of {}: {}.",
+            model.set, model.finding
+        ));
+        for quantity in &model.not_applied {
+            page.note(quantity.to_string());
+        }
+    }
     let relabelled = found
         .distinct
         .iter()

@@ -28,44 +28,56 @@ pub struct PhaseErrors {
 }
 
 impl PhaseErrors {
-    /// Compare the pillars of an element with its phase. `transmissions` is the cell at the wavelength
-    /// of the mapping, with the width [nm] as index.
+    /// Compare the pillars of an element with its phase. `response` is what a pillar transmits at the wavelength of
+    /// the mapping [um], zero where its aperture is shut.
     pub fn of(
         widths: &WidthMap,
         phase: &ElementPhase<'_>,
         rule: &WidthRule,
         wavelength_um: f64,
-        transmissions: &[Complex64],
+        response: &(dyn Fn(Pillar) -> Complex64 + Sync),
     ) -> Self {
         let pitch_nm = f64::from(widths.lattice.pitch_nm());
         let forward = ForwardPolynomial::published();
         let by_width = |nm: f64| TAU * forward.turns(nm / pitch_nm, wavelength_um);
-        let directions = transmissions.iter().map(unit).collect::<Vec<_>>();
-        let written = (0..directions.len()).map(|w| by_width(w as f64)).collect::<Vec<_>>();
-        let rounding = accumulate(widths, phase, |width, u| {
-            written[width] - by_width(rule.unrounded_nm(u))
+        let widest = widths.width_nm.iter().copied().max().unwrap_or(0);
+        let written = (0..=widest).map(|w| by_width(f64::from(w))).collect::<Vec<_>>();
+        let rounding = accumulate(widths, phase, |pillar, u| {
+            Some(written[usize::from(pillar.width_nm)] - by_width(rule.unrounded_nm(u)))
         });
-        let mean = sum_rows(widths, phase, Complex64::new(0.0, 0.0), |width, u| {
-            directions[width] * Complex64::cis(-TAU * u)
-        });
-        let piston = unit(&mean).conj();
-        let mapping = accumulate(widths, phase, |width, u| {
-            (directions[width] * Complex64::cis(-TAU * u) * piston).arg()
+        let off = |pillar: Pillar, u: f64| unit(response(pillar)) * Complex64::cis(-TAU * u);
+        let mean = sum_rows(widths, phase, Complex64::ZERO, off);
+        let piston = unit(mean).conj();
+        let mapping = accumulate(widths, phase, |pillar, u| {
+            let off = off(pillar, u);
+            (off != Complex64::ZERO).then(|| (off * piston).arg())
         });
         Self { rounding, mapping }
     }
 }
 
-fn unit(t: &Complex64) -> Complex64 {
-    let modulus = t.norm();
-    if modulus > 0.0 { t / modulus } else { *t }
+/// A pillar as read.
+#[derive(Clone, Copy, Debug)]
+pub struct Pillar {
+    /// Its place, counted row by row.
+    pub site: usize,
+    pub width_nm: u16,
 }
 
-/// Root mean square and largest of an error over all pillars.
-fn accumulate(widths: &WidthMap, phase: &ElementPhase<'_>, error: impl Fn(usize, f64) -> f64 + Sync) -> PhaseError {
+fn unit(t: Complex64) -> Complex64 {
+    let modulus = t.norm();
+    if modulus > 0.0 { t / modulus } else { t }
+}
+
+/// Root mean square and largest of an error over all pillars that have one.
+fn accumulate(
+    widths: &WidthMap,
+    phase: &ElementPhase<'_>,
+    error: impl Fn(Pillar, f64) -> Option<f64> + Sync,
+) -> PhaseError {
     let rows = per_row(widths, phase, |sites| {
-        sites.fold((0.0_f64, 0.0_f64, 0_u64), |(squares, largest, count), (width, u)| {
-            let e = error(width, u);
+        let errors = sites.filter_map(|(pillar, u)| error(pillar, u));
+        errors.fold((0.0_f64, 0.0_f64, 0_u64), |(squares, largest, count), e| {
             (squares + e * e, largest.max(e.abs()), count + 1)
         })
     });
@@ -82,21 +94,21 @@ fn sum_rows(
     widths: &WidthMap,
     phase: &ElementPhase<'_>,
     zero: Complex64,
-    value: impl Fn(usize, f64) -> Complex64 + Sync,
+    value: impl Fn(Pillar, f64) -> Complex64 + Sync,
 ) -> Complex64 {
     per_row(widths, phase, |sites| {
-        sites.map(|(width, u)| value(width, u)).fold(zero, |a, b| a + b)
+        sites.map(|(pillar, u)| value(pillar, u)).fold(zero, |a, b| a + b)
     })
     .into_iter()
     .fold(zero, |a, b| a + b)
 }
 
 /// Fold each row on whatever thread; the caller adds the rows in order, so that sums do not depend on
-/// the number of threads. Sites come as width [nm] and phase [turns, 0 to 1].
+/// the number of threads. Sites come with their phase [turns, 0 to 1].
 fn per_row<T: Send>(
     widths: &WidthMap,
     phase: &ElementPhase<'_>,
-    fold: impl Fn(&mut dyn Iterator<Item = (usize, f64)>) -> T + Sync,
+    fold: impl Fn(&mut dyn Iterator<Item = (Pillar, f64)>) -> T + Sync,
 ) -> Vec<T> {
     let n = widths.lattice.sites();
     (0..n)
@@ -107,7 +119,10 @@ fn per_row<T: Send>(
                 .iter()
                 .enumerate()
                 .filter(|(_, w)| **w != 0)
-                .filter_map(|(ix, &w)| Some((usize::from(w), phase.wrapped(ix, iy)?)));
+                .filter_map(|(ix, &width_nm)| {
+                    let site = iy * n + ix;
+                    Some((Pillar { site, width_nm }, phase.wrapped(ix, iy)?))
+                });
             fold(&mut sites)
         })
         .collect()

@@ -21,6 +21,7 @@ mod plane;
 mod zoom;
 
 pub use aperture::{Aperture, PhaseArray, PhaseFunction, PillarFunction, Pillars};
+pub use cis::cis;
 pub use direct::Direct;
 pub use fade::{Accuracy, Fade};
 pub use fold::Fold;

@@ -1,19 +1,15 @@
-//! The bench in the computer: from pillars to what each capture should show, whatever departs from what is
-//! stated.
+//! The bench in the computer: from pillars to what each capture should show, under any perturbation.
 
 mod light;
-mod sites;
-
-use std::sync::OnceLock;
+mod view;
 
 use rayon::prelude::*;
 
 pub use light::Lit;
-pub use sites::legendre;
 
-use super::departure::Departure;
 use super::optics::{Optic, PixelGrid, Planes, Planned, Quadrature};
 use super::set::{Camera, CaptureIndex, ElementIndex, LedIndex, MeasuredSet, PerCapture, PerElement, PerLed};
+use metalith_made::{DrawnElement, GeometryChange, Perturbation, veiled};
 
 /// How finely a bench is sampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,8 +42,8 @@ pub struct Bench<'a> {
     /// Where the wavelengths of each LED begin among all.
     first: PerLed<usize>,
     groups: Vec<Group>,
-    /// Area fraction around each site of each element, made when first asked for.
-    fill: PerElement<OnceLock<Vec<f32>>>,
+    /// The elements as drawn.
+    drawn: PerElement<DrawnElement<'a>>,
     /// Windows follow what tilted light does to the place of an image: placement is a nuisance, and an image
     /// that moves is no polynomial of the tilt.
     pub follows: bool,
@@ -114,7 +110,11 @@ impl<'a> Bench<'a> {
             quadratures,
             first,
             groups,
-            fill: set.elements.iter().map(|_| OnceLock::new()).collect(),
+            drawn: set
+                .elements
+                .iter()
+                .map(|e| DrawnElement::new(&e.pillars, 0.5 * e.aperture_diameter_um))
+                .collect(),
             follows: true,
         }
     }
@@ -142,8 +142,13 @@ impl<'a> Bench<'a> {
         all.fold((f64::MAX, 0.0), |(a, b), &w| (a.min(f64::from(w)), b.max(f64::from(w))))
     }
 
+    /// Width added to the pillar at a site of an element by bias and density [nm].
+    pub fn bias_nm(&self, element: ElementIndex, site: usize, geometry: &GeometryChange) -> f64 {
+        self.drawn[element].bias_nm(site, geometry)
+    }
+
     /// What the pixels of each capture see, before placement, flux and black level.
-    pub fn grids(&self, intensities: &PerCapture<Vec<f32>>, departure: &Departure) -> Vec<PixelGrid> {
+    pub fn grids(&self, intensities: &PerCapture<Vec<f32>>, perturbation: &Perturbation) -> Vec<PixelGrid> {
         let camera = &self.set.camera;
         let work: Vec<(&Group, CaptureIndex)> = {
             let mut work: Vec<_> = self
@@ -156,15 +161,15 @@ impl<'a> Bench<'a> {
         };
         work.par_iter()
             .map(|(group, capture)| {
-                let z = self.set.captures[*capture].distance_um + departure.path.gap_um;
+                let z = self.set.captures[*capture].distance_um + perturbation.path.gap_um;
                 let optic = Optic {
                     pixel_um: camera.pixel_um,
-                    disc_um: self.disc_um(group, z, departure),
-                    blur_um: departure.camera.pixel_blur_um,
+                    disc_um: self.disc_um(group, z, perturbation),
+                    blur_um: perturbation.camera.pixel_blur_um,
                 };
-                let stray = departure.camera.stray_light as f32;
+                let stray = perturbation.camera.stray_light;
                 let step = group.plan.step_um();
-                let off = self.off_um(group, z, departure);
+                let off = self.off_um(group, z, perturbation);
                 if stray == 0.0 {
                     return PixelGrid::new(&intensities[*capture], step, &optic, camera.rows, camera.cols).moved(off);
                 }
@@ -174,15 +179,18 @@ impl<'a> Bench<'a> {
                     self.set.camera.pixel_um / step,
                     camera,
                 );
-                let veiled: Vec<f32> = intensities[*capture].iter().map(|v| v + stray * (mean - v)).collect();
+                let veiled: Vec<f32> = intensities[*capture]
+                    .iter()
+                    .map(|v| veiled(f64::from(*v), mean, stray) as f32)
+                    .collect();
                 PixelGrid::new(&veiled, step, &optic, camera.rows, camera.cols).moved(off)
             })
             .collect()
     }
 
     /// Images of the two radii of the source disc on the sensor [um].
-    fn disc_um(&self, group: &Group, z: f64, departure: &Departure) -> [[f64; 2]; 2] {
-        let radius = 0.5 * self.set.divergence_rad * (1.0 + departure.light.source_size);
+    fn disc_um(&self, group: &Group, z: f64, perturbation: &Perturbation) -> [[f64; 2]; 2] {
+        let radius = 0.5 * self.set.divergence_rad * (1.0 + perturbation.light.source_size);
         let [x, y] = self.landing_um(group, z);
         [x.map(|v| v * radius), y.map(|v| v * radius)]
     }
@@ -202,18 +210,18 @@ impl<'a> Bench<'a> {
     }
 
     /// How far tilted light carries the image off its window, where windows follow it [um].
-    fn off_um(&self, group: &Group, z: f64, departure: &Departure) -> [f64; 2] {
+    fn off_um(&self, group: &Group, z: f64, perturbation: &Perturbation) -> [f64; 2] {
         if !self.follows {
             return [0.0; 2];
         }
         let [x, y] = self.landing_um(group, z);
-        let [tx, ty] = departure.path.tilt_mrad.map(|t| t * 1e-3);
+        let [tx, ty] = perturbation.path.tilt_mrad.map(|t| t * 1e-3);
         [0, 1].map(|axis| x[axis] * tx + y[axis] * ty)
     }
 }
 
 /// Mean intensity over the pixels of a window that stands in the middle of `n` x `n` samples.
-fn window_mean(intensity: &[f32], n: usize, samples_per_pixel: f64, camera: &Camera) -> f32 {
+fn window_mean(intensity: &[f32], n: usize, samples_per_pixel: f64, camera: &Camera) -> f64 {
     let range = |pixels: usize| {
         let wide = ((pixels as f64 * samples_per_pixel).round() as usize).clamp(1, n);
         (n - wide) / 2..(n + wide) / 2
@@ -223,5 +231,5 @@ fn window_mean(intensity: &[f32], n: usize, samples_per_pixel: f64, camera: &Cam
         .clone()
         .map(|y| intensity[y * n..][cols.clone()].iter().sum::<f32>())
         .sum();
-    sum / (rows.len() * cols.len()) as f32
+    f64::from(sum / (rows.len() * cols.len()) as f32)
 }

@@ -15,12 +15,12 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
-pub use table::CellTable;
+pub use table::PillarTable;
 
 use self::carry::{Carried, carried_over};
-use super::departure::CellChange;
 use metalith_cell::{CellModel, CellStack};
 use metalith_core::{Error, Progress, Result, WholeFile};
+use metalith_made::{CellChange, off_cutoff, perturbed, possible_width_nm};
 use metalith_rcwa::{Incidence, Orders, Outline, Side, solve};
 
 /// Orders along an axis for the stated cell: errs by about 0.005 rad.
@@ -55,7 +55,7 @@ pub struct RigorousCells {
     coarse: usize,
     leaning: usize,
     folder: Option<PathBuf>,
-    made: Mutex<HashMap<[u64; 6], Arc<CellTable>>>,
+    made: Mutex<HashMap<[u64; 6], Arc<PillarTable>>>,
 }
 
 impl RigorousCells {
@@ -84,7 +84,7 @@ impl RigorousCells {
     ///
     /// # Errors
     /// If a pillar cannot be (a foot wider than the pitch), or the user stopped it.
-    pub fn table(&self, change: &CellChange, progress: &dyn Progress) -> Result<Arc<CellTable>> {
+    pub fn table(&self, change: &CellChange, progress: &dyn Progress) -> Result<Arc<PillarTable>> {
         let stated = CellChange::default();
         let (alike, coarse) = if change.taper_deg == 0.0 {
             (stated, self.coarse)
@@ -110,11 +110,11 @@ impl RigorousCells {
         alike: &CellChange,
         coarse: usize,
         progress: &dyn Progress,
-    ) -> Result<CellTable> {
+    ) -> Result<PillarTable> {
         let stated = self.table(alike, progress)?;
         let before = self.solved(alike, coarse, progress)?;
         let after = self.solve(change, coarse, progress)?;
-        let stack = changed(&self.stack, change);
+        let stack = perturbed(&self.stack, change);
         let orders = Orders::new(self.fine)?;
         let t = (0..self.wavelengths_nm.len())
             .into_par_iter()
@@ -130,7 +130,7 @@ impl RigorousCells {
             })
             .collect::<Result<Vec<_>>>()?;
         let bare = stated.bare.iter().zip(before.bare.iter().zip(&after.bare));
-        Ok(CellTable {
+        Ok(PillarTable {
             bare: bare.map(|(t, (a, b))| t + b - a).collect(),
             t,
             ..(*stated).clone()
@@ -142,7 +142,7 @@ impl RigorousCells {
     ///
     /// # Errors
     /// As [`RigorousCells::table`].
-    pub fn anisotropic(&self, nm: f64, progress: &dyn Progress) -> Result<[CellTable; 2]> {
+    pub fn anisotropic(&self, nm: f64, progress: &dyn Progress) -> Result<[PillarTable; 2]> {
         let orders = Orders::new(ANISOTROPIC)?;
         let count = self.count();
         let rows: Vec<Vec<[Complex64; 2]>> = self
@@ -168,18 +168,23 @@ impl RigorousCells {
             })
             .collect::<Result<_>>()?;
         let stated = self.solved(&CellChange::default(), self.fine, progress)?;
-        Ok([0, 1].map(|axis| CellTable {
+        Ok([0, 1].map(|axis| PillarTable {
             t: rows.iter().map(|row| row.iter().map(|t| t[axis]).collect()).collect(),
             ..(*stated).clone()
         }))
     }
 
-    fn solved(&self, change: &CellChange, orders: usize, progress: &dyn Progress) -> Result<Arc<CellTable>> {
+    fn solved(&self, change: &CellChange, orders: usize, progress: &dyn Progress) -> Result<Arc<PillarTable>> {
         self.kept(change, orders as f64, || self.solve(change, orders, progress))
     }
 
     /// A table as it was made before, or made now; `how` tells ways of making it apart.
-    fn kept(&self, change: &CellChange, how: f64, make: impl FnOnce() -> Result<CellTable>) -> Result<Arc<CellTable>> {
+    fn kept(
+        &self,
+        change: &CellChange,
+        how: f64,
+        make: impl FnOnce() -> Result<PillarTable>,
+    ) -> Result<Arc<PillarTable>> {
         let key = [
             change.height_nm,
             change.index,
@@ -200,7 +205,7 @@ impl RigorousCells {
             .map(|f| f.join(format!("{}.cells", self.digest(&key))));
         let (wavelengths, count) = (self.wavelengths_nm.len(), self.count());
         let load = |path: &std::path::Path| {
-            CellTable::from_bytes(&fs::read(path).ok()?, wavelengths, count, self.first_nm(), STEP_NM)
+            PillarTable::from_bytes(&fs::read(path).ok()?, wavelengths, count, self.first_nm(), STEP_NM)
         };
         let table = match path.as_deref().and_then(load) {
             Some(table) => table,
@@ -234,9 +239,9 @@ impl RigorousCells {
         ((self.widths_nm.1 - self.first_nm()) / STEP_NM).ceil() as usize + 1
     }
 
-    fn solve(&self, change: &CellChange, orders: usize, progress: &dyn Progress) -> Result<CellTable> {
+    fn solve(&self, change: &CellChange, orders: usize, progress: &dyn Progress) -> Result<PillarTable> {
         let orders = Orders::new(orders)?;
-        let stack = changed(&self.stack, change);
+        let stack = perturbed(&self.stack, change);
         let count = self.count();
         progress.begin("cells as etched", self.wavelengths_nm.len() as u64);
         let rows: Vec<(Vec<Complex64>, Complex64)> = self
@@ -256,7 +261,7 @@ impl RigorousCells {
             })
             .collect::<Result<_>>()?;
         let (t, bare) = rows.into_iter().unzip();
-        Ok(CellTable {
+        Ok(PillarTable {
             first_nm: self.first_nm(),
             step_nm: STEP_NM,
             t,
@@ -267,8 +272,7 @@ impl RigorousCells {
     /// Transmission of entry `k` at wavelength `l`.
     fn solve_one(&self, stack: &CellStack, l: usize, k: usize, orders: Orders) -> Result<Complex64> {
         // Where leaning walls would meet, the widest pillar that has room stands in.
-        let room = stack.pitch_nm - 1.0 - (2.0 * stack.taper.tan() * stack.height_nm).max(0.0);
-        off_cutoff(self.width_nm(k).min(room), |width| {
+        off_cutoff(possible_width_nm(stack, self.width_nm(k)), |width| {
             stack.transmission(width, self.wavelengths_nm[l] * 1e-3, orders)
         })
     }
@@ -296,25 +300,6 @@ impl RigorousCells {
     }
 }
 
-/// A mode at its very cutoff has no field to solve for; a pillar that is wider by less than anyone can tell has.
-fn off_cutoff<T>(width_nm: f64, solve: impl Fn(f64) -> Result<T>) -> Result<T> {
-    solve(width_nm)
-        .or_else(|_| solve(width_nm - 3e-4))
-        .or_else(|_| solve(width_nm - 1e-3))
-}
-
-/// The stack with a change.
-pub fn changed(stack: &CellStack, change: &CellChange) -> CellStack {
-    CellStack {
-        height_nm: stack.height_nm + change.height_nm,
-        film: stack.film.shifted(change.index),
-        taper: stack.taper + change.taper_deg.to_radians(),
-        corner_radius_nm: stack.corner_radius_nm + change.corner_rounding_nm,
-        mask_height_nm: stack.mask_height_nm + change.residual_mask_nm,
-        ..stack.clone()
-    }
-}
-
 impl CellSource {
     /// The table at `wavelengths_nm` of the cell with a change.
     ///
@@ -326,7 +311,7 @@ impl CellSource {
         wavelengths_nm: &[f64],
         widths_nm: (f64, f64),
         progress: &dyn Progress,
-    ) -> Result<Arc<CellTable>> {
+    ) -> Result<Arc<PillarTable>> {
         match self {
             Self::Rigorous(cells) => cells.table(change, progress),
             Self::Model(model) => {
@@ -339,7 +324,7 @@ impl CellSource {
                         Ok(row[first as usize..].to_vec())
                     })
                     .collect::<Result<Vec<_>>>()?;
-                Ok(Arc::new(CellTable {
+                Ok(Arc::new(PillarTable {
                     first_nm: first,
                     step_nm: 1.0,
                     bare: vec![Complex64::new(1.0, 0.0); t.len()],

@@ -1,10 +1,11 @@
 //! Transmissions of pillars over width and wavelength.
 
-use num_complex::{Complex32, Complex64};
+use metalith_made::lagrange;
+use num_complex::Complex64;
 
 /// Transmission over wavelength and width.
 #[derive(Clone, Debug)]
-pub struct CellTable {
+pub struct PillarTable {
     pub first_nm: f64,
     pub step_nm: f64,
     /// For each wavelength, the transmissions of all widths.
@@ -13,26 +14,15 @@ pub struct CellTable {
     pub bare: Vec<Complex64>,
 }
 
-impl CellTable {
-    /// Transmission of a pillar of any width [nm] at one of the wavelengths, by cubics through the table.
-    pub fn at(&self, wavelength: usize, width_nm: f64) -> Complex32 {
+impl PillarTable {
+    /// Transmission of a pillar of any width [nm] at one of the wavelengths, by cubics through the table; beyond
+    /// its ends, that of the end.
+    pub fn at(&self, wavelength: usize, width_nm: f64) -> Complex64 {
         let row = &self.t[wavelength];
         let x = ((width_nm - self.first_nm) / self.step_nm).clamp(0.0, (row.len() - 1) as f64);
         let i = (x.floor() as usize).clamp(1, row.len() - 3);
-        let u = x - i as f64;
-        let [a, b, c, d] = [row[i - 1], row[i], row[i + 1], row[i + 2]];
-        // Lagrange through the four neighbours.
-        let value = a * (-u * (u - 1.0) * (u - 2.0) / 6.0)
-            + b * ((u + 1.0) * (u - 1.0) * (u - 2.0) / 2.0)
-            + c * (-(u + 1.0) * u * (u - 2.0) / 2.0)
-            + d * ((u + 1.0) * u * (u - 1.0) / 6.0);
-        Complex32::new(value.re as f32, value.im as f32)
-    }
-
-    /// Transmission of a site without pillar.
-    pub fn bare(&self, wavelength: usize) -> Complex32 {
-        let value = self.bare[wavelength];
-        Complex32::new(value.re as f32, value.im as f32)
+        let weights = lagrange(x - i as f64);
+        row[i - 1..i + 3].iter().zip(weights).map(|(t, w)| t * w).sum()
     }
 
     /// As it is kept on disk.

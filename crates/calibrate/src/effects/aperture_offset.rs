@@ -1,7 +1,7 @@
 //! The aperture is not where the pillars are: overlay of the second exposure.
 
 use super::{Effect, Parameter, Stage};
-use crate::departure::Departure;
+use metalith_made::Perturbation;
 
 /// From the pillars to their aperture along x and y. Light through the crescent that opens on the far side is
 /// not deflected and left out.
@@ -29,7 +29,7 @@ impl Effect for ApertureOffset {
         true
     }
 
-    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
         to.geometry.aperture_offset_um = [parameters[0], parameters[1]];
     }
 

@@ -1,7 +1,7 @@
 //! Every pillar is wider or narrower than drawn by the same amount.
 
 use super::{Effect, Parameter, Stage};
-use crate::departure::Departure;
+use metalith_made::Perturbation;
 
 /// Width added to every pillar.
 pub struct CdBias;
@@ -23,7 +23,7 @@ impl Effect for CdBias {
         vec![Parameter::new(-30.0, 30.0, 5.0)]
     }
 
-    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
         to.geometry.cd_bias_nm = parameters[0];
     }
 

@@ -1,7 +1,7 @@
 //! Pillars are wider where more is exposed around them: backscattered electrons, or loading of the etch.
 
 use super::{Effect, Parameter, Stage};
-use crate::departure::Departure;
+use metalith_made::Perturbation;
 
 /// Width added for each unit of area fraction, averaged over the range of the backscatter.
 pub struct CdBiasDensity;
@@ -23,7 +23,7 @@ impl Effect for CdBiasDensity {
         vec![Parameter::new(-80.0, 80.0, 15.0)]
     }
 
-    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
         to.geometry.cd_bias_density_nm = parameters[0];
     }
 

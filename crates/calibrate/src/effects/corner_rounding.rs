@@ -1,8 +1,8 @@
 //! Vertical edges are round: resist and etch do not resolve corners.
 
 use super::{Effect, Parameter, Stage};
-use crate::departure::Departure;
 use crate::set::MeasuredSet;
+use metalith_made::Perturbation;
 
 /// Radius of the vertical edges. Area and phase fall with its square, which is what is fitted.
 pub struct CornerRounding;
@@ -24,7 +24,7 @@ impl Effect for CornerRounding {
         vec![Parameter::new(0.0, 4900.0, 625.0)]
     }
 
-    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
         to.cell.corner_rounding_nm = parameters[0].max(0.0).sqrt();
     }
 

@@ -1,8 +1,8 @@
 //! The film, and so every pillar, is thicker or thinner than stated.
 
 use super::{Effect, Parameter, Stage};
-use crate::departure::Departure;
 use crate::set::MeasuredSet;
+use metalith_made::Perturbation;
 
 /// Added to the height; the height itself is reported.
 pub struct FilmHeight;
@@ -24,7 +24,7 @@ impl Effect for FilmHeight {
         vec![Parameter::new(-60.0, 60.0, 10.0)]
     }
 
-    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
         to.cell.height_nm = parameters[0];
     }
 

@@ -1,7 +1,7 @@
 //! The film has another index than ellipsometry found: another place on the wafer, or densified since.
 
 use super::{Effect, Parameter, Stage};
-use crate::departure::Departure;
+use metalith_made::Perturbation;
 
 /// Added to n at every wavelength.
 pub struct FilmIndex;
@@ -23,7 +23,7 @@ impl Effect for FilmIndex {
         vec![Parameter::new(-0.15, 0.15, 0.02)]
     }
 
-    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
         to.cell.index = parameters[0];
     }
 

@@ -1,7 +1,7 @@
 //! The camera's plane is farther from the chip than stated.
 
 use super::{Effect, Parameter, Stage};
-use crate::departure::Departure;
+use metalith_made::Perturbation;
 
 /// Added to every distance.
 pub struct Gap;
@@ -23,7 +23,7 @@ impl Effect for Gap {
         vec![Parameter::new(-60.0, 60.0, 4.0)]
     }
 
-    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
         to.path.gap_um = parameters[0];
     }
 

@@ -1,7 +1,7 @@
 //! The spectrum of one LED is centred elsewhere than stated: temperature, current, or the batch.
 
 use super::{Effect, Parameter, Stage};
-use crate::departure::Departure;
+use metalith_made::Perturbation;
 
 /// Added to the centre of one LED.
 pub struct LedCentre {
@@ -28,7 +28,7 @@ impl Effect for LedCentre {
         vec![Parameter::new(-12.0, 12.0, 2.0)]
     }
 
-    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
         *to.light.shift_mut(self.led) = parameters[0];
     }
 

@@ -1,8 +1,8 @@
 //! Spectra are wider or narrower than stated.
 
 use super::{Effect, Parameter, Stage};
-use crate::departure::Departure;
 use crate::set::MeasuredSet;
+use metalith_made::Perturbation;
 
 /// Width of all spectra over what is stated; less one is fitted.
 pub struct LedWidth;
@@ -24,7 +24,7 @@ impl Effect for LedWidth {
         vec![Parameter::new(-0.6, 1.5, 0.15)]
     }
 
-    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
         to.light.led_width = parameters[0];
     }
 

@@ -1,7 +1,7 @@
 //! Pillars fell or never stood, at random places.
 
 use super::{Effect, Parameter, Stage};
-use crate::departure::Departure;
+use metalith_made::Perturbation;
 
 /// Share of the pillars that are not there.
 pub struct MissingPillars;
@@ -27,7 +27,7 @@ impl Effect for MissingPillars {
         true
     }
 
-    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
         to.geometry.missing_pillars = parameters[0].max(0.0);
     }
 

@@ -1,7 +1,7 @@
 //! What chips and benches are known to do to light, one file each.
 //!
-//! An effect has a name, a unit, a range that physics allows, and turns one or two numbers of a
-//! [`Departure`]. Adding one touches its file and [`all`].
+//! An effect has a name, a unit, a range that physics allows, and sets one or two numbers of a
+//! [`Perturbation`]. Adding one touches its file and [`all`].
 
 mod aperture_offset;
 mod cd_bias;
@@ -22,8 +22,8 @@ mod stray_light;
 mod tilt;
 mod zero_order;
 
-use super::departure::Departure;
 use super::set::MeasuredSet;
+use metalith_made::Perturbation;
 
 /// Where in the model an effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +40,7 @@ pub enum Stage {
     Camera,
 }
 
-/// A number that an effect turns. It is chosen so that the image answers to it about linearly.
+/// A number that an effect sets. It is chosen so that the image answers to it about linearly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
     /// What physics allows.
@@ -74,21 +74,21 @@ pub trait Effect: Send + Sync {
     /// Where it acts.
     fn stage(&self) -> Stage;
 
-    /// The numbers that it turns; zero for each is no effect.
+    /// The numbers that it sets; zero for each is no effect.
     fn parameters(&self) -> Vec<Parameter>;
 
-    /// Whether what it does turns sharply at zero, so that one side tells nothing of the other.
+    /// Whether its derivative jumps at zero, so that one side says nothing about the other.
     fn kinked(&self) -> bool {
         false
     }
 
-    /// Whether it strikes single pillars at random, so that no numbers tell what each capture shows.
+    /// Whether it acts on single pillars at random, so that no number of its own determines what a capture shows.
     fn random(&self) -> bool {
         false
     }
 
     /// Set its numbers.
-    fn apply(&self, parameters: &[f64], to: &mut Departure);
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation);
 
     /// The value that is reported for one of its numbers.
     fn value(&self, parameter: f64, _set: &MeasuredSet) -> f64 {

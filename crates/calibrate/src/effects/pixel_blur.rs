@@ -1,8 +1,8 @@
 //! The camera blurs: its relay, or charge that diffuses.
 
 use super::{Effect, Parameter, Stage};
-use crate::departure::Departure;
 use crate::set::MeasuredSet;
+use metalith_made::Perturbation;
 
 /// Standard deviation of a Gaussian; its square is what is fitted.
 pub struct PixelBlur;
@@ -24,7 +24,7 @@ impl Effect for PixelBlur {
         vec![Parameter::new(0.0, 9.0, 0.09)]
     }
 
-    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
         to.camera.pixel_blur_um = parameters[0].max(0.0).sqrt();
     }
 

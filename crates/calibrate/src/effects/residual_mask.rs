@@ -1,7 +1,7 @@
 //! Alumina of the etch mask was left on the pillars.
 
 use super::{Effect, Parameter, Stage};
-use crate::departure::Departure;
+use metalith_made::Perturbation;
 
 /// Thickness of what is left.
 pub struct ResidualMask;
@@ -23,7 +23,7 @@ impl Effect for ResidualMask {
         vec![Parameter::new(0.0, 80.0, 15.0)]
     }
 
-    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
         to.cell.residual_mask_nm = parameters[0].max(0.0);
     }
 

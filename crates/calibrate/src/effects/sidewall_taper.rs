@@ -1,7 +1,7 @@
 //! Walls lean: the top keeps its width, the foot is wider or narrower.
 
 use super::{Effect, Parameter, Stage};
-use crate::departure::Departure;
+use metalith_made::Perturbation;
 
 /// Lean from upright; positive is wider at the foot.
 pub struct SidewallTaper;
@@ -23,7 +23,7 @@ impl Effect for SidewallTaper {
         vec![Parameter::new(-3.0, 3.0, 0.6)]
     }
 
-    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
         to.cell.taper_deg = parameters[0];
     }
 

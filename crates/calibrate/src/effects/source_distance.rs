@@ -1,8 +1,8 @@
 //! The source is not at infinity: light arrives as a sphere.
 
 use super::{Effect, Parameter, Stage};
-use crate::departure::Departure;
 use crate::set::MeasuredSet;
+use metalith_made::Perturbation;
 
 /// One over its distance is fitted [1/m], the distance itself is reported.
 pub struct SourceDistance;
@@ -24,7 +24,7 @@ impl Effect for SourceDistance {
         vec![Parameter::new(0.0, 200.0, 25.0)]
     }
 
-    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
         to.path.source_per_m = parameters[0].max(0.0);
     }
 

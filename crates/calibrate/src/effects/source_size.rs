@@ -1,8 +1,8 @@
 //! The source is larger or smaller than stated.
 
 use super::{Effect, Parameter, Stage};
-use crate::departure::Departure;
 use crate::set::MeasuredSet;
+use metalith_made::Perturbation;
 
 /// Diameter over what is stated; less one is fitted.
 pub struct SourceSize;
@@ -24,7 +24,7 @@ impl Effect for SourceSize {
         vec![Parameter::new(-1.0, 6.0, 0.5)]
     }
 
-    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
         to.light.source_size = parameters[0];
     }
 

@@ -1,7 +1,7 @@
 //! A share of the light is spread evenly: scatter in the relay.
 
 use super::{Effect, Parameter, Stage};
-use crate::departure::Departure;
+use metalith_made::Perturbation;
 
 /// Share of the light of a window that is spread over it.
 pub struct StrayLight;
@@ -23,7 +23,7 @@ impl Effect for StrayLight {
         vec![Parameter::new(0.0, 0.6, 0.02)]
     }
 
-    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
         to.camera.stray_light = parameters[0];
     }
 

@@ -1,7 +1,7 @@
 //! Light arrives at another angle than stated, the same for every capture.
 
 use super::{Effect, Parameter, Stage};
-use crate::departure::Departure;
+use metalith_made::Perturbation;
 
 /// Added to the angle of incidence along x and y.
 pub struct Tilt;
@@ -23,7 +23,7 @@ impl Effect for Tilt {
         vec![Parameter::new(-40.0, 40.0, 3.0); 2]
     }
 
-    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
         to.path.tilt_mrad = [parameters[0], parameters[1]];
     }
 

@@ -1,8 +1,8 @@
 //! Light passes the aperture without seeing pillars.
 
 use super::{Effect, Parameter, Stage};
-use crate::departure::Departure;
 use crate::set::MeasuredSet;
+use metalith_made::Perturbation;
 
 /// Amplitude of that light over what arrives.
 pub struct ZeroOrder;
@@ -25,7 +25,7 @@ impl Effect for ZeroOrder {
         vec![Parameter::new(-0.6, 0.6, 0.05); 2]
     }
 
-    fn apply(&self, parameters: &[f64], to: &mut Departure) {
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
         to.geometry.zero_order = parameters[0].hypot(parameters[1]);
         to.geometry.zero_order_phase = parameters[1].atan2(parameters[0]);
     }

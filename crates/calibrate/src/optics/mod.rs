@@ -6,6 +6,5 @@ mod planes;
 mod spectrum;
 
 pub use camera::{Optic, PixelGrid, Reading};
-pub(super) use cis::cis;
 pub use planes::{Passed, Planes, Planned, Scratch};
 pub use spectrum::Quadrature;

@@ -91,7 +91,7 @@ pub(super) fn widths(page: &mut Page, session: &Session<'_>, finding: &Finding) 
         return;
     }
     page.section("Widths by SEM");
-    let geometry = session.simulator.departure(&finding.after.theta).geometry;
+    let geometry = session.simulator.perturbation(&finding.after.theta).geometry;
     let offset = set.sem_offset_sigma_nm;
     let mut chart = Chart::new(
         "Widths by SEM",

@@ -46,11 +46,13 @@ impl DefectNoise {
         let share = simulator.slots[slot].parameter.typical;
         let mut theta = about.to_vec();
         theta[slot] = share;
-        let departure = simulator.departure(&theta);
-        let mean = simulator.expose(std::slice::from_ref(&departure), progress)?.remove(0);
+        let perturbation = simulator.perturbation(&theta);
+        let mean = simulator
+            .expose(std::slice::from_ref(&perturbation), progress)?
+            .remove(0);
         let mut drawn = Vec::new();
         for k in 0..DRAWS {
-            drawn.push(simulator.expose_drawn(&departure, SEED + k * SEEDS_APART, progress)?);
+            drawn.push(simulator.expose_drawn(&perturbation, SEED + k * SEEDS_APART, progress)?);
         }
         let captures: Vec<Speckle> = (0..mean.len())
             .into_par_iter()

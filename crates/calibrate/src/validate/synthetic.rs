@@ -9,13 +9,13 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::bench::{Bench, Lit, Sampling};
 use crate::cells::{CellSource, RigorousCells};
-use crate::departure::Departure;
 use crate::effects;
 use crate::optics::PixelGrid;
 use crate::session::{Settings, check_effects};
 use crate::set::{MeasuredSet, PerCapture, PerLed};
 use crate::simulator::{Simulator, WIDTH_ROOM_NM};
 use metalith_core::{Error, Progress, Result};
+use metalith_made::Perturbation;
 
 /// Diffraction orders along an axis; fits use others.
 const ORDERS: usize = 11;
@@ -49,7 +49,7 @@ pub struct Synthesizer<'a> {
 pub struct SyntheticImages {
     images: Vec<PixelGrid>,
     ghost: Option<(f64, [f64; 2])>,
-    departure: Departure,
+    perturbation: Perturbation,
 }
 
 impl<'a> Synthesizer<'a> {
@@ -94,25 +94,25 @@ impl<'a> Synthesizer<'a> {
     /// # Errors
     /// As [`Synthesizer::with_effect`].
     pub fn with_effects(&self, chips: &[Vec<(&str, &[f64])>], progress: &dyn Progress) -> Result<Vec<SyntheticImages>> {
-        let mut departures = Vec::new();
+        let mut perturbations = Vec::new();
         for chip in chips {
-            let mut departure = Departure::default();
+            let mut perturbation = Perturbation::default();
             for (name, numbers) in chip.iter().filter(|(name, _)| !name.is_empty()) {
                 check_effects(&self.simulator.effects, &[(*name).to_owned()])?;
                 if let Some(effect) = self.simulator.effects.iter().find(|e| e.name() == *name) {
-                    effect.apply(numbers, &mut departure);
+                    effect.apply(numbers, &mut perturbation);
                 }
             }
-            departures.push(departure);
+            perturbations.push(perturbation);
         }
-        let images = self.simulator.expose(&departures, progress)?;
+        let images = self.simulator.expose(&perturbations, progress)?;
         Ok(images
             .into_iter()
-            .zip(departures)
-            .map(|(images, departure)| SyntheticImages {
+            .zip(perturbations)
+            .map(|(images, perturbation)| SyntheticImages {
                 images,
                 ghost: None,
-                departure,
+                perturbation,
             })
             .collect())
     }
@@ -122,13 +122,13 @@ impl<'a> Synthesizer<'a> {
     /// # Errors
     /// If a cell cannot be solved.
     pub fn off_list(&self, what: UnlistedEffect, progress: &dyn Progress) -> Result<SyntheticImages> {
-        let mut departure = Departure::default();
+        let mut perturbation = Perturbation::default();
         match what {
             UnlistedEffect::Astigmatism(nm) => {
-                departure.geometry.wavefront_nm = vec![0.0, nm];
-                self.expose(departure, None, progress)
+                perturbation.geometry.wavefront_nm = vec![0.0, nm];
+                self.expose(perturbation, None, progress)
             }
-            UnlistedEffect::Ghost(share, at) => self.expose(departure, Some((share, at)), progress),
+            UnlistedEffect::Ghost(share, at) => self.expose(perturbation, Some((share, at)), progress),
             UnlistedEffect::Anisotropy(nm) => {
                 let tables = match &self.simulator.cells {
                     CellSource::Rigorous(cells) => cells.anisotropic(nm, progress)?,
@@ -141,20 +141,20 @@ impl<'a> Synthesizer<'a> {
                 };
                 let chips = tables.map(|table| Lit {
                     cells: Arc::new(table),
-                    geometry: &departure.geometry,
-                    lights: vec![&departure.light],
+                    geometry: &perturbation.geometry,
+                    lights: vec![&perturbation.light],
                     scatter: None,
                 });
-                let planes = self.simulator.bench.intensities(&chips, &departure.path, progress)?;
+                let planes = self.simulator.bench.intensities(&chips, &perturbation.path, progress)?;
                 let both: PerCapture<Vec<f32>> = planes[0][0]
                     .iter()
                     .zip(&planes[1][0])
                     .map(|(x, y)| x.iter().zip(y).map(|(a, b)| 0.5 * (a + b)).collect())
                     .collect();
                 Ok(SyntheticImages {
-                    images: self.simulator.bench.grids(&both, &departure),
+                    images: self.simulator.bench.grids(&both, &perturbation),
                     ghost: None,
-                    departure,
+                    perturbation,
                 })
             }
         }
@@ -162,18 +162,18 @@ impl<'a> Synthesizer<'a> {
 
     fn expose(
         &self,
-        departure: Departure,
+        perturbation: Perturbation,
         ghost: Option<(f64, [f64; 2])>,
         progress: &dyn Progress,
     ) -> Result<SyntheticImages> {
         let images = self
             .simulator
-            .expose(std::slice::from_ref(&departure), progress)?
+            .expose(std::slice::from_ref(&perturbation), progress)?
             .remove(0);
         Ok(SyntheticImages {
             images,
             ghost,
-            departure,
+            perturbation,
         })
     }
 
@@ -209,7 +209,10 @@ impl<'a> Synthesizer<'a> {
             let Some((element, at)) = like.site_of(site) else {
                 continue;
             };
-            let bias = self.simulator.bench.bias_nm(element, at, &exposed.departure.geometry);
+            let bias = self
+                .simulator
+                .bench
+                .bias_nm(element, at, &exposed.perturbation.geometry);
             site.measured_nm = site.designed_nm + bias + offset + site.sigma_nm * normal(&mut rng);
         }
         set

@@ -72,15 +72,6 @@ impl PillarArray {
         self.placed.iter().map(|p| of_class[p.class]).sum()
     }
 
-    /// Share of the area of the lenses that is pillar, 0 to 1.
-    pub fn fill(&self) -> f64 {
-        let of_class = |c: &Class| (c.widths.filled_sites(), c.widths.pillars() as f64);
-        let of_class = self.classes.iter().map(of_class).collect::<Vec<_>>();
-        let pairs = self.placed.iter().map(|p| of_class[p.class]);
-        let (pillars, lens) = pairs.fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
-        if lens > 0.0 { pillars / lens } else { 0.0 }
-    }
-
     /// The pillars of one element.
     pub fn widths(&self, placed: &Placed) -> WidthMap {
         placed.symmetry.apply(&self.classes[placed.class].widths)

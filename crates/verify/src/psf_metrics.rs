@@ -1,4 +1,4 @@
-//! What is measured of the PSFs of one element: designed beside extracted, and where light goes.
+//! Metrics of the PSFs of one element: designed beside extracted, and where light goes.
 
 use ndarray::Array2;
 use num_complex::Complex64;
@@ -15,9 +15,9 @@ const CURVE_POINTS: u32 = 60;
 /// Samples of the phase that the orders of a mapping are computed from: many times the number of widths.
 const ORDER_SAMPLES: usize = 4096;
 
-/// What one PSF is worth to the sensor.
+/// Metrics of one PSF on the sensor.
 #[derive(Clone, Debug, Serialize)]
-pub struct Spot {
+pub struct PsfMetrics {
     #[serde(flatten)]
     pub measures: PsfMeasures,
     /// Line pairs a millimetre and MTF, pixel included, mean of x and y, for pictures.
@@ -25,7 +25,7 @@ pub struct Spot {
     pub mtf_curve: Vec<(f64, f64)>,
 }
 
-impl Spot {
+impl PsfMetrics {
     pub fn of(psf: &Psf, matched: &Matched, pixel_um: f64) -> Self {
         let frequencies = (0..=CURVE_POINTS)
             .map(|k| CURVE_END_LP_MM * f64::from(k) / f64::from(CURVE_POINTS))
@@ -46,7 +46,7 @@ impl Spot {
 
 /// Design and layout side by side, for one wavelength and field angle.
 #[derive(Clone, Debug, Serialize)]
-pub struct SpotPair {
+pub struct PsfPair {
     pub wavelength_um: f64,
     /// Counted from where the element looks.
     pub field: FieldAngle,
@@ -57,25 +57,29 @@ pub struct SpotPair {
     /// Frequency bins that had to be relabelled towards the mean ray.
     pub relabelled: u64,
     /// Of the unrounded design phase.
-    pub designed: Spot,
-    /// Of the pillars that were read back, by each cell; the first one judges.
-    pub extracted: Vec<(Fidelity, Spot)>,
+    pub designed: PsfMetrics,
+    /// Of the pillars that were read back, in each case; the first one judges.
+    pub extracted: Vec<(Fidelity, PsfMetrics)>,
     /// Rms difference of the judged PSF from the designed one, both of the same energy in the window, over the
     /// rms of the designed one.
     pub psf_difference: f64,
     #[serde(skip)]
-    pub(super) images: Option<Box<Images>>,
+    pub(super) images: Option<Box<PsfImages>>,
 }
 
-/// Per unit of arriving power, so that cells with and without amplitude share one scale.
+/// Two PSFs on the window about the chief ray, per unit of arriving power, so that cells with and without amplitude
+/// share one scale. Row index along +y.
 #[derive(Clone, Debug)]
-pub(super) struct Images {
+pub struct PsfImages {
+    /// Of the unrounded design phase.
     pub designed: Array2<f32>,
+    /// Of the layout, in the case that judges.
     pub extracted: Array2<f32>,
+    /// Distance of the samples [um].
     pub step_um: f64,
 }
 
-impl SpotPair {
+impl PsfPair {
     /// Wavelength and field angle in words.
     pub fn place(&self) -> String {
         let nm = self.wavelength_um * 1e3;
@@ -89,8 +93,8 @@ impl SpotPair {
         format!("element {}, {}", element.label(), self.place())
     }
 
-    /// The spot of the cell that judges.
-    pub fn judged(&self) -> &Spot {
+    /// The metrics of the case that judges.
+    pub fn judged(&self) -> &PsfMetrics {
         &self.extracted[0].1
     }
 
@@ -111,7 +115,8 @@ impl SpotPair {
         (a[0] - b[0]).abs().max((a[1] - b[1]).abs())
     }
 
-    pub(super) fn images(&self) -> Option<&Images> {
+    /// The PSFs themselves, kept for the middle of the field.
+    pub fn images(&self) -> Option<&PsfImages> {
         self.images.as_deref()
     }
 }
@@ -132,11 +137,16 @@ pub struct Orders {
 }
 
 impl Orders {
+    /// The widths that a mapping draws [nm], rising.
+    pub(super) fn drawn_nm(rule: &WidthRule) -> Vec<u16> {
+        let all: std::collections::BTreeSet<u16> = (0..ORDER_SAMPLES).map(|i| rule.width_nm(order_phase(i))).collect();
+        all.into_iter().collect()
+    }
+
     /// Of a mapping, by the table of a cell at one wavelength; `full` is |t| of a cell that passes everything.
     pub(super) fn of(rule: &WidthRule, wavelength_um: f64, fidelity: Fidelity, full: f64, table: &[Complex64]) -> Self {
-        let u = |i: usize| (i as f64 + 0.5) / ORDER_SAMPLES as f64;
         let t = (0..ORDER_SAMPLES)
-            .map(|i| table[usize::from(rule.width_nm(u(i)))])
+            .map(|i| table[usize::from(rule.width_nm(order_phase(i)))])
             .collect::<Vec<_>>();
         let shares = order_shares(&t, full, &[0, 1, 2]);
         Self {
@@ -148,4 +158,9 @@ impl Orders {
             transmitted: t.iter().map(Complex64::norm_sqr).sum::<f64>() / (full * full * t.len() as f64),
         }
     }
+}
+
+/// Phase of a sample of a mapping [turns].
+fn order_phase(i: usize) -> f64 {
+    (i as f64 + 0.5) / ORDER_SAMPLES as f64
 }

@@ -2,7 +2,7 @@
 
 use metalith_core::Lattice;
 
-/// First polynomial of the free term: piston and tilts are nothing that a bench sees, defocus is a gap.
+/// First polynomial of the free term: a bench does not see piston and tilts, and defocus is a gap.
 pub const FIRST: u32 = 5;
 
 /// Radial order and azimuthal frequency of Noll's polynomial `j`; negative for sines.

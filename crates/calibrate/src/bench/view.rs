@@ -1,0 +1,156 @@
+//! The forward model of a set, opened between the pillars and the pixels.
+
+use super::light::light;
+use super::{Bench, Group};
+use crate::set::CaptureIndex;
+use metalith_core::Result;
+use metalith_made::{ArrivingLight, DrawnElement, MadeElement, MadeView, Perturbation, SolvedWidths};
+
+impl Bench<'_> {
+    /// The element of a capture as a perturbation makes it.
+    ///
+    /// # Errors
+    /// As [`MadeElement::new`].
+    pub fn element_of(&self, capture: CaptureIndex, perturbation: &Perturbation) -> Result<MadeElement> {
+        let drawn: &DrawnElement<'_> = &self.drawn[self.set.captures[capture].element];
+        MadeElement::new(drawn, &perturbation.geometry)
+    }
+
+    /// That element in the light of the capture, at one wavelength [um]. `solved` is what its widths transmit.
+    pub fn view<'a>(
+        &self,
+        capture: CaptureIndex,
+        element: &'a MadeElement,
+        perturbation: &Perturbation,
+        wavelength_um: f64,
+        solved: &SolvedWidths,
+    ) -> MadeView<'a> {
+        let polarisations = solved.pillars.iter().zip(&solved.bare);
+        MadeView {
+            element,
+            tables: polarisations.map(|(t, bare)| element.table_of(t, *bare)).collect(),
+            light: self.direction_of(capture, perturbation, wavelength_um),
+            gap_um: perturbation.path.gap_um,
+            camera: perturbation.camera,
+        }
+    }
+
+    /// The wave that arrives at the element of a capture, at one wavelength [um].
+    pub fn direction_of(
+        &self,
+        capture: CaptureIndex,
+        perturbation: &Perturbation,
+        wavelength_um: f64,
+    ) -> ArrivingLight {
+        light(self.group_of(capture), &perturbation.path, wavelength_um)
+    }
+
+    fn group_of(&self, capture: CaptureIndex) -> &Group {
+        let group = self.groups.iter().find(|g| g.captures.contains(&capture));
+        group.expect("every capture is in a group")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Sampling;
+    use super::*;
+    use crate::cells::CellSource;
+    use crate::effects;
+    use crate::set::MeasuredSet;
+    use crate::simulator::Simulator;
+    use metalith_cell::{CellModel, PublishedCell};
+    use metalith_core::Silent;
+    use metalith_wave::{Accuracy, Scratch, Window};
+    use num_complex::Complex64;
+
+    /// Share of the peak by which pixels may differ: what the propagator for many distances errs by, see its own
+    /// test, and the border of a window that it fades.
+    const OF_THE_PEAK: f64 = 2e-3;
+
+    /// Effects that the published cell cannot show, since it knows no stack.
+    const OF_THE_STACK: [&str; 5] = [
+        "film_height",
+        "film_index",
+        "sidewall_taper",
+        "corner_rounding",
+        "residual_mask",
+    ];
+
+    #[test]
+    fn captures_show_what_the_made_chip_makes_of_every_effect() {
+        let folder = tempfile::tempdir().unwrap();
+        metalith_testing::session::small_set(folder.path());
+        let mut set = MeasuredSet::read(folder.path(), &Silent).unwrap();
+        // One wavelength and a point source: what is left is chip, path and camera.
+        set.leds.iter_mut().for_each(|led| led.fwhm_nm = 1e-6);
+        set.divergence_rad = 0.0;
+        let sampling = Sampling {
+            spectrum: 3.0,
+            ..Sampling::default()
+        };
+        let mut bench = Bench::new(&set, sampling);
+        bench.follows = false;
+        let published = || PublishedCell::new(set.stack.pitch_nm);
+        let simulator = Simulator::new(bench, CellSource::Model(Box::new(published())), effects::all(&set));
+        let pixel = set.camera.pixel_um;
+        for effect in &simulator.effects {
+            if OF_THE_STACK.contains(&effect.name().as_str()) {
+                continue;
+            }
+            let typical: Vec<f64> = effect.parameters().iter().map(|p| p.typical).collect();
+            let mut perturbation = Perturbation::default();
+            effect.apply(&typical, &mut perturbation);
+            let grids = simulator
+                .expose(std::slice::from_ref(&perturbation), &Silent)
+                .unwrap()
+                .remove(0);
+            for (c, grid) in grids
+                .iter()
+                .enumerate()
+                .step_by(3)
+                .map(|(c, grid)| (CaptureIndex::from(c), grid))
+            {
+                let capture = &set.captures[c];
+                let um = set.leds[capture.led].centre_nm * 1e-3;
+                let element = simulator.bench.element_of(c, &perturbation).unwrap();
+                let table = published().transmissions(um, 400).unwrap();
+                let solved = SolvedWidths {
+                    pillars: vec![element.widths_nm().iter().map(|w| between(&table, *w)).collect()],
+                    bare: vec![Complex64::ONE],
+                };
+                let window = Window {
+                    centre_um: capture.window_centre_um,
+                    step_um: 0.25,
+                    samples: 160,
+                    distance_um: capture.distance_um,
+                };
+                let view = simulator.bench.view(c, &element, &perturbation, um, &solved);
+                let mut view = view;
+                // The veil is over the light of the camera's window: taken from the pixels below.
+                let stray = std::mem::take(&mut view.camera.stray_light);
+                let psf = view.psf(window, Accuracy::Accurate, &mut Scratch::default()).unwrap();
+                let mut want = psf
+                    .on_pixels(capture.window_centre_um, pixel, set.camera.rows)
+                    .unwrap()
+                    .mapv(|energy| energy / (pixel * pixel));
+                let mean = want.mean().unwrap();
+                want.mapv_inplace(|v| metalith_made::veiled(v, mean, stray));
+                let peak = want.iter().copied().fold(0.0, f64::max);
+                let got = grid.pixels([0.0; 2]);
+                let worst = got.iter().zip(&want).map(|(a, b)| (f64::from(*a) - b).abs());
+                let worst = worst.fold(0.0, f64::max) / peak;
+                println!("{}, {}: {worst:.1e}", effect.name(), capture.name);
+                assert!(worst < OF_THE_PEAK, "{}, {}: {worst}", effect.name(), capture.name);
+            }
+        }
+    }
+
+    /// The table of widths in whole nanometres at any width, as the tables of this crate are read.
+    fn between(table: &[Complex64], width_nm: f64) -> Complex64 {
+        let i = width_nm.floor();
+        let weights = metalith_made::lagrange(width_nm - i);
+        let at = i as usize;
+        table[at - 1..at + 3].iter().zip(weights).map(|(t, w)| t * w).sum()
+    }
+}

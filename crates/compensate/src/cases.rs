@@ -1,0 +1,116 @@
+//! The chips that a compensation is judged by: intended, made without it, made with it.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::Compensated;
+use super::line::Line;
+use metalith_core::{Error, Progress, Result, WidthMap};
+use metalith_design::array::PillarArray;
+use metalith_design::{CellIncidence, Design, Element};
+use metalith_made::{DrawnElement, MadeChip, MadeElement};
+use metalith_verify::{PsfMetrics, read_back};
+use metalith_wave::image::{Matched, Psf, incident, landing_um};
+use metalith_wave::{Accuracy, PhaseFunction, Scratch, Window};
+
+/// Chips that are compared.
+pub(super) const CHIPS: usize = 3;
+
+/// One element of one chip at one wavelength, in the middle of its field.
+#[derive(Clone, Debug, Serialize)]
+pub struct CompensationCase {
+    pub element: String,
+    pub wavelength_um: f64,
+    /// `intended` as stated, `made, uncorrected` and `made, corrected`.
+    pub pillars: &'static str,
+    /// Metrics of the PSF.
+    pub spot: PsfMetrics,
+    /// The PSF on the design's window about the chief ray.
+    #[serde(skip)]
+    pub psf: Psf,
+}
+
+/// Read the compensated layout at `layout` back and simulate it as it would be made, beside the intended pillars as
+/// stated and as they would be made. For the first element of each class at each wavelength, three cases.
+///
+/// # Errors
+/// If the layout cannot be read, a cell cannot be solved, or the user stopped it.
+pub fn compensation_cases(
+    design: &Design,
+    intended: &PillarArray,
+    compensated: &Compensated,
+    layout: &Path,
+    progress: &dyn Progress,
+) -> Result<Vec<CompensationCase>> {
+    let line = &compensated.line;
+    let found = read_back(design, intended, layout, progress)?;
+    let work = intended.classes.len() * line.colours.len();
+    progress.begin("simulating elements", work as u64);
+    let mut cases = Vec::new();
+    for class in 0..intended.classes.len() {
+        let place = intended.placed.iter().position(|p| p.class == class).unwrap_or(0);
+        let plain = intended.widths(&intended.placed[place]);
+        let corrected = &found.elements[place].widths;
+        let element = intended.placed[place].element;
+        cases.extend(of_element(design, line, &element, [&plain, corrected], progress)?);
+    }
+    Ok(cases)
+}
+
+/// One element at all wavelengths, drawn as intended and corrected.
+fn of_element(
+    design: &Design,
+    line: &Line,
+    element: &Element,
+    [plain, corrected]: [&WidthMap; 2],
+    progress: &dyn Progress,
+) -> Result<Vec<CompensationCase>> {
+    let lens = &design.lens;
+    let open = PhaseFunction {
+        lattice: plain.lattice,
+        radius_um: lens.radius_um(),
+        amplitude: 1.0,
+        phase_rad: |_, _| 0.0,
+    };
+    let chips: [(&'static str, &MadeChip, &WidthMap); CHIPS] = [
+        ("intended", &line.stated, plain),
+        ("made, uncorrected", &line.chip, plain),
+        ("made, corrected", &line.chip, corrected),
+    ];
+    let made: Vec<MadeElement> = chips
+        .iter()
+        .map(|(_, chip, widths)| chip.element(&DrawnElement::new(widths, line.aperture_radius_um)))
+        .collect::<Result<_>>()?;
+    let as_lit = design.verify.incidence == CellIncidence::AsLit;
+    let mut scratch = Scratch::default();
+    let mut cases = Vec::new();
+    for colour in &line.colours {
+        if progress.stopped() {
+            return Err(Error::Interrupted);
+        }
+        let um = colour.wavelength_um;
+        let wave = incident(&element.wedge, um, [0.0, 0.0])?;
+        let chief = landing_um(&element.wedge, &wave, lens.focal_length_um)?;
+        let window = Window::about(
+            chief,
+            plain.lattice.pitch_um(),
+            design.verify.window_samples,
+            lens.focal_length_um,
+        );
+        let matched = Matched::of(&open, [0.0, 0.0, lens.focal_length_um], um, colour.full);
+        for ((pillars, chip, _), made) in chips.iter().zip(&made) {
+            let view = chip.view(made, &wave, as_lit, progress)?;
+            let psf = view.psf(window, Accuracy::Accurate, &mut scratch)?;
+            cases.push(CompensationCase {
+                element: element.label(),
+                wavelength_um: um,
+                pillars,
+                spot: PsfMetrics::of(&psf, &matched, design.verify.pixel_um),
+                psf,
+            });
+        }
+        progress.advance(1);
+    }
+    Ok(cases)
+}

@@ -1,0 +1,202 @@
+//! The chip as made: a stated cell and a perturbation, for any layout and light.
+
+use num_complex::Complex64;
+use serde::Serialize;
+
+use super::cells::RealisedCells;
+use super::stack::perturbed;
+use super::{
+    ArrivingLight, CalibratedModel, CameraChange, ClassTable, DrawnElement, MadeElement, NotApplied, Perturbation,
+    cell_direction, mixed, realised_nm,
+};
+use metalith_cell::CellStack;
+use metalith_core::{Error, Progress, Result};
+use metalith_wave::image::Psf;
+use metalith_wave::{Accuracy, Fold, PlaneWave, Propagator, Scratch, Window};
+
+/// Chips of one line and bench, by its calibrated model.
+pub struct MadeChip {
+    model: CalibratedModel,
+    cells: RealisedCells,
+}
+
+/// What a report says of the model that it rests on.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ModelStatement {
+    /// The session that the model comes from.
+    pub set: String,
+    /// What was found there.
+    pub finding: String,
+    /// What the model says that was not simulated, each with the reason.
+    pub not_applied: Vec<NotApplied>,
+}
+
+/// One made element in one light: everything between a wave that arrives and the PSF on the sensor.
+pub struct MadeView<'a> {
+    pub element: &'a MadeElement,
+    /// What sites transmit, one for each polarisation that is averaged over.
+    pub tables: Vec<ClassTable>,
+    pub light: ArrivingLight,
+    /// Added to the distance of the sensor [um].
+    pub gap_um: f64,
+    pub camera: CameraChange,
+}
+
+impl MadeChip {
+    /// Chips with this stated cell, made as the model says.
+    ///
+    /// # Errors
+    /// If a number of the model cannot be, all of them at once.
+    pub fn new(stated: &CellStack, model: &CalibratedModel) -> Result<Self> {
+        let faults = model.perturbation.faults();
+        if !faults.is_empty() {
+            return Err(Error::invalid(faults.join("\n"), "correct the calibrated model"));
+        }
+        let perturbation = &model.perturbation;
+        Ok(Self {
+            cells: RealisedCells::new(perturbed(stated, &perturbation.cell), perturbation.geometry.cd_bias_nm),
+            model: model.clone(),
+        })
+    }
+
+    /// The perturbation.
+    pub fn perturbation(&self) -> &Perturbation {
+        &self.model.perturbation
+    }
+
+    /// The cells as etched, by realised width.
+    pub fn cells(&self) -> &RealisedCells {
+        &self.cells
+    }
+
+    /// What to say in a report of simulations at single wavelengths.
+    pub fn statement(&self) -> ModelStatement {
+        ModelStatement {
+            set: self.model.set.clone(),
+            finding: self.model.finding.clone(),
+            not_applied: self.perturbation().not_applied(),
+        }
+    }
+
+    /// |t| of a cell that passes all its power in the zero order.
+    ///
+    /// # Errors
+    /// If the wavelength is outside the range of a material.
+    pub fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {
+        self.cells.stack().full_transmission(wavelength_um)
+    }
+
+    /// An element as it is made.
+    ///
+    /// # Errors
+    /// As [`MadeElement::new`].
+    pub fn element(&self, drawn: &DrawnElement<'_>) -> Result<MadeElement> {
+        MadeElement::new(drawn, &self.perturbation().geometry)
+    }
+
+    /// A made element in the light of a stated wave; `as_lit` solves the cells at the angle at which light
+    /// arrives, for both polarisations, instead of along the normal.
+    ///
+    /// # Errors
+    /// If a cell cannot be solved, or the user stopped it.
+    pub fn view<'a>(
+        &self,
+        element: &'a MadeElement,
+        stated: &PlaneWave,
+        as_lit: bool,
+        progress: &dyn Progress,
+    ) -> Result<MadeView<'a>> {
+        let light = ArrivingLight::new(stated, &self.perturbation().path);
+        let sines = if as_lit { cell_direction(&light.plane) } else { [0.0; 2] };
+        let solved = self
+            .cells
+            .solve(element.widths_nm(), stated.wavelength_um, sines, progress)?;
+        let polarisations = solved.pillars.iter().zip(&solved.bare);
+        Ok(MadeView {
+            element,
+            tables: polarisations.map(|(t, bare)| element.table_of(t, *bare)).collect(),
+            light,
+            gap_um: self.perturbation().path.gap_um,
+            camera: self.perturbation().camera,
+        })
+    }
+}
+
+impl MadeChip {
+    /// What pillars drawn this wide [nm] transmit along the normal where so many steps of density are added to
+    /// their width (see [`super::realised_nm`]), missing pillars and light that sees none mixed in.
+    ///
+    /// # Errors
+    /// As [`MadeChip::view`].
+    pub fn drawn_widths(
+        &self,
+        drawn_nm: &[u16],
+        density_steps: i32,
+        wavelength_um: f64,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Complex64>> {
+        let geometry = &self.perturbation().geometry;
+        let widths: Vec<f64> = drawn_nm
+            .iter()
+            .map(|w| realised_nm(*w, geometry, density_steps))
+            .collect();
+        let solved = self.cells.solve(&widths, wavelength_um, [0.0; 2], progress)?;
+        let pairs = solved.pillars[0].iter().zip(&widths);
+        Ok(pairs
+            .map(|(t, w)| {
+                let pillar = t * geometry.amplitude(*w);
+                mixed(geometry, geometry.missing_pillars, pillar, solved.bare[0])
+            })
+            .collect())
+    }
+}
+
+impl MadeView<'_> {
+    /// The PSF on a window at the stated distance of the sensor; where the sensor stands farther off, the window
+    /// keeps its place in it. Missing pillars scatter evenly over the window, blur and veil of the camera follow.
+    ///
+    /// # Errors
+    /// If the window is none, or the light arrives too steeply.
+    pub fn psf(&self, stated: Window, accuracy: Accuracy, scratch: &mut Scratch) -> Result<Psf> {
+        let window = Window {
+            distance_um: stated.distance_um + self.gap_um,
+            ..stated
+        };
+        let (lattice, wavelength_um) = (self.element.lattice(), self.light.plane.wavelength_um);
+        let fold = Fold::plan(lattice, self.element.radius_um(), wavelength_um, window, accuracy)?;
+        self.psf_by(&fold, scratch).map(|psf| Psf { window: stated, ..psf })
+    }
+
+    /// The same by a propagator of one's own, whose window is at the distance as made.
+    ///
+    /// # Errors
+    /// As [`Propagator::field`].
+    pub fn psf_by(&self, propagator: &dyn Propagator, scratch: &mut Scratch) -> Result<Psf> {
+        let psfs = self
+            .tables
+            .iter()
+            .map(|table| {
+                let aperture = self.element.lit_aperture(table, &self.light);
+                let mut psf = Psf::of(&propagator.field(&aperture, &self.light.plane, scratch)?);
+                psf.values += self.scattered(table, psf.window.centre_um, psf.window.distance_um);
+                Ok(psf)
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let mut psf = Psf::mean(psfs);
+        self.camera.apply(&mut psf);
+        Ok(psf)
+    }
+
+    fn scattered(&self, table: &ClassTable, at_um: [f64; 2], distance_um: f64) -> f64 {
+        let um = self.light.plane.wavelength_um;
+        table.scattered * spread(self.element.lattice().pitch_um(), at_um, distance_um, um)
+    }
+}
+
+/// Intensity at a place on the sensor for a unit of |t|^2 that one site scatters on its own: the square of a term
+/// of the Rayleigh-Sommerfeld sum, far from the site, that of the element's centre for all. Lengths in um.
+pub fn spread(pitch_um: f64, at_um: [f64; 2], distance_um: f64, wavelength_um: f64) -> f64 {
+    let [x, y] = at_um;
+    let r2 = x * x + y * y + distance_um * distance_um;
+    (pitch_um.powi(2) / (wavelength_um * r2) * distance_um).powi(2)
+}

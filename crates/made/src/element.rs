@@ -1,0 +1,318 @@
+//! One element: as it is drawn, and as it is made.
+
+use std::collections::HashMap;
+use std::sync::OnceLock;
+
+use num_complex::{Complex32, Complex64};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::{ArrivingLight, GeometryChange, NODE_STEP_NM, density, zernike};
+use metalith_core::{Error, Lattice, Result, WidthMap};
+use metalith_wave::{Aperture, cis};
+
+/// Biases by density that differ by less than this share a class [nm]. At most 0.05 nm are lost to it, which is
+/// 1.5 mrad of phase at the steepest (a turn over 200 nm): the error of a field is below 1e-6 of its power.
+pub const BIAS_STEP_NM: f64 = 1.0 / STEPS_PER_NM;
+
+/// A whole number, so that drawn widths are whole steps.
+const STEPS_PER_NM: f64 = 10.0;
+
+/// An element as it is drawn in a layout: what every made version of it starts from.
+pub struct DrawnElement<'a> {
+    pillars: &'a WidthMap,
+    aperture_radius_um: f64,
+    /// Area fraction around each site, made when first asked for.
+    fill: OnceLock<Vec<f32>>,
+}
+
+impl<'a> DrawnElement<'a> {
+    /// The pillars as read from a layout, and the radius of the opening in the metal around them [um].
+    pub fn new(pillars: &'a WidthMap, aperture_radius_um: f64) -> Self {
+        Self {
+            pillars,
+            aperture_radius_um,
+            fill: OnceLock::new(),
+        }
+    }
+
+    /// The pillars.
+    pub fn pillars(&self) -> &'a WidthMap {
+        self.pillars
+    }
+
+    /// Area fraction around each site, row by row; see [`density::fill`].
+    pub fn fill(&self) -> &[f32] {
+        self.fill.get_or_init(|| density::fill(self.pillars))
+    }
+
+    /// Width added to the pillar at a site, counted row by row, by bias and density [nm].
+    pub fn bias_nm(&self, site: usize, geometry: &GeometryChange) -> f64 {
+        if geometry.follows_density() {
+            geometry.bias_nm(f64::from(self.fill()[site]))
+        } else {
+            geometry.cd_bias_nm
+        }
+    }
+
+    /// Steps of [`BIAS_STEP_NM`] that density adds to the width at each site, row by row; nothing if it adds none
+    /// anywhere.
+    pub fn density_steps(&self, geometry: &GeometryChange) -> Option<Vec<i32>> {
+        let steps = |f: &f32| (geometry.cd_bias_density_nm * f64::from(*f) * STEPS_PER_NM).round() as i32;
+        geometry
+            .follows_density()
+            .then(|| self.fill().iter().map(steps).collect())
+    }
+}
+
+impl DrawnElement<'_> {
+    /// What density adds to the widths, mean over the pillars and rounded to the next node of the cells, in steps
+    /// of [`BIAS_STEP_NM`]: for accounts that know drawn widths but no places.
+    pub fn mean_density_steps(&self, geometry: &GeometryChange) -> i32 {
+        if !geometry.follows_density() {
+            return 0;
+        }
+        let (mut sum, mut pillars) = (0.0, 0.0);
+        for (fill, w) in self.fill().iter().zip(&self.pillars.width_nm) {
+            if *w > 0 {
+                sum += f64::from(*fill);
+                pillars += 1.0;
+            }
+        }
+        let nodes = geometry.cd_bias_density_nm * sum / f64::max(pillars, 1.0) / NODE_STEP_NM;
+        (nodes.round() * NODE_STEP_NM * STEPS_PER_NM).round() as i32
+    }
+}
+
+/// Width of a pillar drawn this wide, so many steps of density on top of the common bias [nm].
+pub fn realised_nm(drawn_nm: u16, geometry: &GeometryChange, density_steps: i32) -> f64 {
+    // Steps first: every pair of width and step that comes to one sum gets the same number, bit by bit.
+    (f64::from(drawn_nm) * STEPS_PER_NM + f64::from(density_steps)) / STEPS_PER_NM + geometry.cd_bias_nm
+}
+
+/// An element as it was made: which sites transmit alike, and what is common to all wavelengths.
+#[derive(Clone, Debug)]
+pub struct MadeElement {
+    lattice: Lattice,
+    radius_um: f64,
+    geometry: GeometryChange,
+    /// Share of the pillars that are missing and counted with their mean.
+    missing: f64,
+    /// Class of each site, row by row; zero where light is blocked.
+    class: Vec<u16>,
+    /// Width of each class [nm], zero without pillar; that of class zero is of no use.
+    width_nm: Vec<f64>,
+    /// Sites in each class.
+    count: Vec<u32>,
+    /// Optical path added over the lens [um]; empty for none.
+    path_um: Vec<f32>,
+}
+
+/// What the sites of each class transmit at one wavelength and polarisation.
+#[derive(Clone, Debug)]
+pub struct ClassTable {
+    /// Field ratio, foot to top of the pillars; zero for class zero.
+    pub t: Vec<Complex32>,
+    /// |t|^2 summed over sites of what missing pillars scatter, each on its own.
+    pub scattered: f64,
+}
+
+impl MadeElement {
+    /// What a change of pillars and apertures makes of an element. Each site has the width of its pillar, biased
+    /// and by the density around it; sites that the shifted aperture covers are blocked. Light through the
+    /// crescent that opens on the other side meets no pillar, is not focused, and is left out.
+    ///
+    /// # Errors
+    /// If the widths fall into more classes than can be numbered.
+    pub fn new(drawn: &DrawnElement<'_>, geometry: &GeometryChange) -> Result<Self> {
+        let lattice = drawn.pillars.lattice;
+        let n = lattice.sites();
+        let steps = drawn.density_steps(geometry);
+        let [ox, oy] = geometry.aperture_offset_um;
+        let covered = |site: usize| {
+            let (x, y) = (
+                lattice.coordinate_um(site % n) - ox,
+                lattice.coordinate_um(site / n) - oy,
+            );
+            (ox != 0.0 || oy != 0.0) && x * x + y * y > drawn.aperture_radius_um.powi(2)
+        };
+        let mut known: HashMap<u64, u16> = HashMap::new();
+        let (mut class, mut width_nm, mut count) = (vec![0; n * n], vec![0.0], vec![0u32]);
+        let mut radius2 = 0;
+        for (site, &w) in drawn.pillars.width_nm.iter().enumerate() {
+            if w == 0 || covered(site) {
+                continue;
+            }
+            let width = realised_nm(w, geometry, steps.as_ref().map_or(0, |s| s[site]));
+            let next = width_nm.len();
+            let own = match known.get(&width.to_bits()) {
+                Some(own) => *own,
+                None if next <= usize::from(MOST_CLASS) => {
+                    known.insert(width.to_bits(), next as u16);
+                    width_nm.push(width);
+                    count.push(0);
+                    next as u16
+                }
+                None => return Err(too_many()),
+            };
+            class[site] = own;
+            count[usize::from(own)] += 1;
+            radius2 = radius2.max(lattice.half_radius2(site % n, site / n));
+        }
+        let path_um = if geometry.wavefront_nm.is_empty() {
+            Vec::new()
+        } else {
+            zernike::map(&geometry.wavefront_nm, lattice, drawn.aperture_radius_um)
+        };
+        Ok(Self {
+            lattice,
+            radius_um: (radius2 as f64).sqrt() * 0.5 * lattice.pitch_um(),
+            geometry: geometry.clone(),
+            missing: geometry.missing_pillars,
+            class,
+            width_nm,
+            count,
+            path_um,
+        })
+    }
+
+    /// The same with the missing pillars gone from random places instead of counted with their mean.
+    #[must_use]
+    pub fn with_pillars_removed(mut self, seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let bare = self.width_nm.len() as u16;
+        self.width_nm.push(0.0);
+        self.count.push(0);
+        for class in self.class.iter_mut().filter(|c| **c > 0) {
+            if rng.random::<f64>() < self.missing {
+                *class = bare;
+            }
+        }
+        self.missing = 0.0;
+        self
+    }
+
+    /// Where the sites are.
+    pub fn lattice(&self) -> Lattice {
+        self.lattice
+    }
+
+    /// Distance of the outermost open site from the element's centre [um].
+    pub fn radius_um(&self) -> f64 {
+        self.radius_um
+    }
+
+    /// Class of each site, row by row; zero where light is blocked.
+    pub fn classes(&self) -> &[u16] {
+        &self.class
+    }
+
+    /// Width of each class from the first open one, number 1, on [nm].
+    pub fn widths_nm(&self) -> &[f64] {
+        &self.width_nm[1..]
+    }
+
+    /// What each class transmits, of a pillar of some width [nm] and of a site without one: missing pillars
+    /// mixed in, and the light that sees no pillar added.
+    pub fn table(&self, pillar: impl Fn(f64) -> Complex64, bare: Complex64) -> ClassTable {
+        let of = |width: f64| if width > 0.0 { pillar(width) } else { bare };
+        let open: Vec<Complex64> = self.widths_nm().iter().map(|w| of(*w)).collect();
+        self.table_of(&open, bare)
+    }
+
+    /// The same from the transmission of each class, in the order of [`MadeElement::widths_nm`].
+    ///
+    /// # Panics
+    /// If there is not one value for each of them.
+    pub fn table_of(&self, open: &[Complex64], bare: Complex64) -> ClassTable {
+        assert_eq!(open.len() + 1, self.width_nm.len(), "one value for each class");
+        let (mut t, mut scattered) = (vec![Complex32::ZERO], 0.0);
+        for ((pillar, width), count) in open.iter().zip(&self.width_nm[1..]).zip(&self.count[1..]) {
+            let pillar = if *width > 0.0 {
+                pillar * self.geometry.amplitude(*width)
+            } else {
+                *pillar
+            };
+            scattered += f64::from(*count) * (pillar - bare).norm_sqr();
+            t.push(single(mixed(&self.geometry, self.missing, pillar, bare)));
+        }
+        ClassTable {
+            t,
+            scattered: self.missing * (1.0 - self.missing) * scattered,
+        }
+    }
+
+    /// The element as an aperture at one wavelength [um], without the wave that arrives.
+    pub fn aperture<'a>(&'a self, table: &'a ClassTable, wavelength_um: f64) -> MadeAperture<'a> {
+        MadeAperture {
+            element: self,
+            table: &table.t,
+            wavelength_um,
+            sphere: None,
+        }
+    }
+
+    /// The same with the curvature of the wave that arrives, for propagators that know plane waves alone.
+    pub fn lit_aperture<'a>(&'a self, table: &'a ClassTable, light: &ArrivingLight) -> MadeAperture<'a> {
+        MadeAperture {
+            sphere: light.sphere(self.lattice),
+            ..self.aperture(table, light.plane.wavelength_um)
+        }
+    }
+}
+
+/// What stands at a site on the mean: a pillar, or with the share `missing` none; and the light that sees neither.
+pub fn mixed(geometry: &GeometryChange, missing: f64, pillar: Complex64, bare: Complex64) -> Complex64 {
+    pillar + (bare - pillar) * missing + geometry.unstructured()
+}
+
+/// Classes are numbered with 16 bits, one of which is kept for sites whose pillar is removed.
+const MOST_CLASS: u16 = u16::MAX - 1;
+
+fn too_many() -> Error {
+    Error::invalid(
+        format!("widths as made fall into more than {MOST_CLASS} classes of {BIAS_STEP_NM} nm"),
+        "lower `cd_bias_density_nm` of the model, or draw fewer widths",
+    )
+}
+
+/// A made element at one wavelength, row by row.
+pub struct MadeAperture<'a> {
+    element: &'a MadeElement,
+    table: &'a [Complex32],
+    wavelength_um: f64,
+    /// Curvature of the wave along an axis; the same for both.
+    sphere: Option<Vec<Complex32>>,
+}
+
+impl Aperture for MadeAperture<'_> {
+    fn lattice(&self) -> Lattice {
+        self.element.lattice
+    }
+
+    fn radius_um(&self) -> f64 {
+        self.element.radius_um
+    }
+
+    fn fill_row(&self, iy: usize, row: &mut [Complex32]) {
+        let n = self.element.lattice.sites();
+        let classes = &self.element.class[iy * n..][..n];
+        for (to, &class) in row.iter_mut().zip(classes) {
+            *to = self.table[usize::from(class)];
+        }
+        if !self.element.path_um.is_empty() {
+            for (to, path) in row.iter_mut().zip(&self.element.path_um[iy * n..]) {
+                *to *= cis(f64::from(*path) / self.wavelength_um);
+            }
+        }
+        if let Some(sphere) = &self.sphere {
+            for (to, along_x) in row.iter_mut().zip(sphere) {
+                *to *= along_x * sphere[iy];
+            }
+        }
+    }
+}
+
+fn single(t: Complex64) -> Complex32 {
+    Complex32::new(t.re as f32, t.im as f32)
+}

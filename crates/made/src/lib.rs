@@ -1,0 +1,44 @@
+//! The chip as made: what a measured line and bench make of a drawn layout, for every command in one place.
+//!
+//! ```text
+//! pillars as read from a layout  ->  DrawnElement
+//! stated cell, model file        ->  MadeChip
+//! both                           ->  MadeElement: sites in classes of realised width, aperture, wavefront
+//! with a wave                    ->  MadeView: transmission of each class, light that arrives, distance, camera
+//! with a window                  ->  PSF
+//! ```
+//!
+//! A [`Perturbation`] is applied as follows; what is zero changes nothing.
+//!
+//! | part | applied to |
+//! | --- | --- |
+//! | `geometry` | width of each site (bias, bias by the density around it), open sites (aperture offset), transmission of each class (missing pillars, light that sees no pillar, free amplitude), optical path of each site (free wavefront) |
+//! | `cell` | the stack that every realised width is solved with |
+//! | `path` | the wave that arrives (tilt, curvature) and the distance of the sensor (gap) |
+//! | `camera` | the PSF: Gaussian blur, veil over its window |
+//! | `light` | spectra and source of a bench; a PSF of one wavelength and one point names them with [`Perturbation::not_applied`] |
+//!
+//! [`MadeElement::aperture`] gives a [`metalith_wave::Aperture`], so that every propagator runs from it.
+
+mod camera;
+mod cells;
+mod chip;
+mod density;
+mod element;
+mod light;
+mod model;
+mod not_applied;
+mod perturbation;
+mod stack;
+pub mod zernike;
+
+pub use camera::veiled;
+pub use cells::{NODE_STEP_NM, RealisedCells, SolvedWidths, lagrange};
+pub use chip::{MadeChip, MadeView, ModelStatement, spread};
+pub use density::{RANGE_UM, fill};
+pub use element::{BIAS_STEP_NM, ClassTable, DrawnElement, MadeAperture, MadeElement, mixed, realised_nm};
+pub use light::{ArrivingLight, cell_direction};
+pub use model::CalibratedModel;
+pub use not_applied::NotApplied;
+pub use perturbation::{CameraChange, CellChange, GeometryChange, LightChange, PathChange, Perturbation, legendre};
+pub use stack::{off_cutoff, perturbed, possible_width_nm};

@@ -1,0 +1,120 @@
+//! The calibrated model as a file.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::Perturbation;
+use metalith_core::{Error, Result, WholeFile, document};
+
+/// Version of the format that is written. The first called its perturbation `departure`; it is still read.
+const SCHEMA: u32 = 2;
+
+/// What a session has taught, in a file that later designs are simulated and compensated with.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CalibratedModel {
+    schema: u32,
+    /// The session that it comes from.
+    pub set: String,
+    /// In words: what was found.
+    pub finding: String,
+    /// How chips and bench differ from what is stated.
+    #[serde(alias = "departure")]
+    pub perturbation: Perturbation,
+}
+
+impl CalibratedModel {
+    /// A model of what was found.
+    pub fn new(set: String, finding: String, perturbation: Perturbation) -> Self {
+        Self {
+            schema: SCHEMA,
+            set,
+            finding,
+            perturbation,
+        }
+    }
+
+    /// Read a model file.
+    ///
+    /// # Errors
+    /// If it cannot be read or is not such a file; all numbers that cannot be at once.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = document::load(path)?;
+        let fault = |what: String| Error::Table {
+            path: path.to_owned(),
+            line: None,
+            what,
+            hint: "give the `model.toml` that `metalith calibrate` has written".into(),
+        };
+        let model: Self = toml::from_str(&text).map_err(|e| fault(e.to_string()))?;
+        if !(1..=SCHEMA).contains(&model.schema) {
+            return Err(fault(format!(
+                "this is a model of schema {}, 1 to {SCHEMA} are known",
+                model.schema
+            )));
+        }
+        let faults = model.perturbation.faults();
+        if !faults.is_empty() {
+            return Err(fault(faults.join("\n")));
+        }
+        Ok(Self {
+            schema: SCHEMA,
+            ..model
+        })
+    }
+
+    /// Write it.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let text = toml::to_string(self).expect("plain data serialises");
+        WholeFile::write(path, text.as_bytes())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn model() -> CalibratedModel {
+        let mut perturbation = Perturbation::default();
+        perturbation.geometry.cd_bias_nm = -9.75;
+        *perturbation.light.shift_mut(1) = 0.5;
+        CalibratedModel::new("chip".into(), "explained by cd_bias".into(), perturbation)
+    }
+
+    #[test]
+    fn a_model_file_reads_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("model.toml");
+        model().write(&path).unwrap();
+        assert_eq!(CalibratedModel::read(&path).unwrap(), model());
+        std::fs::write(&path, "schema = 7").unwrap();
+        assert!(CalibratedModel::read(&path).is_err());
+    }
+
+    #[test]
+    fn a_file_of_the_first_schema_is_read_and_a_number_that_cannot_be_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("model.toml");
+        model().write(&path).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let first = text
+            .replace("schema = 2", "schema = 1")
+            .replace("[perturbation", "[departure");
+        assert!(first.contains("[departure.geometry]"), "{first}");
+        std::fs::write(&path, first).unwrap();
+        assert_eq!(CalibratedModel::read(&path).unwrap(), model());
+        let wrong = text
+            .replace("stray_light = 0.0", "stray_light = 7.0")
+            .replace("missing_pillars = 0.0", "missing_pillars = nan");
+        std::fs::write(&path, wrong).unwrap();
+        let error = CalibratedModel::read(&path).unwrap_err().to_string();
+        assert!(
+            error.contains("stray_light") && error.contains("missing_pillars"),
+            "{error}"
+        );
+    }
+}

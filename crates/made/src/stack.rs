@@ -1,0 +1,42 @@
+//! The cell as etched: a stated stack with a change, and the widths that its pillars can have.
+
+use metalith_cell::CellStack;
+use metalith_core::Result;
+
+use super::CellChange;
+
+/// Least width of a pillar, and least room that a pillar's foot leaves in its cell [nm].
+const LEAST_NM: f64 = 1.0;
+
+/// The stack with a change.
+pub fn perturbed(stated: &CellStack, change: &CellChange) -> CellStack {
+    CellStack {
+        height_nm: stated.height_nm + change.height_nm,
+        film: stated.film.shifted(change.index),
+        taper: stated.taper + change.taper_deg.to_radians(),
+        corner_radius_nm: stated.corner_radius_nm + change.corner_rounding_nm,
+        mask_height_nm: stated.mask_height_nm + change.residual_mask_nm,
+        ..stated.clone()
+    }
+}
+
+/// The nearest width that a pillar of this stack can have, its foot within the pitch [nm].
+pub fn possible_width_nm(stack: &CellStack, width_nm: f64) -> f64 {
+    let foot = (2.0 * stack.taper.tan() * stack.height_nm).max(0.0);
+    let most = (stack.pitch_nm - LEAST_NM - foot).max(LEAST_NM);
+    width_nm.clamp(LEAST_NM, most)
+}
+
+/// A pillar that is narrower by these [nm] is the same to anyone, but no mode of it is at its cutoff.
+const OFF_CUTOFF_NM: [f64; 2] = [3e-4, 1e-3];
+
+/// Solve a cell of some width [nm]. A mode exactly at its cutoff has no field to solve for; where that is so, a
+/// pillar narrower by a thousandth of a nanometre stands in.
+///
+/// # Errors
+/// That of `solve` if the neighbouring widths fail as well.
+pub fn off_cutoff<T>(width_nm: f64, solve: impl Fn(f64) -> Result<T>) -> Result<T> {
+    solve(width_nm)
+        .or_else(|_| solve(width_nm - OFF_CUTOFF_NM[0]))
+        .or_else(|_| solve(width_nm - OFF_CUTOFF_NM[1]))
+}

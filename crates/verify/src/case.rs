@@ -1,0 +1,154 @@
+//! What a layout is judged by: a cell, or a chip as made.
+
+use std::collections::HashMap;
+
+use num_complex::Complex64;
+
+use metalith_cell::{CellModel, Fidelity};
+use metalith_core::Progress;
+use metalith_core::{Error, Result};
+use metalith_made::{MadeChip, cell_direction};
+use metalith_wave::PlaneWave;
+
+/// What the pillars of a layout are simulated as.
+#[derive(Clone, Copy)]
+pub enum SimulationCase<'a> {
+    /// As drawn, by a cell; chip, light and sensor are where the design has them.
+    Cell(&'a dyn CellModel),
+    /// As made on a measured line and bench.
+    Made(&'a MadeChip),
+}
+
+/// The case that judges, and those that are simulated beside it.
+#[derive(Clone)]
+pub struct SimulationCases<'a> {
+    pub judge: SimulationCase<'a>,
+    pub beside: Vec<SimulationCase<'a>>,
+}
+
+impl<'a> From<&'a dyn CellModel> for SimulationCase<'a> {
+    fn from(cell: &'a dyn CellModel) -> Self {
+        Self::Cell(cell)
+    }
+}
+
+impl<'a> From<&'a MadeChip> for SimulationCase<'a> {
+    fn from(chip: &'a MadeChip) -> Self {
+        Self::Made(chip)
+    }
+}
+
+impl SimulationCase<'_> {
+    /// How truly the cell is described.
+    pub fn fidelity(&self) -> Fidelity {
+        match self {
+            Self::Cell(cell) => cell.fidelity(),
+            Self::Made(_) => Fidelity::Calibrated,
+        }
+    }
+
+    /// |t| of a cell that passes all its power in the zero order.
+    ///
+    /// # Errors
+    /// If the wavelength is outside what the cell covers.
+    pub fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {
+        match self {
+            Self::Cell(cell) => cell.full_transmission(wavelength_um),
+            Self::Made(chip) => chip.full_transmission(wavelength_um),
+        }
+    }
+}
+
+impl<'a> SimulationCases<'a> {
+    /// Judged by this case alone.
+    pub fn judged_by(judge: impl Into<SimulationCase<'a>>) -> Self {
+        Self {
+            judge: judge.into(),
+            beside: Vec::new(),
+        }
+    }
+
+    /// Judged by the first of some cells, with the others beside it.
+    ///
+    /// # Errors
+    /// If there is no cell.
+    pub fn of_cells(cells: &'a [Box<dyn CellModel>]) -> Result<Self> {
+        let (judge, beside) = cells
+            .split_first()
+            .ok_or_else(|| Error::invalid("there is no cell to judge a layout by", "ask for at least one fidelity"))?;
+        Ok(Self::judged_by(judge.as_ref()).with_cells(beside))
+    }
+
+    /// The same with these cells beside.
+    #[must_use]
+    pub fn with_cells(mut self, cells: &'a [Box<dyn CellModel>]) -> Self {
+        self.beside
+            .extend(cells.iter().map(|c| SimulationCase::Cell(c.as_ref())));
+        self
+    }
+
+    /// All cases, the one that judges first.
+    pub fn iter(&self) -> impl Iterator<Item = SimulationCase<'a>> {
+        std::iter::once(self.judge).chain(self.beside.iter().copied())
+    }
+}
+
+/// Transmissions by drawn width of one cell at one wavelength.
+pub(super) struct TransmissionTables {
+    /// Along the normal.
+    pub normal: Vec<Complex64>,
+    /// By direction, for s and p; empty where the design asks for normal incidence, or the cell knows no angles.
+    oblique: HashMap<[u64; 2], [Vec<Complex64>; 2]>,
+}
+
+impl TransmissionTables {
+    /// Solve a cell along the normal.
+    ///
+    /// # Errors
+    /// If it has no answer at this wavelength.
+    pub fn new(cell: &dyn CellModel, wavelength_um: f64, widest_nm: u16) -> Result<Self> {
+        Ok(Self {
+            normal: cell.transmissions(wavelength_um, widest_nm)?,
+            oblique: HashMap::new(),
+        })
+    }
+
+    /// Solve it for more directions, those that are alike by symmetry once.
+    ///
+    /// # Errors
+    /// As [`TransmissionTables::new`]; also if the user stopped it.
+    pub fn add_directions(
+        &mut self,
+        cell: &dyn CellModel,
+        waves: &[PlaneWave],
+        widest_nm: u16,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        for wave in waves {
+            if progress.stopped() {
+                return Err(Error::Interrupted);
+            }
+            let sines = cell_direction(wave);
+            if sines != [0.0; 2]
+                && !self.oblique.contains_key(&key(sines))
+                && let Some(tables) = cell.oblique(wave.wavelength_um, sines, widest_nm)?
+            {
+                self.oblique.insert(key(sines), tables);
+            }
+            progress.advance(1);
+        }
+        Ok(())
+    }
+
+    /// The tables whose PSFs are to be averaged: one along the normal, one for each polarisation else.
+    pub fn of(&self, wave: &PlaneWave) -> &[Vec<Complex64>] {
+        match self.oblique.get(&key(cell_direction(wave))) {
+            Some(both) => both,
+            None => std::slice::from_ref(&self.normal),
+        }
+    }
+}
+
+fn key(sines: [f64; 2]) -> [u64; 2] {
+    sines.map(f64::to_bits)
+}

@@ -1,0 +1,317 @@
+//! PSFs of a single layout from anywhere, without a design.
+
+use std::io::Write;
+use std::path::Path;
+
+use ndarray::Array2;
+use npyz::WriterBuilder;
+use num_complex::Complex64;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::case::{SimulationCase, TransmissionTables};
+use metalith_cell::{CellModel, Fidelity};
+use metalith_core::{Error, Lattice, Progress, Result, Silent, WholeFile, WidthMap};
+use metalith_gds::extract::{ElementSite, Extraction};
+use metalith_made::{DrawnElement, MadeChip, ModelStatement};
+use metalith_report::{Cell, Column, ImageGrid, Page, PillarZoom, Table, count, sig, write_json};
+use metalith_wave::image::{Matched, Psf, PsfMeasures};
+use metalith_wave::{Accuracy, Aperture, Fold, Pillars, PlaneWave, Propagator, Scratch, Window};
+
+/// In what light, and where on the sensor.
+#[derive(Clone, Debug)]
+pub struct Lighting {
+    /// Wavelengths [um].
+    pub wavelengths_um: Vec<f64>,
+    /// Direction sines of the incident light, in air.
+    pub incidence_sin: [f64; 2],
+    /// Whether cells are solved at that angle, for both polarisations, or along the normal.
+    pub cells_as_lit: bool,
+    /// From the pillar tops to the sensor [um].
+    pub distance_um: f64,
+    /// Middle of the window, from the axis of an element [um].
+    pub at_um: [f64; 2],
+    /// Samples an axis, one pitch apart.
+    pub samples: usize,
+    /// Edge of a sensor pixel [um].
+    pub pixel_um: f64,
+    /// Radius of the openings in the metal [um]; that of the circle around the pillars if none is given. It counts
+    /// where a model has them off their place.
+    pub aperture_radius_um: Option<f64>,
+    pub accuracy: Accuracy,
+}
+
+/// The PSF of one element of a layout at one wavelength.
+#[derive(Clone, Debug, Serialize)]
+pub struct SinglePsf {
+    /// Name of the element: of several with the same pillars, the first.
+    pub element: String,
+    pub wavelength_um: f64,
+    pub fidelity: Fidelity,
+    #[serde(flatten)]
+    pub measures: PsfMeasures,
+    #[serde(skip)]
+    pub psf: Psf,
+}
+
+/// Simulate every distinct element of a layout.
+///
+/// # Errors
+/// If a cell has no answer at a wavelength, the window is none, or the user stopped it.
+pub fn single_psfs(
+    found: &Extraction,
+    case: SimulationCase<'_>,
+    light: &Lighting,
+    progress: &dyn Progress,
+) -> Result<Vec<SinglePsf>> {
+    let elements = distinct(found);
+    progress.begin(
+        "simulating elements",
+        (elements.len() * light.wavelengths_um.len()) as u64,
+    );
+    let mut all = Vec::new();
+    for &wavelength_um in &light.wavelengths_um {
+        let psfs = match case {
+            SimulationCase::Cell(cell) => by_cell(&elements, cell, light, wavelength_um, progress)?,
+            SimulationCase::Made(chip) => as_made(&elements, chip, light, wavelength_um, progress)?,
+        };
+        let full = case.full_transmission(wavelength_um)?;
+        let focus = [light.at_um[0], light.at_um[1], light.distance_um];
+        for ((site, widths), psf) in elements.iter().zip(psfs) {
+            // Strehl is against the sites as drawn, whatever they transmit.
+            let table = vec![Complex64::ONE; usize::from(widest_nm(&elements)) + 1];
+            let matched = Matched::of(&Pillars::new(widths, &table)?, focus, wavelength_um, full);
+            all.push(SinglePsf {
+                element: site.name.clone(),
+                wavelength_um,
+                fidelity: case.fidelity(),
+                measures: psf.measures(&matched, light.pixel_um),
+                psf,
+            });
+        }
+    }
+    Ok(all)
+}
+
+/// The PSF of each element by a cell.
+fn by_cell(
+    elements: &[(&ElementSite, &WidthMap)],
+    cell: &dyn CellModel,
+    light: &Lighting,
+    wavelength_um: f64,
+    progress: &dyn Progress,
+) -> Result<Vec<Psf>> {
+    let widest = widest_nm(elements);
+    let mut tables = TransmissionTables::new(cell, wavelength_um, widest)?;
+    let wave = light.wave(wavelength_um);
+    if light.cells_as_lit {
+        tables.add_directions(cell, &[wave], widest, &Silent)?;
+    }
+    elements
+        .par_iter()
+        .map_init(Scratch::default, |scratch, (_, widths)| {
+            if progress.stopped() {
+                return Err(Error::Interrupted);
+            }
+            let mut of = |table: &Vec<Complex64>| {
+                let pillars = Pillars::new(widths, table)?;
+                let window = light.window(widths.lattice);
+                let fold = Fold::plan(
+                    widths.lattice,
+                    pillars.radius_um(),
+                    wavelength_um,
+                    window,
+                    light.accuracy,
+                )?;
+                Ok(Psf::of(&fold.field(&pillars, &wave, scratch)?))
+            };
+            let psf = Psf::mean(tables.of(&wave).iter().map(&mut of).collect::<Result<_>>()?);
+            progress.advance(1);
+            Ok(psf)
+        })
+        .collect()
+}
+
+/// The PSF of each element as made.
+fn as_made(
+    elements: &[(&ElementSite, &WidthMap)],
+    chip: &MadeChip,
+    light: &Lighting,
+    wavelength_um: f64,
+    progress: &dyn Progress,
+) -> Result<Vec<Psf>> {
+    let wave = light.wave(wavelength_um);
+    let radius_um = |widths: &WidthMap| match light.aperture_radius_um {
+        Some(radius) => radius,
+        None => circle_um(widths),
+    };
+    let made = elements
+        .iter()
+        .map(|(_, widths)| chip.element(&DrawnElement::new(widths, radius_um(widths))))
+        .collect::<Result<Vec<_>>>()?;
+    let views = made
+        .iter()
+        .map(|element| chip.view(element, &wave, light.cells_as_lit, progress))
+        .collect::<Result<Vec<_>>>()?;
+    views
+        .par_iter()
+        .map_init(Scratch::default, |scratch, view| {
+            if progress.stopped() {
+                return Err(Error::Interrupted);
+            }
+            let psf = view.psf(light.window(view.element.lattice()), light.accuracy, scratch)?;
+            progress.advance(1);
+            Ok(psf)
+        })
+        .collect()
+}
+
+/// Radius of the circle about the element's centre that holds all of its pillars [um].
+fn circle_um(widths: &WidthMap) -> f64 {
+    let standing = widths.width_nm.indexed_iter().filter(|(_, w)| **w > 0);
+    let radius2 = standing.map(|((iy, ix), _)| widths.lattice.half_radius2(ix, iy)).max();
+    (radius2.unwrap_or(0) as f64).sqrt() * 0.5 * widths.lattice.pitch_um()
+}
+
+fn widest_nm(elements: &[(&ElementSite, &WidthMap)]) -> u16 {
+    let all = elements.iter().flat_map(|(_, w)| w.width_nm.iter().copied());
+    all.max().unwrap_or(0)
+}
+
+impl Lighting {
+    fn wave(&self, wavelength_um: f64) -> PlaneWave {
+        PlaneWave {
+            wavelength_um,
+            sin_x: self.incidence_sin[0],
+            sin_y: self.incidence_sin[1],
+        }
+    }
+
+    fn window(&self, lattice: Lattice) -> Window {
+        Window::about(self.at_um, lattice.pitch_um(), self.samples, self.distance_um)
+    }
+}
+
+/// Elements whose pillars differ from those of all before them.
+fn distinct(found: &Extraction) -> Vec<(&ElementSite, &WidthMap)> {
+    let mut kept: Vec<(&ElementSite, &WidthMap)> = Vec::new();
+    for element in &found.elements {
+        if kept.iter().all(|(_, widths)| **widths != element.widths) {
+            kept.push((&element.site, &element.widths));
+        }
+    }
+    kept
+}
+
+/// What is reported of the PSFs of one layout.
+pub struct SinglePsfReport<'a> {
+    /// Name of the layout file.
+    pub file: &'a str,
+    pub found: &'a Extraction,
+    pub psfs: &'a [SinglePsf],
+    /// Of the model that chips were made by, if any.
+    pub model: Option<&'a ModelStatement>,
+}
+
+/// Write `report.html`, `report.json` and each PSF as an NPY array (float64, rows along +y) into a folder.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> Result<()> {
+    let SinglePsfReport {
+        file,
+        found,
+        psfs,
+        model,
+    } = *report;
+    let elements = distinct(found);
+    let mut page = Page::new(
+        format!("PSFs of {file}"),
+        "a layout without a design, computed from its bytes",
+    );
+    page.facts(&[
+        ("Pillars", count(found.pillars)),
+        ("Elements", found.elements.len().to_string()),
+        ("of them distinct", elements.len().to_string()),
+        ("Other shapes on the pillar layer", count(found.oddities.total())),
+    ]);
+    if let Some(model) = model {
+        page.paragraph(format!(
+            "As made by the calibrated model of {}: {}.",
+            model.set, model.finding
+        ));
+        for quantity in &model.not_applied {
+            page.note(quantity.to_string());
+        }
+    }
+    let mut table = Table::new([
+        Column::text("Element"),
+        Column::number("Wavelength", "nm"),
+        Column::number("Strehl", ""),
+        Column::number("Energy in 1 pixel", "%"),
+        Column::number("in 2", "%"),
+        Column::number("Peak x", "um"),
+        Column::number("y", "um"),
+    ]);
+    let mut images = ImageGrid::new("PSFs", 4).values("|E|² / |E inc|²", "").log(4.0);
+    for (k, found) in psfs.iter().enumerate() {
+        let m = &found.measures;
+        table.row([
+            Cell::from(found.element.as_str()),
+            Cell::sig(found.wavelength_um * 1e3, 5),
+            Cell::sig(m.strehl, 3),
+            Cell::fixed(m.energy_1_pixel * 100.0, 2),
+            Cell::fixed(m.energy_2_pixels * 100.0, 2),
+            Cell::fixed(m.peak_um[0], 2),
+            Cell::fixed(m.peak_um[1], 2),
+        ]);
+        let nm = sig(found.wavelength_um * 1e3, 4);
+        images = images.pixel_um(found.psf.window.step_um);
+        images.image(format!("{}, {nm} nm", found.element), found.psf.values.clone());
+        write_npy(&folder.join(format!("psf_{k}_{nm}nm.npy")), &found.psf.values)?;
+    }
+    page.section("PSFs");
+    page.table(table);
+    page.figure(images.caption("The whole window, four decades."));
+    page.section("Pillars");
+    let zooms = elements.iter().take(4).map(|(site, widths)| {
+        PillarZoom::new(format!("Middle of {}", site.name), widths, (0.0, 0.0), 10.0).caption("As read, to scale.")
+    });
+    page.row(zooms);
+    write_json(
+        &folder.join("report.json"),
+        "psf",
+        &Numbers {
+            psfs,
+            oddities: &found.oddities,
+            model,
+        },
+    )?;
+    page.write(&folder.join("report.html"))
+}
+
+#[derive(Serialize)]
+struct Numbers<'a> {
+    psfs: &'a [SinglePsf],
+    oddities: &'a metalith_gds::extract::Oddities,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    model: Option<&'a ModelStatement>,
+}
+
+fn write_npy(path: &Path, values: &Array2<f64>) -> Result<()> {
+    let mut bytes = Vec::new();
+    let shape = [values.nrows() as u64, values.ncols() as u64];
+    let fill = |bytes: &mut Vec<u8>| -> std::io::Result<()> {
+        let mut npy = npyz::WriteOptions::new()
+            .default_dtype()
+            .shape(&shape)
+            .writer(bytes)
+            .begin_nd()?;
+        npy.extend(values.iter().copied())?;
+        npy.finish()
+    };
+    fill(&mut bytes).map_err(Error::io("encode", path))?;
+    let mut file = WholeFile::create(path)?;
+    file.write_all(&bytes).map_err(Error::io("write", path))?;
+    file.commit()
+}
