@@ -8,6 +8,7 @@ mod lattice;
 mod layer;
 mod plane;
 mod progress;
+pub mod srgb;
 mod wedge;
 
 pub use cross::cross_corners;
