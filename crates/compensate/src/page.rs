@@ -13,8 +13,8 @@ use metalith_design::array::PillarArray;
 use metalith_gds::extract::Extraction;
 use metalith_report::{Axis, Cell, Chart, Column, Figure, ImageGrid, Page, Table, count, sig, write_json};
 use metalith_verify::{Spot, read_back};
-use metalith_wave::image::{Matched, Psf, incident, landing_um};
-use metalith_wave::{Accuracy, Fold, PhaseFunction, Pillars, Propagator, Scratch, Window};
+use metalith_wave::propagation::{incident, landing_um};
+use metalith_wave::{Accuracy, Fold, Matched, PhaseFunction, Pillars, Propagator, Psf, Scratch, Window};
 
 /// Decades of a PSF that are shown.
 const DECADES: f64 = 4.0;

@@ -7,11 +7,11 @@ use num_complex::{Complex32, Complex64};
 use rayon::prelude::*;
 
 use super::focus::Lens;
+use super::image_error::Spectrum;
 use super::imaging::{Imaging, Rooms, Transfer};
 use super::mapping::Mapping;
 use super::pupil::Pupil;
 use super::views::{Views, window_offset_um};
-use super::image_error::Spectrum;
 use metalith_cell::CellModel;
 use metalith_core::{Error, Progress, Result};
 

@@ -16,7 +16,7 @@ use super::imaging::Transfer;
 /// # Errors
 /// If there are fewer than three wavelengths, or the window has an odd number of pixels or none.
 pub fn blurs_of_colours(transfers: &[Transfer], window: PixelWindow) -> Result<[Blur; 3]> {
-    let third = |colour: usize| {
+    let third = |colour: usize| -> Result<Blur> {
         let count = transfers.len();
         let some = &transfers[(2 - colour) * count / 3..(3 - colour) * count / 3];
         Ok(Blur::uniform(kernel_of_otf(&mean(some, window))?)?)

@@ -22,7 +22,7 @@ use metalith_design::{Design, Element};
 use metalith_gds::extract::{ElementSite, ExtractedElement, Extraction, ExtractionPlan, Oddities, Survey, extract};
 use metalith_gds::{self, Layout};
 use metalith_wave::Accuracy;
-use metalith_wave::image::Steepness;
+use metalith_wave::propagation::Steepness;
 
 pub use check::{Check, Sense};
 pub use lone::{Lighting, LonePsf, lone_psfs, write_lone_report};

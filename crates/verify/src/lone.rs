@@ -14,8 +14,9 @@ use metalith_cell::{CellModel, Fidelity};
 use metalith_core::{Error, Progress, Result, Silent, WholeFile, WidthMap};
 use metalith_gds::extract::{ElementSite, Extraction};
 use metalith_report::{Cell, Column, ImageGrid, Page, PillarZoom, Table, count, sig, write_json};
-use metalith_wave::image::{Matched, Psf, PsfMeasures};
-use metalith_wave::{Accuracy, Aperture, Fold, Pillars, PlaneWave, Propagator, Scratch, Window};
+use metalith_wave::{
+    Accuracy, Aperture, Fold, Matched, Pillars, PlaneWave, Propagator, Psf, PsfMetrics, Scratch, Window,
+};
 
 /// In what light, and where on the sensor.
 #[derive(Clone, Debug)]
@@ -45,7 +46,7 @@ pub struct LonePsf {
     pub wavelength_um: f64,
     pub fidelity: Fidelity,
     #[serde(flatten)]
-    pub measures: PsfMeasures,
+    pub measures: PsfMetrics,
     #[serde(skip)]
     pub psf: Psf,
 }
@@ -94,7 +95,7 @@ pub fn lone_psfs(
                     element: site.name.clone(),
                     wavelength_um,
                     fidelity: cell.fidelity(),
-                    measures: psf.measures(&matched, light.pixel_um),
+                    measures: psf.metrics(&matched, light.pixel_um),
                     psf,
                 })
             })

@@ -12,8 +12,10 @@ use metalith_core::{Lattice, WidthMap};
 use metalith_design::array::WidthRule;
 use metalith_design::phase::ElementPhase;
 use metalith_design::{CellIncidence, Design, Element, FieldAngle};
-use metalith_wave::image::{Matched, Psf, incident, landing_um};
-use metalith_wave::{Accuracy, Aperture, Fold, PhaseFunction, Pillars, PlaneWave, Propagator, Scratch, Window};
+use metalith_wave::propagation::{incident, landing_um};
+use metalith_wave::{
+    Accuracy, Aperture, Fold, Matched, PhaseFunction, Pillars, PlaneWave, Propagator, Psf, Scratch, Window,
+};
 
 /// One wavelength, with what all elements and angles share.
 struct Colour {
@@ -192,11 +194,8 @@ impl<'a> Bench<'a> {
 
 /// The wave that arrives at an element from one of its field angles.
 fn arriving(element: &Element, wavelength_um: f64, field: FieldAngle) -> Result<PlaneWave> {
-    incident(
-        &element.wedge,
-        wavelength_um,
-        [field.x_deg, field.y_deg].map(f64::to_radians),
-    )
+    let field_rad = [field.x_deg, field.y_deg].map(f64::to_radians);
+    Ok(incident(&element.wedge, wavelength_um, field_rad)?)
 }
 
 /// Widths that tables go to: no pillar is wider than the pitch.

@@ -7,7 +7,7 @@ use serde::Serialize;
 use metalith_cell::Fidelity;
 use metalith_design::array::WidthRule;
 use metalith_design::{Element, FieldAngle};
-use metalith_wave::image::{Matched, Psf, PsfMeasures, order_shares, pixel_mtf};
+use metalith_wave::psf::{Matched, Psf, PsfMetrics, order_shares, pixel_mtf};
 
 /// Greatest frequency of an MTF curve [line pairs a millimetre], and its points.
 const CURVE_END_LP_MM: f64 = 120.0;
@@ -19,7 +19,7 @@ const ORDER_SAMPLES: usize = 4096;
 #[derive(Clone, Debug, Serialize)]
 pub struct Spot {
     #[serde(flatten)]
-    pub measures: PsfMeasures,
+    pub measures: PsfMetrics,
     /// Line pairs a millimetre and MTF, pixel included, mean of x and y, for pictures.
     #[serde(skip)]
     pub mtf_curve: Vec<(f64, f64)>,
@@ -33,7 +33,7 @@ impl Spot {
         let [x, y] = [0, 1].map(|axis| psf.mtf_curve(axis, &frequencies));
         let mean = |k: usize| 0.5 * (x[k] + y[k]) * pixel_mtf(pixel_um, frequencies[k]);
         Self {
-            measures: psf.measures(matched, pixel_um),
+            measures: psf.metrics(matched, pixel_um),
             mtf_curve: frequencies.iter().enumerate().map(|(k, f)| (*f, mean(k))).collect(),
         }
     }

@@ -140,6 +140,8 @@ mod tests {
             last_nm: 288,
         };
         let text = metalith_core::Error::from(error).to_string();
-        assert!(text.contains("300 nm wide") && text.contains("ends at 288 nm") && text.contains("help: make the table"));
+        assert!(
+            text.contains("300 nm wide") && text.contains("ends at 288 nm") && text.contains("help: make the table")
+        );
     }
 }

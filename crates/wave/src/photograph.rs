@@ -109,6 +109,13 @@ mod tests {
     fn each_colour_has_its_blur() {
         let blurs = [perfect(), perfect()];
         let error = Photograph::take(&image(), &blurs, &expected(Noise::default()), 1).unwrap_err();
-        assert!(matches!(error, WaveError::Count { given: 2, needed: 3, .. }));
+        assert!(matches!(
+            error,
+            WaveError::Count {
+                given: 2,
+                needed: 3,
+                ..
+            }
+        ));
     }
 }

@@ -307,7 +307,14 @@ fn what_does_not_fit_together_is_refused() {
     let elsewhere = fold.field(&other, &wave, scratch);
     assert!(matches!(elsewhere, Err(WaveError::Lattice { .. })));
     let back = fold.adjoint(&Array2::zeros((8, 7)), &wave, scratch);
-    assert!(matches!(back, Err(WaveError::Shape { given: [8, 7], wanted: [8, 8], .. })));
+    assert!(matches!(
+        back,
+        Err(WaveError::Shape {
+            given: [8, 7],
+            wanted: [8, 8],
+            ..
+        })
+    ));
     let far = Window {
         distance_um: f64::NAN,
         ..window
@@ -365,7 +372,9 @@ fn a_pixel_sees_the_same_by_both_ways() {
         distance_um: 50.0,
     };
     let fold = Fold::plan(lens.lattice, 20.0, 0.55, window, Accuracy::Accurate).unwrap();
-    let field = fold.field(&lens, &PlaneWave::normal(0.55), &mut Scratch::default()).unwrap();
+    let field = fold
+        .field(&lens, &PlaneWave::normal(0.55), &mut Scratch::default())
+        .unwrap();
     let psf = Psf::of(&field);
     let (pixel_um, pixels, off_um) = (1.3, 7, [0.4, -0.2]);
     let energy = psf.on_pixels(off_um, pixel_um, pixels).unwrap();

@@ -1,11 +1,10 @@
 //! From the pillars of an element to the pixels of a camera, planned once and run many times.
 
-mod camera;
-mod cis;
-mod planes;
 mod spectrum;
 
-pub use camera::{Optic, PixelGrid, Reading};
-pub(super) use cis::cis;
-pub use planes::{Passed, Planes, Planned, Scratch};
+pub(super) use metalith_wave::camera::{Optic, PixelGrid, Reading};
+pub(super) use metalith_wave::kernels::cis;
+pub(super) use metalith_wave::propagation::{
+    Distances as Planes, DistancesPlan as Planned, DistancesScratch as Scratch, FillRow as Passed,
+};
 pub use spectrum::Quadrature;

@@ -151,7 +151,10 @@ mod tests {
                 let (sy, sx) = (y as i64 + 1 - ky as i64, x as i64 + 2 - kx as i64);
                 want += k * scene[[mirror(sy, 12), mirror(sx, 17)]];
             }
-            assert!((got - want).abs() < ROUNDING * kernel.sum(), "{y} {x}: {got} is not {want}");
+            assert!(
+                (got - want).abs() < ROUNDING * kernel.sum(),
+                "{y} {x}: {got} is not {want}"
+            );
         }
     }
 

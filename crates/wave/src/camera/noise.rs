@@ -62,7 +62,10 @@ mod tests {
         let n = 200 * 200;
         for (photon, signal) in [(4e-5, 0.5), (4e-5, 2e-4), (0.01, 0.3), (0.0, 0.3), (4e-5, 0.0)] {
             let noise = Noise { photon, read: 1e-5 };
-            let image = noise.expose(&Array2::from_elem((200, 200), signal), &mut ChaCha8Rng::seed_from_u64(7));
+            let image = noise.expose(
+                &Array2::from_elem((200, 200), signal),
+                &mut ChaCha8Rng::seed_from_u64(7),
+            );
             let mean = image.sum() / f64::from(n);
             let variance = image.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / f64::from(n);
             let want = noise.variance(signal);

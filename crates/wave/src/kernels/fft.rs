@@ -66,7 +66,14 @@ mod tests {
 
     #[test]
     fn sizes_are_the_next_smooth_number() {
-        for (n, size) in [(1, 8), (4096, 4096), (2435, 2500), (4097, 4320), (751, 768), (1161, 1200)] {
+        for (n, size) in [
+            (1, 8),
+            (4096, 4096),
+            (2435, 2500),
+            (4097, 4320),
+            (751, 768),
+            (1161, 1200),
+        ] {
             assert_eq!(fft_size(n), size);
         }
     }
@@ -76,7 +83,10 @@ mod tests {
         let period: Vec<Complex32> = (0..5).map(|i| Complex32::from(i as f32)).collect();
         let mut kept = vec![Complex32::ZERO; 7];
         gather(&mut kept, &period, -2);
-        assert_eq!(kept.iter().map(|v| v.re).collect::<Vec<_>>(), [3.0, 4.0, 0.0, 1.0, 2.0, 3.0, 4.0]);
+        assert_eq!(
+            kept.iter().map(|v| v.re).collect::<Vec<_>>(),
+            [3.0, 4.0, 0.0, 1.0, 2.0, 3.0, 4.0]
+        );
         let mut back = vec![Complex32::ZERO; 5];
         scatter(&mut back, &kept, -2);
         assert_eq!(back.iter().map(|v| v.re).collect::<Vec<_>>(), [0.0, 1.0, 2.0, 6.0, 8.0]);

@@ -24,7 +24,12 @@ mod tests {
         for (share, want) in [(-1.0, 1.0), (0.0, 1.0), (0.5, 0.5), (1.0, 0.0), (2.0, 0.0)] {
             assert!((raised_cosine(share) - want).abs() < ROUNDING);
         }
-        for (x, want) in [(0.0, 1.0), (0.5, std::f64::consts::FRAC_2_PI), (1.0, 0.0), (-1.5, -2.0 / 3.0 / std::f64::consts::PI)] {
+        for (x, want) in [
+            (0.0, 1.0),
+            (0.5, std::f64::consts::FRAC_2_PI),
+            (1.0, 0.0),
+            (-1.5, -2.0 / 3.0 / std::f64::consts::PI),
+        ] {
             assert!((sinc(x) - want).abs() < ROUNDING);
         }
     }

@@ -105,11 +105,7 @@ impl Band {
         window.check(wavelength_um)?;
         let [full_um, zero_um] = fade_um;
         if bins > MOST_BINS || bins == 0 || full_um.is_nan() || zero_um <= full_um {
-            return Err(WaveError::Fade {
-                bins,
-                full_um,
-                zero_um,
-            });
+            return Err(WaveError::Fade { bins, full_um, zero_um });
         }
         let period_um = bins as f64 * lattice.pitch_um();
         let z = window.distance_um;

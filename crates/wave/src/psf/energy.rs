@@ -53,8 +53,7 @@ impl Psf {
         let room = self.window.half_width_um() + 0.5 * self.window.step_um;
         // Pixels that end where the window does fit into it, however decimals were rounded.
         const ROUNDING: f64 = 1e-9;
-        let inside =
-            (0..2).all(|a| (centre_um[a] - self.window.centre_um[a]).abs() + reach <= room * (1.0 + ROUNDING));
+        let inside = (0..2).all(|a| (centre_um[a] - self.window.centre_um[a]).abs() + reach <= room * (1.0 + ROUNDING));
         if !(pixel_um > 0.0 && pixels > 0 && inside) {
             return Err(WaveError::Pixels {
                 pixels,

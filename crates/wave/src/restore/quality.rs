@@ -131,7 +131,10 @@ mod tests {
     #[test]
     fn what_cannot_be_compared_is_refused() {
         let (small, wide) = (Array2::zeros((10, 20)), Array2::zeros((20, 10)));
-        assert!(matches!(psnr_db(small.view(), wide.view()), Err(WaveError::Shape { .. })));
+        assert!(matches!(
+            psnr_db(small.view(), wide.view()),
+            Err(WaveError::Shape { .. })
+        ));
         assert!(matches!(
             ssim(small.view(), small.view()),
             Err(WaveError::SmallImage { least: 11, .. })

@@ -78,9 +78,7 @@ impl Restoration {
     /// at zero frequency the square of its mean.
     fn signal(&self, fourier: &Fourier) -> Array2<f64> {
         let f = |axis: usize, i: usize| fourier.frequency(axis, i) * self.longest_pixels;
-        let mut power = Array2::from_shape_fn(fourier.size(), |(y, x)| {
-            Scene::power(f(0, y).powi(2) + f(1, x).powi(2))
-        });
+        let mut power = Array2::from_shape_fn(fourier.size(), |(y, x)| Scene::power(f(0, y).powi(2) + f(1, x).powi(2)));
         power[[0, 0]] = 0.0;
         power *= self.scene.contrast.powi(2) / power.sum();
         power[[0, 0]] = self.scene.mean.powi(2);
@@ -173,7 +171,10 @@ mod tests {
         let mut shifted = Array2::zeros((5, 5));
         shifted[[2, 3]] = 1.0;
         let blur = Blur::uniform(shifted).unwrap();
-        let quiet = Noise { photon: 1e-12, read: 1e-8 };
+        let quiet = Noise {
+            photon: 1e-12,
+            read: 1e-8,
+        };
         let seen = blur.image(&scene);
         assert!((seen[[20, 31]] - scene[[20, 30]]).abs() < ROUNDING);
         let restored = restoration(quiet).restore(&seen, &blur);
