@@ -5,8 +5,8 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use metalith::array::WidthRule;
 use metalith::cell::PublishedCell;
 use metalith::optimise::{
-    Exchange, FabricationError, FieldProblem, Kind, Lens, Mapping, Objective, Pupil, Rings, Schedule, Start, StepLimit,
-    Window, wavelengths,
+    Exchange, FabricationError, FieldProblem, Kind, Lens, Mapping, Objective, PixelWindow, Pupil, Rings, Schedule,
+    Start, StepLimit, wavelengths,
 };
 use metalith::{CellModel, Design, Lattice};
 
@@ -42,7 +42,7 @@ fn optimise(c: &mut Criterion) {
         b.iter(|| problem.climb(&turns, 1, 0, &mut gradient));
     });
     group.bench_function("kernel of one view, 160 pixels", |b| {
-        let window = Window {
+        let window = PixelWindow {
             pixels: 160,
             pixel_um: 5.86,
         };

@@ -4,8 +4,7 @@ use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use std::f64::consts::TAU;
 use std::hint::black_box;
 
-use metalith::image::{Matched, Psf};
-use metalith::wave::{Fold, Pillars, PlaneWave, Propagator, Scratch, Window};
+use metalith::wave::{Fold, Matched, Pillars, PlaneWave, Propagator, Psf, Scratch, Window};
 use metalith::{Accuracy, Lattice, WidthMap};
 use num_complex::Complex64;
 
@@ -53,8 +52,8 @@ fn fields(c: &mut Criterion) {
             b.iter(|| black_box(fold.adjoint(&field.values, &wave, &mut scratch)).expect("an adjoint"));
         });
         let matched = Matched::of(&pillars, [0.0, 0.0, focal_um], 0.55, 1.0);
-        group.bench_function(BenchmarkId::new(name, "measures"), |b| {
-            b.iter(|| black_box(Psf::of(&field).measures(&matched, 5.86)));
+        group.bench_function(BenchmarkId::new(name, "metrics"), |b| {
+            b.iter(|| black_box(Psf::of(&field).metrics(&matched, 5.86)));
         });
     }
     group.finish();

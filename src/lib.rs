@@ -18,7 +18,8 @@
 //! | [`Layout`], [`extract()`] | [`gds`], [`mod@extract`] | the bytes of any GDSII file |
 //! | [`CellModel`] | [`cell`] | a pillar's width and a wavelength: published, fitted or rigorous |
 //! | [`Propagator`](wave::Propagator) | [`wave`] | transmissions on a lattice: folded, direct, by rings |
-//! | [`Psf`](image::Psf) | [`image`] | a field; and scenes through it, with noise, restored |
+//! | [`Psf`](wave::Psf) | [`wave::psf`] | a field |
+//! | [`Photograph`](wave::Photograph) | [`wave::camera`], [`wave::restore`] | a scene through PSFs, with noise, restored |
 //! | [`verify()`] | [`mod@verify`] | a design, its array and the bytes of a layout |
 //! | [`report`] | [`report`] | anything found: one HTML page and one JSON file |
 //!
@@ -91,7 +92,6 @@ pub use metalith_rcwa as rcwa;
 pub use metalith_report as report;
 pub use metalith_verify as verify;
 pub use metalith_wave as wave;
-pub use metalith_wave::image;
 
 pub use metalith_cell::{CellModel, Fidelity};
 pub use metalith_core::{Error, Fault, Faults, Lattice, Progress, Result, Silent, WholeFile, WidthMap, text};

@@ -6,10 +6,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::cell::{RigorousCell, cache_folder};
-use metalith::optimise::{Camera, Deconvolution, Start, StepLimit, Task, turns_of, views};
+use metalith::optimise::{Deconvolution, Start, StepLimit, Task, blurs_of_colours, turns_of, views};
 use metalith::phase::{Interpolation, RadialPhase};
+use metalith::wave::Photograph;
+use metalith::wave::restore::Restoration;
 use metalith::{CellModel, Design, Error, Fidelity, Result, cell_models};
 use ndarray::Array3;
+use rayon::prelude::*;
 
 use super::verify::FidelityArg;
 use super::{Outcome, Terminal, print_line};
@@ -17,8 +20,9 @@ use super::{Outcome, Terminal, print_line};
 /// Take photographs of images through a lens with each of several phases, restore them, and print how close
 /// they come, as a table in Markdown.
 ///
-/// At each field angle of [optimise.views]; blue, green and red are thirds of the band, lit evenly; noise as
-/// in the merit `deconvolution`; restored by the Wiener filter of each colour's mean blur.
+/// At each field angle of [optimise.views]; blue, green and red are thirds of the band, lit evenly; photons and
+/// reading make the noise that the merit `deconvolution` expects; scenes go on beyond their border as their mirror
+/// images; restored by the Wiener filter of each colour's mean blur.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  metalith photographs designs/imaging_3x3.toml images/*.png --phase log=designs/phases/broadband.csv"
@@ -59,7 +63,12 @@ pub fn run(args: &PhotographsArgs, terminal: &Terminal) -> Result<Outcome> {
         _ => cell_models(&design, &[fidelity])?.remove(0),
     };
     let between = views(&task.spec, &task.spec.views, 0.5);
-    let (window, scene) = (between.window, between.scene);
+    let window = between.window;
+    let expected = Restoration {
+        scene: between.scene,
+        noise: between.noise,
+        longest_pixels: window.pixels as f64,
+    };
     let memory = task.spec.memory_mb << 20;
     let lens = Deconvolution::new(
         &task.lens,
@@ -79,16 +88,17 @@ pub fn run(args: &PhotographsArgs, terminal: &Terminal) -> Result<Outcome> {
         let transfers = lens.transfers(&widths);
         let mut means = Vec::new();
         for at_angle in &transfers {
-            let camera = Camera::new(at_angle, window, scene);
+            let blurs = blurs_of_colours(at_angle, window)?;
             let found = images
-                .iter()
+                .par_iter()
                 .enumerate()
-                .map(|(i, image)| camera.photograph(image, i as u64).1)
-                .collect::<Vec<_>>();
-            let mean = |pick: fn(&metalith::optimise::Restored) -> f64| {
-                found.iter().map(pick).sum::<f64>() / found.len() as f64
-            };
-            means.push((mean(|f| f.psnr_db), mean(|f| f.ssim)));
+                .map(|(i, image)| {
+                    let photograph = Photograph::take(image, &blurs, &expected, i as u64)?;
+                    Ok((photograph.psnr_db, photograph.ssim))
+                })
+                .collect::<Result<Vec<_>>>()?;
+            let mean = |pick: fn(&(f64, f64)) -> f64| found.iter().map(pick).sum::<f64>() / found.len() as f64;
+            means.push((mean(|f| f.0), mean(|f| f.1)));
         }
         let list = |values: Vec<String>| values.join(" / ");
         let count = means.len() as f64;

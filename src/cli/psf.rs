@@ -231,10 +231,10 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             "{}, {} nm: Strehl {}, {} % in a pixel of 5.86 um, peak at ({}, {}) um",
             psf.element,
             sig(psf.wavelength_um * 1e3, 4),
-            sig(psf.measures.strehl, 3),
-            sig(psf.measures.energy_1_pixel * 100.0, 3),
-            sig(psf.measures.peak_um[0], 5),
-            sig(psf.measures.peak_um[1], 5),
+            sig(psf.metrics.strehl, 3),
+            sig(psf.metrics.energy_1_pixel * 100.0, 3),
+            sig(psf.metrics.peak_um[0], 5),
+            sig(psf.metrics.peak_um[1], 5),
         );
     }
     if let Some(folder) = &args.out {

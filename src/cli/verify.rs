@@ -129,9 +129,9 @@ fn summary(found: &Verification, folder: &Path) {
                 "element {}, {}: Strehl {} ({}), {} designed",
                 element.element.label(),
                 spot.place(),
-                sig(spot.judged().measures.strehl, 3),
+                sig(spot.judged().metrics.strehl, 3),
                 found.fidelity,
-                sig(spot.designed.measures.strehl, 3),
+                sig(spot.designed.metrics.strehl, 3),
             );
         }
     }

@@ -193,7 +193,7 @@ fn a_design_may_ask_for_cells_as_they_are_lit() {
         let found = verify(design, &array, &file, &cases, Accuracy::Fast, &Silent).unwrap();
         let spots = found.distinct.iter().flat_map(|d| &d.spots);
         spots
-            .map(|s| (s.incidence_sin == [0.0; 2], s.judged().measures.strehl))
+            .map(|s| (s.incidence_sin == [0.0; 2], s.judged().metrics.strehl))
             .collect()
     };
     let lit = strehls(&design);

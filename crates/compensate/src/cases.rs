@@ -10,8 +10,9 @@ use metalith_core::{Error, Progress, Result, WidthMap};
 use metalith_design::array::PillarArray;
 use metalith_design::{CellIncidence, Design, Element};
 use metalith_made::{DrawnElement, MadeChip, MadeElement};
-use metalith_verify::{PsfMetrics, read_back};
-use metalith_wave::image::{Matched, Psf, incident, landing_um};
+use metalith_verify::{PsfResult, read_back};
+use metalith_wave::propagation::{incident, landing_um};
+use metalith_wave::psf::{Matched, Psf};
 use metalith_wave::{Accuracy, PhaseFunction, Scratch, Window};
 
 /// Chips that are compared.
@@ -25,7 +26,7 @@ pub struct CompensationCase {
     /// `intended` as stated, `made, uncorrected` and `made, corrected`.
     pub pillars: &'static str,
     /// Metrics of the PSF.
-    pub spot: PsfMetrics,
+    pub spot: PsfResult,
     /// The PSF on the design's window about the chief ray.
     #[serde(skip)]
     pub psf: Psf,
@@ -106,7 +107,7 @@ fn of_element(
                 element: element.label(),
                 wavelength_um: um,
                 pillars,
-                spot: PsfMetrics::of(&psf, &matched, design.verify.pixel_um),
+                spot: PsfResult::of(&psf, &matched, design.verify.pixel_um),
                 psf,
             });
         }

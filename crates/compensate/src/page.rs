@@ -84,7 +84,7 @@ fn table(cases: &[CompensationCase]) -> Table {
         Column::number("85.3/mm", ""),
     ]);
     for case in cases {
-        let (m, [half, nyquist]) = (&case.spot.measures, case.spot.mtf());
+        let (m, [half, nyquist]) = (&case.spot.metrics, case.spot.mtf());
         table.row([
             Cell::from(case.element.as_str()),
             Cell::exact(case.wavelength_um * 1e3),

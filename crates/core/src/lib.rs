@@ -11,6 +11,7 @@ mod layer;
 pub mod npy;
 mod plane;
 mod progress;
+pub mod srgb;
 pub mod text;
 mod wedge;
 

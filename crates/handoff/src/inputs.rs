@@ -20,7 +20,7 @@ pub(super) fn keep(
     folder: &Path,
 ) -> Result<Vec<(String, &'static str)>> {
     let mut kept = Vec::new();
-    let mut put = |name: String, purpose: &'static str, bytes: &[u8]| {
+    let mut put = |name: String, purpose: &'static str, bytes: &[u8]| -> Result<()> {
         WholeFile::write(&folder.join(&name), bytes)?;
         kept.push((name, purpose));
         Ok::<_, Error>(())

@@ -7,7 +7,7 @@ use num_complex::Complex64;
 use rustfft::{Fft, FftPlanner};
 
 use super::CameraChange;
-use metalith_wave::image::Psf;
+use metalith_wave::Psf;
 
 impl CameraChange {
     /// Blur a PSF and spread the stray share of its light evenly over its window. The energy in the window stays.

@@ -11,7 +11,7 @@ use super::{
 };
 use metalith_cell::CellStack;
 use metalith_core::{Error, Progress, Result};
-use metalith_wave::image::Psf;
+use metalith_wave::Psf;
 use metalith_wave::{Accuracy, Fold, PlaneWave, Propagator, Scratch, Window};
 
 /// Chips of one line and bench, by its calibrated model.

@@ -9,7 +9,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{ArrivingLight, GeometryChange, NODE_STEP_NM, density, zernike};
 use metalith_core::{Error, Lattice, Result, WidthMap};
-use metalith_wave::{Aperture, cis};
+use metalith_wave::Aperture;
+use metalith_wave::kernels::cis;
 
 /// Biases by density that differ by less than this share a class [nm]. At most 0.05 nm are lost to it, which is
 /// 1.5 mrad of phase at the steepest (a turn over 200 nm): the error of a field is below 1e-6 of its power.

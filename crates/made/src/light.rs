@@ -4,7 +4,8 @@ use num_complex::Complex32;
 
 use super::PathChange;
 use metalith_core::Lattice;
-use metalith_wave::{PlaneWave, cis};
+use metalith_wave::PlaneWave;
+use metalith_wave::kernels::cis;
 
 /// A plane or spherical wave of unit amplitude on the axis of an element.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,11 +7,11 @@ use num_complex::{Complex32, Complex64};
 use rayon::prelude::*;
 
 use super::focus::Lens;
+use super::image_error::Spectrum;
 use super::imaging::{Imaging, Rooms, Transfer};
 use super::mapping::Mapping;
 use super::pupil::Pupil;
 use super::views::{Views, window_offset_um};
-use super::wiener::Spectrum;
 use metalith_cell::CellModel;
 use metalith_core::{Error, Progress, Result};
 
@@ -105,7 +105,7 @@ impl Deconvolution {
             .collect::<Result<Vec<Vec<_>>>>()?;
         Ok(Self {
             rings: lens.rings.len(),
-            spectrum: Spectrum::new(&views.scene, views.window),
+            spectrum: Spectrum::new(&views.scene, &views.noise, views.window),
             views,
             mapping,
             pupils,
@@ -211,7 +211,7 @@ pub(super) fn bracket(table: &[Complex64], width_nm: f64) -> (usize, f64) {
 #[cfg(test)]
 pub mod tests {
     use super::super::mapping::tests::published;
-    use super::super::{Rings, Start, Window};
+    use super::super::{PixelWindow, Rings, Start};
     use super::*;
     use metalith_cell::PublishedCell;
     use metalith_core::{Lattice, Silent};
@@ -223,7 +223,7 @@ pub mod tests {
             wavelengths_um: vec![0.45, 0.5, 0.6, 0.65],
             angles_rad: vec![0.0, 0.26],
             channels: 2,
-            window: Window {
+            window: PixelWindow {
                 pixels: 20,
                 pixel_um: 2.93,
             },

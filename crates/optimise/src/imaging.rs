@@ -6,13 +6,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 use num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
-use super::pupil::{Pupil, Window};
+use super::PixelWindow;
+use super::pupil::Pupil;
 
 /// Plans and place to work for one pupil. The field is even in y, so that columns stand for themselves
 /// and their mirror images.
 pub struct Imaging<'p> {
     pupil: &'p Pupil,
-    window: Window,
+    window: PixelWindow,
     forward: Arc<dyn Fft<f32>>,
     inverse: Arc<dyn Fft<f32>>,
     scratch: Vec<Complex32>,
@@ -49,7 +50,7 @@ impl Rooms {
 pub type Transfer = Vec<Complex32>;
 
 impl<'p> Imaging<'p> {
-    pub fn new(pupil: &'p Pupil, window: Window, mut room: Room) -> Self {
+    pub fn new(pupil: &'p Pupil, window: PixelWindow, mut room: Room) -> Self {
         // Both are written in full before they are read.
         room.rows.resize(pupil.cells.1 * pupil.size, Complex32::default());
         room.field
@@ -259,7 +260,7 @@ mod tests {
     use super::*;
     use metalith_core::Lattice;
 
-    const WINDOW: Window = Window {
+    const WINDOW: PixelWindow = PixelWindow {
         pixels: 24,
         pixel_um: 2.5,
     };

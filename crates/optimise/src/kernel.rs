@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
-use super::bessel::Bessel;
 use super::rings::Rings;
+use metalith_wave::kernels::Bessel;
 
 /// Field of the rings of one lens in air, at one wavelength and distance, for a unit wave along the axis.
 ///

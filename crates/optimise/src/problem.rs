@@ -3,19 +3,20 @@
 use num_complex::Complex32;
 use rayon::prelude::*;
 
-use super::bessel::Bessel;
+use super::PixelWindow;
 use super::deconvolution::Deconvolution;
 use super::field::{Condition, FieldProblem, Kind, Row};
 use super::focus::{FabricationError, Lens, wavelengths};
 use super::kernel::RingField;
 use super::mapping::Mapping;
-use super::pupil::Window;
 use super::robust;
 use super::views::Views;
-use super::wiener::Scene;
 use metalith_cell::CellModel;
 use metalith_core::{Progress, Result};
 use metalith_design::{MeritSpec, OptimiseSpec, ViewSpec};
+use metalith_wave::camera::Noise;
+use metalith_wave::kernels::Bessel;
+use metalith_wave::restore::Scene;
 
 /// Radii at which side lobes are sampled, out to four times the radius where they begin.
 const SIDE_LOBE_POINTS: usize = 48;
@@ -124,13 +125,14 @@ pub fn views(spec: &OptimiseSpec, views: &ViewSpec, shift: f64) -> Views {
         wavelengths_um: wavelengths(first, last, step_nm),
         angles_rad: views.angles_deg.iter().map(|a| a.to_radians()).collect(),
         channels: 3,
-        window: Window {
+        window: PixelWindow {
             pixels: views.pixels,
             pixel_um: views.pixel_um,
         },
         shared_filter: views.shared_filter,
         drawn: views.drawn,
         scene: Scene::default(),
+        noise: Noise::default(),
     }
 }
 

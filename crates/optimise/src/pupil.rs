@@ -15,9 +15,11 @@ use std::f64::consts::{PI, TAU};
 
 use num_complex::{Complex32, Complex64};
 
+use super::PixelWindow;
 use super::focus::Lens;
 use super::rings::ring_of;
 use metalith_core::{Error, Result};
+use metalith_wave::kernels::{fft_size, raised_cosine};
 
 /// Cells an axis that a site is spread over.
 const SPREAD: usize = 4;
@@ -29,22 +31,6 @@ pub const USED: f64 = 0.8;
 const SHAPE: f64 = 0.97 * PI * SPREAD as f64 * (1.0 - 0.5 * USED);
 /// Samples a cell of the tabulated spreading kernel.
 const SAMPLES: usize = 512;
-
-/// A square window on the sensor.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Window {
-    /// Pixels along a side, even.
-    pub pixels: usize,
-    /// Pixel pitch [um].
-    pub pixel_um: f64,
-}
-
-impl Window {
-    /// Side of the window [um].
-    pub fn side_um(&self) -> f64 {
-        self.pixels as f64 * self.pixel_um
-    }
-}
 
 /// What each ring of unit transmission puts into each cell of directions.
 ///
@@ -75,7 +61,7 @@ impl Pupil {
     ///
     /// # Errors
     /// If the transform would be larger than 8192 an axis.
-    pub fn new(lens: &Lens, wavelength_um: f64, angle_rad: f64, window: Window, offset_um: f64) -> Result<Self> {
+    pub fn new(lens: &Lens, wavelength_um: f64, angle_rad: f64, window: PixelWindow, offset_um: f64) -> Result<Self> {
         let mut geometry = Geometry::new(lens, wavelength_um, angle_rad, window, offset_um);
         let (low, high, top) = geometry.extent();
         let half = SPREAD as i32 / 2;
@@ -83,7 +69,7 @@ impl Pupil {
         let cells = ((last_x - first_x + 1) as usize, (top.ceil() as i32 + half + 1) as usize);
         // Intensities have twice the bandwidth; only frequencies up to the pixels' must be free of aliases.
         let needed = cells.0.max(2 * cells.1) + window.pixels / 2 + 1;
-        let size = smooth_even(needed);
+        let size = fft_size(needed);
         if size > 8192 {
             return Err(Error::invalid(
                 format!(
@@ -215,7 +201,7 @@ struct Site {
 }
 
 impl<'l> Geometry<'l> {
-    fn new(lens: &'l Lens, wavelength_um: f64, angle_rad: f64, window: Window, offset_um: f64) -> Self {
+    fn new(lens: &'l Lens, wavelength_um: f64, angle_rad: f64, window: PixelWindow, offset_um: f64) -> Self {
         let pitch2 = lens.rings.lattice().pitch_um().powi(2);
         Self {
             lens,
@@ -358,24 +344,8 @@ fn intensity_weights(size: usize) -> Vec<f32> {
                 .map(|z| spreading(z) * (TAU * z * x).cos())
                 .sum::<f64>()
                 * step;
-            let out = ((2.0 * x - FADE) / (USED - FADE)).clamp(0.0, 1.0);
-            (0.5 * (1.0 + (PI * out).cos()) / transform.powi(2)) as f32
+            let faded = raised_cosine((2.0 * x - FADE) / (USED - FADE));
+            (faded / transform.powi(2)) as f32
         })
         .collect()
-}
-
-/// The smallest even number from `least` on without prime factors above five.
-fn smooth_even(least: usize) -> usize {
-    let smooth = |mut n: usize| {
-        for p in [2, 3, 5] {
-            while n.is_multiple_of(p) {
-                n /= p;
-            }
-        }
-        n == 1
-    };
-    (least.next_multiple_of(2)..)
-        .step_by(2)
-        .find(|&n| smooth(n))
-        .expect("powers of two are smooth")
 }

@@ -4,13 +4,14 @@ use ndarray::Array2;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::bessel::Bessel;
+use super::PixelWindow;
 use super::focus::Lens;
 use super::imaging::{Imaging, Room};
 use super::kernel::RingField;
-use super::pupil::{Pupil, Window};
+use super::pupil::Pupil;
 use metalith_cell::CellModel;
 use metalith_core::Result;
+use metalith_wave::kernels::Bessel;
 
 /// One lens with each of several phases, over wavelength.
 pub struct OverWavelength<'a> {
@@ -63,7 +64,7 @@ impl OverWavelength<'_> {
     ///
     /// # Errors
     /// If the cell does not cover a wavelength.
-    pub fn mtf(&self, window: Window, wavelengths_um: &[f64]) -> Result<Vec<Vec<(f64, f64)>>> {
+    pub fn mtf(&self, window: PixelWindow, wavelengths_um: &[f64]) -> Result<Vec<Vec<(f64, f64)>>> {
         let at_wavelength = wavelengths_um
             .par_iter()
             .map(|&wavelength| {

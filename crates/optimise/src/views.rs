@@ -1,8 +1,10 @@
 //! What expected image errors are taken over: wavelengths, field angles, the window, the scene.
 
+use super::PixelWindow;
 use super::focus::Lens;
-use super::pupil::{USED, Window};
-use super::wiener::Scene;
+use super::pupil::USED;
+use metalith_wave::camera::Noise;
+use metalith_wave::restore::Scene;
 
 /// What the merit is taken over.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,14 +16,16 @@ pub struct Views {
     /// Colour channels: the wavelengths are split evenly among them.
     pub channels: usize,
     /// The window, larger than the blur by a quarter at least.
-    pub window: Window,
+    pub window: PixelWindow,
     /// Weight, 0 to 1, of the error if one filter must serve the blurs of all wavelengths of a channel, as in
     /// a camera it must (the regulariser of the paper); the rest is with a filter for each wavelength.
     pub shared_filter: f64,
     /// Wavelengths of each channel that a step of the optimiser draws.
     pub drawn: usize,
-    /// Scene and noise.
+    /// What is looked at.
     pub scene: Scene,
+    /// Noise of the sensor.
+    pub noise: Noise,
 }
 
 impl Default for Views {
@@ -31,13 +35,14 @@ impl Default for Views {
             wavelengths_um: super::wavelengths(400.0, 700.0, 10.0),
             angles_rad: [0.0f64, 15.0, 30.0].map(f64::to_radians).to_vec(),
             channels: 3,
-            window: Window {
+            window: PixelWindow {
                 pixels: 160,
                 pixel_um: 5.86,
             },
             shared_filter: 0.5,
             drawn: 3,
             scene: Scene::default(),
+            noise: Noise::default(),
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Colours: series that colour-blind readers can tell apart, and maps of equal perceived steps.
 
+use metalith_core::srgb::encoded;
+
 /// Number of series with a colour and dash of their own; further ones begin again.
 pub const SERIES: usize = 7;
 
@@ -40,7 +42,7 @@ fn from_oklch(lightness: f64, chroma: f64, hue: f64) -> [u8; 3] {
     loop {
         let linear = oklab_to_linear(lightness, chroma * hue.cos(), chroma * hue.sin());
         if chroma < 1e-3 || linear.iter().all(|&c| (-1e-3..=1.001).contains(&c)) {
-            return linear.map(|c| (255.0 * srgb(c.clamp(0.0, 1.0))).round() as u8);
+            return linear.map(|c| (255.0 * encoded(c)).round() as u8);
         }
         chroma *= 0.97;
     }
@@ -55,14 +57,6 @@ fn oklab_to_linear(lightness: f64, a: f64, b: f64) -> [f64; 3] {
         -1.268_438_004_6 * l + 2.609_757_401_1 * m - 0.341_319_396_5 * s,
         -0.004_196_086_3 * l - 0.703_418_614_7 * m + 1.707_614_701_0 * s,
     ]
-}
-
-fn srgb(linear: f64) -> f64 {
-    if linear <= 0.003_130_8 {
-        12.92 * linear
-    } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
-    }
 }
 
 #[cfg(test)]

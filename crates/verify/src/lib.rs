@@ -23,14 +23,14 @@ use metalith_design::{Design, Element};
 use metalith_gds::extract::{ElementSite, ExtractedElement, Extraction, ExtractionPlan, Oddities, Survey, extract};
 use metalith_gds::{self, Layout};
 use metalith_made::{MadeChip, ModelStatement};
-use metalith_wave::image::Steepness;
+use metalith_wave::propagation::Steepness;
 use metalith_wave::{Accuracy, PlaneWave};
 
 pub use case::{SimulationCase, SimulationCases};
 pub use check::{Check, Sense};
 pub use page::write_report;
 pub use phase::{PhaseError, PhaseErrors};
-pub use psf_metrics::{Orders, PsfImages, PsfMetrics, PsfPair};
+pub use psf_metrics::{Orders, PsfImages, PsfPair, PsfResult};
 pub use single::{Lighting, SinglePsf, SinglePsfReport, single_psfs, write_single_psf_report};
 pub use widths::WidthCheck;
 

@@ -5,7 +5,7 @@ use num_complex::{Complex32, Complex64};
 use rayon::prelude::*;
 
 use super::case::{SimulationCase, SimulationCases, TransmissionTables};
-use super::psf_metrics::{Orders, PsfImages, PsfMetrics, PsfPair};
+use super::psf_metrics::{Orders, PsfImages, PsfPair, PsfResult};
 use metalith_cell::Fidelity;
 use metalith_core::Progress;
 use metalith_core::{Error, Result};
@@ -14,8 +14,10 @@ use metalith_design::array::WidthRule;
 use metalith_design::phase::ElementPhase;
 use metalith_design::{CellIncidence, Design, Element, FieldAngle};
 use metalith_made::{DrawnElement, MadeChip, MadeElement, MadeView};
-use metalith_wave::image::{Matched, Psf, incident, landing_um};
-use metalith_wave::{Accuracy, Aperture, Fold, PhaseFunction, Pillars, PlaneWave, Propagator, Scratch, Window};
+use metalith_wave::propagation::{incident, landing_um};
+use metalith_wave::{
+    Accuracy, Aperture, Fold, Matched, PhaseFunction, Pillars, PlaneWave, Propagator, Psf, Scratch, Window,
+};
 
 /// One wavelength, with what all elements and angles share.
 struct Colour {
@@ -258,7 +260,7 @@ impl<'a> ElementSimulator<'a> {
                 (None, None) => unreachable!("a case is a cell or a made chip"),
             };
             let matched = scaled(&colour.perfect, at.full);
-            extracted.push((at.fidelity, PsfMetrics::of(&found, &matched, spec.pixel_um)));
+            extracted.push((at.fidelity, PsfResult::of(&found, &matched, spec.pixel_um)));
             judged.get_or_insert(found);
         }
         let judged = judged.expect("the case that judges is the first");
@@ -276,7 +278,7 @@ impl<'a> ElementSimulator<'a> {
             chief_ray_um: chief,
             relabelled: fold.fade().relabelled,
             psf_difference: judged.shape_difference(&designed)?,
-            designed: PsfMetrics::of(&designed, &colour.perfect, spec.pixel_um),
+            designed: PsfResult::of(&designed, &colour.perfect, spec.pixel_um),
             extracted,
             images,
         })
@@ -312,11 +314,8 @@ fn by_drawn_width(
 
 /// The wave that arrives at an element from one of its field angles.
 fn arriving(element: &Element, wavelength_um: f64, field: FieldAngle) -> Result<PlaneWave> {
-    incident(
-        &element.wedge,
-        wavelength_um,
-        [field.x_deg, field.y_deg].map(f64::to_radians),
-    )
+    let field_rad = [field.x_deg, field.y_deg].map(f64::to_radians);
+    Ok(incident(&element.wedge, wavelength_um, field_rad)?)
 }
 
 /// Widths that tables go to: no pillar is wider than the pitch.

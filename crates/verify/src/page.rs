@@ -5,7 +5,7 @@ use std::path::Path;
 
 use ndarray::Array2;
 
-use super::{DistinctElement, PsfMetrics, Sense, Verification};
+use super::{DistinctElement, PsfResult, Sense, Verification};
 use metalith_core::Result;
 use metalith_design::array::PillarArray;
 use metalith_design::phase::{ElementPhase, LensPhase};
@@ -347,8 +347,8 @@ fn spot_table(element: &DistinctElement) -> Table {
         Column::number("PSF difference", ""),
     ]);
     for spot in &element.spots {
-        let mut row = |of: String, spot_of: &PsfMetrics, difference: Cell| {
-            let (m, [half, nyquist]) = (&spot_of.measures, spot_of.mtf());
+        let mut row = |of: String, spot_of: &PsfResult, difference: Cell| {
+            let (m, [half, nyquist]) = (&spot_of.metrics, spot_of.mtf());
             table.row([
                 Cell::from(spot.place()),
                 Cell::from(of),

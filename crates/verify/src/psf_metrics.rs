@@ -7,7 +7,7 @@ use serde::Serialize;
 use metalith_cell::Fidelity;
 use metalith_design::array::WidthRule;
 use metalith_design::{Element, FieldAngle};
-use metalith_wave::image::{Matched, Psf, PsfMeasures, order_shares, pixel_mtf};
+use metalith_wave::psf::{Matched, Psf, PsfMetrics, order_shares, pixel_mtf};
 
 /// Greatest frequency of an MTF curve [line pairs a millimetre], and its points.
 const CURVE_END_LP_MM: f64 = 120.0;
@@ -17,15 +17,15 @@ const ORDER_SAMPLES: usize = 4096;
 
 /// Metrics of one PSF on the sensor.
 #[derive(Clone, Debug, Serialize)]
-pub struct PsfMetrics {
+pub struct PsfResult {
     #[serde(flatten)]
-    pub measures: PsfMeasures,
+    pub metrics: PsfMetrics,
     /// Line pairs a millimetre and MTF, pixel included, mean of x and y, for pictures.
     #[serde(skip)]
     pub mtf_curve: Vec<(f64, f64)>,
 }
 
-impl PsfMetrics {
+impl PsfResult {
     pub fn of(psf: &Psf, matched: &Matched, pixel_um: f64) -> Self {
         let frequencies = (0..=CURVE_POINTS)
             .map(|k| CURVE_END_LP_MM * f64::from(k) / f64::from(CURVE_POINTS))
@@ -33,14 +33,14 @@ impl PsfMetrics {
         let [x, y] = [0, 1].map(|axis| psf.mtf_curve(axis, &frequencies));
         let mean = |k: usize| 0.5 * (x[k] + y[k]) * pixel_mtf(pixel_um, frequencies[k]);
         Self {
-            measures: psf.measures(matched, pixel_um),
+            metrics: psf.metrics(matched, pixel_um),
             mtf_curve: frequencies.iter().enumerate().map(|(k, f)| (*f, mean(k))).collect(),
         }
     }
 
     /// MTF with the pixel at 42.7 and at 85.3 line pairs a millimetre, mean of x and y.
     pub fn mtf(&self) -> [f64; 2] {
-        [self.measures.mtf_half_nyquist_pixel, self.measures.mtf_nyquist_pixel].map(|m| 0.5 * (m[0] + m[1]))
+        [self.metrics.mtf_half_nyquist_pixel, self.metrics.mtf_nyquist_pixel].map(|m| 0.5 * (m[0] + m[1]))
     }
 }
 
@@ -57,9 +57,9 @@ pub struct PsfPair {
     /// Frequency bins that had to be relabelled towards the mean ray.
     pub relabelled: u64,
     /// Of the unrounded design phase.
-    pub designed: PsfMetrics,
+    pub designed: PsfResult,
     /// Of the pillars that were read back, in each case; the first one judges.
-    pub extracted: Vec<(Fidelity, PsfMetrics)>,
+    pub extracted: Vec<(Fidelity, PsfResult)>,
     /// Rms difference of the judged PSF from the designed one, both of the same energy in the window, over the
     /// rms of the designed one.
     pub psf_difference: f64,
@@ -94,18 +94,18 @@ impl PsfPair {
     }
 
     /// The metrics of the case that judges.
-    pub fn judged(&self) -> &PsfMetrics {
+    pub fn judged(&self) -> &PsfResult {
         &self.extracted[0].1
     }
 
     /// Strehl of the layout over that of the design phase.
     pub fn strehl_ratio(&self) -> f64 {
-        self.judged().measures.strehl / self.designed.measures.strehl
+        self.judged().metrics.strehl / self.designed.metrics.strehl
     }
 
     /// Distance of the two centroids [um].
     pub fn centroid_shift_um(&self) -> f64 {
-        let (a, b) = (self.judged().measures.centroid_um, self.designed.measures.centroid_um);
+        let (a, b) = (self.judged().metrics.centroid_um, self.designed.metrics.centroid_um);
         (a[0] - b[0]).hypot(a[1] - b[1])
     }
 

@@ -15,7 +15,7 @@ use metalith_core::{Error, Lattice, Progress, Result, Silent, WholeFile, WidthMa
 use metalith_gds::extract::{ElementSite, Extraction};
 use metalith_made::{DrawnElement, MadeChip, ModelStatement};
 use metalith_report::{Cell, Column, ImageGrid, Page, PillarZoom, Table, count, sig, write_json};
-use metalith_wave::image::{Matched, Psf, PsfMeasures};
+use metalith_wave::psf::{Matched, Psf, PsfMetrics};
 use metalith_wave::{Accuracy, Aperture, Fold, Pillars, PlaneWave, Propagator, Scratch, Window};
 
 /// In what light, and where on the sensor.
@@ -49,7 +49,7 @@ pub struct SinglePsf {
     pub wavelength_um: f64,
     pub fidelity: Fidelity,
     #[serde(flatten)]
-    pub measures: PsfMeasures,
+    pub metrics: PsfMetrics,
     #[serde(skip)]
     pub psf: Psf,
 }
@@ -85,7 +85,7 @@ pub fn single_psfs(
                 element: site.name.clone(),
                 wavelength_um,
                 fidelity: case.fidelity(),
-                measures: psf.measures(&matched, light.pixel_um),
+                metrics: psf.metrics(&matched, light.pixel_um),
                 psf,
             });
         }
@@ -255,7 +255,7 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
     ]);
     let mut images = ImageGrid::new("PSFs", 4).values("|E|² / |E inc|²", "").log(4.0);
     for (k, found) in psfs.iter().enumerate() {
-        let m = &found.measures;
+        let m = &found.metrics;
         table.row([
             Cell::from(found.element.as_str()),
             Cell::sig(found.wavelength_um * 1e3, 5),

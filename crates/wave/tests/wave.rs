@@ -1,14 +1,17 @@
 //! The propagators against one another, against the sum over all pillars, and against reference fields.
 
 use metalith_core::{Lattice, WidthMap};
-use metalith_wave::image::{Matched, Psf};
+use metalith_wave::camera::{Optic, PixelGrid};
 use metalith_wave::{
-    Accuracy, Aperture, Direct, Fold, Hankel, PhaseFunction, Pillars, PlaneWave, Propagator, Scratch, Window,
+    Accuracy, Aperture, Direct, Fold, Hankel, Matched, PhaseFunction, Pillars, PlaneWave, Propagator, Psf, Scratch,
+    WaveError, Window,
 };
 use ndarray::Array2;
 use num_complex::{Complex32, Complex64};
 use std::f64::consts::TAU;
 
+/// Places of the reference are given to so many samples.
+const SAME_PLACE: f64 = 1e-6;
 /// What the accurate mode is asked for: a part in 1e5 of the largest field of the lens.
 const ACCURATE: f64 = 1e-5;
 /// What the fast mode is asked for.
@@ -98,7 +101,7 @@ fn worst(case: &[Reference], aperture: &dyn Aperture, accuracy: Accuracy, peak: 
         for (r, error) in case.iter().zip(&mut errors) {
             let place = [0, 1].map(|a| (r.point_um[a] - window.centre_um[a]) / step + 128.0);
             let index = place.map(f64::round);
-            if (0..2).all(|a| (place[a] - index[a]).abs() < 1e-6 && (0.0..257.0).contains(&index[a])) {
+            if (0..2).all(|a| (place[a] - index[a]).abs() < SAME_PLACE && (0.0..257.0).contains(&index[a])) {
                 let got = double(values[[index[1] as usize, index[0] as usize]]);
                 *error = error.max((got - r.field).norm() / peak);
             }
@@ -281,7 +284,9 @@ fn rings_agree_with_the_lattice_on_the_axis_and_near_it() {
     let back = rings.adjoint(&values, &rho).unwrap();
     let left: Complex64 = values.iter().zip(&field).map(|(v, f)| v.conj() * f).sum();
     let right: Complex64 = back.iter().zip(&transmission).map(|(b, t)| b.conj() * t).sum();
-    assert!((left - right).norm() < 1e-12 * left.norm());
+    // Sums over a few hundred products in double precision.
+    const DOUBLE: f64 = 1e-12;
+    assert!((left - right).norm() < DOUBLE * left.norm());
 }
 
 #[test]
@@ -290,25 +295,34 @@ fn what_does_not_fit_together_is_refused() {
     let window = Window::about([0.0, 0.0], 0.5, 8, 50.0);
     let fold = Fold::plan(lens.lattice, 20.0, 0.55, window, Accuracy::Fast).unwrap();
     let scratch = &mut Scratch::default();
-    assert!(fold.field(&lens, &PlaneWave::normal(0.56), scratch).is_err());
+    let wave = PlaneWave::normal(0.55);
+    let blue = fold.field(&lens, &PlaneWave::normal(0.56), scratch);
+    assert!(matches!(blue, Err(WaveError::Wave { planned_um: 0.55, .. })));
     let other = PhaseFunction {
         lattice: Lattice::new(350, 114).unwrap(),
         radius_um: 20.0,
         amplitude: 1.0,
         phase_rad: |_: f64, _: f64| 0.0,
     };
-    assert!(fold.field(&other, &PlaneWave::normal(0.55), scratch).is_err());
-    assert!(
-        fold.adjoint(&Array2::zeros((8, 7)), &PlaneWave::normal(0.55), scratch)
-            .is_err()
-    );
+    let elsewhere = fold.field(&other, &wave, scratch);
+    assert!(matches!(elsewhere, Err(WaveError::Lattice { .. })));
+    let back = fold.adjoint(&Array2::zeros((8, 7)), &wave, scratch);
+    assert!(matches!(
+        back,
+        Err(WaveError::Shape {
+            given: [8, 7],
+            wanted: [8, 8],
+            ..
+        })
+    ));
     let far = Window {
         distance_um: f64::NAN,
         ..window
     };
-    assert!(Fold::plan(lens.lattice, 20.0, 0.55, far, Accuracy::Fast).is_err());
+    let plan = |window| Fold::plan(lens.lattice, 20.0, 0.55, window, Accuracy::Fast).err();
+    assert!(matches!(plan(far), Some(WaveError::Window { .. })));
     let wide = Window { step_um: 1e6, ..window };
-    assert!(Fold::plan(lens.lattice, 20.0, 0.55, wide, Accuracy::Fast).is_err());
+    assert!(matches!(plan(wide), Some(WaveError::Fade { .. })));
 }
 
 #[test]
@@ -326,10 +340,11 @@ fn a_perfect_lens_has_the_image_of_theory() {
         .unwrap();
     let psf = Psf::of(&field);
     let matched = Matched::of(&lens, [0.0, 0.0, 336.0], 0.53, 1.2);
-    let measures = psf.measures(&matched, 5.86);
+    let metrics = psf.metrics(&matched, 5.86);
     // All sites in phase: the accuracy of the fold, twice for the square.
-    assert!((measures.strehl - 1.0).abs() < 2.0 * ACCURATE);
-    assert!(measures.peak_um.iter().all(|p| p.abs() < 1e-9));
+    assert!((metrics.strehl - 1.0).abs() < 2.0 * ACCURATE);
+    const ROUNDING_UM: f64 = 1e-9;
+    assert!(metrics.peak_um.iter().all(|p| p.abs() < ROUNDING_UM));
     // A rim of the circle on the lattice and rays at 12 degrees are what the paraxial closed form leaves out; light
     // outside the window, 1 / (pi^2 NA w / lambda), is what the window leaves out of its zero frequency.
     const PARAXIAL: f64 = 5e-3;
@@ -340,6 +355,39 @@ fn a_perfect_lens_has_the_image_of_theory() {
         let got = psf.mtf([f, 0.0]);
         assert!((got - theory).abs() < PARAXIAL, "{got} is not {theory}");
     }
-    assert!(measures.energy_window > 0.99 && measures.energy_window < 1.0);
-    assert!(measures.energy_1_pixel < measures.energy_2_pixels && measures.energy_2_pixels < measures.energy_window);
+    assert!(metrics.energy_window > 0.99 && metrics.energy_window < 1.0);
+    assert!(metrics.energy_1_pixel < metrics.energy_2_pixels && metrics.energy_2_pixels < metrics.energy_window);
+}
+
+/// A pixel is one thing: the PSF integrated over pixels, and its spectrum read behind their aperture.
+#[test]
+fn a_pixel_sees_the_same_by_both_ways() {
+    // Single precision, and what the fade of the surroundings takes, of the brightest pixel.
+    const SAME_PIXELS: f64 = 1e-5;
+    let lens = small(0.0);
+    let window = Window {
+        centre_um: [0.0, 0.0],
+        step_um: 0.25,
+        samples: 96,
+        distance_um: 50.0,
+    };
+    let fold = Fold::plan(lens.lattice, 20.0, 0.55, window, Accuracy::Accurate).unwrap();
+    let field = fold
+        .field(&lens, &PlaneWave::normal(0.55), &mut Scratch::default())
+        .unwrap();
+    let psf = Psf::of(&field);
+    let (pixel_um, pixels, off_um) = (1.3, 7, [0.4, -0.2]);
+    let energy = psf.on_pixels(off_um, pixel_um, pixels).unwrap();
+    let optic = Optic {
+        pixel_um,
+        disc_um: [[0.0; 2]; 2],
+        blur_um: 0.0,
+    };
+    let samples: Vec<f32> = psf.values.iter().map(|v| *v as f32).collect();
+    let mean = PixelGrid::new(&samples, window.step_um, &optic, pixels, pixels).pixels(off_um);
+    let brightest = energy.iter().copied().fold(0.0, f64::max);
+    for (e, m) in energy.iter().zip(&mean) {
+        let error = (e - f64::from(*m) * pixel_um * pixel_um).abs() / brightest;
+        assert!(error < SAME_PIXELS, "{error:.1e}");
+    }
 }

@@ -1,10 +1,9 @@
 //! From the pillars of an element to the pixels of a camera, planned once and run many times.
 
-mod camera;
-mod cis;
-mod planes;
 mod spectrum;
 
-pub use camera::{Optic, PixelGrid, Reading};
-pub use planes::{Passed, Planes, Planned, Scratch};
+pub use metalith_wave::camera::{Optic, PixelGrid, Reading};
+pub use metalith_wave::propagation::{
+    Distances as Planes, DistancesPlan as Planned, DistancesScratch as Scratch, FillRow as Passed,
+};
 pub use spectrum::Quadrature;

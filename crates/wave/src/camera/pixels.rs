@@ -1,0 +1,253 @@
+//! From intensity on fine samples to the pixels of a camera.
+//!
+//! Intensity is band-limited, so all of this happens on its spectrum and is exact; the samples that stand
+//! around the window are faded out towards their border, which keeps its far side from coming in.
+
+use metalith_core::part;
+use ndarray::{Array2, ArrayView2};
+use num_complex::Complex32;
+use rustfft::FftPlanner;
+
+use super::Optic;
+use crate::kernels::{cis, raised_cosine};
+
+/// The intensity around one window, as a spectrum.
+#[derive(Clone, Debug)]
+pub struct PixelGrid {
+    /// Bins that hold light, shape `[my, 2 mx + 1]`: ky from zero, kx from -mx to mx.
+    re: Array2<f32>,
+    im: Array2<f32>,
+    /// Width of a bin [1/um].
+    cycle: f64,
+    /// From the first sample to the middle of the window [um].
+    middle_um: f64,
+    shape: [usize; 2],
+    pixel_um: f64,
+}
+
+/// Bins below this share of the mean are left out: together they are below any noise.
+const EMPTY: f32 = 1e-6;
+
+/// Share of the samples on each side over which the surroundings are faded out.
+const FADED: f64 = 0.06;
+
+impl PixelGrid {
+    /// The spectrum of `intensity` (a square of samples `step_um` apart) behind `optic`, to be read on
+    /// `rows` x `cols` pixels about its middle.
+    pub fn new(intensity: &[f32], step_um: f64, optic: &Optic, rows: usize, cols: usize) -> Self {
+        let n = (intensity.len() as f64).sqrt().round() as usize;
+        let ramp = ((FADED * n as f64) as usize).max(2);
+        let border: f32 = {
+            let ends = (0..n).flat_map(|i| [i, (n - 1) * n + i, i * n, i * n + n - 1]);
+            ends.map(|i| intensity[i]).sum::<f32>() / (4 * n) as f32
+        };
+        let fade: Vec<f32> = (0..n)
+            .map(|i| {
+                let depth = (i.min(n - 1 - i) as f64 + 0.5) / ramp as f64;
+                raised_cosine(1.0 - depth) as f32
+            })
+            .collect();
+        let mut planner = FftPlanner::<f32>::new();
+        let fft = planner.plan_fft_forward(n);
+        let mut rows_of: Vec<Complex32> = intensity
+            .iter()
+            .enumerate()
+            .map(|(i, v)| Complex32::new(border + (v - border) * fade[i / n] * fade[i % n], 0.0))
+            .collect();
+        fft.process(&mut rows_of);
+        let mut columns = vec![Complex32::ZERO; n * n];
+        for y in 0..n {
+            for x in 0..n {
+                columns[x * n + y] = rows_of[y * n + x];
+            }
+        }
+        fft.process(&mut columns);
+        let half = n / 2;
+        let cycle = 1.0 / (n as f64 * step_um);
+        let norm = 1.0 / (n * n) as f64;
+        let bin = |kx: i64, ky: usize| {
+            let weight = if ky == 0 { norm } else { 2.0 * norm };
+            let factor = optic.transfer(kx as f64 * cycle, ky as f64 * cycle) * weight;
+            columns[kx.rem_euclid(n as i64) as usize * n + ky] * factor as f32
+        };
+        let reach = half as i64 - 1;
+        let least = EMPTY * bin(0, 0).norm();
+        let (mut mx, mut my) = (1, 1);
+        let mut bins = Array2::from_elem((half, 2 * reach as usize + 1), Complex32::ZERO);
+        for ((ky, i), value) in bins.indexed_iter_mut() {
+            let kx = i as i64 - reach;
+            *value = bin(kx, ky);
+            if value.norm() > least {
+                (mx, my) = (mx.max(kx.abs()), my.max(ky + 1));
+            }
+        }
+        let kept = part(
+            bins.view(),
+            0..my as usize,
+            (reach - mx) as usize..(reach + mx + 1) as usize,
+        );
+        Self {
+            re: kept.mapv(|v| v.re),
+            im: kept.mapv(|v| v.im),
+            cycle,
+            middle_um: 0.5 * (n as f64 - 1.0) * step_um,
+            shape: [rows, cols],
+            pixel_um: optic.pixel_um,
+        }
+    }
+
+    /// The sum of grids, each with its factor. They must be of the same window.
+    pub fn combine(parts: &[(&Self, f32)]) -> Self {
+        let my = parts.iter().map(|(g, _)| g.re.nrows()).max().unwrap_or(0);
+        let mx = parts.iter().map(|(g, _)| g.re.ncols()).max().unwrap_or(0);
+        let (mut re, mut im) = (Array2::zeros((my, mx)), Array2::zeros((my, mx)));
+        for (grid, factor) in parts {
+            let (rows, cols) = grid.re.dim();
+            let from = (mx - cols) / 2;
+            part(re.view_mut(), 0..rows, from..from + cols).scaled_add(*factor, &grid.re);
+            part(im.view_mut(), 0..rows, from..from + cols).scaled_add(*factor, &grid.im);
+        }
+        Self {
+            re,
+            im,
+            ..*parts.first().expect("a sum has parts").0
+        }
+    }
+
+    /// The same seen from a window that is off by so much (x, y) [um].
+    pub fn moved(mut self, [x, y]: [f64; 2]) -> Self {
+        if x == 0.0 && y == 0.0 {
+            return self;
+        }
+        let middle = (self.re.ncols() / 2) as f64;
+        for ((ky, kx), re) in self.re.indexed_iter_mut() {
+            let im = &mut self.im[[ky, kx]];
+            let turned = Complex32::new(*re, *im) * cis(self.cycle * ((kx as f64 - middle) * x + ky as f64 * y));
+            (*re, *im) = (turned.re, turned.im);
+        }
+        self
+    }
+
+    /// Its derivative by the shift along x (0) or y (1) [1/um].
+    pub fn slope(&self, axis: usize) -> Self {
+        let middle = (self.re.ncols() / 2) as f32;
+        let omega = (std::f64::consts::TAU * self.cycle) as f32;
+        let at = |(ky, kx): (usize, usize)| omega * if axis == 0 { kx as f32 - middle } else { ky as f32 };
+        // A derivative turns each wave by a quarter.
+        let (mut re, mut im) = (self.im.clone(), self.re.clone());
+        re.indexed_iter_mut().for_each(|(i, v)| *v *= -at(i));
+        im.indexed_iter_mut().for_each(|(i, v)| *v *= at(i));
+        Self { re, im, ..*self }
+    }
+
+    /// What a blur changes, for a unit of its covariance between two axes [1/um^2].
+    pub fn blur(&self, [a, b]: [usize; 2]) -> Self {
+        let half = if a == b { 0.5 } else { 1.0 };
+        Self::combine(&[(&self.slope(a).slope(b), half)])
+    }
+
+    /// The pixels of a window whose middle is off by `shift_um` (x, y).
+    pub fn pixels(&self, shift_um: [f64; 2]) -> Array2<f32> {
+        Reading::new([self], shift_um).pixels(self)
+    }
+}
+
+/// How bins become the pixels of one window at one place: worked out once for all grids of the window.
+pub struct Reading {
+    /// Cosine and sine of each bin at each pixel along x, `[kx, col]`, and y, `[row, ky]`.
+    along_x: [Array2<f32>; 2],
+    along_y: [Array2<f32>; 2],
+}
+
+impl Reading {
+    /// For a window whose middle is off by `shift_um` (x, y), as wide in frequency as the widest of `grids`.
+    pub fn new<'g>(grids: impl IntoIterator<Item = &'g PixelGrid>, shift_um: [f64; 2]) -> Self {
+        let mut grids = grids.into_iter().peekable();
+        let first = *grids.peek().expect("there is something to read");
+        let [rows, cols] = first.shape;
+        let (half, n) = grids.fold((0, 0), |(a, b), g| (a.max(g.re.nrows()), b.max(g.re.ncols())));
+        let place = |i: usize, count: usize, shift: f64| {
+            (i as f64 - 0.5 * (count as f64 - 1.0)) * first.pixel_um + shift + first.middle_um
+        };
+        let x: Vec<f64> = (0..cols).map(|j| place(j, cols, shift_um[0]) * first.cycle).collect();
+        let y: Vec<f64> = (0..rows).map(|i| place(i, rows, shift_um[1]) * first.cycle).collect();
+        let turns = Array2::from_shape_fn((n, cols), |(k, j)| cis((k as f64 - (n / 2) as f64) * x[j]));
+        let along_x = [turns.mapv(|v| v.re), turns.mapv(|v| v.im)];
+        let turns = Array2::from_shape_fn((rows, half), |(i, k)| cis(k as f64 * y[i]));
+        let along_y = [turns.mapv(|v| v.re), turns.mapv(|v| v.im)];
+        Self { along_x, along_y }
+    }
+
+    /// The pixels.
+    pub fn pixels(&self, grid: &PixelGrid) -> Array2<f32> {
+        self.read(grid.re.view(), grid.im.view())
+    }
+
+    fn read(&self, re: ArrayView2<'_, f32>, im: ArrayView2<'_, f32>) -> Array2<f32> {
+        let (half, n) = re.dim();
+        let from = (self.along_x[0].nrows() - n) / 2;
+        let [cx, sx] = [0, 1].map(|i| part(self.along_x[i].view(), from..from + n, 0..self.along_x[i].ncols()));
+        let [cy, sy] = [0, 1].map(|i| part(self.along_y[i].view(), 0..self.along_y[i].nrows(), 0..half));
+        let real = re.dot(&cx) - im.dot(&sx);
+        let imaginary = re.dot(&sx) + im.dot(&cx);
+        cy.dot(&real) - sy.dot(&imaginary)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_of_a_gaussian_are_those_of_its_integral() {
+        let (n, step, sigma) = (96, 0.5, 1.3);
+        let at = |i: usize| (i as f64 - 47.5) * step;
+        let gauss = |s: f64, x: f64, y: f64| (-(x * x + y * y) / (2.0 * s * s)).exp();
+        let samples: Vec<f32> = (0..n * n).map(|i| gauss(sigma, at(i % n), at(i / n)) as f32).collect();
+        let optic = Optic {
+            pixel_um: 0.7,
+            disc_um: [[0.0; 2]; 2],
+            blur_um: 0.4,
+        };
+        let grid = PixelGrid::new(&samples, step, &optic, 40, 32);
+        let shift = [0.23, -0.61];
+        let pixels = grid.pixels(shift);
+        // A blurred Gaussian is one of the summed variance; over a pixel by a fine midpoint rule.
+        let total: f64 = sigma * sigma + 0.16;
+        for (row, col) in [(20, 16), (17, 20), (25, 11)] {
+            let x = (col as f64 - 15.5) * 0.7 + shift[0];
+            let y = (row as f64 - 19.5) * 0.7 + shift[1];
+            let fine = (0..40 * 40).map(|k| {
+                let (a, b) = ((k % 40) as f64, (k / 40) as f64);
+                let off = |v: f64| ((v + 0.5) / 40.0 - 0.5) * 0.7;
+                gauss(total.sqrt(), x + off(a), y + off(b)) * sigma * sigma / total / 1600.0
+            });
+            let want: f64 = fine.sum();
+            assert!(
+                (f64::from(pixels[[row, col]]) - want).abs() < 2e-5,
+                "{} {want}",
+                pixels[[row, col]]
+            );
+        }
+        let h = 1e-2;
+        let slope = grid.slope(0).pixels(shift);
+        let numeric =
+            (&grid.pixels([shift[0] + h, shift[1]]) - &grid.pixels([shift[0] - h, shift[1]])) / (2.0 * h as f32);
+        assert!((&slope - &numeric).iter().all(|d| d.abs() < 1e-3));
+        let moved = grid.clone().moved([0.4, -0.2]).pixels([shift[0] - 0.4, shift[1] + 0.2]);
+        assert!((&moved - &pixels).iter().all(|d| d.abs() < 1e-5));
+        // A little more blur, as its term has it.
+        let blurred = PixelGrid::new(&samples, step, &Optic { blur_um: 0.41, ..optic }, 40, 32);
+        let variance = 0.41f32.powi(2) - 0.4f32.powi(2);
+        let both = PixelGrid::combine(&[
+            (&grid, 1.0),
+            (&grid.blur([0, 0]), variance),
+            (&grid.blur([1, 1]), variance),
+        ]);
+        assert!(
+            (&blurred.pixels(shift) - &both.pixels(shift))
+                .iter()
+                .all(|d| d.abs() < 1e-4)
+        );
+    }
+}

@@ -1,0 +1,153 @@
+//! What can go wrong on the way of light, as causes that a caller can match on.
+
+use metalith_core::Lattice;
+
+use crate::propagation::LandingGrid;
+use crate::{PlaneWave, Window};
+
+/// Result of every fallible operation of this crate.
+pub type Result<T, E = WaveError> = std::result::Result<T, E>;
+
+/// What went wrong. The text says what and where; [`WaveError::hint`] says what to do.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum WaveError {
+    /// A window without a size, place or distance.
+    #[error(
+        "no field can be had at {wavelength_um} um on {0} x {0} samples of {1} um about {2:?} um, {3} um away",
+        window.samples, window.step_um, window.centre_um, window.distance_um
+    )]
+    Window { wavelength_um: f64, window: Window },
+
+    /// A fade that does not end after it begins, or a period that no memory holds.
+    #[error("a fade from {full_um} to {zero_um} um and {bins} bins an axis")]
+    Fade { bins: usize, full_um: f64, zero_um: f64 },
+
+    /// A wave of another wavelength than the propagator's, or one that does not propagate.
+    #[error(
+        "a wave of {} um with sines {}, {} meets a propagator planned for {planned_um} um",
+        wave.wavelength_um, wave.sin_x, wave.sin_y
+    )]
+    Wave { wave: PlaneWave, planned_um: f64 },
+
+    /// An aperture on another lattice than the propagator's.
+    #[error("an aperture on {given:?}, planned for {planned:?}")]
+    Lattice { given: Lattice, planned: Lattice },
+
+    /// An array of another shape than it must have, or with rows that are not contiguous.
+    #[error("{what} of shape {given:?} where {wanted:?} is needed")]
+    Shape {
+        what: &'static str,
+        given: [usize; 2],
+        wanted: [usize; 2],
+    },
+
+    /// Another number of values than there are places for them.
+    #[error("{given} {what} where {needed} are needed")]
+    Count {
+        what: &'static str,
+        given: usize,
+        needed: usize,
+    },
+
+    /// A pillar wider than the table of what pillars transmit.
+    #[error("a pillar is {width_nm} nm wide, the table of the cell ends at {last_nm} nm")]
+    Width { width_nm: usize, last_nm: usize },
+
+    /// Rings without a radius or an area, or a wavelength or distance that is not positive.
+    #[error("{radii} radii and {areas} areas of rings")]
+    Rings { radii: usize, areas: usize },
+
+    /// A field angle from which no light arrives.
+    #[error("no light arrives from {field_rad:?} rad of an element that looks at sines {}, {}", looks_at[0], looks_at[1])]
+    Incidence { field_rad: [f64; 2], looks_at: [f64; 2] },
+
+    /// A direction behind the element that never meets the sensor.
+    #[error("light that leaves an element with sines {}, {} does not reach the sensor", sines[0], sines[1])]
+    Landing { sines: [f64; 2] },
+
+    /// Pixels that reach beyond the window that the PSF is known on.
+    #[error("{pixels} pixels of {pixel_um} um about {centre_um:?} um do not fit into the window")]
+    Pixels {
+        pixels: usize,
+        pixel_um: f64,
+        centre_um: [f64; 2],
+    },
+
+    /// Two PSFs on windows of different samples.
+    #[error("PSFs on windows of different samples cannot be compared")]
+    Samples,
+
+    /// Kernels of a blur that do not fit together.
+    #[error("{kernels} kernels, the first of {shape:?} pixels, for {grid:?} patches")]
+    Kernels {
+        kernels: usize,
+        shape: (usize, usize),
+        grid: [usize; 2],
+    },
+
+    /// A map of the sensor's plane without a size, or too large for memory.
+    #[error("a map of {0} x {0} squares of {1} um at {2} um", grid.cells, grid.cell_um, grid.distance_um)]
+    Map { grid: LandingGrid, most: usize },
+
+    /// An image smaller than what is to be measured of it.
+    #[error("an image of {rows} x {columns} pixels")]
+    SmallImage {
+        rows: usize,
+        columns: usize,
+        /// Pixels an axis that it must have.
+        least: usize,
+    },
+}
+
+impl WaveError {
+    /// What to do about it.
+    pub fn hint(&self) -> String {
+        match self {
+            Self::Window { .. } => {
+                "use a positive wavelength, step and distance, a finite place, and 1 to 8192 samples".into()
+            }
+            Self::Fade { .. } => "make the lens or the window smaller, or the fade wider".into(),
+            Self::Wave { .. } => "plan one propagator a wavelength, and keep the sine of the angle below one".into(),
+            Self::Lattice { .. } => "plan one propagator a lattice".into(),
+            Self::Shape { .. } => "give a contiguous array of that shape".into(),
+            Self::Count { .. } => "give one transmission a ring, and one value a point".into(),
+            Self::Width { .. } => "make the table up to the widest pillar of the layout".into(),
+            Self::Rings { .. } => {
+                "give one positive, finite area for each radius, and a positive wavelength and distance".into()
+            }
+            Self::Incidence { .. } => "keep the field angles of steered elements smaller".into(),
+            Self::Landing { .. } => "keep wedge and field angle smaller at the longest wavelength".into(),
+            Self::Pixels { .. } => "use fewer pixels, or form the PSF on a larger window".into(),
+            Self::Samples => "form both on the same number of samples and with the same step".into(),
+            Self::Kernels { .. } => {
+                "give one kernel for each patch, all of the same odd number of pixels and with energy in them".into()
+            }
+            Self::Map { most, .. } => format!("use positive lengths and at most {most} squares"),
+            Self::SmallImage { least, .. } => format!("give an image of at least {least} x {least} pixels"),
+        }
+    }
+}
+
+impl From<WaveError> for metalith_core::Error {
+    fn from(error: WaveError) -> Self {
+        Self::invalid(error.to_string(), error.hint())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn causes_become_text_with_a_remedy_at_the_border() {
+        let error = WaveError::Width {
+            width_nm: 300,
+            last_nm: 288,
+        };
+        let text = metalith_core::Error::from(error).to_string();
+        assert!(
+            text.contains("300 nm wide") && text.contains("ends at 288 nm") && text.contains("help: make the table")
+        );
+    }
+}

@@ -1,0 +1,24 @@
+//! What lies below every way that light takes here: each of these exists once.
+//!
+//! | file | holds |
+//! | --- | --- |
+//! | `cis` | exp(2 pi i x), good to 1.5e-7, and products of complex samples |
+//! | `fft` | the sizes of all transforms, and transforms of lines |
+//! | `fourier` | transforms of images, with the border rule |
+//! | `taper` | the raised cosine that ends every fade, and sinc |
+//! | `bessel` | J0, J1 and the transform of a disc |
+
+mod bessel;
+mod cis;
+mod fft;
+mod fourier;
+mod taper;
+
+pub use bessel::{Bessel, jinc};
+pub use cis::{CIS_ERROR, cis, cis_all};
+pub use fft::fft_size;
+pub use taper::{raised_cosine, sinc};
+
+pub(crate) use cis::{accumulate, multiply, multiply_conj, multiply_to};
+pub(crate) use fft::{gather, process, scatter};
+pub(crate) use fourier::Fourier;

@@ -1,0 +1,179 @@
+//! Which frequencies of an element count for a window, and how long a period keeps its images apart.
+
+use std::ops::Range;
+
+use metalith_core::Lattice;
+
+use super::Window;
+use crate::error::{Result, WaveError};
+use crate::kernels::fft_size;
+
+/// How true a folded field is asked to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Accuracy {
+    /// All light that can reach the window, and none that cannot: errors of 1e-6 of a matched peak, which
+    /// is single precision.
+    Accurate,
+    /// For sweeps and optimisers: a shorter period and a steeper fade, through which light of orders other than
+    /// the designed one comes back into the window: errors of 1e-3 of a matched peak.
+    Fast,
+}
+
+/// How a field was folded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fade {
+    /// Period of the transform on both axes [um].
+    pub period_um: f64,
+    /// Frequencies whose ray from the element's centre lands this near to the window's middle count in full [um].
+    pub full_um: f64,
+    /// Frequencies whose ray lands this far from the window's middle, or farther, do not count [um].
+    pub zero_um: f64,
+    /// Frequencies inside the fade that are not in the transform's own period, -1/2 to 1/2 a pitch, and had
+    /// to be relabelled by a multiple of 1 / pitch towards the rays that reach the window.
+    pub relabelled: u64,
+}
+
+/// Width of the fade in units of sqrt(wavelength * distance), the size that diffraction gives to a sharp edge.
+/// Measured over whole windows of lenses of 1 mm, 140 um and 60 um, steered, at 450 to 660 nm: errors of 1e-6 of
+/// the matched peak for 1 mm, 1e-5 for 60 um.
+const FADE_WIDTHS: f64 = 5.5;
+/// What a raised cosine lets through falls with the cube of its width and counts against the gain of the focus:
+/// below this gain the fade is made wider to match, at most twice.
+const FADE_GAIN: f64 = 100.0;
+/// How far beyond the last needed ray the fade begins, and how far before the first ray that would come back it
+/// ends, in the same unit.
+const FADE_MARGINS: [f64; 2] = [1.0, 0.5];
+/// In fast mode: width of the fade, in the same unit.
+const FAST_FADE_WIDTHS: f64 = 3.0;
+/// In fast mode: what a period is longer by than lens and window, in the same unit.
+const FAST_MARGIN: f64 = 1.5;
+/// Undiffracted light of an element is a disc of its size, 1 / gain of the focus; where that is less than this, its
+/// coming back into the window is within what fast mode may err by, and the period need not hold it.
+const FAST_STRAY: f64 = 2.5e-3;
+/// In fast mode, with a gain that allows it: period in units of lens radius and half the window.
+const FAST_PERIOD: f64 = 1.19;
+/// More bins an axis than any element of this program needs; beyond it memory is the fault that shows.
+const MOST_BINS: usize = 1 << 16;
+
+/// The frequency bins that count: `bins` an axis in a period, of which a disc (in landing points) is kept.
+pub(super) struct Band {
+    pub bins: usize,
+    /// First kept bin of each axis, counted from zero frequency; may be outside the transform's own period.
+    pub first: [i64; 2],
+    /// Number of kept bins of each axis.
+    pub count: [usize; 2],
+    /// Kept rows of each kept column, counted from `first`.
+    pub rows: Vec<Range<usize>>,
+    pub fade: Fade,
+}
+
+impl Band {
+    pub fn choose(
+        lattice: Lattice,
+        radius_um: f64,
+        wavelength_um: f64,
+        window: &Window,
+        accuracy: Accuracy,
+    ) -> Result<Self> {
+        let half = window.half_width_um();
+        let edge = edge_um(window, wavelength_um, radius_um + half);
+        let gain = std::f64::consts::PI * radius_um * radius_um / (wavelength_um * window.distance_um);
+        let (full, width) = match accuracy {
+            Accuracy::Accurate => {
+                let corner = half * std::f64::consts::SQRT_2;
+                let wider = (FADE_GAIN / gain).cbrt().clamp(1.0, 2.0);
+                (radius_um + corner + FADE_MARGINS[0] * edge, FADE_WIDTHS * wider * edge)
+            }
+            Accuracy::Fast => (radius_um + half, FAST_FADE_WIDTHS * edge),
+        };
+        let period = match accuracy {
+            Accuracy::Accurate => full + width + FADE_MARGINS[1] * edge + radius_um + half,
+            Accuracy::Fast if gain * FAST_STRAY > 1.0 => FAST_PERIOD * (radius_um + half),
+            Accuracy::Fast => 2.0 * (radius_um + half) + FAST_MARGIN * edge,
+        };
+        let bins = fft_size((period / lattice.pitch_um()).ceil() as usize);
+        let zero = match accuracy {
+            // What rounding the period up leaves makes the fade wider; it costs nothing.
+            Accuracy::Accurate => bins as f64 * lattice.pitch_um() - radius_um - half - FADE_MARGINS[1] * edge,
+            Accuracy::Fast => full + width,
+        };
+        Self::new(lattice, wavelength_um, window, bins, [full, zero])
+    }
+
+    /// With a period and a fade of one's own: `fade_um` is where it begins and where it ends.
+    pub fn new(lattice: Lattice, wavelength_um: f64, window: &Window, bins: usize, fade_um: [f64; 2]) -> Result<Self> {
+        window.check(wavelength_um)?;
+        let [full_um, zero_um] = fade_um;
+        if bins > MOST_BINS || bins == 0 || full_um.is_nan() || zero_um <= full_um {
+            return Err(WaveError::Fade { bins, full_um, zero_um });
+        }
+        let period_um = bins as f64 * lattice.pitch_um();
+        let z = window.distance_um;
+        // Bins per unit of sine; along the rim of the disc neighbouring samples are less than a bin apart.
+        let per_sine = period_um / wavelength_um;
+        let samples = (8.0 * std::f64::consts::PI * zero_um / z * per_sine).ceil() as usize + 64;
+        let rim: Vec<[i64; 2]> = (0..samples)
+            .map(|i| {
+                let (sin, cos) = (std::f64::consts::TAU * i as f64 / samples as f64).sin_cos();
+                let x = window.centre_um[0] + zero_um * cos;
+                let y = window.centre_um[1] + zero_um * sin;
+                let ray = (x * x + y * y + z * z).sqrt();
+                [x, y].map(|s| (s / ray * per_sine).floor() as i64)
+            })
+            .collect();
+        let lowest = [0, 1].map(|a| rim.iter().map(|b| b[a]).min().unwrap_or(0));
+        let highest = [0, 1].map(|a| rim.iter().map(|b| b[a]).max().unwrap_or(0) + 1);
+        let count = [0, 1].map(|a| (highest[a] - lowest[a] + 1) as usize);
+        let mut rows = vec![Range::<usize>::default(); count[0]];
+        for b in &rim {
+            let [column, row] = [0, 1].map(|a| (b[a] - lowest[a]) as usize);
+            for r in &mut rows[column..=column + 1] {
+                let start = if r.end == 0 { row } else { r.start.min(row) };
+                *r = start..r.end.max(row + 2);
+            }
+        }
+        let mut band = Self {
+            bins,
+            first: lowest,
+            count,
+            rows,
+            fade: Fade {
+                period_um,
+                full_um,
+                zero_um,
+                relabelled: 0,
+            },
+        };
+        band.fade.relabelled = band.relabelled();
+        Ok(band)
+    }
+
+    fn relabelled(&self) -> u64 {
+        let half = (self.bins / 2) as i64;
+        let own = |first: i64, range: &Range<usize>| {
+            let start = (first + range.start as i64).max(-half);
+            let end = (first + range.end as i64).min(self.bins as i64 - half);
+            (end - start).max(0) as u64
+        };
+        let mut moved = 0;
+        for (k, rows) in self.rows.iter().enumerate() {
+            let kept = if own(self.first[0], &(k..k + 1)) == 1 {
+                own(self.first[1], rows)
+            } else {
+                0
+            };
+            moved += rows.len() as u64 - kept;
+        }
+        moved
+    }
+}
+
+/// Size of the diffraction of a sharp edge along the steepest ray that is needed, which lands `reach_um` from the
+/// window's middle [um].
+fn edge_um(window: &Window, wavelength_um: f64, reach_um: f64) -> f64 {
+    let [x, y] = window.centre_um;
+    let z = window.distance_um;
+    let landing = x.hypot(y) + reach_um;
+    let cosine = z / landing.hypot(z);
+    (wavelength_um * z / cosine.powi(3)).sqrt()
+}

@@ -1,0 +1,249 @@
+//! Intensity in a window, at several distances and one wavelength.
+//!
+//! The element is transformed once, zeros around it up to a period; for each distance the frequencies whose
+//! rays land near the window are multiplied with the transfer function and transformed back onto samples of
+//! about a pixel. A ray is weighed by where it lands, falling smoothly to zero, so that what belongs elsewhere
+//! does not come back into the window as an alias. Intensity has twice the band of the field: the step is
+//! chosen to hold it.
+
+mod propagate;
+
+use std::sync::Arc;
+
+use metalith_core::Lattice;
+use num_complex::Complex32;
+use rustfft::{Fft, FftPlanner};
+
+use super::Fade;
+use super::transfer::FadedColumn;
+use crate::kernels::fft_size;
+
+/// Beyond what geometry needs, a period holds this for the fade [um]: with it, fields agree with the
+/// direct sum to 1e-4 of the peak; see the tests.
+const FADE_ROOM_UM: f64 = 70.0;
+
+/// The fade begins within this share of where it ends, however far the distances are apart.
+const LATEST_FADE: f64 = 0.9;
+
+/// Where intensity is wanted, for one element and one direction of light.
+#[derive(Clone, Copy, Debug)]
+pub struct Distances {
+    /// Where the samples of the element are.
+    pub lattice: Lattice,
+    /// Radius outside of which the element is opaque [um].
+    pub radius_um: f64,
+    /// Middle of the window from the element's axis [um].
+    pub centre_um: [f64; 2],
+    /// Half of the window's edge that must be right [um].
+    pub half_width_um: f64,
+    /// Largest step of the samples [um]; the step taken divides the period.
+    pub step_um: f64,
+}
+
+/// The transforms for [`Distances`], shared by all wavelengths and distances.
+pub struct DistancesPlan {
+    wanted: Distances,
+    /// Sites in a period.
+    sites: usize,
+    /// Samples in a period.
+    samples: usize,
+    /// Samples of the window along an axis.
+    window: usize,
+    period_um: f64,
+    forward: Arc<dyn Fft<f32>>,
+    inverse: Arc<dyn Fft<f32>>,
+}
+
+/// Working memory of a [`DistancesPlan`]: one a thread.
+#[derive(Default)]
+pub struct DistancesScratch {
+    row: Vec<Complex32>,
+    lines: Vec<Complex32>,
+    spectrum: Vec<Complex32>,
+    columns: Vec<Complex32>,
+    fft: Vec<Complex32>,
+    column: FadedColumn,
+    /// Transfer function to each distance, `[distance][kx][ky]`.
+    transfer: Vec<Complex32>,
+}
+
+/// Fills a row of the lattice with what leaves the element, the incident wave included; rows are asked for in
+/// order.
+pub type FillRow<'a> = dyn Fn(usize, &mut [Complex32]) + 'a;
+
+/// Frequencies that are kept, in whole cycles a period.
+#[derive(Clone, Copy)]
+struct Kept {
+    first: [i64; 2],
+    count: [usize; 2],
+}
+
+impl DistancesPlan {
+    /// Plan for a window; `margin` more samples are kept on each side of it.
+    pub fn new(wanted: Distances, margin: usize) -> Self {
+        // A period of whole steps must not gain one by rounding.
+        const ROUNDING: f64 = 1e-9;
+        let pitch = wanted.lattice.pitch_um();
+        let aperture_um = pitch * wanted.lattice.sites() as f64;
+        let least = (2.0 * (wanted.radius_um + wanted.half_width_um) + FADE_ROOM_UM).max(aperture_um);
+        let sites = fft_size((least / pitch).ceil() as usize);
+        let period_um = pitch * sites as f64;
+        let samples = fft_size((period_um / wanted.step_um - ROUNDING).ceil() as usize);
+        let step = period_um / samples as f64;
+        let inner = (2.0 * wanted.half_width_um / step).ceil() as usize + 2 * margin;
+        let mut planner = FftPlanner::new();
+        Self {
+            wanted,
+            sites,
+            samples,
+            window: (inner + inner % 2).min(samples),
+            period_um,
+            forward: planner.plan_fft_forward(sites),
+            inverse: planner.plan_fft_inverse(samples),
+        }
+    }
+
+    /// Samples of the window along an axis; sample `i` is at the middle plus (i - (n - 1) / 2) steps.
+    pub fn window(&self) -> usize {
+        self.window
+    }
+
+    /// Distance of the samples [um].
+    pub fn step_um(&self) -> f64 {
+        self.period_um / self.samples as f64
+    }
+
+    /// |field|^2 behind some elements at each of `distances_um`, for a wavelength [um]: the transfer function is
+    /// worked out once for all of them. Output, `[element][distance]`: one square of `window` x `window`.
+    pub fn intensities(
+        &self,
+        wavelength_um: f64,
+        distances_um: &[f64],
+        elements: &[&FillRow<'_>],
+        scratch: &mut DistancesScratch,
+        out: &mut [Vec<Vec<f32>>],
+    ) {
+        let kept = self.kept(wavelength_um, distances_um);
+        self.transfer(wavelength_um, distances_um, &kept, scratch);
+        for (fill_row, out) in elements.iter().zip(out) {
+            self.transform(&kept, fill_row, scratch);
+            self.propagate(distances_um.len(), &kept, scratch);
+            for (d, out) in out.iter_mut().enumerate() {
+                self.square(&kept, d, scratch, out);
+            }
+        }
+    }
+
+    /// Frequencies whose rays land within the end of the fade at any of the distances.
+    fn kept(&self, wavelength_um: f64, distances_um: &[f64]) -> Kept {
+        let end = self.fade_end_um();
+        let z = distances_um.iter().copied().fold(f64::MAX, f64::min);
+        let mut kept = Kept {
+            first: [0; 2],
+            count: [0; 2],
+        };
+        for axis in [0, 1] {
+            let [c, o] = [self.wanted.centre_um[axis], self.wanted.centre_um[1 - axis]];
+            // The sine along this axis is largest for rays that stay closest to its plane.
+            let across = (o.abs() - end).max(0.0);
+            let sine = |x: f64| x / (x * x + across * across + z * z).sqrt();
+            let cycles = |x: f64| sine(x) / wavelength_um * self.period_um;
+            let first = cycles(c - end).floor() as i64;
+            let last = cycles(c + end).ceil() as i64;
+            let most = self.samples.min(self.sites) as i64;
+            let middle = (first + last) / 2;
+            let first = first.max(middle - most / 2);
+            kept.first[axis] = first;
+            kept.count[axis] = ((last - first + 1).min(most)) as usize;
+        }
+        kept
+    }
+
+    /// From the window's middle to the outermost rays that it needs [um].
+    fn reach_um(&self) -> f64 {
+        self.wanted.radius_um + self.wanted.half_width_um
+    }
+
+    /// From the window's middle to the nearest rays that would come back into it as aliases [um].
+    fn fade_end_um(&self) -> f64 {
+        self.period_um - self.reach_um()
+    }
+
+    /// Distances differ by little, and one fade serves all: it begins where the least of them needs it to.
+    fn fade(&self, middle_um: f64, least_um: f64) -> Fade {
+        let [cx, cy] = self.wanted.centre_um;
+        let (reach, end) = (self.reach_um(), self.fade_end_um());
+        Fade {
+            period_um: self.period_um,
+            full_um: (reach + (middle_um / least_um - 1.0) * (reach + cx.hypot(cy))).min(LATEST_FADE * end),
+            zero_um: end,
+            relabelled: 0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernels::cis;
+    use crate::propagation::{Aperture, Direct, PhaseFunction, PlaneWave};
+
+    /// Share of the peak intensity by which samples may differ from the direct sum: what the fade lets
+    /// through, in single precision.
+    const OF_THE_PEAK: f64 = 1e-3;
+
+    #[test]
+    fn intensity_is_that_of_the_direct_sum() {
+        let lattice = Lattice::new(350, 116).unwrap();
+        let (um, focal) = (0.53, 60.0);
+        let lens = PhaseFunction {
+            lattice,
+            radius_um: 20.0,
+            amplitude: 1.1,
+            phase_rad: |x: f64, y: f64| {
+                let k = std::f64::consts::TAU / 0.53;
+                -k * ((x * x + y * y + focal * focal).sqrt() - focal) + k * 0.26 * x
+            },
+        };
+        // Light that the wedge brings 6 um off the axis.
+        let wave = PlaneWave {
+            wavelength_um: um,
+            sin_x: -0.16,
+            sin_y: 0.02,
+        };
+        let wanted = Distances {
+            lattice,
+            radius_um: 20.0,
+            centre_um: [6.0, 1.0],
+            half_width_um: 8.0,
+            step_um: 0.5,
+        };
+        let planned = DistancesPlan::new(wanted, 4);
+        let distances = [56.0, 60.0];
+        let mut out = vec![vec![Vec::new(); 2]];
+        let fill = |iy: usize, row: &mut [Complex32]| {
+            lens.fill_row(iy, row);
+            for (ix, t) in row.iter_mut().enumerate() {
+                *t *= cis(wave.turns(lattice.coordinate_um(ix), lattice.coordinate_um(iy)));
+            }
+        };
+        planned.intensities(um, &distances, &[&fill], &mut DistancesScratch::default(), &mut out);
+        let n = planned.window();
+        let at = |i: usize| (i as f64 - 0.5 * (n as f64 - 1.0)) * planned.step_um();
+        for (plane, z) in out[0].iter().zip(distances) {
+            let peak = f64::from(plane.iter().copied().fold(0.0, f32::max));
+            let places: Vec<usize> = (0..40).map(|k| (k * 7919) % (n * n)).collect();
+            let points: Vec<[f64; 3]> = places.iter().map(|&i| [6.0 + at(i % n), 1.0 + at(i / n), z]).collect();
+            for (i, field) in places.iter().zip(Direct::at(&lens, &wave, &points)) {
+                let miss = f64::from(plane[*i]) - field.norm_sqr();
+                println!("{:.1e}", miss.abs() / peak);
+                assert!(
+                    miss.abs() < OF_THE_PEAK * peak,
+                    "{} is not {}, peak {peak}",
+                    plane[*i],
+                    field.norm_sqr()
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! The transforms: from the lattice to frequencies, and from there to the window at each distance.
+
+use num_complex::Complex32;
+
+use super::{DistancesPlan, DistancesScratch, FillRow, Kept};
+use crate::kernels::{gather, multiply_to, process};
+use crate::propagation::transfer::{Column, Transfer};
+
+/// Columns that go through one call of a transform: enough to fill cache lines.
+const LANES: usize = 8;
+
+impl DistancesPlan {
+    /// The transfer function to each distance at each kept frequency.
+    pub(super) fn transfer(
+        &self,
+        wavelength_um: f64,
+        distances_um: &[f64],
+        kept: &Kept,
+        scratch: &mut DistancesScratch,
+    ) {
+        let [kx, ky] = kept.count;
+        let least = distances_um.iter().copied().fold(f64::MAX, f64::min);
+        let middle = distances_um.iter().sum::<f64>() / distances_um.len() as f64;
+        // The window's first sample; its middle lies between two.
+        let first_sample = -0.5 * (self.window as f64 - 1.0) * self.step_um();
+        let x0 = self.wanted.lattice.coordinate_um(0);
+        let transfer = Transfer {
+            wavelength_um,
+            centre_um: self.wanted.centre_um,
+            shift_um: self.wanted.centre_um.map(|c| c + first_sample - x0),
+            fade: &self.fade(middle, least),
+            pitch_um: self.wanted.lattice.pitch_um(),
+        };
+        scratch.transfer.resize(distances_um.len() * kx * ky, Complex32::ZERO);
+        for k in 0..kx {
+            let column = Column {
+                first: [kept.first[0] + k as i64, kept.first[1]],
+                count: ky,
+            };
+            transfer.fade(middle, column, &mut scratch.column);
+            for (d, &z) in distances_um.iter().enumerate() {
+                let out = &mut scratch.transfer[(d * kx + k) * ky..][..ky];
+                transfer.to_distance(z, column, &scratch.column, out);
+            }
+        }
+    }
+
+    /// Forward transform of the element, cut to the kept frequencies: `spectrum[kx][ky]`.
+    pub(super) fn transform(&self, kept: &Kept, fill_row: &FillRow<'_>, scratch: &mut DistancesScratch) {
+        let (n, m) = (self.wanted.lattice.sites(), self.sites);
+        let [kx, ky] = kept.count;
+        scratch.row.resize(m.max(scratch.row.len()), Complex32::ZERO);
+        // Rows first; only the kept part of each goes on, as columns of length m with zeros behind the element.
+        scratch.lines.resize(n * kx, Complex32::ZERO);
+        for (iy, line) in scratch.lines.chunks_exact_mut(kx).enumerate() {
+            let row = &mut scratch.row[..m];
+            row.fill(Complex32::ZERO);
+            fill_row(iy, &mut row[..n]);
+            process(&*self.forward, row, &mut scratch.fft);
+            gather(line, row, kept.first[0]);
+        }
+        scratch.spectrum.resize(kx * ky, Complex32::ZERO);
+        scratch.columns.resize(LANES * m, Complex32::ZERO);
+        for from in (0..kx).step_by(LANES) {
+            let lanes = LANES.min(kx - from);
+            let columns = &mut scratch.columns[..lanes * m];
+            columns.fill(Complex32::ZERO);
+            for (iy, line) in scratch.lines.chunks_exact(kx).enumerate() {
+                for (lane, value) in line[from..from + lanes].iter().enumerate() {
+                    columns[lane * m + iy] = *value;
+                }
+            }
+            process(&*self.forward, columns, &mut scratch.fft);
+            let spectrum = scratch.spectrum[from * ky..].chunks_exact_mut(ky);
+            for (column, spectrum) in columns.chunks_exact(m).zip(spectrum) {
+                gather(spectrum, column, kept.first[1]);
+            }
+        }
+    }
+
+    /// Multiply the spectrum with the transfer function and transform its columns back:
+    /// `lines[distance][row][kx]`.
+    pub(super) fn propagate(&self, distances: usize, kept: &Kept, scratch: &mut DistancesScratch) {
+        let [kx, ky] = kept.count;
+        let (samples, window) = (self.samples, self.window);
+        let start = kept.first[1].rem_euclid(samples as i64) as usize;
+        let head = ky.min(samples - start);
+        let DistancesScratch {
+            lines,
+            spectrum,
+            columns,
+            fft,
+            transfer,
+            ..
+        } = scratch;
+        lines.resize(distances * window * kx, Complex32::ZERO);
+        columns.resize(LANES * samples, Complex32::ZERO);
+        for d in 0..distances {
+            let lines = &mut lines[d * window * kx..][..window * kx];
+            for from in (0..kx).step_by(LANES) {
+                let lanes = LANES.min(kx - from);
+                for lane in 0..lanes {
+                    let source = &spectrum[(from + lane) * ky..][..ky];
+                    let transfer = &transfer[(d * kx + from + lane) * ky..][..ky];
+                    let column = &mut columns[lane * samples..][..samples];
+                    column.fill(Complex32::ZERO);
+                    multiply_to(&mut column[start..start + head], &source[..head], &transfer[..head]);
+                    multiply_to(&mut column[..ky - head], &source[head..], &transfer[head..]);
+                }
+                process(&*self.inverse, &mut columns[..lanes * samples], fft);
+                for (iy, line) in lines.chunks_exact_mut(kx).enumerate() {
+                    for (lane, to) in line[from..from + lanes].iter_mut().enumerate() {
+                        *to = columns[lane * samples + iy];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Transform the rows of one distance back and square them.
+    pub(super) fn square(&self, kept: &Kept, distance: usize, scratch: &mut DistancesScratch, out: &mut Vec<f32>) {
+        let kx = kept.count[0];
+        let (samples, window) = (self.samples, self.window);
+        out.resize(window * window, 0.0);
+        scratch.row.resize(samples.max(scratch.row.len()), Complex32::ZERO);
+        let start = kept.first[0].rem_euclid(samples as i64) as usize;
+        let head = kx.min(samples - start);
+        let lines = &scratch.lines[distance * window * kx..][..window * kx];
+        for (line, out) in lines.chunks_exact(kx).zip(out.chunks_exact_mut(window)) {
+            let row = &mut scratch.row[..samples];
+            row.fill(Complex32::ZERO);
+            row[start..start + head].copy_from_slice(&line[..head]);
+            row[..kx - head].copy_from_slice(&line[head..]);
+            process(&*self.inverse, row, &mut scratch.fft);
+            for (to, field) in out.iter_mut().zip(row.iter()) {
+                *to = field.norm_sqr();
+            }
+        }
+    }
+}

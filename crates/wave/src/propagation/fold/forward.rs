@@ -1,0 +1,104 @@
+//! From the lattice to the window.
+
+use ndarray::ArrayViewMut2;
+use num_complex::Complex32;
+
+use super::{Fold, LANES};
+use crate::kernels::{accumulate, gather, multiply, process};
+use crate::propagation::{Aperture, PlaneWave, Scratch};
+
+impl Fold {
+    /// Folds and transforms along x; leaves the kept columns in tiles of `LANES` columns by all rows.
+    pub(super) fn rows_forward(&self, aperture: &dyn Aperture, wave: &PlaneWave, scratch: &mut Scratch) {
+        let (n, m, residues) = (self.lattice.sites(), self.band.bins, self.residues());
+        self.fill_wave(wave, scratch);
+        let Scratch {
+            row,
+            wave: [wave_x, wave_y],
+            tiles,
+            columns,
+            spectrum,
+            fft,
+            ..
+        } = scratch;
+        row.resize(n, Complex32::ZERO);
+        columns.resize(m.max(columns.len()), Complex32::ZERO);
+        spectrum.resize(self.blocks() * LANES, Complex32::ZERO);
+        tiles.resize(self.blocks() * residues * LANES, Complex32::ZERO);
+        let folded = &mut columns[..m];
+        for r in 0..residues {
+            folded.fill(Complex32::ZERO);
+            for iy in (r..n).step_by(m) {
+                aperture.fill_row(iy, row);
+                for (part, wave) in row.chunks(m).zip(wave_x.chunks(m)) {
+                    accumulate(&mut folded[..part.len()], part, wave, wave_y[iy]);
+                }
+            }
+            process(&*self.forward, folded, fft);
+            gather(&mut spectrum[..self.band.count[0]], folded, self.band.first[0]);
+            for (block, lanes) in spectrum.chunks_exact(LANES).enumerate() {
+                let at = (block * residues + r) * LANES;
+                tiles[at..at + LANES].copy_from_slice(lanes);
+            }
+        }
+    }
+
+    /// Transforms along y, sends each frequency to the sensor, shows it to `observe`, and forms the window's rows of each column.
+    pub(super) fn columns_forward(&self, scratch: &mut Scratch, observe: &mut dyn FnMut(&[Complex32])) {
+        let (m, residues, samples) = (self.band.bins, self.residues(), self.window.samples);
+        let [kx, ky] = self.band.count;
+        let Scratch {
+            tiles,
+            columns,
+            spectrum,
+            middle,
+            fft,
+            padded,
+            transfer,
+            column: faded,
+            row,
+            ..
+        } = scratch;
+        columns.resize(LANES * m, Complex32::ZERO);
+        spectrum.resize(ky, Complex32::ZERO);
+        transfer.resize(ky, Complex32::ZERO);
+        middle.resize(samples * kx, Complex32::ZERO);
+        row.resize(samples.max(row.len()), Complex32::ZERO);
+        for (block, tile) in tiles.chunks_exact(residues * LANES).enumerate() {
+            let lanes = LANES.min(kx - block * LANES);
+            for (lane, column) in columns.chunks_exact_mut(m).enumerate() {
+                for (value, line) in column.iter_mut().zip(tile.chunks_exact(LANES)) {
+                    *value = line[lane];
+                }
+                column[residues..].fill(Complex32::ZERO);
+            }
+            for (lane, column) in columns.chunks_exact_mut(m).enumerate().take(lanes) {
+                let k = block * LANES + lane;
+                let rows = self.band.rows[k].clone();
+                process(&*self.forward, column, fft);
+                spectrum.fill(Complex32::ZERO);
+                let kept = &mut spectrum[rows.clone()];
+                gather(kept, column, self.band.first[1] + rows.start as i64);
+                let transfer = &mut transfer[..rows.len()];
+                self.transfer(k, faded, transfer);
+                multiply(kept, transfer);
+                observe(spectrum);
+                self.zoom[1].run(spectrum, &mut row[..samples], padded, fft);
+                for (value, line) in row.iter().zip(middle.chunks_exact_mut(kx)) {
+                    line[k] = *value;
+                }
+            }
+        }
+    }
+
+    /// Forms the window's samples of each of its rows.
+    pub(super) fn window_rows(&self, scratch: &mut Scratch, values: &mut ArrayViewMut2<Complex32>) {
+        let Scratch {
+            middle, fft, padded, ..
+        } = scratch;
+        for (line, mut out) in middle.chunks(self.band.count[0]).zip(values.rows_mut()) {
+            let out = out.as_slice_mut().expect("rows are contiguous");
+            self.zoom[0].run(line, out, padded, fft);
+        }
+    }
+}

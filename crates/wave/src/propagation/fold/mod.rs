@@ -1,0 +1,233 @@
+//! The field through frequencies, on a period no longer than the window needs.
+//!
+//! Samples of the aperture are added up modulo the period and transformed; each frequency goes its way to
+//! the sensor, weighed by a raised cosine of where its ray lands; the window alone is formed, by chirps.
+//! A lattice of point samples is periodic in frequency with 1 / pitch: each frequency that lands near the
+//! window takes the bin it is equal to modulo 1 / pitch, so a steep wedge needs no finer lattice.
+//!
+//! Folding and the fade are exact but for light that leaves the window's neighbourhood; a hard band limit
+//! (Matsushima and Shimobaba, Opt. Express 17, 19662 (2009)) would ring instead.
+
+mod adjoint;
+mod forward;
+mod otf;
+
+use std::sync::Arc;
+
+use metalith_core::Lattice;
+use ndarray::{Array2, ArrayViewMut2};
+use num_complex::Complex32;
+use rustfft::{Fft, FftPlanner};
+
+use super::band::Band;
+use super::propagator::{check_shape, check_wave};
+use super::transfer::{Column, FadedColumn, Transfer};
+use super::zoom::Zoom;
+use super::{Accuracy, Aperture, Fade, Field, PlaneWave, Propagator, Scratch, Window};
+use crate::error::{Result, WaveError};
+use crate::kernels::cis_all;
+
+pub use otf::{Otf, power_um2};
+
+/// Columns that travel together between the two transforms: one cache line of samples.
+pub(super) const LANES: usize = 8;
+
+/// A plan for one lattice, wavelength and window; made once, used for any number of apertures and angles.
+pub struct Fold {
+    lattice: Lattice,
+    wavelength_um: f64,
+    window: Window,
+    accuracy: Accuracy,
+    band: Band,
+    forward: Arc<dyn Fft<f32>>,
+    inverse: Arc<dyn Fft<f32>>,
+    zoom: [Zoom; 2],
+}
+
+impl Fold {
+    /// For apertures on `lattice` that pass nothing outside `radius_um` of their centre. Period and fade
+    /// follow from lens, window, distance and the accuracy asked for.
+    ///
+    /// # Errors
+    /// If the window is not one, or so large that the transform would not fit into memory.
+    pub fn plan(
+        lattice: Lattice,
+        radius_um: f64,
+        wavelength_um: f64,
+        window: Window,
+        accuracy: Accuracy,
+    ) -> Result<Self> {
+        window.check(wavelength_um)?;
+        let band = Band::choose(lattice, radius_um, wavelength_um, &window, accuracy)?;
+        Ok(Self::with_band(lattice, wavelength_um, window, accuracy, band))
+    }
+
+    /// With a period of `bins` samples and a fade of one's own, from `fade_um[0]` to `fade_um[1]`: for those
+    /// who study the method.
+    ///
+    /// # Errors
+    /// As [`Fold::plan`], and if the fade does not end after it begins.
+    pub fn with_fade(
+        lattice: Lattice,
+        wavelength_um: f64,
+        window: Window,
+        bins: usize,
+        fade_um: [f64; 2],
+    ) -> Result<Self> {
+        let band = Band::new(lattice, wavelength_um, &window, bins, fade_um)?;
+        Ok(Self::with_band(
+            lattice,
+            wavelength_um,
+            window,
+            Accuracy::Accurate,
+            band,
+        ))
+    }
+
+    fn with_band(lattice: Lattice, wavelength_um: f64, window: Window, accuracy: Accuracy, band: Band) -> Self {
+        let mut planner = FftPlanner::new();
+        let cycles = window.step_um / band.fade.period_um;
+        let zoom = [0, 1].map(|a| Zoom::new(&mut planner, band.count[a], band.first[a], window.samples, cycles));
+        Self {
+            lattice,
+            wavelength_um,
+            window,
+            accuracy,
+            forward: planner.plan_fft_forward(band.bins),
+            inverse: planner.plan_fft_inverse(band.bins),
+            zoom,
+            band,
+        }
+    }
+
+    /// Period and fade that were chosen.
+    pub fn fade(&self) -> &Fade {
+        &self.band.fade
+    }
+
+    /// As [`Propagator::field`], into memory of the caller's. Shape `[samples, samples]`.
+    ///
+    /// # Errors
+    /// As [`Propagator::field`], and if `values` has not the window's shape or its rows are not contiguous.
+    pub fn field_into(
+        &self,
+        aperture: &dyn Aperture,
+        wave: &PlaneWave,
+        scratch: &mut Scratch,
+        values: ArrayViewMut2<Complex32>,
+    ) -> Result<()> {
+        self.field_observed(aperture, wave, scratch, values, &mut |_| {})
+    }
+
+    /// The same, where `observe` sees the spectrum of the field at the sensor, column by column: all rows of the band,
+    /// the phase counted from the window's middle.
+    fn field_observed(
+        &self,
+        aperture: &dyn Aperture,
+        wave: &PlaneWave,
+        scratch: &mut Scratch,
+        mut values: ArrayViewMut2<Complex32>,
+        observe: &mut dyn FnMut(&[Complex32]),
+    ) -> Result<()> {
+        check_wave(wave, self.wavelength_um)?;
+        if aperture.lattice() != self.lattice {
+            return Err(WaveError::Lattice {
+                given: aperture.lattice(),
+                planned: self.lattice,
+            });
+        }
+        let samples = self.window.samples;
+        if values.dim() != (samples, samples) || !values.is_standard_layout() {
+            return Err(WaveError::Shape {
+                what: "an array",
+                given: values.dim().into(),
+                wanted: [samples; 2],
+            });
+        }
+        self.rows_forward(aperture, wave, scratch);
+        self.columns_forward(scratch, observe);
+        self.window_rows(scratch, &mut values);
+        Ok(())
+    }
+
+    fn finished(&self, values: Array2<Complex32>, wave: &PlaneWave) -> Field {
+        Field {
+            window: self.window,
+            wave: *wave,
+            values,
+            fade: Some(self.band.fade),
+            accuracy: Some(self.accuracy),
+        }
+    }
+
+    /// Rows of the lattice that a row of the period is the sum of.
+    fn residues(&self) -> usize {
+        self.lattice.sites().min(self.band.bins)
+    }
+
+    fn blocks(&self) -> usize {
+        self.band.count[0].div_ceil(LANES)
+    }
+
+    /// What multiplies the kept frequencies of column `k` of the band.
+    fn transfer(&self, k: usize, faded: &mut FadedColumn, out: &mut [Complex32]) {
+        let z = self.window.distance_um;
+        let x0 = self.lattice.coordinate_um(0);
+        let transfer = Transfer {
+            wavelength_um: self.wavelength_um,
+            centre_um: self.window.centre_um,
+            shift_um: self.window.centre_um.map(|c| c - x0),
+            fade: &self.band.fade,
+            pitch_um: self.lattice.pitch_um(),
+        };
+        let column = Column {
+            first: [
+                self.band.first[0] + k as i64,
+                self.band.first[1] + self.band.rows[k].start as i64,
+            ],
+            count: out.len(),
+        };
+        transfer.fade(z, column, faded);
+        transfer.to_distance(z, column, faded, out);
+    }
+
+    /// The incident wave along both axes of the lattice.
+    fn fill_wave(&self, wave: &PlaneWave, scratch: &mut Scratch) {
+        let n = self.lattice.sites();
+        for (axis, sine) in [wave.sin_x, wave.sin_y].into_iter().enumerate() {
+            let turns = &mut scratch.turns;
+            turns.clear();
+            turns.extend((0..n).map(|i| self.lattice.coordinate_um(i) * sine / wave.wavelength_um));
+            scratch.wave[axis].resize(n, Complex32::ZERO);
+            cis_all(turns, &mut scratch.wave[axis]);
+        }
+    }
+}
+
+impl Propagator for Fold {
+    fn window(&self) -> &Window {
+        &self.window
+    }
+
+    fn field(&self, aperture: &dyn Aperture, wave: &PlaneWave, scratch: &mut Scratch) -> Result<Field> {
+        let samples = self.window.samples;
+        let mut values = Array2::zeros((samples, samples));
+        self.field_into(aperture, wave, scratch, values.view_mut())?;
+        Ok(self.finished(values, wave))
+    }
+
+    fn adjoint(
+        &self,
+        values: &Array2<Complex32>,
+        wave: &PlaneWave,
+        scratch: &mut Scratch,
+    ) -> Result<Array2<Complex32>> {
+        check_wave(wave, self.wavelength_um)?;
+        check_shape(values, &self.window)?;
+        self.window_rows_adjoint(values, scratch);
+        self.columns_adjoint(scratch);
+        let mut sites = Array2::zeros([self.lattice.sites(); 2]);
+        self.rows_adjoint(wave, scratch, &mut sites);
+        Ok(sites)
+    }
+}

@@ -1,0 +1,165 @@
+//! Contrast of all the light near a window, not of what the window holds: the autocorrelation of the field's spectrum.
+//!
+//! The optical transfer function at a frequency is the transform of the intensity over the whole plane, which is the
+//! sum over the spectrum of the field of each amplitude times the conjugate of the one a frequency below it
+//! (Goodman, Introduction to Fourier Optics, ch. 6). The spectrum is at hand before the window is formed, with all
+//! rays that land within the fade; light beyond it is a veil without contrast, and counts in the power alone.
+
+use metalith_core::Lattice;
+use ndarray::Array2;
+use num_complex::{Complex32, Complex64};
+
+use super::Fold;
+use crate::error::Result;
+use crate::propagation::{Aperture, Field, PlaneWave, Scratch};
+
+/// Transfer of all the light that an element passes, at some frequencies.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Otf {
+    /// Frequencies [line pairs a millimetre].
+    pub lp_mm: Vec<f64>,
+    /// Transform of the intensity along x and along y [um^2, in units of |E_inc|^2]; the phase counts from the
+    /// window's middle.
+    pub transform_um2: [Vec<Complex64>; 2],
+    /// Power that the element passes [um^2, in the same units]: the transform at zero frequency, of all light.
+    pub power_um2: f64,
+}
+
+impl Otf {
+    /// Mean of those of two polarisations.
+    ///
+    /// # Panics
+    /// If there is none, or they are at other frequencies.
+    pub fn mean(all: &[Self]) -> Self {
+        let weight = 1.0 / all.len() as f64;
+        let mut mean = all[0].clone();
+        mean.power_um2 = all.iter().map(|o| o.power_um2).sum::<f64>() * weight;
+        for (axis, values) in mean.transform_um2.iter_mut().enumerate() {
+            for (i, value) in values.iter_mut().enumerate() {
+                *value = all.iter().map(|o| o.transform_um2[axis][i]).sum::<Complex64>() * weight;
+            }
+        }
+        mean
+    }
+
+    /// Contrast along x and y at the `i`-th frequency: one if all light fell into one point.
+    pub fn contrast(&self, i: usize) -> [f64; 2] {
+        [0, 1].map(|axis| self.transform_um2[axis][i].norm() / self.power_um2)
+    }
+}
+
+impl Fold {
+    /// The field in the window, and the transfer function of all light at `lp_mm` [line pairs a millimetre].
+    ///
+    /// Between two bins of the transform the transfer function is interpolated: right for light that lands within a
+    /// tenth of the period of the window's middle, less for what is farther and has no contrast there.
+    ///
+    /// # Errors
+    /// As `Propagator::field`.
+    pub fn field_and_otf(
+        &self,
+        aperture: &dyn Aperture,
+        wave: &PlaneWave,
+        lp_mm: &[f64],
+        scratch: &mut Scratch,
+    ) -> Result<(Field, Otf)> {
+        let period_um = self.band.fade.period_um;
+        let at = |f: &f64| f * 1e-3 * period_um;
+        let mut shifts: Vec<usize> = lp_mm
+            .iter()
+            .flat_map(|f| [at(f) as usize, at(f) as usize + 1])
+            .collect();
+        shifts.sort_unstable();
+        shifts.dedup();
+        let mut correlation = Correlation::new(shifts, self.band.count[1]);
+        let mut values = Array2::zeros([self.window.samples; 2]);
+        self.field_observed(aperture, wave, scratch, values.view_mut(), &mut |column| {
+            correlation.add(column)
+        })?;
+        let transform_um2 = [0, 1].map(|axis| {
+            let of = |shift: usize| correlation.sum(axis, shift) * period_um * period_um;
+            let between = |f: &f64| {
+                let share = at(f).fract();
+                of(at(f) as usize) * (1.0 - share) + of(at(f) as usize + 1) * share
+            };
+            lp_mm.iter().map(between).collect()
+        });
+        let otf = Otf {
+            lp_mm: lp_mm.to_vec(),
+            transform_um2,
+            power_um2: power_um2(aperture),
+        };
+        Ok((self.finished(values, wave), otf))
+    }
+}
+
+/// Power that an aperture passes of a wave of unit amplitude [um^2].
+pub fn power_um2(aperture: &dyn Aperture) -> f64 {
+    let lattice: Lattice = aperture.lattice();
+    let mut row = vec![Complex32::ZERO; lattice.sites()];
+    let mut sum = 0.0;
+    for iy in 0..lattice.sites() {
+        aperture.fill_row(iy, &mut row);
+        sum += row.iter().map(|t| f64::from(t.norm_sqr())).sum::<f64>();
+    }
+    sum * lattice.pitch_um().powi(2)
+}
+
+/// Autocorrelation of a spectrum that comes column by column, at some shifts along x and along y.
+struct Correlation {
+    /// Bins, ascending.
+    shifts: Vec<usize>,
+    sums: [Vec<Complex64>; 2],
+    /// The last columns, as many as the greatest shift, and one.
+    ring: Vec<Vec<Complex32>>,
+    seen: usize,
+}
+
+impl Correlation {
+    fn new(shifts: Vec<usize>, rows: usize) -> Self {
+        let columns = shifts.last().copied().unwrap_or(0) + 1;
+        Self {
+            sums: [0, 1].map(|_| vec![Complex64::ZERO; shifts.len()]),
+            shifts,
+            ring: vec![vec![Complex32::ZERO; rows]; columns],
+            seen: 0,
+        }
+    }
+
+    fn add(&mut self, column: &[Complex32]) {
+        let columns = self.ring.len();
+        let place = self.seen % columns;
+        self.ring[place].copy_from_slice(column);
+        let [along_x, along_y] = &mut self.sums;
+        for ((&shift, x), y) in self.shifts.iter().zip(along_x).zip(along_y) {
+            if shift <= self.seen {
+                *x += product_sum(column, &self.ring[(self.seen - shift) % columns]);
+            }
+            if shift < column.len() {
+                *y += product_sum(&column[shift..], &column[..column.len() - shift]);
+            }
+        }
+        self.seen += 1;
+    }
+
+    fn sum(&self, axis: usize, shift: usize) -> Complex64 {
+        let place = self.shifts.binary_search(&shift).expect("asked for when it was made");
+        self.sums[axis][place]
+    }
+}
+
+/// Sum of a[i] conj(b[i]), in an order that does not depend on the machine.
+fn product_sum(a: &[Complex32], b: &[Complex32]) -> Complex64 {
+    const LANES: usize = 16;
+    let (mut re, mut im) = ([0.0f32; LANES], [0.0f32; LANES]);
+    pulp::Arch::new().dispatch(|| {
+        for (a, b) in a.chunks(LANES).zip(b.chunks(LANES)) {
+            for (i, (a, b)) in a.iter().zip(b).enumerate() {
+                re[i] += a.re * b.re + a.im * b.im;
+                im[i] += a.im * b.re - a.re * b.im;
+            }
+        }
+    });
+    let sum = |lanes: &[f32]| lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
+    Complex64::new(sum(&re), sum(&im))
+}

@@ -1,0 +1,86 @@
+//! What a frequency meets between the element and the sensor: the transfer function of free space, faded.
+//!
+//! Columns of frequencies go through two loops: where each ray lands, which says how much of it counts, and the
+//! phase to a distance. Several distances that differ little share the first.
+
+use num_complex::Complex32;
+
+use super::Fade;
+use crate::kernels::cis;
+
+/// The transfer function on a grid of frequencies, one wavelength and window.
+pub(super) struct Transfer<'a> {
+    pub wavelength_um: f64,
+    /// Middle of the window from the element's centre [um].
+    pub centre_um: [f64; 2],
+    /// From the first site of the lattice to where the inverse transform has its origin [um].
+    pub shift_um: [f64; 2],
+    pub fade: &'a Fade,
+    /// Pitch of the lattice [um].
+    pub pitch_um: f64,
+}
+
+/// One column of frequencies: kx is the same for all, ky rises by one.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Column {
+    /// Frequencies of the first [cycles a period].
+    pub first: [i64; 2],
+    pub count: usize,
+}
+
+/// Where the rays of a column go. Working memory.
+#[derive(Default)]
+pub(crate) struct FadedColumn {
+    /// Cycles along z [1/um].
+    axial: Vec<f64>,
+    /// How much each counts, with the weights of both transforms.
+    weight: Vec<f32>,
+}
+
+/// Below the square of this many cycles along z [1/um^2] light does not propagate; its ray lands at infinity.
+const GRAZING: f64 = 1e-12;
+
+impl Transfer<'_> {
+    /// Works out how much each frequency of a column counts for the window, by where its ray from the element's
+    /// centre lands `distance_um` behind it: a raised cosine from `full_um` to `zero_um` of the window's middle.
+    pub fn fade(&self, distance_um: f64, column: Column, faded: &mut FadedColumn) {
+        let df = 1.0 / self.fade.period_um;
+        let [fx, first] = column.first.map(|f| f as f64 * df);
+        let rest = self.wavelength_um.powi(-2) - fx * fx;
+        let [cx, cy] = self.centre_um;
+        let Fade { full_um, zero_um, .. } = *self.fade;
+        let slope = 0.5 / (zero_um - full_um);
+        // Pitch^2 of the sum over the aperture, 1 / period^2 of that over frequencies.
+        let scale = (self.pitch_um * df).powi(2) as f32;
+        faded.axial.resize(column.count, 0.0);
+        faded.weight.resize(column.count, 0.0);
+        pulp::Arch::new().dispatch(|| {
+            for (i, (axial, weight)) in faded.axial.iter_mut().zip(&mut faded.weight).enumerate() {
+                let fy = first + i as f64 * df;
+                let fz = (rest - fy * fy).max(GRAZING).sqrt();
+                let (sx, sy) = (distance_um * fx / fz - cx, distance_um * fy / fz - cy);
+                let half_turn = ((sx * sx + sy * sy).sqrt() - full_um) * slope;
+                *axial = fz;
+                *weight = (0.5 + 0.5 * cis(half_turn.clamp(0.0, 0.5)).re) * scale;
+            }
+        });
+    }
+
+    /// `out[i]` is what multiplies frequency `i` of a column on its way to `distance_um`.
+    pub fn to_distance(&self, distance_um: f64, column: Column, faded: &FadedColumn, out: &mut [Complex32]) {
+        let df = 1.0 / self.fade.period_um;
+        let [fx, first] = column.first.map(|f| f as f64 * df);
+        let along_x = fx * self.shift_um[0];
+        let along_y = self.shift_um[1];
+        pulp::Arch::new().dispatch(|| {
+            for (i, (out, (fz, weight))) in out.iter_mut().zip(faded.axial.iter().zip(&faded.weight)).enumerate() {
+                let fy = first + i as f64 * df;
+                let way = cis(distance_um * fz + along_x + fy * along_y);
+                *out = Complex32 {
+                    re: way.re * weight,
+                    im: way.im * weight,
+                };
+            }
+        });
+    }
+}

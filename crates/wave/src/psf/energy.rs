@@ -1,0 +1,140 @@
+//! Energy of a PSF in parts of the sensor's plane.
+
+use ndarray::Array2;
+
+use super::Psf;
+use crate::error::{Result, WaveError};
+use crate::kernels::sinc;
+
+impl Psf {
+    /// Energy in the window [um^2], in units of |E_inc|^2.
+    pub fn energy_um2(&self) -> f64 {
+        self.values.sum() * self.window.step_um.powi(2)
+    }
+
+    /// Energy in a square with edges along x and y [um^2].
+    pub fn energy_in_square_um2(&self, centre_um: [f64; 2], edge_um: f64) -> f64 {
+        let weights = [0, 1].map(|axis| self.interval(axis, centre_um[axis], edge_um));
+        let rows = self.values.rows().into_iter().zip(&weights[1]);
+        rows.map(|(row, wy)| wy * row.iter().zip(&weights[0]).map(|(v, wx)| v * wx).sum::<f64>())
+            .sum()
+    }
+
+    /// Energy in a circle [um^2]. Each sample stands for its square, of which parts of a sixteenth an edge are
+    /// counted: good to a percent of a sample's width in radius.
+    pub fn energy_in_circle_um2(&self, centre_um: [f64; 2], radius_um: f64) -> f64 {
+        const PARTS: usize = 16;
+        let step = self.window.step_um;
+        let part = |i: usize| ((i as f64 + 0.5) / PARTS as f64 - 0.5) * step;
+        let mut sum = 0.0;
+        for ((iy, ix), &v) in self.values.indexed_iter() {
+            let x = self.window.coordinate_um(0, ix) - centre_um[0];
+            let y = self.window.coordinate_um(1, iy) - centre_um[1];
+            let (r, reach) = (x.hypot(y), 0.75 * step);
+            if r < radius_um - reach {
+                sum += v;
+            } else if r < radius_um + reach {
+                let inside = (0..PARTS * PARTS)
+                    .filter(|i| (x + part(i % PARTS)).hypot(y + part(i / PARTS)) < radius_um)
+                    .count();
+                sum += v * inside as f64 / (PARTS * PARTS) as f64;
+            }
+        }
+        sum * step * step
+    }
+
+    /// What a camera with square, gapless pixels sees of a point: the energy in each of `pixels` x `pixels` [um^2],
+    /// with the middle of the array at `centre_um`.
+    ///
+    /// # Errors
+    /// If the pixels have no size or reach beyond the window.
+    pub fn on_pixels(&self, centre_um: [f64; 2], pixel_um: f64, pixels: usize) -> Result<Array2<f64>> {
+        let reach = 0.5 * pixels as f64 * pixel_um;
+        let room = self.window.half_width_um() + 0.5 * self.window.step_um;
+        // Pixels that end where the window does fit into it, however decimals were rounded.
+        const ROUNDING: f64 = 1e-9;
+        let inside = (0..2).all(|a| (centre_um[a] - self.window.centre_um[a]).abs() + reach <= room * (1.0 + ROUNDING));
+        if !(pixel_um > 0.0 && pixels > 0 && inside) {
+            return Err(WaveError::Pixels {
+                pixels,
+                pixel_um,
+                centre_um,
+            });
+        }
+        let [wx, wy] = [0, 1].map(|axis| {
+            let mut weights = Array2::zeros((pixels, self.window.samples));
+            for (i, mut row) in weights.rows_mut().into_iter().enumerate() {
+                let middle = centre_um[axis] + (i as f64 - 0.5 * (pixels as f64 - 1.0)) * pixel_um;
+                for (w, v) in row.iter_mut().zip(self.interval(axis, middle, pixel_um)) {
+                    *w = v;
+                }
+            }
+            weights
+        });
+        Ok(wy.dot(&self.values).dot(&wx.t()))
+    }
+
+    /// Weights of the samples of an axis in the integral over an interval [um]: each term of the finite Fourier
+    /// series through the samples is integrated exactly.
+    fn interval(&self, axis: usize, middle_um: f64, length_um: f64) -> Vec<f64> {
+        let n = self.window.samples;
+        let period = n as f64 * self.window.step_um;
+        let terms: Vec<f64> = (0..=n / 2)
+            .map(|k| {
+                let pair = if k == 0 || 2 * k == n { 1.0 } else { 2.0 };
+                pair * sinc(k as f64 * length_um / period) * length_um / n as f64
+            })
+            .collect();
+        (0..n)
+            .map(|i| {
+                let turns = (middle_um - self.window.coordinate_um(axis, i)) / period;
+                let cosine = |k: usize| (std::f64::consts::TAU * k as f64 * turns).cos();
+                terms.iter().enumerate().map(|(k, t)| t * cosine(k)).sum()
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{AT, BAND, SIGMA, gaussian};
+
+    /// Integral of a Gaussian over an interval about its middle, by Simpson's rule.
+    fn interval(sigma: f64, length: f64) -> f64 {
+        let n = 200;
+        let h = length / n as f64;
+        let f = |i: usize| (-((i as f64 * h - 0.5 * length) / sigma).powi(2) / 2.0).exp();
+        let weight = |i: usize| {
+            if i == 0 || i == n {
+                1.0
+            } else {
+                2.0 + 2.0 * (i % 2) as f64
+            }
+        };
+        (0..=n).map(|i| weight(i) * f(i)).sum::<f64>() * h / 3.0
+    }
+
+    #[test]
+    fn energies_of_a_gaussian_are_those_of_the_closed_form() {
+        let psf = gaussian(SIGMA, AT);
+        let total = std::f64::consts::TAU * SIGMA * SIGMA;
+        assert!((psf.energy_um2() - total).abs() < BAND * total);
+        let square = psf.energy_in_square_um2(AT, 5.86);
+        assert!((square - interval(SIGMA, 5.86).powi(2)).abs() < BAND * total);
+        // Samples that stand for their squares are a Gaussian wider by step^2 / 12.
+        const WIDER: f64 = 2e-2;
+        let circle = psf.energy_in_circle_um2(AT, 3.0);
+        let want = total * (1.0 - (-4.5 / (SIGMA * SIGMA)).exp());
+        assert!((circle - want).abs() < WIDER * total, "{circle} is not {want}");
+    }
+
+    #[test]
+    fn pixels_tile_the_plane() {
+        let psf = gaussian(SIGMA, AT);
+        let pixels = psf.on_pixels(AT, 1.7, 9).unwrap();
+        assert!((pixels.sum() - psf.energy_in_square_um2(AT, 9.0 * 1.7)).abs() < BAND);
+        assert!((pixels[[4, 4]] - interval(SIGMA, 1.7).powi(2)).abs() < BAND);
+        assert!((pixels[[4, 5]] - pixels[[5, 4]]).abs() < BAND);
+        assert!(psf.on_pixels(AT, 5.86, 9).is_err());
+    }
+}

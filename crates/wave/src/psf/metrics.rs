@@ -1,0 +1,52 @@
+//! The numbers that are reported of a PSF.
+
+use serde::Serialize;
+
+use super::{HALF_NYQUIST_LP_MM, Matched, NYQUIST_LP_MM, Psf, pixel_mtf};
+
+/// The numbers that two PSFs are compared by.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PsfMetrics {
+    /// Largest sample over the peak of the same aperture with all its power and the perfect phase.
+    pub strehl: f64,
+    /// Place of the largest sample from the element's centre, x and y [um].
+    pub peak_um: [f64; 2],
+    /// Centre of gravity of the window from the element's centre, x and y [um].
+    pub centroid_um: [f64; 2],
+    /// Energy in a square of one pixel about the peak, over what the perfect aperture passes.
+    pub energy_1_pixel: f64,
+    /// The same in a square of two pixels an edge.
+    pub energy_2_pixels: f64,
+    /// Energy in the whole window, over the same.
+    pub energy_window: f64,
+    /// MTF at 42.7 line pairs a millimetre along x and y.
+    pub mtf_half_nyquist: [f64; 2],
+    /// MTF at 85.3 line pairs a millimetre along x and y.
+    pub mtf_nyquist: [f64; 2],
+    /// The first times the MTF of a pixel.
+    pub mtf_half_nyquist_pixel: [f64; 2],
+    /// The second times the MTF of a pixel.
+    pub mtf_nyquist_pixel: [f64; 2],
+}
+
+impl Psf {
+    /// All numbers that are reported of a PSF.
+    pub fn metrics(&self, matched: &Matched, pixel_um: f64) -> PsfMetrics {
+        let (peak, peak_um) = self.peak();
+        let mtf = |lp_mm: f64| [0, 1].map(|axis| self.mtf_curve(axis, &[lp_mm])[0]);
+        let seen = |lp_mm: f64| mtf(lp_mm).map(|m| m * pixel_mtf(pixel_um, lp_mm));
+        let share = |edge_um| self.energy_in_square_um2(peak_um, edge_um) / matched.power_um2;
+        PsfMetrics {
+            strehl: peak / matched.peak,
+            peak_um,
+            centroid_um: self.centroid_um(),
+            energy_1_pixel: share(pixel_um),
+            energy_2_pixels: share(2.0 * pixel_um),
+            energy_window: self.energy_um2() / matched.power_um2,
+            mtf_half_nyquist: mtf(HALF_NYQUIST_LP_MM),
+            mtf_nyquist: mtf(NYQUIST_LP_MM),
+            mtf_half_nyquist_pixel: seen(HALF_NYQUIST_LP_MM),
+            mtf_nyquist_pixel: seen(NYQUIST_LP_MM),
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! The point spread function, and what is measured of it.
+//!
+//! | question | file |
+//! | --- | --- |
+//! | the function, its peak and centroid | here |
+//! | energy in squares, circles and pixels | `energy` |
+//! | contrast | `mtf` |
+//! | all numbers that are reported | `metrics` |
+//! | what the best element of the same shape would do | `reference` |
+//! | how much two differ | `difference` |
+//! | shares of light in diffraction orders of a mapping | `orders` |
+
+mod difference;
+mod energy;
+mod metrics;
+mod mtf;
+mod orders;
+mod reference;
+
+use ndarray::{Array2, Axis};
+
+use crate::{Field, Window};
+
+pub use metrics::PsfMetrics;
+pub use mtf::{HALF_NYQUIST_LP_MM, NYQUIST_LP_MM, pixel_mtf};
+pub use orders::order_shares;
+pub use reference::Matched;
+
+/// |E|^2 / |E_inc|^2 on a window of the sensor's plane, E_inc in the medium of incidence.
+///
+/// Energies are integrals over the sensor's plane of the function through the samples that has no frequencies
+/// beyond half their rate: exact where the step is at most wavelength / (4 NA).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Psf {
+    /// Where the samples are.
+    pub window: Window,
+    /// Shape `[samples, samples]`, row index along +y, column index along +x.
+    pub values: Array2<f64>,
+}
+
+impl Psf {
+    /// Of a field of a unit wave.
+    pub fn of(field: &Field) -> Self {
+        Self {
+            window: field.window,
+            values: field.values.map(|e| f64::from(e.re).powi(2) + f64::from(e.im).powi(2)),
+        }
+    }
+
+    /// Mean of PSFs on the same window, as of light that is not polarised.
+    ///
+    /// # Panics
+    /// If there is none, or their windows are of different sizes.
+    pub fn mean(psfs: Vec<Self>) -> Self {
+        let share = 1.0 / psfs.len() as f64;
+        let mut all = psfs.into_iter();
+        let mut sum = all.next().expect("a PSF to take the mean of");
+        for psf in all {
+            sum.values += &psf.values;
+        }
+        if share < 1.0 {
+            sum.values *= share;
+        }
+        sum
+    }
+
+    /// The largest sample and its place from the element's centre [um]; of equals the first in reading order.
+    pub fn peak(&self) -> (f64, [f64; 2]) {
+        let mut best = (f64::NEG_INFINITY, [0, 0]);
+        for ((iy, ix), &v) in self.values.indexed_iter() {
+            if v > best.0 {
+                best = (v, [ix, iy]);
+            }
+        }
+        let (value, [ix, iy]) = best;
+        (
+            value,
+            [self.window.coordinate_um(0, ix), self.window.coordinate_um(1, iy)],
+        )
+    }
+
+    /// Centre of gravity from the element's centre, x and y [um].
+    pub fn centroid_um(&self) -> [f64; 2] {
+        let total = self.values.sum();
+        [0, 1].map(|axis| {
+            let line = self.line_spread(axis);
+            let moments = line.iter().enumerate();
+            moments
+                .map(|(i, v)| v * self.window.coordinate_um(axis, i))
+                .sum::<f64>()
+                / total
+        })
+    }
+
+    /// Sum over the other axis, the image of a line. Axis 0 is x.
+    pub fn line_spread(&self, axis: usize) -> Vec<f64> {
+        self.values.sum_axis(Axis(axis)).to_vec()
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// The spectrum of the Gaussian at half the sampling rate is exp(-2 (pi sigma / 2 step)^2) = 1e-17, times the
+    /// number of samples and a margin.
+    pub const BAND: f64 = 1e-9;
+
+    pub fn gaussian(sigma_um: f64, at_um: [f64; 2]) -> Psf {
+        let window = Window {
+            centre_um: [100.0, -40.0],
+            step_um: 0.5,
+            samples: 64,
+            distance_um: 100.0,
+        };
+        let values = Array2::from_shape_fn((64, 64), |(iy, ix)| {
+            let x = window.coordinate_um(0, ix) - at_um[0];
+            let y = window.coordinate_um(1, iy) - at_um[1];
+            (-(x * x + y * y) / (2.0 * sigma_um * sigma_um)).exp()
+        });
+        Psf { window, values }
+    }
+
+    pub const AT: [f64; 2] = [100.3, -41.2];
+    pub const SIGMA: f64 = 1.4;
+
+    #[test]
+    fn the_centroid_of_a_gaussian_is_its_middle() {
+        let psf = gaussian(SIGMA, AT);
+        let centroid = psf.centroid_um();
+        assert!((0..2).all(|a| (centroid[a] - AT[a]).abs() < BAND));
+    }
+}
