@@ -1,4 +1,4 @@
-//! The README's table of optimised phases, made again: `cargo run --release --example merits`
+//! The table of optimised phases in `docs/method/optimise.md`, made again: `cargo run --release --example merits`
 //!
 //! Geometric mean (smallest) of the Strehl ratio on axis, half way between the wavelengths that were optimised on,
 //! for two focal lengths, two cells and several limits on the phase step. The rigorous cells use the table that

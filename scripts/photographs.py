@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Photographs through every phase: the table in the README, made again.
+"""Photographs through every phase: the table in docs/method/optimise.md, made again.
 
     cargo build --release
     python3 -m venv venv && venv/bin/pip install scikit-image

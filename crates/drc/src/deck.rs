@@ -194,7 +194,7 @@ fn read_rule(s: &Section<'_, '_>, context: &Context, before: &[ActiveRule]) -> O
             s.fault(
                 "check",
                 format!("there is no check `{check}`"),
-                "the README lists all checks",
+                "docs/guide/check.md lists all checks",
             );
         }
         return None;
