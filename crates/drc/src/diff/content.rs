@@ -41,7 +41,7 @@ impl Content {
         pillars: LayerNumber,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let mut reader = Reader {
+        let mut reader = ContentReader {
             pillars,
             factor,
             filler: Filler::new(sites.to_vec(), Scale::of(layout)?),
@@ -69,7 +69,7 @@ impl Content {
     }
 }
 
-struct Reader {
+struct ContentReader {
     pillars: LayerNumber,
     factor: i64,
     filler: Filler,
@@ -80,7 +80,7 @@ struct Reader {
     texts: Vec<(LayerNumber, String, Point)>,
 }
 
-impl Reader {
+impl ContentReader {
     /// A rectangle of the pillar layer. Of two squares on one site the wider counts, in whatever order
     /// they come; odd widths are off the site by half a unit and are kept as they stand.
     #[inline]
@@ -155,7 +155,7 @@ pub(super) fn area2(ring: &[Point]) -> i128 {
     ring.iter().enumerate().map(part).sum()
 }
 
-impl Visitor for Reader {
+impl Visitor for ContentReader {
     fn cell(&mut self, _cell: &Cell, placements: &[Transform]) -> Result<()> {
         self.filler.begin(placements.len());
         Ok(())
