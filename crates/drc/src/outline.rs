@@ -29,8 +29,8 @@ enum Form {
 struct OutlineRule {
     layers: Vec<LayerNumber>,
     form: Form,
-    /// Whether a graver rule of the deck looks at each of the layers too: crossing, acute, area, Manhattan.
-    graver: Vec<[bool; 4]>,
+    /// Whether a graver rule of the deck looks at each of the layers too: crossing, acute, area.
+    graver: Vec<[bool; 3]>,
 }
 
 pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Option<Box<dyn Rule>> {
@@ -50,31 +50,25 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Optio
     let layers = context.some_layers(s);
     let graver = layers
         .iter()
-        .map(|&l| ["self_crossing", "acute_angle", "zero_area", "manhattan"].map(|c| context.covers(c, l)))
+        .map(|&l| ["self_crossing", "acute_angle", "zero_area"].map(|c| context.covers(c, l)))
         .collect();
     Some(Box::new(OutlineRule { layers, form, graver }))
 }
 
 impl OutlineRule {
-    /// Whether a graver rule reports this outline: each defect has one name.
+    /// Whether a graver rule reports this outline: each defect has one name. What is no square is told by the
+    /// rule that says that pillars are squares, whatever else is wrong with it.
     fn reported_elsewhere(&self, outline: &DrawnOutline<'_>) -> bool {
         let k = self.layers.iter().position(|&l| l == outline.layer).unwrap_or(0);
-        let [crossing, acute, area, manhattan] = self.graver[k];
+        let [crossing, acute, area] = self.graver[k];
         if area && self.form != Form::Area && outline.twice_area() == 0 {
             return true;
         }
-        let shape = matches!(
-            self.form,
-            Form::Square | Form::Manhattan | Form::Angle(_) | Form::Winding(_)
-        );
+        let shape = matches!(self.form, Form::Manhattan | Form::Angle(_) | Form::Winding(_));
         if crossing && shape && outline.crosses_itself() {
             return true;
         }
-        let angles = matches!(self.form, Form::Square | Form::Manhattan);
-        if acute && angles && outline.sharpest_deg() < 90.0 - ROUNDING_DEG {
-            return true;
-        }
-        manhattan && self.form == Form::Square && !outline.is_manhattan()
+        acute && self.form == Form::Manhattan && outline.sharpest_deg() < 90.0 - ROUNDING_DEG
     }
 
     fn wrong(&self, outline: &DrawnOutline<'_>) -> Option<String> {
