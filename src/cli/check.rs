@@ -63,7 +63,7 @@ pub fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let open = |path: &PathBuf| Layout::open_with(path, ReadLimits::default(), terminal);
     let layout = open(&args.layout)?;
-    let with = args.with.iter().map(open).collect::<Result<Vec<_>>>()?;
+    let with = args.with.iter().map(open).collect::<Result<Vec<_>, _>>()?;
     let input = CheckInput {
         with: with.iter().collect(),
         design: design.as_ref(),

@@ -19,6 +19,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use miette::{Diagnostic, GraphicalReportHandler, SourceCode};
 
+use metalith::text::{printable, printable_lines};
 use metalith::{Error, Faults};
 pub use terminal::Terminal;
 
@@ -117,7 +118,8 @@ fn report(error: &Error) {
             return;
         }
     }
-    eprintln!("error: {error}");
+    // Names from files may hold what moves a cursor.
+    eprintln!("error: {}", printable_lines(&error.to_string()));
 }
 
 /// The faults of a file under one line that counts them; each is then drawn at its place.
@@ -126,10 +128,12 @@ struct Headline<'a>(&'a Faults);
 
 impl fmt::Display for Headline<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let path = self.0.path().display();
-        match self.0.faults().len() {
-            1 => write!(f, "one mistake in {path}"),
-            count => write!(f, "{count} mistakes in {path}"),
+        let path = self.0.path().display().to_string();
+        let path = printable(&path);
+        match (self.0.count(), self.0.faults().len()) {
+            (1, _) => write!(f, "one mistake in {path}"),
+            (count, shown) if shown < count => write!(f, "{count} mistakes in {path}, the first {shown} are"),
+            (count, _) => write!(f, "{count} mistakes in {path}"),
         }
     }
 }

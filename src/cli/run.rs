@@ -27,6 +27,8 @@ pub struct RunArgs {
 
 pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
     let design = Design::read(&args.design)?;
+    // What could not be read back is not written; `metalith layout` writes it.
+    metalith::verify::fits(&design, &args.target.folder(&design))?;
     terminal.stop_on_interrupt();
     let array = PillarArray::build(&design, terminal)?;
     let written = args.target.write(&design, &array, terminal)?;

@@ -151,6 +151,7 @@ fn summary(found: &Verification, folder: &Path) {
 
 pub fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
     let design = Design::read(&args.design)?;
+    metalith::verify::fits(&design, &args.layout)?;
     terminal.stop_on_interrupt();
     let array = PillarArray::build(&design, terminal)?;
     let folder = args

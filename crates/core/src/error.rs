@@ -2,6 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+/// What an error came from, for [`std::error::Error::source`].
+pub type Cause = Box<dyn std::error::Error + Send + Sync>;
+
 /// Result of every fallible operation of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
@@ -10,6 +13,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[non_exhaustive]
 pub enum Error {
     /// One or more mistakes in a text file that a person wrote (design, rules, process, measurement).
+    #[cfg(feature = "documents")]
     #[error("{0}")]
     Text(Box<crate::document::Faults>),
 
@@ -21,6 +25,8 @@ pub enum Error {
         offset: u64,
         what: String,
         hint: String,
+        /// The error of the crate that reads layouts, which can be matched on.
+        source: Option<Cause>,
     },
 
     /// The operating system refused.
@@ -43,7 +49,12 @@ pub enum Error {
 
     /// A value that cannot be: out of range, inconsistent, not physical.
     #[error("{what}\n  help: {hint}")]
-    Invalid { what: String, hint: String },
+    Invalid {
+        what: String,
+        hint: String,
+        /// The error of the crate that found it, which can be matched on, if it has errors of its own.
+        source: Option<Cause>,
+    },
 
     /// The user asked to stop. What was complete has been kept, nothing is half written.
     #[error("interrupted; files written before this run are unchanged")]
@@ -56,6 +67,7 @@ impl Error {
         Self::Invalid {
             what: what.into(),
             hint: hint.into(),
+            source: None,
         }
     }
 
@@ -68,7 +80,9 @@ impl Error {
     /// Exit code of the program: 2 for bad input, 3 for what could not be done.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Text(_) | Self::Layout { .. } | Self::Table { .. } | Self::Invalid { .. } => 2,
+            #[cfg(feature = "documents")]
+            Self::Text(_) => 2,
+            Self::Layout { .. } | Self::Table { .. } | Self::Invalid { .. } => 2,
             Self::Io { source, .. } if source.kind() == std::io::ErrorKind::NotFound => 2,
             Self::Io { .. } | Self::Interrupted => 3,
         }

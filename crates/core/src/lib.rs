@@ -1,16 +1,21 @@
 //! What every room of the project stands on: errors, progress, whole files, documents with spans, the lattice.
 
 mod cross;
+#[cfg(feature = "documents")]
 pub mod document;
 mod error;
 pub mod file;
 mod lattice;
 mod layer;
+#[cfg(feature = "npy")]
+pub mod npy;
 mod plane;
 mod progress;
+pub mod text;
 mod wedge;
 
 pub use cross::cross_corners;
+#[cfg(feature = "documents")]
 pub use document::{Fault, Faults};
 pub use error::{Error, Result};
 pub use file::WholeFile;

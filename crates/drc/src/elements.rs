@@ -33,7 +33,7 @@ pub(super) fn sites(
     // The pillars may be in a companion, where the apertures are what is checked.
     let mut why = String::new();
     for file in std::iter::once(&layout).chain(&input.with) {
-        match discover(file, selection, &deck.pillars, Scale::of(file)?, progress) {
+        match discover(file, selection, &deck.pillars, Scale::of(file)?, progress).map_err(Error::from) {
             Ok(sites) => {
                 let total: u64 = sites.iter().map(|s| (s.lattice.sites() as u64).pow(2)).sum();
                 if total <= allowance.sites {

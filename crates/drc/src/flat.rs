@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::body::Body;
-use super::input::CheckInput;
 use super::work::Work;
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
@@ -90,36 +89,7 @@ pub(super) struct FlatLayout<'a> {
     pub incomplete: Option<String>,
 }
 
-impl<'a> FlatLayout<'a> {
-    /// A layout that was not expanded, and why.
-    pub fn unread(
-        layout: &'a Layout,
-        pillars: LayerNumber,
-        input: &CheckInput<'a>,
-        work: &'a Work<'_>,
-        why: String,
-    ) -> Self {
-        Self {
-            work,
-            layout,
-            with: input.with.clone(),
-            design: input.design,
-            array: None,
-            unit_nm: layout.unit_nm(),
-            pillars,
-            elements: Vec::new(),
-            no_elements: why.clone(),
-            loose: BTreeMap::new(),
-            off_lattice: Vec::new(),
-            odd_on_lattice: 0,
-            texts: Vec::new(),
-            text_count: 0,
-            counts: BTreeMap::new(),
-            unread: Some(why.clone()),
-            incomplete: Some(why),
-        }
-    }
-
+impl FlatLayout<'_> {
     /// A length in database units.
     pub fn units(&self, nm: f64) -> f64 {
         nm / self.unit_nm

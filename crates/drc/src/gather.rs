@@ -12,6 +12,7 @@ use super::input::CheckInput;
 use super::polygon::twice_area;
 use super::rule::DeckRule;
 use super::work::{Allowance, Stop, Work};
+use metalith_core::text::printable_bytes;
 use metalith_core::{Error, Progress, Result};
 use metalith_gds::extract::{Filler, Scale, Why};
 use metalith_gds::{
@@ -36,10 +37,6 @@ pub(super) fn gather<'a>(
     found: &mut [Findings],
     progress: &dyn Progress,
 ) -> Result<FlatLayout<'a>> {
-    let files = || std::iter::once(layout).chain(input.with.iter().copied());
-    if let Some(why) = files().find_map(|file| allowance.beyond(file)) {
-        return Ok(FlatLayout::unread(layout, pillar_layers(deck).0, input, work, why));
-    }
     let selection = Selection {
         lenient: true,
         ..Selection::default()
@@ -74,8 +71,8 @@ pub(super) fn gather<'a>(
         rules,
     };
     let mut unread = None;
-    for file in files() {
-        match file.visit(&selection, &mut visit, progress) {
+    for file in std::iter::once(&layout).chain(&input.with) {
+        match file.visit(&selection, &mut visit, progress).map_err(Error::from) {
             Err(error @ Error::Layout { .. }) => unread = Some(error.to_string()),
             Err(Error::Invalid { what, .. }) => unread = Some(what),
             other => other?,
@@ -262,7 +259,10 @@ impl Visitor for Gather<'_, '_> {
         if room == 0 {
             return Ok(());
         }
-        let (layer, string) = (self.known_as(text.layer), Arc::from(one_line(text.string)));
+        let (layer, string) = (
+            self.known_as(text.layer),
+            Arc::from(printable_bytes(&text.string[..text.string.len().min(LONGEST_TEXT)])),
+        );
         let placed = placements.iter().take(room).map(|placement| PlacedText {
             layer,
             string: Arc::clone(&string),
@@ -313,13 +313,6 @@ fn ended(stop: Stop) -> Error {
         Stop::TooMuch(why) => Error::invalid(why, "write the layout with simpler outlines or fewer copies"),
         Stop::Interrupted => Error::Interrupted,
     }
-}
-
-/// A text of a layout on one line of a report, cut where it is very long.
-fn one_line(bytes: &[u8]) -> String {
-    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(LONGEST_TEXT)]);
-    let cut = if bytes.len() > LONGEST_TEXT { "..." } else { "" };
-    format!("{text}{cut}")
 }
 
 /// Whether a rectangle is drawn clockwise.

@@ -9,10 +9,6 @@ use metalith_gds::Layout;
 const STEPS: u64 = 200_000_000;
 /// Steps for each byte of the files: two seconds a megabyte.
 const STEPS_A_BYTE: u64 = 200;
-/// Shapes with all references followed, for any layout, and for each byte: an array of 5 x 5 equal lenses, each an
-/// octant and seven copies of it, has 7 shapes a byte.
-const SHAPES: u64 = 8_000_000;
-const SHAPES_A_BYTE: u64 = 16;
 /// Rectangles off every lattice: 16 bytes each. A rectangle that is drawn takes 64 bytes of the file.
 const RECTS: u64 = 8_000_000;
 const RECTS_A_BYTE: u64 = 1;
@@ -28,7 +24,6 @@ const STEPS_A_LOOK: u64 = 1 << 20;
 /// What a check or a comparison may hold, by the size of the files.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Allowance {
-    pub shapes: u64,
     pub rects: u64,
     pub vertices: u64,
     pub sites: u64,
@@ -40,24 +35,11 @@ impl Allowance {
         let bytes = layouts.into_iter().map(Layout::bytes).fold(0, u64::saturating_add);
         let grown = |base: u64, a_byte: u64| bytes.saturating_mul(a_byte).saturating_add(base);
         Self {
-            shapes: grown(SHAPES, SHAPES_A_BYTE),
             rects: grown(RECTS, RECTS_A_BYTE),
             vertices: grown(VERTICES, VERTICES_A_BYTE),
             sites: grown(SITES, SITES_A_BYTE),
             steps: grown(STEPS, STEPS_A_BYTE),
         }
-    }
-
-    /// Why a layout is not expanded, if it has too many shapes for its bytes.
-    pub fn beyond(&self, layout: &Layout) -> Option<String> {
-        let shapes = layout.flat_shapes();
-        (shapes > self.shapes).then(|| {
-            format!(
-                "{shapes} shapes with all references followed are out of proportion to {} bytes; {} are read",
-                layout.bytes(),
-                self.shapes
-            )
-        })
     }
 }
 

@@ -6,6 +6,7 @@ use metalith_core::LayerNumber;
 /// One cell ("structure") of a layout in number.
 #[derive(Clone, Debug)]
 pub struct Cell {
+    /// Printable: see [`metalith_core::text::printable_bytes`].
     pub name: String,
     /// Its bytes in the file, from BGNSTR to behind ENDSTR.
     pub bytes: std::ops::Range<u64>,
@@ -64,6 +65,8 @@ pub struct LayerTally {
     pub boxes: u64,
     pub paths: u64,
     pub texts: u64,
+    /// Of all their strings.
+    pub text_bytes: u64,
     pub nodes: u64,
     pub vertices: u64,
     /// Around the areas, in the cell's coordinates.
@@ -76,6 +79,7 @@ impl LayerTally {
         boxes: 0,
         paths: 0,
         texts: 0,
+        text_bytes: 0,
         nodes: 0,
         vertices: 0,
         bounds: Rect::EMPTY,

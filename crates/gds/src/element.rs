@@ -2,10 +2,11 @@
 
 use super::input::Input;
 use super::limits::ReadLimits;
-use super::record::{self, Record, data, kind};
+use super::record::{Record, data, kind};
 use super::shape::Point;
 use super::transform::Transform;
-use metalith_core::{LayerNumber, Result};
+use crate::error::{Error, LayoutError, Limit, Result};
+use metalith_core::LayerNumber;
 
 /// Which element the records between a head and ENDEL make.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -122,8 +123,8 @@ impl Element {
                 kind::SNAME => {
                     let name = input.text(record)?;
                     if name.is_empty() || name.len() > limits.name_bytes {
-                        let what = format!("a reference to a cell whose name has {} bytes", name.len());
-                        return Err(input.fault(record.offset, what, "give cells names of 1 to 32 characters"));
+                        let cause = LayoutError::ReferenceName { bytes: name.len() };
+                        return Err(input.fault(record.offset, cause));
                     }
                     self.name.clear();
                     self.name.extend_from_slice(name);
@@ -162,9 +163,14 @@ impl Element {
 
     fn extend_points(&mut self, input: &Input, record: Record, limits: &ReadLimits) -> Result<()> {
         let body = input.checked(record, data::INT4, 8)?;
-        if self.points.len() + body.len() / 8 > limits.vertices {
-            let what = format!("an element of more than {} vertices", limits.vertices);
-            return Err(input.fault(record.offset, what, "split the polygon; the format says 8191 at most"));
+        let found = self.points.len() + body.len() / 8;
+        if found > limits.vertices {
+            let cause = LayoutError::Limit {
+                limit: Limit::Vertices,
+                found: found as u64,
+                most: limits.vertices as u64,
+            };
+            return Err(input.fault(record.offset, cause));
         }
         self.points.extend(body.chunks_exact(8).map(|xy| {
             Point::new(
@@ -175,21 +181,17 @@ impl Element {
         Ok(())
     }
 
-    fn unended(&self, input: &Input, record: Record) -> metalith_core::Error {
-        input.fault(
-            record.offset,
-            format!(
-                "a {} record inside the element that begins at byte {}: ENDEL is missing",
-                record::name(record.kind),
-                self.offset
-            ),
-            "the file is damaged here: write it again",
-        )
+    fn unended(&self, input: &Input, record: Record) -> Error {
+        let cause = LayoutError::ElementNotEnded {
+            kind: record.kind,
+            begin: self.offset,
+        };
+        input.fault(record.offset, cause)
     }
 
     /// Whether everything that this element needs was there.
     fn check(&self, input: &Input, has_layer: bool, has_datatype: bool) -> Result<()> {
-        let (noun, points) = match self.kind {
+        let (element, points) = match self.kind {
             ElementKind::Boundary => ("BOUNDARY", 3..=usize::MAX),
             ElementKind::Box => ("BOX", 3..=usize::MAX),
             ElementKind::Path => ("PATH", 1..=usize::MAX),
@@ -198,45 +200,32 @@ impl Element {
             ElementKind::Reference => ("SREF", 1..=1),
             ElementKind::Array => ("AREF", 3..=3),
         };
-        let fail = |what: String| {
-            Err(input.fault(
-                self.offset,
-                what,
-                "the tool that wrote this file breaks the format: report it there",
-            ))
-        };
+        let fail = |cause: LayoutError| Err(input.fault(self.offset, cause));
         if !points.contains(&self.points.len()) {
-            return fail(format!("a {noun} with {} points", self.points.len()));
+            let points = self.points.len();
+            return fail(LayoutError::Points { element, points });
         }
         if matches!(self.kind, ElementKind::Reference | ElementKind::Array) {
             if self.name.is_empty() {
-                return fail(format!("a {noun} without SNAME"));
+                return fail(LayoutError::Lacks { element, lacks: "SNAME" });
             }
-            if self.kind == ElementKind::Array && (self.columns as i16 <= 0 || self.rows as i16 <= 0) {
-                return fail(format!("an AREF of {} x {}", self.columns as i16, self.rows as i16));
+            let (columns, rows) = (self.columns as i16, self.rows as i16);
+            if self.kind == ElementKind::Array && (columns <= 0 || rows <= 0) {
+                return fail(LayoutError::ArraySize { columns, rows });
             }
             if self.absolute && (self.magnification != 1.0 || self.angle_deg != 0.0) {
-                return Err(input.fault(
-                    self.offset,
-                    format!("a {noun} with absolute magnification or angle"),
-                    "few tools agree on what this means: write the reference with relative ones",
-                ));
+                return fail(LayoutError::Absolute { element });
             }
             if self.transform().is_none() {
-                return Err(input.fault(
-                    self.offset,
-                    format!(
-                        "a {noun} with magnification {:e}, angle {}",
-                        self.magnification, self.angle_deg
-                    ),
-                    "magnifications from 1e-6 to 1e6 are read",
-                ));
+                return fail(LayoutError::Magnification {
+                    element,
+                    magnification: self.magnification,
+                    angle_deg: self.angle_deg,
+                });
             }
         } else if !has_layer || !has_datatype {
-            return fail(format!(
-                "a {noun} without {}",
-                if has_layer { "its datatype" } else { "LAYER" }
-            ));
+            let lacks = if has_layer { "its datatype" } else { "LAYER" };
+            return fail(LayoutError::Lacks { element, lacks });
         }
         Ok(())
     }

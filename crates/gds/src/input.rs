@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::record::{self, Record};
 use metalith_core::file::{Ahead, Block};
-use metalith_core::{Error, Result};
+use crate::error::{Error, LayoutError, Result};
 
 /// Bytes read at a time: enough that the kernel's copy is the cost, not the call. No mapping of the file:
 /// mapped pages count as memory of the process.
@@ -38,10 +38,7 @@ impl Source {
     pub fn file(path: &Path) -> Result<Self> {
         let meta = std::fs::metadata(path).map_err(Error::io("read", path))?;
         if !meta.is_file() {
-            return Err(Error::invalid(
-                format!("{} is not a file", path.display()),
-                "name a GDSII file (.gds)",
-            ));
+            return Err(Error::NotAFile { path: path.to_owned() });
         }
         Ok(Self::File {
             path: path.to_owned(),
@@ -70,13 +67,11 @@ impl Source {
                 let file = File::open(path).map_err(Error::io("open", path))?;
                 let now = file.metadata().map_err(Error::io("read", path))?.len();
                 if now != *bytes {
-                    return Err(Error::invalid(
-                        format!(
-                            "{} changed from {bytes} to {now} bytes while it was read",
-                            path.display()
-                        ),
-                        "wait until whoever writes it is done",
-                    ));
+                    return Err(Error::Changed {
+                        path: path.clone(),
+                        before: *bytes,
+                        now,
+                    });
                 }
                 let large = (*bytes >= LARGE).then(|| Ahead::open(path, LONGEST)).flatten();
                 large.map_or_else(|| Stream::Plain(Box::new(file)), Stream::Large)
@@ -116,12 +111,11 @@ impl Input {
     }
 
     /// An error at a place of this file.
-    pub fn fault(&self, offset: u64, what: impl Into<String>, hint: impl Into<String>) -> Error {
+    pub fn fault(&self, offset: u64, cause: LayoutError) -> Error {
         Error::Layout {
             path: self.path.clone(),
             offset,
-            what: what.into(),
-            hint: hint.into(),
+            cause,
         }
     }
 
@@ -205,40 +199,20 @@ impl Input {
     pub fn next(&mut self) -> Result<Record> {
         let offset = self.offset();
         let window = self.window()?;
+        let held = window.len();
         let &[high, low, kind, data, ..] = window else {
-            let left = window.len();
-            let what = format!("the file ends {left} bytes into a record, before ENDLIB");
-            return Err(self.fault(offset, what, "the file is cut short: copy or write it again"));
+            return Err(self.fault(offset, LayoutError::EndsEarly { held }));
         };
         let length = usize::from(u16::from_be_bytes([high, low]));
-        let held = window.len();
         if length < 4 || length % 2 != 0 {
-            return Err(self.fault(
-                offset,
-                format!("a record of length {length}; it must be even and at least 4"),
-                if offset == 0 {
-                    "this does not begin like GDSII; is it another format, or compressed?"
-                } else {
-                    "the file is damaged from here on, or was changed by a text tool: write it again"
-                },
-            ));
+            let first = offset == 0;
+            return Err(self.fault(offset, LayoutError::RecordLength { length, first }));
         }
         if length > held {
-            return Err(self.fault(
-                offset,
-                format!(
-                    "the file ends inside a {} record of {length} bytes, {held} of them there",
-                    record::name(kind)
-                ),
-                "the file is cut short: copy or write it again",
-            ));
+            return Err(self.fault(offset, LayoutError::EndsInRecord { kind, length, held }));
         }
         if kind > record::kind::LAST {
-            return Err(self.fault(
-                offset,
-                format!("record type 0x{kind:02X} is not GDSII"),
-                "the file is damaged from here on, or is another format",
-            ));
+            return Err(self.fault(offset, LayoutError::RecordKind { kind }));
         }
         let from = self.from + 4;
         self.from += length;
@@ -260,16 +234,14 @@ impl Input {
     pub fn checked(&self, record: Record, data: u8, unit: usize) -> Result<&[u8]> {
         let body = self.body(record);
         if record.data != data || body.is_empty() || !body.len().is_multiple_of(unit) {
-            return Err(self.fault(
-                record.offset,
-                format!(
-                    "a {} record of data type {} and {} bytes; it must be of type {data} in steps of {unit} bytes",
-                    record::name(record.kind),
-                    record.data,
-                    body.len()
-                ),
-                "the tool that wrote this file breaks the format: report it there",
-            ));
+            let cause = LayoutError::RecordBody {
+                kind: record.kind,
+                data: record.data,
+                bytes: body.len(),
+                wanted: data,
+                unit,
+            };
+            return Err(self.fault(record.offset, cause));
         }
         Ok(body)
     }
@@ -297,11 +269,11 @@ impl Input {
     pub fn text(&self, record: Record) -> Result<&[u8]> {
         let body = self.body(record);
         if record.data != record::data::ASCII {
-            return Err(self.fault(
-                record.offset,
-                format!("a {} record of data type {}", record::name(record.kind), record.data),
-                "it must be text (data type 6): the tool that wrote this file breaks the format",
-            ));
+            let cause = LayoutError::NotText {
+                kind: record.kind,
+                data: record.data,
+            };
+            return Err(self.fault(record.offset, cause));
         }
         let end = body.iter().rposition(|&b| b != 0).map_or(0, |last| last + 1);
         Ok(&body[..end])

@@ -10,7 +10,11 @@ use super::record::kind;
 use super::scan::{Scan, scan};
 use super::tree::{self, Tree};
 use super::visit::Selection;
-use metalith_core::{Error, Progress, Result, Silent};
+use crate::error::{Error, LayoutError, Result};
+use metalith_core::{Progress, Silent};
+
+/// Cells at the top that a message names.
+const TOPS_NAMED: usize = 8;
 
 /// A GDSII file of which every byte has been looked at once: cells in number, their tree, their faults.
 /// Shapes are not held; [`Layout::visit`] reads them again.
@@ -130,13 +134,7 @@ impl Layout {
             .map(|den| (nm * den as f64, den))
             .find(|(num, _)| num.round() >= 1.0 && (num - num.round()).abs() < 1e-9 * num)
             .map(|(num, den)| (num.round() as i64, den))
-            .ok_or_else(|| {
-                self.fault(
-                    0,
-                    format!("a database unit of {nm} nm is no ratio of whole nanometres"),
-                    "write the layout with a database unit of 1 nm",
-                )
-            })
+            .ok_or_else(|| self.fault(0, LayoutError::UnitRatio { nm }))
     }
 
     /// Cells in the order of the file.
@@ -149,9 +147,12 @@ impl Layout {
         &self.tree.tops
     }
 
-    /// Index of the cell with this name.
+    /// Index of the cell with this name: its bytes, or as it is printed.
     pub fn cell_index(&self, name: &str) -> Option<usize> {
-        self.tree.definitions[self.names.find(name.as_bytes())? as usize]
+        match self.names.find(name.as_bytes()) {
+            Some(number) => self.tree.definitions[number as usize],
+            None => self.cells.iter().position(|cell| cell.name == name),
+        }
     }
 
     /// Longest chain of references.
@@ -209,67 +210,56 @@ impl Layout {
         }
         if let Some(name) = &selection.top {
             let index = self.cell_index(name).ok_or_else(|| {
-                self.fault(
-                    0,
-                    format!("there is no cell {name}"),
-                    format!("cells at the top: {}", self.top_names()),
-                )
+                let (name, tops) = (name.clone(), self.top_names());
+                self.fault(0, LayoutError::NoSuchCell { name, tops })
             })?;
             return Ok(vec![index]);
         }
         match self.tree.tops.as_slice() {
-            [] if !selection.lenient => Err(self.fault(0, "there is no cell in the file", "is this the right file?")),
+            [] if !selection.lenient => Err(self.fault(0, LayoutError::NoCells)),
             [_] => Ok(self.tree.tops.clone()),
             all if selection.lenient => Ok(all.to_vec()),
-            _ => Err(self.fault(
-                self.cells[self.tree.tops[1]].bytes.start,
-                format!("{} cells at the top: {}", self.tree.tops.len(), self.top_names()),
-                "say which with --top",
-            )),
+            all => {
+                let cause = LayoutError::SeveralTops {
+                    count: all.len(),
+                    tops: self.top_names(),
+                };
+                Err(self.fault(self.cells[all[1]].bytes.start, cause))
+            }
         }
     }
 
     /// Whether every reference leads to a cell, and none round in a circle.
     fn sound(&self) -> Result<()> {
-        if let Some(f) = self.circles().first() {
-            let what = format!("cell {} refers to {}, which contains it", f.cell, f.name);
-            return Err(self.fault(f.offset, what, "remove the reference: a cell cannot contain itself"));
+        let cause = |f: Faulty, of: fn(String, String) -> LayoutError| self.fault(f.offset, of(f.cell, f.name));
+        if let Some(f) = self.circles().into_iter().next() {
+            return Err(cause(f, |cell, name| LayoutError::Circle { cell, name }));
         }
-        if let Some(f) = self.dangling().first() {
-            let what = format!("cell {} refers to {}, which is not in the file", f.cell, f.name);
-            return Err(self.fault(f.offset, what, "write the file with all cells that it needs"));
+        if let Some(f) = self.dangling().into_iter().next() {
+            return Err(cause(f, |cell, name| LayoutError::Dangling { cell, name }));
         }
-        if let Some(f) = self.doubled().first() {
-            let what = format!("a second cell with the name {}", f.name);
-            return Err(self.fault(
-                f.offset,
-                what,
-                "rename one of them: references cannot tell which is meant",
-            ));
+        if let Some(f) = self.doubled().into_iter().next() {
+            return Err(cause(f, |_, name| LayoutError::Doubled { name }));
         }
         Ok(())
     }
 
-    fn top_names(&self) -> String {
-        let mut names: Vec<&str> = self
-            .tree
-            .tops
-            .iter()
-            .take(8)
-            .map(|&t| self.cells[t].name.as_str())
-            .collect();
-        if self.tree.tops.len() > 8 {
-            names.push("...");
+    /// The first cells at the top.
+    fn top_names(&self) -> Vec<String> {
+        let first = self.tree.tops.iter().take(TOPS_NAMED);
+        let mut names: Vec<String> = first.map(|&t| self.cells[t].name.clone()).collect();
+        if self.tree.tops.len() > TOPS_NAMED {
+            names.push("...".into());
         }
-        names.join(", ")
+        names
     }
 
-    pub fn fault(&self, offset: u64, what: impl Into<String>, hint: impl Into<String>) -> Error {
+    /// An error at a place of this layout.
+    pub(super) fn fault(&self, offset: u64, cause: LayoutError) -> Error {
         Error::Layout {
             path: self.path().to_owned(),
             offset,
-            what: what.into(),
-            hint: hint.into(),
+            cause,
         }
     }
 
@@ -299,11 +289,7 @@ impl Layout {
         input.seek(self.cells[index].bytes.start)?;
         let (begin, name) = (input.next()?, input.next()?);
         if begin.kind != kind::BGNSTR || name.kind != kind::STRNAME {
-            return Err(input.fault(
-                begin.offset,
-                "the file changed while it was read",
-                "wait until whoever writes it is done",
-            ));
+            return Err(input.fault(begin.offset, LayoutError::Rewritten));
         }
         Ok(())
     }

@@ -7,10 +7,12 @@
 //!
 //! What the format allows is read: any order of records inside an element, optional records, several XY
 //! records an element, padding after ENDLIB, any database unit. What it forbids, and what would cost
-//! unbounded memory or time ([`ReadLimits`]), is an [`metalith_core::Error::Layout`] with the offset of the byte.
+//! unbounded memory or time ([`ReadLimits`]), is an [`Error::Layout`] with the offset of the byte and a cause that
+//! can be matched on.
 
 mod cell;
 mod element;
+mod error;
 pub mod extract;
 mod fast;
 mod input;
@@ -29,6 +31,7 @@ mod visit;
 mod walk;
 
 pub use cell::{Cell, Child, LayerTally};
+pub use error::{Error, ExtractionError, LayoutError, Limit, Result};
 pub use layout::{Faulty, Layout};
 pub use limits::ReadLimits;
 pub use metalith_core::LayerNumber;

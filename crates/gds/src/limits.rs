@@ -20,7 +20,25 @@ pub struct ReadLimits {
     pub placements: u64,
     /// Shapes in the whole layout with every reference followed.
     pub flat_shapes: u64,
+    /// The same from a short file, and how many more for each of its bytes: arrays of arrays make of a few hundred
+    /// bytes any number of shapes. A lens of elements that share their eighths has 8 shapes a byte.
+    pub short_file_shapes: u64,
+    pub shapes_per_byte: u64,
+    /// Bytes of all texts with every reference followed, and 64 for each of them: whoever keeps texts keeps them
+    /// one by one.
+    pub flat_text_bytes: u64,
 }
+
+impl ReadLimits {
+    /// Shapes that are read of a file of so many bytes, every reference followed.
+    pub(super) fn shapes_of(&self, bytes: u64) -> u64 {
+        let in_proportion = self.shapes_per_byte.saturating_mul(bytes);
+        self.flat_shapes.min(self.short_file_shapes.saturating_add(in_proportion))
+    }
+}
+
+/// What a text costs beside its bytes, where texts are kept.
+pub(super) const TEXT_BYTES: u64 = 64;
 
 impl Default for ReadLimits {
     /// Twelve times the largest array asked for (5 x 5, 160 million pillars) in under a gigabyte.
@@ -34,6 +52,9 @@ impl Default for ReadLimits {
             depth: 256,
             placements: 1 << 22,
             flat_shapes: 2_000_000_000,
+            short_file_shapes: 1 << 24,
+            shapes_per_byte: 64,
+            flat_text_bytes: 1 << 26,
         }
     }
 }

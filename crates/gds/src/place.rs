@@ -7,8 +7,9 @@ use super::names::Recent;
 use super::shape::Point;
 use super::transform::Transform;
 use super::tree;
-use super::walk::{Sink, Walk};
-use metalith_core::{Error, LayerNumber, Result, Silent};
+use super::walk::{Sink, Stop, Walk};
+use crate::error::{Error, LayoutError, Result};
+use metalith_core::{LayerNumber, Silent};
 
 /// Placements of each cell that is not placed shape by shape, by index of the cell.
 pub(super) fn placements(layout: &Layout, input: &mut Input, roots: &[usize]) -> Result<Vec<Vec<Transform>>> {
@@ -70,11 +71,11 @@ impl Placer<'_> {
 }
 
 impl Sink for Placer<'_> {
-    fn five_points(&mut self, _offset: u64, _layer: LayerNumber, _points: &[Point; 5]) -> Result<()> {
+    fn five_points(&mut self, _offset: u64, _layer: LayerNumber, _points: &[Point; 5]) -> Result<(), Stop> {
         Ok(())
     }
 
-    fn plain_reference(&mut self, offset: u64, key: u64, at: Point) -> Result<()> {
+    fn plain_reference(&mut self, offset: u64, key: u64, at: Point) -> Result<(), Stop> {
         let names = self.layout.names();
         let number = self.recent.number(key, |name| names.find(name).unwrap_or(u32::MAX));
         let Some(child) = self.target((number != u32::MAX).then_some(number)) else {
@@ -114,9 +115,5 @@ impl Sink for Placer<'_> {
 
 /// The error of a chain of references whose magnification is beyond limits.
 pub(super) fn magnified(layout: &Layout, offset: u64) -> Error {
-    layout.fault(
-        offset,
-        "a reference inside references whose magnifications multiply beyond 1e6 or 1e-6",
-        "write the cell at its true size",
-    )
+    layout.fault(offset, LayoutError::Magnifications)
 }

@@ -10,8 +10,10 @@ use super::names::{Names, Recent};
 use super::outline::outline;
 use super::record::{self, kind};
 use super::shape::{Point, Rect};
-use super::walk::{Sink, Walk};
-use metalith_core::{Error, LayerNumber, Progress, Result};
+use super::walk::{Sink, Stop, Walk};
+use crate::error::{Error, LayoutError, Limit, Result};
+use metalith_core::text::printable_bytes;
+use metalith_core::{LayerNumber, Progress};
 
 /// What the first reading found.
 pub(super) struct Scan {
@@ -39,8 +41,7 @@ pub(super) fn scan_with(input: &mut Input, bytes: u64, walk: &mut Walk<'_>) -> R
     if let &[_, _, first, ..] = input.window()?
         && first != kind::HEADER
     {
-        let what = "the file does not begin with HEADER";
-        return Err(input.fault(0, what, "is this a GDSII file? OASIS and compressed files are not read"));
+        return Err(input.fault(0, LayoutError::NoHeader));
     }
     input.next()?;
     let mut title = String::new();
@@ -49,12 +50,11 @@ pub(super) fn scan_with(input: &mut Input, bytes: u64, walk: &mut Walk<'_>) -> R
     loop {
         let record = input.next()?;
         match record.kind {
-            kind::LIBNAME => title = String::from_utf8_lossy(input.text(record)?).into_owned(),
+            kind::LIBNAME => title = printable_bytes(input.text(record)?),
             kind::UNITS => units = Some(read_units(input, record)?),
             kind::BGNSTR => {
                 if units.is_none() {
-                    let what = "a cell begins before UNITS";
-                    return Err(input.fault(record.offset, what, "the tool that wrote this file breaks the format"));
+                    return Err(input.fault(record.offset, LayoutError::UnitsMissingBeforeCell));
                 }
                 tally.begin(input, record.offset)?;
                 walk.cell(input, &mut tally)?;
@@ -67,8 +67,7 @@ pub(super) fn scan_with(input: &mut Input, bytes: u64, walk: &mut Walk<'_>) -> R
         }
     }
     let Some(units) = units else {
-        let what = "the file has no UNITS";
-        return Err(input.fault(input.offset(), what, "the tool that wrote this file breaks the format"));
+        return Err(input.fault(input.offset(), LayoutError::NoUnits));
     };
     let trailing = bytes.saturating_sub(input.offset());
     let mut nonzero = false;
@@ -92,11 +91,7 @@ pub(super) fn scan_with(input: &mut Input, bytes: u64, walk: &mut Walk<'_>) -> R
 }
 
 fn stray(input: &Input, record: record::Record) -> Error {
-    input.fault(
-        record.offset,
-        format!("a {} record outside every cell", record::name(record.kind)),
-        "the file is damaged here: write it again",
-    )
+    input.fault(record.offset, LayoutError::OutsideCells { kind: record.kind })
 }
 
 /// Smallest and largest database unit that is read [m].
@@ -105,11 +100,11 @@ const UNIT_RANGE_M: std::ops::RangeInclusive<f64> = 1e-13..=1e-3;
 fn read_units(input: &Input, record: record::Record) -> Result<[f64; 2]> {
     let units = [input.real8(record, 0)?, input.real8(record, 1)?];
     if !UNIT_RANGE_M.contains(&units[1]) || units[0].is_nan() || units[0] <= 0.0 {
-        return Err(input.fault(
-            record.offset,
-            format!("a database unit of {:e} m, {:e} user units", units[1], units[0]),
-            "database units from 1e-13 to 1e-3 m are read; layouts are in 1e-9",
-        ));
+        let cause = LayoutError::UnitSize {
+            metres: units[1],
+            user: units[0],
+        };
+        return Err(input.fault(record.offset, cause));
     }
     Ok(units)
 }
@@ -151,24 +146,20 @@ impl Tally {
     fn begin(&mut self, input: &mut Input, offset: u64) -> Result<()> {
         let record = input.next()?;
         if record.kind != kind::STRNAME {
-            return Err(input.fault(
-                record.offset,
-                format!("a cell begins with {}, not with its name", record::name(record.kind)),
-                "the tool that wrote this file breaks the format",
-            ));
+            let kind = record.kind;
+            return Err(input.fault(record.offset, LayoutError::NoCellName { kind }));
         }
         let name = input.text(record)?;
         if name.is_empty() || name.len() > self.limits.name_bytes {
-            let what = format!("a cell name of {} bytes", name.len());
-            return Err(input.fault(record.offset, what, "give cells names of 1 to 32 characters"));
+            return Err(input.fault(record.offset, LayoutError::CellName { bytes: name.len() }));
         }
         if self.cells.len() >= self.limits.cells {
-            let what = format!("more than {} cells", self.limits.cells);
-            return Err(input.fault(record.offset, what, "draw shapes that occur once where they stand"));
+            let cause = too_many(Limit::Cells, self.cells.len() + 1, self.limits.cells);
+            return Err(input.fault(record.offset, cause));
         }
         self.numbers.push(self.names.number(name));
         self.cells.push(Cell {
-            name: String::from_utf8_lossy(name).into_owned(),
+            name: printable_bytes(name),
             bytes: offset..offset,
             layers: Vec::new(),
             children: Vec::new(),
@@ -190,7 +181,7 @@ impl Tally {
             let (references, copies, offset) = std::mem::take(&mut self.counts[number as usize]);
             cell.children.push(Child {
                 cell: None,
-                name: String::from_utf8_lossy(self.names.name(number)).into_owned(),
+                name: printable_bytes(self.names.name(number)),
                 references,
                 copies,
                 offset,
@@ -201,7 +192,7 @@ impl Tally {
     }
 
     #[inline]
-    fn layer(&mut self, layer: LayerNumber, offset: u64) -> Result<&mut LayerTally> {
+    fn layer(&mut self, layer: LayerNumber) -> Result<&mut LayerTally, LayoutError> {
         let cell = self.cells.last_mut().expect("a cell was begun");
         if cell.layers.get(self.last).is_none_or(|(l, _)| *l != layer) {
             let next = cell.layers.len();
@@ -209,7 +200,7 @@ impl Tally {
             if self.last == next {
                 self.tallies += 1;
                 if self.tallies > self.limits.tallies {
-                    return Err(too_many(offset, "layers"));
+                    return Err(too_many(Limit::Layers, self.tallies, self.limits.tallies));
                 }
                 cell.layers.push((layer, LayerTally::EMPTY));
             }
@@ -218,11 +209,11 @@ impl Tally {
     }
 
     #[inline]
-    fn reference(&mut self, number: u32, copies: u64, offset: u64) -> Result<()> {
+    fn reference(&mut self, number: u32, copies: u64, offset: u64) -> Result<(), LayoutError> {
         let number = number as usize;
         if number >= self.counts.len() {
             if number >= self.limits.cells || self.names.bytes() > self.limits.all_name_bytes {
-                return Err(too_many(offset, "names"));
+                return Err(too_many(Limit::Names, number + 1, self.limits.cells));
             }
             self.counts.resize(self.names.len().max(number + 1), (0, 0, 0));
         }
@@ -232,7 +223,7 @@ impl Tally {
             self.touched.push(number as u32);
             self.tallies += 1;
             if self.tallies > self.limits.tallies {
-                return Err(too_many(offset, "references"));
+                return Err(too_many(Limit::References, self.tallies, self.limits.tallies));
             }
         }
         count.0 += 1;
@@ -241,17 +232,18 @@ impl Tally {
     }
 }
 
-fn too_many(offset: u64, what: &str) -> Error {
-    Error::invalid(
-        format!("byte {offset}: more distinct {what} in cells than are read"),
-        "this is not the layout of a lens; is the file damaged?",
-    )
+fn too_many(limit: Limit, found: usize, most: usize) -> LayoutError {
+    LayoutError::Limit {
+        limit,
+        found: found as u64,
+        most: most as u64,
+    }
 }
 
 impl Sink for Tally {
     #[inline]
-    fn five_points(&mut self, offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<()> {
-        let tally = self.layer(layer, offset)?;
+    fn five_points(&mut self, _offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<(), Stop> {
+        let tally = self.layer(layer)?;
         tally.boundaries += 1;
         tally.vertices += 5;
         points[..4].iter().for_each(|&p| tally.bounds.include(p));
@@ -262,17 +254,14 @@ impl Sink for Tally {
     }
 
     #[inline]
-    fn plain_reference(&mut self, offset: u64, key: u64, _at: Point) -> Result<()> {
+    fn plain_reference(&mut self, offset: u64, key: u64, _at: Point) -> Result<(), Stop> {
         let names = &mut self.names;
         let number = self.recent.number(key, |name| names.number(name));
-        self.reference(number, 1, offset)
+        Ok(self.reference(number, 1, offset)?)
     }
 
     fn element(&mut self, input: &Input, element: &Element) -> Result<()> {
-        let located = |error| match error {
-            Error::Invalid { what, hint } => input.fault(element.offset, what, hint),
-            other => other,
-        };
+        let located = |cause| input.fault(element.offset, cause);
         self.cells.last_mut().expect("a cell was begun").with_properties += u64::from(element.properties > 0);
         if matches!(element.kind, ElementKind::Reference | ElementKind::Array) {
             let number = self.names.number(&element.name);
@@ -291,7 +280,7 @@ impl Sink for Tally {
             );
         }
         let path = Rect::around(&self.path);
-        let tally = self.layer(element.layer, element.offset).map_err(located)?;
+        let tally = self.layer(element.layer).map_err(located)?;
         let count = match element.kind {
             ElementKind::Boundary => &mut tally.boundaries,
             ElementKind::Box => &mut tally.boxes,
@@ -301,9 +290,13 @@ impl Sink for Tally {
         };
         *count += 1;
         match element.kind {
+            ElementKind::Text => tally.text_bytes += element.string.len() as u64,
             ElementKind::Path => tally.bounds.unite(&path),
             ElementKind::Boundary | ElementKind::Box => element.points.iter().for_each(|&p| tally.bounds.include(p)),
-            _ => return Ok(()),
+            _ => {}
+        }
+        if matches!(element.kind, ElementKind::Text | ElementKind::Node) {
+            return Ok(());
         }
         tally.vertices += element.points.len() as u64;
         Ok(())
@@ -321,7 +314,7 @@ mod tests {
     struct All(Vec<(LayerNumber, Vec<Point>, Option<Rect>)>);
 
     impl Visitor for All {
-        fn shape(&mut self, shape: &Shape<'_>, _placements: &[Transform]) -> Result<()> {
+        fn shape(&mut self, shape: &Shape<'_>, _placements: &[Transform]) -> metalith_core::Result<()> {
             self.0.push((shape.layer, shape.points.to_vec(), shape.rect));
             Ok(())
         }

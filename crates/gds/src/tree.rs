@@ -2,7 +2,8 @@
 //! before anything is expanded.
 
 use super::cell::Cell;
-use super::limits::ReadLimits;
+use super::limits::{ReadLimits, TEXT_BYTES};
+use crate::error::{LayoutError, Limit};
 use super::names::Names;
 
 /// Cells larger than this are placed as a whole; smaller ones without references shape by shape.
@@ -155,29 +156,38 @@ pub(super) fn flat_shapes(cells: &[Cell], placements: &[u64]) -> u64 {
     })
 }
 
-/// What of the layout is beyond the limits, in words.
-pub(super) fn beyond(cells: &[Cell], placements: &[u64], depths: &[u32], limits: &ReadLimits) -> Option<String> {
+/// Bytes of texts, every reference followed, and what each costs beside.
+fn flat_text_bytes(cells: &[Cell], placements: &[u64]) -> u64 {
+    cells.iter().zip(placements).fold(0u64, |sum, (cell, &n)| {
+        let texts = cell.layers.iter().map(|(_, t)| t.text_bytes + TEXT_BYTES * t.texts).sum::<u64>();
+        sum.saturating_add(n.saturating_mul(texts))
+    })
+}
+
+/// What of the layout is beyond the limits, known before anything is expanded. `bytes` is the size of the file.
+pub(super) fn beyond(
+    cells: &[Cell],
+    placements: &[u64],
+    depths: &[u32],
+    limits: &ReadLimits,
+    bytes: u64,
+) -> Option<LayoutError> {
     let depth = depths.iter().copied().max().unwrap_or(0);
-    if depth > limits.depth {
-        return Some(format!("references {depth} deep, {} are followed", limits.depth));
-    }
-    let shapes = flat_shapes(cells, placements);
-    if shapes > limits.flat_shapes {
-        return Some(format!(
-            "{shapes} shapes with all references followed, {} are",
-            limits.flat_shapes
-        ));
-    }
     // Empty cells cost copies too.
     let copies = cells
         .iter()
         .zip(placements)
         .filter(|(c, _)| !c.inline)
         .fold(0u64, |sum, (_, &n)| sum.saturating_add(n));
-    (copies > limits.placements).then(|| {
-        format!(
-            "{copies} copies of cells that have references or more than {INLINE_SHAPES} shapes, {} are followed",
-            limits.placements
-        )
-    })
+    let shapes = flat_shapes(cells, placements);
+    [
+        (Limit::Depth, u64::from(depth), u64::from(limits.depth)),
+        (Limit::FlatShapes, shapes, limits.flat_shapes),
+        (Limit::FlatShapesOfShortFile, shapes, limits.shapes_of(bytes)),
+        (Limit::FlatTexts, flat_text_bytes(cells, placements), limits.flat_text_bytes),
+        (Limit::Placements, copies, limits.placements),
+    ]
+    .into_iter()
+    .find(|(_, found, most)| found > most)
+    .map(|(limit, found, most)| LayoutError::Limit { limit, found, most })
 }

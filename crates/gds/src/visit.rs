@@ -10,8 +10,9 @@ use super::place::{self, magnified};
 use super::shape::{Point, Rect, Shape, ShapeKind, Text, rectangle_of};
 use super::transform::Transform;
 use super::tree;
-use super::walk::{Sink, Walk};
-use metalith_core::{LayerNumber, Progress, Result, Silent};
+use super::walk::{Sink, Stop, Walk};
+use crate::error::Result;
+use metalith_core::{LayerNumber, Progress, Silent};
 
 /// What takes the shapes of a layout.
 pub trait Visitor {
@@ -20,7 +21,7 @@ pub trait Visitor {
     ///
     /// # Errors
     /// Any error ends the visit.
-    fn cell(&mut self, _cell: &Cell, _placements: &[Transform]) -> Result<()> {
+    fn cell(&mut self, _cell: &Cell, _placements: &[Transform]) -> metalith_core::Result<()> {
         Ok(())
     }
 
@@ -28,13 +29,13 @@ pub trait Visitor {
     ///
     /// # Errors
     /// Any error ends the visit.
-    fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> Result<()>;
+    fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> metalith_core::Result<()>;
 
     /// A text, in the coordinates of the cell.
     ///
     /// # Errors
     /// Any error ends the visit.
-    fn text(&mut self, _text: &Text<'_>, _placements: &[Transform]) -> Result<()> {
+    fn text(&mut self, _text: &Text<'_>, _placements: &[Transform]) -> metalith_core::Result<()> {
         Ok(())
     }
 }
@@ -75,8 +76,8 @@ impl Layout {
     fn visit_by<V: Visitor>(&self, mut walk: Walk<'_>, selection: &Selection, visitor: &mut V) -> Result<()> {
         let roots = self.roots(selection)?;
         let (counts, depths) = tree::count(self.cells(), &self.tree().order, &roots);
-        if let Some(what) = tree::beyond(self.cells(), &counts, &depths, self.limits()) {
-            return Err(self.fault(0, what, "write the layout with fewer levels or in parts"));
+        if let Some(cause) = tree::beyond(self.cells(), &counts, &depths, self.limits(), self.bytes()) {
+            return Err(self.fault(0, cause));
         }
         let mut input = self.source().open()?;
         let placed = place::placements(self, &mut input, &roots)?;
@@ -143,7 +144,7 @@ struct Kept {
 struct Keep(Vec<Kept>);
 
 impl Sink for Keep {
-    fn five_points(&mut self, _offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<()> {
+    fn five_points(&mut self, _offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<(), Stop> {
         self.0.push(Kept {
             kind: ShapeKind::Boundary,
             layer,
@@ -153,7 +154,7 @@ impl Sink for Keep {
         Ok(())
     }
 
-    fn plain_reference(&mut self, _offset: u64, _key: u64, _at: Point) -> Result<()> {
+    fn plain_reference(&mut self, _offset: u64, _key: u64, _at: Point) -> Result<(), Stop> {
         Ok(())
     }
 
@@ -245,7 +246,7 @@ impl<V: Visitor> Spread<'_, V> {
 
 impl<V: Visitor> Sink for Spread<'_, V> {
     #[inline]
-    fn five_points(&mut self, offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<()> {
+    fn five_points(&mut self, offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<(), Stop> {
         if !self.wants(layer) {
             return Ok(());
         }
@@ -256,11 +257,11 @@ impl<V: Visitor> Sink for Spread<'_, V> {
             rect: rectangle_of(points),
             offset,
         };
-        self.visitor.shape(&shape, self.placements)
+        Ok(self.visitor.shape(&shape, self.placements)?)
     }
 
     #[inline]
-    fn plain_reference(&mut self, offset: u64, key: u64, at: Point) -> Result<()> {
+    fn plain_reference(&mut self, offset: u64, key: u64, at: Point) -> Result<(), Stop> {
         let layout = self.layout;
         let inline = self.recent.number(key, |name| layout.inline_cell(name));
         if inline == u32::MAX {
@@ -271,7 +272,7 @@ impl<V: Visitor> Sink for Spread<'_, V> {
             dx: at.x,
             dy: at.y,
         };
-        self.copy(inline as usize, own, offset)
+        Ok(self.copy(inline as usize, own, offset)?)
     }
 
     fn element(&mut self, _input: &Input, element: &Element) -> Result<()> {
@@ -292,7 +293,7 @@ impl<V: Visitor> Sink for Spread<'_, V> {
                     at: element.points[0],
                     offset: element.offset,
                 };
-                self.visitor.text(&text, self.placements)
+                Ok(self.visitor.text(&text, self.placements)?)
             }
             _ if self.wants(element.layer) => {
                 let mut points = std::mem::take(&mut self.path);

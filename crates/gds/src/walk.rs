@@ -4,20 +4,45 @@ use super::element::{Element, ElementKind};
 use super::fast;
 use super::input::Input;
 use super::limits::ReadLimits;
-use super::record::{self, kind};
+use super::record::kind;
 use super::shape::Point;
-use metalith_core::{Error, LayerNumber, Progress, Result};
+use crate::error::{Error, LayoutError, Result};
+use metalith_core::{LayerNumber, Progress};
 
 /// What takes the elements of a cell.
 pub(super) trait Sink {
     /// A BOUNDARY of five points; most of them are upright squares.
-    fn five_points(&mut self, offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<()>;
+    fn five_points(&mut self, offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<(), Stop>;
 
     /// A plain reference, the name by its key.
-    fn plain_reference(&mut self, offset: u64, key: u64, at: Point) -> Result<()>;
+    fn plain_reference(&mut self, offset: u64, key: u64, at: Point) -> Result<(), Stop>;
 
     /// Any other element.
     fn element(&mut self, input: &Input, element: &Element) -> Result<()>;
+}
+
+/// Why a sink ends the reading: a cause at the element that it was given, or an error as it is.
+pub(super) enum Stop {
+    Here(LayoutError),
+    With(Error),
+}
+
+impl From<LayoutError> for Stop {
+    fn from(cause: LayoutError) -> Self {
+        Self::Here(cause)
+    }
+}
+
+impl From<Error> for Stop {
+    fn from(error: Error) -> Self {
+        Self::With(error)
+    }
+}
+
+impl From<metalith_core::Error> for Stop {
+    fn from(error: metalith_core::Error) -> Self {
+        Self::With(error.into())
+    }
 }
 
 /// Reads elements from behind STRNAME to behind ENDSTR.
@@ -79,14 +104,8 @@ impl<'a> Walk<'a> {
             } else if record.kind == kind::ENDSTR {
                 return self.report(input.offset());
             } else if matches!(record.kind, kind::BGNSTR | kind::ENDLIB | kind::BGNLIB | kind::HEADER) {
-                return Err(input.fault(
-                    record.offset,
-                    format!(
-                        "a {} record inside a cell: ENDSTR is missing",
-                        record::name(record.kind)
-                    ),
-                    "the file is damaged here: write it again",
-                ));
+                let kind = record.kind;
+                return Err(input.fault(record.offset, LayoutError::CellNotEnded { kind }));
             }
         }
     }
@@ -99,14 +118,19 @@ impl<'a> Walk<'a> {
             let window = input.window()?;
             let mut at = 0;
             while let Some(bytes) = window.get(at..).and_then(<[u8]>::first_chunk) {
-                if let Some((layer, points)) = fast::boundary(bytes) {
-                    sink.five_points(base + at as u64, layer, &points)?;
-                    at += fast::BOUNDARY_BYTES;
+                let offset = base + at as u64;
+                let (taken, length) = if let Some((layer, points)) = fast::boundary(bytes) {
+                    (sink.five_points(offset, layer, &points), fast::BOUNDARY_BYTES)
                 } else if let Some(reference) = bytes.first_chunk().and_then(fast::reference) {
-                    sink.plain_reference(base + at as u64, reference.key, reference.at)?;
-                    at += reference.bytes;
+                    let taken = sink.plain_reference(offset, reference.key, reference.at);
+                    (taken, reference.bytes)
                 } else {
                     break;
+                };
+                match taken {
+                    Ok(()) => at += length,
+                    Err(Stop::Here(cause)) => return Err(input.fault(offset, cause)),
+                    Err(Stop::With(error)) => return Err(error),
                 }
             }
             let more = window.len() - at < fast::BOUNDARY_BYTES && at > 0;

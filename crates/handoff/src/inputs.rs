@@ -23,7 +23,7 @@ pub(super) fn keep(
     let mut put = |name: String, purpose: &'static str, bytes: &[u8]| {
         WholeFile::write(&folder.join(&name), bytes)?;
         kept.push((name, purpose));
-        Ok(())
+        Ok::<_, Error>(())
     };
     // The process and its decks may be those of the program, which are no files.
     let (path, text) = process.source();

@@ -1,8 +1,8 @@
 //! Damage to layouts, and the reading that must survive it.
 
-use metalith_core::{Error, Silent};
+use metalith_core::Silent;
 use metalith_gds::extract::ExtractionPlan;
-use metalith_gds::{LayerNumber, Layout, ReadLimits, Selection, Shape, Text, Transform, Visitor};
+use metalith_gds::{Error, LayerNumber, Layout, ReadLimits, Selection, Shape, Text, Transform, Visitor};
 use rand::Rng;
 
 /// Limits small enough that the worst a mutant can ask for is done in milliseconds.
@@ -15,6 +15,9 @@ pub const LIMITS: ReadLimits = ReadLimits {
     depth: 32,
     placements: 1 << 12,
     flat_shapes: 1 << 14,
+    short_file_shapes: 1 << 14,
+    shapes_per_byte: 0,
+    flat_text_bytes: 1 << 16,
 };
 
 /// Change a few bytes, cut, repeat or move a piece, or splice in a piece of another file.
@@ -89,15 +92,15 @@ impl Visitor for Count {
 pub fn survives(bytes: &[u8]) -> bool {
     let length = bytes.len() as u64;
     let located = |error: &Error| {
-        if let Error::Layout { offset, what, hint, .. } = error {
-            assert!(*offset <= length, "{what}: byte {offset} of {length}");
-            assert!(!what.is_empty() && !hint.is_empty());
+        if let Some((offset, cause)) = error.in_layout() {
+            assert!(offset <= length, "{cause}: byte {offset} of {length}");
+            assert!(!cause.to_string().is_empty() && !cause.remedy().is_empty());
         }
     };
     let layout = match Layout::from_bytes("mutant.gds", bytes, LIMITS) {
         Ok(layout) => layout,
         Err(error) => {
-            assert!(matches!(error, Error::Layout { .. } | Error::Invalid { .. }), "{error}");
+            assert!(matches!(error, Error::Layout { .. }), "{error}");
             located(&error);
             return false;
         }

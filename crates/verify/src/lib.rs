@@ -100,6 +100,21 @@ impl Verification {
     }
 }
 
+/// Whether a layout of this design, at `path`, can be held to it: asked before work is spent on one that cannot.
+///
+/// # Errors
+/// If the elements have more lattice sites together than are held at a time.
+pub fn fits(design: &Design, path: &Path) -> Result<()> {
+    let lattice = design.lattice();
+    let site = |element: Element| ElementSite {
+        name: element.label(),
+        centre_nm: [element.centre_nm.0, element.centre_nm.1],
+        lattice,
+    };
+    let sites: Vec<ElementSite> = design.elements().into_iter().map(site).collect();
+    Ok(metalith_gds::extract::fits(path, &sites)?)
+}
+
 /// Read the layout at `path` back and hold it to its design.
 ///
 /// The first of `premises` is the one that the layout is judged by; the others are simulated beside it.
@@ -114,6 +129,7 @@ pub fn verify(
     accuracy: Accuracy,
     progress: &dyn Progress,
 ) -> Result<Verification> {
+    fits(design, path)?;
     let layout = Layout::open_with(path, metalith_gds::ReadLimits::default(), progress)?;
     let mut extraction = extract(&layout, &plan(design, array), progress)?;
     let elements = compare(array, &extraction);
@@ -167,7 +183,7 @@ pub fn verify(
 /// If the layout cannot be read, or the user stopped it.
 pub fn read_back(design: &Design, array: &PillarArray, path: &Path, progress: &dyn Progress) -> Result<Extraction> {
     let layout = Layout::open_with(path, metalith_gds::ReadLimits::default(), progress)?;
-    extract(&layout, &plan(design, array), progress)
+    Ok(extract(&layout, &plan(design, array), progress)?)
 }
 
 /// Where the elements of a design are.

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
 
+use crate::text::{is_printable, printable};
+
 /// One mistake: what, where in the text (bytes), and what to do.
 #[derive(Clone, Debug)]
 pub struct Fault {
@@ -14,13 +16,17 @@ pub struct Fault {
     pub hint: String,
 }
 
-/// All mistakes of one file. Its `Display` is one line for each with file, line and column;
-/// as a [`miette::Diagnostic`] it shows the text with each place marked.
+/// Mistakes that are listed; the rest is counted.
+const MOST_LISTED: usize = 50;
+
+/// All mistakes of one file, the first 50 of them in words. Its `Display` is one line for each with file, line
+/// and column; as a [`miette::Diagnostic`] it shows the text with each place marked.
 #[derive(Debug)]
 pub struct Faults {
     path: PathBuf,
     source: NamedSource<String>,
     faults: Vec<Fault>,
+    total: usize,
     single: Vec<Mark>,
 }
 
@@ -33,7 +39,15 @@ struct Mark {
 }
 
 impl Faults {
-    pub fn new(path: &Path, text: &str, faults: Vec<Fault>) -> Self {
+    /// Mistakes in the order of the file; `total` counts those that are not in the list too.
+    pub fn new(path: &Path, text: &str, faults: Vec<Fault>, total: usize) -> Self {
+        let mut faults = faults;
+        faults.truncate(MOST_LISTED);
+        for fault in &mut faults {
+            for words in [&mut fault.what, &mut fault.hint] {
+                *words = printable(words).into_owned();
+            }
+        }
         let single = faults
             .iter()
             .map(|f| Mark {
@@ -44,10 +58,16 @@ impl Faults {
             .collect();
         Self {
             path: path.to_owned(),
-            source: NamedSource::new(path.display().to_string(), text.to_owned()),
+            source: NamedSource::new(printable(&path.display().to_string()), drawable(text)),
             faults,
+            total,
             single,
         }
+    }
+
+    /// How many mistakes there are, listed or not.
+    pub fn count(&self) -> usize {
+        self.total
     }
 
     /// The file.
@@ -55,7 +75,7 @@ impl Faults {
         &self.path
     }
 
-    /// The mistakes, in the order of the file.
+    /// The first mistakes, in the order of the file: 50 at most.
     pub fn faults(&self) -> &[Fault] {
         &self.faults
     }
@@ -68,6 +88,20 @@ impl Faults {
         let column = before.rsplit('\n').next().unwrap_or("").chars().count() + 1;
         (line, column)
     }
+}
+
+/// The text as it can be drawn: another character of the same length for each that would change a terminal, so
+/// that all places stay.
+pub(super) fn drawable(text: &str) -> String {
+    text.chars()
+        .map(|c| match c.len_utf8() {
+            _ if is_printable(c) || matches!(c, '\n' | '\r' | '\t') => c,
+            1 => '?',
+            2 => '\u{bf}',
+            3 => '\u{fffd}',
+            _ => '\u{1f5cc}',
+        })
+        .collect()
 }
 
 impl fmt::Display for Faults {
@@ -85,7 +119,10 @@ impl fmt::Display for Faults {
                 fault.hint
             )?;
         }
-        Ok(())
+        match self.total - self.faults.len() {
+            0 => Ok(()),
+            more => write!(f, "\n{}: {more} more mistakes", self.path.display()),
+        }
     }
 }
 

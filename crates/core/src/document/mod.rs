@@ -1,8 +1,9 @@
 //! Text files that people write: TOML with a place for every fault.
 //!
 //! A [`Document`] is read section by section. A fault (missing, unknown, of the wrong type, out of
-//! range) is recorded with its line and column, a harmless value takes the place of the bad one, and
-//! reading goes on; [`Document::finish`] then reports all faults at once.
+//! range) is recorded with its line and column, a value inside the limits takes the place of the bad one, and
+//! reading goes on; at its end all faults are reported at once. What depends on a value with a fault is not judged:
+//! it would be a second fault for one mistake, and its advice would be wrong.
 
 mod fault;
 mod section;
@@ -10,7 +11,8 @@ mod section;
 pub use fault::{Fault, Faults};
 pub use section::{Limits, Section};
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use toml::de::DeTable;
@@ -21,25 +23,27 @@ use crate::error::{Error, Result};
 pub struct Document<'t> {
     path: PathBuf,
     text: &'t str,
-    faults: RefCell<Vec<Fault>>,
+    /// None where a fault turned out to be part of another.
+    faults: RefCell<Vec<Option<Fault>>>,
+    /// Faults found after the list was full.
+    more: Cell<usize>,
+    /// Paths of values with a fault, and of those among them that another value stands in for.
+    doubted: RefCell<HashSet<String>>,
+    replaced: RefCell<HashSet<String>>,
 }
 
 /// Longest text file that is read: a design is a few kilobytes.
 const LONGEST: u64 = 4 << 20;
+
+/// Faults that are held; the rest is counted.
+const MOST_HELD: usize = 1000;
 
 /// The text of a file that a person wrote.
 ///
 /// # Errors
 /// If it cannot be read, is longer than 4 MiB, or is not UTF-8.
 pub fn load(path: &Path) -> Result<String> {
-    let size = std::fs::metadata(path).map_err(Error::io("read", path))?.len();
-    if size > LONGEST {
-        return Err(Error::invalid(
-            format!("{} is {size} bytes long", path.display()),
-            "text files of up to 4 MiB are read; is this the right file?",
-        ));
-    }
-    let bytes = std::fs::read(path).map_err(Error::io("read", path))?;
+    let bytes = crate::file::read_at_most(path, LONGEST, "a text that a person wrote")?;
     String::from_utf8(bytes).map_err(|e| Error::Table {
         path: path.to_owned(),
         line: Some(
@@ -57,38 +61,53 @@ impl<'t> Document<'t> {
     /// Parse the text of the file at `path` and hand its root section to `read`.
     ///
     /// # Errors
-    /// All faults that were found, of syntax or of content, at once.
+    /// If the syntax is wrong, the first place where it is: what follows may be read in another sense than it was
+    /// written in. Else all faults of content, at once.
     pub fn read<T>(path: &Path, text: &'t str, read: impl FnOnce(&Section<'_, '_>) -> T) -> Result<T> {
         let document = Document {
             path: path.to_owned(),
             text,
             faults: RefCell::default(),
+            more: Cell::default(),
+            doubted: RefCell::default(),
+            replaced: RefCell::default(),
         };
-        let (table, syntax) = DeTable::parse_recoverable(text);
-        for error in &syntax {
-            let span = error.span().unwrap_or(0..0);
-            document.fault(span, error.message().trim(), "mend the TOML syntax here");
-        }
-        if !syntax.is_empty() {
-            return Err(document.into_error());
-        }
+        let table = match DeTable::parse(text) {
+            Ok(table) => table,
+            Err(error) => {
+                let span = error.span().unwrap_or(0..0);
+                document.fault(span, error.message().trim(), "mend the TOML syntax here or just before");
+                return Err(document.into_error());
+            }
+        };
         let root = Section::root(&document, &table);
         let value = read(&root);
         root.finish();
-        if document.faults.borrow().is_empty() {
+        if document.is_faultless() {
             Ok(value)
         } else {
             Err(document.into_error())
         }
     }
 
-    /// Record a fault at a byte range of the text.
-    pub fn fault(&self, span: std::ops::Range<usize>, what: impl Into<String>, hint: impl Into<String>) {
-        self.faults.borrow_mut().push(Fault {
+    /// Record a fault at a byte range of the text. Its number, if it is held and not only counted.
+    pub fn fault(
+        &self,
+        span: std::ops::Range<usize>,
+        what: impl Into<String>,
+        hint: impl Into<String>,
+    ) -> Option<usize> {
+        if self.is_full() {
+            self.count_one_more();
+            return None;
+        }
+        let mut faults = self.faults.borrow_mut();
+        faults.push(Some(Fault {
             span,
             what: what.into(),
             hint: hint.into(),
-        });
+        }));
+        Some(faults.len() - 1)
     }
 
     /// The folder of the file: relative paths in it count from here.
@@ -96,9 +115,59 @@ impl<'t> Document<'t> {
         self.path.parent().map_or_else(PathBuf::new, Path::to_owned)
     }
 
+    /// Whether further faults are counted only.
+    fn is_full(&self) -> bool {
+        self.faults.borrow().len() >= MOST_HELD
+    }
+
+    fn count_one_more(&self) {
+        self.more.set(self.more.get() + 1);
+    }
+
+    /// A fault turned out to be part of another.
+    fn withdraw(&self, number: usize) {
+        self.faults.borrow_mut()[number] = None;
+    }
+
+    /// The value at a path has a fault.
+    fn doubt(&self, path: String) {
+        self.doubted.borrow_mut().insert(path);
+    }
+
+    /// Another value stands in for the one at a path.
+    fn replace(&self, path: String) {
+        self.doubt(path.clone());
+        self.replaced.borrow_mut().insert(path);
+    }
+
+    fn is_replaced(&self, path: &str) -> bool {
+        self.replaced.borrow().contains(path)
+    }
+
+    /// Whether no value at one of these paths, nor a section that it is in, has a fault.
+    fn is_sound(&self, paths: &[&str]) -> bool {
+        let doubted = self.doubted.borrow();
+        let ends = |path: &str| {
+            let mut ends: Vec<usize> = path.match_indices('.').map(|(at, _)| at).collect();
+            ends.push(path.len());
+            ends
+        };
+        paths
+            .iter()
+            .all(|path| ends(path).into_iter().all(|end| !doubted.contains(&path[..end])))
+    }
+
+    fn is_faultless(&self) -> bool {
+        self.more.get() == 0 && self.faults.borrow().iter().all(Option::is_none)
+    }
+
     fn into_error(self) -> Error {
-        let mut faults = self.faults.into_inner();
+        let mut faults: Vec<Fault> = self.faults.into_inner().into_iter().flatten().collect();
         faults.sort_by_key(|f| f.span.start);
-        Error::Text(Box::new(Faults::new(&self.path, self.text, faults)))
+        let total = faults.len() + self.more.get();
+        Error::Text(Box::new(Faults::new(&self.path, self.text, faults, total)))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,20 +1,48 @@
 //! Files that appear whole or not at all.
 
+mod part;
 mod past_cache;
 
-use std::fs::{self, File};
-use std::io::{self, Write};
+use std::fs;
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 pub use past_cache::{Ahead, Block};
 
 use crate::error::{Error, Result};
 
+/// The bytes of an ordinary file of at most `most` bytes; `what` says what it should be.
+///
+/// # Errors
+/// If it cannot be read, is a device or a pipe, or is longer.
+pub fn read_at_most(path: &Path, most: u64, what: &str) -> Result<Vec<u8>> {
+    let found = fs::metadata(path).map_err(Error::io("read", path))?;
+    let refused = |why: String| {
+        let hint = format!("{what} of up to {most} bytes is read; is this the right file?");
+        Err(Error::invalid(format!("{} {why}", path.display()), hint))
+    };
+    if !found.is_file() {
+        return refused("is not an ordinary file".into());
+    }
+    if found.len() > most {
+        return refused(format!("is {} bytes long", found.len()));
+    }
+    let mut bytes = Vec::with_capacity(found.len() as usize);
+    let file = fs::File::open(path).map_err(Error::io("read", path))?;
+    // The file may grow while it is read.
+    file.take(most + 1).read_to_end(&mut bytes).map_err(Error::io("read", path))?;
+    if bytes.len() as u64 > most {
+        return refused("grows while it is read".into());
+    }
+    Ok(bytes)
+}
+
 /// A file written beside its place and renamed into it when complete.
 ///
 /// Until [`WholeFile::commit`] the old file, if any, is untouched; dropped or killed before, nothing
 /// replaces it. The unfinished file has a fixed name (`.name.part`), so that the next run overwrites
-/// what a killed one left, and it is locked, so that two runs do not write into one another.
+/// what a killed one left. It is locked, so that two runs do not write into one another, and it is written only
+/// if it is an ordinary file with no other name: links and pipes that lie there are refused.
 pub struct WholeFile {
     target: PathBuf,
     part: PathBuf,
@@ -38,19 +66,7 @@ impl WholeFile {
             )
         })?;
         let part = target.with_file_name(format!(".{}.part", name.to_string_lossy()));
-        let file = File::options()
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .open(&part)
-            .map_err(Error::io("create", &part))?;
-        if let Err(fs::TryLockError::WouldBlock) = file.try_lock() {
-            return Err(Error::invalid(
-                format!("another process is writing {}", target.display()),
-                "wait for it, or write elsewhere with --out",
-            ));
-        }
-        file.set_len(0).map_err(Error::io("empty", &part))?;
+        let file = part::open(&part, target)?;
         Ok(Self {
             target: target.to_owned(),
             out: Some(past_cache::Output::new(file, &part)),
@@ -73,18 +89,19 @@ impl WholeFile {
     /// # Errors
     /// If the disk is full or refuses; the old file is then as it was.
     pub fn commit(mut self) -> Result<()> {
-        let out = self.out.take().expect("a file is committed once");
-        let placed = self.place(out);
-        if placed.is_err() {
-            let _ = fs::remove_file(&self.part);
-        }
-        placed
-    }
-
-    fn place(&self, out: past_cache::Output) -> Result<()> {
+        let out = self.out.as_mut().expect("a file is committed once");
         let file = out.finish().map_err(Error::io("write", &self.target))?;
         file.sync_all().map_err(Error::io("write", &self.target))?;
-        fs::rename(&self.part, &self.target).map_err(Error::io("rename to", &self.target))
+        if !part::is_at(file, &self.part).map_err(Error::io("read", &self.part))? {
+            return Err(Error::invalid(
+                format!("{} was replaced while it was written", self.part.display()),
+                "let one program at a time write into this folder, and try again",
+            ));
+        }
+        fs::rename(&self.part, &self.target).map_err(Error::io("rename to", &self.target))?;
+        // What is at the path of the unfinished file from now on belongs to another run.
+        self.out = None;
+        part::flush_folder_of(&self.target).map_err(Error::io("flush the folder of", &self.target))
     }
 }
 
@@ -100,10 +117,13 @@ impl Write for WholeFile {
 
 impl Drop for WholeFile {
     fn drop(&mut self) {
-        if let Some(out) = self.out.take() {
-            // Not finished: what is left of an abandoned file is of no use.
-            drop(out);
+        if self.out.is_some() {
+            // Not finished: what is left of an abandoned file is of no use. It is removed while it is still
+            // locked, so that it cannot be the file of another run.
             let _ = fs::remove_file(&self.part);
         }
     }
 }
+
+#[cfg(all(test, unix))]
+mod tests;

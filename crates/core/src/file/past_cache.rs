@@ -83,15 +83,18 @@ impl Output {
         }
     }
 
-    /// Hand over what waits, and the file.
-    pub fn finish(mut self) -> io::Result<File> {
+    /// Hand over what waits; the file, complete.
+    pub fn finish(&mut self) -> io::Result<&File> {
         self.put(self.waiting)?;
-        Ok(self.file)
+        Ok(&self.file)
     }
 
     fn full(&mut self) -> io::Result<()> {
         if let Way::Untried = self.way {
-            self.way = open(File::options().write(true), &self.path).map_or(Way::Ordinary, Way::PastCache);
+            // The path is opened anew: only the same file will do.
+            let direct = open(File::options().write(true), &self.path)
+                .filter(|direct| super::part::is_same(direct, &self.file).unwrap_or(false));
+            self.way = direct.map_or(Way::Ordinary, Way::PastCache);
         }
         if let Way::PastCache(file) = &mut self.way {
             match file.write_all(self.block.stretch()) {

@@ -1,12 +1,10 @@
 //! Tables of phase over radius, from CSV or NPY.
 
 use std::f64::consts::TAU;
-use std::fs::File;
-use std::io::BufReader;
 use std::path::Path;
 
 use super::Interpolation;
-use metalith_core::{Error, Result, document};
+use metalith_core::{Error, Result, document, npy};
 
 /// Most rows of a table: a ring for each site of the largest lens that can be designed.
 const MOST_ROWS: usize = 1 << 20;
@@ -78,21 +76,12 @@ fn read_npy(path: &Path) -> Result<Vec<(f64, f64)>> {
         what,
         hint: "save an array of shape [rows, 2], columns r_um and phase_rad, as float64 or float32 in C order".into(),
     };
-    let file = File::open(path).map_err(Error::io("read", path))?;
-    let npy = npyz::NpyFile::new(BufReader::new(file)).map_err(|e| fault(format!("this is no NPY file: {e}")))?;
-    let shape = npy.shape().to_vec();
-    if shape.len() != 2 || shape[1] != 2 || shape[0] > MOST_ROWS as u64 || npy.order() != npyz::Order::C {
-        return Err(fault(format!("an array of shape {shape:?}")));
-    }
-    let values = match npy.try_data::<f64>() {
-        Ok(data) => data.collect::<std::io::Result<Vec<_>>>(),
-        Err(npy) => npy
-            .try_data::<f32>()
-            .map_err(|_| fault("the entries are neither float64 nor float32".into()))?
-            .map(|v| v.map(f64::from))
-            .collect(),
+    let array = npy::read(path, |shape| shape.len() == 2 && shape[1] == 2 && shape[0] <= MOST_ROWS as u64);
+    let values = match array {
+        Ok(array) => array.values,
+        Err(npy::NpyError::Io(error)) => return Err(Error::io("read", path)(error)),
+        Err(error) => return Err(fault(error.to_string())),
     };
-    let values = values.map_err(|e| fault(format!("the file ends early: {e}")))?;
     Ok(values.chunks_exact(2).map(|row| (row[0], row[1])).collect())
 }
 

@@ -4,6 +4,7 @@ use super::DiffPlan;
 use super::area::{MOST_SIDES, Sides};
 use super::content::{Content, Outlines, PlacedText, Ring};
 use super::report::{Change, ChangeMap, ElementDiff, LayerDiff, LayoutDiff, TextAt, TreeDiff};
+use metalith_core::text::printable_bytes;
 use metalith_gds::extract::ExtractedElement;
 use metalith_gds::{LayerNumber, Point, Rect};
 
@@ -235,7 +236,7 @@ fn layer(
 const LONGEST_TEXT: usize = 512;
 
 fn shortened(bytes: &[u8]) -> String {
-    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(LONGEST_TEXT)]);
+    let text = printable_bytes(&bytes[..bytes.len().min(LONGEST_TEXT)]);
     let cut = if bytes.len() > LONGEST_TEXT { "..." } else { "" };
     format!("{text}{cut}")
 }

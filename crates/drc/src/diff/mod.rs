@@ -52,18 +52,9 @@ pub fn diff(a: &Layout, b: &Layout, plan: &DiffPlan, progress: &dyn Progress) ->
     let ((num_a, den_a), (num_b, den_b)) = (a.unit_ratio_nm()?, b.unit_ratio_nm()?);
     let den = den_a / gcd(den_a, den_b) * den_b;
     let factors = [num_a * (den / den_a), num_b * (den / den_b)];
-    for layout in [a, b] {
-        if let Some(what) = Allowance::of([layout]).beyond(layout) {
-            return Err(layout.fault(
-                0,
-                what,
-                "write the layout with fewer copies, or compare its cells one by one",
-            ));
-        }
-    }
     let mut sites = Vec::new();
     for layout in [a, b] {
-        match discover(layout, &everything, &[plan.pillar_layer], Scale::of(layout)?, progress) {
+        match discover(layout, &everything, &[plan.pillar_layer], Scale::of(layout)?, progress).map_err(Error::from) {
             Ok(found) => sites::unite(&mut sites, found),
             // Without elements, all shapes are compared as outlines.
             Err(Error::Invalid { .. }) => {}

@@ -4,8 +4,10 @@ use std::collections::{BTreeMap, HashMap};
 
 use super::plan::ElementSite;
 use super::sites::Scale;
-use crate::{Cell, LayerNumber, Layout, Rect, Selection, Shape, Transform, Visitor};
-use metalith_core::{Error, Lattice, Progress, Result};
+use crate::{
+    Cell, Error, ExtractionError, LayerNumber, Layout, Rect, Result, Selection, Shape, Transform, Visitor,
+};
+use metalith_core::{Lattice, Progress};
 
 /// Tiles of the map of occupied places [nm]: two elements with an empty tile between them are two. Wider
 /// than any pitch, so that sparse places of a lens hold together.
@@ -39,6 +41,8 @@ struct Map {
     tiles: Vec<((i64, i64), Tile)>,
     /// Tile that each placement of the current cell met last.
     guesses: Vec<u32>,
+    /// There are more tiles than are held.
+    scattered: bool,
 }
 
 /// Find the elements of a layout whose pillars are on these layers.
@@ -54,30 +58,36 @@ pub fn discover(
         numbers: HashMap::new(),
         tiles: Vec::new(),
         guesses: Vec::new(),
+        scattered: false,
     };
     let selection = Selection {
         layers: Some(layers.to_vec()),
         ..from.clone()
     };
+    let fail = |cause| Error::Extraction {
+        path: layout.path().to_owned(),
+        cause,
+    };
     layout.visit(&selection, &mut map, progress)?;
-    let layer = layers.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    if map.scattered {
+        return Err(fail(ExtractionError::Scattered { most: MOST_TILES }));
+    }
+    let layers = || layers.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
     let mut sites = Vec::new();
     for cluster in map.clusters() {
-        if let Some(site) = map.element(&cluster)? {
+        if let Some(site) = map.element(&cluster).map_err(fail)? {
             sites.push(site);
         }
     }
     if sites.is_empty() {
-        return Err(Error::invalid(
-            format!("no element found on layer {} of {}", layer, layout.path().display()),
-            "name the layer the pillars are on with --layer, or give the design",
-        ));
+        return Err(fail(ExtractionError::NoElements { layers: layers() }));
     }
     if sites.len() > MOST_ELEMENTS {
-        return Err(Error::invalid(
-            format!("{} separate groups of squares on layer {}", sites.len(), layer),
-            format!("up to {MOST_ELEMENTS} elements are read; name the cell of one with --top"),
-        ));
+        return Err(fail(ExtractionError::Groups {
+            groups: sites.len(),
+            layers: layers(),
+            most: MOST_ELEMENTS,
+        }));
     }
     sites.sort_by_key(|s| (s.centre_nm[1], s.centre_nm[0]));
     for (k, site) in sites.iter_mut().enumerate() {
@@ -87,19 +97,19 @@ pub fn discover(
 }
 
 impl Map {
-    fn add(&mut self, r: &Rect, placement: usize) -> Result<()> {
+    fn add(&mut self, r: &Rect, placement: usize) {
         if !self.scale.reaches(r) || r.width() != r.height() {
-            return Ok(());
+            return;
         }
         let (Some(width), Some(x), Some(y)) = (
             self.scale.whole_nm(r.width()),
             self.scale.whole_nm(r.x0 + r.x1),
             self.scale.whole_nm(r.y0 + r.y1),
         ) else {
-            return Ok(());
+            return;
         };
         if width > WIDEST_NM {
-            return Ok(());
+            return;
         }
         let key = (x.div_euclid(2 * TILE_NM), y.div_euclid(2 * TILE_NM));
         let guess = &mut self.guesses[placement];
@@ -107,12 +117,6 @@ impl Map {
             let next = self.tiles.len() as u32;
             *guess = *self.numbers.entry(key).or_insert(next);
             if *guess == next {
-                if self.tiles.len() >= MOST_TILES {
-                    return Err(Error::invalid(
-                        "small squares are spread over more than two million places of 8 um",
-                        "give the design, or name the cell of one element with --top",
-                    ));
-                }
                 self.tiles.push((key, Tile::default()));
             }
         }
@@ -130,7 +134,6 @@ impl Map {
             tile.samples[usize::from(tile.sampled)] = (from_corner(x), from_corner(y));
             tile.sampled += 1;
         }
-        Ok(())
     }
 
     /// Tiles that touch, corners included.
@@ -168,7 +171,7 @@ impl Map {
     }
 
     /// The lattice of one cluster; none if it is too small to be an element.
-    fn element(&self, cluster: &[usize]) -> Result<Option<ElementSite>> {
+    fn element(&self, cluster: &[usize]) -> Result<Option<ElementSite>, ExtractionError> {
         let squares: u64 = cluster.iter().map(|&k| self.tiles[k].1.squares).sum();
         if squares < FEWEST {
             return Ok(None);
@@ -209,33 +212,30 @@ impl Map {
         let (y, rows) = axis(|s| s.1, bounds.y0, bounds.y1);
         let sites = columns.max(rows);
         if (sites as u64).saturating_pow(2) > squares.saturating_mul(SITES_PER_PILLAR) + (1 << 16) {
-            return Err(Error::invalid(
-                format!(
-                    "{squares} squares about ({}, {}) nm spread over {columns} x {rows} sites of {} nm",
-                    bounds.x0 / 2,
-                    bounds.y0 / 2,
-                    step as f64 / 2.0
-                ),
-                "this is no lens on a lattice; give the design to say where its elements are",
-            ));
+            return Err(ExtractionError::Sparse {
+                squares,
+                at_nm: [bounds.x0 / 2, bounds.y0 / 2],
+                columns,
+                rows,
+                pitch_nm: step as f64 / 2.0,
+            });
         }
         let centre = |first: i64, count: i64| first - (sites - count) / 2 * step + (sites - 1) * step / 2;
         let (twice_x, twice_y) = (centre(x, columns), centre(y, rows));
+        let bad = ExtractionError::Lattice {
+            pitch_nm: step as f64 / 2.0,
+            centre_nm: [twice_x as f64 / 2.0, twice_y as f64 / 2.0],
+        };
         if step % 4 != 0 || twice_x % 2 != 0 || twice_y % 2 != 0 {
-            return Err(Error::invalid(
-                format!(
-                    "a lattice of pitch {} nm about ({}, {}) nm",
-                    step as f64 / 2.0,
-                    twice_x as f64 / 2.0,
-                    twice_y as f64 / 2.0
-                ),
-                "lattices with an even pitch about a whole nanometre are read",
-            ));
+            return Err(bad);
         }
+        let Ok(lattice) = Lattice::new((step / 2) as u32, sites as usize) else {
+            return Err(bad);
+        };
         Ok(Some(ElementSite {
             name: String::new(),
             centre_nm: [twice_x / 2, twice_y / 2],
-            lattice: Lattice::new((step / 2) as u32, sites as usize)?,
+            lattice,
         }))
     }
 }
@@ -249,18 +249,23 @@ fn most_common(counts: BTreeMap<i64, u64>) -> Option<i64> {
 }
 
 impl Visitor for Map {
-    fn cell(&mut self, _cell: &Cell, placements: &[Transform]) -> Result<()> {
+    fn cell(&mut self, _cell: &Cell, placements: &[Transform]) -> metalith_core::Result<()> {
         self.guesses.clear();
         self.guesses.resize(placements.len(), 0);
         Ok(())
     }
 
     #[inline]
-    fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> Result<()> {
+    fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> metalith_core::Result<()> {
         let Some(rect) = &shape.rect else { return Ok(()) };
         for (k, placement) in placements.iter().enumerate() {
+            // A tile too many, and no more is looked for.
+            self.scattered |= self.tiles.len() > MOST_TILES;
+            if self.scattered {
+                break;
+            }
             if let Some(placed) = placement.apply_rect(rect) {
-                self.add(&placed, k)?;
+                self.add(&placed, k);
             }
         }
         Ok(())

@@ -15,8 +15,10 @@ pub use oddity::{Oddities, Oddity, Why};
 pub use plan::{ElementSite, Elements, ExtractedElement, Extraction, ExtractionPlan};
 pub use survey::{LayerSummary, Survey, TextSummary};
 
-use crate::Layout;
-use metalith_core::{Error, Progress, Result};
+use std::path::Path;
+
+use crate::{Error, ExtractionError, Layout, Result};
+use metalith_core::Progress;
 use pillars::Pillars;
 
 pub use discover::discover;
@@ -25,6 +27,25 @@ pub use sites::Scale;
 
 /// Sites of all elements together: 5 x 5 lenses of 1 mm have 204 million.
 const MOST_SITES: u64 = 1 << 28;
+
+/// Whether the lattices of these elements can be held, known before the layout at `path` is read.
+///
+/// # Errors
+/// [`ExtractionError::Sites`] if they have too many sites together.
+pub fn fits(path: &Path, elements: &[ElementSite]) -> Result<()> {
+    let sites = elements.iter().map(|e| (e.lattice.sites() as u64).pow(2)).sum();
+    if sites <= MOST_SITES {
+        return Ok(());
+    }
+    Err(Error::Extraction {
+        path: path.to_owned(),
+        cause: ExtractionError::Sites {
+            elements: elements.len(),
+            sites,
+            most: MOST_SITES,
+        },
+    })
+}
 
 /// Read the pillars of every element out of a layout.
 ///
@@ -39,13 +60,7 @@ pub fn extract(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) 
         Elements::Given(sites) => sites.clone(),
         Elements::Discover => discover(layout, &plan.selection(), &[plan.pillar_layer], scale, progress)?,
     };
-    let total: u64 = sites.iter().map(|s| (s.lattice.sites() as u64).pow(2)).sum();
-    if total > MOST_SITES {
-        return Err(Error::invalid(
-            format!("{} elements with {total} lattice sites together", sites.len()),
-            format!("up to {MOST_SITES} sites are held; read part of the layout with --top"),
-        ));
-    }
+    fits(layout.path(), &sites)?;
     let mut pillars = Pillars::new(plan, sites, scale);
     layout.visit(&selection, &mut pillars, progress)?;
     Ok(pillars.finish(layout.cells()[roots[0]].name.clone()))

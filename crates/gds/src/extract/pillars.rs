@@ -5,7 +5,7 @@ use super::plan::{ElementSite, ExtractedElement, Extraction, ExtractionPlan};
 use super::sites::{Scale, Sites, Standing};
 use super::survey::Surveyor;
 use crate::{Cell, LayerNumber, Point, Rect, Shape, Text, Transform, Visitor, rectangle_of, simplified};
-use metalith_core::{Result, WidthMap};
+use metalith_core::WidthMap;
 
 /// Puts squares on the sites of elements.
 pub struct Filler {
@@ -165,14 +165,14 @@ impl Pillars {
 }
 
 impl Visitor for Pillars {
-    fn cell(&mut self, _cell: &Cell, placements: &[Transform]) -> Result<()> {
+    fn cell(&mut self, _cell: &Cell, placements: &[Transform]) -> metalith_core::Result<()> {
         self.surveyor.begin(placements);
         self.filler.begin(placements.len());
         Ok(())
     }
 
     #[inline]
-    fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> Result<()> {
+    fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> metalith_core::Result<()> {
         self.surveyor.shape(shape, placements);
         if shape.layer != self.layer {
             return Ok(());
@@ -189,7 +189,7 @@ impl Visitor for Pillars {
         Ok(())
     }
 
-    fn text(&mut self, text: &Text<'_>, placements: &[Transform]) -> Result<()> {
+    fn text(&mut self, text: &Text<'_>, placements: &[Transform]) -> metalith_core::Result<()> {
         self.surveyor.text(text, placements, self.scale, self.listed);
         Ok(())
     }

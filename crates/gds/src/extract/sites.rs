@@ -3,8 +3,7 @@
 use std::collections::HashMap;
 
 use super::plan::ElementSite;
-use crate::{Layout, Rect};
-use metalith_core::Result;
+use crate::{Layout, Rect, Result};
 
 /// Database unit as `num / den` nanometres: lengths are compared as `database units * num` and `nm * den`.
 #[derive(Clone, Copy, Debug)]

@@ -3,6 +3,8 @@
 use serde::Serialize;
 
 use super::sites::Scale;
+use metalith_core::text::printable_bytes;
+
 use crate::{LayerNumber, Point, Rect, Shape, Text, Transform};
 
 /// One layer with all references followed.
@@ -22,6 +24,7 @@ pub struct LayerSummary {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TextSummary {
     pub layer: LayerNumber,
+    /// Printable: see [`metalith_core::text::printable_bytes`].
     pub string: String,
     pub at_nm: [f64; 2],
 }
@@ -107,7 +110,7 @@ impl Surveyor {
             let at = placement.apply(text.at);
             self.texts.push(TextSummary {
                 layer: text.layer,
-                string: String::from_utf8_lossy(text.string).into_owned(),
+                string: printable_bytes(text.string),
                 at_nm: [scale.nm(at.x as f64), scale.nm(at.y as f64)],
             });
         }

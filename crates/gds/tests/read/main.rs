@@ -4,9 +4,9 @@ mod trees;
 
 use std::path::PathBuf;
 
-use metalith_core::{Error, Lattice, Silent, WidthMap};
+use metalith_core::{Lattice, Silent, WidthMap};
 use metalith_gds::extract::{ElementSite, ExtractionPlan, Why, extract};
-use metalith_gds::{LayerNumber, Layout, Point, ReadLimits, Rect, Selection, Shape, Transform, Visitor};
+use metalith_gds::{Error, LayerNumber, Layout, Point, ReadLimits, Rect, Selection, Shape, Transform, Visitor};
 use metalith_testing::gds::{self, Gds};
 use rand::SeedableRng;
 
@@ -18,7 +18,7 @@ fn layout(bytes: Vec<u8>) -> Layout {
 
 fn fault_of(bytes: Vec<u8>) -> (u64, String) {
     match Layout::from_bytes("test.gds", bytes, ReadLimits::default()).map(|_| ()) {
-        Err(Error::Layout { offset, what, .. }) => (offset, what),
+        Err(Error::Layout { offset, cause, .. }) => (offset, cause.to_string()),
         other => panic!("expected a fault of the layout, not {other:?}"),
     }
 }

@@ -1,0 +1,239 @@
+//! One table of a text file, read key by key.
+
+mod values;
+mod words;
+
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::{Range, RangeInclusive};
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::Document;
+use crate::text::quoted;
+use words::{article, describe, nearest};
+
+/// The values a number may take, with the unit it is in and why the limits are there.
+#[derive(Clone, Debug)]
+pub struct Limits {
+    pub range: RangeInclusive<f64>,
+    pub unit: &'static str,
+}
+
+impl Limits {
+    /// `Limits::new(100.0..=1000.0, "nm")`; the unit may be empty.
+    pub fn new(range: RangeInclusive<f64>, unit: &'static str) -> Self {
+        Self { range, unit }
+    }
+}
+
+/// One table of a document. Every getter records a fault instead of failing and then returns a value
+/// inside the limits, so that one reading finds all faults. Keys that nobody asked for are faults too.
+///
+/// A value inside the limits that takes the place of a wrong one says nothing about what depends on it:
+/// [`Section::fault`] is silent about a key whose value is such a one, and checks of one value against another
+/// go through [`Section::fault_given`], which is silent if one of them is.
+pub struct Section<'d, 't> {
+    document: &'d Document<'t>,
+    table: &'d DeTable<'t>,
+    name: String,
+    span: Range<usize>,
+    asked: RefCell<BTreeSet<String>>,
+    /// Keys that were asked for and are not there, with the number of the fault that says so.
+    missing: RefCell<BTreeMap<String, usize>>,
+    /// Stands in for a section that is missing: its absence is one fault, not one for each key.
+    vacant: bool,
+}
+
+impl<'d, 't> Section<'d, 't> {
+    pub(super) fn root(document: &'d Document<'t>, table: &'d Spanned<DeTable<'t>>) -> Self {
+        Self::new(document, table.get_ref(), String::new(), 0..0)
+    }
+
+    fn new(document: &'d Document<'t>, table: &'d DeTable<'t>, name: String, span: Range<usize>) -> Self {
+        Self {
+            document,
+            table,
+            name,
+            span,
+            asked: RefCell::default(),
+            missing: RefCell::default(),
+            vacant: false,
+        }
+    }
+
+    /// Record a fault at a key of this section, or at the section itself if the key is absent. Silent where the
+    /// value of the key has a fault already and was replaced.
+    pub fn fault(&self, key: &str, what: impl Into<String>, hint: impl Into<String>) {
+        let path = self.path_of(key);
+        if !self.vacant && !self.document.is_replaced(&path) {
+            self.document.fault(self.span_of(key), what, hint);
+            self.document.doubt(path);
+        }
+    }
+
+    /// As [`Section::fault`], for a check that depends on other values too: their paths from the top of the file,
+    /// such as `"cell.pitch_nm"`. Silent if one of them has a fault.
+    pub fn fault_given(&self, others: &[&str], key: &str, what: impl Into<String>, hint: impl Into<String>) {
+        if self.document.is_sound(others) {
+            self.fault(key, what, hint);
+        }
+    }
+
+    /// Whether none of these values, by their paths from the top of the file, has a fault so far: what was read
+    /// is what the file says, or a default.
+    pub fn sound(&self, paths: &[&str]) -> bool {
+        self.document.is_sound(paths)
+    }
+
+    /// Whether the key is there.
+    pub fn has(&self, key: &str) -> bool {
+        self.table.contains_key(key)
+    }
+
+    /// Whether the key holds a list.
+    pub fn is_list(&self, key: &str) -> bool {
+        matches!(self.table.get(key).map(Spanned::get_ref), Some(DeValue::Array(_)))
+    }
+
+    /// A table that must be there.
+    pub fn section(&self, key: &str) -> Section<'d, 't> {
+        self.optional_section(key).unwrap_or_else(|| {
+            self.missing_unless_present(key, &format!("a section [{}]", self.path_of(key)));
+            self.vacant(key)
+        })
+    }
+
+    /// A table that may be left out.
+    pub fn optional_section(&self, key: &str) -> Option<Section<'d, 't>> {
+        let value = self.get(key)?;
+        match value.get_ref() {
+            DeValue::Table(table) => Some(Self::new(self.document, table, self.path_of(key), self.span_of(key))),
+            _ => {
+                self.wrong_type(key, value, &format!("a section [{}]", self.path_of(key)));
+                None
+            }
+        }
+    }
+
+    /// The tables of `[[key]]`, none where the key is left out.
+    pub fn sections(&self, key: &str) -> Vec<Section<'d, 't>> {
+        let Some(value) = self.get(key) else { return Vec::new() };
+        let DeValue::Array(items) = value.get_ref() else {
+            self.wrong_type(key, value, &format!("one or more sections [[{}]]", self.path_of(key)));
+            return Vec::new();
+        };
+        items
+            .iter()
+            .filter_map(|item| match item.get_ref() {
+                DeValue::Table(table) => Some(Self::new(self.document, table, self.path_of(key), item.span())),
+                _ => {
+                    self.wrong_type(key, item, &format!("a section [[{}]]", self.path_of(key)));
+                    None
+                }
+            })
+            .collect()
+    }
+
+    /// All keys of this section, for maps whose keys the user names.
+    pub fn keys(&self) -> Vec<String> {
+        self.table.keys().map(|k| k.get_ref().to_string()).collect()
+    }
+
+    /// Report the keys that nobody asked for. Called when all known keys have been read.
+    pub fn finish(&self) {
+        let asked = self.asked.borrow();
+        let known = asked.iter().cloned().collect::<Vec<_>>().join(", ");
+        let place = if self.name.is_empty() {
+            "at the top".to_owned()
+        } else {
+            format!("in [{}]", self.name)
+        };
+        for (key, _) in self.table {
+            let name = key.get_ref().as_ref();
+            if asked.contains(name) {
+                continue;
+            }
+            if self.document.is_full() {
+                self.document.count_one_more();
+                continue;
+            }
+            // A key that is missing and one that nobody knows, much alike, are one mistake.
+            let mut missing = self.missing.borrow_mut();
+            let hint = if let Some(meant) = nearest(name, missing.keys().map(String::as_str)).map(str::to_owned) {
+                if let Some(number) = missing.remove(&meant) {
+                    self.document.withdraw(number);
+                }
+                format!("known here: {known}; did you mean `{meant}`, which is missing?")
+            } else {
+                let meant = words::did_you_mean(name, asked.iter().map(String::as_str));
+                format!("known here: {known}{meant}")
+            };
+            let what = format!("unknown key `{}` {place}", quoted(name));
+            self.document.fault(key.span(), what, hint);
+        }
+    }
+
+    fn get(&self, key: &str) -> Option<&'d Spanned<DeValue<'t>>> {
+        self.asked.borrow_mut().insert(key.to_owned());
+        self.table.get(key)
+    }
+
+    fn vacant(&self, key: &str) -> Section<'d, 't> {
+        thread_local!(static EMPTY: &'static DeTable<'static> = Box::leak(Box::default()));
+        let mut section = Self::new(self.document, EMPTY.with(|e| *e), self.path_of(key), self.span.clone());
+        section.vacant = true;
+        section
+    }
+
+    fn missing_unless_present(&self, key: &str, expected: &str) {
+        self.document.replace(self.path_of(key));
+        if self.table.contains_key(key) || self.vacant {
+            return;
+        }
+        let place = if self.name.is_empty() {
+            "the file".into()
+        } else {
+            format!("[{}]", self.name)
+        };
+        let number = self.document.fault(
+            self.span.clone(),
+            format!("{place} lacks `{key}`"),
+            format!("add `{key}`: {expected}"),
+        );
+        if let Some(number) = number {
+            self.missing.borrow_mut().insert(key.to_owned(), number);
+        }
+    }
+
+    fn wrong_type(&self, key: &str, value: &Spanned<DeValue<'t>>, expected: &str) {
+        self.document.replace(self.path_of(key));
+        self.document.fault(
+            value.span(),
+            format!("`{key}` is {}", article(value.get_ref().type_str())),
+            format!("it must be {expected}"),
+        );
+    }
+
+    fn out_of_range(&self, span: Range<usize>, key: &str, value: &str, limits: &Limits) {
+        self.document.replace(self.path_of(key));
+        self.document.fault(
+            span,
+            format!("`{key}` cannot be {}", quoted(value)),
+            format!("it must be a number{}", describe(limits)),
+        );
+    }
+
+    fn span_of(&self, key: &str) -> Range<usize> {
+        self.table.get(key).map_or_else(|| self.span.clone(), Spanned::span)
+    }
+
+    fn path_of(&self, key: &str) -> String {
+        if self.name.is_empty() {
+            key.to_owned()
+        } else {
+            format!("{}.{key}", self.name)
+        }
+    }
+}

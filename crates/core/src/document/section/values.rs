@@ -1,0 +1,220 @@
+//! The values of a section: numbers, texts, choices, lists, paths.
+
+use std::ops::{Range, RangeInclusive};
+use std::path::PathBuf;
+
+use toml::Spanned;
+use toml::de::DeValue;
+
+use super::words::{describe, did_you_mean};
+use super::{Limits, Section};
+use crate::text::{first_unprintable, quoted};
+
+impl<'t> Section<'_, 't> {
+    /// A number that must be there.
+    pub fn float(&self, key: &str, limits: Limits) -> f64 {
+        match self.optional_float(key, limits.clone()) {
+            Some(value) => value,
+            None => {
+                self.missing_unless_present(key, &format!("a number{}", describe(&limits)));
+                *limits.range.start()
+            }
+        }
+    }
+
+    /// A number that may be left out.
+    pub fn optional_float(&self, key: &str, limits: Limits) -> Option<f64> {
+        let value = self.get(key)?;
+        let Some(number) = number(value.get_ref()) else {
+            self.wrong_type(key, value, &format!("a number{}", describe(&limits)));
+            return Some(*limits.range.start());
+        };
+        Some(self.limited(value.span(), key, number, &limits))
+    }
+
+    /// A whole number that must be there.
+    pub fn integer(&self, key: &str, range: RangeInclusive<i64>, unit: &'static str) -> i64 {
+        match self.optional_integer(key, range.clone(), unit) {
+            Some(value) => value,
+            None => {
+                self.missing_unless_present(key, "a whole number");
+                *range.start()
+            }
+        }
+    }
+
+    /// A whole number that may be left out.
+    pub fn optional_integer(&self, key: &str, range: RangeInclusive<i64>, unit: &'static str) -> Option<i64> {
+        let value = self.get(key)?;
+        let limits = Limits::new(*range.start() as f64..=*range.end() as f64, unit);
+        let DeValue::Integer(integer) = value.get_ref() else {
+            self.wrong_type(key, value, &format!("a whole number{}", describe(&limits)));
+            return Some(*range.start());
+        };
+        let parsed = i64::from_str_radix(integer.as_str(), integer.radix()).ok();
+        match parsed {
+            Some(v) if range.contains(&v) => Some(v),
+            _ => {
+                self.out_of_range(value.span(), key, integer.as_str(), &limits);
+                Some(*range.start())
+            }
+        }
+    }
+
+    /// A text that must be there.
+    pub fn text(&self, key: &str) -> String {
+        match self.optional_text(key) {
+            Some(text) => text,
+            None => {
+                self.missing_unless_present(key, "a text in quotes");
+                String::new()
+            }
+        }
+    }
+
+    /// A text that may be left out.
+    pub fn optional_text(&self, key: &str) -> Option<String> {
+        let value = self.get(key)?;
+        match value.get_ref() {
+            DeValue::String(s) => Some(self.one_line(key, value.span(), s)),
+            _ => {
+                self.wrong_type(key, value, "a text in quotes");
+                Some(String::new())
+            }
+        }
+    }
+
+    /// A text that may go where one line is expected: layouts, job files and pages are written from it.
+    fn one_line(&self, key: &str, span: Range<usize>, text: &str) -> String {
+        let Some(c) = first_unprintable(text) else {
+            return text.to_owned();
+        };
+        self.document.replace(self.path_of(key));
+        self.document.fault(
+            span,
+            format!("`{key}` contains the character U+{:04X}", u32::from(c)),
+            "write it in one line of printable characters",
+        );
+        String::new()
+    }
+
+    /// A list of texts; an empty one where the key is left out.
+    pub fn texts(&self, key: &str) -> Vec<String> {
+        let Some(value) = self.get(key) else { return Vec::new() };
+        let DeValue::Array(items) = value.get_ref() else {
+            self.wrong_type(key, value, "a list of texts in quotes");
+            return Vec::new();
+        };
+        let text = |item: &Spanned<DeValue<'t>>| match item.get_ref() {
+            DeValue::String(s) => Some(self.one_line(key, item.span(), s)),
+            _ => {
+                self.wrong_type(key, item, "a list of texts in quotes");
+                None
+            }
+        };
+        items.iter().filter_map(text).collect()
+    }
+
+    /// One of a few words; the first choice takes the place of a wrong one.
+    pub fn choice<T: Copy>(&self, key: &str, choices: &[(&str, T)], default: Option<T>) -> T {
+        let words = choices.iter().map(|(w, _)| *w).collect::<Vec<_>>().join(", ");
+        let Some(value) = self.get(key) else {
+            return default.unwrap_or_else(|| {
+                self.missing_unless_present(key, &format!("one of: {words}"));
+                choices[0].1
+            });
+        };
+        let DeValue::String(word) = value.get_ref() else {
+            self.wrong_type(key, value, &format!("one of: {words}"));
+            return choices[0].1;
+        };
+        choices.iter().find(|(w, _)| *w == word.as_ref()).map_or_else(
+            || {
+                self.document.replace(self.path_of(key));
+                self.document.fault(
+                    value.span(),
+                    format!("`{key}` cannot be \"{}\"", quoted(word)),
+                    format!("use one of: {words}{}", did_you_mean(word, choices.iter().map(|c| c.0))),
+                );
+                choices[0].1
+            },
+            |(_, v)| *v,
+        )
+    }
+
+    /// A list of numbers, each within the limits; an empty one where the key is left out.
+    pub fn floats(&self, key: &str, limits: Limits) -> Vec<f64> {
+        let Some(value) = self.get(key) else { return Vec::new() };
+        let DeValue::Array(items) = value.get_ref() else {
+            self.wrong_type(key, value, &format!("a list of numbers{}", describe(&limits)));
+            return Vec::new();
+        };
+        items
+            .iter()
+            .map(|item| match number(item.get_ref()) {
+                Some(v) => self.limited(item.span(), key, v, &limits),
+                None => {
+                    self.wrong_type(key, item, &format!("a list of numbers{}", describe(&limits)));
+                    *limits.range.start()
+                }
+            })
+            .collect()
+    }
+
+    /// Exactly `N` numbers that must be there, each within the limits.
+    pub fn array<const N: usize>(&self, key: &str, limits: Limits) -> [f64; N] {
+        match self.optional_array(key, limits.clone()) {
+            Some(values) => values,
+            None => {
+                self.missing_unless_present(key, &format!("a list of {N} numbers"));
+                [*limits.range.start(); N]
+            }
+        }
+    }
+
+    /// Exactly `N` numbers, each within the limits, or nothing where the key is left out.
+    pub fn optional_array<const N: usize>(&self, key: &str, limits: Limits) -> Option<[f64; N]> {
+        self.get(key)?;
+        let values = self.floats(key, limits.clone());
+        let count = values.len();
+        Some(values.try_into().unwrap_or_else(|_| {
+            self.fault(
+                key,
+                format!("`{key}` has {count} entries"),
+                format!("give exactly {N} numbers"),
+            );
+            self.document.replace(self.path_of(key));
+            [*limits.range.start(); N]
+        }))
+    }
+
+    /// A path, relative ones counted from the folder of this file. The file must exist.
+    pub fn file(&self, key: &str) -> PathBuf {
+        let text = self.text(key);
+        let path = self.document.folder().join(&text);
+        if !text.is_empty() && !path.is_file() {
+            self.fault(
+                key,
+                format!("there is no file {}", path.display()),
+                "relative paths count from the folder of this file",
+            );
+        }
+        path
+    }
+
+    fn limited(&self, span: Range<usize>, key: &str, value: f64, limits: &Limits) -> f64 {
+        if limits.range.contains(&value) {
+            return value;
+        }
+        self.out_of_range(span, key, &value.to_string(), limits);
+        *limits.range.start()
+    }
+}
+
+fn number(value: &DeValue<'_>) -> Option<f64> {
+    match value {
+        DeValue::Integer(i) => i64::from_str_radix(i.as_str(), i.radix()).ok().map(|v| v as f64),
+        DeValue::Float(f) => f.as_str().parse().ok(),
+        _ => None,
+    }
+}

@@ -1,0 +1,184 @@
+//! Arrays of numbers from NPY files.
+
+use std::fs::File;
+use std::io::{self, BufReader, Cursor, Read};
+use std::path::Path;
+
+/// An array as the file has it, in C order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Array {
+    /// Entries along each axis, slowest first.
+    pub shape: Vec<u64>,
+    pub values: Vec<f64>,
+}
+
+/// Why a file holds no array that can be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum NpyError {
+    #[error("it cannot be read: {0}")]
+    Io(#[from] io::Error),
+    #[error("it is not an ordinary file")]
+    NotAFile,
+    #[error("it is no NPY file: {0}")]
+    Format(String),
+    #[error("its header says that entries have several fields, or is nested")]
+    Nested,
+    #[error("it holds an array of shape {shape:?}{}", if *columns_first { " in Fortran order" } else { "" })]
+    Shape { shape: Vec<u64>, columns_first: bool },
+    #[error("its entries are neither float32 nor float64")]
+    Type,
+    #[error("it ends early: {0}")]
+    Short(io::Error),
+}
+
+/// Longest header that is read [bytes]: that of a plain array has 118.
+const LONGEST_HEADER: usize = 1 << 12;
+
+/// Most entries of an array: no file that is read has as many.
+const MOST_ENTRIES: u64 = 1 << 40;
+
+/// Read an array of float32 or float64 in C order, if its shape is one that the caller takes: nothing is read or
+/// set aside for entries before that.
+///
+/// # Errors
+/// If the file cannot be read or holds something else.
+pub fn read(path: &Path, takes: impl FnOnce(&[u64]) -> bool) -> Result<Array, NpyError> {
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(NpyError::NotAFile);
+    }
+    read_from(BufReader::new(File::open(path)?), takes)
+}
+
+/// As [`read`], from anything that can be read.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_from(mut from: impl Read, takes: impl FnOnce(&[u64]) -> bool) -> Result<Array, NpyError> {
+    let header = plain_header(&mut from)?;
+    let npy = npyz::NpyFile::new(Cursor::new(header).chain(from)).map_err(|e| NpyError::Format(e.to_string()))?;
+    let shape = npy.shape().to_vec();
+    let columns_first = npy.order() != npyz::Order::C;
+    if columns_first || !takes(&shape) {
+        return Err(NpyError::Shape { shape, columns_first });
+    }
+    let values = match npy.try_data::<f64>() {
+        Ok(data) => data.collect::<io::Result<Vec<f64>>>(),
+        Err(npy) => npy
+            .try_data::<f32>()
+            .map_err(|_| NpyError::Type)?
+            .map(|v| v.map(f64::from))
+            .collect(),
+    };
+    Ok(Array {
+        shape,
+        values: values.map_err(NpyError::Short)?,
+    })
+}
+
+/// The bytes before the entries, if they describe a plain array. The parser behind takes twice the time for each
+/// bracket inside brackets, and a plain array has none: its header is one dictionary with one tuple, the shape.
+fn plain_header(from: &mut impl Read) -> Result<Vec<u8>, NpyError> {
+    const MAGIC: &[u8] = b"\x93NUMPY";
+    let early = |error: io::Error| match error.kind() {
+        io::ErrorKind::UnexpectedEof => NpyError::Format("it ends in its header".into()),
+        _ => NpyError::Io(error),
+    };
+    let mut bytes = vec![0; 8];
+    from.read_exact(&mut bytes).map_err(early)?;
+    if !bytes.starts_with(MAGIC) {
+        return Err(NpyError::Format("it does not begin like one".into()));
+    }
+    // Version 1 has two bytes for the length of the header, later ones four.
+    let digits = if bytes[6] == 1 { 2 } else { 4 };
+    let mut length = [0; 4];
+    from.read_exact(&mut length[..digits]).map_err(early)?;
+    bytes.extend(&length[..digits]);
+    let length = u32::from_le_bytes(length) as usize;
+    if length > LONGEST_HEADER {
+        return Err(NpyError::Format(format!("a header of {length} bytes")));
+    }
+    let start = bytes.len();
+    bytes.resize(start + length, 0);
+    from.read_exact(&mut bytes[start..]).map_err(early)?;
+    let opening = |bracket: u8| bytes[start..].iter().filter(|&&b| b == bracket).count();
+    if opening(b'[') > 0 || opening(b'(') > 1 || opening(b'{') > 1 {
+        return Err(NpyError::Nested);
+    }
+    check_entries(&bytes[start..])?;
+    Ok(bytes)
+}
+
+/// The product of the numbers in the one tuple, the shape: the parser behind multiplies without a look.
+fn check_entries(header: &[u8]) -> Result<(), NpyError> {
+    let tuple = header.split(|&b| b == b'(').nth(1).unwrap_or_default();
+    let tuple = tuple.split(|&b| b == b')').next().unwrap_or_default();
+    let entries = tuple.split(|&b| b == b',').try_fold(1u64, |entries, digits| {
+        let digits = digits.trim_ascii();
+        if digits.is_empty() {
+            return Some(entries);
+        }
+        entries.checked_mul(std::str::from_utf8(digits).ok()?.parse().ok()?)
+    });
+    match entries {
+        Some(entries) if entries <= MOST_ENTRIES => Ok(()),
+        _ => {
+            let shape = crate::text::printable_bytes(tuple);
+            Err(NpyError::Format(format!("its shape is ({shape})")))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(header: &str, data: &[u8]) -> Vec<u8> {
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend((header.len() as u16).to_le_bytes());
+        bytes.extend(header.as_bytes());
+        bytes.extend(data);
+        bytes
+    }
+
+    fn outcome(bytes: &[u8]) -> Result<Array, NpyError> {
+        read_from(bytes, |shape| shape == [2, 2])
+    }
+
+    const PLAIN: &str = "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 2), }\n";
+
+    #[test]
+    fn plain_arrays_are_read() {
+        let numbers = [1.5f32, -2.0, 3.25, f32::INFINITY];
+        let data: Vec<u8> = numbers.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let read = outcome(&file(PLAIN, &data)).unwrap();
+        assert_eq!(read.values, numbers.map(f64::from));
+        let double = PLAIN.replace("<f4", ">f8");
+        let data: Vec<u8> = numbers.iter().flat_map(|&v| f64::from(v).to_be_bytes()).collect();
+        assert_eq!(outcome(&file(&double, &data)).unwrap().values, numbers.map(f64::from));
+        assert!(matches!(outcome(&file(PLAIN, &[0; 15])), Err(NpyError::Short(_))));
+    }
+
+    #[test]
+    fn what_is_no_plain_array_is_named() {
+        let with = |from: &str, to: &str| outcome(&file(&PLAIN.replace(from, to), &[0; 64]));
+        assert!(matches!(with("(2, 2)", "(2, 3)"), Err(NpyError::Shape { .. })));
+        assert!(matches!(with("False", "True"), Err(NpyError::Shape { columns_first: true, .. })));
+        assert!(matches!(with("<f4", "<i4"), Err(NpyError::Type)));
+        assert!(matches!(with("(2, 2)", "(99999999999, 99999999999)"), Err(NpyError::Format(_))));
+        assert!(matches!(with("'shape'", "'form'"), Err(NpyError::Format(_))));
+        assert!(matches!(outcome(b"\x93NUMPY\x01\x00"), Err(NpyError::Format(_))));
+        assert!(matches!(outcome(b"P5 2 2"), Err(NpyError::Format(_))));
+        assert!(matches!(outcome(b"\x93NUMPY\x02\x00\xff\xff\xff\xff{}"), Err(NpyError::Format(_))));
+    }
+
+    /// A header of nested brackets, for which the parser behind would take 2^n steps.
+    #[test]
+    fn nested_headers_are_refused_before_they_are_parsed() {
+        for (open, close) in [("[", "]"), ("(", ")"), ("{", "}")] {
+            let deep = format!("{}1{}", open.repeat(100), close.repeat(100));
+            let header = PLAIN.replace("(2, 2)", &deep);
+            assert!(matches!(outcome(&file(&header, &[0; 64])), Err(NpyError::Nested)));
+        }
+    }
+}

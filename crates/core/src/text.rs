@@ -1,0 +1,117 @@
+//! Texts from files, made safe to print: names and titles that somebody else chose may hold control characters
+//! that move a cursor, change a terminal, reverse a line, or that HTML, XML and CSV cannot carry.
+
+use std::borrow::Cow;
+use std::fmt::Write;
+
+/// Whether a character can stand in one line of a terminal, of HTML and of XML 1.0 as itself: no control
+/// character, no end of a line, nothing that changes the direction of a line, no code point that is no character.
+pub fn is_printable(c: char) -> bool {
+    let directs = matches!(
+        c,
+        '\u{61C}' | '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}'
+    );
+    let ends_a_line = matches!(c, '\u{2028}' | '\u{2029}');
+    let is_none = matches!(c, '\u{FDD0}'..='\u{FDEF}') || u32::from(c) & 0xFFFE == 0xFFFE;
+    !(c.is_control() || directs || ends_a_line || is_none || c == '\u{FEFF}')
+}
+
+/// The first character of a text that is not [printable](is_printable).
+pub fn first_unprintable(text: &str) -> Option<char> {
+    text.chars().find(|&c| !is_printable(c))
+}
+
+/// A text for one line: what is not [printable](is_printable) is written as `\u{1b}`. Characters with a meaning
+/// in HTML, XML or CSV (`<`, `&`, `"`, a leading `=`) are left for whoever writes that format.
+pub fn printable(text: &str) -> Cow<'_, str> {
+    if text.chars().all(is_printable) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len() + 16);
+    text.chars().for_each(|c| push(&mut out, c));
+    Cow::Owned(out)
+}
+
+/// As [`printable`], several lines: ends of lines and tabs stay.
+pub fn printable_lines(text: &str) -> Cow<'_, str> {
+    let stays = |c: char| is_printable(c) || c == '\n' || c == '\t';
+    if text.chars().all(stays) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len() + 16);
+    for c in text.chars() {
+        if stays(c) {
+            out.push(c);
+        } else {
+            push(&mut out, c);
+        }
+    }
+    Cow::Owned(out)
+}
+
+/// Bytes that should be text, for one line: as [`printable`]; bytes that are not UTF-8 are written as `\xff`, and
+/// `\` as `\\`, so that different bytes never look alike.
+pub fn printable_bytes(bytes: &[u8]) -> String {
+    let mut out = String::with_capacity(bytes.len());
+    for chunk in bytes.utf8_chunks() {
+        for c in chunk.valid().chars() {
+            if c == '\\' {
+                out.push_str("\\\\");
+            } else {
+                push(&mut out, c);
+            }
+        }
+        for byte in chunk.invalid() {
+            // Writing to a string cannot fail.
+            let _ = write!(out, "\\x{byte:02x}");
+        }
+    }
+    out
+}
+
+/// As [`printable`], and cut at 80 characters: for quoting in a message what may be of any length.
+pub fn quoted(text: &str) -> String {
+    const LONGEST: usize = 80;
+    match text.char_indices().nth(LONGEST) {
+        None => printable(text).into_owned(),
+        Some((end, _)) => format!("{}...", printable(&text[..end])),
+    }
+}
+
+fn push(out: &mut String, c: char) {
+    if is_printable(c) {
+        out.push(c);
+    } else {
+        let _ = write!(out, "\\u{{{:x}}}", u32::from(c));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_moves_a_cursor_is_written_out() {
+        assert_eq!(printable("a\u{1b}[2Jb\u{7}\n"), "a\\u{1b}[2Jb\\u{7}\\u{a}");
+        assert_eq!(printable("\u{fffe}\u{9b}1m\u{202e}x"), "\\u{fffe}\\u{9b}1m\\u{202e}x");
+        assert_eq!(printable_lines("a\n\tb\r"), "a\n\tb\\u{d}");
+        for plain in ["LENS_1", "Ünïcode µm 透镜", "<&\"=", ""] {
+            assert!(matches!(printable(plain), Cow::Borrowed(same) if same == plain));
+        }
+        assert_eq!(first_unprintable("ab\u{fffe}"), Some('\u{fffe}'));
+    }
+
+    #[test]
+    fn different_bytes_look_different() {
+        let names: [&[u8]; 6] = [b"A\x01", b"A\\u{1}", b"A\xff", b"A\\xff", b"A", "A\u{fffd}".as_bytes()];
+        let shown: std::collections::BTreeSet<String> = names.iter().map(|n| printable_bytes(n)).collect();
+        assert_eq!(shown.len(), names.len());
+        assert!(shown.iter().all(|s| first_unprintable(s).is_none()));
+    }
+
+    #[test]
+    fn long_texts_are_cut() {
+        assert_eq!(quoted(&"ä".repeat(200)), format!("{}...", "ä".repeat(80)));
+        assert_eq!(quoted("short"), "short");
+    }
+}

@@ -1,0 +1,359 @@
+//! What can go wrong in reading a layout: causes with numbers and places, and for each a remedy.
+
+use std::path::{Path, PathBuf};
+
+use metalith_core::text::quoted;
+
+use super::record;
+
+/// Result of reading a layout.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Why a layout could not be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The operating system refused.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io {
+        action: &'static str,
+        path: PathBuf,
+        source: std::io::Error,
+    },
+
+    /// A folder, a device or a pipe.
+    #[error("{} is not a file", path.display())]
+    NotAFile { path: PathBuf },
+
+    /// Somebody wrote the file while it was read.
+    #[error("{} changed from {before} to {now} bytes while it was read", path.display())]
+    Changed { path: PathBuf, before: u64, now: u64 },
+
+    /// The file breaks the format, has a faulty tree of cells, or is beyond a limit.
+    #[error("{}, byte {offset}: {cause}", path.display())]
+    Layout {
+        path: PathBuf,
+        /// Offset of the record at fault from the start of the file.
+        offset: u64,
+        #[source]
+        cause: LayoutError,
+    },
+
+    /// What was to be read out of the layout is not there or too much.
+    #[error("{}: {cause}", path.display())]
+    Extraction {
+        path: PathBuf,
+        #[source]
+        cause: ExtractionError,
+    },
+
+    /// The caller asked to stop.
+    #[error("interrupted")]
+    Interrupted,
+
+    /// What a [`super::Visitor`] returned.
+    #[error(transparent)]
+    Visitor(metalith_core::Error),
+}
+
+/// What is wrong at a place of a layout.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LayoutError {
+    #[error("the file ends {held} bytes into a record, before ENDLIB")]
+    EndsEarly { held: usize },
+    #[error("the file ends inside a {} record of {length} bytes, {held} of them there", record::name(*kind))]
+    EndsInRecord { kind: u8, length: usize, held: usize },
+    #[error("a record of length {length}; it must be even and at least 4")]
+    RecordLength { length: usize, first: bool },
+    #[error("record type 0x{kind:02X} is not GDSII")]
+    RecordKind { kind: u8 },
+    #[error(
+        "a {} record of data type {data} and {bytes} bytes; it must be of type {wanted} in steps of {unit} bytes",
+        record::name(*kind)
+    )]
+    RecordBody {
+        kind: u8,
+        data: u8,
+        bytes: usize,
+        wanted: u8,
+        unit: usize,
+    },
+    #[error("a {} record of data type {data}", record::name(*kind))]
+    NotText { kind: u8, data: u8 },
+    #[error("the file does not begin with HEADER")]
+    NoHeader,
+    #[error("the file has no UNITS")]
+    NoUnits,
+    #[error("a cell begins before UNITS")]
+    UnitsMissingBeforeCell,
+    /// Database unit in metres and in user units.
+    #[error("a database unit of {metres:e} m, {user:e} user units")]
+    UnitSize { metres: f64, user: f64 },
+    #[error("a database unit of {nm} nm is no ratio of whole nanometres")]
+    UnitRatio { nm: f64 },
+    #[error("a {} record outside every cell", record::name(*kind))]
+    OutsideCells { kind: u8 },
+    #[error("a {} record inside a cell: ENDSTR is missing", record::name(*kind))]
+    CellNotEnded { kind: u8 },
+    #[error("a {} record inside the element that begins at byte {begin}: ENDEL is missing", record::name(*kind))]
+    ElementNotEnded { kind: u8, begin: u64 },
+    #[error("a cell begins with {}, not with its name", record::name(*kind))]
+    NoCellName { kind: u8 },
+    #[error("a cell name of {bytes} bytes")]
+    CellName { bytes: usize },
+    #[error("a reference to a cell whose name has {bytes} bytes")]
+    ReferenceName { bytes: usize },
+    #[error("a {element} with {points} points")]
+    Points { element: &'static str, points: usize },
+    #[error("a {element} without {lacks}")]
+    Lacks {
+        element: &'static str,
+        lacks: &'static str,
+    },
+    #[error("an AREF of {columns} x {rows}")]
+    ArraySize { columns: i16, rows: i16 },
+    #[error("a {element} with absolute magnification or angle")]
+    Absolute { element: &'static str },
+    #[error("a {element} with magnification {magnification:e}, angle {angle_deg}")]
+    Magnification {
+        element: &'static str,
+        magnification: f64,
+        angle_deg: f64,
+    },
+    #[error("a reference inside references whose magnifications multiply beyond 1e6 or 1e-6")]
+    Magnifications,
+    /// The bytes at a place are not those of the first reading.
+    #[error("the file changed while it was read")]
+    Rewritten,
+
+    #[error("cell {cell} refers to {name}, which contains it")]
+    Circle { cell: String, name: String },
+    #[error("cell {cell} refers to {name}, which is not in the file")]
+    Dangling { cell: String, name: String },
+    #[error("a second cell with the name {name}")]
+    Doubled { name: String },
+    #[error("there is no cell in the file")]
+    NoCells,
+    /// Names of the first cells that no other refers to.
+    #[error("there is no cell {}", quoted(name))]
+    NoSuchCell { name: String, tops: Vec<String> },
+    #[error("{count} cells at the top: {}", tops.join(", "))]
+    SeveralTops { count: usize, tops: Vec<String> },
+
+    /// Beyond one of [`super::ReadLimits`].
+    #[error("{}", limit.words(*found, *most))]
+    Limit { limit: Limit, found: u64, most: u64 },
+}
+
+/// Which of [`super::ReadLimits`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Limit {
+    Cells,
+    /// Distinct names of cells that are referred to.
+    Names,
+    /// Distinct layers of cells.
+    Layers,
+    /// Distinct pairs of a cell and one that it refers to.
+    References,
+    Vertices,
+    Depth,
+    /// Copies of cells that are placed as a whole.
+    Placements,
+    /// Shapes, every reference followed.
+    FlatShapes,
+    /// The same, from a file as short as this one.
+    FlatShapesOfShortFile,
+    /// Bytes of texts, every reference followed.
+    FlatTexts,
+}
+
+impl Limit {
+    fn words(self, found: u64, most: u64) -> String {
+        match self {
+            Self::Cells => format!("more than {most} cells"),
+            Self::Names => "more distinct names in cells than are read".into(),
+            Self::Layers => "more distinct layers in cells than are read".into(),
+            Self::References => "more distinct references in cells than are read".into(),
+            Self::Vertices => format!("an element of more than {most} vertices"),
+            Self::Depth => format!("references {found} deep, {most} are followed"),
+            Self::Placements => format!(
+                "{found} copies of cells that have references or are large, {most} are followed"
+            ),
+            Self::FlatShapes => format!("{found} shapes with all references followed, {most} are read"),
+            Self::FlatShapesOfShortFile => {
+                format!("{found} shapes with all references followed, {most} are read from a file as short as this")
+            }
+            Self::FlatTexts => format!("texts of {found} bytes with all references followed, {most} are read"),
+        }
+    }
+
+    fn remedy(self) -> &'static str {
+        match self {
+            Self::Cells => "draw shapes that occur once where they stand",
+            Self::Vertices => "split the polygon; the format says 8191 at most",
+            Self::Names | Self::Layers | Self::References => "this is not the layout of a lens; is the file damaged?",
+            Self::Depth | Self::Placements | Self::FlatShapes => "write the layout with fewer levels or in parts",
+            Self::FlatShapesOfShortFile => {
+                "arrays of arrays multiply: is this the layout that was meant? Write it in parts"
+            }
+            Self::FlatTexts => "a long text stands in an array of cells: write it once, at the top",
+        }
+    }
+}
+
+/// Why nothing was extracted from a layout.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExtractionError {
+    #[error("{elements} elements with {sites} lattice sites together")]
+    Sites { elements: usize, sites: u64, most: u64 },
+    #[error("no element found on layer {layers}")]
+    NoElements { layers: String },
+    #[error("{groups} separate groups of squares on layer {layers}")]
+    Groups { groups: usize, layers: String, most: usize },
+    #[error("small squares are spread over more than {most} places of 8 um")]
+    Scattered { most: usize },
+    /// Squares that would take far more lattice sites than there are squares.
+    #[error(
+        "{squares} squares about ({}, {}) nm spread over {columns} x {rows} sites of {pitch_nm} nm",
+        at_nm[0], at_nm[1]
+    )]
+    Sparse {
+        squares: u64,
+        at_nm: [i64; 2],
+        columns: i64,
+        rows: i64,
+        pitch_nm: f64,
+    },
+    #[error("a lattice of pitch {pitch_nm} nm about ({}, {}) nm", centre_nm[0], centre_nm[1])]
+    Lattice { pitch_nm: f64, centre_nm: [f64; 2] },
+}
+
+const REWRITE: &str = "the file is damaged here: write it again";
+const REPORT: &str = "the tool that wrote this file breaks the format: report it there";
+const CUT_SHORT: &str = "the file is cut short: copy or write it again";
+const BEING_WRITTEN: &str = "wait until whoever writes it is done";
+
+impl LayoutError {
+    /// What to do about it.
+    pub fn remedy(&self) -> String {
+        match self {
+            Self::EndsEarly { .. } | Self::EndsInRecord { .. } => CUT_SHORT.into(),
+            Self::RecordLength { first: true, .. } => {
+                "this does not begin like GDSII; is it another format, or compressed?".into()
+            }
+            Self::RecordLength { .. } => {
+                "the file is damaged from here on, or was changed by a text tool: write it again".into()
+            }
+            Self::RecordKind { .. } => "the file is damaged from here on, or is another format".into(),
+            Self::NotText { .. } => {
+                "it must be text (data type 6): the tool that wrote this file breaks the format".into()
+            }
+            Self::NoHeader => "is this a GDSII file? OASIS and compressed files are not read".into(),
+            Self::RecordBody { .. }
+            | Self::NoUnits
+            | Self::UnitsMissingBeforeCell
+            | Self::NoCellName { .. }
+            | Self::Points { .. }
+            | Self::Lacks { .. }
+            | Self::ArraySize { .. } => REPORT.into(),
+            Self::UnitSize { .. } => "database units from 1e-13 to 1e-3 m are read; layouts are in 1e-9".into(),
+            Self::UnitRatio { .. } => "write the layout with a database unit of 1 nm".into(),
+            Self::OutsideCells { .. } | Self::CellNotEnded { .. } | Self::ElementNotEnded { .. } => REWRITE.into(),
+            Self::CellName { .. } | Self::ReferenceName { .. } => "give cells names of 1 to 32 characters".into(),
+            Self::Absolute { .. } => {
+                "few tools agree on what this means: write the reference with relative ones".into()
+            }
+            Self::Magnification { .. } => "magnifications from 1e-6 to 1e6 are read".into(),
+            Self::Magnifications => "write the cell at its true size".into(),
+            Self::Rewritten => BEING_WRITTEN.into(),
+            Self::Circle { .. } => "remove the reference: a cell cannot contain itself".into(),
+            Self::Dangling { .. } => "write the file with all cells that it needs".into(),
+            Self::Doubled { .. } => "rename one of them: references cannot tell which is meant".into(),
+            Self::NoCells => "is this the right file?".into(),
+            Self::NoSuchCell { tops, .. } => format!("cells at the top: {}", tops.join(", ")),
+            Self::SeveralTops { .. } => {
+                "write the one to be read to a file of its own, or name it where a command takes --top".into()
+            }
+            Self::Limit { limit, .. } => limit.remedy().into(),
+        }
+    }
+}
+
+impl ExtractionError {
+    /// What to do about it.
+    pub fn remedy(&self) -> String {
+        match self {
+            Self::Sites { most, .. } => {
+                format!("up to {most} sites are held at a time: a smaller lens, or fewer elements in one layout")
+            }
+            Self::NoElements { .. } => "name the layer that the pillars are on, or give the design".into(),
+            Self::Groups { most, .. } => format!("up to {most} elements are read; is this the layer of the pillars?"),
+            Self::Scattered { .. } => "give the design, which says where the elements are".into(),
+            Self::Sparse { .. } => {
+                "this is no lens on a lattice; give the design to say where its elements are".into()
+            }
+            Self::Lattice { .. } => "lattices with an even pitch about a whole nanometre are read".into(),
+        }
+    }
+}
+
+impl Error {
+    /// An operating-system error with what was attempted.
+    pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::Io { action, path, source }
+    }
+
+    /// What is wrong with the layout, and at which byte, if it is the layout.
+    pub fn in_layout(&self) -> Option<(u64, &LayoutError)> {
+        match self {
+            Self::Layout { offset, cause, .. } => Some((*offset, cause)),
+            _ => None,
+        }
+    }
+}
+
+/// What a visitor returns ends the visit and comes back as it was.
+impl From<metalith_core::Error> for Error {
+    fn from(error: metalith_core::Error) -> Self {
+        match error {
+            metalith_core::Error::Interrupted => Self::Interrupted,
+            other => Self::Visitor(other),
+        }
+    }
+}
+
+/// One text with its remedy, for a program; the cause stays its source.
+impl From<Error> for metalith_core::Error {
+    fn from(error: Error) -> Self {
+        let (what, hint) = match error {
+            Error::Io { action, path, source } => return Self::Io { action, path, source },
+            Error::Interrupted => return Self::Interrupted,
+            Error::Visitor(error) => return error,
+            Error::Layout {
+                ref path,
+                offset,
+                ref cause,
+            } => {
+                return Self::Layout {
+                    path: path.clone(),
+                    offset,
+                    what: cause.to_string(),
+                    hint: cause.remedy(),
+                    source: Some(Box::new(error)),
+                };
+            }
+            Error::NotAFile { .. } => (error.to_string(), "name a GDSII file (.gds)".into()),
+            Error::Changed { .. } => (error.to_string(), BEING_WRITTEN.into()),
+            Error::Extraction { ref cause, .. } => (error.to_string(), cause.remedy()),
+        };
+        Self::Invalid {
+            what,
+            hint,
+            source: Some(Box::new(error)),
+        }
+    }
+}
