@@ -1,5 +1,6 @@
 //! Files that appear whole or not at all.
 
+mod folder;
 mod part;
 mod past_cache;
 
@@ -7,6 +8,7 @@ use std::fs;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
+pub use folder::WholeFolder;
 pub use past_cache::{Ahead, Block};
 
 use crate::error::{Error, Result};
@@ -30,7 +32,9 @@ pub fn read_at_most(path: &Path, most: u64, what: &str) -> Result<Vec<u8>> {
     let mut bytes = Vec::with_capacity(found.len() as usize);
     let file = fs::File::open(path).map_err(Error::io("read", path))?;
     // The file may grow while it is read.
-    file.take(most + 1).read_to_end(&mut bytes).map_err(Error::io("read", path))?;
+    file.take(most + 1)
+        .read_to_end(&mut bytes)
+        .map_err(Error::io("read", path))?;
     if bytes.len() as u64 > most {
         return refused("grows while it is read".into());
     }
