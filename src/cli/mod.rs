@@ -7,6 +7,7 @@ mod diff;
 mod handoff;
 mod layout;
 mod optimize;
+mod paths;
 mod photographs;
 mod psf;
 mod run;

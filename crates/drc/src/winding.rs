@@ -408,8 +408,8 @@ mod tests {
         const STROKES: i64 = 100_000;
         const REACH: i64 = 1_000_000;
         let zigzag = |place: &dyn Fn(i64, i64) -> Point| {
-            // There and back again beside the way there.
-            let along = |k: i64, aside: i64| place(k * 10 + aside, if k % 2 == 0 { 0 } else { REACH });
+            // There, and back again above the way there.
+            let along = |k: i64, above: i64| place(k * 10, above + if k % 2 == 0 { 0 } else { REACH });
             let there = (0..STROKES).map(|k| along(k, 0));
             let back = (0..STROKES).rev().map(|k| along(k, 4));
             let mut ring: Vec<Point> = there.chain(back).collect();
