@@ -10,7 +10,7 @@ pub(super) struct Context {
     pub layers: BTreeMap<String, LayerNumber>,
     pub pillars: LayerNumber,
     pub height_nm: f64,
-    /// Checks of the deck with the layers they look at, to let the gravest name win.
+    /// Checks of the deck with the layers they look at, so that the most serious rule reports a defect.
     pub covered: Vec<(String, Vec<LayerNumber>)>,
 }
 

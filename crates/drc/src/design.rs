@@ -5,11 +5,12 @@ use super::findings::Findings;
 use super::flat::FlatLayout;
 use super::rule::{Judged, Needs, NotRun, Rule};
 use super::work::Stop;
-use metalith_cell::Material;
+
 use metalith_core::Lattice;
 use metalith_core::document::{Limits, Section};
 use metalith_design::Design;
 use metalith_design::phase::{ElementPhase, LensPhase};
+use metalith_rcwa::Material;
 
 enum Against {
     Count,

@@ -29,8 +29,8 @@ enum Form {
 struct OutlineRule {
     layers: Vec<LayerNumber>,
     form: Form,
-    /// Whether a graver rule of the deck looks at each of the layers too: crossing, acute, area.
-    graver: Vec<[bool; 3]>,
+    /// Whether a more serious rule of the deck looks at each of the layers too: crossing, acute, area.
+    more_serious: Vec<[bool; 3]>,
 }
 
 pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Option<Box<dyn Rule>> {
@@ -48,19 +48,23 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Optio
         _ => return None,
     };
     let layers = context.some_layers(s);
-    let graver = layers
+    let more_serious = layers
         .iter()
         .map(|&l| ["self_crossing", "acute_angle", "zero_area"].map(|c| context.covers(c, l)))
         .collect();
-    Some(Box::new(OutlineRule { layers, form, graver }))
+    Some(Box::new(OutlineRule {
+        layers,
+        form,
+        more_serious,
+    }))
 }
 
 impl OutlineRule {
-    /// Whether a graver rule reports this outline: each defect has one name. What is no square is told by the
-    /// rule that says that pillars are squares, whatever else is wrong with it.
+    /// Whether a more serious rule reports this outline: each defect has one name. The rule that says that pillars
+    /// are squares reports every outline that is not a square, whatever else is wrong with it.
     fn reported_elsewhere(&self, outline: &DrawnOutline<'_>) -> bool {
         let k = self.layers.iter().position(|&l| l == outline.layer).unwrap_or(0);
-        let [crossing, acute, area] = self.graver[k];
+        let [crossing, acute, area] = self.more_serious[k];
         if area && self.form != Form::Area && outline.twice_area() == 0 {
             return true;
         }

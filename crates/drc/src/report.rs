@@ -51,7 +51,7 @@ pub struct DrcReport {
     pub pillars_on_lattices: u64,
     /// Every rule of the deck, in its order.
     pub rules: Vec<RuleReport>,
-    /// What was odd about the check itself: waivers that cover nothing or have expired.
+    /// Warnings about the check itself: waivers that cover nothing or have expired.
     pub warnings: Vec<String>,
     /// For each of them the hash of its waiver.
     #[serde(skip)]

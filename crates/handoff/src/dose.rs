@@ -71,10 +71,10 @@ pub struct WriteTime {
     pub job_s: f64,
 }
 
-/// How the time of a job is reckoned, for people.
+/// How the time of a job is computed, for the page.
 pub(super) const FORMULA: &str =
     "time = dose x area / current  +  shapes x overhead a shape  +  fields x overhead a field  +  overhead of the job";
-/// How step and clock follow from the dose, for people.
+/// How step and clock follow from the dose, for the page.
 pub(super) const DOSE_FORMULA: &str = "dose [uC/cm2] = current [pA] x 100 / (clock [MHz] x step^2 [nm2])";
 
 impl WriteTime {
@@ -101,7 +101,7 @@ impl WriteTime {
     }
 }
 
-/// Seconds as people say them.
+/// A time in hours, minutes or seconds.
 pub(super) fn duration(seconds: f64) -> String {
     let minutes = (seconds / 60.0).round() as u64;
     match minutes {

@@ -1,4 +1,4 @@
-//! What is in a hand-off, and whether a received one is whole and unaltered.
+//! What is in a hand-off, and whether a received one is complete and unaltered.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;

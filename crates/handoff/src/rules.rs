@@ -208,15 +208,15 @@ fn text(waivers: &[Waiver]) -> String {
 }
 
 /// A waiver that covers something in one layout is not stale because it covers nothing in another; one that covers
-/// nothing anywhere is told once.
+/// nothing anywhere is reported once.
 fn warn_once(reports: &mut RuleReports) {
-    let mut told: BTreeSet<String> = reports.iter().flat_map(|(_, r)| r.covered.iter().cloned()).collect();
+    let mut reported_once: BTreeSet<String> = reports.iter().flat_map(|(_, r)| r.covered.iter().cloned()).collect();
     for (_, report) in reports {
         let warnings = std::mem::take(&mut report.warnings)
             .into_iter()
             .zip(std::mem::take(&mut report.warned));
         for (words, hash) in warnings {
-            if told.insert(hash.clone()) {
+            if reported_once.insert(hash.clone()) {
                 report.warnings.push(words);
                 report.warned.push(hash);
             }

@@ -8,7 +8,7 @@ use super::structures::Structure;
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
 
-/// Pillars on each side of a site whose widths should be alike: an SEM then measures the right one even
+/// Pillars on each side of a site whose widths should be nearly equal: an SEM then measures the right one even
 /// when it counts wrong by one.
 const NEIGHBOURS: usize = 1;
 /// Widths between the narrowest and the widest that are looked for on the lenses.
@@ -105,7 +105,7 @@ struct BestSite {
     around_nm: (u16, u16),
 }
 
-/// For each width and each ring of the lens the site whose neighbours are most like it; among equals
+/// For each width and each ring of the lens the site whose neighbours differ least from it; among equals
 /// the one nearest the x axis, where a stage finds it by moving along one axis.
 fn best_sites(map: &metalith_core::WidthMap, radius_um: f64, widths: &[u16], zones: usize) -> Vec<BestSite> {
     let n = map.lattice.sites();
@@ -119,9 +119,9 @@ fn best_sites(map: &metalith_core::WidthMap, radius_um: f64, widths: &[u16], zon
             let Some(around_nm) = around(map, ix, iy) else { continue };
             let r_um = map.lattice.coordinate_um(ix).hypot(map.lattice.coordinate_um(iy));
             let zone = ((r_um / radius_um * zones as f64) as usize).min(zones - 1);
-            let unlike = u64::from((width_nm - around_nm.0).max(around_nm.1 - width_nm));
+            let difference = u64::from((width_nm - around_nm.0).max(around_nm.1 - width_nm));
             let aside = map.lattice.half_index(iy).unsigned_abs();
-            let score = (unlike << 32) | aside;
+            let score = (difference << 32) | aside;
             let held = &mut best[target * zones + zone];
             if held.as_ref().is_none_or(|(known, _)| score < *known) {
                 *held = Some((

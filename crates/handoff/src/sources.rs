@@ -29,7 +29,7 @@ pub(super) struct Sources {
 
 /// One input as it was read.
 struct Kept {
-    /// Its name without its folder, behind what it is: not yet unlike all others.
+    /// Its file name with a prefix that says what it is; not yet unique.
     name: String,
     purpose: &'static str,
     bytes: Vec<u8>,
@@ -91,7 +91,7 @@ impl Sources {
     pub fn keep(&self, files: &mut Listing) -> Result<()> {
         let mut taken = BTreeSet::new();
         for input in &self.kept {
-            let name = unlike(&taken, &input.name);
+            let name = unique(&taken, &input.name);
             files.write(format!("inputs/{name}"), input.purpose, &input.bytes)?;
             taken.insert(name.to_lowercase());
         }
@@ -117,8 +117,9 @@ impl Kept {
     }
 }
 
-/// The name, with a number before its ending if one like it is taken; case does not tell files apart everywhere.
-fn unlike(taken: &BTreeSet<String>, name: &str) -> String {
+/// The name, with a number before its extension if it is taken. Upper and lower case count as equal, because some file
+/// systems do not distinguish them.
+fn unique(taken: &BTreeSet<String>, name: &str) -> String {
     let (stem, ending) = match name.rfind('.') {
         Some(dot) if dot > 0 => name.split_at(dot),
         _ => (name, ""),

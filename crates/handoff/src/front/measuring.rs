@@ -12,7 +12,7 @@ pub(super) fn tests(page: &mut Page, c: &Contents<'_>) {
         Column::text("Structure"),
         Column::number("x", "um"),
         Column::number("y", "um"),
-        Column::text("What it tells"),
+        Column::text("What is measured on it"),
     ]);
     for s in &c.structures {
         let (x, y) = s.bounds.centre();
@@ -36,7 +36,7 @@ pub(super) fn tests(page: &mut Page, c: &Contents<'_>) {
 pub(super) fn metrology(page: &mut Page, c: &Contents<'_>) {
     page.section("Where to measure widths");
     page.paragraph(format!(
-        "Sites on the lenses are those whose neighbours are most like them, so that counting wrong by one does little harm. \
+        "Sites on the lenses are those whose neighbours have nearly the same width, so that a miscount by one pillar changes the result little. \
          Expected: drawn width within two standard deviations of {} nm. `metrology/cd_table.csv` has columns to fill in.",
         c.process.metrology.width_tolerance_nm
     ));

@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn all_mistakes_are_told_at_once_with_their_places() {
+    fn all_mistakes_are_reported_at_once_with_their_places() {
         let text = STANDARD
             .1
             .replace("tone = \"positive\"", "tone = \"possitive\"")

@@ -1,4 +1,4 @@
-//! Test structures: what tells width, depth, overlay and stitching apart from everything else.
+//! Test structures: structures from which width, depth, overlay and stitching are measured.
 
 use std::path::Path;
 
@@ -23,7 +23,7 @@ const LEVEL_REACH: i64 = 50_000;
 #[derive(Clone, Debug, serde::Serialize)]
 pub(super) struct Structure {
     pub id: String,
-    /// What it is and what it tells.
+    /// What it is and what is measured on it.
     pub purpose: String,
     /// On the chip of the test structures, whose lower left corner is the origin [nm].
     #[serde(rename = "bounds_nm")]

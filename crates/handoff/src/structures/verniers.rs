@@ -1,4 +1,4 @@
-//! Solid squares and verniers: what tells depth, film, overlay and stitching apart from everything else.
+//! Solid squares and verniers: structures from which depth, film, overlay and stitching are measured.
 
 use super::{APART, BESIDE, StructureLayers, Structures};
 use crate::drawing::{RectNm, nm};
@@ -120,7 +120,7 @@ impl Structures {
                 bounds,
                 None,
             );
-            self.breaks(&[("field_cut", "it tells how two fields meet")]);
+            self.breaks(&[("field_cut", "it measures how two fields meet")]);
             highest = highest.max(bounds.y1);
         }
         highest
