@@ -56,7 +56,19 @@ pub struct CheckArgs {
     sarif: Option<PathBuf>,
 }
 
+impl CheckArgs {
+    /// Refuse to overwrite what is read.
+    fn paths_are_apart(&self) -> Result<()> {
+        let inputs = [&self.rules, &self.design, &self.waivers];
+        let inputs = inputs.into_iter().flatten().chain(&self.with).chain([&self.layout]);
+        let outputs = [&self.lyrdb, &self.junit, &self.sarif].into_iter().flatten();
+        let outputs: Vec<&Path> = outputs.map(PathBuf::as_path).collect();
+        super::paths::apart(inputs.map(PathBuf::as_path), &outputs)
+    }
+}
+
 pub fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
+    args.paths_are_apart()?;
     let deck = args.rules.as_deref().map_or_else(|| Ok(Deck::standard()), Deck::read)?;
     let waivers = args.waivers.as_deref().map(Waivers::read).transpose()?;
     let design = args.design.as_deref().map(Design::read).transpose()?;
@@ -67,6 +79,7 @@ pub fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
     let input = CheckInput {
         with: with.iter().collect(),
         design: design.as_ref(),
+        array: None,
         waivers: waivers.as_ref(),
         today: Date::today(),
         markers: args.markers,

@@ -45,6 +45,8 @@ pub fn run(args: &DiffArgs, terminal: &Terminal) -> Result<Outcome> {
             "write layer and datatype as 1/0",
         ));
     };
+    let report: Vec<_> = args.report.as_deref().into_iter().collect();
+    super::paths::apart([args.a.as_path(), &args.b], &report)?;
     terminal.stop_on_interrupt();
     let open = |path: &PathBuf| Layout::open_with(path, ReadLimits::default(), terminal);
     let plan = DiffPlan {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::handoff::{Handoff, HandoffOptions, Verification as HandoffVerification, handoff, verify_handoff};
+use metalith::handoff::{Handoff, HandoffOptions, HandoffVerification, handoff, verify_handoff};
 use metalith::report::Verdict;
 use metalith::{Accuracy, Design, Result};
 

@@ -9,6 +9,7 @@ mod handoff;
 mod layout;
 mod optimise;
 mod output;
+mod paths;
 mod photographs;
 mod psf;
 mod run;

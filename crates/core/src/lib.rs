@@ -19,7 +19,7 @@ pub use cross::cross_corners;
 #[cfg(feature = "documents")]
 pub use document::{Fault, Faults};
 pub use error::{Error, Result};
-pub use file::WholeFile;
+pub use file::{WholeFile, WholeFolder};
 pub use lattice::{Lattice, WidthMap};
 pub use layer::LayerNumber;
 pub use plane::part;

@@ -2,21 +2,23 @@
 
 use ndarray::{ArrayView1, Axis};
 
-use super::deck::Context;
-use super::found::Found;
-use super::polygon::{inside, point_segment, ring_of};
-use super::rule::{Rule, Status};
-use super::scene::Scene;
+use super::context::Context;
+use super::findings::Findings;
+use super::flat::{FlatLayout, Loose};
+use super::polygon::{point_segment, ring_of};
+use super::rule::{Judged, NotRun, Rule};
+use super::tolerance::EQUAL_NM;
+use super::work::Stop;
 use metalith_core::document::{Limits, Section};
 use metalith_gds::{LayerNumber, Point, Rect};
 
-struct Aperture {
+struct ApertureRule {
     layer: LayerNumber,
-    want: Want,
+    want: OpeningRule,
 }
 
 #[derive(PartialEq)]
-enum Want {
+enum OpeningRule {
     /// Distance from the pillars of a lens to the metal [nm].
     Margin(f64),
     NoMetalOnPillars,
@@ -26,20 +28,20 @@ enum Want {
 
 pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Option<Box<dyn Rule>> {
     let want = match check {
-        "aperture_margin" => Want::Margin(s.float("nm", Limits::new(0.0..=1e9, "nm"))),
-        "metal_on_pillars" => Want::NoMetalOnPillars,
-        "aperture_each" => Want::OneEach,
+        "aperture_margin" => OpeningRule::Margin(s.float("nm", Limits::new(0.0..=1e9, "nm"))),
+        "metal_on_pillars" => OpeningRule::NoMetalOnPillars,
+        "aperture_each" => OpeningRule::OneEach,
         _ => return None,
     };
-    Some(Box::new(Aperture {
+    Some(Box::new(ApertureRule {
         layer: context.layer(s, "layer"),
         want,
     }))
 }
 
 /// Corners of the outermost pillars of each row and each column: their hull is that of the lens.
-fn rim(scene: &Scene<'_>, element: usize) -> Vec<Point> {
-    let widths = &scene.elements[element].widths.width_nm;
+fn rim(flat: &FlatLayout<'_>, element: usize) -> Vec<Point> {
+    let widths = &flat.elements[element].widths.width_nm;
     let ends = |line: ArrayView1<'_, u16>| {
         let first = line.iter().position(|&w| w != 0);
         let last = line.iter().rposition(|&w| w != 0);
@@ -52,84 +54,128 @@ fn rim(scene: &Scene<'_>, element: usize) -> Vec<Point> {
         .chain(columns.flat_map(|(column, line)| ends(line).map(move |row| (row, column))));
     at_ends
         .flat_map(|(row, column)| {
-            let [a, b, c, d, _] = ring_of(&scene.pillar(element, row, column));
+            let [a, b, c, d, _] = ring_of(&flat.pillar(element, row, column));
             [a, b, c, d]
         })
         .collect()
 }
 
-impl Rule for Aperture {
+impl Rule for ApertureRule {
     fn words(&self) -> String {
         match self.want {
-            Want::Margin(nm) => format!("metal at least {nm} nm from the pillars of a lens"),
-            Want::NoMetalOnPillars => "every pillar stands in an opening of the metal".into(),
-            Want::OneEach => "one opening for each lens, and no other".into(),
+            OpeningRule::Margin(nm) => format!("metal at least {nm} nm from the pillars of a lens"),
+            OpeningRule::NoMetalOnPillars => "every pillar stands in an opening of the metal".into(),
+            OpeningRule::OneEach => "one opening for each lens, and no other".into(),
         }
     }
 
-    fn judge(&mut self, scene: &Scene<'_>, found: &mut Found) -> Status {
-        let openings: Vec<Vec<Point>> = match scene.loose(self.layer) {
-            Some(loose) => {
-                let rects = (0..loose.rects.len()).map(|k| ring_of(&loose.rect(k)).to_vec());
-                rects.chain(loose.polygons.iter().map(|p| p.to_vec())).collect()
-            }
-            None => return Status::Skipped(format!("no opening on layer {}: give its file with --with", self.layer)),
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+        let Some(openings) = flat.loose(self.layer) else {
+            return Err(NotRun::Skipped(format!(
+                "no opening on layer {}: give its file with --with",
+                self.layer
+            )));
         };
-        if scene.elements.is_empty() {
-            return Status::Skipped(format!(
+        if flat.elements.is_empty() {
+            return Err(NotRun::Skipped(format!(
                 "{}: give the file of the pillars with --with",
-                scene.no_elements
-            ));
+                flat.no_elements
+            )));
         }
-        let mut uses = vec![0u32; openings.len()];
-        for element in 0..scene.elements.len() {
-            let rim = rim(scene, element);
-            let centre = scene.elements[element]
-                .site
-                .centre_nm
-                .map(|c| scene.units(c as f64).round() as i64);
-            let round = Rect::around(&rim);
-            let holds = |opening: &Vec<Point>| inside(opening, Point::new(centre[0], centre[1]));
-            let mine: Vec<usize> = (0..openings.len()).filter(|&k| holds(&openings[k])).collect();
-            mine.iter().for_each(|&k| uses[k] += 1);
-            let name = &scene.elements[element].site.name;
-            let covered = |&&p: &&Point| !mine.iter().any(|&k| inside(&openings[k], p));
-            let outside = rim.iter().filter(covered).count();
-            match self.want {
-                Want::OneEach if mine.len() > 1 => {
-                    found.rect(&round, || format!("{} openings over {name}", mine.len()));
+        let mut uses = vec![0u32; openings.len() as usize];
+        for element in 0..flat.elements.len() {
+            let over = over_centre(flat, openings, element)?;
+            over.iter().for_each(|&k| uses[k] += 1);
+            self.judge_element(flat, openings, element, &over, found)?;
+        }
+        match self.want {
+            OpeningRule::NoMetalOnPillars => metal_on_others(flat, openings, found),
+            OpeningRule::OneEach => {
+                for (opening, _) in openings.bodies().zip(&uses).filter(|(_, uses)| **uses == 0) {
+                    found.at(&opening.ring(), || "an opening over no lens".into());
                 }
-                Want::NoMetalOnPillars if outside > 0 => {
-                    found.rect(&round, || format!("metal on the pillars of {name}"));
-                }
-                // Where metal is on pillars, that rule says so.
-                Want::Margin(nm) if outside == 0 && !mine.is_empty() => {
-                    let nearest = mine
-                        .iter()
-                        .flat_map(|&k| openings[k].windows(2))
-                        .flat_map(|s| rim.iter().map(move |&p| point_segment(p, s[0], s[1])))
-                        .fold(f64::INFINITY, f64::min)
-                        * scene.unit_nm;
-                    if nearest < nm - 1e-6 {
-                        found.rect(&round, || format!("metal {nearest:.0} nm from the pillars of {name}"));
+                Ok(())
+            }
+            OpeningRule::Margin(_) => Ok(()),
+        }
+    }
+}
+
+/// Openings that the centre of an element lies in.
+fn over_centre(flat: &FlatLayout<'_>, openings: &Loose, element: usize) -> Result<Vec<usize>, Stop> {
+    let [x, y] = flat.elements[element]
+        .site
+        .centre_nm
+        .map(|c| flat.units(c as f64).round() as i64);
+    let mut over = Vec::new();
+    for (k, opening) in openings.bodies().enumerate() {
+        flat.work.spend(1 + opening.sides())?;
+        if opening.holds(Point::new(x, y)) {
+            over.push(k);
+        }
+    }
+    Ok(over)
+}
+
+impl ApertureRule {
+    fn judge_element(
+        &self,
+        flat: &FlatLayout<'_>,
+        openings: &Loose,
+        element: usize,
+        over: &[usize],
+        found: &mut Findings,
+    ) -> Judged {
+        let rim = rim(flat, element);
+        let round = Rect::around(&rim);
+        let name = &flat.elements[element].site.name;
+        if self.want == OpeningRule::OneEach {
+            if over.len() > 1 {
+                found.rect(&round, || format!("{} openings over {name}", over.len()));
+            }
+            return Ok(());
+        }
+        let sides: u64 = over.iter().map(|&k| openings.body(k).sides()).sum();
+        flat.work.spend((rim.len() as u64).saturating_mul(sides))?;
+        let covered = |&&p: &&Point| !over.iter().any(|&k| openings.body(k).holds(p));
+        let outside = rim.iter().filter(covered).count();
+        match self.want {
+            OpeningRule::NoMetalOnPillars if outside > 0 => {
+                found.rect(&round, || format!("metal on the pillars of {name}"));
+            }
+            // Where metal is on pillars, that rule says so.
+            OpeningRule::Margin(nm) if outside == 0 && !over.is_empty() => {
+                let mut nearest = f64::INFINITY;
+                for opening in over.iter().map(|&k| openings.body(k).ring()) {
+                    for (s, &p) in opening.windows(2).flat_map(|s| rim.iter().map(move |p| (s, p))) {
+                        nearest = nearest.min(point_segment(p, s[0], s[1]));
                     }
                 }
-                _ => {}
-            }
-        }
-        if self.want == Want::NoMetalOnPillars {
-            for r in scene.loose(scene.pillars).iter().flat_map(|l| l.bounds()) {
-                let open = |opening: &Vec<Point>| ring_of(&r).iter().all(|&p| inside(opening, p));
-                if !openings.iter().any(open) {
-                    found.rect(&r, || "metal on a shape of the pillar layer".into());
+                let nearest = nearest * flat.unit_nm;
+                if nearest < nm - EQUAL_NM {
+                    found.rect(&round, || format!("metal {nearest:.0} nm from the pillars of {name}"));
                 }
             }
+            _ => {}
         }
-        if self.want == Want::OneEach {
-            for (opening, _) in openings.iter().zip(&uses).filter(|(_, uses)| **uses == 0) {
-                found.at(opening, || "an opening over no lens".into());
+        Ok(())
+    }
+}
+
+/// Metal on shapes of the pillar layer that belong to no element.
+fn metal_on_others(flat: &FlatLayout<'_>, openings: &Loose, found: &mut Findings) -> Judged {
+    for r in flat.loose(flat.pillars).iter().flat_map(|l| l.bounds()) {
+        let mut open = false;
+        for opening in openings.bodies() {
+            flat.work.spend(1 + opening.sides())?;
+            if ring_of(&r).iter().all(|&p| opening.holds(p)) {
+                open = true;
+                break;
             }
         }
-        Status::Run
+        if !open {
+            found.rect(&r, || "metal on a shape of the pillar layer".into());
+        }
     }
+    Ok(())
 }

@@ -1,13 +1,13 @@
 //! What a layout may cost: bytes, shapes, hours on the writer.
 
-use super::deck::Context;
-use super::found::Found;
-use super::rule::{Needs, Rule, Status};
-use super::scene::Scene;
+use super::context::Context;
+use super::findings::Findings;
+use super::flat::FlatLayout;
+use super::rule::{Judged, Needs, Rule};
 use metalith_core::document::{Limits, Section};
 use metalith_gds::LayerNumber;
 
-enum Budget {
+enum BudgetRule {
     FileSize(f64),
     Shapes(f64),
     WriteTime(Writing),
@@ -27,9 +27,9 @@ struct Writing {
 pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Option<Box<dyn Rule>> {
     let positive = |unit| Limits::new(0.0..=f64::MAX, unit);
     Some(Box::new(match check {
-        "file_size" => Budget::FileSize(s.float("mb", positive("MB"))),
-        "shape_count" => Budget::Shapes(s.float("count", positive("shapes"))),
-        "write_time" => Budget::WriteTime(Writing {
+        "file_size" => BudgetRule::FileSize(s.float("mb", positive("MB"))),
+        "shape_count" => BudgetRule::Shapes(s.float("count", positive("shapes"))),
+        "write_time" => BudgetRule::WriteTime(Writing {
             layers: context.some_layers(s),
             dose_uc_cm2: s.float("dose_uc_cm2", Limits::new(0.001..=1e6, "uC/cm2")),
             current_na: s.float("current_na", Limits::new(0.001..=1e6, "nA")),
@@ -42,7 +42,7 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Optio
     }))
 }
 
-impl Rule for Budget {
+impl Rule for BudgetRule {
     fn words(&self) -> String {
         match self {
             Self::FileSize(mb) => format!("a file of at most {mb} MB"),
@@ -62,35 +62,35 @@ impl Rule for Budget {
         }
     }
 
-    fn judge(&mut self, scene: &Scene<'_>, found: &mut Found) -> Status {
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
         let (value, most, unit) = match self {
-            Self::FileSize(mb) => (scene.layout.bytes() as f64 * 1e-6, *mb, "MB"),
-            Self::Shapes(count) => (scene.layout.flat_shapes() as f64, *count, "shapes"),
-            Self::WriteTime(w) => (w.hours(scene, found), w.most_h, "h"),
+            Self::FileSize(mb) => (flat.layout.bytes() as f64 * 1e-6, *mb, "MB"),
+            Self::Shapes(count) => (flat.layout.flat_shapes() as f64, *count, "shapes"),
+            Self::WriteTime(w) => (w.hours(flat, found), w.most_h, "h"),
         };
         found.facts.push((unit.to_owned(), value));
         if value > most {
             found.plain(unit, || format!("{value:.3} {unit}, at most {most}"));
         }
-        Status::Run
+        Ok(())
     }
 }
 
 impl Writing {
     /// Dose x area / current, and the overheads of shapes and fields.
-    fn hours(&self, scene: &Scene<'_>, found: &mut Found) -> f64 {
+    fn hours(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> f64 {
         let (mut area_nm2, mut shapes) = (0.0, 0.0);
-        let unit2 = scene.unit_nm * scene.unit_nm;
+        let unit2 = flat.unit_nm * flat.unit_nm;
         for layer in &self.layers {
-            if *layer == scene.pillars {
-                for e in &scene.elements {
+            if *layer == flat.pillars {
+                for e in &flat.elements {
                     for (w, &count) in e.widths.histogram().iter().enumerate().skip(1) {
                         area_nm2 += count as f64 * (w * w) as f64;
                         shapes += count as f64;
                     }
                 }
             }
-            let Some(loose) = scene.loose(*layer) else { continue };
+            let Some(loose) = flat.loose(*layer) else { continue };
             for k in 0..loose.rects.len() {
                 let r = loose.rect(k);
                 area_nm2 += r.width() as f64 * r.height() as f64 * unit2;
@@ -103,7 +103,7 @@ impl Writing {
         }
         // 1 nm2 = 1e-14 cm2; uC / nA = 1000 s.
         let exposure_s = self.dose_uc_cm2 * area_nm2 * 1e-14 / self.current_na * 1e3;
-        let fields: f64 = scene
+        let fields: f64 = flat
             .elements
             .iter()
             .map(|e| {

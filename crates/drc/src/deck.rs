@@ -1,9 +1,11 @@
 //! The deck: which rules with which limits, read from a file with a place for every mistake.
 
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use super::rule::{Rule, Severity};
+use super::context::Context;
+use super::rule::{DeckRule, Rule, Severity};
 use super::{aperture, budget, density, design, field, lattice, layers, marks, outline, spacing, tree, width};
 use metalith_core::Result;
 use metalith_core::document::{Document, Limits, Section, load};
@@ -23,34 +25,31 @@ const SHIPPED: [(&str, &str); 5] = [
 
 /// Version of the format of rule files that this program reads.
 const SCHEMA: i64 = 1;
+/// Rules of one deck: every outline is shown to every rule of its layer.
+const MOST_RULES: usize = 1000;
+/// Characters of an id.
+const LONGEST_ID: usize = 64;
 
 /// A deck of rules.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Deck {
     pub name: String,
     /// Layers that the pillars are on: one, or several where the datatype is a dose. They count as one.
     pub pillars: Vec<LayerNumber>,
-    path: std::path::PathBuf,
+    path: PathBuf,
     text: String,
+    /// In the order of the file; shared by all clones.
+    rules: Arc<[DeckRule]>,
 }
 
-/// One rule of the deck, ready to run.
-pub(super) struct ActiveRule {
-    pub id: String,
-    pub check: String,
-    pub severity: Severity,
-    /// Whether it applies: some need a design and are written to wait for one.
-    pub in_force: bool,
-    pub rule: Box<dyn Rule>,
-}
-
-/// What rules of all families ask of the file.
-pub(super) struct Context {
-    pub layers: BTreeMap<String, LayerNumber>,
-    pub pillars: LayerNumber,
-    pub height_nm: f64,
-    /// Checks of the deck with the layers they look at, to let the gravest name win.
-    pub covered: Vec<(String, Vec<LayerNumber>)>,
+impl std::fmt::Debug for Deck {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Deck")
+            .field("name", &self.name)
+            .field("path", &self.path)
+            .field("rules", &self.rules.len())
+            .finish_non_exhaustive()
+    }
 }
 
 impl Deck {
@@ -83,26 +82,30 @@ impl Deck {
     }
 
     fn parse(path: &Path, text: String) -> Result<Self> {
-        let mut deck = Self {
-            name: String::new(),
-            pillars: Vec::new(),
+        let contents = Document::read(path, &text, read)?;
+        Ok(Self {
+            name: contents.name,
+            pillars: contents.pillars,
             path: path.to_owned(),
             text,
-        };
-        let (name, pillars) = Document::read(path, &deck.text, |root| read(root).0)?;
-        (deck.name, deck.pillars) = (name, pillars);
-        Ok(deck)
+            rules: contents.rules.into(),
+        })
     }
 
-    /// The rules, with nothing found yet.
-    pub(super) fn rules(&self, with_design: bool) -> Result<Vec<ActiveRule>> {
-        let mut rules = Document::read(&self.path, &self.text, |root| read(root).1)?;
-        rules.iter_mut().for_each(|r| r.in_force |= with_design);
-        Ok(rules)
+    /// The rules, in the order of the file.
+    pub(super) fn rules(&self) -> &[DeckRule] {
+        &self.rules
     }
 }
 
-fn read(root: &Section<'_, '_>) -> ((String, Vec<LayerNumber>), Vec<ActiveRule>) {
+/// What a deck file says.
+struct Contents {
+    name: String,
+    pillars: Vec<LayerNumber>,
+    rules: Vec<DeckRule>,
+}
+
+fn read(root: &Section<'_, '_>) -> Contents {
     root.integer("schema", SCHEMA..=SCHEMA, "");
     let name = root.text("name");
     let section = root.section("layers");
@@ -145,9 +148,17 @@ fn read(root: &Section<'_, '_>) -> ((String, Vec<LayerNumber>), Vec<ActiveRule>)
         .iter()
         .map(|s| (s.text("check"), context.some_layers(s)))
         .collect();
-    let mut rules: Vec<ActiveRule> = Vec::new();
-    for s in &sections {
-        if let Some(rule) = read_rule(s, &context, &rules) {
+    if sections.len() > MOST_RULES {
+        root.fault(
+            "rule",
+            format!("{} rules, at most {MOST_RULES}", sections.len()),
+            "split the deck and check with each part",
+        );
+    }
+    let mut ids = BTreeSet::new();
+    let mut rules: Vec<DeckRule> = Vec::new();
+    for s in sections.iter().take(MOST_RULES) {
+        if let Some(rule) = read_rule(s, &context, &mut ids) {
             rules.push(rule);
         }
         s.finish();
@@ -155,12 +166,19 @@ fn read(root: &Section<'_, '_>) -> ((String, Vec<LayerNumber>), Vec<ActiveRule>)
     if sections.is_empty() {
         root.fault("rule", "the deck has no rules", "add one or more [[rule]] sections");
     }
-    ((name, pillars), rules)
+    Contents { name, pillars, rules }
 }
 
-fn read_rule(s: &Section<'_, '_>, context: &Context, before: &[ActiveRule]) -> Option<ActiveRule> {
+fn read_rule(s: &Section<'_, '_>, context: &Context, ids: &mut BTreeSet<String>) -> Option<DeckRule> {
     let (id, check) = (s.text("id"), s.text("check"));
-    if before.iter().any(|r| r.id == id) {
+    if s.has("id") && !legal_id(&id) {
+        s.fault(
+            "id",
+            format!("\"{}\" is not an id", id.escape_debug()),
+            format!("use letters, digits and _ - ., at most {LONGEST_ID} characters"),
+        );
+    }
+    if !ids.insert(id.clone()) {
         s.fault(
             "id",
             format!("a second rule `{id}`"),
@@ -173,7 +191,7 @@ fn read_rule(s: &Section<'_, '_>, context: &Context, before: &[ActiveRule]) -> O
         ("note", Severity::Note),
     ];
     let severity = s.choice("severity", &severities, Some(Severity::Error));
-    let in_force = s.choice("when", &[("always", true), ("design", false)], Some(true));
+    let always = s.choice("when", &[("always", true), ("design", false)], Some(true));
     let families: [Family; 12] = [
         width::read,
         outline::read,
@@ -199,55 +217,22 @@ fn read_rule(s: &Section<'_, '_>, context: &Context, before: &[ActiveRule]) -> O
         }
         return None;
     };
-    Some(ActiveRule {
+    Some(DeckRule {
         id,
         check,
         severity,
-        in_force,
+        always,
         rule,
     })
 }
 
+/// Ids name rules in reports of several formats, and their parts between dots are nested categories in one.
+fn legal_id(id: &str) -> bool {
+    (1..=LONGEST_ID).contains(&id.len()) && id.chars().all(|c| c.is_ascii_alphanumeric() || "_-.".contains(c))
+}
+
 /// Reads a rule of one family; none if the check is of another.
 type Family = fn(&str, &Section<'_, '_>, &Context) -> Option<Box<dyn Rule>>;
-
-impl Context {
-    /// The layer named by `layer`, the pillars if left out.
-    pub fn layer(&self, s: &Section<'_, '_>, key: &str) -> LayerNumber {
-        match s.optional_text(key) {
-            None => self.pillars,
-            Some(name) => self.named(s, key, &name),
-        }
-    }
-
-    /// The layers named by `layers`, the pillars if left out.
-    pub fn some_layers(&self, s: &Section<'_, '_>) -> Vec<LayerNumber> {
-        if s.has("layers") {
-            s.texts("layers").iter().map(|n| self.named(s, "layers", n)).collect()
-        } else {
-            vec![self.pillars]
-        }
-    }
-
-    /// Whether the deck has this check on this layer.
-    pub fn covers(&self, check: &str, layer: LayerNumber) -> bool {
-        self.covered
-            .iter()
-            .any(|(c, layers)| c == check && layers.contains(&layer))
-    }
-
-    fn named(&self, s: &Section<'_, '_>, key: &str, name: &str) -> LayerNumber {
-        self.layers.get(name).copied().unwrap_or_else(|| {
-            let known = self.layers.keys().cloned().collect::<Vec<_>>().join(", ");
-            s.fault(
-                key,
-                format!("there is no layer `{name}` in [layers]"),
-                format!("known: {known}"),
-            );
-            LayerNumber::default()
-        })
-    }
-}
 
 fn parse_layer(text: &str) -> Option<LayerNumber> {
     let (layer, datatype) = text.split_once('/')?;
@@ -264,11 +249,11 @@ mod tests {
     #[test]
     fn the_decks_of_the_program_are_sound() {
         for (name, _) in SHIPPED {
-            assert!(!Deck::shipped(Path::new(name)).unwrap().rules(true).unwrap().is_empty());
+            assert!(!Deck::shipped(Path::new(name)).unwrap().rules().is_empty());
         }
         let deck = Deck::standard();
-        assert!(deck.rules(true).unwrap().len() > 30);
-        assert!(deck.rules(true).unwrap().iter().all(|r| r.in_force));
+        assert!(deck.rules().len() > 30);
+        assert!(deck.rules().iter().any(|r| !r.always));
     }
 
     #[test]

@@ -1,19 +1,19 @@
 //! How much of the area is pillar: what the dose of the neighbours adds to a place follows it.
 
-use super::deck::Context;
-use super::found::Found;
-use super::rule::{Rule, Status};
-use super::scene::Scene;
+use super::context::Context;
+use super::findings::Findings;
+use super::flat::FlatLayout;
+use super::rule::{Judged, NotRun, Rule};
 use metalith_core::document::{Limits, Section};
 use metalith_core::part;
 use metalith_gds::{Point, Rect};
 
-struct Fill {
+struct FillRule {
     window_um: f64,
-    want: Want,
+    want: FillLimit,
 }
 
-enum Want {
+enum FillLimit {
     Between([f64; 2]),
     Gradient(f64),
 }
@@ -21,11 +21,11 @@ enum Want {
 pub(super) fn read(check: &str, s: &Section<'_, '_>, _context: &Context) -> Option<Box<dyn Rule>> {
     let share = || Limits::new(0.0..=1.0, "of the area");
     let want = match check {
-        "fill" => Want::Between(s.array("range", share())),
-        "fill_gradient" => Want::Gradient(s.float("max", share())),
+        "fill" => FillLimit::Between(s.array("range", share())),
+        "fill_gradient" => FillLimit::Gradient(s.float("max", share())),
         _ => return None,
     };
-    Some(Box::new(Fill {
+    Some(Box::new(FillRule {
         window_um: s.float("window_um", Limits::new(1.0..=10_000.0, "um")),
         want,
     }))
@@ -41,8 +41,8 @@ struct Windows {
 }
 
 impl Windows {
-    fn of(scene: &Scene<'_>, element: usize, window_um: f64) -> Self {
-        let e = &scene.elements[element];
+    fn of(flat: &FlatLayout<'_>, element: usize, window_um: f64) -> Self {
+        let e = &flat.elements[element];
         let pitch = e.site.lattice.pitch_um();
         let (n, sites) = (e.site.lattice.sites(), ((window_um / pitch) as usize).max(1));
         // Windows on each side of the middle one.
@@ -72,14 +72,14 @@ impl Windows {
     }
 
     /// The area of window `k`.
-    fn place(&self, scene: &Scene<'_>, element: usize, k: usize) -> Rect {
-        let site = &scene.elements[element].site;
+    fn place(&self, flat: &FlatLayout<'_>, element: usize, k: usize) -> Rect {
+        let site = &flat.elements[element].site;
         let pitch = i64::from(site.lattice.pitch_nm());
         let corner = |axis: usize, at: usize| {
             let first = self.first + (at * self.sites) as i64;
             site.centre_nm[axis] + site.lattice.coordinate_nm(0) + first * pitch - pitch / 2
         };
-        let unit = |nm: i64| scene.units(nm as f64).round() as i64;
+        let unit = |nm: i64| flat.units(nm as f64).round() as i64;
         let (x, y) = (corner(0, k % self.count), corner(1, k / self.count));
         let size = self.sites as i64 * pitch;
         let mut r = Rect::EMPTY;
@@ -89,33 +89,35 @@ impl Windows {
     }
 }
 
-impl Rule for Fill {
+impl Rule for FillRule {
     fn words(&self) -> String {
         let window = self.window_um;
         match self.want {
-            Want::Between([a, b]) => format!("{a} to {b} of every window of {window} um inside a lens is pillar"),
-            Want::Gradient(max) => format!("the fill of neighbouring windows of {window} um differs by at most {max}"),
+            FillLimit::Between([a, b]) => format!("{a} to {b} of every window of {window} um inside a lens is pillar"),
+            FillLimit::Gradient(max) => {
+                format!("the fill of neighbouring windows of {window} um differs by at most {max}")
+            }
         }
     }
 
-    fn judge(&mut self, scene: &Scene<'_>, found: &mut Found) -> Status {
-        if scene.elements.is_empty() {
-            return Status::Skipped(scene.no_elements.clone());
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+        if flat.elements.is_empty() {
+            return Err(NotRun::Skipped(flat.no_elements.clone()));
         }
         let (mut windows, mut low, mut high, mut steepest) = (0u64, f64::INFINITY, 0.0f64, 0.0f64);
-        for element in 0..scene.elements.len() {
-            let all = Windows::of(scene, element, self.window_um);
+        for element in 0..flat.elements.len() {
+            let all = Windows::of(flat, element, self.window_um);
             for k in 0..all.fill.len() {
                 let Some(fill) = all.fill[k] else { continue };
                 windows += 1;
                 (low, high) = (low.min(fill), high.max(fill));
                 match self.want {
-                    Want::Between([a, b]) if fill < a || fill > b => {
-                        found.rect(&all.place(scene, element, k), || {
+                    FillLimit::Between([a, b]) if fill < a || fill > b => {
+                        found.rect(&all.place(flat, element, k), || {
                             format!("{fill:.4} of the area is pillar")
                         });
                     }
-                    Want::Gradient(max) => {
+                    FillLimit::Gradient(max) => {
                         let right = (k % all.count + 1 < all.count).then_some(k + 1);
                         for other in right.into_iter().chain(Some(k + all.count)) {
                             let Some(&Some(beside)) = all.fill.get(other) else {
@@ -123,25 +125,28 @@ impl Rule for Fill {
                             };
                             steepest = steepest.max((fill - beside).abs());
                             if (fill - beside).abs() > max {
-                                let mut both = all.place(scene, element, k);
-                                both.unite(&all.place(scene, element, other));
+                                let mut both = all.place(flat, element, k);
+                                both.unite(&all.place(flat, element, other));
                                 found.rect(&both, || format!("fill from {fill:.4} to {beside:.4}"));
                             }
                         }
                     }
-                    Want::Between(_) => {}
+                    FillLimit::Between(_) => {}
                 }
             }
         }
         if windows == 0 {
-            return Status::Skipped(format!("no element holds a full window of {} um", self.window_um));
+            return Err(NotRun::Skipped(format!(
+                "no element holds a full window of {} um",
+                self.window_um
+            )));
         }
         match self.want {
-            Want::Between(_) => found
+            FillLimit::Between(_) => found
                 .facts
                 .extend([("least fill".into(), low), ("largest fill".into(), high)]),
-            Want::Gradient(_) => found.facts.push(("largest step of fill".into(), steepest)),
+            FillLimit::Gradient(_) => found.facts.push(("largest step of fill".into(), steepest)),
         }
-        Status::Run
+        Ok(())
     }
 }

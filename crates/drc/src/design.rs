@@ -1,17 +1,16 @@
 //! The layout against the design it should hold, and the design against what the cell can do.
 
-use sha2::{Digest, Sha256};
+use super::context::Context;
+use super::findings::Findings;
+use super::flat::FlatLayout;
+use super::rule::{Judged, Needs, NotRun, Rule};
+use super::work::Stop;
 
-use super::deck::Context;
-use super::found::Found;
-use super::rule::{Rule, Status};
-use super::scene::Scene;
-use metalith_cell::Material;
+use metalith_core::Lattice;
 use metalith_core::document::{Limits, Section};
-use metalith_core::{Lattice, Silent, WidthMap};
 use metalith_design::Design;
-use metalith_design::array::PillarArray;
 use metalith_design::phase::{ElementPhase, LensPhase};
+use metalith_rcwa::Material;
 
 enum Against {
     Count,
@@ -41,29 +40,34 @@ impl Rule for Against {
         }
     }
 
-    fn judge(&mut self, scene: &Scene<'_>, found: &mut Found) -> Status {
-        let Some(design) = scene.design else {
-            return Status::Skipped("no design was given: name it with --design".into());
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+        let Some(design) = flat.design else {
+            return Err(NotRun::Skipped("no design was given: name it with --design".into()));
         };
         match self {
-            Self::Count | Self::Widths => self.compare(scene, design, found),
-            Self::PhaseStep(share) => phase_step(design, *share, found),
+            Self::Count | Self::Widths => self.compare(flat, found),
+            Self::PhaseStep(share) => phase_step(flat, design, *share, found),
             Self::NoLatticeOrders => lattice_orders(design, found),
+        }
+    }
+
+    fn needs(&self) -> Needs {
+        match self {
+            Self::Count | Self::Widths => Needs::Array,
+            Self::PhaseStep(_) | Self::NoLatticeOrders => Needs::Numbers,
         }
     }
 }
 
 impl Against {
-    fn compare(&self, scene: &Scene<'_>, design: &Design, found: &mut Found) -> Status {
-        let array = match PillarArray::build(design, &Silent) {
-            Ok(array) => array,
-            Err(error) => return Status::Failed(error.to_string()),
-        };
-        for (k, (read, placed)) in scene.elements.iter().zip(&array.placed).enumerate() {
-            let meant = array.widths(placed);
+    fn compare(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+        let array = flat.array.expect("made where a rule needs it");
+        for (k, (read, placed)) in flat.elements.iter().zip(&array.placed).enumerate() {
+            flat.work.spend(read.widths.width_nm.len() as u64)?;
+            let designed = array.widths(placed);
             let name = &read.site.name;
             if let Self::Count = self {
-                let (there, wanted) = (read.widths.pillars(), meant.pillars());
+                let (there, wanted) = (read.widths.pillars(), designed.pillars());
                 if there != wanted {
                     found.plain(&format!("{name} {there}"), || {
                         format!("{there} pillars in {name}, {wanted} designed")
@@ -71,38 +75,29 @@ impl Against {
                 }
                 continue;
             }
-            if digest(&read.widths) == digest(&meant) {
+            if read.widths.width_nm == designed.width_nm {
                 continue;
             }
             for ((row, column), &w) in read.widths.width_nm.indexed_iter() {
-                let wanted = meant.width_nm[[row, column]];
+                let wanted = designed.width_nm[[row, column]];
                 // Missing and additional pillars are a matter of count.
                 if w != wanted && w != 0 && wanted != 0 {
-                    found.rect(&scene.pillar(k, row, column), || {
+                    found.rect(&flat.pillar(k, row, column), || {
                         format!("{w} nm wide, {wanted} nm designed")
                     });
                 }
             }
         }
-        Status::Run
+        Ok(())
     }
 }
 
-fn digest(widths: &WidthMap) -> [u8; 32] {
-    let mut hash = Sha256::new();
-    for row in widths.width_nm.outer_iter() {
-        let bytes: Vec<u8> = row.iter().flat_map(|w| w.to_le_bytes()).collect();
-        hash.update(bytes);
-    }
-    hash.finalize().into()
-}
-
-fn phase_step(design: &Design, most: f64, found: &mut Found) -> Status {
+fn phase_step(flat: &FlatLayout<'_>, design: &Design, most: f64, found: &mut Findings) -> Judged {
     let lattice = design.lattice();
     let lens = LensPhase::new(lattice, design.lens.diameter_nm, &design.lens.phase);
     for element in design.elements() {
         let phase = ElementPhase::new(&lens, &element.wedge);
-        let (steps, steep) = steps(lattice, &phase);
+        let (steps, steep) = steps(flat, lattice, &phase)?;
         let share = steep as f64 / steps.max(1) as f64;
         found
             .facts
@@ -116,13 +111,14 @@ fn phase_step(design: &Design, most: f64, found: &mut Found) -> Status {
             });
         }
     }
-    Status::Run
+    Ok(())
 }
 
 /// Steps between neighbouring sites, and those beyond half a turn.
-fn steps(lattice: Lattice, phase: &ElementPhase<'_>) -> (u64, u64) {
+fn steps(flat: &FlatLayout<'_>, lattice: Lattice, phase: &ElementPhase<'_>) -> Result<(u64, u64), Stop> {
     let (mut all, mut steep) = (0, 0);
     for iy in 0..lattice.sites() {
+        flat.work.look()?;
         for ix in 0..lattice.sites() {
             let Some(own) = phase.turns(ix, iy) else { continue };
             for (x, y) in [(ix + 1, iy), (ix, iy + 1)] {
@@ -136,21 +132,21 @@ fn steps(lattice: Lattice, phase: &ElementPhase<'_>) -> (u64, u64) {
             }
         }
     }
-    (all, steep)
+    Ok((all, steep))
 }
 
-fn lattice_orders(design: &Design, found: &mut Found) -> Status {
+fn lattice_orders(design: &Design, found: &mut Findings) -> Judged {
     let folder = design.path.parent().unwrap_or_else(|| std::path::Path::new("."));
     let substrate = match Material::resolve(&design.cell.substrate_material, folder) {
         Ok(material) => material,
-        Err(error) => return Status::Failed(error.to_string()),
+        Err(error) => return Err(NotRun::Failed(error.to_string())),
     };
     let pitch_nm = f64::from(design.cell.pitch_nm);
     for &wavelength_um in &design.verify.wavelengths_um {
         let wavelength_nm = wavelength_um * 1e3;
         let index = match substrate.index(wavelength_um) {
             Ok(index) => index.re,
-            Err(error) => return Status::Failed(error.to_string()),
+            Err(error) => return Err(NotRun::Failed(error.to_string())),
         };
         let shortest = index * pitch_nm;
         if wavelength_nm < shortest {
@@ -159,5 +155,5 @@ fn lattice_orders(design: &Design, found: &mut Found) -> Status {
             });
         }
     }
-    Status::Run
+    Ok(())
 }

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use metalith_core::text::{is_printable, printable};
 use serde_json::json;
 
 use super::report::{DrcReport, RuleReport};
@@ -14,7 +15,11 @@ pub fn text(report: &DrcReport) -> String {
     let _ = writeln!(
         out,
         "{}: {} shapes, {} elements, {} pillars on their lattices\ndeck: {}\n",
-        report.layout, report.shapes, report.elements, report.pillars_on_lattices, report.deck
+        printable(&report.layout),
+        report.shapes,
+        report.elements,
+        report.pillars_on_lattices,
+        report.deck
     );
     for r in &report.rules {
         let state = match &r.status {
@@ -87,8 +92,8 @@ fn escaped(text: &str) -> String {
             '&' => out.push_str("&amp;"),
             '"' => out.push_str("&quot;"),
             '\'' => out.push_str("&apos;"),
-            // XML has no place for other control characters.
-            c if c < ' ' && !"\n\t\r".contains(c) => out.push('?'),
+            // What XML has no place for, and what would change how a line is shown.
+            c if !is_printable(c) && c != '\n' => out.push_str(&printable(c.encode_utf8(&mut [0; 4]))),
             c => out.push(c),
         }
     }

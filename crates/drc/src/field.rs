@@ -1,36 +1,37 @@
 //! The writer's fields: what is cut by a boundary is exposed in two parts, some nanometres apart.
 
-use super::deck::Context;
-use super::found::Found;
-use super::rule::{Rule, Status};
-use super::scene::Scene;
+use super::context::Context;
+use super::findings::Findings;
+use super::flat::FlatLayout;
+use super::rule::{Judged, NotRun, Rule};
+use super::tolerance::ROUNDING_NM;
 use metalith_core::document::{Limits, Section};
 use metalith_gds::Rect;
 
 /// Fields of one size, in a grid about the centre of each element or of the layout.
-struct Field {
+struct FieldRule {
     size_nm: f64,
     offset_nm: [f64; 2],
     about_elements: bool,
-    want: Want,
+    want: BoundaryRule,
 }
 
 #[derive(PartialEq)]
-enum Want {
+enum BoundaryRule {
     NoCut,
     NoBoundary,
 }
 
 pub(super) fn read(check: &str, s: &Section<'_, '_>, _context: &Context) -> Option<Box<dyn Rule>> {
     let want = match check {
-        "field_cut" => Want::NoCut,
-        "field_in_lens" => Want::NoBoundary,
+        "field_cut" => BoundaryRule::NoCut,
+        "field_in_lens" => BoundaryRule::NoBoundary,
         _ => return None,
     };
     let offset = s
         .optional_array("offset_um", Limits::new(-1e5..=1e5, "um"))
         .unwrap_or([0.0; 2]);
-    Some(Box::new(Field {
+    Some(Box::new(FieldRule {
         size_nm: 1e3 * s.float("field_um", Limits::new(1.0..=1e5, "um")),
         offset_nm: offset.map(|v| v * 1e3),
         about_elements: s.choice("about", &[("elements", true), ("layout", false)], Some(true)),
@@ -38,7 +39,7 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, _context: &Context) -> Opti
     }))
 }
 
-impl Field {
+impl FieldRule {
     /// Boundaries between two places of an axis [nm], the middle of a field being at `centre`.
     fn boundaries(&self, axis: usize, centre: f64, from: f64, to: f64) -> impl Iterator<Item = f64> + use<> {
         let first = centre + self.offset_nm[axis] + self.size_nm / 2.0;
@@ -61,8 +62,8 @@ impl Field {
     }
 
     /// Rows or columns whose pillars could reach over a boundary, with the boundary's distance from them.
-    fn lines(&self, scene: &Scene<'_>, element: usize, axis: usize) -> Vec<(usize, f64)> {
-        let site = &scene.elements[element].site;
+    fn lines(&self, flat: &FlatLayout<'_>, element: usize, axis: usize) -> Vec<(usize, f64)> {
+        let site = &flat.elements[element].site;
         let (lattice, centre) = (site.lattice, self.centre(site.centre_nm));
         let pitch = f64::from(lattice.pitch_nm());
         let first = (site.centre_nm[axis] + lattice.coordinate_nm(0)) as f64;
@@ -75,22 +76,22 @@ impl Field {
             .collect()
     }
 
-    fn cut_on_lattices(&self, scene: &Scene<'_>, found: &mut Found) {
-        for (k, e) in scene.elements.iter().enumerate() {
-            let columns = self.lines(scene, k, 0);
-            let rows = self.lines(scene, k, 1);
+    fn cut_on_lattices(&self, flat: &FlatLayout<'_>, found: &mut Findings) {
+        for (k, e) in flat.elements.iter().enumerate() {
+            let columns = self.lines(flat, k, 0);
+            let rows = self.lines(flat, k, 1);
             let w = &e.widths.width_nm;
-            let cut = |w: u16, distance: f64| w != 0 && distance < f64::from(w) / 2.0 - 1e-9;
+            let cut = |w: u16, distance: f64| w != 0 && distance < f64::from(w) / 2.0 - ROUNDING_NM;
             let words = || "cut by a field boundary".to_owned();
             for &(column, distance) in &columns {
                 for (row, _) in w.column(column).iter().enumerate().filter(|(_, w)| cut(**w, distance)) {
-                    found.rect(&scene.pillar(k, row, column), words);
+                    found.rect(&flat.pillar(k, row, column), words);
                 }
             }
             for &(row, distance) in &rows {
                 for (column, &w) in w.row(row).iter().enumerate().filter(|(_, w)| cut(**w, distance)) {
                     if !columns.iter().any(|&(c, d)| c == column && cut(w, d)) {
-                        found.rect(&scene.pillar(k, row, column), words);
+                        found.rect(&flat.pillar(k, row, column), words);
                     }
                 }
             }
@@ -98,14 +99,16 @@ impl Field {
     }
 
     /// Shapes off every lattice, by the fields of the nearest element.
-    fn cut_loose(&self, scene: &Scene<'_>, found: &mut Found) {
-        let Some(loose) = scene.loose(scene.pillars) else {
-            return;
+    fn cut_loose(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+        let Some(loose) = flat.loose(flat.pillars) else {
+            return Ok(());
         };
+        flat.work
+            .spend(loose.len().saturating_mul(1 + flat.elements.len() as u64))?;
         for r in loose.bounds() {
-            let nm = |v: i64| v as f64 * scene.unit_nm;
+            let nm = |v: i64| v as f64 * flat.unit_nm;
             let middle = [nm(r.x0 + r.x1) / 2.0, nm(r.y0 + r.y1) / 2.0];
-            let nearest = scene.elements.iter().min_by(|a, b| {
+            let nearest = flat.elements.iter().min_by(|a, b| {
                 let far = |e: &metalith_gds::extract::ExtractedElement| {
                     let c = e.site.centre_nm;
                     (c[0] as f64 - middle[0]).hypot(c[1] as f64 - middle[1])
@@ -119,32 +122,32 @@ impl Field {
                 found.rect(&r, || "cut by a field boundary".into());
             }
         }
+        Ok(())
     }
 }
 
-impl Rule for Field {
+impl Rule for FieldRule {
     fn words(&self) -> String {
         let um = self.size_nm * 1e-3;
         match self.want {
-            Want::NoCut => format!("no pillar is cut by a boundary of the {um} um fields"),
-            Want::NoBoundary => format!("no boundary of the {um} um fields runs through a lens"),
+            BoundaryRule::NoCut => format!("no pillar is cut by a boundary of the {um} um fields"),
+            BoundaryRule::NoBoundary => format!("no boundary of the {um} um fields runs through a lens"),
         }
     }
 
-    fn judge(&mut self, scene: &Scene<'_>, found: &mut Found) -> Status {
-        if scene.elements.is_empty() && (self.about_elements || self.want == Want::NoBoundary) {
-            return Status::Skipped(scene.no_elements.clone());
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+        if flat.elements.is_empty() && (self.about_elements || self.want == BoundaryRule::NoBoundary) {
+            return Err(NotRun::Skipped(flat.no_elements.clone()));
         }
-        if self.want == Want::NoCut {
-            self.cut_on_lattices(scene, found);
-            self.cut_loose(scene, found);
-            return Status::Run;
+        if self.want == BoundaryRule::NoCut {
+            self.cut_on_lattices(flat, found);
+            return self.cut_loose(flat, found);
         }
-        for (k, e) in scene.elements.iter().enumerate() {
-            let lines = self.lines(scene, k, 0).len() + self.lines(scene, k, 1).len();
+        for (k, e) in flat.elements.iter().enumerate() {
+            let lines = self.lines(flat, k, 0).len() + self.lines(flat, k, 1).len();
             if lines > 0 {
                 let half = (e.site.lattice.coordinate_nm(0).abs() + i64::from(e.site.lattice.pitch_nm()) / 2) as f64;
-                let unit = |nm: f64| scene.units(nm).round() as i64;
+                let unit = |nm: f64| flat.units(nm).round() as i64;
                 let c = e.site.centre_nm.map(|c| c as f64);
                 let lens = Rect {
                     x0: unit(c[0] - half),
@@ -157,6 +160,6 @@ impl Rule for Field {
                 });
             }
         }
-        Status::Run
+        Ok(())
     }
 }

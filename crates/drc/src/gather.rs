@@ -1,52 +1,60 @@
-//! One visit of the layout: outlines to the rules that look at them, geometry into the scene.
+//! One visit of the layout: outlines to the rules that look at them, geometry into the flat.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
-use super::CheckInput;
-use super::deck::{ActiveRule, Deck};
-use super::found::Found;
-use super::polygon::{Outline, twice_area};
-use super::scene::{Loose, PlacedText, Scene};
+use super::deck::Deck;
+use super::drawn::DrawnOutline;
+use super::elements::{pillar_layers, sites};
+use super::findings::Findings;
+use super::flat::{FlatLayout, Loose, PlacedText};
+use super::input::CheckInput;
+use super::polygon::twice_area;
+use super::rule::DeckRule;
+use super::work::{Allowance, Stop, Work};
+use metalith_core::text::printable_bytes;
 use metalith_core::{Error, Progress, Result};
-use metalith_gds::extract::{ElementSite, Filler, Scale, Why, discover};
+use metalith_gds::extract::{Filler, Scale, Why};
 use metalith_gds::{
     Cell, LayerNumber, Layout, Point, Rect, Selection, Shape, Text, Transform, Visitor, rectangle_of, simplified,
 };
 
 /// Widest square that is decided by table [database units].
 const TABLE: usize = 4096;
-/// Rectangles off every lattice that are held, 16 bytes each: the pillars of a 3 x 3 array, and a fifth more.
-const MOST_RECTS: usize = 70_000_000;
-/// Vertices of outlines that are not rectangles.
-const MOST_VERTICES: usize = 20_000_000;
+/// Bytes of a text that reports show.
+const LONGEST_TEXT: usize = 512;
 const TOO_FAR: &str = "shapes farther than 2^31 database units from the origin";
 /// Texts that are held.
 const MOST_TEXTS: usize = 100_000;
-/// Lattice sites of all elements together.
-const MOST_SITES: u64 = 1 << 28;
 
 /// Visit the layout and its companions.
 pub(super) fn gather<'a>(
     layout: &'a Layout,
     deck: &Deck,
     input: &CheckInput<'a>,
-    rules: &mut [ActiveRule],
-    found: &mut [Found],
+    allowance: &Allowance,
+    work: &'a Work<'_>,
+    found: &mut [Findings],
     progress: &dyn Progress,
-) -> Result<Scene<'a>> {
+) -> Result<FlatLayout<'a>> {
     let selection = Selection {
         lenient: true,
         ..Selection::default()
     };
-    let (sites, no_elements) = sites(layout, deck, input, &selection, progress)?;
+    let (sites, no_elements) = sites(layout, deck, input, allowance, &selection, progress)?;
     let unit_nm = layout.unit_nm();
-    let (pillars, doses) = deck.pillars.split_first().expect("a deck names a layer of pillars");
-    let pillars = *pillars;
+    let (pillars, doses) = pillar_layers(deck);
+    let rules: Vec<(&DeckRule, &mut Findings)> = deck
+        .rules()
+        .iter()
+        .zip(found)
+        .filter(|(rule, _)| rule.always || input.design.is_some())
+        .collect();
     let mut visit = Gather {
         pillars,
         doses,
         unit_nm,
-        passes: pass_table(pillars, unit_nm, rules),
+        passes: pass_table(pillars, unit_nm, &rules),
         filler: Filler::new(sites, Scale::of(layout)?),
         loose: BTreeMap::new(),
         vertices: 0,
@@ -58,23 +66,27 @@ pub(super) fn gather<'a>(
         text_count: 0,
         counts: BTreeMap::new(),
         incomplete: None,
+        allowance: *allowance,
+        work,
         rules,
-        found,
     };
     let mut unread = None;
     for file in std::iter::once(&layout).chain(&input.with) {
         match file.visit(&selection, &mut visit, progress).map_err(Error::from) {
             Err(error @ Error::Layout { .. }) => unread = Some(error.to_string()),
+            Err(Error::Invalid { what, .. }) => unread = Some(what),
             other => other?,
         }
     }
     if visit.pillar_shapes > 0 {
         *visit.counts.entry(pillars).or_default() += visit.pillar_shapes;
     }
-    Ok(Scene {
+    Ok(FlatLayout {
+        work,
         layout,
         with: input.with.clone(),
         design: input.design,
+        array: None,
         unit_nm,
         pillars,
         elements: visit.filler.elements,
@@ -90,55 +102,21 @@ pub(super) fn gather<'a>(
     })
 }
 
-/// Elements of the design if there is one, else those that can be found, else why there are none.
-fn sites(
-    layout: &Layout,
-    deck: &Deck,
-    input: &CheckInput<'_>,
-    selection: &Selection,
-    progress: &dyn Progress,
-) -> Result<(Vec<ElementSite>, String)> {
-    if let Some(design) = input.design {
-        let site = |e: &metalith_design::Element| ElementSite {
-            name: e.label(),
-            centre_nm: [e.centre_nm.0, e.centre_nm.1],
-            lattice: design.lattice(),
-        };
-        return Ok((design.elements().iter().map(site).collect(), String::new()));
-    }
-    // The pillars may be in a companion, where the apertures are what is checked.
-    let mut why = String::new();
-    for file in std::iter::once(&layout).chain(&input.with) {
-        match discover(file, selection, &deck.pillars, Scale::of(file)?, progress).map_err(Error::from) {
-            Ok(sites) => {
-                let total: u64 = sites.iter().map(|s| (s.lattice.sites() as u64).pow(2)).sum();
-                if total <= MOST_SITES {
-                    return Ok((sites, String::new()));
-                }
-                why = format!("elements with {total} lattice sites; {MOST_SITES} are held");
-            }
-            Err(Error::Invalid { what, .. } | Error::Layout { what, .. }) => why = what,
-            Err(other) => return Err(other),
-        }
-    }
-    Ok((Vec::new(), why))
-}
-
 /// For each width and direction whether no rule on the pillar layer finds anything in such a square.
-fn pass_table(pillars: LayerNumber, unit_nm: f64, rules: &[ActiveRule]) -> [Vec<bool>; 2] {
+fn pass_table(pillars: LayerNumber, unit_nm: f64, rules: &[(&DeckRule, &mut Findings)]) -> [Vec<bool>; 2] {
     [false, true].map(|clockwise| {
         (0..TABLE)
             .map(|w| {
                 rules
                     .iter()
-                    .filter(|r| r.in_force && r.rule.outlines().contains(&pillars))
-                    .all(|r| r.rule.passes_square(w as f64 * unit_nm, clockwise))
+                    .filter(|(r, _)| r.rule.outlines().contains(&pillars))
+                    .all(|(r, _)| r.rule.passes_square(w as f64 * unit_nm, clockwise))
             })
             .collect()
     })
 }
 
-struct Gather<'r> {
+struct Gather<'r, 'p> {
     pillars: LayerNumber,
     /// Further layers whose shapes count as if they were on that one.
     doses: &'r [LayerNumber],
@@ -146,8 +124,8 @@ struct Gather<'r> {
     passes: [Vec<bool>; 2],
     filler: Filler,
     loose: BTreeMap<LayerNumber, Loose>,
-    rects: usize,
-    vertices: usize,
+    rects: u64,
+    vertices: u64,
     off_lattice: Vec<Rect>,
     odd_on_lattice: u64,
     pillar_shapes: u64,
@@ -155,11 +133,13 @@ struct Gather<'r> {
     text_count: u64,
     counts: BTreeMap<LayerNumber, u64>,
     incomplete: Option<String>,
-    rules: &'r mut [ActiveRule],
-    found: &'r mut [Found],
+    allowance: Allowance,
+    work: &'r Work<'p>,
+    /// Those in force, each with what it found.
+    rules: Vec<(&'r DeckRule, &'r mut Findings)>,
 }
 
-impl Gather<'_> {
+impl Gather<'_, '_> {
     /// The layer that rules know a shape by.
     #[inline]
     fn known_as(&self, layer: LayerNumber) -> LayerNumber {
@@ -171,13 +151,18 @@ impl Gather<'_> {
     }
 
     /// Show an outline to the rules that look at its layer.
-    fn show(&mut self, shape: &Shape<'_>, placements: &[Transform]) {
-        let outline = Outline::new(shape, placements, self.unit_nm);
-        for (rule, found) in self.rules.iter_mut().zip(self.found.iter_mut()) {
-            if rule.in_force && rule.rule.outlines().contains(&shape.layer) {
+    ///
+    /// # Errors
+    /// If that is too much work.
+    fn show(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> Result<()> {
+        let outline = DrawnOutline::new(shape, placements, self.unit_nm);
+        for (rule, found) in &mut self.rules {
+            if rule.rule.outlines().contains(&shape.layer) {
+                self.work.spend(shape.points.len() as u64).map_err(ended)?;
                 rule.rule.outline(&outline, found);
             }
         }
+        Ok(())
     }
 
     #[inline]
@@ -201,8 +186,11 @@ impl Gather<'_> {
             return;
         };
         self.rects += 1;
-        if self.rects > MOST_RECTS {
-            self.incomplete = Some(format!("more than {MOST_RECTS} rectangles off every lattice"));
+        if self.rects > self.allowance.rects {
+            self.incomplete = Some(format!(
+                "more than {} rectangles off every lattice",
+                self.allowance.rects
+            ));
             return;
         }
         self.loose.entry(layer).or_default().rects.push([x0, y0, x1, y1]);
@@ -222,16 +210,19 @@ impl Gather<'_> {
             self.incomplete = Some(TOO_FAR.into());
             return;
         }
-        self.vertices += corners.len();
-        if self.vertices > MOST_VERTICES {
-            self.incomplete = Some(format!("outlines with more than {MOST_VERTICES} vertices"));
+        self.vertices += corners.len() as u64;
+        if self.vertices > self.allowance.vertices {
+            self.incomplete = Some(format!(
+                "outlines with more than {} vertices together",
+                self.allowance.vertices
+            ));
             return;
         }
         self.loose.entry(layer).or_default().polygons.push(corners.into());
     }
 }
 
-impl Visitor for Gather<'_> {
+impl Visitor for Gather<'_, '_> {
     fn cell(&mut self, _cell: &Cell, placements: &[Transform]) -> Result<()> {
         self.filler.begin(placements.len());
         Ok(())
@@ -251,7 +242,7 @@ impl Visitor for Gather<'_> {
             let table = &self.passes[usize::from(turns_right(shape.points))];
             let known = rect.width() == rect.height() && table.get(rect.width() as usize).is_some_and(|&p| p);
             if !known {
-                self.show(shape, placements);
+                self.show(shape, placements)?;
             }
             for (k, placement) in placements.iter().enumerate() {
                 let placed = placement.apply_rect(rect).unwrap_or(*rect);
@@ -259,33 +250,44 @@ impl Visitor for Gather<'_> {
             }
             return Ok(());
         }
-        self.other(shape, placements, square);
-        Ok(())
+        self.other(shape, placements, square)
     }
 
     fn text(&mut self, text: &Text<'_>, placements: &[Transform]) -> Result<()> {
-        for placement in placements {
-            self.text_count += 1;
-            if self.texts.len() < MOST_TEXTS {
-                self.texts.push(PlacedText {
-                    layer: self.known_as(text.layer),
-                    string: String::from_utf8_lossy(text.string).into_owned(),
-                    at: placement.apply(text.at),
-                });
-            }
+        self.text_count += placements.len() as u64;
+        let room = MOST_TEXTS.saturating_sub(self.texts.len());
+        if room == 0 {
+            return Ok(());
         }
+        let (layer, string) = (
+            self.known_as(text.layer),
+            Arc::from(printable_bytes(&text.string[..text.string.len().min(LONGEST_TEXT)])),
+        );
+        let placed = placements.iter().take(room).map(|placement| PlacedText {
+            layer,
+            string: Arc::clone(&string),
+            at: placement.apply(text.at),
+        });
+        self.texts.extend(placed);
         Ok(())
     }
 }
 
-impl Gather<'_> {
+impl Gather<'_, '_> {
     /// A shape that is no plain pillar.
-    fn other(&mut self, shape: &Shape<'_>, placements: &[Transform], square: bool) {
+    ///
+    /// # Errors
+    /// If that is too much work.
+    fn other(&mut self, shape: &Shape<'_>, placements: &[Transform], square: bool) -> Result<()> {
         *self.counts.entry(shape.layer).or_default() += placements.len() as u64;
         if square {
-            self.show(shape, placements);
+            self.show(shape, placements)?;
+            if self.incomplete.is_some() {
+                return Ok(());
+            }
         }
         for (k, placement) in placements.iter().enumerate() {
+            self.work.spend(shape.points.len() as u64).map_err(ended)?;
             let placed: Vec<Point> = shape.points.iter().map(|&p| placement.apply(p)).collect();
             if !square {
                 // Turned and magnified outlines are looked at where they stand: rounding may bend them.
@@ -294,13 +296,22 @@ impl Gather<'_> {
                     rect: rectangle_of(&placed),
                     ..*shape
                 };
-                self.show(&here, &[Transform::IDENTITY]);
+                self.show(&here, &[Transform::IDENTITY])?;
             }
             match rectangle_of(&simplified(&placed)) {
                 Some(r) if shape.layer == self.pillars => self.pillar(&r, k),
                 _ => self.keep(shape.layer, &placed),
             }
         }
+        Ok(())
+    }
+}
+
+/// The error that ends a visit.
+fn ended(stop: Stop) -> Error {
+    match stop {
+        Stop::TooMuch(why) => Error::invalid(why, "write the layout with simpler outlines or fewer copies"),
+        Stop::Interrupted => Error::Interrupted,
     }
 }
 

@@ -1,9 +1,10 @@
 //! Grids: the lattice of the element, the grid of the database, and the steps of the beam.
 
-use super::deck::Context;
-use super::found::Found;
-use super::rule::{Rule, Status};
-use super::scene::Scene;
+use super::context::Context;
+use super::findings::Findings;
+use super::flat::FlatLayout;
+use super::rule::{Judged, NotRun, Rule};
+use super::tolerance::{EQUAL_NM, ROUNDING_NM};
 use metalith_core::document::{Limits, Section};
 use metalith_gds::{LayerNumber, Point};
 
@@ -13,7 +14,7 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Optio
         "on_lattice" => Box::new(OnLattice {
             pitch_nm: s.float("pitch_nm", nm()),
         }),
-        "grid" => Box::new(Grid {
+        "grid" => Box::new(GridRule {
             layers: context.some_layers(s),
             step_nm: s.float("nm", nm()),
         }),
@@ -34,11 +35,11 @@ impl Rule for OnLattice {
         format!("pillars of an element stand on one lattice of {} nm", self.pitch_nm)
     }
 
-    fn judge(&mut self, scene: &Scene<'_>, found: &mut Found) -> Status {
-        if scene.elements.is_empty() {
-            return Status::Skipped(scene.no_elements.clone());
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+        if flat.elements.is_empty() {
+            return Err(NotRun::Skipped(flat.no_elements.clone()));
         }
-        for e in &scene.elements {
+        for e in &flat.elements {
             let pitch = e.site.lattice.pitch_nm();
             if f64::from(pitch) != self.pitch_nm {
                 found.plain(&format!("{} {pitch}", e.site.name), || {
@@ -46,67 +47,67 @@ impl Rule for OnLattice {
                 });
             }
         }
-        for r in &scene.off_lattice {
+        for r in &flat.off_lattice {
             found.rect(r, || "a square between the sites of its element".into());
         }
-        Status::Run
+        Ok(())
     }
 }
 
 /// Vertices are on multiples of a step.
-struct Grid {
+struct GridRule {
     layers: Vec<LayerNumber>,
     step_nm: f64,
 }
 
-impl Grid {
+impl GridRule {
     fn off(&self, p: Point, unit_nm: f64) -> bool {
         let off = |v: i64| {
             let steps = v as f64 * unit_nm / self.step_nm;
-            (steps - steps.round()).abs() * self.step_nm > 1e-6
+            (steps - steps.round()).abs() * self.step_nm > EQUAL_NM
         };
         off(p.x) || off(p.y)
     }
 }
 
-impl Rule for Grid {
+impl Rule for GridRule {
     fn words(&self) -> String {
         format!("vertices are on a grid of {} nm", self.step_nm)
     }
 
-    fn judge(&mut self, scene: &Scene<'_>, found: &mut Found) -> Status {
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
         // Every place in database units is on the grid if the unit is a multiple of its step.
-        let per_step = scene.unit_nm / self.step_nm;
-        if (per_step - per_step.round()).abs() < 1e-9 && per_step >= 0.5 {
-            return Status::Run;
+        let per_step = flat.unit_nm / self.step_nm;
+        if (per_step - per_step.round()).abs() < ROUNDING_NM && per_step >= 0.5 {
+            return Ok(());
         }
         for layer in &self.layers {
-            if *layer == scene.pillars {
-                self.pillars(scene, found);
+            if *layer == flat.pillars {
+                self.pillars(flat, found);
             }
-            let Some(loose) = scene.loose(*layer) else { continue };
+            let Some(loose) = flat.loose(*layer) else { continue };
             for k in 0..loose.rects.len() {
                 let r = loose.rect(k);
-                if self.off(Point::new(r.x0, r.y0), scene.unit_nm) || self.off(Point::new(r.x1, r.y1), scene.unit_nm) {
+                if self.off(Point::new(r.x0, r.y0), flat.unit_nm) || self.off(Point::new(r.x1, r.y1), flat.unit_nm) {
                     found.rect(&r, || format!("a corner off the grid of {} nm", self.step_nm));
                 }
             }
             for p in &loose.polygons {
-                if p.iter().any(|&v| self.off(v, scene.unit_nm)) {
+                if p.iter().any(|&v| self.off(v, flat.unit_nm)) {
                     found.at(p, || format!("a vertex off the grid of {} nm", self.step_nm));
                 }
             }
         }
-        Status::Run
+        Ok(())
     }
 }
 
-impl Grid {
-    fn pillars(&self, scene: &Scene<'_>, found: &mut Found) {
-        for (k, e) in scene.elements.iter().enumerate() {
+impl GridRule {
+    fn pillars(&self, flat: &FlatLayout<'_>, found: &mut Findings) {
+        for (k, e) in flat.elements.iter().enumerate() {
             for ((row, column), _) in e.widths.width_nm.indexed_iter().filter(|(_, w)| **w != 0) {
-                let r = scene.pillar(k, row, column);
-                if self.off(Point::new(r.x0, r.y0), scene.unit_nm) || self.off(Point::new(r.x1, r.y1), scene.unit_nm) {
+                let r = flat.pillar(k, row, column);
+                if self.off(Point::new(r.x0, r.y0), flat.unit_nm) || self.off(Point::new(r.x1, r.y1), flat.unit_nm) {
                     found.rect(&r, || format!("a corner off the grid of {} nm", self.step_nm));
                 }
             }
@@ -131,18 +132,18 @@ impl Rule for ExposureGrid {
         format!("pitch and widths are whole steps of a beam of {} nm", self.step_nm)
     }
 
-    fn judge(&mut self, scene: &Scene<'_>, found: &mut Found) -> Status {
-        if scene.elements.is_empty() {
-            return Status::Skipped(scene.no_elements.clone());
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+        if flat.elements.is_empty() {
+            return Err(NotRun::Skipped(flat.no_elements.clone()));
         }
         let (mut squares, mut sum) = (0u64, 0.0);
         let mut count = |width_nm: f64, pillars: u64| {
             squares += pillars;
             sum += pillars as f64 * self.remainder(width_nm).powi(2);
         };
-        for (k, e) in scene.elements.iter().enumerate() {
+        for (k, e) in flat.elements.iter().enumerate() {
             let pitch = f64::from(e.site.lattice.pitch_nm());
-            if self.remainder(pitch).abs() > 1e-9 {
+            if self.remainder(pitch).abs() > ROUNDING_NM {
                 found.plain(&format!("{} pitch", e.site.name), || {
                     format!(
                         "{}: a pitch of {pitch} nm is no multiple of {} nm",
@@ -152,7 +153,7 @@ impl Rule for ExposureGrid {
             }
             let histogram = e.widths.histogram();
             let off: Vec<bool> = (0..histogram.len())
-                .map(|w| w > 0 && self.remainder(w as f64).abs() > 1e-9)
+                .map(|w| w > 0 && self.remainder(w as f64).abs() > ROUNDING_NM)
                 .collect();
             for (w, &pillars) in histogram.iter().enumerate().skip(1) {
                 count(w as f64, pillars);
@@ -162,18 +163,18 @@ impl Rule for ExposureGrid {
             }
             for ((row, column), &w) in e.widths.width_nm.indexed_iter() {
                 if off[usize::from(w)] {
-                    found.rect(&scene.pillar(k, row, column), || {
+                    found.rect(&flat.pillar(k, row, column), || {
                         format!("{w} nm wide is no multiple of {} nm", self.step_nm)
                     });
                 }
             }
         }
-        if let Some(loose) = scene.loose(scene.pillars) {
+        if let Some(loose) = flat.loose(flat.pillars) {
             for k in 0..loose.rects.len() {
                 let r = loose.rect(k);
-                let width = r.width() as f64 * scene.unit_nm;
+                let width = r.width() as f64 * flat.unit_nm;
                 count(width, 1);
-                if self.remainder(width).abs() > 1e-6 {
+                if self.remainder(width).abs() > EQUAL_NM {
                     found.rect(&r, || format!("{width} nm wide is no multiple of {} nm", self.step_nm));
                 }
             }
@@ -184,6 +185,6 @@ impl Rule for ExposureGrid {
             (sum / squares as f64).sqrt()
         };
         found.facts.push(("rms change of width if snapped [nm]".into(), rms));
-        Status::Run
+        Ok(())
     }
 }

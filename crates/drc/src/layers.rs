@@ -1,13 +1,13 @@
 //! What may be on which layer, and where.
 
-use super::deck::Context;
-use super::found::Found;
-use super::rule::{Rule, Status};
-use super::scene::Scene;
+use super::context::Context;
+use super::findings::Findings;
+use super::flat::FlatLayout;
+use super::rule::{Judged, NotRun, Rule};
 use metalith_core::document::{Limits, Section};
 use metalith_gds::{LayerNumber, Rect};
 
-enum Layers {
+enum LayerRule {
     Whitelist(Vec<LayerNumber>),
     /// Exposed shapes lie within an area.
     Area {
@@ -26,8 +26,8 @@ enum Within {
 
 pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Option<Box<dyn Rule>> {
     Some(Box::new(match check {
-        "layers_known" => Layers::Whitelist(context.some_layers(s)),
-        "active_area" => Layers::Area {
+        "layers_known" => LayerRule::Whitelist(context.some_layers(s)),
+        "active_area" => LayerRule::Area {
             layers: context.some_layers(s),
             within: if s.has("inside") {
                 Within::Drawn(context.layer(s, "inside"))
@@ -38,12 +38,12 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Optio
                 }
             },
         },
-        "no_text_exposed" => Layers::NoText(context.some_layers(s)),
+        "no_text_exposed" => LayerRule::NoText(context.some_layers(s)),
         _ => return None,
     }))
 }
 
-impl Rule for Layers {
+impl Rule for LayerRule {
     fn words(&self) -> String {
         let list = |l: &[LayerNumber]| l.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
         match self {
@@ -67,26 +67,26 @@ impl Rule for Layers {
         }
     }
 
-    fn judge(&mut self, scene: &Scene<'_>, found: &mut Found) -> Status {
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
         match self {
             Self::Whitelist(layers) => {
-                let mut used: Vec<LayerNumber> = scene.counts.keys().copied().collect();
-                used.extend(scene.texts.iter().map(|t| t.layer));
+                let mut used: Vec<LayerNumber> = flat.counts.keys().copied().collect();
+                used.extend(flat.texts.iter().map(|t| t.layer));
                 used.sort_unstable();
                 used.dedup();
                 for layer in used.iter().filter(|l| !layers.contains(l)) {
-                    let shapes = scene.counts.get(layer).copied().unwrap_or(0);
+                    let shapes = flat.counts.get(layer).copied().unwrap_or(0);
                     found.plain(&layer.to_string(), || format!("layer {layer} with {shapes} shapes"));
                 }
-                Status::Run
+                Ok(())
             }
             Self::Area { layers, within } => {
-                let Some(area) = within.area(scene) else {
-                    return Status::Skipped("nothing is drawn on the layer of the frame".into());
+                let Some(area) = within.area(flat) else {
+                    return Err(NotRun::Skipped("nothing is drawn on the layer of the frame".into()));
                 };
                 let out = |r: &Rect| r.x0 < area.x0 || r.y0 < area.y0 || r.x1 > area.x1 || r.y1 > area.y1;
                 for layer in layers.iter() {
-                    for r in scene
+                    for r in flat
                         .loose(*layer)
                         .into_iter()
                         .flat_map(|l| l.bounds())
@@ -94,20 +94,23 @@ impl Rule for Layers {
                     {
                         found.rect(&r, || format!("a shape on {layer} outside the active area"));
                     }
-                    if *layer == scene.pillars {
-                        pillars_out(scene, &out, found);
+                    if *layer == flat.pillars {
+                        pillars_out(flat, &out, found);
                     }
                 }
-                Status::Run
+                Ok(())
             }
             Self::NoText(layers) => {
-                if scene.text_count > scene.texts.len() as u64 {
-                    return Status::Failed(format!("{} texts are more than are held", scene.text_count));
+                if flat.text_count > flat.texts.len() as u64 {
+                    return Err(NotRun::Failed(format!(
+                        "{} texts are more than are held",
+                        flat.text_count
+                    )));
                 }
-                for t in scene.texts.iter().filter(|t| layers.contains(&t.layer)) {
+                for t in flat.texts.iter().filter(|t| layers.contains(&t.layer)) {
                     found.at(&[t.at], || format!("text \"{}\" on {}", t.string, t.layer));
                 }
-                Status::Run
+                Ok(())
             }
         }
     }
@@ -115,15 +118,15 @@ impl Rule for Layers {
 
 impl Within {
     /// In database units; none if nothing is drawn there.
-    fn area(&self, scene: &Scene<'_>) -> Option<Rect> {
+    fn area(&self, flat: &FlatLayout<'_>) -> Option<Rect> {
         let um = match self {
             Self::Drawn(frame) => {
-                return scene.loose(*frame)?.bounds().reduce(|mut all, r| {
+                return flat.loose(*frame)?.bounds().reduce(|mut all, r| {
                     all.unite(&r);
                     all
                 });
             }
-            Self::Edges { um, edge_um } => match (scene.design, edge_um) {
+            Self::Edges { um, edge_um } => match (flat.design, edge_um) {
                 (Some(design), Some(edge)) => {
                     let (width, height) = design.layout.chip.size_nm;
                     let [x, y] = [width, height].map(|size| size as f64 * 0.5e-3 - *edge);
@@ -132,17 +135,17 @@ impl Within {
                 _ => *um,
             },
         };
-        let [x0, y0, x1, y1] = um.map(|v| scene.units(v * 1e3).round() as i64);
+        let [x0, y0, x1, y1] = um.map(|v| flat.units(v * 1e3).round() as i64);
         Some(Rect { x0, y0, x1, y1 })
     }
 }
 
-fn pillars_out(scene: &Scene<'_>, out: &impl Fn(&Rect) -> bool, found: &mut Found) {
-    for (k, e) in scene.elements.iter().enumerate() {
+fn pillars_out(flat: &FlatLayout<'_>, out: &impl Fn(&Rect) -> bool, found: &mut Findings) {
+    for (k, e) in flat.elements.iter().enumerate() {
         let n = e.site.lattice.sites() - 1;
         let site = |row, column| {
             let half = i64::from(e.site.lattice.pitch_nm()) / 2;
-            let unit = |nm: i64| scene.units(nm as f64).round() as i64;
+            let unit = |nm: i64| flat.units(nm as f64).round() as i64;
             let x = e.site.centre_nm[0] + e.site.lattice.coordinate_nm(column);
             let y = e.site.centre_nm[1] + e.site.lattice.coordinate_nm(row);
             Rect {
@@ -158,7 +161,7 @@ fn pillars_out(scene: &Scene<'_>, out: &impl Fn(&Rect) -> bool, found: &mut Foun
             continue;
         }
         for ((row, column), _) in e.widths.width_nm.indexed_iter().filter(|(_, w)| **w != 0) {
-            let r = scene.pillar(k, row, column);
+            let r = flat.pillar(k, row, column);
             if out(&r) {
                 found.rect(&r, || "a pillar outside the active area".into());
             }

@@ -6,15 +6,21 @@
 //! density and place look at those. **Closed when in doubt**: what did not run is not clean.
 
 mod aperture;
+mod body;
 mod budget;
+mod context;
 mod deck;
 mod density;
 mod design;
 pub mod diff;
+mod drawn;
+mod elements;
 mod export;
 mod field;
-mod found;
+mod findings;
+mod flat;
 mod gather;
+mod input;
 mod lattice;
 mod layers;
 mod marks;
@@ -23,39 +29,29 @@ mod pairs;
 mod polygon;
 mod report;
 mod rule;
-mod scene;
 mod spacing;
+mod tolerance;
 mod tree;
 mod waiver;
 mod width;
+mod winding;
+mod work;
 
 pub use deck::Deck;
 pub use export::{junit, lyrdb, sarif, text};
-pub use found::Marker;
+pub use findings::Marker;
+pub use input::CheckInput;
 pub use report::{DrcReport, RuleReport};
 pub use rule::{Severity, Status};
 pub use waiver::{Date, Waiver, Waivers};
 
-use found::Found;
+use findings::Findings;
+use flat::FlatLayout;
 use metalith_core::{Error, Progress, Result};
-use metalith_design::Design;
+use metalith_design::array::PillarArray;
 use metalith_gds::Layout;
-use rule::{Needs, Rule};
-use scene::Scene;
-
-/// What is checked besides the layout itself.
-#[derive(Default)]
-pub struct CheckInput<'a> {
-    /// Further files that are written on the same glass, such as the apertures.
-    pub with: Vec<&'a Layout>,
-    /// The design that the layout should hold.
-    pub design: Option<&'a Design>,
-    pub waivers: Option<&'a Waivers>,
-    /// Today, for the expiry of waivers.
-    pub today: Date,
-    /// Most markers that are kept a rule; all are counted.
-    pub markers: usize,
-}
+use rule::{DeckRule, Needs, NotRun};
+use work::{Allowance, Work};
 
 /// Check a layout against a deck.
 ///
@@ -63,49 +59,70 @@ pub struct CheckInput<'a> {
 /// If a file cannot be read again, the files do not share one database unit, or the user stopped it. What a
 /// rule cannot do is in the report, not an error.
 pub fn check(layout: &Layout, deck: &Deck, input: &CheckInput<'_>, progress: &dyn Progress) -> Result<DrcReport> {
-    for other in &input.with {
-        if other.unit_nm() != layout.unit_nm() {
-            return Err(Error::invalid(
-                format!(
-                    "{} has a database unit of {} nm, {} one of {} nm",
-                    layout.path().display(),
-                    layout.unit_nm(),
-                    other.path().display(),
-                    other.unit_nm()
-                ),
-                "write both with the same unit",
-            ));
-        }
-    }
-    let mut rules = deck.rules(input.design.is_some())?;
-    let mut found: Vec<Found> = rules
+    same_unit(layout, input)?;
+    let in_force = |r: &DeckRule| r.always || input.design.is_some();
+    let needs_array = deck
+        .rules()
         .iter()
-        .map(|r| Found::new(&r.id, layout.unit_nm(), input))
+        .any(|r| in_force(r) && r.rule.needs() == Needs::Array);
+    let built = match (input.design, input.array) {
+        (Some(design), None) if needs_array => Some(PillarArray::build(design, progress)?),
+        _ => None,
+    };
+    let allowance = Allowance::of(std::iter::once(layout).chain(input.with.iter().copied()));
+    let work = Work::new(&allowance, progress);
+    let mut found: Vec<Findings> = deck
+        .rules()
+        .iter()
+        .map(|r| Findings::new(&r.id, layout.unit_nm(), input))
         .collect();
-    let scene = gather::gather(layout, deck, input, &mut rules, &mut found, progress)?;
-    progress.begin("rules", rules.len() as u64);
-    let mut statuses = Vec::with_capacity(rules.len());
-    for (rule, found) in rules.iter_mut().zip(&mut found) {
+    let mut flat = gather::gather(layout, deck, input, &allowance, &work, &mut found, progress)?;
+    flat.array = input.array.or(built.as_ref());
+    progress.begin("rules", deck.rules().len() as u64);
+    let mut statuses = Vec::with_capacity(deck.rules().len());
+    for (rule, found) in deck.rules().iter().zip(&mut found) {
         if progress.stopped() {
             return Err(Error::Interrupted);
         }
-        statuses.push(judge(rule.in_force, rule.rule.as_mut(), &scene, found));
+        statuses.push(if in_force(rule) {
+            judge(rule, &flat, found)?
+        } else {
+            Status::NotInForce
+        });
         progress.advance(1);
     }
-    Ok(report::assemble(&scene, deck, rules, statuses, found, input))
+    Ok(report::assemble(&flat, deck, statuses, found, input))
 }
 
-fn judge(in_force: bool, rule: &mut dyn Rule, scene: &Scene<'_>, found: &mut Found) -> Status {
-    if !in_force {
-        return Status::NotInForce;
+fn same_unit(layout: &Layout, input: &CheckInput<'_>) -> Result<()> {
+    match input.with.iter().find(|other| other.unit_nm() != layout.unit_nm()) {
+        None => Ok(()),
+        Some(other) => Err(Error::invalid(
+            format!(
+                "{} has a database unit of {} nm, {} one of {} nm",
+                layout.path().display(),
+                layout.unit_nm(),
+                other.path().display(),
+                other.unit_nm()
+            ),
+            "write both with the same unit",
+        )),
     }
-    let missing = match rule.needs() {
+}
+
+fn judge(rule: &DeckRule, flat: &FlatLayout<'_>, found: &mut Findings) -> Result<Status> {
+    let missing = match rule.rule.needs() {
         Needs::Numbers => None,
-        Needs::Outlines => scene.unread.as_ref(),
-        Needs::Geometry => scene.incomplete.as_ref(),
+        Needs::Outlines => flat.unread.as_ref(),
+        Needs::Geometry | Needs::Array => flat.incomplete.as_ref(),
     };
     if let Some(why) = missing {
-        return Status::Failed(why.clone());
+        return Ok(Status::Failed(why.clone()));
     }
-    rule.judge(scene, found)
+    match rule.rule.judge(flat, found) {
+        Ok(()) => Ok(Status::Run),
+        Err(NotRun::Skipped(why)) => Ok(Status::Skipped(why)),
+        Err(NotRun::Failed(why)) => Ok(Status::Failed(why)),
+        Err(NotRun::Interrupted) => Err(Error::Interrupted),
+    }
 }

@@ -1,9 +1,9 @@
 //! Alignment marks: all there, and nothing near them.
 
-use super::deck::Context;
-use super::found::Found;
-use super::rule::{Rule, Status};
-use super::scene::Scene;
+use super::context::Context;
+use super::findings::Findings;
+use super::flat::{FlatLayout, Loose};
+use super::rule::{Judged, NotRun, Rule};
 use metalith_core::document::{Limits, Section};
 use metalith_design::MarkSpec;
 use metalith_gds::{LayerNumber, Point, Rect};
@@ -63,30 +63,37 @@ impl Rule for Marks {
         }
     }
 
-    fn judge(&mut self, scene: &Scene<'_>, found: &mut Found) -> Status {
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
         match self {
-            Self::KeepOut { marks, others, nm } => keep_out(scene, *marks, others, *nm, found),
+            Self::KeepOut { marks, others, nm } => keep_out(flat, *marks, others, *nm, found),
             Self::Complete { marks, sets } => {
-                if let Some(design) = scene.design {
+                let of_design = flat.design.map(|design| {
                     let set = |m: &MarkSpec| (m.length_nm as f64, m.centres_nm.len() as u64);
-                    *sets = design.layout.marks.iter().map(set).collect();
-                }
-                complete(scene, *marks, sets, found)
+                    design.layout.marks.iter().map(set).collect::<Vec<_>>()
+                });
+                complete(flat, *marks, of_design.as_ref().unwrap_or(sets), found)
             }
         }
     }
 }
 
-fn keep_out(scene: &Scene<'_>, marks: LayerNumber, others: &[LayerNumber], nm: f64, found: &mut Found) -> Status {
-    let Some(loose) = scene.loose(marks) else {
+fn keep_out(
+    flat: &FlatLayout<'_>,
+    marks: LayerNumber,
+    others: &[LayerNumber],
+    nm: f64,
+    found: &mut Findings,
+) -> Judged {
+    let Some(loose) = flat.loose(marks) else {
         // A design that asks for none has nothing to keep away from.
-        return match scene.design {
-            Some(design) if design.layout.marks.is_empty() => Status::Run,
-            _ => Status::Skipped(format!("no marks on layer {marks}")),
+        return match flat.design {
+            Some(design) if design.layout.marks.is_empty() => Ok(()),
+            _ => Err(NotRun::Skipped(format!("no marks on layer {marks}"))),
         };
     };
-    let reach = scene.units(nm).round() as i64;
+    let reach = flat.units(nm).round() as i64;
     for mark in loose.bounds() {
+        flat.work.spend(flat.elements.len() as u64)?;
         let zone = Rect {
             x0: mark.x0 - reach,
             y0: mark.y0 - reach,
@@ -95,23 +102,24 @@ fn keep_out(scene: &Scene<'_>, marks: LayerNumber, others: &[LayerNumber], nm: f
         };
         let near = |r: &Rect| r.x0 < zone.x1 && zone.x0 < r.x1 && r.y0 < zone.y1 && zone.y0 < r.y1;
         for layer in others {
-            let shapes = scene.loose(*layer).into_iter().flat_map(|l| l.bounds());
+            flat.work.spend(flat.loose(*layer).map_or(0, Loose::len))?;
+            let shapes = flat.loose(*layer).into_iter().flat_map(|l| l.bounds());
             for r in shapes.filter(|r| near(r) && (*layer != marks || *r != mark)) {
                 found.rect(&r, || format!("within {} um of a mark", nm * 1e-3));
             }
-            if *layer == scene.pillars {
-                pillars_near(scene, &zone, found);
+            if *layer == flat.pillars {
+                pillars_near(flat, &zone, found)?;
             }
         }
     }
-    Status::Run
+    Ok(())
 }
 
-fn pillars_near(scene: &Scene<'_>, zone: &Rect, found: &mut Found) {
-    for (k, e) in scene.elements.iter().enumerate() {
+fn pillars_near(flat: &FlatLayout<'_>, zone: &Rect, found: &mut Findings) -> Judged {
+    for (k, e) in flat.elements.iter().enumerate() {
         let n = e.site.lattice.sites() - 1;
-        let mut lens = scene.pillar(k, 0, 0);
-        lens.unite(&scene.pillar(k, n, n));
+        let mut lens = flat.pillar(k, 0, 0);
+        lens.unite(&flat.pillar(k, n, n));
         let margin = i64::from(e.site.lattice.pitch_nm());
         let apart = lens.x0 - margin > zone.x1
             || lens.x1 + margin < zone.x0
@@ -120,20 +128,23 @@ fn pillars_near(scene: &Scene<'_>, zone: &Rect, found: &mut Found) {
         if apart {
             continue;
         }
+        flat.work.spend(e.widths.width_nm.len() as u64)?;
         for ((row, column), _) in e.widths.width_nm.indexed_iter().filter(|(_, w)| **w != 0) {
-            let r = scene.pillar(k, row, column);
+            let r = flat.pillar(k, row, column);
             if r.x0 < zone.x1 && zone.x0 < r.x1 && r.y0 < zone.y1 && zone.y0 < r.y1 {
                 found.rect(&r, || "a pillar too near to a mark".into());
             }
         }
     }
+    Ok(())
 }
 
-fn complete(scene: &Scene<'_>, marks: LayerNumber, sets: &[(f64, u64)], found: &mut Found) -> Status {
-    let bounds: Vec<Rect> = scene.loose(marks).into_iter().flat_map(|l| l.bounds()).collect();
+fn complete(flat: &FlatLayout<'_>, marks: LayerNumber, sets: &[(f64, u64)], found: &mut Findings) -> Judged {
+    let bounds: Vec<Rect> = flat.loose(marks).into_iter().flat_map(|l| l.bounds()).collect();
     let mut known = vec![false; bounds.len()];
     for &(nm, count) in sets {
-        let size = scene.units(nm);
+        flat.work.spend(bounds.len() as u64)?;
+        let size = flat.units(nm);
         let mut there = 0;
         for (r, known) in bounds.iter().zip(&mut known) {
             if r.width() == r.height() && (r.width() as f64 - size).abs() < 0.5 {
@@ -152,5 +163,5 @@ fn complete(scene: &Scene<'_>, marks: LayerNumber, sets: &[(f64, u64)], found: &
         let ring = [Point::new(r.x0, r.y0), Point::new(r.x1, r.y1)];
         found.at(&ring, || "a shape among the marks that is none".into());
     }
-    Status::Run
+    Ok(())
 }

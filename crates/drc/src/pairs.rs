@@ -1,100 +1,12 @@
 //! Pairs of shapes that are near one another: a sweep over bounding boxes from below.
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 
-use super::polygon::{distance, overlap, ring_of};
-use super::scene::{Loose, Scene};
-use metalith_gds::{LayerNumber, Point, Rect, simplified};
-
-/// Pairs of sides that are looked at before giving up, two rectangles counting as one: a clean layer has few,
-/// and ten for each pillar of an array without a lattice are fewer.
-const MOST_PAIRS: u64 = 1_000_000_000;
-
-/// One shape of a pair.
-#[derive(Clone, Copy)]
-pub(super) enum Body<'a> {
-    Rect(Rect),
-    Ring(&'a [Point]),
-}
-
-impl Body<'_> {
-    pub fn bounds(&self) -> Rect {
-        match self {
-            Self::Rect(r) => *r,
-            Self::Ring(p) => Rect::around(p),
-        }
-    }
-
-    /// Pairs of sides that comparing two shapes takes.
-    fn effort(&self, other: &Self) -> u64 {
-        let sides = |body: &Self| match body {
-            Self::Rect(_) => 4,
-            Self::Ring(p) => p.len() as u64,
-        };
-        match (self, other) {
-            (Self::Rect(_), Self::Rect(_)) => 1,
-            _ => sides(self) * sides(other),
-        }
-    }
-
-    /// Its corners, closed.
-    pub fn ring(&self) -> Vec<Point> {
-        match self {
-            Self::Rect(r) => ring_of(r).to_vec(),
-            Self::Ring(p) => p.to_vec(),
-        }
-    }
-
-    /// Euclidean distance; zero if they touch or overlap.
-    pub fn gap(&self, other: &Self) -> f64 {
-        match (self, other) {
-            (Self::Rect(a), Self::Rect(b)) => {
-                let (dx, dy) = between(a, b);
-                (dx as f64).hypot(dy as f64)
-            }
-            _ => distance(&self.ring(), &other.ring()),
-        }
-    }
-
-    /// Whether they share area.
-    pub fn overlaps(&self, other: &Self) -> bool {
-        let (a, b) = (self.bounds(), other.bounds());
-        let boxes = a.x0 < b.x1 && b.x0 < a.x1 && a.y0 < b.y1 && b.y0 < a.y1;
-        match (self, other) {
-            (Self::Rect(_), Self::Rect(_)) => boxes,
-            _ => boxes && overlap(&self.ring(), &other.ring()),
-        }
-    }
-
-    /// Whether they are the same area drawn twice.
-    pub fn equals(&self, other: &Self) -> bool {
-        match (self, other) {
-            (Self::Rect(a), Self::Rect(b)) => a == b,
-            (Self::Ring(a), Self::Ring(b)) => same_ring(a, b),
-            _ => false,
-        }
-    }
-}
-
-fn same_ring(a: &[Point], b: &[Point]) -> bool {
-    let normal = |ring: &[Point]| {
-        let mut ring = simplified(ring);
-        ring.pop();
-        if super::polygon::twice_area(&ring) < 0 {
-            ring.reverse();
-        }
-        let start = (0..ring.len()).min_by_key(|&k| ring[k]).unwrap_or(0);
-        ring.rotate_left(start);
-        ring
-    };
-    a.len() == b.len() && Rect::around(a) == Rect::around(b) && normal(a) == normal(b)
-}
-
-/// Distances of two rectangles along x and y, zero where they overlap.
-fn between(a: &Rect, b: &Rect) -> (i64, i64) {
-    let along = |a0: i64, a1: i64, b0: i64, b1: i64| (b0 - a1).max(a0 - b1).max(0);
-    (along(a.x0, a.x1, b.x0, b.x1), along(a.y0, a.y1, b.y0, b.y1))
-}
+use super::body::Body;
+use super::flat::FlatLayout;
+use super::work::{Stop, Work};
+use metalith_gds::{LayerNumber, Rect};
 
 /// The rectangle between two shapes, or where they overlap: where to look.
 pub(super) fn place(a: &Rect, b: &Rect) -> Rect {
@@ -111,16 +23,15 @@ pub(super) fn place(a: &Rect, b: &Rect) -> Rect {
 /// and of loose shapes with pillars on lattices. Pairs of pillars on one lattice are not among them.
 ///
 /// # Errors
-/// In words, if there are too many.
+/// If the work is out of proportion to the layout, or the user stopped it.
 pub(super) fn near<'s>(
-    scene: &'s Scene<'_>,
+    flat: &'s FlatLayout<'_>,
     layer: LayerNumber,
     reach: i64,
     mut f: impl FnMut(Body<'s>, Body<'s>),
-) -> Result<(), String> {
-    let Some(loose) = scene.loose(layer) else { return Ok(()) };
-    let body = |k: usize| body(loose, k);
-    let mut left = MOST_PAIRS;
+) -> Result<(), Stop> {
+    let Some(loose) = flat.loose(layer) else { return Ok(()) };
+    let body = |k: usize| loose.body(k);
     let bounds: Vec<[i32; 4]> = if loose.polygons.is_empty() {
         Vec::new()
     } else {
@@ -132,8 +43,8 @@ pub(super) fn near<'s>(
     };
     let boxes = if bounds.is_empty() { &loose.rects } else { &bounds };
     let effort = |a: usize, b: usize| body(a).effort(&body(b));
-    sweep(boxes, reach, effort, &mut left, |a, b| f(body(a), body(b)))?;
-    if layer != scene.pillars {
+    sweep(boxes, reach, effort, flat.work, |a, b| f(body(a), body(b)))?;
+    if layer != flat.pillars {
         return Ok(());
     }
     for (k, b) in boxes.iter().enumerate() {
@@ -144,10 +55,13 @@ pub(super) fn near<'s>(
             x1: x1 + reach,
             y1: y1 + reach,
         };
-        for element in 0..scene.elements.len() {
-            for pillar in pillars_in(scene, element, &grown) {
+        for element in 0..flat.elements.len() {
+            let (rows, columns) = sites_in(flat, element, &grown);
+            let sites = (rows.end - rows.start).max(0) as u64 * (columns.end - columns.start).max(0) as u64;
+            flat.work.spend(1 + sites)?;
+            for pillar in pillars_in(flat, element, rows, columns, grown) {
                 let pillar = Body::Rect(pillar);
-                left = left.checked_sub(body(k).effort(&pillar)).ok_or_else(too_many)?;
+                flat.work.spend(body(k).effort(&pillar))?;
                 f(body(k), pillar);
             }
         }
@@ -155,66 +69,64 @@ pub(super) fn near<'s>(
     Ok(())
 }
 
-fn body(loose: &Loose, k: usize) -> Body<'_> {
-    match loose.rects.len() {
-        n if k < n => Body::Rect(loose.rect(k)),
-        n => Body::Ring(&loose.polygons[k - n]),
-    }
-}
-
-fn too_many() -> String {
-    format!("more than {MOST_PAIRS} pairs of sides are near one another")
-}
-
-/// Pillars on the lattice of an element that touch a rectangle.
-fn pillars_in<'s>(scene: &'s Scene<'_>, element: usize, r: &Rect) -> impl Iterator<Item = Rect> + 's {
-    let site = &scene.elements[element].site;
+/// Rows and columns of the lattice of an element whose pillars could touch a rectangle.
+fn sites_in(flat: &FlatLayout<'_>, element: usize, r: &Rect) -> (Range<i64>, Range<i64>) {
+    let site = &flat.elements[element].site;
     let (sites, pitch) = (site.lattice.sites() as i64, f64::from(site.lattice.pitch_nm()));
     let range = |low: i64, high: i64, centre: i64| {
         // Widths are at most a pitch: sites within half a pitch of the rectangle.
         let first = site.lattice.coordinate_nm(0) as f64 + centre as f64;
-        let index = |v: i64, half: f64| (v as f64 * scene.unit_nm + half - first) / pitch;
+        let index = |v: i64, half: f64| (v as f64 * flat.unit_nm + half - first) / pitch;
         let from = index(low, -pitch / 2.0).floor().max(0.0) as i64;
         let to = index(high, pitch / 2.0).ceil().min((sites - 1) as f64) as i64;
         from..to + 1
     };
     let columns = range(r.x0, r.x1, site.centre_nm[0]);
     let rows = range(r.y0, r.y1, site.centre_nm[1]);
-    let r = *r;
+    (rows, columns)
+}
+
+/// Pillars of those sites that touch the rectangle.
+fn pillars_in<'s>(
+    flat: &'s FlatLayout<'_>,
+    element: usize,
+    rows: Range<i64>,
+    columns: Range<i64>,
+    r: Rect,
+) -> impl Iterator<Item = Rect> + 's {
     rows.flat_map(move |row| columns.clone().map(move |column| (row as usize, column as usize)))
-        .filter(move |&(row, column)| scene.elements[element].widths.width_nm[[row, column]] != 0)
-        .map(move |(row, column)| scene.pillar(element, row, column))
+        .filter(move |&(row, column)| flat.elements[element].widths.width_nm[[row, column]] != 0)
+        .map(move |(row, column)| flat.pillar(element, row, column))
         .filter(move |p| p.x0 <= r.x1 && r.x0 <= p.x1 && p.y0 <= r.y1 && r.y0 <= p.y1)
 }
 
 /// Pairs of boxes at most `reach` apart along x and along y. Boxes are taken from the lowest; those that
-/// still reach up are kept by their left edge in classes of size, so that a search spans little more than
-/// the box itself.
+/// still reach up are kept by their left edge in classes of width, so that a search spans little more than
+/// the box itself. What a search meets counts as work, whether it is near or not.
 fn sweep(
     boxes: &[[i32; 4]],
     reach: i64,
     effort: impl Fn(usize, usize) -> u64,
-    left: &mut u64,
+    work: &Work<'_>,
     mut f: impl FnMut(usize, usize),
-) -> Result<(), String> {
+) -> Result<(), Stop> {
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
     order.sort_unstable_by_key(|&k| (boxes[k as usize][1], k));
     let mut classes: Vec<BTreeSet<(i32, u32)>> = vec![BTreeSet::new(); 33];
     let mut gone: Vec<(i32, u32)> = Vec::new();
     for &k in &order {
-        let [x0, y0, x1, y1] = boxes[k as usize].map(i64::from);
+        let [x0, y0, x1, _] = boxes[k as usize].map(i64::from);
         for (class, open) in classes.iter_mut().enumerate().filter(|(_, open)| !open.is_empty()) {
             let limit = |v: i64| v.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32;
             let from = limit(x0 - reach - (1 << class));
             let to = limit(x1 + reach);
             for &(other_x0, other) in open.range((from, 0)..=(to, u32::MAX)) {
+                work.spend(1)?;
                 let [_, _, other_x1, other_y1] = boxes[other as usize].map(i64::from);
                 if other_y1 + reach < y0 {
                     gone.push((other_x0, other));
                 } else if other_x1 + reach >= x0 {
-                    *left = left
-                        .checked_sub(effort(other as usize, k as usize))
-                        .ok_or_else(too_many)?;
+                    work.spend(effort(other as usize, k as usize))?;
                     f(other as usize, k as usize);
                 }
             }
@@ -222,8 +134,8 @@ fn sweep(
                 open.remove(&entry);
             }
         }
-        let size = (x1 - x0).max(y1 - y0).max(1) as u64;
-        let class = size.next_power_of_two().trailing_zeros() as usize;
+        let width = (x1 - x0).max(1) as u64;
+        let class = width.next_power_of_two().trailing_zeros() as usize;
         classes[class].insert((x0 as i32, k));
     }
     Ok(())
@@ -233,6 +145,8 @@ fn sweep(
 mod tests {
     use rand::{Rng, SeedableRng};
 
+    use super::super::body::between;
+    use super::super::work::Allowance;
     use super::*;
 
     /// Against all pairs, for boxes of many sizes.
@@ -248,15 +162,8 @@ mod tests {
                 })
                 .collect();
             let mut found = Vec::new();
-            let mut left = u64::MAX;
-            sweep(
-                &boxes,
-                reach,
-                |_, _| 1,
-                &mut left,
-                |a, b| found.push((a.min(b), a.max(b))),
-            )
-            .unwrap();
+            let work = Work::new(&Allowance::of([]), &metalith_core::Silent);
+            sweep(&boxes, reach, |_, _| 1, &work, |a, b| found.push((a.min(b), a.max(b)))).unwrap();
             found.sort_unstable();
             let near = |a: [i32; 4], b: [i32; 4]| {
                 let rect = |r: [i32; 4]| {

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::CheckInput;
-use super::deck::{ActiveRule, Deck};
-use super::found::{Found, Marker};
+use super::deck::Deck;
+use super::findings::{Findings, Marker};
+use super::flat::FlatLayout;
+use super::input::CheckInput;
 use super::rule::{Severity, Status};
-use super::scene::Scene;
 
 /// What became of one rule.
 #[derive(Clone, Debug, Serialize)]
@@ -51,7 +51,7 @@ pub struct DrcReport {
     pub pillars_on_lattices: u64,
     /// Every rule of the deck, in its order.
     pub rules: Vec<RuleReport>,
-    /// What was odd about the check itself: waivers that cover nothing or have expired.
+    /// Warnings about the check itself: waivers that cover nothing or have expired.
     pub warnings: Vec<String>,
     /// For each of them the hash of its waiver.
     #[serde(skip)]
@@ -85,23 +85,23 @@ impl DrcReport {
 }
 
 pub(super) fn assemble(
-    scene: &Scene<'_>,
+    flat: &FlatLayout<'_>,
     deck: &Deck,
-    rules: Vec<ActiveRule>,
     statuses: Vec<Status>,
-    found: Vec<Found>,
+    found: Vec<Findings>,
     input: &CheckInput<'_>,
 ) -> DrcReport {
     let (covered, stale) = waivers(&found, input);
     let (warned, warnings) = stale.into_iter().unzip();
-    let rules = rules
-        .into_iter()
+    let rules = deck
+        .rules()
+        .iter()
         .zip(statuses)
         .zip(found)
         .map(|((rule, status), found)| RuleReport {
             words: rule.rule.words(),
-            id: rule.id,
-            check: rule.check,
+            id: rule.id.clone(),
+            check: rule.check.clone(),
             severity: rule.severity,
             status,
             violations: found.total,
@@ -110,11 +110,11 @@ pub(super) fn assemble(
             facts: found.facts.into_iter().collect(),
         })
         .collect();
-    let layout = scene.layout;
+    let layout = flat.layout;
     let name = |l: &metalith_gds::Layout| l.path().display().to_string();
     DrcReport {
         layout: name(layout),
-        with: scene.with.iter().map(|l| name(l)).collect(),
+        with: flat.with.iter().map(|l| name(l)).collect(),
         deck: deck.name.clone(),
         top: layout
             .tops()
@@ -122,8 +122,8 @@ pub(super) fn assemble(
             .map_or_else(String::new, |&t| layout.cells()[t].name.clone()),
         bytes: layout.bytes(),
         shapes: layout.flat_shapes(),
-        elements: scene.elements.len(),
-        pillars_on_lattices: scene.pillars_on_lattices(),
+        elements: flat.elements.len(),
+        pillars_on_lattices: flat.pillars_on_lattices(),
         rules,
         warnings,
         warned,
@@ -132,10 +132,10 @@ pub(super) fn assemble(
 }
 
 /// Hashes of the waivers that cover something, and what is wrong with others.
-fn waivers(found: &[Found], input: &CheckInput<'_>) -> (Vec<String>, Vec<(String, String)>) {
+fn waivers(found: &[Findings], input: &CheckInput<'_>) -> (Vec<String>, Vec<(String, String)>) {
     let list = input.waivers.map_or(&[][..], |w| &w.list);
     let mut counts = vec![None; list.len()];
-    for (index, count) in found.iter().flat_map(Found::tried) {
+    for (index, count) in found.iter().flat_map(Findings::tried) {
         counts[index] = Some(count);
     }
     let (mut covered, mut warnings) = (Vec::new(), Vec::new());

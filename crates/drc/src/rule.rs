@@ -2,9 +2,10 @@
 
 use serde::Serialize;
 
-use super::found::Found;
-use super::polygon::Outline;
-use super::scene::Scene;
+use super::drawn::DrawnOutline;
+use super::findings::Findings;
+use super::flat::FlatLayout;
+use super::work::Stop;
 use metalith_gds::LayerNumber;
 
 /// How much a violation matters.
@@ -42,6 +43,39 @@ impl Status {
     }
 }
 
+/// Why a rule did not run.
+#[derive(Debug)]
+pub(super) enum NotRun {
+    /// There was nothing to run it on.
+    Skipped(String),
+    /// It could not be carried out.
+    Failed(String),
+    /// The user asked to stop.
+    Interrupted,
+}
+
+impl From<Stop> for NotRun {
+    fn from(stop: Stop) -> Self {
+        match stop {
+            Stop::TooMuch(why) => Self::Failed(why),
+            Stop::Interrupted => Self::Interrupted,
+        }
+    }
+}
+
+/// What carrying out a rule gives; its findings are elsewhere.
+pub(super) type Judged = Result<(), NotRun>;
+
+/// One rule of the deck, ready to run.
+pub(super) struct DeckRule {
+    pub id: String,
+    pub check: String,
+    pub severity: Severity,
+    /// Whether it applies without a design; some rules are written to wait for one.
+    pub always: bool,
+    pub rule: Box<dyn Rule>,
+}
+
 /// What a rule cannot do without.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Needs {
@@ -51,10 +85,12 @@ pub(super) enum Needs {
     Outlines,
     /// All shapes at hand in `judge`.
     Geometry,
+    /// The design, and the pillars computed from it beside all shapes.
+    Array,
 }
 
-/// One rule of a deck with its limits.
-pub(super) trait Rule {
+/// One rule of a deck with its limits. It keeps nothing between layouts.
+pub(super) trait Rule: Send + Sync {
     /// What must hold, with the limit.
     fn words(&self) -> String;
 
@@ -70,7 +106,7 @@ pub(super) trait Rule {
     }
 
     /// Look at one outline of those layers.
-    fn outline(&mut self, _outline: &Outline<'_>, _found: &mut Found) {}
+    fn outline(&self, _outline: &DrawnOutline<'_>, _found: &mut Findings) {}
 
     /// What it cannot do without.
     fn needs(&self) -> Needs {
@@ -82,7 +118,7 @@ pub(super) trait Rule {
     }
 
     /// Look at the layout as a whole, after all outlines.
-    fn judge(&mut self, _scene: &Scene<'_>, _found: &mut Found) -> Status {
-        Status::Run
+    fn judge(&self, _scene: &FlatLayout<'_>, _found: &mut Findings) -> Judged {
+        Ok(())
     }
 }

@@ -1,15 +1,17 @@
 //! Distances between shapes: gaps, overlaps, and the same shape twice.
 
-use super::deck::Context;
-use super::found::Found;
-use super::pairs::{Body, near, place};
-use super::rule::{Rule, Status};
-use super::scene::Scene;
+use super::body::Body;
+use super::context::Context;
+use super::findings::Findings;
+use super::flat::FlatLayout;
+use super::pairs::{near, place};
+use super::rule::{Judged, NotRun, Rule};
+use super::tolerance::ROUNDING_NM;
 use metalith_core::document::{Limits, Section};
 use metalith_gds::LayerNumber;
 
 #[derive(Clone, Copy, PartialEq)]
-enum Want {
+enum Distance {
     /// Least distance [nm].
     Gap {
         nm: f64,
@@ -19,76 +21,83 @@ enum Want {
     NoDuplicate,
 }
 
-struct Spacing {
+struct SpacingRule {
     layer: LayerNumber,
-    want: Want,
+    want: Distance,
 }
 
 pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Option<Box<dyn Rule>> {
     let want = match check {
-        "gap_min" => Want::Gap {
+        "gap_min" => Distance::Gap {
             nm: s.float("nm", Limits::new(0.0..=1e6, "nm")),
             height_nm: None,
         },
-        "gap_aspect_max" => Want::Gap {
+        "gap_aspect_max" => Distance::Gap {
             nm: context.height_nm / s.float("ratio", Limits::new(0.01..=1000.0, "")),
             height_nm: Some(context.height_nm),
         },
-        "overlap" => Want::NoOverlap,
-        "duplicate" => Want::NoDuplicate,
+        "overlap" => Distance::NoOverlap,
+        "duplicate" => Distance::NoDuplicate,
         _ => return None,
     };
-    Some(Box::new(Spacing {
+    Some(Box::new(SpacingRule {
         layer: context.layer(s, "layer"),
         want,
     }))
 }
 
-impl Rule for Spacing {
+impl Rule for SpacingRule {
     fn words(&self) -> String {
         match self.want {
-            Want::Gap { nm, height_nm: None } => format!("gaps of at least {nm} nm, in any direction"),
-            Want::Gap { nm, height_nm: Some(h) } => format!("gaps at most {:.4} times as deep as wide", h / nm),
-            Want::NoOverlap => "no two shapes share area".into(),
-            Want::NoDuplicate => "no shape is there twice".into(),
+            Distance::Gap { nm, height_nm: None } => format!("gaps of at least {nm} nm, in any direction"),
+            Distance::Gap { nm, height_nm: Some(h) } => format!("gaps at most {:.4} times as deep as wide", h / nm),
+            Distance::NoOverlap => "no two shapes share area".into(),
+            Distance::NoDuplicate => "no shape is there twice".into(),
         }
     }
 
-    fn judge(&mut self, scene: &Scene<'_>, found: &mut Found) -> Status {
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
         let limit = match self.want {
-            Want::Gap { nm, .. } => scene.units(nm) - 1e-9,
+            Distance::Gap { nm, .. } => flat.units(nm) - ROUNDING_NM,
             _ => 0.0,
         };
-        if let (Want::Gap { nm, height_nm }, true) = (self.want, self.layer == scene.pillars)
-            && let Err(why) = on_lattices(scene, nm, height_nm, found)
+        if let (Distance::Gap { nm, height_nm }, true) = (self.want, self.layer == flat.pillars)
+            && let Err(why) = on_lattices(flat, nm, height_nm, found)
         {
-            return Status::Failed(why);
+            return Err(NotRun::Failed(why));
         }
         let want = self.want;
-        let judged = near(scene, self.layer, limit.ceil() as i64, |a, b| match want {
-            Want::Gap { height_nm, .. } => {
+        let judged = near(flat, self.layer, limit.ceil() as i64, |a, b| match want {
+            Distance::Gap { height_nm, .. } => {
                 let gap = a.gap(&b);
                 if gap < limit && !a.overlaps(&b) {
-                    report_gap(scene, &a, &b, gap, height_nm, found);
+                    report_gap(flat, &a, &b, gap, height_nm, found);
                 }
             }
-            Want::NoOverlap => {
+            Distance::NoOverlap => {
                 if !a.equals(&b) && a.overlaps(&b) {
                     found.rect(&place(&a.bounds(), &b.bounds()), || "two shapes share area".into());
                 }
             }
-            Want::NoDuplicate => {
+            Distance::NoDuplicate => {
                 if a.equals(&b) {
                     found.at(&a.ring(), || "the same shape twice".into());
                 }
             }
         });
-        judged.map_or_else(Status::Failed, |()| Status::Run)
+        Ok(judged?)
     }
 }
 
-fn report_gap(scene: &Scene<'_>, a: &Body<'_>, b: &Body<'_>, gap: f64, height_nm: Option<f64>, found: &mut Found) {
-    let nm = gap * scene.unit_nm;
+fn report_gap(
+    flat: &FlatLayout<'_>,
+    a: &Body<'_>,
+    b: &Body<'_>,
+    gap: f64,
+    height_nm: Option<f64>,
+    found: &mut Findings,
+) {
+    let nm = gap * flat.unit_nm;
     found.rect(&place(&a.bounds(), &b.bounds()), || match height_nm {
         None => format!("a gap of {nm:.2} nm"),
         Some(h) => format!("a gap of {nm:.2} nm and {h} nm deep, 1 : {:.2}", h / nm),
@@ -97,8 +106,8 @@ fn report_gap(scene: &Scene<'_>, a: &Body<'_>, b: &Body<'_>, gap: f64, height_nm
 
 /// Gaps between pillars on one lattice: neighbours along the axes and diagonals. Pillars are at most a
 /// pitch wide, so farther ones are at least a pitch apart.
-fn on_lattices(scene: &Scene<'_>, nm: f64, height_nm: Option<f64>, found: &mut Found) -> Result<(), String> {
-    for (k, e) in scene.elements.iter().enumerate() {
+fn on_lattices(flat: &FlatLayout<'_>, nm: f64, height_nm: Option<f64>, found: &mut Findings) -> Result<(), String> {
+    for (k, e) in flat.elements.iter().enumerate() {
         let pitch = f64::from(e.site.lattice.pitch_nm());
         if nm > pitch {
             return Err(format!(
@@ -125,10 +134,10 @@ fn on_lattices(scene: &Scene<'_>, nm: f64, height_nm: Option<f64>, found: &mut F
                 } else {
                     along
                 };
-                if other != 0 && gap < nm - 1e-9 {
-                    let body = |row, column| Body::Rect(scene.pillar(k, row, column));
+                if other != 0 && gap < nm - ROUNDING_NM {
+                    let body = |row, column| Body::Rect(flat.pillar(k, row, column));
                     let (a, b) = (body(row, column), body(r, c as usize));
-                    report_gap(scene, &a, &b, gap / scene.unit_nm, height_nm, found);
+                    report_gap(flat, &a, &b, gap / flat.unit_nm, height_nm, found);
                 }
             }
         }

@@ -1,13 +1,13 @@
 //! Cells: names that every tool takes, a tree that every tool follows.
 
-use super::deck::Context;
-use super::found::Found;
-use super::rule::{Needs, Rule, Status};
-use super::scene::Scene;
+use super::context::Context;
+use super::findings::Findings;
+use super::flat::FlatLayout;
+use super::rule::{Judged, Needs, Rule};
 use metalith_core::document::Section;
 use metalith_gds::{Faulty, Layout};
 
-enum Tree {
+enum TreeRule {
     /// Longest name; characters are those of the format.
     Names(i64),
     Depth(i64),
@@ -21,19 +21,19 @@ enum Tree {
 
 pub(super) fn read(check: &str, s: &Section<'_, '_>, _context: &Context) -> Option<Box<dyn Rule>> {
     Some(Box::new(match check {
-        "cell_names" => Tree::Names(s.integer("longest", 1..=1024, "characters")),
-        "depth_max" => Tree::Depth(s.integer("levels", 1..=256, "levels")),
-        "references_max" => Tree::References(s.integer("count", 0..=i64::MAX, "references")),
-        "one_top" => Tree::OneTop,
-        "dangling" => Tree::NoDangling,
-        "recursive" => Tree::NoCircle,
-        "cell_twice" => Tree::NamesOnce,
-        "bytes_behind_end" => Tree::NothingBehind,
+        "cell_names" => TreeRule::Names(s.integer("longest", 1..=1024, "characters")),
+        "depth_max" => TreeRule::Depth(s.integer("levels", 1..=256, "levels")),
+        "references_max" => TreeRule::References(s.integer("count", 0..=i64::MAX, "references")),
+        "one_top" => TreeRule::OneTop,
+        "dangling" => TreeRule::NoDangling,
+        "recursive" => TreeRule::NoCircle,
+        "cell_twice" => TreeRule::NamesOnce,
+        "bytes_behind_end" => TreeRule::NothingBehind,
         _ => return None,
     }))
 }
 
-impl Rule for Tree {
+impl Rule for TreeRule {
     fn words(&self) -> String {
         match self {
             Self::Names(most) => format!("cell names of A-Z a-z 0-9 _ ? $, at most {most}"),
@@ -51,14 +51,14 @@ impl Rule for Tree {
         Needs::Numbers
     }
 
-    fn judge(&mut self, scene: &Scene<'_>, found: &mut Found) -> Status {
-        self.file(scene.layout, found);
-        Status::Run
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+        self.file(flat.layout, found);
+        Ok(())
     }
 }
 
-impl Tree {
-    fn file(&self, layout: &Layout, found: &mut Found) {
+impl TreeRule {
+    fn file(&self, layout: &Layout, found: &mut Findings) {
         let file = layout
             .path()
             .file_name()

@@ -80,6 +80,8 @@ pub struct Waiver {
 #[derive(Clone, Debug)]
 pub struct Waivers {
     pub path: PathBuf,
+    /// The text that was read.
+    pub text: String,
     pub list: Vec<Waiver>,
 }
 
@@ -96,6 +98,7 @@ impl Waivers {
         })?;
         Ok(Self {
             path: path.to_owned(),
+            text,
             list,
         })
     }

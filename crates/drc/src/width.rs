@@ -1,14 +1,15 @@
 //! Widths of pillars: between limits, in proportion to their height, and of the cell library.
 
-use super::deck::Context;
-use super::found::Found;
-use super::polygon::Outline;
+use super::context::Context;
+use super::drawn::DrawnOutline;
+use super::findings::Findings;
 use super::rule::Rule;
+use super::tolerance::{EQUAL_NM, ROUNDING};
 use metalith_core::document::{Limits, Section};
 use metalith_gds::LayerNumber;
 
 /// What must hold of the smaller and the larger side of a pillar [nm].
-enum Want {
+enum WidthLimit {
     Min(f64),
     Max(f64),
     /// Height over width.
@@ -25,17 +26,17 @@ enum Want {
     },
 }
 
-struct Width {
+struct WidthRule {
     layers: Vec<LayerNumber>,
-    want: Want,
+    want: WidthLimit,
 }
 
 pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Option<Box<dyn Rule>> {
     let nm = || Limits::new(0.0..=1e9, "nm");
     let want = match check {
-        "width_min" => Want::Min(s.float("nm", nm())),
-        "width_max" => Want::Max(s.float("nm", nm())),
-        "aspect_max" => Want::Aspect {
+        "width_min" => WidthLimit::Min(s.float("nm", nm())),
+        "width_max" => WidthLimit::Max(s.float("nm", nm())),
+        "aspect_max" => WidthLimit::Aspect {
             height_nm: context.height_nm,
             most: s.float("ratio", Limits::new(0.01..=1000.0, "")),
         },
@@ -49,7 +50,7 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Optio
                     "give first and last width of each range",
                 );
             }
-            Want::Library {
+            WidthLimit::Library {
                 first,
                 last,
                 step: s.float("step_nm", Limits::new(0.001..=1e6, "nm")),
@@ -58,25 +59,22 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Optio
         }
         _ => return None,
     };
-    Some(Box::new(Width {
+    Some(Box::new(WidthRule {
         layers: context.some_layers(s),
         want,
     }))
 }
 
-/// Lengths closer than this are equal: database units are converted in double precision [nm].
-const EQUAL_NM: f64 = 1e-6;
-
-impl Width {
+impl WidthRule {
     fn wrong(&self, small: f64, large: f64) -> Option<String> {
         match &self.want {
-            Want::Min(nm) if small < nm - EQUAL_NM => Some(format!("{small} nm wide, at least {nm} nm")),
-            Want::Max(nm) if large > nm + EQUAL_NM => Some(format!("{large} nm wide, at most {nm} nm")),
-            Want::Aspect { height_nm, most } if height_nm / small > most + 1e-12 => Some(format!(
+            WidthLimit::Min(nm) if small < nm - EQUAL_NM => Some(format!("{small} nm wide, at least {nm} nm")),
+            WidthLimit::Max(nm) if large > nm + EQUAL_NM => Some(format!("{large} nm wide, at most {nm} nm")),
+            WidthLimit::Aspect { height_nm, most } if height_nm / small > most * (1.0 + ROUNDING) => Some(format!(
                 "{small} nm wide and {height_nm} nm high, 1 : {:.2}, at most 1 : {most}",
                 height_nm / small
             )),
-            Want::Library {
+            WidthLimit::Library {
                 first,
                 last,
                 step,
@@ -98,13 +96,13 @@ impl Width {
     }
 }
 
-impl Rule for Width {
+impl Rule for WidthRule {
     fn words(&self) -> String {
         match &self.want {
-            Want::Min(nm) => format!("pillars at least {nm} nm wide"),
-            Want::Max(nm) => format!("pillars at most {nm} nm wide"),
-            Want::Aspect { most, .. } => format!("pillars at most {most} times as high as wide"),
-            Want::Library {
+            WidthLimit::Min(nm) => format!("pillars at least {nm} nm wide"),
+            WidthLimit::Max(nm) => format!("pillars at most {nm} nm wide"),
+            WidthLimit::Aspect { most, .. } => format!("pillars at most {most} times as high as wide"),
+            WidthLimit::Library {
                 first,
                 last,
                 step,
@@ -127,7 +125,7 @@ impl Rule for Width {
         self.wrong(width_nm, width_nm).is_none()
     }
 
-    fn outline(&mut self, outline: &Outline<'_>, found: &mut Found) {
+    fn outline(&self, outline: &DrawnOutline<'_>, found: &mut Findings) {
         let bounds = outline.bounds();
         let (a, b) = (
             bounds.width() as f64 * outline.unit_nm,

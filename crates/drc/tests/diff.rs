@@ -10,6 +10,9 @@ use metalith_layout::write_pillars;
 use metalith_testing::gds::Gds;
 use metalith_testing::lens::Chip;
 
+/// Rounding of a root of a quotient of order 0.1 in double precision.
+const ROUNDING: f64 = 1e-12;
+
 fn write(folder: &Path, name: &str, bytes: Vec<u8>) -> PathBuf {
     let path = folder.join(name);
     std::fs::write(&path, bytes).unwrap();
@@ -79,7 +82,7 @@ fn pillars_added_removed_widened_narrowed() {
     assert_eq!((e.added, e.removed, e.widened, e.narrowed), (1, 1, 1, 2));
     assert_eq!(e.largest_change_nm, 8);
     let squares = f64::from(6 * 6 + 8 * 8 + 2 * 2);
-    assert!((e.rms_change_nm - (squares / 14_399.0).sqrt()).abs() < 1e-12);
+    assert!((e.rms_change_nm - (squares / 14_399.0).sqrt()).abs() < ROUNDING);
     assert_eq!((found.changes, found.listed.len()), (5, 5));
     assert_eq!(found.map.counts.iter().sum::<u64>(), 5);
     let html = page(&found).html();

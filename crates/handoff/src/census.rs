@@ -51,7 +51,14 @@ impl Census {
     /// # Errors
     /// If it cannot be read or has faults.
     pub fn take(path: &Path, progress: &dyn Progress) -> Result<Self> {
-        let layout = Layout::open_with(path, ReadLimits::default(), progress)?;
+        Self::of(&Layout::open_with(path, ReadLimits::default(), progress)?, progress)
+    }
+
+    /// Count a layout that is open.
+    ///
+    /// # Errors
+    /// If it cannot be read again or has faults.
+    pub fn of(layout: &Layout, progress: &dyn Progress) -> Result<Self> {
         let mut counter = Counter::default();
         layout.visit(&Selection::default(), &mut counter, progress)?;
         counter.flush();
@@ -75,7 +82,12 @@ impl Census {
             children: cell.children.iter().map(|c| c.name.clone()).collect(),
         });
         Ok(Self {
-            file: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            file: layout
+                .path()
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned(),
             bytes: layout.bytes(),
             top: layout
                 .tops()
@@ -97,20 +109,20 @@ impl Census {
 
 #[derive(Default)]
 struct Counter {
-    layers: BTreeMap<LayerNumber, Tally>,
+    layers: BTreeMap<LayerNumber, LayerSum>,
     /// Of the cell that is being visited, in its own coordinates.
     own: BTreeMap<LayerNumber, Rect>,
     placements: Vec<Transform>,
 }
 
-struct Tally {
+struct LayerSum {
     shapes: u64,
     texts: u64,
     twice_area: i128,
     bounds: Rect,
 }
 
-impl Tally {
+impl LayerSum {
     const NONE: Self = Self {
         shapes: 0,
         texts: 0,
@@ -123,7 +135,7 @@ impl Counter {
     /// Place the bounds of the last cell.
     fn flush(&mut self) {
         for (layer, own) in std::mem::take(&mut self.own) {
-            let bounds = &mut self.layers.entry(layer).or_insert(Tally::NONE).bounds;
+            let bounds = &mut self.layers.entry(layer).or_insert(LayerSum::NONE).bounds;
             for placed in self.placements.iter().filter_map(|t| t.apply_rect(&own)) {
                 bounds.unite(&placed);
             }
@@ -139,7 +151,7 @@ impl Visitor for Counter {
     }
 
     fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> Result<()> {
-        let tally = self.layers.entry(shape.layer).or_insert(Tally::NONE);
+        let tally = self.layers.entry(shape.layer).or_insert(LayerSum::NONE);
         tally.shapes += placements.len() as u64;
         let twice = match &shape.rect {
             Some(r) => 2 * i128::from(r.width()) * i128::from(r.height()),
@@ -152,7 +164,7 @@ impl Visitor for Counter {
     }
 
     fn text(&mut self, text: &Text<'_>, placements: &[Transform]) -> Result<()> {
-        self.layers.entry(text.layer).or_insert(Tally::NONE).texts += placements.len() as u64;
+        self.layers.entry(text.layer).or_insert(LayerSum::NONE).texts += placements.len() as u64;
         Ok(())
     }
 }

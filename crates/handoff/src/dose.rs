@@ -71,10 +71,10 @@ pub struct WriteTime {
     pub job_s: f64,
 }
 
-/// How the time of a job is reckoned, for people.
+/// How the time of a job is computed, for the page.
 pub(super) const FORMULA: &str =
     "time = dose x area / current  +  shapes x overhead a shape  +  fields x overhead a field  +  overhead of the job";
-/// How step and clock follow from the dose, for people.
+/// How step and clock follow from the dose, for the page.
 pub(super) const DOSE_FORMULA: &str = "dose [uC/cm2] = current [pA] x 100 / (clock [MHz] x step^2 [nm2])";
 
 impl WriteTime {
@@ -101,7 +101,7 @@ impl WriteTime {
     }
 }
 
-/// Seconds as people say them.
+/// A time in hours, minutes or seconds.
 pub(super) fn duration(seconds: f64) -> String {
     let minutes = (seconds / 60.0).round() as u64;
     match minutes {
@@ -139,6 +139,9 @@ pub fn doses(process: &Process) -> Vec<DoseRow> {
 mod tests {
     use super::*;
 
+    /// Relative rounding of a few operations in double precision.
+    const ROUNDING: f64 = 1e-12;
+
     fn process() -> Process {
         Process::standard()
     }
@@ -151,7 +154,7 @@ mod tests {
             assert_eq!(beam.shot_step_nm, step_nm);
             // Charge of one shot over its own area, from first principles: C/nm2 to uC/cm2 is 1e20.
             let charge = current_na * 1e-9 / (beam.clock_mhz * 1e6);
-            assert!((charge / (step_nm * step_nm) * 1e20 - 280.0).abs() < 1e-9);
+            assert!((charge / (step_nm * step_nm) * 1e20 - 280.0).abs() < 280.0 * ROUNDING);
         }
         assert!(Beam::choose(&process().writer, 1e6, 280.0).is_err());
     }
@@ -165,8 +168,8 @@ mod tests {
         };
         let time = WriteTime::of(&process(), &exposure, 2.0).unwrap();
         // 280 uC/cm2 on 0.01 cm2 are 2.8 uC: 1400 s at 2 nA.
-        assert!((time.beam_s - 1400.0).abs() < 1e-9);
-        assert!((time.total_s() - (1400.0 + 1.0 + 3.6 + 2700.0)).abs() < 1e-9);
+        assert!((time.beam_s - 1400.0).abs() < 1400.0 * ROUNDING);
+        assert!((time.total_s() - (1400.0 + 1.0 + 3.6 + 2700.0)).abs() < time.total_s() * ROUNDING);
         assert_eq!(duration(time.total_s()), "1 h 08 min");
         assert_eq!(duration(12.0), "12 s");
     }

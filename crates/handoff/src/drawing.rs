@@ -23,14 +23,14 @@ pub(super) fn number(layer: &Layer) -> LayerNumber {
 
 /// A rectangle between two corners [nm].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-pub(super) struct Rect {
+pub(super) struct RectNm {
     pub x0: i64,
     pub y0: i64,
     pub x1: i64,
     pub y1: i64,
 }
 
-impl Rect {
+impl RectNm {
     pub fn new(x0: i64, y0: i64, x1: i64, y1: i64) -> Self {
         Self { x0, y0, x1, y1 }
     }
@@ -73,7 +73,7 @@ impl Sheet {
         }
     }
 
-    pub fn rectangle(&mut self, layer: LayerNumber, r: Rect) {
+    pub fn rectangle(&mut self, layer: LayerNumber, r: RectNm) {
         let corners = [(r.x0, r.y0), (r.x1, r.y0), (r.x1, r.y1), (r.x0, r.y1), (r.x0, r.y0)];
         let boundary = GdsBoundary {
             layer: layer.0,
@@ -86,7 +86,7 @@ impl Sheet {
 
     /// A square of even width about a place.
     pub fn square(&mut self, layer: LayerNumber, (x, y): (i64, i64), width: i64) {
-        self.rectangle(layer, Rect::at(x - width / 2, y - width / 2, width, width));
+        self.rectangle(layer, RectNm::at(x - width / 2, y - width / 2, width, width));
     }
 
     pub fn text(&mut self, layer: LayerNumber, (x, y): (i64, i64), words: impl Into<String>) {
@@ -141,7 +141,7 @@ impl Sheet {
                 for (first, last) in runs(*bits) {
                     self.rectangle(
                         layer,
-                        Rect::new(left + block * first, bottom, left + block * last, bottom + block),
+                        RectNm::new(left + block * first, bottom, left + block * last, bottom + block),
                     );
                 }
             }

@@ -1,5 +1,7 @@
 //! What must hold before anything is made.
 
+use std::collections::BTreeSet;
+use std::io::ErrorKind;
 use std::path::Path;
 
 use super::manifest::{self, files_below};
@@ -18,6 +20,17 @@ pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
             "a positive resist needs `method = \"lift_off\"`, a negative one `method = \"direct_etch\"`",
         ));
     }
+    let film = design.cell.pillar_material.as_str();
+    if !process.transfer.films.iter().any(|f| f == film) {
+        return Err(Error::invalid(
+            format!(
+                "the film of the design is \"{film}\", but the process etches {}: {}",
+                process.transfer.films.join(", "),
+                process.transfer.etch
+            ),
+            "use a process file for this film, or, if its etch is right for it, add the film to `films` in [transfer]",
+        ));
+    }
     let taken = design.layout.layers.all();
     if let Some((key, layer)) = taken.iter().find(|(_, l)| l.layer == process.dose_matrix.layer) {
         return Err(Error::invalid(
@@ -31,26 +44,41 @@ pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
     Ok(())
 }
 
-/// Whether the folder is not there, empty, or holds nothing but an older hand-off.
-pub(super) fn replaceable(folder: &Path) -> Result<()> {
+/// Whether a hand-off may be put at this place: nothing is there, or an empty folder, or nothing but an older hand-off
+/// with its archive.
+///
+/// # Errors
+/// If something else is there, with the name of the first such file.
+pub(super) fn replaceable(folder: &Path, archive: &Path) -> Result<()> {
+    let hint = "choose another folder with --out, or move it away";
+    for (path, kind) in [(folder, "folder"), (archive, "file")] {
+        match std::fs::symlink_metadata(path) {
+            Ok(found) if (kind == "folder" && found.is_dir()) || (kind == "file" && found.is_file()) => {}
+            Ok(_) => {
+                return Err(Error::invalid(
+                    format!("{} is there and is no {kind}", path.display()),
+                    hint,
+                ));
+            }
+            Err(error) if error.kind() == ErrorKind::NotFound => {}
+            Err(error) => return Err(Error::io("read", path)(error)),
+        }
+    }
     if !folder.exists() {
         return Ok(());
     }
-    let (there, other) = files_below(folder)?;
-    let known = if there.contains_key(manifest::NAME) {
-        manifest::listed(folder)?
-    } else {
-        Vec::new()
+    let there = files_below(folder)?;
+    let known = match there.files.contains_key(manifest::NAME) {
+        true => manifest::listed(folder)?,
+        false => BTreeSet::new(),
     };
-    let strange = there
-        .keys()
-        .chain(&other)
-        .find(|name| *name != manifest::NAME && !known.contains(name));
-    match strange {
+    let listed = |name: &str| name == manifest::NAME || known.contains(name);
+    let strange = there.files.keys().find(|name| !listed(name));
+    match strange.or(there.other.first()) {
         None => Ok(()),
         Some(name) => Err(Error::invalid(
             format!("{} holds {name}, which no hand-off put there", folder.display()),
-            "choose another folder with --out, or move the file away",
+            hint,
         )),
     }
 }

@@ -7,27 +7,34 @@
 
 mod build;
 mod census;
+mod contents;
+mod documents;
 mod dose;
 mod drawing;
 mod exposure;
 mod fields;
 mod front;
 mod guard;
-mod inputs;
 mod job;
+mod layouts;
+mod listing;
 mod manifest;
 mod matrix;
+mod options;
 mod pictures;
 mod process;
 mod rules;
 mod sites;
+mod sources;
 mod structures;
 mod tables;
 mod zip;
 
-pub use build::{Handoff, HandoffOptions, handoff};
+pub use build::handoff;
 pub use census::{CellCount, Census, LayerCount};
+pub use contents::{Handoff, HandoffCheck};
 pub use dose::{Beam, DoseRow, Exposure, WriteTime};
-pub use manifest::{Entry, Manifest, Verification, verify as verify_handoff};
+pub use manifest::{HandoffVerification, Manifest, ManifestEntry, verify as verify_handoff};
+pub use options::HandoffOptions;
 pub use process::Process;
-pub use sites::{Cross, Site};
+pub use sites::{Cross, MetrologySite};

@@ -1,13 +1,16 @@
-//! What is in a hand-off, and whether a received one is whole and unaltered.
+//! What is in a hand-off, and whether a received one is complete and unaltered.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
+use serde::de::{Error as _, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 use sha2::{Digest, Sha256};
 
+use metalith_core::file::read_at_most;
+use metalith_core::text::{printable, quoted};
 use metalith_core::{Error, Result};
 use metalith_core::{Progress, WholeFile};
 
@@ -19,7 +22,8 @@ const BLOCK: usize = 1 << 20;
 
 /// One file of a hand-off.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Entry {
+#[serde(deny_unknown_fields)]
+pub struct ManifestEntry {
     pub bytes: u64,
     /// In hexadecimal.
     pub sha256: String,
@@ -27,6 +31,7 @@ pub struct Entry {
 
 /// All files of a hand-off with their digests, and what made them.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Manifest {
     /// Version of the program that made it.
     pub metalith: String,
@@ -37,19 +42,46 @@ pub struct Manifest {
     pub design_digest: String,
     pub process: String,
     /// By path in the folder, with `/` between its parts.
-    pub files: BTreeMap<String, Entry>,
+    #[serde(deserialize_with = "each_once")]
+    pub files: BTreeMap<String, ManifestEntry>,
     /// SHA-256 over all of the above: one number to read out over a telephone.
     pub seal: String,
+}
+
+/// A map in which no key comes twice: of two entries for one file, readers would take different ones.
+fn each_once<'de, D: Deserializer<'de>>(from: D) -> Result<BTreeMap<String, ManifestEntry>, D::Error> {
+    struct EachOnce;
+
+    impl<'de> Visitor<'de> for EachOnce {
+        type Value = BTreeMap<String, ManifestEntry>;
+
+        fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+            f.write_str("files with their sizes and digests, each once")
+        }
+
+        fn visit_map<M: MapAccess<'de>>(self, mut map: M) -> Result<Self::Value, M::Error> {
+            let mut files = BTreeMap::new();
+            while let Some((name, entry)) = map.next_entry::<String, ManifestEntry>()? {
+                if files.contains_key(&name) {
+                    return Err(M::Error::custom(format!("{} is listed twice", quoted(&name))));
+                }
+                files.insert(name, entry);
+            }
+            Ok(files)
+        }
+    }
+
+    from.deserialize_map(EachOnce)
 }
 
 impl Manifest {
     /// The seal that belongs to the contents.
     pub(super) fn sealed(mut self) -> Self {
-        self.seal = self.reckoned_seal();
+        self.seal = self.computed_seal();
         self
     }
 
-    fn reckoned_seal(&self) -> String {
+    fn computed_seal(&self) -> String {
         let mut hash = Sha256::new();
         let mut line = |parts: &[&str]| {
             for part in parts {
@@ -82,24 +114,19 @@ impl Manifest {
 
     fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(NAME);
-        let bad = |what: String, line: Option<usize>| Error::Table {
-            path: path.clone(),
-            line,
-            what,
+        let bytes = read_at_most(&path, LONGEST, "the manifest of a hand-off")?;
+        serde_json::from_slice(&bytes).map_err(|e| Error::Table {
+            path,
+            line: Some(e.line()),
+            what: format!("this is not a manifest: {}", printable(&e.to_string())),
             hint: "ask the sender for the hand-off again".into(),
-        };
-        let size = std::fs::metadata(&path).map_err(Error::io("read", &path))?.len();
-        if size > LONGEST {
-            return Err(bad(format!("{size} bytes are no manifest"), None));
-        }
-        let bytes = std::fs::read(&path).map_err(Error::io("read", &path))?;
-        serde_json::from_slice(&bytes).map_err(|e| bad(format!("this is no manifest: {e}"), Some(e.line())))
+        })
     }
 }
 
-/// What came out of checking a received hand-off. All empty and the seal right: whole and unaltered.
+/// What came out of checking a received hand-off. If all lists are empty and the seal is right, it is complete and unaltered.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Verification {
+pub struct HandoffVerification {
     pub manifest: Manifest,
     /// Whether the seal is that of the contents of the manifest.
     pub seal_holds: bool,
@@ -107,12 +134,12 @@ pub struct Verification {
     pub missing: Vec<String>,
     /// There, but not as listed.
     pub altered: Vec<String>,
-    /// There, but not listed.
+    /// There, but not listed: files, folders without files, links and the like.
     pub unknown: Vec<String>,
 }
 
-impl Verification {
-    /// Whole and unaltered.
+impl HandoffVerification {
+    /// Whether it is complete and unaltered.
     pub fn holds(&self) -> bool {
         self.seal_holds && self.missing.is_empty() && self.altered.is_empty() && self.unknown.is_empty()
     }
@@ -122,18 +149,20 @@ impl Verification {
 ///
 /// # Errors
 /// If there is no manifest to compare with, or a file cannot be read.
-pub fn verify(folder: &Path, progress: &dyn Progress) -> Result<Verification> {
+pub fn verify(folder: &Path, progress: &dyn Progress) -> Result<HandoffVerification> {
     let manifest = Manifest::read(folder)?;
-    let (there, other) = files_below(folder)?;
-    let mut result = Verification {
-        seal_holds: manifest.seal == manifest.reckoned_seal(),
+    let there = files_below(folder)?;
+    let mut result = HandoffVerification {
+        seal_holds: manifest.seal == manifest.computed_seal(),
         missing: Vec::new(),
         altered: Vec::new(),
         unknown: there
+            .files
             .keys()
             .filter(|name| *name != NAME && !manifest.files.contains_key(*name))
+            .chain(&there.other)
+            .chain(&there.empty)
             .cloned()
-            .chain(other)
             .collect(),
         manifest,
     };
@@ -147,7 +176,7 @@ pub fn verify(folder: &Path, progress: &dyn Progress) -> Result<Verification> {
             .fold(0, u64::saturating_add),
     );
     for (name, listed) in &result.manifest.files {
-        match there.get(name) {
+        match there.files.get(name) {
             None => result.missing.push(name.clone()),
             Some(path) => {
                 if entry_of(path, progress)? != *listed {
@@ -163,7 +192,7 @@ pub fn verify(folder: &Path, progress: &dyn Progress) -> Result<Verification> {
 ///
 /// # Errors
 /// If it cannot be read, or the user stopped it.
-pub(super) fn entry_of(path: &Path, progress: &dyn Progress) -> Result<Entry> {
+pub(super) fn entry_of(path: &Path, progress: &dyn Progress) -> Result<ManifestEntry> {
     let mut file = File::open(path).map_err(Error::io("read", path))?;
     let mut hash = Sha256::new();
     let mut block = vec![0; BLOCK];
@@ -180,34 +209,52 @@ pub(super) fn entry_of(path: &Path, progress: &dyn Progress) -> Result<Entry> {
         bytes += n as u64;
         progress.advance(n as u64);
     }
-    Ok(Entry {
+    Ok(ManifestEntry {
         bytes,
         sha256: hex(&hash.finalize()),
     })
 }
 
-/// All files below a folder by their path in it, in order, and the paths of all that is neither file nor
-/// folder: links and the like are nothing that a hand-off has, and are not opened.
-pub(super) fn files_below(folder: &Path) -> Result<(BTreeMap<String, PathBuf>, Vec<String>)> {
-    let mut found = BTreeMap::new();
-    let mut other = Vec::new();
+/// What is below a folder, by its path in it.
+#[derive(Default)]
+pub(super) struct Below {
+    pub files: BTreeMap<String, PathBuf>,
+    /// What is neither file nor folder: links and the like are nothing that a hand-off has, and are not opened.
+    pub other: Vec<String>,
+    /// Folders with nothing in them, with `/` at the end.
+    pub empty: Vec<String>,
+}
+
+/// Everything below a folder, in order.
+///
+/// # Errors
+/// If it cannot be read.
+pub(super) fn files_below(folder: &Path) -> Result<Below> {
+    let mut found = Below::default();
     let mut open = vec![(String::new(), folder.to_owned())];
     while let Some((prefix, folder)) = open.pop() {
+        let mut entries = 0;
         for entry in std::fs::read_dir(&folder).map_err(Error::io("read the folder", &folder))? {
             let entry = entry.map_err(Error::io("read the folder", &folder))?;
+            entries += 1;
             let kind = entry.file_type().map_err(Error::io("read", &entry.path()))?;
+            // A name that is not UTF-8 is shown as one that no manifest lists.
             let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
             if kind.is_dir() {
                 open.push((format!("{name}/"), entry.path()));
             } else if kind.is_file() {
-                found.insert(name, entry.path());
+                found.files.insert(name, entry.path());
             } else {
-                other.push(name);
+                found.other.push(name);
             }
         }
+        if entries == 0 && !prefix.is_empty() {
+            found.empty.push(prefix);
+        }
     }
-    other.sort();
-    Ok((found, other))
+    found.other.sort();
+    found.empty.sort();
+    Ok(found)
 }
 
 fn hex(bytes: &[u8]) -> String {
@@ -218,6 +265,6 @@ fn hex(bytes: &[u8]) -> String {
 ///
 /// # Errors
 /// If it cannot be read.
-pub(super) fn listed(folder: &Path) -> Result<Vec<String>> {
+pub(super) fn listed(folder: &Path) -> Result<BTreeSet<String>> {
     Ok(Manifest::read(folder)?.files.into_keys().collect())
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::dose::doses;
-use super::drawing::{Drawing, LayerNumber, Rect, Sheet, nm, number};
+use super::drawing::{Drawing, LayerNumber, RectNm, Sheet, nm, number};
 use super::process::Process;
 use metalith_core::{Result, Silent};
 use metalith_design::Design;
@@ -17,7 +17,7 @@ const NUMERAL: i64 = 20_000;
 
 /// Where one dose stands.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
-pub(super) struct Block {
+pub(super) struct DoseBlock {
     /// 1 to 9; also the datatype.
     pub number: usize,
     /// Centre of the small lens and of the row of pads [nm].
@@ -26,12 +26,12 @@ pub(super) struct Block {
     #[serde(rename = "pads_nm")]
     pub pads: (i64, i64),
     #[serde(rename = "bounds_nm")]
-    pub bounds: Rect,
+    pub bounds: RectNm,
 }
 
 /// The blocks of a dose matrix, base dose in the middle of the file, each in the middle of a field of its own: a
 /// dose is not to be judged across a seam.
-pub(super) fn blocks(process: &Process) -> Vec<Block> {
+pub(super) fn blocks(process: &Process) -> Vec<DoseBlock> {
     let size = Sizes::of(process);
     let field = nm(process.writer.field_used_um);
     let fields = |length: i64| (length + size.gap).div_euclid(field) * field + field;
@@ -41,8 +41,8 @@ pub(super) fn blocks(process: &Process) -> Vec<Block> {
             // Row by row from the upper left, as one reads.
             let (column, row) = (k % 3 - 1, 1 - k / 3);
             let (x, y) = (column * step.0, row * step.1);
-            let bounds = Rect::at(x - size.width / 2, y - size.height / 2, size.width, size.height);
-            Block {
+            let bounds = RectNm::at(x - size.width / 2, y - size.height / 2, size.width, size.height);
+            DoseBlock {
                 number: k as usize + 1,
                 lens: (x, bounds.y1 - size.lens / 2),
                 pads: (x, bounds.y0 + size.pad / 2),
@@ -113,7 +113,7 @@ pub(super) fn hyperbolic(design: &Design, wavelength_nm: f64) -> Design {
 ///
 /// # Errors
 /// If the file cannot be written.
-pub(super) fn write(path: &Path, design: &Design, process: &Process) -> Result<Vec<Block>> {
+pub(super) fn write(path: &Path, design: &Design, process: &Process) -> Result<Vec<DoseBlock>> {
     let spec = &process.dose_matrix;
     let lens = small_lens(design, spec.lens_diameter_um, process.tests.reference_wavelength_nm)?;
     let pitch = i64::from(design.cell.pitch_nm);

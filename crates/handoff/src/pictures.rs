@@ -1,13 +1,13 @@
 //! Pictures of a hand-off: the chip, the tone of both steps in cross-section, the dose matrix, the tests.
 
-use super::drawing::Rect;
-use super::matrix::Block;
+use super::drawing::RectNm;
+use super::matrix::DoseBlock;
 use super::process::{Method, Process, Tone};
 use super::structures::Structure;
 use metalith_design::Design;
 use metalith_report::{Figure, Layer, Plan};
 
-fn corners(r: Rect) -> ((f64, f64), (f64, f64)) {
+fn corners(r: RectNm) -> ((f64, f64), (f64, f64)) {
     (
         (r.x0 as f64 * 1e-3, r.y0 as f64 * 1e-3),
         (r.x1 as f64 * 1e-3, r.y1 as f64 * 1e-3),
@@ -23,7 +23,7 @@ pub(super) fn chip(design: &Design) -> Figure {
     let marks = plan.solid("marks of both steps");
     let axes = plan.solid("origin and axes");
     let (w, h) = design.layout.chip.size_nm;
-    let (a, b) = corners(Rect::new(-w / 2, -h / 2, w / 2, h / 2));
+    let (a, b) = corners(RectNm::new(-w / 2, -h / 2, w / 2, h / 2));
     plan.rectangle(outline, a, b);
     let radius = design.lens.radius_um();
     let margin = design.layout.apertures.margin_nm as f64 * 1e-3;
@@ -186,7 +186,7 @@ fn complement(intervals: &[(f64, f64)], end: f64) -> Vec<(f64, f64)> {
 }
 
 /// The nine blocks with their doses.
-pub(super) fn dose_matrix(process: &Process, blocks: &[Block], doses: &[super::dose::DoseRow]) -> Figure {
+pub(super) fn dose_matrix(process: &Process, blocks: &[DoseBlock], doses: &[super::dose::DoseRow]) -> Figure {
     let spec = &process.dose_matrix;
     let mut plan = Plan::new("Dose matrix").width(560.0);
     let bounds = plan.outlines("block");
@@ -225,7 +225,7 @@ pub(super) fn dose_matrix(process: &Process, blocks: &[Block], doses: &[super::d
         );
     }
     plan.caption(format!(
-        "Block n is on layer {}, datatype n, and has its number beside its lens. Each stands in the middle of a field of \
+        "DoseBlock n is on layer {}, datatype n, and has its number beside its lens. Each stands in the middle of a field of \
          {} um, if a field is about the origin. Pads from the left: {} nm.",
         spec.layer,
         process.writer.field_used_um,
@@ -238,7 +238,7 @@ pub(super) fn dose_matrix(process: &Process, blocks: &[Block], doses: &[super::d
 }
 
 /// Where each test structure is.
-pub(super) fn tests(structures: &[Structure], frame: Rect, border: (i64, i64)) -> Figure {
+pub(super) fn tests(structures: &[Structure], frame: RectNm, border: (i64, i64)) -> Figure {
     let mut plan = Plan::new("Test structures").width(1000.0);
     let edge = plan.outlines("frame");
     let kinds = ["D", "S", "CD", "ETCH", "FILM", "OVER", "FIELD", "CLEAVE"];

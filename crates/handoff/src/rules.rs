@@ -1,15 +1,19 @@
 //! Every layout of the hand-off held to the rules of the process.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::borrow::Cow;
+use std::collections::BTreeSet;
+use std::path::PathBuf;
 
-use super::build::Check;
-use super::process::Process;
-use super::structures::Structure;
+use super::contents::{HandoffCheck, RuleReports};
+use super::layouts::{Layouts, OfEach};
+use super::listing::Listing;
+use super::sources::Sources;
+use super::structures::{Structure, middle_of_reference};
 use metalith_core::{Progress, Result, WholeFile};
 use metalith_design::Design;
-use metalith_drc::{CheckInput, Date, DrcReport, Waiver, Waivers};
-use metalith_gds::{Layout, ReadLimits};
+use metalith_design::array::PillarArray;
+use metalith_drc::{CheckInput, Date, Deck, DrcReport, Waiver, Waivers};
+use metalith_gds::Layout;
 use metalith_report::{Verdict, write_json};
 
 /// Kinds of files that a check leaves, with what they are for.
@@ -19,111 +23,149 @@ const FILES: [(&str, &str); 3] = [
     ("lyrdb", "the same for the marker browser of KLayout"),
 ];
 
-/// What became of the rules, by layout.
-pub(super) type RuleReports = Vec<(&'static str, DrcReport)>;
-
 /// Markers kept for each rule; all violations are counted.
 const MARKERS: usize = 100;
 /// Markers among which what test structures break on purpose is looked for.
 const MARKERS_ON_PURPOSE: usize = 100_000;
-/// Last day of what is waived because a structure is meant so.
+/// Last day of what is waived because a structure is drawn to break it.
 const NO_END: &str = "2099-12-31";
 
 /// One layout to check.
 pub(super) struct Subject<'a> {
     /// Also the name of the report's files.
     pub name: &'static str,
-    pub layout: &'a Path,
+    pub layout: &'a Layout,
     /// The deck of the process.
-    pub rules: &'a Path,
+    pub deck: &'a Deck,
     /// The pillars under openings.
-    pub with: Option<&'a Path>,
-    pub design: Option<&'a Design>,
+    pub with: Option<&'a Layout>,
+    /// The design that it should hold, and its pillars.
+    pub design: Option<(&'a Design, &'a PillarArray)>,
     /// What breaks rules on purpose.
-    pub structures: &'a [Structure],
+    pub structures: Cow<'a, [Structure]>,
+}
+
+/// The layouts of a hand-off with what each is held to.
+pub(super) fn subjects<'a>(sources: &'a Sources, layouts: &'a Layouts, opened: &'a OfEach<Layout>) -> [Subject<'a>; 7] {
+    let decks = &sources.process.checks;
+    let design = Some((&sources.design, &layouts.array));
+    let reference = Some((&layouts.reference, &layouts.reference_array));
+    let subject = |name, layout, rules: &std::path::Path| Subject {
+        name,
+        layout,
+        deck: sources.deck(rules),
+        with: None,
+        design: None,
+        structures: Cow::Borrowed(&[]),
+    };
+    [
+        Subject {
+            design,
+            ..subject("pillars", &opened.pillars, &decks.pillar_rules)
+        },
+        Subject {
+            design,
+            with: Some(&opened.pillars),
+            ..subject("apertures", &opened.apertures, &decks.aperture_rules)
+        },
+        subject("dose_matrix", &opened.dose_matrix, &decks.dose_rules),
+        Subject {
+            structures: Cow::Borrowed(&layouts.structures),
+            ..subject("tests_pillars", &opened.tests, &decks.test_rules)
+        },
+        Subject {
+            with: Some(&opened.tests),
+            ..subject("tests_apertures", &opened.test_openings, &decks.test_opening_rules)
+        },
+        Subject {
+            design: reference,
+            structures: Cow::Owned(vec![middle_of_reference()]),
+            ..subject("reference_pillars", &opened.reference, &decks.pillar_rules)
+        },
+        Subject {
+            design: reference,
+            with: Some(&opened.reference),
+            ..subject("reference_apertures", &opened.reference_openings, &decks.aperture_rules)
+        },
+    ]
 }
 
 /// What checking left behind.
 pub(super) struct Checked {
-    pub checks: Vec<Check>,
+    pub checks: Vec<HandoffCheck>,
     pub reports: RuleReports,
-    /// Files in the folder of the checks, with what they are for.
-    pub files: Vec<(String, String)>,
 }
 
-/// Check each layout and write what came out into `folder`.
+/// Check each layout and write what came out into the folder of the checks.
 ///
 /// # Errors
-/// Mistakes in a deck or the waivers; a file that cannot be read or written; the user stopped it.
+/// A file that cannot be read or written; the user stopped it.
 pub(super) fn check(
+    files: &mut Listing,
     subjects: &[Subject<'_>],
-    process: &Process,
-    waivers: Option<&Path>,
-    folder: &Path,
+    accepted: Option<&Waivers>,
     progress: &dyn Progress,
 ) -> Result<Checked> {
-    let accepted = waivers.map(Waivers::read).transpose()?;
-    let mut layouts = BTreeMap::new();
-    for path in subjects.iter().flat_map(|s| std::iter::once(s.layout).chain(s.with)) {
-        if !layouts.contains_key(path) {
-            layouts.insert(path, Layout::open_with(path, ReadLimits::default(), progress)?);
-        }
-    }
-    let mut files = Vec::new();
     let mut reports = Vec::new();
     for subject in subjects {
-        let deck = process.deck(subject.rules)?;
-        let judge = |waivers: Option<&Waivers>, markers| {
-            let input = CheckInput {
-                with: subject.with.iter().map(|path| &layouts[path]).collect(),
-                design: subject.design,
-                waivers,
-                today: Date::today(),
-                markers,
-            };
-            metalith_drc::check(&layouts[subject.layout], &deck, &input, progress)
-        };
-        let mut waivers = accepted.clone();
-        let meant = match subject.structures.is_empty() {
-            true => Vec::new(),
-            false => on_purpose(subject.structures, &judge(None, MARKERS_ON_PURPOSE)?),
-        };
-        if !meant.is_empty() {
-            let name = format!("{}_waivers.toml", subject.name);
-            WholeFile::write(&folder.join(&name), text(&meant).as_bytes())?;
-            files.push((
-                name.clone(),
-                "what test structures break on purpose, and why".to_owned(),
-            ));
-            let meant = Waivers::read(&folder.join(name))?;
-            waivers = Some(waivers.map_or(meant.clone(), |accepted| accepted.and(&meant)));
-        }
-        let mut report = judge(waivers.as_ref(), MARKERS)?;
-        // Where the files lay while they were made is of no use to who receives them.
-        let bare = |path: &str| {
-            PathBuf::from(path)
-                .file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned()
-        };
-        report.layout = bare(&report.layout);
-        report.with.iter_mut().for_each(|w| *w = bare(w));
-        reports.push((subject.name, report));
+        reports.push((subject.name, subject.check(files, accepted, progress)?));
     }
     warn_once(&mut reports);
     for (name, report) in &reports {
-        let file = |kind: &str| folder.join(format!("{name}.{kind}"));
-        WholeFile::write(&file("txt"), metalith_drc::text(report).as_bytes())?;
-        write_json(&file("json"), "check", report)?;
-        WholeFile::write(&file("lyrdb"), metalith_drc::lyrdb(report).as_bytes())?;
-        files.extend(FILES.map(|(kind, purpose)| (format!("{name}.{kind}"), purpose.to_owned())));
+        let texts = [metalith_drc::text(report), String::new(), metalith_drc::lyrdb(report)];
+        for ((kind, purpose), text) in FILES.into_iter().zip(texts) {
+            let path = files.add(format!("checks/{name}.{kind}"), purpose);
+            if kind == "json" {
+                write_json(&path, "check", report)?;
+            } else {
+                WholeFile::write(&path, text.as_bytes())?;
+            }
+        }
     }
     Ok(Checked {
         checks: reports.iter().map(|(name, report)| summary(name, report)).collect(),
         reports,
-        files,
     })
+}
+
+impl Subject<'_> {
+    /// Check one layout; what it breaks on purpose is waived, and the waivers are written.
+    fn check(&self, files: &mut Listing, accepted: Option<&Waivers>, progress: &dyn Progress) -> Result<DrcReport> {
+        let mut waivers = accepted.cloned();
+        if !self.structures.is_empty() {
+            let on_purpose = on_purpose(&self.structures, &self.judge(None, MARKERS_ON_PURPOSE, progress)?);
+            if !on_purpose.is_empty() {
+                let path = files.add(
+                    format!("checks/{}_waivers.toml", self.name),
+                    "what test structures break on purpose, and why",
+                );
+                WholeFile::write(&path, text(&on_purpose).as_bytes())?;
+                let on_purpose = Waivers::read(&path)?;
+                waivers = Some(waivers.map_or(on_purpose.clone(), |accepted| accepted.and(&on_purpose)));
+            }
+        }
+        let mut report = self.judge(waivers.as_ref(), MARKERS, progress)?;
+        // Where the files lay while they were made is of no use to who receives them.
+        let bare = |path: &str| {
+            let path = PathBuf::from(path);
+            path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+        };
+        report.layout = bare(&report.layout);
+        report.with.iter_mut().for_each(|w| *w = bare(w));
+        Ok(report)
+    }
+
+    fn judge(&self, waivers: Option<&Waivers>, markers: usize, progress: &dyn Progress) -> Result<DrcReport> {
+        let input = CheckInput {
+            with: self.with.into_iter().collect(),
+            design: self.design.map(|(design, _)| design),
+            array: self.design.map(|(_, array)| array),
+            waivers,
+            today: Date::today(),
+            markers,
+        };
+        metalith_drc::check(self.layout, self.deck, &input, progress)
+    }
 }
 
 /// Waivers for what lies inside a structure that breaks the rule because it is what it is.
@@ -166,15 +208,15 @@ fn text(waivers: &[Waiver]) -> String {
 }
 
 /// A waiver that covers something in one layout is not stale because it covers nothing in another; one that covers
-/// nothing anywhere is told once.
+/// nothing anywhere is reported once.
 fn warn_once(reports: &mut RuleReports) {
-    let mut told: BTreeSet<String> = reports.iter().flat_map(|(_, r)| r.covered.iter().cloned()).collect();
+    let mut reported_once: BTreeSet<String> = reports.iter().flat_map(|(_, r)| r.covered.iter().cloned()).collect();
     for (_, report) in reports {
         let warnings = std::mem::take(&mut report.warnings)
             .into_iter()
             .zip(std::mem::take(&mut report.warned));
         for (words, hash) in warnings {
-            if told.insert(hash.clone()) {
+            if reported_once.insert(hash.clone()) {
                 report.warnings.push(words);
                 report.warned.push(hash);
             }
@@ -182,7 +224,7 @@ fn warn_once(reports: &mut RuleReports) {
     }
 }
 
-fn summary(name: &str, report: &DrcReport) -> Check {
+fn summary(name: &str, report: &DrcReport) -> HandoffCheck {
     let waived: u64 = report.rules.iter().map(|r| r.waived).sum();
     let mut words = format!(
         "{} rules, {} violations, {waived} waived",
@@ -192,7 +234,7 @@ fn summary(name: &str, report: &DrcReport) -> Check {
     if report.not_run() > 0 {
         words.push_str(&format!(", {} rules did not run", report.not_run()));
     }
-    Check {
+    HandoffCheck {
         name: format!("design rules, {}", name.replace('_', " ")),
         verdict: match report.exit_code() {
             0 => Verdict::Pass,

@@ -8,7 +8,7 @@ use super::structures::Structure;
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
 
-/// Pillars on each side of a site whose widths should be alike: an SEM then measures the right one even
+/// Pillars on each side of a site whose widths should be nearly equal: an SEM then measures the right one even
 /// when it counts wrong by one.
 const NEIGHBOURS: usize = 1;
 /// Widths between the narrowest and the widest that are looked for on the lenses.
@@ -16,7 +16,7 @@ const WIDTHS: usize = 5;
 
 /// One place to measure a width at.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Site {
+pub struct MetrologySite {
     pub id: String,
     /// Which file it is in: `pillars` or `tests`.
     pub file: &'static str,
@@ -35,7 +35,12 @@ pub struct Site {
 }
 
 /// Places on the first and the last element of the array, and one on each structure that has a width.
-pub(super) fn sites(design: &Design, process: &Process, array: &PillarArray, structures: &[Structure]) -> Vec<Site> {
+pub(super) fn sites(
+    design: &Design,
+    process: &Process,
+    array: &PillarArray,
+    structures: &[Structure],
+) -> Vec<MetrologySite> {
     let zones = process.metrology.sites_per_width as usize;
     let mut sites = Vec::new();
     let widths = targets(design);
@@ -53,7 +58,7 @@ pub(super) fn sites(design: &Design, process: &Process, array: &PillarArray, str
         let (cx, cy) = placed.element.centre_nm;
         for best in best_sites(&map, design.lens.radius_um(), &widths, zones) {
             let (x, y) = (map.lattice.coordinate_nm(best.ix), map.lattice.coordinate_nm(best.iy));
-            sites.push(Site {
+            sites.push(MetrologySite {
                 id: format!("L{:02}", sites.len() + 1),
                 file: "pillars",
                 place: format!("element {}", placed.element.label()),
@@ -69,7 +74,7 @@ pub(super) fn sites(design: &Design, process: &Process, array: &PillarArray, str
     for structure in structures {
         let Some(width) = structure.width_nm else { continue };
         let (x, y) = structure.bounds.centre();
-        sites.push(Site {
+        sites.push(MetrologySite {
             id: format!("T{:02}", sites.len() + 1),
             file: "tests",
             place: structure.id.clone(),
@@ -93,18 +98,18 @@ fn targets(design: &Design) -> Vec<u16> {
         .collect()
 }
 
-struct Best {
+struct BestSite {
     ix: usize,
     iy: usize,
     width_nm: u16,
     around_nm: (u16, u16),
 }
 
-/// For each width and each ring of the lens the site whose neighbours are most like it; among equals
+/// For each width and each ring of the lens the site whose neighbours differ least from it; among equals
 /// the one nearest the x axis, where a stage finds it by moving along one axis.
-fn best_sites(map: &metalith_core::WidthMap, radius_um: f64, widths: &[u16], zones: usize) -> Vec<Best> {
+fn best_sites(map: &metalith_core::WidthMap, radius_um: f64, widths: &[u16], zones: usize) -> Vec<BestSite> {
     let n = map.lattice.sites();
-    let mut best: Vec<Option<(u64, Best)>> = (0..widths.len() * zones).map(|_| None).collect();
+    let mut best: Vec<Option<(u64, BestSite)>> = (0..widths.len() * zones).map(|_| None).collect();
     for iy in NEIGHBOURS..n.saturating_sub(NEIGHBOURS) {
         for ix in NEIGHBOURS..n.saturating_sub(NEIGHBOURS) {
             let width_nm = map.width_nm[[iy, ix]];
@@ -114,14 +119,14 @@ fn best_sites(map: &metalith_core::WidthMap, radius_um: f64, widths: &[u16], zon
             let Some(around_nm) = around(map, ix, iy) else { continue };
             let r_um = map.lattice.coordinate_um(ix).hypot(map.lattice.coordinate_um(iy));
             let zone = ((r_um / radius_um * zones as f64) as usize).min(zones - 1);
-            let unlike = u64::from((width_nm - around_nm.0).max(around_nm.1 - width_nm));
+            let difference = u64::from((width_nm - around_nm.0).max(around_nm.1 - width_nm));
             let aside = map.lattice.half_index(iy).unsigned_abs();
-            let score = (unlike << 32) | aside;
+            let score = (difference << 32) | aside;
             let held = &mut best[target * zones + zone];
             if held.as_ref().is_none_or(|(known, _)| score < *known) {
                 *held = Some((
                     score,
-                    Best {
+                    BestSite {
                         ix,
                         iy,
                         width_nm,

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use super::dose::{DoseRow, WriteTime};
-use super::matrix::Block;
+use super::matrix::DoseBlock;
 use super::process::Process;
-use super::sites::{Cross, Site};
+use super::sites::{Cross, MetrologySite};
 use super::structures::Structure;
 use metalith_core::{Result, WholeFile};
 
@@ -30,12 +30,17 @@ impl Csv {
     }
 }
 
-/// As RFC 4180 asks: quoted where a comma, quote or line end would be taken for structure.
+/// As RFC 4180 asks: quoted where a comma, quote or line end would be taken for structure. A text that a spreadsheet
+/// would compute as a formula has an apostrophe before it, which makes it a text there.
 fn quoted(cell: &str) -> String {
+    let cell = match cell.chars().next() {
+        Some('=' | '+' | '-' | '@' | '\t' | '\r') if cell.parse::<f64>().is_err() => format!("'{cell}"),
+        _ => cell.to_owned(),
+    };
     if cell.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", cell.replace('"', "\"\""))
     } else {
-        cell.to_owned()
+        cell
     }
 }
 
@@ -43,7 +48,7 @@ fn um(x: f64) -> String {
     format!("{x:.3}")
 }
 
-pub(super) fn write_doses(path: &Path, doses: &[DoseRow], blocks: &[Block], layer: i16) -> Result<()> {
+pub(super) fn write_doses(path: &Path, doses: &[DoseRow], blocks: &[DoseBlock], layer: i16) -> Result<()> {
     let mut csv = Csv::new(&[
         "number",
         "layer",
@@ -107,7 +112,7 @@ pub(super) fn write_times(path: &Path, files: &[(String, Vec<WriteTime>)]) -> Re
     csv.write(path)
 }
 
-pub(super) fn write_sites(path: &Path, sites: &[Site], process: &Process) -> Result<()> {
+pub(super) fn write_sites(path: &Path, sites: &[MetrologySite], process: &Process) -> Result<()> {
     let mut csv = Csv::new(&[
         "id",
         "file",
@@ -187,4 +192,25 @@ pub(super) fn write_structures(path: &Path, structures: &[Structure]) -> Result<
         csv.row(&[s.id.clone(), x0, y0, x1, y1, width, s.purpose.clone()]);
     }
     csv.write(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_are_no_formulas_and_numbers_stay_numbers() {
+        for (cell, written) in [
+            ("=1+1", "'=1+1"),
+            ("@SUM(A1)", "'@SUM(A1)"),
+            ("-cmd|' /C calc'!A0", "'-cmd|' /C calc'!A0"),
+            ("+2.50", "+2.50"),
+            ("-75.000", "-75.000"),
+            ("=a,\"b\"", "\"'=a,\"\"b\"\"\""),
+            ("plain", "plain"),
+            ("", ""),
+        ] {
+            assert_eq!(quoted(cell), written);
+        }
+    }
 }

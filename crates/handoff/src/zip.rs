@@ -26,7 +26,7 @@ const ELSEWHERE: u32 = u32::MAX;
 const LEVEL: u32 = 4;
 const BLOCK: usize = 1 << 20;
 
-struct Entry {
+struct PackedFile {
     name: String,
     crc: u32,
     size: u64,
@@ -62,7 +62,7 @@ pub(super) fn pack(path: &Path, files: &[(String, std::path::PathBuf)], progress
     out.inner.commit()
 }
 
-fn pack_one(out: &mut Counted, path: &Path, name: &str, file: &Path, progress: &dyn Progress) -> Result<Entry> {
+fn pack_one(out: &mut Counted, path: &Path, name: &str, file: &Path, progress: &dyn Progress) -> Result<PackedFile> {
     let offset = out.written;
     let mut header = Vec::with_capacity(64 + name.len());
     header.extend(0x0403_4b50u32.to_le_bytes());
@@ -104,7 +104,7 @@ fn pack_one(out: &mut Counted, path: &Path, name: &str, file: &Path, progress: &
     behind.extend(packed.to_le_bytes());
     behind.extend(size.to_le_bytes());
     out.write_all(&behind).map_err(Error::io("write", path))?;
-    Ok(Entry {
+    Ok(PackedFile {
         name: name.to_owned(),
         crc: crc.sum(),
         size,
@@ -113,7 +113,7 @@ fn pack_one(out: &mut Counted, path: &Path, name: &str, file: &Path, progress: &
     })
 }
 
-fn central(out: &mut Vec<u8>, entry: &Entry) {
+fn central(out: &mut Vec<u8>, entry: &PackedFile) {
     out.extend(0x0201_4b50u32.to_le_bytes());
     fields(out, &[VERSION, VERSION, FLAGS, DEFLATED, 0, DATE]);
     out.extend(entry.crc.to_le_bytes());

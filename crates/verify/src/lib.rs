@@ -134,7 +134,23 @@ pub fn verify(
 ) -> Result<Verification> {
     fits(design, path)?;
     let layout = Layout::open_with(path, metalith_gds::ReadLimits::default(), progress)?;
-    let mut extraction = extract(&layout, &plan(design, array), progress)?;
+    verify_layout(design, array, &layout, cases, accuracy, progress)
+}
+
+/// As [`verify`], of a layout that is open.
+///
+/// # Errors
+/// As [`verify`].
+pub fn verify_layout(
+    design: &Design,
+    array: &PillarArray,
+    layout: &Layout,
+    cases: &SimulationCases<'_>,
+    accuracy: Accuracy,
+    progress: &dyn Progress,
+) -> Result<Verification> {
+    fits(design, layout.path())?;
+    let mut extraction = extract(layout, &plan(design, array), progress)?;
     let elements = compare(array, &extraction);
     let lens = LensPhase::new(array.lattice, design.lens.diameter_nm, &design.lens.phase);
     let rule = WidthRule::new(&design.cell, &design.mapping);
@@ -172,7 +188,7 @@ pub fn verify(
             Accuracy::Accurate => "accurate",
             Accuracy::Fast => "fast",
         },
-        layout: facts(&layout, &extraction, path),
+        layout: facts(layout, &extraction, layout.path()),
         elements,
         foreign: extraction.oddities,
         distinct: simulated,

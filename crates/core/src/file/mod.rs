@@ -1,5 +1,6 @@
 //! Files that appear whole or not at all.
 
+mod folder;
 mod part;
 mod past_cache;
 
@@ -7,6 +8,7 @@ use std::fs;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
+pub use folder::WholeFolder;
 pub use past_cache::{Ahead, Block};
 
 use crate::error::{Error, Result};

@@ -1,17 +1,18 @@
 //! Two contents side by side.
 
 use super::DiffPlan;
-use super::area::same_cover;
-use super::content::{Content, Outlines, Ring, area2};
+use super::area::{MOST_SIDES, Sides};
+use super::content::{Content, Outlines, PlacedText, Ring};
 use super::report::{Change, ChangeMap, ElementDiff, LayerDiff, LayoutDiff, TextAt, TreeDiff};
+use metalith_core::text::printable_bytes;
 use metalith_gds::extract::ExtractedElement;
 use metalith_gds::{LayerNumber, Point, Rect};
 
 /// Tiles along the longer side of the map of changes.
 const TILES: usize = 128;
 
-/// Everything that differs; `unit_nm` is the common unit.
-pub(super) fn compare(a: Content, b: Content, unit_nm: f64, plan: &DiffPlan) -> LayoutDiff {
+/// Everything that differs; `strings` are those that texts name by number, `unit_nm` is the common unit.
+pub(super) fn compare(a: Content, b: Content, strings: &[Box<[u8]>], unit_nm: f64, plan: &DiffPlan) -> LayoutDiff {
     let mut changes = Changes {
         plan: *plan,
         total: 0,
@@ -39,14 +40,15 @@ pub(super) fn compare(a: Content, b: Content, unit_nm: f64, plan: &DiffPlan) -> 
         })
         .collect();
     let (texts_a, texts_b) = apart(&a.texts, &b.texts);
-    let texts = |list: Vec<&(LayerNumber, String, Point)>| -> Vec<TextAt> {
+    let texts_apart = [texts_a.len() as u64, texts_b.len() as u64];
+    let texts = |list: Vec<&PlacedText>| -> Vec<TextAt> {
         let at = |p: Point| [p.x as f64 * unit_nm, p.y as f64 * unit_nm];
-        let text = |t: &(LayerNumber, String, Point)| TextAt {
-            layer: t.0,
-            string: t.1.clone(),
-            at_nm: at(t.2),
+        let text = |t: &PlacedText| TextAt {
+            layer: t.layer,
+            string: shortened(&strings[t.string as usize]),
+            at_nm: at(t.at),
         };
-        list.into_iter().map(text).collect()
+        list.into_iter().take(plan.listed).map(text).collect()
     };
     let (texts_only_in_a, texts_only_in_b) = (texts(texts_a), texts(texts_b));
     let same = |l: &LayerDiff| l.same_area || l.only_in_a + l.only_in_b == 0;
@@ -54,13 +56,11 @@ pub(super) fn compare(a: Content, b: Content, unit_nm: f64, plan: &DiffPlan) -> 
         a: String::new(),
         b: String::new(),
         same_bytes: false,
-        same_geometry: elements.iter().all(|e| e.changed() == 0)
-            && layers.iter().all(same)
-            && texts_only_in_a.is_empty()
-            && texts_only_in_b.is_empty(),
+        same_geometry: elements.iter().all(|e| e.changed() == 0) && layers.iter().all(same) && texts_apart == [0, 0],
         tree: TreeDiff::default(),
         elements,
         layers,
+        texts_apart,
         texts_only_in_a,
         texts_only_in_b,
         changes: changes.total,
@@ -207,22 +207,15 @@ fn layer(
         diff.same_area = true;
         return diff;
     }
-    let corners = |r: &[i32; 4]| {
-        let [x0, y0, x1, y1] = r.map(i64::from);
-        [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
-            .map(|(x, y)| Point::new(x, y))
-            .to_vec()
-    };
-    // Only a few outlines can be compared by area, so only a few are copied for it.
-    if only_in_a.max(only_in_b) < 1 << 16 {
-        let gather = |rects: &[&[i32; 4]], rings: &[&Ring]| -> Vec<Vec<Point>> {
-            let rects = rects.iter().map(|r| corners(r));
-            rects.chain(rings.iter().map(|r| r.to_vec())).collect()
-        };
-        let (cover_a, cover_b) = (gather(&rects_a, &rings_a), gather(&rects_b, &rings_b));
-        // Equal sums as well: what overlaps is exposed twice.
-        let sum = |rings: &[Vec<Point>]| rings.iter().map(|r| area2(r).abs()).sum::<i128>();
-        diff.same_area = sum(&cover_a) == sum(&cover_b) && same_cover(&cover_a, &cover_b) == Some(true);
+    let sets = [(&rects_a, &rings_a, 1), (&rects_b, &rings_b, -1)];
+    let count = |rects: &[&[i32; 4]], rings: &[&Ring]| 4 * rects.len() + rings.iter().map(|r| r.len()).sum::<usize>();
+    if sets.iter().map(|(rects, rings, _)| count(rects, rings)).sum::<usize>() <= MOST_SIDES {
+        let mut sides = Sides::default();
+        for (rects, rings, sign) in sets {
+            rects.iter().for_each(|r| sides.add(&corners(r), sign));
+            rings.iter().for_each(|ring| sides.add(ring, sign));
+        }
+        diff.same_area = sides.cancel();
     }
     if !diff.same_area {
         for (what, rects, rings) in [("only in a", rects_a, rings_a), ("only in b", rects_b, rings_b)] {
@@ -237,6 +230,20 @@ fn layer(
         }
     }
     diff
+}
+
+/// Bytes of a text that a report shows.
+const LONGEST_TEXT: usize = 512;
+
+fn shortened(bytes: &[u8]) -> String {
+    let text = printable_bytes(&bytes[..bytes.len().min(LONGEST_TEXT)]);
+    let cut = if bytes.len() > LONGEST_TEXT { "..." } else { "" };
+    format!("{text}{cut}")
+}
+
+fn corners(r: &[i32; 4]) -> [Point; 4] {
+    let [x0, y0, x1, y1] = r.map(i64::from);
+    [(x0, y0), (x1, y0), (x1, y1), (x0, y1)].map(|(x, y)| Point::new(x, y))
 }
 
 /// What only one of two sorted lists has, equal items counted.

@@ -1,7 +1,8 @@
 //! What a layout holds, in an order that does not depend on how it is nested.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
+use super::super::work::Allowance;
 use metalith_core::Progress;
 use metalith_core::{Error, Result};
 use metalith_gds::extract::{ElementSite, ExtractedElement, Filler, Scale, Why};
@@ -9,8 +10,8 @@ use metalith_gds::{
     Cell, LayerNumber, Layout, Point, Rect, Selection, Shape, Text, Transform, Visitor, rectangle_of, simplified,
 };
 
-/// Vertices of outlines and rectangles that are held: 57.7 million squares off every lattice, and a fifth more.
-const MOST: usize = 70_000_000;
+/// Vertices that may be placed for each that may be held: most corners of rectangles are not.
+const PLACED: u64 = 8;
 
 /// Corners of an outline, in order, not closed.
 pub(super) type Ring = Box<[Point]>;
@@ -28,8 +29,51 @@ pub(super) struct Content {
     pub elements: Vec<ExtractedElement>,
     pub outlines: BTreeMap<LayerNumber, Outlines>,
     pub counts: BTreeMap<LayerNumber, u64>,
-    /// Layer, string and place in the common unit, sorted.
-    pub texts: Vec<(LayerNumber, String, Point)>,
+    /// Sorted.
+    pub texts: Vec<PlacedText>,
+}
+
+/// One copy of a text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct PlacedText {
+    pub layer: LayerNumber,
+    /// Its string, by its number in [`Strings`].
+    pub string: u32,
+    /// In the common unit.
+    pub at: Point,
+}
+
+/// The strings of both layouts, each once however often it stands in them.
+#[derive(Default)]
+pub(super) struct Strings(HashMap<Box<[u8]>, u32>);
+
+impl Strings {
+    fn number(&mut self, string: &[u8]) -> u32 {
+        if let Some(&number) = self.0.get(string) {
+            return number;
+        }
+        let number = self.0.len() as u32;
+        self.0.insert(string.into(), number);
+        number
+    }
+
+    /// The strings in order, the texts of both layouts numbered and sorted by it.
+    pub fn sorted(self, contents: [&mut Content; 2]) -> Vec<Box<[u8]>> {
+        let mut strings: Vec<(Box<[u8]>, u32)> = self.0.into_iter().collect();
+        strings.sort_unstable();
+        let mut place = vec![0; strings.len()];
+        for (new, (_, old)) in strings.iter().enumerate() {
+            place[*old as usize] = new as u32;
+        }
+        for content in contents {
+            content
+                .texts
+                .iter_mut()
+                .for_each(|t| t.string = place[t.string as usize]);
+            content.texts.sort_unstable();
+        }
+        strings.into_iter().map(|(string, _)| string).collect()
+    }
 }
 
 impl Content {
@@ -39,14 +83,19 @@ impl Content {
         factor: i64,
         sites: &[ElementSite],
         pillars: LayerNumber,
+        strings: &mut Strings,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let mut reader = Reader {
+        let allowance = Allowance::of([layout]);
+        let mut reader = ContentReader {
             pillars,
             factor,
             filler: Filler::new(sites.to_vec(), Scale::of(layout)?),
             outlines: BTreeMap::new(),
             held: 0,
+            most: allowance.rects,
+            strings,
+            moved: 0,
             pillar_shapes: 0,
             counts: BTreeMap::new(),
             texts: Vec::new(),
@@ -56,7 +105,6 @@ impl Content {
             outlines.rects.sort_unstable();
             outlines.rings.sort_unstable();
         }
-        reader.texts.sort_unstable();
         if reader.pillar_shapes > 0 {
             *reader.counts.entry(pillars).or_default() += reader.pillar_shapes;
         }
@@ -69,18 +117,22 @@ impl Content {
     }
 }
 
-struct Reader {
+struct ContentReader<'s> {
     pillars: LayerNumber,
     factor: i64,
     filler: Filler,
     outlines: BTreeMap<LayerNumber, Outlines>,
-    held: usize,
+    /// Rectangles, texts and vertices of other outlines, and how many may be held.
+    held: u64,
+    most: u64,
+    strings: &'s mut Strings,
+    moved: u64,
     pillar_shapes: u64,
     counts: BTreeMap<LayerNumber, u64>,
-    texts: Vec<(LayerNumber, String, Point)>,
+    texts: Vec<PlacedText>,
 }
 
-impl Reader {
+impl ContentReader<'_> {
     /// A rectangle of the pillar layer. Of two squares on one site the wider counts, in whatever order
     /// they come; odd widths are off the site by half a unit and are kept as they stand.
     #[inline]
@@ -96,11 +148,25 @@ impl Reader {
     }
 
     fn room(&mut self, count: usize) -> Result<()> {
-        self.held += count;
-        if self.held > MOST {
+        self.held += count as u64;
+        if self.held > self.most {
             return Err(Error::invalid(
-                format!("more than {MOST} rectangles and vertices off every lattice"),
-                "compare the layouts in parts",
+                format!("more than {} rectangles and vertices off every lattice", self.most),
+                "write the layouts with fewer copies, or compare their cells one by one",
+            ));
+        }
+        Ok(())
+    }
+
+    /// Count vertices that are placed, whatever is kept of them.
+    fn placed(&mut self, vertices: usize, copies: usize) -> Result<()> {
+        self.moved = self
+            .moved
+            .saturating_add((vertices as u64).saturating_mul(copies as u64));
+        if self.moved > PLACED * self.most {
+            return Err(Error::invalid(
+                format!("more than {} vertices with all references followed", PLACED * self.most),
+                "write the layouts with fewer copies, or compare their cells one by one",
             ));
         }
         Ok(())
@@ -155,7 +221,7 @@ pub(super) fn area2(ring: &[Point]) -> i128 {
     ring.iter().enumerate().map(part).sum()
 }
 
-impl Visitor for Reader {
+impl Visitor for ContentReader<'_> {
     fn cell(&mut self, _cell: &Cell, placements: &[Transform]) -> Result<()> {
         self.filler.begin(placements.len());
         Ok(())
@@ -174,6 +240,7 @@ impl Visitor for Reader {
             }
             _ => {
                 *self.counts.entry(shape.layer).or_default() += placements.len() as u64;
+                self.placed(shape.points.len(), placements.len())?;
                 for (k, placement) in placements.iter().enumerate() {
                     let placed: Vec<Point> = shape.points.iter().map(|&p| placement.apply(p)).collect();
                     self.outline(shape.layer, &placed, k)?;
@@ -184,12 +251,16 @@ impl Visitor for Reader {
     }
 
     fn text(&mut self, text: &Text<'_>, placements: &[Transform]) -> Result<()> {
+        let string = self.strings.number(text.string);
+        self.room(placements.len())?;
         for placement in placements {
-            self.room(1)?;
             let at = placement.apply(text.at);
             let at = Point::new(at.x.saturating_mul(self.factor), at.y.saturating_mul(self.factor));
-            let string = String::from_utf8_lossy(text.string).into_owned();
-            self.texts.push((text.layer, string, at));
+            self.texts.push(PlacedText {
+                layer: text.layer,
+                string,
+                at,
+            });
         }
         Ok(())
     }

@@ -17,7 +17,8 @@ pub use report::{Change, ElementDiff, LayerDiff, LayoutDiff, TextAt, TreeDiff, t
 
 use std::io::Read;
 
-use content::Content;
+use super::work::Allowance;
+use content::{Content, Strings};
 use metalith_core::{Error, Progress, Result};
 use metalith_gds::extract::{Scale, discover};
 use metalith_gds::{LayerNumber, Layout, Selection};
@@ -40,9 +41,6 @@ impl Default for DiffPlan {
     }
 }
 
-/// Lattice sites of all elements together: those of 5 x 5 lenses of 1 mm, and a quarter more.
-const MOST_SITES: u64 = 1 << 28;
-
 /// Compare two layouts.
 ///
 /// # Errors
@@ -64,18 +62,22 @@ pub fn diff(a: &Layout, b: &Layout, plan: &DiffPlan, progress: &dyn Progress) ->
         }
     }
     let total: u64 = sites.iter().map(|s| (s.lattice.sites() as u64).pow(2)).sum();
-    if total > MOST_SITES {
+    let most = Allowance::of([a, b]).sites;
+    if total > most {
         return Err(Error::invalid(
             format!("{} elements with {total} lattice sites together", sites.len()),
-            format!("up to {MOST_SITES} sites are compared; compare the layouts in parts"),
+            format!("up to {most} sites are compared; compare the cells of the elements one by one"),
         ));
     }
     for (k, site) in sites.iter_mut().enumerate() {
         site.name = format!("element {}", k + 1);
     }
-    let content = |layout: &Layout, factor| Content::read(layout, factor, &sites, plan.pillar_layer, progress);
-    let (first, second) = (content(a, factors[0])?, content(b, factors[1])?);
-    let mut report = compare::compare(first, second, 1.0 / den as f64, plan);
+    let mut strings = Strings::default();
+    let mut content =
+        |layout: &Layout, factor| Content::read(layout, factor, &sites, plan.pillar_layer, &mut strings, progress);
+    let (mut first, mut second) = (content(a, factors[0])?, content(b, factors[1])?);
+    let strings = strings.sorted([&mut first, &mut second]);
+    let mut report = compare::compare(first, second, &strings, 1.0 / den as f64, plan);
     report.a = a.path().display().to_string();
     report.b = b.path().display().to_string();
     report.same_bytes = identical;

@@ -112,6 +112,9 @@ pub struct LayoutDiff {
     pub tree: TreeDiff,
     pub elements: Vec<ElementDiff>,
     pub layers: Vec<LayerDiff>,
+    /// Texts that only one of the layouts has, all of them.
+    pub texts_apart: [u64; 2],
+    /// The first of them.
     pub texts_only_in_a: Vec<TextAt>,
     pub texts_only_in_b: Vec<TextAt>,
     /// Places that differ, all of them.
@@ -171,6 +174,11 @@ pub fn text(diff: &LayoutDiff) -> String {
                 "text only in {which}: \"{}\" on {} at ({x:.3}, {y:.3}) um",
                 t.string, t.layer
             );
+        }
+    }
+    for (which, count) in [("a", diff.texts_apart[0]), ("b", diff.texts_apart[1])] {
+        if count > SHOWN as u64 {
+            let _ = writeln!(out, "and {} more texts only in {which}", count - SHOWN as u64);
         }
     }
     for c in diff.listed.iter().take(SHOWN) {

@@ -6,6 +6,7 @@ mod design;
 mod forms;
 mod openings;
 mod pillars;
+mod proportion;
 
 use metalith_core::Silent;
 use metalith_drc::{CheckInput, Date, Deck, DrcReport};

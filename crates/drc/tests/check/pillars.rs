@@ -427,3 +427,30 @@ fn bytes_behind_the_end() {
     bytes.push(7);
     assert_eq!(broken(&check(bytes, &[])), [("file.end", 1)]);
 }
+
+/// Circles and turned squares are no squares, whichever other rule looks at their sides.
+#[test]
+fn what_is_no_square_is_found() {
+    /// Vertices of the polygon that stands for a circle.
+    const VERTICES: i32 = 32;
+    let mut chip = Chip::clean();
+    for k in 0..10 {
+        let (x, y) = (site(2 * k), site(5));
+        remove(&mut chip, 2 * k, 5);
+        let angle = |v: i32| std::f64::consts::TAU * f64::from(v % VERTICES) / f64::from(VERTICES);
+        let circle: Vec<_> = (0..=VERTICES)
+            .map(|v| {
+                let (sin, cos) = angle(v).sin_cos();
+                (x + (100.0 * cos).round() as i32, y + (100.0 * sin).round() as i32)
+            })
+            .collect();
+        chip.extra.polygon(1, &circle);
+        let y = site(9);
+        remove(&mut chip, 2 * k, 9);
+        let turned = [(x + 90, y), (x, y + 90), (x - 90, y), (x, y - 90), (x + 90, y)];
+        chip.extra.polygon(1, &turned);
+    }
+    let report = check(chip.bytes(), &[]);
+    let violations = |id: &str| report.rules.iter().find(|r| r.id == id).unwrap().violations;
+    assert_eq!((violations("pillar.square"), violations("outline.manhattan")), (20, 20));
+}

@@ -106,6 +106,8 @@ pub struct Transfer {
     pub mask: String,
     pub mask_thickness_nm: f64,
     pub etch: String,
+    /// Films that this etch is for, by the names that designs give to the material of their pillars.
+    pub films: Vec<String>,
 }
 
 /// Backscatter of electrons: range [um] and ratio to the direct dose, with limits on what is not known.
@@ -280,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn all_mistakes_are_told_at_once_with_their_places() {
+    fn all_mistakes_are_reported_at_once_with_their_places() {
         let text = STANDARD
             .1
             .replace("tone = \"positive\"", "tone = \"possitive\"")

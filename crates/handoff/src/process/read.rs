@@ -64,6 +64,19 @@ fn some(s: &Section<'_, '_>, key: &str, low: f64, high: f64, unit: &'static str)
     list
 }
 
+/// Names of materials; at least one.
+fn films(s: &Section<'_, '_>) -> Vec<String> {
+    let films = s.texts("films");
+    if films.is_empty() {
+        s.fault(
+            "films",
+            "the list is missing or empty",
+            "list the materials that the etch is for, as designs name them in `pillar_material`",
+        );
+    }
+    films
+}
+
 /// Two numbers, the smaller first.
 fn range(s: &Section<'_, '_>, key: &str, low: f64, high: f64, unit: &'static str) -> [f64; 2] {
     let pair = s.array::<2>(key, Limits::new(low..=high, unit));
@@ -118,6 +131,7 @@ fn transfer(s: &Section<'_, '_>) -> Transfer {
         mask: s.text("mask"),
         mask_thickness_nm: within(s, "mask_thickness_nm", 0.0, 10_000.0, "nm"),
         etch: s.text("etch"),
+        films: films(s),
     }
 }
 

@@ -14,6 +14,9 @@ const MARKS: LayerNumber = LayerNumber { layer: 3, datatype: 0 };
 /// Names of job decks and schedules without their endings, with their currents [nA].
 const JOBS: [(&str, f64); 3] = [("mini_3x3_0p5nA", 0.5), ("mini_3x3_2nA", 2.0), ("mini_3x3_8nA", 8.0)];
 
+/// Places in jobs have three decimals: half a nanometre [um].
+const HALF_NM_UM: f64 = 5e-4;
+
 type Place = (f64, f64);
 
 /// What a job deck says. Places are on the substrate or from the middle of a chip [um].
@@ -260,7 +263,7 @@ fn what_the_job_places_lands_where_the_tables_say() {
     assert_eq!(deck.chips, [(0.0, 0.0)]);
     let chip = deck.chips[0];
     let land = |(x, y): Place| (chip.0 + x - middle.0, chip.1 + y - middle.1);
-    let near = |a: Place, b: Place| (a.0 - b.0).abs() < 5e-4 && (a.1 - b.1).abs() < 5e-4;
+    let near = |a: Place, b: Place| (a.0 - b.0).abs() < HALF_NM_UM && (a.1 - b.1).abs() < HALF_NM_UM;
 
     let table = rows("metrology/alignment.csv");
     assert_eq!(table.len(), crosses.0.len());

@@ -1,8 +1,12 @@
 //! A layout as rules see it, with all references followed.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
+use super::body::Body;
+use super::work::Work;
 use metalith_design::Design;
+use metalith_design::array::PillarArray;
 use metalith_gds::extract::ExtractedElement;
 use metalith_gds::{LayerNumber, Layout, Point, Rect};
 
@@ -16,9 +20,27 @@ pub(super) struct Loose {
 }
 
 impl Loose {
+    /// Shapes.
+    pub fn len(&self) -> u64 {
+        (self.rects.len() + self.polygons.len()) as u64
+    }
+
     pub fn rect(&self, k: usize) -> Rect {
         let [x0, y0, x1, y1] = self.rects[k].map(i64::from);
         Rect { x0, y0, x1, y1 }
+    }
+
+    /// One shape, rectangles first.
+    pub fn body(&self, k: usize) -> Body<'_> {
+        match self.rects.len() {
+            n if k < n => Body::Rect(self.rect(k)),
+            n => Body::Ring(&self.polygons[k - n]),
+        }
+    }
+
+    /// All shapes, rectangles first.
+    pub fn bodies(&self) -> impl Iterator<Item = Body<'_>> {
+        (0..self.rects.len() + self.polygons.len()).map(|k| self.body(k))
     }
 
     /// Bounding boxes of all, rectangles first.
@@ -32,15 +54,20 @@ impl Loose {
 /// One text.
 pub(super) struct PlacedText {
     pub layer: LayerNumber,
-    pub string: String,
+    /// One for all copies of a text.
+    pub string: Arc<str>,
     pub at: Point,
 }
 
 /// What rules look at.
-pub(super) struct Scene<'a> {
+pub(super) struct FlatLayout<'a> {
+    /// What rules may still do.
+    pub work: &'a Work<'a>,
     pub layout: &'a Layout,
     pub with: Vec<&'a Layout>,
     pub design: Option<&'a Design>,
+    /// The pillars of the design.
+    pub array: Option<&'a PillarArray>,
     pub unit_nm: f64,
     pub pillars: LayerNumber,
     /// Elements with the pillars on their lattices.
@@ -62,7 +89,7 @@ pub(super) struct Scene<'a> {
     pub incomplete: Option<String>,
 }
 
-impl Scene<'_> {
+impl FlatLayout<'_> {
     /// A length in database units.
     pub fn units(&self, nm: f64) -> f64 {
         nm / self.unit_nm

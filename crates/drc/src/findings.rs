@@ -1,9 +1,11 @@
 //! What a rule found: markers up to a number, counts without one.
 
+use std::collections::HashMap;
+
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use super::CheckInput;
+use super::input::CheckInput;
 use super::waiver::Waiver;
 use metalith_gds::{Point, Rect, Transform};
 
@@ -21,11 +23,13 @@ pub struct Marker {
 }
 
 /// Gathers what one rule finds.
-pub(super) struct Found {
+pub(super) struct Findings {
     rule: String,
     unit_nm: f64,
     most: usize,
     waivers: Vec<Waiver>,
+    /// Their numbers in that list by hash: the first of equal ones.
+    by_hash: HashMap<String, usize>,
     /// Places covered by each of those waivers.
     pub matched: Vec<u64>,
     pub total: u64,
@@ -35,10 +39,15 @@ pub(super) struct Found {
     pub facts: Vec<(String, f64)>,
 }
 
-impl Found {
+impl Findings {
     pub fn new(rule: &str, unit_nm: f64, input: &CheckInput<'_>) -> Self {
         let waivers = input.waivers.map_or_else(Vec::new, |w| w.valid(rule, input.today));
+        let mut by_hash = HashMap::new();
+        for (k, waiver) in waivers.iter().enumerate() {
+            by_hash.entry(waiver.hash.clone()).or_insert(k);
+        }
         Self {
+            by_hash,
             rule: rule.to_owned(),
             unit_nm,
             most: input.markers,
@@ -97,7 +106,7 @@ impl Found {
     }
 
     fn keep(&mut self, outline_nm: Vec<[f64; 2]>, hash: String, words: impl FnOnce() -> String) {
-        let waiver = self.waivers.iter().position(|w| w.hash == hash);
+        let waiver = self.by_hash.get(&hash).copied();
         if let Some(k) = waiver {
             self.matched[k] += 1;
             self.waived += 1;

@@ -1,0 +1,107 @@
+//! One shape as rules about distances see it.
+
+use super::polygon::{distance, inside, overlap, ring_of, twice_area};
+use metalith_gds::{Point, Rect, simplified};
+
+/// Steps of work of one pair of sides of polygons: four distances of a point from a side.
+const SIDES: u64 = 8;
+
+/// One shape of a pair.
+#[derive(Clone, Copy)]
+pub(super) enum Body<'a> {
+    Rect(Rect),
+    Ring(&'a [Point]),
+}
+
+impl Body<'_> {
+    pub fn bounds(&self) -> Rect {
+        match self {
+            Self::Rect(r) => *r,
+            Self::Ring(p) => Rect::around(p),
+        }
+    }
+
+    /// Steps of work that comparing two shapes takes.
+    pub fn effort(&self, other: &Self) -> u64 {
+        match (self, other) {
+            (Self::Rect(_), Self::Rect(_)) => 1,
+            _ => SIDES.saturating_mul(self.sides()).saturating_mul(other.sides()),
+        }
+    }
+
+    /// Its corners, closed.
+    pub fn ring(&self) -> Vec<Point> {
+        match self {
+            Self::Rect(r) => ring_of(r).to_vec(),
+            Self::Ring(p) => p.to_vec(),
+        }
+    }
+
+    /// Euclidean distance; zero if they touch or overlap.
+    pub fn gap(&self, other: &Self) -> f64 {
+        match (self, other) {
+            (Self::Rect(a), Self::Rect(b)) => {
+                let (dx, dy) = between(a, b);
+                (dx as f64).hypot(dy as f64)
+            }
+            _ => distance(&self.ring(), &other.ring()),
+        }
+    }
+
+    /// Whether a place is inside, not on the edge.
+    pub fn holds(&self, p: Point) -> bool {
+        let r = self.bounds();
+        let within = p.x > r.x0 && p.x < r.x1 && p.y > r.y0 && p.y < r.y1;
+        match self {
+            Self::Rect(_) => within,
+            Self::Ring(ring) => within && inside(ring, p),
+        }
+    }
+
+    /// Corners, the first not counted twice.
+    pub fn sides(&self) -> u64 {
+        match self {
+            Self::Rect(_) => 4,
+            Self::Ring(p) => p.len() as u64 - 1,
+        }
+    }
+
+    /// Whether they share area.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        let (a, b) = (self.bounds(), other.bounds());
+        let boxes = a.x0 < b.x1 && b.x0 < a.x1 && a.y0 < b.y1 && b.y0 < a.y1;
+        match (self, other) {
+            (Self::Rect(_), Self::Rect(_)) => boxes,
+            _ => boxes && overlap(&self.ring(), &other.ring()),
+        }
+    }
+
+    /// Whether they are the same area drawn twice.
+    pub fn equals(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Rect(a), Self::Rect(b)) => a == b,
+            (Self::Ring(a), Self::Ring(b)) => same_ring(a, b),
+            _ => false,
+        }
+    }
+}
+
+fn same_ring(a: &[Point], b: &[Point]) -> bool {
+    let normal = |ring: &[Point]| {
+        let mut ring = simplified(ring);
+        ring.pop();
+        if twice_area(&ring) < 0 {
+            ring.reverse();
+        }
+        let start = (0..ring.len()).min_by_key(|&k| ring[k]).unwrap_or(0);
+        ring.rotate_left(start);
+        ring
+    };
+    a.len() == b.len() && Rect::around(a) == Rect::around(b) && normal(a) == normal(b)
+}
+
+/// Distances of two rectangles along x and y, zero where they overlap.
+pub(super) fn between(a: &Rect, b: &Rect) -> (i64, i64) {
+    let along = |a0: i64, a1: i64, b0: i64, b1: i64| (b0 - a1).max(a0 - b1).max(0);
+    (along(a.x0, a.x1, b.x0, b.x1), along(a.y0, a.y1, b.y0, b.y1))
+}

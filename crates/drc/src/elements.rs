@@ -1,0 +1,49 @@
+//! Where the elements of a layout are: as designed, or as found.
+
+use super::deck::Deck;
+use super::input::CheckInput;
+use super::work::Allowance;
+use metalith_core::{Error, Progress, Result};
+use metalith_gds::extract::{ElementSite, Scale, discover};
+use metalith_gds::{LayerNumber, Layout, Selection};
+
+/// The layer that pillars are known by, and further layers whose shapes count as if they were on it.
+pub(super) fn pillar_layers(deck: &Deck) -> (LayerNumber, &[LayerNumber]) {
+    let (first, doses) = deck.pillars.split_first().expect("a deck names a layer of pillars");
+    (*first, doses)
+}
+
+/// Elements of the design if there is one, else those that can be found, else why there are none.
+pub(super) fn sites(
+    layout: &Layout,
+    deck: &Deck,
+    input: &CheckInput<'_>,
+    allowance: &Allowance,
+    selection: &Selection,
+    progress: &dyn Progress,
+) -> Result<(Vec<ElementSite>, String)> {
+    if let Some(design) = input.design {
+        let site = |e: &metalith_design::Element| ElementSite {
+            name: e.label(),
+            centre_nm: [e.centre_nm.0, e.centre_nm.1],
+            lattice: design.lattice(),
+        };
+        return Ok((design.elements().iter().map(site).collect(), String::new()));
+    }
+    // The pillars may be in a companion, where the apertures are what is checked.
+    let mut why = String::new();
+    for file in std::iter::once(&layout).chain(&input.with) {
+        match discover(file, selection, &deck.pillars, Scale::of(file)?, progress).map_err(Error::from) {
+            Ok(sites) => {
+                let total: u64 = sites.iter().map(|s| (s.lattice.sites() as u64).pow(2)).sum();
+                if total <= allowance.sites {
+                    return Ok((sites, String::new()));
+                }
+                why = format!("elements with {total} lattice sites; {} are held", allowance.sites);
+            }
+            Err(Error::Invalid { what, .. } | Error::Layout { what, .. }) => why = what,
+            Err(other) => return Err(other),
+        }
+    }
+    Ok((Vec::new(), why))
+}

@@ -1,0 +1,23 @@
+//! What a layout is checked with.
+
+use metalith_design::Design;
+use metalith_design::array::PillarArray;
+use metalith_gds::Layout;
+
+use super::waiver::{Date, Waivers};
+
+/// What is checked besides the layout itself.
+#[derive(Default)]
+pub struct CheckInput<'a> {
+    /// Further files that are written on the same glass, such as the apertures.
+    pub with: Vec<&'a Layout>,
+    /// The design that the layout should hold.
+    pub design: Option<&'a Design>,
+    /// The pillars of that design, where the caller has computed them; else they are computed if a rule needs them.
+    pub array: Option<&'a PillarArray>,
+    pub waivers: Option<&'a Waivers>,
+    /// Today, for the expiry of waivers.
+    pub today: Date,
+    /// Most markers that are kept for each rule; all violations are counted.
+    pub markers: usize,
+}

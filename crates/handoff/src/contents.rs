@@ -1,0 +1,66 @@
+//! What was made: everything that the front page and `handoff.json` tell.
+
+use serde::Serialize;
+
+use super::census::Census;
+use super::documents::Documents;
+use super::drawing::RectNm;
+use super::manifest::Manifest;
+use super::matrix::DoseBlock;
+use super::process::Process;
+use super::structures::Structure;
+use metalith_core::Result;
+use metalith_design::Design;
+use metalith_drc::DrcReport;
+use metalith_report::Verdict;
+
+/// What was handed over.
+#[derive(Clone, Debug)]
+pub struct Handoff {
+    pub folder: std::path::PathBuf,
+    pub archive: std::path::PathBuf,
+    pub manifest: Manifest,
+    pub checks: Vec<HandoffCheck>,
+}
+
+/// One look at the layout that is part of the hand-off.
+#[derive(Clone, Debug, Serialize)]
+pub struct HandoffCheck {
+    pub name: String,
+    #[serde(serialize_with = "as_word")]
+    pub verdict: Verdict,
+    /// What came out, in one sentence.
+    pub words: String,
+    /// Its own report, in the folder.
+    pub report: Option<String>,
+}
+
+fn as_word<S: serde::Serializer>(verdict: &Verdict, s: S) -> Result<S::Ok, S::Error> {
+    s.serialize_str(verdict.word())
+}
+
+/// What became of the rules, by layout.
+pub(super) type RuleReports = Vec<(&'static str, DrcReport)>;
+
+/// Everything that the front page and `handoff.json` tell.
+#[derive(Serialize)]
+pub(super) struct Contents<'a> {
+    #[serde(skip)]
+    pub design: &'a Design,
+    pub process: &'a Process,
+    pub command: &'a str,
+    pub design_digest: String,
+    pub pillars: u64,
+    pub census: Vec<Census>,
+    #[serde(flatten)]
+    pub documents: Documents,
+    pub blocks: Vec<DoseBlock>,
+    pub structures: Vec<Structure>,
+    #[serde(skip)]
+    pub tests_frame: (RectNm, (i64, i64)),
+    pub checks: Vec<HandoffCheck>,
+    /// What became of each rule, by layout.
+    pub rules: RuleReports,
+    /// Path in the folder and what it is for.
+    pub files: Vec<(String, String)>,
+}

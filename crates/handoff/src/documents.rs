@@ -1,0 +1,125 @@
+//! The tables and drafts that go with the layouts: doses, times, places to measure at, marks, jobs.
+
+use serde::Serialize;
+
+use super::census::Census;
+use super::dose::{Beam, DoseRow, Exposure, WriteTime, doses};
+use super::exposure::{exposures, snapping};
+use super::layouts::Layouts;
+use super::listing::Listing;
+use super::process::Process;
+use super::sites::{Cross, MetrologySite, crosses, sites};
+use super::{job, tables};
+use metalith_core::Result;
+use metalith_design::Design;
+
+/// What the tables say.
+#[derive(Serialize)]
+pub(super) struct Documents {
+    /// Exposure of each file of the first step, with its time at each current.
+    pub exposures: Vec<(String, Exposure, Vec<WriteTime>)>,
+    /// Root mean square change of the widths when snapped to the shots of each beam [nm].
+    pub snapping: Vec<(Beam, f64)>,
+    pub doses: Vec<DoseRow>,
+    pub sites: Vec<MetrologySite>,
+    pub crosses: Vec<Cross>,
+}
+
+/// Write them.
+///
+/// # Errors
+/// If a file cannot be written, or no beam of the process gives its dose.
+pub(super) fn write(
+    files: &mut Listing,
+    design: &Design,
+    process: &Process,
+    layouts: &Layouts,
+    census: &[Census],
+) -> Result<Documents> {
+    let documents = Documents {
+        exposures: exposures(design, process, census)?,
+        snapping: snapping(&layouts.array, process)?,
+        doses: doses(process),
+        sites: sites(design, process, &layouts.array, &layouts.structures),
+        crosses: crosses(design),
+    };
+    dose_tables(files, process, layouts, &documents)?;
+    measuring_tables(files, design, process, layouts, &documents)?;
+    jobs(files, design, process, &documents)?;
+    Ok(documents)
+}
+
+fn dose_tables(files: &mut Listing, process: &Process, layouts: &Layouts, documents: &Documents) -> Result<()> {
+    tables::write_doses(
+        &files.add(
+            "dose/dose_table.csv",
+            "the nine doses, where each is, a column to fill in",
+        ),
+        &documents.doses,
+        &layouts.blocks,
+        process.dose_matrix.layer,
+    )?;
+    let times: Vec<_> = documents
+        .exposures
+        .iter()
+        .map(|(file, _, times)| (file.clone(), times.clone()))
+        .collect();
+    tables::write_times(
+        &files.add("dose/write_time.csv", "time of each file of step 1 at each current"),
+        &times,
+    )
+}
+
+fn measuring_tables(
+    files: &mut Listing,
+    design: &Design,
+    process: &Process,
+    layouts: &Layouts,
+    documents: &Documents,
+) -> Result<()> {
+    tables::write_structures(
+        &files.add("tests/structures.csv", "what each test structure is for and where"),
+        &layouts.structures,
+    )?;
+    tables::write_sites(
+        &files.add("metrology/cd_table.csv", "where to measure widths, columns to fill in"),
+        &documents.sites,
+        process,
+    )?;
+    let layers = &design.layout.layers;
+    let both = format!(
+        "{}/{} step 1, {}/{} step 2",
+        layers.pillar_marks.layer,
+        layers.pillar_marks.datatype,
+        layers.aperture_marks.layer,
+        layers.aperture_marks.datatype
+    );
+    tables::write_crosses(
+        &files.add("metrology/alignment.csv", "alignment crosses of both steps"),
+        &documents.crosses,
+        &both,
+    )
+}
+
+fn jobs(files: &mut Listing, design: &Design, process: &Process, documents: &Documents) -> Result<()> {
+    for (beam, _) in &documents.snapping {
+        let name = |kind: &str| format!("job/{}.{kind}", job::stem(design, beam));
+        let drafts = [
+            (
+                "jdf",
+                "DRAFT of the job deck, to be reviewed by staff",
+                job::job_deck(design, process, &documents.crosses, beam),
+            ),
+            (
+                "sdf",
+                "DRAFT of the schedule, to be reviewed by staff",
+                job::schedule(design, process, beam),
+            ),
+        ];
+        for (kind, purpose, text) in drafts {
+            // The writer's computer and a PC both read lines that end this way.
+            files.write(name(kind), purpose, text.replace('\n', "\r\n").as_bytes())?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,95 @@
+//! Test structures, places to measure at, marks.
+
+use super::SHOWN;
+use crate::contents::Contents;
+use crate::pictures;
+use metalith_report::{Cell, Column, Page, Table};
+
+pub(super) fn tests(page: &mut Page, c: &Contents<'_>) {
+    page.section("Test structures");
+    page.figure(pictures::tests(&c.structures, c.tests_frame.0, c.tests_frame.1));
+    let mut table = Table::new([
+        Column::text("Structure"),
+        Column::number("x", "um"),
+        Column::number("y", "um"),
+        Column::text("What is measured on it"),
+    ]);
+    for s in &c.structures {
+        let (x, y) = s.bounds.centre();
+        table.row([
+            Cell::code(&s.id),
+            Cell::fixed(x as f64 * 1e-3, 1),
+            Cell::fixed(y as f64 * 1e-3, 1),
+            s.purpose.as_str().into(),
+        ]);
+    }
+    page.details("All structures", |inner| {
+        inner.table(table);
+    });
+    page.paragraph(format!(
+        "The hyperbolic reference lens for {} nm, {} um across like the elements, is a file of its own: place it beside the array.",
+        c.process.tests.reference_wavelength_nm,
+        f64::from(c.design.lens.diameter_nm) * 1e-3
+    ));
+}
+
+pub(super) fn metrology(page: &mut Page, c: &Contents<'_>) {
+    page.section("Where to measure widths");
+    page.paragraph(format!(
+        "Sites on the lenses are those whose neighbours have nearly the same width, so that a miscount by one pillar changes the result little. \
+         Expected: drawn width within two standard deviations of {} nm. `metrology/cd_table.csv` has columns to fill in.",
+        c.process.metrology.width_tolerance_nm
+    ));
+    let mut table = Table::new([
+        Column::text("Site"),
+        Column::text("Place"),
+        Column::number("x", "um"),
+        Column::number("y", "um"),
+        Column::number("in the element x", "um"),
+        Column::number("y", "um"),
+        Column::number("Drawn", "nm"),
+        Column::text("Neighbours"),
+    ]);
+    for s in c.documents.sites.iter().filter(|s| s.file == "pillars") {
+        table.row([
+            Cell::code(&s.id),
+            s.place.as_str().into(),
+            Cell::fixed(s.x_um, 3),
+            Cell::fixed(s.y_um, 3),
+            s.element_x_um.map(|x| Cell::fixed(x, 3)).unwrap_or(Cell::none()),
+            s.element_y_um.map(|y| Cell::fixed(y, 3)).unwrap_or(Cell::none()),
+            u64::from(s.width_nm).into(),
+            format!("{} to {} nm", s.around_nm.0, s.around_nm.1).into(),
+        ]);
+    }
+    page.table(table);
+    page.section("Alignment");
+    let mut table = Table::new([
+        Column::text("Set"),
+        Column::text("Name at the writer"),
+        Column::number("x", "um"),
+        Column::number("y", "um"),
+        Column::number("Arm", "um"),
+        Column::number("Width", "um"),
+    ]);
+    for k in c.documents.crosses.iter().take(SHOWN) {
+        table.row([
+            k.set.as_str().into(),
+            if k.role.is_empty() {
+                Cell::none()
+            } else {
+                Cell::code(&k.role)
+            },
+            Cell::fixed(k.x_um, 1),
+            Cell::fixed(k.y_um, 1),
+            Cell::fixed(k.length_um, 1),
+            Cell::fixed(k.width_um, 2),
+        ]);
+    }
+    page.table(table);
+    page.paragraph(format!(
+        "The same crosses are drawn in both steps, on layers of their own. Overlay of step 2 to step 1 expected: {} nm; of \
+         neighbouring fields: {} nm.",
+        c.process.apertures.overlay_nm, c.process.writer.stitching_nm
+    ));
+}

@@ -1,0 +1,25 @@
+//! What is asked for.
+
+use std::path::PathBuf;
+
+use metalith_cell::Fidelity;
+use metalith_wave::Accuracy;
+
+/// What to hand over, and where to.
+#[derive(Clone, Debug)]
+pub struct HandoffOptions {
+    /// The design file.
+    pub design: PathBuf,
+    /// The process file; the program's own if left out.
+    pub process: Option<PathBuf>,
+    /// Folder to make; the archive stands beside it, with `.zip` behind its name.
+    pub out: PathBuf,
+    /// The command as it was given, for the manifest.
+    pub command: String,
+    /// The cell that the layout is judged by; the published polynomials are shown beside it.
+    pub fidelity: Fidelity,
+    /// How closely the layout is simulated.
+    pub accuracy: Accuracy,
+    /// Violations of the rules that have been accepted.
+    pub waivers: Option<PathBuf>,
+}

@@ -1,0 +1,144 @@
+//! Rows of pads and of lines to measure widths on.
+
+use super::{APART, BESIDE, NUMERAL, StructureLayers, Structures, clear_of_borders};
+use crate::drawing::{RectNm, Sheet, nm};
+use crate::matrix::{legal_width, top_pad};
+use crate::process::Process;
+use metalith_design::Design;
+
+/// Lines of a dense CD group; odd, so that the middle one is as dense as lines get.
+const LINES: i64 = 5;
+
+impl Structures {
+    /// A row of uniform pads, and the line along which to cleave through the dense ones.
+    pub(super) fn pads(
+        &mut self,
+        design: &Design,
+        process: &Process,
+        layers: &StructureLayers,
+        kind: &str,
+        sparse: i64,
+        y: i64,
+    ) -> RectNm {
+        let side = nm(process.tests.pad_um);
+        let pitch = i64::from(design.cell.pitch_nm) * sparse;
+        let cleave = sparse == 1;
+        // Room at the left for the dashes of the cleave line.
+        let mut x = APART + side + APART;
+        let mut row = RectNm::at(x, y, side, side);
+        for width in pad_widths(design, process) {
+            let pillar = self.pillar(width);
+            x = clear_of_borders(x, side, nm(process.writer.field_used_um));
+            let pad = RectNm::at(x, y, side, side);
+            top_pad(&mut self.top, &pillar, pad.centre(), side, pitch);
+            let words = width.to_string();
+            let numeral = pad.centre().0 - Sheet::numerals_width(NUMERAL, &words) / 2;
+            self.top
+                .numerals(layers.marks, (numeral, pad.y1 + BESIDE), NUMERAL, &words);
+            self.step2.rectangle(layers.openings, pad.grown(BESIDE / 2));
+            let bounds = RectNm::new(pad.x0, pad.y0, pad.x1, pad.y1 + BESIDE + NUMERAL);
+            self.record(
+                layers,
+                format!("{}{width}", if cleave { "D" } else { "S" }),
+                format!("uniform pillars of {width} nm, {kind}, pitch {pitch} nm: transmission, width, height"),
+                bounds,
+                Some(width),
+            );
+            row = row.united(&bounds);
+            x = pad.x1 + APART;
+        }
+        if cleave {
+            let middle = y + side / 2;
+            for left in [APART, x] {
+                // Five dashes, thin enough to aim by.
+                for k in 0..5 {
+                    let dash = RectNm::at(left + k * side / 5, middle - 1_000, side / 10, 2_000);
+                    self.top.rectangle(layers.marks, dash);
+                    row = row.united(&dash);
+                }
+            }
+            let line = RectNm::new(APART, middle - 1_000, x + side, middle + 1_000);
+            self.record(
+                layers,
+                "CLEAVE".into(),
+                "line between the dashes: a cleave along it opens every dense pad for a cross-section",
+                line,
+                None,
+            );
+        }
+        row
+    }
+
+    /// Lines for CD, dense and single: upright ones give the width along x, level ones along y.
+    pub(super) fn cd_bars(
+        &mut self,
+        design: &Design,
+        process: &Process,
+        layers: &StructureLayers,
+        upright: bool,
+        y: i64,
+    ) -> RectNm {
+        let length = nm(process.tests.cd_length_um);
+        let (axis, turned) = if upright { ("x", "upright") } else { ("y", "level") };
+        let mut x = APART;
+        let mut row = RectNm::at(x, y, 0, length);
+        for &asked in &process.tests.cd_widths_nm {
+            let width = legal_width(design, asked);
+            let across = if upright {
+                2 * width * (LINES + 1) + 10_000
+            } else {
+                length
+            };
+            x = clear_of_borders(x, across, nm(process.writer.field_used_um));
+            let bar = |at: i64| {
+                if upright {
+                    RectNm::at(x + at, y, width, length)
+                } else {
+                    RectNm::at(x, y + at, length, width)
+                }
+            };
+            let mut bounds = bar(0);
+            // Dense lines at equal line and space, then one line far from all others.
+            let places = (0..LINES).map(|k| 2 * width * k);
+            for at in places.chain([2 * width * LINES + 10_000]) {
+                self.top.rectangle(layers.pillars, bar(at));
+                bounds = bounds.united(&bar(at));
+            }
+            let words = format!("{}{width}", axis.to_ascii_uppercase());
+            self.top
+                .numerals(layers.marks, (bounds.x0, y + length + BESIDE), NUMERAL, &words);
+            let label = RectNm::at(
+                bounds.x0,
+                y + length + BESIDE,
+                Sheet::numerals_width(NUMERAL, &words),
+                NUMERAL,
+            );
+            let bounds = bounds.united(&label);
+            self.record(
+                layers,
+                format!("CD_{axis}_{width}"),
+                format!("{turned} lines {width} nm wide, {LINES} at equal space and one single: width along {axis}"),
+                bounds,
+                Some(width),
+            );
+            row = row.united(&bounds);
+            x = bounds.x1 + APART;
+        }
+        row
+    }
+}
+
+/// Widths of the uniform pads [nm], from the narrowest to the widest that the design may write.
+fn pad_widths(design: &Design, process: &Process) -> Vec<i64> {
+    let (low, high) = design.cell.width_range_nm;
+    let step = process
+        .tests
+        .pad_width_step_nm
+        .max(f64::from(design.cell.width_step_nm));
+    let count = (f64::from(high - low) / step).floor() as i64;
+    let mut widths: Vec<i64> = (0..=count)
+        .map(|k| legal_width(design, f64::from(low) + k as f64 * step))
+        .collect();
+    widths.dedup();
+    widths
+}
