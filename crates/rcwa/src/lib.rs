@@ -1,8 +1,4 @@
-//! Rigorous coupled-wave analysis of a pillar on a square lattice.
-//!
-//! exp(-i w t); z runs from the half-space below to the one above, the lateral reference is the pillar's
-//! centre. Transmission relates the field at the plane where the stack ends to the incident field at
-//! the plane where it begins, reflection both at the latter.
+#![doc = include_str!("../README.md")]
 
 mod basis;
 mod error;
