@@ -1,25 +1,19 @@
 //! Cell libraries on the disk.
 //!
-//! A file is, in this order, little-endian: eight bytes of magic; the length (u32) and text of the inputs
-//! as JSON; the number of columns (u32); for each its width [nm] (u16), its number of samples (u32) and
-//! for each sample wavelength [um], Re t, Im t (f64); SHA-256 of all before. Inputs or checksum that do
-//! not agree mean that the file is not what is needed; it is then made again.
+//! The content of the kept file ([`kept`]) is, little-endian: the number of columns (u32); for each its width [nm]
+//! (u16), its number of samples (u32) and for each sample wavelength [um], Re t, Im t (f64). Its inputs are JSON.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use num_complex::Complex64;
 use serde::Serialize;
-use sha2::{Digest, Sha256};
 
 use super::column::Column;
+use super::kept;
 use super::table::TableSpec;
-use metalith_core::{Result, WholeFile};
+use metalith_core::Result;
 
-const MAGIC: &[u8; 8] = b"MLCELL\0\x01";
-
-/// Raised whenever the solver or the sampling changes what it answers: kept tables are then of no use.
-const SOLVER: u32 = 1;
+const MAGIC: [u8; 8] = *b"MLCELL\0\x01";
 
 /// Longest file that is read [bytes]: ten times the library of the shipped designs at a tenth of its
 /// tolerance.
@@ -42,20 +36,17 @@ pub(super) fn inputs(spec: &TableSpec) -> Vec<u8> {
         solver: u32,
         spec: &'a TableSpec,
     }
-    serde_json::to_vec(&Inputs { solver: SOLVER, spec }).expect("plain data serialises")
+    let solver = kept::SOLVER;
+    serde_json::to_vec(&Inputs { solver, spec }).expect("plain data serialises")
 }
 
 /// Name of the file for these inputs.
 pub(super) fn file_name(inputs: &[u8]) -> String {
-    let digest = Sha256::digest(inputs);
-    let short: String = digest.iter().take(8).map(|b| format!("{b:02x}")).collect();
-    format!("cell-{short}.bin")
+    format!("cell-{}.bin", kept::name_of(inputs))
 }
 
 pub(super) fn write(file: &Path, inputs: &[u8], widths: &[u16], columns: &[Column]) -> Result<()> {
-    let mut bytes = MAGIC.to_vec();
-    bytes.extend((inputs.len() as u32).to_le_bytes());
-    bytes.extend(inputs);
+    let mut bytes = Vec::new();
     bytes.extend((columns.len() as u32).to_le_bytes());
     for (width, column) in widths.iter().zip(columns) {
         bytes.extend(width.to_le_bytes());
@@ -66,37 +57,16 @@ pub(super) fn write(file: &Path, inputs: &[u8], widths: &[u16], columns: &[Colum
             }
         }
     }
-    let digest = Sha256::digest(&bytes);
-    bytes.extend(digest);
-    WholeFile::write(file, &bytes)
+    kept::write(file, MAGIC, inputs, &bytes)
 }
 
 /// The columns kept in a file; none if there is no such file, a reason if it cannot be trusted.
 pub(super) fn read(file: &Path, inputs: &[u8], widths: &[u16]) -> std::result::Result<Option<Vec<Column>>, String> {
-    match fs::metadata(file) {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(error.to_string()),
-        Ok(metadata) if metadata.len() > LONGEST => return Err("it is too long to be a cell library".into()),
-        Ok(_) => {}
-    }
-    let bytes = fs::read(file).map_err(|e| e.to_string())?;
-    let body = bytes.len().checked_sub(32).ok_or("it is cut short")?;
-    let (body, digest) = bytes.split_at(body);
-    if Sha256::digest(body).as_slice() != digest {
-        return Err("its checksum does not hold".into());
-    }
-    let mut rest = Reader(body);
-    if rest.take(MAGIC.len()) != Some(MAGIC) {
-        return Err("it is not a cell library of this version".into());
-    }
-    let parsed = (|| {
-        let length = rest.u32()? as usize;
-        if rest.take(length)? != inputs {
-            return None;
-        }
-        rest.columns(widths)
-    })();
-    parsed.map(Some).ok_or_else(|| "it was made from other inputs".into())
+    let Some(content) = kept::read(file, MAGIC, inputs, LONGEST)? else {
+        return Ok(None);
+    };
+    let columns = Reader(&content).columns(widths);
+    columns.map(Some).ok_or_else(|| "it holds other columns".into())
 }
 
 /// What is left to read.

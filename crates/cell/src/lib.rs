@@ -5,6 +5,7 @@ mod column;
 mod curve;
 mod exact;
 mod fit;
+pub mod kept;
 mod model;
 mod pointwise;
 mod polynomial;

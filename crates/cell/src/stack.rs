@@ -106,12 +106,12 @@ impl CellStack {
                 "give its width in nm",
             ));
         }
-        transmit(
+        Ok(transmit(
             &self.layers(width_nm, wavelength_um)?,
             wavelength_um,
             Side::Below,
             orders,
-        )
+        )?)
     }
 
     /// Zero-order transmission of light whose direction has these sines in air, along x and y: for light

@@ -1,14 +1,4 @@
-//! Layout bytes -> shapes and where they stand: a streaming reader of GDSII stream format, release 6.
-//!
-//! Written from the format, not from our writer. A file is read in blocks through a fixed buffer and is
-//! never held: [`Layout::open`] goes through it once and keeps what there is of each cell in number (byte
-//! range, shapes a layer, references a child); [`Layout::visit`] goes through it again and hands every
-//! shape, decoded once, to a [`Visitor`] together with all places its cell stands at.
-//!
-//! What the format allows is read: any order of records inside an element, optional records, several XY
-//! records an element, padding after ENDLIB, any database unit. What it forbids, and what would cost
-//! unbounded memory or time ([`ReadLimits`]), is an [`Error::Layout`] with the offset of the byte and a cause that
-//! can be matched on.
+#![doc = include_str!("../README.md")]
 
 mod cell;
 mod element;
@@ -29,6 +19,7 @@ mod transform;
 mod tree;
 mod visit;
 mod walk;
+pub mod write;
 
 pub use cell::{Cell, Child, LayerTally};
 pub use error::{Error, ExtractionError, LayoutError, Limit, Result};

@@ -8,7 +8,6 @@ mod frame;
 mod mark;
 mod pillars;
 mod properties;
-mod record;
 
 use std::path::{Path, PathBuf};
 

@@ -8,8 +8,8 @@ use gds21::{GdsElement, GdsStrans, GdsStructRef};
 use rayon::prelude::*;
 
 use super::frame::Frame;
-use super::record::{ReferenceRecord, SquareRecord};
 use super::{coordinate, point, polygon};
+use metalith_gds::write::{ReferenceRecord, SquareRecord};
 use metalith_core::{Error, Progress, Result, WholeFile, WidthMap};
 use metalith_design::Layer;
 use metalith_design::array::{PillarArray, Placed, Symmetry};
@@ -61,7 +61,7 @@ impl<'a> PillarWriter<'a> {
     /// Write each class once, folded by its symmetries, and refer to it for each element.
     /// Says which classes have no symmetry to fold by.
     pub fn folded(&mut self, array: &PillarArray) -> Result<Vec<String>> {
-        let square = SquareRecord::on(self.layer);
+        let square = SquareRecord::on(self.layer.number());
         let n = array.lattice.sites();
         let mut remarks = Vec::new();
         for (k, class) in array.classes.iter().enumerate() {
@@ -141,7 +141,7 @@ impl<'a> PillarWriter<'a> {
         let (begin, end) = self.frame.cell(top, fixed)?;
         self.put(&begin)?;
         if let Some(array) = flat {
-            let square = SquareRecord::on(self.layer);
+            let square = SquareRecord::on(self.layer.number());
             for placed in &array.placed {
                 let widths = array.widths(placed);
                 let (cx, cy) = placed.element.centre_nm;

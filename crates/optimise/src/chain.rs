@@ -118,7 +118,7 @@ impl Task {
             blocks: finished.then(BlockState::default),
         };
         if finished && course.blocks > 0 && !progress.stopped() {
-            progress.advance(u64::from(schedule.sweeps() - exchange.sweep()));
+            progress.advance(u64::from(schedule.sweeps().saturating_sub(exchange.sweep())));
             return self.blocks(problem, course.blocks, seed, chain, history, best);
         }
         Found {
@@ -153,10 +153,10 @@ impl Task {
             best.progress.advance(1);
             best.show(exchange.merit());
             if exchange.block().is_multiple_of(every) || exchange.finished() {
-                history.push((chain.sweep + exchange.block(), exchange.merit()));
+                history.push((chain.sweep.saturating_add(exchange.block()), exchange.merit()));
             }
         }
-        best.progress.advance(u64::from(blocks - exchange.block()));
+        best.progress.advance(u64::from(blocks.saturating_sub(exchange.block())));
         Found {
             turns: exchange.turns(),
             widths_nm: exchange.widths_nm(),

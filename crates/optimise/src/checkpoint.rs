@@ -6,8 +6,19 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::adam::Adam;
-use metalith_core::{Error, Result, WholeFile};
+use super::rings::Rings;
+use metalith_cell::kept;
+use metalith_core::{Error, Result};
 use metalith_design::Design;
+
+/// Of the kept file.
+const MAGIC: [u8; 8] = *b"MLOPTI\0\x01";
+
+/// Raised whenever the optimiser goes another way from the same state.
+const OPTIMISER: u32 = 1;
+
+/// Longest checkpoint that is read [bytes]: the largest lens has a million rings of 20 digits, for each chain.
+const LONGEST: u64 = 1 << 30;
 
 /// The state of every chain, so that going on gives the same result as never having stopped.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -91,19 +102,41 @@ impl Checkpoint {
         }
     }
 
-    /// The checkpoint in a file if it is one of this design, else a new one.
+    /// The checkpoint in a file if it is whole and one of this design and this optimiser, else a new one.
     ///
     /// # Errors
     /// If the file is there but cannot be read.
     pub fn load(path: &Path, design: &Design) -> Result<Self> {
         let fresh = Self::begin(design);
-        let bytes = match std::fs::read(path) {
-            Ok(bytes) => bytes,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(fresh),
-            Err(e) => return Err(Error::io("read", path)(e)),
+        if let Err(error) = std::fs::metadata(path)
+            && error.kind() != std::io::ErrorKind::NotFound
+        {
+            return Err(Error::io("read", path)(error));
+        }
+        // One that cannot be used costs time, and the next save replaces it.
+        let Ok(Some(content)) = kept::read(path, MAGIC, &fresh.inputs(), LONGEST) else {
+            return Ok(fresh);
         };
-        let kept = serde_json::from_slice::<Self>(&bytes).unwrap_or_else(|_| fresh.clone());
-        Ok(if kept.digest == fresh.digest { kept } else { fresh })
+        let rings = Rings::new(design.lattice(), design.lens.diameter_nm)?.len();
+        let read = serde_json::from_slice::<Self>(&content).ok();
+        Ok(read
+            .filter(|kept| kept.digest == fresh.digest && kept.is_of(rings))
+            .unwrap_or(fresh))
+    }
+
+    /// What it was made from.
+    fn inputs(&self) -> Vec<u8> {
+        let mut bytes = OPTIMISER.to_le_bytes().to_vec();
+        bytes.extend(kept::SOLVER.to_le_bytes());
+        bytes.extend(self.digest.as_bytes());
+        bytes
+    }
+
+    /// Whether every chain and Adam have a finite number for each of so many rings.
+    fn is_of(&self, rings: usize) -> bool {
+        let fits = |numbers: &Numbers| numbers.0.len() == rings && numbers.values().iter().all(|v| v.is_finite());
+        let adam = self.adam.iter().flat_map(|a| [&a.turns, &a.mean, &a.square]);
+        self.chains.iter().map(|chain| &chain.turns).chain(adam).all(fits)
     }
 
     /// Whether anything was done.
@@ -116,7 +149,8 @@ impl Checkpoint {
     /// # Errors
     /// If it cannot be written.
     pub fn save(&self, path: &Path) -> Result<()> {
-        WholeFile::write(path, &serde_json::to_vec(self).expect("plain data serialises"))
+        let content = serde_json::to_vec(self).expect("plain data serialises");
+        kept::write(path, MAGIC, &self.inputs(), &content)
     }
 }
 
@@ -125,4 +159,37 @@ fn digest(design: &Design) -> String {
     let decisive = (&design.cell, &design.lens, &design.mapping, &design.optimise);
     let bytes = serde_json::to_vec(&decisive).expect("plain data serialises");
     Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A chain of another length, or with numbers that are none, would be a panic at every start.
+    #[test]
+    fn a_checkpoint_that_does_not_fit_is_not_taken() {
+        let folder = tempfile::tempdir().unwrap();
+        let kept = folder.path().join("checkpoint");
+        let design = Design::read(&metalith_testing::design("mini_3x3")).unwrap();
+        let rings = Rings::new(design.lattice(), design.lens.diameter_nm).unwrap().len();
+        let with = |turns: &[f64]| {
+            let chain = Chain {
+                sweep: 1,
+                turns: Numbers::of(turns),
+                blocks: None,
+            };
+            let checkpoint = Checkpoint {
+                chains: vec![chain],
+                ..Checkpoint::begin(&design)
+            };
+            checkpoint.save(&kept).unwrap();
+            Checkpoint::load(&kept, &design).unwrap().begun()
+        };
+        assert!(with(&vec![0.5; rings]));
+        assert!(!with(&vec![0.5; rings - 1]) && !with(&vec![0.5; rings + 1]) && !with(&[]));
+        assert!(!with(&vec![f64::NAN; rings]));
+        // What an earlier release kept.
+        std::fs::write(&kept, serde_json::to_vec(&Checkpoint::begin(&design)).unwrap()).unwrap();
+        assert!(!Checkpoint::load(&kept, &design).unwrap().begun());
+    }
 }

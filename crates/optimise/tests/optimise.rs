@@ -126,6 +126,16 @@ fn an_interrupted_run_goes_on_to_the_same_end() {
         assert_eq!(rest.widths_nm, whole.widths_nm);
         assert_eq!(rest.merit, whole.merit);
 
+        // A damaged one is of no use.
+        let whole = std::fs::read(&kept).unwrap();
+        for at in (0..whole.len()).step_by(whole.len() / 50 + 1) {
+            let mut damaged = whole.clone();
+            damaged[at] ^= 1;
+            std::fs::write(&kept, damaged).unwrap();
+            assert!(!Checkpoint::load(&kept, &design).unwrap().begun());
+        }
+        std::fs::write(&kept, whole).unwrap();
+
         // A checkpoint of another design is of no use.
         let other = Design::read(&metalith_testing::design("mini_3x3")).unwrap();
         assert!(!Checkpoint::load(&kept, &other).unwrap().begun());

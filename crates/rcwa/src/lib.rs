@@ -1,10 +1,7 @@
-//! Rigorous coupled-wave analysis of a pillar on a square lattice.
-//!
-//! exp(-i w t); z runs from the half-space below to the one above, the lateral reference is the pillar's
-//! centre. Transmission relates the field at the plane where the stack ends to the incident field at
-//! the plane where it begins, reflection both at the latter.
+#![doc = include_str!("../README.md")]
 
 mod basis;
+mod error;
 mod layer;
 mod material;
 mod outline;
@@ -26,7 +23,7 @@ use propagate::{Ends, Slab, propagate};
 pub use response::{Convergence, DiffractionOrder, Response, converge};
 pub use stack::{Layer, LayerStack, Orders};
 
-use metalith_core::{Error, Result};
+pub use error::{Error, Result, TableError};
 
 /// Where a wave comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -93,16 +90,12 @@ impl Incidence {
 
     fn check(&self) -> Result<()> {
         if !(self.wavelength_um.is_finite() && self.wavelength_um > 0.0) {
-            return Err(Error::invalid(
-                format!("light of a wavelength of {} um", self.wavelength_um),
-                "use a positive number of micrometres",
-            ));
+            return Err(Error::Wavelength {
+                wavelength_um: self.wavelength_um,
+            });
         }
         if !self.sines.iter().all(|s| s.is_finite()) {
-            return Err(Error::invalid(
-                "an angle of incidence that is not a number",
-                "give it in degrees",
-            ));
+            return Err(Error::Angle);
         }
         Ok(())
     }
@@ -169,10 +162,7 @@ fn solve_with(stack: &LayerStack, incidence: &Incidence, orders: Orders, symmetr
 /// As [`solve`]; also if the cell tells x from y.
 pub fn transmit(stack: &LayerStack, wavelength_um: f64, side: Side, orders: Orders) -> Result<Complex64> {
     if !stack.is_square() {
-        return Err(Error::invalid(
-            "a cell whose transmission depends on polarisation",
-            "solve for its Jones matrix instead",
-        ));
+        return Err(Error::Polarising);
     }
     let problem = Problem::new(stack, &Incidence::normal(wavelength_um, side), orders)?;
     let part = problem.part(Space::Even, Space::Even, &[[Complex64::ONE, Complex64::ZERO]])?;
@@ -209,13 +199,10 @@ impl Problem {
         };
         let transverse = incidence.sines[0].hypot(incidence.sines[1]);
         if stack.below.im != 0.0 || transverse >= stack.below.re {
-            return Err(Error::invalid(
-                format!(
-                    "no wave arrives at a sine of {transverse:.4} through a medium of index {} + {} i",
-                    stack.below.re, stack.below.im
-                ),
-                "use a medium without loss on the side of the light, and an angle that exists in it",
-            ));
+            return Err(Error::NoIncidentWave {
+                sine: transverse,
+                index: stack.below,
+            });
         }
         let wavelength_nm = incidence.wavelength_um * 1e3;
         Ok(Self {
@@ -230,15 +217,11 @@ impl Problem {
     fn part(&self, x: Space, y: Space, incident: &[[Complex64; 2]]) -> Result<Part> {
         let basis = Basis::new(self.orders.highest(), x, y, self.k, self.step);
         if basis.len() > MOST_UNKNOWNS {
-            return Err(Error::invalid(
-                format!(
-                    "{} x {} orders without symmetry are {} unknowns",
-                    self.orders.along_axis(),
-                    self.orders.along_axis(),
-                    basis.len()
-                ),
-                format!("use fewer orders: at most {MOST_UNKNOWNS} unknowns are solved for"),
-            ));
+            return Err(Error::TooLarge {
+                along_axis: self.orders.along_axis(),
+                unknowns: basis.len(),
+                most: MOST_UNKNOWNS,
+            });
         }
         let below = Medium::new(self.stack.below * self.stack.below, &basis);
         let above = Medium::new(self.stack.above * self.stack.above, &basis);

@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 
 use super::{Incidence, LayerStack, Orders, Part, Problem, solve};
-use metalith_core::{Error, Result};
+use super::{Error, Result};
 
 /// How a stack answers a plane wave.
 ///
@@ -187,10 +187,7 @@ pub(super) fn finite(value: Complex64) -> Result<Complex64> {
     if value.re.is_finite() && value.im.is_finite() {
         Ok(value)
     } else {
-        Err(Error::invalid(
-            "the solver lost the field in this cell: it has a mode at its very cutoff",
-            "change the wavelength, the angle or the width by a part in a million",
-        ))
+        Err(Error::Cutoff)
     }
 }
 

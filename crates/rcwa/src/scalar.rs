@@ -9,7 +9,7 @@ use faer::prelude::default;
 use faer::{Mat, MatRef, Par};
 use num_complex::Complex64;
 
-use metalith_core::{Error, Result};
+use super::{Error, Result};
 
 /// What the layers need of a number.
 pub(super) trait Scalar:
@@ -44,10 +44,9 @@ pub(super) struct Eigen<T> {
 }
 
 fn no_convergence<E: std::fmt::Debug>(error: E) -> Error {
-    Error::invalid(
-        format!("the modes of a layer were not found ({error:?})"),
-        "change the wavelength, the width or the number of orders a little",
-    )
+    Error::NoModes {
+        reason: format!("{error:?}"),
+    }
 }
 
 impl Scalar for f64 {

@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 
 use super::outline::Outline;
-use metalith_core::{Error, Result};
+use super::{Error, Result};
 
 /// Layers between two half-spaces, all on one square lattice, centred on one another.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,13 +57,7 @@ impl Orders {
     /// If the number is zero, even or above [`Orders::MOST`].
     pub fn new(along_axis: usize) -> Result<Self> {
         if along_axis.is_multiple_of(2) || along_axis > Self::MOST {
-            return Err(Error::invalid(
-                format!("{along_axis} diffraction orders along an axis"),
-                format!(
-                    "use an odd number from 1 to {}: 13 resolves the pillar cell to about 0.005 rad",
-                    Self::MOST
-                ),
-            ));
+            return Err(Error::Orders { along_axis });
         }
         Ok(Self(along_axis))
     }
@@ -99,10 +93,7 @@ impl LayerStack {
     pub(super) fn check(&self) -> Result<()> {
         let pitch = self.pitch_nm;
         if !(pitch.is_finite() && pitch > 0.0) {
-            return Err(Error::invalid(
-                format!("a lattice with a pitch of {pitch} nm"),
-                "use a positive number of nanometres",
-            ));
+            return Err(Error::Pitch { pitch_nm: pitch });
         }
         let indices = self
             .layers
@@ -111,19 +102,16 @@ impl LayerStack {
             .chain([self.below, self.above]);
         for n in indices {
             if !(n.re.is_finite() && n.im.is_finite() && n.re >= 0.0 && n.im >= 0.0 && n.norm() > 1e-3) {
-                return Err(Error::invalid(
-                    format!("a medium with the index {} + {} i", n.re, n.im),
-                    "use n >= 0 and k >= 0, not both zero; gain is not supported",
-                ));
+                return Err(Error::Index { index: n });
             }
         }
         for (number, layer) in self.layers.iter().enumerate() {
             let height = layer.height_nm;
             if !(height.is_finite() && height > 0.0) {
-                return Err(Error::invalid(
-                    format!("layer {} of the cell is {height} nm thick", number + 1),
-                    "give a positive thickness, or leave the layer out",
-                ));
+                return Err(Error::Height {
+                    layer: number + 1,
+                    height_nm: height,
+                });
             }
             let widest = layer
                 .outline
@@ -131,10 +119,10 @@ impl LayerStack {
                 .into_iter()
                 .fold(0.0, |a, b| if b > a || b.is_nan() { b } else { a });
             if !layer.outline.is_sound() || widest > pitch {
-                return Err(Error::invalid(
-                    format!("a pillar {widest} nm wide on a lattice with a pitch of {pitch} nm"),
-                    "make the width at most the pitch; walls that lean outwards count at their foot",
-                ));
+                return Err(Error::Width {
+                    width_nm: widest,
+                    pitch_nm: pitch,
+                });
             }
         }
         Ok(())

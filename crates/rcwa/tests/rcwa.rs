@@ -16,6 +16,48 @@ const OFF_NORMAL: f64 = 1e-5;
 /// The oblique truth is known well enough to judge by where its own bound is below this.
 const BOUND_OF_USE: f64 = 0.005;
 
+/// What the solver may add to the truth's own bound, in |t| and in rad, with so many orders, and the least share of
+/// the points that must keep to it: resonances of high quality shift by more.
+struct Agreement {
+    orders: usize,
+    amplitude: f64,
+    phase_rad: f64,
+    share: f64,
+    /// Largest |t - truth| beyond the bound over all points, resonances included: an upper limit for the worst.
+    worst: f64,
+}
+
+/// 13 orders resolve the cell to about 0.005 rad rms. The worst point is on a resonance that is narrower than the
+/// shift that 13 orders leave it.
+const COARSE: Agreement = Agreement {
+    orders: 13,
+    amplitude: 0.01,
+    phase_rad: 0.015,
+    share: 0.93,
+    worst: 0.3,
+};
+
+/// 17 orders, two and a half times as near.
+const FINE: Agreement = Agreement {
+    orders: 17,
+    amplitude: 0.004,
+    phase_rad: 0.006,
+    share: 0.90,
+    worst: 0.3,
+};
+
+/// Difference between a rounded pillar and a square of its area, over what the rounding changes: to first order
+/// they act alike.
+const STAIRCASE: f64 = 0.35;
+
+/// Tolerance of a convergence loop, and what its answer may differ by from one with far more orders: steps shrink
+/// more slowly than by half.
+const CONVERGED: f64 = 0.01;
+const REMAINDER: f64 = 2.0 * CONVERGED;
+
+/// Power that is left of light in pillars of k = 0.05, at most.
+const ABSORBED: f64 = 0.95;
+
 fn index(n: f64) -> Complex64 {
     Complex64::new(n, 0.0)
 }
@@ -58,12 +100,21 @@ fn truth(name: &str) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Share of the points within the truth's own bound plus `amplitude` in |t| and `phase` in rad.
-fn share_within(points: &[(Complex64, Complex64, f64)], amplitude: f64, phase: f64) -> f64 {
+/// Points got, wanted, and the bound of the truth.
+type Points = [(Complex64, Complex64, f64)];
+
+/// Hold points to the truth: the share of them within the tolerances, and the worst of all.
+fn hold(points: &Points, to: &Agreement) {
     let good = points.iter().filter(|(got, want, bound)| {
-        (got.norm() - want.norm()).abs() <= bound + amplitude && (got / want).arg().abs() <= bound / want.norm() + phase
+        (got.norm() - want.norm()).abs() <= bound + to.amplitude
+            && (got / want).arg().abs() <= bound / want.norm() + to.phase_rad
     });
-    good.count() as f64 / points.len() as f64
+    let share = good.count() as f64 / points.len() as f64;
+    let beyond = points.iter().map(|(got, want, bound)| (got - want).norm() - bound);
+    let worst = beyond.fold(f64::MIN, f64::max);
+    println!("{0} x {0}: {share:.3} of {1} points, worst {worst:.4}", to.orders, points.len());
+    assert!(share >= to.share, "{0} x {0}: {share}", to.orders);
+    assert!(worst <= to.worst, "{0} x {0}: worst {worst}", to.orders);
 }
 
 fn normal_points(n: usize) -> Vec<(Complex64, Complex64, f64)> {
@@ -80,11 +131,9 @@ fn normal_points(n: usize) -> Vec<(Complex64, Complex64, f64)> {
 
 #[test]
 fn truth_at_normal_incidence() {
-    let coarse = share_within(&normal_points(13), 0.01, 0.015);
-    let fine = share_within(&normal_points(17), 0.004, 0.006);
-    println!("13 x 13: {coarse:.3} of the points, 17 x 17: {fine:.3}");
-    assert!(coarse >= 0.93, "13 x 13: {coarse}");
-    assert!(fine >= 0.90, "17 x 17: {fine}");
+    for agreement in [COARSE, FINE] {
+        hold(&normal_points(agreement.orders), &agreement);
+    }
 }
 
 /// Slabs of one material in closed form: the field at the far end over the incident (Airy), s or p as
@@ -111,7 +160,7 @@ fn truth_at_oblique_incidence() {
     for row in truth("rcwa_oblique.csv") {
         let wavelength_um = row[2] * 1e-3;
         let incidence = Incidence::in_air(wavelength_um, Side::Below, row[0].to_radians(), 0.0);
-        let response = solve(&pillar(row[1], wavelength_um), &incidence, orders(17)).unwrap();
+        let response = solve(&pillar(row[1], wavelength_um), &incidence, orders(FINE.orders)).unwrap();
         for (polarisation, at) in [(0, 3), (1, 6)] {
             if row[at + 2] < BOUND_OF_USE {
                 let want = Complex64::new(row[at], row[at + 1]);
@@ -120,9 +169,8 @@ fn truth_at_oblique_incidence() {
         }
         assert!(response.transmission[0][1].norm() < ROUNDING && response.transmission[1][0].norm() < ROUNDING);
     }
-    let share = share_within(&points, 0.004, 0.006);
-    println!("oblique, 17 x 17: {share:.3} of {} points", points.len());
-    assert!(points.len() > 50 && share >= 0.90, "{share} of {}", points.len());
+    assert!(points.len() > 50, "{} points", points.len());
+    hold(&points, &FINE);
 }
 
 #[test]
@@ -192,7 +240,7 @@ fn power_is_conserved_without_loss_and_lost_with_it() {
     let mut lossy = stack;
     lossy.layers[0].inside += Complex64::new(0.0, 0.05);
     let power = solve(&lossy, &oblique, orders(7)).unwrap().total_power();
-    assert!(power.iter().all(|p| *p > 0.0 && *p < 0.95), "{power:?}");
+    assert!(power.iter().all(|p| *p > 0.0 && *p < ABSORBED), "{power:?}");
 }
 
 #[test]
@@ -289,7 +337,7 @@ fn a_staircase_of_four_steps_is_round_enough() {
     let area = 200.0 * 200.0 - (4.0 - std::f64::consts::PI) * 40.0 * 40.0;
     let narrower = of(Outline::square(area.sqrt()));
     assert!(
-        (rounded - narrower).norm() < 0.35 * (rounded - square).norm(),
+        (rounded - narrower).norm() < STAIRCASE * (rounded - square).norm(),
         "{square} {rounded} {narrower}"
     );
     assert_eq!(of(Outline::rounded(200.0, 0.0)), square);
@@ -299,11 +347,11 @@ fn a_staircase_of_four_steps_is_round_enough() {
 fn orders_double_until_the_answer_holds() {
     let incidence = Incidence::normal(0.6, Side::Below);
     let stack = pillar(150.0, 0.6);
-    let found = converge(&stack, &incidence, 0.01, orders(49)).unwrap();
-    assert!(found.converged && found.change <= 0.01 && found.orders > orders(7));
+    let found = converge(&stack, &incidence, CONVERGED, orders(49)).unwrap();
+    assert!(found.converged && found.change <= CONVERGED && found.orders > orders(7));
     let truth = converge(&stack, &incidence, 1e-9, orders(25)).unwrap();
     assert!(!truth.converged && truth.orders == orders(25));
-    assert!((truth.response.transmission[0][0] - found.response.transmission[0][0]).norm() < 0.02);
+    assert!((truth.response.transmission[0][0] - found.response.transmission[0][0]).norm() < REMAINDER);
 }
 
 #[test]

@@ -1,7 +1,11 @@
 //! Transmissions of pillars over width and wavelength.
 
+use metalith_cell::kept;
 use metalith_made::lagrange;
 use num_complex::Complex64;
+
+/// Of the kept file.
+const MAGIC: [u8; 8] = *b"MLETCH\0\x01";
 
 /// Transmission over wavelength and width.
 #[derive(Clone, Debug)]
@@ -25,22 +29,26 @@ impl PillarTable {
         row[i - 1..i + 3].iter().zip(weights).map(|(t, w)| t * w).sum()
     }
 
-    /// As it is kept on disk.
+    /// As it is kept on disk: with what it was made for, the number of the solver, and a checksum.
     pub fn bytes(&self) -> Vec<u8> {
+        let count = self.t.first().map_or(0, Vec::len);
+        let inputs = inputs(self.t.len(), count, self.first_nm, self.step_nm);
         let rows = self.t.iter().zip(&self.bare);
         let numbers = rows.flat_map(|(row, bare)| row.iter().chain([bare]));
-        numbers
+        let content: Vec<u8> = numbers
             .flat_map(|z| [z.re.to_le_bytes(), z.im.to_le_bytes()])
             .flatten()
-            .collect()
+            .collect();
+        kept::seal(MAGIC, &inputs, &content)
     }
 
     /// From what was kept: so many widths from the first on, at so many wavelengths; nothing if it is not that.
     pub fn from_bytes(bytes: &[u8], wavelengths: usize, count: usize, first_nm: f64, step_nm: f64) -> Option<Self> {
-        if bytes.len() != wavelengths * (count + 1) * 16 {
+        let content = kept::open(bytes, MAGIC, &inputs(wavelengths, count, first_nm, step_nm)).ok()?;
+        if content.len() != wavelengths * (count + 1) * 16 {
             return None;
         }
-        let numbers: Vec<f64> = bytes
+        let numbers: Vec<f64> = content
             .chunks_exact(8)
             .map(|b| f64::from_le_bytes(b.try_into().expect("eight bytes")))
             .collect();
@@ -59,5 +67,50 @@ impl PillarTable {
             t,
             bare,
         })
+    }
+}
+
+/// What a kept table was made for; the cell itself is in the name of its file.
+fn inputs(wavelengths: usize, count: usize, first_nm: f64, step_nm: f64) -> Vec<u8> {
+    let mut bytes = kept::SOLVER.to_le_bytes().to_vec();
+    for number in [wavelengths as u64, count as u64, first_nm.to_bits(), step_nm.to_bits()] {
+        bytes.extend(number.to_le_bytes());
+    }
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table() -> CellTable {
+        let value = |l: usize, k: usize| Complex64::new(l as f64 + 0.25, 0.5 * k as f64);
+        CellTable {
+            first_nm: 100.0,
+            step_nm: 2.0,
+            t: (0..3).map(|l| (0..400).map(|k| value(l, k)).collect()).collect(),
+            bare: (0..3).map(|l| value(l, 0)).collect(),
+        }
+    }
+
+    #[test]
+    fn a_kept_table_comes_back() {
+        let table = table();
+        let back = CellTable::from_bytes(&table.bytes(), 3, 400, 100.0, 2.0).unwrap();
+        assert_eq!((back.t, back.bare), (table.t, table.bare));
+    }
+
+    /// A page of zeros, which is finite numbers all the same, and a table of other widths.
+    #[test]
+    fn a_damaged_table_is_made_again() {
+        let bytes = table().bytes();
+        for page in (0..bytes.len()).step_by(4096) {
+            let mut damaged = bytes.clone();
+            damaged[page..(page + 4096).min(bytes.len())].fill(0);
+            assert!(CellTable::from_bytes(&damaged, 3, 400, 100.0, 2.0).is_none());
+        }
+        assert!(CellTable::from_bytes(&bytes, 3, 400, 102.0, 2.0).is_none());
+        assert!(CellTable::from_bytes(&bytes, 2, 400, 100.0, 2.0).is_none());
+        assert!(CellTable::from_bytes(&bytes[..bytes.len() - 1], 3, 400, 100.0, 2.0).is_none());
     }
 }

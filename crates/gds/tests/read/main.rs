@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use metalith_core::{Lattice, Silent, WidthMap};
 use metalith_gds::extract::{ElementSite, ExtractionPlan, Why, extract};
-use metalith_gds::{Error, LayerNumber, Layout, Point, ReadLimits, Rect, Selection, Shape, Transform, Visitor};
+use metalith_gds::{Error, LayerNumber, Layout, LayoutError, Limit, Point, ReadLimits, Rect, Selection, Shape, Transform, Visitor};
 use metalith_testing::gds::{self, Gds};
 use rand::SeedableRng;
 
@@ -277,6 +277,72 @@ fn faults_of_the_tree_are_found_before_anything_is_expanded() {
             .to_string()
             .contains("shapes with all references followed")
     );
+}
+
+fn visited(layout: &Layout) -> Result<(), LayoutError> {
+    match layout.visit(&Selection::default(), &mut Flat(Vec::new()), &Silent) {
+        Err(Error::Layout { cause, .. }) => Err(cause),
+        other => Ok(other.unwrap()),
+    }
+}
+
+/// A text of 60 kB under an array of 320 x 320 copies: 6 GB for whoever keeps texts.
+#[test]
+fn texts_count_as_often_as_they_stand() {
+    let mut bomb = Gds::library();
+    bomb.cell("T");
+    bomb.text(10, &"x".repeat(60_000), 0, 0).end_cell();
+    bomb.cell("TOP").array("T", 320, 320, [0, 0, 320, 0, 0, 320]).end_cell();
+    let found = 320 * 320 * (60_000 + 64);
+    let most = ReadLimits::default().flat_text_bytes;
+    let limit = Limit::FlatTexts;
+    assert_eq!(visited(&layout(bomb.end())), Err(LayoutError::Limit { limit, found, most }));
+    // As many short labels as a mask may have are no matter.
+    let mut labels = Gds::library();
+    labels.cell("T").text(10, "0123456789", 0, 0).end_cell();
+    labels.cell("TOP").array("T", 320, 320, [0, 0, 320, 0, 0, 320]).end_cell();
+    assert_eq!(visited(&layout(labels.end())), Ok(()));
+}
+
+/// A few hundred bytes that ask for 2e9 squares are refused for their size, before one is made.
+#[test]
+fn a_short_file_has_no_billion_of_shapes() {
+    let mut bomb = Gds::library();
+    bomb.cell("P").square(1, 0, 0, 100).end_cell();
+    bomb.cell("TOP").array("P", 32_000, 32_000, [0, 0, 350 * 32_000, 0, 0, 350 * 32_000]).end_cell();
+    let layout = layout(bomb.end());
+    let (found, limits) = (32_000 * 32_000, ReadLimits::default());
+    let most = limits.short_file_shapes + limits.shapes_per_byte * layout.bytes();
+    let limit = Limit::FlatShapesOfShortFile;
+    assert!(found < limits.flat_shapes);
+    assert_eq!(visited(&layout), Err(LayoutError::Limit { limit, found, most }));
+}
+
+/// Names come out printable, unlike names look unlike, and a cell is found by what is printed.
+#[test]
+fn names_are_printable() {
+    let mut gds = Gds::library();
+    gds.cell("A\u{1b}[2J\u{fffe}").square(1, 0, 0, 10).end_cell();
+    gds.cell("TOP").sref("A\u{1b}[2J\u{fffe}", 0, 0).sref("B\n", 0, 0).end_cell();
+    let layout = layout(gds.end());
+    assert_eq!(layout.cells()[0].name, "A\\u{1b}[2J\\u{fffe}");
+    assert_eq!(layout.cell_index("A\\u{1b}[2J\\u{fffe}"), Some(0));
+    assert_eq!(layout.cell_index("A\u{1b}[2J\u{fffe}"), Some(0));
+    let error = visited(&layout).unwrap_err();
+    assert_eq!(error.to_string(), "cell TOP refers to B\\u{a}, which is not in the file");
+}
+
+/// The program's error says the same as ours, and keeps it as its source.
+#[test]
+fn causes_stay_behind_the_text() {
+    use std::error::Error as _;
+    let bytes = &gds::everything()[..500];
+    let error = Layout::from_bytes("cut.gds", bytes, ReadLimits::default()).map(|_| ()).unwrap_err();
+    let text = format!("{error}\n  help: {}", error.in_layout().unwrap().1.remedy());
+    let of_program = metalith_core::Error::from(error);
+    assert_eq!(of_program.to_string(), text);
+    let behind = of_program.source().and_then(|s| s.downcast_ref::<Error>());
+    assert!(matches!(behind, Some(Error::Layout { cause: LayoutError::EndsInRecord { .. }, .. })), "{behind:?}");
 }
 
 /// Cells with dangling and circular references can still be visited by whoever reports these faults.

@@ -1,17 +1,19 @@
-//! The two records that a layout has millions of, byte for byte as gds21 would write them.
+//! The two elements that a layout has millions of, as templates: all bytes ready but for the place.
 
-use metalith_design::Layer;
+use crate::LayerNumber;
+use crate::fast::BOUNDARY_BYTES;
 
-/// Length of a BOUNDARY of five points.
-pub(super) const SQUARE_BYTES: usize = 64;
-
-/// A square on one layer, ready but for its corners.
+/// A square on one layer: a BOUNDARY with five points and no optional record.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct SquareRecord([u8; SQUARE_BYTES]);
+pub struct SquareRecord([u8; BOUNDARY_BYTES]);
 
 impl SquareRecord {
-    pub fn on(layer: &Layer) -> Self {
-        let mut record = [0; SQUARE_BYTES];
+    /// Length of the element in the file.
+    pub const BYTES: usize = BOUNDARY_BYTES;
+
+    /// The template for squares on a layer.
+    pub fn on(layer: LayerNumber) -> Self {
+        let mut record = [0; BOUNDARY_BYTES];
         let [l1, l0] = layer.layer.to_be_bytes();
         let [d1, d0] = layer.datatype.to_be_bytes();
         let (boundary, end) = ([0, 4, 0x08, 0], [0, 4, 0x11, 0]);
@@ -23,7 +25,7 @@ impl SquareRecord {
         Self(record)
     }
 
-    /// Append the square of this width about a centre [nm], corners counter-clockwise from the lower left.
+    /// Append the square of an even width about a centre, both in database units, corners counter-clockwise from the lower left.
     pub fn append(&self, out: &mut Vec<u8>, x: i32, y: i32, width: u16) {
         let half = i32::from(width) / 2;
         let (left, low, right, high) = (x - half, y - half, x + half, y + half);
@@ -36,15 +38,20 @@ impl SquareRecord {
     }
 }
 
-/// A plain reference (SREF) to one cell, ready but for its place.
+/// A plain reference (SREF) to one cell: not mirrored, magnified or turned.
 #[derive(Clone, Debug)]
-pub(super) struct ReferenceRecord {
+pub struct ReferenceRecord {
     record: Vec<u8>,
     place: usize,
 }
 
 impl ReferenceRecord {
+    /// The template for references to a cell.
+    ///
+    /// # Panics
+    /// If its name has more than 65,530 bytes; the format says 32.
     pub fn to(cell: &str) -> Self {
+        assert!(cell.len() <= 65_530, "a cell name of {} bytes", cell.len());
         let mut record = vec![0, 4, 0x0a, 0];
         // Strings are padded to an even length.
         let length = (cell.len() + cell.len() % 2 + 4) as u16;
@@ -59,7 +66,7 @@ impl ReferenceRecord {
         Self { record, place }
     }
 
-    /// Append the reference at a place [nm].
+    /// Append the reference at a place in database units.
     pub fn append(&self, out: &mut Vec<u8>, x: i32, y: i32) {
         let start = out.len() + self.place;
         out.extend_from_slice(&self.record);
@@ -70,9 +77,8 @@ impl ReferenceRecord {
 
 #[cfg(test)]
 mod tests {
-    use super::super::polygon;
     use super::*;
-    use gds21::{GdsElement, GdsLibrary, GdsPoint, GdsStruct, GdsStructRef};
+    use gds21::{GdsBoundary, GdsElement, GdsLibrary, GdsPoint, GdsStruct, GdsStructRef};
     use proptest::prelude::*;
 
     /// The bytes of one element as gds21 writes it.
@@ -95,12 +101,17 @@ mod tests {
     proptest! {
         #[test]
         fn squares_are_those_of_gds21(x in -2_000_000_000..2_000_000_000, y in -2_000_000_000..2_000_000_000, half in 1u16..30_000, layer in 0i16..256, datatype in 0i16..256) {
-            let layer = Layer { layer, datatype, purpose: String::new() };
             let mut ours = Vec::new();
-            SquareRecord::on(&layer).append(&mut ours, x, y, 2 * half);
-            let (x, y, h) = (i64::from(x), i64::from(y), i64::from(half));
-            let corners = [(x - h, y - h), (x + h, y - h), (x + h, y + h), (x - h, y + h)];
-            prop_assert_eq!(ours, by_gds21(polygon(&layer, &corners)));
+            SquareRecord::on(LayerNumber::new(layer as u16, datatype as u16)).append(&mut ours, x, y, 2 * half);
+            let h = i32::from(half);
+            let corners = [(x - h, y - h), (x + h, y - h), (x + h, y + h), (x - h, y + h), (x - h, y - h)];
+            let boundary = GdsBoundary {
+                layer,
+                datatype,
+                xy: corners.map(|(x, y)| GdsPoint::new(x, y)).to_vec(),
+                ..Default::default()
+            };
+            prop_assert_eq!(ours, by_gds21(boundary.into()));
         }
 
         #[test]

@@ -1,0 +1,128 @@
+//! Results that are kept on the disk between runs: cell libraries, tables of etched cells, checkpoints.
+//!
+//! A kept file is, in this order, little-endian: eight bytes of magic, which name the kind of content and its
+//! version; the length (u32) and bytes of the inputs that it was made from; the content; SHA-256 of all before.
+//! Magic, inputs or checksum that do not agree mean that the file is not what is needed; it is then made again.
+//! The inputs hold [`SOLVER`], so that nothing outlives the solver that made it.
+
+use std::path::Path;
+
+use sha2::{Digest, Sha256};
+
+use metalith_core::{Error, Result, WholeFile, file::read_at_most};
+
+/// Raised whenever the solver or the sampling changes what it answers: kept results are then of no use.
+pub const SOLVER: u32 = 1;
+
+/// Length of the checksum.
+const CHECKSUM: usize = 32;
+
+/// Why a kept file is not used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Unusable {
+    #[error("it is cut short")]
+    CutShort,
+    #[error("its checksum does not hold")]
+    Damaged,
+    #[error("it is of another kind or version")]
+    OtherKind,
+    #[error("it was made from other inputs")]
+    OtherInputs,
+}
+
+/// The bytes of a kept file.
+///
+/// # Panics
+/// If the inputs are longer than 4 GiB.
+pub fn seal(magic: [u8; 8], inputs: &[u8], content: &[u8]) -> Vec<u8> {
+    let length = u32::try_from(inputs.len()).expect("inputs are short");
+    let mut bytes = Vec::with_capacity(magic.len() + 4 + inputs.len() + content.len() + CHECKSUM);
+    bytes.extend(magic);
+    bytes.extend(length.to_le_bytes());
+    bytes.extend(inputs);
+    bytes.extend(content);
+    let digest = Sha256::digest(&bytes);
+    bytes.extend(digest);
+    bytes
+}
+
+/// The content of a kept file.
+///
+/// # Errors
+/// If the bytes are not whole, or of another kind or other inputs.
+pub fn open<'b>(bytes: &'b [u8], magic: [u8; 8], inputs: &[u8]) -> Result<&'b [u8], Unusable> {
+    let end = bytes.len().checked_sub(CHECKSUM).ok_or(Unusable::CutShort)?;
+    let (body, digest) = bytes.split_at(end);
+    if Sha256::digest(body).as_slice() != digest {
+        return Err(Unusable::Damaged);
+    }
+    let rest = body.strip_prefix(&magic).ok_or(Unusable::OtherKind)?;
+    let (length, rest) = rest.split_first_chunk().ok_or(Unusable::CutShort)?;
+    let length = u32::from_le_bytes(*length) as usize;
+    match rest.split_at_checked(length) {
+        Some((found, content)) if found == inputs => Ok(content),
+        _ => Err(Unusable::OtherInputs),
+    }
+}
+
+/// Keep content in a file.
+///
+/// # Errors
+/// If it cannot be written; what was there is then as it was.
+pub fn write(file: &Path, magic: [u8; 8], inputs: &[u8], content: &[u8]) -> Result<()> {
+    WholeFile::write(file, &seal(magic, inputs, content))
+}
+
+/// The content kept in a file of at most `longest` bytes; none if there is no such file, a reason if it cannot be
+/// used.
+///
+/// # Errors
+/// The reason, in words.
+pub fn read(file: &Path, magic: [u8; 8], inputs: &[u8], longest: u64) -> Result<Option<Vec<u8>>, String> {
+    let bytes = match read_at_most(file, longest, "a kept result") {
+        Ok(bytes) => bytes,
+        Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(Error::Io { source, .. }) => return Err(source.to_string()),
+        Err(Error::Invalid { what, .. }) => return Err(what),
+        Err(other) => return Err(other.to_string()),
+    };
+    let content = open(&bytes, magic, inputs).map_err(|why| why.to_string())?;
+    Ok(Some(content.to_vec()))
+}
+
+/// Sixteen hexadecimal digits that name a file by the inputs of its content.
+pub fn name_of(inputs: &[u8]) -> String {
+    Sha256::digest(inputs).iter().take(8).map(|b| format!("{b:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MAGIC: [u8; 8] = *b"MLTEST\0\x01";
+
+    #[test]
+    fn what_is_kept_comes_back_and_nothing_else_does() {
+        let sealed = seal(MAGIC, b"inputs", b"content");
+        assert_eq!(open(&sealed, MAGIC, b"inputs"), Ok(&b"content"[..]));
+        assert_eq!(open(&sealed, MAGIC, b"others"), Err(Unusable::OtherInputs));
+        assert_eq!(open(&sealed, *b"MLTEST\0\x02", b"inputs"), Err(Unusable::OtherKind));
+        for end in 0..sealed.len() {
+            assert!(open(&sealed[..end], MAGIC, b"inputs").is_err());
+        }
+        for at in 0..sealed.len() {
+            for bit in 0..8 {
+                let mut damaged = sealed.clone();
+                damaged[at] ^= 1 << bit;
+                assert_eq!(open(&damaged, MAGIC, b"inputs"), Err(Unusable::Damaged));
+            }
+        }
+        // A whole checksum over a length that is beyond the end.
+        let mut body = MAGIC.to_vec();
+        body.extend(u32::MAX.to_le_bytes());
+        let digest = Sha256::digest(&body);
+        body.extend(digest);
+        assert_eq!(open(&body, MAGIC, b"inputs"), Err(Unusable::OtherInputs));
+    }
+}

@@ -1,0 +1,158 @@
+//! What can go wrong in solving a cell: causes with numbers, and for each a remedy.
+
+use std::path::{Path, PathBuf};
+
+use num_complex::Complex64;
+
+use super::Orders;
+
+/// Result of solving a cell.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Why a cell was not solved, or a material is not known.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    #[error("light of a wavelength of {wavelength_um} um")]
+    Wavelength { wavelength_um: f64 },
+    #[error("an angle of incidence that is not a number")]
+    Angle,
+    /// The wave is evanescent in the half-space that it comes from, or that absorbs.
+    #[error("no wave arrives at a sine of {sine:.4} through a medium of index {} + {} i", index.re, index.im)]
+    NoIncidentWave { sine: f64, index: Complex64 },
+    #[error("{along_axis} diffraction orders along an axis")]
+    Orders { along_axis: usize },
+    #[error("{along_axis} x {along_axis} orders without symmetry are {unknowns} unknowns")]
+    TooLarge {
+        along_axis: usize,
+        unknowns: usize,
+        most: usize,
+    },
+    #[error("a lattice with a pitch of {pitch_nm} nm")]
+    Pitch { pitch_nm: f64 },
+    #[error("a medium with the index {} + {} i", index.re, index.im)]
+    Index { index: Complex64 },
+    /// Layers count from one, the lowest.
+    #[error("layer {layer} of the cell is {height_nm} nm thick")]
+    Height { layer: usize, height_nm: f64 },
+    #[error("a pillar {width_nm} nm wide on a lattice with a pitch of {pitch_nm} nm")]
+    Width { width_nm: f64, pitch_nm: f64 },
+    #[error("a cell whose transmission depends on polarisation")]
+    Polarising,
+    /// The eigenvalue problem of a layer was not solved.
+    #[error("the modes of a layer were not found ({reason})")]
+    NoModes { reason: String },
+    /// A mode at its very cutoff: the field is not finite.
+    #[error("the solver lost the field in this cell: it has a mode at its very cutoff")]
+    Cutoff,
+
+    #[error("no material is called \"{}\"", metalith_core::text::quoted(name))]
+    UnknownMaterial { name: String, known: Vec<&'static str> },
+    #[error("a material of index {n} + {k} i")]
+    MaterialIndex { n: f64, k: f64 },
+    #[error("{material} is known from {from_um} to {to_um} um, not at {wavelength_um} um")]
+    OutOfRange {
+        material: String,
+        from_um: f64,
+        to_um: f64,
+        wavelength_um: f64,
+    },
+    /// A table of indices cannot be read from the disk.
+    #[error("cannot read {}: {source}", path.display())]
+    Io { path: PathBuf, source: std::io::Error },
+    /// A table of indices does not hold what was expected. Lines count from one.
+    #[error("{}{}: {cause}", path.display(), line.map_or_else(String::new, |l| format!(", line {l}")))]
+    Table {
+        path: PathBuf,
+        line: Option<usize>,
+        #[source]
+        cause: TableError,
+    },
+}
+
+/// What is wrong with a table of indices.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TableError {
+    #[error("{bytes} bytes are not a table of indices")]
+    TooLong { bytes: u64 },
+    #[error("it is not an ordinary file")]
+    NotAFile,
+    #[error("the table is empty")]
+    Empty,
+    #[error("no column of wavelengths in \"{header}\"")]
+    NoWavelengths { header: String },
+    #[error("no column n in \"{header}\"")]
+    NoIndex { header: String },
+    #[error("a value is missing")]
+    Missing,
+    #[error("\"{text}\" is not a number")]
+    NotANumber { text: String },
+    #[error("\"{text}\" is not a finite number")]
+    NotFinite { text: String },
+    #[error("a wavelength, n or k that is not physical")]
+    NotPhysical,
+    #[error("the wavelengths do not rise")]
+    NotRising,
+    #[error("fewer than two rows")]
+    TooFewRows,
+}
+
+impl Error {
+    pub(super) fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::Io { path, source }
+    }
+
+    /// What to do about it.
+    pub fn remedy(&self) -> String {
+        match self {
+            Self::Wavelength { .. } => "use a positive number of micrometres".into(),
+            Self::Angle => "give it in degrees".into(),
+            Self::NoIncidentWave { .. } => {
+                "use a medium without loss on the side of the light, and an angle that exists in it".into()
+            }
+            Self::Orders { .. } => format!(
+                "use an odd number from 1 to {}: 13 resolves the pillar cell to about 0.005 rad",
+                Orders::MOST
+            ),
+            Self::TooLarge { most, .. } => format!("use fewer orders: at most {most} unknowns are solved for"),
+            Self::Pitch { .. } => "use a positive number of nanometres".into(),
+            Self::Index { .. } => "use n >= 0 and k >= 0, not both zero; gain is not supported".into(),
+            Self::Height { .. } => "give a positive thickness, or leave the layer out".into(),
+            Self::Width { .. } => {
+                "make the width at most the pitch; walls that lean outwards count at their foot".into()
+            }
+            Self::Polarising => "solve for its Jones matrix instead".into(),
+            Self::NoModes { .. } => "change the wavelength, the width or the number of orders a little".into(),
+            Self::Cutoff => "change the wavelength, the angle or the width by a part in a million".into(),
+            Self::UnknownMaterial { known, .. } => {
+                format!("use one of {}, or the path of a .csv table of n and k", known.join(", "))
+            }
+            Self::MaterialIndex { .. } => "use n > 0 and k >= 0".into(),
+            Self::OutOfRange { .. } => "choose wavelengths in that range, or another material".into(),
+            Self::Io { .. } => "check the path; relative paths count from the file that names them".into(),
+            Self::Table { .. } => "give columns wavelength_nm (or wavelength_um), n and, if it absorbs, k, with rising \
+                                   wavelengths"
+                .into(),
+        }
+    }
+}
+
+/// One text with its remedy, for a program; the cause stays its source.
+impl From<Error> for metalith_core::Error {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::Io { path, source } => Self::Io {
+                action: "read",
+                path,
+                source,
+            },
+            other => Self::Invalid {
+                what: other.to_string(),
+                hint: other.remedy(),
+                source: Some(Box::new(other)),
+            },
+        }
+    }
+}

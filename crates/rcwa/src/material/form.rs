@@ -1,0 +1,89 @@
+//! The index over the wavelength: dispersion formulas and tables.
+
+use num_complex::Complex64;
+use serde::Serialize;
+
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) enum Form {
+    Constant {
+        n: f64,
+        k: f64,
+    },
+    /// n^2 = 1 + sum of b L^2 / (L^2 - c^2), L in um; pairs (b, c).
+    Sellmeier {
+        terms: Vec<(f64, f64)>,
+        range_um: (f64, f64),
+    },
+    /// n = sum of a_i L^(-2 i), L in um.
+    Cauchy {
+        coefficients: Vec<f64>,
+        range_um: (f64, f64),
+    },
+    /// Samples (L [um], n, k) with rising L, joined by monotone cubics.
+    Table {
+        samples: Vec<[f64; 3]>,
+    },
+}
+
+impl Form {
+    /// Wavelengths it is known for [um].
+    pub fn range_um(&self) -> (f64, f64) {
+        match self {
+            Self::Constant { .. } => (0.0, f64::INFINITY),
+            Self::Sellmeier { range_um, .. } | Self::Cauchy { range_um, .. } => *range_um,
+            Self::Table { samples } => (samples[0][0], samples[samples.len() - 1][0]),
+        }
+    }
+
+    /// Complex index n + i k at a wavelength [um] in that range.
+    pub fn index(&self, wavelength_um: f64) -> Complex64 {
+        let l2 = wavelength_um * wavelength_um;
+        match self {
+            Self::Constant { n, k } => Complex64::new(*n, *k),
+            Self::Sellmeier { terms, .. } => {
+                let sum: f64 = terms.iter().map(|(b, c)| b * l2 / (l2 - c * c)).sum();
+                Complex64::from((1.0 + sum).sqrt())
+            }
+            Self::Cauchy { coefficients, .. } => {
+                Complex64::from(coefficients.iter().rev().fold(0.0, |sum, a| sum / l2 + a))
+            }
+            Self::Table { samples } => Complex64::new(
+                monotone_cubic(samples, 1, wavelength_um),
+                monotone_cubic(samples, 2, wavelength_um).max(0.0),
+            ),
+        }
+    }
+}
+
+/// Cubic between samples that does not overshoot them (Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5,
+/// 300 (1984)): the slope at a sample is a harmonic mean of those beside it.
+pub(super) fn monotone_cubic(samples: &[[f64; 3]], column: usize, x: f64) -> f64 {
+    let last = samples.len() - 1;
+    let i = samples.partition_point(|s| s[0] <= x).clamp(1, last) - 1;
+    let step = |j: usize| samples[j + 1][0] - samples[j][0];
+    let secant = |j: usize| (samples[j + 1][column] - samples[j][column]) / step(j);
+    let slope = |j: usize| -> f64 {
+        if j == 0 {
+            return secant(0);
+        }
+        if j == last {
+            return secant(last - 1);
+        }
+        let (a, b) = (secant(j - 1), secant(j));
+        if a * b <= 0.0 {
+            return 0.0;
+        }
+        let (wa, wb) = (2.0 * step(j) + step(j - 1), step(j) + 2.0 * step(j - 1));
+        (wa + wb) / (wa / a + wb / b)
+    };
+    let h = step(i);
+    let u = ((x - samples[i][0]) / h).clamp(0.0, 1.0);
+    let (y0, y1, d0, d1) = (
+        samples[i][column],
+        samples[i + 1][column],
+        slope(i) * h,
+        slope(i + 1) * h,
+    );
+    let v = 1.0 - u;
+    y0 * v * v * (1.0 + 2.0 * u) + y1 * u * u * (3.0 - 2.0 * u) + d0 * u * v * v - d1 * u * u * v
+}

@@ -1,0 +1,259 @@
+//! Refractive indices: published dispersion formulas with their ranges, constants, tables.
+
+mod form;
+mod known;
+mod table;
+
+use std::fmt;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use num_complex::Complex64;
+use serde::Serialize;
+
+use crate::{Error, Result, TableError};
+use form::Form;
+use known::KNOWN;
+
+/// An optical material: complex index n + i k over the wavelength.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Material {
+    name: String,
+    form: Form,
+    /// Added to n at every wavelength.
+    offset: f64,
+}
+
+/// Longest table of indices that is read [bytes].
+const LONGEST_TABLE: u64 = 8 << 20;
+
+/// Rounding [um] where tables in nm and bands in um meet at their ends.
+const ROUNDING: f64 = 1e-9;
+
+impl Material {
+    /// A material that can be named in a design.
+    ///
+    /// # Errors
+    /// If there is none of that name; the error lists those there are.
+    pub fn named(name: &str) -> Result<Self> {
+        let known = KNOWN
+            .iter()
+            .find(|k| k.name == name)
+            .ok_or_else(|| Error::UnknownMaterial {
+                name: name.to_owned(),
+                known: KNOWN.iter().map(|k| k.name).collect(),
+            })?;
+        Ok(Self {
+            name: name.to_owned(),
+            form: (known.form)(),
+            offset: 0.0,
+        })
+    }
+
+    /// The material that a text file names: one of [`Material::named`], or a CSV table whose path counts
+    /// from `folder`.
+    ///
+    /// # Errors
+    /// As [`Material::named`] and [`Material::read_csv`].
+    pub fn resolve(text: &str, folder: &Path) -> Result<Self> {
+        if text.to_ascii_lowercase().ends_with(".csv") {
+            Self::read_csv(&folder.join(text))
+        } else {
+            Self::named(text)
+        }
+    }
+
+    /// The same index at all wavelengths.
+    ///
+    /// # Errors
+    /// If `n` is not positive or `k` is negative.
+    pub fn constant(n: f64, k: f64) -> Result<Self> {
+        if !(n.is_finite() && n > 0.0 && k.is_finite() && k >= 0.0) {
+            return Err(Error::MaterialIndex { n, k });
+        }
+        Ok(Self {
+            name: if k == 0.0 {
+                format!("n = {n}")
+            } else {
+                format!("n = {n} + {k} i")
+            },
+            form: Form::Constant { n, k },
+            offset: 0.0,
+        })
+    }
+
+    /// A table of the index by wavelength: a header with `wavelength_nm` or `wavelength_um`, `n` and, if
+    /// wanted, `k`; lines that begin with `#` are skipped. Between its rows a monotone cubic.
+    ///
+    /// # Errors
+    /// If the file cannot be read, is too large, or a row is not what the header says.
+    pub fn read_csv(path: &Path) -> Result<Self> {
+        let fault = |line: Option<usize>, cause: TableError| Error::Table {
+            path: path.to_owned(),
+            line,
+            cause,
+        };
+        let found = std::fs::metadata(path).map_err(Error::io(path))?;
+        if !found.is_file() {
+            return Err(fault(None, TableError::NotAFile));
+        }
+        let bytes = found.len();
+        if bytes > LONGEST_TABLE {
+            return Err(fault(None, TableError::TooLong { bytes }));
+        }
+        let mut text = Vec::new();
+        File::open(path)
+            .and_then(|file| file.take(LONGEST_TABLE).read_to_end(&mut text))
+            .map_err(Error::io(path))?;
+        let samples =
+            table::parse(&String::from_utf8_lossy(&text)).map_err(|(line, cause)| fault(line, cause))?;
+        let name = path
+            .file_name()
+            .map_or_else(String::new, |n| n.to_string_lossy().into());
+        Ok(Self {
+            name,
+            form: Form::Table { samples },
+            offset: 0.0,
+        })
+    }
+
+    /// The same material with `offset` added to n.
+    #[must_use]
+    pub fn shifted(&self, offset: f64) -> Self {
+        Self {
+            offset: self.offset + offset,
+            ..self.clone()
+        }
+    }
+
+    /// Its name, or that of its file.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Where its numbers come from, for a report.
+    pub fn source(&self) -> &str {
+        let known = KNOWN.iter().find(|k| k.name == self.name);
+        known.map_or(self.name.as_str(), |k| k.source)
+    }
+
+    /// Wavelengths it is known for [um].
+    pub fn range_um(&self) -> (f64, f64) {
+        self.form.range_um()
+    }
+
+    /// Complex index n + i k at a wavelength [um].
+    ///
+    /// # Errors
+    /// If the wavelength is outside [`Material::range_um`].
+    pub fn index(&self, wavelength_um: f64) -> Result<Complex64> {
+        let (low, high) = self.range_um();
+        if !(wavelength_um > 0.0 && wavelength_um >= low - ROUNDING && wavelength_um <= high + ROUNDING) {
+            return Err(Error::OutOfRange {
+                material: self.to_string(),
+                from_um: low,
+                to_um: high,
+                wavelength_um,
+            });
+        }
+        Ok(self.form.index(wavelength_um) + self.offset)
+    }
+}
+
+impl fmt::Display for Material {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.name)?;
+        if self.offset != 0.0 {
+            write!(f, " {:+} in n", self.offset)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::form::monotone_cubic;
+    use super::*;
+
+    /// Indices as published, to the digits given there.
+    const PRINTED: f64 = 2e-4;
+
+    /// One-sided slopes at the ends of a table of 20 nm steps are what is left of the error of its cubics.
+    const CUBIC: f64 = 3e-4;
+
+    /// Rounding of one sum near 2.
+    const ROUNDED: f64 = 1e-12;
+
+    fn index(name: &str, wavelength_um: f64) -> f64 {
+        Material::named(name).unwrap().index(wavelength_um).unwrap().re
+    }
+
+    #[test]
+    fn published_values_at_lines() {
+        // Malitson's table at the d and h lines; the others by hand from their formulas.
+        for (name, wavelength_um, want) in [
+            ("fused_silica_malitson_1965", 0.587_562, 1.458_46),
+            ("fused_silica_malitson_1965", 0.404_656, 1.469_62),
+            ("sin_luke_2015", 0.6328, 2.0395),
+            ("sin_philipp_1973", 0.5876, 2.0167),
+            ("alumina_malitson_dodge_1972", 0.5876, 1.7682),
+            ("alumina_zhukovsky_2015", 0.500_005, 1.633_752),
+        ] {
+            let got = index(name, wavelength_um);
+            assert!((got - want).abs() < PRINTED, "{name}: {got}");
+        }
+    }
+
+    #[test]
+    fn out_of_range_says_the_range() {
+        let error = Material::named("sin_philipp_1973")
+            .unwrap()
+            .index(1.5)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("0.207 to 1.24 um"), "{error}");
+        let error = Material::named("glass").unwrap_err();
+        assert!(error.remedy().contains("fused_silica_malitson_1965"), "{error}");
+        assert!(Material::constant(0.0, 0.0).is_err() && Material::constant(1.5, -0.1).is_err());
+    }
+
+    #[test]
+    fn tables_pass_through_their_rows_and_follow_a_smooth_curve() {
+        let exact = Material::named("sin_luke_2015").unwrap();
+        let mut text = "# film\nwavelength_nm,n,k\n".to_owned();
+        for nm in (400..=700).step_by(20) {
+            text += &format!("{nm},{},0\n", exact.index(f64::from(nm) * 1e-3).unwrap().re);
+        }
+        let samples = table::parse(&text).unwrap();
+        for nm in 400..=700 {
+            let wavelength_um = f64::from(nm) * 1e-3;
+            let error = monotone_cubic(&samples, 1, wavelength_um) - exact.index(wavelength_um).unwrap().re;
+            assert!(error.abs() < CUBIC, "{nm}: {error}");
+        }
+    }
+
+    #[test]
+    fn bad_tables_name_the_line() {
+        for (text, line) in [
+            ("", None),
+            ("wavelength_nm,k\n", Some(1)),
+            ("lambda,n\n", Some(1)),
+            ("wavelength_nm,n\n400,2\n400,2\n", Some(3)),
+            ("wavelength_nm,n\n400,2\n410,abc\n", Some(3)),
+            ("wavelength_nm,n\n400,2\n410\n", Some(3)),
+            ("wavelength_nm,n\n400,nan\n", Some(2)),
+            ("wavelength_nm,n\n400,2\n", None),
+        ] {
+            assert_eq!(table::parse(text).unwrap_err().0, line, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_shift_adds_to_n() {
+        let film = Material::named("sin_luke_2015").unwrap();
+        let shifted = film.shifted(0.02).index(0.5).unwrap() - film.index(0.5).unwrap();
+        assert!((shifted.re - 0.02).abs() < ROUNDED && shifted.im == 0.0);
+        assert_eq!(film.shifted(-0.01).to_string(), "sin_luke_2015 -0.01 in n");
+    }
+}

@@ -1,0 +1,59 @@
+//! Tables of the index by wavelength, from CSV.
+
+use crate::TableError;
+use metalith_core::text::quoted;
+
+/// Line, counted from one, and what is wrong there.
+type Fault = (Option<usize>, TableError);
+
+/// Samples (L [um], n, k) of the text of a table, wavelengths rising.
+pub(super) fn parse(text: &str) -> Result<Vec<[f64; 3]>, Fault> {
+    let mut lines = text
+        .lines()
+        .enumerate()
+        .map(|(i, line)| (i + 1, line.trim()))
+        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+    let (number, header) = lines.next().ok_or((None, TableError::Empty))?;
+    let names: Vec<_> = header.split(',').map(str::trim).collect();
+    let column = |name: &str| names.iter().position(|n| *n == name);
+    let (wavelength, unit) = match (column("wavelength_nm"), column("wavelength_um")) {
+        (Some(at), _) => (at, 1e-3),
+        (None, Some(at)) => (at, 1.0),
+        (None, None) => {
+            let header = quoted(header);
+            return Err((Some(number), TableError::NoWavelengths { header }));
+        }
+    };
+    let n = column("n").ok_or_else(|| {
+        let header = quoted(header);
+        (Some(number), TableError::NoIndex { header })
+    })?;
+    let k = column("k");
+    let mut samples: Vec<[f64; 3]> = Vec::new();
+    for (number, line) in lines {
+        let cells: Vec<_> = line.split(',').map(str::trim).collect();
+        let value = |at: usize| -> Result<f64, Fault> {
+            let text = cells.get(at).ok_or((Some(number), TableError::Missing))?;
+            let value: f64 = text
+                .parse()
+                .map_err(|_| (Some(number), TableError::NotANumber { text: quoted(text) }))?;
+            if value.is_finite() {
+                Ok(value)
+            } else {
+                Err((Some(number), TableError::NotFinite { text: quoted(text) }))
+            }
+        };
+        let sample = [value(wavelength)? * unit, value(n)?, k.map_or(Ok(0.0), value)?];
+        if sample[0] <= 0.0 || sample[1] <= 0.0 || sample[2] < 0.0 {
+            return Err((Some(number), TableError::NotPhysical));
+        }
+        if samples.last().is_some_and(|last| last[0] >= sample[0]) {
+            return Err((Some(number), TableError::NotRising));
+        }
+        samples.push(sample);
+    }
+    if samples.len() < 2 {
+        return Err((None, TableError::TooFewRows));
+    }
+    Ok(samples)
+}
