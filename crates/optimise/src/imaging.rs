@@ -339,11 +339,15 @@ mod tests {
     /// No more light arrives than was sent, and with a sharp focus nearly all of it.
     #[test]
     fn power_is_kept() {
+        /// Sums of single precision.
+        const SINGLE: f32 = 1e-6;
+        /// The window cuts rings of the Airy pattern off, and spreading adds aliases of up to 4e-3 at its edge.
+        const ARRIVES: std::ops::Range<f32> = 0.9..1.02;
         let lens = lens();
         let t = planes(&phases(&lens));
         let pupil = Pupil::new(&lens, 0.55, 0.0, WINDOW, 0.0).unwrap();
         let h0 = Imaging::new(&pupil, WINDOW, Room::default()).transfer(&t.0, &t.1)[0];
-        assert!(h0.im.abs() < 1e-6 && h0.re > 0.9 && h0.re < 1.02, "{h0}");
+        assert!(h0.im.abs() < SINGLE && ARRIVES.contains(&h0.re), "{h0}");
     }
 
     /// The slope of a linear function of the transfer function by every ring, by differences.

@@ -159,19 +159,22 @@ pub mod tests {
 
     #[test]
     fn steps_are_wrapped() {
-        assert!((step(0.9, 0.1) - 0.2).abs() < 1e-15);
-        assert!((step(0.1, 0.9) + 0.2).abs() < 1e-15);
+        const ROUNDING: f64 = 1e-15;
+        assert!((step(0.9, 0.1) - 0.2).abs() < ROUNDING);
+        assert!((step(0.1, 0.9) + 0.2).abs() < ROUNDING);
         assert_eq!(step(0.25, 0.75), -0.5);
     }
 
     #[test]
     fn the_slope_is_that_of_the_width() {
+        /// Rounding of widths of hundreds of nm, 1e-13, over steps of 1e-6 turns, and a margin.
+        const DIFFERENCE: f64 = 1e-5;
         let mapping = published();
         for turns in [0.01, 0.3, 0.77, 0.99] {
             let (h, slope) = (1e-6, mapping.width_nm(turns).1);
             let difference = (mapping.width_nm(turns + h).0 - mapping.width_nm(turns - h).0) / (2.0 * h);
             assert!(
-                (slope - difference).abs() < 1e-5 * slope.abs(),
+                (slope - difference).abs() < DIFFERENCE * slope.abs(),
                 "{turns}: {slope} {difference}"
             );
         }

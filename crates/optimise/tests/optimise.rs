@@ -144,6 +144,8 @@ fn an_interrupted_run_goes_on_to_the_same_end() {
 
 #[test]
 fn both_solvers_beat_what_they_begin_from_and_exchange_beats_adam() {
+    /// What broadband phases gain over a hyperbolic one at the least; the paper's gain is several times.
+    const GAIN: f64 = 1.5;
     let folder = tempfile::tempdir().unwrap();
     let cell = PublishedCell::new(350);
     let reached = [ADAM, EXCHANGE].map(|section| {
@@ -152,7 +154,7 @@ fn both_solvers_beat_what_they_begin_from_and_exchange_beats_adam() {
         let found = task.solve(&[&cell], Checkpoint::begin(&design), &Silent).unwrap();
         let before = task.judge_rings(&task.own_turns, &cell).unwrap();
         let after = task.judge_rings(&found.turns, &cell).unwrap();
-        assert!(after.geometric_mean > 1.5 * before.geometric_mean);
+        assert!(after.geometric_mean > GAIN * before.geometric_mean);
         after.geometric_mean
     });
     assert!(reached[1] > reached[0], "{reached:?}");

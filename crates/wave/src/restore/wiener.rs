@@ -181,7 +181,9 @@ mod tests {
         // All but the column that has left the image.
         let inner = |a: &Array2<f64>| part(a.view(), 0..64, 0..79).to_owned();
         let found = psnr_db(inner(&restored).view(), inner(&scene).view()).unwrap();
-        assert!(found > 50.0, "{found}");
+        // What the filter leaves of so little noise; an image that stays shifted has 20 dB.
+        const UNDONE_DB: f64 = 50.0;
+        assert!(found > UNDONE_DB, "{found}");
     }
 
     #[test]

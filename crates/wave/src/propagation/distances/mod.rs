@@ -18,8 +18,8 @@ use super::Fade;
 use super::transfer::FadedColumn;
 use crate::kernels::fft_size;
 
-/// Beyond what geometry needs, a period holds this for the fade [um]: with it, fields agree with the
-/// direct sum to 1e-4 of the peak; see the tests.
+/// Beyond what geometry needs, a period holds this for the fade [um]: with it, intensities agree with the
+/// direct sum to 2e-4 of the peak; see the tests.
 const FADE_ROOM_UM: f64 = 70.0;
 
 /// The fade begins within this share of where it ends, however far the distances are apart.
@@ -230,20 +230,16 @@ mod tests {
         planned.intensities(um, &distances, &[&fill], &mut DistancesScratch::default(), &mut out);
         let n = planned.window();
         let at = |i: usize| (i as f64 - 0.5 * (n as f64 - 1.0)) * planned.step_um();
+        let mut worst = 0.0f64;
         for (plane, z) in out[0].iter().zip(distances) {
             let peak = f64::from(plane.iter().copied().fold(0.0, f32::max));
             let places: Vec<usize> = (0..40).map(|k| (k * 7919) % (n * n)).collect();
             let points: Vec<[f64; 3]> = places.iter().map(|&i| [6.0 + at(i % n), 1.0 + at(i / n), z]).collect();
             for (i, field) in places.iter().zip(Direct::at(&lens, &wave, &points)) {
-                let miss = f64::from(plane[*i]) - field.norm_sqr();
-                println!("{:.1e}", miss.abs() / peak);
-                assert!(
-                    miss.abs() < OF_THE_PEAK * peak,
-                    "{} is not {}, peak {peak}",
-                    plane[*i],
-                    field.norm_sqr()
-                );
+                worst = worst.max((f64::from(plane[*i]) - field.norm_sqr()).abs() / peak);
             }
         }
+        println!("{worst:.1e} of the peak");
+        assert!(worst < OF_THE_PEAK);
     }
 }

@@ -11,26 +11,18 @@
 //! 1 / window in q, with a kernel whose transform is divided out after the fast Fourier transform. What a
 //! ring puts into a cell is summed once; a step then is a sparse matrix and the transform.
 
-use std::f64::consts::{PI, TAU};
+mod geometry;
+mod spreading;
 
-use num_complex::{Complex32, Complex64};
+use metalith_core::{Error, Result};
+use metalith_wave::kernels::fft_size;
+use num_complex::Complex32;
 
 use super::PixelWindow;
 use super::focus::Lens;
-use super::rings::ring_of;
-use metalith_core::{Error, Result};
-use metalith_wave::kernels::{fft_size, raised_cosine};
-
-/// Cells an axis that a site is spread over.
-const SPREAD: usize = 4;
-/// Part of the window that is used, 1 / 1.25 of it. The rest keeps aliases of the gridding, which are of
-/// exp(-pi SPREAD sqrt(1 - 1 / 1.25)) = 4e-3 of the field at the edge of that part, away from it.
-pub const USED: f64 = 0.8;
-/// Shape of the spreading kernel exp(SHAPE (sqrt(1 - (z / 2)^2) - 1)), 0.97 pi SPREAD (1 - USED / 2)
-/// (Barnett, Magland, af Klinteberg 2019).
-const SHAPE: f64 = 0.97 * PI * SPREAD as f64 * (1.0 - 0.5 * USED);
-/// Samples a cell of the tabulated spreading kernel.
-const SAMPLES: usize = 512;
+use geometry::Geometry;
+pub use spreading::USED;
+use spreading::{SPREAD, Spreading, first_cell, intensity_weights};
 
 /// What each ring of unit transmission puts into each cell of directions.
 ///
@@ -177,175 +169,4 @@ impl Pupil {
             }
         }
     }
-}
-
-/// Where light comes from and goes to.
-struct Geometry<'l> {
-    lens: &'l Lens,
-    wavelength_um: f64,
-    sine: f64,
-    /// Where the chief ray lands, and how far that is.
-    landing_um: f64,
-    distance_um: f64,
-    side_um: f64,
-    offset_um: f64,
-    scale: f64,
-}
-
-/// One site above the x axis, and with it its mirror image below.
-struct Site {
-    ring: u32,
-    /// Direction in cells.
-    q: (f64, f64),
-    value: Complex64,
-}
-
-impl<'l> Geometry<'l> {
-    fn new(lens: &'l Lens, wavelength_um: f64, angle_rad: f64, window: PixelWindow, offset_um: f64) -> Self {
-        let pitch2 = lens.rings.lattice().pitch_um().powi(2);
-        Self {
-            lens,
-            wavelength_um,
-            sine: angle_rad.sin(),
-            landing_um: lens.gap_um * angle_rad.tan(),
-            distance_um: lens.gap_um / angle_rad.cos(),
-            side_um: window.side_um(),
-            offset_um,
-            // Root of the area of a sample over that of the lens; the number of samples comes later.
-            scale: window.side_um() / (lens.rings.sites() as f64 * pitch2).sqrt(),
-        }
-    }
-
-    /// Least and greatest direction along x, and greatest along y, in cells.
-    fn extent(&self) -> (f64, f64, f64) {
-        let radius = 0.5e-3 * f64::from(self.lens.rings.diameter_nm());
-        let mut extent = (f64::MAX, f64::MIN, 0.0f64);
-        for i in 0..=180 {
-            let (sin, cos) = (PI * f64::from(i) / 180.0).sin_cos();
-            let q = self.site(radius * cos, radius * sin, 0, false).q;
-            extent = (extent.0.min(q.0), extent.1.max(q.0), extent.2.max(q.1.abs()));
-        }
-        extent
-    }
-
-    fn site(&self, x: f64, y: f64, ring: u32, with_value: bool) -> Site {
-        let (z, x0) = (self.lens.gap_um, self.landing_um);
-        let dx = x0 - x;
-        let r2 = dx * dx + y * y + z * z;
-        let r = r2.sqrt();
-        let q_x = (dx / r - self.sine) / self.wavelength_um;
-        // The field is even in y: of a site and its mirror image, one stands for both.
-        let q = (q_x * self.side_um, y / r / self.wavelength_um * self.side_um);
-        if !with_value {
-            return Site {
-                ring,
-                q,
-                value: Complex64::ZERO,
-            };
-        }
-        // R - R0 without cancellation, and the incident wave.
-        let path = (x * x - 2.0 * x * x0 + y * y) / (r + self.distance_um) + x * self.sine;
-        let turns = path / self.wavelength_um + q_x * self.offset_um;
-        let k = TAU / self.wavelength_um;
-        let area = self.lens.rings.lattice().pitch_um().powi(2);
-        let amplitude = self.scale * area * z / (TAU * r2);
-        let value = amplitude * Complex64::new(1.0 / r, -k) * Complex64::cis(TAU * (turns - turns.round()));
-        Site { ring, q, value }
-    }
-
-    fn for_each(&self, with_value: bool, mut visit: impl FnMut(&Site)) {
-        let lattice = self.lens.rings.lattice();
-        let half = lattice.sites() / 2;
-        for iy in half..lattice.sites() {
-            let y = lattice.coordinate_um(iy);
-            for ix in 0..lattice.sites() {
-                if self.lens.rings.ring_at(ix, iy).is_some() {
-                    let ring = ring_of(lattice.half_radius2(ix, iy)) as u32;
-                    visit(&self.site(lattice.coordinate_um(ix), y, ring, with_value));
-                }
-            }
-        }
-    }
-}
-
-/// The kernel that sites are spread with, tabulated from its middle to its end.
-struct Spreading {
-    table: Vec<f32>,
-}
-
-impl Spreading {
-    fn new() -> Self {
-        let count = SPREAD / 2 * SAMPLES;
-        let table = (0..=count + 1)
-            .map(|i| spreading(i as f64 / SAMPLES as f64) as f32)
-            .collect();
-        Self { table }
-    }
-
-    /// First cell of those that a place is spread over, and their weights.
-    fn weights(&self, at: f64) -> (i32, [f32; SPREAD]) {
-        let first = first_cell(at);
-        let mut weights = [0.0; SPREAD];
-        for (i, weight) in weights.iter_mut().enumerate() {
-            let z = ((first + i as f64 - at).abs() * SAMPLES as f64) as f32;
-            let low = z as usize;
-            let part = z - low as f32;
-            *weight = self.table[low] + part * (self.table[low + 1] - self.table[low]);
-        }
-        (first as i32, weights)
-    }
-
-    /// Visit every cell at y >= 0 that a site and its mirror image touch.
-    fn spread(&self, site: &Site, first_x: i32, cells: (usize, usize), mut visit: impl FnMut(usize, f32)) {
-        let (n_x, w_x) = self.weights(site.q.0);
-        let (n_y, w_y) = self.weights(site.q.1);
-        for (j, w_y) in w_y.iter().enumerate() {
-            let y = n_y + j as i32;
-            for y in [y, -y] {
-                if (0..cells.1 as i32).contains(&y) {
-                    let base = y as usize * cells.0 + (n_x - first_x) as usize;
-                    for (i, w_x) in w_x.iter().enumerate() {
-                        visit(base + i, w_x * w_y);
-                    }
-                }
-            }
-        }
-    }
-}
-
-/// First cell of those that a place is spread over.
-fn first_cell(at: f64) -> f64 {
-    (at - 0.5 * SPREAD as f64).ceil()
-}
-
-/// exp(SHAPE (sqrt(1 - (z / 2)^2) - 1)) within two cells, zero outside.
-fn spreading(z: f64) -> f64 {
-    let inside = 1.0 - (2.0 * z / SPREAD as f64).powi(2);
-    if inside < 0.0 {
-        0.0
-    } else {
-        (SHAPE * (inside.sqrt() - 1.0)).exp()
-    }
-}
-
-/// By distance from the middle of the window in samples, 0 to size / 2: one over the squared transform of
-/// the spreading kernel, times a fade to zero at the end of the part that is used.
-fn intensity_weights(size: usize) -> Vec<f32> {
-    /// Midpoint rule; the kernel is smooth but for steps of exp(-SHAPE) at its ends.
-    const POINTS: u32 = 400;
-    /// Where the fade begins, as part of the window's half.
-    const FADE: f64 = 0.9 * USED;
-    (0..=size / 2)
-        .map(|m| {
-            let x = m as f64 / size as f64;
-            let step = SPREAD as f64 / f64::from(POINTS);
-            let transform = (0..POINTS)
-                .map(|i| -0.5 * SPREAD as f64 + (f64::from(i) + 0.5) * step)
-                .map(|z| spreading(z) * (TAU * z * x).cos())
-                .sum::<f64>()
-                * step;
-            let faded = raised_cosine((2.0 * x - FADE) / (USED - FADE));
-            (faded / transform.powi(2)) as f32
-        })
-        .collect()
 }
