@@ -25,6 +25,8 @@ mod effects;
 mod fidelity;
 mod fit;
 mod forward_model;
+#[cfg(test)]
+mod linear_model;
 mod model;
 mod names;
 mod optics;

@@ -229,3 +229,80 @@ fn ends_95(draws: &mut [f64]) -> [f64; 2] {
     let at = |share: f64| draws[((draws.len() - 1) as f64 * share).round() as usize];
     [at(0.025), at(0.975)]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linear_model::{LinearModel, PIXELS, Term, beams, information};
+
+    const PERIODS: [u32; 2] = [2, 3];
+
+    /// Relative: what the faded border of the samples of the test images leaves of their closed forms.
+    const TOLERANCE: f64 = 5e-3;
+
+    fn model(leds: usize, elements: usize) -> LinearModel {
+        LinearModel::new(vec![Term::linear(PERIODS)], beams(leds, elements, 1))
+    }
+
+    /// One colour asks for a, the other for b: each is predicted with the other's, and errs by a - b.
+    #[test]
+    fn a_colour_is_predicted_with_the_parameters_of_the_others() {
+        let (a, b) = (0.01, 0.03);
+        let model = model(2, 1);
+        let data = model.data(|c| vec![[a, b][c]], None);
+        let problem = model.problem(&data);
+        let fit = problem.fit(&[0], &problem.nuisance_fit());
+        assert!((fit.theta[0] / (0.5 * (a + b)) - 1.0).abs() < TOLERANCE);
+        let expected = (a - b).powi(2) * information(PERIODS) / (PIXELS * PIXELS) as f64;
+        for error in held_out(&problem, &fit.equations, &fit) {
+            let error = error.unwrap();
+            assert!((error / expected - 1.0).abs() < TOLERANCE, "{error} {expected}");
+        }
+    }
+
+    /// Where all captures agree, nothing is left; where nothing is fitted, the whole pattern is left.
+    #[test]
+    fn what_all_captures_agree_on_is_predicted() {
+        /// Reduced chi-square per pixel: rounding of single-precision images at a signal of 100 sigma.
+        const ROUNDING: f64 = 1e-4;
+        let theta = 0.02;
+        let model = model(2, 2);
+        let data = model.data(|_| vec![theta], None);
+        let problem = model.problem(&data);
+        let nothing = problem.nuisance_fit();
+        let fit = problem.fit(&[0], &nothing);
+        let before = held_out(&problem, &nothing.equations, &nothing);
+        let after = held_out(&problem, &fit.equations, &fit);
+        let expected = theta * theta * information(PERIODS) / (PIXELS * PIXELS) as f64;
+        assert!((mean_error(&before) / expected - 1.0).abs() < TOLERANCE);
+        assert!(mean_error(&after) < ROUNDING, "{}", mean_error(&after));
+        // All captures gain the same: no draw of the bootstrap differs.
+        let gain = gain(&problem, &before, &after);
+        for end in gain.interval {
+            assert!((end / gain.value - 1.0).abs() < TOLERANCE, "{gain:?}");
+        }
+        assert!((gain.value / expected - 1.0).abs() < TOLERANCE);
+    }
+
+    #[test]
+    fn the_bootstrap_of_two_groups_has_the_ends_of_these_groups() {
+        let model = model(2, 1);
+        let data = model.data(|_| vec![0.0], None);
+        let problem = model.problem(&data);
+        let before: HeldOutErrors = vec![Some(3.0), Some(5.0)].into();
+        let after: HeldOutErrors = vec![Some(2.0), Some(1.0)].into();
+        // Differences 1 and 4: of two draws, both are the first in a quarter of the cases.
+        let gain = gain(&problem, &before, &after);
+        assert_eq!(
+            gain,
+            Gain {
+                value: 2.5,
+                interval: [1.0, 4.0]
+            }
+        );
+        // A capture that does not count takes no part.
+        let mut problem = problem.clone();
+        problem.used[CaptureIndex::from(1)] = false;
+        assert_eq!(super::gain(&problem, &before, &after).value, 1.0);
+    }
+}

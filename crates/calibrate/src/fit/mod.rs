@@ -15,6 +15,8 @@ mod registration;
 mod widths;
 
 pub use cross_validation::{Gain, HeldOutErrors, beam_groups, gain, half_widths, held_out, mean_error};
+#[cfg(test)]
+pub use data::Beam;
 pub use data::Data;
 pub use normal_equations::{covariance, minimise};
 pub use nuisances::Nuisances;

@@ -111,3 +111,59 @@ impl Problem<'_> {
             .collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::linear_model::{LinearModel, PARAMETER, Term, beams};
+    use metalith_core::Silent;
+
+    /// Not a polynomial of the degree of the surrogate: the response saturates.
+    fn saturating() -> LinearModel {
+        let term = Term {
+            amplitude: |theta| 0.05 * (theta / 0.03).tanh(),
+            patterns: vec![([2, 3], 1.0)],
+        };
+        LinearModel::new(vec![term], beams(2, 2, 1))
+    }
+
+    /// The minimum of chi-square is where the data were made: refinement reaches it, the surrogate alone does
+    /// not.
+    #[test]
+    fn refinement_converges_to_the_minimum() {
+        /// In typical sizes. Full simulations are stopped when a parameter moves by less than 2e-2; each step
+        /// shortens the distance by more than ten.
+        const TOLERANCE: f64 = 2e-3;
+        let model = saturating();
+        for truth in [0.6, 1.7, -2.2].map(|size| size * PARAMETER.typical) {
+            let data = model.data(|_| vec![truth], None);
+            let mut problem = model.problem(&data);
+            let plain = problem.fit(&[0], &problem.nuisance_fit());
+            let refined = problem.refine(plain.clone(), &Silent).unwrap();
+            let off = |theta: f64| (theta - truth).abs() / PARAMETER.typical;
+            assert!(off(refined.theta[0]) < TOLERANCE, "{truth}: {}", refined.theta[0]);
+            assert!(off(refined.theta[0]) < off(plain.theta[0]), "{truth}");
+        }
+    }
+
+    /// A minimum far outside the simulated range is followed, and the surrogate knows its surroundings after.
+    #[test]
+    fn a_fit_that_leaves_the_simulated_range_is_followed() {
+        /// In typical sizes, as above.
+        const TOLERANCE: f64 = 2e-3;
+        let cubic = Term {
+            amplitude: |theta| theta + 20.0 * theta.powi(3),
+            patterns: vec![([2, 3], 1.0)],
+        };
+        let model = LinearModel::new(vec![cubic], beams(2, 2, 1));
+        let truth = 7.0 * PARAMETER.typical;
+        let data = model.data(|_| vec![truth], None);
+        let mut problem = model.problem(&data);
+        assert!(problem.surrogate.simulated_range(0).1 < truth);
+        let plain = problem.fit(&[0], &problem.nuisance_fit());
+        assert!(problem.extrapolates(&plain));
+        let refined = problem.refine(plain, &Silent).unwrap();
+        assert!(!problem.extrapolates(&refined));
+        let off = (refined.theta[0] - truth).abs() / PARAMETER.typical;
+        assert!(off < TOLERANCE, "{}", refined.theta[0]);
+    }
+}
