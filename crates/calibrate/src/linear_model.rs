@@ -9,8 +9,8 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::effects::Parameter;
-use crate::fit::{Beam, Data, Problem};
-use crate::forward_model::{ForwardModel, PATH_TERMS, Point, Slot, SmoothTerm};
+use crate::fit::{CaptureSetup, Data, FitProblem};
+use crate::forward_model::{ForwardModel, PATH_TERMS, ParameterPoint, Slot, SmoothTerm};
 use crate::optics::{Optic, PixelGrid};
 use crate::set::PerCapture;
 use crate::surrogate::Surrogate;
@@ -52,7 +52,7 @@ impl Term {
 pub struct LinearModel {
     terms: Vec<Term>,
     slots: Vec<Slot>,
-    beam: PerCapture<Beam>,
+    beam: PerCapture<CaptureSetup>,
 }
 
 /// Range and typical size of each parameter: amplitudes relative to the base image.
@@ -68,7 +68,7 @@ pub fn smooth_periods(term: usize) -> [u32; 2] {
 
 impl LinearModel {
     /// Effects `terms`, seen in captures that are lit and placed as `beam` says.
-    pub fn new(terms: Vec<Term>, beam: Vec<Beam>) -> Self {
+    pub fn new(terms: Vec<Term>, beam: Vec<CaptureSetup>) -> Self {
         let slots = (0..terms.len()).map(|effect| Slot {
             effect,
             index: 0,
@@ -93,7 +93,7 @@ impl LinearModel {
         let mut rng = ChaCha8Rng::seed_from_u64(noise.unwrap_or(0));
         let sigma = if noise.is_some() { SIGMA } else { 0.0 };
         let pixels = (0..self.beam.len()).map(|c| {
-            let image = self.image(&Point::new(theta(c))).pixels([0.0; 2]);
+            let image = self.image(&ParameterPoint::new(theta(c))).pixels([0.0; 2]);
             image.mapv(|v| (SCALE * f64::from(v) + sigma * normal(&mut rng)) as f32)
         });
         let signal: PerCapture<_> = pixels.collect::<Vec<_>>().into();
@@ -112,12 +112,12 @@ impl LinearModel {
     }
 
     /// The problem of some data.
-    pub fn problem<'a>(&'a self, data: &'a Data) -> Problem<'a> {
-        Problem::new(self, self.surrogate(), data)
+    pub fn problem<'a>(&'a self, data: &'a Data) -> FitProblem<'a> {
+        FitProblem::new(self, self.surrogate(), data)
     }
 
     /// Image of every capture at a point.
-    pub fn image(&self, point: &Point) -> PixelGrid {
+    pub fn image(&self, point: &ParameterPoint) -> PixelGrid {
         let mut waves = vec![([1, 0], BASE_CONTRAST), ([0, 1], BASE_CONTRAST)];
         for (term, theta) in self.terms.iter().zip(&point.theta) {
             let amplitude = (term.amplitude)(*theta);
@@ -165,12 +165,12 @@ pub fn information(periods: [u32; 2]) -> f64 {
 }
 
 /// Captures of so many LEDs, elements and distances, each combination once.
-pub fn beams(leds: usize, elements: usize, distances: usize) -> Vec<Beam> {
+pub fn beams(leds: usize, elements: usize, distances: usize) -> Vec<CaptureSetup> {
     let mut out = Vec::new();
     for led in 0..leds {
         for element in 0..elements {
             for distance in 0..distances {
-                out.push(Beam {
+                out.push(CaptureSetup {
                     element: element.into(),
                     led: led.into(),
                     aoi_rad: [0.0; 2],
@@ -199,7 +199,7 @@ impl ForwardModel for LinearModel {
         None
     }
 
-    fn images(&self, points: &[Point], _: &dyn Progress) -> Result<Vec<PerCapture<PixelGrid>>> {
+    fn images(&self, points: &[ParameterPoint], _: &dyn Progress) -> Result<Vec<PerCapture<PixelGrid>>> {
         let images = points.iter().map(|p| vec![self.image(p); self.beam.len()].into());
         Ok(images.collect())
     }

@@ -4,7 +4,7 @@ use metalith_core::{Progress, Result};
 
 use crate::departure::Departure;
 use crate::effects::{Stage, separate_by};
-use crate::forward_model::{ForwardModel, PATH_TERMS, Point, Slot, SmoothTerm, TRANSMISSION_TERMS};
+use crate::forward_model::{ForwardModel, PATH_TERMS, ParameterPoint, Slot, SmoothTerm, TRANSMISSION_TERMS};
 use crate::optics::PixelGrid;
 use crate::set::PerCapture;
 use crate::simulator::Simulator;
@@ -13,7 +13,7 @@ use crate::simulator::Simulator;
 const CELL_STEP: f64 = 1.0 / 16.0;
 
 impl Simulator<'_> {
-    fn departure_at(&self, point: &Point) -> Departure {
+    fn departure_at(&self, point: &ParameterPoint) -> Departure {
         let mut departure = self.departure(&point.theta);
         match point.smooth {
             None => {}
@@ -49,7 +49,7 @@ impl ForwardModel for Simulator<'_> {
         solved.then(|| CELL_STEP * slot.parameter.typical)
     }
 
-    fn images(&self, points: &[Point], progress: &dyn Progress) -> Result<Vec<PerCapture<PixelGrid>>> {
+    fn images(&self, points: &[ParameterPoint], progress: &dyn Progress) -> Result<Vec<PerCapture<PixelGrid>>> {
         let departures: Vec<_> = points.iter().map(|p| self.departure_at(p)).collect();
         let exposed = self.expose(&departures, progress)?;
         Ok(exposed.into_iter().map(PerCapture::from).collect())

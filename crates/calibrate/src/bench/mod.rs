@@ -13,7 +13,7 @@ pub use sites::legendre;
 
 use super::departure::Departure;
 use super::optics::{Optic, PixelGrid, Planes, Planned, Quadrature};
-use super::set::{Camera, CaptureIndex, ElementIndex, LedIndex, MeasuredSet, PerCapture, PerElement, PerLed};
+use super::set::{CaptureIndex, ElementIndex, LedIndex, MeasuredSet, PerCapture, PerElement, PerLed, RelayCamera};
 
 /// How finely a bench is sampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -213,7 +213,7 @@ impl<'a> Bench<'a> {
 }
 
 /// Mean intensity over the pixels of a window that stands in the middle of `n` x `n` samples.
-fn window_mean(intensity: &[f32], n: usize, samples_per_pixel: f64, camera: &Camera) -> f32 {
+fn window_mean(intensity: &[f32], n: usize, samples_per_pixel: f64, camera: &RelayCamera) -> f32 {
     let range = |pixels: usize| {
         let wide = ((pixels as f64 * samples_per_pixel).round() as usize).clamp(1, n);
         (n - wide) / 2..(n + wide) / 2

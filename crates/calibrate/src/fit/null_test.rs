@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use super::capture_equations::CaptureEquations;
 use super::cross_validation::{HeldOutErrors, SEED, held_out, mean_error};
 use super::normal_equations::NormalEquations;
-use super::problem::{Fit, Problem};
+use super::problem::{Fit, FitProblem};
 use crate::forward_model::PATH_TERMS;
 use crate::optics::PixelGrid;
 use crate::set::CaptureIndex;
@@ -18,7 +18,7 @@ const DRAWS: usize = 60;
 /// An effect must gain more than this percentage of them.
 const PERCENTILE: usize = 95;
 
-impl Problem<'_> {
+impl FitProblem<'_> {
     /// Normal equations with further columns after those of the active parameters; `more` gives the changes for
     /// a unit of each in a capture, from its predicted image.
     pub fn equations_with(
@@ -49,7 +49,7 @@ impl Problem<'_> {
 
 /// The gain on captures left out that 95 % of random smooth terms with so many parameters stay below; zero if
 /// no smooth terms were simulated.
-pub fn null_gain(problem: &Problem<'_>, now: &Fit, errors_now: &HeldOutErrors, parameters: usize) -> f64 {
+pub fn null_gain(problem: &FitProblem<'_>, now: &Fit, errors_now: &HeldOutErrors, parameters: usize) -> f64 {
     let mut gains = null_gains(problem, now, errors_now, parameters);
     if gains.is_empty() {
         return 0.0;
@@ -59,7 +59,12 @@ pub fn null_gain(problem: &Problem<'_>, now: &Fit, errors_now: &HeldOutErrors, p
 }
 
 /// The gain of each random term.
-pub(super) fn null_gains(problem: &Problem<'_>, now: &Fit, errors_now: &HeldOutErrors, parameters: usize) -> Vec<f64> {
+pub(super) fn null_gains(
+    problem: &FitProblem<'_>,
+    now: &Fit,
+    errors_now: &HeldOutErrors,
+    parameters: usize,
+) -> Vec<f64> {
     if !problem.surrogate.has_paths() {
         return Vec::new();
     }

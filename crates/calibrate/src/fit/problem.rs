@@ -8,7 +8,7 @@ use super::data::Data;
 use super::normal_equations::{NormalEquations, hold, minimise};
 use super::nuisances::Nuisances;
 use super::registration::whole_pixel_shift;
-use crate::forward_model::{ForwardModel, Point};
+use crate::forward_model::{ForwardModel, ParameterPoint};
 use crate::optics::PixelGrid;
 use crate::set::{CaptureIndex, PerCapture};
 use crate::surrogate::Surrogate;
@@ -30,7 +30,7 @@ const MOST_DAMPING: f64 = 1e6;
 
 /// A set of captures with a model of them.
 #[derive(Clone)]
-pub struct Problem<'a> {
+pub struct FitProblem<'a> {
     pub model: &'a dyn ForwardModel,
     pub surrogate: Surrogate,
     pub data: &'a Data,
@@ -69,7 +69,7 @@ impl Fit {
     }
 }
 
-impl<'a> Problem<'a> {
+impl<'a> FitProblem<'a> {
     /// All captures count, and the surrogate is used alone.
     pub fn new(model: &'a dyn ForwardModel, surrogate: Surrogate, data: &'a Data) -> Self {
         Self {
@@ -82,7 +82,7 @@ impl<'a> Problem<'a> {
     }
 }
 
-impl Problem<'_> {
+impl FitProblem<'_> {
     /// Number of shared nuisances: flux of each LED, and black level.
     pub fn shared(&self) -> usize {
         self.data.leds + 1
@@ -200,7 +200,10 @@ impl Problem<'_> {
     /// # Errors
     /// As [`ForwardModel::images`].
     pub fn correct_at(&mut self, theta: &[f64], progress: &dyn Progress) -> Result<()> {
-        let simulated = self.model.images(&[Point::new(theta.to_vec())], progress)?.remove(0);
+        let simulated = self
+            .model
+            .images(&[ParameterPoint::new(theta.to_vec())], progress)?
+            .remove(0);
         let interpolated = self.surrogate_images(theta);
         let pairs = simulated.iter().zip(&interpolated);
         let difference = pairs.map(|(s, i)| PixelGrid::combine(&[(s, 1.0), (i, -1.0)]));

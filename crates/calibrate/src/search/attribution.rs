@@ -7,7 +7,7 @@ use super::alternatives::{Alternative, alternatives, drop_redundant};
 use super::pairs::find_pair;
 use super::state::SearchState;
 use super::stepwise::{LEAST_GAIN, RESIDUAL, TriedEffect, step_forward};
-use crate::fit::{Fit, HeldOutErrors, Problem, half_widths, mean_error};
+use crate::fit::{Fit, FitProblem, HeldOutErrors, half_widths, mean_error};
 use crate::optics::PixelGrid;
 use crate::set::PerCapture;
 use crate::surrogate::Surrogate;
@@ -108,7 +108,7 @@ impl SearchHistory {
 /// # Errors
 /// If a simulation fails, or the user stopped it.
 pub fn attribute(
-    problem: Problem<'_>,
+    problem: FitProblem<'_>,
     full: bool,
     earlier: Option<&Finding>,
     progress: &dyn Progress,

@@ -2,7 +2,7 @@
 
 use metalith_core::{Progress, Result};
 
-use crate::fit::{Fit, Problem};
+use crate::fit::{Fit, FitProblem};
 use crate::optics::PixelGrid;
 
 /// Times that the surrogate is extended towards where a fit goes.
@@ -20,7 +20,7 @@ const CONVERGED: f64 = 2e-2;
 /// Room at the ends of a simulated range, relative to it: rounding.
 const ROUNDING: f64 = 1e-9;
 
-impl Problem<'_> {
+impl FitProblem<'_> {
     /// Whether a fit left the simulated range.
     pub fn extrapolates(&self, fit: &Fit) -> bool {
         fit.active.iter().any(|&s| self.is_beyond(s, fit.theta[s]))
@@ -77,7 +77,7 @@ impl Problem<'_> {
     /// Refine a fit with full simulations, at its parameters or close by, until it has converged.
     ///
     /// # Errors
-    /// As [`Problem::extend_and_fit`].
+    /// As [`FitProblem::extend_and_fit`].
     pub fn refine(&mut self, mut fit: Fit, progress: &dyn Progress) -> Result<Fit> {
         for _ in 0..FULL_SIMULATIONS {
             fit = self.extend_and_fit(fit, progress)?;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{NOTHING, Trial, Validation};
+use super::{NOTHING, Validation, ValidationTrial};
 use crate::page::round_json;
 use metalith_core::{Result, WholeFile};
 use metalith_report::{Axis, Cell, Column, HeatMap, ImageGrid, Matrix, Page, Table, Verdict, sig, write_json};
@@ -82,7 +82,7 @@ fn limits(page: &mut Page, validation: &Validation) {
     ])
     .caption("The smallest size from which on an effect was named, alone or as one of several alternatives; the estimated limit is the size at which its residual would reach the least gain of a claim.");
     for limit in &validation.limits {
-        let at = |t: &&Trial| t.truth == limit.name && Some(t.size) == limit.named_from;
+        let at = |t: &&ValidationTrial| t.truth == limit.name && Some(t.size) == limit.named_from;
         let first = validation.trials.iter().find(at);
         let unit = first.map_or("", |t| t.unit.as_str());
         table.row([
@@ -104,7 +104,7 @@ fn limits(page: &mut Page, validation: &Validation) {
 }
 
 fn off_list(page: &mut Page, validation: &Validation) {
-    let odd: Vec<&Trial> = validation.trials.iter().filter(|t| t.off_list).collect();
+    let odd: Vec<&ValidationTrial> = validation.trials.iter().filter(|t| t.off_list).collect();
     if odd.is_empty() {
         return;
     }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{NOTHING, Trial};
+use super::{NOTHING, ValidationTrial};
 use crate::diagnosis::SetVerdict;
 use crate::search::LEAST_GAIN;
 use metalith_report::sig;
@@ -31,7 +31,7 @@ pub struct Validation {
     /// Effects of one value that were named, and how many of their intervals include the true value.
     pub intervals: usize,
     pub intervals_inside: usize,
-    pub trials: Vec<Trial>,
+    pub trials: Vec<ValidationTrial>,
 }
 
 /// The size from which on an effect is found.
@@ -47,8 +47,8 @@ pub struct DetectionLimit {
 
 impl Validation {
     /// Summarise the trials.
-    pub(super) fn new(like: String, thresholds: &[Trial], trials: Vec<Trial>) -> Self {
-        let nulls: Vec<&Trial> = trials.iter().filter(|t| t.truth == NOTHING).collect();
+    pub(super) fn new(like: String, thresholds: &[ValidationTrial], trials: Vec<ValidationTrial>) -> Self {
+        let nulls: Vec<&ValidationTrial> = trials.iter().filter(|t| t.truth == NOTHING).collect();
         let mut truths: Vec<String> = Vec::new();
         for t in &trials {
             if !truths.contains(&t.truth) {
@@ -69,7 +69,7 @@ impl Validation {
         let confusion = truths
             .iter()
             .map(|truth| {
-                let own: Vec<&Trial> = trials.iter().filter(|t| t.truth == *truth).collect();
+                let own: Vec<&ValidationTrial> = trials.iter().filter(|t| t.truth == *truth).collect();
                 let shares = claimed.iter().map(|column| {
                     let sum: f64 = own.iter().map(|t| t.share(column)).sum();
                     sum / own.len() as f64
@@ -131,7 +131,7 @@ impl Validation {
     }
 }
 
-impl Trial {
+impl ValidationTrial {
     /// The verdict as it is written in JSON.
     pub fn verdict_name(&self) -> String {
         let value = serde_json::to_value(self.verdict).ok();
@@ -154,8 +154,8 @@ impl Trial {
 }
 
 impl DetectionLimit {
-    fn new(name: &str, trials: &[Trial]) -> Self {
-        let own: Vec<&Trial> = trials.iter().filter(|t| t.truth == name).collect();
+    fn new(name: &str, trials: &[ValidationTrial]) -> Self {
+        let own: Vec<&ValidationTrial> = trials.iter().filter(|t| t.truth == name).collect();
         let named_from = own.iter().rev().take_while(|t| t.named).last().map(|t| t.size);
         let estimate = own.first().and_then(|t| {
             let above = t.held_out_before - 1.0;
