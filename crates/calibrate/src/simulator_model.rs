@@ -45,8 +45,8 @@ impl ForwardModel for Simulator<'_> {
 
     fn cheap_step(&self, slot: usize) -> Option<f64> {
         let slot = &self.slots[slot];
-        let solved = self.effects[slot.effect].stage() == Stage::Stack;
-        solved.then(|| CELL_STEP * slot.parameter.typical)
+        let is_solved = self.effects[slot.effect].stage() == Stage::Stack;
+        is_solved.then_some(CELL_STEP * slot.parameter.typical)
     }
 
     fn images(&self, points: &[ParameterPoint], progress: &dyn Progress) -> Result<Vec<PerCapture<PixelGrid>>> {

@@ -1,10 +1,12 @@
 //! Measured sets: all faults are named at once, effects are found, and nothing is found where there is none.
 
 use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use metalith_calibrate::{
-    Diagnosis, MeasuredSet, Sampling, Session, SetVerdict, Settings, Synthesizer, UnlistedEffect, ValidationPlan,
-    calibrate, validate,
+    Diagnosis, MeasuredSet, Sampling, Session, SetVerdict, Settings, Simulations, Synthesizer, UnlistedEffect,
+    ValidationPlan, calibrate, validate,
 };
 use metalith_core::Silent;
 use metalith_testing::session::{PIXELS, small_set, write_npy};
@@ -49,16 +51,41 @@ fn every_fault_of_a_set_is_named_in_one_go() {
     }
 }
 
+/// The small set on disk, and a folder for tables of cells: every test would solve the same ones. Both are emptied
+/// by the first test that needs them, so that no run depends on another.
+static FOLDERS: LazyLock<[PathBuf; 2]> = LazyLock::new(|| {
+    ["small-set", "cells"].map(|name| {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("calibrate").join(name);
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(&folder).unwrap();
+        folder
+    })
+});
+
+static LIKE: LazyLock<MeasuredSet> = LazyLock::new(|| {
+    let [folder, _] = &*FOLDERS;
+    small_set(folder);
+    MeasuredSet::read(folder, &Silent).unwrap()
+});
+
+/// With some of the effects whose cells need not be solved again.
+static SIMULATIONS: LazyLock<Simulations> =
+    LazyLock::new(|| Session::new(&LIKE, settings()).unwrap().simulate(&Silent).unwrap());
+
+static SYNTHESIZER: LazyLock<Synthesizer<'static>> = LazyLock::new(|| Synthesizer::new(&LIKE, &settings()).unwrap());
+
 fn settings() -> Settings {
+    with_effects(&["cd_bias", "gap", "tilt", "led_width", "zero_order", "pixel_blur"])
+}
+
+fn with_effects(names: &[&str]) -> Settings {
     Settings {
         sampling: Sampling {
             spectrum: 0.34,
             ..Sampling::default()
         },
-        // Effects whose cells need not be solved again.
-        only: ["cd_bias", "gap", "tilt", "led_width", "zero_order", "pixel_blur"]
-            .map(String::from)
-            .to_vec(),
+        cache: Some(FOLDERS[1].clone()),
+        only: names.iter().map(|n| (*n).into()).collect(),
         ladder: false,
         exact: true,
         ..Settings::default()
@@ -70,15 +97,10 @@ fn effects_are_found_and_nothing_is_found_where_nothing_is() {
     /// Reduced chi-square per pixel that may be left: synthetic sets have another sampling and other orders than
     /// fits, which a coarse spectrum does not average out.
     const EXPLAINED: f64 = 1.3;
-    let folder = tempfile::tempdir().unwrap();
-    small_set(folder.path());
-    let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
-    let session = Session::new(&like, settings()).unwrap();
-    let simulations = session.simulate(&Silent).unwrap();
-    let synthesizer = Synthesizer::new(&like, &settings()).unwrap();
+    let synthesizer = &*SYNTHESIZER;
     let diagnose = |set: &MeasuredSet| {
         let session = Session::new(set, settings()).unwrap();
-        session.diagnose(&simulations, &Silent).unwrap().0
+        session.diagnose(&SIMULATIONS, &Silent).unwrap().0
     };
     let nothing = synthesizer.with_effect("", &[], &Silent).unwrap();
     for seed in 1..=3 {
@@ -115,17 +137,10 @@ fn effects_are_found_and_nothing_is_found_where_nothing_is() {
     assert!(d.left_out.len() >= 5);
 }
 
-/// The diagnosis of a small chip with some effects.
-fn diagnosed(parts: &[(&str, &[f64])], settings: Settings, seed: u64) -> Diagnosis {
-    let folder = tempfile::tempdir().unwrap();
-    small_set(folder.path());
-    let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
-    let synthesizer = Synthesizer::new(&like, &settings).unwrap();
-    let images = synthesizer.with_effects(&[parts.to_vec()], &Silent).unwrap().remove(0);
-    let set = synthesizer.draw(&images, seed);
-    let session = Session::new(&set, settings).unwrap();
-    let simulations = session.simulate(&Silent).unwrap();
-    session.diagnose(&simulations, &Silent).unwrap().0
+/// A set like the small one with some effects.
+fn synthetic(parts: &[(&str, &[f64])], seed: u64) -> MeasuredSet {
+    let images = SYNTHESIZER.with_effects(&[parts.to_vec()], &Silent).unwrap().remove(0);
+    SYNTHESIZER.draw(&images, seed)
 }
 
 /// The names of what was found, in order of the alphabet.
@@ -137,7 +152,9 @@ fn names(d: &Diagnosis) -> Vec<&str> {
 
 #[test]
 fn two_effects_at_once_are_both_found() {
-    let d = diagnosed(&[("cd_bias", &[6.0]), ("gap", &[-4.0])], settings(), 21);
+    let set = synthetic(&[("cd_bias", &[6.0]), ("gap", &[-4.0])], 21);
+    let session = Session::new(&set, settings()).unwrap();
+    let d = session.diagnose(&SIMULATIONS, &Silent).unwrap().0;
     assert_eq!(names(&d), ["cd_bias", "gap"], "{}", d.sentence());
     assert_eq!(d.verdict, SetVerdict::Explained);
 }
@@ -149,17 +166,11 @@ fn a_pair_is_found_where_neither_of_the_two_helps() {
     /// Relative: two colours of a coarse spectrum, and synthetic sets have another sampling.
     const TOLERANCE: f64 = 0.08;
     let truth = [("cd_bias", -12.0), ("film_index", 0.06)];
-    let settings = Settings {
-        only: ["cd_bias", "film_index", "zero_order", "gap"]
-            .map(String::from)
-            .to_vec(),
-        ..settings()
-    };
-    let d = diagnosed(
-        &truth.each_ref().map(|(n, v)| (*n, std::slice::from_ref(v))),
-        settings,
-        22,
-    );
+    let parts = truth.each_ref().map(|(n, v)| (*n, std::slice::from_ref(v)));
+    let set = synthetic(&parts, 22);
+    let session = Session::new(&set, with_effects(&["cd_bias", "film_index", "zero_order", "gap"])).unwrap();
+    let simulations = session.simulate(&Silent).unwrap();
+    let d = session.diagnose(&simulations, &Silent).unwrap().0;
     assert_eq!(names(&d), ["cd_bias", "film_index"], "{}", d.sentence());
     assert_eq!(d.verdict, SetVerdict::Explained);
     let mut gains = Vec::new();
@@ -180,23 +191,12 @@ fn missing_pillars_are_found_by_their_mean_and_by_their_speckle() {
     const SHARE: f64 = 0.04;
     /// Relative: a lens of 60 um in eight captures has few speckles, and its mean is seen through them.
     const TOLERANCE: f64 = 0.25;
-    let folder = tempfile::tempdir().unwrap();
-    small_set(folder.path());
-    let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
-    let settings = Settings {
-        only: ["missing_pillars", "zero_order", "stray_light", "gap"]
-            .map(String::from)
-            .to_vec(),
-        ..settings()
-    };
-    let synthesizer = Synthesizer::new(&like, &settings).unwrap();
-    let images = synthesizer.with_effect("missing_pillars", &[SHARE], &Silent).unwrap();
-    let set = synthesizer.draw(&images, 31);
+    let set = synthetic(&[("missing_pillars", &[SHARE])], 31);
+    let settings = with_effects(&["missing_pillars", "zero_order", "stray_light", "gap"]);
     let session = Session::new(&set, settings).unwrap();
     let simulations = session.simulate(&Silent).unwrap();
     let d = session.diagnose(&simulations, &Silent).unwrap().0;
-    let found: Vec<&str> = d.effects.iter().map(|e| e.name.as_str()).collect();
-    assert_eq!(found, ["missing_pillars"], "{} {:?}", d.sentence(), d.error);
+    assert_eq!(names(&d), ["missing_pillars"], "{} {:?}", d.sentence(), d.error);
     assert_eq!(d.verdict, SetVerdict::Explained);
     let by_mean = d.effects[0].value.as_f64().unwrap();
     let by_speckle = d.missing_by_grain.unwrap();
@@ -208,16 +208,13 @@ fn missing_pillars_are_found_by_their_mean_and_by_their_speckle() {
 
 #[test]
 fn a_validation_counts_claims() {
-    let folder = tempfile::tempdir().unwrap();
-    small_set(folder.path());
-    let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
     let plan = ValidationPlan {
         nulls: 3,
         threshold_nulls: 1,
         effects: vec!["gap".into()],
         off_list: false,
     };
-    let validation = validate(&like, &settings(), &plan, &Silent).unwrap();
+    let validation = validate(&LIKE, &settings(), &plan, &Silent).unwrap();
     assert_eq!(
         (validation.nulls, validation.false_claims, validation.trials.len()),
         (3, 0, 6)
@@ -233,24 +230,19 @@ fn a_validation_counts_claims() {
 
 #[test]
 fn unknown_effects_are_refused_all_at_once() {
-    let folder = tempfile::tempdir().unwrap();
-    small_set(folder.path());
-    let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
     let wrong = ["cd_bais", "gap", "wavefront"].map(String::from).to_vec();
     let settings = Settings {
         only: wrong.clone(),
         ..settings()
     };
-    let by_session = Session::new(&like, settings.clone()).err().unwrap();
+    let by_session = Session::new(&LIKE, settings.clone()).err().unwrap();
     let plan = ValidationPlan {
         effects: wrong,
         ..ValidationPlan::default()
     };
-    let outs = [folder.path().join("out")];
-    let by_run = calibrate(&[folder.path().to_owned()], &outs, &settings, &Silent)
-        .err()
-        .unwrap();
-    let by_validation = validate(&like, &self::settings(), &plan, &Silent).err().unwrap();
+    let outs = [FOLDERS[0].join("out")];
+    let by_run = calibrate(&FOLDERS[..1], &outs, &settings, &Silent).err().unwrap();
+    let by_validation = validate(&LIKE, &self::settings(), &plan, &Silent).err().unwrap();
     for error in [by_session, by_run, by_validation] {
         assert_eq!(error.exit_code(), 2);
         let text = error.to_string();
