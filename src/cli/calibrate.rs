@@ -9,19 +9,19 @@ use metalith::calibrate::{
 };
 use metalith::cell::cache_folder;
 
-use super::{Outcome, Terminal, print_line};
+use super::{Outcome, Terminal, print_json, print_line};
 
-/// Find what a measured set tells that the model does not know.
+/// Find the effects by which a measured set differs from its model.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  metalith calibrate bench/session-1 --out out/session-1\n\nWrites diagnosis.json, report.html and model.toml. Exit code 1 if too few captures can be used."
 )]
 pub struct CalibrateArgs {
-    /// Folders of sets, or their `measurement.toml`. Sessions planned alike share their simulations.
+    /// Folders of sets, or their `measurement.toml`. Sessions of one plan share their simulations.
     #[arg(required = true)]
     sets: Vec<PathBuf>,
 
-    /// Folder for the answers, created if need be, with one folder a set if there are several;
+    /// Folder for the answers, created if need be, one folder for each set if there are several;
     /// `out/calibrate/` and the set's name if left out.
     #[arg(long, short, value_name = "FOLDER")]
     out: Option<PathBuf>,
@@ -30,13 +30,14 @@ pub struct CalibrateArgs {
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     effects: Vec<String>,
 
-    /// Judge the calibration itself instead: twins of this set with nothing, with each effect at three sizes,
-    /// and with effects in no list. Takes half an hour; writes proof.html, proof.json and proof.txt.
-    #[arg(long)]
-    proof: bool,
+    /// Validate the calibration itself instead, on synthetic sets like this one: without effects, with each
+    /// effect at three sizes, with pairs, and with effects that are not listed. Takes half an hour; writes
+    /// validation.html, validation.json and validation.txt.
+    #[arg(long, alias = "proof")]
+    validate: bool,
 
-    /// Synthesizer without effect that the proof judges.
-    #[arg(long, value_name = "N", default_value_t = 60, requires = "proof")]
+    /// Synthetic sets without effect in the validation.
+    #[arg(long, value_name = "N", default_value_t = 60, requires = "validate")]
     nulls: u64,
 
     /// Print the diagnosis as JSON.
@@ -65,25 +66,29 @@ pub fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> {
     };
     let settings = Settings {
         cache: cache_folder(),
-        // A proof makes twins with some effects, but always tries all of them.
-        only: if args.proof { Vec::new() } else { args.effects.clone() },
+        // A validation makes sets with some effects, but always tries all of them.
+        only: if args.validate {
+            Vec::new()
+        } else {
+            args.effects.clone()
+        },
         ..Settings::default()
     };
-    if args.proof {
+    if args.validate {
         let (set, out) = (MeasuredSet::read(&args.sets[0], terminal)?, &outs[0]);
-        let extent = ValidationPlan {
+        let plan = ValidationPlan {
             nulls: args.nulls,
             effects: args.effects.clone(),
             ..ValidationPlan::default()
         };
-        let proof = validate(&set, &settings, &extent, terminal)?;
-        write_validation(out, &proof)?;
+        let validation = validate(&set, &settings, &plan, terminal)?;
+        write_validation(out, &validation)?;
         terminal.clear();
         if args.json {
-            print_line!("{}", serde_json::to_string_pretty(&proof).unwrap_or_default());
+            print_json(&validation);
         } else {
-            print_line!("{}", proof.text().trim_end());
-            print_line!("{}", out.join("proof.html").display());
+            print_line!("{}", validation.text().trim_end());
+            print_line!("{}", out.join("validation.html").display());
         }
         return Ok(Outcome::Fine);
     }
@@ -106,7 +111,7 @@ fn describe(done: &Calibration) {
     let error = &done.diagnosis.error;
     print_line!("{}: {}", done.diagnosis.set, done.diagnosis.sentence());
     print_line!(
-        "{} on captures left out: {:.4} before, {:.4} after; 1 is noise alone",
+        "{} on captures left out: {:.4} before, {:.4} after; noise alone gives 1",
         error.measure,
         error.before.held_out,
         error.after.held_out

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::bench::{Bench, Sampling};
 use crate::cells::CellSource;
-use crate::fit::{Problem, held_out, mean_error};
+use crate::fit::{FitProblem, held_out, mean_error};
 use crate::set::{MeasuredSet, PerCapture};
 use crate::simulator::Simulator;
 use crate::surrogate::Surrogate;
@@ -33,7 +33,7 @@ pub struct Rung {
 pub fn compare_fidelities(
     set: &MeasuredSet,
     sampling: Sampling,
-    problem: &Problem<'_>,
+    problem: &FitProblem<'_>,
     progress: &dyn Progress,
 ) -> Result<Vec<Rung>> {
     let bench = Bench::new(set, sampling);
@@ -53,7 +53,7 @@ pub fn compare_fidelities(
     for (name, cells) in [("published", published), ("fitted", fitted)] {
         let simulator = Simulator::new(Bench::new(set, sampling), cells, Vec::new());
         let images = simulator.expose(&[Perturbation::default()], progress)?.remove(0);
-        let of_model = Problem {
+        let of_model = FitProblem {
             model: &simulator,
             surrogate: Surrogate::constant(images.into()),
             ..problem.clone()
@@ -64,7 +64,7 @@ pub fn compare_fidelities(
     Ok(rungs)
 }
 
-fn rung(name: &str, problem: &Problem<'_>) -> Rung {
+fn rung(name: &str, problem: &FitProblem<'_>) -> Rung {
     let fit = problem.nuisance_fit();
     let residual = |c| {
         let image = problem.image(&fit.theta, c);

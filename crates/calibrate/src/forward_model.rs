@@ -54,14 +54,14 @@ impl SmoothTerm {
 
 /// Where a forward model is evaluated.
 #[derive(Clone, Debug)]
-pub struct Point {
+pub struct ParameterPoint {
     /// Value of each parameter, by slot.
     pub theta: Vec<f64>,
     /// A smooth term that is added at its [`SmoothTerm::step`].
     pub smooth: Option<SmoothTerm>,
 }
 
-impl Point {
+impl ParameterPoint {
     /// Without a smooth term.
     pub fn new(theta: Vec<f64>) -> Self {
         Self { theta, smooth: None }
@@ -96,7 +96,7 @@ pub trait ForwardModel: Send + Sync {
     ///
     /// # Errors
     /// If a simulation fails, or the user stopped it.
-    fn images(&self, points: &[Point], progress: &dyn Progress) -> Result<Vec<PerCapture<PixelGrid>>>;
+    fn images(&self, points: &[ParameterPoint], progress: &dyn Progress) -> Result<Vec<PerCapture<PixelGrid>>>;
 
     /// What the parameters add to the width at each site that was measured by SEM [nm]; none for sites that
     /// are on no lattice.

@@ -23,6 +23,8 @@ mod effects;
 mod fidelity;
 mod fit;
 mod forward_model;
+#[cfg(test)]
+mod linear_model;
 mod names;
 mod optics;
 mod page;
@@ -42,7 +44,7 @@ pub use effects::{Effect, Parameter, Stage, all as all_effects};
 pub use fidelity::Rung;
 pub use run::{Calibration, calibrate};
 pub use session::{Screening, Session, Settings, Simulations};
-pub use set::{Camera, Capture, Led, MeasuredElement, MeasuredSet, SemSite, Stack};
+pub use set::{Capture, Led, MeasuredElement, MeasuredSet, RelayCamera, SemSite, Stack};
 pub use set::{CaptureIndex, ElementIndex, LedIndex, PerCapture, PerElement, PerLed};
 pub use validate::synthetic::{Synthesizer, SyntheticImages, UnlistedEffect};
-pub use validate::{DetectionLimit, Trial, Validation, ValidationPlan, validate, write_validation};
+pub use validate::{DetectionLimit, Validation, ValidationPlan, ValidationTrial, validate, write_validation};

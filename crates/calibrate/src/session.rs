@@ -10,7 +10,7 @@ use crate::cells::{CellSource, RigorousCells};
 use crate::diagnosis::Diagnosis;
 use crate::effects::{self, Effect};
 use crate::fidelity::compare_fidelities;
-use crate::fit::{Data, Fit, Problem};
+use crate::fit::{Data, Fit, FitProblem};
 use crate::names::unknown_names;
 use crate::search::{DefectNoise, Evidence, UnusableCapture, attribute_set, unusable_captures};
 use crate::set::{MeasuredSet, PerCapture};
@@ -124,8 +124,8 @@ impl<'a> Session<'a> {
     }
 
     /// The set as stated, all captures counted.
-    pub fn problem(&self, simulations: &Simulations) -> Problem<'_> {
-        Problem::new(&self.simulator, simulations.surrogate.clone(), &self.data)
+    pub fn problem(&self, simulations: &Simulations) -> FitProblem<'_> {
+        FitProblem::new(&self.simulator, simulations.surrogate.clone(), &self.data)
     }
 
     /// Find the captures that cannot be used.
@@ -180,8 +180,8 @@ impl<'a> Session<'a> {
         Ok((diagnosis, Some(evidence)))
     }
 
-    fn screened(&self, simulations: &Simulations, screening: &Screening) -> Problem<'_> {
-        Problem {
+    fn screened(&self, simulations: &Simulations, screening: &Screening) -> FitProblem<'_> {
+        FitProblem {
             used: screening.used.clone(),
             ..self.problem(simulations)
         }

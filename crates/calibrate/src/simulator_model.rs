@@ -3,7 +3,7 @@
 use metalith_core::{Progress, Result};
 
 use crate::effects::{Stage, separate_by};
-use crate::forward_model::{ForwardModel, PATH_TERMS, Point, Slot, SmoothTerm, TRANSMISSION_TERMS};
+use crate::forward_model::{ForwardModel, PATH_TERMS, ParameterPoint, Slot, SmoothTerm, TRANSMISSION_TERMS};
 use crate::optics::PixelGrid;
 use crate::set::PerCapture;
 use crate::simulator::Simulator;
@@ -13,7 +13,7 @@ use metalith_made::Perturbation;
 const CELL_STEP: f64 = 1.0 / 16.0;
 
 impl Simulator<'_> {
-    fn departure_at(&self, point: &Point) -> Perturbation {
+    fn perturbation_at(&self, point: &ParameterPoint) -> Perturbation {
         let mut perturbation = self.perturbation(&point.theta);
         match point.smooth {
             None => {}
@@ -45,12 +45,12 @@ impl ForwardModel for Simulator<'_> {
 
     fn cheap_step(&self, slot: usize) -> Option<f64> {
         let slot = &self.slots[slot];
-        let solved = self.effects[slot.effect].stage() == Stage::Stack;
-        solved.then(|| CELL_STEP * slot.parameter.typical)
+        let is_solved = self.effects[slot.effect].stage() == Stage::Stack;
+        is_solved.then_some(CELL_STEP * slot.parameter.typical)
     }
 
-    fn images(&self, points: &[Point], progress: &dyn Progress) -> Result<Vec<PerCapture<PixelGrid>>> {
-        let perturbations: Vec<_> = points.iter().map(|p| self.departure_at(p)).collect();
+    fn images(&self, points: &[ParameterPoint], progress: &dyn Progress) -> Result<Vec<PerCapture<PixelGrid>>> {
+        let perturbations: Vec<_> = points.iter().map(|p| self.perturbation_at(p)).collect();
         let exposed = self.expose(&perturbations, progress)?;
         Ok(exposed.into_iter().map(PerCapture::from).collect())
     }

@@ -2,7 +2,7 @@
 
 use ndarray::Array2;
 
-use crate::fit::{Fit, Problem, covariance, minimise};
+use crate::fit::{Fit, FitProblem, covariance, minimise};
 use crate::forward_model::{PATH_TERMS, TRANSMISSION_TERMS};
 use crate::simulator::Simulator;
 use metalith_made::legendre;
@@ -38,7 +38,7 @@ pub struct SmoothResidual {
 
 impl SmoothResidual {
     /// Fit the shapes to what a fit leaves; none if the surrogate has no smooth terms.
-    pub fn new(simulator: &Simulator<'_>, problem: &Problem<'_>, fit: &Fit) -> Option<Self> {
+    pub fn new(simulator: &Simulator<'_>, problem: &FitProblem<'_>, fit: &Fit) -> Option<Self> {
         let leds = problem.data.leds;
         let surrogate = &problem.surrogate;
         let simulated = surrogate.smooth_terms();

@@ -1,10 +1,12 @@
-//! Measured sets: what cannot be read is named in one go, what differs is found, what does not is not.
+//! Measured sets: all faults are named at once, effects are found, and nothing is found where there is none.
 
 use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use metalith_calibrate::{
-    Diagnosis, MeasuredSet, Sampling, Session, SetVerdict, Settings, Synthesizer, UnlistedEffect, ValidationPlan,
-    validate,
+    Diagnosis, MeasuredSet, Sampling, Session, SetVerdict, Settings, Simulations, Synthesizer, UnlistedEffect,
+    ValidationPlan, calibrate, validate,
 };
 use metalith_core::Silent;
 use metalith_testing::session::{PIXELS, small_set, write_npy};
@@ -49,16 +51,41 @@ fn every_fault_of_a_set_is_named_in_one_go() {
     }
 }
 
+/// The small set on disk, and a folder for tables of cells: every test would solve the same ones. Both are emptied
+/// by the first test that needs them, so that no run depends on another.
+static FOLDERS: LazyLock<[PathBuf; 2]> = LazyLock::new(|| {
+    ["small-set", "cells"].map(|name| {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("calibrate").join(name);
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(&folder).unwrap();
+        folder
+    })
+});
+
+static LIKE: LazyLock<MeasuredSet> = LazyLock::new(|| {
+    let [folder, _] = &*FOLDERS;
+    small_set(folder);
+    MeasuredSet::read(folder, &Silent).unwrap()
+});
+
+/// With some of the effects whose cells need not be solved again.
+static SIMULATIONS: LazyLock<Simulations> =
+    LazyLock::new(|| Session::new(&LIKE, settings()).unwrap().simulate(&Silent).unwrap());
+
+static SYNTHESIZER: LazyLock<Synthesizer<'static>> = LazyLock::new(|| Synthesizer::new(&LIKE, &settings()).unwrap());
+
 fn settings() -> Settings {
+    with_effects(&["cd_bias", "gap", "tilt", "led_width", "zero_order", "pixel_blur"])
+}
+
+fn with_effects(names: &[&str]) -> Settings {
     Settings {
         sampling: Sampling {
             spectrum: 0.34,
             ..Sampling::default()
         },
-        // Those whose cells need not be solved again.
-        only: ["cd_bias", "gap", "tilt", "led_width", "zero_order", "pixel_blur"]
-            .map(String::from)
-            .to_vec(),
+        cache: Some(FOLDERS[1].clone()),
+        only: names.iter().map(|n| (*n).into()).collect(),
         ladder: false,
         exact: true,
         ..Settings::default()
@@ -67,15 +94,13 @@ fn settings() -> Settings {
 
 #[test]
 fn effects_are_found_and_nothing_is_found_where_nothing_is() {
-    let folder = tempfile::tempdir().unwrap();
-    small_set(folder.path());
-    let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
-    let session = Session::new(&like, settings()).unwrap();
-    let simulations = session.simulate(&Silent).unwrap();
-    let synthesizer = Synthesizer::new(&like, &settings()).unwrap();
+    /// Reduced chi-square per pixel that may be left: synthetic sets have another sampling and other orders than
+    /// fits, which a coarse spectrum does not average out.
+    const EXPLAINED: f64 = 1.3;
+    let synthesizer = &*SYNTHESIZER;
     let diagnose = |set: &MeasuredSet| {
         let session = Session::new(set, settings()).unwrap();
-        session.diagnose(&simulations, &Silent).unwrap().0
+        session.diagnose(&SIMULATIONS, &Silent).unwrap().0
     };
     let nothing = synthesizer.with_effect("", &[], &Silent).unwrap();
     for seed in 1..=3 {
@@ -84,25 +109,25 @@ fn effects_are_found_and_nothing_is_found_where_nothing_is() {
         assert!(d.effects.is_empty());
     }
     for (name, number) in [("cd_bias", -8.0), ("gap", 5.0)] {
-        let exposed = synthesizer.with_effect(name, &[number], &Silent).unwrap();
-        let d = diagnose(&synthesizer.draw(&exposed, 11));
+        let images = synthesizer.with_effect(name, &[number], &Silent).unwrap();
+        let d = diagnose(&synthesizer.draw(&images, 11));
         let found = d.effects.iter().find(|e| e.name == name);
         let found = found.unwrap_or_else(|| panic!("{name}: {} {:?}", d.sentence(), d.error));
         let ends: Vec<f64> = serde_json::from_value(found.interval.clone()).unwrap();
         assert!((ends[0]..=ends[1]).contains(&number), "{name}: {ends:?}");
-        assert!(d.error.after.held_out < 1.3 && d.error.before.held_out > d.error.after.held_out);
+        assert!(d.error.after.held_out < EXPLAINED && d.error.before.held_out > d.error.after.held_out);
     }
-    // In no list: whatever is said, it is not said that a known effect explains it.
-    let exposed = synthesizer
+    // An effect that is not listed: no known effect may be said to explain it.
+    let images = synthesizer
         .off_list(UnlistedEffect::Ghost(0.1, [4.0, -3.0]), &Silent)
         .unwrap();
-    let d = diagnose(&synthesizer.draw(&exposed, 12));
+    let d = diagnose(&synthesizer.draw(&images, 12));
     assert!(
         matches!(d.verdict, SetVerdict::Unexplained | SetVerdict::Partly),
         "{}",
         d.sentence()
     );
-    // Frames that were lost: the set is mostly unfit, and says which.
+    // Lost frames: the verdict is `data_unfit`, and the captures are named.
     let mut dark = synthesizer.draw(&nothing, 13);
     for capture in dark.captures.iter_mut().take(5) {
         capture.dn.fill(40.0);
@@ -112,17 +137,10 @@ fn effects_are_found_and_nothing_is_found_where_nothing_is() {
     assert!(d.left_out.len() >= 5);
 }
 
-/// What is said of a small chip with some effects.
-fn diagnosed(parts: &[(&str, &[f64])], settings: Settings, seed: u64) -> Diagnosis {
-    let folder = tempfile::tempdir().unwrap();
-    small_set(folder.path());
-    let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
-    let synthesizer = Synthesizer::new(&like, &settings).unwrap();
-    let exposed = synthesizer.with_effects(&[parts.to_vec()], &Silent).unwrap().remove(0);
-    let set = synthesizer.draw(&exposed, seed);
-    let session = Session::new(&set, settings).unwrap();
-    let simulations = session.simulate(&Silent).unwrap();
-    session.diagnose(&simulations, &Silent).unwrap().0
+/// A set like the small one with some effects.
+fn synthetic(parts: &[(&str, &[f64])], seed: u64) -> MeasuredSet {
+    let images = SYNTHESIZER.with_effects(&[parts.to_vec()], &Silent).unwrap().remove(0);
+    SYNTHESIZER.draw(&images, seed)
 }
 
 /// The names of what was found, in order of the alphabet.
@@ -134,25 +152,25 @@ fn names(d: &Diagnosis) -> Vec<&str> {
 
 #[test]
 fn two_effects_at_once_are_both_found() {
-    let d = diagnosed(&[("cd_bias", &[6.0]), ("gap", &[-4.0])], settings(), 21);
+    let set = synthetic(&[("cd_bias", &[6.0]), ("gap", &[-4.0])], 21);
+    let session = Session::new(&set, settings()).unwrap();
+    let d = session.diagnose(&SIMULATIONS, &Silent).unwrap().0;
     assert_eq!(names(&d), ["cd_bias", "gap"], "{}", d.sentence());
     assert_eq!(d.verdict, SetVerdict::Explained);
 }
 
-/// A bias and another index pull the phase of blue and green their own ways: a fit of either alone fails on captures
+/// A bias and another index change the phase of blue and green differently: a fit of either alone fails on captures
 /// left out.
 #[test]
 fn a_pair_is_found_where_neither_of_the_two_helps() {
-    /// Two colours of a coarse spectrum through lenses of 60 um; twins have another sampling.
+    /// Relative: two colours of a coarse spectrum, and synthetic sets have another sampling.
     const TOLERANCE: f64 = 0.08;
     let truth = [("cd_bias", -12.0), ("film_index", 0.06)];
-    let settings = Settings {
-        only: ["cd_bias", "film_index", "zero_order", "gap"]
-            .map(String::from)
-            .to_vec(),
-        ..settings()
-    };
-    let d = diagnosed(&[("cd_bias", &[-12.0]), ("film_index", &[0.06])], settings, 22);
+    let parts = truth.each_ref().map(|(n, v)| (*n, std::slice::from_ref(v)));
+    let set = synthetic(&parts, 22);
+    let session = Session::new(&set, with_effects(&["cd_bias", "film_index", "zero_order", "gap"])).unwrap();
+    let simulations = session.simulate(&Silent).unwrap();
+    let d = session.diagnose(&simulations, &Silent).unwrap().0;
     assert_eq!(names(&d), ["cd_bias", "film_index"], "{}", d.sentence());
     assert_eq!(d.verdict, SetVerdict::Explained);
     let mut gains = Vec::new();
@@ -166,53 +184,72 @@ fn a_pair_is_found_where_neither_of_the_two_helps() {
     assert_eq!(gains[0], gains[1]);
 }
 
-/// Single pillars that are gone make a grain that no fit predicts: it is counted as noise, and speaks of the same
-/// share as their mean.
+/// Missing pillars make a speckle that no fit predicts: it is counted as noise, and gives the same share as their
+/// mean.
 #[test]
-fn missing_pillars_are_told_by_their_mean_and_by_their_grain() {
+fn missing_pillars_are_found_by_their_mean_and_by_their_speckle() {
     const SHARE: f64 = 0.04;
-    /// Relative: a lens of 60 um in eight captures has few grains, and its mean is seen through them.
+    /// Relative: a lens of 60 um in eight captures has few speckles, and its mean is seen through them.
     const TOLERANCE: f64 = 0.25;
-    let folder = tempfile::tempdir().unwrap();
-    small_set(folder.path());
-    let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
-    let settings = Settings {
-        only: ["missing_pillars", "zero_order", "stray_light", "gap"]
-            .map(String::from)
-            .to_vec(),
-        ..settings()
-    };
-    let synthesizer = Synthesizer::new(&like, &settings).unwrap();
-    let exposed = synthesizer.with_effect("missing_pillars", &[SHARE], &Silent).unwrap();
-    let set = synthesizer.draw(&exposed, 31);
+    let set = synthetic(&[("missing_pillars", &[SHARE])], 31);
+    let settings = with_effects(&["missing_pillars", "zero_order", "stray_light", "gap"]);
     let session = Session::new(&set, settings).unwrap();
     let simulations = session.simulate(&Silent).unwrap();
     let d = session.diagnose(&simulations, &Silent).unwrap().0;
-    let found: Vec<&str> = d.effects.iter().map(|e| e.name.as_str()).collect();
-    assert_eq!(found, ["missing_pillars"], "{} {:?}", d.sentence(), d.error);
+    assert_eq!(names(&d), ["missing_pillars"], "{} {:?}", d.sentence(), d.error);
     assert_eq!(d.verdict, SetVerdict::Explained);
     let by_mean = d.effects[0].value.as_f64().unwrap();
-    let by_grain = d.missing_by_grain.unwrap();
+    let by_speckle = d.missing_by_grain.unwrap();
     assert_eq!(d.effects[0].holds(SHARE), Some(true), "{}", d.sentence());
-    for found in [by_mean, by_grain] {
-        assert!((found / SHARE - 1.0).abs() < TOLERANCE, "{by_mean} {by_grain}");
+    for found in [by_mean, by_speckle] {
+        assert!((found / SHARE - 1.0).abs() < TOLERANCE, "{by_mean} {by_speckle}");
     }
 }
 
 #[test]
-fn a_proof_counts_what_was_said() {
-    let folder = tempfile::tempdir().unwrap();
-    small_set(folder.path());
-    let like = MeasuredSet::read(folder.path(), &Silent).unwrap();
-    let extent = ValidationPlan {
+fn a_validation_counts_claims() {
+    let plan = ValidationPlan {
         nulls: 3,
         threshold_nulls: 1,
         effects: vec!["gap".into()],
         off_list: false,
     };
-    let proof = validate(&like, &settings(), &extent, &Silent).unwrap();
-    assert_eq!((proof.nulls, proof.false_claims, proof.trials.len()), (3, 0, 6));
-    assert_eq!(proof.limits.len(), 1);
-    assert!(proof.limits[0].named_from.is_some_and(|s| s <= 1.0), "{}", proof.text());
-    assert!(proof.largest_gain_by_chance < proof.least_gain);
+    let validation = validate(&LIKE, &settings(), &plan, &Silent).unwrap();
+    assert_eq!(
+        (validation.nulls, validation.false_claims, validation.trials.len()),
+        (3, 0, 6)
+    );
+    assert_eq!(validation.limits.len(), 1);
+    assert!(
+        validation.limits[0].named_from.is_some_and(|s| s <= 1.0),
+        "{}",
+        validation.text()
+    );
+    assert!(validation.largest_gain_by_chance < validation.least_gain);
+}
+
+#[test]
+fn unknown_effects_are_refused_all_at_once() {
+    let wrong = ["cd_bais", "gap", "wavefront"].map(String::from).to_vec();
+    let settings = Settings {
+        only: wrong.clone(),
+        ..settings()
+    };
+    let by_session = Session::new(&LIKE, settings.clone()).err().unwrap();
+    let plan = ValidationPlan {
+        effects: wrong,
+        ..ValidationPlan::default()
+    };
+    let outs = [FOLDERS[0].join("out")];
+    let by_run = calibrate(&FOLDERS[..1], &outs, &settings, &Silent).err().unwrap();
+    let by_validation = validate(&LIKE, &self::settings(), &plan, &Silent).err().unwrap();
+    for error in [by_session, by_run, by_validation] {
+        assert_eq!(error.exit_code(), 2);
+        let text = error.to_string();
+        for part in ["`cd_bais` (did you mean `cd_bias`?)", "`wavefront`", "led_centre_500"] {
+            assert!(text.contains(part), "{part} is not in:\n{text}");
+        }
+        assert!(!text.contains("`gap`"), "{text}");
+    }
+    assert!(!outs[0].exists());
 }

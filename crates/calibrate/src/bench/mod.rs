@@ -8,7 +8,7 @@ use rayon::prelude::*;
 pub use light::Lit;
 
 use super::optics::{Optic, PixelGrid, Planes, Planned, Quadrature};
-use super::set::{Camera, CaptureIndex, ElementIndex, LedIndex, MeasuredSet, PerCapture, PerElement, PerLed};
+use super::set::{CaptureIndex, ElementIndex, LedIndex, MeasuredSet, PerCapture, PerElement, PerLed, RelayCamera};
 use metalith_made::{DrawnElement, GeometryChange, Perturbation, veiled};
 
 /// How finely a bench is sampled.
@@ -221,7 +221,7 @@ impl<'a> Bench<'a> {
 }
 
 /// Mean intensity over the pixels of a window that stands in the middle of `n` x `n` samples.
-fn window_mean(intensity: &[f32], n: usize, samples_per_pixel: f64, camera: &Camera) -> f64 {
+fn window_mean(intensity: &[f32], n: usize, samples_per_pixel: f64, camera: &RelayCamera) -> f64 {
     let range = |pixels: usize| {
         let wide = ((pixels as f64 * samples_per_pixel).round() as usize).clamp(1, n);
         (n - wide) / 2..(n + wide) / 2

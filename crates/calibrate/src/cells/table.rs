@@ -83,9 +83,9 @@ fn inputs(wavelengths: usize, count: usize, first_nm: f64, step_nm: f64) -> Vec<
 mod tests {
     use super::*;
 
-    fn table() -> CellTable {
+    fn table() -> PillarTable {
         let value = |l: usize, k: usize| Complex64::new(l as f64 + 0.25, 0.5 * k as f64);
-        CellTable {
+        PillarTable {
             first_nm: 100.0,
             step_nm: 2.0,
             t: (0..3).map(|l| (0..400).map(|k| value(l, k)).collect()).collect(),
@@ -96,7 +96,7 @@ mod tests {
     #[test]
     fn a_kept_table_comes_back() {
         let table = table();
-        let back = CellTable::from_bytes(&table.bytes(), 3, 400, 100.0, 2.0).unwrap();
+        let back = PillarTable::from_bytes(&table.bytes(), 3, 400, 100.0, 2.0).unwrap();
         assert_eq!((back.t, back.bare), (table.t, table.bare));
     }
 
@@ -107,10 +107,10 @@ mod tests {
         for page in (0..bytes.len()).step_by(4096) {
             let mut damaged = bytes.clone();
             damaged[page..(page + 4096).min(bytes.len())].fill(0);
-            assert!(CellTable::from_bytes(&damaged, 3, 400, 100.0, 2.0).is_none());
+            assert!(PillarTable::from_bytes(&damaged, 3, 400, 100.0, 2.0).is_none());
         }
-        assert!(CellTable::from_bytes(&bytes, 3, 400, 102.0, 2.0).is_none());
-        assert!(CellTable::from_bytes(&bytes, 2, 400, 100.0, 2.0).is_none());
-        assert!(CellTable::from_bytes(&bytes[..bytes.len() - 1], 3, 400, 100.0, 2.0).is_none());
+        assert!(PillarTable::from_bytes(&bytes, 3, 400, 102.0, 2.0).is_none());
+        assert!(PillarTable::from_bytes(&bytes, 2, 400, 100.0, 2.0).is_none());
+        assert!(PillarTable::from_bytes(&bytes[..bytes.len() - 1], 3, 400, 100.0, 2.0).is_none());
     }
 }

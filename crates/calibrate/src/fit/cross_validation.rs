@@ -7,9 +7,9 @@ use nalgebra::{DMatrix, DVector};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::data::{Beam, Data};
+use super::data::{CaptureSetup, Data};
 use super::normal_equations::{NormalEquations, covariance, hold, minimise};
-use super::problem::{Fit, Problem};
+use super::problem::{Fit, FitProblem};
 use crate::set::{CaptureIndex, PerCapture};
 
 /// A parameter is not predicted from a training set that holds less than this share of the information on it.
@@ -42,7 +42,7 @@ fn partitions(data: &Data) -> [PerCapture<usize>; 3] {
     let mut distances: Vec<f64> = data.beam.iter().map(|b| b.distance_um).collect();
     distances.sort_by(f64::total_cmp);
     distances.dedup();
-    let distance = |b: &Beam| distances.iter().position(|d| *d == b.distance_um).unwrap_or(0);
+    let distance = |b: &CaptureSetup| distances.iter().position(|d| *d == b.distance_um).unwrap_or(0);
     [
         data.beam.iter().map(|b| b.led.into()).collect(),
         data.beam.iter().map(|b| b.element.into()).collect(),
@@ -51,7 +51,7 @@ fn partitions(data: &Data) -> [PerCapture<usize>; 3] {
 }
 
 /// The error on captures left out, of a fit or of anything that has normal equations about it.
-pub fn held_out(problem: &Problem<'_>, equations: &NormalEquations, fit: &Fit) -> HeldOutErrors {
+pub fn held_out(problem: &FitProblem<'_>, equations: &NormalEquations, fit: &Fit) -> HeldOutErrors {
     let mut sums: PerCapture<(f64, u32)> = vec![(0.0, 0); problem.used.len()].into();
     let whole = problem.total(equations, &fit.nuisances);
     for partition in partitions(problem.data) {
@@ -80,7 +80,7 @@ pub fn held_out(problem: &Problem<'_>, equations: &NormalEquations, fit: &Fit) -
 /// The coefficients of all columns that predict the captures in `left` from all others; one for the residual.
 /// None if there is nothing to predict, or not enough to predict it from.
 fn predicted(
-    problem: &Problem<'_>,
+    problem: &FitProblem<'_>,
     equations: &NormalEquations,
     fit: &Fit,
     whole: &DMatrix<f64>,
@@ -110,7 +110,7 @@ fn predicted(
 }
 
 /// The parameters that the training data ask for, as steps from the fit, none beyond what physics allows.
-fn trained(problem: &Problem<'_>, fit: &Fit, train: &DMatrix<f64>) -> Vec<(usize, f64)> {
+fn trained(problem: &FitProblem<'_>, fit: &Fit, train: &DMatrix<f64>) -> Vec<(usize, f64)> {
     let shared = problem.shared();
     let count = train.nrows() - 1;
     let mut at: Vec<(usize, f64)> = Vec::new();
@@ -146,7 +146,7 @@ pub fn mean_error(errors: &HeldOutErrors) -> f64 {
 
 /// How much lower the error `after` is than that `before`, with a 95 % interval by a bootstrap over captures
 /// that share element, direction and colour: pixels are not independent, nor are distances of one beam.
-pub fn gain(problem: &Problem<'_>, before: &HeldOutErrors, after: &HeldOutErrors) -> Gain {
+pub fn gain(problem: &FitProblem<'_>, before: &HeldOutErrors, after: &HeldOutErrors) -> Gain {
     let differences: Vec<(f64, f64)> = beam_groups(problem)
         .iter()
         .map(|g| {
@@ -177,7 +177,7 @@ pub fn gain(problem: &Problem<'_>, before: &HeldOutErrors, after: &HeldOutErrors
 }
 
 /// The captures of each element, direction and colour that count.
-pub fn beam_groups(problem: &Problem<'_>) -> Vec<Vec<CaptureIndex>> {
+pub fn beam_groups(problem: &FitProblem<'_>) -> Vec<Vec<CaptureIndex>> {
     let beam = &problem.data.beam;
     let mut groups: Vec<Vec<CaptureIndex>> = Vec::new();
     for c in problem.data.captures().filter(|&c| problem.used[c]) {
@@ -192,7 +192,7 @@ pub fn beam_groups(problem: &Problem<'_>) -> Vec<Vec<CaptureIndex>> {
 
 /// 95 % half-widths of the active parameters of a fit: by a bootstrap over groups of captures, and never less
 /// than the noise alone gives.
-pub fn half_widths(problem: &Problem<'_>, fit: &Fit) -> Vec<f64> {
+pub fn half_widths(problem: &FitProblem<'_>, fit: &Fit) -> Vec<f64> {
     let shared = problem.shared();
     let all: Vec<usize> = (0..fit.equations.size() - 1).collect();
     let groups = beam_groups(problem);
@@ -228,4 +228,81 @@ fn ends_95(draws: &mut [f64]) -> [f64; 2] {
     draws.sort_by(f64::total_cmp);
     let at = |share: f64| draws[((draws.len() - 1) as f64 * share).round() as usize];
     [at(0.025), at(0.975)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linear_model::{LinearModel, PIXELS, Term, beams, information};
+
+    const PERIODS: [u32; 2] = [2, 3];
+
+    /// Relative: what the faded border of the samples of the test images leaves of their closed forms.
+    const TOLERANCE: f64 = 5e-3;
+
+    fn model(leds: usize, elements: usize) -> LinearModel {
+        LinearModel::new(vec![Term::linear(PERIODS)], beams(leds, elements, 1))
+    }
+
+    /// One colour asks for a, the other for b: each is predicted with the other's, and errs by a - b.
+    #[test]
+    fn a_colour_is_predicted_with_the_parameters_of_the_others() {
+        let (a, b) = (0.01, 0.03);
+        let model = model(2, 1);
+        let data = model.data(|c| vec![[a, b][c]], None);
+        let problem = model.problem(&data);
+        let fit = problem.fit(&[0], &problem.nuisance_fit());
+        assert!((fit.theta[0] / (0.5 * (a + b)) - 1.0).abs() < TOLERANCE);
+        let expected = (a - b).powi(2) * information(PERIODS) / (PIXELS * PIXELS) as f64;
+        for error in held_out(&problem, &fit.equations, &fit) {
+            let error = error.unwrap();
+            assert!((error / expected - 1.0).abs() < TOLERANCE, "{error} {expected}");
+        }
+    }
+
+    /// Where all captures agree, nothing is left; where nothing is fitted, the whole pattern is left.
+    #[test]
+    fn what_all_captures_agree_on_is_predicted() {
+        /// Reduced chi-square per pixel: rounding of single-precision images at a signal of 100 sigma.
+        const ROUNDING: f64 = 1e-4;
+        let theta = 0.02;
+        let model = model(2, 2);
+        let data = model.data(|_| vec![theta], None);
+        let problem = model.problem(&data);
+        let nothing = problem.nuisance_fit();
+        let fit = problem.fit(&[0], &nothing);
+        let before = held_out(&problem, &nothing.equations, &nothing);
+        let after = held_out(&problem, &fit.equations, &fit);
+        let expected = theta * theta * information(PERIODS) / (PIXELS * PIXELS) as f64;
+        assert!((mean_error(&before) / expected - 1.0).abs() < TOLERANCE);
+        assert!(mean_error(&after) < ROUNDING, "{}", mean_error(&after));
+        // All captures gain the same: no draw of the bootstrap differs.
+        let gain = gain(&problem, &before, &after);
+        for end in gain.interval {
+            assert!((end / gain.value - 1.0).abs() < TOLERANCE, "{gain:?}");
+        }
+        assert!((gain.value / expected - 1.0).abs() < TOLERANCE);
+    }
+
+    #[test]
+    fn the_bootstrap_of_two_groups_has_the_ends_of_these_groups() {
+        let model = model(2, 1);
+        let data = model.data(|_| vec![0.0], None);
+        let problem = model.problem(&data);
+        let before: HeldOutErrors = vec![Some(3.0), Some(5.0)].into();
+        let after: HeldOutErrors = vec![Some(2.0), Some(1.0)].into();
+        // Differences 1 and 4: of two draws, both are the first in a quarter of the cases.
+        let gain = gain(&problem, &before, &after);
+        assert_eq!(
+            gain,
+            Gain {
+                value: 2.5,
+                interval: [1.0, 4.0]
+            }
+        );
+        // A capture that does not count takes no part.
+        let mut problem = problem.clone();
+        problem.used[CaptureIndex::from(1)] = false;
+        assert_eq!(super::gain(&problem, &before, &after).value, 1.0);
+    }
 }

@@ -10,7 +10,7 @@ const SATURATED: f64 = 0.97;
 
 /// How a capture was lit and where it was taken: captures are grouped by this.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Beam {
+pub struct CaptureSetup {
     pub element: ElementIndex,
     pub led: LedIndex,
     /// Angle of incidence along x and y [rad].
@@ -34,7 +34,7 @@ pub struct Data {
     pub weight: PerCapture<Array2<f32>>,
     /// DN less the stated black level.
     pub signal: PerCapture<Array2<f32>>,
-    pub beam: PerCapture<Beam>,
+    pub beam: PerCapture<CaptureSetup>,
     /// DN for unit intensity.
     pub scale: PerCapture<f64>,
     /// Number of LEDs.
@@ -70,7 +70,7 @@ impl Data {
                 })
             })
             .collect();
-        let beam = set.captures.iter().map(|c| Beam {
+        let beam = set.captures.iter().map(|c| CaptureSetup {
             element: c.element,
             led: c.led,
             aoi_rad: c.aoi_rad,

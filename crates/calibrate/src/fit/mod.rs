@@ -15,8 +15,10 @@ mod registration;
 mod widths;
 
 pub use cross_validation::{Gain, HeldOutErrors, beam_groups, gain, half_widths, held_out, mean_error};
+#[cfg(test)]
+pub use data::CaptureSetup;
 pub use data::Data;
 pub use normal_equations::{covariance, minimise};
 pub use nuisances::Nuisances;
 pub use null_test::null_gain;
-pub use problem::{Fit, Problem};
+pub use problem::{Fit, FitProblem};

@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use super::capture_equations::CaptureEquations;
 use super::cross_validation::{HeldOutErrors, SEED, held_out, mean_error};
 use super::normal_equations::NormalEquations;
-use super::problem::{Fit, Problem};
+use super::problem::{Fit, FitProblem};
 use crate::forward_model::PATH_TERMS;
 use crate::optics::PixelGrid;
 use crate::set::CaptureIndex;
@@ -18,7 +18,7 @@ const DRAWS: usize = 60;
 /// An effect must gain more than this percentage of them.
 const PERCENTILE: usize = 95;
 
-impl Problem<'_> {
+impl FitProblem<'_> {
     /// Normal equations with further columns after those of the active parameters; `more` gives the changes for
     /// a unit of each in a capture, from its predicted image.
     pub fn equations_with(
@@ -49,7 +49,7 @@ impl Problem<'_> {
 
 /// The gain on captures left out that 95 % of random smooth terms with so many parameters stay below; zero if
 /// no smooth terms were simulated.
-pub fn null_gain(problem: &Problem<'_>, now: &Fit, errors_now: &HeldOutErrors, parameters: usize) -> f64 {
+pub fn null_gain(problem: &FitProblem<'_>, now: &Fit, errors_now: &HeldOutErrors, parameters: usize) -> f64 {
     let mut gains = null_gains(problem, now, errors_now, parameters);
     if gains.is_empty() {
         return 0.0;
@@ -59,7 +59,12 @@ pub fn null_gain(problem: &Problem<'_>, now: &Fit, errors_now: &HeldOutErrors, p
 }
 
 /// The gain of each random term.
-pub(super) fn null_gains(problem: &Problem<'_>, now: &Fit, errors_now: &HeldOutErrors, parameters: usize) -> Vec<f64> {
+pub(super) fn null_gains(
+    problem: &FitProblem<'_>,
+    now: &Fit,
+    errors_now: &HeldOutErrors,
+    parameters: usize,
+) -> Vec<f64> {
     if !problem.surrogate.has_paths() {
         return Vec::new();
     }
@@ -89,4 +94,55 @@ pub(super) fn null_gains(problem: &Problem<'_>, now: &Fit, errors_now: &HeldOutE
             mean_error(errors_now) - mean_error(&held_out(problem, &wide.mixed(&mix), now))
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linear_model::{LinearModel, PIXELS, Term, beams, information, smooth_periods};
+
+    /// Relative: smooth patterns differ in size on the pixels by less than this, and are orthogonal to it.
+    const TOLERANCE: f64 = 2e-2;
+
+    /// A residual that is one smooth pattern: a random direction c explains c1^2 / |c|^2 of it, in every capture
+    /// alike. All directions together explain all of it.
+    #[test]
+    fn random_terms_gain_their_projection_on_the_residual() {
+        const AMPLITUDE: f64 = 0.01;
+        let hidden = smooth_periods(0);
+        let model = LinearModel::new(vec![Term::linear(hidden)], beams(2, 1, 1));
+        let data = model.data(|_| vec![AMPLITUDE], None);
+        let problem = model.problem(&data);
+        let now = problem.nuisance_fit();
+        let errors = held_out(&problem, &now.equations, &now);
+        let whole = AMPLITUDE.powi(2) * information(hidden) / (PIXELS * PIXELS) as f64;
+        let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+        let mut expected: Vec<f64> = (0..DRAWS)
+            .map(|_| {
+                let c: Vec<f64> = (0..PATH_TERMS).map(|_| rng.random_range(-1.0..1.0)).collect();
+                whole * c[0] * c[0] / c.iter().map(|v| v * v).sum::<f64>()
+            })
+            .collect();
+        for (found, expected) in null_gains(&problem, &now, &errors, 1).iter().zip(&expected) {
+            assert!((found - expected).abs() < TOLERANCE * whole, "{found} {expected}");
+        }
+        expected.sort_by(f64::total_cmp);
+        let quantile = null_gain(&problem, &now, &errors, 1);
+        // Three of sixty draws are above 95 %.
+        assert!((quantile - expected[DRAWS - 4]).abs() < TOLERANCE * whole, "{quantile}");
+        let all = null_gain(&problem, &now, &errors, PATH_TERMS);
+        assert!((all / whole - 1.0).abs() < TOLERANCE, "{all} {whole}");
+    }
+
+    /// Without smooth terms there is nothing to compare with.
+    #[test]
+    fn nothing_is_gained_by_no_terms() {
+        let model = LinearModel::new(vec![Term::linear([2, 3])], beams(2, 1, 1));
+        let data = model.data(|_| vec![0.01], None);
+        let mut problem = model.problem(&data);
+        problem.surrogate = crate::surrogate::Surrogate::constant((*problem.surrogate.base).clone());
+        let now = problem.nuisance_fit();
+        let errors = held_out(&problem, &now.equations, &now);
+        assert_eq!(null_gain(&problem, &now, &errors, 1), 0.0);
+    }
 }

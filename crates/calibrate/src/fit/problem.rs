@@ -8,7 +8,7 @@ use super::data::Data;
 use super::normal_equations::{NormalEquations, hold, minimise};
 use super::nuisances::Nuisances;
 use super::registration::whole_pixel_shift;
-use crate::forward_model::{ForwardModel, Point};
+use crate::forward_model::{ForwardModel, ParameterPoint};
 use crate::optics::PixelGrid;
 use crate::set::{CaptureIndex, PerCapture};
 use crate::surrogate::Surrogate;
@@ -30,7 +30,7 @@ const MOST_DAMPING: f64 = 1e6;
 
 /// A set of captures with a model of them.
 #[derive(Clone)]
-pub struct Problem<'a> {
+pub struct FitProblem<'a> {
     pub model: &'a dyn ForwardModel,
     pub surrogate: Surrogate,
     pub data: &'a Data,
@@ -69,7 +69,7 @@ impl Fit {
     }
 }
 
-impl<'a> Problem<'a> {
+impl<'a> FitProblem<'a> {
     /// All captures count, and the surrogate is used alone.
     pub fn new(model: &'a dyn ForwardModel, surrogate: Surrogate, data: &'a Data) -> Self {
         Self {
@@ -82,7 +82,7 @@ impl<'a> Problem<'a> {
     }
 }
 
-impl Problem<'_> {
+impl FitProblem<'_> {
     /// Number of shared nuisances: flux of each LED, and black level.
     pub fn shared(&self) -> usize {
         self.data.leds + 1
@@ -200,7 +200,10 @@ impl Problem<'_> {
     /// # Errors
     /// As [`ForwardModel::images`].
     pub fn correct_at(&mut self, theta: &[f64], progress: &dyn Progress) -> Result<()> {
-        let simulated = self.model.images(&[Point::new(theta.to_vec())], progress)?.remove(0);
+        let simulated = self
+            .model
+            .images(&[ParameterPoint::new(theta.to_vec())], progress)?
+            .remove(0);
         let interpolated = self.surrogate_images(theta);
         let pairs = simulated.iter().zip(&interpolated);
         let difference = pairs.map(|(s, i)| PixelGrid::combine(&[(s, 1.0), (i, -1.0)]));
@@ -217,5 +220,82 @@ impl Problem<'_> {
     pub fn pixels(&self) -> f64 {
         let counted = self.data.captures().filter(|&c| self.used[c]);
         counted.map(|c| self.data.pixels(c) as f64).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{covariance, half_widths};
+    use crate::fit::cross_validation::SIGMAS_95;
+    use crate::linear_model::{LinearModel, Term, beams, image, information};
+
+    /// Captures of two LEDs, two elements and two distances.
+    const CAPTURES: f64 = 8.0;
+
+    /// Relative: what the faded border of the samples of the test images leaves of their closed forms.
+    const TOLERANCE: f64 = 1e-3;
+
+    /// With orthogonal columns, an estimate is the product of its pattern with the residual over that with
+    /// itself, whatever else is fitted.
+    #[test]
+    fn estimates_of_orthogonal_columns_are_projections() {
+        let periods = [[2, 3], [5, 4], [3, 0]];
+        let model = LinearModel::new(periods.map(Term::linear).to_vec(), beams(2, 2, 2));
+        let data = model.data(|_| vec![0.01, -0.02, 0.0], Some(5));
+        let problem = model.problem(&data);
+        let start = problem.nuisance_fit();
+        let fit = problem.fit(&[0, 1, 2], &start);
+        let form = problem.total(&fit.equations, &fit.nuisances);
+        let sigmas = covariance(&form, &(0..form.nrows() - 1).collect::<Vec<_>>());
+        for (k, p) in periods.into_iter().enumerate() {
+            let pattern = image(0.0, &[(p, 1.0)]).pixels([0.0; 2]);
+            let projected: f64 = data
+                .captures()
+                .map(|c| {
+                    let pairs = data.signal[c].iter().zip(&pattern).zip(&data.weight[c]);
+                    let scale = data.scale[c];
+                    pairs
+                        .map(|((s, p), w)| f64::from(*s) * scale * f64::from(*p) * f64::from(*w).powi(2))
+                        .sum::<f64>()
+                })
+                .sum();
+            let expected = projected / (CAPTURES * information(p));
+            let sigma = (CAPTURES * information(p)).sqrt().recip();
+            // Flux and registration change the size of a pattern in second order: by their noise.
+            assert!(
+                (fit.theta[k] - expected).abs() < TOLERANCE * expected.abs() + 0.02 * sigma,
+                "{k}"
+            );
+            let own = sigmas[(problem.shared() + k, problem.shared() + k)].sqrt();
+            assert!((own / sigma - 1.0).abs() < 3.0 * TOLERANCE, "{k}: {own} {sigma}");
+        }
+    }
+
+    /// Two patterns with a correlation of rho: half-widths are wider by 1 / sqrt(1 - rho^2). Without noise, the
+    /// bootstrap adds nothing.
+    #[test]
+    fn half_widths_of_correlated_columns_are_those_of_the_closed_form() {
+        const RHO: f64 = 0.8;
+        // Swapped periods: both patterns have the same size on the pixels.
+        let (own, other) = ([5, 4], [4, 5]);
+        let correlated = Term {
+            amplitude: |theta| theta,
+            patterns: vec![(own, RHO), (other, (1.0 - RHO * RHO).sqrt())],
+        };
+        let model = LinearModel::new(vec![Term::linear(own), correlated], beams(2, 2, 2));
+        let data = model.data(|_| vec![0.01, 0.03], None);
+        let problem = model.problem(&data);
+        let fit = problem.fit(&[0, 1], &problem.nuisance_fit());
+        let sigma = (CAPTURES * information(own) * (1.0 - RHO * RHO)).sqrt().recip();
+        for (k, width) in half_widths(&problem, &fit).into_iter().enumerate() {
+            let expected = SIGMAS_95 * sigma;
+            assert!(
+                (width / expected - 1.0).abs() < 10.0 * TOLERANCE,
+                "{k}: {width} {expected}"
+            );
+        }
+        for (found, truth) in fit.theta.iter().zip([0.01, 0.03]) {
+            assert!((found / truth - 1.0).abs() < TOLERANCE, "{found} {truth}");
+        }
     }
 }

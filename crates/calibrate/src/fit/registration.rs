@@ -1,16 +1,16 @@
-//! Where a window is to within a pixel, before anything is fitted.
+//! Registration of a window to within a pixel, before anything is fitted: cross-correlation.
 
 use ndarray::Array2;
 use num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
-/// A window is looked for so far around its stated place [pixels].
+/// Largest shift that is searched, along each axis [pixels].
 const REACH: i64 = 16;
 
-/// A shift is taken if it raises the correlation by this share: less is what fits find by themselves.
+/// A shift is taken if it raises the correlation by this factor: the fit finds smaller shifts by itself.
 const BETTER: f32 = 1.02;
 
-/// Whole pixels (x, y) by which a window seems to be off: where `seen` and `expected` correlate best.
+/// Whole pixels (x, y) by which a window is off: the shift at which `seen` and `expected` correlate best.
 pub fn whole_pixel_shift(seen: &Array2<f32>, expected: &Array2<f32>) -> [f64; 2] {
     let (rows, cols) = seen.dim();
     let mut planner = FftPlanner::new();
@@ -67,7 +67,7 @@ mod tests {
                 2.0 + 100.0 * (-r2 / 8.0).exp()
             })
         };
-        // A window that is off by (5, -3) sees the spot at the opposite side.
+        // In a window that is off by (5, -3), the spot appears on the opposite side.
         assert_eq!(whole_pixel_shift(&spot(27.0, 27.0), &spot(32.0, 24.0)), [5.0, -3.0]);
         assert_eq!(whole_pixel_shift(&spot(32.2, 24.0), &spot(32.0, 24.0)), [0.0, 0.0]);
     }

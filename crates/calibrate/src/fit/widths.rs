@@ -2,9 +2,9 @@
 
 use nalgebra::DMatrix;
 
-use super::problem::Problem;
+use super::problem::FitProblem;
 
-impl Problem<'_> {
+impl FitProblem<'_> {
     /// The widths as a form over shared nuisances, the parameters in `active` and the residual; the offset that
     /// all widths share is eliminated.
     pub(super) fn width_form(&self, active: &[usize], theta: &[f64]) -> DMatrix<f64> {

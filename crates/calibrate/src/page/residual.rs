@@ -1,6 +1,6 @@
 //! What the effects leave, which effects are hard to distinguish, and the nuisances.
 
-use crate::fit::{Nuisances, Problem};
+use crate::fit::{FitProblem, Nuisances};
 use crate::search::{Evidence, cosines};
 use crate::session::{Session, Simulations};
 use crate::simulator_model::separating_measurement;
@@ -69,7 +69,7 @@ pub(super) fn smooth_residual(page: &mut Page, session: &Session<'_>, evidence: 
 /// Pairs of effects that these captures can hardly distinguish.
 pub(super) fn confusable(page: &mut Page, session: &Session<'_>, simulations: &Simulations, evidence: &Evidence) {
     page.section("Effects that are hard to distinguish");
-    let problem = Problem {
+    let problem = FitProblem {
         used: evidence.used.clone(),
         data: &evidence.data,
         ..session.problem(simulations)

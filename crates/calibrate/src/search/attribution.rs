@@ -7,7 +7,7 @@ use super::alternatives::{Alternative, alternatives, drop_redundant};
 use super::pairs::find_pair;
 use super::state::SearchState;
 use super::stepwise::{LEAST_GAIN, RESIDUAL, TriedEffect, step_forward};
-use crate::fit::{Fit, HeldOutErrors, Problem, half_widths, mean_error};
+use crate::fit::{Fit, FitProblem, HeldOutErrors, half_widths, mean_error};
 use crate::optics::PixelGrid;
 use crate::set::PerCapture;
 use crate::surrogate::Surrogate;
@@ -108,7 +108,7 @@ impl SearchHistory {
 /// # Errors
 /// If a simulation fails, or the user stopped it.
 pub fn attribute(
-    problem: Problem<'_>,
+    problem: FitProblem<'_>,
     full: bool,
     earlier: Option<&Finding>,
     progress: &dyn Progress,
@@ -192,4 +192,68 @@ fn add_effects(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::forward_model::ForwardModel;
+    use crate::linear_model::{LinearModel, Term, beams};
+    use metalith_core::Silent;
+
+    fn six_effects() -> LinearModel {
+        let periods = [[2, 3], [5, 4], [3, 0], [0, 6], [7, 2], [4, 5]];
+        LinearModel::new(periods.map(Term::linear).to_vec(), beams(2, 2, 2))
+    }
+
+    #[test]
+    fn stepwise_selection_takes_the_true_regressors_strongest_first() {
+        let model = six_effects();
+        let truth = [0.0, 0.006, 0.0, 0.0, -0.012, 0.0];
+        let data = model.data(|_| truth.to_vec(), Some(1));
+        let found = attribute(model.problem(&data), false, None, &Silent).unwrap();
+        assert_eq!(found.chosen, [4, 1]);
+        assert!(found.alternatives.iter().all(Vec::is_empty));
+        for effect in [4, 1] {
+            let place = found.after.position(effect).unwrap();
+            let error = found.after.theta[effect] - truth[effect];
+            assert!(error.abs() < found.half_widths[place], "{effect}: {error}");
+        }
+        assert!(mean_error(&found.held_after) < 1.0 + LEAST_GAIN);
+    }
+
+    #[test]
+    fn stepwise_selection_takes_nothing_of_pure_noise() {
+        let model = six_effects();
+        for seed in 10..20 {
+            let data = model.data(|_| vec![0.0; 6], Some(seed));
+            let found = attribute(model.problem(&data), false, None, &Silent).unwrap();
+            assert!(found.chosen.is_empty(), "{seed}: {:?}", found.chosen);
+        }
+    }
+
+    /// Two effects with the same signature explain the same: one is found, the other is its alternative.
+    #[test]
+    fn an_effect_with_the_same_signature_is_an_alternative() {
+        let twin = Term::linear([2, 3]);
+        let model = LinearModel::new(vec![twin.clone(), twin, Term::linear([5, 4])], beams(2, 2, 2));
+        let data = model.data(|_| vec![0.01, 0.0, 0.0], Some(3));
+        let found = attribute(model.problem(&data), false, None, &Silent).unwrap();
+        assert_eq!(found.chosen.len(), 1);
+        let mut both = vec![found.chosen[0]];
+        both.extend(found.alternatives[0].iter().map(|a| a.effect));
+        both.sort_unstable();
+        assert_eq!(both, [0, 1]);
+    }
+
+    #[test]
+    fn widths_are_never_below_the_floor() {
+        let model = six_effects();
+        let data = model.data(|_| vec![0.02, 0.0, 0.0, 0.0, 0.0, 0.0], None);
+        let problem = model.problem(&data);
+        let found = attribute(problem.clone(), false, None, &Silent).unwrap();
+        let bare = half_widths(&problem, &found.after)[0];
+        let floor = MODEL_SHARE * model.slots()[0].parameter.typical;
+        assert_eq!(found.half_widths, [bare.max(floor)]);
+    }
 }

@@ -1,6 +1,6 @@
 //! Capture screening: frames that nothing can be learned from.
 
-use crate::fit::{Nuisances, Problem};
+use crate::fit::{FitProblem, Nuisances};
 use crate::set::{CaptureIndex, MeasuredSet};
 
 /// Share of saturated pixels past which a capture has lost what matters: its peak.
@@ -21,7 +21,7 @@ pub struct UnusableCapture {
 }
 
 /// Captures that cannot be used, by a fit of the nuisances to the set as stated.
-pub fn unusable_captures(set: &MeasuredSet, problem: &Problem<'_>, nuisances: &Nuisances) -> Vec<UnusableCapture> {
+pub fn unusable_captures(set: &MeasuredSet, problem: &FitProblem<'_>, nuisances: &Nuisances) -> Vec<UnusableCapture> {
     let mut out = Vec::new();
     let registration = set.camera.registration_sigma_px;
     let beyond = window_offsets(nuisances, set.camera.pixel_um);

@@ -10,7 +10,7 @@ use metalith_core::{Progress, Result};
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::fit::{Data, Fit, Problem};
+use crate::fit::{Data, Fit, FitProblem};
 use crate::set::{CaptureIndex, PerCapture};
 use crate::simulator::Simulator;
 
@@ -68,7 +68,7 @@ impl DefectNoise {
     }
 
     /// Maximum-likelihood estimate of the share of missing pillars from the residual of a fit.
-    pub fn share(&self, problem: &Problem<'_>, fit: &Fit) -> f64 {
+    pub fn share(&self, problem: &FitProblem<'_>, fit: &Fit) -> f64 {
         let used: Vec<CaptureIndex> = problem.data.captures().filter(|&c| problem.used[c]).collect();
         let captures: Vec<Vec<[f32; 3]>> = used.par_iter().map(|&c| self.spread(problem, fit, c)).collect();
         let minus_log_likelihood = |share: f64| {
@@ -108,7 +108,7 @@ impl DefectNoise {
     }
 
     /// The data with the speckle of a share of missing pillars added to the noise.
-    pub fn added_to(&self, problem: &Problem<'_>, fit: &Fit, share: f64) -> Data {
+    pub fn added_to(&self, problem: &FitProblem<'_>, fit: &Fit, share: f64) -> Data {
         let p = (share * (1.0 - share)) as f32;
         let mut data = problem.data.clone();
         data.weight = problem.data.for_captures(|c| {
@@ -124,7 +124,7 @@ impl DefectNoise {
 
     /// Of each pixel that counts: the square of the residual, the variance of the camera, that of a unit of
     /// speckle [DN^2].
-    fn spread(&self, problem: &Problem<'_>, fit: &Fit, c: CaptureIndex) -> Vec<[f32; 3]> {
+    fn spread(&self, problem: &FitProblem<'_>, fit: &Fit, c: CaptureIndex) -> Vec<[f32; 3]> {
         let data = problem.data;
         let grid = problem.image(&fit.theta, c);
         let light = grid.pixels(fit.nuisances.shift_um[c]);

@@ -6,7 +6,7 @@ use metalith_core::{Progress, Result};
 use super::attribution::{Finding, attribute};
 use super::defect_noise::DefectNoise;
 use super::stepwise::RESIDUAL;
-use crate::fit::{Data, Problem, mean_error};
+use crate::fit::{Data, FitProblem, mean_error};
 use crate::forward_model::ForwardModel;
 use crate::set::PerCapture;
 
@@ -42,7 +42,7 @@ pub struct Evidence {
 
 impl Evidence {
     /// The problem that the finding solves.
-    pub fn problem<'a>(&'a self, model: &'a dyn ForwardModel) -> Problem<'a> {
+    pub fn problem<'a>(&'a self, model: &'a dyn ForwardModel) -> FitProblem<'a> {
         problem_of(model, &self.data, &self.used, &self.finding)
     }
 }
@@ -52,8 +52,8 @@ fn problem_of<'a>(
     data: &'a Data,
     used: &PerCapture<bool>,
     finding: &Finding,
-) -> Problem<'a> {
-    Problem {
+) -> FitProblem<'a> {
+    FitProblem {
         model,
         surrogate: finding.surrogate.clone(),
         data,
@@ -68,7 +68,7 @@ fn problem_of<'a>(
 /// # Errors
 /// If a simulation fails, or the user stopped it.
 pub fn attribute_set(
-    problem: &Problem<'_>,
+    problem: &FitProblem<'_>,
     full: bool,
     defects: Option<(usize, &DefectNoise)>,
     progress: &dyn Progress,
@@ -89,14 +89,14 @@ pub fn attribute_set(
 }
 
 /// Where something is found and a residual is left, repeat on a surrogate about what was found.
-fn attribute_recentred(problem: &Problem<'_>, full: bool, progress: &dyn Progress) -> Result<Finding> {
+fn attribute_recentred(problem: &FitProblem<'_>, full: bool, progress: &dyn Progress) -> Result<Finding> {
     let mut finding = attribute(problem.clone(), full, None, progress)?;
     for _ in 0..RECENTRED {
         if !full || finding.chosen.is_empty() || mean_error(&finding.held_after) < RESIDUAL {
             break;
         }
         let after = &finding.after;
-        let nearer = Problem {
+        let nearer = FitProblem {
             surrogate: finding
                 .surrogate
                 .recentred(problem.model, &after.theta, &after.active, progress)?,
@@ -118,7 +118,7 @@ fn attribute_recentred(problem: &Problem<'_>, full: bool, progress: &dyn Progres
 /// The finding with the speckle of missing pillars treated as noise, if this explains what is left and the mean
 /// of missing pillars agrees with it.
 fn attribute_with_defects(
-    problem: &Problem<'_>,
+    problem: &FitProblem<'_>,
     full: bool,
     effect: usize,
     noise: &DefectNoise,
@@ -145,7 +145,7 @@ fn attribute_with_defects(
         if !DefectNoise::is_inside(share) {
             break;
         }
-        let with_noise = Problem {
+        let with_noise = FitProblem {
             data: &data,
             ..problem.clone()
         };

@@ -2,18 +2,18 @@
 
 use nalgebra::DMatrix;
 
-use crate::fit::{Fit, Problem, minimise};
+use crate::fit::{Fit, FitProblem, minimise};
 
 /// Effects by the share of the residual that their signature explains, highest first; nuisances and what is
 /// chosen are projected out.
-pub fn score_effects(problem: &Problem<'_>, now: &Fit, chosen: &[usize]) -> Vec<(usize, f64)> {
+pub fn score_effects(problem: &FitProblem<'_>, now: &Fit, chosen: &[usize]) -> Vec<(usize, f64)> {
     let sets = others(problem, chosen).into_iter().map(|e| [e]).collect();
     let scores = explained(problem, now, chosen, sets);
     scores.into_iter().map(|([e], score)| (e, score)).collect()
 }
 
 /// The same for all pairs of effects.
-pub fn score_pairs(problem: &Problem<'_>, now: &Fit, chosen: &[usize]) -> Vec<([usize; 2], f64)> {
+pub fn score_pairs(problem: &FitProblem<'_>, now: &Fit, chosen: &[usize]) -> Vec<([usize; 2], f64)> {
     let others = others(problem, chosen);
     let pairs = others
         .iter()
@@ -22,12 +22,12 @@ pub fn score_pairs(problem: &Problem<'_>, now: &Fit, chosen: &[usize]) -> Vec<([
     explained(problem, now, chosen, pairs.collect())
 }
 
-fn others(problem: &Problem<'_>, chosen: &[usize]) -> Vec<usize> {
+fn others(problem: &FitProblem<'_>, chosen: &[usize]) -> Vec<usize> {
     (0..problem.model.effects()).filter(|e| !chosen.contains(e)).collect()
 }
 
 fn explained<const N: usize>(
-    problem: &Problem<'_>,
+    problem: &FitProblem<'_>,
     now: &Fit,
     chosen: &[usize],
     sets: Vec<[usize; N]>,
@@ -52,14 +52,14 @@ fn explained<const N: usize>(
 }
 
 /// Normal equations over all parameters of all effects.
-fn form_of_all(problem: &Problem<'_>, now: &Fit) -> DMatrix<f64> {
+fn form_of_all(problem: &FitProblem<'_>, now: &Fit) -> DMatrix<f64> {
     let slots: Vec<usize> = (0..problem.model.slots().len()).collect();
     let wide = problem.at(&slots, now.theta.clone(), now.nuisances.clone());
     problem.total(&wide.equations, &wide.nuisances)
 }
 
 /// Cosines between the signatures of all parameters, nuisances projected out, weighted by the noise of this set.
-pub fn cosines(problem: &Problem<'_>, at: &Fit) -> DMatrix<f64> {
+pub fn cosines(problem: &FitProblem<'_>, at: &Fit) -> DMatrix<f64> {
     let form = form_of_all(problem, at);
     let (shared, n) = (problem.shared(), problem.model.slots().len());
     let a = form.view((0, 0), (shared, shared)).into_owned();

@@ -2,12 +2,12 @@
 
 use metalith_core::{Progress, Result};
 
-use crate::fit::{Fit, HeldOutErrors, Problem, held_out, mean_error};
+use crate::fit::{Fit, FitProblem, HeldOutErrors, held_out, mean_error};
 
 /// A fit with the problem that it solves.
 #[derive(Clone)]
 pub struct SearchState<'a> {
-    pub problem: Problem<'a>,
+    pub problem: FitProblem<'a>,
     pub fit: Fit,
     /// The error of the fit on captures left out.
     pub held_out: HeldOutErrors,
@@ -15,7 +15,7 @@ pub struct SearchState<'a> {
 
 impl<'a> SearchState<'a> {
     /// At a fit.
-    pub fn new(problem: Problem<'a>, fit: Fit) -> Self {
+    pub fn new(problem: FitProblem<'a>, fit: Fit) -> Self {
         let held_out = held_out(&problem, &fit.equations, &fit);
         Self { problem, fit, held_out }
     }
@@ -34,7 +34,7 @@ impl<'a> SearchState<'a> {
     /// Refine the fit with full simulations.
     ///
     /// # Errors
-    /// As [`Problem::refine`].
+    /// As [`FitProblem::refine`].
     pub fn refine(&mut self, progress: &dyn Progress) -> Result<()> {
         let fit = self.problem.refine(self.fit.clone(), progress)?;
         self.move_to(fit);

@@ -4,7 +4,7 @@ use metalith_core::{Progress, Result};
 
 use super::signatures::score_effects;
 use super::state::SearchState;
-use crate::fit::{Fit, Gain, HeldOutErrors, Problem, gain, half_widths, held_out, mean_error, null_gain};
+use crate::fit::{Fit, FitProblem, Gain, HeldOutErrors, gain, half_widths, held_out, mean_error, null_gain};
 
 /// Candidates that are fitted in full at each step.
 const LEADERS: usize = 6;
@@ -237,7 +237,7 @@ const LEAST_ERROR: f64 = 1e-6;
 const AT_END: f64 = 1e-6;
 
 /// Whether the parameters lie within their physical ranges, not at the ends.
-pub fn physical(problem: &Problem<'_>, fit: &Fit, slots: &[usize]) -> bool {
+pub fn physical(problem: &FitProblem<'_>, fit: &Fit, slots: &[usize]) -> bool {
     slots.iter().all(|&s| {
         let (a, b) = problem.model.slots()[s].parameter.range;
         let room = AT_END * (b - a);
@@ -246,7 +246,7 @@ pub fn physical(problem: &Problem<'_>, fit: &Fit, slots: &[usize]) -> bool {
 }
 
 /// The best fit of some effects on top of those in `chosen`, over all starting points.
-pub fn fit_with(problem: &Problem<'_>, now: &Fit, chosen: &[usize], effects: &[usize]) -> Option<Fit> {
+pub fn fit_with(problem: &FitProblem<'_>, now: &Fit, chosen: &[usize], effects: &[usize]) -> Option<Fit> {
     let active = problem.model.slots_of_all(&[chosen, effects].concat());
     let begin = |from: Vec<Fit>, effect: &usize| from.iter().flat_map(|f| starts(problem, *effect, f)).collect();
     let fits = effects.iter().fold(vec![now.clone()], begin).into_iter();
@@ -255,7 +255,7 @@ pub fn fit_with(problem: &Problem<'_>, now: &Fit, chosen: &[usize], effects: &[u
 }
 
 /// Starting points for fits of an effect: the present fit, or both sides of a kink at zero.
-fn starts(problem: &Problem<'_>, effect: usize, now: &Fit) -> Vec<Fit> {
+fn starts(problem: &FitProblem<'_>, effect: usize, now: &Fit) -> Vec<Fit> {
     if !problem.model.kinked(effect) {
         return vec![now.clone()];
     }
@@ -299,7 +299,7 @@ impl Candidate {
     }
 
     /// By a fit that it is part of, and the error of this fit on captures left out.
-    pub fn judge(&mut self, problem: &Problem<'_>, fit: Fit, held: HeldOutErrors, errors_now: &HeldOutErrors) {
+    pub fn judge(&mut self, problem: &FitProblem<'_>, fit: Fit, held: HeldOutErrors, errors_now: &HeldOutErrors) {
         self.tried.gain = Some(gain(problem, errors_now, &held));
         let slots = problem.model.slots_of(self.tried.effect);
         self.tried.values = slots.iter().map(|&s| fit.theta[s]).collect();
@@ -311,7 +311,7 @@ impl Candidate {
     }
 
     /// Why it cannot be taken, whatever others do.
-    pub fn fault(&self, problem: &Problem<'_>, errors_now: &HeldOutErrors) -> Option<Rejection> {
+    pub fn fault(&self, problem: &FitProblem<'_>, errors_now: &HeldOutErrors) -> Option<Rejection> {
         let Gain {
             value,
             interval: [low, _],

@@ -27,7 +27,7 @@ pub struct MeasuredSet {
     pub stack: Stack,
     /// Full angle of the uniform disc that the source is [rad].
     pub divergence_rad: f64,
-    pub camera: Camera,
+    pub camera: RelayCamera,
     pub leds: PerLed<Led>,
     pub elements: PerElement<MeasuredElement>,
     pub captures: PerCapture<Capture>,
@@ -69,7 +69,7 @@ impl MeasuredSet {
 
     /// Whether two sessions have one plan: all is equal but light levels, noise and frames.
     pub fn same_plan(&self, other: &Self) -> bool {
-        let camera = |c: &Camera| (c.pixel_um, c.rows, c.cols);
+        let camera = |c: &RelayCamera| (c.pixel_um, c.rows, c.cols);
         let captures = |set: &Self| -> Vec<_> {
             let of = |c: &Capture| (c.element, c.led, c.aoi_rad, c.distance_um, c.window_centre_um);
             set.captures.iter().map(of).collect()
@@ -103,7 +103,7 @@ pub struct Stack {
 
 /// The camera behind its relay, in units of the sensor plane.
 #[derive(Clone, Copy, Debug)]
-pub struct Camera {
+pub struct RelayCamera {
     pub pixel_um: f64,
     pub rows: usize,
     pub cols: usize,

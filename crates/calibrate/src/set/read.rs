@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Camera, Capture, Led, MeasuredElement, MeasuredSet, Stack, frame, sem};
+use super::{Capture, Led, MeasuredElement, MeasuredSet, RelayCamera, Stack, frame, sem};
 use super::{ElementIndex, LedIndex, PerElement, PerLed};
 use metalith_cell::Material;
 use metalith_core::document::{Document, Limits, Section, load};
@@ -121,9 +121,9 @@ fn source(s: &Section<'_, '_>) -> f64 {
     mrad * 1e-3
 }
 
-fn camera(s: &Section<'_, '_>) -> Camera {
+fn camera(s: &Section<'_, '_>) -> RelayCamera {
     let positive = |key, high, unit| s.float(key, Limits::new(f64::MIN_POSITIVE..=high, unit));
-    let camera = Camera {
+    let camera = RelayCamera {
         pixel_um: positive("pixel_um", 100.0, "um"),
         rows: s.integer("rows", 16..=1024, "pixels") as usize,
         cols: s.integer("cols", 16..=1024, "pixels") as usize,
@@ -243,7 +243,7 @@ fn elements(
 
 fn captures(
     root: &Section<'_, '_>,
-    camera: &Camera,
+    camera: &RelayCamera,
     leds: &PerLed<Led>,
     elements: &PerElement<MeasuredElement>,
 ) -> Vec<Capture> {

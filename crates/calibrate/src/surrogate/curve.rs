@@ -1,32 +1,32 @@
-//! How one number changes every capture: a polynomial through the sizes that were simulated.
+//! How one parameter changes every capture: a polynomial through the simulated values.
 
 use std::sync::Arc;
 
 use crate::optics::PixelGrid;
 use crate::set::{CaptureIndex, PerCapture};
 
-/// Most sizes that a polynomial goes through; beyond, those farthest from where it is wanted are dropped.
+/// Most nodes of a polynomial; if there are more, those farthest from where it is evaluated are dropped.
 const MOST_NODES: usize = 6;
 
-/// Changes of all captures with one number.
+/// Changes of all captures with one parameter.
 #[derive(Clone, Default)]
 pub struct Curve {
-    /// Offsets from the middle, zero left out.
+    /// Offsets from the base; zero is not among them.
     nodes: Vec<f64>,
     /// Changes from the base at each node, `by node and capture`.
     grids: Vec<Arc<PerCapture<PixelGrid>>>,
-    /// Nodes on one side of zero say nothing of the other.
+    /// Nodes on one side of zero do not count on the other.
     kinked: bool,
 }
 
 impl Curve {
-    /// Through the changes at some offsets.
+    /// A polynomial through the changes at some offsets.
     pub fn new(nodes: Vec<f64>, grids: impl IntoIterator<Item = PerCapture<PixelGrid>>, kinked: bool) -> Self {
         let grids = grids.into_iter().map(Arc::new).collect();
         Self { nodes, grids, kinked }
     }
 
-    /// With one more offset, which it is wanted about.
+    /// Add an offset, near which the polynomial is evaluated from now on.
     pub fn add(&mut self, node: f64, grids: PerCapture<PixelGrid>) {
         if self.nodes.len() >= MOST_NODES {
             let farthest = (0..self.nodes.len())
@@ -56,14 +56,14 @@ impl Curve {
             .map(move |(grids, w)| (&grids[capture], w as f32))
     }
 
-    /// Least and greatest offset that was simulated.
+    /// Least and greatest simulated offset.
     pub fn ends(&self) -> (f64, f64) {
         let low = self.nodes.iter().copied().fold(0.0, f64::min);
         let high = self.nodes.iter().copied().fold(0.0, f64::max);
         (low, high)
     }
 
-    /// Weights of the nodes' changes at `u`; straight on beyond the ends.
+    /// Weights of the changes at the nodes for an offset `u`; linear beyond the ends.
     fn weights(&self, u: f64) -> Vec<f64> {
         let (low, high) = self.ends();
         let inside = u.clamp(low, high);
@@ -92,7 +92,7 @@ impl Curve {
         !self.kinked || (node > 0.0) == (u >= 0.0)
     }
 
-    /// Where the polynomial that is one at node `i` is zero: at the others and in the middle.
+    /// Zeros of the Lagrange polynomial of node `i`: the other nodes and the base.
     fn roots(&self, i: usize, u: f64) -> Vec<f64> {
         let others = self.nodes.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, n)| *n);
         others.filter(|n| self.counts(*n, u)).chain([0.0]).collect()
@@ -128,7 +128,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_polynomial_goes_through_its_nodes_and_straight_on() {
+    fn a_polynomial_of_degree_four_is_reproduced_and_continued_linearly() {
+        /// Absolute, of values of a few: rounding.
+        const ROUNDING: f64 = 1e-12;
         let curve = Curve {
             nodes: vec![-2.0, -1.0, 1.0, 2.0],
             grids: Vec::new(),
@@ -139,8 +141,8 @@ mod tests {
         let value = |u: f64| -> f64 { curve.weights(u).iter().zip(&curve.nodes).map(|(w, n)| w * f(*n)).sum() };
         let derivative = |u: f64| -> f64 { curve.slopes(u).iter().zip(&curve.nodes).map(|(w, n)| w * f(*n)).sum() };
         for u in [-2.0, -0.7, 0.0, 0.3, 1.9] {
-            assert!((value(u) - f(u)).abs() < 1e-12 && (derivative(u) - slope(u)).abs() < 1e-12);
+            assert!((value(u) - f(u)).abs() < ROUNDING && (derivative(u) - slope(u)).abs() < ROUNDING);
         }
-        assert!((value(3.0) - f(2.0) - slope(2.0)).abs() < 1e-12);
+        assert!((value(3.0) - f(2.0) - slope(2.0)).abs() < ROUNDING);
     }
 }

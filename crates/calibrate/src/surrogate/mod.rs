@@ -12,7 +12,7 @@ use metalith_core::{Progress, Result};
 use rayon::prelude::*;
 
 use crate::effects::Parameter;
-use crate::forward_model::{ForwardModel, PATH_TERMS, Point, SmoothTerm};
+use crate::forward_model::{ForwardModel, PATH_TERMS, ParameterPoint, SmoothTerm};
 use crate::optics::PixelGrid;
 use crate::set::{CaptureIndex, LedIndex, PerCapture};
 use curve::Curve;
@@ -57,7 +57,7 @@ impl Surrogate {
         smooth: Option<(&PerCapture<LedIndex>, usize)>,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let mut points = vec![Point::new(about.to_vec())];
+        let mut points = vec![ParameterPoint::new(about.to_vec())];
         let mut nodes: Vec<Vec<f64>> = Vec::new();
         for (s, slot) in model.slots().iter().enumerate() {
             let one_sided = slot.parameter.one_sided() && about[s] == 0.0;
@@ -65,7 +65,7 @@ impl Surrogate {
             nodes.push(add_nodes(model, about, s, multiples, &mut points));
         }
         if smooth.is_some() {
-            points.extend(SmoothTerm::all().map(|term| Point::with(about, term)));
+            points.extend(SmoothTerm::all().map(|term| ParameterPoint::with(about, term)));
         }
         let mut images = model.images(&points, progress)?.into_iter();
         let base = images.next().expect("the first point is the base");
@@ -112,7 +112,7 @@ impl Surrogate {
         slots: &[usize],
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let mut points = vec![Point::new(about.to_vec())];
+        let mut points = vec![ParameterPoint::new(about.to_vec())];
         let nodes: Vec<Vec<f64>> = slots
             .iter()
             .map(|&s| add_nodes(model, about, s, &NEAR, &mut points))
@@ -149,7 +149,7 @@ impl Surrogate {
             .map(|value| {
                 let mut theta = self.about.clone();
                 theta[slot] = *value;
-                Point::new(theta)
+                ParameterPoint::new(theta)
             })
             .collect();
         for (images, value) in model.images(&points, progress)?.into_iter().zip(values) {
@@ -226,7 +226,7 @@ fn add_nodes(
     about: &[f64],
     s: usize,
     multiples: &[f64],
-    points: &mut Vec<Point>,
+    points: &mut Vec<ParameterPoint>,
 ) -> Vec<f64> {
     let Parameter { typical, range, .. } = model.slots()[s].parameter;
     let offsets = multiples.iter().map(|m| m * typical);
@@ -236,7 +236,7 @@ fn add_nodes(
     for offset in &offsets {
         let mut theta = about.to_vec();
         theta[s] += offset;
-        points.push(Point::new(theta));
+        points.push(ParameterPoint::new(theta));
     }
     offsets
 }

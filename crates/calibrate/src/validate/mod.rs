@@ -47,7 +47,7 @@ const JUDGED_SEED: u64 = 1000;
 
 /// One synthetic set and its diagnosis.
 #[derive(Clone, Debug, Serialize)]
-pub struct Trial {
+pub struct ValidationTrial {
     /// What differed; [`NOTHING`] for a set without effect.
     pub truth: String,
     /// Whether it is no known effect.
@@ -163,13 +163,13 @@ pub fn validate(
     let nulls = (0..plan.nulls).map(|k| (&exposed[0], &chips[0], JUDGED_SEED + k));
     let others = JUDGED_SEED + plan.nulls;
     let listed = exposed.iter().zip(&chips).skip(1).zip(others..);
-    let mut work: Vec<(&SyntheticImages, Trial, &[Part])> = thresholds
+    let mut work: Vec<(&SyntheticImages, ValidationTrial, &[AppliedEffect])> = thresholds
         .chain(nulls)
         .chain(listed.map(|((exposed, chip), seed)| (exposed, chip, seed)))
-        .map(|(exposed, chip, seed)| (exposed, Trial::new(chip, seed), chip.parts.as_slice()))
+        .map(|(exposed, chip, seed)| (exposed, ValidationTrial::new(chip, seed), chip.parts.as_slice()))
         .collect();
     for ((name, exposed), seed) in odd.iter().zip(others + chips.len() as u64 - 1..) {
-        let mut trial = Trial::new(&Chip::single(name, 1.0, Vec::new()), seed);
+        let mut trial = ValidationTrial::new(&SyntheticChip::single(name, 1.0, Vec::new()), seed);
         trial.off_list = true;
         work.push((exposed, trial, &[]));
     }
@@ -194,16 +194,16 @@ pub fn validate(
 }
 
 /// An effect with its parameters.
-type Part = (String, Vec<f64>);
+type AppliedEffect = (String, Vec<f64>);
 
 /// A chip and a bench that sets are made of.
-struct Chip {
+struct SyntheticChip {
     truth: String,
     size: f64,
-    parts: Vec<Part>,
+    parts: Vec<AppliedEffect>,
 }
 
-impl Chip {
+impl SyntheticChip {
     fn single(name: &str, size: f64, numbers: Vec<f64>) -> Self {
         Self {
             truth: name.into(),
@@ -214,7 +214,7 @@ impl Chip {
 }
 
 /// One chip without effect, one for each effect and size, one for each pair.
-fn chips(session: &Session<'_>, plan: &ValidationPlan) -> Vec<Chip> {
+fn chips(session: &Session<'_>, plan: &ValidationPlan) -> Vec<SyntheticChip> {
     let wanted = |name: &str| plan.effects.is_empty() || plan.effects.iter().any(|e| e == name);
     let effects: Vec<_> = session.simulator.effects.iter().filter(|e| wanted(&e.name())).collect();
     // The two parameters of an effect along two axes are unequal and of opposite signs.
@@ -222,24 +222,28 @@ fn chips(session: &Session<'_>, plan: &ValidationPlan) -> Vec<Chip> {
         let parts = parameters.iter().zip([1.0, -0.6]);
         parts.map(|(p, s)| s * size * p.typical).collect()
     };
-    let mut chips = vec![Chip {
+    let mut chips = vec![SyntheticChip {
         truth: NOTHING.into(),
         size: 0.0,
         parts: Vec::new(),
     }];
     for effect in &effects {
         for size in SIZES {
-            chips.push(Chip::single(&effect.name(), size, numbers(effect.parameters(), size)));
+            chips.push(SyntheticChip::single(
+                &effect.name(),
+                size,
+                numbers(effect.parameters(), size),
+            ));
         }
     }
     for (a, b) in PAIRS {
-        let both: Vec<Part> = [a, b]
+        let both: Vec<AppliedEffect> = [a, b]
             .iter()
             .filter_map(|name| effects.iter().find(|e| e.name() == *name))
             .map(|e| (e.name(), numbers(e.parameters(), 1.0)))
             .collect();
         if both.len() == 2 {
-            chips.push(Chip {
+            chips.push(SyntheticChip {
                 truth: format!("{a} + {b}"),
                 size: 1.0,
                 parts: both,
@@ -262,8 +266,8 @@ impl Progress for StopOnly<'_> {
     }
 }
 
-impl Trial {
-    fn new(chip: &Chip, seed: u64) -> Self {
+impl ValidationTrial {
+    fn new(chip: &SyntheticChip, seed: u64) -> Self {
         Self {
             truth: chip.truth.clone(),
             off_list: false,
@@ -285,7 +289,7 @@ impl Trial {
         }
     }
 
-    fn judge(&mut self, diagnosis: &Diagnosis, parts: &[Part], session: &Session<'_>) {
+    fn judge(&mut self, diagnosis: &Diagnosis, parts: &[AppliedEffect], session: &Session<'_>) {
         self.verdict = diagnosis.verdict;
         self.found = diagnosis.effects.iter().map(|e| e.name.clone()).collect();
         self.named = !parts.is_empty() && parts.iter().all(|(name, _)| self.found.contains(name));

@@ -1,8 +1,8 @@
-//! The proof for people: `proof.html`, with `proof.txt` and `proof.json` beside it.
+//! The validation for people: `validation.html`, with `validation.txt` and `validation.json` beside it.
 
 use std::path::Path;
 
-use super::{NOTHING, Trial, Validation};
+use super::{NOTHING, Validation, ValidationTrial};
 use crate::page::round_json;
 use metalith_core::{Result, WholeFile};
 use metalith_report::{Axis, Cell, Column, HeatMap, ImageGrid, Matrix, Page, Table, Verdict, sig, write_json};
@@ -13,18 +13,18 @@ const MOST_FALSE: f64 = 0.05;
 /// Range of residual pictures [sigma].
 const SIGMAS: f64 = 6.0;
 
-/// Write the proof to a folder.
+/// Write the validation to a folder.
 ///
 /// # Errors
 /// If a file cannot be written.
-pub fn write_validation(folder: &Path, proof: &Validation) -> Result<()> {
-    WholeFile::write(&folder.join("proof.txt"), proof.text().as_bytes())?;
-    write_json(&folder.join("proof.json"), "calibrate --proof", proof)?;
+pub fn write_validation(folder: &Path, validation: &Validation) -> Result<()> {
+    WholeFile::write(&folder.join("validation.txt"), validation.text().as_bytes())?;
+    write_json(&folder.join("validation.json"), "calibrate --validate", validation)?;
     let mut page = Page::new(
-        "How far calibration can be trusted",
-        format!("Synthesizer of `{}`, of our own making", proof.like),
+        "Validation of the calibration",
+        format!("Synthetic sets like `{}`; synthetic, not measured", validation.like),
     );
-    let share = proof.false_claims as f64 / proof.nulls.max(1) as f64;
+    let share = validation.false_claims as f64 / validation.nulls.max(1) as f64;
     page.verdict(
         if share <= MOST_FALSE {
             Verdict::Pass
@@ -33,7 +33,7 @@ pub fn write_validation(folder: &Path, proof: &Validation) -> Result<()> {
         },
         format!(
             "{} false claims in {} sets without effect.",
-            proof.false_claims, proof.nulls
+            validation.false_claims, validation.nulls
         ),
     );
     page.facts(&[
@@ -41,49 +41,49 @@ pub fn write_validation(folder: &Path, proof: &Validation) -> Result<()> {
             "Largest gain by chance",
             format!(
                 "{} in {} other sets without effect",
-                sig(proof.largest_gain_by_chance, 2),
-                proof.threshold_nulls
+                sig(validation.largest_gain_by_chance, 2),
+                validation.threshold_nulls
             ),
         ),
-        ("Gain that a claim takes", sig(proof.least_gain, 2)),
+        ("Least gain of a claim", sig(validation.least_gain, 2)),
         (
-            "Intervals that hold the truth",
-            format!("{} of {}", proof.intervals_inside, proof.intervals),
+            "Intervals that include the true value",
+            format!("{} of {}", validation.intervals_inside, validation.intervals),
         ),
     ]);
     page.paragraph(
-        "Each twin has its own placement, flux, black level and noise, and is made with wavelengths, samples and orders of the rigorous cell that fits do not use; missing pillars are single ones. What is told apart is what these captures can tell apart, at their noise.",
+        "Each synthetic set has its own registration, flux, black level and noise. Its wavelengths, samples and diffraction orders differ from those of the fits, and single pillars are missing. Which effects can be distinguished depends on these captures and their noise.",
     );
-    page.section("What is taken for what");
-    let mut matrix = Matrix::new("What is taken for what", proof.claimed.iter().cloned()).axes("claimed", "true");
-    for (truth, shares) in &proof.confusion {
+    page.section("Confusion matrix");
+    let mut matrix = Matrix::new("Confusion matrix", validation.claimed.iter().cloned()).axes("claimed", "true");
+    for (truth, shares) in &validation.confusion {
         matrix.row(truth.as_str(), shares.iter().copied());
     }
     page.figure(matrix.caption(
-        "Percent of the trials of each truth, sizes together. Members of a set that cannot be told apart share their trial.",
+        "Percent of the trials of each true effect, all sizes together. Effects that cannot be distinguished share their trial.",
     ));
-    limits(&mut page, proof);
-    off_list(&mut page, proof);
+    limits(&mut page, validation);
+    off_list(&mut page, validation);
     page.section("Every trial");
     page.details("Trials", |inner| {
-        inner.table(trials(proof));
+        inner.table(trials(validation));
     });
-    page.write(&folder.join("proof.html"))
+    page.write(&folder.join("validation.html"))
 }
 
-fn limits(page: &mut Page, proof: &Validation) {
-    page.section("From which size on");
+fn limits(page: &mut Page, validation: &Validation) {
+    page.section("Detection limits");
     let mut table = Table::new([
         Column::text("Effect"),
-        Column::text("Named from"),
+        Column::text("Named from size"),
         Column::text("Value there"),
         Column::text("Interval there"),
         Column::number("Estimated limit", "typical sizes"),
     ])
-    .caption("The least size tried from which on an effect was named, alone or in a set; the limit is where its residual would come to what a claim takes.");
-    for limit in &proof.limits {
-        let at = |t: &&Trial| t.truth == limit.name && Some(t.size) == limit.named_from;
-        let first = proof.trials.iter().find(at);
+    .caption("The smallest size from which on an effect was named, alone or as one of several alternatives; the estimated limit is the size at which its residual would reach the least gain of a claim.");
+    for limit in &validation.limits {
+        let at = |t: &&ValidationTrial| t.truth == limit.name && Some(t.size) == limit.named_from;
+        let first = validation.trials.iter().find(at);
         let unit = first.map_or("", |t| t.unit.as_str());
         table.row([
             Cell::code(&limit.name),
@@ -103,12 +103,12 @@ fn limits(page: &mut Page, proof: &Validation) {
     page.table(table);
 }
 
-fn off_list(page: &mut Page, proof: &Validation) {
-    let odd: Vec<&Trial> = proof.trials.iter().filter(|t| t.off_list).collect();
+fn off_list(page: &mut Page, validation: &Validation) {
+    let odd: Vec<&ValidationTrial> = validation.trials.iter().filter(|t| t.off_list).collect();
     if odd.is_empty() {
         return;
     }
-    page.section("What is in no list");
+    page.section("Effects that are not listed");
     for t in odd {
         page.subsection(&t.truth);
         let said = if t.found.is_empty() {
@@ -124,7 +124,7 @@ fn off_list(page: &mut Page, proof: &Validation) {
             .max_by(|a, b| (a.1.abs() / a.2).total_cmp(&(b.1.abs() / b.2)));
         if let Some((noll, value, sigma)) = strongest {
             page.paragraph(format!(
-                "Strongest term of the free path: Noll {noll}, {} +- {} nm. Free blur: {} um^2 along x, {} along y, {} across.",
+                "Strongest term of the smooth path: Noll {noll}, {} +- {} nm. Smooth blur: {} um^2 along x, {} along y, {} across.",
                 sig(*value, 3),
                 sig(*sigma, 1),
                 sig(left.blur_um2[0].0, 2),
@@ -134,7 +134,7 @@ fn off_list(page: &mut Page, proof: &Validation) {
         }
         let r = left.radius_um;
         let map = HeatMap::new(
-            format!("{}: free path", t.truth),
+            format!("{}: smooth path", t.truth),
             left.path.clone(),
             (Axis::linear("x", "um"), -r, r),
             (Axis::linear("y", "um"), -r, r),
@@ -150,13 +150,13 @@ fn off_list(page: &mut Page, proof: &Validation) {
             .side(280.0);
         picture.image(left.capture.as_str(), left.residual.clone());
         page.row([
-            map.caption("Smooth path over the lens that the residual asks for."),
-            picture.caption("What is left of the capture that is predicted worst."),
+            map.caption("Smooth optical path over the lens, fitted to the residual."),
+            picture.caption("Residual of the capture with the largest error."),
         ]);
     }
 }
 
-fn trials(proof: &Validation) -> Table {
+fn trials(validation: &Validation) -> Table {
     let mut table = Table::new([
         Column::text("True"),
         Column::number("Size", "typical"),
@@ -165,11 +165,11 @@ fn trials(proof: &Validation) -> Table {
         Column::text("Claimed"),
         Column::text("Found"),
         Column::text("Interval"),
-        Column::text("Holds the truth"),
+        Column::text("Includes the true value"),
         Column::number("Held out, before", ""),
         Column::number("after", ""),
     ]);
-    for t in proof
+    for t in validation
         .trials
         .iter()
         .filter(|t| t.truth != NOTHING || !t.found.is_empty())

@@ -1,25 +1,25 @@
-//! What the trials come to: shares, what is taken for what, the least size that is found.
+//! Summary of the trials: shares, confusions, detection limits.
 
 use serde::Serialize;
 
-use super::{NOTHING, Trial};
+use super::{NOTHING, ValidationTrial};
 use crate::diagnosis::SetVerdict;
 use crate::search::LEAST_GAIN;
 use metalith_report::sig;
 
-/// What a set is counted under when no effect is claimed.
+/// The column that a set without a claim counts in.
 const UNEXPLAINED: &str = "unexplained";
 
-/// Trials and what they come to.
+/// Trials and their summary.
 #[derive(Clone, Debug, Serialize)]
 pub struct Validation {
-    /// The set that twins are made of.
+    /// The measured set that the synthetic ones are like.
     pub like: String,
     /// Sets without effect that were judged, and how many of them an effect was claimed in.
     pub nulls: usize,
     pub false_claims: usize,
-    /// Sets without effect, other than those, that thresholds are held against; the largest gain in them, and
-    /// the gain that a claim takes.
+    /// Other sets without effect, which thresholds are compared with; the largest gain in them, and the least gain
+    /// of a claim.
     pub threshold_nulls: usize,
     pub largest_gain_by_chance: f64,
     pub least_gain: f64,
@@ -28,27 +28,27 @@ pub struct Validation {
     /// For each truth: shares of its trials in which each column was claimed.
     pub confusion: Vec<(String, Vec<f64>)>,
     pub limits: Vec<DetectionLimit>,
-    /// Effects of one number that were named, and how many of their intervals hold the true value.
+    /// Effects of one value that were named, and how many of their intervals include the true value.
     pub intervals: usize,
     pub intervals_inside: usize,
-    pub trials: Vec<Trial>,
+    pub trials: Vec<ValidationTrial>,
 }
 
-/// From which size on an effect is found.
+/// The size from which on an effect is found.
 #[derive(Clone, Debug, Serialize)]
 pub struct DetectionLimit {
     pub name: String,
-    /// The least size tried from which on it was named at all sizes [typical sizes]; none if not at the largest.
+    /// The smallest size from which on it was named at all sizes [typical sizes]; none if not at the largest.
     pub named_from: Option<f64>,
-    /// Size at which a residual would reach the gain that a claim takes, by its square law from the smallest
-    /// size tried [typical sizes].
+    /// Size at which the residual would reach the least gain of a claim [typical sizes]: a residual grows with
+    /// the square of the size, and is known at the smallest size tried.
     pub estimate: Option<f64>,
 }
 
 impl Validation {
-    /// Count.
-    pub(super) fn new(like: String, thresholds: &[Trial], trials: Vec<Trial>) -> Self {
-        let nulls: Vec<&Trial> = trials.iter().filter(|t| t.truth == NOTHING).collect();
+    /// Summarise the trials.
+    pub(super) fn new(like: String, thresholds: &[ValidationTrial], trials: Vec<ValidationTrial>) -> Self {
+        let nulls: Vec<&ValidationTrial> = trials.iter().filter(|t| t.truth == NOTHING).collect();
         let mut truths: Vec<String> = Vec::new();
         for t in &trials {
             if !truths.contains(&t.truth) {
@@ -69,7 +69,7 @@ impl Validation {
         let confusion = truths
             .iter()
             .map(|truth| {
-                let own: Vec<&Trial> = trials.iter().filter(|t| t.truth == *truth).collect();
+                let own: Vec<&ValidationTrial> = trials.iter().filter(|t| t.truth == *truth).collect();
                 let shares = claimed.iter().map(|column| {
                     let sum: f64 = own.iter().map(|t| t.share(column)).sum();
                     sum / own.len() as f64
@@ -99,10 +99,10 @@ impl Validation {
         }
     }
 
-    /// In words: shares, then one line for each trial.
+    /// As text: shares, then one line for each trial.
     pub fn text(&self) -> String {
         let mut text = format!(
-            "{} false claims in {} sets without effect\nlargest gain by chance in {} others {}, a claim takes {}\n{} of {} intervals hold the true value\n\n",
+            "{} false claims in {} sets without effect\nlargest gain by chance in {} others {}, least gain of a claim {}\n{} of {} intervals include the true value\n\n",
             self.false_claims,
             self.nulls,
             self.threshold_nulls,
@@ -131,14 +131,14 @@ impl Validation {
     }
 }
 
-impl Trial {
-    /// The verdict as it is written.
+impl ValidationTrial {
+    /// The verdict as it is written in JSON.
     pub fn verdict_name(&self) -> String {
         let value = serde_json::to_value(self.verdict).ok();
         value.and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
     }
 
-    /// How much of this trial counts for a column: members of a set that cannot be told apart share it.
+    /// How much of this trial counts for a column: effects that cannot be distinguished share it.
     fn share(&self, column: &str) -> f64 {
         if self.found.is_empty() {
             let said = if self.verdict == SetVerdict::NoResidual {
@@ -154,8 +154,8 @@ impl Trial {
 }
 
 impl DetectionLimit {
-    fn new(name: &str, trials: &[Trial]) -> Self {
-        let own: Vec<&Trial> = trials.iter().filter(|t| t.truth == name).collect();
+    fn new(name: &str, trials: &[ValidationTrial]) -> Self {
+        let own: Vec<&ValidationTrial> = trials.iter().filter(|t| t.truth == name).collect();
         let named_from = own.iter().rev().take_while(|t| t.named).last().map(|t| t.size);
         let estimate = own.first().and_then(|t| {
             let above = t.held_out_before - 1.0;

@@ -106,8 +106,7 @@ impl Material {
         File::open(path)
             .and_then(|file| file.take(LONGEST_TABLE).read_to_end(&mut text))
             .map_err(Error::io(path))?;
-        let samples =
-            table::parse(&String::from_utf8_lossy(&text)).map_err(|(line, cause)| fault(line, cause))?;
+        let samples = table::parse(&String::from_utf8_lossy(&text)).map_err(|(line, cause)| fault(line, cause))?;
         let name = path
             .file_name()
             .map_or_else(String::new, |n| n.to_string_lossy().into());
