@@ -156,7 +156,7 @@ impl Files {
         let solved = chip.cells().solve(element.widths_nm(), UM, sines, &Silent).unwrap();
         let view = bench.view(0.into(), &element, perturbation, UM, &solved);
         let psf = view
-            .psf(self.window(), Accuracy::Accurate, &mut Scratch::default())
+            .psf(self.window(), Accuracy::Accurate, &[], &mut Scratch::default())
             .unwrap();
         psfs.push(("calibrate", psf.values));
         psfs

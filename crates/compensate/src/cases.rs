@@ -12,7 +12,7 @@ use metalith_design::{CellIncidence, Design, Element};
 use metalith_made::{DrawnElement, MadeChip, MadeElement};
 use metalith_verify::{PsfResult, read_back};
 use metalith_wave::propagation::{incident, landing_um};
-use metalith_wave::psf::{Matched, Psf};
+use metalith_wave::psf::{CURVE_LP_MM, Matched, Psf};
 use metalith_wave::{Accuracy, PhaseFunction, Scratch, Window};
 
 /// Chips that are compared.
@@ -99,10 +99,10 @@ fn of_element(
             design.verify.window_samples,
             lens.focal_length_um,
         );
-        let matched = Matched::of(&open, [0.0, 0.0, lens.focal_length_um], um, colour.full);
+        let matched = Matched::of(&open, [chief[0], chief[1], lens.focal_length_um], um, colour.full);
         for ((pillars, chip, _), made) in chips.iter().zip(&made) {
             let view = chip.view(made, &wave, as_lit, progress)?;
-            let psf = view.psf(window, Accuracy::Accurate, &mut scratch)?;
+            let psf = view.psf(window, Accuracy::Accurate, &CURVE_LP_MM, &mut scratch)?;
             cases.push(CompensationCase {
                 element: element.label(),
                 wavelength_um: um,

@@ -19,6 +19,14 @@ impl CameraChange {
             let mean = psf.values.mean().unwrap_or(0.0);
             psf.values.mapv_inplace(|v| veiled(v, mean, self.stray_light));
         }
+        if let Some(otf) = &mut psf.otf {
+            // A veil has no contrast at the frequencies of interest; a blur takes its share of each.
+            let sigma = self.pixel_blur_um;
+            otf.scale(|lp_mm| {
+                let blurred = (-2.0 * (std::f64::consts::PI * sigma * lp_mm * 1e-3).powi(2)).exp();
+                (1.0 - self.stray_light) * blurred
+            });
+        }
     }
 }
 
@@ -79,6 +87,7 @@ mod tests {
         Psf {
             window,
             values: Array2::from_shape_fn((64, 64), value),
+            otf: None,
         }
     }
 

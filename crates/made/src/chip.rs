@@ -153,32 +153,36 @@ impl MadeChip {
 
 impl MadeView<'_> {
     /// The PSF on a window at the stated distance of the sensor; where the sensor stands farther off, the window
-    /// keeps its place in it. Missing pillars scatter evenly over the window, blur and veil of the camera follow.
+    /// keeps its place in it; with the transfer of all light at `lp_mm` [line pairs a millimetre]. Missing pillars scatter evenly over the window, blur and veil of the camera follow.
     ///
     /// # Errors
     /// If the window is none, or the light arrives too steeply.
-    pub fn psf(&self, stated: Window, accuracy: Accuracy, scratch: &mut Scratch) -> Result<Psf> {
+    pub fn psf(&self, stated: Window, accuracy: Accuracy, lp_mm: &[f64], scratch: &mut Scratch) -> Result<Psf> {
         let window = Window {
             distance_um: stated.distance_um + self.gap_um,
             ..stated
         };
         let (lattice, wavelength_um) = (self.element.lattice(), self.light.plane.wavelength_um);
         let fold = Fold::plan(lattice, self.element.radius_um(), wavelength_um, window, accuracy)?;
-        self.psf_by(&fold, scratch).map(|psf| Psf { window: stated, ..psf })
+        self.psf_by(&fold, lp_mm, scratch)
+            .map(|psf| Psf { window: stated, ..psf })
     }
 
     /// The same by a propagator of one's own, whose window is at the distance as made.
     ///
     /// # Errors
     /// As [`Propagator::field`].
-    pub fn psf_by(&self, propagator: &dyn Propagator, scratch: &mut Scratch) -> Result<Psf> {
+    pub fn psf_by(&self, propagator: &dyn Propagator, lp_mm: &[f64], scratch: &mut Scratch) -> Result<Psf> {
         let psfs = self
             .tables
             .iter()
             .map(|table| {
                 let aperture = self.element.lit_aperture(table, &self.light);
-                let mut psf = Psf::of(&propagator.field(&aperture, &self.light.plane, scratch)?);
+                let mut psf = Psf::formed(propagator, &aperture, &self.light.plane, lp_mm, scratch)?;
                 psf.values += self.scattered(table, psf.window.centre_um, psf.window.distance_um);
+                if let Some(otf) = &mut psf.otf {
+                    otf.power_um2 += table.scattered * self.element.lattice().pitch_um().powi(2);
+                }
                 Ok(psf)
             })
             .collect::<Result<Vec<_>>>()?;

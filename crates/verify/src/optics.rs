@@ -15,15 +15,12 @@ use metalith_design::phase::ElementPhase;
 use metalith_design::{CellIncidence, Design, Element, FieldAngle};
 use metalith_made::{DrawnElement, MadeChip, MadeElement, MadeView};
 use metalith_wave::propagation::{incident, landing_um};
-use metalith_wave::{
-    Accuracy, Aperture, Fold, Matched, PhaseFunction, Pillars, PlaneWave, Propagator, Psf, Scratch, Window,
-};
+use metalith_wave::psf::{CONTRAST_LP_MM, CURVE_LP_MM};
+use metalith_wave::{Accuracy, Aperture, Fold, Matched, PhaseFunction, Pillars, PlaneWave, Psf, Scratch, Window};
 
 /// One wavelength, with what all elements and angles share.
 struct Colour {
     wavelength_um: f64,
-    /// The lens with the perfect phase, all sites of modulus one.
-    perfect: Matched,
     /// Of each case.
     cases: Vec<CaseAt>,
 }
@@ -55,12 +52,6 @@ pub(super) struct ReadElement<'a> {
 impl<'a> ElementSimulator<'a> {
     /// Look up the cells at all wavelengths.
     pub fn new(design: &'a Design, lattice: Lattice, cases: &SimulationCases<'a>, accuracy: Accuracy) -> Result<Self> {
-        let open = PhaseFunction {
-            lattice,
-            radius_um: design.lens.radius_um(),
-            amplitude: 1.0,
-            phase_rad: |_, _| 0.0,
-        };
         let cases: Vec<_> = cases.iter().collect();
         let colour = |&wavelength_um: &f64| {
             let at = |case: &SimulationCase<'_>| {
@@ -77,7 +68,6 @@ impl<'a> ElementSimulator<'a> {
             };
             Ok(Colour {
                 wavelength_um,
-                perfect: Matched::of(&open, [0.0, 0.0, design.lens.focal_length_um], wavelength_um, 1.0),
                 cases: cases.iter().map(at).collect::<Result<_>>()?,
             })
         };
@@ -119,6 +109,19 @@ impl<'a> ElementSimulator<'a> {
             }
         }
         Ok(())
+    }
+
+    /// The lens with the perfect phase for the place where a chief ray lands, all sites of modulus one: what Strehl ratios
+    /// are against.
+    fn perfect(&self, chief_um: [f64; 2], wavelength_um: f64) -> Matched {
+        let open = PhaseFunction {
+            lattice: self.lattice,
+            radius_um: self.design.lens.radius_um(),
+            amplitude: 1.0,
+            phase_rad: |_, _| 0.0,
+        };
+        let [x, y] = chief_um;
+        Matched::of(&open, [x, y, self.design.lens.focal_length_um], wavelength_um, 1.0)
     }
 
     /// Number of wavelengths and angles of one element.
@@ -245,21 +248,29 @@ impl<'a> ElementSimulator<'a> {
             lens.focal_length_um,
         );
         let fold = Fold::plan(self.lattice, lens.radius_um(), wavelength_um, window, self.accuracy)?;
-        let designed = Psf::of(&fold.field(&DesignPhase(phase, lens.radius_um()), wave, scratch)?);
+        let aperture = DesignPhase(phase, lens.radius_um());
+        let designed = Psf::formed(&fold, &aperture, wave, &CURVE_LP_MM, scratch)?;
+        let perfect = self.perfect(chief, wavelength_um);
         let mut extracted = Vec::new();
         let mut judged = None;
         for (at, view) in colour.cases.iter().zip(&task.views) {
+            // Curves are drawn of the case that judges alone.
+            let lp_mm: &[f64] = if judged.is_none() {
+                &CURVE_LP_MM
+            } else {
+                &CONTRAST_LP_MM
+            };
             let found = match (&at.tables, view) {
-                (_, Some(view)) => view.psf(window, self.accuracy, scratch)?,
+                (_, Some(view)) => view.psf(window, self.accuracy, lp_mm, scratch)?,
                 (Some(tables), None) => {
                     let mut of = |table: &Vec<Complex64>| {
-                        Ok::<_, Error>(Psf::of(&fold.field(&Pillars::new(widths, table)?, wave, scratch)?))
+                        Ok::<_, Error>(Psf::formed(&fold, &Pillars::new(widths, table)?, wave, lp_mm, scratch)?)
                     };
                     Psf::mean(tables.of(wave).iter().map(&mut of).collect::<Result<_>>()?)
                 }
                 (None, None) => unreachable!("a case is a cell or a made chip"),
             };
-            let matched = scaled(&colour.perfect, at.full);
+            let matched = scaled(&perfect, at.full);
             extracted.push((at.fidelity, PsfResult::of(&found, &matched, spec.pixel_um)));
             judged.get_or_insert(found);
         }
@@ -278,7 +289,7 @@ impl<'a> ElementSimulator<'a> {
             chief_ray_um: chief,
             relabelled: fold.fade().relabelled,
             psf_difference: judged.shape_difference(&designed)?,
-            designed: PsfResult::of(&designed, &colour.perfect, spec.pixel_um),
+            designed: PsfResult::of(&designed, &perfect, spec.pixel_um),
             extracted,
             images,
         })

@@ -9,9 +9,6 @@ use metalith_design::array::WidthRule;
 use metalith_design::{Element, FieldAngle};
 use metalith_wave::psf::{Matched, Psf, PsfMetrics, order_shares, pixel_mtf};
 
-/// Greatest frequency of an MTF curve [line pairs a millimetre], and its points.
-const CURVE_END_LP_MM: f64 = 120.0;
-const CURVE_POINTS: u32 = 60;
 /// Samples of the phase that the orders of a mapping are computed from: many times the number of widths.
 const ORDER_SAMPLES: usize = 4096;
 
@@ -27,14 +24,11 @@ pub struct PsfResult {
 
 impl PsfResult {
     pub fn of(psf: &Psf, matched: &Matched, pixel_um: f64) -> Self {
-        let frequencies = (0..=CURVE_POINTS)
-            .map(|k| CURVE_END_LP_MM * f64::from(k) / f64::from(CURVE_POINTS))
-            .collect::<Vec<_>>();
-        let [x, y] = [0, 1].map(|axis| psf.mtf_curve(axis, &frequencies));
-        let mean = |k: usize| 0.5 * (x[k] + y[k]) * pixel_mtf(pixel_um, frequencies[k]);
+        let mean = |f: f64| 0.5 * (psf.contrast(0, f) + psf.contrast(1, f)) * pixel_mtf(pixel_um, f);
+        let known = psf.otf.iter().flat_map(|otf| otf.lp_mm.iter().copied());
         Self {
             metrics: psf.metrics(matched, pixel_um),
-            mtf_curve: frequencies.iter().enumerate().map(|(k, f)| (*f, mean(k))).collect(),
+            mtf_curve: std::iter::once((0.0, 1.0)).chain(known.map(|f| (f, mean(f)))).collect(),
         }
     }
 

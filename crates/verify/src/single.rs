@@ -15,8 +15,8 @@ use metalith_core::{Error, Lattice, Progress, Result, Silent, WholeFile, WidthMa
 use metalith_gds::extract::{ElementSite, Extraction};
 use metalith_made::{DrawnElement, MadeChip, ModelStatement};
 use metalith_report::{Cell, Column, ImageGrid, Page, PillarZoom, Table, count, sig, write_json};
-use metalith_wave::psf::{Matched, Psf, PsfMetrics};
-use metalith_wave::{Accuracy, Aperture, Fold, Pillars, PlaneWave, Propagator, Scratch, Window};
+use metalith_wave::psf::{CONTRAST_LP_MM, Matched, Psf, PsfMetrics};
+use metalith_wave::{Accuracy, Aperture, Fold, Pillars, PlaneWave, Scratch, Window};
 
 /// In what light, and where on the sensor.
 #[derive(Clone, Debug)]
@@ -123,7 +123,7 @@ fn by_cell(
                     window,
                     light.accuracy,
                 )?;
-                Ok(Psf::of(&fold.field(&pillars, &wave, scratch)?))
+                Ok(Psf::formed(&fold, &pillars, &wave, &CONTRAST_LP_MM, scratch)?)
             };
             let psf = Psf::mean(tables.of(&wave).iter().map(&mut of).collect::<Result<_>>()?);
             progress.advance(1);
@@ -159,7 +159,12 @@ fn as_made(
             if progress.stopped() {
                 return Err(Error::Interrupted);
             }
-            let psf = view.psf(light.window(view.element.lattice()), light.accuracy, scratch)?;
+            let psf = view.psf(
+                light.window(view.element.lattice()),
+                light.accuracy,
+                &CONTRAST_LP_MM,
+                scratch,
+            )?;
             progress.advance(1);
             Ok(psf)
         })

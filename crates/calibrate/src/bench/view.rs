@@ -129,7 +129,9 @@ mod tests {
                 let mut view = view;
                 // The veil is over the light of the camera's window: taken from the pixels below.
                 let stray = std::mem::take(&mut view.camera.stray_light);
-                let psf = view.psf(window, Accuracy::Accurate, &mut Scratch::default()).unwrap();
+                let psf = view
+                    .psf(window, Accuracy::Accurate, &[], &mut Scratch::default())
+                    .unwrap();
                 let mut want = psf
                     .on_pixels(capture.window_centre_um, pixel, set.camera.rows)
                     .unwrap()

@@ -4,7 +4,7 @@ use ndarray::Array2;
 use num_complex::Complex32;
 
 use super::transfer::FadedColumn;
-use super::{Accuracy, Aperture, Fade, PlaneWave, Window};
+use super::{Accuracy, Aperture, Fade, Otf, PlaneWave, Window};
 use crate::error::{Result, WaveError};
 
 /// The field on a window, and how it was come by.
@@ -53,6 +53,22 @@ pub trait Propagator {
     /// # Errors
     /// If the aperture's lattice or the wave's wavelength is not the one this propagator was made for.
     fn field(&self, aperture: &dyn Aperture, wave: &PlaneWave, scratch: &mut Scratch) -> Result<Field>;
+
+    /// The field, and the transfer of all the light that `aperture` passes at `lp_mm` [line pairs a millimetre], where
+    /// this propagator sees light outside of its window.
+    ///
+    /// # Errors
+    /// As [`Propagator::field`].
+    fn field_and_otf(
+        &self,
+        aperture: &dyn Aperture,
+        wave: &PlaneWave,
+        lp_mm: &[f64],
+        scratch: &mut Scratch,
+    ) -> Result<(Field, Option<Otf>)> {
+        let _ = lp_mm;
+        Ok((self.field(aperture, wave, scratch)?, None))
+    }
 
     /// The adjoint of [`Propagator::field`]: from values on the window to values on the lattice, shape
     /// `[sites, sites]`, before the aperture and including the wave.

@@ -19,7 +19,9 @@ pub struct PsfMetrics {
     pub energy_2_pixels: f64,
     /// Energy in the whole window, over the same.
     pub energy_window: f64,
-    /// MTF at 42.7 line pairs a millimetre along x and y.
+    /// Energy of all light that the element passes, over the same; that of the window where no more is known.
+    pub energy_passed: f64,
+    /// MTF at 42.7 line pairs a millimetre along x and y, over all light that the element passes.
     pub mtf_half_nyquist: [f64; 2],
     /// MTF at 85.3 line pairs a millimetre along x and y.
     pub mtf_nyquist: [f64; 2],
@@ -33,7 +35,8 @@ impl Psf {
     /// All numbers that are reported of a PSF.
     pub fn metrics(&self, matched: &Matched, pixel_um: f64) -> PsfMetrics {
         let (peak, peak_um) = self.peak();
-        let mtf = |lp_mm: f64| [0, 1].map(|axis| self.mtf_curve(axis, &[lp_mm])[0]);
+        let mtf = |lp_mm: f64| [0, 1].map(|axis| self.contrast(axis, lp_mm));
+        let passed = self.otf.as_ref().map_or_else(|| self.energy_um2(), |otf| otf.power_um2);
         let seen = |lp_mm: f64| mtf(lp_mm).map(|m| m * pixel_mtf(pixel_um, lp_mm));
         let share = |edge_um| self.energy_in_square_um2(peak_um, edge_um) / matched.power_um2;
         PsfMetrics {
@@ -43,6 +46,7 @@ impl Psf {
             energy_1_pixel: share(pixel_um),
             energy_2_pixels: share(2.0 * pixel_um),
             energy_window: self.energy_um2() / matched.power_um2,
+            energy_passed: passed / matched.power_um2,
             mtf_half_nyquist: mtf(HALF_NYQUIST_LP_MM),
             mtf_nyquist: mtf(NYQUIST_LP_MM),
             mtf_half_nyquist_pixel: seen(HALF_NYQUIST_LP_MM),

@@ -20,10 +20,11 @@ mod reference;
 use metalith_core::part;
 use ndarray::{Array2, Axis};
 
-use crate::{Field, Window};
+use crate::error::Result;
+use crate::propagation::{Aperture, Field, Otf, PlaneWave, Propagator, Scratch, Window};
 
 pub use metrics::PsfMetrics;
-pub use mtf::{HALF_NYQUIST_LP_MM, NYQUIST_LP_MM, pixel_mtf};
+pub use mtf::{CONTRAST_LP_MM, CURVE_LP_MM, HALF_NYQUIST_LP_MM, NYQUIST_LP_MM, pixel_mtf};
 pub use orders::order_shares;
 pub use reference::Matched;
 
@@ -37,6 +38,9 @@ pub struct Psf {
     pub window: Window,
     /// Shape `[samples, samples]`, row index along +y, column index along +x.
     pub values: Array2<f64>,
+    /// The transfer of all the light that the element passes, at the frequencies that were asked for; without it,
+    /// contrast can only be that of the light in the window.
+    pub otf: Option<Otf>,
 }
 
 impl Psf {
@@ -45,7 +49,27 @@ impl Psf {
         Self {
             window: field.window,
             values: field.values.map(|e| f64::from(e.re).powi(2) + f64::from(e.im).powi(2)),
+            otf: None,
         }
+    }
+
+    /// Of an element in a unit wave, with the transfer of all its light at `lp_mm` [line pairs a millimetre] where the
+    /// propagator knows it.
+    ///
+    /// # Errors
+    /// As [`Propagator::field`].
+    pub fn formed(
+        propagator: &dyn Propagator,
+        aperture: &dyn Aperture,
+        wave: &PlaneWave,
+        lp_mm: &[f64],
+        scratch: &mut Scratch,
+    ) -> Result<Self> {
+        let (field, otf) = propagator.field_and_otf(aperture, wave, lp_mm, scratch)?;
+        Ok(Self {
+            otf,
+            ..Self::of(&field)
+        })
     }
 
     /// Mean of PSFs on the same window, as of light that is not polarised.
@@ -54,6 +78,7 @@ impl Psf {
     /// If there is none, or their windows are of different sizes.
     pub fn mean(psfs: Vec<Self>) -> Self {
         let share = 1.0 / psfs.len() as f64;
+        let otfs: Option<Vec<Otf>> = psfs.iter().map(|p| p.otf.clone()).collect();
         let mut all = psfs.into_iter();
         let mut sum = all.next().expect("a PSF to take the mean of");
         for psf in all {
@@ -62,6 +87,7 @@ impl Psf {
         if share < 1.0 {
             sum.values *= share;
         }
+        sum.otf = otfs.map(|all| Otf::mean(&all));
         sum
     }
 
@@ -124,7 +150,11 @@ pub(super) mod tests {
             let y = window.coordinate_um(1, iy) - at_um[1];
             (-(x * x + y * y) / (2.0 * sigma_um * sigma_um)).exp()
         });
-        Psf { window, values }
+        Psf {
+            window,
+            values,
+            otf: None,
+        }
     }
 
     pub const AT: [f64; 2] = [100.3, -41.2];
@@ -142,7 +172,12 @@ pub(super) mod tests {
                 let [x, y] = [window.coordinate_um(0, ix) - at[0], window.coordinate_um(1, iy) - at[1]];
                 1.0 / (1.0 + x * x + 0.2 * y * y)
             });
-            let centroid = Psf { window, values }.centroid_um();
+            let centroid = Psf {
+                window,
+                values,
+                otf: None,
+            }
+            .centroid_um();
             assert!(
                 (0..2).all(|a| (centroid[a] - at[a]).abs() < ROUNDING_UM),
                 "{centroid:?}"

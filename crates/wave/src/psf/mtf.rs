@@ -10,10 +10,39 @@ pub const NYQUIST_LP_MM: f64 = 85.3;
 /// Half of it [line pairs a millimetre].
 pub const HALF_NYQUIST_LP_MM: f64 = 42.7;
 
+/// What is asked for where contrast is reported: both of them.
+pub const CONTRAST_LP_MM: [f64; 2] = [HALF_NYQUIST_LP_MM, NYQUIST_LP_MM];
+/// What is asked for where contrast is drawn: dense where the veil takes it away, and both of them.
+pub const CURVE_LP_MM: [f64; 13] = [
+    2.0,
+    5.0,
+    10.0,
+    20.0,
+    30.0,
+    HALF_NYQUIST_LP_MM,
+    52.0,
+    63.0,
+    74.0,
+    NYQUIST_LP_MM,
+    96.0,
+    108.0,
+    120.0,
+];
+
 impl Psf {
-    /// Optical transfer function at a frequency along x and y [line pairs a millimetre], one at zero frequency; the
+    /// Contrast along one axis (0 is x) at a frequency [line pairs a millimetre], without the pixel: of all the light
+    /// that the element passes where the PSF knows it ([`Psf::otf`] at that very frequency), else of the window's.
+    pub fn contrast(&self, axis: usize, lp_mm: f64) -> f64 {
+        let whole = self.otf.as_ref().and_then(|otf| {
+            let place = otf.lp_mm.iter().position(|f| *f == lp_mm)?;
+            Some(otf.contrast(place)[axis])
+        });
+        whole.unwrap_or_else(|| self.mtf_curve(axis, &[lp_mm])[0])
+    }
+
+    /// Optical transfer function of the window's light at a frequency along x and y [line pairs a millimetre], one at zero frequency; the
     /// phase counts from the window's middle. What lies outside the window is left out.
-    pub fn otf(&self, lp_mm: [f64; 2]) -> Complex64 {
+    pub fn window_otf(&self, lp_mm: [f64; 2]) -> Complex64 {
         let [x, y] = [0, 1].map(|axis| self.phasors(lp_mm[axis]));
         let rows = self.values.rows().into_iter().zip(&y);
         let sum: Complex64 = rows
@@ -24,7 +53,7 @@ impl Psf {
 
     /// Contrast at a frequency along x and y [line pairs a millimetre], without the pixel: see [`pixel_mtf`].
     pub fn mtf(&self, lp_mm: [f64; 2]) -> f64 {
-        self.otf(lp_mm).norm()
+        self.window_otf(lp_mm).norm()
     }
 
     /// Contrast along one axis (0 is x) at many frequencies [line pairs a millimetre].
@@ -69,7 +98,7 @@ mod tests {
             }
         }
         // Displaced to higher x, the phase falls with frequency.
-        assert!(psf.otf([10.0, 0.0]).arg() < 0.0 && psf.otf([0.0, 10.0]).arg() > 0.0);
+        assert!(psf.window_otf([10.0, 0.0]).arg() < 0.0 && psf.window_otf([0.0, 10.0]).arg() > 0.0);
     }
 
     #[test]

@@ -216,6 +216,17 @@ impl Propagator for Fold {
         Ok(self.finished(values, wave))
     }
 
+    fn field_and_otf(
+        &self,
+        aperture: &dyn Aperture,
+        wave: &PlaneWave,
+        lp_mm: &[f64],
+        scratch: &mut Scratch,
+    ) -> Result<(Field, Option<Otf>)> {
+        self.with_otf(aperture, wave, lp_mm, scratch)
+            .map(|(field, otf)| (field, Some(otf)))
+    }
+
     fn adjoint(
         &self,
         values: &Array2<Complex32>,

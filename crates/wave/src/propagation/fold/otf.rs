@@ -42,6 +42,15 @@ impl Otf {
         mean
     }
 
+    /// Multiply the transform at each frequency [line pairs a millimetre] by what a camera leaves of it.
+    pub fn scale(&mut self, factor: impl Fn(f64) -> f64) {
+        for values in &mut self.transform_um2 {
+            for (value, f) in values.iter_mut().zip(&self.lp_mm) {
+                *value *= factor(*f);
+            }
+        }
+    }
+
     /// Contrast along x and y at the `i`-th frequency: one if all light fell into one point.
     pub fn contrast(&self, i: usize) -> [f64; 2] {
         [0, 1].map(|axis| self.transform_um2[axis][i].norm() / self.power_um2)
@@ -56,7 +65,7 @@ impl Fold {
     ///
     /// # Errors
     /// As `Propagator::field`.
-    pub fn field_and_otf(
+    pub(super) fn with_otf(
         &self,
         aperture: &dyn Aperture,
         wave: &PlaneWave,
