@@ -116,8 +116,8 @@ fn tall_boxes_over_one_another() {
 
 #[test]
 fn outlines_of_many_vertices() {
-    // A zigzag of 250,000 vertices, level strokes one above the other, there and back.
-    let along = |k: i32, above: i32| (if k % 2 == 0 { 0 } else { 1_000_000 }, 20 * k + above);
+    // A zigzag of 250,000 vertices, level strokes one above the other, there and back beside the way there.
+    let along = |k: i32, aside: i32| (aside + if k % 2 == 0 { 0 } else { 1_000_000 }, 20 * k);
     let there = (0..125_000).map(|k| along(k, 0));
     let mut zigzag: Vec<_> = there.chain((0..125_000).rev().map(|k| along(k, 7))).collect();
     zigzag.push(zigzag[0]);

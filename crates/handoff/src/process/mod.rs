@@ -273,7 +273,7 @@ mod tests {
             // The same deck, built in and from its file.
             let name = |deck: Deck| deck.name;
             let file = Path::new(env!("CARGO_MANIFEST_DIR"))
-                .join("rules")
+                .join("../../rules")
                 .join(rules.file_name().unwrap());
             assert_eq!(name(process.deck(rules).unwrap()), name(Deck::read(&file).unwrap()));
         }

@@ -41,8 +41,8 @@ fn a_file_that_is_not_read_is_not_copied() {
 #[test]
 fn inputs_of_one_name_are_both_kept() {
     let folder = tempfile::tempdir().unwrap();
-    let phase = "radius_um,phase_rad\n0,0\n10,-3\n20,-11\n30.5,-25\n";
-    let widths = "phase_turns,width_nm\n0,102\n0.25,160\n0.5,210\n0.75,250\n0.98,288\n";
+    let phase = "r_um,phase_rad\n0,0\n10,-3\n20,-11\n30.5,-25\n";
+    let widths = "turns,width_nm\n0.125,102\n0.375,160\n0.625,210\n0.875,288\n";
     for (name, text) in [("a", phase), ("b", widths)] {
         fs::create_dir(folder.path().join(name)).unwrap();
         fs::write(folder.path().join(name).join("t.csv"), text).unwrap();
