@@ -93,7 +93,11 @@ pub fn read(file: &Path, magic: [u8; 8], inputs: &[u8], longest: u64) -> Result<
 
 /// Sixteen hexadecimal digits that name a file by the inputs of its content.
 pub fn name_of(inputs: &[u8]) -> String {
-    Sha256::digest(inputs).iter().take(8).map(|b| format!("{b:02x}")).collect()
+    Sha256::digest(inputs)
+        .iter()
+        .take(8)
+        .map(|b| format!("{b:02x}"))
+        .collect()
 }
 
 #[cfg(test)]

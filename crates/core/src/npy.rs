@@ -32,7 +32,7 @@ pub enum NpyError {
     Short(io::Error),
 }
 
-/// Longest header that is read [bytes]: that of a plain array has 118.
+/// Longest header that is read (bytes): that of a plain array has 118.
 const LONGEST_HEADER: usize = 1 << 12;
 
 /// Most entries of an array: no file that is read has as many.
@@ -163,13 +163,25 @@ mod tests {
     fn what_is_no_plain_array_is_named() {
         let with = |from: &str, to: &str| outcome(&file(&PLAIN.replace(from, to), &[0; 64]));
         assert!(matches!(with("(2, 2)", "(2, 3)"), Err(NpyError::Shape { .. })));
-        assert!(matches!(with("False", "True"), Err(NpyError::Shape { columns_first: true, .. })));
+        assert!(matches!(
+            with("False", "True"),
+            Err(NpyError::Shape {
+                columns_first: true,
+                ..
+            })
+        ));
         assert!(matches!(with("<f4", "<i4"), Err(NpyError::Type)));
-        assert!(matches!(with("(2, 2)", "(99999999999, 99999999999)"), Err(NpyError::Format(_))));
+        assert!(matches!(
+            with("(2, 2)", "(99999999999, 99999999999)"),
+            Err(NpyError::Format(_))
+        ));
         assert!(matches!(with("'shape'", "'form'"), Err(NpyError::Format(_))));
         assert!(matches!(outcome(b"\x93NUMPY\x01\x00"), Err(NpyError::Format(_))));
         assert!(matches!(outcome(b"P5 2 2"), Err(NpyError::Format(_))));
-        assert!(matches!(outcome(b"\x93NUMPY\x02\x00\xff\xff\xff\xff{}"), Err(NpyError::Format(_))));
+        assert!(matches!(
+            outcome(b"\x93NUMPY\x02\x00\xff\xff\xff\xff{}"),
+            Err(NpyError::Format(_))
+        ));
     }
 
     /// A header of nested brackets, for which the parser behind would take 2^n steps.

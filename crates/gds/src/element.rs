@@ -207,7 +207,10 @@ impl Element {
         }
         if matches!(self.kind, ElementKind::Reference | ElementKind::Array) {
             if self.name.is_empty() {
-                return fail(LayoutError::Lacks { element, lacks: "SNAME" });
+                return fail(LayoutError::Lacks {
+                    element,
+                    lacks: "SNAME",
+                });
             }
             let (columns, rows) = (self.columns as i16, self.rows as i16);
             if self.kind == ElementKind::Array && (columns <= 0 || rows <= 0) {

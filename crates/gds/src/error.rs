@@ -107,10 +107,7 @@ pub enum LayoutError {
     #[error("a {element} with {points} points")]
     Points { element: &'static str, points: usize },
     #[error("a {element} without {lacks}")]
-    Lacks {
-        element: &'static str,
-        lacks: &'static str,
-    },
+    Lacks { element: &'static str, lacks: &'static str },
     #[error("an AREF of {columns} x {rows}")]
     ArraySize { columns: i16, rows: i16 },
     #[error("a {element} with absolute magnification or angle")]
@@ -178,9 +175,9 @@ impl Limit {
             Self::References => "more distinct references in cells than are read".into(),
             Self::Vertices => format!("an element of more than {most} vertices"),
             Self::Depth => format!("references {found} deep, {most} are followed"),
-            Self::Placements => format!(
-                "{found} copies of cells that have references or are large, {most} are followed"
-            ),
+            Self::Placements => {
+                format!("{found} copies of cells that have references or are large, {most} are followed")
+            }
             Self::FlatShapes => format!("{found} shapes with all references followed, {most} are read"),
             Self::FlatShapesOfShortFile => {
                 format!("{found} shapes with all references followed, {most} are read from a file as short as this")
@@ -292,9 +289,7 @@ impl ExtractionError {
             Self::NoElements { .. } => "name the layer that the pillars are on, or give the design".into(),
             Self::Groups { most, .. } => format!("up to {most} elements are read; is this the layer of the pillars?"),
             Self::Scattered { .. } => "give the design, which says where the elements are".into(),
-            Self::Sparse { .. } => {
-                "this is no lens on a lattice; give the design to say where its elements are".into()
-            }
+            Self::Sparse { .. } => "this is no lens on a lattice; give the design to say where its elements are".into(),
             Self::Lattice { .. } => "lattices with an even pitch about a whole nanometre are read".into(),
         }
     }

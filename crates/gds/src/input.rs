@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::record::{self, Record};
-use metalith_core::file::{Ahead, Block};
 use crate::error::{Error, LayoutError, Result};
+use metalith_core::file::{Ahead, Block};
 
 /// Bytes read at a time: enough that the kernel's copy is the cost, not the call. No mapping of the file:
 /// mapped pages count as memory of the process.

@@ -33,7 +33,8 @@ impl ReadLimits {
     /// Shapes that are read of a file of so many bytes, every reference followed.
     pub(super) fn shapes_of(&self, bytes: u64) -> u64 {
         let in_proportion = self.shapes_per_byte.saturating_mul(bytes);
-        self.flat_shapes.min(self.short_file_shapes.saturating_add(in_proportion))
+        self.flat_shapes
+            .min(self.short_file_shapes.saturating_add(in_proportion))
     }
 }
 
@@ -62,6 +63,6 @@ impl Default for ReadLimits {
 /// Largest magnification, and the inverse of the smallest, of a reference and of a chain of them.
 pub(super) const MAGNIFICATION: f64 = 1e6;
 
-/// Coordinates of placed shapes are held within this of the origin [database units], so that sums and
+/// Coordinates of placed shapes are held within this of the origin (database units), so that sums and
 /// differences of a few of them cannot overflow. The format's own coordinates end at 2^31.
 pub(super) const FARTHEST: i64 = 1 << 50;

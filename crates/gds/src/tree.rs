@@ -3,8 +3,8 @@
 
 use super::cell::Cell;
 use super::limits::{ReadLimits, TEXT_BYTES};
-use crate::error::{LayoutError, Limit};
 use super::names::Names;
+use crate::error::{LayoutError, Limit};
 
 /// Cells larger than this are placed as a whole; smaller ones without references shape by shape.
 const INLINE_SHAPES: u64 = 64;
@@ -159,7 +159,11 @@ pub(super) fn flat_shapes(cells: &[Cell], placements: &[u64]) -> u64 {
 /// Bytes of texts, every reference followed, and what each costs beside.
 fn flat_text_bytes(cells: &[Cell], placements: &[u64]) -> u64 {
     cells.iter().zip(placements).fold(0u64, |sum, (cell, &n)| {
-        let texts = cell.layers.iter().map(|(_, t)| t.text_bytes + TEXT_BYTES * t.texts).sum::<u64>();
+        let texts = cell
+            .layers
+            .iter()
+            .map(|(_, t)| t.text_bytes + TEXT_BYTES * t.texts)
+            .sum::<u64>();
         sum.saturating_add(n.saturating_mul(texts))
     })
 }
@@ -184,7 +188,11 @@ pub(super) fn beyond(
         (Limit::Depth, u64::from(depth), u64::from(limits.depth)),
         (Limit::FlatShapes, shapes, limits.flat_shapes),
         (Limit::FlatShapesOfShortFile, shapes, limits.shapes_of(bytes)),
-        (Limit::FlatTexts, flat_text_bytes(cells, placements), limits.flat_text_bytes),
+        (
+            Limit::FlatTexts,
+            flat_text_bytes(cells, placements),
+            limits.flat_text_bytes,
+        ),
         (Limit::Placements, copies, limits.placements),
     ]
     .into_iter()

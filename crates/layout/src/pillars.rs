@@ -9,10 +9,10 @@ use rayon::prelude::*;
 
 use super::frame::Frame;
 use super::{coordinate, point, polygon};
-use metalith_gds::write::{ReferenceRecord, SquareRecord};
 use metalith_core::{Error, Progress, Result, WholeFile, WidthMap};
 use metalith_design::Layer;
 use metalith_design::array::{PillarArray, Placed, Symmetry};
+use metalith_gds::write::{ReferenceRecord, SquareRecord};
 
 /// Rows of a lattice that are encoded as one block: a megabyte of a full-size lens.
 const ROWS: usize = 4;

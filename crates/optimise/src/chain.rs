@@ -156,7 +156,8 @@ impl Task {
                 history.push((chain.sweep.saturating_add(exchange.block()), exchange.merit()));
             }
         }
-        best.progress.advance(u64::from(blocks.saturating_sub(exchange.block())));
+        best.progress
+            .advance(u64::from(blocks.saturating_sub(exchange.block())));
         Found {
             turns: exchange.turns(),
             widths_nm: exchange.widths_nm(),

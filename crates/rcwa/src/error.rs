@@ -127,14 +127,19 @@ impl Error {
             Self::NoModes { .. } => "change the wavelength, the width or the number of orders a little".into(),
             Self::Cutoff => "change the wavelength, the angle or the width by a part in a million".into(),
             Self::UnknownMaterial { known, .. } => {
-                format!("use one of {}, or the path of a .csv table of n and k", known.join(", "))
+                format!(
+                    "use one of {}, or the path of a .csv table of n and k",
+                    known.join(", ")
+                )
             }
             Self::MaterialIndex { .. } => "use n > 0 and k >= 0".into(),
             Self::OutOfRange { .. } => "choose wavelengths in that range, or another material".into(),
             Self::Io { .. } => "check the path; relative paths count from the file that names them".into(),
-            Self::Table { .. } => "give columns wavelength_nm (or wavelength_um), n and, if it absorbs, k, with rising \
+            Self::Table { .. } => {
+                "give columns wavelength_nm (or wavelength_um), n and, if it absorbs, k, with rising \
                                    wavelengths"
-                .into(),
+                    .into()
+            }
         }
     }
 }

@@ -12,10 +12,10 @@ use faer::linalg::solvers::Solve;
 use faer::{Accum, Mat, Par};
 use num_complex::Complex64;
 
+use super::Result;
 use super::basis::{Basis, Row, Space};
 use super::outline::{Outline, slab_coefficients};
 use super::scalar::{Eigen, Scalar};
-use super::Result;
 
 /// Below this the square of a propagation constant over k0 counts as zero, and is moved off it: the
 /// wave grazes, and 1 / gamma would not be a number. The field changes by about its square root.

@@ -2,8 +2,8 @@
 
 use num_complex::Complex64;
 
-use super::{Incidence, LayerStack, Orders, Part, Problem, solve};
 use super::{Error, Result};
+use super::{Incidence, LayerStack, Orders, Part, Problem, solve};
 
 /// How a stack answers a plane wave.
 ///

@@ -112,7 +112,11 @@ fn hold(points: &Points, to: &Agreement) {
     let share = good.count() as f64 / points.len() as f64;
     let beyond = points.iter().map(|(got, want, bound)| (got - want).norm() - bound);
     let worst = beyond.fold(f64::MIN, f64::max);
-    println!("{0} x {0}: {share:.3} of {1} points, worst {worst:.4}", to.orders, points.len());
+    println!(
+        "{0} x {0}: {share:.3} of {1} points, worst {worst:.4}",
+        to.orders,
+        points.len()
+    );
     assert!(share >= to.share, "{0} x {0}: {share}", to.orders);
     assert!(worst <= to.worst, "{0} x {0}: worst {worst}", to.orders);
 }

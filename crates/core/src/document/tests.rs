@@ -21,15 +21,26 @@ fn cell(root: &Section<'_, '_>) {
     let pitch = s.float("pitch_nm", Limits::new(100.0..=2000.0, "nm"));
     let width = s.float("width_nm", Limits::new(10.0..=2000.0, "nm"));
     if width > pitch {
-        s.fault_given(&["cell.pitch_nm"], "width_nm", "the pillar is wider than the pitch", "make it narrower");
+        s.fault_given(
+            &["cell.pitch_nm"],
+            "width_nm",
+            "the pillar is wider than the pitch",
+            "make it narrower",
+        );
     }
     s.finish();
 }
 
 #[test]
 fn what_depends_on_a_wrong_value_is_not_judged() {
-    assert_eq!(words(&faults_of("[cell]\npitch_nm = 35\nwidth_nm = 300", cell)), ["`pitch_nm` cannot be 35"]);
-    assert_eq!(words(&faults_of("[cell]\nwidth_nm = 300", cell)), ["[cell] lacks `pitch_nm`"]);
+    assert_eq!(
+        words(&faults_of("[cell]\npitch_nm = 35\nwidth_nm = 300", cell)),
+        ["`pitch_nm` cannot be 35"]
+    );
+    assert_eq!(
+        words(&faults_of("[cell]\nwidth_nm = 300", cell)),
+        ["[cell] lacks `pitch_nm`"]
+    );
     assert_eq!(words(&faults_of("", cell)), ["the file lacks `cell`"]);
     let right = faults_of("[cell]\npitch_nm = 200\nwidth_nm = 300", cell);
     assert_eq!(words(&right), ["the pillar is wider than the pitch"]);
@@ -39,7 +50,11 @@ fn what_depends_on_a_wrong_value_is_not_judged() {
 fn a_misspelt_key_is_one_mistake() {
     let faults = faults_of("[cell]\npitch_nn = 350\nwidth_nm = 300", cell);
     assert_eq!(words(&faults), ["unknown key `pitch_nn` in [cell]"]);
-    assert!(faults.faults()[0].hint.ends_with("did you mean `pitch_nm`, which is missing?"));
+    assert!(
+        faults.faults()[0]
+            .hint
+            .ends_with("did you mean `pitch_nm`, which is missing?")
+    );
 }
 
 #[test]
@@ -66,7 +81,11 @@ fn many_mistakes_are_counted_in_linear_time() {
 
 #[test]
 fn texts_are_one_printable_line() {
-    for (text, character) in [("\"a\\u001b[2J\"", "U+001B"), ("\"a\\nb\"", "U+000A"), ("\"\\uFFFE\"", "U+FFFE")] {
+    for (text, character) in [
+        ("\"a\\u001b[2J\"", "U+001B"),
+        ("\"a\\nb\"", "U+000A"),
+        ("\"\\uFFFE\"", "U+FFFE"),
+    ] {
         let faults = faults_of(&format!("title = {text}"), |root| {
             root.text("title");
         });

@@ -30,7 +30,9 @@ pub fn read_at_most(path: &Path, most: u64, what: &str) -> Result<Vec<u8>> {
     let mut bytes = Vec::with_capacity(found.len() as usize);
     let file = fs::File::open(path).map_err(Error::io("read", path))?;
     // The file may grow while it is read.
-    file.take(most + 1).read_to_end(&mut bytes).map_err(Error::io("read", path))?;
+    file.take(most + 1)
+        .read_to_end(&mut bytes)
+        .map_err(Error::io("read", path))?;
     if bytes.len() as u64 > most {
         return refused("grows while it is read".into());
     }

@@ -24,7 +24,12 @@ fn part_of(target: &Path) -> PathBuf {
 /// This program again, as another process that plays a role.
 fn start(role: &str, file: &Path) -> Child {
     Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", "file::tests::other_process", "--nocapture", "--include-ignored"])
+        .args([
+            "--exact",
+            "file::tests::other_process",
+            "--nocapture",
+            "--include-ignored",
+        ])
         .env(ROLE, role)
         .env(FILE, file)
         .stdin(Stdio::piped())
@@ -37,7 +42,10 @@ fn wait_for(child: &mut BufReader<std::process::ChildStdout>, word: &str) {
     let mut line = String::new();
     while !line.contains(word) {
         line.clear();
-        assert!(child.read_line(&mut line).unwrap() > 0, "the other process ended before it said {word}");
+        assert!(
+            child.read_line(&mut line).unwrap() > 0,
+            "the other process ended before it said {word}"
+        );
     }
 }
 
@@ -116,7 +124,10 @@ fn two_processes_never_mix() {
     let mut looks = 0;
     while writers.iter_mut().any(|w| w.try_wait().unwrap().is_none()) {
         let bytes = std::fs::read(&target).unwrap();
-        assert!(bytes.len() == LENGTH && bytes.iter().all(|b| *b == bytes[0]), "half a file");
+        assert!(
+            bytes.len() == LENGTH && bytes.iter().all(|b| *b == bytes[0]),
+            "half a file"
+        );
         looks += 1;
     }
     for mut writer in writers {

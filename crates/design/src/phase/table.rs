@@ -76,7 +76,9 @@ fn read_npy(path: &Path) -> Result<Vec<(f64, f64)>> {
         what,
         hint: "save an array of shape [rows, 2], columns r_um and phase_rad, as float64 or float32 in C order".into(),
     };
-    let array = npy::read(path, |shape| shape.len() == 2 && shape[1] == 2 && shape[0] <= MOST_ROWS as u64);
+    let array = npy::read(path, |shape| {
+        shape.len() == 2 && shape[1] == 2 && shape[0] <= MOST_ROWS as u64
+    });
     let values = match array {
         Ok(array) => array.values,
         Err(npy::NpyError::Io(error)) => return Err(Error::io("read", path)(error)),

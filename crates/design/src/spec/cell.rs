@@ -45,7 +45,11 @@ impl CellSpec {
             );
         }
         // A pitch with a fault bounds nothing.
-        let widest = if s.sound(&["cell.pitch_nm"]) { pitch_nm } else { WIDEST_PITCH_NM };
+        let widest = if s.sound(&["cell.pitch_nm"]) {
+            pitch_nm
+        } else {
+            WIDEST_PITCH_NM
+        };
         let low = s.integer("width_min_nm", 10..=i64::from(widest), "nm") as u16;
         let high = s.integer("width_max_nm", 10..=i64::from(widest), "nm") as u16;
         for (key, width) in [("width_min_nm", low), ("width_max_nm", high)] {

@@ -179,7 +179,8 @@ impl Layers {
                 && s.has(key)
                 && s.has(other)
             {
-                let numbers = [*key, *other].map(|layer| [format!("layers.{layer}.layer"), format!("layers.{layer}.datatype")]);
+                let numbers =
+                    [*key, *other].map(|layer| [format!("layers.{layer}.layer"), format!("layers.{layer}.datatype")]);
                 s.fault_given(
                     &numbers.iter().flatten().map(String::as_str).collect::<Vec<_>>(),
                     key,

@@ -263,7 +263,11 @@ impl MeritSpec {
         };
         if merit.sum + merit.log + merit.deconvolution + merit.side_lobes == 0.0 {
             s.fault_given(
-                &["optimise.merit.sum", "optimise.merit.deconvolution", "optimise.merit.side_lobes"],
+                &[
+                    "optimise.merit.sum",
+                    "optimise.merit.deconvolution",
+                    "optimise.merit.side_lobes",
+                ],
                 "log",
                 "all merits have a weight of zero",
                 "give one of sum, log, deconvolution, side_lobes a weight",

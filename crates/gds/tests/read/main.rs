@@ -6,7 +6,9 @@ use std::path::PathBuf;
 
 use metalith_core::{Lattice, Silent, WidthMap};
 use metalith_gds::extract::{ElementSite, ExtractionPlan, Why, extract};
-use metalith_gds::{Error, LayerNumber, Layout, LayoutError, Limit, Point, ReadLimits, Rect, Selection, Shape, Transform, Visitor};
+use metalith_gds::{
+    Error, LayerNumber, Layout, LayoutError, Limit, Point, ReadLimits, Rect, Selection, Shape, Transform, Visitor,
+};
 use metalith_testing::gds::{self, Gds};
 use rand::SeedableRng;
 
@@ -296,11 +298,17 @@ fn texts_count_as_often_as_they_stand() {
     let found = 320 * 320 * (60_000 + 64);
     let most = ReadLimits::default().flat_text_bytes;
     let limit = Limit::FlatTexts;
-    assert_eq!(visited(&layout(bomb.end())), Err(LayoutError::Limit { limit, found, most }));
+    assert_eq!(
+        visited(&layout(bomb.end())),
+        Err(LayoutError::Limit { limit, found, most })
+    );
     // As many short labels as a mask may have are no matter.
     let mut labels = Gds::library();
     labels.cell("T").text(10, "0123456789", 0, 0).end_cell();
-    labels.cell("TOP").array("T", 320, 320, [0, 0, 320, 0, 0, 320]).end_cell();
+    labels
+        .cell("TOP")
+        .array("T", 320, 320, [0, 0, 320, 0, 0, 320])
+        .end_cell();
     assert_eq!(visited(&layout(labels.end())), Ok(()));
 }
 
@@ -309,7 +317,9 @@ fn texts_count_as_often_as_they_stand() {
 fn a_short_file_has_no_billion_of_shapes() {
     let mut bomb = Gds::library();
     bomb.cell("P").square(1, 0, 0, 100).end_cell();
-    bomb.cell("TOP").array("P", 32_000, 32_000, [0, 0, 350 * 32_000, 0, 0, 350 * 32_000]).end_cell();
+    bomb.cell("TOP")
+        .array("P", 32_000, 32_000, [0, 0, 350 * 32_000, 0, 0, 350 * 32_000])
+        .end_cell();
     let layout = layout(bomb.end());
     let (found, limits) = (32_000 * 32_000, ReadLimits::default());
     let most = limits.short_file_shapes + limits.shapes_per_byte * layout.bytes();
@@ -323,13 +333,19 @@ fn a_short_file_has_no_billion_of_shapes() {
 fn names_are_printable() {
     let mut gds = Gds::library();
     gds.cell("A\u{1b}[2J\u{fffe}").square(1, 0, 0, 10).end_cell();
-    gds.cell("TOP").sref("A\u{1b}[2J\u{fffe}", 0, 0).sref("B\n", 0, 0).end_cell();
+    gds.cell("TOP")
+        .sref("A\u{1b}[2J\u{fffe}", 0, 0)
+        .sref("B\n", 0, 0)
+        .end_cell();
     let layout = layout(gds.end());
     assert_eq!(layout.cells()[0].name, "A\\u{1b}[2J\\u{fffe}");
     assert_eq!(layout.cell_index("A\\u{1b}[2J\\u{fffe}"), Some(0));
     assert_eq!(layout.cell_index("A\u{1b}[2J\u{fffe}"), Some(0));
     let error = visited(&layout).unwrap_err();
-    assert_eq!(error.to_string(), "cell TOP refers to B\\u{a}, which is not in the file");
+    assert_eq!(
+        error.to_string(),
+        "cell TOP refers to B\\u{a}, which is not in the file"
+    );
 }
 
 /// The program's error says the same as ours, and keeps it as its source.
@@ -337,12 +353,23 @@ fn names_are_printable() {
 fn causes_stay_behind_the_text() {
     use std::error::Error as _;
     let bytes = &gds::everything()[..500];
-    let error = Layout::from_bytes("cut.gds", bytes, ReadLimits::default()).map(|_| ()).unwrap_err();
+    let error = Layout::from_bytes("cut.gds", bytes, ReadLimits::default())
+        .map(|_| ())
+        .unwrap_err();
     let text = format!("{error}\n  help: {}", error.in_layout().unwrap().1.remedy());
     let of_program = metalith_core::Error::from(error);
     assert_eq!(of_program.to_string(), text);
     let behind = of_program.source().and_then(|s| s.downcast_ref::<Error>());
-    assert!(matches!(behind, Some(Error::Layout { cause: LayoutError::EndsInRecord { .. }, .. })), "{behind:?}");
+    assert!(
+        matches!(
+            behind,
+            Some(Error::Layout {
+                cause: LayoutError::EndsInRecord { .. },
+                ..
+            })
+        ),
+        "{behind:?}"
+    );
 }
 
 /// Cells with dangling and circular references can still be visited by whoever reports these faults.
