@@ -1,7 +1,7 @@
 //! Cell libraries on the disk.
 //!
-//! The content of the kept file ([`kept`]) is, little-endian: the number of columns (u32); for each its width [nm]
-//! (u16), its number of samples (u32) and for each sample wavelength [um], Re t, Im t (f64). Its inputs are JSON.
+//! The content of the kept file ([`kept`]) is, little-endian: the number of columns (u32); for each its width (nm)
+//! (u16), its number of samples (u32) and for each sample wavelength (um), Re t, Im t (f64). Its inputs are JSON.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ use metalith_core::Result;
 
 const MAGIC: [u8; 8] = *b"MLCELL\0\x01";
 
-/// Longest file that is read [bytes]: ten times the library of the shipped designs at a tenth of its
+/// Longest file that is read (bytes): ten times the library of the shipped designs at a tenth of its
 /// tolerance.
 const LONGEST: u64 = 256 << 20;
 

@@ -4,11 +4,11 @@ use num_complex::Complex64;
 
 use metalith_core::Result;
 
-/// Distance of the first samples [um]. Between them t turns by less than an eighth of a turn; every
+/// Distance of the first samples (um). Between them t turns by less than an eighth of a turn; every
 /// interval is checked in its middle, so none in the end is longer than half of this.
 const FIRST_STEP_UM: f64 = 0.004;
 
-/// Shortest interval that is still divided [um]: a resonance narrower than this moves less light of any
+/// Shortest interval that is still divided (um): a resonance narrower than this moves less light of any
 /// LED than the camera's noise.
 const LAST_STEP_UM: f64 = 5e-5;
 

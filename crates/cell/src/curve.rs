@@ -11,22 +11,22 @@ use metalith_core::{Error, Result};
 /// The cell at one wavelength, width by width.
 #[derive(Clone, Debug)]
 pub struct PhaseCurve {
-    /// Wavelength [um].
+    /// Wavelength (um).
     pub wavelength_um: f64,
-    /// Widths [nm], rising.
+    /// Widths (nm), rising.
     pub widths_nm: Vec<u16>,
     /// Transmission over that of a cell that passes all power.
     pub t: Vec<Complex64>,
-    /// Phase [turns], continued from width to width.
+    /// Phase (turns), continued from width to width.
     pub turns: Vec<f64>,
 }
 
 /// A width to stay away from at a wavelength.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BadCell {
-    /// Width [nm].
+    /// Width (nm).
     pub width_nm: u16,
-    /// Wavelength [um].
+    /// Wavelength (um).
     pub wavelength_um: f64,
     /// Power of the zero order over the incident.
     pub zero_order: f64,
@@ -35,7 +35,7 @@ pub struct BadCell {
 }
 
 impl PhaseCurve {
-    /// The curve of a cell over these widths [nm], which rise in small steps.
+    /// The curve of a cell over these widths (nm), which rise in small steps.
     ///
     /// # Errors
     /// As [`CellModel::transmissions`]; also if there are fewer than two widths.
@@ -91,7 +91,7 @@ impl PhaseCurve {
             .collect()
     }
 
-    /// Phase [turns] at any width within the curve [nm], straight between its widths.
+    /// Phase (turns) at any width within the curve (nm), straight between its widths.
     pub fn turns_at(&self, width_nm: f64) -> f64 {
         let last = self.widths_nm.len() - 1;
         let i = self

@@ -12,14 +12,14 @@ use metalith_core::{Error, Result};
 /// Width for each of equal parts of a turn.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct MappingTable {
-    /// Width [nm] of phases from `i / n` to `(i + 1) / n` turns.
+    /// Width (nm) of phases from `i / n` to `(i + 1) / n` turns.
     pub widths_nm: Vec<u16>,
 }
 
 /// Parts of a turn of an exact mapping: finer than the phase of one step of 2 nm in width.
 const PARTS: usize = 512;
 
-/// Longest mapping that is read [bytes], and the rounding of its phases in print.
+/// Longest mapping that is read (bytes), and the rounding of its phases in print.
 const LONGEST_CSV: u64 = 4 << 20;
 const PRINTED_TURNS: f64 = 1e-6;
 
@@ -29,7 +29,7 @@ const MOST_ROUNDS: usize = 200;
 /// Power that a mapping sends into the orders of a blazed ramp, over the incident power.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct RampOrders {
-    /// Wavelength [um].
+    /// Wavelength (um).
     pub wavelength_um: f64,
     /// Where the design sends it.
     pub first: f64,
@@ -42,13 +42,13 @@ pub struct RampOrders {
 }
 
 impl MappingTable {
-    /// The width [nm] for a phase of `u` turns, `0 <= u < 1`.
+    /// The width (nm) for a phase of `u` turns, `0 <= u < 1`.
     pub fn width_nm(&self, u: f64) -> u16 {
         let n = self.widths_nm.len();
         self.widths_nm[((u * n as f64) as usize).min(n - 1)]
     }
 
-    /// The table as text: the phase in the middle of each part [turns] and its width.
+    /// The table as text: the phase in the middle of each part (turns) and its width.
     pub fn to_csv(&self) -> String {
         let n = self.widths_nm.len() as f64;
         let mut text = "turns,width_nm\n".to_owned();
@@ -59,7 +59,7 @@ impl MappingTable {
     }
 
     /// Reads what [`MappingTable::to_csv`] writes: parts of equal length, in order, of the widths `allowed`
-    /// [nm], which rise.
+    /// (nm), which rise.
     ///
     /// # Errors
     /// If the file cannot be read, has too few or too many rows, or a row is not such a part.

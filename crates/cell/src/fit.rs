@@ -17,9 +17,9 @@ const ROUND_TRIP: usize = 1024;
 /// Phase error of a mapping, its mean taken off.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct MappingError {
-    /// Root mean square [rad].
+    /// Root mean square (rad).
     pub rms_rad: f64,
-    /// Largest [rad].
+    /// Largest (rad).
     pub worst_rad: f64,
 }
 
@@ -180,7 +180,7 @@ fn least_squares(points: &[(f64, f64)], degree: usize, function: impl Fn(f64, us
 pub struct ForwardFit {
     /// Phase over duty cycle and wavelength.
     pub polynomial: ForwardPolynomial,
-    /// Error at each wavelength [um].
+    /// Error at each wavelength (um).
     pub errors: Vec<(f64, MappingError)>,
     /// Over all wavelengths.
     pub overall: MappingError,
@@ -276,7 +276,7 @@ pub fn fit_forward(curves: &[PhaseCurve], pitch_nm: f64, degree: usize) -> Resul
     })
 }
 
-/// Wavelength [nm] and duty cycle brought to about -1..1, where powers are told apart.
+/// Wavelength (nm) and duty cycle brought to about -1..1, where powers are told apart.
 struct Frame {
     centre: (f64, f64),
     half: (f64, f64),
@@ -358,7 +358,7 @@ impl FittedCell {
         Self { pitch_nm, forward }
     }
 
-    /// Fit the rigorous cell over a band [um] and a range of widths [nm], at enough of both for the trend.
+    /// Fit the rigorous cell over a band (um) and a range of widths (nm), at enough of both for the trend.
     ///
     /// # Errors
     /// As [`CellStack::transmission`] and [`fit_forward`].
@@ -384,7 +384,7 @@ impl FittedCell {
     }
 }
 
-/// Curves every 5 nm of a band [um], over even widths of a range [nm].
+/// Curves every 5 nm of a band (um), over even widths of a range (nm).
 ///
 /// # Errors
 /// As [`PhaseCurve::new`].

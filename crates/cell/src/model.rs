@@ -61,7 +61,7 @@ pub trait CellModel: Sync {
     /// What the model is.
     fn fidelity(&self) -> Fidelity;
 
-    /// Complex transmission of the zero order at one wavelength, with the width [nm] as index from zero
+    /// Complex transmission of the zero order at one wavelength, with the width (nm) as index from zero
     /// to `max_width_nm`.
     ///
     /// A field ratio, from a plane wave in the substrate at the plane of the pillar base to air at the

@@ -26,7 +26,7 @@ pub struct PointwiseCell {
 }
 
 impl PointwiseCell {
-    /// The cell for these widths [nm]. Widths between them are interpolated, those beyond them get the
+    /// The cell for these widths (nm). Widths between them are interpolated, those beyond them get the
     /// nearest.
     pub fn new(stack: CellStack, widths_nm: impl IntoIterator<Item = u16>) -> Self {
         let orders = Orders::new(ORDERS).expect("a constant that is odd and not large");
@@ -68,7 +68,7 @@ impl CellModel for PointwiseCell {
     }
 }
 
-/// Tables over all widths [nm] of what is solved for some of them, in rising order, each with `N` values.
+/// Tables over all widths (nm) of what is solved for some of them, in rising order, each with `N` values.
 ///
 /// # Errors
 /// That of the first width that cannot be solved.
@@ -84,7 +84,7 @@ pub fn tabulate<const N: usize>(
     }))
 }
 
-/// A table over all widths [nm]: straight lines between those that were solved, the nearest beyond, nothing at
+/// A table over all widths (nm): straight lines between those that were solved, the nearest beyond, nothing at
 /// zero.
 fn spread(widths_nm: &[u16], solved: &[Complex64], max_width_nm: u16) -> Vec<Complex64> {
     let at = |width: u16| {

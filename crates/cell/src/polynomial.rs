@@ -15,7 +15,7 @@ pub enum Basis {
 /// Duty cycle over phase at one wavelength: Eq. 4 of Chakravarthula et al. 2023.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct InversePolynomial {
-    /// Wavelength that it holds for [um].
+    /// Wavelength that it holds for (um).
     pub wavelength_um: f64,
     pub basis: Basis,
     /// Coefficients of the powers of `basis`, lowest first.
@@ -54,7 +54,7 @@ impl InversePolynomial {
 /// Phase over duty cycle and wavelength: Eq. 5 of Chakravarthula et al. 2023, of any total degree.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ForwardPolynomial {
-    /// Power of the wavelength [nm], power of the duty cycle, coefficient [turns].
+    /// Power of the wavelength (nm), power of the duty cycle, coefficient (turns).
     pub terms: Vec<(u32, u32, f64)>,
 }
 
@@ -73,7 +73,7 @@ impl ForwardPolynomial {
         }
     }
 
-    /// Phase [turns] of a pillar of this duty cycle at a wavelength [um].
+    /// Phase (turns) of a pillar of this duty cycle at a wavelength (um).
     pub fn turns(&self, duty: f64, wavelength_um: f64) -> f64 {
         let length_nm = wavelength_um * 1e3;
         self.terms

@@ -11,20 +11,20 @@ use metalith_rcwa::{Incidence, Layer, LayerStack, Material, Orders, Outline, Sid
 /// A pillar on its substrate, as etched: everything that decides its transmission but its width.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CellStack {
-    /// Pitch of the lattice [nm].
+    /// Pitch of the lattice (nm).
     pub pitch_nm: f64,
-    /// Height of the pillar [nm].
+    /// Height of the pillar (nm).
     pub height_nm: f64,
     /// What the pillar is etched from.
     pub film: Material,
     pub substrate: Material,
     /// Around and above the pillar.
     pub ambient: Material,
-    /// Angle of the walls from upright [rad]. The width is that of the top; positive is wider at the foot.
+    /// Angle of the walls from upright (rad). The width is that of the top; positive is wider at the foot.
     pub taper: f64,
-    /// Radius of the vertical edges [nm].
+    /// Radius of the vertical edges (nm).
     pub corner_radius_nm: f64,
-    /// Thickness of the mask left on top [nm]; 0 for none.
+    /// Thickness of the mask left on top (nm); 0 for none.
     pub mask_height_nm: f64,
     /// What the mask is of.
     pub mask: Material,
@@ -35,7 +35,7 @@ pub struct CellStack {
 const TAPER_SLICES: usize = 6;
 
 impl CellStack {
-    /// The materials of the paper, silicon nitride on fused silica in air, on a pitch [nm] and so high [nm].
+    /// The materials of the paper, silicon nitride on fused silica in air, on a pitch (nm) and so high (nm).
     ///
     /// # Errors
     /// None but those of a program that does not know its own materials.
@@ -53,7 +53,7 @@ impl CellStack {
         })
     }
 
-    /// Layers of the pillar of a width [nm] at a wavelength [um], from the substrate upwards. A width of
+    /// Layers of the pillar of a width (nm) at a wavelength (um), from the substrate upwards. A width of
     /// zero leaves the bare substrate.
     ///
     /// # Errors
@@ -143,7 +143,7 @@ impl CellStack {
         Ok([jones[0][0], jones[1][1]].map(|t| t * (above / below).sqrt()))
     }
 
-    /// [`CellStack::transmission`] of all pairs of widths [nm] and wavelengths [um], in parallel. Shape
+    /// [`CellStack::transmission`] of all pairs of widths (nm) and wavelengths (um), in parallel. Shape
     /// `[wavelengths, widths]`.
     ///
     /// # Errors
@@ -173,7 +173,7 @@ impl CellStack {
         Ok((below.re / above.re).sqrt())
     }
 
-    /// Wavelengths at which every material is known [um].
+    /// Wavelengths at which every material is known (um).
     pub fn range_um(&self) -> (f64, f64) {
         let materials = [&self.film, &self.substrate, &self.ambient];
         let masks = (self.mask_height_nm > 0.0).then_some(&self.mask);
@@ -212,7 +212,7 @@ impl CellStack {
     }
 }
 
-/// Leaning walls beyond this are not a pillar any more [rad].
+/// Leaning walls beyond this are not a pillar any more (rad).
 const MOST_TAPER: f64 = std::f64::consts::FRAC_PI_4;
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ use metalith_rcwa::Orders;
 pub struct TableSpec {
     /// The cell.
     pub stack: CellStack,
-    /// Shortest and longest wavelength [um].
+    /// Shortest and longest wavelength (um).
     pub band_um: (f64, f64),
     /// Narrowest and widest pillar tabulated at every nanometre; other widths up to the pitch stand at
     /// every five.
@@ -28,10 +28,10 @@ pub struct TableSpec {
     pub orders: usize,
 }
 
-/// Distance of widths outside of [`TableSpec::widths_nm`] [nm].
+/// Distance of widths outside of [`TableSpec::widths_nm`] (nm).
 const COARSE_STEP_NM: usize = 5;
 
-/// Widest band that a table may span [um].
+/// Widest band that a table may span (um).
 const WIDEST_BAND_UM: f64 = 4.0;
 
 impl TableSpec {
@@ -51,7 +51,7 @@ impl TableSpec {
         }
     }
 
-    /// Widths that are tabulated [nm], rising; the first is 0, the bare substrate.
+    /// Widths that are tabulated (nm), rising; the first is 0, the bare substrate.
     fn columns_nm(&self) -> Vec<u16> {
         let (low, high) = self.widths_nm;
         let pitch = self.stack.pitch_nm as u16;
@@ -92,7 +92,7 @@ impl TableSpec {
 #[derive(Clone, Debug, PartialEq)]
 pub struct CellTable {
     spec: TableSpec,
-    /// Tabulated widths [nm], rising from 0.
+    /// Tabulated widths (nm), rising from 0.
     widths_nm: Vec<f64>,
     columns: Vec<Column>,
 }
@@ -181,7 +181,7 @@ impl CellTable {
         self.columns.iter().map(|c| c.t.len()).sum()
     }
 
-    /// Transmission of a pillar of any width up to the pitch [nm] at a wavelength of the band [um]; a
+    /// Transmission of a pillar of any width up to the pitch (nm) at a wavelength of the band (um); a
     /// width of zero is the bare substrate.
     ///
     /// # Errors
@@ -202,7 +202,7 @@ impl CellTable {
         ))
     }
 
-    /// Transmission of every whole width from 0 to `max_width_nm` at a wavelength of the band [um]; the
+    /// Transmission of every whole width from 0 to `max_width_nm` at a wavelength of the band (um); the
     /// first is the bare substrate.
     ///
     /// # Errors

@@ -47,12 +47,12 @@ impl Lattice {
         Self::new(pitch_nm, sites + sites % 2)
     }
 
-    /// Distance of neighbouring sites [nm].
+    /// Distance of neighbouring sites (nm).
     pub fn pitch_nm(&self) -> u32 {
         self.pitch_nm
     }
 
-    /// Distance of neighbouring sites [um].
+    /// Distance of neighbouring sites (um).
     pub fn pitch_um(&self) -> f64 {
         f64::from(self.pitch_nm) * 1e-3
     }
@@ -67,12 +67,12 @@ impl Lattice {
         2 * i as i64 - (self.sites as i64 - 1)
     }
 
-    /// Place of site `i` of an axis from the centre [nm].
+    /// Place of site `i` of an axis from the centre (nm).
     pub fn coordinate_nm(&self, i: usize) -> i64 {
         self.half_index(i) * i64::from(self.pitch_nm / 2)
     }
 
-    /// Place of site `i` of an axis from the centre [um].
+    /// Place of site `i` of an axis from the centre (um).
     pub fn coordinate_um(&self, i: usize) -> f64 {
         self.coordinate_nm(i) as f64 * 1e-3
     }
@@ -91,7 +91,7 @@ impl Lattice {
 pub struct WidthMap {
     /// Where the sites are.
     pub lattice: Lattice,
-    /// Width of the pillar at each site [nm], zero where there is none. Shape `[sites, sites]`, row
+    /// Width of the pillar at each site (nm), zero where there is none. Shape `[sites, sites]`, row
     /// index along +y, column index along +x. The width is its own index into tables of the cell.
     pub width_nm: Array2<u16>,
 }
@@ -111,7 +111,7 @@ impl WidthMap {
         self.width_nm.iter().filter(|&&w| w != 0).count() as u64
     }
 
-    /// Number of pillars of each width; index is the width [nm], the first entry counts empty sites.
+    /// Number of pillars of each width; index is the width (nm), the first entry counts empty sites.
     pub fn histogram(&self) -> Vec<u64> {
         let mut counts = Vec::new();
         for &w in &self.width_nm {

@@ -32,7 +32,7 @@ pub enum NpyError {
     Short(io::Error),
 }
 
-/// Longest header that is read [bytes]: that of a plain array has 118.
+/// Longest header that is read (bytes): that of a plain array has 118.
 const LONGEST_HEADER: usize = 1 << 12;
 
 /// Most entries of an array: no file that is read has as many.

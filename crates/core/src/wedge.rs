@@ -5,7 +5,7 @@ use serde::Serialize;
 /// A linear phase over an element: Eq. 3 of Chakravarthula et al. 2023.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Wedge {
-    /// Wavelength lambda_w at which it steers by its angles [um].
+    /// Wavelength lambda_w at which it steers by its angles (um).
     pub wavelength_um: f64,
     /// Sine of the steering angle along x and y.
     pub sin_x: f64,

@@ -108,7 +108,7 @@ impl Layout {
         &self.title
     }
 
-    /// Database unit [nm].
+    /// Database unit (nm).
     pub fn unit_nm(&self) -> f64 {
         let nm = self.units[1] * 1e9;
         // The format's reals are not decimal: one nanometre comes back as 1 to within 1e-16.

@@ -63,6 +63,6 @@ impl Default for ReadLimits {
 /// Largest magnification, and the inverse of the smallest, of a reference and of a chain of them.
 pub(super) const MAGNIFICATION: f64 = 1e6;
 
-/// Coordinates of placed shapes are held within this of the origin [database units], so that sums and
+/// Coordinates of placed shapes are held within this of the origin (database units), so that sums and
 /// differences of a few of them cannot overflow. The format's own coordinates end at 2^31.
 pub(super) const FARTHEST: i64 = 1 << 50;

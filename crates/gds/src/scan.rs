@@ -94,7 +94,7 @@ fn stray(input: &Input, record: record::Record) -> Error {
     input.fault(record.offset, LayoutError::OutsideCells { kind: record.kind })
 }
 
-/// Smallest and largest database unit that is read [m].
+/// Smallest and largest database unit that is read (m).
 const UNIT_RANGE_M: std::ops::RangeInclusive<f64> = 1e-13..=1e-3;
 
 fn read_units(input: &Input, record: record::Record) -> Result<[f64; 2]> {

@@ -37,13 +37,13 @@ pub enum Side {
 /// A plane wave that arrives at the stack.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Incidence {
-    /// Wavelength in vacuum [um].
+    /// Wavelength in vacuum (um).
     pub wavelength_um: f64,
     /// Half-space it comes from.
     pub side: Side,
     /// Components of the wave vector along x and y over that in vacuum: the sines of the angles in air.
     pub sines: [f64; 2],
-    /// Azimuth of the plane of incidence [rad] where the sines are zero; else their direction counts.
+    /// Azimuth of the plane of incidence (rad) where the sines are zero; else their direction counts.
     azimuth: f64,
 }
 
@@ -58,7 +58,7 @@ impl Incidence {
         }
     }
 
-    /// At an angle measured in air, the plane of incidence at an azimuth from x [rad].
+    /// At an angle measured in air, the plane of incidence at an azimuth from x (rad).
     pub fn in_air(wavelength_um: f64, side: Side, theta: f64, azimuth: f64) -> Self {
         let sin = theta.sin();
         Self {

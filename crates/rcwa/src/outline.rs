@@ -52,7 +52,7 @@ impl Outline {
         Self { corners_nm }
     }
 
-    /// The largest width along x and y [nm].
+    /// The largest width along x and y (nm).
     pub fn extent_nm(&self) -> [f64; 2] {
         match (self.corners_nm.first(), self.corners_nm.last()) {
             (Some(first), Some(last)) => [2.0 * last[0], 2.0 * first[1]],
@@ -104,7 +104,7 @@ impl Outline {
     }
 }
 
-/// Where |across| is between `from` and `to`, the pillar reaches to +-`half_width` [nm].
+/// Where |across| is between `from` and `to`, the pillar reaches to +-`half_width` (nm).
 pub(super) struct Band {
     pub half_width: f64,
     pub from: f64,

@@ -8,7 +8,7 @@ use super::{Error, Result};
 /// Layers between two half-spaces, all on one square lattice, centred on one another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LayerStack {
-    /// Pitch of the lattice [nm].
+    /// Pitch of the lattice (nm).
     pub pitch_nm: f64,
     /// Complex index of the half-space below, where the substrate is.
     pub below: Complex64,
@@ -21,7 +21,7 @@ pub struct LayerStack {
 /// One layer: a pillar of one material in another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layer {
-    /// Thickness [nm].
+    /// Thickness (nm).
     pub height_nm: f64,
     /// Cross-section of the pillar.
     pub outline: Outline,

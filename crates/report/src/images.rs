@@ -44,7 +44,7 @@ impl ImageGrid {
         self
     }
 
-    /// Size of a pixel [um]: draws a scale bar.
+    /// Size of a pixel (um): draws a scale bar.
     pub fn pixel_um(mut self, pixel_um: f64) -> Self {
         self.pixel_um = Some(pixel_um).filter(|p| p.is_finite() && *p > 0.0);
         self

@@ -69,37 +69,37 @@ impl Plan {
         self.add_layer(name, Fill::Solid)
     }
 
-    /// A disc: centre and radius [um].
+    /// A disc: centre and radius (um).
     pub fn circle(&mut self, layer: Layer, x_um: f64, y_um: f64, radius_um: f64) -> &mut Self {
         self.shapes.push((layer.0, Shape::Circle([x_um, y_um, radius_um])));
         self
     }
 
-    /// A closed polygon of `(x, y)` [um].
+    /// A closed polygon of `(x, y)` (um).
     pub fn polygon(&mut self, layer: Layer, points_um: impl IntoIterator<Item = (f64, f64)>) -> &mut Self {
         self.shapes
             .push((layer.0, Shape::Polygon(points_um.into_iter().collect())));
         self
     }
 
-    /// A rectangle between two corners [um].
+    /// A rectangle between two corners (um).
     pub fn rectangle(&mut self, layer: Layer, (x0, y0): (f64, f64), (x1, y1): (f64, f64)) -> &mut Self {
         self.polygon(layer, [(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
     }
 
-    /// An upright cross: centre, length and width of its arms [um].
+    /// An upright cross: centre, length and width of its arms (um).
     pub fn cross(&mut self, layer: Layer, (x, y): (f64, f64), length_um: f64, width_um: f64) -> &mut Self {
         let corners = cross_corners(length_um / 2.0, width_um / 2.0);
         self.polygon(layer, corners.map(|(a, b)| (x + a, y + b)))
     }
 
-    /// A few words in the middle of a place [um].
+    /// A few words in the middle of a place (um).
     pub fn label(&mut self, x_um: f64, y_um: f64, words: impl Into<String>) -> &mut Self {
         self.labels.push((x_um, y_um, words.into()));
         self
     }
 
-    /// Make the frame reach to a place where nothing is drawn [um], such as that of a label.
+    /// Make the frame reach to a place where nothing is drawn (um), such as that of a label.
     pub fn reach(&mut self, x_um: f64, y_um: f64) -> &mut Self {
         self.reached.push((x_um, y_um));
         self
@@ -116,7 +116,7 @@ impl Plan {
         Figure::from(self).caption(caption)
     }
 
-    /// Bounding box of all shapes [um], with a little air.
+    /// Bounding box of all shapes (um), with a little air.
     fn extent(&self) -> [f64; 4] {
         let mut e = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
         let mut take = |x: f64, y: f64| {

@@ -21,7 +21,7 @@ pub struct PillarZoom {
 }
 
 impl PillarZoom {
-    /// Pillars of `map` in a square of `span_um` about a place counted from the element's centre [um].
+    /// Pillars of `map` in a square of `span_um` about a place counted from the element's centre (um).
     /// The span is held to 80 pitches, so that pillars can be seen.
     pub fn new(title: impl Into<String>, map: &WidthMap, centre_um: (f64, f64), span_um: f64) -> Self {
         let lattice = map.lattice;

@@ -6,12 +6,12 @@ use crate::gds::Gds;
 pub const SITES: i32 = 120;
 pub const PITCH: i32 = 350;
 
-/// Centre of a site from the lens's centre [nm].
+/// Centre of a site from the lens's centre (nm).
 pub fn site(i: i32) -> i32 {
     (2 * i - (SITES - 1)) * PITCH / 2
 }
 
-/// Width of the pillar at a site [nm]: neighbours differ, and every even width from 160 to 240 occurs.
+/// Width of the pillar at a site (nm): neighbours differ, and every even width from 160 to 240 occurs.
 pub fn width(ix: i32, iy: i32) -> i32 {
     160 + 2 * ((ix * 7 + iy * 11) % 41)
 }

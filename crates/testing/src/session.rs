@@ -9,7 +9,7 @@ use metalith_layout::write_pillars;
 use ndarray::Array2;
 use npyz::WriterBuilder;
 
-/// Edge of a capture of the small set [pixels].
+/// Edge of a capture of the small set (pixels).
 pub const PIXELS: usize = 48;
 
 /// Elements of the small set, with the light that they steer to their axis.

@@ -144,17 +144,11 @@ impl<'t> Document<'t> {
         self.replaced.borrow().contains(path)
     }
 
-    /// Whether no value at one of these paths, nor a section that it is in, has a fault.
-    fn is_sound(&self, paths: &[&str]) -> bool {
+    /// Whether neither the value at a path, nor a section that it is in, has a fault.
+    fn is_sound(&self, path: &str) -> bool {
         let doubted = self.doubted.borrow();
-        let ends = |path: &str| {
-            let mut ends: Vec<usize> = path.match_indices('.').map(|(at, _)| at).collect();
-            ends.push(path.len());
-            ends
-        };
-        paths
-            .iter()
-            .all(|path| ends(path).into_iter().all(|end| !doubted.contains(&path[..end])))
+        let sections = path.match_indices('.').map(|(end, _)| &path[..end]);
+        !sections.chain([path]).any(|p| doubted.contains(p))
     }
 
     fn is_faultless(&self) -> bool {

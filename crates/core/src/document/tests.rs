@@ -103,3 +103,21 @@ fn what_is_drawn_keeps_its_places() {
     assert_eq!(drawn.len(), text.len());
     assert!(drawn.chars().all(|c| crate::text::is_printable(c) || c == '\n'));
 }
+
+/// One of several sections with a fault says nothing about the others.
+#[test]
+fn sections_of_one_name_are_judged_each() {
+    let text = "[[pair]]\na = 50\nb = 3\n[[pair]]\na = 5\nb = 3\n";
+    let faults = faults_of(text, |root| {
+        for s in root.sections("pair") {
+            let limits = Limits::new(0.0..=10.0, "");
+            let (a, b) = (s.float("a", limits.clone()), s.float("b", limits));
+            if a != b {
+                s.fault_given(&["pair.a"], "b", "a and b differ", "make them equal");
+            }
+            s.finish();
+        }
+    });
+    assert_eq!(words(&faults), ["`a` cannot be 50", "a and b differ"]);
+    assert_eq!(faults.line_column(faults.faults()[1].span.start), (6, 5));
+}

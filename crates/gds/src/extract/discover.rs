@@ -7,14 +7,14 @@ use super::sites::Scale;
 use crate::{Cell, Error, ExtractionError, LayerNumber, Layout, Rect, Result, Selection, Shape, Transform, Visitor};
 use metalith_core::{Lattice, Progress};
 
-/// Tiles of the map of occupied places [nm]: two elements with an empty tile between them are two. Wider
+/// Tiles of the map of occupied places (nm): two elements with an empty tile between them are two. Wider
 /// than any pitch, so that sparse places of a lens hold together.
 const TILE_NM: i64 = 1 << 13;
 /// Tiles of the map: 5 x 5 lenses of 1 mm occupy 300,000.
 const MOST_TILES: usize = 1 << 21;
 /// Centres remembered a tile, to tell pitch and phase from.
 const SAMPLES: usize = 24;
-/// Wider squares are pads or marks [nm].
+/// Wider squares are pads or marks (nm).
 const WIDEST_NM: i64 = 4000;
 /// Fewer squares together are no element.
 const FEWEST: u64 = 16;
@@ -23,12 +23,12 @@ const MOST_ELEMENTS: usize = 4096;
 /// Lattice sites for each square found: a lens fills 0.79 of its lattice.
 const SITES_PER_PILLAR: u64 = 64;
 
-/// Squares in one tile; centres doubled [half nm].
+/// Squares in one tile; centres doubled (half nm).
 #[derive(Clone, Debug, Default)]
 struct Tile {
     squares: u64,
     bounds: Option<Rect>,
-    /// Centres from the tile's corner, doubled [half nm]; so many of them.
+    /// Centres from the tile's corner, doubled (half nm); so many of them.
     samples: [(u16, u16); SAMPLES],
     sampled: u8,
 }
@@ -160,7 +160,7 @@ impl Map {
         clusters
     }
 
-    /// Centres remembered of a tile, doubled [half nm].
+    /// Centres remembered of a tile, doubled (half nm).
     fn samples(&self, tile: usize) -> impl Iterator<Item = (i64, i64)> + '_ {
         let ((x, y), tile) = &self.tiles[tile];
         tile.samples[..usize::from(tile.sampled)]

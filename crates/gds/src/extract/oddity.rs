@@ -49,9 +49,9 @@ impl Why {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Oddity {
     pub why: Why,
-    /// Middle of its bounding box in the layout [nm].
+    /// Middle of its bounding box in the layout (nm).
     pub centre_nm: [f64; 2],
-    /// Its bounding box [nm].
+    /// Its bounding box (nm).
     pub size_nm: [f64; 2],
     /// Place in the file of its element, or of the reference that placed it.
     pub offset: u64,

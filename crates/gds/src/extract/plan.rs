@@ -10,7 +10,7 @@ use metalith_core::{Lattice, WidthMap};
 pub struct ElementSite {
     /// For messages and reports.
     pub name: String,
-    /// Centre of the lattice in the layout [nm].
+    /// Centre of the lattice in the layout (nm).
     pub centre_nm: [i64; 2],
     pub lattice: Lattice,
 }

@@ -12,7 +12,7 @@ pub struct Scale {
     pub den: i64,
 }
 
-/// Farthest coordinate at which a pillar is looked for [database units]: products with [`Scale`] fit.
+/// Farthest coordinate at which a pillar is looked for (database units): products with [`Scale`] fit.
 const REACH: i64 = 1 << 40;
 
 impl Scale {
@@ -122,7 +122,7 @@ impl Sites {
         }
     }
 
-    /// Pitch of an element [nm].
+    /// Pitch of an element (nm).
     #[inline]
     pub fn pitch_nm(&self, element: u32) -> i64 {
         self.grids[element as usize].pitch_nm

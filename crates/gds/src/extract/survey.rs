@@ -15,7 +15,7 @@ pub struct LayerSummary {
     pub shapes: u64,
     /// Texts.
     pub texts: u64,
-    /// Left, bottom, right, top of all areas [nm]; none if there are no areas. Around a cell that is turned
+    /// Left, bottom, right, top of all areas (nm); none if there are no areas. Around a cell that is turned
     /// by other than quarter turns, the box of its box.
     pub bounds_nm: Option<[f64; 4]>,
 }

@@ -19,14 +19,14 @@ pub(super) enum Form {
         coefficients: Vec<f64>,
         range_um: (f64, f64),
     },
-    /// Samples (L [um], n, k) with rising L, joined by monotone cubics.
+    /// Samples (L (um), n, k) with rising L, joined by monotone cubics.
     Table {
         samples: Vec<[f64; 3]>,
     },
 }
 
 impl Form {
-    /// Wavelengths it is known for [um].
+    /// Wavelengths it is known for (um).
     pub fn range_um(&self) -> (f64, f64) {
         match self {
             Self::Constant { .. } => (0.0, f64::INFINITY),
@@ -35,7 +35,7 @@ impl Form {
         }
     }
 
-    /// Complex index n + i k at a wavelength [um] in that range.
+    /// Complex index n + i k at a wavelength (um) in that range.
     pub fn index(&self, wavelength_um: f64) -> Complex64 {
         let l2 = wavelength_um * wavelength_um;
         match self {

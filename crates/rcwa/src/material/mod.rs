@@ -25,10 +25,10 @@ pub struct Material {
     offset: f64,
 }
 
-/// Longest table of indices that is read [bytes].
+/// Longest table of indices that is read (bytes).
 const LONGEST_TABLE: u64 = 8 << 20;
 
-/// Rounding [um] where tables in nm and bands in um meet at their ends.
+/// Rounding (um) where tables in nm and bands in um meet at their ends.
 const ROUNDING: f64 = 1e-9;
 
 impl Material {
@@ -137,12 +137,12 @@ impl Material {
         known.map_or(self.name.as_str(), |k| k.source)
     }
 
-    /// Wavelengths it is known for [um].
+    /// Wavelengths it is known for (um).
     pub fn range_um(&self) -> (f64, f64) {
         self.form.range_um()
     }
 
-    /// Complex index n + i k at a wavelength [um].
+    /// Complex index n + i k at a wavelength (um).
     ///
     /// # Errors
     /// If the wavelength is outside [`Material::range_um`].

@@ -6,7 +6,7 @@ use metalith_core::text::quoted;
 /// Line, counted from one, and what is wrong there.
 type Fault = (Option<usize>, TableError);
 
-/// Samples (L [um], n, k) of the text of a table, wavelengths rising.
+/// Samples (L (um), n, k) of the text of a table, wavelengths rising.
 pub(super) fn parse(text: &str) -> Result<Vec<[f64; 3]>, Fault> {
     let mut lines = text
         .lines()

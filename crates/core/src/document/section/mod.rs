@@ -38,6 +38,8 @@ pub struct Section<'d, 't> {
     document: &'d Document<'t>,
     table: &'d DeTable<'t>,
     name: String,
+    /// Its place from the top of the file: the name, and a number where several sections have it.
+    path: String,
     span: Range<usize>,
     asked: RefCell<BTreeSet<String>>,
     /// Keys that were asked for and are not there, with the number of the fault that says so.
@@ -55,6 +57,7 @@ impl<'d, 't> Section<'d, 't> {
         Self {
             document,
             table,
+            path: name.clone(),
             name,
             span,
             asked: RefCell::default(),
@@ -66,7 +69,7 @@ impl<'d, 't> Section<'d, 't> {
     /// Record a fault at a key of this section, or at the section itself if the key is absent. Silent where the
     /// value of the key has a fault already and was replaced.
     pub fn fault(&self, key: &str, what: impl Into<String>, hint: impl Into<String>) {
-        let path = self.path_of(key);
+        let path = self.place_of(key);
         if !self.vacant && !self.document.is_replaced(&path) {
             self.document.fault(self.span_of(key), what, hint);
             self.document.doubt(path);
@@ -74,9 +77,10 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// As [`Section::fault`], for a check that depends on other values too: their paths from the top of the file,
-    /// such as `"cell.pitch_nm"`. Silent if one of them has a fault.
+    /// such as `"cell.pitch_nm"`; a path into sections of the name of this one means this one. Silent if one of
+    /// them has a fault.
     pub fn fault_given(&self, others: &[&str], key: &str, what: impl Into<String>, hint: impl Into<String>) {
-        if self.document.is_sound(others) {
+        if self.sound(others) {
             self.fault(key, what, hint);
         }
     }
@@ -84,7 +88,14 @@ impl<'d, 't> Section<'d, 't> {
     /// Whether none of these values, by their paths from the top of the file, has a fault so far: what was read
     /// is what the file says, or a default.
     pub fn sound(&self, paths: &[&str]) -> bool {
-        self.document.is_sound(paths)
+        let in_here = |path: &str| {
+            let key = path.strip_prefix(&self.name)?.strip_prefix('.')?;
+            Some(self.place_of(key))
+        };
+        paths.iter().all(|path| {
+            self.document
+                .is_sound(&in_here(path).unwrap_or_else(|| (*path).to_owned()))
+        })
     }
 
     /// Whether the key is there.
@@ -109,7 +120,11 @@ impl<'d, 't> Section<'d, 't> {
     pub fn optional_section(&self, key: &str) -> Option<Section<'d, 't>> {
         let value = self.get(key)?;
         match value.get_ref() {
-            DeValue::Table(table) => Some(Self::new(self.document, table, self.path_of(key), self.span_of(key))),
+            DeValue::Table(table) => {
+                let mut section = Self::new(self.document, table, self.path_of(key), self.span_of(key));
+                section.path = self.place_of(key);
+                Some(section)
+            }
             _ => {
                 self.wrong_type(key, value, &format!("a section [{}]", self.path_of(key)));
                 None
@@ -126,8 +141,13 @@ impl<'d, 't> Section<'d, 't> {
         };
         items
             .iter()
-            .filter_map(|item| match item.get_ref() {
-                DeValue::Table(table) => Some(Self::new(self.document, table, self.path_of(key), item.span())),
+            .enumerate()
+            .filter_map(|(k, item)| match item.get_ref() {
+                DeValue::Table(table) => {
+                    let mut section = Self::new(self.document, table, self.path_of(key), item.span());
+                    section.path = format!("{}#{k}", self.place_of(key));
+                    Some(section)
+                }
                 _ => {
                     self.wrong_type(key, item, &format!("a section [[{}]]", self.path_of(key)));
                     None
@@ -183,12 +203,13 @@ impl<'d, 't> Section<'d, 't> {
     fn vacant(&self, key: &str) -> Section<'d, 't> {
         thread_local!(static EMPTY: &'static DeTable<'static> = Box::leak(Box::default()));
         let mut section = Self::new(self.document, EMPTY.with(|e| *e), self.path_of(key), self.span.clone());
+        section.path = self.place_of(key);
         section.vacant = true;
         section
     }
 
     fn missing_unless_present(&self, key: &str, expected: &str) {
-        self.document.replace(self.path_of(key));
+        self.document.replace(self.place_of(key));
         if self.table.contains_key(key) || self.vacant {
             return;
         }
@@ -208,7 +229,7 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     fn wrong_type(&self, key: &str, value: &Spanned<DeValue<'t>>, expected: &str) {
-        self.document.replace(self.path_of(key));
+        self.document.replace(self.place_of(key));
         self.document.fault(
             value.span(),
             format!("`{key}` is {}", article(value.get_ref().type_str())),
@@ -217,7 +238,7 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     fn out_of_range(&self, span: Range<usize>, key: &str, value: &str, limits: &Limits) {
-        self.document.replace(self.path_of(key));
+        self.document.replace(self.place_of(key));
         self.document.fault(
             span,
             format!("`{key}` cannot be {}", quoted(value)),
@@ -227,6 +248,15 @@ impl<'d, 't> Section<'d, 't> {
 
     fn span_of(&self, key: &str) -> Range<usize> {
         self.table.get(key).map_or_else(|| self.span.clone(), Spanned::span)
+    }
+
+    /// The place of a key from the top of the file.
+    fn place_of(&self, key: &str) -> String {
+        if self.path.is_empty() {
+            key.to_owned()
+        } else {
+            format!("{}.{key}", self.path)
+        }
     }
 
     fn path_of(&self, key: &str) -> String {

@@ -89,7 +89,7 @@ impl<'t> Section<'_, 't> {
         let Some(c) = first_unprintable(text) else {
             return text.to_owned();
         };
-        self.document.replace(self.path_of(key));
+        self.document.replace(self.place_of(key));
         self.document.fault(
             span,
             format!("`{key}` contains the character U+{:04X}", u32::from(c)),
@@ -130,7 +130,7 @@ impl<'t> Section<'_, 't> {
         };
         choices.iter().find(|(w, _)| *w == word.as_ref()).map_or_else(
             || {
-                self.document.replace(self.path_of(key));
+                self.document.replace(self.place_of(key));
                 self.document.fault(
                     value.span(),
                     format!("`{key}` cannot be \"{}\"", quoted(word)),
@@ -183,7 +183,7 @@ impl<'t> Section<'_, 't> {
                 format!("`{key}` has {count} entries"),
                 format!("give exactly {N} numbers"),
             );
-            self.document.replace(self.path_of(key));
+            self.document.replace(self.place_of(key));
             [*limits.range.start(); N]
         }))
     }
