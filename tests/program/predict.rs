@@ -76,6 +76,8 @@ fn what_cannot_be_undone_is_made_less() {
 #[test]
 fn the_program_predicts_and_compensates() {
     let folder = tempfile::tempdir().unwrap();
+    let narrow = folder.path().join("narrow.toml");
+    model(|d| d.geometry.cd_bias_nm = -10.0).write(&narrow).unwrap();
     let path = folder.path().join("model.toml");
     model(|d| {
         d.geometry.cd_bias_nm = -10.0;
@@ -85,10 +87,10 @@ fn the_program_predicts_and_compensates() {
     .unwrap();
     let design = "designs/mini_3x3.toml";
     let out = |name: &str| folder.path().join(name);
-    // The bias undone: the compensated layout as made is the intended one, whatever stays of the gap.
+    // The bias undone: the compensated layout as made is the intended one.
     metalith()
         .args(["layout", design, "--compensate"])
-        .arg(&path)
+        .arg(&narrow)
         .arg("--out")
         .arg(out("made"))
         .assert()

@@ -12,7 +12,7 @@ use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::Orders;
 
 /// Distance of the widths at which cells are solved [nm]. Widths between them are interpolated by a cubic through
-/// four neighbours, or solved themselves where that is not good enough: see [`ROUGH`].
+/// four neighbours, or solved themselves where that is not good enough: near resonances and cutoffs.
 pub const NODE_STEP_NM: f64 = 0.5;
 
 /// Where a node is farther than this from the cubic through its four neighbours, transmission is not smooth: a
