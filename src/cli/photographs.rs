@@ -114,7 +114,7 @@ pub fn run(args: &PhotographsArgs, terminal: &Terminal) -> Result<Outcome> {
     Ok(Outcome::Fine)
 }
 
-/// Names and phases [turns], all within the step limit of the design.
+/// Names and phases (turns), all within the step limit of the design.
 fn phases(args: &PhotographsArgs, task: &Task) -> Result<Vec<(String, Vec<f64>)>> {
     let band_um = task.spec.band_um;
     let hyperbolic = Start::Hyperbolic {

@@ -31,27 +31,27 @@ pub struct PsfArgs {
     #[arg(long)]
     top: Option<String>,
 
-    /// From the pillar tops to the sensor [um].
+    /// From the pillar tops to the sensor (um).
     #[arg(long, default_value_t = 2400.0)]
     distance_um: f64,
 
-    /// Wavelength [nm]; may be given several times.
+    /// Wavelength (nm); may be given several times.
     #[arg(long = "wavelength-nm", default_values_t = [455.0, 530.0, 660.0])]
     wavelengths_nm: Vec<f64>,
 
-    /// Angle of incidence in the x-z plane, in air [degrees].
+    /// Angle of incidence in the x-z plane, in air (degrees).
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     angle_x_deg: f64,
 
-    /// Angle of incidence in the y-z plane, in air [degrees].
+    /// Angle of incidence in the y-z plane, in air (degrees).
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     angle_y_deg: f64,
 
-    /// Middle of the window from the element's axis [um].
+    /// Middle of the window from the element's axis (um).
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     at_x_um: f64,
 
-    /// Middle of the window from the element's axis [um].
+    /// Middle of the window from the element's axis (um).
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     at_y_um: f64,
 
@@ -59,7 +59,7 @@ pub struct PsfArgs {
     #[arg(long, default_value_t = 256)]
     samples: usize,
 
-    /// Height of the pillars [nm], for the rigorous cell.
+    /// Height of the pillars (nm), for the rigorous cell.
     #[arg(long, default_value_t = 700.0)]
     height_nm: f64,
 
@@ -72,7 +72,7 @@ pub struct PsfArgs {
     #[arg(long, value_name = "MODEL", conflicts_with = "fidelity")]
     model: Option<PathBuf>,
 
-    /// Diameter of the openings in the metal [um], for a model whose aperture is off its place; that of the circle
+    /// Diameter of the openings in the metal (um), for a model whose aperture is off its place; that of the circle
     /// around the pillars if left out.
     #[arg(long)]
     aperture_um: Option<f64>,

@@ -21,7 +21,7 @@ pub struct Rung {
     pub fit: f64,
     /// The same on captures left out.
     pub held_out: f64,
-    /// Residual of each capture [sigma], nuisances fitted; for pictures.
+    /// Residual of each capture (sigma), nuisances fitted; for pictures.
     #[serde(skip)]
     pub residuals: PerCapture<Array2<f32>>,
 }

@@ -98,7 +98,7 @@ pub trait ForwardModel: Send + Sync {
     /// If a simulation fails, or the user stopped it.
     fn images(&self, points: &[ParameterPoint], progress: &dyn Progress) -> Result<Vec<PerCapture<PixelGrid>>>;
 
-    /// What the parameters add to the width at each site that was measured by SEM [nm]; none for sites that
+    /// What the parameters add to the width at each site that was measured by SEM (nm); none for sites that
     /// are on no lattice.
     fn width_biases_nm(&self, theta: &[f64]) -> Vec<Option<f64>>;
 

@@ -18,11 +18,11 @@ use crate::surrogate::Surrogate;
 /// Edge of the window, and of its pixels one: pixels are 1 um wide.
 pub const PIXELS: usize = 32;
 
-/// DN for unit intensity, and one standard deviation of each pixel [DN].
+/// DN for unit intensity, and one standard deviation of each pixel (DN).
 pub const SCALE: f64 = 1000.0;
 pub const SIGMA: f64 = 10.0;
 
-/// Samples of the intensity [um], and how far they reach beyond the window on each side [um].
+/// Samples of the intensity (um), and how far they reach beyond the window on each side (um).
 const STEP_UM: f64 = 0.5;
 const MARGIN_UM: usize = 12;
 

@@ -10,7 +10,7 @@ use super::optics::PixelGrid;
 use metalith_core::{Progress, Result};
 use metalith_made::Perturbation;
 
-/// Widths that a bias may add or take [nm]; cells are tabulated so far beyond the layout.
+/// Widths that a bias may add or take (nm); cells are tabulated so far beyond the layout.
 pub const WIDTH_ROOM_NM: f64 = 36.0;
 
 /// Chips that are sent along one path at once; each takes a few megabytes.

@@ -19,20 +19,20 @@ const CURVE_POINTS: u32 = 41;
 
 /// Smooth shapes fitted to what is left; everything found and every nuisance is projected out.
 pub struct SmoothResidual {
-    /// Optical path over the lens [nm], common to colours and elements; NaN outside. Shape `[SIDE, SIDE]`, row
+    /// Optical path over the lens (nm), common to colours and elements; NaN outside. Shape `[SIDE, SIDE]`, row
     /// index along +y.
     pub path_nm: Array2<f64>,
-    /// Its root mean square over the lens [nm], and that of its noise.
+    /// Its root mean square over the lens (nm), and that of its noise.
     pub path_rms_nm: (f64, f64),
-    /// Half the edge of the map [um].
+    /// Half the edge of the map (um).
     pub radius_um: f64,
-    /// Relative change of amplitude over width [nm], for each LED.
+    /// Relative change of amplitude over width (nm), for each LED.
     pub transmission: Vec<Vec<(f64, f64)>>,
-    /// Covariance of a blur common to all captures, xx, xy and yy, with standard deviations [um^2].
+    /// Covariance of a blur common to all captures, xx, xy and yy, with standard deviations (um^2).
     pub blur_um2: [(f64, f64); 3],
     /// Reduced chi-square per pixel without and with the shapes.
     pub chi2: (f64, f64),
-    /// The path's coefficients by Noll's index [nm], with their standard deviations.
+    /// The path's coefficients by Noll's index (nm), with their standard deviations.
     pub coefficients_nm: Vec<(u32, f64, f64)>,
 }
 

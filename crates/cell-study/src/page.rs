@@ -103,7 +103,7 @@ fn maps(page: &mut Page, study: &CellStudy) {
     );
 }
 
-/// Where a resonance takes most light: width, wavelength [nm], label. Local minima in width every 20 nm
+/// Where a resonance takes most light: width, wavelength (nm), label. Local minima in width every 20 nm
 /// of wavelength.
 fn dips(study: &CellStudy) -> Vec<(f64, f64, String)> {
     let mut found = Vec::new();

@@ -13,10 +13,10 @@ use metalith_core::{Error, Result};
 use metalith_design::Design;
 use metalith_design::array::WidthRule;
 
-/// Wavelengths that mappings are compared at [um]: LEDs of a colour camera.
+/// Wavelengths that mappings are compared at (um): LEDs of a colour camera.
 pub const LED_UM: [f64; 4] = [0.455, 0.530, 0.590, 0.660];
 
-/// Band that the best mapping sends light to the first order in [um], and its step.
+/// Band that the best mapping sends light to the first order in (um), and its step.
 const BEST_BAND_UM: (f64, f64, f64) = (0.440, 0.680, 0.008);
 
 /// Degree of the inverse polynomial that stands for `fitted`.
@@ -84,7 +84,7 @@ pub struct CellStudy {
     pub tolerance: f64,
     /// Cells solved for the library.
     pub points: usize,
-    /// Wavelength of the mapping [um].
+    /// Wavelength of the mapping (um).
     pub mapping_um: f64,
     /// Turns between the narrowest and the widest pillar at that wavelength.
     pub span_turns: f64,
@@ -163,7 +163,7 @@ impl CellStudy {
     }
 }
 
-/// Wavelengths of a band at about this step [um], both ends included.
+/// Wavelengths of a band at about this step (um), both ends included.
 fn steps(band_um: (f64, f64), step_um: f64) -> Vec<f64> {
     let count = ((band_um.1 - band_um.0) / step_um).round().max(1.0) as usize;
     (0..=count)

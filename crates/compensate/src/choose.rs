@@ -17,7 +17,7 @@ const ROUNDS: usize = 6;
 const STARTS: i32 = 12;
 const START_STEP_UM: f64 = 0.02;
 
-/// Pillars that are alike: intended width [nm] and step of density, with their number.
+/// Pillars that are alike: intended width (nm) and step of density, with their number.
 #[derive(Default)]
 pub struct Kinds(BTreeMap<(u16, i32), u64>);
 

@@ -43,7 +43,7 @@ impl Compensated {
 /// Numbers of a compensation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CompensationSummary {
-    /// Root mean square of how far drawn widths moved [nm].
+    /// Root mean square of how far drawn widths moved (nm).
     pub moved_rms_nm: f64,
     /// Root mean square error of the complex transmission over the pillars and wavelengths, made against
     /// intended, over the root mean square of the intended one: of the layout as it was, and compensated.

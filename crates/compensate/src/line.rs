@@ -13,7 +13,7 @@ pub struct Colour {
     pub wavelength_um: f64,
     /// |t| of a stated cell that passes everything.
     pub full: f64,
-    /// Of intended pillars as stated, by width [nm].
+    /// Of intended pillars as stated, by width (nm).
     pub stated: Vec<Complex64>,
     /// Of made pillars, by the place of the drawn width in [`Line::drawn_nm`] and then by step of density.
     made: Vec<Vec<Complex64>>,
@@ -26,9 +26,9 @@ pub struct Line {
     /// Chips as they are made.
     pub chip: MadeChip,
     pub colours: Vec<Colour>,
-    /// Widths that may be drawn [nm].
+    /// Widths that may be drawn (nm).
     pub drawn_nm: Vec<u16>,
-    /// Radius of the openings in the metal [um].
+    /// Radius of the openings in the metal (um).
     pub aperture_radius_um: f64,
     /// The least step of density that transmissions are known for.
     first_step: i32,

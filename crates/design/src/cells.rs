@@ -8,7 +8,7 @@ use metalith_rcwa::Material;
 
 use crate::Design;
 
-/// The band that every design's table spans [um].
+/// The band that every design's table spans (um).
 const VISIBLE_UM: (f64, f64) = (0.4, 0.7);
 
 impl Design {
@@ -48,7 +48,7 @@ impl Design {
         ))
     }
 
-    /// The visible and all wavelengths that the design names [um].
+    /// The visible and all wavelengths that the design names (um).
     fn band_um(&self) -> (f64, f64) {
         let named = self.verify.wavelengths_um.iter().chain([&self.mapping.wavelength_um]);
         named.fold(VISIBLE_UM, |(short, long), &l| (short.min(l), long.max(l)))

@@ -99,7 +99,7 @@ impl Design {
         Lattice::covering(self.lens.diameter_nm, self.cell.pitch_nm).expect("checked when the design was read")
     }
 
-    /// Radius of the openings in the metal around the lenses [um].
+    /// Radius of the openings in the metal around the lenses (um).
     pub fn aperture_radius_um(&self) -> f64 {
         self.lens.radius_um() + self.layout.apertures.margin_nm as f64 * 1e-3
     }

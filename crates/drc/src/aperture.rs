@@ -19,7 +19,7 @@ struct ApertureRule {
 
 #[derive(PartialEq)]
 enum OpeningRule {
-    /// Distance from the pillars of a lens to the metal [nm].
+    /// Distance from the pillars of a lens to the metal (nm).
     Margin(f64),
     NoMetalOnPillars,
     /// One opening a lens, and no other.

@@ -63,7 +63,7 @@ impl<'a> DrawnOutline<'a> {
         self.rect.is_some() || self.corners().windows(2).all(|s| s[0].x == s[1].x || s[0].y == s[1].y)
     }
 
-    /// Smallest interior or exterior angle between two sides [degrees]; 180 if there is no corner.
+    /// Smallest interior or exterior angle between two sides (degrees); 180 if there is no corner.
     pub fn sharpest_deg(&self) -> f64 {
         let c = self.corners();
         if c.len() < 4 {

@@ -40,7 +40,7 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, _context: &Context) -> Opti
 }
 
 impl FieldRule {
-    /// Boundaries between two places of an axis [nm], the middle of a field being at `centre`.
+    /// Boundaries between two places of an axis (nm), the middle of a field being at `centre`.
     fn boundaries(&self, axis: usize, centre: f64, from: f64, to: f64) -> impl Iterator<Item = f64> + use<> {
         let first = centre + self.offset_nm[axis] + self.size_nm / 2.0;
         let size = self.size_nm;

@@ -12,7 +12,7 @@ use metalith_gds::{Point, Rect, Transform};
 /// One place where a rule does not hold.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Marker {
-    /// Outline in the layout [nm]; empty for what has no place, such as a name.
+    /// Outline in the layout (nm); empty for what has no place, such as a name.
     pub outline_nm: Vec<[f64; 2]>,
     /// What is wrong here, with numbers.
     pub words: String,

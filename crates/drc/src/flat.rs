@@ -13,7 +13,7 @@ use metalith_gds::{LayerNumber, Layout, Point, Rect};
 /// Everything on one layer that is not a pillar on the lattice of an element.
 #[derive(Default)]
 pub(super) struct Loose {
-    /// Upright rectangles: left, bottom, right, top [database units].
+    /// Upright rectangles: left, bottom, right, top (database units).
     pub rects: Vec<[i32; 4]>,
     /// Other closed outlines, without corners that are none.
     pub polygons: Vec<Box<[Point]>>,

@@ -19,7 +19,7 @@ use metalith_gds::{
     Cell, LayerNumber, Layout, Point, Rect, Selection, Shape, Text, Transform, Visitor, rectangle_of, simplified,
 };
 
-/// Widest square that is decided by table [database units].
+/// Widest square that is decided by table (database units).
 const TABLE: usize = 4096;
 /// Bytes of a text that reports show.
 const LONGEST_TEXT: usize = 512;

@@ -18,7 +18,7 @@ enum LayerRule {
 }
 
 enum Within {
-    /// Left, bottom, right, top [um]; where a design is given, so far inside the edge of its chip.
+    /// Left, bottom, right, top (um); where a design is given, so far inside the edge of its chip.
     Edges { um: [f64; 4], edge_um: Option<f64> },
     /// The box of what is drawn on a layer.
     Drawn(LayerNumber),

@@ -9,13 +9,13 @@ use metalith_design::MarkSpec;
 use metalith_gds::{LayerNumber, Point, Rect};
 
 enum Marks {
-    /// Nothing on `others` within a distance of a mark [nm].
+    /// Nothing on `others` within a distance of a mark (nm).
     KeepOut {
         marks: LayerNumber,
         others: Vec<LayerNumber>,
         nm: f64,
     },
-    /// So many marks of each size [nm]; those of the design where one is given.
+    /// So many marks of each size (nm); those of the design where one is given.
     Complete { marks: LayerNumber, sets: Vec<(f64, u64)> },
 }
 

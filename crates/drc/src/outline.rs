@@ -12,7 +12,7 @@ use metalith_gds::LayerNumber;
 enum Form {
     Square,
     Manhattan,
-    /// Sharpest angle [degrees].
+    /// Sharpest angle (degrees).
     Angle(f64),
     NoCrossing,
     NoDoubled,

@@ -12,7 +12,7 @@ use metalith_gds::LayerNumber;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Distance {
-    /// Least distance [nm].
+    /// Least distance (nm).
     Gap {
         nm: f64,
         height_nm: Option<f64>,

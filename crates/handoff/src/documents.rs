@@ -18,7 +18,7 @@ use metalith_design::Design;
 pub(super) struct Documents {
     /// Exposure of each file of the first step, with its time at each current.
     pub exposures: Vec<(String, Exposure, Vec<WriteTime>)>,
-    /// Root mean square change of the widths when snapped to the shots of each beam [nm].
+    /// Root mean square change of the widths when snapped to the shots of each beam (nm).
     pub snapping: Vec<(Beam, f64)>,
     pub doses: Vec<DoseRow>,
     pub sites: Vec<MetrologySite>,

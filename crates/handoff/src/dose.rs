@@ -9,15 +9,15 @@ use metalith_core::{Error, Result};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Beam {
     pub current_na: f64,
-    /// Distance of neighbouring shots [nm].
+    /// Distance of neighbouring shots (nm).
     pub shot_step_nm: f64,
-    /// Shots a microsecond that give the dose at this step [MHz].
+    /// Shots a microsecond that give the dose at this step (MHz).
     pub clock_mhz: f64,
 }
 
 impl Beam {
-    /// The finest step at which the writer's clock can follow: with I the current [pA], f the clock [MHz]
-    /// and s the step [nm], dose [uC/cm2] = 100 I / (f s^2).
+    /// The finest step at which the writer's clock can follow: with I the current (pA), f the clock (MHz)
+    /// and s the step (nm), dose (uC/cm2) = 100 I / (f s^2).
     ///
     /// # Errors
     /// If no step up to a pillar's size is coarse enough.
@@ -44,7 +44,7 @@ impl Beam {
             })
     }
 
-    /// What a width becomes on the grid of shots [nm].
+    /// What a width becomes on the grid of shots (nm).
     pub fn snapped_nm(&self, width_nm: f64) -> f64 {
         (width_nm / self.shot_step_nm).round() * self.shot_step_nm
     }
@@ -61,7 +61,7 @@ pub struct Exposure {
     pub fields: u64,
 }
 
-/// How long an exposure takes and of what the time is made [s].
+/// How long an exposure takes and of what the time is made (s).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct WriteTime {
     pub beam: Beam,
@@ -95,7 +95,7 @@ impl WriteTime {
         })
     }
 
-    /// All of it [s].
+    /// All of it (s).
     pub fn total_s(&self) -> f64 {
         self.beam_s + self.shapes_s + self.fields_s + self.job_s
     }
@@ -118,7 +118,7 @@ pub struct DoseRow {
     pub number: usize,
     pub factor: f64,
     pub dose_uc_cm2: f64,
-    /// Change from the base dose as a job asks for it [%].
+    /// Change from the base dose as a job asks for it (%).
     pub modulation_percent: f64,
 }
 

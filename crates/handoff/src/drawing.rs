@@ -21,7 +21,7 @@ pub(super) fn number(layer: &Layer) -> LayerNumber {
     (layer.layer, layer.datatype)
 }
 
-/// A rectangle between two corners [nm].
+/// A rectangle between two corners (nm).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub(super) struct RectNm {
     pub x0: i64,

@@ -6,7 +6,7 @@ use super::drawing::RectNm;
 use super::process::Process;
 use metalith_design::Design;
 
-/// A grid of square fields from a corner [nm].
+/// A grid of square fields from a corner (nm).
 struct WriteFields {
     origin: (i64, i64),
     edge: i64,

@@ -22,7 +22,7 @@ pub(super) struct Layouts {
     pub reference_array: PillarArray,
     pub blocks: Vec<DoseBlock>,
     pub structures: Vec<Structure>,
-    /// Frame of the test structures, and where they cross borders of fields on purpose [nm].
+    /// Frame of the test structures, and where they cross borders of fields on purpose (nm).
     pub tests_frame: (RectNm, (i64, i64)),
     pub paths: OfEach<PathBuf>,
 }
@@ -150,7 +150,7 @@ pub(super) fn write(
     })
 }
 
-/// From the opening over the reference lens to the edge of its chip [nm]: decks ask for room there.
+/// From the opening over the reference lens to the edge of its chip (nm): decks ask for room there.
 const BESIDE_REFERENCE: i64 = 50_000;
 
 /// The design with one hyperbolic lens on a chip of its own, at full size.

@@ -10,9 +10,9 @@ use metalith_design::Design;
 use metalith_design::array::{Class, PillarArray, Symmetry};
 use metalith_design::phase::RadialPhase;
 
-/// Room between the parts of a block [nm].
+/// Room between the parts of a block (nm).
 const APART: i64 = 20_000;
-/// Height of the number of a block [nm].
+/// Height of the number of a block (nm).
 const NUMERAL: i64 = 20_000;
 
 /// Where one dose stands.
@@ -20,7 +20,7 @@ const NUMERAL: i64 = 20_000;
 pub(super) struct DoseBlock {
     /// 1 to 9; also the datatype.
     pub number: usize,
-    /// Centre of the small lens and of the row of pads [nm].
+    /// Centre of the small lens and of the row of pads (nm).
     #[serde(rename = "lens_nm")]
     pub lens: (i64, i64),
     #[serde(rename = "pads_nm")]
@@ -161,7 +161,7 @@ pub(super) fn top_pad(sheet: &mut Sheet, pillar: &str, (x, y): (i64, i64), side:
     sheet.array(pillar, (x + first, y + first), (n as i16, n as i16), pitch);
 }
 
-/// The width that the design may write nearest to one that is asked for [nm].
+/// The width that the design may write nearest to one that is asked for (nm).
 pub(super) fn legal_width(design: &Design, width_nm: f64) -> i64 {
     let nearest = design
         .cell

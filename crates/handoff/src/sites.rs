@@ -22,15 +22,15 @@ pub struct MetrologySite {
     pub file: &'static str,
     /// Element or structure.
     pub place: String,
-    /// On the chip, seen from the pillar side, origin in its middle [um]; for test structures from their
+    /// On the chip, seen from the pillar side, origin in its middle (um); for test structures from their
     /// lower left corner.
     pub x_um: f64,
     pub y_um: f64,
-    /// From the middle of the element [um].
+    /// From the middle of the element (um).
     pub element_x_um: Option<f64>,
     pub element_y_um: Option<f64>,
     pub width_nm: u16,
-    /// Narrowest and widest of the pillar and its neighbours [nm].
+    /// Narrowest and widest of the pillar and its neighbours (nm).
     pub around_nm: (u16, u16),
 }
 
@@ -89,7 +89,7 @@ pub(super) fn sites(
     sites
 }
 
-/// Widths to look for: equal steps inside the range, not its ends, where few pillars are [nm].
+/// Widths to look for: equal steps inside the range, not its ends, where few pillars are (nm).
 fn targets(design: &Design) -> Vec<u16> {
     let (low, high) = design.cell.width_range_nm;
     let step = f64::from(high - low) / (WIDTHS + 1) as f64;

@@ -33,7 +33,7 @@ pub(super) struct PillarWriter<'a> {
     buffers: [Vec<u8>; BLOCKS],
 }
 
-/// One pillar of a lens: its site, its centre from the lens's [nm], its width [nm].
+/// One pillar of a lens: its site, its centre from the lens's (nm), its width (nm).
 struct Site {
     ix: usize,
     iy: usize,

@@ -11,7 +11,7 @@ use metalith_cell::{CellStack, OBLIQUE_ORDERS, ORDERS};
 use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::Orders;
 
-/// Distance of the widths at which cells are solved [nm]. Widths between them are interpolated by a cubic through
+/// Distance of the widths at which cells are solved (nm). Widths between them are interpolated by a cubic through
 /// four neighbours, or solved themselves where that is not good enough: near resonances and cutoffs.
 pub const NODE_STEP_NM: f64 = 0.5;
 
@@ -33,7 +33,7 @@ enum Solve {
     Bare,
     /// The pillar of a node.
     Node(i64),
-    /// A pillar of this width [nm], bit by bit.
+    /// A pillar of this width (nm), bit by bit.
     Width(u64),
 }
 
@@ -43,7 +43,7 @@ type Place = [u64; 3];
 /// Cells of one stack by realised width. What was solved is kept for as long as this lives.
 pub struct RealisedCells {
     stack: CellStack,
-    /// Nodes are at this width and whole steps from it [nm]: drawn widths are whole nanometres, so that pillars
+    /// Nodes are at this width and whole steps from it (nm): drawn widths are whole nanometres, so that pillars
     /// under a bias common to all are solved exactly at their width.
     offset_nm: f64,
     known: Mutex<HashMap<(Place, Solve), Polarised>>,
@@ -98,7 +98,7 @@ impl RealisedCells {
         &self.stack
     }
 
-    /// Transmission of pillars of these widths [nm], zero-order, as `CellModel::transmissions` has it; and as
+    /// Transmission of pillars of these widths (nm), zero-order, as `CellModel::transmissions` has it; and as
     /// `CellModel::oblique` has it where `sines` are not zero: those of the direction in air along x and y.
     /// Widths that no pillar can have are those of the nearest that can be.
     ///

@@ -37,7 +37,7 @@ pub struct MadeView<'a> {
     /// What sites transmit, one for each polarisation that is averaged over.
     pub tables: Vec<ClassTable>,
     pub light: ArrivingLight,
-    /// Added to the distance of the sensor [um].
+    /// Added to the distance of the sensor (um).
     pub gap_um: f64,
     pub camera: CameraChange,
 }
@@ -123,7 +123,7 @@ impl MadeChip {
 }
 
 impl MadeChip {
-    /// What pillars drawn this wide [nm] transmit along the normal where so many steps of density are added to
+    /// What pillars drawn this wide (nm) transmit along the normal where so many steps of density are added to
     /// their width (see [`super::realised_nm`]), missing pillars and light that sees none mixed in.
     ///
     /// # Errors
@@ -153,7 +153,7 @@ impl MadeChip {
 
 impl MadeView<'_> {
     /// The PSF on a window at the stated distance of the sensor; where the sensor stands farther off, the window
-    /// keeps its place in it; with the transfer of all light at `lp_mm` [line pairs a millimetre]. Missing pillars scatter evenly over the window, blur and veil of the camera follow.
+    /// keeps its place in it; with the transfer of all light at `lp_mm` (line pairs a millimetre). Missing pillars scatter evenly over the window, blur and veil of the camera follow.
     ///
     /// # Errors
     /// If the window is none, or the light arrives too steeply.

@@ -3,7 +3,7 @@
 use metalith_core::WidthMap;
 use rayon::prelude::*;
 
-/// Range of the backscattered electrons over which fill is averaged [um]: exp(-r^2 / range^2).
+/// Range of the backscattered electrons over which fill is averaged (um): exp(-r^2 / range^2).
 pub const RANGE_UM: f64 = 31.0;
 
 /// Ranges after which the Gaussian is cut: 1e-4 of it is left.

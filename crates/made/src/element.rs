@@ -12,7 +12,7 @@ use metalith_core::{Error, Lattice, Result, WidthMap};
 use metalith_wave::Aperture;
 use metalith_wave::kernels::cis;
 
-/// Biases by density that differ by less than this share a class [nm]. At most 0.05 nm are lost to it, which is
+/// Biases by density that differ by less than this share a class (nm). At most 0.05 nm are lost to it, which is
 /// 1.5 mrad of phase at the steepest (a turn over 200 nm): the error of a field is below 1e-6 of its power.
 pub const BIAS_STEP_NM: f64 = 1.0 / STEPS_PER_NM;
 
@@ -28,7 +28,7 @@ pub struct DrawnElement<'a> {
 }
 
 impl<'a> DrawnElement<'a> {
-    /// The pillars as read from a layout, and the radius of the opening in the metal around them [um].
+    /// The pillars as read from a layout, and the radius of the opening in the metal around them (um).
     pub fn new(pillars: &'a WidthMap, aperture_radius_um: f64) -> Self {
         Self {
             pillars,
@@ -47,7 +47,7 @@ impl<'a> DrawnElement<'a> {
         self.fill.get_or_init(|| density::fill(self.pillars))
     }
 
-    /// Width added to the pillar at a site, counted row by row, by bias and density [nm].
+    /// Width added to the pillar at a site, counted row by row, by bias and density (nm).
     pub fn bias_nm(&self, site: usize, geometry: &GeometryChange) -> f64 {
         if geometry.follows_density() {
             geometry.bias_nm(f64::from(self.fill()[site]))
@@ -85,7 +85,7 @@ impl DrawnElement<'_> {
     }
 }
 
-/// Width of a pillar drawn this wide, so many steps of density on top of the common bias [nm].
+/// Width of a pillar drawn this wide, so many steps of density on top of the common bias (nm).
 pub fn realised_nm(drawn_nm: u16, geometry: &GeometryChange, density_steps: i32) -> f64 {
     // Steps first: every pair of width and step that comes to one sum gets the same number, bit by bit.
     (f64::from(drawn_nm) * STEPS_PER_NM + f64::from(density_steps)) / STEPS_PER_NM + geometry.cd_bias_nm
@@ -101,11 +101,11 @@ pub struct MadeElement {
     missing: f64,
     /// Class of each site, row by row; zero where light is blocked.
     class: Vec<u16>,
-    /// Width of each class [nm], zero without pillar; that of class zero is of no use.
+    /// Width of each class (nm), zero without pillar; that of class zero is of no use.
     width_nm: Vec<f64>,
     /// Sites in each class.
     count: Vec<u32>,
-    /// Optical path added over the lens [um]; empty for none.
+    /// Optical path added over the lens (um); empty for none.
     path_um: Vec<f32>,
 }
 
@@ -198,7 +198,7 @@ impl MadeElement {
         self.lattice
     }
 
-    /// Distance of the outermost open site from the element's centre [um].
+    /// Distance of the outermost open site from the element's centre (um).
     pub fn radius_um(&self) -> f64 {
         self.radius_um
     }
@@ -208,12 +208,12 @@ impl MadeElement {
         &self.class
     }
 
-    /// Width of each class from the first open one, number 1, on [nm].
+    /// Width of each class from the first open one, number 1, on (nm).
     pub fn widths_nm(&self) -> &[f64] {
         &self.width_nm[1..]
     }
 
-    /// What each class transmits, of a pillar of some width [nm] and of a site without one: missing pillars
+    /// What each class transmits, of a pillar of some width (nm) and of a site without one: missing pillars
     /// mixed in, and the light that sees no pillar added.
     pub fn table(&self, pillar: impl Fn(f64) -> Complex64, bare: Complex64) -> ClassTable {
         let of = |width: f64| if width > 0.0 { pillar(width) } else { bare };
@@ -243,7 +243,7 @@ impl MadeElement {
         }
     }
 
-    /// The element as an aperture at one wavelength [um], without the wave that arrives.
+    /// The element as an aperture at one wavelength (um), without the wave that arrives.
     pub fn aperture<'a>(&'a self, table: &'a ClassTable, wavelength_um: f64) -> MadeAperture<'a> {
         MadeAperture {
             element: self,

@@ -12,7 +12,7 @@ use metalith_wave::kernels::cis;
 pub struct ArrivingLight {
     /// Its direction at the axis, the tilt of the chip counted in.
     pub plane: PlaneWave,
-    /// One over the distance of the source [1/m]; zero for a plane wave.
+    /// One over the distance of the source (1/m); zero for a plane wave.
     pub source_per_m: f64,
 }
 
@@ -36,7 +36,7 @@ impl ArrivingLight {
         }
     }
 
-    /// Path that the sphere adds at a distance from the axis [um], along either axis: x^2 / 2R. The next term of
+    /// Path that the sphere adds at a distance from the axis (um), along either axis: x^2 / 2R. The next term of
     /// the sphere, x^4 / 8R^3, is 1 nm at the rim of a 1 mm lens for a source at 20 mm.
     fn sag_um(&self, x_um: f64) -> f64 {
         // 1/m is 1e-6/um.
@@ -62,7 +62,7 @@ impl ArrivingLight {
     }
 }
 
-/// Directions closer than this see the same cell [sine]: a thousandth of the angle over which a resonance passes.
+/// Directions closer than this see the same cell (sine): a thousandth of the angle over which a resonance passes.
 const SAME_DIRECTION: f64 = 1e-5;
 
 /// The direction that a square cell cannot tell from that of a wave: both sines positive, the larger along x.

@@ -18,24 +18,24 @@ pub struct Perturbation {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GeometryChange {
-    /// Added to every width [nm].
+    /// Added to every width (nm).
     pub cd_bias_nm: f64,
-    /// Added to a width for each unit of area fraction around it [nm].
+    /// Added to a width for each unit of area fraction around it (nm).
     pub cd_bias_density_nm: f64,
     /// Share of the pillars that are missing, at random places.
     pub missing_pillars: f64,
     /// Amplitude of light that passes the aperture without seeing pillars, over that which arrives.
     pub zero_order: f64,
-    /// Phase of that light at the top of the pillars, relative to what arrives at their foot [rad].
+    /// Phase of that light at the top of the pillars, relative to what arrives at their foot (rad).
     pub zero_order_phase: f64,
-    /// From the pillars to their aperture along x and y [um].
+    /// From the pillars to their aperture along x and y (um).
     pub aperture_offset_um: [f64; 2],
-    /// Free terms, which are no effect: optical path over the lens [nm], by Zernike polynomial from Noll's
+    /// Free terms, which are no effect: optical path over the lens (nm), by Zernike polynomial from Noll's
     /// fifth on, normalised to an rms of one over the aperture.
     pub wavefront_nm: Vec<f64>,
     /// Relative change of amplitude over the range of widths, by Legendre polynomial from the first on.
     pub transmission: Vec<f64>,
-    /// Widths that stand at -1 and +1 of those polynomials [nm].
+    /// Widths that stand at -1 and +1 of those polynomials (nm).
     pub transmission_range_nm: [f64; 2],
 }
 
@@ -43,15 +43,15 @@ pub struct GeometryChange {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CellChange {
-    /// Added to the height [nm].
+    /// Added to the height (nm).
     pub height_nm: f64,
     /// Added to the index of the film.
     pub index: f64,
-    /// Lean of the walls, the width at the top kept; positive is wider at the foot [deg].
+    /// Lean of the walls, the width at the top kept; positive is wider at the foot (deg).
     pub taper_deg: f64,
-    /// Radius of the vertical edges [nm].
+    /// Radius of the vertical edges (nm).
     pub corner_rounding_nm: f64,
-    /// Alumina left on top [nm].
+    /// Alumina left on top (nm).
     pub residual_mask_nm: f64,
 }
 
@@ -59,11 +59,11 @@ pub struct CellChange {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PathChange {
-    /// Added to every distance of chip and sensor [um].
+    /// Added to every distance of chip and sensor (um).
     pub gap_um: f64,
-    /// Added to every angle of incidence along x and y [mrad].
+    /// Added to every angle of incidence along x and y (mrad).
     pub tilt_mrad: [f64; 2],
-    /// One over the distance of the source [1/m]; zero for collimated light.
+    /// One over the distance of the source (1/m); zero for collimated light.
     pub source_per_m: f64,
 }
 
@@ -71,7 +71,7 @@ pub struct PathChange {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LightChange {
-    /// Added to the centre of each LED, by its place in the set [nm]; missing ones are zero.
+    /// Added to the centre of each LED, by its place in the set (nm); missing ones are zero.
     pub led_shift_nm: Vec<f64>,
     /// Width of all spectra over what is stated, less one.
     pub led_width: f64,
@@ -83,7 +83,7 @@ pub struct LightChange {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CameraChange {
-    /// Standard deviation of a Gaussian blur [um].
+    /// Standard deviation of a Gaussian blur (um).
     pub pixel_blur_um: f64,
     /// Share of the light of a window that is spread evenly over it.
     pub stray_light: f64,
@@ -95,7 +95,7 @@ impl GeometryChange {
         Complex64::from_polar(self.zero_order, self.zero_order_phase)
     }
 
-    /// Width added to a pillar with this area fraction around it [nm].
+    /// Width added to a pillar with this area fraction around it (nm).
     pub fn bias_nm(&self, fill: f64) -> f64 {
         self.cd_bias_nm + self.cd_bias_density_nm * fill
     }
@@ -105,7 +105,7 @@ impl GeometryChange {
         self.cd_bias_density_nm != 0.0
     }
 
-    /// Factor of the amplitude of a pillar that came out this wide [nm].
+    /// Factor of the amplitude of a pillar that came out this wide (nm).
     pub fn amplitude(&self, width_nm: f64) -> f64 {
         let [narrow, wide] = self.transmission_range_nm;
         let place = (2.0 * width_nm - narrow - wide) / (wide - narrow).max(1.0);
@@ -114,7 +114,7 @@ impl GeometryChange {
 }
 
 impl LightChange {
-    /// Shift of one LED [nm].
+    /// Shift of one LED (nm).
     pub fn shift_nm(&self, led: usize) -> f64 {
         self.led_shift_nm.get(led).copied().unwrap_or(0.0)
     }

@@ -5,7 +5,7 @@ use metalith_core::Result;
 
 use super::CellChange;
 
-/// Least width of a pillar, and least room that a pillar's foot leaves in its cell [nm].
+/// Least width of a pillar, and least room that a pillar's foot leaves in its cell (nm).
 const LEAST_NM: f64 = 1.0;
 
 /// The stack with a change.
@@ -20,17 +20,17 @@ pub fn perturbed(stated: &CellStack, change: &CellChange) -> CellStack {
     }
 }
 
-/// The nearest width that a pillar of this stack can have, its foot within the pitch [nm].
+/// The nearest width that a pillar of this stack can have, its foot within the pitch (nm).
 pub fn possible_width_nm(stack: &CellStack, width_nm: f64) -> f64 {
     let foot = (2.0 * stack.taper.tan() * stack.height_nm).max(0.0);
     let most = (stack.pitch_nm - LEAST_NM - foot).max(LEAST_NM);
     width_nm.clamp(LEAST_NM, most)
 }
 
-/// A pillar that is narrower by these [nm] is the same to anyone, but no mode of it is at its cutoff.
+/// A pillar that is narrower by these (nm) is the same to anyone, but no mode of it is at its cutoff.
 const OFF_CUTOFF_NM: [f64; 2] = [3e-4, 1e-3];
 
-/// Solve a cell of some width [nm]. A mode exactly at its cutoff has no field to solve for; where that is so, a
+/// Solve a cell of some width (nm). A mode exactly at its cutoff has no field to solve for; where that is so, a
 /// pillar narrower by a thousandth of a nanometre stands in.
 ///
 /// # Errors

@@ -43,7 +43,7 @@ pub fn value(j: u32, x: f64, y: f64) -> f64 {
     }
 }
 
-/// Optical path [um] on the sites of a lattice, for coefficients [nm] from [`FIRST`] on; zero outside.
+/// Optical path (um) on the sites of a lattice, for coefficients (nm) from [`FIRST`] on; zero outside.
 pub fn map(coefficients_nm: &[f64], lattice: Lattice, radius_um: f64) -> Vec<f32> {
     let n = lattice.sites();
     (0..n * n)

@@ -35,7 +35,7 @@ impl Adam {
         }
     }
 
-    /// Phase of each ring [turns]; every step keeps the limit.
+    /// Phase of each ring (turns); every step keeps the limit.
     pub fn turns(&self) -> &[f64] {
         &self.turns
     }
@@ -61,7 +61,7 @@ impl Adam {
         self
     }
 
-    /// One step up a gradient [1/turn], taken at [`Adam::turns`].
+    /// One step up a gradient (1/turn), taken at [`Adam::turns`].
     pub fn climb(&mut self, gradient: &[f64]) {
         self.step += 1;
         let progress = f64::from(self.step) / f64::from(self.steps.max(1));

@@ -101,12 +101,12 @@ impl<'p> BlockExchange<'p> {
         self.merit
     }
 
-    /// Phase of each ring [turns]; every step keeps the limit.
+    /// Phase of each ring (turns); every step keeps the limit.
     pub fn turns(&self) -> Vec<f64> {
         self.mapping.turns_of(&self.choices)
     }
 
-    /// Width of the pillars of each ring [nm].
+    /// Width of the pillars of each ring (nm).
     pub fn widths_nm(&self) -> Vec<u16> {
         self.mapping.widths_of(&self.choices)
     }

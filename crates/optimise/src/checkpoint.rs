@@ -17,7 +17,7 @@ const MAGIC: [u8; 8] = *b"MLOPTI\0\x01";
 /// Raised whenever the optimiser goes another way from the same state.
 const OPTIMISER: u32 = 1;
 
-/// Longest checkpoint that is read [bytes]: the largest lens has a million rings of 20 digits, for each chain.
+/// Longest checkpoint that is read (bytes): the largest lens has a million rings of 20 digits, for each chain.
 const LONGEST: u64 = 1 << 30;
 
 /// The state of every chain, so that going on gives the same result as never having stopped.

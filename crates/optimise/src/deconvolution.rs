@@ -145,7 +145,7 @@ impl Deconvolution {
             .collect()
     }
 
-    /// Expected peak signal-to-noise ratio of restored images [dB], white being one: over all views, and at
+    /// Expected peak signal-to-noise ratio of restored images (dB), white being one: over all views, and at
     /// each angle.
     pub fn expected_psnr(&self, widths_nm: &[f64]) -> (f64, Vec<f64>) {
         let transfers = self.transfers(widths_nm);

@@ -84,12 +84,12 @@ impl<'p> Exchange<'p> {
         self.finished || self.sweep >= self.schedule.sweeps()
     }
 
-    /// Phase of each ring [turns].
+    /// Phase of each ring (turns).
     pub fn turns(&self) -> Vec<f64> {
         self.problem.mapping().turns_of(&self.choices)
     }
 
-    /// Width of the pillars of each ring [nm].
+    /// Width of the pillars of each ring (nm).
     pub fn widths_nm(&self) -> Vec<u16> {
         self.problem.mapping().widths_of(&self.choices)
     }

@@ -19,11 +19,11 @@ pub const FLOOR: f64 = 1e-9;
 /// What a cell is asked for at one row: a wavelength and an error of fabrication.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Condition {
-    /// Vacuum wavelength [um].
+    /// Vacuum wavelength (um).
     pub wavelength_um: f64,
     /// Which of the cells given: they differ in height.
     pub cell: usize,
-    /// Made width less designed width [nm].
+    /// Made width less designed width (nm).
     pub width_bias_nm: f64,
 }
 

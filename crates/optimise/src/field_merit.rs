@@ -14,7 +14,7 @@ impl FieldProblem {
         self.merit_of_fields(&fields)
     }
 
-    /// Merit at continuous phases [turns], widths not rounded. Its gradient [1/turn] is added to
+    /// Merit at continuous phases (turns), widths not rounded. Its gradient (1/turn) is added to
     /// `gradient`.
     pub fn merit_of_phases(&self, turns: &[f64], gradient: Option<&mut [f64]>) -> f64 {
         let widths = turns.iter().map(|&t| self.mapping.width_nm(t)).collect::<Vec<_>>();

@@ -17,18 +17,18 @@ use metalith_core::{Error, Result, WidthMap};
 pub struct Lens {
     /// The rings of its lattice.
     pub rings: Rings,
-    /// Distance from the tops of the pillars to the sensor [um].
+    /// Distance from the tops of the pillars to the sensor (um).
     pub gap_um: f64,
 }
 
 /// One draw of what the cleanroom and the assembly get wrong.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FabricationError {
-    /// Made width less designed width [nm].
+    /// Made width less designed width (nm).
     pub width_bias_nm: f64,
     /// Which of the cells given, by their film height.
     pub cell: usize,
-    /// Distance to the sensor less the designed one [um].
+    /// Distance to the sensor less the designed one (um).
     pub gap_error_um: f64,
 }
 
@@ -132,7 +132,7 @@ impl Lens {
 /// Strehl ratio over wavelength.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Strehl {
-    /// Wavelengths [um].
+    /// Wavelengths (um).
     pub wavelength_um: Vec<f64>,
     /// Strehl ratio at each.
     pub ratio: Vec<f64>,
@@ -162,7 +162,7 @@ impl Strehl {
     }
 }
 
-/// Wavelengths [um] from `first` to `last` inclusive, `step_nm` apart.
+/// Wavelengths (um) from `first` to `last` inclusive, `step_nm` apart.
 pub fn wavelengths(first_nm: f64, last_nm: f64, step_nm: f64) -> Vec<f64> {
     let count = ((last_nm - first_nm) / step_nm + 1e-9) as usize + 1;
     (0..count).map(|i| (first_nm + i as f64 * step_nm) * 1e-3).collect()

@@ -11,7 +11,7 @@ use super::deconvolution::{Channel, Deconvolution, bracket};
 use super::imaging::Imaging;
 
 impl Deconvolution {
-    /// Merit over the given channels at phases, widths not rounded; its gradient [1/turn] is added.
+    /// Merit over the given channels at phases, widths not rounded; its gradient (1/turn) is added.
     fn climb_channels(&self, turns: &[f64], channels: &[Channel], gradient: &mut [f64]) -> f64 {
         let (widths_nm, rises): (Vec<_>, Vec<_>) = turns.iter().map(|&t| self.mapping.width_nm(t)).unzip();
         let (merit, slopes) = self.evaluate(&widths_nm, channels, true);

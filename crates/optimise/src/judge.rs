@@ -30,7 +30,7 @@ pub struct Judged {
     pub mean: f64,
     /// Smallest.
     pub smallest: f64,
-    /// Largest wrapped phase step between neighbours [turns].
+    /// Largest wrapped phase step between neighbours (turns).
     pub largest_step_turns: f64,
     #[serde(skip)]
     pub strehl: Strehl,
@@ -55,7 +55,7 @@ impl Task {
         judging_wavelengths(self.spec.band_um.0 * 1e3, self.spec.band_um.1 * 1e3)
     }
 
-    /// From the widths that phases [turns] make, with one cell.
+    /// From the widths that phases (turns) make, with one cell.
     ///
     /// # Errors
     /// If the cell does not cover the band.
@@ -96,7 +96,7 @@ impl Task {
         Ok(Judged::new("layout", cell.fidelity(), strehl, step))
     }
 
-    /// Geometric-mean Strehl ratio of phases [turns] for errors of fabrication drawn afresh: one for each
+    /// Geometric-mean Strehl ratio of phases (turns) for errors of fabrication drawn afresh: one for each
     /// draw. `cells` as in [`Task::solve`].
     ///
     /// # Errors

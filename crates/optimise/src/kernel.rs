@@ -74,7 +74,7 @@ impl<'r> RingField<'r> {
         sum
     }
 
-    /// Field of a single site at a squared lateral distance [um^2].
+    /// Field of a single site at a squared lateral distance (um^2).
     pub fn point(&self, lateral2_um2: f64) -> Complex64 {
         let r2 = lateral2_um2 + self.gap_um * self.gap_um;
         let r = r2.sqrt();

@@ -4,10 +4,10 @@ use super::mapping::{Mapping, step};
 use metalith_core::WidthMap;
 use metalith_core::{Error, Result};
 
-/// Steps are held to the limit but for rounding [turns].
+/// Steps are held to the limit but for rounding (turns).
 const ROUNDING: f64 = 1e-9;
 
-/// Largest wrapped step between neighbouring rings [turns].
+/// Largest wrapped step between neighbouring rings (turns).
 ///
 /// The transmission of a ring is that of an endless lattice of its own pillars; it holds only while the
 /// neighbours are alike.
@@ -34,7 +34,7 @@ impl StepLimit {
         ))
     }
 
-    /// The limit [turns].
+    /// The limit (turns).
     pub fn turns(self) -> f64 {
         self.turns
     }
@@ -129,12 +129,12 @@ impl StepLimit {
     }
 }
 
-/// Largest wrapped step between neighbouring rings [turns].
+/// Largest wrapped step between neighbouring rings (turns).
 pub fn largest_step(turns: &[f64]) -> f64 {
     turns.windows(2).map(|w| step(w[0], w[1]).abs()).fold(0.0, f64::max)
 }
 
-/// Largest wrapped phase step between neighbouring pillars of a layout [turns], by the phase that each
+/// Largest wrapped phase step between neighbouring pillars of a layout (turns), by the phase that each
 /// width stands for. Sites without pillar are passed over.
 ///
 /// # Errors

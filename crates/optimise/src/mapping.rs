@@ -8,7 +8,7 @@ const SAMPLES: usize = 4096;
 /// Phase to pillar width, as the array stage of a design maps it.
 #[derive(Clone, Debug)]
 pub struct Mapping {
-    /// Width at `i / SAMPLES` turns, the last entry at the end of the turn [nm].
+    /// Width at `i / SAMPLES` turns, the last entry at the end of the turn (nm).
     width_nm: Vec<f64>,
     choices: Vec<Choice>,
 }
@@ -16,10 +16,10 @@ pub struct Mapping {
 /// A width that a ring can have, and the phase to ask for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Choice {
-    /// Phase [turns], in [0, 1): the middle of the phases that are mapped to this width, so that
+    /// Phase (turns), in [0, 1): the middle of the phases that are mapped to this width, so that
     /// rounding a phase to a text file and back cannot change the width.
     pub turns: f64,
-    /// Width of the pillars [nm].
+    /// Width of the pillars (nm).
     pub width_nm: u16,
 }
 
@@ -35,7 +35,7 @@ impl Mapping {
         }
     }
 
-    /// Width before rounding [nm], and its derivative [nm per turn]. Any phase; it is taken modulo one turn.
+    /// Width before rounding (nm), and its derivative (nm per turn). Any phase; it is taken modulo one turn.
     pub fn width_nm(&self, turns: f64) -> (f64, f64) {
         let at = turns.rem_euclid(1.0) * SAMPLES as f64;
         let i = (at as usize).min(SAMPLES - 1);
@@ -48,17 +48,17 @@ impl Mapping {
         &self.choices
     }
 
-    /// Phases of given choices [turns].
+    /// Phases of given choices (turns).
     pub fn turns_of(&self, choices: &[usize]) -> Vec<f64> {
         choices.iter().map(|&c| self.choices[c].turns).collect()
     }
 
-    /// Widths of given choices [nm].
+    /// Widths of given choices (nm).
     pub fn widths_of(&self, choices: &[usize]) -> Vec<u16> {
         choices.iter().map(|&c| self.choices[c].width_nm).collect()
     }
 
-    /// Largest width [nm].
+    /// Largest width (nm).
     pub fn max_width_nm(&self) -> u16 {
         self.choices.iter().map(|c| c.width_nm).max().unwrap_or(0)
     }

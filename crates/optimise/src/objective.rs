@@ -5,7 +5,7 @@ pub trait Objective: Sync {
     /// The merit with pillars of `widths_nm[k]` in ring `k`.
     fn merit(&self, widths_nm: &[u16]) -> f64;
 
-    /// The merit that step `step` climbs, with its gradient [1/turn] added to `gradient`. Parts that are
+    /// The merit that step `step` climbs, with its gradient (1/turn) added to `gradient`. Parts that are
     /// drawn afresh for each step depend on the seed and the step alone.
     fn climb(&self, turns: &[f64], seed: u64, step: u32, gradient: &mut [f64]) -> f64;
 

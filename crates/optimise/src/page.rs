@@ -21,28 +21,28 @@ pub struct Findings {
     pub start: String,
     /// Merit, as optimised.
     pub merit: f64,
-    /// Limit on the step [turns].
+    /// Limit on the step (turns).
     pub step_limit_turns: f64,
     /// The design's own phase before, judged in each way.
     pub before: Vec<Judged>,
     /// The optimised phase.
     pub after: Vec<Judged>,
-    /// Geometric-mean Strehl ratio that exchange reaches for other limits [turns].
+    /// Geometric-mean Strehl ratio that exchange reaches for other limits (turns).
     pub merit_over_limit: Vec<(f64, f64)>,
-    /// Expected PSNR of restored images [dB] at each field angle [degrees], before and after.
+    /// Expected PSNR of restored images (dB) at each field angle (degrees), before and after.
     pub expected_psnr_db: Vec<(f64, f64, f64)>,
     /// Geometric-mean Strehl ratios with drawn errors of fabrication, one a draw, of several phases by name.
     pub with_errors: Vec<(&'static str, Vec<f64>)>,
     /// Merit along the way.
     #[serde(skip)]
     pub history: Vec<(u32, f64)>,
-    /// Radius [um], phase before and after [turns], width after [nm] of each ring.
+    /// Radius (um), phase before and after (turns), width after (nm) of each ring.
     #[serde(skip)]
     pub rings: Vec<(f64, f64, f64, u16)>,
-    /// Wavelengths of the pictures [um], their greatest radius [um], and PSFs before and after.
+    /// Wavelengths of the pictures (um), their greatest radius (um), and PSFs before and after.
     #[serde(skip)]
     pub psf: (Vec<f64>, f64, Vec<Array2<f64>>),
-    /// Wavelengths [um], and MTF at half and all of Nyquist, before and after.
+    /// Wavelengths (um), and MTF at half and all of Nyquist, before and after.
     #[serde(skip)]
     pub mtf: (Vec<f64>, Vec<Vec<(f64, f64)>>),
 }

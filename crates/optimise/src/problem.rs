@@ -20,10 +20,10 @@ use metalith_wave::restore::Scene;
 
 /// Radii at which side lobes are sampled, out to four times the radius where they begin.
 const SIDE_LOBE_POINTS: usize = 48;
-/// Distance of wavelengths at which side lobes are sampled [nm]: haze is smooth in wavelength.
+/// Distance of wavelengths at which side lobes are sampled (nm): haze is smooth in wavelength.
 const SIDE_LOBE_STEP_NM: f64 = 15.0;
 
-/// Wavelengths of a design's merit [um].
+/// Wavelengths of a design's merit (um).
 pub fn band(spec: &OptimiseSpec) -> Vec<f64> {
     wavelengths(spec.band_um.0 * 1e3, spec.band_um.1 * 1e3, spec.step_um * 1e3)
 }

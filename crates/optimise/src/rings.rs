@@ -28,7 +28,7 @@ pub struct Rings {
 /// One radius that stands for a part of a ring.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Node {
-    /// Distance from the centre [um].
+    /// Distance from the centre (um).
     pub radius_um: f64,
     /// Number of sites it stands for; not whole, and a few are below zero.
     pub weight: f64,
@@ -94,7 +94,7 @@ impl Rings {
         self.lattice
     }
 
-    /// Diameter of the lens [nm].
+    /// Diameter of the lens (nm).
     pub fn diameter_nm(&self) -> u32 {
         self.diameter_nm
     }
@@ -109,7 +109,7 @@ impl Rings {
         self.sites.iter().map(|&n| u64::from(n)).sum()
     }
 
-    /// Radius in the middle of a ring [um], (k + 1/2) pitch: where a table of the phase has its rows.
+    /// Radius in the middle of a ring (um), (k + 1/2) pitch: where a table of the phase has its rows.
     pub fn middle_um(&self, ring: usize) -> f64 {
         (ring as f64 + 0.5) * self.lattice.pitch_um()
     }
@@ -136,7 +136,7 @@ impl Rings {
         &self.nodes[ring]
     }
 
-    /// Every distinct distance of a ring's sites [um] with its number of sites: the oracle of [`Node`].
+    /// Every distinct distance of a ring's sites (um) with its number of sites: the oracle of [`Node`].
     #[cfg(test)]
     pub fn distances(&self, ring: usize) -> impl Iterator<Item = (f64, u32)> {
         let half_pitch = 0.5 * self.lattice.pitch_um();

@@ -17,9 +17,9 @@ use metalith_design::{Design, MeritSpec, OptimiseSpec, StartSpec};
 /// What an optimisation found.
 #[derive(Clone, Debug)]
 pub struct Optimised {
-    /// Phase of each ring [turns], in [0, 1).
+    /// Phase of each ring (turns), in [0, 1).
     pub turns: Vec<f64>,
-    /// Width of the pillars of each ring [nm].
+    /// Width of the pillars of each ring (nm).
     pub widths_nm: Vec<u16>,
     /// The merit, as it was optimised.
     pub merit: f64,
@@ -40,7 +40,7 @@ pub struct Task {
     pub mapping: Mapping,
     /// How it is to be optimised.
     pub spec: OptimiseSpec,
-    /// The design's own phase [turns].
+    /// The design's own phase (turns).
     pub own_turns: Vec<f64>,
     /// What gains are counted from: the design's own phase, or where that is a table, which may well be an
     /// optimised one, a hyperbolic lens for the middle of the band.
@@ -90,7 +90,7 @@ impl Task {
         plain
     }
 
-    /// Widths that are made of phases, without any limit on their steps [nm].
+    /// Widths that are made of phases, without any limit on their steps (nm).
     pub fn widths_nm(&self, turns: &[f64]) -> Vec<u16> {
         let choices = self.mapping.choices();
         turns
@@ -131,7 +131,7 @@ impl Task {
     }
 }
 
-/// Phase in the middle of each ring [turns].
+/// Phase in the middle of each ring (turns).
 pub fn turns_of(rings: &Rings, phase: &RadialPhase) -> Vec<f64> {
     (0..rings.len())
         .map(|ring| phase.turns(rings.middle_um(ring).powi(2)))

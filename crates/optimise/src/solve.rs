@@ -120,7 +120,7 @@ impl Task {
         Ok(found.optimised(name, interrupted))
     }
 
-    /// Phases [turns] that Adam, or an exchange of blocks alone, begins from, and their name. What exchange
+    /// Phases (turns) that Adam, or an exchange of blocks alone, begins from, and their name. What exchange
     /// makes of a logarithmic asphere for the merit `log` costs some seconds; it is not made again for a run
     /// that goes on from a checkpoint.
     fn start_of_images(

@@ -19,7 +19,7 @@ pub struct OverWavelength<'a> {
     pub lens: &'a Lens,
     /// The cell.
     pub cell: &'a dyn CellModel,
-    /// Widths of the rings [nm], one list for each phase.
+    /// Widths of the rings (nm), one list for each phase.
     pub widths_nm: &'a [&'a [u16]],
 }
 

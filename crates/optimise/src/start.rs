@@ -10,16 +10,16 @@ use super::focus::Lens;
 pub enum Start {
     /// One focus for one wavelength: phi = -k (sqrt(r^2 + f^2) - f).
     Hyperbolic {
-        /// Wavelength in focus [um].
+        /// Wavelength in focus (um).
         wavelength_um: f64,
     },
     /// A focal length that changes with r^2 such that each zone of equal area has another wavelength of
     /// the band in focus (logarithmic asphere: dphi/dr = -k r / sqrt(r^2 + F(r)^2)).
     LogAsphere {
-        /// First and last wavelength in focus, at the centre and at the edge [um].
+        /// First and last wavelength in focus, at the centre and at the edge (um).
         band_um: (f64, f64),
     },
-    /// Phases of an earlier result [turns].
+    /// Phases of an earlier result (turns).
     Previous(Vec<f64>),
     /// Every phase at random.
     Random,
@@ -36,7 +36,7 @@ impl Start {
         }
     }
 
-    /// Phase of each ring [turns], before any limit on the step. A previous result of another number of
+    /// Phase of each ring (turns), before any limit on the step. A previous result of another number of
     /// rings is cut, or goes on with its last phase.
     pub fn turns(&self, lens: &Lens, seed: u64) -> Vec<f64> {
         let (count, f) = (lens.rings.len(), lens.gap_um);

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::rings::Rings;
 use metalith_core::{Result, WholeFile};
 
-/// Write the phase of each ring [turns] as `r_um,phase_rad`, one row in the middle of each ring. A design
+/// Write the phase of each ring (turns) as `r_um,phase_rad`, one row in the middle of each ring. A design
 /// reads it with `source = "table"` and `interpolation = "nearest"`. `remarks` go before it as comments.
 ///
 /// # Errors

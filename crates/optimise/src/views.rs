@@ -9,9 +9,9 @@ use metalith_wave::restore::Scene;
 /// What the merit is taken over.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Views {
-    /// Wavelengths [um], ascending.
+    /// Wavelengths (um), ascending.
     pub wavelengths_um: Vec<f64>,
-    /// Field angles in the x-z plane [rad].
+    /// Field angles in the x-z plane (rad).
     pub angles_rad: Vec<f64>,
     /// Colour channels: the wavelengths are split evenly among them.
     pub channels: usize,
@@ -47,7 +47,7 @@ impl Default for Views {
     }
 }
 
-/// Middle of the window from where the chief ray lands [um]: half way between the rays from both edges of
+/// Middle of the window from where the chief ray lands (um): half way between the rays from both edges of
 /// the lens, if it is a perfect lens for light along its axis.
 pub fn window_offset_um(lens: &Lens, angle_rad: f64, side_um: f64) -> f64 {
     let radius = 0.5e-3 * f64::from(lens.rings.diameter_nm());

@@ -5,12 +5,12 @@
 pub struct PixelWindow {
     /// Pixels along a side, even.
     pub pixels: usize,
-    /// Pixel pitch [um].
+    /// Pixel pitch (um).
     pub pixel_um: f64,
 }
 
 impl PixelWindow {
-    /// Side of the window [um].
+    /// Side of the window (um).
     pub fn side_um(&self) -> f64 {
         self.pixels as f64 * self.pixel_um
     }

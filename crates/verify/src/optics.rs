@@ -305,7 +305,7 @@ struct Task<'a> {
     views: Vec<Option<MadeView<'a>>>,
 }
 
-/// Transmissions with the drawn width [nm] as index, for the widths that a rule draws.
+/// Transmissions with the drawn width (nm) as index, for the widths that a rule draws.
 fn by_drawn_width(
     chip: &MadeChip,
     rule: &WidthRule,

@@ -16,7 +16,7 @@ use metalith_report::{
 
 /// Decades of a PSF that are shown: below lies what a camera's noise hides.
 const PSF_DECADES: f64 = 4.0;
-/// Edge of the part of a PSF that is shown [um]: some ten sensor pixels.
+/// Edge of the part of a PSF that is shown (um): some ten sensor pixels.
 const PSF_SHOWN_UM: f64 = 60.0;
 
 /// Write `report.html` and `report.json` into a folder.

@@ -11,7 +11,7 @@ use metalith_core::WidthMap;
 use metalith_design::array::WidthRule;
 use metalith_design::phase::ElementPhase;
 
-/// Root mean square and largest magnitude of a phase error over the pillars [rad].
+/// Root mean square and largest magnitude of a phase error over the pillars (rad).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PhaseError {
     pub rms_rad: f64,
@@ -29,7 +29,7 @@ pub struct PhaseErrors {
 
 impl PhaseErrors {
     /// Compare the pillars of an element with its phase. `response` is what a pillar transmits at the wavelength of
-    /// the mapping [um], zero where its aperture is shut.
+    /// the mapping (um), zero where its aperture is shut.
     pub fn of(
         widths: &WidthMap,
         phase: &ElementPhase<'_>,
@@ -104,7 +104,7 @@ fn sum_rows(
 }
 
 /// Fold each row on whatever thread; the caller adds the rows in order, so that sums do not depend on
-/// the number of threads. Sites come with their phase [turns, 0 to 1].
+/// the number of threads. Sites come with their phase (turns, 0 to 1).
 fn per_row<T: Send>(
     widths: &WidthMap,
     phase: &ElementPhase<'_>,

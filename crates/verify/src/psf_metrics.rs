@@ -46,7 +46,7 @@ pub struct PsfPair {
     pub field: FieldAngle,
     /// Direction sines of the light as it arrives at the chip.
     pub incidence_sin: [f64; 2],
-    /// Where the chief ray meets the sensor, from the element's axis [um].
+    /// Where the chief ray meets the sensor, from the element's axis (um).
     pub chief_ray_um: [f64; 2],
     /// Frequency bins that had to be relabelled towards the mean ray.
     pub relabelled: u64,
@@ -69,7 +69,7 @@ pub struct PsfImages {
     pub designed: Array2<f32>,
     /// Of the layout, in the case that judges.
     pub extracted: Array2<f32>,
-    /// Distance of the samples [um].
+    /// Distance of the samples (um).
     pub step_um: f64,
 }
 
@@ -97,7 +97,7 @@ impl PsfPair {
         self.judged().metrics.strehl / self.designed.metrics.strehl
     }
 
-    /// Distance of the two centroids [um].
+    /// Distance of the two centroids (um).
     pub fn centroid_shift_um(&self) -> f64 {
         let (a, b) = (self.judged().metrics.centroid_um, self.designed.metrics.centroid_um);
         (a[0] - b[0]).hypot(a[1] - b[1])
@@ -131,7 +131,7 @@ pub struct Orders {
 }
 
 impl Orders {
-    /// The widths that a mapping draws [nm], rising.
+    /// The widths that a mapping draws (nm), rising.
     pub(super) fn drawn_nm(rule: &WidthRule) -> Vec<u16> {
         let all: std::collections::BTreeSet<u16> = (0..ORDER_SAMPLES).map(|i| rule.width_nm(order_phase(i))).collect();
         all.into_iter().collect()
@@ -154,7 +154,7 @@ impl Orders {
     }
 }
 
-/// Phase of a sample of a mapping [turns].
+/// Phase of a sample of a mapping (turns).
 fn order_phase(i: usize) -> f64 {
     (i as f64 + 0.5) / ORDER_SAMPLES as f64
 }

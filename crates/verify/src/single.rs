@@ -21,21 +21,21 @@ use metalith_wave::{Accuracy, Aperture, Fold, Pillars, PlaneWave, Scratch, Windo
 /// In what light, and where on the sensor.
 #[derive(Clone, Debug)]
 pub struct Lighting {
-    /// Wavelengths [um].
+    /// Wavelengths (um).
     pub wavelengths_um: Vec<f64>,
     /// Direction sines of the incident light, in air.
     pub incidence_sin: [f64; 2],
     /// Whether cells are solved at that angle, for both polarisations, or along the normal.
     pub cells_as_lit: bool,
-    /// From the pillar tops to the sensor [um].
+    /// From the pillar tops to the sensor (um).
     pub distance_um: f64,
-    /// Middle of the window, from the axis of an element [um].
+    /// Middle of the window, from the axis of an element (um).
     pub at_um: [f64; 2],
     /// Samples an axis, one pitch apart.
     pub samples: usize,
-    /// Edge of a sensor pixel [um].
+    /// Edge of a sensor pixel (um).
     pub pixel_um: f64,
-    /// Radius of the openings in the metal [um]; that of the circle around the pillars if none is given. It counts
+    /// Radius of the openings in the metal (um); that of the circle around the pillars if none is given. It counts
     /// where a model has them off their place.
     pub aperture_radius_um: Option<f64>,
     pub accuracy: Accuracy,
@@ -171,7 +171,7 @@ fn as_made(
         .collect()
 }
 
-/// Radius of the circle about the element's centre that holds all of its pillars [um].
+/// Radius of the circle about the element's centre that holds all of its pillars (um).
 fn circle_um(widths: &WidthMap) -> f64 {
     let standing = widths.width_nm.indexed_iter().filter(|(_, w)| **w > 0);
     let radius2 = standing.map(|((iy, ix), _)| widths.lattice.half_radius2(ix, iy)).max();

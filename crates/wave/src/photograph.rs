@@ -16,7 +16,7 @@ pub struct Photograph {
     pub seen: Array3<f64>,
     /// Restored, sRGB from 0 to 1. Same shape.
     pub restored: Array3<f64>,
-    /// Peak signal to noise ratio of the restored image, over all colours [dB].
+    /// Peak signal to noise ratio of the restored image, over all colours (dB).
     pub psnr_db: f64,
     /// Structural similarity of the restored image, mean over the colours.
     pub ssim: f64,

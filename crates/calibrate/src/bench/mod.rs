@@ -16,9 +16,9 @@ use metalith_made::{DrawnElement, GeometryChange, Perturbation, veiled};
 pub struct Sampling {
     /// Wavelengths are at most this share of a spectrum's full width apart.
     pub spectrum: f64,
-    /// And at most so far [nm].
+    /// And at most so far (nm).
     pub step_nm: f64,
-    /// Distance of the samples of the intensity [um].
+    /// Distance of the samples of the intensity (um).
     pub step_um: f64,
     /// Samples around each window that placement, blur and borders may use up.
     pub margin: usize,
@@ -124,7 +124,7 @@ impl<'a> Bench<'a> {
         self.set
     }
 
-    /// All wavelengths that cells are needed at [nm].
+    /// All wavelengths that cells are needed at (nm).
     pub fn wavelengths_nm(&self) -> Vec<f64> {
         self.quadratures
             .iter()
@@ -132,7 +132,7 @@ impl<'a> Bench<'a> {
             .collect()
     }
 
-    /// Least and greatest width of the layout [nm].
+    /// Least and greatest width of the layout (nm).
     pub fn widths_nm(&self) -> (f64, f64) {
         let all = self
             .set
@@ -142,7 +142,7 @@ impl<'a> Bench<'a> {
         all.fold((f64::MAX, 0.0), |(a, b), &w| (a.min(f64::from(w)), b.max(f64::from(w))))
     }
 
-    /// Width added to the pillar at a site of an element by bias and density [nm].
+    /// Width added to the pillar at a site of an element by bias and density (nm).
     pub fn bias_nm(&self, element: ElementIndex, site: usize, geometry: &GeometryChange) -> f64 {
         self.drawn[element].bias_nm(site, geometry)
     }
@@ -188,14 +188,14 @@ impl<'a> Bench<'a> {
             .collect()
     }
 
-    /// Images of the two radii of the source disc on the sensor [um].
+    /// Images of the two radii of the source disc on the sensor (um).
     fn disc_um(&self, group: &Group, z: f64, perturbation: &Perturbation) -> [[f64; 2]; 2] {
         let radius = 0.5 * self.set.divergence_rad * (1.0 + perturbation.light.source_size);
         let [x, y] = self.landing_um(group, z);
         [x.map(|v| v * radius), y.map(|v| v * radius)]
     }
 
-    /// How far light lands from where it did for a turn of what arrives by one radian about each axis [um].
+    /// How far light lands from where it did for a turn of what arrives by one radian about each axis (um).
     fn landing_um(&self, group: &Group, z: f64) -> [[f64; 2]; 2] {
         let [cx, cy] = group.centre_um;
         let r = (cx * cx + cy * cy + z * z).sqrt();
@@ -209,7 +209,7 @@ impl<'a> Bench<'a> {
         ]
     }
 
-    /// How far tilted light carries the image off its window, where windows follow it [um].
+    /// How far tilted light carries the image off its window, where windows follow it (um).
     fn off_um(&self, group: &Group, z: f64, perturbation: &Perturbation) -> [f64; 2] {
         if !self.follows {
             return [0.0; 2];

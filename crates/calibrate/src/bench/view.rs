@@ -16,7 +16,7 @@ impl Bench<'_> {
         MadeElement::new(drawn, &perturbation.geometry)
     }
 
-    /// That element in the light of the capture, at one wavelength [um]. `solved` is what its widths transmit.
+    /// That element in the light of the capture, at one wavelength (um). `solved` is what its widths transmit.
     pub fn view<'a>(
         &self,
         capture: CaptureIndex,
@@ -35,7 +35,7 @@ impl Bench<'_> {
         }
     }
 
-    /// The wave that arrives at the element of a capture, at one wavelength [um].
+    /// The wave that arrives at the element of a capture, at one wavelength (um).
     pub fn direction_of(
         &self,
         capture: CaptureIndex,

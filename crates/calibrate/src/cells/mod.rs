@@ -35,7 +35,7 @@ const LEANING: usize = 7;
 /// And for pillars that are wider one way, which twins alone are made of.
 const ANISOTROPIC: usize = 9;
 
-/// Widths are tabulated this far apart [nm]; resonances are a few nanometres wide.
+/// Widths are tabulated this far apart (nm); resonances are a few nanometres wide.
 const STEP_NM: f64 = 2.0;
 
 /// Where tables come from.

@@ -19,7 +19,7 @@ pub struct PillarTable {
 }
 
 impl PillarTable {
-    /// Transmission of a pillar of any width [nm] at one of the wavelengths, by cubics through the table; beyond
+    /// Transmission of a pillar of any width (nm) at one of the wavelengths, by cubics through the table; beyond
     /// its ends, that of the end.
     pub fn at(&self, wavelength: usize, width_nm: f64) -> Complex64 {
         let row = &self.t[wavelength];

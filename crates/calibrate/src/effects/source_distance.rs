@@ -4,7 +4,7 @@ use super::{Effect, Parameter, Stage};
 use crate::set::MeasuredSet;
 use metalith_made::Perturbation;
 
-/// One over its distance is fitted [1/m], the distance itself is reported.
+/// One over its distance is fitted (1/m), the distance itself is reported.
 pub struct SourceDistance;
 
 impl Effect for SourceDistance {

@@ -72,7 +72,7 @@ impl CaptureEquations {
         self.gram.view((2, 2), (n, n)) - cross.transpose() * inner * cross
     }
 
-    /// The best step of registration [um] after the others have moved by `step` (flux, black level, further).
+    /// The best step of registration (um) after the others have moved by `step` (flux, black level, further).
     pub fn registration(&self, step: &DVector<f64>) -> [f64; 2] {
         let last = self.gram.ncols() - 1;
         let mut rhs = self.gram.view((0, last), (2, 1)).into_owned();

@@ -13,7 +13,7 @@ const SATURATED: f64 = 0.97;
 pub struct CaptureSetup {
     pub element: ElementIndex,
     pub led: LedIndex,
-    /// Angle of incidence along x and y [rad].
+    /// Angle of incidence along x and y (rad).
     pub aoi_rad: [f64; 2],
     pub distance_um: f64,
 }
@@ -21,16 +21,16 @@ pub struct CaptureSetup {
 /// A width by SEM.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WidthDeviation {
-    /// Measured less designed [nm].
+    /// Measured less designed (nm).
     pub deviation_nm: f64,
-    /// One standard deviation [nm].
+    /// One standard deviation (nm).
     pub sigma_nm: f64,
 }
 
 /// Frames with their noise, and widths with theirs.
 #[derive(Clone)]
 pub struct Data {
-    /// One over the standard deviation of each pixel [1 / DN], zero where a pixel does not count.
+    /// One over the standard deviation of each pixel (1 / DN), zero where a pixel does not count.
     pub weight: PerCapture<Array2<f32>>,
     /// DN less the stated black level.
     pub signal: PerCapture<Array2<f32>>,
@@ -40,13 +40,13 @@ pub struct Data {
     /// Number of LEDs.
     pub leds: usize,
     pub pixel_um: f64,
-    /// Standard deviation of the position of a window along each axis [um].
+    /// Standard deviation of the position of a window along each axis (um).
     pub registration_um: f64,
     /// Relative standard deviation of the flux of each LED.
     pub flux_sigma: f64,
     /// Widths by SEM.
     pub widths: Vec<WidthDeviation>,
-    /// Standard deviation of the offset that all widths share [nm].
+    /// Standard deviation of the offset that all widths share (nm).
     pub width_offset_sigma_nm: f64,
 }
 

@@ -11,7 +11,7 @@ use super::data::Data;
 use crate::optics::PixelGrid;
 use crate::set::{CaptureIndex, LedIndex, PerCapture, PerLed};
 
-/// How far the black level may be off [DN], one standard deviation: sensors drift by less over a session.
+/// How far the black level may be off (DN), one standard deviation: sensors drift by less over a session.
 pub const BLACK_SIGMA_DN: f64 = 0.5;
 
 /// Gauss-Newton steps; within a pixel, three bring registration to a thousandth.
@@ -23,11 +23,11 @@ const LARGEST_SHIFT: f64 = 2.0;
 /// The nuisances of a set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Nuisances {
-    /// Position of each window, relative to its stated position, along x and y [um].
+    /// Position of each window, relative to its stated position, along x and y (um).
     pub shift_um: PerCapture<[f64; 2]>,
     /// Flux of each LED over what is stated.
     pub flux: PerLed<f64>,
-    /// Black level less what is stated [DN].
+    /// Black level less what is stated (DN).
     pub black_dn: f64,
 }
 

@@ -4,7 +4,7 @@ use ndarray::Array2;
 use num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
-/// Largest shift that is searched, along each axis [pixels].
+/// Largest shift that is searched, along each axis (pixels).
 const REACH: i64 = 16;
 
 /// A shift is taken if it raises the correlation by this factor: the fit finds smaller shifts by itself.

@@ -6,7 +6,7 @@ use crate::set::Led;
 /// of its step.
 #[derive(Clone, Debug)]
 pub struct Quadrature {
-    /// Wavelengths [nm].
+    /// Wavelengths (nm).
     pub wavelengths_nm: Vec<f64>,
     led: Led,
 }

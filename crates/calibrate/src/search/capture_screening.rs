@@ -45,7 +45,7 @@ pub fn unusable_captures(set: &MeasuredSet, problem: &FitProblem<'_>, nuisances:
     out
 }
 
-/// How far each window is off, along the worse axis [pixels]. What all windows share is an effect of the light,
+/// How far each window is off, along the worse axis (pixels). What all windows share is an effect of the light,
 /// and is taken out.
 fn window_offsets(nuisances: &Nuisances, pixel_um: f64) -> Vec<f64> {
     let shifts: Vec<[f64; 2]> = nuisances.shift_um.iter().map(|s| s.map(|v| v / pixel_um)).collect();

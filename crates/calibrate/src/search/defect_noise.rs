@@ -123,7 +123,7 @@ impl DefectNoise {
     }
 
     /// Of each pixel that counts: the square of the residual, the variance of the camera, that of a unit of
-    /// speckle [DN^2].
+    /// speckle (DN^2).
     fn spread(&self, problem: &FitProblem<'_>, fit: &Fit, c: CaptureIndex) -> Vec<[f32; 3]> {
         let data = problem.data;
         let grid = problem.image(&fit.theta, c);

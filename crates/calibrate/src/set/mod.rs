@@ -25,7 +25,7 @@ pub struct MeasuredSet {
     /// The layout that was written.
     pub layout: PathBuf,
     pub stack: Stack,
-    /// Full angle of the uniform disc that the source is [rad].
+    /// Full angle of the uniform disc that the source is (rad).
     pub divergence_rad: f64,
     pub camera: RelayCamera,
     pub leds: PerLed<Led>,
@@ -33,7 +33,7 @@ pub struct MeasuredSet {
     pub captures: PerCapture<Capture>,
     /// Widths seen from above; empty where none were taken.
     pub sem: Vec<SemSite>,
-    /// Standard deviation of the offset common to all widths of the SEM [nm].
+    /// Standard deviation of the offset common to all widths of the SEM (nm).
     pub sem_offset_sigma_nm: f64,
 }
 
@@ -111,7 +111,7 @@ pub struct RelayCamera {
     pub gain_e_per_dn: f64,
     pub read_noise_dn: f64,
     pub saturation_dn: f64,
-    /// Standard deviation of where a window is, along each axis [pixels].
+    /// Standard deviation of where a window is, along each axis (pixels).
     pub registration_sigma_px: f64,
     /// Relative standard deviation of the DN scale of each LED.
     pub flux_sigma: f64,
@@ -125,7 +125,7 @@ pub struct Led {
 }
 
 impl Led {
-    /// Standard deviation [nm].
+    /// Standard deviation (nm).
     pub fn sigma_nm(&self) -> f64 {
         self.fwhm_nm / (8.0 * 2f64.ln()).sqrt()
     }
@@ -153,11 +153,11 @@ pub struct Capture {
     pub name: String,
     pub element: ElementIndex,
     pub led: LedIndex,
-    /// Angle of incidence in air along x and y [rad].
+    /// Angle of incidence in air along x and y (rad).
     pub aoi_rad: [f64; 2],
-    /// From the pillar tops to the sensor [um].
+    /// From the pillar tops to the sensor (um).
     pub distance_um: f64,
-    /// Middle of the window from the element's axis [um].
+    /// Middle of the window from the element's axis (um).
     pub window_centre_um: [f64; 2],
     /// DN for |E|^2 / |E_inc|^2 = 1.
     pub scale_dn: f64,

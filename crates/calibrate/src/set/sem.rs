@@ -9,11 +9,11 @@ use metalith_core::{Error, Result, document};
 pub struct SemSite {
     /// Element by its place in the array.
     pub element: [i64; 2],
-    /// Place of the pillar from the element's centre [um].
+    /// Place of the pillar from the element's centre (um).
     pub at_um: [f64; 2],
     pub designed_nm: f64,
     pub measured_nm: f64,
-    /// Standard deviation of the single measurement [nm].
+    /// Standard deviation of the single measurement (nm).
     pub sigma_nm: f64,
 }
 

@@ -38,7 +38,7 @@ pub struct Surrogate {
     pub base: Arc<PerCapture<PixelGrid>>,
     /// Changes with each parameter, by slot.
     curves: Vec<Curve>,
-    /// Changes for a unit of each smooth term: paths [1/nm], then transmissions of each LED.
+    /// Changes for a unit of each smooth term: paths (1/nm), then transmissions of each LED.
     smooth: Arc<Vec<SmoothChange>>,
 }
 

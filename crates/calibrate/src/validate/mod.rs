@@ -21,7 +21,7 @@ use crate::smooth_residual::SmoothResidual;
 use metalith_core::{Progress, Result};
 use synthetic::{Synthesizer, SyntheticImages, UnlistedEffect};
 
-/// Sizes at which every effect is tried [typical sizes].
+/// Sizes at which every effect is tried (typical sizes).
 pub const SIZES: [f64; 3] = [0.5, 1.0, 2.0];
 
 /// Effects that are tried together, each at its typical size: of one stage and of several, alike and unlike.
@@ -80,9 +80,9 @@ pub struct ValidationTrial {
 /// What a diagnosis could not name, for people.
 #[derive(Clone, Debug, Serialize)]
 pub struct UnexplainedResidual {
-    /// Coefficients of the smooth path by Noll's number, with standard deviations [nm].
+    /// Coefficients of the smooth path by Noll's number, with standard deviations (nm).
     pub path_nm: Vec<(u32, f64, f64)>,
-    /// Covariance of the smooth blur, xx, xy, yy, with standard deviations [um^2].
+    /// Covariance of the smooth blur, xx, xy, yy, with standard deviations (um^2).
     pub blur_um2: [(f64, f64); 3],
     /// Capture whose residual is shown.
     pub capture: String,
@@ -90,7 +90,7 @@ pub struct UnexplainedResidual {
     pub path: Array2<f64>,
     #[serde(skip)]
     pub radius_um: f64,
-    /// Residual of that capture [sigma].
+    /// Residual of that capture (sigma).
     #[serde(skip)]
     pub residual: Array2<f64>,
 }

@@ -10,7 +10,7 @@ use metalith_report::{Axis, Cell, Column, HeatMap, ImageGrid, Matrix, Page, Tabl
 /// Largest share of sets without effect in which one may be claimed.
 const MOST_FALSE: f64 = 0.05;
 
-/// Range of residual pictures [sigma].
+/// Range of residual pictures (sigma).
 const SIGMAS: f64 = 6.0;
 
 /// Write the validation to a folder.

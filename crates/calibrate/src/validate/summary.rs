@@ -38,9 +38,9 @@ pub struct Validation {
 #[derive(Clone, Debug, Serialize)]
 pub struct DetectionLimit {
     pub name: String,
-    /// The smallest size from which on it was named at all sizes [typical sizes]; none if not at the largest.
+    /// The smallest size from which on it was named at all sizes (typical sizes); none if not at the largest.
     pub named_from: Option<f64>,
-    /// Size at which the residual would reach the least gain of a claim [typical sizes]: a residual grows with
+    /// Size at which the residual would reach the least gain of a claim (typical sizes): a residual grows with
     /// the square of the size, and is known at the smallest size tried.
     pub estimate: Option<f64>,
 }

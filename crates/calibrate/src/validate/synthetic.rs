@@ -26,17 +26,17 @@ const TAPER_ORDERS: usize = 9;
 /// Seed of the places of missing pillars.
 const MISSING_SEED: u64 = 77;
 
-/// Standard deviation of the black level of a synthetic set [DN].
+/// Standard deviation of the black level of a synthetic set (DN).
 const BLACK_DN: f64 = 0.1;
 
 /// Effects that are not listed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum UnlistedEffect {
-    /// A bowed substrate: astigmatism along the axes [nm rms of path].
+    /// A bowed substrate: astigmatism along the axes (nm rms of path).
     Astigmatism(f64),
-    /// A second image: its brightness, relative to the first, and its offset [um].
+    /// A second image: its brightness, relative to the first, and its offset (um).
     Ghost(f64, [f64; 2]),
-    /// Pillars wider along x and narrower along y [nm].
+    /// Pillars wider along x and narrower along y (nm).
     Anisotropy(f64),
 }
 

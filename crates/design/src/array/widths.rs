@@ -29,7 +29,7 @@ impl WidthRule {
         }
     }
 
-    /// Width before rounding [nm] for a phase of `u` turns, `0 <= u < 1`.
+    /// Width before rounding (nm) for a phase of `u` turns, `0 <= u < 1`.
     pub fn unrounded_nm(&self, u: f64) -> f64 {
         match &self.table {
             Some(table) => f64::from(table.width_nm(u)),
@@ -37,7 +37,7 @@ impl WidthRule {
         }
     }
 
-    /// Width to write [nm] for a phase of `u` turns, `0 <= u < 1`.
+    /// Width to write (nm) for a phase of `u` turns, `0 <= u < 1`.
     pub fn width_nm(&self, u: f64) -> u16 {
         let width = (self.unrounded_nm(u) / self.step_nm).round() * self.step_nm;
         width.clamp(self.range_nm.0, self.range_nm.1) as u16

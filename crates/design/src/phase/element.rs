@@ -52,7 +52,7 @@ impl LensPhase {
         self.lattice
     }
 
-    /// Phase at a site [turns], not reduced; none outside the lens.
+    /// Phase at a site (turns), not reduced; none outside the lens.
     pub fn turns(&self, ix: usize, iy: usize) -> Option<f64> {
         let r2 = self.lattice.half_radius2(ix, iy);
         (r2 <= self.limit).then(|| self.turns[((r2 - self.offset) / self.stride) as usize])
@@ -82,7 +82,7 @@ impl<'a> ElementPhase<'a> {
         self.lens.lattice
     }
 
-    /// Phase at a site [turns], not reduced; none outside the lens.
+    /// Phase at a site (turns), not reduced; none outside the lens.
     pub fn turns(&self, ix: usize, iy: usize) -> Option<f64> {
         let radial = self.lens.turns(ix, iy)?;
         let (x, y) = (

@@ -26,10 +26,10 @@ pub enum RadialPhase {
     /// `sum a_i (r / R)^(2 i)`, `i` from one, in radians: what optical design programs call Binary 2.
     EvenPowers {
         coefficients_rad: Vec<f64>,
-        /// The radius R that r is divided by [um].
+        /// The radius R that r is divided by (um).
         normalisation_um: f64,
     },
-    /// Phase [rad] over radius [um], ascending.
+    /// Phase (rad) over radius (um), ascending.
     Table {
         #[serde(skip)]
         file: PathBuf,
@@ -94,7 +94,7 @@ impl RadialPhase {
         Ok(())
     }
 
-    /// Phase at a radius [turns], not reduced. `radius2_um2` is the square of the radius [um^2].
+    /// Phase at a radius (turns), not reduced. `radius2_um2` is the square of the radius (um^2).
     pub fn turns(&self, radius2_um2: f64) -> f64 {
         match self {
             Self::Hyperbola {

@@ -9,7 +9,7 @@ use metalith_core::{Error, Result, document, npy};
 /// Most rows of a table: a ring for each site of the largest lens that can be designed.
 const MOST_ROWS: usize = 1 << 20;
 
-/// Radii [um], strictly ascending from zero or more, and phases [rad].
+/// Radii (um), strictly ascending from zero or more, and phases (rad).
 ///
 /// # Errors
 /// If the file cannot be read, is neither CSV with the columns `r_um, phase_rad` nor an NPY array of

@@ -12,11 +12,11 @@ use metalith_core::document::{Limits, Section};
 pub struct ArraySpec {
     /// Number of elements along x and y, odd, so that one is in the centre.
     pub count: (u32, u32),
-    /// Distance of neighbouring elements [nm].
+    /// Distance of neighbouring elements (nm).
     pub spacing_nm: i64,
-    /// Steering of an element by each step from the centre [degrees].
+    /// Steering of an element by each step from the centre (degrees).
     pub steering_deg: f64,
-    /// Wavelength lambda_w at which a wedge steers by its angle [um].
+    /// Wavelength lambda_w at which a wedge steers by its angle (um).
     pub wedge_wavelength_um: f64,
 }
 
@@ -25,7 +25,7 @@ pub struct ArraySpec {
 pub struct Element {
     /// Steps from the centre element along x and y: (m, n) of the paper.
     pub index: (i32, i32),
-    /// Centre on the chip [nm].
+    /// Centre on the chip (nm).
     pub centre_nm: (i64, i64),
     /// The phase that steers it.
     pub wedge: Wedge,

@@ -7,13 +7,13 @@ use metalith_core::document::{Limits, Section};
 /// The unit cell: a square pillar on a square lattice.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CellSpec {
-    /// Distance of neighbouring pillars [nm], even.
+    /// Distance of neighbouring pillars (nm), even.
     pub pitch_nm: u32,
-    /// Height of the pillars [nm].
+    /// Height of the pillars (nm).
     pub pillar_height_nm: f64,
-    /// Narrowest and widest pillar that may be written [nm], both multiples of the step.
+    /// Narrowest and widest pillar that may be written (nm), both multiples of the step.
     pub width_range_nm: (u16, u16),
-    /// Widths are multiples of this [nm], even, so that edges of centred squares are whole nanometres.
+    /// Widths are multiples of this (nm), even, so that edges of centred squares are whole nanometres.
     pub width_step_nm: u16,
     /// Name of the pillar's material, or path of a CSV table of n and k.
     pub pillar_material: String,
@@ -23,7 +23,7 @@ pub struct CellSpec {
     pub ambient_index: f64,
 }
 
-/// Longest pitch [nm].
+/// Longest pitch (nm).
 const WIDEST_PITCH_NM: u32 = 2000;
 
 impl CellSpec {
@@ -91,7 +91,7 @@ impl CellSpec {
         cell
     }
 
-    /// All widths that may be written [nm], narrowest first.
+    /// All widths that may be written (nm), narrowest first.
     pub fn widths_nm(&self) -> impl Iterator<Item = u16> + use<> {
         (self.width_range_nm.0..=self.width_range_nm.1).step_by(usize::from(self.width_step_nm))
     }

@@ -56,9 +56,9 @@ pub struct Layers {
 /// Circular openings in the metal, one round each lens.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ApertureSpec {
-    /// Distance from the rim of the lens to the metal [nm].
+    /// Distance from the rim of the lens to the metal (nm).
     pub margin_nm: i64,
-    /// Largest distance between a circle and its polygon [nm].
+    /// Largest distance between a circle and its polygon (nm).
     pub chord_error_nm: f64,
     /// Most vertices of a polygon, the closing one counted.
     pub max_vertices: usize,
@@ -67,7 +67,7 @@ pub struct ApertureSpec {
 /// The piece of glass.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChipSpec {
-    /// Edges along x and y [nm]; the centre element is in its middle.
+    /// Edges along x and y (nm); the centre element is in its middle.
     pub size_nm: (i64, i64),
 }
 
@@ -76,11 +76,11 @@ pub struct ChipSpec {
 pub struct MarkSpec {
     /// What the set is for, such as "global".
     pub name: String,
-    /// Length of an arm from tip to tip [nm].
+    /// Length of an arm from tip to tip (nm).
     pub length_nm: i64,
-    /// Width of an arm [nm].
+    /// Width of an arm (nm).
     pub width_nm: i64,
-    /// Centres on the chip [nm].
+    /// Centres on the chip (nm).
     pub centres_nm: Vec<(i64, i64)>,
 }
 
@@ -231,7 +231,7 @@ impl ApertureSpec {
         ((std::f64::consts::PI / half_angle / 8.0).ceil() as usize).max(2) * 8
     }
 
-    /// Chord error that the most vertices allowed reach [nm].
+    /// Chord error that the most vertices allowed reach (nm).
     fn error_nm(&self, radius_nm: f64) -> f64 {
         let corners = ((self.max_vertices - 1) / 8 * 8).max(8) as f64;
         radius_nm * (1.0 / (std::f64::consts::PI / corners).cos() - 1.0)

@@ -10,9 +10,9 @@ use metalith_core::document::{Limits, Section};
 /// The lens that all elements of the array share.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LensSpec {
-    /// Pillars stand where their centre is within this diameter [nm].
+    /// Pillars stand where their centre is within this diameter (nm).
     pub diameter_nm: u32,
-    /// Distance from the pillar tops to the sensor [um].
+    /// Distance from the pillar tops to the sensor (um).
     pub focal_length_um: f64,
     /// Phase over the radius, before wedge and modulo.
     pub phase: RadialPhase,
@@ -47,7 +47,7 @@ impl LensSpec {
         }
     }
 
-    /// Half the diameter [um].
+    /// Half the diameter (um).
     pub fn radius_um(&self) -> f64 {
         f64::from(self.diameter_nm) * 0.5e-3
     }

@@ -13,7 +13,7 @@ use metalith_core::document::{Limits, Section};
 /// How phase becomes width.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MappingSpec {
-    /// Wavelength lambda_0 that the mapping is made for [um].
+    /// Wavelength lambda_0 that the mapping is made for (um).
     pub wavelength_um: f64,
     /// Duty cycle over phase.
     pub polynomial: InversePolynomial,

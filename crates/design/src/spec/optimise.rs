@@ -13,10 +13,10 @@ pub struct OptimiseSpec {
     /// The cell that phases are optimised with.
     pub fidelity: Fidelity,
     pub solver: SolverSpec,
-    /// First and last wavelength [um], and their distance.
+    /// First and last wavelength (um), and their distance.
     pub band_um: (f64, f64),
     pub step_um: f64,
-    /// Largest wrapped phase step from ring to ring [turns]; 0.5 is no limit.
+    /// Largest wrapped phase step from ring to ring (turns); 0.5 is no limit.
     pub step_limit_turns: f64,
     pub start: StartSpec,
     /// Decides all that is random.
@@ -24,7 +24,7 @@ pub struct OptimiseSpec {
     pub merit: MeritSpec,
     pub robust: Option<RobustSpec>,
     pub views: ViewSpec,
-    /// Bound of all kernels together [MB].
+    /// Bound of all kernels together (MB).
     pub memory_mb: u64,
 }
 
@@ -69,7 +69,7 @@ pub struct MeritSpec {
     pub log: f64,
     pub deconvolution: f64,
     pub side_lobes: f64,
-    /// Energy beyond this is side lobe [um].
+    /// Energy beyond this is side lobe (um).
     pub side_lobe_radius_um: f64,
 }
 
@@ -88,7 +88,7 @@ pub struct RobustSpec {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ViewSpec {
     pub angles_deg: Vec<f64>,
-    /// Distance of wavelengths [um].
+    /// Distance of wavelengths (um).
     pub step_um: f64,
     /// Pixels along a side of the window, even.
     pub pixels: usize,

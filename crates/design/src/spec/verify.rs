@@ -8,7 +8,7 @@ use metalith_core::document::{Limits, Section};
 /// What is simulated from the layout that was read back, and the limits it is held to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct VerifySpec {
-    /// Wavelengths of the PSFs [um].
+    /// Wavelengths of the PSFs (um).
     pub wavelengths_um: Vec<f64>,
     /// Field angles, counted from where an element looks.
     pub field_angles: Vec<FieldAngle>,
@@ -16,7 +16,7 @@ pub struct VerifySpec {
     pub incidence: CellIncidence,
     /// Edge of the square window about the chief ray, in samples of one pitch.
     pub window_samples: usize,
-    /// Edge of a sensor pixel [um].
+    /// Edge of a sensor pixel (um).
     pub pixel_um: f64,
     pub limits: LimitSpec,
 }
@@ -46,11 +46,11 @@ pub struct LimitSpec {
     pub wrong_widths_max: u64,
     /// Shapes on the pillar layer that are not a pillar on the lattice.
     pub foreign_shapes_max: u64,
-    /// Root mean square phase error of rounding widths to the step [rad].
+    /// Root mean square phase error of rounding widths to the step (rad).
     pub rounding_phase_rms_max_rad: f64,
     /// Strehl of the layout over that of the unrounded design phase.
     pub strehl_ratio_min: f64,
-    /// Distance of the centroids [um].
+    /// Distance of the centroids (um).
     pub centroid_shift_max_um: f64,
     /// Largest difference of the MTF at 42.7 and 85.3 line pairs a millimetre.
     pub mtf_difference_max: f64,

@@ -21,9 +21,9 @@ pub struct ElementDiff {
     pub removed: u64,
     pub widened: u64,
     pub narrowed: u64,
-    /// Largest change of width where both have a pillar [nm].
+    /// Largest change of width where both have a pillar (nm).
     pub largest_change_nm: u16,
-    /// Root of the mean squared change over all sites where both have a pillar [nm].
+    /// Root of the mean squared change over all sites where both have a pillar (nm).
     pub rms_change_nm: f64,
 }
 
@@ -61,9 +61,9 @@ pub struct Change {
     /// `added`, `removed`, `widened`, `narrowed` for pillars; `only in a`, `only in b` for other outlines.
     pub what: &'static str,
     pub layer: LayerNumber,
-    /// Left, bottom, right, top [nm].
+    /// Left, bottom, right, top (nm).
     pub bounds_nm: [f64; 4],
-    /// Widths of a pillar [nm], zero where there is none.
+    /// Widths of a pillar (nm), zero where there is none.
     pub width_nm: Option<[u16; 2]>,
 }
 
@@ -93,7 +93,7 @@ pub struct TreeDiff {
 /// Where changes are: counts in a grid of square tiles.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChangeMap {
-    /// Left, bottom, right, top of all geometry [nm].
+    /// Left, bottom, right, top of all geometry (nm).
     pub bounds_nm: [f64; 4],
     pub columns: usize,
     pub rows: usize,

@@ -20,7 +20,7 @@ pub(super) fn unite(known: &mut Vec<ElementSite>, more: Vec<ElementSite>) {
     }
 }
 
-/// Outermost sites along an axis [nm].
+/// Outermost sites along an axis (nm).
 fn ends(site: &ElementSite, axis: usize) -> (i64, i64) {
     let last = site.lattice.sites() - 1;
     let at = |k| site.centre_nm[axis] + site.lattice.coordinate_nm(k);

@@ -13,7 +13,7 @@ const MARKS: i16 = 4;
 
 /// What of a file can be drawn otherwise.
 struct Draw {
-    /// Half the edge of the opening over the lens [nm], and how far it is off along x.
+    /// Half the edge of the opening over the lens (nm), and how far it is off along x.
     half: i32,
     off: i32,
     /// Arms of the marks; the last one is left out if false.
@@ -65,7 +65,7 @@ fn square(gds: &mut Gds, x: i32, y: i32, half: i32) {
     gds.rect(OPEN, x - half, y - half, x + half, y + half);
 }
 
-/// A polygon on the layer of the marks, far from everything [um].
+/// A polygon on the layer of the marks, far from everything (um).
 fn mark(gds: &mut Gds, points: &[(i32, i32)]) {
     let nm: Vec<_> = points.iter().map(|&(x, y)| (2_000_000 + 1000 * x, 1000 * y)).collect();
     gds.polygon(MARKS, &nm);

@@ -9,12 +9,12 @@ use metalith_testing::gds::Gds;
 
 use crate::check;
 
-/// CPU time that any file may take, and each megabyte of it [s]; builds that are not optimised are 30 times slower.
+/// CPU time that any file may take, and each megabyte of it (s); builds that are not optimised are 30 times slower.
 const ANY_FILE_S: f64 = 5.0;
 const A_MEGABYTE_S: f64 = 5.0;
 const NOT_OPTIMISED: f64 = 30.0;
 
-/// CPU time of this thread [s]; none where the system does not tell.
+/// CPU time of this thread (s); none where the system does not tell.
 fn cpu_s() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     Some(text.split_whitespace().next()?.parse::<f64>().ok()? * 1e-9)

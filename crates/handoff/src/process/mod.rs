@@ -51,19 +51,19 @@ pub struct Writer {
     pub acceleration_kv: f64,
     /// Name of the lens mode.
     pub mode: String,
-    /// Largest edge of a write field [um].
+    /// Largest edge of a write field (um).
     pub field_um: f64,
-    /// Edge of a write field as used [um], so that its border runs between pillars.
+    /// Edge of a write field as used (um), so that its border runs between pillars.
     pub field_used_um: f64,
-    /// Grid that figures are placed on [nm].
+    /// Grid that figures are placed on (nm).
     pub grid_nm: f64,
-    /// Fastest shot rate [MHz].
+    /// Fastest shot rate (MHz).
     pub clock_max_mhz: f64,
-    /// Beam currents to choose from [nA].
+    /// Beam currents to choose from (nA).
     pub currents_na: Vec<f64>,
-    /// Error between neighbouring fields, in use [nm].
+    /// Error between neighbouring fields, in use (nm).
     pub stitching_nm: f64,
-    /// Time lost at each figure [us], at each field [s], and once [s].
+    /// Time lost at each figure (us), at each field (s), and once (s).
     pub shape_overhead_us: f64,
     pub field_overhead_s: f64,
     pub job_overhead_s: f64,
@@ -84,7 +84,7 @@ pub struct Resist {
     pub tone: Tone,
     pub thickness_nm: f64,
     pub developer: String,
-    /// Charge an area [uC/cm2], and the range that labs report.
+    /// Charge an area (uC/cm2), and the range that labs report.
     pub dose_uc_cm2: f64,
     pub dose_range_uc_cm2: [f64; 2],
 }
@@ -110,7 +110,7 @@ pub struct Transfer {
     pub films: Vec<String>,
 }
 
-/// Backscatter of electrons: range [um] and ratio to the direct dose, with limits on what is not known.
+/// Backscatter of electrons: range (um) and ratio to the direct dose, with limits on what is not known.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Proximity {
     pub range_um: f64,
@@ -166,7 +166,7 @@ pub struct TestSpec {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MetrologySpec {
     pub sites_per_width: i64,
-    /// One standard deviation of the width that this process holds [nm].
+    /// One standard deviation of the width that this process holds (nm).
     pub width_tolerance_nm: f64,
 }
 

@@ -10,13 +10,13 @@ use super::process::Process;
 use metalith_core::Result;
 use metalith_design::Design;
 
-/// Room between structures [nm].
+/// Room between structures (nm).
 const APART: i64 = 40_000;
-/// Height of the numbers beside structures [nm].
+/// Height of the numbers beside structures (nm).
 const NUMERAL: i64 = 15_000;
-/// Room between a pad and its number [nm].
+/// Room between a pad and its number (nm).
 const BESIDE: i64 = 8_000;
-/// How far from the middle of the reference lens its phase is level [nm]: a window of density and its neighbours.
+/// How far from the middle of the reference lens its phase is level (nm): a window of density and its neighbours.
 const LEVEL_REACH: i64 = 50_000;
 
 /// A structure and what to do with it.
@@ -25,10 +25,10 @@ pub(super) struct Structure {
     pub id: String,
     /// What it is and what is measured on it.
     pub purpose: String,
-    /// On the chip of the test structures, whose lower left corner is the origin [nm].
+    /// On the chip of the test structures, whose lower left corner is the origin (nm).
     #[serde(rename = "bounds_nm")]
     pub bounds: RectNm,
-    /// Width drawn, where one is to be measured [nm].
+    /// Width drawn, where one is to be measured (nm).
     pub width_nm: Option<i64>,
     /// Checks that it breaks because it is what it is, each with the reason.
     pub on_purpose: &'static [(&'static str, &'static str)],
@@ -37,9 +37,9 @@ pub(super) struct Structure {
 /// Everything of the two files of test structures.
 pub(super) struct Structures {
     pub list: Vec<Structure>,
-    /// The frame, from the origin; fields begin at its lower left corner [nm].
+    /// The frame, from the origin; fields begin at its lower left corner (nm).
     pub frame: RectNm,
-    /// Where borders of fields are crossed on purpose [nm].
+    /// Where borders of fields are crossed on purpose (nm).
     pub field_border: (i64, i64),
     pillars: Vec<PillarCell>,
     top: Sheet,

@@ -128,7 +128,7 @@ impl Structures {
     }
 }
 
-/// Widths of the uniform pads [nm], from the narrowest to the widest that the design may write.
+/// Widths of the uniform pads (nm), from the narrowest to the widest that the design may write.
 fn pad_widths(design: &Design, process: &Process) -> Vec<i64> {
     let (low, high) = design.cell.width_range_nm;
     let step = process

@@ -11,15 +11,15 @@ use crate::{DESIGN, PILLARS, Squares, rows, shared};
 
 /// Layer of the crosses of the first step.
 const MARKS: LayerNumber = LayerNumber { layer: 3, datatype: 0 };
-/// Names of job decks and schedules without their endings, with their currents [nA].
+/// Names of job decks and schedules without their endings, with their currents (nA).
 const JOBS: [(&str, f64); 3] = [("mini_3x3_0p5nA", 0.5), ("mini_3x3_2nA", 2.0), ("mini_3x3_8nA", 8.0)];
 
-/// Places in jobs have three decimals: half a nanometre [um].
+/// Places in jobs have three decimals: half a nanometre (um).
 const HALF_NM_UM: f64 = 5e-4;
 
 type Place = (f64, f64);
 
-/// What a job deck says. Places are on the substrate or from the middle of a chip [um].
+/// What a job deck says. Places are on the substrate or from the middle of a chip (um).
 #[derive(Debug, Default)]
 struct Deck {
     name: String,
@@ -34,7 +34,7 @@ struct Deck {
     layer: u32,
     patterns: BTreeMap<usize, String>,
     current_na: f64,
-    /// Change of dose of each rank [%].
+    /// Change of dose of each rank (%).
     shots: BTreeMap<String, BTreeMap<u32, f64>>,
 }
 
@@ -207,7 +207,7 @@ fn schedules_lead_to_their_decks() {
     }
 }
 
-/// Boxes of the crosses [um]: middle and length.
+/// Boxes of the crosses (um): middle and length.
 #[derive(Default)]
 struct Crosses(Vec<(Place, f64)>);
 

@@ -22,11 +22,11 @@ const DESIGN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/mini_3x
 const PILLARS: LayerNumber = LayerNumber { layer: 1, datatype: 0 };
 /// Relative: sums of a few million areas in double precision, whose rounding is 1e-10 at most.
 const SUMMED: f64 = 1e-9;
-/// Times in tables have one decimal [s].
+/// Times in tables have one decimal (s).
 const TABLE_S: f64 = 0.06;
-/// Half the widest pillar of the design [um].
+/// Half the widest pillar of the design (um).
 const WIDEST_HALF_UM: f64 = 0.15;
-/// Both halves of a vernier keep 100 nm from the border; their bars differ by less than this in length [um].
+/// Both halves of a vernier keep 100 nm from the border; their bars differ by less than this in length (um).
 const VERNIER_UM: f64 = 1.0;
 const PROCESS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../processes/jbx6300_zep520a.toml");
 
@@ -224,7 +224,7 @@ fn unpack(archive: &[u8]) -> Vec<(String, Vec<u8>)> {
 
 #[derive(Default)]
 struct Squares {
-    /// Centre in half nanometres, width [nm].
+    /// Centre in half nanometres, width (nm).
     found: BTreeMap<(i64, i64), i64>,
 }
 

@@ -44,7 +44,7 @@ pub struct Pupil {
 }
 
 impl Pupil {
-    /// The kernel of a lens lit at an angle [rad] in the x-z plane, over a window whose middle is
+    /// The kernel of a lens lit at an angle (rad) in the x-z plane, over a window whose middle is
     /// `offset_um` along x from where the chief ray lands.
     ///
     /// Intensities are such that their sum over the transform's samples is the share of the incident

@@ -69,7 +69,7 @@ impl Blur {
         })
     }
 
-    /// How far a kernel reaches from its middle [pixels].
+    /// How far a kernel reaches from its middle (pixels).
     pub(crate) fn reach(&self) -> usize {
         let (rows, columns) = self.kernels[0].dim();
         rows.max(columns) / 2

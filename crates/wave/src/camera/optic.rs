@@ -5,16 +5,16 @@ use crate::kernels::{jinc, sinc};
 /// What intensity passes on its way to the pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Optic {
-    /// Edge of a pixel [um].
+    /// Edge of a pixel (um).
     pub pixel_um: f64,
-    /// The images of the source disc's two radii, as the columns of a matrix [um].
+    /// The images of the source disc's two radii, as the columns of a matrix (um).
     pub disc_um: [[f64; 2]; 2],
-    /// Standard deviation of a Gaussian blur [um].
+    /// Standard deviation of a Gaussian blur (um).
     pub blur_um: f64,
 }
 
 impl Optic {
-    /// Factor of the intensity's spectrum at a frequency [cycles / um].
+    /// Factor of the intensity's spectrum at a frequency (cycles / um).
     pub(super) fn transfer(&self, fx: f64, fy: f64) -> f64 {
         let [u, v] = self.disc_um;
         let disc = jinc(std::f64::consts::TAU * (fx * u[0] + fy * u[1]).hypot(fx * v[0] + fy * v[1]));

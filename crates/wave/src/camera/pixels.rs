@@ -17,9 +17,9 @@ pub struct PixelGrid {
     /// Bins that hold light, shape `[my, 2 mx + 1]`: ky from zero, kx from -mx to mx.
     re: Array2<f32>,
     im: Array2<f32>,
-    /// Width of a bin [1/um].
+    /// Width of a bin (1/um).
     cycle: f64,
-    /// From the first sample to the middle of the window [um].
+    /// From the first sample to the middle of the window (um).
     middle_um: f64,
     shape: [usize; 2],
     pixel_um: f64,
@@ -114,7 +114,7 @@ impl PixelGrid {
         }
     }
 
-    /// The same seen from a window that is off by so much (x, y) [um].
+    /// The same seen from a window that is off by so much (x, y) (um).
     pub fn moved(mut self, [x, y]: [f64; 2]) -> Self {
         if x == 0.0 && y == 0.0 {
             return self;
@@ -128,7 +128,7 @@ impl PixelGrid {
         self
     }
 
-    /// Its derivative by the shift along x (0) or y (1) [1/um].
+    /// Its derivative by the shift along x (0) or y (1) (1/um).
     pub fn slope(&self, axis: usize) -> Self {
         let middle = (self.re.ncols() / 2) as f32;
         let omega = (std::f64::consts::TAU * self.cycle) as f32;
@@ -140,7 +140,7 @@ impl PixelGrid {
         Self { re, im, ..*self }
     }
 
-    /// What a blur changes, for a unit of its covariance between two axes [1/um^2].
+    /// What a blur changes, for a unit of its covariance between two axes (1/um^2).
     pub fn blur(&self, [a, b]: [usize; 2]) -> Self {
         let half = if a == b { 0.5 } else { 1.0 };
         Self::combine(&[(&self.slope(a).slope(b), half)])

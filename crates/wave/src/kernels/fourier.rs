@@ -47,7 +47,7 @@ impl Fourier {
         self.size
     }
 
-    /// Frequency of element `i` of an axis of a spectrum [cycles a pixel].
+    /// Frequency of element `i` of an axis of a spectrum (cycles a pixel).
     pub fn frequency(&self, axis: usize, i: usize) -> f64 {
         let n = self.size[axis];
         let signed = if 2 * i < n { i as f64 } else { i as f64 - n as f64 };

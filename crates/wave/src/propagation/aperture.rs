@@ -13,7 +13,7 @@ pub trait Aperture: Sync {
     /// Where the samples are.
     fn lattice(&self) -> Lattice;
 
-    /// Radius of a circle about the element's centre outside of which nothing passes [um]. Half the
+    /// Radius of a circle about the element's centre outside of which nothing passes (um). Half the
     /// diagonal of the lattice unless better is known; a tight one makes every propagation cheaper.
     fn radius_um(&self) -> f64 {
         let lattice = self.lattice();
@@ -103,7 +103,7 @@ pub struct PillarFunction<F> {
 }
 
 impl<F: Fn(f64, f64) -> u16 + Sync> PillarFunction<F> {
-    /// `width_nm` at x, y [um] from the element's centre, asked for within the circle; `table` as in
+    /// `width_nm` at x, y (um) from the element's centre, asked for within the circle; `table` as in
     /// [`Pillars::new`]. A width beyond the table passes nothing.
     pub fn new(lattice: Lattice, radius_um: f64, table: &[Complex64], width_nm: F) -> Self {
         Self {

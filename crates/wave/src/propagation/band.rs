@@ -22,11 +22,11 @@ pub enum Accuracy {
 /// How a field was folded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fade {
-    /// Period of the transform on both axes [um].
+    /// Period of the transform on both axes (um).
     pub period_um: f64,
-    /// Frequencies whose ray from the element's centre lands this near to the window's middle count in full [um].
+    /// Frequencies whose ray from the element's centre lands this near to the window's middle count in full (um).
     pub full_um: f64,
-    /// Frequencies whose ray lands this far from the window's middle, or farther, do not count [um].
+    /// Frequencies whose ray lands this far from the window's middle, or farther, do not count (um).
     pub zero_um: f64,
     /// Frequencies inside the fade that are not in the transform's own period, -1/2 to 1/2 a pitch, and had
     /// to be relabelled by a multiple of 1 / pitch towards the rays that reach the window.
@@ -169,7 +169,7 @@ impl Band {
 }
 
 /// Size of the diffraction of a sharp edge along the steepest ray that is needed, which lands `reach_um` from the
-/// window's middle [um].
+/// window's middle (um).
 fn edge_um(window: &Window, wavelength_um: f64, reach_um: f64) -> f64 {
     let [x, y] = window.centre_um;
     let z = window.distance_um;

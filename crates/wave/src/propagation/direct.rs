@@ -33,7 +33,7 @@ impl Direct {
         })
     }
 
-    /// The field at places x, y, z [um] from the element's centre in the plane of the pillar tops.
+    /// The field at places x, y, z (um) from the element's centre in the plane of the pillar tops.
     pub fn at(aperture: &dyn Aperture, wave: &PlaneWave, points_um: &[[f64; 3]]) -> Vec<Complex64> {
         let lattice = aperture.lattice();
         let n = lattice.sites();
@@ -70,7 +70,7 @@ fn row_sum(row: &[Complex32], lattice: &Lattice, iy: usize, wave: &PlaneWave, po
     sum
 }
 
-/// The field of a unit source along `path` [um], with a phase of `turns` to begin with [1/um^2].
+/// The field of a unit source along `path` (um), with a phase of `turns` to begin with (1/um^2).
 pub(super) fn kernel(path: [f64; 3], wavelength_um: f64, turns: f64) -> Complex64 {
     let [x, y, z] = path;
     let r2 = x * x + y * y + z * z;

@@ -95,7 +95,7 @@ impl Hankel {
         Self::new(wavelength_um, distance_um, radii, areas)
     }
 
-    /// Radius of each ring [um].
+    /// Radius of each ring (um).
     pub fn radii_um(&self) -> &[f64] {
         &self.radii_um
     }

@@ -26,15 +26,15 @@ const MOST_CELLS: usize = 1 << 24;
 /// A map of squares on the sensor's plane, with the axis of the element in the middle of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LandingGrid {
-    /// Edge of a square \[um\].
+    /// Edge of a square (um).
     pub cell_um: f64,
     /// Squares an axis.
     pub cells: usize,
-    /// Distance of the plane from the pillar tops \[um\].
+    /// Distance of the plane from the pillar tops (um).
     pub distance_um: f64,
 }
 
-/// The power of one element on the sensor's plane \[um^2, in units of |E_inc|^2\].
+/// The power of one element on the sensor's plane (um^2, in units of |E_inc|^2).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Landing {
     pub grid: LandingGrid,
@@ -111,7 +111,7 @@ impl Landing {
         Ok(landing)
     }
 
-    /// All power that travels towards the plane \[um^2\].
+    /// All power that travels towards the plane (um^2).
     pub fn travelling_um2(&self) -> f64 {
         self.power_um2.sum() + self.beyond_um2
     }
@@ -154,7 +154,7 @@ impl LandingGrid {
 
 /// How far the light of each frequency of a tile lands from the tile, in the order of a transposed transform.
 struct Rays {
-    /// Along x and y \[um\]; none for light that does not travel.
+    /// Along x and y (um); none for light that does not travel.
     shift_um: Vec<Option<[f64; 2]>>,
 }
 

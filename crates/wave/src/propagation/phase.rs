@@ -15,11 +15,11 @@ use crate::kernels::cis_all;
 pub struct PhaseFunction<F> {
     /// Where the samples are.
     pub lattice: Lattice,
-    /// Radius of the circle [um]; sites on it belong to it.
+    /// Radius of the circle (um); sites on it belong to it.
     pub radius_um: f64,
     /// |t| inside the circle.
     pub amplitude: f64,
-    /// Phase [rad] at x, y [um] from the element's centre; reduced modulo 2 pi here.
+    /// Phase (rad) at x, y (um) from the element's centre; reduced modulo 2 pi here.
     pub phase_rad: F,
 }
 

@@ -54,7 +54,7 @@ pub trait Propagator {
     /// If the aperture's lattice or the wave's wavelength is not the one this propagator was made for.
     fn field(&self, aperture: &dyn Aperture, wave: &PlaneWave, scratch: &mut Scratch) -> Result<Field>;
 
-    /// The field, and the transfer of all the light that `aperture` passes at `lp_mm` [line pairs a millimetre], where
+    /// The field, and the transfer of all the light that `aperture` passes at `lp_mm` (line pairs a millimetre), where
     /// this propagator sees light outside of its window.
     ///
     /// # Errors

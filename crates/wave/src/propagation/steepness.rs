@@ -5,7 +5,7 @@ use serde::Serialize;
 /// Where a phase is too steep for its lattice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Steepness {
-    /// Largest step of the phase from a site to the next along x or y [rad].
+    /// Largest step of the phase from a site to the next along x or y (rad).
     pub largest_step_rad: f64,
     /// Sites with a step of more than pi to a neighbour at larger x or y: there the lattice cannot tell the phase from
     /// one that falls.
@@ -17,7 +17,7 @@ pub struct Steepness {
 }
 
 impl Steepness {
-    /// Of a phase [turns], not reduced, at sites `(ix, iy)` of a square lattice of `sites` an axis; none where there is
+    /// Of a phase (turns), not reduced, at sites `(ix, iy)` of a square lattice of `sites` an axis; none where there is
     /// no pillar.
     pub fn of(sites: usize, turns: impl Fn(usize, usize) -> Option<f64>) -> Self {
         let mut found = Self::default();

@@ -11,12 +11,12 @@ use crate::kernels::cis;
 /// The transfer function on a grid of frequencies, one wavelength and window.
 pub(super) struct Transfer<'a> {
     pub wavelength_um: f64,
-    /// Middle of the window from the element's centre [um].
+    /// Middle of the window from the element's centre (um).
     pub centre_um: [f64; 2],
-    /// From the first site of the lattice to where the inverse transform has its origin [um].
+    /// From the first site of the lattice to where the inverse transform has its origin (um).
     pub shift_um: [f64; 2],
     pub fade: &'a Fade,
-    /// Pitch of the lattice [um].
+    /// Pitch of the lattice (um).
     pub pitch_um: f64,
 }
 
@@ -31,13 +31,13 @@ pub(super) struct Column {
 /// Where the rays of a column go. Working memory.
 #[derive(Default)]
 pub(crate) struct FadedColumn {
-    /// Cycles along z [1/um].
+    /// Cycles along z (1/um).
     axial: Vec<f64>,
     /// How much each counts, with the weights of both transforms.
     weight: Vec<f32>,
 }
 
-/// Below the square of this many cycles along z [1/um^2] light does not propagate; its ray lands at infinity.
+/// Below the square of this many cycles along z (1/um^2) light does not propagate; its ray lands at infinity.
 const GRAZING: f64 = 1e-12;
 
 impl Transfer<'_> {

@@ -7,7 +7,7 @@ use crate::error::{Result, WaveError};
 /// A plane wave of unit amplitude in the plane of the pillar tops: exp(i k (x sin_x + y sin_y)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlaneWave {
-    /// Vacuum wavelength [um].
+    /// Vacuum wavelength (um).
     pub wavelength_um: f64,
     /// Sine of the angle of incidence in the x-z plane, as seen in air.
     pub sin_x: f64,
@@ -25,7 +25,7 @@ impl PlaneWave {
         }
     }
 
-    /// Phase at a place of the aperture [turns].
+    /// Phase at a place of the aperture (turns).
     pub fn turns(&self, x_um: f64, y_um: f64) -> f64 {
         (x_um * self.sin_x + y_um * self.sin_y) / self.wavelength_um
     }
@@ -59,7 +59,7 @@ pub fn leaving(wedge: &Wedge, wave: &PlaneWave) -> [f64; 2] {
     [wave.sin_x - x, wave.sin_y - y]
 }
 
-/// Where the chief ray lands on a plane behind the element, from the element's centre [um].
+/// Where the chief ray lands on a plane behind the element, from the element's centre (um).
 ///
 /// # Errors
 /// If it does not: its direction sines reach one.
@@ -76,7 +76,7 @@ pub fn landing_um(wedge: &Wedge, wave: &PlaneWave, distance_um: f64) -> Result<[
 mod tests {
     use super::*;
 
-    /// Rounding of sines, and of places millimetres away [um].
+    /// Rounding of sines, and of places millimetres away (um).
     const ROUNDING: f64 = 1e-15;
     const ROUNDING_UM: f64 = 1e-9;
 

@@ -11,13 +11,13 @@ const MOST_SAMPLES: usize = 1 << 13;
 /// index along +x, as in a camera's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
-    /// Middle of the window from the element's centre, x and y [um].
+    /// Middle of the window from the element's centre, x and y (um).
     pub centre_um: [f64; 2],
-    /// Distance of neighbouring samples [um].
+    /// Distance of neighbouring samples (um).
     pub step_um: f64,
     /// Samples an axis.
     pub samples: usize,
-    /// Distance of the plane from the pillar tops [um].
+    /// Distance of the plane from the pillar tops (um).
     pub distance_um: f64,
 }
 
@@ -33,12 +33,12 @@ impl Window {
         }
     }
 
-    /// Place of sample `i` of an axis (0 for x, 1 for y) from the element's centre [um].
+    /// Place of sample `i` of an axis (0 for x, 1 for y) from the element's centre (um).
     pub fn coordinate_um(&self, axis: usize, i: usize) -> f64 {
         self.centre_um[axis] + (i as f64 - 0.5 * (self.samples as f64 - 1.0)) * self.step_um
     }
 
-    /// From the middle to the outermost sample of an axis [um].
+    /// From the middle to the outermost sample of an axis (um).
     pub fn half_width_um(&self) -> f64 {
         0.5 * (self.samples as f64 - 1.0) * self.step_um
     }

@@ -22,7 +22,7 @@ pub(super) struct Zoom {
 }
 
 impl Zoom {
-    /// `cycles` is c above, the phase of neighbouring inputs at neighbouring outputs [turns].
+    /// `cycles` is c above, the phase of neighbouring inputs at neighbouring outputs (turns).
     pub fn new(planner: &mut FftPlanner<f32>, inputs: usize, first: i64, outputs: usize, cycles: f64) -> Self {
         let size = fft_size(inputs + outputs - 1);
         let middle = 0.5 * (outputs as f64 - 1.0);

@@ -7,12 +7,12 @@ use crate::error::{Result, WaveError};
 use crate::kernels::sinc;
 
 impl Psf {
-    /// Energy in the window [um^2], in units of |E_inc|^2.
+    /// Energy in the window (um^2), in units of |E_inc|^2.
     pub fn energy_um2(&self) -> f64 {
         self.values.sum() * self.window.step_um.powi(2)
     }
 
-    /// Energy in a square with edges along x and y [um^2].
+    /// Energy in a square with edges along x and y (um^2).
     pub fn energy_in_square_um2(&self, centre_um: [f64; 2], edge_um: f64) -> f64 {
         let weights = [0, 1].map(|axis| self.interval(axis, centre_um[axis], edge_um));
         let rows = self.values.rows().into_iter().zip(&weights[1]);
@@ -20,7 +20,7 @@ impl Psf {
             .sum()
     }
 
-    /// Energy in a circle [um^2]. Each sample stands for its square, of which parts of a sixteenth an edge are
+    /// Energy in a circle (um^2). Each sample stands for its square, of which parts of a sixteenth an edge are
     /// counted: good to a percent of a sample's width in radius.
     pub fn energy_in_circle_um2(&self, centre_um: [f64; 2], radius_um: f64) -> f64 {
         const PARTS: usize = 16;
@@ -43,7 +43,7 @@ impl Psf {
         sum * step * step
     }
 
-    /// What a camera with square, gapless pixels sees of a point: the energy in each of `pixels` x `pixels` [um^2],
+    /// What a camera with square, gapless pixels sees of a point: the energy in each of `pixels` x `pixels` (um^2),
     /// with the middle of the array at `centre_um`.
     ///
     /// # Errors
@@ -74,7 +74,7 @@ impl Psf {
         Ok(wy.dot(&self.values).dot(&wx.t()))
     }
 
-    /// Weights of the samples of an axis in the integral over an interval [um]: each term of the finite Fourier
+    /// Weights of the samples of an axis in the integral over an interval (um): each term of the finite Fourier
     /// series through the samples is integrated exactly.
     fn interval(&self, axis: usize, middle_um: f64, length_um: f64) -> Vec<f64> {
         let n = self.window.samples;

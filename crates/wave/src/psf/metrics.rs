@@ -9,9 +9,9 @@ use super::{HALF_NYQUIST_LP_MM, Matched, NYQUIST_LP_MM, Psf, pixel_mtf};
 pub struct PsfMetrics {
     /// Largest sample over the peak of the same aperture with all its power and the perfect phase.
     pub strehl: f64,
-    /// Place of the largest sample from the element's centre, x and y [um].
+    /// Place of the largest sample from the element's centre, x and y (um).
     pub peak_um: [f64; 2],
-    /// Centre of gravity of the window from the element's centre, x and y [um].
+    /// Centre of gravity of the window from the element's centre, x and y (um).
     pub centroid_um: [f64; 2],
     /// Energy in a square of one pixel about the peak, over what the perfect aperture passes.
     pub energy_1_pixel: f64,

@@ -53,7 +53,7 @@ impl Psf {
         }
     }
 
-    /// Of an element in a unit wave, with the transfer of all its light at `lp_mm` [line pairs a millimetre] where the
+    /// Of an element in a unit wave, with the transfer of all its light at `lp_mm` (line pairs a millimetre) where the
     /// propagator knows it.
     ///
     /// # Errors
@@ -91,7 +91,7 @@ impl Psf {
         sum
     }
 
-    /// The largest sample and its place from the element's centre [um]; of equals the first in reading order.
+    /// The largest sample and its place from the element's centre (um); of equals the first in reading order.
     pub fn peak(&self) -> (f64, [f64; 2]) {
         let mut best = (f64::NEG_INFINITY, [0, 0]);
         for ((iy, ix), &v) in self.values.indexed_iter() {
@@ -106,7 +106,7 @@ impl Psf {
         )
     }
 
-    /// Centre of gravity from the element's centre, x and y [um], of the samples on both sides of sample
+    /// Centre of gravity from the element's centre, x and y (um), of the samples on both sides of sample
     /// `samples / 2`. An even number of them has a row and a column more below it than above, which would draw the
     /// centre of a symmetric PSF there.
     pub fn centroid_um(&self) -> [f64; 2] {

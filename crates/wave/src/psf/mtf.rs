@@ -5,9 +5,9 @@ use num_complex::Complex64;
 use super::Psf;
 use crate::kernels::sinc;
 
-/// The finest frequency that pixels of 5.86 um can tell [line pairs a millimetre].
+/// The finest frequency that pixels of 5.86 um can tell (line pairs a millimetre).
 pub const NYQUIST_LP_MM: f64 = 85.3;
-/// Half of it [line pairs a millimetre].
+/// Half of it (line pairs a millimetre).
 pub const HALF_NYQUIST_LP_MM: f64 = 42.7;
 
 /// What is asked for where contrast is reported: both of them.
@@ -30,7 +30,7 @@ pub const CURVE_LP_MM: [f64; 13] = [
 ];
 
 impl Psf {
-    /// Contrast along one axis (0 is x) at a frequency [line pairs a millimetre], without the pixel: of all the light
+    /// Contrast along one axis (0 is x) at a frequency (line pairs a millimetre), without the pixel: of all the light
     /// that the element passes where the PSF knows it ([`Psf::otf`] at that very frequency), else of the window's.
     pub fn contrast(&self, axis: usize, lp_mm: f64) -> f64 {
         let whole = self.otf.as_ref().and_then(|otf| {
@@ -40,7 +40,7 @@ impl Psf {
         whole.unwrap_or_else(|| self.mtf_curve(axis, &[lp_mm])[0])
     }
 
-    /// Optical transfer function of the window's light at a frequency along x and y [line pairs a millimetre], one at zero frequency; the
+    /// Optical transfer function of the window's light at a frequency along x and y (line pairs a millimetre), one at zero frequency; the
     /// phase counts from the window's middle. What lies outside the window is left out.
     pub fn window_otf(&self, lp_mm: [f64; 2]) -> Complex64 {
         let [x, y] = [0, 1].map(|axis| self.phasors(lp_mm[axis]));
@@ -51,12 +51,12 @@ impl Psf {
         sum / self.values.sum()
     }
 
-    /// Contrast at a frequency along x and y [line pairs a millimetre], without the pixel: see [`pixel_mtf`].
+    /// Contrast at a frequency along x and y (line pairs a millimetre), without the pixel: see [`pixel_mtf`].
     pub fn mtf(&self, lp_mm: [f64; 2]) -> f64 {
         self.window_otf(lp_mm).norm()
     }
 
-    /// Contrast along one axis (0 is x) at many frequencies [line pairs a millimetre].
+    /// Contrast along one axis (0 is x) at many frequencies (line pairs a millimetre).
     pub fn mtf_curve(&self, axis: usize, lp_mm: &[f64]) -> Vec<f64> {
         let line = self.line_spread(axis);
         let total: f64 = line.iter().sum();
@@ -75,7 +75,7 @@ impl Psf {
     }
 }
 
-/// Contrast that is left by a square pixel at a frequency along its edge [line pairs a millimetre].
+/// Contrast that is left by a square pixel at a frequency along its edge (line pairs a millimetre).
 pub fn pixel_mtf(pixel_um: f64, lp_mm: f64) -> f64 {
     sinc(pixel_um * lp_mm * 1e-3).abs()
 }

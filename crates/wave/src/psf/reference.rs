@@ -10,7 +10,7 @@ use crate::Aperture;
 pub struct Matched {
     /// |E|^2 / |E_inc|^2 where all sites arrive in phase.
     pub peak: f64,
-    /// |E|^2 / |E_inc|^2 behind the aperture, summed over its area [um^2].
+    /// |E|^2 / |E_inc|^2 behind the aperture, summed over its area (um^2).
     pub power_um2: f64,
 }
 

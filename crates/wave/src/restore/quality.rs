@@ -4,10 +4,10 @@ use ndarray::{Array2, ArrayView, ArrayView2, ArrayView3, Axis, Dimension};
 
 use crate::error::{Result, WaveError};
 
-/// Half of the window of structural similarity, without its middle [pixels].
+/// Half of the window of structural similarity, without its middle (pixels).
 const REACH: usize = 5;
 
-/// Peak signal to noise ratio [dB], for images between zero and one, grey or in colour; infinite where they are equal.
+/// Peak signal to noise ratio (dB), for images between zero and one, grey or in colour; infinite where they are equal.
 ///
 /// # Errors
 /// If the shapes differ.

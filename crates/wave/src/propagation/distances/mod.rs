@@ -18,7 +18,7 @@ use super::Fade;
 use super::transfer::FadedColumn;
 use crate::kernels::fft_size;
 
-/// Beyond what geometry needs, a period holds this for the fade [um]: with it, intensities agree with the
+/// Beyond what geometry needs, a period holds this for the fade (um): with it, intensities agree with the
 /// direct sum to 2e-4 of the peak; see the tests.
 const FADE_ROOM_UM: f64 = 70.0;
 
@@ -30,13 +30,13 @@ const LATEST_FADE: f64 = 0.9;
 pub struct Distances {
     /// Where the samples of the element are.
     pub lattice: Lattice,
-    /// Radius outside of which the element is opaque [um].
+    /// Radius outside of which the element is opaque (um).
     pub radius_um: f64,
-    /// Middle of the window from the element's axis [um].
+    /// Middle of the window from the element's axis (um).
     pub centre_um: [f64; 2],
-    /// Half of the window's edge that must be right [um].
+    /// Half of the window's edge that must be right (um).
     pub half_width_um: f64,
-    /// Largest step of the samples [um]; the step taken divides the period.
+    /// Largest step of the samples (um); the step taken divides the period.
     pub step_um: f64,
 }
 
@@ -108,12 +108,12 @@ impl DistancesPlan {
         self.window
     }
 
-    /// Distance of the samples [um].
+    /// Distance of the samples (um).
     pub fn step_um(&self) -> f64 {
         self.period_um / self.samples as f64
     }
 
-    /// |field|^2 behind some elements at each of `distances_um`, for a wavelength [um]: the transfer function is
+    /// |field|^2 behind some elements at each of `distances_um`, for a wavelength (um): the transfer function is
     /// worked out once for all of them. Output, `[element][distance]`: one square of `window` x `window`.
     pub fn intensities(
         &self,
@@ -159,12 +159,12 @@ impl DistancesPlan {
         kept
     }
 
-    /// From the window's middle to the outermost rays that it needs [um].
+    /// From the window's middle to the outermost rays that it needs (um).
     fn reach_um(&self) -> f64 {
         self.wanted.radius_um + self.wanted.half_width_um
     }
 
-    /// From the window's middle to the nearest rays that would come back into it as aliases [um].
+    /// From the window's middle to the nearest rays that would come back into it as aliases (um).
     fn fade_end_um(&self) -> f64 {
         self.period_um - self.reach_um()
     }

@@ -16,7 +16,7 @@ use crate::propagation::{Aperture, Field, PlaneWave, Scratch};
 /// Transfer of all the light that an element passes, at some frequencies.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Otf {
-    /// Frequencies [line pairs a millimetre].
+    /// Frequencies (line pairs a millimetre).
     pub lp_mm: Vec<f64>,
     /// Transform of the intensity along x and along y [um^2, in units of |E_inc|^2]; the phase counts from the
     /// window's middle.
@@ -42,7 +42,7 @@ impl Otf {
         mean
     }
 
-    /// Multiply the transform at each frequency [line pairs a millimetre] by what a camera leaves of it.
+    /// Multiply the transform at each frequency (line pairs a millimetre) by what a camera leaves of it.
     pub fn scale(&mut self, factor: impl Fn(f64) -> f64) {
         for values in &mut self.transform_um2 {
             for (value, f) in values.iter_mut().zip(&self.lp_mm) {
@@ -58,7 +58,7 @@ impl Otf {
 }
 
 impl Fold {
-    /// The field in the window, and the transfer function of all light at `lp_mm` [line pairs a millimetre].
+    /// The field in the window, and the transfer function of all light at `lp_mm` (line pairs a millimetre).
     ///
     /// Between two bins of the transform the transfer function is interpolated: right for light that lands within a
     /// tenth of the period of the window's middle, less for what is farther and has no contrast there.
@@ -102,7 +102,7 @@ impl Fold {
     }
 }
 
-/// Power that an aperture passes of a wave of unit amplitude [um^2].
+/// Power that an aperture passes of a wave of unit amplitude (um^2).
 pub fn power_um2(aperture: &dyn Aperture) -> f64 {
     let lattice: Lattice = aperture.lattice();
     let mut row = vec![Complex32::ZERO; lattice.sites()];
