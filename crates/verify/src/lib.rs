@@ -1,6 +1,7 @@
 //! From the bytes of a layout to a verdict: what was written is read back, compared with what was meant,
 //! and simulated.
 
+mod assumptions;
 mod case;
 mod check;
 mod optics;

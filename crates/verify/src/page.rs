@@ -5,7 +5,7 @@ use std::path::Path;
 
 use ndarray::Array2;
 
-use super::{DistinctElement, PsfResult, Sense, Verification};
+use super::{DistinctElement, PsfResult, Sense, Verification, assumptions};
 use metalith_core::Result;
 use metalith_design::array::PillarArray;
 use metalith_design::phase::{ElementPhase, LensPhase};
@@ -46,9 +46,12 @@ fn page(design: &Design, array: &PillarArray, found: &Verification) -> Page {
         ("Pillars", count(found.layout.pillars)),
         ("Elements", found.elements.len().to_string()),
         ("of them distinct", found.distinct.len().to_string()),
+        ("Strehl ratio, least to greatest", strehl(found)),
+        ("MTF at 42.7 lp/mm", contrast(found)),
         ("File", format!("{} MB", sig(found.layout.bytes as f64 * 1e-6, 3))),
     ]);
     limits(&mut page, found);
+    assumptions::write(&mut page, design, found);
     designed(&mut page, design, array);
     written(&mut page, design, found);
     // From the middle outwards: the plainest element first.
@@ -59,6 +62,22 @@ fn page(design: &Design, array: &PillarArray, found: &Verification) -> Page {
     }
     method(&mut page, design, found);
     page
+}
+
+/// Range of the Strehl ratios of the case that judges.
+fn strehl(found: &Verification) -> String {
+    range(found, |psf| psf.metrics.strehl)
+}
+
+/// Range of its contrast at half the frequency of the sensor, pixel included.
+fn contrast(found: &Verification) -> String {
+    range(found, |psf| psf.mtf()[0])
+}
+
+fn range(found: &Verification, of: impl Fn(&PsfResult) -> f64) -> String {
+    let all = found.distinct.iter().flat_map(|d| &d.spots).map(|s| of(s.judged()));
+    let (least, most) = all.fold((f64::MAX, 0.0), |(a, b), v| (f64::min(a, v), f64::max(b, v)));
+    format!("{} to {}", sig(least, 2), sig(most, 2))
 }
 
 fn limits(page: &mut Page, found: &Verification) {
@@ -81,7 +100,9 @@ fn limits(page: &mut Page, found: &Verification) {
             Cell::from(Verdict::of(check.passed())),
         ]);
     }
-    page.table(table.caption("Limits come from `[verify.limits]` of the design file."));
+    page.table(table.caption(
+        "From `[verify.limits]` of the design file; limits that it does not set have their default, or none.",
+    ));
 }
 
 fn designed(page: &mut Page, design: &Design, array: &PillarArray) {
@@ -97,19 +118,19 @@ fn designed(page: &mut Page, design: &Design, array: &PillarArray) {
         exact(design.array.wedge_wavelength_um * 1e3),
         design.cell.pitch_nm,
     ));
-    let zoomed = &array.classes[0].widths;
+    let centre = array
+        .placed
+        .iter()
+        .find(|p| p.element.index == (0, 0))
+        .expect("the count of elements is odd");
+    let zoomed = array.widths(centre);
     page.row([
         chip(design).caption("The chip from above: openings, pillars, marks and outline as they are written."),
-        PillarZoom::new("Pillars in the middle of the centre element", zoomed, (0.0, 0.0), 12.0)
+        PillarZoom::new("Pillars in the middle of the centre element", &zoomed, (0.0, 0.0), 12.0)
             .caption("Pillars as they are written, to scale."),
     ]);
     let lens = LensPhase::new(array.lattice, design.lens.diameter_nm, &design.lens.phase);
-    let centre = design
-        .elements()
-        .into_iter()
-        .find(|e| e.index == (0, 0))
-        .expect("the count of elements is odd");
-    let phase = ElementPhase::new(&lens, &centre.wedge);
+    let phase = ElementPhase::new(&lens, &centre.element.wedge);
     let n = array.lattice.sites();
     let along = |value: &dyn Fn(usize) -> Option<f64>| {
         let radius = |ix| array.lattice.coordinate_um(ix);
@@ -402,7 +423,7 @@ fn method(page: &mut Page, design: &Design, found: &Verification) {
         .max()
         .unwrap_or(0);
     page.paragraph(format!(
-        "Design `{}`, digest `{}`. Everything about the layout is computed from the file that was read back. Fields: the lattice of point samples, each of weight pitch², folded ({} mode), frequencies weighed by where their rays land; at most {} frequency bins had to be relabelled towards the mean ray. PSF: |E|² over that of the incident wave. Strehl: against the same aperture passing all its power in the zero order with the perfect phase. Field angles count from where an element looks at each wavelength.",
+        "Design `{}`, digest `{}`. Everything about the layout is computed from the file that was read back. Fields: the lattice of point samples, each of weight pitch², folded ({} mode), frequencies weighed by where their rays land; at most {} frequency bins had to be relabelled towards the mean ray. PSF: |E|² over that of the incident wave. Strehl: against the same aperture passing all its power in the zero order with the perfect phase for the place where the chief ray lands. MTF: the transform of the PSF over all light that the element passes, of which what lands outside of the window is a veil. Field angles count from where an element looks at each wavelength.",
         found.design, found.design_digest, found.accuracy, count(relabelled),
     ));
     page.paragraph(format!(

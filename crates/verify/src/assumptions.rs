@@ -1,0 +1,142 @@
+//! What a simulation assumes, and how much each assumption weighs for the design at hand.
+
+use metalith_cell::Fidelity;
+use metalith_design::{CellIncidence, Design, Element};
+use metalith_report::{Cell, Column, Page, Table, fixed, sig};
+
+use super::{PsfResult, Verification};
+
+/// Share by which a cell in an infinite lattice of equal pillars overstates the first order of a blazed row at 455,
+/// 530 and 660 nm, by the turns of phase a pitch: rows of 18, 6, 3 and 2.5 pillars a turn of the shipped mapping,
+/// solved as supercells (`golden/truth`), mean over offsets and polarisations, light as a steered element sees it.
+const BLAZED_ROWS: [(f64, [f64; 3]); 5] = [
+    (0.0, [0.0, 0.0, 0.0]),
+    (1.0 / 18.0, [0.011, 0.023, 0.041]),
+    (1.0 / 6.0, [0.070, 0.044, 0.063]),
+    (1.0 / 3.0, [0.493, 0.326, 0.328]),
+    (0.4, [0.929, 0.540, 0.488]),
+];
+
+/// The table of assumptions.
+pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
+    page.section("What is assumed");
+    let mut table = Table::new([
+        Column::text("Assumption"),
+        Column::text("Size for this design"),
+        Column::text("How it is known"),
+    ]);
+    let mut row = |what: &str, size: String, how: &str| {
+        table.row([Cell::from(what), Cell::from(size), Cell::from(how)]);
+    };
+    if found.fidelity != Fidelity::Published && found.fidelity != Fidelity::Fitted {
+        row(
+            "Each pillar passes light as in an infinite lattice of equal pillars",
+            neighbours(design),
+            "rows of unlike pillars solved rigorously, for the mapping of the shipped designs; where the phase jumps from pillar to pillar it is more",
+        );
+    } else {
+        row(
+            "Pillars change the phase alone, by a polynomial",
+            "amplitude and resonances are left out".into(),
+            "`--fidelity rigorous` shows them",
+        );
+    }
+    if design.verify.incidence == CellIncidence::Normal {
+        row(
+            "Cells are lit along the normal",
+            "not computed in this run".into(),
+            "`--as-lit` solves them at the angle at which light arrives, both polarisations",
+        );
+    }
+    let (least, most) = outside(found);
+    row(
+        "PSFs and energies are of a window about the chief ray; MTF counts all light that passes",
+        format!(
+            "{} to {} % of the light is outside of the window",
+            fixed(least * 100.0, 0),
+            fixed(most * 100.0, 0)
+        ),
+        "power of all pillars against the energy of the window",
+    );
+    row(
+        "Each wavelength comes from the direction that suits it",
+        dispersion(design),
+        "f sin(psi) / lambda_w: light of a band from one direction is spread by so much",
+    );
+    row(
+        "A scalar field from point samples, one a pillar",
+        match found.accuracy {
+            "fast" => "1e-3 of the amplitude of a perfect lens".into(),
+            _ => "1e-5 of the amplitude of a perfect lens".into(),
+        },
+        "direct sums in double precision; polarisation of the field behind the lens is left out",
+    );
+    page.table(table);
+}
+
+/// By how much the first order is overstated, for the wedges of the middle and of the outermost element.
+fn neighbours(design: &Design) -> String {
+    let turns = |e: &Element| e.wedge.sin_x.hypot(e.wedge.sin_y) / e.wedge.wavelength_um * design.lattice().pitch_um();
+    let steepest = design.elements().iter().map(turns).fold(0.0, f64::max);
+    // The lens adds its own slope, at its rim as much as sin(atan(R / f)) / wavelength.
+    let rim = (design.lens.radius_um() / design.lens.focal_length_um).atan().sin();
+    let rim = rim / design.mapping.wavelength_um * design.lattice().pitch_um();
+    let worst = |turns: f64| {
+        let all = overstated(turns);
+        all.iter().copied().fold(0.0, f64::max)
+    };
+    format!(
+        "first order too high by up to {} % where the wedge of the outermost element is alone, {} % at its steepest rim",
+        fixed(worst(steepest) * 100.0, 0),
+        if steepest + rim > BLAZED_ROWS[4].0 {
+            format!("over {}", fixed(worst(0.4) * 100.0, 0))
+        } else {
+            fixed(worst(steepest + rim) * 100.0, 0)
+        },
+    )
+}
+
+/// Straight lines through [`BLAZED_ROWS`].
+fn overstated(turns: f64) -> [f64; 3] {
+    let above = BLAZED_ROWS
+        .partition_point(|(t, _)| *t < turns)
+        .clamp(1, BLAZED_ROWS.len() - 1);
+    let ((a, low), (b, high)) = (BLAZED_ROWS[above - 1], BLAZED_ROWS[above]);
+    let share = ((turns - a) / (b - a)).clamp(0.0, 1.0);
+    std::array::from_fn(|i| low[i] + share * (high[i] - low[i]))
+}
+
+/// Least and greatest share of the light that passes and is not in the window.
+fn outside(found: &Verification) -> (f64, f64) {
+    let share = |psf: &PsfResult| 1.0 - psf.metrics.energy_window / psf.metrics.energy_passed;
+    let all = found.distinct.iter().flat_map(|d| &d.spots).map(|s| share(s.judged()));
+    all.fold((1.0, 0.0), |(least, most), s| (f64::min(least, s), f64::max(most, s)))
+}
+
+fn dispersion(design: &Design) -> String {
+    let of =
+        |e: &Element| design.lens.focal_length_um * e.wedge.sin_x.hypot(e.wedge.sin_y) / (e.wedge.wavelength_um * 1e3);
+    let most = design.elements().iter().map(of).fold(0.0, f64::max);
+    if most == 0.0 {
+        return "none: no element has a wedge".into();
+    }
+    format!(
+        "{} um per nm of wavelength for the outermost element, {} sensor pixels over 25 nm",
+        sig(most, 3),
+        sig(most * 25.0 / design.verify.pixel_um, 2)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn between_solved_rows_the_size_of_the_assumption_is_interpolated() {
+        const ROUNDING: f64 = 1e-12;
+        assert_eq!(overstated(0.0), [0.0; 3]);
+        assert_eq!(overstated(1.0 / 6.0), BLAZED_ROWS[2].1);
+        assert!((overstated(0.25)[1] - 0.5 * (0.044 + 0.326)).abs() < ROUNDING);
+        assert_eq!(overstated(2.0), BLAZED_ROWS[4].1);
+    }
+}
