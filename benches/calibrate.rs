@@ -16,8 +16,8 @@ fn calibration(c: &mut Criterion) {
             ..Sampling::default()
         },
         only: ["cd_bias", "gap", "zero_order"].map(String::from).to_vec(),
-        ladder: false,
-        exact: false,
+        compare_fidelities: false,
+        refine: false,
         ..Settings::default()
     };
     let synthesizer = Synthesizer::new(&like, &settings).expect("a synthesizer");

@@ -26,11 +26,11 @@ pub struct Settings {
     /// Try these effects alone; all if empty.
     pub only: Vec<String>,
     /// Compare the three fidelities of the cell first.
-    pub ladder: bool,
+    pub compare_fidelities: bool,
     /// Simulate smooth terms, which null tests are made of as well.
-    pub free: bool,
+    pub smooth_terms: bool,
     /// Refine what is found with full simulations, where the surrogate adds up polynomials.
-    pub exact: bool,
+    pub refine: bool,
 }
 
 impl Default for Settings {
@@ -39,9 +39,9 @@ impl Default for Settings {
             sampling: Sampling::default(),
             cache: None,
             only: Vec::new(),
-            ladder: true,
-            free: true,
-            exact: true,
+            compare_fidelities: true,
+            smooth_terms: true,
+            refine: true,
         }
     }
 }
@@ -110,7 +110,7 @@ impl<'a> Session<'a> {
     pub fn simulate(&self, progress: &dyn Progress) -> Result<Simulations> {
         let nothing = vec![0.0; self.simulator.slots.len()];
         let led = self.data.led_of_captures();
-        let smooth = self.settings.free.then_some((&led, self.data.leds));
+        let smooth = self.settings.smooth_terms.then_some((&led, self.data.leds));
         let surrogate = Surrogate::simulate(&self.simulator, &nothing, smooth, progress)?;
         let random = self.simulator.effects.iter().position(|e| e.random());
         let defects = match random {
@@ -152,7 +152,7 @@ impl<'a> Session<'a> {
     ) -> Result<Evidence> {
         let problem = self.screened(simulations, screening);
         let defects = simulations.defects.as_ref().map(|(effect, noise)| (*effect, noise));
-        attribute_set(&problem, self.settings.exact, defects, progress)
+        attribute_set(&problem, self.settings.refine, defects, progress)
     }
 
     /// The answer for the set, and the evidence for it where there was enough to search in.
@@ -169,7 +169,7 @@ impl<'a> Session<'a> {
             let error = screening.fit.chi2 / self.screened(simulations, &screening).pixels().max(1.0);
             return Ok((Diagnosis::data_unfit(self.set(), error, &screening.unusable), None));
         }
-        let ladder = if self.settings.ladder {
+        let ladder = if self.settings.compare_fidelities {
             let problem = self.screened(simulations, &screening);
             compare_fidelities(self.set(), self.settings.sampling, &problem, progress)?
         } else {

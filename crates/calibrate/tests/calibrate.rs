@@ -86,8 +86,8 @@ fn with_effects(names: &[&str]) -> Settings {
         },
         cache: Some(FOLDERS[1].clone()),
         only: names.iter().map(|n| (*n).into()).collect(),
-        ladder: false,
-        exact: true,
+        compare_fidelities: false,
+        refine: true,
         ..Settings::default()
     }
 }

@@ -48,7 +48,7 @@ const JUDGED_SEED: u64 = 1000;
 /// One synthetic set and its diagnosis.
 #[derive(Clone, Debug, Serialize)]
 pub struct ValidationTrial {
-    /// What differed; [`NOTHING`] for a set without effect.
+    /// What differed; `nothing` for a set without effect.
     pub truth: String,
     /// Whether it is no known effect.
     pub off_list: bool,
@@ -130,7 +130,7 @@ pub fn validate(
     progress: &dyn Progress,
 ) -> Result<Validation> {
     let settings = Settings {
-        ladder: false,
+        compare_fidelities: false,
         ..settings.clone()
     };
     let session = Session::new(like, settings.clone())?;
