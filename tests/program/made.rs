@@ -66,7 +66,7 @@ impl Files {
         let found = metalith::verify::read_back(&design, &array, &layout, &Silent).unwrap();
         for element in &mut set.elements {
             let index = (element.index[0] as i32, element.index[1] as i32);
-            let at = array.placed.iter().position(|p| p.element.index == index.into());
+            let at = array.placed.iter().position(|p| p.element.index == index);
             element.pillars = found.elements[at.unwrap()].widths.clone();
             element.aperture_diameter_um = 2.0 * design.aperture_radius_um();
         }

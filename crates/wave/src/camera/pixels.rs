@@ -81,11 +81,7 @@ impl PixelGrid {
                 (mx, my) = (mx.max(kx.abs()), my.max(ky + 1));
             }
         }
-        let kept = part(
-            bins.view(),
-            0..my as usize,
-            (reach - mx) as usize..(reach + mx + 1) as usize,
-        );
+        let kept = part(bins.view(), 0..my, (reach - mx) as usize..(reach + mx + 1) as usize);
         Self {
             re: kept.mapv(|v| v.re),
             im: kept.mapv(|v| v.im),
