@@ -100,7 +100,7 @@ pub fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
         .clone()
         .unwrap_or_else(|| PathBuf::from("out").join(&design.name).join("optimise"));
     let phase = args.phase.clone().unwrap_or_else(|| folder.join("phase.csv"));
-    let kept = folder.join("checkpoint.json");
+    let kept = folder.join("checkpoint.bin");
     let task = Task::of(&design)?;
     let cells = Cells::of(&design, !args.no_report, terminal)?;
     let checkpoint = if args.fresh {

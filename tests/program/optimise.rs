@@ -5,7 +5,7 @@ use std::path::Path;
 
 use assert_cmd::Command;
 use metalith::cell::PublishedCell;
-use metalith::optimise::Task;
+use metalith::optimise::{Checkpoint, Task};
 use metalith::{Design, Silent};
 
 const EXCHANGE: &str = "[optimise]\ncell = \"published\"\nstep_nm = 5\nchains = 3\nhot_sweeps = 12\nseed = 4\n";
@@ -40,7 +40,7 @@ fn the_phase_of_the_command_becomes_a_layout_that_keeps_the_limit() {
             .join("\n")
     });
     assert_eq!(one, two);
-    assert!(!folder.path().join("checkpoint.json").exists());
+    assert!(!folder.path().join("checkpoint.bin").exists());
 
     let text = fs::read_to_string(&path).unwrap();
     let table = format!(
@@ -63,7 +63,8 @@ fn the_phase_of_the_command_becomes_a_layout_that_keeps_the_limit() {
 #[test]
 fn the_program_is_interrupted_and_goes_on() {
     use std::process::{Command, Stdio};
-    use std::time::Duration;
+    /// Of CPU time, a hundredth of a second each: many sweeps of the small lens.
+    const WORKED_TICKS: u64 = 60;
     // Long enough to be stopped twice.
     const LONG: &str = "[optimise]\ncell = \"published\"\nstep_nm = 2\nchains = 1\nhot_sweeps = 100000\nseed = 4\n";
     let folder = tempfile::tempdir().unwrap();
@@ -79,23 +80,26 @@ fn the_program_is_interrupted_and_goes_on() {
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        // Until it is known to catch the signal, which is number 2.
-        let status = format!("/proc/{}/status", child.id());
+        // Until it catches the signal, which is number 2, and has worked for a while: nothing that can be waited for.
+        let proc = Path::new("/proc").join(child.id().to_string());
         let catches = || {
-            let text = fs::read_to_string(&status).unwrap();
+            let text = fs::read_to_string(proc.join("status")).unwrap();
             let mask = text.lines().find_map(|l| l.strip_prefix("SigCgt:")).unwrap();
             u64::from_str_radix(mask.trim(), 16).unwrap() & 2 != 0
         };
-        while !catches() {
-            std::thread::sleep(Duration::from_millis(20));
+        let worked_ticks = || -> u64 {
+            let text = fs::read_to_string(proc.join("stat")).unwrap();
+            let fields = text[text.rfind(')').unwrap()..].split(' ').skip(12);
+            fields.take(2).map(|ticks| ticks.parse::<u64>().unwrap()).sum()
+        };
+        while !catches() || worked_ticks() < WORKED_TICKS {
+            std::thread::yield_now();
         }
-        std::thread::sleep(Duration::from_millis(700));
         let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
         assert!(sent.unwrap().success());
         let ended = child.wait_with_output().unwrap();
         assert_eq!(ended.status.code(), Some(3));
-        let kept = fs::read_to_string(out.join("checkpoint.json")).unwrap();
-        let kept: serde_json::Value = serde_json::from_str(&kept).unwrap();
+        let kept = Checkpoint::load(&out.join("checkpoint.bin"), &Design::read(&path).unwrap()).unwrap();
         let rings = fs::read_to_string(out.join("phase.csv")).unwrap();
         let rows = rings
             .lines()
@@ -103,7 +107,7 @@ fn the_program_is_interrupted_and_goes_on() {
             .count();
         assert!(rows > 80, "{rows}");
         let said = String::from_utf8(ended.stderr).unwrap();
-        (kept["chains"][0]["sweep"].as_u64().unwrap(), said)
+        (kept.chains[0].sweep, said)
     };
     let (first, said) = interrupt();
     assert!(first > 0 && said.contains("interrupted"), "{said}");

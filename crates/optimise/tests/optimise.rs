@@ -108,7 +108,7 @@ fn an_interrupted_run_goes_on_to_the_same_end() {
         assert!(largest_step(&whole.turns) <= 0.2 + 1e-9);
 
         // Over and over, in every stage.
-        let kept = folder.path().join("checkpoint.json");
+        let kept = folder.path().join("checkpoint.bin");
         let (mut checkpoint, mut interruptions) = (begin(), 0);
         let rest = loop {
             let part = task.solve(&cells, checkpoint, &StopAfter::new(14)).unwrap();

@@ -19,7 +19,7 @@
 //! that carry their units (`strehl`, `width_rms_nm`).
 //!
 //! ```
-//! use metalith::report::{Axis, Cell, Chart, Column, Page, Table, Verdict};
+//! use metalith_report::{Axis, Cell, Chart, Column, Page, Table, Verdict};
 //!
 //! let mut page = Page::new("A lens", "60 um across, F/2.4");
 //! page.verdict(Verdict::Pass, "All 2 limits hold.");
