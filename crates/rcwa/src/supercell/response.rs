@@ -30,6 +30,8 @@ pub struct SupercellOrder {
     /// stack ends. Scaled
     /// so that the incident wave carries unit power and |Ex|^2 + |Ey|^2 is the power of an order along the normal.
     pub transmitted: [[Complex64; 2]; 2],
+    /// Transverse unit vectors of the incident s and p.
+    pub incident: [[f64; 2]; 2],
     /// Transmitted over incident power, for s and p incident.
     pub power: [f64; 2],
     /// Reflected over incident power, for s and p incident.
@@ -37,10 +39,17 @@ pub struct SupercellOrder {
 }
 
 impl SupercellOrder {
-    /// Amplitude of the order in the component of the incident polarisation (0 for s, 1 for p), whose
-    /// square is the power of the order. For a wave in the x-z plane s is Ey and p is Ex.
+    /// Field along the transverse unit vector of the incident polarisation (0 for s, 1 for p). For a wave in the x-z
+    /// plane it is Ey for s and Ex for p.
+    pub fn along_incident(&self, polarisation: usize) -> Complex64 {
+        let ([x, y], unit) = (self.transmitted[polarisation], self.incident[polarisation]);
+        x * unit[0] + y * unit[1]
+    }
+
+    /// Amplitude whose squared modulus is the power of the order, and whose phase is that of
+    /// [`SupercellOrder::along_incident`]; 0 for s, 1 for p.
     pub fn amplitude(&self, polarisation: usize) -> Complex64 {
-        let own = self.transmitted[polarisation][1 - polarisation];
+        let own = self.along_incident(polarisation);
         let norm = own.norm();
         if norm > 0.0 {
             own * (self.power[polarisation].sqrt() / norm)
@@ -84,6 +93,7 @@ impl SupercellResponse {
                 wave,
                 sines,
                 transmitted: [[Complex64::ZERO; 2]; 2],
+                incident: polarisations,
                 power: [0.0; 2],
                 reflected: [0.0; 2],
             };
