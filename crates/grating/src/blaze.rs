@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
-use metalith_core::Result;
+use metalith_core::{Error, Result};
 use metalith_rcwa::{SiteLattice, SupercellResponse};
 
 use crate::CoarseCell;
@@ -70,8 +70,14 @@ impl Blaze {
     /// in air along x and y.
     ///
     /// # Errors
-    /// If it has no sites or more than [`SiteLattice::MOST`], or as [`CoarseCell::solve`].
+    /// If it has no sites or more than [`SiteLattice::MOST`], if its offset is not finite, or as [`CoarseCell::solve`].
     pub fn solve(&self, cell: &CoarseCell<'_>, width_nm: impl Fn(f64) -> f64, sines: [f64; 2]) -> Result<BlazeOrders> {
+        if !self.offset_turns.is_finite() {
+            return Err(Error::invalid(
+                format!("a grating with a phase of {} turns at the origin", self.offset_turns),
+                "give a finite phase",
+            ));
+        }
         let lattice = SiteLattice::of_grating(self.turns, self.sites)?;
         let response = cell.solve(lattice, &self.widths_nm(&lattice, width_nm), sines)?;
         // The lattice has fewer sites than the grating says where turns and sites have a common divisor.

@@ -45,6 +45,13 @@ fn a_fraction_that_reduces_is_the_same_grating() {
     }
     assert!(whole.order(1).share[0] > 0.1);
     assert_eq!(whole.order(i32::MAX).share, [0.0; 2]);
+    for impossible in [
+        blaze([1, 0], 0, 0.0),
+        blaze([1, 0], 65, 0.0),
+        blaze([1, 0], 3, f64::NAN),
+    ] {
+        assert!(impossible.solve(&cell, linear, [0.0, 0.0]).is_err(), "{impossible:?}");
+    }
 }
 
 #[test]
