@@ -25,7 +25,8 @@
 //!
 //! Beside the line stand [`optimise`], which finds the radial phase; [`drc`], [`mod@diff`] and [`handoff`], which
 //! start from layouts too; [`calibrate`], which learns from captures what the model lacks; and [`compensate`],
-//! which draws what comes out as meant on the line that was so measured. The names at the root are those that
+//! which draws what comes out as meant on the line that was so measured. [`grating`] predicts the diffraction orders
+//! of blazed rows of pillars as supercells; no command judges by it yet. The names at the root are those that
 //! the line itself needs; each room has its own.
 //!
 //! # Conventions
@@ -84,6 +85,7 @@ pub use metalith_drc as drc;
 pub use metalith_drc::diff;
 pub use metalith_gds as gds;
 pub use metalith_gds::extract;
+pub use metalith_grating as grating;
 pub use metalith_handoff as handoff;
 pub use metalith_layout as layout;
 pub use metalith_made as made;

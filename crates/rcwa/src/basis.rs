@@ -108,7 +108,23 @@ impl Row {
     }
 }
 
-/// The transverse field of a lattice in one symmetry: rows of Ex, then of Ey.
+/// The components of the transverse field that are solved for: rows of Ex, then of Ey.
+#[derive(Clone)]
+pub(super) struct Rows {
+    pub list: Vec<Row>,
+    /// Number of rows of Ex.
+    pub of_x: usize,
+    /// Number of rows of Ez.
+    pub of_z: usize,
+}
+
+impl Rows {
+    pub fn len(&self) -> usize {
+        self.list.len()
+    }
+}
+
+/// The transverse field of a lattice in one symmetry.
 ///
 /// Ex is in the space `x` times `y`, Ey in their derived spaces, Ez in `x` derived times `y`.
 #[derive(Clone)]
@@ -116,11 +132,7 @@ pub(super) struct Basis {
     pub highest: usize,
     pub x: Space,
     pub y: Space,
-    pub rows: Vec<Row>,
-    /// Number of rows of Ex.
-    pub rows_x: usize,
-    /// Number of rows of Ez.
-    pub rows_z: usize,
+    pub rows: Rows,
 }
 
 impl Basis {
@@ -152,14 +164,12 @@ impl Basis {
             highest,
             x,
             y,
-            rows,
-            rows_x,
-            rows_z: rows_of(spaces[2]),
+            rows: Rows {
+                list: rows,
+                of_x: rows_x,
+                of_z: rows_of(spaces[2]),
+            },
         }
-    }
-
-    pub fn len(&self) -> usize {
-        self.rows.len()
     }
 
     /// Spaces of a component along x and y.
@@ -175,7 +185,7 @@ impl Basis {
         let (sx, sy) = self.spaces(component);
         let (i, a) = sx.plane_wave(m, self.highest)?;
         let (j, b) = sy.plane_wave(n, self.highest)?;
-        Some((component * self.rows_x + i * sy.len(self.highest) + j, a * b))
+        Some((component * self.rows.of_x + i * sy.len(self.highest) + j, a * b))
     }
 
     /// The plane-wave amplitudes of order (m, n) of the field in column `column` of `field`.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use num_complex::Complex64;
 
-use super::Orders;
+use super::{Orders, SiteLattice};
 
 /// Result of solving a cell.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -25,6 +25,29 @@ pub enum Error {
     #[error("{along_axis} x {along_axis} orders without symmetry are {unknowns} unknowns")]
     TooLarge {
         along_axis: usize,
+        unknowns: usize,
+        most: usize,
+    },
+    #[error("a supercell of {sites} sites")]
+    Sites { sites: usize },
+    #[error("{cells} cells on a lattice of {sites} sites")]
+    CellCount { cells: usize, sites: usize },
+    /// Cells are counted from one.
+    #[error("cell {cell} of a supercell differs from the first in pitch, in heights or in materials")]
+    UnlikeCells { cell: usize },
+    /// Layers are counted from one, the lowest.
+    #[error("layer {layer} of a supercell has {outlines} outlines on {sites} sites")]
+    OutlineCount {
+        layer: usize,
+        outlines: usize,
+        sites: usize,
+    },
+    #[error("diffraction orders up to {highest} for each cell of a supercell")]
+    SupercellOrders { highest: usize },
+    #[error("{sites} sites with orders up to {highest} for each are {unknowns} unknowns")]
+    SupercellTooLarge {
+        sites: usize,
+        highest: usize,
         unknowns: usize,
         most: usize,
     },
@@ -117,6 +140,18 @@ impl Error {
                 Orders::MOST
             ),
             Self::TooLarge { most, .. } => format!("use fewer orders: at most {most} unknowns are solved for"),
+            Self::Sites { .. } => format!("use 1 to {} sites", SiteLattice::MOST),
+            Self::CellCount { .. } => "give one cell for each site".into(),
+            Self::UnlikeCells { .. } => {
+                "let the cells of a supercell differ only in the outlines of their pillars".into()
+            }
+            Self::OutlineCount { .. } => {
+                "give each layer one outline for each site, an empty one where nothing stands".into()
+            }
+            Self::SupercellOrders { .. } => format!("use at most {}", Orders::MOST / 2),
+            Self::SupercellTooLarge { most, .. } => {
+                format!("use fewer orders or fewer sites: at most {most} unknowns are solved for")
+            }
             Self::Pitch { .. } => "use a positive number of nanometres".into(),
             Self::Index { .. } => "use n >= 0 and k >= 0, not both zero; gain is not supported".into(),
             Self::Height { .. } => "give a positive thickness, or leave the layer out".into(),

@@ -13,7 +13,7 @@ use faer::{Accum, Mat, Par};
 use num_complex::Complex64;
 
 use super::Result;
-use super::basis::{Basis, Row, Space};
+use super::basis::{Basis, Row, Rows, Space};
 use super::outline::{Outline, slab_coefficients};
 use super::scalar::{Eigen, Scalar};
 
@@ -57,25 +57,30 @@ pub(super) struct Modes {
 impl Modes {
     pub fn of(section: &Section<'_>, basis: &Basis) -> Result<Self> {
         if let Some(permittivity) = section.uniform() {
-            let medium = Medium::new(permittivity, basis);
-            let identity = Mat::<Complex64>::identity(basis.len(), basis.len());
-            return Ok(Self {
-                v: medium.admittance(basis, &identity),
-                w: identity,
-                gamma: medium.gamma,
-            });
+            return Ok(Self::uniform(permittivity, &basis.rows));
         }
         if section.inside.im == 0.0 && section.outside.im == 0.0 {
-            Self::solve::<f64>(section, basis)
+            Self::structured(&Permittivity::<f64>::new(section, basis), &basis.rows)
         } else {
-            Self::solve::<Complex64>(section, basis)
+            Self::structured(&Permittivity::<Complex64>::new(section, basis), &basis.rows)
         }
     }
 
-    fn solve<T: Scalar>(section: &Section<'_>, basis: &Basis) -> Result<Self> {
-        let permittivity = Permittivity::<T>::new(section, basis);
-        let Eigen { values, packed } = T::eigen(permittivity.operator(basis).as_ref())?;
-        let bw = permittivity.curl_of(basis, &packed);
+    /// Modes of a layer without structure: the plane waves.
+    pub fn uniform(permittivity: Complex64, rows: &Rows) -> Self {
+        let medium = Medium::new(permittivity, rows);
+        let identity = Mat::<Complex64>::identity(rows.len(), rows.len());
+        Self {
+            v: medium.admittance(rows, &identity),
+            w: identity,
+            gamma: medium.gamma,
+        }
+    }
+
+    /// Modes of a layer with these permittivity matrices.
+    pub fn structured<T: Scalar>(permittivity: &Permittivity<T>, rows: &Rows) -> Result<Self> {
+        let Eigen { values, packed } = T::eigen(permittivity.operator(rows).as_ref())?;
+        let bw = permittivity.curl_of(rows, &packed);
         let gamma: Vec<Complex64> = values.iter().map(|&g2| root(g2)).collect();
         let mut v = T::unpack(bw, &values);
         for (j, g) in gamma.iter().enumerate() {
@@ -97,11 +102,11 @@ fn root(square: Complex64) -> Complex64 {
 }
 
 /// The permittivity matrices of a layer.
-struct Permittivity<T> {
+pub(super) struct Permittivity<T> {
     /// For Ex and Ey, each in its own rows.
-    transverse: [Mat<T>; 2],
+    pub transverse: [Mat<T>; 2],
     /// For Ez.
-    z: Mat<T>,
+    pub z: Mat<T>,
 }
 
 impl<T: Scalar> Permittivity<T> {
@@ -140,15 +145,15 @@ impl<T: Scalar> Permittivity<T> {
             m
         };
 
-        let mut ex = outside(basis.rows_x);
-        let mut ez = outside(basis.rows_z);
+        let mut ex = outside(basis.rows.of_x);
+        let mut ez = outside(basis.rows.of_z);
         let contrast = T::of(section.inside - section.outside);
         for band in section.outline.bands(0) {
             let across = band_of(y, band.from, band.to);
             add_kronecker(&mut ex, T::real(1.0), &inverse_rule(x, band.half_width), &across);
             add_kronecker(&mut ez, contrast, &laurent(x.derived(), band.half_width), &across);
         }
-        let mut ey = outside(basis.len() - basis.rows_x);
+        let mut ey = outside(basis.rows.len() - basis.rows.of_x);
         for band in section.outline.bands(1) {
             let across = band_of(x.derived(), band.from, band.to);
             add_kronecker(
@@ -165,18 +170,18 @@ impl<T: Scalar> Permittivity<T> {
     }
 
     /// A B, whose eigenvalues are the squares of the propagation constants.
-    fn operator(&self, basis: &Basis) -> Mat<T> {
-        let n = basis.len();
-        let offset = [0, basis.rows_x];
+    fn operator(&self, rows: &Rows) -> Mat<T> {
+        let n = rows.len();
+        let offset = [0, rows.of_x];
         // k^T diag(ex, ey), then e^-1 times it.
-        let mut divergence = Mat::<T>::zeros(basis.rows_z, n);
+        let mut divergence = Mat::<T>::zeros(rows.of_z, n);
         for c in [0, 1] {
             let e = &self.transverse[c];
             for j in 0..e.ncols() {
                 let from = e.col_as_slice(j);
                 let to = divergence.col_as_slice_mut(offset[c] + j);
                 for (i, value) in from.iter().enumerate() {
-                    let row = &basis.rows[offset[c] + i];
+                    let row = &rows.list[offset[c] + i];
                     if let Some(z) = row.z {
                         to[z] += *value * T::real(row.divergence());
                     }
@@ -187,28 +192,28 @@ impl<T: Scalar> Permittivity<T> {
 
         let mut operator = Mat::<T>::zeros(n, n);
         for j in 0..n {
-            let c = usize::from(j >= basis.rows_x);
+            let c = usize::from(j >= rows.of_x);
             let to = operator.col_as_slice_mut(j);
             let e = self.transverse[c].col_as_slice(j - offset[c]);
             to[offset[c]..offset[c] + e.len()].copy_from_slice(e);
             let from = divergence.col_as_slice(j);
-            for (row, value) in basis.rows.iter().zip(to.iter_mut()) {
+            for (row, value) in rows.list.iter().zip(to.iter_mut()) {
                 if let Some(z) = row.z {
                     *value -= from[z] * T::real(row.divergence());
                 }
             }
-            let row = &basis.rows[j];
+            let row = &rows.list[j];
             to[j] -= T::real(row.curl() * row.curl());
             if let Some(p) = row.partner {
-                to[p] -= T::real(basis.rows[p].curl() * row.curl());
+                to[p] -= T::real(rows.list[p].curl() * row.curl());
             }
         }
         operator
     }
 
     /// B times the columns of `w`.
-    fn curl_of(&self, basis: &Basis, w: &Mat<T>) -> Mat<T> {
-        let (n, split) = (basis.len(), basis.rows_x);
+    fn curl_of(&self, rows: &Rows, w: &Mat<T>) -> Mat<T> {
+        let (n, split) = (rows.len(), rows.of_x);
         let mut out = Mat::<T>::zeros(n, w.ncols());
         for (c, range) in [(0, 0..split), (1, split..n)] {
             matmul(
@@ -223,10 +228,10 @@ impl<T: Scalar> Permittivity<T> {
         for j in 0..w.ncols() {
             let from = w.col_as_slice(j);
             let to = out.col_as_slice_mut(j);
-            for (i, row) in basis.rows.iter().enumerate() {
+            for (i, row) in rows.list.iter().enumerate() {
                 let mut curl = from[i] * T::real(row.curl());
                 if let Some(p) = row.partner {
-                    curl += from[p] * T::real(basis.rows[p].curl());
+                    curl += from[p] * T::real(rows.list[p].curl());
                 }
                 to[i] -= curl * T::real(row.curl());
             }
@@ -235,7 +240,7 @@ impl<T: Scalar> Permittivity<T> {
     }
 }
 
-fn invert<T: Scalar>(matrix: Mat<T>) -> Mat<T> {
+pub(super) fn invert<T: Scalar>(matrix: Mat<T>) -> Mat<T> {
     let n = matrix.nrows();
     let mut inverse = Mat::<T>::zeros(n, n);
     (0..n).for_each(|i| inverse[(i, i)] = T::real(1.0));
@@ -268,9 +273,9 @@ pub(super) struct Medium {
 }
 
 impl Medium {
-    pub fn new(permittivity: Complex64, basis: &Basis) -> Self {
-        let gamma = basis
-            .rows
+    pub fn new(permittivity: Complex64, rows: &Rows) -> Self {
+        let gamma = rows
+            .list
             .iter()
             .map(|row| root(permittivity - row.k[0] * row.k[0] - row.k[1] * row.k[1]))
             .collect();
@@ -284,9 +289,9 @@ impl Medium {
     }
 
     /// Y times the columns of a field.
-    pub fn admittance(&self, basis: &Basis, field: &Mat<Complex64>) -> Mat<Complex64> {
-        let entries: Vec<_> = basis
-            .rows
+    pub fn admittance(&self, rows: &Rows, field: &Mat<Complex64>) -> Mat<Complex64> {
+        let entries: Vec<_> = rows
+            .list
             .iter()
             .zip(&self.gamma)
             .enumerate()

@@ -9,6 +9,7 @@ mod propagate;
 mod response;
 mod scalar;
 mod stack;
+mod supercell;
 
 use std::f64::consts::TAU;
 
@@ -22,6 +23,7 @@ pub use outline::Outline;
 use propagate::{Ends, Slab, propagate};
 pub use response::{Convergence, DiffractionOrder, Response, converge};
 pub use stack::{Layer, LayerStack, Orders};
+pub use supercell::{SiteLattice, SiteLayer, Supercell, SupercellOrder, SupercellResponse, solve_supercell};
 
 pub use error::{Error, Result, TableError};
 
@@ -96,6 +98,15 @@ impl Incidence {
         }
         if !self.sines.iter().all(|s| s.is_finite()) {
             return Err(Error::Angle);
+        }
+        Ok(())
+    }
+
+    /// Refuses a wave that does not travel in the medium it comes from.
+    fn check_medium(&self, index: Complex64) -> Result<()> {
+        let sine = self.sines[0].hypot(self.sines[1]);
+        if index.im != 0.0 || sine >= index.re {
+            return Err(Error::NoIncidentWave { sine, index });
         }
         Ok(())
     }
@@ -197,13 +208,7 @@ impl Problem {
             Side::Below => stack.clone(),
             Side::Above => stack.flipped(),
         };
-        let transverse = incidence.sines[0].hypot(incidence.sines[1]);
-        if stack.below.im != 0.0 || transverse >= stack.below.re {
-            return Err(Error::NoIncidentWave {
-                sine: transverse,
-                index: stack.below,
-            });
-        }
+        incidence.check_medium(stack.below)?;
         let wavelength_nm = incidence.wavelength_um * 1e3;
         Ok(Self {
             k: incidence.sines,
@@ -216,15 +221,15 @@ impl Problem {
 
     fn part(&self, x: Space, y: Space, incident: &[[Complex64; 2]]) -> Result<Part> {
         let basis = Basis::new(self.orders.highest(), x, y, self.k, self.step);
-        if basis.len() > MOST_UNKNOWNS {
+        if basis.rows.len() > MOST_UNKNOWNS {
             return Err(Error::TooLarge {
                 along_axis: self.orders.along_axis(),
-                unknowns: basis.len(),
+                unknowns: basis.rows.len(),
                 most: MOST_UNKNOWNS,
             });
         }
-        let below = Medium::new(self.stack.below * self.stack.below, &basis);
-        let above = Medium::new(self.stack.above * self.stack.above, &basis);
+        let below = Medium::new(self.stack.below * self.stack.below, &basis.rows);
+        let above = Medium::new(self.stack.above * self.stack.above, &basis.rows);
         let slabs = self
             .stack
             .layers
@@ -242,7 +247,7 @@ impl Problem {
                 })
             })
             .collect::<Result<Vec<_>>>()?;
-        let mut arriving = Mat::zeros(basis.len(), incident.len());
+        let mut arriving = Mat::zeros(basis.rows.len(), incident.len());
         for (column, amplitudes) in incident.iter().enumerate() {
             for (component, amplitude) in amplitudes.iter().enumerate() {
                 if let Some((row, factor)) = basis.plane_wave(component, 0, 0) {
@@ -250,7 +255,7 @@ impl Problem {
                 }
             }
         }
-        let ends = propagate(&basis, &below, &slabs, &above, &arriving);
+        let ends = propagate(&basis.rows, &below, &slabs, &above, &arriving);
         Ok(Part {
             basis,
             ends,

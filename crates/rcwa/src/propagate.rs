@@ -10,7 +10,7 @@ use faer::linalg::solvers::{PartialPivLu, Solve};
 use faer::{Accum, Mat, Par};
 use num_complex::Complex64;
 
-use super::basis::Basis;
+use super::basis::Rows;
 use super::layer::{Medium, Modes};
 
 /// A wave that decays by more than this across a layer is not there at its other end; it is far below
@@ -50,19 +50,19 @@ struct Crossed<'a> {
 
 /// Fields at both ends for the transverse fields `incident` arriving from `below`.
 pub(super) fn propagate(
-    basis: &Basis,
+    rows: &Rows,
     below: &Medium,
     slabs: &[Slab],
     above: &Medium,
     incident: &Mat<Complex64>,
 ) -> Ends {
-    let n = basis.len();
+    let n = rows.len();
     // At the near end G + Y E = 2 Y E_inc, and E is what arrives and what returns.
-    let mut drive = below.admittance(basis, incident);
+    let mut drive = below.admittance(rows, incident);
     drive *= faer::Scale(Complex64::new(2.0, 0.0));
     let Some((first, rest)) = slabs.split_first() else {
         let identity = Mat::identity(n, n);
-        let sum = above.admittance(basis, &identity) + below.admittance(basis, &identity);
+        let sum = above.admittance(rows, &identity) + below.admittance(rows, &identity);
         sum.partial_piv_lu().solve_in_place(&mut drive);
         let reflected = &drive - incident;
         return Ends {
@@ -74,7 +74,7 @@ pub(super) fn propagate(
     let mut load = Load::Medium(above);
     let mut crossed = Vec::with_capacity(rest.len());
     for slab in rest.iter().rev() {
-        let (through, backward, p, q) = cross(basis, slab, &load);
+        let (through, backward, p, q) = cross(rows, slab, &load);
         let near = p.partial_piv_lu();
         // Y = q p^-1, and p^T Y^T = q^T.
         let mut y = q.transpose().to_owned();
@@ -88,8 +88,8 @@ pub(super) fn propagate(
         });
     }
 
-    let (through, backward, p, q) = cross(basis, first, &load);
-    let matched = q + below.admittance(basis, &p);
+    let (through, backward, p, q) = cross(rows, first, &load);
+    let matched = q + below.admittance(rows, &p);
     matched.partial_piv_lu().solve_in_place(&mut drive);
     let reflected = &p * &drive - incident;
     let mut field = far_field(&first.modes, &through, &backward, &drive);
@@ -107,9 +107,9 @@ type Through = Vec<(usize, Complex64)>;
 
 /// One layer before its load: the modes that reach through, their backward waves at the far end, and
 /// E = p a, G = q a at the near end, for forward waves a there.
-fn cross(basis: &Basis, slab: &Slab, load: &Load<'_>) -> (Through, Mat<Complex64>, Mat<Complex64>, Mat<Complex64>) {
+fn cross(rows: &Rows, slab: &Slab, load: &Load<'_>) -> (Through, Mat<Complex64>, Mat<Complex64>, Mat<Complex64>) {
     let Modes { w, v, gamma } = &slab.modes;
-    let n = basis.len();
+    let n = rows.len();
     let through: Through = gamma
         .iter()
         .map(|g| (Complex64::I * g * slab.depth).exp())
@@ -117,7 +117,7 @@ fn cross(basis: &Basis, slab: &Slab, load: &Load<'_>) -> (Through, Mat<Complex64
         .filter(|(_, x)| x.norm() > GONE)
         .collect();
     let yw = match load {
-        Load::Medium(medium) => medium.admittance(basis, w),
+        Load::Medium(medium) => medium.admittance(rows, w),
         Load::Admittance(y) => y * w,
     };
     let mut backward = Mat::from_fn(n, through.len(), |i, j| {

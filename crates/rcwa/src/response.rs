@@ -166,7 +166,7 @@ impl<'a> Fields<'a> {
 }
 
 /// Power flux along z of a plane wave with transverse amplitude `e` and wave vector `k` over k0.
-fn flux(index: Complex64, k: [f64; 2], e: [Complex64; 2]) -> f64 {
+pub(super) fn flux(index: Complex64, k: [f64; 2], e: [Complex64; 2]) -> f64 {
     let permittivity = index * index;
     if permittivity.im == 0.0 && permittivity.re <= k[0] * k[0] + k[1] * k[1] {
         return 0.0;

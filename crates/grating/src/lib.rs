@@ -1,0 +1,31 @@
+//! Diffraction orders of blazed rows of pillars, predicted from supercells.
+//!
+//! The models in `metalith-cell` take each pillar for one of a lattice of equal pillars. That holds for a lens where the
+//! widths change slowly. Where the phase is steep the width changes from site to site, the orders leave at large
+//! angles, and the resonances of a lattice of equal pillars do not form.
+//!
+//! - [`Blaze`]: one place of a lens is nearly a blazed grating whose vector is the gradient of the phase. One period of
+//!   it is solved as a supercell; its orders are what this place of the lens sends out. Power and amplitude of each
+//!   order follow, for s and p.
+//! - [`CoarseCell`]: the pillar with few diffraction orders that makes this fast, with its widths corrected so that the
+//!   single cell is right on average.
+//! - [`RealRow`]: consecutive pillars of an element, solved together; it measures how far any model of single sites, such
+//!   as the local cell, is from the supercell. [`site_transmissions`] are the values it compares with.
+//!
+//! This is a prediction by a solver that is held to an independent one (`golden/truth/supercell.csv`). It is not a stage
+//! of any command: `metalith run`, `verify` and `optimise` judge by single cells. A model that gives every site of an
+//! element the transmission that it has among its neighbours is under evaluation; it is not part of this crate.
+//! `examples/blazed_rows.rs` prints the shares by the truth, by single cells and by [`Blaze`].
+//!
+//! Conventions are those of `metalith-rcwa`: exp(-i w t), light arrives from the substrate, phases are counted from the
+//! middle of site 0 in the plane of the pillar tops.
+
+mod blaze;
+mod cell;
+mod rows;
+mod sites;
+
+pub use blaze::{Blaze, BlazeOrder, BlazeOrders};
+pub use cell::{COARSE, CoarseCell};
+pub use rows::RealRow;
+pub use sites::site_transmissions;
