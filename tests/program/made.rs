@@ -184,6 +184,7 @@ fn largest_difference(a: &Array2<f64>, b: &Array2<f64>) -> f64 {
 }
 
 #[test]
+#[ignore = "second tier: a minute of CPU time, run by .ci/run"]
 fn every_effect_is_the_same_in_every_command() {
     let folder = tempfile::tempdir().unwrap();
     let files = Files::write(folder.path());

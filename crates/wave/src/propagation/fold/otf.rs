@@ -172,3 +172,76 @@ fn product_sum(a: &[Complex32], b: &[Complex32]) -> Complex64 {
     let sum = |lanes: &[f32]| lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
     Complex64::new(sum(&re), sum(&im))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::propagation::{Accuracy, PhaseFunction, Propagator, Window};
+    use crate::psf::Psf;
+
+    const WAVELENGTH_UM: f64 = 0.53;
+    const FOCAL_UM: f64 = 400.0;
+    const RADIUS_UM: f64 = 40.0;
+    const LP_MM: [f64; 4] = [20.0, 60.0, 150.0, 300.0];
+
+    fn fold(samples: usize) -> Fold {
+        let window = Window {
+            centre_um: [0.0; 2],
+            step_um: 0.35,
+            samples,
+            distance_um: FOCAL_UM,
+        };
+        let lattice = Lattice::covering(80_000, 350).unwrap();
+        Fold::plan(lattice, RADIUS_UM, WAVELENGTH_UM, window, Accuracy::Accurate).unwrap()
+    }
+
+    /// A lens with the phase times a factor: one for a perfect lens, less for one that leaves a veil round its image.
+    fn lens(strength: f64) -> PhaseFunction<impl Fn(f64, f64) -> f64 + Sync> {
+        PhaseFunction {
+            lattice: Lattice::covering(80_000, 350).unwrap(),
+            radius_um: RADIUS_UM,
+            amplitude: 1.0,
+            phase_rad: move |x: f64, y: f64| {
+                let path = (x * x + y * y + FOCAL_UM * FOCAL_UM).sqrt() - FOCAL_UM;
+                -strength * std::f64::consts::TAU * path / WAVELENGTH_UM
+            },
+        }
+    }
+
+    #[test]
+    fn a_perfect_lens_has_the_contrast_of_its_pupil() {
+        /// The pupil is made of sites, and its rim is seen at an angle whose cosine is 0.995.
+        const SITES_AND_ANGLE: f64 = 0.01;
+        let wave = PlaneWave::normal(WAVELENGTH_UM);
+        let (_, otf) = fold(64)
+            .with_otf(&lens(1.0), &wave, &LP_MM, &mut Scratch::default())
+            .unwrap();
+        for (i, f) in LP_MM.iter().enumerate() {
+            // Overlap of two circles (Goodman, eq. 6-30).
+            let x = f * 1e-3 * WAVELENGTH_UM * FOCAL_UM / (2.0 * RADIUS_UM);
+            let want = std::f64::consts::FRAC_2_PI * (x.acos() - x * (1.0 - x * x).sqrt());
+            for got in otf.contrast(i) {
+                assert!((got - want).abs() < SITES_AND_ANGLE, "{f}: {got}, not {want}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_veil_outside_of_the_window_takes_contrast() {
+        /// Of the power that passes: light that a window of 210 um does not hold either, and interpolation of bins.
+        const WIDE_WINDOW: f64 = 3e-3;
+        let wave = PlaneWave::normal(WAVELENGTH_UM);
+        let blurred = lens(0.8);
+        let (field, otf) = fold(64)
+            .with_otf(&blurred, &wave, &LP_MM, &mut Scratch::default())
+            .unwrap();
+        let wide = Psf::of(&fold(600).field(&blurred, &wave, &mut Scratch::default()).unwrap());
+        let narrow = Psf::of(&field);
+        assert!(narrow.energy_um2() < 0.9 * otf.power_um2, "the window holds the image");
+        for (i, f) in LP_MM.iter().enumerate() {
+            let exact = wide.window_otf([*f, 0.0]).norm() * wide.energy_um2() / otf.power_um2;
+            let got = otf.contrast(i)[0];
+            assert!((got - exact).abs() < WIDE_WINDOW, "{f}: {got}, not {exact}");
+        }
+    }
+}
