@@ -38,14 +38,14 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
         row(
             "Pillars change the phase alone, by a polynomial",
             "amplitude and resonances are left out".into(),
-            "`--fidelity rigorous` shows them",
+            "--fidelity rigorous shows them",
         );
     }
     if design.verify.incidence == CellIncidence::Normal {
         row(
             "Cells are lit along the normal",
             "not computed in this run".into(),
-            "`--as-lit` solves them at the angle at which light arrives, both polarisations",
+            "--as-lit solves them at the angle at which light arrives, both polarisations",
         );
     }
     let (least, most) = outside(found);
@@ -86,7 +86,7 @@ fn neighbours(design: &Design) -> String {
         all.iter().copied().fold(0.0, f64::max)
     };
     format!(
-        "first order too high by up to {} % where the wedge of the outermost element is alone, {} % at its steepest rim",
+        "first order too high by up to {} % in the middle of the outermost element, {} % at its steepest rim",
         fixed(worst(steepest) * 100.0, 0),
         if steepest + rim > BLAZED_ROWS[4].0 {
             format!("over {}", fixed(worst(0.4) * 100.0, 0))
