@@ -232,12 +232,12 @@ mod tests {
         const WIDE_WINDOW: f64 = 3e-3;
         let wave = PlaneWave::normal(WAVELENGTH_UM);
         let blurred = lens(0.8);
-        let (field, otf) = fold(64)
+        let (field, otf) = fold(32)
             .with_otf(&blurred, &wave, &LP_MM, &mut Scratch::default())
             .unwrap();
         let wide = Psf::of(&fold(600).field(&blurred, &wave, &mut Scratch::default()).unwrap());
         let narrow = Psf::of(&field);
-        assert!(narrow.energy_um2() < 0.9 * otf.power_um2, "the window holds the image");
+        assert!(narrow.energy_um2() < 0.9 * otf.power_um2, "the window holds the whole image");
         for (i, f) in LP_MM.iter().enumerate() {
             let exact = wide.window_otf([*f, 0.0]).norm() * wide.energy_um2() / otf.power_um2;
             let got = otf.contrast(i)[0];
