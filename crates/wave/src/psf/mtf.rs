@@ -12,22 +12,8 @@ pub const HALF_NYQUIST_LP_MM: f64 = 42.7;
 
 /// What is asked for where contrast is reported: both of them.
 pub const CONTRAST_LP_MM: [f64; 2] = [HALF_NYQUIST_LP_MM, NYQUIST_LP_MM];
-/// What is asked for where contrast is drawn: dense where the veil takes it away, and both of them.
-pub const CURVE_LP_MM: [f64; 13] = [
-    2.0,
-    5.0,
-    10.0,
-    20.0,
-    30.0,
-    HALF_NYQUIST_LP_MM,
-    52.0,
-    63.0,
-    74.0,
-    NYQUIST_LP_MM,
-    96.0,
-    108.0,
-    120.0,
-];
+/// What is asked for where contrast is drawn: few, since each costs two correlations of the spectrum along each axis.
+pub const CURVE_LP_MM: [f64; 6] = [5.0, 20.0, HALF_NYQUIST_LP_MM, 63.0, NYQUIST_LP_MM, 110.0];
 
 impl Psf {
     /// Contrast along one axis (0 is x) at a frequency (line pairs a millimetre), without the pixel: of all the light

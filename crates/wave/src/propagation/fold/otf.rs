@@ -237,7 +237,10 @@ mod tests {
             .unwrap();
         let wide = Psf::of(&fold(600).field(&blurred, &wave, &mut Scratch::default()).unwrap());
         let narrow = Psf::of(&field);
-        assert!(narrow.energy_um2() < 0.9 * otf.power_um2, "the window holds the whole image");
+        assert!(
+            narrow.energy_um2() < 0.9 * otf.power_um2,
+            "the window holds the whole image"
+        );
         for (i, f) in LP_MM.iter().enumerate() {
             let exact = wide.window_otf([*f, 0.0]).norm() * wide.energy_um2() / otf.power_um2;
             let got = otf.contrast(i)[0];
