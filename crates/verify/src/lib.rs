@@ -13,7 +13,7 @@ mod widths;
 
 use std::path::Path;
 
-use num_complex::Complex64;
+use num_complex::{Complex32, Complex64};
 use serde::Serialize;
 
 use metalith_cell::Fidelity;
@@ -30,7 +30,7 @@ use metalith_wave::{Accuracy, PlaneWave};
 pub use case::{SimulationCase, SimulationCases};
 pub use check::{Check, Sense};
 pub use page::write_report;
-pub use phase::{PhaseError, PhaseErrors};
+pub use phase::{PhaseError, PhaseErrors, PillarResponse};
 pub use psf_metrics::{Orders, PsfImages, PsfPair, PsfResult};
 pub use single::{Lighting, SinglePsf, SinglePsfReport, single_psfs, write_single_psf_report};
 pub use widths::WidthCheck;
@@ -223,19 +223,23 @@ impl<'a> MappingResponse<'a> {
         progress: &dyn Progress,
     ) -> Result<PhaseErrors> {
         let widths = read.drawn.pillars();
+        let errors = |wavelength_um: &f64, table: &[Complex64], class: &(dyn Fn(usize, u16) -> usize + Sync)| {
+            let response = PillarResponse {
+                wavelength_um: *wavelength_um,
+                table,
+                class,
+            };
+            PhaseErrors::of(widths, phase, rule, &response)
+        };
         match (self, &read.made[0]) {
             (Self::Made(um, chip), Some(made)) => {
                 let view = chip.view(made, &PlaneWave::normal(*um), false, progress)?;
-                let of = |pillar: phase::Pillar| {
-                    let t = view.tables[0].t[usize::from(made.classes()[pillar.site])];
-                    Complex64::new(f64::from(t.re), f64::from(t.im))
-                };
-                Ok(PhaseErrors::of(widths, phase, rule, *um, &of))
+                let single = |t: &Complex32| Complex64::new(f64::from(t.re), f64::from(t.im));
+                let table: Vec<_> = view.tables[0].t.iter().map(single).collect();
+                let classes = made.classes();
+                Ok(errors(um, &table, &|site, _| usize::from(classes[site])))
             }
-            (Self::ByWidth(um, table), _) => {
-                let of = |pillar: phase::Pillar| table[usize::from(pillar.width_nm)];
-                Ok(PhaseErrors::of(widths, phase, rule, *um, &of))
-            }
+            (Self::ByWidth(um, table), _) => Ok(errors(um, table, &|_, width_nm| usize::from(width_nm))),
             (Self::Made(..), None) => unreachable!("a made chip has made elements"),
         }
     }

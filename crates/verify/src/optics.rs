@@ -1,7 +1,7 @@
 //! The PSFs of one element: of its unrounded design phase, and of its pillars in each case.
 
 use ndarray::Array2;
-use num_complex::{Complex32, Complex64};
+use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::case::{SimulationCase, SimulationCases, TransmissionTables};
@@ -16,7 +16,7 @@ use metalith_design::{CellIncidence, Design, Element, FieldAngle};
 use metalith_made::{DrawnElement, MadeChip, MadeElement, MadeView};
 use metalith_wave::propagation::{incident, landing_um};
 use metalith_wave::psf::{CONTRAST_LP_MM, CURVE_LP_MM};
-use metalith_wave::{Accuracy, Aperture, Fold, Matched, PhaseFunction, Pillars, PlaneWave, Psf, Scratch, Window};
+use metalith_wave::{Accuracy, Fold, Matched, PhaseFunction, PhaseMap, Pillars, PlaneWave, Psf, Scratch, Window};
 
 /// One wavelength, with what all elements and angles share.
 struct Colour {
@@ -185,6 +185,9 @@ impl<'a> ElementSimulator<'a> {
         progress: &dyn Progress,
     ) -> Result<Vec<PsfPair>> {
         let angles = &self.design.verify.field_angles;
+        // The phase before mapping and rounding, once for all colours and angles.
+        let radius_um = self.design.lens.radius_um();
+        let designed = PhaseMap::new(self.lattice, radius_um, |ix, iy| phase.turns(ix, iy));
         let mut tasks = Vec::new();
         for colour in &self.colours {
             for field in angles {
@@ -204,7 +207,7 @@ impl<'a> ElementSimulator<'a> {
                 if progress.stopped() {
                     return Err(Error::Interrupted);
                 }
-                let pair = self.pair(&task, element, phase, read.drawn.pillars(), scratch);
+                let pair = self.pair(&task, element, &designed, read.drawn.pillars(), scratch);
                 progress.advance(1);
                 pair
             })
@@ -231,7 +234,7 @@ impl<'a> ElementSimulator<'a> {
         &self,
         task: &Task<'_>,
         element: &Element,
-        phase: &ElementPhase<'_>,
+        designed: &PhaseMap,
         widths: &WidthMap,
         scratch: &mut Scratch,
     ) -> Result<PsfPair> {
@@ -248,8 +251,7 @@ impl<'a> ElementSimulator<'a> {
             lens.focal_length_um,
         );
         let fold = Fold::plan(self.lattice, lens.radius_um(), wavelength_um, window, self.accuracy)?;
-        let aperture = DesignPhase(phase, lens.radius_um());
-        let designed = Psf::formed(&fold, &aperture, wave, &CURVE_LP_MM, scratch)?;
+        let designed = Psf::formed(&fold, designed, wave, &CURVE_LP_MM, scratch)?;
         let perfect = self.perfect(chief, wavelength_um);
         let mut extracted = Vec::new();
         let mut judged = None;
@@ -347,26 +349,4 @@ fn scaled(matched: &Matched, full_transmission: f64) -> Matched {
 fn picture(psf: &Psf, full_transmission: f64) -> Array2<f32> {
     let power = full_transmission * full_transmission;
     psf.values.mapv(|v| (v / power) as f32)
-}
-
-/// The phase of an element before mapping and rounding, as an aperture of modulus one.
-struct DesignPhase<'a>(&'a ElementPhase<'a>, f64);
-
-impl Aperture for DesignPhase<'_> {
-    fn lattice(&self) -> Lattice {
-        self.0.lattice()
-    }
-
-    fn radius_um(&self) -> f64 {
-        self.1
-    }
-
-    fn fill_row(&self, iy: usize, row: &mut [Complex32]) {
-        for (ix, t) in row.iter_mut().enumerate() {
-            *t = self.0.wrapped(ix, iy).map_or(Complex32::ZERO, |u| {
-                let (sin, cos) = (std::f64::consts::TAU * u).sin_cos();
-                Complex32::new(cos as f32, sin as f32)
-            });
-        }
-    }
 }

@@ -27,103 +27,114 @@ pub struct PhaseErrors {
     pub mapping: PhaseError,
 }
 
+/// What pillars transmit at the wavelength of the mapping.
+pub struct PillarResponse<'a> {
+    /// Wavelength of the mapping (um).
+    pub wavelength_um: f64,
+    /// Transmission of each class of pillars, zero where the aperture is shut.
+    pub table: &'a [Complex64],
+    /// Class of a pillar, by its site counted row by row and its width (nm).
+    pub class: &'a (dyn Fn(usize, u16) -> usize + Sync),
+}
+
 impl PhaseErrors {
-    /// Compare the pillars of an element with its phase. `response` is what a pillar transmits at the wavelength of
-    /// the mapping (um), zero where its aperture is shut.
-    pub fn of(
-        widths: &WidthMap,
-        phase: &ElementPhase<'_>,
-        rule: &WidthRule,
-        wavelength_um: f64,
-        response: &(dyn Fn(Pillar) -> Complex64 + Sync),
-    ) -> Self {
+    /// Compare the pillars of an element with its phase.
+    pub fn of(widths: &WidthMap, phase: &ElementPhase<'_>, rule: &WidthRule, response: &PillarResponse<'_>) -> Self {
         let pitch_nm = f64::from(widths.lattice.pitch_nm());
         let forward = ForwardPolynomial::published();
-        let by_width = |nm: f64| TAU * forward.turns(nm / pitch_nm, wavelength_um);
+        let by_width = |nm: f64| TAU * forward.turns(nm / pitch_nm, response.wavelength_um);
         let widest = widths.width_nm.iter().copied().max().unwrap_or(0);
         let written = (0..=widest).map(|w| by_width(f64::from(w))).collect::<Vec<_>>();
-        let rounding = accumulate(widths, phase, |pillar, u| {
-            Some(written[usize::from(pillar.width_nm)] - by_width(rule.unrounded_nm(u)))
+        let turns_of = |t: &Complex64| (t.norm() > 0.0).then(|| t.arg() / TAU);
+        let turns: Vec<Option<f64>> = response.table.iter().map(turns_of).collect();
+        let off = |pillar: Pillar| Some(turns[(response.class)(pillar.site, pillar.width_nm)]? - pillar.design_turns);
+
+        // One walk for the rounding and the mean of the mapping, one for the mapping about its mean.
+        let first = per_row(widths, phase, |pillars| {
+            pillars.fold((Sums::default(), Complex64::ZERO), |(mut sums, mean), pillar| {
+                sums.add(written[usize::from(pillar.width_nm)] - by_width(rule.unrounded_nm(pillar.design_turns)));
+                let unit = off(pillar).map_or(Complex64::ZERO, |turns| Complex64::cis(TAU * turns));
+                (sums, mean + unit)
+            })
         });
-        let off = |pillar: Pillar, u: f64| unit(response(pillar)) * Complex64::cis(-TAU * u);
-        let mean = sum_rows(widths, phase, Complex64::ZERO, off);
-        let piston = unit(mean).conj();
-        let mapping = accumulate(widths, phase, |pillar, u| {
-            let off = off(pillar, u);
-            (off != Complex64::ZERO).then(|| (off * piston).arg())
+        let mean: Complex64 = first.iter().map(|(_, mean)| mean).sum();
+        let mean_turns = mean.arg() / TAU;
+        let second = per_row(widths, phase, |pillars| {
+            pillars.filter_map(off).fold(Sums::default(), |mut sums, turns| {
+                let about = turns - mean_turns;
+                sums.add(TAU * (about - about.round()));
+                sums
+            })
         });
-        Self { rounding, mapping }
+        Self {
+            rounding: Sums::error(first.iter().map(|(sums, _)| sums)),
+            mapping: Sums::error(second.iter()),
+        }
     }
 }
 
-/// A pillar as read.
+/// A pillar as read, with the phase of its site (turns, 0 to 1).
 #[derive(Clone, Copy, Debug)]
-pub struct Pillar {
+struct Pillar {
     /// Its place, counted row by row.
-    pub site: usize,
-    pub width_nm: u16,
+    site: usize,
+    width_nm: u16,
+    design_turns: f64,
 }
 
-fn unit(t: Complex64) -> Complex64 {
-    let modulus = t.norm();
-    if modulus > 0.0 { t / modulus } else { t }
+/// Errors of a row (rad).
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    squares: f64,
+    largest: f64,
+    count: u64,
 }
 
-/// Root mean square and largest of an error over all pillars that have one.
-fn accumulate(
-    widths: &WidthMap,
-    phase: &ElementPhase<'_>,
-    error: impl Fn(Pillar, f64) -> Option<f64> + Sync,
-) -> PhaseError {
-    let rows = per_row(widths, phase, |sites| {
-        let errors = sites.filter_map(|(pillar, u)| error(pillar, u));
-        errors.fold((0.0_f64, 0.0_f64, 0_u64), |(squares, largest, count), e| {
-            (squares + e * e, largest.max(e.abs()), count + 1)
-        })
-    });
-    let (squares, largest_rad, count) = rows
-        .into_iter()
-        .fold((0.0, 0.0_f64, 0), |(s, l, n), (rs, rl, rn)| (s + rs, l.max(rl), n + rn));
-    PhaseError {
-        rms_rad: (squares / count.max(1) as f64).sqrt(),
-        largest_rad,
+impl Sums {
+    fn add(&mut self, error: f64) {
+        self.squares += error * error;
+        self.largest = self.largest.max(error.abs());
+        self.count += 1;
     }
-}
 
-fn sum_rows(
-    widths: &WidthMap,
-    phase: &ElementPhase<'_>,
-    zero: Complex64,
-    value: impl Fn(Pillar, f64) -> Complex64 + Sync,
-) -> Complex64 {
-    per_row(widths, phase, |sites| {
-        sites.map(|(pillar, u)| value(pillar, u)).fold(zero, |a, b| a + b)
-    })
-    .into_iter()
-    .fold(zero, |a, b| a + b)
+    /// Over all rows.
+    fn error<'s>(rows: impl Iterator<Item = &'s Self>) -> PhaseError {
+        let all = rows.fold(Self::default(), |all, row| Self {
+            squares: all.squares + row.squares,
+            largest: all.largest.max(row.largest),
+            count: all.count + row.count,
+        });
+        PhaseError {
+            rms_rad: (all.squares / all.count.max(1) as f64).sqrt(),
+            largest_rad: all.largest,
+        }
+    }
 }
 
 /// Fold each row on whatever thread; the caller adds the rows in order, so that sums do not depend on
-/// the number of threads. Sites come with their phase (turns, 0 to 1).
+/// the number of threads.
 fn per_row<T: Send>(
     widths: &WidthMap,
     phase: &ElementPhase<'_>,
-    fold: impl Fn(&mut dyn Iterator<Item = (Pillar, f64)>) -> T + Sync,
+    fold: impl Fn(&mut dyn Iterator<Item = Pillar>) -> T + Sync,
 ) -> Vec<T> {
     let n = widths.lattice.sites();
     (0..n)
         .into_par_iter()
         .map(|iy| {
             let row = widths.width_nm.row(iy);
-            let mut sites = row
+            let mut pillars = row
                 .iter()
                 .enumerate()
                 .filter(|(_, w)| **w != 0)
                 .filter_map(|(ix, &width_nm)| {
-                    let site = iy * n + ix;
-                    Some((Pillar { site, width_nm }, phase.wrapped(ix, iy)?))
+                    Some(Pillar {
+                        site: iy * n + ix,
+                        width_nm,
+                        design_turns: phase.wrapped(ix, iy)?,
+                    })
                 });
-            fold(&mut sites)
+            fold(&mut pillars)
         })
         .collect()
 }

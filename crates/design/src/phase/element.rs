@@ -14,7 +14,8 @@ pub struct LensPhase {
     /// Greatest squared radius inside the lens, in squared half pitches.
     limit: i64,
     turns: Vec<f64>,
-    stride: i64,
+    /// Entries are this power of two apart in squared half pitches: a shift, since this is done for each pillar.
+    stride_log2: u32,
     offset: i64,
 }
 
@@ -24,25 +25,25 @@ impl LensPhase {
         // r^2 <= R^2 in half pitches: (2 R / p)^2, floored; exact in integers.
         let (d, p) = (i128::from(diameter_nm), i128::from(lattice.pitch_nm()));
         let limit = (d * d / (p * p)) as i64;
-        let (stride, offset) = if lattice.sites().is_multiple_of(2) {
-            (8, 2)
+        let (stride_log2, offset) = if lattice.sites().is_multiple_of(2) {
+            (3, 2)
         } else {
-            (4, 0)
+            (2, 0)
         };
         let half_pitch_um = lattice.pitch_um() / 2.0;
         let entries = if limit < offset {
             0
         } else {
-            (limit - offset) / stride + 1
+            ((limit - offset) >> stride_log2) + 1
         };
         let turns = (0..entries)
-            .map(|k| radial.turns((k * stride + offset) as f64 * half_pitch_um * half_pitch_um))
+            .map(|k| radial.turns(((k << stride_log2) + offset) as f64 * half_pitch_um * half_pitch_um))
             .collect();
         Self {
             lattice,
             limit,
             turns,
-            stride,
+            stride_log2,
             offset,
         }
     }
@@ -55,7 +56,7 @@ impl LensPhase {
     /// Phase at a site (turns), not reduced; none outside the lens.
     pub fn turns(&self, ix: usize, iy: usize) -> Option<f64> {
         let r2 = self.lattice.half_radius2(ix, iy);
-        (r2 <= self.limit).then(|| self.turns[((r2 - self.offset) / self.stride) as usize])
+        (r2 <= self.limit).then(|| self.turns[((r2 - self.offset) >> self.stride_log2) as usize])
     }
 }
 

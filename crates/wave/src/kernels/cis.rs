@@ -5,7 +5,7 @@
 //! Loops go through `pulp`, which picks the widest vectors of the machine at run time; none of them
 //! contracts or reorders arithmetic, so every machine gets the same bits.
 
-use num_complex::Complex32;
+use num_complex::{Complex32, Complex64};
 
 /// Largest error of the real or the imaginary part of [`cis`]: two roundings of a number of size one in single
 /// precision.
@@ -57,6 +57,17 @@ pub fn cis_all(turns: &[f64], out: &mut [Complex32]) {
     });
 }
 
+/// `out[i] = exp(2 pi i turns[i])`, zero where `turns` is NaN.
+pub(crate) fn cis_where(turns: &[f32], out: &mut [Complex32]) {
+    pulp::Arch::new().dispatch(|| {
+        for (o, &t) in out.iter_mut().zip(turns) {
+            let passes = if t.is_nan() { 0.0 } else { 1.0 };
+            let v = cis(if t.is_nan() { 0.0 } else { f64::from(t) });
+            *o = Complex32::new(passes * v.re, passes * v.im);
+        }
+    });
+}
+
 /// `a[i] *= b[i]`.
 pub(crate) fn multiply(a: &mut [Complex32], b: &[Complex32]) {
     pulp::Arch::new().dispatch(|| {
@@ -93,6 +104,29 @@ pub(crate) fn accumulate(sum: &mut [Complex32], a: &[Complex32], b: &[Complex32]
             s.im += v.im;
         }
     });
+}
+
+/// Sum of a[i] conj(b[i]), in an order that does not depend on the machine.
+pub(crate) fn product_sum(a: &[Complex32], b: &[Complex32]) -> Complex64 {
+    const LANES: usize = 16;
+    let (mut re, mut im) = ([0.0f32; LANES], [0.0f32; LANES]);
+    pulp::Arch::new().dispatch(|| {
+        let mut add = |i: usize, a: &Complex32, b: &Complex32| {
+            re[i] += a.re * b.re + a.im * b.im;
+            im[i] += a.im * b.re - a.re * b.im;
+        };
+        let (a_lanes, b_lanes) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+        for (i, (a, b)) in a_lanes.remainder().iter().zip(b_lanes.remainder()).enumerate() {
+            add(i, a, b);
+        }
+        for (a, b) in a_lanes.zip(b_lanes) {
+            for i in 0..LANES {
+                add(i, &a[i], &b[i]);
+            }
+        }
+    });
+    let sum = |lanes: &[f32]| lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
+    Complex64::new(sum(&re), sum(&im))
 }
 
 /// A product without the checks for infinities.

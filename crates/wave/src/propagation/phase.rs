@@ -3,11 +3,12 @@
 use std::f64::consts::TAU;
 
 use metalith_core::Lattice;
+use ndarray::Array2;
 use num_complex::Complex32;
 
 use super::Aperture;
 use super::aperture::sites_inside;
-use crate::kernels::cis_all;
+use crate::kernels::{cis_all, cis_where};
 
 /// A phase as a function of place, such as the design before mapping and rounding, with the same
 /// amplitude everywhere inside a circle.
@@ -51,5 +52,44 @@ impl<F: Fn(f64, f64) -> f64 + Sync> Aperture for PhaseFunction<F> {
                 *t = Complex32::new(t.re * amplitude, t.im * amplitude);
             }
         }
+    }
+}
+
+/// A phase that is known at each site, with modulus one where there is one.
+#[derive(Clone, Debug)]
+pub struct PhaseMap {
+    lattice: Lattice,
+    radius_um: f64,
+    /// Turns, within half a turn of zero, so that single precision keeps 4e-7 rad; NaN where nothing passes.
+    turns: Array2<f32>,
+}
+
+impl PhaseMap {
+    /// `turns` is the phase at column `ix` and row `iy`, not reduced; nothing passes where there is none. No site that
+    /// passes light may be farther from the centre than `radius_um`.
+    pub fn new(lattice: Lattice, radius_um: f64, turns: impl Fn(usize, usize) -> Option<f64>) -> Self {
+        let n = lattice.sites();
+        let reduced = |turns: f64| (turns - turns.round()) as f32;
+        Self {
+            lattice,
+            radius_um,
+            turns: Array2::from_shape_fn([n; 2], |(iy, ix)| turns(ix, iy).map_or(f32::NAN, reduced)),
+        }
+    }
+}
+
+impl Aperture for PhaseMap {
+    fn lattice(&self) -> Lattice {
+        self.lattice
+    }
+
+    fn radius_um(&self) -> f64 {
+        self.radius_um
+    }
+
+    fn fill_row(&self, iy: usize, row: &mut [Complex32]) {
+        let turns = self.turns.row(iy);
+        let turns = turns.to_slice().expect("rows are contiguous");
+        cis_where(turns, row);
     }
 }

@@ -23,28 +23,40 @@ impl Steepness {
         let mut found = Self::default();
         let mut nearest2 = i64::MAX;
         let half = |i: usize| 2 * i as i64 - (sites as i64 - 1);
-        let line = |iy: usize| (0..sites).map(|ix| turns(ix, iy)).collect::<Vec<_>>();
-        let mut here = line(0);
+        // NaN where there is no phase, beyond the last row and column too: `f64::max` leaves it out.
+        let fill = |line: &mut [f64], iy: usize| {
+            for (ix, value) in line[..sites].iter_mut().enumerate() {
+                *value = turns(ix, iy).unwrap_or(f64::NAN);
+            }
+        };
+        let mut here = vec![f64::NAN; sites + 1];
+        let mut above = here.clone();
+        let mut largest_step: f64 = 0.0;
+        if sites > 0 {
+            fill(&mut here, 0);
+        }
         for iy in 0..sites {
-            let above = if iy + 1 < sites {
-                line(iy + 1)
+            if iy + 1 < sites {
+                fill(&mut above, iy + 1);
             } else {
-                vec![None; sites]
-            };
-            for (ix, phase) in here.iter().enumerate() {
-                let Some(phase) = phase else { continue };
+                above.fill(f64::NAN);
+            }
+            for ix in 0..sites {
+                let phase = here[ix];
+                if phase.is_nan() {
+                    continue;
+                }
                 found.sites += 1;
-                let right = here.get(ix + 1).copied().flatten();
-                let steps = [right, above[ix]].into_iter().flatten();
-                let step = steps.map(|next| (next - phase).abs()).fold(0.0, f64::max);
-                found.largest_step_rad = found.largest_step_rad.max(step * std::f64::consts::TAU);
+                let step = (here[ix + 1] - phase).abs().max((above[ix] - phase).abs());
+                largest_step = largest_step.max(step);
                 if step > 0.5 {
                     found.steep_sites += 1;
                     nearest2 = nearest2.min(half(ix).pow(2) + half(iy).pow(2));
                 }
             }
-            here = above;
+            std::mem::swap(&mut here, &mut above);
         }
+        found.largest_step_rad = largest_step * std::f64::consts::TAU;
         found.from_pitches = (found.steep_sites > 0).then(|| 0.5 * (nearest2 as f64).sqrt());
         found
     }

@@ -4,12 +4,13 @@ use ndarray::ArrayViewMut2;
 use num_complex::Complex32;
 
 use super::{Fold, LANES};
-use crate::kernels::{accumulate, gather, multiply, process};
+use crate::kernels::{accumulate, gather, multiply, process, product_sum};
 use crate::propagation::{Aperture, PlaneWave, Scratch};
 
 impl Fold {
-    /// Folds and transforms along x; leaves the kept columns in tiles of `LANES` columns by all rows.
-    pub(super) fn rows_forward(&self, aperture: &dyn Aperture, wave: &PlaneWave, scratch: &mut Scratch) {
+    /// Folds and transforms along x; leaves the kept columns in tiles of `LANES` columns by all rows. Gives the power
+    /// that the aperture passes of a wave of unit amplitude (um^2).
+    pub(super) fn rows_forward(&self, aperture: &dyn Aperture, wave: &PlaneWave, scratch: &mut Scratch) -> f64 {
         let (n, m, residues) = (self.lattice.sites(), self.band.bins, self.residues());
         self.fill_wave(wave, scratch);
         let Scratch {
@@ -26,10 +27,12 @@ impl Fold {
         spectrum.resize(self.blocks() * LANES, Complex32::ZERO);
         tiles.resize(self.blocks() * residues * LANES, Complex32::ZERO);
         let folded = &mut columns[..m];
+        let mut power = 0.0;
         for r in 0..residues {
             folded.fill(Complex32::ZERO);
             for iy in (r..n).step_by(m) {
                 aperture.fill_row(iy, row);
+                power += product_sum(row, row).re;
                 for (part, wave) in row.chunks(m).zip(wave_x.chunks(m)) {
                     accumulate(&mut folded[..part.len()], part, wave, wave_y[iy]);
                 }
@@ -41,6 +44,7 @@ impl Fold {
                 tiles[at..at + LANES].copy_from_slice(lanes);
             }
         }
+        power * self.lattice.pitch_um().powi(2)
     }
 
     /// Transforms along y, sends each frequency to the sensor, shows it to `observe`, and forms the window's rows of each column.

@@ -27,7 +27,7 @@ use super::{Accuracy, Aperture, Fade, Field, PlaneWave, Propagator, Scratch, Win
 use crate::error::{Result, WaveError};
 use crate::kernels::cis_all;
 
-pub use otf::{Otf, power_um2};
+pub use otf::Otf;
 
 /// Columns that travel together between the two transforms: one cache line of samples.
 pub(super) const LANES: usize = 8;
@@ -116,11 +116,12 @@ impl Fold {
         scratch: &mut Scratch,
         values: ArrayViewMut2<Complex32>,
     ) -> Result<()> {
-        self.field_observed(aperture, wave, scratch, values, &mut |_| {})
+        self.field_observed(aperture, wave, scratch, values, &mut |_| {})?;
+        Ok(())
     }
 
     /// The same, where `observe` sees the spectrum of the field at the sensor, column by column: all rows of the band,
-    /// the phase counted from the window's middle.
+    /// the phase counted from the window's middle. Gives the power that the aperture passes (um^2).
     fn field_observed(
         &self,
         aperture: &dyn Aperture,
@@ -128,7 +129,7 @@ impl Fold {
         scratch: &mut Scratch,
         mut values: ArrayViewMut2<Complex32>,
         observe: &mut dyn FnMut(&[Complex32]),
-    ) -> Result<()> {
+    ) -> Result<f64> {
         check_wave(wave, self.wavelength_um)?;
         if aperture.lattice() != self.lattice {
             return Err(WaveError::Lattice {
@@ -144,10 +145,10 @@ impl Fold {
                 wanted: [samples; 2],
             });
         }
-        self.rows_forward(aperture, wave, scratch);
+        let power_um2 = self.rows_forward(aperture, wave, scratch);
         self.columns_forward(scratch, observe);
         self.window_rows(scratch, &mut values);
-        Ok(())
+        Ok(power_um2)
     }
 
     fn finished(&self, values: Array2<Complex32>, wave: &PlaneWave) -> Field {

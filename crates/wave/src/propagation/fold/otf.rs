@@ -5,12 +5,12 @@
 //! (Goodman, Introduction to Fourier Optics, ch. 6). The spectrum is at hand before the window is formed, with all
 //! rays that land within the fade; light beyond it is a veil without contrast, and counts in the power alone.
 
-use metalith_core::Lattice;
 use ndarray::Array2;
 use num_complex::{Complex32, Complex64};
 
 use super::Fold;
 use crate::error::Result;
+use crate::kernels::product_sum;
 use crate::propagation::{Aperture, Field, PlaneWave, Scratch};
 
 /// Transfer of all the light that an element passes, at some frequencies.
@@ -82,7 +82,7 @@ impl Fold {
         shifts.dedup();
         let mut correlation = Correlation::new(shifts, self.band.count[1]);
         let mut values = Array2::zeros([self.window.samples; 2]);
-        self.field_observed(aperture, wave, scratch, values.view_mut(), &mut |column| {
+        let power_um2 = self.field_observed(aperture, wave, scratch, values.view_mut(), &mut |column| {
             correlation.add(column)
         })?;
         let transform_um2 = [0, 1].map(|axis| {
@@ -96,22 +96,10 @@ impl Fold {
         let otf = Otf {
             lp_mm: lp_mm.to_vec(),
             transform_um2,
-            power_um2: power_um2(aperture),
+            power_um2,
         };
         Ok((self.finished(values, wave), otf))
     }
-}
-
-/// Power that an aperture passes of a wave of unit amplitude (um^2).
-pub fn power_um2(aperture: &dyn Aperture) -> f64 {
-    let lattice: Lattice = aperture.lattice();
-    let mut row = vec![Complex32::ZERO; lattice.sites()];
-    let mut sum = 0.0;
-    for iy in 0..lattice.sites() {
-        aperture.fill_row(iy, &mut row);
-        sum += row.iter().map(|t| f64::from(t.norm_sqr())).sum::<f64>();
-    }
-    sum * lattice.pitch_um().powi(2)
 }
 
 /// Autocorrelation of a spectrum that comes column by column, at some shifts along x and along y.
@@ -157,24 +145,10 @@ impl Correlation {
     }
 }
 
-/// Sum of a[i] conj(b[i]), in an order that does not depend on the machine.
-fn product_sum(a: &[Complex32], b: &[Complex32]) -> Complex64 {
-    const LANES: usize = 16;
-    let (mut re, mut im) = ([0.0f32; LANES], [0.0f32; LANES]);
-    pulp::Arch::new().dispatch(|| {
-        for (a, b) in a.chunks(LANES).zip(b.chunks(LANES)) {
-            for (i, (a, b)) in a.iter().zip(b).enumerate() {
-                re[i] += a.re * b.re + a.im * b.im;
-                im[i] += a.im * b.re - a.re * b.im;
-            }
-        }
-    });
-    let sum = |lanes: &[f32]| lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
-    Complex64::new(sum(&re), sum(&im))
-}
-
 #[cfg(test)]
 mod tests {
+    use metalith_core::Lattice;
+
     use super::*;
     use crate::propagation::{Accuracy, PhaseFunction, Propagator, Window};
     use crate::psf::Psf;
