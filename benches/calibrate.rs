@@ -9,7 +9,7 @@ use metalith::calibrate::{MeasuredSet, Sampling, Session, Settings, Synthesizer}
 fn calibration(c: &mut Criterion) {
     let folder = tempfile::tempdir().expect("a folder");
     metalith_testing::session::small_set(folder.path());
-    let like = MeasuredSet::read(folder.path(), &Silent).expect("a set");
+    let like = MeasuredSet::read(folder.path(), &metalith::extract::GdsPillars, &Silent).expect("a set");
     let settings = Settings {
         sampling: Sampling {
             spectrum: 0.34,

@@ -8,6 +8,7 @@ use metalith::calibrate::{
     Calibration, MeasuredSet, SetVerdict, Settings, ValidationPlan, calibrate, validate, write_validation,
 };
 use metalith::cell::cache_folder;
+use metalith::extract::GdsPillars;
 
 use super::{Outcome, Terminal, print_json, print_line};
 
@@ -75,7 +76,7 @@ pub fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> {
         ..Settings::default()
     };
     if args.validate {
-        let (set, out) = (MeasuredSet::read(&args.sets[0], terminal)?, &outs[0]);
+        let (set, out) = (MeasuredSet::read(&args.sets[0], &GdsPillars, terminal)?, &outs[0]);
         let plan = ValidationPlan {
             nulls: args.nulls,
             effects: args.effects.clone(),
@@ -93,7 +94,7 @@ pub fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> {
         return Ok(Outcome::Fine);
     }
     let mut outcome = Outcome::Fine;
-    for done in calibrate(&args.sets, &outs, &settings, terminal)? {
+    for done in calibrate(&args.sets, &outs, &settings, &GdsPillars, terminal)? {
         terminal.clear();
         if args.json {
             print_line!("{}", serde_json::to_string_pretty(&done.diagnosis).unwrap_or_default());

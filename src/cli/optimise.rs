@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use metalith::cell::{RigorousCell, cache_folder};
 use metalith::optimise::{
-    Checkpoint, Deconvolution, Findings, Judged, Optimised, OverWavelength, Task, cells_off_height, mean_and_deviation,
-    views, wavelengths, write_phase_table,
+    Checkpoint, Deconvolution, Findings, Judged, Optimised, OverWavelength, Task, cells_off_height, lens_alone,
+    mean_and_deviation, views, wavelengths, write_phase_table,
 };
 use metalith::report::sig;
-use metalith::{CellModel, Design, Fidelity, Result, cell_models};
+use metalith::verify::read_back;
+use metalith::{CellModel, Design, Fidelity, Hierarchy, PillarArray, Result, cell_models, write_pillars};
 
 use super::{Outcome, Terminal, print_json, print_line};
 
@@ -180,8 +181,12 @@ fn findings(
         ])
     };
     let (before, mut after) = (judge(&task.reference_turns)?, judge(&found.turns)?);
+    let alone = lens_alone(design, phase)?;
+    let array = PillarArray::build(&alone, terminal)?;
     let layout = folder.join("lens.gds");
-    after.push(task.judge_layout(design, phase, &layout, cells.rigorous(), terminal)?);
+    write_pillars(&alone, &array, Hierarchy::Folded, &layout, terminal)?;
+    let read = read_back(&alone, &array, &layout, terminal)?;
+    after.push(task.judge_layout(&read.elements[0].widths, cells.rigorous())?);
     let limits = [0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5];
     let over_limit = task.merit_over_limit(&cells.all(), &found.turns, &limits, terminal)?;
     let reference_widths = task.widths_nm(&task.reference_turns);

@@ -7,6 +7,7 @@ use assert_cmd::Command;
 use metalith::calibrate::{Bench, MeasuredSet, Sampling, Stage, all_effects};
 use metalith::compensate::{compensate, compensation_cases};
 use metalith::design::CellIncidence;
+use metalith::extract::GdsPillars;
 use metalith::made::{CalibratedModel, MadeChip, Perturbation};
 use metalith::verify::{Lighting, SimulationCase, single_psfs};
 use metalith::wave::{Scratch, Window};
@@ -61,7 +62,7 @@ impl Files {
         let layout = folder.join("few.gds");
         write_pillars(&design, &array, design.layout.hierarchy, &layout, &Silent).unwrap();
         small_set(folder);
-        let mut set = MeasuredSet::read(folder, &Silent).unwrap();
+        let mut set = MeasuredSet::read(folder, &GdsPillars, &Silent).unwrap();
         // The same chip on a bench: pillars of this layout, openings as the design has them.
         let found = metalith::verify::read_back(&design, &array, &layout, &Silent).unwrap();
         for element in &mut set.elements {

@@ -5,8 +5,9 @@ use std::path::Path;
 
 use assert_cmd::Command;
 use metalith::cell::PublishedCell;
-use metalith::optimise::{Checkpoint, Task};
-use metalith::{Design, Silent};
+use metalith::optimise::{Checkpoint, Task, lens_alone};
+use metalith::verify::read_back;
+use metalith::{Design, Hierarchy, PillarArray, Silent, write_pillars};
 
 const EXCHANGE: &str = "[optimise]\ncell = \"published\"\nstep_nm = 5\nchains = 3\nhot_sweeps = 12\nseed = 4\n";
 
@@ -53,7 +54,11 @@ fn the_phase_of_the_command_becomes_a_layout_that_keeps_the_limit() {
     let (task, cell) = (Task::of(&design).unwrap(), PublishedCell::new(350));
     let rings = task.judge_rings(&task.own_turns, &cell).unwrap();
     let layout = folder.path().join("lens.gds");
-    let found = task.judge_layout(&design, &phases[0], &layout, &cell, &Silent).unwrap();
+    let alone = lens_alone(&design, &phases[0]).unwrap();
+    let array = PillarArray::build(&alone, &Silent).unwrap();
+    write_pillars(&alone, &array, Hierarchy::Folded, &layout, &Silent).unwrap();
+    let read = read_back(&alone, &array, &layout, &Silent).unwrap();
+    let found = task.judge_layout(&read.elements[0].widths, &cell).unwrap();
     assert!(found.largest_step_turns <= 0.2 + 1e-6, "{}", found.largest_step_turns);
     assert!((found.geometric_mean / rings.geometric_mean - 1.0).abs() < SAME);
 }

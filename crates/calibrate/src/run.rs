@@ -7,7 +7,7 @@ use crate::effects;
 use crate::page::write_page;
 use crate::session::{Session, Settings, Simulations, check_effects};
 use crate::set::MeasuredSet;
-use metalith_core::{Progress, Result};
+use metalith_core::{PillarReader, Progress, Result};
 use metalith_made::CalibratedModel;
 
 /// The files of a calibration.
@@ -23,7 +23,7 @@ pub struct Calibration {
 }
 
 /// Read the sets at `paths`, find what the model lacks, and write diagnosis, report and model of each to its
-/// folder of `outs`. Sessions of one plan share their simulations.
+/// folder of `outs`. Sessions of one plan share their simulations. `layouts` reads the layouts that the sets name.
 ///
 /// # Errors
 /// Every fault of a set at once, and all unknown names of effects; else if a cell cannot be solved, a file
@@ -32,11 +32,12 @@ pub fn calibrate(
     paths: &[PathBuf],
     outs: &[PathBuf],
     settings: &Settings,
+    layouts: &dyn PillarReader,
     progress: &dyn Progress,
 ) -> Result<Vec<Calibration>> {
     let sets = paths
         .iter()
-        .map(|p| MeasuredSet::read(p, progress))
+        .map(|p| MeasuredSet::read(p, layouts, progress))
         .collect::<Result<Vec<_>>>()?;
     for set in &sets {
         check_effects(&effects::all(set), &settings.only)?;

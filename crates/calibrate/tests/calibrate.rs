@@ -9,6 +9,7 @@ use metalith_calibrate::{
     ValidationPlan, calibrate, validate,
 };
 use metalith_core::Silent;
+use metalith_gds::extract::GdsPillars;
 use metalith_testing::session::{PIXELS, small_set, write_npy};
 use ndarray::Array2;
 
@@ -16,7 +17,7 @@ use ndarray::Array2;
 fn every_fault_of_a_set_is_named_in_one_go() {
     let folder = tempfile::tempdir().unwrap();
     let path = small_set(folder.path());
-    assert!(MeasuredSet::read(folder.path(), &Silent).is_ok());
+    assert!(MeasuredSet::read(folder.path(), &GdsPillars, &Silent).is_ok());
     fs::remove_file(folder.path().join("e0_500_z0.npy")).unwrap();
     write_npy(
         &folder.path().join("e0_500_z1.npy"),
@@ -34,7 +35,7 @@ fn every_fault_of_a_set_is_named_in_one_go() {
         .replace("index = [1, 0]\n", "index = [1, 0]\ncolour = \"red\"\n")
         .replacen("element = [1, 0]", "element = [7, 0]", 1);
     fs::write(&path, text).unwrap();
-    let error = MeasuredSet::read(folder.path(), &Silent).unwrap_err();
+    let error = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap_err();
     assert_eq!(error.exit_code(), 2);
     let error = error.to_string();
     for fault in [
@@ -65,7 +66,7 @@ static FOLDERS: LazyLock<[PathBuf; 2]> = LazyLock::new(|| {
 static LIKE: LazyLock<MeasuredSet> = LazyLock::new(|| {
     let [folder, _] = &*FOLDERS;
     small_set(folder);
-    MeasuredSet::read(folder, &Silent).unwrap()
+    MeasuredSet::read(folder, &GdsPillars, &Silent).unwrap()
 });
 
 /// With some of the effects whose cells need not be solved again.
@@ -241,7 +242,9 @@ fn unknown_effects_are_refused_all_at_once() {
         ..ValidationPlan::default()
     };
     let outs = [FOLDERS[0].join("out")];
-    let by_run = calibrate(&FOLDERS[..1], &outs, &settings, &Silent).err().unwrap();
+    let by_run = calibrate(&FOLDERS[..1], &outs, &settings, &GdsPillars, &Silent)
+        .err()
+        .unwrap();
     let by_validation = validate(&LIKE, &self::settings(), &plan, &Silent).err().unwrap();
     // A validation knows the effects that are tried; a session all of them.
     for (error, known) in [

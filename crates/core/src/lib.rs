@@ -9,6 +9,7 @@ mod lattice;
 mod layer;
 #[cfg(feature = "npy")]
 pub mod npy;
+mod pillars;
 mod plane;
 mod progress;
 pub mod srgb;
@@ -22,6 +23,7 @@ pub use error::{Error, Result};
 pub use file::{WholeFile, WholeFolder};
 pub use lattice::{Lattice, WidthMap};
 pub use layer::LayerNumber;
+pub use pillars::{ElementSite, PillarReader};
 pub use plane::part;
 pub use progress::{Progress, Silent};
 pub use wedge::Wedge;

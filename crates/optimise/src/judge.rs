@@ -9,13 +9,9 @@ use super::limit::{largest_step, largest_step_in_layout};
 use super::robust;
 use super::run::Task;
 use metalith_cell::{CellModel, Fidelity};
-use metalith_core::{Progress, Result};
-use metalith_design::array::PillarArray;
+use metalith_core::{Result, WidthMap};
+use metalith_design::Design;
 use metalith_design::phase::{Interpolation, RadialPhase};
-use metalith_design::{Design, Hierarchy};
-use metalith_gds::Layout;
-use metalith_gds::extract::{ElementSite, ExtractionPlan, extract};
-use metalith_layout::write_pillars;
 
 /// Strehl ratio over wavelength of one phase, judged in one way.
 #[derive(Clone, Debug, Serialize)]
@@ -50,6 +46,17 @@ impl Judged {
     }
 }
 
+/// The design of a lens alone, with the phase in `table`.
+///
+/// # Errors
+/// If the table cannot be read.
+pub fn lens_alone(design: &Design, table: &Path) -> Result<Design> {
+    let mut alone = design.clone();
+    alone.lens.phase = RadialPhase::read_table(table, Interpolation::Nearest, design.lens.radius_um())?;
+    alone.array.count = (1, 1);
+    Ok(alone)
+}
+
 impl Task {
     fn judging_wavelengths(&self) -> Vec<f64> {
         judging_wavelengths(self.spec.band_um.0 * 1e3, self.spec.band_um.1 * 1e3)
@@ -65,34 +72,13 @@ impl Task {
         Ok(Judged::new("rings", cell.fidelity(), strehl, largest_step(turns)))
     }
 
-    /// From a layout: the lens is written as the design's array of one element, read back, and summed over
-    /// every pillar. `layout` is where the file goes; `table` is the phase file that its design reads.
+    /// From the pillars of a layout of the lens alone, summed over every pillar.
     ///
     /// # Errors
-    /// If a file cannot be written or read, or the cell does not cover the band.
-    pub fn judge_layout(
-        &self,
-        design: &Design,
-        table: &Path,
-        layout: &Path,
-        cell: &dyn CellModel,
-        progress: &dyn Progress,
-    ) -> Result<Judged> {
-        let mut alone = design.clone();
-        alone.lens.phase = RadialPhase::read_table(table, Interpolation::Nearest, design.lens.radius_um())?;
-        alone.array.count = (1, 1);
-        let array = PillarArray::build(&alone, progress)?;
-        write_pillars(&alone, &array, Hierarchy::Folded, layout, progress)?;
-        let sites = array.placed.iter().map(|placed| ElementSite {
-            name: placed.element.label(),
-            centre_nm: [placed.element.centre_nm.0, placed.element.centre_nm.1],
-            lattice: array.lattice,
-        });
-        let plan = ExtractionPlan::given(alone.layout.layers.pillars.number(), sites.collect());
-        let found = extract(&Layout::open(layout)?, &plan, progress)?;
-        let widths = &found.elements[0].widths;
-        let strehl = self.lens.strehl_of_layout(widths, cell, &self.judging_wavelengths())?;
-        let step = largest_step_in_layout(widths, &self.mapping)?;
+    /// If a width is none that a phase is mapped to, or the cell does not cover the band.
+    pub fn judge_layout(&self, pillars: &WidthMap, cell: &dyn CellModel) -> Result<Judged> {
+        let strehl = self.lens.strehl_of_layout(pillars, cell, &self.judging_wavelengths())?;
+        let step = largest_step_in_layout(pillars, &self.mapping)?;
         Ok(Judged::new("layout", cell.fidelity(), strehl, step))
     }
 

@@ -60,7 +60,7 @@ pub use exchange::{Exchange, Schedule};
 pub use field::{Condition, FieldProblem, Kind, Row};
 pub use focus::{FabricationError, Lens, Strehl, judging_wavelengths, wavelengths};
 pub use imaging::Transfer;
-pub use judge::Judged;
+pub use judge::{Judged, lens_alone};
 pub use kernel::RingField;
 pub use limit::{StepLimit, largest_step, largest_step_in_layout};
 pub use mapping::{Choice, Mapping, step};

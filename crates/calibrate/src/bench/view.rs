@@ -61,6 +61,7 @@ mod tests {
     use crate::simulator::Simulator;
     use metalith_cell::{CellModel, PublishedCell};
     use metalith_core::Silent;
+    use metalith_gds::extract::GdsPillars;
     use metalith_wave::{Accuracy, Scratch, Window};
     use num_complex::Complex64;
 
@@ -81,7 +82,7 @@ mod tests {
     fn captures_show_what_the_made_chip_makes_of_every_effect() {
         let folder = tempfile::tempdir().unwrap();
         metalith_testing::session::small_set(folder.path());
-        let mut set = MeasuredSet::read(folder.path(), &Silent).unwrap();
+        let mut set = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
         // One wavelength and a point source: what is left is chip, path and camera.
         set.leds.iter_mut().for_each(|led| led.fwhm_nm = 1e-6);
         set.divergence_rad = 0.0;

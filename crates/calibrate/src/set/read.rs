@@ -6,9 +6,7 @@ use super::{Capture, Led, MeasuredElement, MeasuredSet, RelayCamera, Stack, fram
 use super::{ElementIndex, LedIndex, PerElement, PerLed};
 use metalith_cell::Material;
 use metalith_core::document::{Document, Limits, Section, load};
-use metalith_core::{Lattice, Progress, Result, WidthMap};
-use metalith_gds::extract::{ElementSite, ExtractionPlan, extract};
-use metalith_gds::{LayerNumber, Layout};
+use metalith_core::{ElementSite, Lattice, LayerNumber, PillarReader, Progress, Result, WidthMap};
 
 /// Version of the format that is read.
 const SCHEMA: i64 = 1;
@@ -18,23 +16,23 @@ const SCHEMA: i64 = 1;
 pub(super) const SPECTRUM_SIGMAS: f64 = 3.2;
 
 impl MeasuredSet {
-    /// Read the set in `folder`, or the `measurement.toml` given.
+    /// Read the set in `folder`, or the `measurement.toml` given; `layouts` reads the layout that it names.
     ///
     /// # Errors
     /// [`metalith_core::Error::Text`] with every fault of the text, the captures, the tables and the layout, each at
     /// the line that names it.
-    pub fn read(folder: &Path, progress: &dyn Progress) -> Result<Self> {
+    pub fn read(folder: &Path, layouts: &dyn PillarReader, progress: &dyn Progress) -> Result<Self> {
         let path = if folder.is_dir() {
             folder.join("measurement.toml")
         } else {
             folder.to_owned()
         };
         let text = load(&path)?;
-        Document::read(&path, &text, |root| sections(&path, root, progress))
+        Document::read(&path, &text, |root| sections(&path, root, layouts, progress))
     }
 }
 
-fn sections(path: &Path, root: &Section<'_, '_>, progress: &dyn Progress) -> MeasuredSet {
+fn sections(path: &Path, root: &Section<'_, '_>, layouts: &dyn PillarReader, progress: &dyn Progress) -> MeasuredSet {
     root.integer("schema", SCHEMA..=SCHEMA, "");
     let title = root.text("title");
     let layers = root.section("layout_layers");
@@ -54,7 +52,10 @@ fn sections(path: &Path, root: &Section<'_, '_>, progress: &dyn Progress) -> Mea
     let camera = camera(&root.section("camera"));
     let leds: PerLed<_> = leds(root, film_is_known.then_some(&stack.film)).into();
     let layout = root.file("layout");
-    let elements: PerElement<_> = elements(root, &stack, &layout, pillar_layer, progress).into();
+    let elements: PerElement<_> = {
+        let read = |sites: &[ElementSite]| layouts.pillars(&layout, pillar_layer, sites, progress);
+        elements(root, &stack, &layout, &read).into()
+    };
     let captures = captures(root, &camera, &leds, &elements);
     let (sem, sem_offset_sigma_nm) = widths(root, &elements);
     MeasuredSet {
@@ -181,8 +182,7 @@ fn elements(
     root: &Section<'_, '_>,
     stack: &Stack,
     layout: &Path,
-    layer: LayerNumber,
-    progress: &dyn Progress,
+    read: &dyn Fn(&[ElementSite]) -> Result<Vec<WidthMap>>,
 ) -> Vec<MeasuredElement> {
     let sections = root.sections("element");
     if sections.is_empty() {
@@ -215,7 +215,7 @@ fn elements(
     if !layout.is_file() {
         return elements;
     }
-    let sites = elements
+    let sites: Vec<_> = elements
         .iter()
         .map(|e| ElementSite {
             name: format!("({}, {})", e.index[0], e.index[1]),
@@ -223,11 +223,11 @@ fn elements(
             lattice: e.pillars.lattice,
         })
         .collect();
-    match Layout::open(layout).and_then(|file| extract(&file, &ExtractionPlan::given(layer, sites), progress)) {
+    match read(&sites) {
         Err(e) => root.fault("layout", e.to_string(), "give the layout that was written"),
         Ok(found) => {
-            for ((element, found), s) in elements.iter_mut().zip(found.elements).zip(&sections) {
-                element.pillars = found.widths;
+            for ((element, found), s) in elements.iter_mut().zip(found).zip(&sections) {
+                element.pillars = found;
                 if element.pillars.pillars() == 0 {
                     s.fault(
                         "centre_um",

@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use super::plan::ElementSite;
 use super::sites::Scale;
 use crate::{Cell, Error, ExtractionError, LayerNumber, Layout, Rect, Result, Selection, Shape, Transform, Visitor};
+use metalith_core::ElementSite;
 use metalith_core::{Lattice, Progress};
 
 /// Tiles of the map of occupied places (nm): two elements with an empty tile between them are two. Wider

@@ -12,13 +12,14 @@ mod sites;
 mod survey;
 
 pub use oddity::{Oddities, Oddity, Why};
-pub use plan::{ElementSite, Elements, ExtractedElement, Extraction, ExtractionPlan};
+pub use plan::{Elements, ExtractedElement, Extraction, ExtractionPlan};
 pub use survey::{LayerSummary, Survey, TextSummary};
 
 use std::path::Path;
 
 use crate::{Error, ExtractionError, Layout, Result};
-use metalith_core::Progress;
+pub use metalith_core::ElementSite;
+use metalith_core::{LayerNumber, PillarReader, Progress, WidthMap};
 use pillars::Pillars;
 
 pub use discover::discover;
@@ -45,6 +46,24 @@ pub fn fits(path: &Path, elements: &[ElementSite]) -> Result<()> {
             most: MOST_SITES,
         },
     })
+}
+
+/// Reads pillars out of GDSII files.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct GdsPillars;
+
+impl PillarReader for GdsPillars {
+    fn pillars(
+        &self,
+        layout: &Path,
+        layer: LayerNumber,
+        elements: &[ElementSite],
+        progress: &dyn Progress,
+    ) -> metalith_core::Result<Vec<WidthMap>> {
+        let file = Layout::open(layout)?;
+        let found = extract(&file, &ExtractionPlan::given(layer, elements.to_vec()), progress)?;
+        Ok(found.elements.into_iter().map(|e| e.widths).collect())
+    }
 }
 
 /// Read the pillars of every element out of a layout.

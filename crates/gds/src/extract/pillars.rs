@@ -1,10 +1,11 @@
 //! The visitor that fills the width maps.
 
 use super::oddity::{Oddities, Oddity, Why};
-use super::plan::{ElementSite, ExtractedElement, Extraction, ExtractionPlan};
+use super::plan::{ExtractedElement, Extraction, ExtractionPlan};
 use super::sites::{Scale, Sites, Standing};
 use super::survey::Surveyor;
 use crate::{Cell, LayerNumber, Point, Rect, Shape, Text, Transform, Visitor, rectangle_of, simplified};
+use metalith_core::ElementSite;
 use metalith_core::WidthMap;
 
 /// Puts squares on the sites of elements.

@@ -3,17 +3,7 @@
 use super::oddity::Oddities;
 use super::survey::Survey;
 use crate::{LayerNumber, Selection};
-use metalith_core::{Lattice, WidthMap};
-
-/// Where an element is and which lattice its pillars should stand on.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ElementSite {
-    /// For messages and reports.
-    pub name: String,
-    /// Centre of the lattice in the layout (nm).
-    pub centre_nm: [i64; 2],
-    pub lattice: Lattice,
-}
+use metalith_core::{ElementSite, WidthMap};
 
 /// Where the elements are.
 #[derive(Clone, Debug)]

@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use super::plan::ElementSite;
 use crate::{Layout, Rect, Result};
+use metalith_core::ElementSite;
 
 /// Database unit as `num / den` nanometres: lengths are compared as `database units * num` and `nm * den`.
 #[derive(Clone, Copy, Debug)]
