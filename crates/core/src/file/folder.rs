@@ -118,9 +118,11 @@ impl Drop for WholeFolder {
             // Not finished: what is left of it is of no use.
             let _ = fs::remove_dir_all(&self.part);
         }
-        if self.lock.take().is_some() {
-            // Removed while it is locked: who waits for it sees that its path has another file, and tries again.
+        if let Some(lock) = self.lock.take() {
+            // Removed while it is locked, or another run could hold the file whose name is taken away here, and a
+            // third one a new file of this name.
             let _ = fs::remove_file(&self.places.lock);
+            drop(lock);
         }
     }
 }
