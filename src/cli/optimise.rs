@@ -175,10 +175,11 @@ fn findings(
     terminal: &Terminal,
 ) -> Result<Findings> {
     let judge = |turns: &[f64]| -> Result<Vec<Judged>> {
-        Ok(vec![
-            task.judge_rings(turns, cells.own())?,
-            task.judge_rings(turns, cells.rigorous())?,
-        ])
+        let mut judged = vec![task.judge_rings(turns, cells.own())?];
+        if cells.own().fidelity() != cells.rigorous().fidelity() {
+            judged.push(task.judge_rings(turns, cells.rigorous())?);
+        }
+        Ok(judged)
     };
     let (before, mut after) = (judge(&task.reference_turns)?, judge(&found.turns)?);
     let alone = lens_alone(design, phase)?;
@@ -201,8 +202,7 @@ fn findings(
     let radii = (0..80).map(|i| 0.5 * f64::from(i)).collect::<Vec<_>>();
     terminal_step(terminal, "pictures over wavelength");
     let psf = spectrum.psf(&radii, &fine)?;
-    let window = views(&task.spec, &task.spec.views, 0.0).window;
-    let mtf = spectrum.mtf(window, &coarse)?;
+    let mtf = spectrum.mtf(task.spec.views.pixel_um, &coarse)?;
     let with_errors = with_errors(task, cells, found, terminal)?;
     Ok(Findings {
         design: format!("{}: {}", design.name, design.title),

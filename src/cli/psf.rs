@@ -1,13 +1,17 @@
 //! `metalith psf`: what a layout from anywhere does to light.
 
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::cell::{CellStack, FittedCell, PointwiseCell, PublishedCell};
 use metalith::gds::{LayerNumber, ReadLimits};
+use metalith::rcwa::Material;
 use metalith::report::{count, sig};
 use metalith::verify::{Lighting, SimulationCase, SinglePsfReport, single_psfs, write_single_psf_report};
-use metalith::{Accuracy, CalibratedModel, CellModel, Extraction, ExtractionPlan, Layout, MadeChip, Result, extract};
+use metalith::{
+    Accuracy, CalibratedModel, CellModel, Error, Extraction, ExtractionPlan, Layout, MadeChip, Result, extract,
+};
 
 use super::verify::FidelityArg;
 use super::{Outcome, Terminal, print_line};
@@ -32,36 +36,44 @@ pub struct PsfArgs {
     top: Option<String>,
 
     /// From the pillar tops to the sensor (um).
-    #[arg(long, default_value_t = 2400.0)]
+    #[arg(long, default_value_t = 2400.0, value_parser = between(0.1, 1e6))]
     distance_um: f64,
 
     /// Wavelength (nm); may be given several times.
-    #[arg(long = "wavelength-nm", default_values_t = [455.0, 530.0, 660.0])]
+    #[arg(long = "wavelength-nm", default_values_t = [455.0, 530.0, 660.0], value_parser = between(150.0, 20_000.0))]
     wavelengths_nm: Vec<f64>,
 
     /// Angle of incidence in the x-z plane, in air (degrees).
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = between(-STEEPEST_DEG, STEEPEST_DEG))]
     angle_x_deg: f64,
 
     /// Angle of incidence in the y-z plane, in air (degrees).
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = between(-STEEPEST_DEG, STEEPEST_DEG))]
     angle_y_deg: f64,
 
     /// Middle of the window from the element's axis (um).
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = between(-1e6, 1e6))]
     at_x_um: f64,
 
     /// Middle of the window from the element's axis (um).
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = between(-1e6, 1e6))]
     at_y_um: f64,
 
     /// Samples an axis, one pitch apart.
     #[arg(long, default_value_t = 256)]
     samples: usize,
 
-    /// Height of the pillars (nm), for the rigorous cell.
-    #[arg(long, default_value_t = 700.0)]
+    /// Height of the pillars (nm), for all cells but the published one.
+    #[arg(long, default_value_t = 700.0, value_parser = between(10.0, 10_000.0))]
     height_nm: f64,
+
+    /// Material of the pillars: a name that a design file takes, or a CSV table of its index.
+    #[arg(long, default_value = "sin_luke_2015")]
+    pillar_material: String,
+
+    /// Material of the substrate, likewise.
+    #[arg(long, default_value = "fused_silica_malitson_1965")]
+    substrate_material: String,
 
     /// The cell.
     #[arg(long, value_enum, default_value = "rigorous")]
@@ -74,7 +86,7 @@ pub struct PsfArgs {
 
     /// Diameter of the openings in the metal (um), for a model whose aperture is off its place; that of the circle
     /// around the pillars if left out.
-    #[arg(long)]
+    #[arg(long, value_parser = between(0.1, 1e5))]
     aperture_um: Option<f64>,
 
     /// Solve the cell at the angle of incidence, for both polarisations, instead of along the normal.
@@ -107,11 +119,67 @@ fn layer(text: &str) -> std::result::Result<LayerNumber, String> {
     }
 }
 
+/// Light that is steeper grazes the chip: no detector of an angle is that good, and cosines become zero.
+const STEEPEST_DEG: f64 = 89.0;
+
+/// A number from `low` to `high`.
+fn between(low: f64, high: f64) -> impl Fn(&str) -> std::result::Result<f64, String> + Clone + Send + Sync + 'static {
+    move |text| match text.parse::<f64>() {
+        Ok(value) if (low..=high).contains(&value) => Ok(value),
+        _ => Err(format!("give a number from {low} to {high}")),
+    }
+}
+
 impl PsfArgs {
-    /// The cell of the layout's own pitch, materials of the paper.
+    fn pitch_nm(found: &Extraction) -> u32 {
+        found.elements.first().map_or(350, |e| e.site.lattice.pitch_nm())
+    }
+
+    /// The cell of the layout's own pitch.
     fn stack(&self, found: &Extraction) -> Result<CellStack> {
-        let pitch_nm = found.elements.first().map_or(350, |e| e.site.lattice.pitch_nm());
-        CellStack::paper(f64::from(pitch_nm), self.height_nm)
+        let here = Path::new("");
+        Ok(CellStack {
+            film: Material::resolve(&self.pillar_material, here)?,
+            substrate: Material::resolve(&self.substrate_material, here)?,
+            ..CellStack::paper(f64::from(Self::pitch_nm(found)), self.height_nm)?
+        })
+    }
+
+    /// What no layout says, and is taken from the options or their defaults.
+    fn assumptions(&self, found: &Extraction) -> Vec<(&'static str, String)> {
+        let mut all = vec![
+            ("pitch, as found", format!("{} nm", Self::pitch_nm(found))),
+            (
+                "distance from pillar tops to sensor",
+                format!("{} um", sig(self.distance_um, 6)),
+            ),
+            (
+                "light arrives at",
+                format!(
+                    "({}, {}) deg in air",
+                    sig(self.angle_x_deg, 4),
+                    sig(self.angle_y_deg, 4)
+                ),
+            ),
+        ];
+        let published = self.model.is_none() && matches!(self.fidelity, FidelityArg::Published);
+        let cell = match (&self.model, self.fidelity) {
+            (Some(model), _) => format!("as made, by {}", model.display()),
+            (None, FidelityArg::Published) => "published polynomials for pillars of the paper, no amplitude".into(),
+            (None, FidelityArg::Fitted) => "polynomials fitted to the rigorous cell, no amplitude".into(),
+            (None, FidelityArg::Rigorous) => "rigorous coupled-wave analysis of a lattice of equal pillars".into(),
+        };
+        all.push(("cell", cell));
+        if !published {
+            let stack = format!(
+                "{} nm of {} on {}, lit from there",
+                sig(self.height_nm, 5),
+                self.pillar_material,
+                self.substrate_material
+            );
+            all.push(("pillars", stack));
+        }
+        all
     }
 
     /// What solves it for the pillars as drawn.
@@ -154,6 +222,24 @@ impl PsfArgs {
     }
 }
 
+/// A figure of a layout of which most was left out would be a figure of something else.
+fn mostly_pillars(args: &PsfArgs, found: &Extraction) -> Result<()> {
+    let others = found.oddities.total();
+    if args.extract_only || others <= found.pillars {
+        return Ok(());
+    }
+    Err(Error::invalid(
+        format!(
+            "{}: only {} of {} shapes on layer {} are square pillars on a lattice",
+            args.layout.display(),
+            count(found.pillars),
+            count(found.pillars + others),
+            args.layer
+        ),
+        "name the layer of the pillars with --layer, or look at what else is there with --extract-only --json",
+    ))
+}
+
 pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let layout = Layout::open_with(&args.layout, ReadLimits::default(), terminal)?;
@@ -162,6 +248,8 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
         ..ExtractionPlan::discover(args.layer)
     };
     let found = extract(&layout, &plan, terminal)?;
+    mostly_pillars(args, &found)?;
+    let assumptions = args.assumptions(&found);
     let made = match &args.model {
         Some(path) => Some(MadeChip::new(&args.stack(&found)?, &CalibratedModel::read(path)?)?),
         None => None,
@@ -184,6 +272,7 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             file: &name,
             found: &found,
             psfs: &psfs,
+            assumptions: &assumptions,
             model: model.as_ref(),
         };
         write_single_psf_report(&report, folder)?;
@@ -204,6 +293,7 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             "elements": elements.collect::<Vec<_>>(),
             "other_shapes": found.oddities,
             "psfs": psfs,
+            "assumptions": assumptions.iter().map(|(k, v)| (*k, v.as_str())).collect::<BTreeMap<_, _>>(),
             "model": model,
         });
         print_line!("{json:#}");
@@ -223,6 +313,9 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
         );
     }
     print_line!("{} other shapes on layer {}", count(found.oddities.total()), args.layer);
+    for (what, value) in &assumptions {
+        print_line!("{what}: {value}");
+    }
     for quantity in model.iter().flat_map(|m| &m.not_applied) {
         print_line!("{quantity}");
     }

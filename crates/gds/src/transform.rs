@@ -73,19 +73,30 @@ impl Transform {
     /// Where a rectangle of the cell stands, if it still is an upright one whatever its size.
     #[inline]
     pub fn apply_rect(&self, r: &Rect) -> Option<Rect> {
+        let between = |ax: i64, ay: i64, bx: i64, by: i64| Rect {
+            x0: ax.min(bx),
+            y0: ay.min(by),
+            x1: ax.max(bx),
+            y1: ay.max(by),
+        };
+        // Done for every pillar: without a call of the general case.
+        if let Self::Square { orientation, dx, dy } = *self {
+            let ((ax, ay), (bx, by)) = (turn(orientation, r.x0, r.y0), turn(orientation, r.x1, r.y1));
+            return Some(between(ax + dx, ay + dy, bx + dx, by + dy));
+        }
+        self.general_rect(r).map(|(a, b)| between(a.x, a.y, b.x, b.y))
+    }
+
+    /// Two opposite corners of a rectangle, if it is not turned by less than a quarter.
+    #[inline(never)]
+    fn general_rect(&self, r: &Rect) -> Option<(Point, Point)> {
         if let Self::General { matrix: m, .. } = self
             && m[1] != 0.0
             && m[0] != 0.0
         {
             return None;
         }
-        let (a, b) = (self.apply(Point::new(r.x0, r.y0)), self.apply(Point::new(r.x1, r.y1)));
-        Some(Rect {
-            x0: a.x.min(b.x),
-            y0: a.y.min(b.y),
-            x1: a.x.max(b.x),
-            y1: a.y.max(b.y),
-        })
+        Some((self.apply(Point::new(r.x0, r.y0)), self.apply(Point::new(r.x1, r.y1))))
     }
 
     /// First `inner`, then this; none if the magnification of the chain is beyond limits.

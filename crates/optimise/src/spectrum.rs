@@ -4,14 +4,16 @@ use ndarray::Array2;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::PixelWindow;
 use super::focus::Lens;
-use super::imaging::{Imaging, Room};
 use super::kernel::RingField;
-use super::pupil::Pupil;
 use metalith_cell::CellModel;
-use metalith_core::Result;
+use metalith_core::{Result, WidthMap};
 use metalith_wave::kernels::Bessel;
+use metalith_wave::psf::{CONTRAST_LP_MM, pixel_mtf};
+use metalith_wave::{Accuracy, Fold, Pillars, PlaneWave, Psf, Scratch, Window};
+
+/// Samples of the window about the focus that contrast is computed with; light outside of it counts too.
+const WINDOW_SAMPLES: usize = 128;
 
 /// One lens with each of several phases, over wavelength.
 pub struct OverWavelength<'a> {
@@ -59,28 +61,31 @@ impl OverWavelength<'_> {
             .collect())
     }
 
-    /// MTF at half and at all of the pixels' Nyquist frequency, pixel included: for each phase, one pair for
-    /// each wavelength.
+    /// Contrast of all light with pixels of `pixel_um`, as for the PSFs of a layout: for each phase, one pair for each
+    /// wavelength, at [`CONTRAST_LP_MM`].
     ///
     /// # Errors
     /// If the cell does not cover a wavelength.
-    pub fn mtf(&self, window: PixelWindow, wavelengths_um: &[f64]) -> Result<Vec<Vec<(f64, f64)>>> {
+    pub fn mtf(&self, pixel_um: f64, wavelengths_um: &[f64]) -> Result<Vec<Vec<(f64, f64)>>> {
+        let (rings, focus_um) = (&self.lens.rings, self.lens.gap_um);
+        let lattice = rings.lattice();
+        let radius_um = 0.5e-3 * f64::from(rings.diameter_nm());
+        let pillars: Vec<_> = self.widths_nm.iter().map(|widths| rings.width_map(widths)).collect();
+        let window = Window::about([0.0; 2], lattice.pitch_um(), WINDOW_SAMPLES, focus_um);
+        let contrast = |scratch: &mut Scratch, &wavelength_um: &f64| {
+            let table = self.cell.transmissions(wavelength_um, self.widest())?;
+            let wave = PlaneWave::normal(wavelength_um);
+            let fold = Fold::plan(lattice, radius_um, wavelength_um, window, Accuracy::Fast)?;
+            let mut of = |pillars: &WidthMap| {
+                let psf = Psf::formed(&fold, &Pillars::new(pillars, &table)?, &wave, &CONTRAST_LP_MM, scratch)?;
+                let [half, all] = CONTRAST_LP_MM.map(|f| psf.contrast(0, f) * pixel_mtf(pixel_um, f));
+                Ok((half, all))
+            };
+            pillars.iter().map(&mut of).collect::<Result<Vec<_>>>()
+        };
         let at_wavelength = wavelengths_um
             .par_iter()
-            .map(|&wavelength| {
-                let t = self.cell.transmissions(wavelength, self.widest())?;
-                let pupil = Pupil::new(self.lens, wavelength, 0.0, window, 0.0)?;
-                let pairs = self.widths_nm.iter().map(|widths| {
-                    let (re, im): (Vec<_>, Vec<_>) = widths
-                        .iter()
-                        .map(|&w| (t[usize::from(w)].re as f32, t[usize::from(w)].im as f32))
-                        .unzip();
-                    let h = Imaging::new(&pupil, window, Room::default()).transfer(&re, &im);
-                    let ratio = |i: usize| f64::from(h[i].norm() / h[0].norm());
-                    (ratio(window.pixels / 4), ratio(window.pixels / 2))
-                });
-                Ok(pairs.collect::<Vec<_>>())
-            })
+            .map_init(Scratch::default, contrast)
             .collect::<Result<Vec<_>>>()?;
         Ok((0..self.widths_nm.len())
             .map(|i| at_wavelength.iter().map(|pairs| pairs[i]).collect())

@@ -68,7 +68,8 @@ pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
             .map(|d| (d.element.label(), d.phase.rounding.rms_rad)),
     );
     if let Some((place, reached)) = rounding {
-        let what = format!("rms phase error of rounding, element {place} [rad]");
+        let nothing = if reached.is_nan() { ": it has no pillars" } else { "" };
+        let what = format!("rms phase error of rounding, element {place} [rad]{nothing}");
         checks.push(at_most(
             what,
             "rounding_phase_rms_max_rad",

@@ -11,7 +11,7 @@ use metalith_core::WidthMap;
 use metalith_design::array::WidthRule;
 use metalith_design::phase::ElementPhase;
 
-/// Root mean square and largest magnitude of a phase error over the pillars (rad).
+/// Root mean square and largest magnitude of a phase error over the pillars (rad); not a number if there are none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PhaseError {
     pub rms_rad: f64,
@@ -104,9 +104,10 @@ impl Sums {
             largest: all.largest.max(row.largest),
             count: all.count + row.count,
         });
+        // Of no pillars there is no error, not one of zero.
         PhaseError {
-            rms_rad: (all.squares / all.count.max(1) as f64).sqrt(),
-            largest_rad: all.largest,
+            rms_rad: (all.squares / all.count as f64).sqrt(),
+            largest_rad: if all.count > 0 { all.largest } else { f64::NAN },
         }
     }
 }

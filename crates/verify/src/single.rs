@@ -1,5 +1,6 @@
 //! PSFs of a single layout from anywhere, without a design.
 
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
 
@@ -214,6 +215,8 @@ pub struct SinglePsfReport<'a> {
     pub file: &'a str,
     pub found: &'a Extraction,
     pub psfs: &'a [SinglePsf],
+    /// What no layout says and was taken for granted, and its value.
+    pub assumptions: &'a [(&'static str, String)],
     /// Of the model that chips were made by, if any.
     pub model: Option<&'a ModelStatement>,
 }
@@ -227,6 +230,7 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
         file,
         found,
         psfs,
+        assumptions,
         model,
     } = *report;
     let elements = distinct(found);
@@ -249,6 +253,13 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
             page.note(quantity.to_string());
         }
     }
+    page.section("What is assumed");
+    page.paragraph("A layout holds shapes alone. These were options of the command, or their defaults:");
+    let mut assumed = Table::new([Column::text("Quantity"), Column::text("Value")]);
+    for (what, value) in assumptions {
+        assumed.row([Cell::from(*what), Cell::from(value.as_str())]);
+    }
+    page.table(assumed);
     let mut table = Table::new([
         Column::text("Element"),
         Column::number("Wavelength", "nm"),
@@ -288,6 +299,10 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
         "psf",
         &Numbers {
             psfs,
+            assumptions: assumptions
+                .iter()
+                .map(|(what, value)| (*what, value.as_str()))
+                .collect(),
             oddities: &found.oddities,
             model,
         },
@@ -298,6 +313,7 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
 #[derive(Serialize)]
 struct Numbers<'a> {
     psfs: &'a [SinglePsf],
+    assumptions: BTreeMap<&'a str, &'a str>,
     oddities: &'a metalith_gds::extract::Oddities,
     #[serde(skip_serializing_if = "Option::is_none")]
     model: Option<&'a ModelStatement>,
