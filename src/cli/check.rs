@@ -7,6 +7,7 @@ use metalith::drc::{self, CheckInput, Date, Deck, DrcReport, Waivers};
 use metalith::gds::ReadLimits;
 use metalith::{Design, Layout, Result, WholeFile};
 
+use super::compensated::CompensatedFor;
 use super::{Outcome, Terminal, print_line};
 
 /// Check a layout against design rules.
@@ -30,6 +31,9 @@ pub struct CheckArgs {
     /// The design that the layout should hold; puts the rules in force that compare with it.
     #[arg(long, value_name = "DESIGN.toml")]
     design: Option<PathBuf>,
+
+    #[command(flatten)]
+    compensated: CompensatedFor,
 
     /// Violations that have been accepted.
     #[arg(long, value_name = "WAIVERS.toml")]
@@ -59,7 +63,7 @@ pub struct CheckArgs {
 impl CheckArgs {
     /// Refuse to overwrite what is read.
     fn paths_are_apart(&self) -> Result<()> {
-        let inputs = [&self.rules, &self.design, &self.waivers];
+        let inputs = [&self.rules, &self.design, &self.waivers, &self.compensated.model];
         let inputs = inputs.into_iter().flatten().chain(&self.with).chain([&self.layout]);
         let outputs = [&self.lyrdb, &self.junit, &self.sarif].into_iter().flatten();
         let outputs: Vec<&Path> = outputs.map(PathBuf::as_path).collect();
@@ -71,15 +75,19 @@ pub fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
     args.paths_are_apart()?;
     let deck = args.rules.as_deref().map_or_else(|| Ok(Deck::standard()), Deck::read)?;
     let waivers = args.waivers.as_deref().map(Waivers::read).transpose()?;
-    let design = args.design.as_deref().map(Design::read).transpose()?;
+    let mut design = args.design.as_deref().map(Design::read).transpose()?;
     terminal.stop_on_interrupt();
     let open = |path: &PathBuf| Layout::open_with(path, ReadLimits::default(), terminal);
     let layout = open(&args.layout)?;
     let with = args.with.iter().map(open).collect::<Result<Vec<_>, _>>()?;
+    let array = match &mut design {
+        Some(design) if args.compensated.model.is_some() => Some(args.compensated.array(design, terminal)?),
+        _ => None,
+    };
     let input = CheckInput {
         with: with.iter().collect(),
         design: design.as_ref(),
-        array: None,
+        array: array.as_ref(),
         waivers: waivers.as_ref(),
         today: Date::today(),
         markers: args.markers,

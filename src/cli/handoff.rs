@@ -36,6 +36,11 @@ pub struct HandoffArgs {
     #[arg(long, value_name = "FOLDER")]
     verify: Option<PathBuf>,
 
+    /// Hand over the layout that is compensated for this process: the `model.toml` of `metalith calibrate`. It is judged
+    /// as the process makes it.
+    #[arg(long, value_name = "MODEL")]
+    compensate: Option<PathBuf>,
+
     /// Simulate with errors of 1e-3 instead of 1e-5 of the peak, several times faster.
     #[arg(long)]
     fast: bool,
@@ -65,7 +70,10 @@ pub fn run(args: &HandoffArgs, terminal: &Terminal) -> Result<Outcome> {
 fn make(design: &Path, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcome> {
     let out = match &args.out {
         Some(out) => out.clone(),
-        None => PathBuf::from("out").join(format!("{}_handoff", Design::read(design)?.name)),
+        None => {
+            let suffix = if args.compensate.is_some() { "_compensated" } else { "" };
+            PathBuf::from("out").join(format!("{}{suffix}_handoff", Design::read(design)?.name))
+        }
     };
     let options = HandoffOptions {
         design: design.to_owned(),
@@ -76,6 +84,7 @@ fn make(design: &Path, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcom
             .collect::<Vec<_>>()
             .join(" "),
         waivers: args.waivers.clone(),
+        compensate: args.compensate.clone(),
         fidelity: args.fidelity.into(),
         accuracy: if args.fast { Accuracy::Fast } else { Accuracy::Accurate },
     };

@@ -3,6 +3,7 @@
 mod calibrate;
 mod cells;
 mod check;
+mod compensated;
 mod completions;
 mod diff;
 mod handoff;

@@ -10,11 +10,15 @@ use metalith::{
     cell_models, verify, write_report,
 };
 
+use super::compensated::CompensatedFor;
 use super::{Outcome, Terminal, print_json, print_line};
 
 /// Read a layout back, compare every pillar with its design, simulate it, and write the report.
 #[derive(Args)]
-#[command(after_help = "Example:\n  metalith verify designs/mini_3x3.toml out/mini_3x3/mini_3x3_pillars.gds --fast")]
+#[command(
+    after_help = "Example:\n  metalith verify designs/mini_3x3.toml out/mini_3x3/mini_3x3_pillars.gds --fast\n\n\
+    A compensated layout (--compensated MODEL) is judged as the process makes it, unless --model names another one."
+)]
 pub struct VerifyArgs {
     /// The design file.
     design: PathBuf,
@@ -27,11 +31,14 @@ pub struct VerifyArgs {
     out: Option<PathBuf>,
 
     #[command(flatten)]
+    compensated: CompensatedFor,
+
+    #[command(flatten)]
     judging: Judging,
 }
 
 /// How a layout is judged.
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub struct Judging {
     /// Simulate with errors of 1e-3 instead of 1e-5 of the peak, several times faster.
     #[arg(long)]
@@ -152,13 +159,18 @@ fn summary(found: &Verification, folder: &Path) {
 }
 
 pub fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
-    let design = Design::read(&args.design)?;
+    let mut design = Design::read(&args.design)?;
     metalith::verify::fits(&design, &args.layout)?;
     terminal.stop_on_interrupt();
-    let array = PillarArray::build(&design, terminal)?;
+    let array = args.compensated.array(&mut design, terminal)?;
     let folder = args
         .out
         .clone()
         .unwrap_or_else(|| args.layout.parent().map_or_else(PathBuf::new, Path::to_owned));
-    args.judging.judge(&design, &array, &args.layout, &folder, terminal)
+    // A compensated layout is right when it is made, not as it is drawn.
+    let judging = Judging {
+        model: args.judging.model.clone().or_else(|| args.compensated.model.clone()),
+        ..args.judging.clone()
+    };
+    judging.judge(&design, &array, &args.layout, &folder, terminal)
 }

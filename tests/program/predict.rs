@@ -113,6 +113,33 @@ fn the_program_predicts_and_compensates() {
     for ((a, b), c) in intended.iter().zip(&plain).zip(&corrected) {
         assert!((c / a - 1.0).abs() < 0.2 * (b / a - 1.0).abs() + 1e-3, "{a} {b} {c}");
     }
+    // Such a layout is held to the design as compensated: all pillars are right, and as made it is what was asked for.
+    let pillars = out("made/mini_3x3_compensated_pillars.gds");
+    for (compensated, code) in [(true, 0), (false, 1)] {
+        let with = |command: &mut Command| {
+            if compensated {
+                command.arg("--compensated").arg(&narrow);
+            }
+        };
+        let mut verify = metalith();
+        verify.args(["verify", design]).arg(&pillars).arg("--fast").arg("--out").arg(out("verified"));
+        with(&mut verify);
+        verify.assert().code(code);
+        let mut check = metalith();
+        check.arg("check").arg(&pillars).args(["--design", design]);
+        with(&mut check);
+        check.assert().code(code);
+    }
+    metalith()
+        .args(["handoff", design, "--fast", "--compensate"])
+        .arg(&narrow)
+        .arg("--out")
+        .arg(out("kit"))
+        .assert()
+        .success()
+        .stdout(predicates::str::contains("as made by the calibrated model"));
+    assert!(out("kit/inputs/model_narrow.toml").exists());
+    assert!(out("kit/layout/mini_3x3_compensated_pillars.gds").exists());
     // Judged by the same model, the layout as it was is another lens than by its own cell.
     let run = metalith()
         .args(["run", design, "--fast", "--json", "--model"])

@@ -65,6 +65,7 @@ pub fn compensate(
     let mut line = Line::new(design, model)?;
     let copies = |class: usize| array.placed.iter().filter(|p| p.class == class).count() as u64;
     let mut drawn = array.clone();
+    drawn.compensated = true;
     let mut error = [0.0; 2];
     for pass in 0..PASSES {
         if progress.stopped() {

@@ -14,8 +14,9 @@ use super::{documents, front, layouts, manifest, rules, zip};
 use metalith_cell::Fidelity;
 use metalith_core::{Error, Progress, Result, WholeFolder};
 use metalith_design::array::PillarArray;
-use metalith_design::{Design, cell_models};
+use metalith_design::cell_models;
 use metalith_gds::Layout;
+use metalith_made::MadeChip;
 use metalith_report::{Verdict, write_json};
 use metalith_verify::{SimulationCases, verify_layout, write_report};
 
@@ -62,7 +63,7 @@ fn fill(
     progress: &dyn Progress,
 ) -> Result<Vec<HandoffCheck>> {
     let (design, process) = (&sources.design, &sources.process);
-    let layouts = layouts::write(files, design, process, progress)?;
+    let layouts = layouts::write(files, sources, progress)?;
     let opened = layouts.paths.open(progress)?;
     let census = opened.census(progress)?;
     let documents = documents::write(files, design, process, &layouts, &census)?;
@@ -73,7 +74,7 @@ fn fill(
     checks.push(verification(
         files,
         options,
-        design,
+        sources,
         &layouts.array,
         &opened.pillars,
         progress,
@@ -110,17 +111,28 @@ fn fill(
 fn verification(
     files: &mut Listing,
     options: &HandoffOptions,
-    design: &Design,
+    sources: &Sources,
     array: &PillarArray,
     pillars: &Layout,
     progress: &dyn Progress,
 ) -> Result<HandoffCheck> {
+    let design = &sources.design;
     let mut wanted = vec![options.fidelity];
     if options.fidelity != Fidelity::Published {
         wanted.push(Fidelity::Published);
     }
     let models = cell_models(design, &wanted)?;
-    let cases = SimulationCases::of_cells(&models)?;
+    // A compensated layout is right when it is made, not as it is drawn.
+    let stack = design.cell_stack()?;
+    let made = sources
+        .model
+        .as_ref()
+        .map(|model| MadeChip::new(&stack, model))
+        .transpose()?;
+    let cases = match &made {
+        Some(chip) => SimulationCases::judged_by(chip).with_cells(&models),
+        None => SimulationCases::of_cells(&models)?,
+    };
     let found = verify_layout(design, array, pillars, &cases, options.accuracy, progress)?;
     write_report(design, array, &found, &files.at("verification"))?;
     let failed: Vec<_> = found
@@ -134,9 +146,12 @@ fn verification(
         verdict: Verdict::of(failed.is_empty()),
         words: if failed.is_empty() {
             format!(
-                "all {} limits of the design hold, by the {} cell",
+                "all {} limits of the design hold, {}",
                 found.checks.len(),
-                found.fidelity
+                match &found.model {
+                    Some(model) => format!("as made by the calibrated model of {}", model.set),
+                    None => format!("by the {} cell", found.fidelity),
+                }
             )
         } else {
             format!(

@@ -7,7 +7,9 @@ use super::drawing::RectNm;
 use super::listing::Listing;
 use super::matrix::{self, DoseBlock};
 use super::process::Process;
+use super::sources::Sources;
 use super::structures::{Structure, Structures};
+use metalith_compensate::compensate;
 use metalith_core::{Progress, Result};
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
@@ -81,14 +83,13 @@ impl OfEach<Layout> {
 ///
 /// # Errors
 /// If one cannot be written, or the user stopped it.
-pub(super) fn write(
-    files: &mut Listing,
-    design: &Design,
-    process: &Process,
-    progress: &dyn Progress,
-) -> Result<Layouts> {
+pub(super) fn write(files: &mut Listing, sources: &Sources, progress: &dyn Progress) -> Result<Layouts> {
+    let (design, process) = (&sources.design, &sources.process);
     let named = |folder: &str, rest: &str| format!("{folder}/{}_{rest}", design.name);
-    let array = PillarArray::build(design, progress)?;
+    let mut array = PillarArray::build(design, progress)?;
+    if let Some(model) = &sources.model {
+        array = compensate(design, &array, model, progress)?.array;
+    }
     let pillars = files.add(named("layout", "pillars.gds"), "layout of step 1: pillars and marks");
     write_pillars(design, &array, design.layout.hierarchy, &pillars, progress)?;
     let apertures = files.add(

@@ -20,6 +20,8 @@ pub struct HandoffOptions {
     pub fidelity: Fidelity,
     /// How closely the layout is simulated.
     pub accuracy: Accuracy,
+    /// The calibrated model that the layout is compensated for, and judged by, if any.
+    pub compensate: Option<PathBuf>,
     /// Violations of the rules that have been accepted.
     pub waivers: Option<PathBuf>,
 }

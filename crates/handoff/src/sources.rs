@@ -12,6 +12,7 @@ use metalith_core::{Error, Result};
 use metalith_design::Design;
 use metalith_design::phase::RadialPhase;
 use metalith_drc::{Deck, Waivers};
+use metalith_made::CalibratedModel;
 use metalith_rcwa::Material;
 
 /// Longest input that is kept; tables of the phase of a 10 mm lens have 1 MB.
@@ -24,6 +25,8 @@ pub(super) struct Sources {
     /// The decks of the process, in its order.
     decks: Vec<(PathBuf, Deck)>,
     pub waivers: Option<Waivers>,
+    /// What the layout is compensated for.
+    pub model: Option<CalibratedModel>,
     kept: Vec<Kept>,
 }
 
@@ -69,7 +72,19 @@ impl Sources {
             let purpose = "violations that were accepted";
             kept.push(Kept::new("waivers_", &waivers.path, purpose, waivers.text.as_bytes()));
         }
+        let mut design = design;
+        let model = match &options.compensate {
+            None => None,
+            Some(path) => {
+                let bytes = read_at_most(path, LONGEST, "a model file")?;
+                let purpose = "the calibrated model that the layout is compensated for";
+                kept.push(Kept::new("model_", path, purpose, &bytes));
+                design.name.push_str("_compensated");
+                Some(CalibratedModel::read(path)?)
+            }
+        };
         Ok(Self {
+            model,
             design,
             process,
             decks,

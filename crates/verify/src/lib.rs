@@ -89,6 +89,9 @@ pub struct Verification {
     /// The calibrated model that the layout is judged by, if it is judged as made.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<ModelStatement>,
+    /// Whether the layout is compared with an array whose widths were moved on purpose.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub compensated: bool,
     /// `accurate` or `fast`.
     pub accuracy: &'static str,
     pub layout: LayoutFacts,
@@ -185,6 +188,7 @@ pub fn verify_layout(
             SimulationCase::Made(chip) => Some(chip.statement()),
             SimulationCase::Cell(_) => None,
         },
+        compensated: array.compensated,
         accuracy: match accuracy {
             Accuracy::Accurate => "accurate",
             Accuracy::Fast => "fast",

@@ -37,6 +37,8 @@ pub struct PillarArray {
     pub lattice: Lattice,
     pub classes: Vec<Class>,
     pub placed: Vec<Placed>,
+    /// Whether widths were moved on purpose, for what a process makes of them, from those that the mapping gives.
+    pub compensated: bool,
 }
 
 impl PillarArray {
@@ -54,6 +56,7 @@ impl PillarArray {
             lattice,
             classes: Vec::new(),
             placed: Vec::new(),
+            compensated: false,
         };
         for element in elements {
             if progress.stopped() {

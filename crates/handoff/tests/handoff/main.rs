@@ -32,6 +32,7 @@ const PROCESS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../processes/jbx6
 
 fn options(out: &Path) -> HandoffOptions {
     HandoffOptions {
+        compensate: None,
         design: DESIGN.into(),
         process: Some(PROCESS.into()),
         out: out.to_owned(),
