@@ -5,7 +5,7 @@ use std::path::Path;
 
 use assert_cmd::Command;
 use metalith::cell::PublishedCell;
-use metalith::optimise::{Checkpoint, Task, lens_alone};
+use metalith::optimise::{Checkpoint, OptimiseTask, lens_alone};
 use metalith::verify::read_back;
 use metalith::{Design, Hierarchy, PillarArray, Silent, write_pillars};
 
@@ -51,7 +51,7 @@ fn the_phase_of_the_command_becomes_a_layout_that_keeps_the_limit() {
     let text = text.replace("source = \"hyperbola\"\nwavelength_nm = 550", &table);
     fs::write(&path, text).unwrap();
     let design = Design::read(&path).unwrap();
-    let (task, cell) = (Task::of(&design).unwrap(), PublishedCell::new(350));
+    let (task, cell) = (OptimiseTask::of(&design).unwrap(), PublishedCell::new(350));
     let rings = task.judge_rings(&task.own_turns, &cell).unwrap();
     let layout = folder.path().join("lens.gds");
     let alone = lens_alone(&design, &phases[0]).unwrap();

@@ -17,12 +17,12 @@ const GRADING: f64 = 2.5;
 
 /// Samples of one width over the band, unevenly spaced.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Column {
+pub(super) struct WidthSpectrum {
     pub wavelengths_um: Vec<f64>,
     pub t: Vec<Complex64>,
 }
 
-impl Column {
+impl WidthSpectrum {
     /// Sample `t` until in the middle of every interval the cubic through the samples around it was
     /// within `tolerance` before the middle itself was added.
     pub fn sample(band_um: (f64, f64), tolerance: f64, t: impl Fn(f64) -> Result<Complex64>) -> Result<Self> {
@@ -125,7 +125,7 @@ mod tests {
     #[test]
     fn a_narrow_resonance_near_a_sample_is_followed() {
         let tolerance = 0.01;
-        let column = Column::sample((0.4, 0.7), tolerance, |l| Ok(resonant(l))).unwrap();
+        let column = WidthSpectrum::sample((0.4, 0.7), tolerance, |l| Ok(resonant(l))).unwrap();
         assert!(column.t.len() < 300, "{}", column.t.len());
         let worst = (0..30_000)
             .map(|i| 0.4 + 1e-5 * f64::from(i))

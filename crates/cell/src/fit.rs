@@ -234,7 +234,7 @@ pub fn fit_forward(curves: &[PhaseCurve], pitch_nm: f64, degree: usize) -> Resul
             "give more wavelengths and widths, or a lower degree",
         ));
     }
-    let frame = Frame::around(&points);
+    let frame = FitScale::around(&points);
     let matrix = DMatrix::from_fn(points.len(), powers.len(), |i, j| {
         let (x, y) = frame.inside(points[i].0, points[i].1);
         x.powi(powers[j].0 as i32) * y.powi(powers[j].1 as i32)
@@ -277,12 +277,12 @@ pub fn fit_forward(curves: &[PhaseCurve], pitch_nm: f64, degree: usize) -> Resul
 }
 
 /// Wavelength (nm) and duty cycle brought to about -1..1, where powers are told apart.
-struct Frame {
+struct FitScale {
     centre: (f64, f64),
     half: (f64, f64),
 }
 
-impl Frame {
+impl FitScale {
     fn around(points: &[(f64, f64, f64)]) -> Self {
         let range = |of: fn(&(f64, f64, f64)) -> f64| {
             let ends = points

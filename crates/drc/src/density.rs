@@ -3,7 +3,7 @@
 use super::context::Context;
 use super::findings::Findings;
 use super::flat::FlatLayout;
-use super::rule::{Judged, NotRun, Rule};
+use super::rule::{NotRun, Rule, RuleOutcome};
 use metalith_core::document::{Limits, Section};
 use metalith_core::part;
 use metalith_gds::{Point, Rect};
@@ -100,7 +100,7 @@ impl Rule for FillRule {
         }
     }
 
-    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
         if flat.elements.is_empty() {
             return Err(NotRun::Skipped(flat.no_elements.clone()));
         }

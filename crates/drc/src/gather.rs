@@ -16,7 +16,7 @@ use metalith_core::text::printable_bytes;
 use metalith_core::{Error, Progress, Result};
 use metalith_gds::extract::{Filler, Scale, Why};
 use metalith_gds::{
-    Cell, LayerNumber, Layout, Point, Rect, Selection, Shape, Text, Transform, Visitor, rectangle_of, simplified,
+    LayerNumber, Layout, LayoutCell, Point, Rect, Selection, Shape, Text, Transform, Visitor, rectangle_of, simplified,
 };
 
 /// Widest square that is decided by table (database units).
@@ -223,7 +223,7 @@ impl Gather<'_, '_> {
 }
 
 impl Visitor for Gather<'_, '_> {
-    fn cell(&mut self, _cell: &Cell, placements: &[Transform]) -> Result<()> {
+    fn cell(&mut self, _cell: &LayoutCell, placements: &[Transform]) -> Result<()> {
         self.filler.begin(placements.len());
         Ok(())
     }

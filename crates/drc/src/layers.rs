@@ -3,7 +3,7 @@
 use super::context::Context;
 use super::findings::Findings;
 use super::flat::FlatLayout;
-use super::rule::{Judged, NotRun, Rule};
+use super::rule::{NotRun, Rule, RuleOutcome};
 use metalith_core::document::{Limits, Section};
 use metalith_gds::{LayerNumber, Rect};
 
@@ -67,7 +67,7 @@ impl Rule for LayerRule {
         }
     }
 
-    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
         match self {
             Self::Whitelist(layers) => {
                 let mut used: Vec<LayerNumber> = flat.counts.keys().copied().collect();

@@ -64,7 +64,7 @@ impl From<Stop> for NotRun {
 }
 
 /// What carrying out a rule gives; its findings are elsewhere.
-pub(super) type Judged = Result<(), NotRun>;
+pub(super) type RuleOutcome = Result<(), NotRun>;
 
 /// One rule of the deck, ready to run.
 pub(super) struct DeckRule {
@@ -118,7 +118,7 @@ pub(super) trait Rule: Send + Sync {
     }
 
     /// Look at the layout as a whole, after all outlines.
-    fn judge(&self, _scene: &FlatLayout<'_>, _found: &mut Findings) -> Judged {
+    fn judge(&self, _scene: &FlatLayout<'_>, _found: &mut Findings) -> RuleOutcome {
         Ok(())
     }
 }

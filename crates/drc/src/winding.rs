@@ -21,7 +21,7 @@ pub(super) fn crosses_itself(ring: &[Point]) -> bool {
 
 /// A side from its left end to its right end.
 #[derive(Clone, Copy)]
-struct Side {
+struct SweepEdge {
     left: Point,
     right: Point,
     /// What it adds to the turns when it is passed upwards: 1 if the outline runs along it to the right.
@@ -30,7 +30,7 @@ struct Side {
 
 /// The sides that the sweep line meets, from below, as a treap with parents: each side is a node.
 struct Sweep {
-    sides: Vec<Side>,
+    sides: Vec<SweepEdge>,
     parent: Vec<u32>,
     child: Vec<[u32; 2]>,
     /// Heap order of the treap: a fixed scramble of the number of the side.
@@ -44,16 +44,16 @@ struct Sweep {
 
 impl Sweep {
     fn new(ring: &[Point]) -> Self {
-        let sides: Vec<Side> = ring
+        let sides: Vec<SweepEdge> = ring
             .windows(2)
             .filter(|s| s[0] != s[1])
             .map(|s| match s[0] < s[1] {
-                true => Side {
+                true => SweepEdge {
                     left: s[0],
                     right: s[1],
                     turn: 1,
                 },
-                false => Side {
+                false => SweepEdge {
                     left: s[1],
                     right: s[0],
                     turn: -1,

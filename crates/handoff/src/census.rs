@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use metalith_core::{Progress, Result};
-use metalith_gds::{Cell, LayerNumber, Layout, ReadLimits, Rect, Selection, Shape, Text, Transform, Visitor};
+use metalith_gds::{LayerNumber, Layout, LayoutCell, ReadLimits, Rect, Selection, Shape, Text, Transform, Visitor};
 
 /// One file.
 #[derive(Clone, Debug, Serialize)]
@@ -144,7 +144,7 @@ impl Counter {
 }
 
 impl Visitor for Counter {
-    fn cell(&mut self, _cell: &Cell, placements: &[Transform]) -> Result<()> {
+    fn cell(&mut self, _cell: &LayoutCell, placements: &[Transform]) -> Result<()> {
         self.flush();
         self.placements = placements.to_vec();
         Ok(())

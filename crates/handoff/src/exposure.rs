@@ -19,7 +19,8 @@ pub(super) fn exposures(
     for file in census {
         let exposed = |l: &&super::census::LayerCount| {
             let number = (i32::from(l.layer), i32::from(l.datatype));
-            let is = |layer: &metalith_design::Layer| number == (i32::from(layer.layer), i32::from(layer.datatype));
+            let is =
+                |layer: &metalith_design::LayoutLayer| number == (i32::from(layer.layer), i32::from(layer.datatype));
             is(&layers.pillars) || is(&layers.pillar_marks) || number.0 == i32::from(process.dose_matrix.layer)
         };
         let mut exposure = Exposure::default();

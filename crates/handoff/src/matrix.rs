@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::dose::doses;
-use super::drawing::{Drawing, LayerNumber, RectNm, Sheet, nm, number};
+use super::drawing::{Drawing, LayerPair, RectNm, Sheet, nm, number};
 use super::process::Process;
 use metalith_core::{Result, Silent};
 use metalith_design::Design;
@@ -125,7 +125,7 @@ pub(super) fn write(path: &Path, design: &Design, process: &Process) -> Result<V
     let mut drawing = Drawing::new("DOSE_MATRIX", &design.layout.timestamp);
     let mut top = Sheet::new("DOSE_MATRIX");
     for (block, dose) in blocks.iter().zip(doses(process)) {
-        let layer: LayerNumber = (spec.layer, block.number as i16);
+        let layer: LayerPair = (spec.layer, block.number as i16);
         let lens_name = format!("D{}_LENS", block.number);
         drawing.add_lens(&lens_name, layer, &lens);
         top.place(&lens_name, block.lens, Symmetry::IDENTITY);

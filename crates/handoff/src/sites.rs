@@ -45,7 +45,7 @@ pub(super) fn sites(
     let mut sites = Vec::new();
     let widths = targets(design);
     // The element in the middle, and the one furthest from it.
-    let distance = |p: &&metalith_design::array::Placed| {
+    let distance = |p: &&metalith_design::array::PlacedElement| {
         let (x, y) = p.element.centre_nm;
         x * x + y * y
     };

@@ -194,7 +194,7 @@ mod tests {
     use super::super::limit::largest_step;
     use super::super::mapping::tests::published;
     use super::super::rings::Rings;
-    use super::super::{Kind, Start, wavelengths};
+    use super::super::{MeritKind, Start, wavelengths};
     use super::*;
     use metalith_cell::{CellModel, PublishedCell};
     use metalith_core::Lattice;
@@ -212,7 +212,7 @@ mod tests {
         let rows = lens
             .focal_rows(&wavelengths(400.0, 700.0, 10.0), FabricationError::default(), &cells)
             .unwrap();
-        let problem = FieldProblem::new(vec![(Kind::Log, 1.0, rows)], &cells, published(), 1 << 24).unwrap();
+        let problem = FieldProblem::new(vec![(MeritKind::Log, 1.0, rows)], &cells, published(), 1 << 24).unwrap();
         test(&lens, &problem);
     }
 

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use num_complex::{Complex32, Complex64};
 use rayon::prelude::*;
 
-use super::field::{Condition, Row};
+use super::field::{Condition, FieldPoint};
 use super::kernel::RingField;
 use super::rings::Rings;
 use metalith_cell::CellModel;
@@ -42,7 +42,7 @@ impl Lens {
         wavelengths_um: &[f64],
         error: FabricationError,
         cells: &[&dyn CellModel],
-    ) -> Result<Vec<Row>> {
+    ) -> Result<Vec<FieldPoint>> {
         wavelengths_um
             .par_iter()
             .map(|&wavelength_um| {
@@ -55,7 +55,7 @@ impl Lens {
                         Complex32::new(e.re as f32, e.im as f32)
                     })
                     .collect();
-                Ok(Row {
+                Ok(FieldPoint {
                     condition: Condition {
                         wavelength_um,
                         cell: error.cell,

@@ -47,7 +47,7 @@ impl Rooms {
 
 /// Transfer function at the frequencies (i, j) / window, i and j from 0 to half the pixels: the others
 /// follow, H(-i, j) = conj H(i, j) since the PSF is real, and H(i, -j) = H(i, j) since it is even in y.
-pub type Transfer = Vec<Complex32>;
+pub type OpticalTransfer = Vec<Complex32>;
 
 impl<'p> Imaging<'p> {
     pub fn new(pupil: &'p Pupil, window: PixelWindow, mut room: Room) -> Self {
@@ -83,7 +83,7 @@ impl<'p> Imaging<'p> {
     }
 
     /// The transfer function, `[j][i]`, from the transmissions of the rings.
-    pub fn transfer(&mut self, t_re: &[f32], t_im: &[f32]) -> Transfer {
+    pub fn transfer(&mut self, t_re: &[f32], t_im: &[f32]) -> OpticalTransfer {
         self.propagate(t_re, t_im);
         let (n, half, modes) = (self.pupil.size, self.pupil.size / 2 + 1, self.modes());
         // Along y: even and real, two columns in one transform.

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::PixelWindow;
 use super::deconvolution::Deconvolution;
-use super::field::{Condition, FieldProblem, Kind, Row};
+use super::field::{Condition, FieldPoint, FieldProblem, MeritKind};
 use super::focus::{FabricationError, Lens, wavelengths};
 use super::kernel::RingField;
 use super::mapping::Mapping;
@@ -56,14 +56,14 @@ pub fn field_problem(
             .skip(i % stride)
             .step_by(stride)
             .collect::<Vec<_>>();
-        for (kind, weight) in [(Kind::Log, merit.log), (Kind::Linear, merit.sum)] {
+        for (kind, weight) in [(MeritKind::Log, merit.log), (MeritKind::Linear, merit.sum)] {
             if weight != 0.0 {
                 blocks.push((kind, weight * share, lens.focal_rows(&some, error, cells)?));
             }
         }
         if merit.side_lobes != 0.0 {
             let rows = side_lobe_rows(lens, spec, merit.side_lobe_radius_um, error, cells)?;
-            blocks.push((Kind::Linear, -merit.side_lobes * share, rows));
+            blocks.push((MeritKind::Linear, -merit.side_lobes * share, rows));
         }
     }
     if blocks.is_empty() {
@@ -80,7 +80,7 @@ fn side_lobe_rows(
     radius_um: f64,
     error: FabricationError,
     cells: &[&dyn CellModel],
-) -> Result<Vec<Row>> {
+) -> Result<Vec<FieldPoint>> {
     let lengths = wavelengths(spec.band_um.0 * 1e3, spec.band_um.1 * 1e3, SIDE_LOBE_STEP_NM);
     let area = lens.rings.sites() as f64 * lens.rings.lattice().pitch_um().powi(2);
     let width = 3.0 * radius_um / SIDE_LOBE_POINTS as f64;
@@ -104,7 +104,7 @@ fn side_lobe_rows(
                     Complex32::new(e.re as f32, e.im as f32)
                 })
                 .collect();
-            Ok(Row {
+            Ok(FieldPoint {
                 condition: Condition {
                     wavelength_um,
                     cell: error.cell,

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use metalith_cell::{CellModel, PublishedCell};
 use metalith_core::{Lattice, Progress, Silent};
 use metalith_design::Design;
-use metalith_optimise::{Checkpoint, Lens, RingField, Rings, Start, Task, largest_step};
+use metalith_optimise::{Checkpoint, Lens, OptimiseTask, RingField, Rings, Start, largest_step};
 use metalith_wave::{Accuracy, Direct, Fold, Pillars, PlaneWave, Propagator, Scratch, Window};
 use num_complex::Complex64;
 
@@ -100,7 +100,7 @@ fn an_interrupted_run_goes_on_to_the_same_end() {
     for section in [EXCHANGE, ADAM, IMAGES] {
         let folder = tempfile::tempdir().unwrap();
         let design = Design::read(&design(folder.path(), section)).unwrap();
-        let (task, cell) = (Task::of(&design).unwrap(), PublishedCell::new(350));
+        let (task, cell) = (OptimiseTask::of(&design).unwrap(), PublishedCell::new(350));
         let cells: [&dyn CellModel; 1] = [&cell];
         let begin = || Checkpoint::begin(&design);
         let whole = task.solve(&cells, begin(), &Silent).unwrap();
@@ -150,7 +150,7 @@ fn both_solvers_beat_what_they_begin_from_and_exchange_beats_adam() {
     let cell = PublishedCell::new(350);
     let reached = [ADAM, EXCHANGE].map(|section| {
         let design = Design::read(&design(folder.path(), section)).unwrap();
-        let task = Task::of(&design).unwrap();
+        let task = OptimiseTask::of(&design).unwrap();
         let found = task.solve(&[&cell], Checkpoint::begin(&design), &Silent).unwrap();
         let before = task.judge_rings(&task.own_turns, &cell).unwrap();
         let after = task.judge_rings(&found.turns, &cell).unwrap();

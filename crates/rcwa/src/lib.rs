@@ -16,8 +16,8 @@ use std::f64::consts::TAU;
 use faer::Mat;
 use num_complex::Complex64;
 
-use basis::{Basis, Space};
-use layer::{Medium, Modes, Section};
+use basis::{FieldBasis, Space};
+use layer::{CrossSection, Medium, Modes};
 pub use material::Material;
 pub use outline::Outline;
 use propagate::{Ends, Slab, propagate};
@@ -192,7 +192,7 @@ struct Problem {
 
 /// The fields of one symmetry.
 struct Part {
-    basis: Basis,
+    basis: FieldBasis,
     ends: Ends,
     /// Transverse amplitudes of the incident zero order, for each column.
     incident: Vec<[Complex64; 2]>,
@@ -220,7 +220,7 @@ impl Problem {
     }
 
     fn part(&self, x: Space, y: Space, incident: &[[Complex64; 2]]) -> Result<Part> {
-        let basis = Basis::new(self.orders.highest(), x, y, self.k, self.step);
+        let basis = FieldBasis::new(self.orders.highest(), x, y, self.k, self.step);
         if basis.rows.len() > MOST_UNKNOWNS {
             return Err(Error::TooLarge {
                 along_axis: self.orders.along_axis(),
@@ -235,7 +235,7 @@ impl Problem {
             .layers
             .iter()
             .map(|layer| {
-                let section = Section {
+                let section = CrossSection {
                     outline: &layer.outline,
                     inside: layer.inside * layer.inside,
                     outside: layer.outside * layer.outside,

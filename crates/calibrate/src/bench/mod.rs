@@ -7,9 +7,10 @@ use rayon::prelude::*;
 
 pub use light::Lit;
 
-use super::optics::{Optic, PixelGrid, Planes, Planned, Quadrature};
+use super::optics::{Optic, PixelGrid, Quadrature};
 use super::set::{CaptureIndex, ElementIndex, LedIndex, MeasuredSet, PerCapture, PerElement, PerLed, RelayCamera};
 use metalith_made::{DrawnElement, GeometryChange, Perturbation, veiled};
+use metalith_wave::propagation::{Distances, DistancesPlan};
 
 /// How finely a bench is sampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,7 +42,7 @@ pub struct Bench<'a> {
     quadratures: PerLed<Quadrature>,
     /// Where the wavelengths of each LED begin among all.
     first: PerLed<usize>,
-    groups: Vec<Group>,
+    groups: Vec<FocusSeries>,
     /// The elements as drawn.
     drawn: PerElement<DrawnElement<'a>>,
     /// Windows follow what tilted light does to the place of an image: placement is a nuisance, and an image
@@ -50,13 +51,13 @@ pub struct Bench<'a> {
 }
 
 /// Captures that differ in their distance alone.
-struct Group {
+struct FocusSeries {
     element: ElementIndex,
     led: LedIndex,
     aoi_rad: [f64; 2],
     centre_um: [f64; 2],
     captures: Vec<CaptureIndex>,
-    plan: Planned,
+    plan: DistancesPlan,
 }
 
 impl<'a> Bench<'a> {
@@ -79,7 +80,7 @@ impl<'a> Bench<'a> {
                 Some(first)
             })
             .collect();
-        let mut groups: Vec<Group> = Vec::new();
+        let mut groups: Vec<FocusSeries> = Vec::new();
         for (i, c) in set.captures.iter_enumerated() {
             let same = groups.iter_mut().find(|g| {
                 (g.element, g.led, g.aoi_rad, g.centre_um) == (c.element, c.led, c.aoi_rad, c.window_centre_um)
@@ -89,20 +90,20 @@ impl<'a> Bench<'a> {
                 continue;
             }
             let longest = set.camera.rows.max(set.camera.cols) as f64;
-            let planes = Planes {
+            let planes = Distances {
                 lattice: set.elements[c.element].pillars.lattice,
                 radius_um: 0.5 * set.elements[c.element].aperture_diameter_um,
                 centre_um: c.window_centre_um,
                 half_width_um: 0.5 * longest * set.camera.pixel_um,
                 step_um: sampling.step_um,
             };
-            groups.push(Group {
+            groups.push(FocusSeries {
                 element: c.element,
                 led: c.led,
                 aoi_rad: c.aoi_rad,
                 centre_um: c.window_centre_um,
                 captures: vec![i],
-                plan: Planned::new(planes, sampling.margin),
+                plan: DistancesPlan::new(planes, sampling.margin),
             });
         }
         Self {
@@ -150,7 +151,7 @@ impl<'a> Bench<'a> {
     /// What the pixels of each capture see, before placement, flux and black level.
     pub fn grids(&self, intensities: &PerCapture<Vec<f32>>, perturbation: &Perturbation) -> Vec<PixelGrid> {
         let camera = &self.set.camera;
-        let work: Vec<(&Group, CaptureIndex)> = {
+        let work: Vec<(&FocusSeries, CaptureIndex)> = {
             let mut work: Vec<_> = self
                 .groups
                 .iter()
@@ -189,14 +190,14 @@ impl<'a> Bench<'a> {
     }
 
     /// Images of the two radii of the source disc on the sensor (um).
-    fn disc_um(&self, group: &Group, z: f64, perturbation: &Perturbation) -> [[f64; 2]; 2] {
+    fn disc_um(&self, group: &FocusSeries, z: f64, perturbation: &Perturbation) -> [[f64; 2]; 2] {
         let radius = 0.5 * self.set.divergence_rad * (1.0 + perturbation.light.source_size);
         let [x, y] = self.landing_um(group, z);
         [x.map(|v| v * radius), y.map(|v| v * radius)]
     }
 
     /// How far light lands from where it did for a turn of what arrives by one radian about each axis (um).
-    fn landing_um(&self, group: &Group, z: f64) -> [[f64; 2]; 2] {
+    fn landing_um(&self, group: &FocusSeries, z: f64) -> [[f64; 2]; 2] {
         let [cx, cy] = group.centre_um;
         let r = (cx * cx + cy * cy + z * z).sqrt();
         let (sx, sy, sz) = (cx / r, cy / r, z / r);
@@ -210,7 +211,7 @@ impl<'a> Bench<'a> {
     }
 
     /// How far tilted light carries the image off its window, where windows follow it (um).
-    fn off_um(&self, group: &Group, z: f64, perturbation: &Perturbation) -> [f64; 2] {
+    fn off_um(&self, group: &FocusSeries, z: f64, perturbation: &Perturbation) -> [f64; 2] {
         if !self.follows {
             return [0.0; 2];
         }

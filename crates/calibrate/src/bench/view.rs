@@ -1,7 +1,7 @@
 //! The forward model of a set, opened between the pillars and the pixels.
 
 use super::light::light;
-use super::{Bench, Group};
+use super::{Bench, FocusSeries};
 use crate::set::CaptureIndex;
 use metalith_core::Result;
 use metalith_made::{ArrivingLight, DrawnElement, MadeElement, MadeView, Perturbation, SolvedWidths};
@@ -45,7 +45,7 @@ impl Bench<'_> {
         light(self.group_of(capture), &perturbation.path, wavelength_um)
     }
 
-    fn group_of(&self, capture: CaptureIndex) -> &Group {
+    fn group_of(&self, capture: CaptureIndex) -> &FocusSeries {
         let group = self.groups.iter().find(|g| g.captures.contains(&capture));
         group.expect("every capture is in a group")
     }

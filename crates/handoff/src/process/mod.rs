@@ -27,7 +27,7 @@ pub struct Process {
     pub title: String,
     pub writer: Writer,
     pub resist: Resist,
-    pub transfer: Transfer,
+    pub transfer: PatternTransfer,
     pub proximity: Proximity,
     pub apertures: ApertureStep,
     pub dose_matrix: DoseMatrixSpec,
@@ -101,7 +101,7 @@ pub enum Method {
 
 /// What becomes of what was exposed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Transfer {
+pub struct PatternTransfer {
     pub method: Method,
     pub mask: String,
     pub mask_thickness_nm: f64,

@@ -5,7 +5,7 @@ use std::path::Path;
 mod rows;
 mod verniers;
 
-use super::drawing::{Drawing, LayerNumber, RectNm, Sheet, nm, number};
+use super::drawing::{Drawing, LayerPair, RectNm, Sheet, nm, number};
 use super::process::Process;
 use metalith_core::Result;
 use metalith_design::Design;
@@ -53,12 +53,12 @@ struct PillarCell {
 }
 
 struct StructureLayers {
-    pillars: LayerNumber,
-    marks: LayerNumber,
-    openings: LayerNumber,
-    step2: LayerNumber,
-    outline: LayerNumber,
-    label: LayerNumber,
+    pillars: LayerPair,
+    marks: LayerPair,
+    openings: LayerPair,
+    step2: LayerPair,
+    outline: LayerPair,
+    label: LayerPair,
 }
 
 impl Structures {

@@ -146,7 +146,7 @@ impl Supercell {
 /// # Errors
 /// As [`crate::solve`].
 pub fn solve_supercell(cell: &Supercell, incidence: &Incidence, highest: usize) -> Result<SupercellResponse> {
-    let problem = Problem::new(cell, incidence, highest)?;
+    let problem = SupercellProblem::new(cell, incidence, highest)?;
     let unit = [[Complex64::ONE, Complex64::ZERO], [Complex64::ZERO, Complex64::ONE]];
     let parts = if cell.lattice.is_row() && incidence.sines[1] == 0.0 {
         vec![
@@ -160,7 +160,7 @@ pub fn solve_supercell(cell: &Supercell, incidence: &Incidence, highest: usize) 
 }
 
 /// A supercell with the wave's side below.
-struct Problem {
+struct SupercellProblem {
     cell: Supercell,
     highest: usize,
     k: [f64; 2],
@@ -170,14 +170,14 @@ struct Problem {
 }
 
 /// The fields of one symmetry.
-struct Part {
+struct SupercellPart {
     waves: Waves,
     ends: Ends,
     /// Transverse amplitudes of the incident zero order, for each column.
     incident: Vec<[Complex64; 2]>,
 }
 
-impl Problem {
+impl SupercellProblem {
     fn new(cell: &Supercell, incidence: &Incidence, highest: usize) -> Result<Self> {
         cell.check()?;
         incidence.check()?;
@@ -199,7 +199,7 @@ impl Problem {
         })
     }
 
-    fn part(&self, y: Space, incident: &[[Complex64; 2]]) -> Result<Part> {
+    fn part(&self, y: Space, incident: &[[Complex64; 2]]) -> Result<SupercellPart> {
         let Supercell { lattice, pitch_nm, .. } = &self.cell;
         let unknowns = Waves::unknowns(lattice, self.highest, y);
         if unknowns > MOST_UNKNOWNS {
@@ -240,7 +240,7 @@ impl Problem {
             }
         }
         let ends = propagate(rows, &below, &slabs, &above, &arriving);
-        Ok(Part {
+        Ok(SupercellPart {
             waves,
             ends,
             incident: incident.to_vec(),
