@@ -59,7 +59,9 @@ fn the_phase_of_the_command_becomes_a_layout_that_keeps_the_limit() {
     write_pillars(&alone, &array, Hierarchy::Folded, &layout, &Silent).unwrap();
     let read = read_back(&alone, &array, &layout, &Silent).unwrap();
     let found = task.judge_layout(&read.elements[0].widths, &cell).unwrap();
-    assert!(found.largest_step_turns <= 0.2 + 1e-6, "{}", found.largest_step_turns);
+    // The limit of the design, and the rounding of phases to the text of their table.
+    const STEP_TURNS: f64 = 0.2 + 1e-6;
+    assert!(found.largest_step_turns <= STEP_TURNS, "{}", found.largest_step_turns);
     assert!((found.geometric_mean / rings.geometric_mean - 1.0).abs() < SAME);
 }
 

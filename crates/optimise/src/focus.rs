@@ -32,7 +32,33 @@ pub struct FabricationError {
     pub gap_error_um: f64,
 }
 
+impl FabricationError {
+    /// The condition at a wavelength.
+    pub(super) fn at(self, wavelength_um: f64) -> Condition {
+        Condition {
+            wavelength_um,
+            cell: self.cell,
+            width_bias_nm: self.width_bias_nm,
+        }
+    }
+}
+
 impl Lens {
+    /// A point of the field to which each ring contributes `field`.
+    pub(super) fn field_point(
+        &self,
+        condition: Condition,
+        weight: f32,
+        field: impl Fn(usize) -> Complex64,
+    ) -> FieldPoint {
+        let single = |e: Complex64| Complex32::new(e.re as f32, e.im as f32);
+        FieldPoint {
+            condition,
+            kernel: (0..self.rings.len()).map(|ring| single(field(ring))).collect(),
+            weight,
+        }
+    }
+
     /// One row for each wavelength: the field at the focus, such that its intensity is the Strehl ratio.
     ///
     /// # Errors
@@ -49,21 +75,8 @@ impl Lens {
                 let full = cells[error.cell].full_transmission(wavelength_um)?;
                 let field = RingField::new(&self.rings, wavelength_um, self.gap_um + error.gap_error_um);
                 let scale = 1.0 / (full * field.matched());
-                let kernel = (0..self.rings.len())
-                    .map(|ring| {
-                        let e = field.on_axis(ring) * scale;
-                        Complex32::new(e.re as f32, e.im as f32)
-                    })
-                    .collect();
-                Ok(FieldPoint {
-                    condition: Condition {
-                        wavelength_um,
-                        cell: error.cell,
-                        width_bias_nm: error.width_bias_nm,
-                    },
-                    kernel,
-                    weight: 1.0 / wavelengths_um.len() as f32,
-                })
+                let weight = 1.0 / wavelengths_um.len() as f32;
+                Ok(self.field_point(error.at(wavelength_um), weight, |ring| field.on_axis(ring) * scale))
             })
             .collect()
     }

@@ -1,11 +1,10 @@
 //! The merit that a design asks for.
 
-use num_complex::Complex32;
 use rayon::prelude::*;
 
 use super::PixelWindow;
 use super::deconvolution::Deconvolution;
-use super::field::{Condition, FieldPoint, FieldProblem, MeritKind};
+use super::field::{FieldPoint, FieldProblem, MeritKind};
 use super::focus::{FabricationError, Lens, wavelengths};
 use super::kernel::RingField;
 use super::mapping::Mapping;
@@ -98,21 +97,10 @@ fn side_lobe_rows(
             let field = RingField::new(&lens.rings, wavelength_um, lens.gap_um + error.gap_error_um);
             // Each ring around the axis with its power, so that all rows are of like size.
             let scale = (std::f64::consts::TAU * rho * width / area).sqrt() / full;
-            let kernel = (0..lens.rings.len())
-                .map(|ring| {
-                    let e = field.at_radius(ring, rho, &bessel) * scale;
-                    Complex32::new(e.re as f32, e.im as f32)
-                })
-                .collect();
-            Ok(FieldPoint {
-                condition: Condition {
-                    wavelength_um,
-                    cell: error.cell,
-                    width_bias_nm: error.width_bias_nm,
-                },
-                kernel,
-                weight: 1.0 / lengths.len() as f32,
-            })
+            let weight = 1.0 / lengths.len() as f32;
+            Ok(lens.field_point(error.at(wavelength_um), weight, |ring| {
+                field.at_radius(ring, rho, &bessel) * scale
+            }))
         })
         .collect()
 }

@@ -95,6 +95,9 @@ const IMAGES: &str = "[optimise]\ncell = \"published\"\nstep_nm = 5\nstart = \"h
     [optimise.merit]\ndeconvolution = 1\nlog = 0.01\n\
     [optimise.views]\nangles_deg = [0, 15]\nstep_nm = 30\npixels = 16\n";
 
+/// Limit on the step of phase in the designs of this file (turns), and the rounding of a difference of phases.
+const STEP_TURNS: f64 = 0.2 + 1e-9;
+
 #[test]
 fn an_interrupted_run_goes_on_to_the_same_end() {
     for section in [EXCHANGE, ADAM, IMAGES] {
@@ -105,14 +108,14 @@ fn an_interrupted_run_goes_on_to_the_same_end() {
         let begin = || Checkpoint::begin(&design);
         let whole = task.solve(&cells, begin(), &Silent).unwrap();
         assert!(whole.interrupted.is_none());
-        assert!(largest_step(&whole.turns) <= 0.2 + 1e-9);
+        assert!(largest_step(&whole.turns) <= STEP_TURNS);
 
         // Over and over, in every stage.
         let kept = folder.path().join("checkpoint.bin");
         let (mut checkpoint, mut interruptions) = (begin(), 0);
         let rest = loop {
             let part = task.solve(&cells, checkpoint, &StopAfter::new(14)).unwrap();
-            assert!(largest_step(&part.turns) <= 0.2 + 1e-9);
+            assert!(largest_step(&part.turns) <= STEP_TURNS);
             let Some(interrupted) = part.interrupted else {
                 break part;
             };

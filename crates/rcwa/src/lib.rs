@@ -17,10 +17,10 @@ use faer::Mat;
 use num_complex::Complex64;
 
 use basis::{FieldBasis, Space};
-use layer::{CrossSection, Medium, Modes};
+use layer::{CrossSection, Modes};
 pub use material::Material;
 pub use outline::Outline;
-use propagate::{Ends, Slab, propagate};
+use propagate::{Ends, propagate_wave};
 pub use response::{Convergence, DiffractionOrder, Response, converge};
 pub use stack::{Layer, LayerStack, Orders};
 pub use supercell::{SiteLattice, SiteLayer, Supercell, SupercellOrder, SupercellResponse, solve_supercell};
@@ -228,34 +228,19 @@ impl Problem {
                 most: MOST_UNKNOWNS,
             });
         }
-        let below = Medium::new(self.stack.below * self.stack.below, &basis.rows);
-        let above = Medium::new(self.stack.above * self.stack.above, &basis.rows);
-        let slabs = self
-            .stack
-            .layers
-            .iter()
-            .map(|layer| {
-                let section = CrossSection {
-                    outline: &layer.outline,
-                    inside: layer.inside * layer.inside,
-                    outside: layer.outside * layer.outside,
-                    pitch_nm: self.stack.pitch_nm,
-                };
-                Ok(Slab {
-                    modes: Modes::of(&section, &basis)?,
-                    depth: layer.height_nm * self.k0_per_nm,
-                })
-            })
-            .collect::<Result<Vec<_>>>()?;
-        let mut arriving = Mat::zeros(basis.rows.len(), incident.len());
-        for (column, amplitudes) in incident.iter().enumerate() {
-            for (component, amplitude) in amplitudes.iter().enumerate() {
-                if let Some((row, factor)) = basis.plane_wave(component, 0, 0) {
-                    arriving[(row, column)] = amplitude / factor;
-                }
-            }
-        }
-        let ends = propagate(&basis.rows, &below, &slabs, &above, &arriving);
+        let layers = self.stack.layers.iter().map(|layer| {
+            let section = CrossSection {
+                outline: &layer.outline,
+                inside: layer.inside * layer.inside,
+                outside: layer.outside * layer.outside,
+                pitch_nm: self.stack.pitch_nm,
+            };
+            Ok((Modes::of(&section, &basis)?, layer.height_nm))
+        });
+        let indices = [self.stack.below, self.stack.above];
+        let ends = propagate_wave(&basis.rows, indices, layers, self.k0_per_nm, incident, |component| {
+            basis.plane_wave(component, 0, 0)
+        })?;
         Ok(Part {
             basis,
             ends,

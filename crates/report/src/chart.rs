@@ -426,6 +426,9 @@ fn draw_limit(limit: &LimitLine, x: &Fitted, y: &Fitted, frame: &Frame) -> Group
 mod tests {
     use super::*;
 
+    /// Two points for each column of pixels, some twenty letters each, and the frame: not a million points.
+    const LARGEST_SVG: usize = 60_000;
+
     #[test]
     fn a_long_line_stays_small_and_keeps_its_extremes() {
         let mut chart = Chart::new("noise", Axis::linear("i", ""), Axis::linear("y", ""));
@@ -434,7 +437,7 @@ mod tests {
             (0..1_000_000).map(|i| (f64::from(i), f64::from(u8::from(i == 654_321)))),
         );
         let svg = Figure::from(chart).to_svg();
-        assert!(svg.len() < 60_000, "{}", svg.len());
+        assert!(svg.len() < LARGEST_SVG, "{}", svg.len());
         // The peak reaches the top of the frame.
         assert!(svg.contains(" 12L"), "the peak is lost");
     }

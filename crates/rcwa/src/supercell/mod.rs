@@ -10,7 +10,6 @@ mod waves;
 
 use std::f64::consts::TAU;
 
-use faer::Mat;
 use num_complex::Complex64;
 
 pub use response::{SupercellOrder, SupercellResponse};
@@ -18,8 +17,8 @@ pub use sites::SiteLattice;
 
 use crate::basis::Space;
 use crate::error::{Error, Result};
-use crate::layer::{Medium, Modes};
-use crate::propagate::{Ends, Slab, propagate};
+use crate::layer::Modes;
+use crate::propagate::{Ends, propagate_wave};
 use crate::{Incidence, Layer, LayerStack, MOST_UNKNOWNS, Orders, Outline, Side};
 use permittivity::permittivity;
 use waves::Waves;
@@ -212,34 +211,19 @@ impl SupercellProblem {
         }
         let waves = Waves::new(lattice, self.highest, y, self.k, self.step);
         let rows = &waves.rows;
-        let below = Medium::new(self.cell.below * self.cell.below, rows);
-        let above = Medium::new(self.cell.above * self.cell.above, rows);
-        let slabs = self
-            .cell
-            .layers
-            .iter()
-            .map(|layer| {
-                let plain = layer.inside == layer.outside || layer.outlines.iter().all(Outline::is_empty);
-                let modes = if plain {
-                    Modes::uniform(layer.outside * layer.outside, rows)
-                } else {
-                    Modes::structured(&permittivity(layer, *pitch_nm, lattice, &waves), rows)?
-                };
-                Ok(Slab {
-                    modes,
-                    depth: layer.height_nm * self.k0_per_nm,
-                })
-            })
-            .collect::<Result<Vec<_>>>()?;
-        let mut arriving = Mat::zeros(rows.len(), incident.len());
-        for (column, amplitudes) in incident.iter().enumerate() {
-            for (component, amplitude) in amplitudes.iter().enumerate() {
-                if let Some((row, factor)) = waves.plane_wave(component, [0, 0]) {
-                    arriving[(row, column)] = amplitude / factor;
-                }
-            }
-        }
-        let ends = propagate(rows, &below, &slabs, &above, &arriving);
+        let layers = self.cell.layers.iter().map(|layer| {
+            let plain = layer.inside == layer.outside || layer.outlines.iter().all(Outline::is_empty);
+            let modes = if plain {
+                Modes::uniform(layer.outside * layer.outside, rows)
+            } else {
+                Modes::structured(&permittivity(layer, *pitch_nm, lattice, &waves), rows)?
+            };
+            Ok((modes, layer.height_nm))
+        });
+        let indices = [self.cell.below, self.cell.above];
+        let ends = propagate_wave(rows, indices, layers, self.k0_per_nm, incident, |component| {
+            waves.plane_wave(component, [0, 0])
+        })?;
         Ok(SupercellPart {
             waves,
             ends,
