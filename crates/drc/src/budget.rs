@@ -1,4 +1,4 @@
-//! What a layout may cost: bytes, shapes, hours on the writer.
+//! Limits on the cost of a layout: bytes, shapes, writing time.
 
 use super::context::Context;
 use super::findings::Findings;
@@ -13,7 +13,7 @@ enum BudgetRule {
     WriteTime(Writing),
 }
 
-/// What the time of writing is made of.
+/// Contributions to the writing time.
 struct Writing {
     layers: Vec<LayerNumber>,
     dose_uc_cm2: f64,

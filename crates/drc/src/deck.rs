@@ -98,7 +98,7 @@ impl Deck {
     }
 }
 
-/// What a deck file says.
+/// Content of a deck file.
 struct DeckContents {
     name: String,
     pillars: Vec<LayerNumber>,

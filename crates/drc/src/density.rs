@@ -1,4 +1,4 @@
-//! How much of the area is pillar: what the dose of the neighbours adds to a place follows it.
+//! Fill factor of pillars, which determines the backscattered dose.
 
 use super::context::Context;
 use super::findings::Findings;

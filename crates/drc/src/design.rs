@@ -1,4 +1,4 @@
-//! The layout against the design it should hold, and the design against what the cell can do.
+//! Comparison of the layout with its design, and of the design with the limits of the cell.
 
 use super::context::Context;
 use super::findings::Findings;

@@ -1,4 +1,4 @@
-//! The writer's fields: what is cut by a boundary is exposed in two parts, some nanometres apart.
+//! Write fields: a shape that a field boundary cuts is exposed in two parts, with a stitching error of some nanometres.
 
 use super::context::Context;
 use super::findings::Findings;

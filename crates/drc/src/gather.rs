@@ -135,12 +135,12 @@ struct Gather<'r, 'p> {
     incomplete: Option<String>,
     allowance: Allowance,
     work: &'r Work<'p>,
-    /// Those in force, each with what it found.
+    /// Active rules, each with its findings.
     rules: Vec<(&'r DeckRule, &'r mut Findings)>,
 }
 
 impl Gather<'_, '_> {
-    /// The layer that rules know a shape by.
+    /// The layer that rules see for a shape.
     #[inline]
     fn known_as(&self, layer: LayerNumber) -> LayerNumber {
         if self.doses.contains(&layer) {

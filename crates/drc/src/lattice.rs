@@ -25,7 +25,7 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Optio
     })
 }
 
-/// Squares in an element stand on its sites.
+/// Squares in an element are on its sites.
 struct OnLattice {
     pitch_nm: f64,
 }

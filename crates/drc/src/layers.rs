@@ -1,4 +1,4 @@
-//! What may be on which layer, and where.
+//! Allowed content and extent of each layer.
 
 use super::context::Context;
 use super::findings::Findings;
@@ -18,9 +18,9 @@ enum LayerRule {
 }
 
 enum Within {
-    /// Left, bottom, right, top (um); where a design is given, so far inside the edge of its chip.
+    /// Left, bottom, right, top (um); with a design, distances from the edge of its chip.
     Edges { um: [f64; 4], edge_um: Option<f64> },
-    /// The box of what is drawn on a layer.
+    /// Bounding box of the shapes on a layer.
     Drawn(LayerNumber),
 }
 

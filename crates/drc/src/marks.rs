@@ -15,7 +15,7 @@ enum Marks {
         others: Vec<LayerNumber>,
         nm: f64,
     },
-    /// So many marks of each size (nm); those of the design where one is given.
+    /// Required number of marks of each size (nm); from the design if one is given.
     Complete { marks: LayerNumber, sets: Vec<(f64, u64)> },
 }
 

@@ -8,7 +8,7 @@ use super::tolerance::{EQUAL_NM, ROUNDING};
 use metalith_core::document::{Limits, Section};
 use metalith_gds::LayerNumber;
 
-/// What must hold of the smaller and the larger side of a pillar (nm).
+/// Limit on the smaller and the larger side of a pillar (nm).
 enum WidthLimit {
     Min(f64),
     Max(f64),

@@ -1,4 +1,4 @@
-//! What is in a layout file, counted in its bytes.
+//! Content of a layout file, counted from its bytes.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -27,7 +27,7 @@ pub struct CellCount {
     pub depth: u32,
     pub shapes: u64,
     pub references: u64,
-    /// How often it stands in the layout.
+    /// Number of placements in the layout.
     pub placements: u64,
     pub children: Vec<String>,
 }

@@ -115,7 +115,7 @@ impl Sheet {
         self.elements.push(reference.into());
     }
 
-    /// So many copies along x and y, the first at a place.
+    /// An array of copies along x and y, the first at a given position.
     pub fn array(&mut self, cell: &str, (x, y): (i64, i64), (columns, rows): (i16, i16), pitch: i64) {
         let reference = GdsArrayRef {
             name: cell.to_owned(),

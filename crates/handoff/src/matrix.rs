@@ -10,12 +10,12 @@ use metalith_design::Design;
 use metalith_design::array::{Class, PillarArray, Symmetry};
 use metalith_design::phase::RadialPhase;
 
-/// Room between the parts of a block (nm).
+/// Space between the parts of a block (nm).
 const APART: i64 = 20_000;
 /// Height of the number of a block (nm).
 const NUMERAL: i64 = 20_000;
 
-/// Where one dose stands.
+/// Position of one dose.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub(super) struct DoseBlock {
     /// 1 to 9; also the datatype.

@@ -173,7 +173,7 @@ pub(super) fn tone(design: &Design, process: &Process) -> Figure {
     ))
 }
 
-/// What lies between intervals, from zero to an end.
+/// Gaps between intervals, from zero to an end.
 fn complement(intervals: &[(f64, f64)], end: f64) -> Vec<(f64, f64)> {
     let mut from = 0.0;
     let mut gaps = Vec::new();

@@ -154,7 +154,7 @@ fn around(map: &metalith_core::WidthMap, ix: usize, iy: usize) -> Option<(u16, u
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cross {
     pub set: String,
-    /// What the writer calls it: P and Q for the global pair, M1 to M4 for those of the chip.
+    /// Its name for the writer: P and Q for the global pair, M1 to M4 for those of the chip.
     pub role: String,
     pub x_um: f64,
     pub y_um: f64,

@@ -1,4 +1,4 @@
-//! What a hand-off is made from: every input read once, with the bytes that were read.
+//! Inputs of a hand-off, each read once, with the bytes that were read.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -29,7 +29,7 @@ pub(super) struct Sources {
 
 /// One input as it was read.
 struct InputCopy {
-    /// Its file name with a prefix that says what it is; not yet unique.
+    /// Its file name with a prefix for its kind; not yet unique.
     name: String,
     purpose: &'static str,
     bytes: Vec<u8>,

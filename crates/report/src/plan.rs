@@ -59,7 +59,7 @@ impl Plan {
         self.add_layer(name, Fill::Area)
     }
 
-    /// A layer drawn as lines alone: outlines, fields, keep-outs.
+    /// A layer drawn as lines only: outlines, fields, keep-outs.
     pub fn outlines(&mut self, name: impl Into<String>) -> PlanLayer {
         self.add_layer(name, Fill::Outline)
     }

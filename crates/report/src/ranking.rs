@@ -1,4 +1,4 @@
-//! Horizontal bars: candidates in order, each with what speaks for it.
+//! Horizontal bars: candidates in order, each with its evidence.
 
 use svg::node::element::Group;
 

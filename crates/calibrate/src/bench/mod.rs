@@ -1,4 +1,4 @@
-//! The bench in the computer: from pillars to what each capture should show, under any perturbation.
+//! The simulated bench: from pillars to the expected pixels of each capture, under any perturbation.
 
 mod light;
 mod view;
@@ -12,16 +12,16 @@ use super::set::{CaptureIndex, ElementIndex, LedIndex, MeasuredSet, PerCapture, 
 use metalith_made::{DrawnElement, GeometryChange, Perturbation, veiled};
 use metalith_wave::propagation::{Distances, DistancesPlan};
 
-/// How finely a bench is sampled.
+/// Sampling of the simulated bench.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
-    /// Wavelengths are at most this share of a spectrum's full width apart.
+    /// Largest step in wavelength, as a share of the full width of the spectrum.
     pub spectrum: f64,
-    /// And at most so far (nm).
+    /// Largest step in wavelength (nm).
     pub step_nm: f64,
-    /// Distance of the samples of the intensity (um).
+    /// Sample spacing of the intensity (um).
     pub step_um: f64,
-    /// Samples around each window that placement, blur and borders may use up.
+    /// Samples around each window, for registration, blur and borders.
     pub margin: usize,
 }
 
@@ -36,21 +36,21 @@ impl Default for Sampling {
     }
 }
 
-/// A set, planned.
+/// A measured set with everything that its simulation can compute in advance.
 pub struct Bench<'a> {
     set: &'a MeasuredSet,
     quadratures: PerLed<Quadrature>,
-    /// Where the wavelengths of each LED begin among all.
+    /// Index of the first wavelength of each LED in the list of all wavelengths.
     first: PerLed<usize>,
     groups: Vec<FocusSeries>,
     /// The elements as drawn.
     drawn: PerElement<DrawnElement<'a>>,
-    /// Windows follow what tilted light does to the place of an image: placement is a nuisance, and an image
-    /// that moves is no polynomial of the tilt.
+    /// Windows move with the image when the incident light is tilted: registration is a nuisance parameter, and
+    /// the intensity in a fixed window is not a polynomial of the tilt.
     pub follows: bool,
 }
 
-/// Captures that differ in their distance alone.
+/// Captures that differ only in their distance.
 struct FocusSeries {
     element: ElementIndex,
     led: LedIndex,
@@ -61,7 +61,7 @@ struct FocusSeries {
 }
 
 impl<'a> Bench<'a> {
-    /// Plan a set.
+    /// Plan the simulation of a set.
     pub fn new(set: &'a MeasuredSet, sampling: Sampling) -> Self {
         let (low, high) = set.stack.film.range_um();
         let quadratures: PerLed<_> = set
@@ -120,12 +120,12 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// The set that it stands for.
+    /// The measured set that is simulated.
     pub fn set(&self) -> &'a MeasuredSet {
         self.set
     }
 
-    /// All wavelengths that cells are needed at (nm).
+    /// All wavelengths at which cells are needed (nm).
     pub fn wavelengths_nm(&self) -> Vec<f64> {
         self.quadratures
             .iter()
@@ -133,7 +133,7 @@ impl<'a> Bench<'a> {
             .collect()
     }
 
-    /// Least and greatest width of the layout (nm).
+    /// Smallest and largest width of the layout (nm).
     pub fn widths_nm(&self) -> (f64, f64) {
         let all = self
             .set
@@ -148,7 +148,7 @@ impl<'a> Bench<'a> {
         self.drawn[element].bias_nm(site, geometry)
     }
 
-    /// What the pixels of each capture see, before placement, flux and black level.
+    /// Pixel values of each capture, before registration, flux and black level are applied.
     pub fn grids(&self, intensities: &PerCapture<Vec<f32>>, perturbation: &Perturbation) -> Vec<PixelGrid> {
         let camera = &self.set.camera;
         let work: Vec<(&FocusSeries, CaptureIndex)> = {
@@ -196,7 +196,7 @@ impl<'a> Bench<'a> {
         [x.map(|v| v * radius), y.map(|v| v * radius)]
     }
 
-    /// How far light lands from where it did for a turn of what arrives by one radian about each axis (um).
+    /// Shift of the image for a tilt of the incident light by one radian about each axis (um).
     fn landing_um(&self, group: &FocusSeries, z: f64) -> [[f64; 2]; 2] {
         let [cx, cy] = group.centre_um;
         let r = (cx * cx + cy * cy + z * z).sqrt();
@@ -210,7 +210,7 @@ impl<'a> Bench<'a> {
         ]
     }
 
-    /// How far tilted light carries the image off its window, where windows follow it (um).
+    /// Shift of the image by tilted light that the windows follow (um); zero if they do not.
     fn off_um(&self, group: &FocusSeries, z: f64, perturbation: &Perturbation) -> [f64; 2] {
         if !self.follows {
             return [0.0; 2];
@@ -221,7 +221,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Mean intensity over the pixels of a window that stands in the middle of `n` x `n` samples.
+/// Mean intensity over each pixel of a window that is centred in `n` x `n` samples.
 fn window_mean(intensity: &[f32], n: usize, samples_per_pixel: f64, camera: &RelayCamera) -> f64 {
     let range = |pixels: usize| {
         let wide = ((pixels as f64 * samples_per_pixel).round() as usize).clamp(1, n);

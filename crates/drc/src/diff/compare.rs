@@ -246,7 +246,7 @@ fn corners(r: &[i32; 4]) -> [Point; 4] {
     [(x0, y0), (x1, y0), (x1, y1), (x0, y1)].map(|(x, y)| Point::new(x, y))
 }
 
-/// What only one of two sorted lists has, equal items counted.
+/// Difference of two sorted lists as multisets.
 fn apart<'a, T: Ord>(a: &'a [T], b: &'a [T]) -> (Vec<&'a T>, Vec<&'a T>) {
     let (mut only_a, mut only_b) = (Vec::new(), Vec::new());
     let (mut i, mut j) = (0, 0);

@@ -1,4 +1,4 @@
-//! What a layout holds, in an order that does not depend on how it is nested.
+//! Content of a layout, in an order that does not depend on its hierarchy.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -43,7 +43,7 @@ pub(super) struct TextCopy {
     pub at: Point,
 }
 
-/// The strings of both layouts, each once however often it stands in them.
+/// The strings of both layouts, each stored once.
 #[derive(Default)]
 pub(super) struct Strings(HashMap<Box<[u8]>, u32>);
 
