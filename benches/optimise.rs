@@ -5,7 +5,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use metalith::array::WidthRule;
 use metalith::cell::PublishedCell;
 use metalith::optimise::{
-    Exchange, FabricationError, FieldProblem, Kind, Lens, Mapping, Objective, PixelWindow, Pupil, Rings, Schedule,
+    Exchange, FabricationError, FieldProblem, Lens, Mapping, MeritKind, Objective, PixelWindow, Pupil, Rings, Schedule,
     Start, StepLimit, wavelengths,
 };
 use metalith::{CellModel, Design, Lattice};
@@ -22,7 +22,7 @@ fn optimise(c: &mut Criterion) {
     let mapping = Mapping::new(&WidthRule::new(&design.cell, &design.mapping));
     let band = wavelengths(400.0, 700.0, 1.0);
     let rows = || lens.focal_rows(&band, FabricationError::default(), &cells).unwrap();
-    let problem = FieldProblem::new(vec![(Kind::Log, 1.0, rows())], &cells, mapping, 1 << 30).unwrap();
+    let problem = FieldProblem::new(vec![(MeritKind::Log, 1.0, rows())], &cells, mapping, 1 << 30).unwrap();
     let turns = Start::LogAsphere { band_um: (0.4, 0.7) }.turns(&lens, 0);
     let mut group = c.benchmark_group("optimise");
     group.sample_size(10);

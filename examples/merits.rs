@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use metalith::cell::{InversePolynomial, PublishedCell, RigorousCell, cache_folder};
 use metalith::design::SolverSpec;
-use metalith::optimise::{Checkpoint, Task};
+use metalith::optimise::{Checkpoint, OptimiseTask};
 use metalith::{CellModel, Design, Error, Fidelity, Result, Silent};
 
 fn main() -> Result<()> {
@@ -54,7 +54,7 @@ fn main() -> Result<()> {
                     _ => Box::new(RigorousCell::obtain(&shipped.table_spec()?, cache_folder().as_deref(), &Silent)?.0),
                 };
                 let start = Instant::now();
-                let task = Task::of(&design)?;
+                let task = OptimiseTask::of(&design)?;
                 let found = task.solve(&[cell.as_ref()], Checkpoint::begin(&design), &Silent)?;
                 let judged = task.judge_rings(&found.turns, cell.as_ref())?;
                 println!(

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use metalith::cell::{RigorousCell, cache_folder};
 use metalith::optimise::{
-    Checkpoint, Deconvolution, Findings, Judged, Optimised, OverWavelength, Task, cells_off_height, lens_alone,
-    mean_and_deviation, views, wavelengths, write_phase_table,
+    Checkpoint, Deconvolution, Judged, OptimiseReport, OptimiseTask, Optimised, OverWavelength, cells_off_height,
+    lens_alone, mean_and_deviation, views, wavelengths, write_phase_table,
 };
 use metalith::report::sig;
 use metalith::verify::read_back;
@@ -102,7 +102,7 @@ pub fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
         .unwrap_or_else(|| PathBuf::from("out").join(&design.name).join("optimise"));
     let phase = args.phase.clone().unwrap_or_else(|| folder.join("phase.csv"));
     let kept = folder.join("checkpoint.bin");
-    let task = Task::of(&design)?;
+    let task = OptimiseTask::of(&design)?;
     let cells = Cells::of(&design, !args.no_report, terminal)?;
     let checkpoint = if args.fresh {
         Checkpoint::begin(&design)
@@ -167,13 +167,13 @@ fn command(args: &OptimiseArgs) -> String {
 fn findings(
     args: &OptimiseArgs,
     design: &Design,
-    task: &Task,
+    task: &OptimiseTask,
     cells: &Cells,
     found: &Optimised,
     phase: &Path,
     folder: &Path,
     terminal: &Terminal,
-) -> Result<Findings> {
+) -> Result<OptimiseReport> {
     let judge = |turns: &[f64]| -> Result<Vec<Judged>> {
         let mut judged = vec![task.judge_rings(turns, cells.own())?];
         if cells.own().fidelity() != cells.rigorous().fidelity() {
@@ -204,7 +204,7 @@ fn findings(
     let psf = spectrum.psf(&radii, &fine)?;
     let mtf = spectrum.mtf(task.spec.views.pixel_um, &coarse)?;
     let with_errors = with_errors(task, cells, found, terminal)?;
-    Ok(Findings {
+    Ok(OptimiseReport {
         design: format!("{}: {}", design.name, design.title),
         command: command(args),
         start: found.start.into(),
@@ -234,7 +234,7 @@ fn findings(
 /// Of a robust design: what it begins from, what is best without errors in mind, and what was found, each
 /// with the same drawn errors.
 fn with_errors(
-    task: &Task,
+    task: &OptimiseTask,
     cells: &Cells,
     found: &Optimised,
     terminal: &Terminal,
@@ -265,7 +265,7 @@ fn terminal_step(terminal: &Terminal, what: &str) {
 
 /// Expected PSNR at wavelengths half a step off those optimised on, for designs that ask for it.
 fn expected_images(
-    task: &Task,
+    task: &OptimiseTask,
     cells: &Cells,
     before: &[u16],
     after: &[u16],
@@ -290,7 +290,7 @@ fn expected_images(
         .collect())
 }
 
-fn summary(findings: &Findings) {
+fn summary(findings: &OptimiseReport) {
     for (name, list) in [("before", &findings.before), ("after", &findings.after)] {
         for judged in list {
             print_line!(

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::cell::{RigorousCell, cache_folder};
-use metalith::optimise::{Deconvolution, Start, StepLimit, Task, blurs_of_colours, turns_of, views};
+use metalith::optimise::{Deconvolution, OptimiseTask, Start, StepLimit, blurs_of_colours, turns_of, views};
 use metalith::phase::{Interpolation, RadialPhase};
 use metalith::wave::Photograph;
 use metalith::wave::restore::Restoration;
@@ -47,7 +47,7 @@ pub struct PhotographsArgs {
 pub fn run(args: &PhotographsArgs, terminal: &Terminal) -> Result<Outcome> {
     let design = Design::read(&args.design)?;
     terminal.stop_on_interrupt();
-    let task = Task::of(&design)?;
+    let task = OptimiseTask::of(&design)?;
     let images = args
         .images
         .iter()
@@ -115,7 +115,7 @@ pub fn run(args: &PhotographsArgs, terminal: &Terminal) -> Result<Outcome> {
 }
 
 /// Names and phases (turns), all within the step limit of the design.
-fn phases(args: &PhotographsArgs, task: &Task) -> Result<Vec<(String, Vec<f64>)>> {
+fn phases(args: &PhotographsArgs, task: &OptimiseTask) -> Result<Vec<(String, Vec<f64>)>> {
     let band_um = task.spec.band_um;
     let hyperbolic = Start::Hyperbolic {
         wavelength_um: 0.5 * (band_um.0 + band_um.1),

@@ -259,9 +259,11 @@ fn the_program_applies_what_it_once_left_out_and_names_what_it_cannot() {
     assert_eq!(nothing["model"]["not_applied"].as_array().unwrap().len(), 0);
     let offset = judged("offset", &|p| p.geometry.aperture_offset_um = [15.0, 0.0]);
     let near = judged("near", &|p| p.path.source_per_m = 50.0);
+    // Either perturbation costs more than a twentieth of the peak; a command that ignored it would cost nothing.
+    const CHANGED: f64 = 0.95;
     for found in [&offset, &near] {
         assert!(
-            strehl(found) < 0.95 * strehl(&nothing),
+            strehl(found) < CHANGED * strehl(&nothing),
             "{} {}",
             strehl(found),
             strehl(&nothing)

@@ -13,6 +13,15 @@ use metalith::{
 };
 use serde_json::Value;
 
+/// Relative error, or nm: rounding of tables of some hundred widths.
+const ROUNDING: f64 = 1e-9;
+
+/// A relative change that nobody would call rounding: each premise of a test exceeds it.
+const FELT: f64 = 0.05;
+
+/// Transmissions of size one by two ways through the same solver, or by a closed form.
+const SOLVED: f64 = 1e-12;
+
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
@@ -47,8 +56,12 @@ fn a_bias_of_whole_steps_is_drawn_the_other_way() {
     let summary = compensate(&design, &array, &narrow, &Silent).unwrap().summary;
     // Every width plus ten is a width that may be drawn: nothing is left but the rounding of the tables.
     let [before, after] = summary.error;
-    assert!(before > 0.05 && after < 1e-9, "{before} {after}");
-    assert!((summary.moved_rms_nm - 10.0).abs() < 1e-9, "{}", summary.moved_rms_nm);
+    assert!(before > FELT && after < ROUNDING, "{before} {after}");
+    assert!(
+        (summary.moved_rms_nm - 10.0).abs() < ROUNDING,
+        "{}",
+        summary.moved_rms_nm
+    );
 }
 
 #[test]
@@ -56,12 +69,14 @@ fn what_cannot_be_undone_is_made_less() {
     let design = mini();
     let array = PillarArray::build(&design, &Silent).unwrap();
     let nothing = compensate(&design, &array, &model(|_| ()), &Silent).unwrap();
-    assert!(nothing.summary.error[1] < 1e-9 && nothing.summary.moved_rms_nm == 0.0);
+    assert!(nothing.summary.error[1] < ROUNDING && nothing.summary.moved_rms_nm == 0.0);
     // A film 25 nm too high turns resonances and phases together: widths mend the phases alone.
+    const MENDED: f64 = 0.9;
     let high = compensate(&design, &array, &model(|d| d.cell.height_nm = 25.0), &Silent).unwrap();
     let [before, after] = high.summary.error;
-    assert!(after < 0.9 * before, "{before} {after}");
-    // Bias by density differs from site to site: the drawn change follows it.
+    assert!(after < MENDED * before, "{before} {after}");
+    // Bias by density differs from site to site: the drawn change follows it, up to the steps of the widths.
+    const FOLLOWED: f64 = 0.5;
     let dense = compensate(
         &design,
         &array,
@@ -70,7 +85,7 @@ fn what_cannot_be_undone_is_made_less() {
     )
     .unwrap();
     let [before, after] = dense.summary.error;
-    assert!(after < 0.5 * before, "{before} {after}");
+    assert!(after < FOLLOWED * before, "{before} {after}");
 }
 
 #[test]
@@ -110,8 +125,14 @@ fn the_program_predicts_and_compensates() {
         strehl("made, corrected"),
     );
     assert_eq!((intended.len(), plain.len()), (9, 9));
+    // Interpolation between solved widths may leave a fifth of the change, and a thousandth where there is none.
+    const LEFT: f64 = 0.2;
+    const NO_CHANGE: f64 = 1e-3;
     for ((a, b), c) in intended.iter().zip(&plain).zip(&corrected) {
-        assert!((c / a - 1.0).abs() < 0.2 * (b / a - 1.0).abs() + 1e-3, "{a} {b} {c}");
+        assert!(
+            (c / a - 1.0).abs() < LEFT * (b / a - 1.0).abs() + NO_CHANGE,
+            "{a} {b} {c}"
+        );
     }
     // Such a layout is held to the design as compensated: all pillars are right, and as made it is what was asked for.
     let pillars = out("made/mini_3x3_compensated_pillars.gds");
@@ -122,7 +143,12 @@ fn the_program_predicts_and_compensates() {
             }
         };
         let mut verify = metalith();
-        verify.args(["verify", design]).arg(&pillars).arg("--fast").arg("--out").arg(out("verified"));
+        verify
+            .args(["verify", design])
+            .arg(&pillars)
+            .arg("--fast")
+            .arg("--out")
+            .arg(out("verified"));
         with(&mut verify);
         verify.assert().code(code);
         let mut check = metalith();
@@ -159,7 +185,7 @@ fn the_program_predicts_and_compensates() {
         };
         (by(0, "calibrated") / by(1, "rigorous") - 1.0).abs()
     });
-    assert!(changes.fold(0.0, f64::max) > 0.05);
+    assert!(changes.fold(0.0, f64::max) > FELT);
     // And without a design.
     metalith()
         .arg("psf")
@@ -181,10 +207,12 @@ fn oblique_light_sees_another_cell_and_the_normal_is_its_limit() {
     let orders = metalith::rcwa::Orders::new(9).unwrap();
     let along = stack.transmission(180.0, 0.53, orders).unwrap();
     for t in stack.oblique(180.0, 0.53, [0.0, 0.0], orders).unwrap() {
-        assert!((t - along).norm() < 1e-12);
+        assert!((t - along).norm() < SOLVED);
     }
     let tilted = stack.oblique(180.0, 0.53, [0.25, 0.0], orders).unwrap();
-    assert!((tilted[0] - along).norm() > 0.02);
+    // Fourteen degrees in the substrate are felt, far above what the solver errs by.
+    const TILTED: f64 = 0.02;
+    assert!((tilted[0] - along).norm() > TILTED);
     // Bare glass: the share of power that Fresnel's coefficients pass, s and p.
     let n = stack.full_transmission(0.53).unwrap().powi(2);
     let (sine, air) = (0.5_f64, 0.75_f64.sqrt());
@@ -195,7 +223,7 @@ fn oblique_light_sees_another_cell_and_the_normal_is_its_limit() {
         (glass - n * air) / (glass + n * air),
     ];
     for (t, r) in bare.iter().zip(reflected) {
-        assert!((t.norm_sqr() / n - (1.0 - r * r)).abs() < 1e-12);
+        assert!((t.norm_sqr() / n - (1.0 - r * r)).abs() < SOLVED);
     }
     assert!(stack.oblique(180.0, 0.53, [1.0, 0.0], orders).is_err());
 }
@@ -229,13 +257,14 @@ fn a_design_may_ask_for_cells_as_they_are_lit() {
     design.verify.incidence = metalith::design::CellIncidence::Normal;
     for ((along_normal, a), (_, b)) in lit.iter().zip(strehls(&design)) {
         // Light along the normal sees what it did; what comes from 33 degrees, at the corner of a corner element's
-        // field, finds cells that were not made for it.
+        // field, finds cells that were not made for it, but still makes an image.
+        const NO_IMAGE: f64 = 0.7;
         let change = 1.0 - a / b;
         assert!(
             if *along_normal {
                 change == 0.0
             } else {
-                change > 0.05 && change < 0.7
+                change > FELT && change < NO_IMAGE
             },
             "{a} {b}"
         );

@@ -173,7 +173,8 @@ fn a_layout_from_anywhere_is_found_and_simulated() {
         spot["extracted_strehl"][0][1].as_f64().unwrap(),
     );
     // Both sample the peak on the same lattice of samples; the rest is rounding to four digits.
-    assert!((here / there - 1.0).abs() < 1e-3, "{here} against {there}");
+    const FOUR_DIGITS: f64 = 1e-3;
+    assert!((here / there - 1.0).abs() < FOUR_DIGITS, "{here} against {there}");
 }
 
 #[test]

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use num_complex::Complex64;
 use serde::Serialize;
 
-use super::column::Column;
+use super::column::WidthSpectrum;
 use super::kept;
 use super::table::TableSpec;
 use metalith_core::Result;
@@ -45,7 +45,7 @@ pub(super) fn file_name(inputs: &[u8]) -> String {
     format!("cell-{}.bin", kept::name_of(inputs))
 }
 
-pub(super) fn write(file: &Path, inputs: &[u8], widths: &[u16], columns: &[Column]) -> Result<()> {
+pub(super) fn write(file: &Path, inputs: &[u8], widths: &[u16], columns: &[WidthSpectrum]) -> Result<()> {
     let mut bytes = Vec::new();
     bytes.extend((columns.len() as u32).to_le_bytes());
     for (width, column) in widths.iter().zip(columns) {
@@ -61,7 +61,11 @@ pub(super) fn write(file: &Path, inputs: &[u8], widths: &[u16], columns: &[Colum
 }
 
 /// The columns kept in a file; none if there is no such file, a reason if it cannot be trusted.
-pub(super) fn read(file: &Path, inputs: &[u8], widths: &[u16]) -> std::result::Result<Option<Vec<Column>>, String> {
+pub(super) fn read(
+    file: &Path,
+    inputs: &[u8],
+    widths: &[u16],
+) -> std::result::Result<Option<Vec<WidthSpectrum>>, String> {
     let Some(content) = kept::read(file, MAGIC, inputs, LONGEST)? else {
         return Ok(None);
     };
@@ -88,7 +92,7 @@ impl<'a> Reader<'a> {
         value.is_finite().then_some(value)
     }
 
-    fn columns(&mut self, widths: &[u16]) -> Option<Vec<Column>> {
+    fn columns(&mut self, widths: &[u16]) -> Option<Vec<WidthSpectrum>> {
         if self.u32()? as usize != widths.len() {
             return None;
         }
@@ -110,7 +114,7 @@ impl<'a> Reader<'a> {
                 }
                 wavelengths_um
                     .is_sorted_by(|a, b| a < b)
-                    .then_some(Column { wavelengths_um, t })
+                    .then_some(WidthSpectrum { wavelengths_um, t })
             })
             .collect::<Option<Vec<_>>>()?;
         self.0.is_empty().then_some(columns)

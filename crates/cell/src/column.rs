@@ -17,12 +17,12 @@ const GRADING: f64 = 2.5;
 
 /// Samples of one width over the band, unevenly spaced.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Column {
+pub(super) struct WidthSpectrum {
     pub wavelengths_um: Vec<f64>,
     pub t: Vec<Complex64>,
 }
 
-impl Column {
+impl WidthSpectrum {
     /// Sample `t` until in the middle of every interval the cubic through the samples around it was
     /// within `tolerance` before the middle itself was added.
     pub fn sample(band_um: (f64, f64), tolerance: f64, t: impl Fn(f64) -> Result<Complex64>) -> Result<Self> {
@@ -116,6 +116,9 @@ pub(super) fn lagrange(places: &[f64], value: impl Fn(usize) -> Complex64, x: f6
 mod tests {
     use super::*;
 
+    /// A polynomial of numbers below a hundred in double precision.
+    const ROUNDING: f64 = 1e-12;
+
     /// A slow phase with a Fano resonance 0.5 nm wide.
     fn resonant(wavelength_um: f64) -> Complex64 {
         let detuning = (wavelength_um - 0.5173) / 2.5e-4;
@@ -125,7 +128,7 @@ mod tests {
     #[test]
     fn a_narrow_resonance_near_a_sample_is_followed() {
         let tolerance = 0.01;
-        let column = Column::sample((0.4, 0.7), tolerance, |l| Ok(resonant(l))).unwrap();
+        let column = WidthSpectrum::sample((0.4, 0.7), tolerance, |l| Ok(resonant(l))).unwrap();
         assert!(column.t.len() < 300, "{}", column.t.len());
         let worst = (0..30_000)
             .map(|i| 0.4 + 1e-5 * f64::from(i))
@@ -141,7 +144,7 @@ mod tests {
         let cubic = |x: f64| Complex64::new(x * x * x - 2.0 * x, 3.0 - x * x);
         for x in [-0.5, 0.3, 1.2, 4.4, 4.5] {
             let got = lagrange(&places, |i| cubic(places[i]), x);
-            assert!((got - cubic(x)).norm() < 1e-12);
+            assert!((got - cubic(x)).norm() < ROUNDING);
         }
         assert_eq!(lagrange(&[2.0], |_| Complex64::I, 7.0), Complex64::I);
     }

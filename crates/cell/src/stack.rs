@@ -244,8 +244,12 @@ pub(super) mod tests {
             .collect();
         let twelve = transmit(&fine, 0.53, Side::Below, orders).unwrap();
         let upright = paper().transmission(180.0, 0.53, orders).unwrap();
-        assert!((six - twelve).norm() < 0.01, "{six} {twelve}");
-        assert!((six - upright).norm() > 0.2, "{six} {upright}");
+        // The error of the slices falls with their number squared and is below the tolerance of a table.
+        const SLICED: f64 = 0.01;
+        // What the walls change must be far more than that error, or the test shows nothing.
+        const TAPERED: f64 = 20.0 * SLICED;
+        assert!((six - twelve).norm() < SLICED, "{six} {twelve}");
+        assert!((six - upright).norm() > TAPERED, "{six} {upright}");
     }
 
     #[test]
@@ -257,13 +261,16 @@ pub(super) mod tests {
         };
         let phase = |s: &CellStack| s.transmission(150.0, 0.6, orders).unwrap().arg();
         // At least the path of 20 nm of air, at most that of solid alumina.
+        const ALUMINA: f64 = 1.7;
         let added = (phase(&masked) - phase(&paper())).rem_euclid(std::f64::consts::TAU);
         let air = std::f64::consts::TAU * 0.020 / 0.6;
-        assert!(added > air && added < 1.7 * air, "{added} {air}");
+        assert!(added > air && added < ALUMINA * air, "{added} {air}");
 
         let n = paper().substrate.index(0.6).unwrap().re;
         let bare = paper().transmission(0.0, 0.6, orders).unwrap();
-        assert!((bare.norm() - 2.0 * n / (n + 1.0)).abs() < 1e-12);
+        // Fresnel's closed form; the solver inverts small matrices of numbers of size one.
+        const ROUNDING: f64 = 1e-12;
+        assert!((bare.norm() - 2.0 * n / (n + 1.0)).abs() < ROUNDING);
     }
 
     #[test]

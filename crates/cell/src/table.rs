@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::cache;
-use super::column::{Column, lagrange};
+use super::column::{WidthSpectrum, lagrange};
 use super::stack::CellStack;
 use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::Orders;
@@ -94,7 +94,7 @@ pub struct CellTable {
     spec: TableSpec,
     /// Tabulated widths (nm), rising from 0.
     widths_nm: Vec<f64>,
-    columns: Vec<Column>,
+    columns: Vec<WidthSpectrum>,
 }
 
 /// Where a table came from.
@@ -122,7 +122,7 @@ impl CellTable {
         let columns = widths
             .par_iter()
             .map(|&width_nm| {
-                let column = Column::sample(spec.band_um, spec.tolerance, |wavelength_um| {
+                let column = WidthSpectrum::sample(spec.band_um, spec.tolerance, |wavelength_um| {
                     if progress.stopped() {
                         return Err(Error::Interrupted);
                     }
@@ -135,7 +135,7 @@ impl CellTable {
         Ok(Self::assemble(spec, &widths, columns))
     }
 
-    fn assemble(spec: &TableSpec, widths: &[u16], columns: Vec<Column>) -> Self {
+    fn assemble(spec: &TableSpec, widths: &[u16], columns: Vec<WidthSpectrum>) -> Self {
         Self {
             spec: spec.clone(),
             widths_nm: widths.iter().map(|&w| f64::from(w)).collect(),

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::line::{Colour, Line};
+use super::line::{ColourTransmissions, Line};
 use metalith_core::WidthMap;
 
 /// Rounds of choosing widths and then the free phases; both converge in a few.
@@ -22,7 +22,7 @@ const START_STEP_UM: f64 = 0.02;
 pub struct Kinds(BTreeMap<(u16, i32), u64>);
 
 /// What is drawn for each kind.
-pub struct Choice {
+pub struct DrawnWidths {
     pub drawn: BTreeMap<(u16, i32), u16>,
     /// Relative rms error if widths stay as they are.
     pub before: f64,
@@ -47,15 +47,15 @@ impl Kinds {
     }
 
     /// Choose among all widths that may be drawn, for a line that was solved for the steps of density.
-    pub fn choose(&self, line: &Line) -> Choice {
+    pub fn choose(&self, line: &Line) -> DrawnWidths {
         let same: BTreeMap<_, _> = self.0.keys().map(|&(w, step)| ((w, step), w)).collect();
         let (before, own) = self.agreement(line, &same);
         let by_path = |path_um: f64| -> Vec<Complex64> {
-            let turn = |c: &Colour| Complex64::cis(std::f64::consts::TAU * path_um / c.wavelength_um);
+            let turn = |c: &ColourTransmissions| Complex64::cis(std::f64::consts::TAU * path_um / c.wavelength_um);
             line.colours.iter().map(turn).collect()
         };
         let starts = (-STARTS..=STARTS).map(|k| by_path(f64::from(k) * START_STEP_UM));
-        let mut best = Choice {
+        let mut best = DrawnWidths {
             drawn: same,
             before,
             after: before,
@@ -99,7 +99,7 @@ impl Kinds {
     /// How far made pillars miss intended ones, relative, and the free phases at which they miss them least.
     fn agreement(&self, line: &Line, drawn: &BTreeMap<(u16, i32), u16>) -> (f64, Vec<Complex64>) {
         let (mut miss, mut size) = (0.0, 0.0);
-        let mut of = |c: &Colour| {
+        let mut of = |c: &ColourTransmissions| {
             let pairs = || {
                 let kinds = self.0.iter().zip(drawn.values());
                 kinds.filter_map(|((&(w, step), &n), d)| {

@@ -15,7 +15,7 @@ use choose::Kinds;
 use line::Line;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
-use metalith_design::array::{Group, PillarArray};
+use metalith_design::array::{PillarArray, SymmetryGroup};
 use metalith_made::{CalibratedModel, NotApplied};
 
 pub use cases::{CompensationCase, compensation_cases};
@@ -104,7 +104,7 @@ pub fn compensate(
                 at_limit += copies(k) * u64::from(d != w && (d == narrow || d == wide));
             }
         }
-        new.group = Group::of(&new.widths);
+        new.group = SymmetryGroup::of(&new.widths);
     }
     Ok(Compensated {
         array: drawn,

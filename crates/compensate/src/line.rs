@@ -9,7 +9,7 @@ use metalith_made::{CalibratedModel, DrawnElement, MadeChip, Perturbation};
 
 /// Transmissions at one wavelength.
 #[derive(Clone, Debug)]
-pub struct Colour {
+pub struct ColourTransmissions {
     pub wavelength_um: f64,
     /// |t| of a stated cell that passes everything.
     pub full: f64,
@@ -25,7 +25,7 @@ pub struct Line {
     pub stated: MadeChip,
     /// Chips as they are made.
     pub chip: MadeChip,
-    pub colours: Vec<Colour>,
+    pub colours: Vec<ColourTransmissions>,
     /// Widths that may be drawn (nm).
     pub drawn_nm: Vec<u16>,
     /// Radius of the openings in the metal (um).
@@ -48,7 +48,7 @@ impl Line {
         let as_stated = MadeChip::new(&stack, &nothing)?;
         let stated = PointwiseCell::new(stack, drawn_nm.iter().copied());
         let colour = |&wavelength_um: &f64| {
-            Ok(Colour {
+            Ok(ColourTransmissions {
                 wavelength_um,
                 full: stated.full_transmission(wavelength_um)?,
                 stated: stated.transmissions(wavelength_um, wide)?,
@@ -100,7 +100,7 @@ impl Line {
 
     /// What a pillar transmits at one of the colours, drawn at a place of [`Line::drawn_nm`], at a step of density
     /// that was solved for.
-    pub fn made(&self, colour: &Colour, place: usize, step: i32) -> Complex64 {
+    pub fn made(&self, colour: &ColourTransmissions, place: usize, step: i32) -> Complex64 {
         colour.made[place][(step - self.first_step) as usize]
     }
 }

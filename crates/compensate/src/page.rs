@@ -14,7 +14,7 @@ use metalith_report::{Axis, Cell, Chart, Column, Figure, ImageGrid, Page, Table,
 const DECADES: f64 = 4.0;
 
 #[derive(serde::Serialize)]
-struct Numbers<'a> {
+struct CompensationNumbers<'a> {
     model: &'a CalibratedModel,
     summary: &'a CompensationSummary,
     /// What the model says that was not simulated.
@@ -63,7 +63,7 @@ pub fn write_compensation_report(
     for row in cases.chunks(CHIPS).filter_map(figures) {
         page.row(row);
     }
-    let numbers = Numbers {
+    let numbers = CompensationNumbers {
         model,
         summary: s,
         not_applied: line.chip.statement().not_applied,

@@ -6,7 +6,7 @@ use super::context::Context;
 use super::findings::Findings;
 use super::flat::{FlatLayout, Loose};
 use super::polygon::{point_segment, ring_of};
-use super::rule::{Judged, NotRun, Rule};
+use super::rule::{NotRun, Rule, RuleOutcome};
 use super::tolerance::EQUAL_NM;
 use super::work::Stop;
 use metalith_core::document::{Limits, Section};
@@ -69,7 +69,7 @@ impl Rule for ApertureRule {
         }
     }
 
-    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
         let Some(openings) = flat.loose(self.layer) else {
             return Err(NotRun::Skipped(format!(
                 "no opening on layer {}: give its file with --with",
@@ -125,7 +125,7 @@ impl ApertureRule {
         element: usize,
         over: &[usize],
         found: &mut Findings,
-    ) -> Judged {
+    ) -> RuleOutcome {
         let rim = rim(flat, element);
         let round = Rect::around(&rim);
         let name = &flat.elements[element].site.name;
@@ -163,7 +163,7 @@ impl ApertureRule {
 }
 
 /// Metal on shapes of the pillar layer that belong to no element.
-fn metal_on_others(flat: &FlatLayout<'_>, openings: &Loose, found: &mut Findings) -> Judged {
+fn metal_on_others(flat: &FlatLayout<'_>, openings: &Loose, found: &mut Findings) -> RuleOutcome {
     for r in flat.loose(flat.pillars).iter().flat_map(|l| l.bounds()) {
         let mut open = false;
         for opening in openings.bodies() {

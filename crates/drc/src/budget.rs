@@ -1,9 +1,9 @@
-//! What a layout may cost: bytes, shapes, hours on the writer.
+//! Limits on the cost of a layout: bytes, shapes, writing time.
 
 use super::context::Context;
 use super::findings::Findings;
 use super::flat::FlatLayout;
-use super::rule::{Judged, Needs, Rule};
+use super::rule::{Needs, Rule, RuleOutcome};
 use metalith_core::document::{Limits, Section};
 use metalith_gds::LayerNumber;
 
@@ -13,7 +13,7 @@ enum BudgetRule {
     WriteTime(Writing),
 }
 
-/// What the time of writing is made of.
+/// Contributions to the writing time.
 struct Writing {
     layers: Vec<LayerNumber>,
     dose_uc_cm2: f64,
@@ -62,7 +62,7 @@ impl Rule for BudgetRule {
         }
     }
 
-    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
         let (value, most, unit) = match self {
             Self::FileSize(mb) => (flat.layout.bytes() as f64 * 1e-6, *mb, "MB"),
             Self::Shapes(count) => (flat.layout.flat_shapes() as f64, *count, "shapes"),

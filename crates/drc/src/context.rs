@@ -1,4 +1,4 @@
-//! What the sections of a deck share: the names of its layers, and which check looks at which layer.
+//! Context that the sections of a deck share: names of its layers, and the layers of each check.
 
 use std::collections::BTreeMap;
 

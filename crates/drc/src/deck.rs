@@ -98,14 +98,14 @@ impl Deck {
     }
 }
 
-/// What a deck file says.
-struct Contents {
+/// Content of a deck file.
+struct DeckContents {
     name: String,
     pillars: Vec<LayerNumber>,
     rules: Vec<DeckRule>,
 }
 
-fn read(root: &Section<'_, '_>) -> Contents {
+fn read(root: &Section<'_, '_>) -> DeckContents {
     root.integer("schema", SCHEMA..=SCHEMA, "");
     let name = root.text("name");
     let section = root.section("layers");
@@ -166,7 +166,7 @@ fn read(root: &Section<'_, '_>) -> Contents {
     if sections.is_empty() {
         root.fault("rule", "the deck has no rules", "add one or more [[rule]] sections");
     }
-    Contents { name, pillars, rules }
+    DeckContents { name, pillars, rules }
 }
 
 fn read_rule(s: &Section<'_, '_>, context: &Context, ids: &mut BTreeSet<String>) -> Option<DeckRule> {

@@ -1,9 +1,9 @@
-//! How much of the area is pillar: what the dose of the neighbours adds to a place follows it.
+//! Fill factor of pillars, which determines the backscattered dose.
 
 use super::context::Context;
 use super::findings::Findings;
 use super::flat::FlatLayout;
-use super::rule::{Judged, NotRun, Rule};
+use super::rule::{NotRun, Rule, RuleOutcome};
 use metalith_core::document::{Limits, Section};
 use metalith_core::part;
 use metalith_gds::{Point, Rect};
@@ -100,7 +100,7 @@ impl Rule for FillRule {
         }
     }
 
-    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
         if flat.elements.is_empty() {
             return Err(NotRun::Skipped(flat.no_elements.clone()));
         }

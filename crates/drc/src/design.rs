@@ -1,9 +1,9 @@
-//! The layout against the design it should hold, and the design against what the cell can do.
+//! Comparison of the layout with its design, and of the design with the limits of the cell.
 
 use super::context::Context;
 use super::findings::Findings;
 use super::flat::FlatLayout;
-use super::rule::{Judged, Needs, NotRun, Rule};
+use super::rule::{Needs, NotRun, Rule, RuleOutcome};
 use super::work::Stop;
 
 use metalith_core::Lattice;
@@ -40,7 +40,7 @@ impl Rule for Against {
         }
     }
 
-    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
         let Some(design) = flat.design else {
             return Err(NotRun::Skipped("no design was given: name it with --design".into()));
         };
@@ -60,7 +60,7 @@ impl Rule for Against {
 }
 
 impl Against {
-    fn compare(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+    fn compare(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
         let array = flat.array.expect("made where a rule needs it");
         for (k, (read, placed)) in flat.elements.iter().zip(&array.placed).enumerate() {
             flat.work.spend(read.widths.width_nm.len() as u64)?;
@@ -92,7 +92,7 @@ impl Against {
     }
 }
 
-fn phase_step(flat: &FlatLayout<'_>, design: &Design, most: f64, found: &mut Findings) -> Judged {
+fn phase_step(flat: &FlatLayout<'_>, design: &Design, most: f64, found: &mut Findings) -> RuleOutcome {
     let lattice = design.lattice();
     let lens = LensPhase::new(lattice, design.lens.diameter_nm, &design.lens.phase);
     for element in design.elements() {
@@ -135,7 +135,7 @@ fn steps(flat: &FlatLayout<'_>, lattice: Lattice, phase: &ElementPhase<'_>) -> R
     Ok((all, steep))
 }
 
-fn lattice_orders(design: &Design, found: &mut Findings) -> Judged {
+fn lattice_orders(design: &Design, found: &mut Findings) -> RuleOutcome {
     let folder = design.path.parent().unwrap_or_else(|| std::path::Path::new("."));
     let substrate = match Material::resolve(&design.cell.substrate_material, folder) {
         Ok(material) => material,

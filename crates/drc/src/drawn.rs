@@ -6,7 +6,7 @@ use super::polygon::twice_area;
 use super::winding::crosses_itself;
 use metalith_gds::{LayerNumber, Point, Rect, ShapeKind, Transform, simplified};
 
-/// One outline of a cell as it is drawn, with what rules ask of it computed when first asked.
+/// One outline of a cell as drawn; derived quantities are computed on first use.
 pub(super) struct DrawnOutline<'a> {
     pub layer: LayerNumber,
     pub kind: ShapeKind,
@@ -32,7 +32,7 @@ impl<'a> DrawnOutline<'a> {
         }
     }
 
-    /// Corners alone, closed.
+    /// Corners only, closed.
     pub fn corners(&self) -> &[Point] {
         self.simple.get_or_init(|| simplified(self.points))
     }

@@ -1,4 +1,4 @@
-//! One result for people, viewers and build servers.
+//! Output of a result as text, for layout viewers, and for build servers.
 
 use std::fmt::Write;
 
@@ -8,7 +8,7 @@ use serde_json::json;
 use super::report::{DrcReport, RuleReport};
 use super::rule::{Severity, Status};
 
-/// For people: one line a rule, the first violations below it.
+/// Plain text: one line for each rule, followed by its first violations.
 pub fn text(report: &DrcReport) -> String {
     const SHOWN: usize = 5;
     let mut out = String::new();
@@ -184,7 +184,7 @@ fn categories(out: &mut String, ids: &[(Vec<&str>, &str)], depth: usize, indent:
     let _ = writeln!(out, "{pad}</categories>");
 }
 
-/// JUnit's XML: a rule is a test case; what did not run is an error there, never a pass.
+/// JUnit XML: each rule is a test case; a rule that did not run is an error, never a pass.
 pub fn junit(report: &DrcReport) -> String {
     let failed = |r: &&RuleReport| r.status == Status::Run && r.severity > Severity::Note && r.open() > 0;
     let waiting = report.rules.iter().filter(|r| r.status == Status::NotInForce).count();

@@ -1,9 +1,9 @@
-//! The writer's fields: what is cut by a boundary is exposed in two parts, some nanometres apart.
+//! Write fields: a shape that a field boundary cuts is exposed in two parts, with a stitching error of some nanometres.
 
 use super::context::Context;
 use super::findings::Findings;
 use super::flat::FlatLayout;
-use super::rule::{Judged, NotRun, Rule};
+use super::rule::{NotRun, Rule, RuleOutcome};
 use super::tolerance::ROUNDING_NM;
 use metalith_core::document::{Limits, Section};
 use metalith_gds::Rect;
@@ -99,7 +99,7 @@ impl FieldRule {
     }
 
     /// Shapes off every lattice, by the fields of the nearest element.
-    fn cut_loose(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+    fn cut_loose(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
         let Some(loose) = flat.loose(flat.pillars) else {
             return Ok(());
         };
@@ -135,7 +135,7 @@ impl Rule for FieldRule {
         }
     }
 
-    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
         if flat.elements.is_empty() && (self.about_elements || self.want == BoundaryRule::NoBoundary) {
             return Err(NotRun::Skipped(flat.no_elements.clone()));
         }

@@ -1,4 +1,4 @@
-//! What a rule found: markers up to a number, counts without one.
+//! Findings of a rule: markers up to a limit, counts without one.
 
 use std::collections::HashMap;
 
@@ -12,17 +12,17 @@ use metalith_gds::{Point, Rect, Transform};
 /// One place where a rule does not hold.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Marker {
-    /// Outline in the layout (nm); empty for what has no place, such as a name.
+    /// Outline in the layout (nm); empty for findings without a position, such as a name.
     pub outline_nm: Vec<[f64; 2]>,
-    /// What is wrong here, with numbers.
+    /// Description of the violation, with numbers.
     pub words: String,
-    /// Of the rule and the place, the same in every run and for every hierarchy: what a waiver names.
+    /// Hash of rule and position, the same in every run and for every hierarchy: waivers refer to it.
     pub hash: String,
     /// Whether a waiver covers it.
     pub waived: bool,
 }
 
-/// Gathers what one rule finds.
+/// Collects the findings of one rule.
 pub(super) struct Findings {
     rule: String,
     unit_nm: f64,
@@ -35,7 +35,7 @@ pub(super) struct Findings {
     pub total: u64,
     pub waived: u64,
     pub markers: Vec<Marker>,
-    /// Numbers worth reporting whether or not they are within limits.
+    /// Values that are reported whether or not they are within limits.
     pub facts: Vec<(String, f64)>,
 }
 
@@ -121,7 +121,7 @@ impl Findings {
         }
     }
 
-    /// Indices of the waivers that were tried, by their place in the file, with what each covered.
+    /// Indices of the waivers that were tried, in the order of the file, with the number of findings that each covered.
     pub fn tried(&self) -> impl Iterator<Item = (usize, u64)> + '_ {
         self.waivers.iter().map(|w| w.index).zip(self.matched.iter().copied())
     }

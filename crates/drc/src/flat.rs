@@ -59,9 +59,9 @@ pub(super) struct PlacedText {
     pub at: Point,
 }
 
-/// What rules look at.
+/// The flattened layout that rules check.
 pub(super) struct FlatLayout<'a> {
-    /// What rules may still do.
+    /// Remaining work budget of the rules.
     pub work: &'a Work<'a>,
     pub layout: &'a Layout,
     pub with: Vec<&'a Layout>,
@@ -75,7 +75,7 @@ pub(super) struct FlatLayout<'a> {
     /// Why there are none, if there are none.
     pub no_elements: String,
     pub loose: BTreeMap<LayerNumber, Loose>,
-    /// Squares inside an element that stand between its sites.
+    /// Squares inside an element that are not on its sites.
     pub off_lattice: Vec<Rect>,
     /// Squares of odd width on a site: kept with the loose ones, because their edges are not symmetric.
     pub odd_on_lattice: u64,

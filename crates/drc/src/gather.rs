@@ -16,7 +16,7 @@ use metalith_core::text::printable_bytes;
 use metalith_core::{Error, Progress, Result};
 use metalith_gds::extract::{Filler, Scale, Why};
 use metalith_gds::{
-    Cell, LayerNumber, Layout, Point, Rect, Selection, Shape, Text, Transform, Visitor, rectangle_of, simplified,
+    LayerNumber, Layout, LayoutCell, Point, Rect, Selection, Shape, Text, Transform, Visitor, rectangle_of, simplified,
 };
 
 /// Widest square that is decided by table (database units).
@@ -135,12 +135,12 @@ struct Gather<'r, 'p> {
     incomplete: Option<String>,
     allowance: Allowance,
     work: &'r Work<'p>,
-    /// Those in force, each with what it found.
+    /// Active rules, each with its findings.
     rules: Vec<(&'r DeckRule, &'r mut Findings)>,
 }
 
 impl Gather<'_, '_> {
-    /// The layer that rules know a shape by.
+    /// The layer that rules see for a shape.
     #[inline]
     fn known_as(&self, layer: LayerNumber) -> LayerNumber {
         if self.doses.contains(&layer) {
@@ -223,7 +223,7 @@ impl Gather<'_, '_> {
 }
 
 impl Visitor for Gather<'_, '_> {
-    fn cell(&mut self, _cell: &Cell, placements: &[Transform]) -> Result<()> {
+    fn cell(&mut self, _cell: &LayoutCell, placements: &[Transform]) -> Result<()> {
         self.filler.begin(placements.len());
         Ok(())
     }

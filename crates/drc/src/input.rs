@@ -1,4 +1,4 @@
-//! What a layout is checked with.
+//! Inputs of a check.
 
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
@@ -6,10 +6,10 @@ use metalith_gds::Layout;
 
 use super::waiver::{Date, Waivers};
 
-/// What is checked besides the layout itself.
+/// Inputs of a check besides the layout itself.
 #[derive(Default)]
 pub struct CheckInput<'a> {
-    /// Further files that are written on the same glass, such as the apertures.
+    /// Further layouts on the same substrate, such as the apertures.
     pub with: Vec<&'a Layout>,
     /// The design that the layout should hold.
     pub design: Option<&'a Design>,

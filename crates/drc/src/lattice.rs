@@ -3,7 +3,7 @@
 use super::context::Context;
 use super::findings::Findings;
 use super::flat::FlatLayout;
-use super::rule::{Judged, NotRun, Rule};
+use super::rule::{NotRun, Rule, RuleOutcome};
 use super::tolerance::{EQUAL_NM, ROUNDING_NM};
 use metalith_core::document::{Limits, Section};
 use metalith_gds::{LayerNumber, Point};
@@ -25,7 +25,7 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Optio
     })
 }
 
-/// Squares in an element stand on its sites.
+/// Squares in an element are on its sites.
 struct OnLattice {
     pitch_nm: f64,
 }
@@ -35,7 +35,7 @@ impl Rule for OnLattice {
         format!("pillars of an element stand on one lattice of {} nm", self.pitch_nm)
     }
 
-    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
         if flat.elements.is_empty() {
             return Err(NotRun::Skipped(flat.no_elements.clone()));
         }
@@ -75,7 +75,7 @@ impl Rule for GridRule {
         format!("vertices are on a grid of {} nm", self.step_nm)
     }
 
-    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
         // Every place in database units is on the grid if the unit is a multiple of its step.
         let per_step = flat.unit_nm / self.step_nm;
         if (per_step - per_step.round()).abs() < ROUNDING_NM && per_step >= 0.5 {
@@ -132,7 +132,7 @@ impl Rule for ExposureGrid {
         format!("pitch and widths are whole steps of a beam of {} nm", self.step_nm)
     }
 
-    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
         if flat.elements.is_empty() {
             return Err(NotRun::Skipped(flat.no_elements.clone()));
         }

@@ -1,9 +1,9 @@
-//! What may be on which layer, and where.
+//! Allowed content and extent of each layer.
 
 use super::context::Context;
 use super::findings::Findings;
 use super::flat::FlatLayout;
-use super::rule::{Judged, NotRun, Rule};
+use super::rule::{NotRun, Rule, RuleOutcome};
 use metalith_core::document::{Limits, Section};
 use metalith_gds::{LayerNumber, Rect};
 
@@ -18,9 +18,9 @@ enum LayerRule {
 }
 
 enum Within {
-    /// Left, bottom, right, top (um); where a design is given, so far inside the edge of its chip.
+    /// Left, bottom, right, top (um); with a design, distances from the edge of its chip.
     Edges { um: [f64; 4], edge_um: Option<f64> },
-    /// The box of what is drawn on a layer.
+    /// Bounding box of the shapes on a layer.
     Drawn(LayerNumber),
 }
 
@@ -67,7 +67,7 @@ impl Rule for LayerRule {
         }
     }
 
-    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
         match self {
             Self::Whitelist(layers) => {
                 let mut used: Vec<LayerNumber> = flat.counts.keys().copied().collect();

@@ -3,7 +3,7 @@
 //! The layout is read once more after its first reading. Every outline is looked at in the cell that it is
 //! drawn in, and what is wrong with it is counted once for each copy of the cell; squares on the lattice
 //! of an element become a width map, everything else is kept as it stands, and rules about distances,
-//! density and place look at those. **Closed when in doubt**: what did not run is not clean.
+//! density and place look at those. **Fail closed**: a rule that did not run is not clean.
 
 mod aperture;
 mod body;

@@ -3,7 +3,7 @@
 use super::context::Context;
 use super::findings::Findings;
 use super::flat::{FlatLayout, Loose};
-use super::rule::{Judged, NotRun, Rule};
+use super::rule::{NotRun, Rule, RuleOutcome};
 use metalith_core::document::{Limits, Section};
 use metalith_design::MarkSpec;
 use metalith_gds::{LayerNumber, Point, Rect};
@@ -15,7 +15,7 @@ enum Marks {
         others: Vec<LayerNumber>,
         nm: f64,
     },
-    /// So many marks of each size (nm); those of the design where one is given.
+    /// Required number of marks of each size (nm); from the design if one is given.
     Complete { marks: LayerNumber, sets: Vec<(f64, u64)> },
 }
 
@@ -63,7 +63,7 @@ impl Rule for Marks {
         }
     }
 
-    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
         match self {
             Self::KeepOut { marks, others, nm } => keep_out(flat, *marks, others, *nm, found),
             Self::Complete { marks, sets } => {
@@ -83,7 +83,7 @@ fn keep_out(
     others: &[LayerNumber],
     nm: f64,
     found: &mut Findings,
-) -> Judged {
+) -> RuleOutcome {
     let Some(loose) = flat.loose(marks) else {
         // A design that asks for none has nothing to keep away from.
         return match flat.design {
@@ -115,7 +115,7 @@ fn keep_out(
     Ok(())
 }
 
-fn pillars_near(flat: &FlatLayout<'_>, zone: &Rect, found: &mut Findings) -> Judged {
+fn pillars_near(flat: &FlatLayout<'_>, zone: &Rect, found: &mut Findings) -> RuleOutcome {
     for (k, e) in flat.elements.iter().enumerate() {
         let n = e.site.lattice.sites() - 1;
         let mut lens = flat.pillar(k, 0, 0);
@@ -139,7 +139,7 @@ fn pillars_near(flat: &FlatLayout<'_>, zone: &Rect, found: &mut Findings) -> Jud
     Ok(())
 }
 
-fn complete(flat: &FlatLayout<'_>, marks: LayerNumber, sets: &[(f64, u64)], found: &mut Findings) -> Judged {
+fn complete(flat: &FlatLayout<'_>, marks: LayerNumber, sets: &[(f64, u64)], found: &mut Findings) -> RuleOutcome {
     let bounds: Vec<Rect> = flat.loose(marks).into_iter().flat_map(|l| l.bounds()).collect();
     let mut known = vec![false; bounds.len()];
     for &(nm, count) in sets {

@@ -9,7 +9,7 @@ use metalith_core::document::{Limits, Section};
 use metalith_gds::LayerNumber;
 
 #[derive(Clone, Copy, PartialEq)]
-enum Form {
+enum OutlineCheck {
     Square,
     Manhattan,
     /// Sharpest angle (degrees).
@@ -28,23 +28,25 @@ enum Form {
 
 struct OutlineRule {
     layers: Vec<LayerNumber>,
-    form: Form,
+    form: OutlineCheck,
     /// Whether a more serious rule of the deck looks at each of the layers too: crossing, acute, area.
     more_serious: Vec<[bool; 3]>,
 }
 
 pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Option<Box<dyn Rule>> {
     let form = match check {
-        "square" => Form::Square,
-        "manhattan" => Form::Manhattan,
-        "acute_angle" => Form::Angle(s.float("min_deg", Limits::new(1.0..=179.0, "degrees"))),
-        "self_crossing" => Form::NoCrossing,
-        "doubled_vertex" => Form::NoDoubled,
-        "collinear_vertex" => Form::NoCollinear,
-        "zero_area" => Form::Area,
-        "winding" => Form::Winding(s.choice("direction", &[("counter_clockwise", true), ("clockwise", false)], None)),
-        "vertices_max" => Form::Vertices(s.integer("count", 4..=8191, "vertices")),
-        "closed" => Form::Closed,
+        "square" => OutlineCheck::Square,
+        "manhattan" => OutlineCheck::Manhattan,
+        "acute_angle" => OutlineCheck::Angle(s.float("min_deg", Limits::new(1.0..=179.0, "degrees"))),
+        "self_crossing" => OutlineCheck::NoCrossing,
+        "doubled_vertex" => OutlineCheck::NoDoubled,
+        "collinear_vertex" => OutlineCheck::NoCollinear,
+        "zero_area" => OutlineCheck::Area,
+        "winding" => {
+            OutlineCheck::Winding(s.choice("direction", &[("counter_clockwise", true), ("clockwise", false)], None))
+        }
+        "vertices_max" => OutlineCheck::Vertices(s.integer("count", 4..=8191, "vertices")),
+        "closed" => OutlineCheck::Closed,
         _ => return None,
     };
     let layers = context.some_layers(s);
@@ -65,20 +67,23 @@ impl OutlineRule {
     fn reported_elsewhere(&self, outline: &DrawnOutline<'_>) -> bool {
         let k = self.layers.iter().position(|&l| l == outline.layer).unwrap_or(0);
         let [crossing, acute, area] = self.more_serious[k];
-        if area && self.form != Form::Area && outline.twice_area() == 0 {
+        if area && self.form != OutlineCheck::Area && outline.twice_area() == 0 {
             return true;
         }
-        let shape = matches!(self.form, Form::Manhattan | Form::Angle(_) | Form::Winding(_));
+        let shape = matches!(
+            self.form,
+            OutlineCheck::Manhattan | OutlineCheck::Angle(_) | OutlineCheck::Winding(_)
+        );
         if crossing && shape && outline.crosses_itself() {
             return true;
         }
-        acute && self.form == Form::Manhattan && outline.sharpest_deg() < 90.0 - ROUNDING_DEG
+        acute && self.form == OutlineCheck::Manhattan && outline.sharpest_deg() < 90.0 - ROUNDING_DEG
     }
 
     fn wrong(&self, outline: &DrawnOutline<'_>) -> Option<String> {
         let points = outline.points;
         match self.form {
-            Form::Square => {
+            OutlineCheck::Square => {
                 let nm = |v: i64| v as f64 * outline.unit_nm;
                 match outline.rectangle() {
                     Some(r) if r.width() == r.height() => None,
@@ -86,24 +91,24 @@ impl OutlineRule {
                     None => Some("not a square".into()),
                 }
             }
-            Form::Manhattan => (!outline.is_manhattan()).then(|| "a side that is not along an axis".into()),
-            Form::Angle(min) => {
+            OutlineCheck::Manhattan => (!outline.is_manhattan()).then(|| "a side that is not along an axis".into()),
+            OutlineCheck::Angle(min) => {
                 let sharpest = outline.sharpest_deg();
                 (sharpest < min - ROUNDING_DEG).then(|| format!("an angle of {sharpest:.2} degrees, at least {min}"))
             }
-            Form::NoCrossing => outline.crosses_itself().then(|| "the outline crosses itself".into()),
-            Form::NoDoubled => {
+            OutlineCheck::NoCrossing => outline.crosses_itself().then(|| "the outline crosses itself".into()),
+            OutlineCheck::NoDoubled => {
                 let doubled = points.windows(2).filter(|w| w[0] == w[1]).count();
                 (doubled > 0).then(|| format!("{doubled} vertices on the one before"))
             }
-            Form::NoCollinear => {
+            OutlineCheck::NoCollinear => {
                 let distinct = points.windows(2).filter(|w| w[0] != w[1]).count() + 1;
                 let needless = distinct.saturating_sub(outline.corners().len());
                 (needless > 0 && points.first() == points.last())
                     .then(|| format!("{needless} vertices on the way between their neighbours"))
             }
-            Form::Area => (outline.twice_area() == 0).then(|| "no area".into()),
-            Form::Winding(counter_clockwise) => {
+            OutlineCheck::Area => (outline.twice_area() == 0).then(|| "no area".into()),
+            OutlineCheck::Winding(counter_clockwise) => {
                 let wrong = (outline.twice_area() > 0) != counter_clockwise;
                 wrong.then(|| {
                     if counter_clockwise {
@@ -114,11 +119,13 @@ impl OutlineRule {
                     .into()
                 })
             }
-            Form::Vertices(most) => {
+            OutlineCheck::Vertices(most) => {
                 let count = points.len();
                 (count as i64 > most).then(|| format!("{count} vertices, at most {most}"))
             }
-            Form::Closed => (points.first() != points.last()).then(|| "the last vertex is not the first".into()),
+            OutlineCheck::Closed => {
+                (points.first() != points.last()).then(|| "the last vertex is not the first".into())
+            }
         }
     }
 }
@@ -126,17 +133,17 @@ impl OutlineRule {
 impl Rule for OutlineRule {
     fn words(&self) -> String {
         match self.form {
-            Form::Square => "pillars are squares".into(),
-            Form::Manhattan => "sides are along the axes".into(),
-            Form::Angle(min) => format!("no angle sharper than {min} degrees"),
-            Form::NoCrossing => "no outline crosses itself".into(),
-            Form::NoDoubled => "no vertex twice in a row".into(),
-            Form::NoCollinear => "no vertex between its neighbours".into(),
-            Form::Area => "every outline has area".into(),
-            Form::Winding(true) => "outlines are drawn counter-clockwise".into(),
-            Form::Winding(false) => "outlines are drawn clockwise".into(),
-            Form::Vertices(most) => format!("at most {most} vertices an outline"),
-            Form::Closed => "outlines end where they begin".into(),
+            OutlineCheck::Square => "pillars are squares".into(),
+            OutlineCheck::Manhattan => "sides are along the axes".into(),
+            OutlineCheck::Angle(min) => format!("no angle sharper than {min} degrees"),
+            OutlineCheck::NoCrossing => "no outline crosses itself".into(),
+            OutlineCheck::NoDoubled => "no vertex twice in a row".into(),
+            OutlineCheck::NoCollinear => "no vertex between its neighbours".into(),
+            OutlineCheck::Area => "every outline has area".into(),
+            OutlineCheck::Winding(true) => "outlines are drawn counter-clockwise".into(),
+            OutlineCheck::Winding(false) => "outlines are drawn clockwise".into(),
+            OutlineCheck::Vertices(most) => format!("at most {most} vertices an outline"),
+            OutlineCheck::Closed => "outlines end where they begin".into(),
         }
     }
 
@@ -146,8 +153,8 @@ impl Rule for OutlineRule {
 
     fn passes_square(&self, _width_nm: f64, clockwise: bool) -> bool {
         match self.form {
-            Form::Winding(counter_clockwise) => clockwise != counter_clockwise,
-            Form::Vertices(most) => most >= 5,
+            OutlineCheck::Winding(counter_clockwise) => clockwise != counter_clockwise,
+            OutlineCheck::Vertices(most) => most >= 5,
             _ => true,
         }
     }
@@ -157,7 +164,11 @@ impl Rule for OutlineRule {
         let path = outline.kind == metalith_gds::ShapeKind::Path;
         let of_file = matches!(
             self.form,
-            Form::NoDoubled | Form::NoCollinear | Form::Winding(_) | Form::Vertices(_) | Form::Closed
+            OutlineCheck::NoDoubled
+                | OutlineCheck::NoCollinear
+                | OutlineCheck::Winding(_)
+                | OutlineCheck::Vertices(_)
+                | OutlineCheck::Closed
         );
         if (path && of_file) || self.reported_elsewhere(outline) {
             return;

@@ -102,7 +102,7 @@ fn pillars_in<'s>(
 
 /// Pairs of boxes at most `reach` apart along x and along y. Boxes are taken from the lowest; those that
 /// still reach up are kept by their left edge in classes of width, so that a search spans little more than
-/// the box itself. What a search meets counts as work, whether it is near or not.
+/// the box itself. Every candidate of a search counts as work, near or not.
 fn sweep(
     boxes: &[[i32; 4]],
     reach: i64,

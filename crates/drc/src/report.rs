@@ -10,13 +10,13 @@ use super::flat::FlatLayout;
 use super::input::CheckInput;
 use super::rule::{Severity, Status};
 
-/// What became of one rule.
+/// Result of one rule.
 #[derive(Clone, Debug, Serialize)]
 pub struct RuleReport {
     pub id: String,
     pub check: String,
     pub severity: Severity,
-    /// What must hold.
+    /// The requirement.
     pub words: String,
     #[serde(flatten)]
     pub status: Status,
@@ -26,7 +26,7 @@ pub struct RuleReport {
     pub waived: u64,
     /// The first of them.
     pub markers: Vec<Marker>,
-    /// Numbers worth knowing, within limits or not.
+    /// Values that are reported whether or not they are within limits.
     pub facts: BTreeMap<String, f64>,
 }
 
@@ -37,7 +37,7 @@ impl RuleReport {
     }
 }
 
-/// What a check found.
+/// Result of a check.
 #[derive(Clone, Debug, Serialize)]
 pub struct DrcReport {
     pub layout: String,
@@ -131,7 +131,7 @@ pub(super) fn assemble(
     }
 }
 
-/// Hashes of the waivers that cover something, and what is wrong with others.
+/// Hashes of the waivers that cover a finding, and faults of the others.
 fn waivers(found: &[Findings], input: &CheckInput<'_>) -> (Vec<String>, Vec<(String, String)>) {
     let list = input.waivers.map_or(&[][..], |w| &w.list);
     let mut counts = vec![None; list.len()];

@@ -1,4 +1,4 @@
-//! What a rule is.
+//! The interface of rules.
 
 use serde::Serialize;
 
@@ -12,7 +12,7 @@ use metalith_gds::LayerNumber;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// True, worth knowing, and no reason to stop.
+    /// Information; not a reason to stop.
     Note,
     Warning,
     Error,
@@ -25,7 +25,7 @@ pub enum Status {
     Run,
     /// There was nothing to run it on: not clean.
     Skipped(String),
-    /// It could not be carried out: not clean.
+    /// It could not be run: not clean.
     Failed(String),
     /// The deck applies it only when a design is given, and none was.
     NotInForce,
@@ -48,7 +48,7 @@ impl Status {
 pub(super) enum NotRun {
     /// There was nothing to run it on.
     Skipped(String),
-    /// It could not be carried out.
+    /// It could not be run.
     Failed(String),
     /// The user asked to stop.
     Interrupted,
@@ -63,8 +63,8 @@ impl From<Stop> for NotRun {
     }
 }
 
-/// What carrying out a rule gives; its findings are elsewhere.
-pub(super) type Judged = Result<(), NotRun>;
+/// Outcome of running a rule; its findings are collected in [`Findings`].
+pub(super) type RuleOutcome = Result<(), NotRun>;
 
 /// One rule of the deck, ready to run.
 pub(super) struct DeckRule {
@@ -76,14 +76,14 @@ pub(super) struct DeckRule {
     pub rule: Box<dyn Rule>,
 }
 
-/// What a rule cannot do without.
+/// Input that a rule requires.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Needs {
-    /// What the first reading counted.
+    /// Counts of the first pass over the file.
     Numbers,
     /// To have been shown every outline.
     Outlines,
-    /// All shapes at hand in `judge`.
+    /// All shapes, available in `judge`.
     Geometry,
     /// The design, and the pillars computed from it beside all shapes.
     Array,
@@ -91,15 +91,15 @@ pub(super) enum Needs {
 
 /// One rule of a deck with its limits. It keeps nothing between layouts.
 pub(super) trait Rule: Send + Sync {
-    /// What must hold, with the limit.
+    /// The requirement, with its limit.
     fn words(&self) -> String;
 
-    /// Layers whose outlines it looks at, one by one, wherever they stand.
+    /// Layers whose outlines it checks one by one, independent of position.
     fn outlines(&self) -> &[LayerNumber] {
         &[]
     }
 
-    /// Whether a square of this width with five points has nothing wrong, wherever it stands. Millions of
+    /// Whether a square of this width with five points is clean at any position. Millions of
     /// equal squares are decided by this once.
     fn passes_square(&self, _width_nm: f64, _clockwise: bool) -> bool {
         false
@@ -108,7 +108,7 @@ pub(super) trait Rule: Send + Sync {
     /// Look at one outline of those layers.
     fn outline(&self, _outline: &DrawnOutline<'_>, _found: &mut Findings) {}
 
-    /// What it cannot do without.
+    /// Input that it requires.
     fn needs(&self) -> Needs {
         if self.outlines().is_empty() {
             Needs::Geometry
@@ -118,7 +118,7 @@ pub(super) trait Rule: Send + Sync {
     }
 
     /// Look at the layout as a whole, after all outlines.
-    fn judge(&self, _scene: &FlatLayout<'_>, _found: &mut Findings) -> Judged {
+    fn judge(&self, _scene: &FlatLayout<'_>, _found: &mut Findings) -> RuleOutcome {
         Ok(())
     }
 }

@@ -5,7 +5,7 @@ use super::context::Context;
 use super::findings::Findings;
 use super::flat::FlatLayout;
 use super::pairs::{near, place};
-use super::rule::{Judged, NotRun, Rule};
+use super::rule::{NotRun, Rule, RuleOutcome};
 use super::tolerance::ROUNDING_NM;
 use metalith_core::document::{Limits, Section};
 use metalith_gds::LayerNumber;
@@ -56,7 +56,7 @@ impl Rule for SpacingRule {
         }
     }
 
-    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
         let limit = match self.want {
             Distance::Gap { nm, .. } => flat.units(nm) - ROUNDING_NM,
             _ => 0.0,

@@ -1,4 +1,4 @@
-//! What counts as equal where whole database units are compared with numbers of the deck.
+//! Tolerances for comparing whole database units with numbers of the deck.
 
 /// Lengths closer than this are equal (nm): database units are converted to nanometres in double precision, and
 /// places up to 1 m (1e9 nm) have 2e-7 nm of rounding.

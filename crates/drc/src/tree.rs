@@ -3,7 +3,7 @@
 use super::context::Context;
 use super::findings::Findings;
 use super::flat::FlatLayout;
-use super::rule::{Judged, Needs, Rule};
+use super::rule::{Needs, Rule, RuleOutcome};
 use metalith_core::document::Section;
 use metalith_gds::{Faulty, Layout};
 
@@ -51,7 +51,7 @@ impl Rule for TreeRule {
         Needs::Numbers
     }
 
-    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> Judged {
+    fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
         self.file(flat.layout, found);
         Ok(())
     }
@@ -98,7 +98,7 @@ impl TreeRule {
                 }
             }
             Self::References(most) => {
-                let count: u64 = layout.cells().iter().map(metalith_gds::Cell::references).sum();
+                let count: u64 = layout.cells().iter().map(metalith_gds::LayoutCell::references).sum();
                 found.facts.push((format!("references in {file}"), count as f64));
                 if count as i128 > i128::from(*most) {
                     found.plain(&format!("{count}"), || {

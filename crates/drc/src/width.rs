@@ -8,7 +8,7 @@ use super::tolerance::{EQUAL_NM, ROUNDING};
 use metalith_core::document::{Limits, Section};
 use metalith_gds::LayerNumber;
 
-/// What must hold of the smaller and the larger side of a pillar (nm).
+/// Limit on the smaller and the larger side of a pillar (nm).
 enum WidthLimit {
     Min(f64),
     Max(f64),
@@ -26,7 +26,7 @@ enum WidthLimit {
     },
 }
 
-struct WidthRule {
+struct WidthBound {
     layers: Vec<LayerNumber>,
     want: WidthLimit,
 }
@@ -59,13 +59,13 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Optio
         }
         _ => return None,
     };
-    Some(Box::new(WidthRule {
+    Some(Box::new(WidthBound {
         layers: context.some_layers(s),
         want,
     }))
 }
 
-impl WidthRule {
+impl WidthBound {
     fn wrong(&self, small: f64, large: f64) -> Option<String> {
         match &self.want {
             WidthLimit::Min(nm) if small < nm - EQUAL_NM => Some(format!("{small} nm wide, at least {nm} nm")),
@@ -96,7 +96,7 @@ impl WidthRule {
     }
 }
 
-impl Rule for WidthRule {
+impl Rule for WidthBound {
     fn words(&self) -> String {
         match &self.want {
             WidthLimit::Min(nm) => format!("pillars at least {nm} nm wide"),

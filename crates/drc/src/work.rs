@@ -18,10 +18,10 @@ const VERTICES_A_BYTE: u64 = 1;
 /// Sites of lattices that were found: 2 bytes each.
 const SITES: u64 = 16_000_000;
 const SITES_A_BYTE: u64 = 16;
-/// Steps between two looks at whether the user asked to stop.
+/// Steps between two checks for an interrupt.
 const STEPS_A_LOOK: u64 = 1 << 20;
 
-/// What a check or a comparison may hold, by the size of the files.
+/// Limits on memory and work of a check or a comparison, by the size of the files.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Allowance {
     pub rects: u64,
@@ -46,12 +46,12 @@ impl Allowance {
 /// Why work ended early.
 #[derive(Debug, PartialEq)]
 pub(super) enum Stop {
-    /// In words.
+    /// Over a limit; the text says which one.
     TooMuch(String),
     Interrupted,
 }
 
-/// Counts work against what the files allow.
+/// Counts work against the limits that follow from the size of the files.
 pub(super) struct Work<'p> {
     left: Cell<u64>,
     unseen: Cell<u64>,

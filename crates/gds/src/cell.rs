@@ -5,7 +5,7 @@ use metalith_core::LayerNumber;
 
 /// One cell ("structure") of a layout in number.
 #[derive(Clone, Debug)]
-pub struct Cell {
+pub struct LayoutCell {
     /// Printable: see [`metalith_core::text::printable_bytes`].
     pub name: String,
     /// Its bytes in the file, from BGNSTR to behind ENDSTR.
@@ -24,7 +24,7 @@ pub struct Cell {
     pub(super) inline: bool,
 }
 
-impl Cell {
+impl LayoutCell {
     /// Areas drawn in the cell itself.
     pub fn shapes(&self) -> u64 {
         self.layers.iter().map(|(_, t)| t.shapes()).sum()

@@ -38,7 +38,7 @@ impl ElementKind {
 
 /// The content of one element. Kept and filled again, so that reading allocates nothing.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Element {
+pub(super) struct ElementContent {
     pub offset: u64,
     pub kind: ElementKind,
     pub layer: LayerNumber,
@@ -59,7 +59,7 @@ pub(super) struct Element {
     absolute: bool,
 }
 
-impl Default for Element {
+impl Default for ElementContent {
     fn default() -> Self {
         Self {
             offset: 0,
@@ -82,7 +82,7 @@ impl Default for Element {
     }
 }
 
-impl Element {
+impl ElementContent {
     /// Forget the last element.
     pub fn begin(&mut self, offset: u64, kind: ElementKind) {
         let (mut points, mut name, mut string) = (

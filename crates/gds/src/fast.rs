@@ -41,7 +41,7 @@ pub(super) fn boundary(bytes: &[u8; BOUNDARY_BYTES]) -> Option<(LayerNumber, [Po
 
 /// A reference of exactly SNAME with a name of up to eight bytes, XY, ENDEL.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Reference {
+pub(super) struct PlainReference {
     /// The name as the record has it, zeros after it: without its padding, a key of the name.
     pub key: u64,
     pub at: Point,
@@ -52,7 +52,7 @@ pub(super) struct Reference {
 pub(super) const REFERENCE_BYTES: usize = 4 + 4 + NAME_BYTES + 12 + 4;
 
 #[inline]
-pub(super) fn reference(bytes: &[u8; REFERENCE_BYTES]) -> Option<Reference> {
+pub(super) fn reference(bytes: &[u8; REFERENCE_BYTES]) -> Option<PlainReference> {
     let word = |at: usize| u32::from_be_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
     if word(0) != 0x0004_0A00 || bytes[4] != 0 || bytes[6] != 0x12 || bytes[7] != 0x06 {
         return None;
@@ -72,7 +72,7 @@ pub(super) fn reference(bytes: &[u8; REFERENCE_BYTES]) -> Option<Reference> {
     if length == 0 || length + 1 < name || bytes[8..8 + length].contains(&0) {
         return None;
     }
-    Some(Reference {
+    Some(PlainReference {
         key,
         at: Point::new(i64::from(word(after + 4) as i32), i64::from(word(after + 8) as i32)),
         bytes: after + 16,

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::cell::Cell;
+use super::cell::LayoutCell;
 use super::input::{Input, Source};
 use super::limits::ReadLimits;
 use super::names::Names;
@@ -23,7 +23,7 @@ pub struct Layout {
     limits: ReadLimits,
     title: String,
     units: [f64; 2],
-    cells: Vec<Cell>,
+    cells: Vec<LayoutCell>,
     names: Names,
     tree: Tree,
     trailing: (u64, bool),
@@ -138,7 +138,7 @@ impl Layout {
     }
 
     /// Cells in the order of the file.
-    pub fn cells(&self) -> &[Cell] {
+    pub fn cells(&self) -> &[LayoutCell] {
         &self.cells
     }
 

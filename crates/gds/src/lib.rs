@@ -21,7 +21,7 @@ mod visit;
 mod walk;
 pub mod write;
 
-pub use cell::{Cell, Child, LayerTally};
+pub use cell::{Child, LayerTally, LayoutCell};
 pub use error::{Error, ExtractionError, LayoutError, Limit, Result};
 pub use layout::{Faulty, Layout};
 pub use limits::ReadLimits;

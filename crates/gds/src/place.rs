@@ -1,13 +1,13 @@
 //! Where every cell stands: the transforms of its copies, from the top down.
 
-use super::element::{Element, ElementKind};
+use super::element::{ElementContent, ElementKind};
 use super::input::Input;
 use super::layout::Layout;
 use super::names::Recent;
 use super::shape::Point;
 use super::transform::Transform;
 use super::tree;
-use super::walk::{Sink, Stop, Walk};
+use super::walk::{Sink, SinkError, Walk};
 use crate::error::{Error, LayoutError, Result};
 use metalith_core::{LayerNumber, Silent};
 
@@ -71,11 +71,11 @@ impl Placer<'_> {
 }
 
 impl Sink for Placer<'_> {
-    fn five_points(&mut self, _offset: u64, _layer: LayerNumber, _points: &[Point; 5]) -> Result<(), Stop> {
+    fn five_points(&mut self, _offset: u64, _layer: LayerNumber, _points: &[Point; 5]) -> Result<(), SinkError> {
         Ok(())
     }
 
-    fn plain_reference(&mut self, offset: u64, key: u64, at: Point) -> Result<(), Stop> {
+    fn plain_reference(&mut self, offset: u64, key: u64, at: Point) -> Result<(), SinkError> {
         let names = self.layout.names();
         let number = self.recent.number(key, |name| names.find(name).unwrap_or(u32::MAX));
         let Some(child) = self.target((number != u32::MAX).then_some(number)) else {
@@ -93,7 +93,7 @@ impl Sink for Placer<'_> {
         Ok(())
     }
 
-    fn element(&mut self, _input: &Input, element: &Element) -> Result<()> {
+    fn element(&mut self, _input: &Input, element: &ElementContent) -> Result<()> {
         if !matches!(element.kind, ElementKind::Reference | ElementKind::Array) {
             return Ok(());
         }

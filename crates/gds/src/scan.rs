@@ -2,15 +2,15 @@
 
 use std::collections::HashMap;
 
-use super::cell::{Cell, Child, LayerTally};
-use super::element::{Element, ElementKind};
+use super::cell::{Child, LayerTally, LayoutCell};
+use super::element::{ElementContent, ElementKind};
 use super::input::{Input, Source};
 use super::limits::ReadLimits;
 use super::names::{Names, Recent};
 use super::outline::outline;
 use super::record::{self, kind};
 use super::shape::{Point, Rect};
-use super::walk::{Sink, Stop, Walk};
+use super::walk::{Sink, SinkError, Walk};
 use crate::error::{Error, LayoutError, Limit, Result};
 use metalith_core::text::printable_bytes;
 use metalith_core::{LayerNumber, Progress};
@@ -20,7 +20,7 @@ pub(super) struct Scan {
     pub title: String,
     /// Database unit in user units, and in metres.
     pub units: [f64; 2],
-    pub cells: Vec<Cell>,
+    pub cells: Vec<LayoutCell>,
     pub names: Names,
     /// Number of the name of each cell.
     pub numbers: Vec<u32>,
@@ -112,7 +112,7 @@ fn read_units(input: &Input, record: record::Record) -> Result<[f64; 2]> {
 /// What is kept of the cells met so far, and the counts of the one being read.
 struct Tally {
     limits: ReadLimits,
-    cells: Vec<Cell>,
+    cells: Vec<LayoutCell>,
     names: Names,
     numbers: Vec<u32>,
     recent: Recent,
@@ -158,7 +158,7 @@ impl Tally {
             return Err(input.fault(record.offset, cause));
         }
         self.numbers.push(self.names.number(name));
-        self.cells.push(Cell {
+        self.cells.push(LayoutCell {
             name: printable_bytes(name),
             bytes: offset..offset,
             layers: Vec::new(),
@@ -242,7 +242,7 @@ fn too_many(limit: Limit, found: usize, most: usize) -> LayoutError {
 
 impl Sink for Tally {
     #[inline]
-    fn five_points(&mut self, _offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<(), Stop> {
+    fn five_points(&mut self, _offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<(), SinkError> {
         let tally = self.layer(layer)?;
         tally.boundaries += 1;
         tally.vertices += 5;
@@ -254,13 +254,13 @@ impl Sink for Tally {
     }
 
     #[inline]
-    fn plain_reference(&mut self, offset: u64, key: u64, _at: Point) -> Result<(), Stop> {
+    fn plain_reference(&mut self, offset: u64, key: u64, _at: Point) -> Result<(), SinkError> {
         let names = &mut self.names;
         let number = self.recent.number(key, |name| names.number(name));
         Ok(self.reference(number, 1, offset)?)
     }
 
-    fn element(&mut self, input: &Input, element: &Element) -> Result<()> {
+    fn element(&mut self, input: &Input, element: &ElementContent) -> Result<()> {
         let located = |cause| input.fault(element.offset, cause);
         self.cells.last_mut().expect("a cell was begun").with_properties += u64::from(element.properties > 0);
         if matches!(element.kind, ElementKind::Reference | ElementKind::Array) {

@@ -1,7 +1,7 @@
 //! Who refers to whom: circles, dangling names, and how often everything stands in the layout, computed
 //! before anything is expanded.
 
-use super::cell::Cell;
+use super::cell::LayoutCell;
 use super::limits::{ReadLimits, TEXT_BYTES};
 use super::names::Names;
 use crate::error::{LayoutError, Limit};
@@ -29,7 +29,7 @@ pub(super) struct Tree {
 }
 
 /// Resolve names, find circles, order and count.
-pub(super) fn resolve(cells: &mut [Cell], names: &Names, numbers: &[u32]) -> Tree {
+pub(super) fn resolve(cells: &mut [LayoutCell], names: &Names, numbers: &[u32]) -> Tree {
     let mut definitions = vec![None; names.len()];
     let mut doubled = Vec::new();
     for (index, &number) in numbers.iter().enumerate() {
@@ -81,7 +81,7 @@ pub(super) fn resolve(cells: &mut [Cell], names: &Names, numbers: &[u32]) -> Tre
 }
 
 /// Children that can be followed: index of the cell and number of copies.
-pub(super) fn followed(cell: &Cell) -> impl Iterator<Item = (usize, u64)> + '_ {
+pub(super) fn followed(cell: &LayoutCell) -> impl Iterator<Item = (usize, u64)> + '_ {
     cell.children
         .iter()
         .filter(|c| !c.cut)
@@ -89,7 +89,7 @@ pub(super) fn followed(cell: &Cell) -> impl Iterator<Item = (usize, u64)> + '_ {
 }
 
 /// Depth first without recursion; a reference to a cell that is being visited closes a circle and is cut.
-fn order(cells: &mut [Cell], referred: &[bool]) -> (Vec<usize>, Vec<(usize, usize)>) {
+fn order(cells: &mut [LayoutCell], referred: &[bool]) -> (Vec<usize>, Vec<(usize, usize)>) {
     #[derive(Clone, Copy, PartialEq)]
     enum State {
         New,
@@ -133,7 +133,7 @@ fn order(cells: &mut [Cell], referred: &[bool]) -> (Vec<usize>, Vec<(usize, usiz
 }
 
 /// Placements of every cell below `roots`, and the longest chain of references to it.
-pub(super) fn count(cells: &[Cell], order: &[usize], roots: &[usize]) -> (Vec<u64>, Vec<u32>) {
+pub(super) fn count(cells: &[LayoutCell], order: &[usize], roots: &[usize]) -> (Vec<u64>, Vec<u32>) {
     let mut placements = vec![0u64; cells.len()];
     let mut depths = vec![0u32; cells.len()];
     roots.iter().for_each(|&r| placements[r] = 1);
@@ -150,14 +150,14 @@ pub(super) fn count(cells: &[Cell], order: &[usize], roots: &[usize]) -> (Vec<u6
 }
 
 /// Shapes, every reference followed, given how often each cell stands.
-pub(super) fn flat_shapes(cells: &[Cell], placements: &[u64]) -> u64 {
+pub(super) fn flat_shapes(cells: &[LayoutCell], placements: &[u64]) -> u64 {
     cells.iter().zip(placements).fold(0u64, |sum, (cell, &n)| {
         sum.saturating_add(n.saturating_mul(cell.shapes()))
     })
 }
 
 /// Bytes of texts, every reference followed, and what each costs beside.
-fn flat_text_bytes(cells: &[Cell], placements: &[u64]) -> u64 {
+fn flat_text_bytes(cells: &[LayoutCell], placements: &[u64]) -> u64 {
     cells.iter().zip(placements).fold(0u64, |sum, (cell, &n)| {
         let texts = cell
             .layers
@@ -170,7 +170,7 @@ fn flat_text_bytes(cells: &[Cell], placements: &[u64]) -> u64 {
 
 /// What of the layout is beyond the limits, known before anything is expanded. `bytes` is the size of the file.
 pub(super) fn beyond(
-    cells: &[Cell],
+    cells: &[LayoutCell],
     placements: &[u64],
     depths: &[u32],
     limits: &ReadLimits,

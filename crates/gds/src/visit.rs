@@ -1,7 +1,7 @@
 //! The second reading: every shape once, with all places it stands at.
 
-use super::cell::Cell;
-use super::element::{Element, ElementKind};
+use super::cell::LayoutCell;
+use super::element::{ElementContent, ElementKind};
 use super::input::Input;
 use super::layout::Layout;
 use super::names::Recent;
@@ -10,7 +10,7 @@ use super::place::{self, magnified};
 use super::shape::{Point, Rect, Shape, ShapeKind, Text, rectangle_of};
 use super::transform::Transform;
 use super::tree;
-use super::walk::{Sink, Stop, Walk};
+use super::walk::{Sink, SinkError, Walk};
 use crate::error::Result;
 use metalith_core::{LayerNumber, Progress, Silent};
 
@@ -21,7 +21,7 @@ pub trait Visitor {
     ///
     /// # Errors
     /// Any error ends the visit.
-    fn cell(&mut self, _cell: &Cell, _placements: &[Transform]) -> metalith_core::Result<()> {
+    fn cell(&mut self, _cell: &LayoutCell, _placements: &[Transform]) -> metalith_core::Result<()> {
         Ok(())
     }
 
@@ -85,8 +85,8 @@ impl Layout {
         let small = self.inline_shapes(&mut own_input, &counts)?;
         drop(own_input);
         let wanted = |layer: LayerNumber| selection.layers.as_ref().is_none_or(|l| l.contains(&layer));
-        let has = |cell: &Cell| cell.layers.iter().any(|(l, _)| wanted(*l));
-        let worth = |cell: &Cell| {
+        let has = |cell: &LayoutCell| cell.layers.iter().any(|(l, _)| wanted(*l));
+        let worth = |cell: &LayoutCell| {
             has(cell) || tree::followed(cell).any(|(t, _)| self.cells()[t].inline && has(&self.cells()[t]))
         };
         let chosen: Vec<usize> = (0..self.cells().len())
@@ -116,7 +116,7 @@ impl Layout {
     }
 
     /// Decode the cells that are placed shape by shape.
-    fn inline_shapes(&self, input: &mut Input, counts: &[u64]) -> Result<Vec<Vec<Kept>>> {
+    fn inline_shapes(&self, input: &mut Input, counts: &[u64]) -> Result<Vec<Vec<InlineShape>>> {
         let mut small = vec![Vec::new(); self.cells().len()];
         let mut walk = Walk::new(self.limits(), &Silent);
         for (index, cell) in self.cells().iter().enumerate() {
@@ -133,7 +133,7 @@ impl Layout {
 
 /// A shape of an inline cell.
 #[derive(Clone, Debug)]
-struct Kept {
+struct InlineShape {
     kind: ShapeKind,
     layer: LayerNumber,
     points: Vec<Point>,
@@ -141,11 +141,11 @@ struct Kept {
 }
 
 #[derive(Default)]
-struct Keep(Vec<Kept>);
+struct Keep(Vec<InlineShape>);
 
 impl Sink for Keep {
-    fn five_points(&mut self, _offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<(), Stop> {
-        self.0.push(Kept {
+    fn five_points(&mut self, _offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<(), SinkError> {
+        self.0.push(InlineShape {
             kind: ShapeKind::Boundary,
             layer,
             points: points.to_vec(),
@@ -154,14 +154,14 @@ impl Sink for Keep {
         Ok(())
     }
 
-    fn plain_reference(&mut self, _offset: u64, _key: u64, _at: Point) -> Result<(), Stop> {
+    fn plain_reference(&mut self, _offset: u64, _key: u64, _at: Point) -> Result<(), SinkError> {
         Ok(())
     }
 
-    fn element(&mut self, _input: &Input, element: &Element) -> Result<()> {
+    fn element(&mut self, _input: &Input, element: &ElementContent) -> Result<()> {
         let mut points = Vec::new();
         if let Some(kind) = outline_of(element, &mut points) {
-            self.0.push(Kept {
+            self.0.push(InlineShape {
                 kind,
                 layer: element.layer,
                 rect: rectangle_of(&points),
@@ -173,7 +173,7 @@ impl Sink for Keep {
 }
 
 /// The area an element covers, if it covers any.
-fn outline_of(element: &Element, points: &mut Vec<Point>) -> Option<ShapeKind> {
+fn outline_of(element: &ElementContent, points: &mut Vec<Point>) -> Option<ShapeKind> {
     let kind = match element.kind {
         ElementKind::Boundary => ShapeKind::Boundary,
         ElementKind::Box => ShapeKind::Box,
@@ -194,7 +194,7 @@ struct Spread<'a, V> {
     visitor: &'a mut V,
     layers: Option<&'a [LayerNumber]>,
     placements: &'a [Transform],
-    small: &'a [Vec<Kept>],
+    small: &'a [Vec<InlineShape>],
     recent: Recent,
     path: Vec<Point>,
     moved: Vec<Point>,
@@ -246,7 +246,7 @@ impl<V: Visitor> Spread<'_, V> {
 
 impl<V: Visitor> Sink for Spread<'_, V> {
     #[inline]
-    fn five_points(&mut self, offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<(), Stop> {
+    fn five_points(&mut self, offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<(), SinkError> {
         if !self.wants(layer) {
             return Ok(());
         }
@@ -261,7 +261,7 @@ impl<V: Visitor> Sink for Spread<'_, V> {
     }
 
     #[inline]
-    fn plain_reference(&mut self, offset: u64, key: u64, at: Point) -> Result<(), Stop> {
+    fn plain_reference(&mut self, offset: u64, key: u64, at: Point) -> Result<(), SinkError> {
         let layout = self.layout;
         let inline = self.recent.number(key, |name| layout.inline_cell(name));
         if inline == u32::MAX {
@@ -275,7 +275,7 @@ impl<V: Visitor> Sink for Spread<'_, V> {
         Ok(self.copy(inline as usize, own, offset)?)
     }
 
-    fn element(&mut self, _input: &Input, element: &Element) -> Result<()> {
+    fn element(&mut self, _input: &Input, element: &ElementContent) -> Result<()> {
         match element.kind {
             ElementKind::Reference | ElementKind::Array => {
                 let inline = self.layout.inline_cell(&element.name);

@@ -1,6 +1,6 @@
 //! The elements of one cell, one after the other.
 
-use super::element::{Element, ElementKind};
+use super::element::{ElementContent, ElementKind};
 use super::fast;
 use super::input::Input;
 use super::limits::ReadLimits;
@@ -12,34 +12,34 @@ use metalith_core::{LayerNumber, Progress};
 /// What takes the elements of a cell.
 pub(super) trait Sink {
     /// A BOUNDARY of five points; most of them are upright squares.
-    fn five_points(&mut self, offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<(), Stop>;
+    fn five_points(&mut self, offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<(), SinkError>;
 
     /// A plain reference, the name by its key.
-    fn plain_reference(&mut self, offset: u64, key: u64, at: Point) -> Result<(), Stop>;
+    fn plain_reference(&mut self, offset: u64, key: u64, at: Point) -> Result<(), SinkError>;
 
     /// Any other element.
-    fn element(&mut self, input: &Input, element: &Element) -> Result<()>;
+    fn element(&mut self, input: &Input, element: &ElementContent) -> Result<()>;
 }
 
 /// Why a sink ends the reading: a cause at the element that it was given, or an error as it is.
-pub(super) enum Stop {
+pub(super) enum SinkError {
     Here(LayoutError),
     With(Error),
 }
 
-impl From<LayoutError> for Stop {
+impl From<LayoutError> for SinkError {
     fn from(cause: LayoutError) -> Self {
         Self::Here(cause)
     }
 }
 
-impl From<Error> for Stop {
+impl From<Error> for SinkError {
     fn from(error: Error) -> Self {
         Self::With(error)
     }
 }
 
-impl From<metalith_core::Error> for Stop {
+impl From<metalith_core::Error> for SinkError {
     fn from(error: metalith_core::Error) -> Self {
         Self::With(error.into())
     }
@@ -49,7 +49,7 @@ impl From<metalith_core::Error> for Stop {
 pub(super) struct Walk<'a> {
     pub limits: &'a ReadLimits,
     pub progress: &'a dyn Progress,
-    element: Element,
+    element: ElementContent,
     /// Whether [`super::fast`] may be used: tests read with and without.
     fast: bool,
     reported: u64,
@@ -60,7 +60,7 @@ impl<'a> Walk<'a> {
         Self {
             limits,
             progress,
-            element: Element::default(),
+            element: ElementContent::default(),
             fast: true,
             reported: 0,
         }
@@ -129,8 +129,8 @@ impl<'a> Walk<'a> {
                 };
                 match taken {
                     Ok(()) => at += length,
-                    Err(Stop::Here(cause)) => return Err(input.fault(offset, cause)),
-                    Err(Stop::With(error)) => return Err(error),
+                    Err(SinkError::Here(cause)) => return Err(input.fault(offset, cause)),
+                    Err(SinkError::With(error)) => return Err(error),
                 }
             }
             let more = window.len() - at < fast::BOUNDARY_BYTES && at > 0;

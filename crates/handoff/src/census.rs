@@ -1,4 +1,4 @@
-//! What is in a layout file, counted in its bytes.
+//! Content of a layout file, counted from its bytes.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use metalith_core::{Progress, Result};
-use metalith_gds::{Cell, LayerNumber, Layout, ReadLimits, Rect, Selection, Shape, Text, Transform, Visitor};
+use metalith_gds::{LayerNumber, Layout, LayoutCell, ReadLimits, Rect, Selection, Shape, Text, Transform, Visitor};
 
 /// One file.
 #[derive(Clone, Debug, Serialize)]
@@ -27,7 +27,7 @@ pub struct CellCount {
     pub depth: u32,
     pub shapes: u64,
     pub references: u64,
-    /// How often it stands in the layout.
+    /// Number of placements in the layout.
     pub placements: u64,
     pub children: Vec<String>,
 }
@@ -144,7 +144,7 @@ impl Counter {
 }
 
 impl Visitor for Counter {
-    fn cell(&mut self, _cell: &Cell, placements: &[Transform]) -> Result<()> {
+    fn cell(&mut self, _cell: &LayoutCell, placements: &[Transform]) -> Result<()> {
         self.flush();
         self.placements = placements.to_vec();
         Ok(())

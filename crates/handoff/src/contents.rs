@@ -1,4 +1,4 @@
-//! What was made: everything that the front page and `handoff.json` tell.
+//! Content of the front page and of `handoff.json`.
 
 use serde::Serialize;
 
@@ -14,7 +14,7 @@ use metalith_design::Design;
 use metalith_drc::DrcReport;
 use metalith_report::Verdict;
 
-/// What was handed over.
+/// Result of a hand-off.
 #[derive(Clone, Debug)]
 pub struct Handoff {
     pub folder: std::path::PathBuf,
@@ -29,7 +29,7 @@ pub struct HandoffCheck {
     pub name: String,
     #[serde(serialize_with = "as_word")]
     pub verdict: Verdict,
-    /// What came out, in one sentence.
+    /// The result in one sentence.
     pub words: String,
     /// Its own report, in the folder.
     pub report: Option<String>,
@@ -39,7 +39,7 @@ fn as_word<S: serde::Serializer>(verdict: &Verdict, s: S) -> Result<S::Ok, S::Er
     s.serialize_str(verdict.word())
 }
 
-/// What became of the rules, by layout.
+/// Results of the rules, by layout.
 pub(super) type RuleReports = Vec<(&'static str, DrcReport)>;
 
 /// Everything that the front page and `handoff.json` tell.
@@ -59,8 +59,8 @@ pub(super) struct Contents<'a> {
     #[serde(skip)]
     pub tests_frame: (RectNm, (i64, i64)),
     pub checks: Vec<HandoffCheck>,
-    /// What became of each rule, by layout.
+    /// Result of each rule, by layout.
     pub rules: RuleReports,
-    /// Path in the folder and what it is for.
+    /// Path in the folder and purpose.
     pub files: Vec<(String, String)>,
 }

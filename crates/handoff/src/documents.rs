@@ -13,7 +13,7 @@ use super::{job, tables};
 use metalith_core::Result;
 use metalith_design::Design;
 
-/// What the tables say.
+/// Content of the tables.
 #[derive(Serialize)]
 pub(super) struct Documents {
     /// Exposure of each file of the first step, with its time at each current.

@@ -11,7 +11,7 @@ pub struct Beam {
     pub current_na: f64,
     /// Distance of neighbouring shots (nm).
     pub shot_step_nm: f64,
-    /// Shots a microsecond that give the dose at this step (MHz).
+    /// Shot rate that gives the dose at this step (MHz).
     pub clock_mhz: f64,
 }
 
@@ -44,7 +44,7 @@ impl Beam {
             })
     }
 
-    /// What a width becomes on the grid of shots (nm).
+    /// A width rounded to the shot grid (nm).
     pub fn snapped_nm(&self, width_nm: f64) -> f64 {
         (width_nm / self.shot_step_nm).round() * self.shot_step_nm
     }
@@ -53,7 +53,7 @@ impl Beam {
 /// Most grid units of a step.
 const COARSEST: u32 = 200;
 
-/// What is to be exposed, counted in a layout.
+/// Exposed area and shapes, counted in a layout.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Exposure {
     pub area_um2: f64,
@@ -61,7 +61,7 @@ pub struct Exposure {
     pub fields: u64,
 }
 
-/// How long an exposure takes and of what the time is made (s).
+/// Exposure time and its contributions (s).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct WriteTime {
     pub beam: Beam,

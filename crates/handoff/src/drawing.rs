@@ -10,14 +10,14 @@ use gds21::{
 
 use metalith_core::WholeFile;
 use metalith_core::{Error, Result};
-use metalith_design::Layer;
+use metalith_design::LayoutLayer;
 use metalith_design::array::{Class, Symmetry};
 
 /// Layer and datatype.
-pub(super) type LayerNumber = (i16, i16);
+pub(super) type LayerPair = (i16, i16);
 
 /// Layer and datatype of a layer of the design.
-pub(super) fn number(layer: &Layer) -> LayerNumber {
+pub(super) fn number(layer: &LayoutLayer) -> LayerPair {
     (layer.layer, layer.datatype)
 }
 
@@ -73,7 +73,7 @@ impl Sheet {
         }
     }
 
-    pub fn rectangle(&mut self, layer: LayerNumber, r: RectNm) {
+    pub fn rectangle(&mut self, layer: LayerPair, r: RectNm) {
         let corners = [(r.x0, r.y0), (r.x1, r.y0), (r.x1, r.y1), (r.x0, r.y1), (r.x0, r.y0)];
         let boundary = GdsBoundary {
             layer: layer.0,
@@ -85,11 +85,11 @@ impl Sheet {
     }
 
     /// A square of even width about a place.
-    pub fn square(&mut self, layer: LayerNumber, (x, y): (i64, i64), width: i64) {
+    pub fn square(&mut self, layer: LayerPair, (x, y): (i64, i64), width: i64) {
         self.rectangle(layer, RectNm::at(x - width / 2, y - width / 2, width, width));
     }
 
-    pub fn text(&mut self, layer: LayerNumber, (x, y): (i64, i64), words: impl Into<String>) {
+    pub fn text(&mut self, layer: LayerPair, (x, y): (i64, i64), words: impl Into<String>) {
         let text = GdsTextElem {
             string: words.into(),
             layer: layer.0,
@@ -115,7 +115,7 @@ impl Sheet {
         self.elements.push(reference.into());
     }
 
-    /// So many copies along x and y, the first at a place.
+    /// An array of copies along x and y, the first at a given position.
     pub fn array(&mut self, cell: &str, (x, y): (i64, i64), (columns, rows): (i16, i16), pitch: i64) {
         let reference = GdsArrayRef {
             name: cell.to_owned(),
@@ -132,7 +132,7 @@ impl Sheet {
     }
 
     /// A number or word in blocks, its lower left corner at a place. Characters: digits and a few capitals.
-    pub fn numerals(&mut self, layer: LayerNumber, (x, y): (i64, i64), height: i64, words: &str) {
+    pub fn numerals(&mut self, layer: LayerPair, (x, y): (i64, i64), height: i64, words: &str) {
         let block = height / 5;
         for (k, c) in words.chars().enumerate() {
             let left = x + 4 * block * k as i64;
@@ -212,14 +212,14 @@ impl Drawing {
     }
 
     /// Add a cell of one square, for arrays of it.
-    pub fn add_pillar(&mut self, name: &str, layer: LayerNumber, width: i64) {
+    pub fn add_pillar(&mut self, name: &str, layer: LayerPair, width: i64) {
         let mut sheet = Sheet::new(name);
         sheet.square(layer, (0, 0), width);
         self.add(sheet);
     }
 
     /// Add the pillars of a lens as a cell of this name, folded by its symmetries.
-    pub fn add_lens(&mut self, name: &str, layer: LayerNumber, class: &Class) {
+    pub fn add_lens(&mut self, name: &str, layer: LayerPair, class: &Class) {
         let lattice = class.widths.lattice;
         let n = lattice.sites();
         let mut whole = Sheet::new(name);

@@ -1,4 +1,4 @@
-//! What the first step exposes, how long that takes, and what its shots do to the widths.
+//! Exposed area and writing time of the first step, and the effect of the shot grid on widths.
 
 use super::census::Census;
 use super::dose::{Beam, Exposure, WriteTime};
@@ -8,7 +8,7 @@ use metalith_core::Result;
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
 
-/// What each file of the first step exposes, and how long that takes.
+/// Exposed area and writing time of each file of the first step.
 pub(super) fn exposures(
     design: &Design,
     process: &Process,
@@ -19,7 +19,8 @@ pub(super) fn exposures(
     for file in census {
         let exposed = |l: &&super::census::LayerCount| {
             let number = (i32::from(l.layer), i32::from(l.datatype));
-            let is = |layer: &metalith_design::Layer| number == (i32::from(layer.layer), i32::from(layer.datatype));
+            let is =
+                |layer: &metalith_design::LayoutLayer| number == (i32::from(layer.layer), i32::from(layer.datatype));
             is(&layers.pillars) || is(&layers.pillar_marks) || number.0 == i32::from(process.dose_matrix.layer)
         };
         let mut exposure = Exposure::default();

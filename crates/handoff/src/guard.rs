@@ -1,4 +1,4 @@
-//! What must hold before anything is made.
+//! Preconditions that are checked before anything is written.
 
 use std::collections::BTreeSet;
 use std::io::ErrorKind;

@@ -32,7 +32,7 @@ pub(super) fn stem(design: &Design, beam: &Beam) -> String {
     format!("{}_{}nA", design.name, beam.current_na).replace('.', "p")
 }
 
-/// The job deck: marks, where each pattern stands, doses.
+/// The job deck: marks, position of each pattern, doses.
 pub(super) fn job_deck(design: &Design, process: &Process, crosses: &[Cross], beam: &Beam) -> String {
     let mut text = String::from(WARNING);
     let place = |role: &str| {

@@ -16,7 +16,7 @@ use metalith_design::array::PillarArray;
 use metalith_gds::{Layout, ReadLimits};
 use metalith_layout::{write_apertures, write_layer_properties, write_pillars};
 
-/// What was written.
+/// The files that were written.
 pub(super) struct Layouts {
     pub array: PillarArray,
     /// The design with one hyperbolic lens on a chip of its own, and its pillars.
@@ -60,7 +60,7 @@ impl OfEach<PathBuf> {
 }
 
 impl OfEach<Layout> {
-    /// Count what is in the files that the front page lists.
+    /// Count the content of the files that the front page lists.
     ///
     /// # Errors
     /// If one cannot be read, or the user stopped it.
@@ -151,7 +151,7 @@ pub(super) fn write(files: &mut Listing, sources: &Sources, progress: &dyn Progr
     })
 }
 
-/// From the opening over the reference lens to the edge of its chip (nm): decks ask for room there.
+/// From the opening over the reference lens to the edge of its chip (nm): rule decks require a margin there.
 const BESIDE_REFERENCE: i64 = 50_000;
 
 /// The design with one hyperbolic lens on a chip of its own, at full size.

@@ -1,4 +1,4 @@
-//! The files of the folder that is being made, each with what it is for.
+//! The files of the folder that is being written, each with its purpose.
 
 use std::path::{Path, PathBuf};
 

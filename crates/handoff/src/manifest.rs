@@ -1,4 +1,4 @@
-//! What is in a hand-off, and whether a received one is complete and unaltered.
+//! The manifest of a hand-off, and verification that a received one is complete and unaltered.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -38,7 +38,7 @@ pub struct Manifest {
     /// The command as it was given.
     pub command: String,
     pub design: String,
-    /// SHA-256 of what decides the layout.
+    /// SHA-256 of all inputs that determine the layout.
     pub design_digest: String,
     pub process: String,
     /// By path in the folder, with `/` between its parts.
@@ -124,7 +124,7 @@ impl Manifest {
     }
 }
 
-/// What came out of checking a received hand-off. If all lists are empty and the seal is right, it is complete and unaltered.
+/// Result of verifying a received hand-off. If all lists are empty and the seal is right, it is complete and unaltered.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct HandoffVerification {
     pub manifest: Manifest,
@@ -215,11 +215,11 @@ pub(super) fn entry_of(path: &Path, progress: &dyn Progress) -> Result<ManifestE
     })
 }
 
-/// What is below a folder, by its path in it.
+/// Content of a folder, by relative path.
 #[derive(Default)]
 pub(super) struct Below {
     pub files: BTreeMap<String, PathBuf>,
-    /// What is neither file nor folder: links and the like are nothing that a hand-off has, and are not opened.
+    /// Entries that are neither file nor folder, such as links: a hand-off has none, and they are not opened.
     pub other: Vec<String>,
     /// Folders with nothing in them, with `/` at the end.
     pub empty: Vec<String>,

@@ -3,19 +3,19 @@
 use std::path::Path;
 
 use super::dose::doses;
-use super::drawing::{Drawing, LayerNumber, RectNm, Sheet, nm, number};
+use super::drawing::{Drawing, LayerPair, RectNm, Sheet, nm, number};
 use super::process::Process;
 use metalith_core::{Result, Silent};
 use metalith_design::Design;
 use metalith_design::array::{Class, PillarArray, Symmetry};
 use metalith_design::phase::RadialPhase;
 
-/// Room between the parts of a block (nm).
+/// Space between the parts of a block (nm).
 const APART: i64 = 20_000;
 /// Height of the number of a block (nm).
 const NUMERAL: i64 = 20_000;
 
-/// Where one dose stands.
+/// Position of one dose.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub(super) struct DoseBlock {
     /// 1 to 9; also the datatype.
@@ -125,7 +125,7 @@ pub(super) fn write(path: &Path, design: &Design, process: &Process) -> Result<V
     let mut drawing = Drawing::new("DOSE_MATRIX", &design.layout.timestamp);
     let mut top = Sheet::new("DOSE_MATRIX");
     for (block, dose) in blocks.iter().zip(doses(process)) {
-        let layer: LayerNumber = (spec.layer, block.number as i16);
+        let layer: LayerPair = (spec.layer, block.number as i16);
         let lens_name = format!("D{}_LENS", block.number);
         drawing.add_lens(&lens_name, layer, &lens);
         top.place(&lens_name, block.lens, Symmetry::IDENTITY);

@@ -1,18 +1,18 @@
-//! What is asked for.
+//! Options of a hand-off.
 
 use std::path::PathBuf;
 
 use metalith_cell::Fidelity;
 use metalith_wave::Accuracy;
 
-/// What to hand over, and where to.
+/// Inputs and destination of a hand-off.
 #[derive(Clone, Debug)]
 pub struct HandoffOptions {
     /// The design file.
     pub design: PathBuf,
     /// The process file; the program's own if left out.
     pub process: Option<PathBuf>,
-    /// Folder to make; the archive stands beside it, with `.zip` behind its name.
+    /// Folder to write; the archive is beside it, with `.zip` appended to the name.
     pub out: PathBuf,
     /// The command as it was given, for the manifest.
     pub command: String,

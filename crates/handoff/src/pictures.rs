@@ -5,7 +5,7 @@ use super::matrix::DoseBlock;
 use super::process::{Method, Process, Tone};
 use super::structures::Structure;
 use metalith_design::Design;
-use metalith_report::{Figure, Layer, Plan};
+use metalith_report::{Figure, Plan, PlanLayer};
 
 fn corners(r: RectNm) -> ((f64, f64), (f64, f64)) {
     (
@@ -61,7 +61,7 @@ pub(super) fn chip(design: &Design) -> Figure {
     )
 }
 
-fn arrow(plan: &mut Plan, layer: Layer, reach: f64, upright: bool) {
+fn arrow(plan: &mut Plan, layer: PlanLayer, reach: f64, upright: bool) {
     let (t, head) = (reach * 0.012, reach * 0.06);
     let points = [
         (0.0, -t),
@@ -173,7 +173,7 @@ pub(super) fn tone(design: &Design, process: &Process) -> Figure {
     ))
 }
 
-/// What lies between intervals, from zero to an end.
+/// Gaps between intervals, from zero to an end.
 fn complement(intervals: &[(f64, f64)], end: f64) -> Vec<(f64, f64)> {
     let mut from = 0.0;
     let mut gaps = Vec::new();
@@ -252,7 +252,7 @@ pub(super) fn tests(structures: &[Structure], frame: RectNm, border: (i64, i64))
         "field verniers",
         "cleave line",
     ];
-    let layers: Vec<Layer> = names.iter().map(|n| plan.layer(*n)).collect();
+    let layers: Vec<PlanLayer> = names.iter().map(|n| plan.layer(*n)).collect();
     let lines = plan.outlines("field borders crossed");
     let (a, b) = corners(frame);
     plan.rectangle(edge, a, b);

@@ -16,7 +16,7 @@ use metalith_drc::{CheckInput, Date, Deck, DrcReport, Waiver, Waivers};
 use metalith_gds::Layout;
 use metalith_report::{Verdict, write_json};
 
-/// Kinds of files that a check leaves, with what they are for.
+/// Kinds of files that a check writes, with their purpose.
 const FILES: [(&str, &str); 3] = [
     ("txt", "what became of each design rule, waivers counted"),
     ("json", "the same for programs"),
@@ -27,7 +27,7 @@ const FILES: [(&str, &str); 3] = [
 const MARKERS: usize = 100;
 /// Markers among which what test structures break on purpose is looked for.
 const MARKERS_ON_PURPOSE: usize = 100_000;
-/// Last day of what is waived because a structure is drawn to break it.
+/// Expiry date of waivers for structures that break rules by intention.
 const NO_END: &str = "2099-12-31";
 
 /// One layout to check.
@@ -41,11 +41,11 @@ pub(super) struct Subject<'a> {
     pub with: Option<&'a Layout>,
     /// The design that it should hold, and its pillars.
     pub design: Option<(&'a Design, &'a PillarArray)>,
-    /// What breaks rules on purpose.
+    /// Structures that break rules by intention.
     pub structures: Cow<'a, [Structure]>,
 }
 
-/// The layouts of a hand-off with what each is held to.
+/// The layouts of a hand-off with the rules of each.
 pub(super) fn subjects<'a>(sources: &'a Sources, layouts: &'a Layouts, opened: &'a OfEach<Layout>) -> [Subject<'a>; 7] {
     let decks = &sources.process.checks;
     let design = Some((&sources.design, &layouts.array));
@@ -90,13 +90,13 @@ pub(super) fn subjects<'a>(sources: &'a Sources, layouts: &'a Layouts, opened: &
     ]
 }
 
-/// What checking left behind.
+/// Output of the checks.
 pub(super) struct Checked {
     pub checks: Vec<HandoffCheck>,
     pub reports: RuleReports,
 }
 
-/// Check each layout and write what came out into the folder of the checks.
+/// Check each layout and write the results into the folder of the checks.
 ///
 /// # Errors
 /// A file that cannot be read or written; the user stopped it.
@@ -168,7 +168,7 @@ impl Subject<'_> {
     }
 }
 
-/// Waivers for what lies inside a structure that breaks the rule because it is what it is.
+/// Waivers for findings inside a structure that breaks the rule by intention.
 fn on_purpose(structures: &[Structure], report: &DrcReport) -> Vec<Waiver> {
     let mut waivers = Vec::new();
     for rule in &report.rules {

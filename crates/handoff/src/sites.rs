@@ -45,7 +45,7 @@ pub(super) fn sites(
     let mut sites = Vec::new();
     let widths = targets(design);
     // The element in the middle, and the one furthest from it.
-    let distance = |p: &&metalith_design::array::Placed| {
+    let distance = |p: &&metalith_design::array::PlacedElement| {
         let (x, y) = p.element.centre_nm;
         x * x + y * y
     };
@@ -154,7 +154,7 @@ fn around(map: &metalith_core::WidthMap, ix: usize, iy: usize) -> Option<(u16, u
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cross {
     pub set: String,
-    /// What the writer calls it: P and Q for the global pair, M1 to M4 for those of the chip.
+    /// Its name for the writer: P and Q for the global pair, M1 to M4 for those of the chip.
     pub role: String,
     pub x_um: f64,
     pub y_um: f64,

@@ -1,4 +1,4 @@
-//! What a hand-off is made from: every input read once, with the bytes that were read.
+//! Inputs of a hand-off, each read once, with the bytes that were read.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -27,12 +27,12 @@ pub(super) struct Sources {
     pub waivers: Option<Waivers>,
     /// What the layout is compensated for.
     pub model: Option<CalibratedModel>,
-    kept: Vec<Kept>,
+    kept: Vec<InputCopy>,
 }
 
 /// One input as it was read.
-struct Kept {
-    /// Its file name with a prefix that says what it is; not yet unique.
+struct InputCopy {
+    /// Its file name with a prefix for its kind; not yet unique.
     name: String,
     purpose: &'static str,
     bytes: Vec<u8>,
@@ -51,7 +51,7 @@ impl Sources {
             .map_or_else(|| Ok(Process::standard()), Process::read)?;
         // The process and its decks may be those of the program, which are no files.
         let (path, text) = process.source();
-        kept.push(Kept::new("process_", path, "the process values", text.as_bytes()));
+        kept.push(InputCopy::new("process_", path, "the process values", text.as_bytes()));
         let mut decks: Vec<(PathBuf, Deck)> = Vec::new();
         for rules in process.checks.decks() {
             if decks.iter().any(|(known, _)| known == rules) {
@@ -59,7 +59,7 @@ impl Sources {
             }
             let deck = process.deck(rules)?;
             let (path, text) = deck.source();
-            kept.push(Kept::new(
+            kept.push(InputCopy::new(
                 "rules_",
                 path,
                 "rules that layouts were checked with",
@@ -70,7 +70,12 @@ impl Sources {
         let waivers = options.waivers.as_deref().map(Waivers::read).transpose()?;
         if let Some(waivers) = &waivers {
             let purpose = "violations that were accepted";
-            kept.push(Kept::new("waivers_", &waivers.path, purpose, waivers.text.as_bytes()));
+            kept.push(InputCopy::new(
+                "waivers_",
+                &waivers.path,
+                purpose,
+                waivers.text.as_bytes(),
+            ));
         }
         let mut design = design;
         let model = match &options.compensate {
@@ -78,7 +83,7 @@ impl Sources {
             Some(path) => {
                 let bytes = read_at_most(path, LONGEST, "a model file")?;
                 let purpose = "the calibrated model that the layout is compensated for";
-                kept.push(Kept::new("model_", path, purpose, &bytes));
+                kept.push(InputCopy::new("model_", path, purpose, &bytes));
                 design.name.push_str("_compensated");
                 Some(CalibratedModel::read(path)?)
             }
@@ -114,7 +119,7 @@ impl Sources {
     }
 }
 
-impl Kept {
+impl InputCopy {
     fn new(kind: &str, path: &Path, purpose: &'static str, bytes: &[u8]) -> Self {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let legal = |c: char| {
@@ -147,7 +152,7 @@ fn unique(taken: &BTreeSet<String>, name: &str) -> String {
 
 /// Read the design and the files it names. What is kept is what was read: the files are read before and after the
 /// design is, and must not change in between.
-fn read_design(path: &Path) -> Result<(Design, Vec<Kept>)> {
+fn read_design(path: &Path) -> Result<(Design, Vec<InputCopy>)> {
     let named = files_of(path, &Design::read(path)?)?;
     let before = bytes_of(&named)?;
     let design = Design::read(path)?;
@@ -161,7 +166,7 @@ fn read_design(path: &Path) -> Result<(Design, Vec<Kept>)> {
         }
     }
     let kept = named.iter().zip(&before);
-    let kept = kept.map(|((path, kind, purpose), bytes)| Kept::new(kind, path, purpose, bytes));
+    let kept = kept.map(|((path, kind, purpose), bytes)| InputCopy::new(kind, path, purpose, bytes));
     Ok((design, kept.collect()))
 }
 

@@ -20,7 +20,7 @@ const FLAGS: u16 = 0x0808;
 const DEFLATED: u16 = 8;
 /// Version 4.5 of the format, which has ZIP64.
 const VERSION: u16 = 45;
-/// Stands for a number that is in the ZIP64 record.
+/// Marks a number that is in the ZIP64 record.
 const ELSEWHERE: u32 = u32::MAX;
 /// Fast, and within a few per cent of the smallest for layouts.
 const LEVEL: u32 = 4;
@@ -157,7 +157,7 @@ fn fields(out: &mut Vec<u8>, numbers: &[u16]) {
     }
 }
 
-/// A file that knows how far it is.
+/// A file that counts the bytes written.
 struct Counted {
     inner: WholeFile,
     written: u64,

@@ -11,12 +11,12 @@ use metalith_design::Design;
 const END: usize = 4;
 
 /// Head and tail of a library, and cells cut so that more records fit before their end.
-pub(super) struct Frame {
+pub(super) struct LibraryFrame {
     empty: GdsLibrary,
     bytes: Vec<u8>,
 }
 
-impl Frame {
+impl LibraryFrame {
     /// The empty library of a design: database unit 1 nm, user unit 1 um, one date for everything.
     pub fn new(design: &Design) -> Result<Self> {
         let date = design

@@ -13,10 +13,10 @@ use std::path::{Path, PathBuf};
 
 use gds21::GdsElement;
 
-use frame::Frame;
+use frame::LibraryFrame;
 use metalith_core::{Error, Progress, Result, WholeFile};
 use metalith_design::array::PillarArray;
-use metalith_design::{Design, Hierarchy, Layer};
+use metalith_design::{Design, Hierarchy, LayoutLayer};
 use pillars::PillarWriter;
 
 pub use properties::write_layer_properties;
@@ -46,7 +46,7 @@ pub fn write_pillars(
     path: &Path,
     progress: &dyn Progress,
 ) -> Result<Written> {
-    let frame = Frame::new(design)?;
+    let frame = LibraryFrame::new(design)?;
     let layers = &design.layout.layers;
     let mut fixed = mark::crosses(&design.layout.marks, &layers.pillar_marks);
     fixed.push(mark::outline(&design.layout.chip, &layers.outline));
@@ -80,7 +80,7 @@ pub fn write_pillars(
 /// # Errors
 /// If the file cannot be written; the old file is then as it was.
 pub fn write_apertures(design: &Design, path: &Path) -> Result<Written> {
-    let frame = Frame::new(design)?;
+    let frame = LibraryFrame::new(design)?;
     let layers = &design.layout.layers;
     let mut elements = aperture::openings(design);
     elements.extend(mark::crosses(&design.layout.marks, &layers.aperture_marks));
@@ -102,7 +102,7 @@ fn top_cell(design: &Design) -> String {
 }
 
 /// Name and digest of the design, at the lower left of the chip.
-fn label(design: &Design, layer: &Layer) -> GdsElement {
+fn label(design: &Design, layer: &LayoutLayer) -> GdsElement {
     let (x, y) = design.layout.chip.size_nm;
     let inset = x.min(y) / 50;
     gds21::GdsTextElem {
@@ -125,7 +125,7 @@ fn coordinate(nm: i64) -> i32 {
 }
 
 /// A polygon; the first point is repeated at the end, as the format asks.
-fn polygon(layer: &Layer, corners: &[(i64, i64)]) -> GdsElement {
+fn polygon(layer: &LayoutLayer, corners: &[(i64, i64)]) -> GdsElement {
     gds21::GdsBoundary {
         layer: layer.layer,
         datatype: layer.datatype,

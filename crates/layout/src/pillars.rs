@@ -7,11 +7,11 @@ use std::path::Path;
 use gds21::{GdsElement, GdsStrans, GdsStructRef};
 use rayon::prelude::*;
 
-use super::frame::Frame;
+use super::frame::LibraryFrame;
 use super::{coordinate, point, polygon};
 use metalith_core::{Error, Progress, Result, WholeFile, WidthMap};
-use metalith_design::Layer;
-use metalith_design::array::{PillarArray, Placed, Symmetry};
+use metalith_design::LayoutLayer;
+use metalith_design::array::{PillarArray, PlacedElement, Symmetry};
 use metalith_gds::write::{ReferenceRecord, SquareRecord};
 
 /// Rows of a lattice that are encoded as one block: a megabyte of a full-size lens.
@@ -23,8 +23,8 @@ const BLOCKS: usize = 8;
 pub(super) struct PillarWriter<'a> {
     file: WholeFile,
     path: &'a Path,
-    frame: &'a Frame,
-    layer: &'a Layer,
+    frame: &'a LibraryFrame,
+    layer: &'a LayoutLayer,
     progress: &'a dyn Progress,
     bytes: u64,
     /// References of the top cell, in the order of the elements.
@@ -34,7 +34,7 @@ pub(super) struct PillarWriter<'a> {
 }
 
 /// One pillar of a lens: its site, its centre from the lens's (nm), its width (nm).
-struct Site {
+struct PlacedPillar {
     ix: usize,
     iy: usize,
     x: i32,
@@ -43,7 +43,12 @@ struct Site {
 }
 
 impl<'a> PillarWriter<'a> {
-    pub fn create(path: &'a Path, frame: &'a Frame, layer: &'a Layer, progress: &'a dyn Progress) -> Result<Self> {
+    pub fn create(
+        path: &'a Path,
+        frame: &'a LibraryFrame,
+        layer: &'a LayoutLayer,
+        progress: &'a dyn Progress,
+    ) -> Result<Self> {
         let mut writer = Self {
             file: WholeFile::create(path)?,
             path,
@@ -94,7 +99,7 @@ impl<'a> PillarWriter<'a> {
             self.put(&begin)?;
             self.put(&end)?;
         }
-        let place = |p: &Placed| reference(&lens_name(p.class), p.symmetry, p.element.centre_nm);
+        let place = |p: &PlacedElement| reference(&lens_name(p.class), p.symmetry, p.element.centre_nm);
         self.placed = array.placed.iter().map(place).collect();
         Ok(remarks)
     }
@@ -157,7 +162,7 @@ impl<'a> PillarWriter<'a> {
     }
 
     /// Encode the pillars of a lens row by row: blocks side by side on all threads, written in order.
-    fn rows(&mut self, widths: &WidthMap, encode: impl Fn(&mut Vec<u8>, Site) + Sync) -> Result<()> {
+    fn rows(&mut self, widths: &WidthMap, encode: impl Fn(&mut Vec<u8>, PlacedPillar) + Sync) -> Result<()> {
         let n = widths.lattice.sites();
         let places = (0..n)
             .map(|i| coordinate(widths.lattice.coordinate_nm(i)))
@@ -181,7 +186,7 @@ impl<'a> PillarWriter<'a> {
                         let iy = first + k * ROWS + row;
                         for (ix, &width) in line.iter().enumerate().filter(|(_, w)| **w != 0) {
                             let (x, y) = (places[ix], places[iy]);
-                            encode(out, Site { ix, iy, x, y, width });
+                            encode(out, PlacedPillar { ix, iy, x, y, width });
                             pillars += 1;
                         }
                     }

@@ -38,7 +38,7 @@ enum Solve {
 }
 
 /// Wavelength and direction, bit by bit.
-type Place = [u64; 3];
+type WaveKey = [u64; 3];
 
 /// Cells of one stack by realised width. What was solved is kept for as long as this lives.
 pub struct RealisedCells {
@@ -46,7 +46,7 @@ pub struct RealisedCells {
     /// Nodes are at this width and whole steps from it (nm): drawn widths are whole nanometres, so that pillars
     /// under a bias common to all are solved exactly at their width.
     offset_nm: f64,
-    known: Mutex<HashMap<(Place, Solve), Polarised>>,
+    known: Mutex<HashMap<(WaveKey, Solve), Polarised>>,
 }
 
 /// What sites of some widths transmit, one table for each polarisation that is to be averaged over.
@@ -147,12 +147,12 @@ impl RealisedCells {
         })
     }
 
-    fn known(&self) -> MutexGuard<'_, HashMap<(Place, Solve), Polarised>> {
+    fn known(&self) -> MutexGuard<'_, HashMap<(WaveKey, Solve), Polarised>> {
         self.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Solve what is not known yet.
-    fn solve_all(&self, place: Place, wanted: BTreeSet<Solve>, progress: &dyn Progress) -> Result<()> {
+    fn solve_all(&self, place: WaveKey, wanted: BTreeSet<Solve>, progress: &dyn Progress) -> Result<()> {
         let missing: Vec<Solve> = {
             let known = self.known();
             wanted
@@ -173,7 +173,7 @@ impl RealisedCells {
         Ok(())
     }
 
-    fn solve_one(&self, place: Place, what: Solve) -> Result<Polarised> {
+    fn solve_one(&self, place: WaveKey, what: Solve) -> Result<Polarised> {
         let [wavelength_um, x, y] = place.map(f64::from_bits);
         let sines = [x, y];
         let width = match what {
@@ -238,9 +238,10 @@ mod tests {
         let cells = RealisedCells::new(stack.clone(), -9.3);
         let widths = [150.0 - 9.3, 152.0 - 9.3];
         let solved = cells.solve(&widths, 0.53, [0.0; 2], &Silent).unwrap();
+        // Widths agree to rounding, and a transmission's slope is below one a nanometre.
+        const ROUNDING: f64 = 1e-12;
         for (w, t) in widths.iter().zip(&solved.pillars[0]) {
-            // Widths agree to rounding, and a transmission's slope is below one a nanometre.
-            assert!((stack.transmission(*w, 0.53, orders).unwrap() - t).norm() < 1e-12);
+            assert!((stack.transmission(*w, 0.53, orders).unwrap() - t).norm() < ROUNDING);
         }
         // Two pillars and a bare site.
         assert_eq!(cells.known().len(), 3);

@@ -239,8 +239,9 @@ mod tests {
     fn legendre_polynomials_are_those_of_the_closed_form() {
         let x = 0.3_f64;
         let third = 0.5 * (5.0 * x.powi(3) - 3.0 * x);
-        // Rounding of a few products of numbers of size one.
-        assert!((legendre(&[0.0, 0.0, 1.0], x) - third).abs() < 1e-15);
-        assert!((legendre(&[2.0], x) - 0.6).abs() < 1e-15);
+        // A few products of numbers of size one.
+        const ROUNDING: f64 = 1e-15;
+        assert!((legendre(&[0.0, 0.0, 1.0], x) - third).abs() < ROUNDING);
+        assert!((legendre(&[2.0], x) - 0.6).abs() < ROUNDING);
     }
 }

@@ -221,6 +221,9 @@ mod tests {
         );
     }
 
+    /// A difference of phases (turns) that are below one.
+    const ROUNDING_TURNS: f64 = 1e-9;
+
     #[test]
     fn the_true_merit_never_falls_and_the_limit_holds() {
         let (lens, images) = small();
@@ -237,7 +240,7 @@ mod tests {
                 exchange.exchange_once();
                 assert!(exchange.merit() >= last);
                 assert_eq!(exchange.merit(), objective.merit(&exchange.widths_nm()));
-                assert!(largest_step(&exchange.turns()) <= limit().turns() + 1e-9);
+                assert!(largest_step(&exchange.turns()) <= limit().turns() + ROUNDING_TURNS);
             }
             assert!(exchange.merit() > before);
         }

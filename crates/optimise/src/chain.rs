@@ -3,11 +3,11 @@
 use std::sync::{Mutex, PoisonError};
 
 use super::blocks::BlockExchange;
-use super::checkpoint::{BlockState, Chain, Checkpoint, Numbers};
+use super::checkpoint::{BlockState, Chain, Checkpoint, ExactNumbers};
 use super::exchange::{Exchange, Schedule};
 use super::field::FieldProblem;
 use super::objective::Objective;
-use super::run::{Optimised, Task};
+use super::run::{OptimiseTask, Optimised};
 use metalith_core::Progress;
 
 /// Sweeps at temperature zero at most; an exchange ends where nothing is gained, commonly within thirty.
@@ -83,7 +83,7 @@ impl Found {
     }
 }
 
-impl Task {
+impl OptimiseTask {
     /// One chain: its sweeps over single rings, and its blocks.
     pub(super) fn chain(
         &self,
@@ -114,7 +114,7 @@ impl Task {
         let finished = exchange.finished();
         let chain = Chain {
             sweep: exchange.sweep(),
-            turns: Numbers::of(&exchange.turns()),
+            turns: ExactNumbers::of(&exchange.turns()),
             blocks: finished.then(BlockState::default),
         };
         if finished && course.blocks > 0 && !progress.stopped() {
@@ -166,10 +166,10 @@ impl Task {
             finished: exchange.finished(),
             chain: Chain {
                 sweep: chain.sweep,
-                turns: Numbers::of(&exchange.turns()),
+                turns: ExactNumbers::of(&exchange.turns()),
                 blocks: Some(BlockState {
                     block: exchange.block(),
-                    shares: Numbers::of(exchange.shares()),
+                    shares: ExactNumbers::of(exchange.shares()),
                 }),
             },
         }

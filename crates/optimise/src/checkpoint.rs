@@ -35,7 +35,7 @@ pub struct Checkpoint {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Chain {
     pub sweep: u32,
-    pub turns: Numbers,
+    pub turns: ExactNumbers,
     /// Its blocks, if its sweeps are done.
     pub blocks: Option<BlockState>,
 }
@@ -44,15 +44,15 @@ pub struct Chain {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BlockState {
     pub block: u32,
-    pub shares: Numbers,
+    pub shares: ExactNumbers,
 }
 
 /// Numbers kept to the last bit, as the text of a decimal fraction need not.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct Numbers(Vec<u64>);
+pub struct ExactNumbers(Vec<u64>);
 
-impl Numbers {
+impl ExactNumbers {
     pub fn of(values: &[f64]) -> Self {
         Self(values.iter().map(|v| v.to_bits()).collect())
     }
@@ -66,9 +66,9 @@ impl Numbers {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AdamState {
     pub step: u32,
-    pub turns: Numbers,
-    pub mean: Numbers,
-    pub square: Numbers,
+    pub turns: ExactNumbers,
+    pub mean: ExactNumbers,
+    pub square: ExactNumbers,
 }
 
 impl AdamState {
@@ -76,9 +76,9 @@ impl AdamState {
         let (mean, square) = adam.means();
         Self {
             step: adam.step(),
-            turns: Numbers::of(adam.turns()),
-            mean: Numbers::of(mean),
-            square: Numbers::of(square),
+            turns: ExactNumbers::of(adam.turns()),
+            mean: ExactNumbers::of(mean),
+            square: ExactNumbers::of(square),
         }
     }
 
@@ -134,7 +134,7 @@ impl Checkpoint {
 
     /// Whether every chain and Adam have a finite number for each of so many rings.
     fn is_of(&self, rings: usize) -> bool {
-        let fits = |numbers: &Numbers| numbers.0.len() == rings && numbers.values().iter().all(|v| v.is_finite());
+        let fits = |numbers: &ExactNumbers| numbers.0.len() == rings && numbers.values().iter().all(|v| v.is_finite());
         let adam = self.adam.iter().flat_map(|a| [&a.turns, &a.mean, &a.square]);
         self.chains.iter().map(|chain| &chain.turns).chain(adam).all(fits)
     }
@@ -175,7 +175,7 @@ mod tests {
         let with = |turns: &[f64]| {
             let chain = Chain {
                 sweep: 1,
-                turns: Numbers::of(turns),
+                turns: ExactNumbers::of(turns),
                 blocks: None,
             };
             let checkpoint = Checkpoint {

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::focus::Lens;
 use super::image_error::Spectrum;
-use super::imaging::{Imaging, Rooms, Transfer};
+use super::imaging::{Imaging, OpticalTransfer, Rooms};
 use super::mapping::Mapping;
 use super::pupil::Pupil;
 use super::views::{Views, window_offset_um};
@@ -126,7 +126,7 @@ impl Deconvolution {
 
     /// Transfer function of each view, `[angle][wavelength]`, with pillars of `widths_nm[k]` in ring `k`.
     /// Shape of each: `[j][i]`, frequencies (i, j) / window from zero to the pixels' Nyquist.
-    pub fn transfers(&self, widths_nm: &[f64]) -> Vec<Vec<Transfer>> {
+    pub fn transfers(&self, widths_nm: &[f64]) -> Vec<Vec<OpticalTransfer>> {
         (0..self.pupils.len())
             .into_par_iter()
             .map(|angle| {

@@ -194,7 +194,7 @@ mod tests {
     use super::super::limit::largest_step;
     use super::super::mapping::tests::published;
     use super::super::rings::Rings;
-    use super::super::{Kind, Start, wavelengths};
+    use super::super::{MeritKind, Start, wavelengths};
     use super::*;
     use metalith_cell::{CellModel, PublishedCell};
     use metalith_core::Lattice;
@@ -205,6 +205,13 @@ mod tests {
         temperature: (1e-2, 1e-3),
     };
 
+    /// A difference of phases (turns) that are below one.
+    const ROUNDING_TURNS: f64 = 1e-9;
+
+    /// Scores sum thousands of numbers in single precision, so a gain may be a loss of this size; the losses
+    /// of a whole sweep may add up to ten of them.
+    const SCORE: f64 = 1e-5;
+
     fn with_problem(test: impl FnOnce(&Lens, &FieldProblem)) {
         let rings = Rings::new(Lattice::covering(40_000, 350).unwrap(), 40_000).unwrap();
         let (lens, cell) = (Lens { rings, gap_um: 96.0 }, PublishedCell::new(350));
@@ -212,7 +219,7 @@ mod tests {
         let rows = lens
             .focal_rows(&wavelengths(400.0, 700.0, 10.0), FabricationError::default(), &cells)
             .unwrap();
-        let problem = FieldProblem::new(vec![(Kind::Log, 1.0, rows)], &cells, published(), 1 << 24).unwrap();
+        let problem = FieldProblem::new(vec![(MeritKind::Log, 1.0, rows)], &cells, published(), 1 << 24).unwrap();
         test(&lens, &problem);
     }
 
@@ -226,10 +233,9 @@ mod tests {
             while !exchange.finished() {
                 let cold = SCHEDULE.temperature_of(exchange.sweep()) == 0.0;
                 exchange.sweep_once();
-                assert!(largest_step(&exchange.turns()) <= limit.turns() + 1e-9);
+                assert!(largest_step(&exchange.turns()) <= limit.turns() + ROUNDING_TURNS);
                 let merit = problem.merit_of_widths(&exchange.widths_nm());
-                // Scores are of single precision.
-                assert!(!cold || merit > last - 1e-4, "{merit} after {last}");
+                assert!(!cold || merit > last - 10.0 * SCORE, "{merit} after {last}");
                 last = merit;
             }
             let before = problem.merit_of_phases(&Start::Hyperbolic { wavelength_um: 0.55 }.turns(lens, 0), None);
@@ -256,7 +262,7 @@ mod tests {
                     let outer = turns.get(ring + 1).is_none_or(|&t| limit.allows(t, choice.turns));
                     if inner && outer {
                         widths[ring] = choice.width_nm;
-                        assert!(problem.merit_of_widths(&widths) <= best + 1e-5);
+                        assert!(problem.merit_of_widths(&widths) <= best + SCORE);
                     }
                 }
                 widths[ring] = kept;

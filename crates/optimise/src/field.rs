@@ -29,7 +29,7 @@ pub struct Condition {
 
 /// A point of the field: its condition, what each ring contributes, and its weight in the merit.
 #[derive(Clone, Debug)]
-pub struct Row {
+pub struct FieldPoint {
     /// Wavelength and fabrication error.
     pub condition: Condition,
     /// Field of each ring of unit transmission, in units of the matched peak at full transmission.
@@ -40,7 +40,7 @@ pub struct Row {
 
 /// How the intensities of a block make a merit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum MeritKind {
     /// Mean of the logarithms.
     Log,
     /// Weighted sum; the weights may be negative.
@@ -49,8 +49,8 @@ pub enum Kind {
 
 /// Rows that are summed up in one way.
 #[derive(Clone, Debug)]
-pub(super) struct Block {
-    pub kind: Kind,
+pub(super) struct MeritBlock {
+    pub kind: MeritKind,
     pub weight: f64,
     /// Padded to `LANES`.
     pub rows: Range<usize>,
@@ -61,7 +61,7 @@ pub(super) struct Block {
 pub struct FieldProblem {
     rings: usize,
     rows: usize,
-    pub(super) blocks: Vec<Block>,
+    pub(super) blocks: Vec<MeritBlock>,
     pub(super) row_weight: Vec<f32>,
     /// `[ring][row]`.
     kernel: Planes,
@@ -79,7 +79,7 @@ impl FieldProblem {
     /// If there are no rows, the rows disagree in the number of rings, the kernel would not fit, or a cell
     /// does not cover a wavelength.
     pub fn new(
-        blocks: Vec<(Kind, f64, Vec<Row>)>,
+        blocks: Vec<(MeritKind, f64, Vec<FieldPoint>)>,
         cells: &[&dyn CellModel],
         mapping: Mapping,
         memory_bytes: u64,
@@ -97,12 +97,12 @@ impl FieldProblem {
             ));
         }
         let mut layout = Vec::new();
-        let mut all = Vec::<Option<Row>>::new();
+        let mut all = Vec::<Option<FieldPoint>>::new();
         for (kind, weight, rows) in blocks {
             let (start, live) = (all.len(), rows.len());
             all.extend(rows.into_iter().map(Some));
             all.resize_with(all.len().next_multiple_of(LANES), || None);
-            layout.push(Block {
+            layout.push(MeritBlock {
                 kind,
                 weight,
                 rows: start..all.len(),
@@ -232,9 +232,9 @@ pub mod tests {
                 .unwrap()
         };
         let blocks = vec![
-            (Kind::Log, 0.7, rows(10.0, FabricationError::default())),
-            (Kind::Log, 0.3, rows(20.0, wide)),
-            (Kind::Linear, 25.0, rows(50.0, FabricationError::default())),
+            (MeritKind::Log, 0.7, rows(10.0, FabricationError::default())),
+            (MeritKind::Log, 0.3, rows(20.0, wide)),
+            (MeritKind::Linear, 25.0, rows(50.0, FabricationError::default())),
         ];
         FieldProblem::new(blocks, &cells, published(), 1 << 24).unwrap()
     }
@@ -259,7 +259,7 @@ pub mod tests {
         let rows = lens
             .focal_rows(&[0.5, 0.6], FabricationError::default(), &cells)
             .unwrap();
-        assert!(FieldProblem::new(vec![(Kind::Log, 1.0, rows)], &cells, published(), 1000).is_err());
-        assert!(FieldProblem::new(vec![(Kind::Log, 1.0, Vec::new())], &cells, published(), 1000).is_err());
+        assert!(FieldProblem::new(vec![(MeritKind::Log, 1.0, rows)], &cells, published(), 1000).is_err());
+        assert!(FieldProblem::new(vec![(MeritKind::Log, 1.0, Vec::new())], &cells, published(), 1000).is_err());
     }
 }

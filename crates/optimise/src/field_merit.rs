@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::field::{FLOOR, FieldProblem, Kind, LANES};
+use super::field::{FLOOR, FieldProblem, LANES, MeritKind};
 use super::objective::Objective;
 use super::planes::Planes;
 
@@ -52,10 +52,10 @@ impl FieldProblem {
             .map(|block| {
                 let rows = block.rows.start..block.rows.start + block.live;
                 let sum = match block.kind {
-                    Kind::Log => {
+                    MeritKind::Log => {
                         fields[rows].iter().map(|e| (e.norm_sqr() + FLOOR).ln()).sum::<f64>() / block.live as f64
                     }
-                    Kind::Linear => fields[rows.clone()]
+                    MeritKind::Linear => fields[rows.clone()]
                         .iter()
                         .zip(&self.row_weight[rows])
                         .map(|(e, &w)| f64::from(w) * e.norm_sqr())
@@ -72,8 +72,8 @@ impl FieldProblem {
         for block in &self.blocks {
             for i in block.rows.start..block.rows.start + block.live {
                 let scale = match block.kind {
-                    Kind::Log => 1.0 / (block.live as f64 * (fields[i].norm_sqr() + FLOOR)),
-                    Kind::Linear => f64::from(self.row_weight[i]),
+                    MeritKind::Log => 1.0 / (block.live as f64 * (fields[i].norm_sqr() + FLOOR)),
+                    MeritKind::Linear => f64::from(self.row_weight[i]),
                 };
                 gradient[i] = block.weight * scale * fields[i];
             }

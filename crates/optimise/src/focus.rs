@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use num_complex::{Complex32, Complex64};
 use rayon::prelude::*;
 
-use super::field::{Condition, Row};
+use super::field::{Condition, FieldPoint};
 use super::kernel::RingField;
 use super::rings::Rings;
 use metalith_cell::CellModel;
@@ -32,7 +32,33 @@ pub struct FabricationError {
     pub gap_error_um: f64,
 }
 
+impl FabricationError {
+    /// The condition at a wavelength.
+    pub(super) fn at(self, wavelength_um: f64) -> Condition {
+        Condition {
+            wavelength_um,
+            cell: self.cell,
+            width_bias_nm: self.width_bias_nm,
+        }
+    }
+}
+
 impl Lens {
+    /// A point of the field to which each ring contributes `field`.
+    pub(super) fn field_point(
+        &self,
+        condition: Condition,
+        weight: f32,
+        field: impl Fn(usize) -> Complex64,
+    ) -> FieldPoint {
+        let single = |e: Complex64| Complex32::new(e.re as f32, e.im as f32);
+        FieldPoint {
+            condition,
+            kernel: (0..self.rings.len()).map(|ring| single(field(ring))).collect(),
+            weight,
+        }
+    }
+
     /// One row for each wavelength: the field at the focus, such that its intensity is the Strehl ratio.
     ///
     /// # Errors
@@ -42,28 +68,15 @@ impl Lens {
         wavelengths_um: &[f64],
         error: FabricationError,
         cells: &[&dyn CellModel],
-    ) -> Result<Vec<Row>> {
+    ) -> Result<Vec<FieldPoint>> {
         wavelengths_um
             .par_iter()
             .map(|&wavelength_um| {
                 let full = cells[error.cell].full_transmission(wavelength_um)?;
                 let field = RingField::new(&self.rings, wavelength_um, self.gap_um + error.gap_error_um);
                 let scale = 1.0 / (full * field.matched());
-                let kernel = (0..self.rings.len())
-                    .map(|ring| {
-                        let e = field.on_axis(ring) * scale;
-                        Complex32::new(e.re as f32, e.im as f32)
-                    })
-                    .collect();
-                Ok(Row {
-                    condition: Condition {
-                        wavelength_um,
-                        cell: error.cell,
-                        width_bias_nm: error.width_bias_nm,
-                    },
-                    kernel,
-                    weight: 1.0 / wavelengths_um.len() as f32,
-                })
+                let weight = 1.0 / wavelengths_um.len() as f32;
+                Ok(self.field_point(error.at(wavelength_um), weight, |ring| field.on_axis(ring) * scale))
             })
             .collect()
     }

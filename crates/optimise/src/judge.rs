@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::focus::{Strehl, judging_wavelengths};
 use super::limit::{largest_step, largest_step_in_layout};
 use super::robust;
-use super::run::Task;
+use super::run::OptimiseTask;
 use metalith_cell::{CellModel, Fidelity};
 use metalith_core::{Result, WidthMap};
 use metalith_design::Design;
@@ -57,7 +57,7 @@ pub fn lens_alone(design: &Design, table: &Path) -> Result<Design> {
     Ok(alone)
 }
 
-impl Task {
+impl OptimiseTask {
     fn judging_wavelengths(&self) -> Vec<f64> {
         judging_wavelengths(self.spec.band_um.0 * 1e3, self.spec.band_um.1 * 1e3)
     }
@@ -83,7 +83,7 @@ impl Task {
     }
 
     /// Geometric-mean Strehl ratio of phases (turns) for errors of fabrication drawn afresh: one for each
-    /// draw. `cells` as in [`Task::solve`].
+    /// draw. `cells` as in [`OptimiseTask::solve`].
     ///
     /// # Errors
     /// If a cell does not cover the band.
@@ -100,7 +100,7 @@ impl Task {
             .into_iter()
             .map(|error| {
                 let rows = self.lens.focal_rows(&band, error, cells)?;
-                let blocks = vec![(super::Kind::Log, 1.0, rows)];
+                let blocks = vec![(super::MeritKind::Log, 1.0, rows)];
                 let problem = super::FieldProblem::new(blocks, cells, self.mapping.clone(), 1 << 30)?;
                 Ok(problem.merit_of_widths(&widths).exp())
             })

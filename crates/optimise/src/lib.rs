@@ -1,7 +1,7 @@
 //! The radial phase that all elements share, optimised ring by ring.
 //!
 //! ```text
-//! Design -> Task -> (cells) -> kernels -> Exchange, BlockExchange or Adam -> Optimised -> phase table, Findings
+//! Design -> OptimiseTask -> (cells) -> kernels -> Exchange, BlockExchange or Adam -> Optimised -> phase table, OptimiseReport
 //! ```
 //!
 //! The field of one lens at one wavelength and angle is linear in the complex transmission of its
@@ -57,21 +57,21 @@ pub use blocks::BlockExchange;
 pub use checkpoint::Checkpoint;
 pub use deconvolution::Deconvolution;
 pub use exchange::{Exchange, Schedule};
-pub use field::{Condition, FieldProblem, Kind, Row};
+pub use field::{Condition, FieldPoint, FieldProblem, MeritKind};
 pub use focus::{FabricationError, Lens, Strehl, judging_wavelengths, wavelengths};
-pub use imaging::Transfer;
+pub use imaging::OpticalTransfer;
 pub use judge::{Judged, lens_alone};
 pub use kernel::RingField;
 pub use limit::{StepLimit, largest_step, largest_step_in_layout};
-pub use mapping::{Choice, Mapping, step};
+pub use mapping::{Mapping, WidthChoice, step};
 pub use objective::{Objective, Sum};
-pub use page::{Findings, mean_and_deviation};
+pub use page::{OptimiseReport, mean_and_deviation};
 pub use point_image::blurs_of_colours;
 pub use problem::views;
 pub use pupil::Pupil;
 pub use rings::Rings;
 pub use robust::{cells_off_height, draw};
-pub use run::{Optimised, Task, turns_of};
+pub use run::{OptimiseTask, Optimised, turns_of};
 pub use spectrum::OverWavelength;
 pub use start::Start;
 pub use table::write_phase_table;

@@ -10,12 +10,12 @@ const SAMPLES: usize = 4096;
 pub struct Mapping {
     /// Width at `i / SAMPLES` turns, the last entry at the end of the turn (nm).
     width_nm: Vec<f64>,
-    choices: Vec<Choice>,
+    choices: Vec<WidthChoice>,
 }
 
 /// A width that a ring can have, and the phase to ask for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Choice {
+pub struct WidthChoice {
     /// Phase (turns), in [0, 1): the middle of the phases that are mapped to this width, so that
     /// rounding a phase to a text file and back cannot change the width.
     pub turns: f64,
@@ -44,7 +44,7 @@ impl Mapping {
     }
 
     /// The widths a ring can have, by rising phase.
-    pub fn choices(&self) -> &[Choice] {
+    pub fn choices(&self) -> &[WidthChoice] {
         &self.choices
     }
 
@@ -85,7 +85,7 @@ pub fn step(from_turns: f64, to_turns: f64) -> f64 {
 }
 
 /// The longest run of samples of each width; its middle is the phase of that width.
-fn choices_of(widths: &[u16]) -> Vec<Choice> {
+fn choices_of(widths: &[u16]) -> Vec<WidthChoice> {
     let mut runs = std::collections::BTreeMap::<u16, (usize, usize)>::new();
     let mut start = 0;
     for end in 1..=SAMPLES {
@@ -99,7 +99,7 @@ fn choices_of(widths: &[u16]) -> Vec<Choice> {
     }
     let mut choices = runs
         .into_iter()
-        .map(|(width_nm, (start, end))| Choice {
+        .map(|(width_nm, (start, end))| WidthChoice {
             turns: 0.5 * (start + end - 1) as f64 / SAMPLES as f64,
             width_nm,
         })

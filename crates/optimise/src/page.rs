@@ -12,7 +12,7 @@ use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, Table, Verdict, 
 
 /// All that is reported.
 #[derive(Clone, Debug, Serialize)]
-pub struct Findings {
+pub struct OptimiseReport {
     /// Name and title of the design.
     pub design: String,
     /// Commands that made the phase.
@@ -47,7 +47,7 @@ pub struct Findings {
     pub mtf: (Vec<f64>, Vec<Vec<(f64, f64)>>),
 }
 
-impl Findings {
+impl OptimiseReport {
     /// Whether every step of the optimised phase keeps the limit, rings and layout.
     pub fn limit_kept(&self) -> bool {
         self.after

@@ -6,7 +6,7 @@ use ndarray::Array2;
 use num_complex::Complex64;
 
 use super::PixelWindow;
-use super::imaging::Transfer;
+use super::imaging::OpticalTransfer;
 
 /// What white light of each colour makes of a point, red first: the mean of the transfer functions of a third of the
 /// wavelengths each, as pixels.
@@ -15,7 +15,7 @@ use super::imaging::Transfer;
 ///
 /// # Errors
 /// If there are fewer than three wavelengths, or the window has an odd number of pixels or none.
-pub fn blurs_of_colours(transfers: &[Transfer], window: PixelWindow) -> Result<[Blur; 3]> {
+pub fn blurs_of_colours(transfers: &[OpticalTransfer], window: PixelWindow) -> Result<[Blur; 3]> {
     let third = |colour: usize| -> Result<Blur> {
         let count = transfers.len();
         let some = &transfers[(2 - colour) * count / 3..(3 - colour) * count / 3];
@@ -26,7 +26,7 @@ pub fn blurs_of_colours(transfers: &[Transfer], window: PixelWindow) -> Result<[
 }
 
 /// Mean of transfer functions, from the quarter plane that they are given on to all frequencies of a window.
-fn mean(transfers: &[Transfer], window: PixelWindow) -> Array2<Complex64> {
+fn mean(transfers: &[OpticalTransfer], window: PixelWindow) -> Array2<Complex64> {
     let (n, side) = (window.pixels, window.pixels / 2 + 1);
     let at = |m: usize| {
         let all = transfers.iter().map(|t| Complex64::new(t[m].re.into(), t[m].im.into()));
@@ -50,7 +50,7 @@ mod tests {
     };
 
     /// Transfer function of a shift by so many pixels along x.
-    fn shift(pixels: f64) -> Transfer {
+    fn shift(pixels: f64) -> OpticalTransfer {
         let side = WINDOW.pixels / 2 + 1;
         let turns = |m: usize| pixels * (m % side) as f64 / WINDOW.pixels as f64;
         (0..side * side)

@@ -1,11 +1,10 @@
 //! The merit that a design asks for.
 
-use num_complex::Complex32;
 use rayon::prelude::*;
 
 use super::PixelWindow;
 use super::deconvolution::Deconvolution;
-use super::field::{Condition, FieldProblem, Kind, Row};
+use super::field::{FieldPoint, FieldProblem, MeritKind};
 use super::focus::{FabricationError, Lens, wavelengths};
 use super::kernel::RingField;
 use super::mapping::Mapping;
@@ -56,14 +55,14 @@ pub fn field_problem(
             .skip(i % stride)
             .step_by(stride)
             .collect::<Vec<_>>();
-        for (kind, weight) in [(Kind::Log, merit.log), (Kind::Linear, merit.sum)] {
+        for (kind, weight) in [(MeritKind::Log, merit.log), (MeritKind::Linear, merit.sum)] {
             if weight != 0.0 {
                 blocks.push((kind, weight * share, lens.focal_rows(&some, error, cells)?));
             }
         }
         if merit.side_lobes != 0.0 {
             let rows = side_lobe_rows(lens, spec, merit.side_lobe_radius_um, error, cells)?;
-            blocks.push((Kind::Linear, -merit.side_lobes * share, rows));
+            blocks.push((MeritKind::Linear, -merit.side_lobes * share, rows));
         }
     }
     if blocks.is_empty() {
@@ -80,7 +79,7 @@ fn side_lobe_rows(
     radius_um: f64,
     error: FabricationError,
     cells: &[&dyn CellModel],
-) -> Result<Vec<Row>> {
+) -> Result<Vec<FieldPoint>> {
     let lengths = wavelengths(spec.band_um.0 * 1e3, spec.band_um.1 * 1e3, SIDE_LOBE_STEP_NM);
     let area = lens.rings.sites() as f64 * lens.rings.lattice().pitch_um().powi(2);
     let width = 3.0 * radius_um / SIDE_LOBE_POINTS as f64;
@@ -98,21 +97,10 @@ fn side_lobe_rows(
             let field = RingField::new(&lens.rings, wavelength_um, lens.gap_um + error.gap_error_um);
             // Each ring around the axis with its power, so that all rows are of like size.
             let scale = (std::f64::consts::TAU * rho * width / area).sqrt() / full;
-            let kernel = (0..lens.rings.len())
-                .map(|ring| {
-                    let e = field.at_radius(ring, rho, &bessel) * scale;
-                    Complex32::new(e.re as f32, e.im as f32)
-                })
-                .collect();
-            Ok(Row {
-                condition: Condition {
-                    wavelength_um,
-                    cell: error.cell,
-                    width_bias_nm: error.width_bias_nm,
-                },
-                kernel,
-                weight: 1.0 / lengths.len() as f32,
-            })
+            let weight = 1.0 / lengths.len() as f32;
+            Ok(lens.field_point(error.at(wavelength_um), weight, |ring| {
+                field.at_radius(ring, rho, &bessel) * scale
+            }))
         })
         .collect()
 }

@@ -33,7 +33,7 @@ pub struct Optimised {
 
 /// The lens and the mapping of a design, ring by ring.
 #[derive(Clone, Debug)]
-pub struct Task {
+pub struct OptimiseTask {
     /// The rings and the distance to the sensor.
     pub lens: Lens,
     /// From phase to width.
@@ -48,7 +48,7 @@ pub struct Task {
     pub(super) limit: StepLimit,
 }
 
-impl Task {
+impl OptimiseTask {
     /// The task that a design sets.
     ///
     /// # Errors

@@ -1,6 +1,6 @@
 //! The inner loop of exchange: the merit of every candidate of one ring.
 
-use super::field::{FLOOR, FieldProblem, Kind};
+use super::field::{FLOOR, FieldProblem, MeritKind};
 use super::planes::Planes;
 
 impl FieldProblem {
@@ -25,8 +25,8 @@ impl FieldProblem {
                 };
                 *score += block.weight
                     * match block.kind {
-                        Kind::Log => trial.log_ratio(&one_over_now[r]) / block.live as f64,
-                        Kind::Linear => trial.weighted(&self.row_weight[r]),
+                        MeritKind::Log => trial.log_ratio(&one_over_now[r]) / block.live as f64,
+                        MeritKind::Linear => trial.weighted(&self.row_weight[r]),
                     };
             }
         }

@@ -4,20 +4,20 @@ use rayon::prelude::*;
 
 use super::adam::Adam;
 use super::chain::{Best, COLD_SWEEPS, Course};
-use super::checkpoint::{AdamState, BlockState, Chain, Checkpoint, Numbers};
+use super::checkpoint::{AdamState, BlockState, Chain, Checkpoint, ExactNumbers};
 use super::deconvolution::Deconvolution;
 use super::exchange::{Exchange, Schedule};
 use super::field::FieldProblem;
 use super::limit::StepLimit;
 use super::objective::{Objective, Sum};
 use super::problem;
-use super::run::{Optimised, Task};
+use super::run::{OptimiseTask, Optimised};
 use super::start::Start;
 use metalith_cell::CellModel;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::{MeritSpec, SolverSpec, StartSpec};
 
-impl Task {
+impl OptimiseTask {
     /// Find the phase. `cells` are the cell that is optimised with and, for robust designs, that at other
     /// film heights ([`super::cells_off_height`]).
     ///
@@ -75,7 +75,7 @@ impl Task {
                 let seed = self.spec.seed.wrapping_add(i as u64);
                 let chain = checkpoint.chains.get(i).cloned().unwrap_or_else(|| Chain {
                     sweep: 0,
-                    turns: Numbers::of(&start.turns(&self.lens, seed)),
+                    turns: ExactNumbers::of(&start.turns(&self.lens, seed)),
                     blocks: None,
                 });
                 self.chain(problem, course, seed, chain, &best)
@@ -106,7 +106,7 @@ impl Task {
         let (turns, name) = self.start_of_images(course, kept.is_some(), cells, progress)?;
         let chain = kept.unwrap_or_else(|| Chain {
             sweep: 0,
-            turns: Numbers::of(&turns),
+            turns: ExactNumbers::of(&turns),
             blocks: Some(BlockState::default()),
         });
         let parts = Parts::new(self, cells, progress)?;
@@ -207,7 +207,7 @@ impl Task {
     /// costs.
     ///
     /// # Errors
-    /// As [`Task::solve`].
+    /// As [`OptimiseTask::solve`].
     pub fn merit_over_limit(
         &self,
         cells: &[&dyn CellModel],
@@ -250,7 +250,7 @@ struct Parts {
 }
 
 impl Parts {
-    fn new(task: &Task, cells: &[&dyn CellModel], progress: &dyn Progress) -> Result<Self> {
+    fn new(task: &OptimiseTask, cells: &[&dyn CellModel], progress: &dyn Progress) -> Result<Self> {
         Ok(Self {
             weight: task.spec.merit.deconvolution,
             images: problem::deconvolution(&task.lens, &task.spec, cells[0], &task.mapping, progress)?,

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use metalith_cell::{CellModel, PublishedCell};
 use metalith_core::{Lattice, Progress, Silent};
 use metalith_design::Design;
-use metalith_optimise::{Checkpoint, Lens, RingField, Rings, Start, Task, largest_step};
+use metalith_optimise::{Checkpoint, Lens, OptimiseTask, RingField, Rings, Start, largest_step};
 use metalith_wave::{Accuracy, Direct, Fold, Pillars, PlaneWave, Propagator, Scratch, Window};
 use num_complex::Complex64;
 
@@ -95,24 +95,27 @@ const IMAGES: &str = "[optimise]\ncell = \"published\"\nstep_nm = 5\nstart = \"h
     [optimise.merit]\ndeconvolution = 1\nlog = 0.01\n\
     [optimise.views]\nangles_deg = [0, 15]\nstep_nm = 30\npixels = 16\n";
 
+/// Limit on the step of phase in the designs of this file (turns), and the rounding of a difference of phases.
+const STEP_TURNS: f64 = 0.2 + 1e-9;
+
 #[test]
 fn an_interrupted_run_goes_on_to_the_same_end() {
     for section in [EXCHANGE, ADAM, IMAGES] {
         let folder = tempfile::tempdir().unwrap();
         let design = Design::read(&design(folder.path(), section)).unwrap();
-        let (task, cell) = (Task::of(&design).unwrap(), PublishedCell::new(350));
+        let (task, cell) = (OptimiseTask::of(&design).unwrap(), PublishedCell::new(350));
         let cells: [&dyn CellModel; 1] = [&cell];
         let begin = || Checkpoint::begin(&design);
         let whole = task.solve(&cells, begin(), &Silent).unwrap();
         assert!(whole.interrupted.is_none());
-        assert!(largest_step(&whole.turns) <= 0.2 + 1e-9);
+        assert!(largest_step(&whole.turns) <= STEP_TURNS);
 
         // Over and over, in every stage.
         let kept = folder.path().join("checkpoint.bin");
         let (mut checkpoint, mut interruptions) = (begin(), 0);
         let rest = loop {
             let part = task.solve(&cells, checkpoint, &StopAfter::new(14)).unwrap();
-            assert!(largest_step(&part.turns) <= 0.2 + 1e-9);
+            assert!(largest_step(&part.turns) <= STEP_TURNS);
             let Some(interrupted) = part.interrupted else {
                 break part;
             };
@@ -150,7 +153,7 @@ fn both_solvers_beat_what_they_begin_from_and_exchange_beats_adam() {
     let cell = PublishedCell::new(350);
     let reached = [ADAM, EXCHANGE].map(|section| {
         let design = Design::read(&design(folder.path(), section)).unwrap();
-        let task = Task::of(&design).unwrap();
+        let task = OptimiseTask::of(&design).unwrap();
         let found = task.solve(&[&cell], Checkpoint::begin(&design), &Silent).unwrap();
         let before = task.judge_rings(&task.own_turns, &cell).unwrap();
         let after = task.judge_rings(&found.turns, &cell).unwrap();

@@ -85,7 +85,7 @@ impl Space {
 
 /// One row of the transverse field: a component of E in one order.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Row {
+pub(super) struct FieldRow {
     /// Component: 0 for Ex, 1 for Ey.
     pub component: usize,
     /// Transverse wave vector over k0.
@@ -96,7 +96,7 @@ pub(super) struct Row {
     pub z: Option<usize>,
 }
 
-impl Row {
+impl FieldRow {
     /// Entry of the divergence, that maps this row to Ez: k along the component.
     pub fn divergence(&self) -> f64 {
         self.k[self.component]
@@ -111,7 +111,7 @@ impl Row {
 /// The components of the transverse field that are solved for: rows of Ex, then of Ey.
 #[derive(Clone)]
 pub(super) struct Rows {
-    pub list: Vec<Row>,
+    pub list: Vec<FieldRow>,
     /// Number of rows of Ex.
     pub of_x: usize,
     /// Number of rows of Ez.
@@ -128,14 +128,14 @@ impl Rows {
 ///
 /// Ex is in the space `x` times `y`, Ey in their derived spaces, Ez in `x` derived times `y`.
 #[derive(Clone)]
-pub(super) struct Basis {
+pub(super) struct FieldBasis {
     pub highest: usize,
     pub x: Space,
     pub y: Space,
     pub rows: Rows,
 }
 
-impl Basis {
+impl FieldBasis {
     /// `k` is the wave vector of the zero order over k0, `step` the wavelength over the pitch. The k of
     /// an axis in an even or odd space is zero.
     pub fn new(highest: usize, x: Space, y: Space, k: [f64; 2], step: f64) -> Self {
@@ -151,7 +151,7 @@ impl Basis {
             for m in sx.orders(highest) {
                 for n in sy.orders(highest) {
                     let partner = place(spaces[1 - component], m, n);
-                    rows.push(Row {
+                    rows.push(FieldRow {
                         component,
                         k: [k[0] + f64::from(m) * step, k[1] + f64::from(n) * step],
                         partner: partner.map(|p| if component == 0 { rows_x + p } else { p }),

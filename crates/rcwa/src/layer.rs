@@ -13,7 +13,7 @@ use faer::{Accum, Mat, Par};
 use num_complex::Complex64;
 
 use super::Result;
-use super::basis::{Basis, Row, Rows, Space};
+use super::basis::{FieldBasis, FieldRow, Rows, Space};
 use super::outline::{Outline, slab_coefficients};
 use super::scalar::{Eigen, Scalar};
 
@@ -26,7 +26,7 @@ const GRAZING: f64 = 1e-18;
 const ROUNDED: f64 = 1e-7;
 
 /// A layer as the operators see it: optical constants in place of materials.
-pub(super) struct Section<'a> {
+pub(super) struct CrossSection<'a> {
     pub outline: &'a Outline,
     /// Permittivity of the pillar.
     pub inside: Complex64,
@@ -35,7 +35,7 @@ pub(super) struct Section<'a> {
     pub pitch_nm: f64,
 }
 
-impl Section<'_> {
+impl CrossSection<'_> {
     /// The permittivity of a layer without structure.
     fn uniform(&self) -> Option<Complex64> {
         if self.outline.is_empty() || self.inside == self.outside {
@@ -55,7 +55,7 @@ pub(super) struct Modes {
 }
 
 impl Modes {
-    pub fn of(section: &Section<'_>, basis: &Basis) -> Result<Self> {
+    pub fn of(section: &CrossSection<'_>, basis: &FieldBasis) -> Result<Self> {
         if let Some(permittivity) = section.uniform() {
             return Ok(Self::uniform(permittivity, &basis.rows));
         }
@@ -110,7 +110,7 @@ pub(super) struct Permittivity<T> {
 }
 
 impl<T: Scalar> Permittivity<T> {
-    fn new(section: &Section<'_>, basis: &Basis) -> Self {
+    fn new(section: &CrossSection<'_>, basis: &FieldBasis) -> Self {
         let (x, y) = (basis.x, basis.y);
         let laurent = |space: Space, half_width: f64| -> Mat<T> {
             let f: Vec<T> = slab_coefficients(half_width, section.pitch_nm, 2 * basis.highest)
@@ -283,7 +283,7 @@ impl Medium {
     }
 
     /// Entries of the admittance G = Y E of a forward wave in the row of a component and its partner's.
-    fn entries(&self, row: &Row, gamma: Complex64) -> (Complex64, f64) {
+    fn entries(&self, row: &FieldRow, gamma: Complex64) -> (Complex64, f64) {
         let across = row.k[1 - row.component];
         ((self.permittivity - across * across) / gamma, row.k[0] * row.k[1])
     }

@@ -16,11 +16,11 @@ use std::f64::consts::TAU;
 use faer::Mat;
 use num_complex::Complex64;
 
-use basis::{Basis, Space};
-use layer::{Medium, Modes, Section};
+use basis::{FieldBasis, Space};
+use layer::{CrossSection, Modes};
 pub use material::Material;
 pub use outline::Outline;
-use propagate::{Ends, Slab, propagate};
+use propagate::{Ends, propagate_wave};
 pub use response::{Convergence, DiffractionOrder, Response, converge};
 pub use stack::{Layer, LayerStack, Orders};
 pub use supercell::{SiteLattice, SiteLayer, Supercell, SupercellOrder, SupercellResponse, solve_supercell};
@@ -192,7 +192,7 @@ struct Problem {
 
 /// The fields of one symmetry.
 struct Part {
-    basis: Basis,
+    basis: FieldBasis,
     ends: Ends,
     /// Transverse amplitudes of the incident zero order, for each column.
     incident: Vec<[Complex64; 2]>,
@@ -220,7 +220,7 @@ impl Problem {
     }
 
     fn part(&self, x: Space, y: Space, incident: &[[Complex64; 2]]) -> Result<Part> {
-        let basis = Basis::new(self.orders.highest(), x, y, self.k, self.step);
+        let basis = FieldBasis::new(self.orders.highest(), x, y, self.k, self.step);
         if basis.rows.len() > MOST_UNKNOWNS {
             return Err(Error::TooLarge {
                 along_axis: self.orders.along_axis(),
@@ -228,34 +228,19 @@ impl Problem {
                 most: MOST_UNKNOWNS,
             });
         }
-        let below = Medium::new(self.stack.below * self.stack.below, &basis.rows);
-        let above = Medium::new(self.stack.above * self.stack.above, &basis.rows);
-        let slabs = self
-            .stack
-            .layers
-            .iter()
-            .map(|layer| {
-                let section = Section {
-                    outline: &layer.outline,
-                    inside: layer.inside * layer.inside,
-                    outside: layer.outside * layer.outside,
-                    pitch_nm: self.stack.pitch_nm,
-                };
-                Ok(Slab {
-                    modes: Modes::of(&section, &basis)?,
-                    depth: layer.height_nm * self.k0_per_nm,
-                })
-            })
-            .collect::<Result<Vec<_>>>()?;
-        let mut arriving = Mat::zeros(basis.rows.len(), incident.len());
-        for (column, amplitudes) in incident.iter().enumerate() {
-            for (component, amplitude) in amplitudes.iter().enumerate() {
-                if let Some((row, factor)) = basis.plane_wave(component, 0, 0) {
-                    arriving[(row, column)] = amplitude / factor;
-                }
-            }
-        }
-        let ends = propagate(&basis.rows, &below, &slabs, &above, &arriving);
+        let layers = self.stack.layers.iter().map(|layer| {
+            let section = CrossSection {
+                outline: &layer.outline,
+                inside: layer.inside * layer.inside,
+                outside: layer.outside * layer.outside,
+                pitch_nm: self.stack.pitch_nm,
+            };
+            Ok((Modes::of(&section, &basis)?, layer.height_nm))
+        });
+        let indices = [self.stack.below, self.stack.above];
+        let ends = propagate_wave(&basis.rows, indices, layers, self.k0_per_nm, incident, |component| {
+            basis.plane_wave(component, 0, 0)
+        })?;
         Ok(Part {
             basis,
             ends,

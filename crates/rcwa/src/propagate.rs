@@ -10,6 +10,7 @@ use faer::linalg::solvers::{PartialPivLu, Solve};
 use faer::{Accum, Mat, Par};
 use num_complex::Complex64;
 
+use super::Result;
 use super::basis::Rows;
 use super::layer::{Medium, Modes};
 
@@ -18,9 +19,9 @@ use super::layer::{Medium, Modes};
 const GONE: f64 = 1e-15;
 
 /// A layer with its modes, and its thickness times k0.
-pub(super) struct Slab {
-    pub modes: Modes,
-    pub depth: f64,
+struct Slab {
+    modes: Modes,
+    depth: f64,
 }
 
 /// Fields for each incident wave (columns).
@@ -48,14 +49,41 @@ struct Crossed<'a> {
     near: PartialPivLu<Complex64>,
 }
 
-/// Fields at both ends for the transverse fields `incident` arriving from `below`.
-pub(super) fn propagate(
+/// Fields at both ends of a stack for the zero order of a plane wave arriving from below.
+///
+/// `indices`: of the half-spaces below and above. `layers`: modes and thickness (nm) of each layer from below. `incident`:
+/// transverse amplitudes, for each column. `zero_order`: row and factor of the zero order in a component, if it has one.
+pub(super) fn propagate_wave(
     rows: &Rows,
-    below: &Medium,
-    slabs: &[Slab],
-    above: &Medium,
-    incident: &Mat<Complex64>,
-) -> Ends {
+    indices: [Complex64; 2],
+    layers: impl Iterator<Item = Result<(Modes, f64)>>,
+    k0_per_nm: f64,
+    incident: &[[Complex64; 2]],
+    zero_order: impl Fn(usize) -> Option<(usize, f64)>,
+) -> Result<Ends> {
+    let [below, above] = indices.map(|n| Medium::new(n * n, rows));
+    let slabs = layers
+        .map(|layer| {
+            let (modes, height_nm) = layer?;
+            Ok(Slab {
+                modes,
+                depth: height_nm * k0_per_nm,
+            })
+        })
+        .collect::<Result<Vec<_>>>()?;
+    let mut arriving = Mat::zeros(rows.len(), incident.len());
+    for (column, amplitudes) in incident.iter().enumerate() {
+        for (component, amplitude) in amplitudes.iter().enumerate() {
+            if let Some((row, factor)) = zero_order(component) {
+                arriving[(row, column)] = amplitude / factor;
+            }
+        }
+    }
+    Ok(propagate(rows, &below, &slabs, &above, &arriving))
+}
+
+/// Fields at both ends for the transverse fields `incident` arriving from `below`.
+fn propagate(rows: &Rows, below: &Medium, slabs: &[Slab], above: &Medium, incident: &Mat<Complex64>) -> Ends {
     let n = rows.len();
     // At the near end G + Y E = 2 Y E_inc, and E is what arrives and what returns.
     let mut drive = below.admittance(rows, incident);

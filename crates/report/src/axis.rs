@@ -2,7 +2,7 @@
 
 use super::number::{fixed, power_of_ten, sig};
 
-/// What is drawn along one side of a chart, and how.
+/// Quantity, unit and scale along one side of a chart.
 #[derive(Clone, Debug)]
 pub struct Axis {
     name: String,
@@ -22,7 +22,7 @@ impl Axis {
         }
     }
 
-    /// An axis of equal ratios; what is not positive is not drawn on it.
+    /// A logarithmic axis; values that are not positive are not drawn.
     pub fn log(name: impl Into<String>, unit: impl Into<String>) -> Self {
         Self {
             logarithmic: true,
@@ -30,7 +30,7 @@ impl Axis {
         }
     }
 
-    /// Show this range, whatever the data; else the axis covers its data.
+    /// Show this range; without it, the axis covers its data.
     pub fn range(mut self, low: f64, high: f64) -> Self {
         self.range = Some((low, high));
         self
@@ -108,7 +108,7 @@ impl Fitted {
             .then(|| self.start + (self.end - self.start) * share.clamp(-4.0, 5.0))
     }
 
-    /// Place of a value, with what is not positive at the low end of a logarithmic axis.
+    /// Position of a value; values that are not positive are at the low end of a logarithmic axis.
     pub fn place_or_end(&self, x: f64) -> Option<f64> {
         self.place(x).or_else(|| x.is_finite().then_some(self.start))
     }
@@ -217,7 +217,7 @@ impl Fitted {
         }
     }
 
-    /// What the axis shows, in words.
+    /// Description of the axis as text.
     pub fn words(&self) -> String {
         format!("{} from {} to {}", self.title(0), sig(self.low, 3), sig(self.high, 3))
     }

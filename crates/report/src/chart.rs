@@ -15,7 +15,7 @@ pub struct Chart {
     x: Axis,
     y: Axis,
     series: Vec<Series>,
-    limits: Vec<Limit>,
+    limits: Vec<LimitLine>,
     size: (f64, f64),
     direct: bool,
 }
@@ -23,12 +23,12 @@ pub struct Chart {
 #[derive(Clone, Debug)]
 struct Series {
     name: String,
-    kind: Kind,
+    kind: SeriesKind,
     points: Vec<[f64; 3]>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum SeriesKind {
     Line,
     /// Third number: half length of the error bar, zero for none.
     Points,
@@ -39,7 +39,7 @@ enum Kind {
 }
 
 #[derive(Clone, Debug)]
-struct Limit {
+struct LimitLine {
     at: f64,
     label: String,
     upright: bool,
@@ -60,7 +60,7 @@ impl Chart {
         }
     }
 
-    fn series(&mut self, name: impl Into<String>, kind: Kind, points: Vec<[f64; 3]>) -> &mut Self {
+    fn series(&mut self, name: impl Into<String>, kind: SeriesKind, points: Vec<[f64; 3]>) -> &mut Self {
         self.series.push(Series {
             name: name.into(),
             kind,
@@ -72,13 +72,13 @@ impl Chart {
     /// A line through `(x, y)`; a value that is not finite breaks it.
     pub fn line(&mut self, name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> &mut Self {
         let points = points.into_iter().map(|(x, y)| [x, y, 0.0]).collect();
-        self.series(name, Kind::Line, points)
+        self.series(name, SeriesKind::Line, points)
     }
 
     /// Separate points at `(x, y)`.
     pub fn points(&mut self, name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> &mut Self {
         let points = points.into_iter().map(|(x, y)| [x, y, 0.0]).collect();
-        self.series(name, Kind::Points, points)
+        self.series(name, SeriesKind::Points, points)
     }
 
     /// Separate points at `(x, y)` with error bars from `y - error` to `y + error`.
@@ -88,24 +88,24 @@ impl Chart {
         points: impl IntoIterator<Item = (f64, f64, f64)>,
     ) -> &mut Self {
         let points = points.into_iter().map(|(x, y, e)| [x, y, e]).collect();
-        self.series(name, Kind::Points, points)
+        self.series(name, SeriesKind::Points, points)
     }
 
     /// A histogram: bars of `(left edge, right edge, height)`.
     pub fn bars(&mut self, name: impl Into<String>, bars: impl IntoIterator<Item = (f64, f64, f64)>) -> &mut Self {
         let points = bars.into_iter().map(|(a, b, h)| [a, h, b]).collect();
-        self.series(name, Kind::Bars, points)
+        self.series(name, SeriesKind::Bars, points)
     }
 
     /// An area between `(x, low, high)`, for spreads and intervals.
     pub fn band(&mut self, name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64, f64)>) -> &mut Self {
         let points = points.into_iter().map(|(x, low, high)| [x, low, high]).collect();
-        self.series(name, Kind::Band, points)
+        self.series(name, SeriesKind::Band, points)
     }
 
     /// A dotted line across the chart at a value of y, with a few words.
     pub fn limit(&mut self, y: f64, label: impl Into<String>) -> &mut Self {
-        self.limits.push(Limit {
+        self.limits.push(LimitLine {
             at: y,
             label: label.into(),
             upright: false,
@@ -115,7 +115,7 @@ impl Chart {
 
     /// A dotted upright line at a value of x, with a few words.
     pub fn marker(&mut self, x: f64, label: impl Into<String>) -> &mut Self {
-        self.limits.push(Limit {
+        self.limits.push(LimitLine {
             at: x,
             label: label.into(),
             upright: true,
@@ -147,14 +147,14 @@ impl Chart {
                 .iter()
                 .flat_map(|s| s.points.iter().map(move |p| (s.kind, *p)))
         };
-        let xs = all().flat_map(|(kind, [a, _, b])| [a, if kind == Kind::Bars { b } else { a }]);
+        let xs = all().flat_map(|(kind, [a, _, b])| [a, if kind == SeriesKind::Bars { b } else { a }]);
         let upright = self.limits.iter().filter(|l| l.upright).map(|l| l.at);
         let level = self.limits.iter().filter(|l| !l.upright).map(|l| l.at);
         let ys = all().flat_map(|(kind, [_, y, z])| match kind {
-            Kind::Line => [y, y],
-            Kind::Points => [y - z, y + z],
-            Kind::Bars => [y, 0.0],
-            Kind::Band => [y, z],
+            SeriesKind::Line => [y, y],
+            SeriesKind::Points => [y - z, y + z],
+            SeriesKind::Bars => [y, 0.0],
+            SeriesKind::Band => [y, z],
         });
         (
             self.x.fit(xs.chain(upright), frame.left, frame.right, false),
@@ -220,7 +220,7 @@ impl From<Chart> for Figure {
         let (x, y) = chart.fit(&frame);
         let mut data = clipped(frame.left, frame.top, frame.width(), frame.height());
         // Areas lie below lines, lines below points.
-        for kind in [Kind::Band, Kind::Bars, Kind::Line, Kind::Points] {
+        for kind in [SeriesKind::Band, SeriesKind::Bars, SeriesKind::Line, SeriesKind::Points] {
             for (i, series) in chart.series.iter().enumerate().filter(|(_, s)| s.kind == kind) {
                 data = data.add(draw(series, i % SERIES, &x, &y));
             }
@@ -265,11 +265,11 @@ fn draw(series: &Series, colour: usize, x: &Fitted, y: &Fitted) -> Group {
     };
     let group = Group::new();
     match series.kind {
-        Kind::Line => {
+        SeriesKind::Line => {
             let points: Vec<_> = series.points.iter().map(|p| place(p[0], p[1])).collect();
             group.add(strokes(thinned(&points), &format!("line c{colour}")))
         }
-        Kind::Points => series.points.iter().fold(group, |group, &[a, b, error]| {
+        SeriesKind::Points => series.points.iter().fold(group, |group, &[a, b, error]| {
             let Some((px, py)) = place(a, b) else { return group };
             let mut group = group;
             if let (true, Some(low), Some(high)) = (error > 0.0, y.place_or_end(b - error), y.place_or_end(b + error)) {
@@ -286,7 +286,7 @@ fn draw(series: &Series, colour: usize, x: &Fitted, y: &Fitted) -> Group {
             }
             group.add(dot(px, py, size, colour))
         }),
-        Kind::Bars => series.points.iter().fold(group, |group, &[a, height, b]| {
+        SeriesKind::Bars => series.points.iter().fold(group, |group, &[a, height, b]| {
             let (Some(left), Some(right), Some(top), Some(base)) =
                 (x.place(a), x.place(b), y.place_or_end(height), y.place_or_end(0.0))
             else {
@@ -303,7 +303,7 @@ fn draw(series: &Series, colour: usize, x: &Fitted, y: &Fitted) -> Group {
                 &format!("bar f{colour}"),
             ))
         }),
-        Kind::Band => {
+        SeriesKind::Band => {
             let there = series
                 .points
                 .iter()
@@ -355,13 +355,13 @@ fn dot(x: f64, y: f64, s: f64, colour: usize) -> Group {
     }
 }
 
-fn swatch(kind: Kind, colour: usize, x: f64, y: f64) -> Group {
+fn swatch(kind: SeriesKind, colour: usize, x: f64, y: f64) -> Group {
     let group = Group::new();
     match kind {
-        Kind::Line => group.add(line(x, y, x + 26.0, y, &format!("line c{colour}"))),
-        Kind::Points => group.add(dot(x + 13.0, y, 3.6, colour)),
-        Kind::Bars => group.add(rectangle(x + 5.0, y - 6.0, 16.0, 12.0, &format!("bar f{colour}"))),
-        Kind::Band => group.add(rectangle(x, y - 6.0, 26.0, 12.0, &format!("band f{colour}"))),
+        SeriesKind::Line => group.add(line(x, y, x + 26.0, y, &format!("line c{colour}"))),
+        SeriesKind::Points => group.add(dot(x + 13.0, y, 3.6, colour)),
+        SeriesKind::Bars => group.add(rectangle(x + 5.0, y - 6.0, 16.0, 12.0, &format!("bar f{colour}"))),
+        SeriesKind::Band => group.add(rectangle(x, y - 6.0, 26.0, 12.0, &format!("band f{colour}"))),
     }
 }
 
@@ -394,7 +394,7 @@ fn direct_labels(series: &[Series], y: &Fitted, frame: &Frame) -> Group {
     })
 }
 
-fn draw_limit(limit: &Limit, x: &Fitted, y: &Fitted, frame: &Frame) -> Group {
+fn draw_limit(limit: &LimitLine, x: &Fitted, y: &Fitted, frame: &Frame) -> Group {
     let group = Group::new();
     let place = if limit.upright {
         x.place(limit.at)
@@ -426,6 +426,9 @@ fn draw_limit(limit: &Limit, x: &Fitted, y: &Fitted, frame: &Frame) -> Group {
 mod tests {
     use super::*;
 
+    /// Two points for each column of pixels, some twenty letters each, and the frame: not a million points.
+    const LARGEST_SVG: usize = 60_000;
+
     #[test]
     fn a_long_line_stays_small_and_keeps_its_extremes() {
         let mut chart = Chart::new("noise", Axis::linear("i", ""), Axis::linear("y", ""));
@@ -434,7 +437,7 @@ mod tests {
             (0..1_000_000).map(|i| (f64::from(i), f64::from(u8::from(i == 654_321)))),
         );
         let svg = Figure::from(chart).to_svg();
-        assert!(svg.len() < 60_000, "{}", svg.len());
+        assert!(svg.len() < LARGEST_SVG, "{}", svg.len());
         // The peak reaches the top of the frame.
         assert!(svg.contains(" 12L"), "the peak is lost");
     }

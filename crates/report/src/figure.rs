@@ -1,4 +1,4 @@
-//! A drawing with what a reader who cannot see it needs, and the strokes that drawings share.
+//! A drawing with a text description for screen readers, and the strokes that drawings share.
 
 use std::path::Path as FilePath;
 
@@ -38,7 +38,7 @@ impl Figure {
         }
     }
 
-    /// The same drawing with a caption, which stands behind its title.
+    /// The same drawing with a caption after its title.
     pub fn caption(mut self, caption: impl Into<String>) -> Self {
         self.caption = caption.into();
         self
@@ -65,7 +65,7 @@ impl Figure {
     }
 }
 
-/// Where a text stands against its point.
+/// Position of a text relative to its point.
 #[derive(Clone, Copy)]
 pub(super) enum Anchor {
     Start,

@@ -23,7 +23,7 @@ pub struct ImageGrid {
 }
 
 impl ImageGrid {
-    /// A grid of so many columns, filled row by row.
+    /// A grid with a given number of columns, filled row by row.
     pub fn new(title: impl Into<String>, columns: usize) -> Self {
         Self {
             title: title.into(),
@@ -62,7 +62,7 @@ impl ImageGrid {
         self
     }
 
-    /// A logarithmic scale of so many decades below the highest value of all images.
+    /// A logarithmic scale over a given number of decades below the highest value of all images.
     pub fn log(mut self, decades: f64) -> Self {
         self.decades = Some(decades);
         self

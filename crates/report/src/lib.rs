@@ -63,7 +63,7 @@ pub use json::write_json;
 pub use matrix::Matrix;
 pub use number::{count, exact, fixed, sig};
 pub use page::Page;
-pub use plan::{Layer, Plan};
+pub use plan::{Plan, PlanLayer};
 pub use ranking::Ranking;
 pub use table::{Cell, Column, Table, Verdict};
 pub use zoom::PillarZoom;

@@ -26,7 +26,7 @@ impl Matrix {
         }
     }
 
-    /// What columns and rows stand for.
+    /// Meaning of columns and rows.
     pub fn axes(mut self, across: impl Into<String>, down: impl Into<String>) -> Self {
         (self.across, self.down) = (across.into(), down.into());
         self

@@ -1,6 +1,6 @@
-//! How numbers are written for people: fixed rules, the same on every machine.
+//! Formatting of numbers for readers: fixed rules, the same on every machine.
 
-/// `x` to so many significant digits: `0.01234`, `12.3`, `57,700,000`, `1.2×10⁻⁷`.
+/// `x` to a given number of significant digits: `0.01234`, `12.3`, `57,700,000`, `1.2×10⁻⁷`.
 pub fn sig(x: f64, digits: usize) -> String {
     let digits = digits.max(1);
     if !x.is_finite() {
@@ -34,7 +34,7 @@ pub fn exact(x: f64) -> String {
     }
 }
 
-/// `x` with so many decimals, thousands grouped, a true minus sign and no minus zero.
+/// `x` to a given number of decimals, thousands grouped, a true minus sign and no minus zero.
 pub fn fixed(x: f64, decimals: usize) -> String {
     if !x.is_finite() {
         return not_finite(x);

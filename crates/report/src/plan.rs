@@ -10,14 +10,14 @@ use metalith_core::cross_corners;
 
 /// A layer of a [`Plan`], made by [`Plan::layer`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Layer(usize);
+pub struct PlanLayer(usize);
 
 /// Shapes of a layout to scale, y upwards, in um.
 #[derive(Clone, Debug)]
 pub struct Plan {
     title: String,
     layers: Vec<(String, Fill)>,
-    shapes: Vec<(usize, Shape)>,
+    shapes: Vec<(usize, PlanShape)>,
     labels: Vec<(f64, f64, String)>,
     reached: Vec<(f64, f64)>,
     width: f64,
@@ -31,7 +31,7 @@ enum Fill {
 }
 
 #[derive(Clone, Debug)]
-enum Shape {
+enum PlanShape {
     Circle([f64; 3]),
     Polygon(Vec<(f64, f64)>),
 }
@@ -49,46 +49,46 @@ impl Plan {
         }
     }
 
-    fn add_layer(&mut self, name: impl Into<String>, fill: Fill) -> Layer {
+    fn add_layer(&mut self, name: impl Into<String>, fill: Fill) -> PlanLayer {
         self.layers.push((name.into(), fill));
-        Layer(self.layers.len() - 1)
+        PlanLayer(self.layers.len() - 1)
     }
 
     /// A layer drawn as tinted areas.
-    pub fn layer(&mut self, name: impl Into<String>) -> Layer {
+    pub fn layer(&mut self, name: impl Into<String>) -> PlanLayer {
         self.add_layer(name, Fill::Area)
     }
 
-    /// A layer drawn as lines alone: outlines, fields, keep-outs.
-    pub fn outlines(&mut self, name: impl Into<String>) -> Layer {
+    /// A layer drawn as lines only: outlines, fields, keep-outs.
+    pub fn outlines(&mut self, name: impl Into<String>) -> PlanLayer {
         self.add_layer(name, Fill::Outline)
     }
 
     /// A layer drawn in full colour: marks and small things.
-    pub fn solid(&mut self, name: impl Into<String>) -> Layer {
+    pub fn solid(&mut self, name: impl Into<String>) -> PlanLayer {
         self.add_layer(name, Fill::Solid)
     }
 
     /// A disc: centre and radius (um).
-    pub fn circle(&mut self, layer: Layer, x_um: f64, y_um: f64, radius_um: f64) -> &mut Self {
-        self.shapes.push((layer.0, Shape::Circle([x_um, y_um, radius_um])));
+    pub fn circle(&mut self, layer: PlanLayer, x_um: f64, y_um: f64, radius_um: f64) -> &mut Self {
+        self.shapes.push((layer.0, PlanShape::Circle([x_um, y_um, radius_um])));
         self
     }
 
     /// A closed polygon of `(x, y)` (um).
-    pub fn polygon(&mut self, layer: Layer, points_um: impl IntoIterator<Item = (f64, f64)>) -> &mut Self {
+    pub fn polygon(&mut self, layer: PlanLayer, points_um: impl IntoIterator<Item = (f64, f64)>) -> &mut Self {
         self.shapes
-            .push((layer.0, Shape::Polygon(points_um.into_iter().collect())));
+            .push((layer.0, PlanShape::Polygon(points_um.into_iter().collect())));
         self
     }
 
     /// A rectangle between two corners (um).
-    pub fn rectangle(&mut self, layer: Layer, (x0, y0): (f64, f64), (x1, y1): (f64, f64)) -> &mut Self {
+    pub fn rectangle(&mut self, layer: PlanLayer, (x0, y0): (f64, f64), (x1, y1): (f64, f64)) -> &mut Self {
         self.polygon(layer, [(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
     }
 
     /// An upright cross: centre, length and width of its arms (um).
-    pub fn cross(&mut self, layer: Layer, (x, y): (f64, f64), length_um: f64, width_um: f64) -> &mut Self {
+    pub fn cross(&mut self, layer: PlanLayer, (x, y): (f64, f64), length_um: f64, width_um: f64) -> &mut Self {
         let corners = cross_corners(length_um / 2.0, width_um / 2.0);
         self.polygon(layer, corners.map(|(a, b)| (x + a, y + b)))
     }
@@ -126,11 +126,11 @@ impl Plan {
         };
         for (_, shape) in &self.shapes {
             match shape {
-                Shape::Circle([x, y, r]) => {
+                PlanShape::Circle([x, y, r]) => {
                     take(x - r, y - r);
                     take(x + r, y + r);
                 }
-                Shape::Polygon(points) => points.iter().for_each(|&(x, y)| take(x, y)),
+                PlanShape::Polygon(points) => points.iter().for_each(|&(x, y)| take(x, y)),
             }
         }
         self.reached.iter().for_each(|&(x, y)| take(x, y));
@@ -186,7 +186,7 @@ impl From<Plan> for Figure {
         for (layer, (_, fill)) in plan.layers.iter().enumerate() {
             for (_, shape) in plan.shapes.iter().filter(|s| s.0 == layer) {
                 drawing = match shape {
-                    Shape::Circle([cx, cy, r]) => {
+                    PlanShape::Circle([cx, cy, r]) => {
                         let Some((px, py)) = at(*cx, *cy) else { continue };
                         let circle = Circle::new()
                             .set("cx", short(px))
@@ -194,7 +194,7 @@ impl From<Plan> for Figure {
                             .set("r", short(r * scale));
                         drawing.add(circle.set("class", class(*fill, layer)))
                     }
-                    Shape::Polygon(points) => {
+                    PlanShape::Polygon(points) => {
                         let first = points.first().copied();
                         let closed = points.iter().copied().chain(first).map(|(a, b)| at(a, b));
                         drawing.add(strokes(closed, &class(*fill, layer)))

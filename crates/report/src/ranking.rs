@@ -1,4 +1,4 @@
-//! Horizontal bars: candidates in order, each with what speaks for it.
+//! Horizontal bars: candidates in order, each with its evidence.
 
 use svg::node::element::Group;
 
@@ -10,11 +10,11 @@ use super::figure::{Anchor, Figure, line, rectangle, text};
 pub struct Ranking {
     title: String,
     axis: Axis,
-    rows: Vec<Row>,
+    rows: Vec<RankedBar>,
 }
 
 #[derive(Clone, Debug)]
-struct Row {
+struct RankedBar {
     name: String,
     value: f64,
     interval: Option<(f64, f64)>,
@@ -41,7 +41,7 @@ impl Ranking {
         remark: impl Into<String>,
         chosen: bool,
     ) -> &mut Self {
-        self.rows.push(Row {
+        self.rows.push(RankedBar {
             name: name.into(),
             value,
             interval,
@@ -61,7 +61,8 @@ impl From<Ranking> for Figure {
     fn from(ranking: Ranking) -> Self {
         const WIDTH: f64 = 760.0;
         const STEP: f64 = 24.0;
-        let letters = |f: fn(&Row) -> &str| ranking.rows.iter().map(|r| f(r).chars().count()).max().unwrap_or(0) as f64;
+        let letters =
+            |f: fn(&RankedBar) -> &str| ranking.rows.iter().map(|r| f(r).chars().count()).max().unwrap_or(0) as f64;
         let left = (20.0 + 6.9 * letters(|r| &r.name)).min(260.0);
         let right = WIDTH - (20.0 + 6.5 * letters(|r| &r.remark)).min(300.0);
         let bottom = 10.0 + STEP * ranking.rows.len() as f64;

@@ -82,12 +82,12 @@ impl Column {
 pub struct Cell(String);
 
 impl Cell {
-    /// A number to so many significant digits.
+    /// A number to a given number of significant digits.
     pub fn sig(x: f64, digits: usize) -> Self {
         Self(sig(x, digits))
     }
 
-    /// A number with so many decimals.
+    /// A number with a given number of decimals.
     pub fn fixed(x: f64, decimals: usize) -> Self {
         Self(fixed(x, decimals))
     }

@@ -1,6 +1,7 @@
 //! A small clean chip that every rule of the standard deck accepts, and ways to break it.
 
 use crate::gds::Gds;
+use metalith_core::cross_corners;
 
 /// Sites an axis of the lens: 42 um, so that it holds one window of 31 um.
 pub const SITES: i32 = 120;
@@ -90,22 +91,8 @@ pub fn cross(gds: &mut Gds, x: i32, y: i32, length: i32, width: i32) {
 
 /// The same on any layer.
 pub fn cross_on(gds: &mut Gds, layer: i16, x: i32, y: i32, length: i32, width: i32) {
-    let (l, w) = (length / 2, width / 2);
-    let corners = [
-        (-w, -l),
-        (w, -l),
-        (w, -w),
-        (l, -w),
-        (l, w),
-        (w, w),
-        (w, l),
-        (-w, l),
-        (-w, w),
-        (-l, w),
-        (-l, -w),
-        (-w, -w),
-        (-w, -l),
-    ];
-    let points: Vec<_> = corners.iter().map(|&(dx, dy)| (x + dx, y + dy)).collect();
+    let corners = cross_corners(length / 2, width / 2);
+    let closed = corners.iter().chain(&corners[..1]);
+    let points: Vec<_> = closed.map(|&(dx, dy)| (x + dx, y + dy)).collect();
     gds.polygon(layer, &points);
 }

@@ -18,7 +18,7 @@ use serde::Serialize;
 
 use metalith_cell::Fidelity;
 use metalith_core::{Progress, Result, WidthMap};
-use metalith_design::array::{PillarArray, Placed, WidthRule};
+use metalith_design::array::{PillarArray, PlacedElement, WidthRule};
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, Element};
 use metalith_gds::extract::{ElementSite, ExtractedElement, Extraction, ExtractionPlan, Oddities, Survey, extract};
@@ -31,7 +31,7 @@ pub use case::{SimulationCase, SimulationCases};
 pub use check::{Check, Sense};
 pub use page::write_report;
 pub use phase::{PhaseError, PhaseErrors, PillarResponse};
-pub use psf_metrics::{Orders, PsfImages, PsfPair, PsfResult};
+pub use psf_metrics::{OrderEfficiencies, PsfImages, PsfPair, PsfResult};
 pub use single::{Lighting, SinglePsf, SinglePsfReport, single_psfs, write_single_psf_report};
 pub use widths::WidthCheck;
 
@@ -71,7 +71,7 @@ pub struct DistinctElement {
     /// Where the design phase is too steep for the lattice.
     pub steepness: Steepness,
     /// Where light goes by the mapping's own account, one entry a wavelength.
-    pub orders: Vec<Orders>,
+    pub orders: Vec<OrderEfficiencies>,
     /// One entry for each wavelength and field angle.
     pub spots: Vec<PsfPair>,
     /// The pillars that were read back, for pictures.
@@ -260,7 +260,7 @@ pub fn read_back(design: &Design, array: &PillarArray, path: &Path, progress: &d
 
 /// Where the elements of a design are.
 fn plan(design: &Design, array: &PillarArray) -> ExtractionPlan {
-    let site = |placed: &Placed| ElementSite {
+    let site = |placed: &PlacedElement| ElementSite {
         name: placed.element.label(),
         centre_nm: [placed.element.centre_nm.0, placed.element.centre_nm.1],
         lattice: array.lattice,
@@ -272,7 +272,7 @@ fn plan(design: &Design, array: &PillarArray) -> ExtractionPlan {
 fn compare(array: &PillarArray, extraction: &Extraction) -> Vec<ElementCheck> {
     let mut first_of_class = vec![None; array.classes.len()];
     let mut distinct = 0;
-    let mut check = |(placed, found): (&Placed, &ExtractedElement)| {
+    let mut check = |(placed, found): (&PlacedElement, &ExtractedElement)| {
         let widths = WidthCheck::compare(&array.widths(placed), &found.widths);
         let copy_of = if widths.faults() == 0 {
             let place = &mut first_of_class[placed.class];

@@ -5,7 +5,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::case::{SimulationCase, SimulationCases, TransmissionTables};
-use super::psf_metrics::{Orders, PsfImages, PsfPair, PsfResult};
+use super::psf_metrics::{OrderEfficiencies, PsfImages, PsfPair, PsfResult};
 use metalith_cell::Fidelity;
 use metalith_core::Progress;
 use metalith_core::{Error, Result};
@@ -154,7 +154,12 @@ impl<'a> ElementSimulator<'a> {
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
-    pub fn orders(&self, rule: &WidthRule, element: &ReadElement<'_>, progress: &dyn Progress) -> Result<Vec<Orders>> {
+    pub fn orders(
+        &self,
+        rule: &WidthRule,
+        element: &ReadElement<'_>,
+        progress: &dyn Progress,
+    ) -> Result<Vec<OrderEfficiencies>> {
         let mut all = Vec::new();
         for colour in &self.colours {
             for (at, case) in colour.cases.iter().zip(&self.cases) {
@@ -167,7 +172,13 @@ impl<'a> ElementSimulator<'a> {
                     }
                     (None, SimulationCase::Cell(_)) => unreachable!("every cell has its tables"),
                 };
-                all.push(Orders::of(rule, colour.wavelength_um, at.fidelity, at.full, table));
+                all.push(OrderEfficiencies::of(
+                    rule,
+                    colour.wavelength_um,
+                    at.fidelity,
+                    at.full,
+                    table,
+                ));
             }
         }
         Ok(all)
@@ -315,7 +326,7 @@ fn by_drawn_width(
     wavelength_um: f64,
     progress: &dyn Progress,
 ) -> Result<Vec<Complex64>> {
-    let widths = Orders::drawn_nm(rule);
+    let widths = OrderEfficiencies::drawn_nm(rule);
     let steps = drawn.mean_density_steps(&chip.perturbation().geometry);
     let t = chip.drawn_widths(&widths, steps, wavelength_um, progress)?;
     let mut table = vec![Complex64::ZERO; usize::from(widths.last().copied().unwrap_or(0)) + 1];

@@ -117,7 +117,7 @@ impl PsfPair {
 
 /// Where light goes by the mapping's own account, at one wavelength, by one cell.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Orders {
+pub struct OrderEfficiencies {
     pub wavelength_um: f64,
     pub fidelity: Fidelity,
     /// Share of the arriving light in the first order, which makes the image.
@@ -130,7 +130,7 @@ pub struct Orders {
     pub transmitted: f64,
 }
 
-impl Orders {
+impl OrderEfficiencies {
     /// The widths that a mapping draws (nm), rising.
     pub(super) fn drawn_nm(rule: &WidthRule) -> Vec<u16> {
         let all: std::collections::BTreeSet<u16> = (0..ORDER_SAMPLES).map(|i| rule.width_nm(order_phase(i))).collect();

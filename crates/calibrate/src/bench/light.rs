@@ -1,30 +1,30 @@
-//! Light from the lamps through the pillars to the windows of the camera.
+//! Light from the LEDs through the pillars to the windows of the camera.
 
 use std::sync::Arc;
 
 use num_complex::Complex32;
 use rayon::prelude::*;
 
-use super::{Bench, Group};
+use super::{Bench, FocusSeries};
 use crate::cells::PillarTable;
-use crate::optics::{Passed, Scratch};
 use crate::set::{ElementIndex, PerCapture};
 use metalith_core::{Error, Lattice, Progress, Result};
 use metalith_made::{ArrivingLight, ClassTable, GeometryChange, LightChange, MadeElement, PathChange, spread};
+use metalith_wave::propagation::{DistancesScratch, FillRow};
 use metalith_wave::{Aperture, PlaneWave};
 
-/// A chip as it may be, and the lamps that it is seen by.
+/// A candidate chip, and the light that it is illuminated with.
 pub struct Lit<'a> {
     pub cells: Arc<PillarTable>,
     pub geometry: &'a GeometryChange,
     pub lights: Vec<&'a LightChange>,
-    /// Seed of the places of missing pillars; without one, they count with their mean.
+    /// Seed of the random positions of missing pillars; without one, their mean effect is used.
     pub scatter: Option<u64>,
 }
 
 impl Bench<'_> {
-    /// Intensity around the window of each capture, for each chip and each of its lamps:
-    /// by chip, light and capture, each a square of samples. Chips on one path share the work of carrying light along it.
+    /// Intensity around the window of each capture, `[chip][light][capture]`, each a square of samples. Chips with the
+    /// same light path share the cost of propagation.
     ///
     /// # Errors
     /// If the user stopped it.
@@ -69,7 +69,7 @@ impl Bench<'_> {
         Ok(out)
     }
 
-    /// An element of a chip as it is made.
+    /// An element of a candidate chip.
     pub(super) fn element(&self, element: ElementIndex, chip: &Lit<'_>) -> Result<MadeElement> {
         let made = MadeElement::new(&self.drawn[element], chip.geometry)?;
         Ok(match chip.scatter {
@@ -78,10 +78,10 @@ impl Bench<'_> {
         })
     }
 
-    /// `[chip][light][distance][sample]` of one group.
+    /// `[chip][light][distance][sample]` of one focus series.
     fn group(
         &self,
-        group: &Group,
+        group: &FocusSeries,
         chips: &[Lit<'_>],
         elements: &[MadeElement],
         path: &PathChange,
@@ -105,7 +105,7 @@ impl Bench<'_> {
             .iter()
             .map(|chip| vec![vec![vec![0.0f32; samples]; distances.len()]; chip.lights.len()])
             .collect();
-        let mut scratch = Scratch::default();
+        let mut scratch = DistancesScratch::default();
         let mut planes = vec![vec![Vec::new(); distances.len()]; chips.len()];
         for (k, nm) in quadrature.wavelengths_nm.iter().enumerate() {
             let um = nm * 1e-3;
@@ -116,7 +116,7 @@ impl Bench<'_> {
                 .zip(elements)
                 .map(|(chip, element)| table(chip, element, self.first[group.led] + k))
                 .collect();
-            let fills: Vec<Box<Passed<'_>>> = tables
+            let fills: Vec<Box<FillRow<'_>>> = tables
                 .iter()
                 .zip(elements)
                 .map(|(table, element)| {
@@ -128,10 +128,10 @@ impl Bench<'_> {
                             *to *= x * wy[iy];
                         }
                     };
-                    Box::new(fill) as Box<Passed<'_>>
+                    Box::new(fill) as Box<FillRow<'_>>
                 })
                 .collect();
-            let fills: Vec<&Passed<'_>> = fills.iter().map(|f| &**f).collect();
+            let fills: Vec<&FillRow<'_>> = fills.iter().map(|f| &**f).collect();
             group
                 .plan
                 .intensities(um, &distances, &fills, &mut scratch, &mut planes);
@@ -154,8 +154,8 @@ impl Bench<'_> {
     }
 }
 
-/// The wave that arrives at the element of a group.
-pub(super) fn light(group: &Group, path: &PathChange, wavelength_um: f64) -> ArrivingLight {
+/// The incident wave at the element of a focus series.
+pub(super) fn light(group: &FocusSeries, path: &PathChange, wavelength_um: f64) -> ArrivingLight {
     let [sin_x, sin_y] = group.aoi_rad.map(f64::sin);
     let stated = PlaneWave {
         wavelength_um,
@@ -165,12 +165,12 @@ pub(super) fn light(group: &Group, path: &PathChange, wavelength_um: f64) -> Arr
     ArrivingLight::new(&stated, path)
 }
 
-/// What the sites of an element transmit at one of the wavelengths.
+/// Transmission of the sites of an element at one of the wavelengths.
 fn table(chip: &Lit<'_>, element: &MadeElement, wavelength: usize) -> ClassTable {
     element.table(|width| chip.cells.at(wavelength, width), chip.cells.bare[wavelength])
 }
 
-/// Intensity in the middle of a group's window for a unit of |t|^2 that one site scatters on its own.
-fn scattered_to(group: &Group, lattice: Lattice, distance_um: f64, wavelength_um: f64) -> f64 {
+/// Intensity at the centre of the window of a focus series for a unit of |t|^2 that one site scatters incoherently.
+fn scattered_to(group: &FocusSeries, lattice: Lattice, distance_um: f64, wavelength_um: f64) -> f64 {
     spread(lattice.pitch_um(), group.centre_um, distance_um, wavelength_um)
 }

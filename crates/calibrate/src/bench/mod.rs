@@ -1,4 +1,4 @@
-//! The bench in the computer: from pillars to what each capture should show, under any perturbation.
+//! The simulated bench: from pillars to the expected pixels of each capture, under any perturbation.
 
 mod light;
 mod view;
@@ -7,20 +7,21 @@ use rayon::prelude::*;
 
 pub use light::Lit;
 
-use super::optics::{Optic, PixelGrid, Planes, Planned, Quadrature};
+use super::optics::{Optic, PixelGrid, Quadrature};
 use super::set::{CaptureIndex, ElementIndex, LedIndex, MeasuredSet, PerCapture, PerElement, PerLed, RelayCamera};
 use metalith_made::{DrawnElement, GeometryChange, Perturbation, veiled};
+use metalith_wave::propagation::{Distances, DistancesPlan};
 
-/// How finely a bench is sampled.
+/// Sampling of the simulated bench.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
-    /// Wavelengths are at most this share of a spectrum's full width apart.
+    /// Largest step in wavelength, as a share of the full width of the spectrum.
     pub spectrum: f64,
-    /// And at most so far (nm).
+    /// Largest step in wavelength (nm).
     pub step_nm: f64,
-    /// Distance of the samples of the intensity (um).
+    /// Sample spacing of the intensity (um).
     pub step_um: f64,
-    /// Samples around each window that placement, blur and borders may use up.
+    /// Samples around each window, for registration, blur and borders.
     pub margin: usize,
 }
 
@@ -35,32 +36,32 @@ impl Default for Sampling {
     }
 }
 
-/// A set, planned.
+/// A measured set with everything that its simulation can compute in advance.
 pub struct Bench<'a> {
     set: &'a MeasuredSet,
     quadratures: PerLed<Quadrature>,
-    /// Where the wavelengths of each LED begin among all.
+    /// Index of the first wavelength of each LED in the list of all wavelengths.
     first: PerLed<usize>,
-    groups: Vec<Group>,
+    groups: Vec<FocusSeries>,
     /// The elements as drawn.
     drawn: PerElement<DrawnElement<'a>>,
-    /// Windows follow what tilted light does to the place of an image: placement is a nuisance, and an image
-    /// that moves is no polynomial of the tilt.
+    /// Windows move with the image when the incident light is tilted: registration is a nuisance parameter, and
+    /// the intensity in a fixed window is not a polynomial of the tilt.
     pub follows: bool,
 }
 
-/// Captures that differ in their distance alone.
-struct Group {
+/// Captures that differ only in their distance.
+struct FocusSeries {
     element: ElementIndex,
     led: LedIndex,
     aoi_rad: [f64; 2],
     centre_um: [f64; 2],
     captures: Vec<CaptureIndex>,
-    plan: Planned,
+    plan: DistancesPlan,
 }
 
 impl<'a> Bench<'a> {
-    /// Plan a set.
+    /// Plan the simulation of a set.
     pub fn new(set: &'a MeasuredSet, sampling: Sampling) -> Self {
         let (low, high) = set.stack.film.range_um();
         let quadratures: PerLed<_> = set
@@ -79,7 +80,7 @@ impl<'a> Bench<'a> {
                 Some(first)
             })
             .collect();
-        let mut groups: Vec<Group> = Vec::new();
+        let mut groups: Vec<FocusSeries> = Vec::new();
         for (i, c) in set.captures.iter_enumerated() {
             let same = groups.iter_mut().find(|g| {
                 (g.element, g.led, g.aoi_rad, g.centre_um) == (c.element, c.led, c.aoi_rad, c.window_centre_um)
@@ -89,20 +90,20 @@ impl<'a> Bench<'a> {
                 continue;
             }
             let longest = set.camera.rows.max(set.camera.cols) as f64;
-            let planes = Planes {
+            let planes = Distances {
                 lattice: set.elements[c.element].pillars.lattice,
                 radius_um: 0.5 * set.elements[c.element].aperture_diameter_um,
                 centre_um: c.window_centre_um,
                 half_width_um: 0.5 * longest * set.camera.pixel_um,
                 step_um: sampling.step_um,
             };
-            groups.push(Group {
+            groups.push(FocusSeries {
                 element: c.element,
                 led: c.led,
                 aoi_rad: c.aoi_rad,
                 centre_um: c.window_centre_um,
                 captures: vec![i],
-                plan: Planned::new(planes, sampling.margin),
+                plan: DistancesPlan::new(planes, sampling.margin),
             });
         }
         Self {
@@ -119,12 +120,12 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// The set that it stands for.
+    /// The measured set that is simulated.
     pub fn set(&self) -> &'a MeasuredSet {
         self.set
     }
 
-    /// All wavelengths that cells are needed at (nm).
+    /// All wavelengths at which cells are needed (nm).
     pub fn wavelengths_nm(&self) -> Vec<f64> {
         self.quadratures
             .iter()
@@ -132,7 +133,7 @@ impl<'a> Bench<'a> {
             .collect()
     }
 
-    /// Least and greatest width of the layout (nm).
+    /// Smallest and largest width of the layout (nm).
     pub fn widths_nm(&self) -> (f64, f64) {
         let all = self
             .set
@@ -147,10 +148,10 @@ impl<'a> Bench<'a> {
         self.drawn[element].bias_nm(site, geometry)
     }
 
-    /// What the pixels of each capture see, before placement, flux and black level.
+    /// Pixel values of each capture, before registration, flux and black level are applied.
     pub fn grids(&self, intensities: &PerCapture<Vec<f32>>, perturbation: &Perturbation) -> Vec<PixelGrid> {
         let camera = &self.set.camera;
-        let work: Vec<(&Group, CaptureIndex)> = {
+        let work: Vec<(&FocusSeries, CaptureIndex)> = {
             let mut work: Vec<_> = self
                 .groups
                 .iter()
@@ -189,14 +190,14 @@ impl<'a> Bench<'a> {
     }
 
     /// Images of the two radii of the source disc on the sensor (um).
-    fn disc_um(&self, group: &Group, z: f64, perturbation: &Perturbation) -> [[f64; 2]; 2] {
+    fn disc_um(&self, group: &FocusSeries, z: f64, perturbation: &Perturbation) -> [[f64; 2]; 2] {
         let radius = 0.5 * self.set.divergence_rad * (1.0 + perturbation.light.source_size);
         let [x, y] = self.landing_um(group, z);
         [x.map(|v| v * radius), y.map(|v| v * radius)]
     }
 
-    /// How far light lands from where it did for a turn of what arrives by one radian about each axis (um).
-    fn landing_um(&self, group: &Group, z: f64) -> [[f64; 2]; 2] {
+    /// Shift of the image for a tilt of the incident light by one radian about each axis (um).
+    fn landing_um(&self, group: &FocusSeries, z: f64) -> [[f64; 2]; 2] {
         let [cx, cy] = group.centre_um;
         let r = (cx * cx + cy * cy + z * z).sqrt();
         let (sx, sy, sz) = (cx / r, cy / r, z / r);
@@ -209,8 +210,8 @@ impl<'a> Bench<'a> {
         ]
     }
 
-    /// How far tilted light carries the image off its window, where windows follow it (um).
-    fn off_um(&self, group: &Group, z: f64, perturbation: &Perturbation) -> [f64; 2] {
+    /// Shift of the image by tilted light that the windows follow (um); zero if they do not.
+    fn off_um(&self, group: &FocusSeries, z: f64, perturbation: &Perturbation) -> [f64; 2] {
         if !self.follows {
             return [0.0; 2];
         }
@@ -220,7 +221,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Mean intensity over the pixels of a window that stands in the middle of `n` x `n` samples.
+/// Mean intensity over each pixel of a window that is centred in `n` x `n` samples.
 fn window_mean(intensity: &[f32], n: usize, samples_per_pixel: f64, camera: &RelayCamera) -> f64 {
     let range = |pixels: usize| {
         let wide = ((pixels as f64 * samples_per_pixel).round() as usize).clamp(1, n);

@@ -1,13 +1,13 @@
-//! The forward model of a set, opened between the pillars and the pixels.
+//! The forward model of a set, with access to the field between the pillars and the pixels.
 
 use super::light::light;
-use super::{Bench, Group};
+use super::{Bench, FocusSeries};
 use crate::set::CaptureIndex;
 use metalith_core::Result;
 use metalith_made::{ArrivingLight, DrawnElement, MadeElement, MadeView, Perturbation, SolvedWidths};
 
 impl Bench<'_> {
-    /// The element of a capture as a perturbation makes it.
+    /// The element of a capture with a perturbation applied.
     ///
     /// # Errors
     /// As [`MadeElement::new`].
@@ -16,7 +16,7 @@ impl Bench<'_> {
         MadeElement::new(drawn, &perturbation.geometry)
     }
 
-    /// That element in the light of the capture, at one wavelength (um). `solved` is what its widths transmit.
+    /// That element under the light of the capture, at one wavelength (um). `solved`: transmission of its widths.
     pub fn view<'a>(
         &self,
         capture: CaptureIndex,
@@ -35,7 +35,7 @@ impl Bench<'_> {
         }
     }
 
-    /// The wave that arrives at the element of a capture, at one wavelength (um).
+    /// The incident wave at the element of a capture, at one wavelength (um).
     pub fn direction_of(
         &self,
         capture: CaptureIndex,
@@ -45,7 +45,7 @@ impl Bench<'_> {
         light(self.group_of(capture), &perturbation.path, wavelength_um)
     }
 
-    fn group_of(&self, capture: CaptureIndex) -> &Group {
+    fn group_of(&self, capture: CaptureIndex) -> &FocusSeries {
         let group = self.groups.iter().find(|g| g.captures.contains(&capture));
         group.expect("every capture is in a group")
     }
@@ -65,11 +65,11 @@ mod tests {
     use metalith_wave::{Accuracy, Scratch, Window};
     use num_complex::Complex64;
 
-    /// Share of the peak by which pixels may differ: what the propagator for many distances errs by, see its own
-    /// test, and the border of a window that it fades.
+    /// Share of the peak by which pixels may differ: the error of the propagator for many distances (see its own
+    /// test), and the faded border of its window.
     const OF_THE_PEAK: f64 = 2e-3;
 
-    /// Effects that the published cell cannot show, since it knows no stack.
+    /// Effects that the published cell cannot show, since it has no layer stack.
     const OF_THE_STACK: [&str; 5] = [
         "film_height",
         "film_index",
@@ -83,7 +83,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         metalith_testing::session::small_set(folder.path());
         let mut set = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
-        // One wavelength and a point source: what is left is chip, path and camera.
+        // One wavelength and a point source: only chip, path and camera remain.
         set.leds.iter_mut().for_each(|led| led.fwhm_nm = 1e-6);
         set.divergence_rad = 0.0;
         let sampling = Sampling {
@@ -128,7 +128,7 @@ mod tests {
                 };
                 let view = simulator.bench.view(c, &element, &perturbation, um, &solved);
                 let mut view = view;
-                // The veil is over the light of the camera's window: taken from the pixels below.
+                // Stray light is a share of the light in the camera's window: computed from the pixels below.
                 let stray = std::mem::take(&mut view.camera.stray_light);
                 let psf = view
                     .psf(window, Accuracy::Accurate, &[], &mut Scratch::default())
@@ -149,7 +149,7 @@ mod tests {
         }
     }
 
-    /// The table of widths in whole nanometres at any width, as the tables of this crate are read.
+    /// The transmission at any width, interpolated in a table of whole nanometres as the tables of this crate are.
     fn between(table: &[Complex64], width_nm: f64) -> Complex64 {
         let i = width_nm.floor();
         let weights = metalith_made::lagrange(width_nm - i);

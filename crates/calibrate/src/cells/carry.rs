@@ -1,18 +1,18 @@
-//! What a change of the pillar does, solved with few orders, corrected to what many would give.
+//! The effect of a change of the pillar, solved with few orders and corrected towards the result of many.
 //!
-//! A changed pillar is like some upright one of the stated film: wider where its walls lean out, narrower where
-//! its corners are round, a turn of phase apart where it is higher. What truncation errs by, as a factor, is
-//! nearly the same in both. Beside narrow resonances nothing is alike; those few widths are to be solved in full.
+//! A changed pillar behaves like an upright pillar of the stated film with another width: wider if its walls are
+//! tapered outwards, narrower if its corners are round, shifted in phase if it is higher. The truncation error, as a
+//! factor, is nearly the same in both. Close to narrow resonances this fails; those few widths are solved in full.
 
 use num_complex::Complex64;
 
-/// Steps of the table within which the stated pillar is sought that a changed one is most like.
+/// Range, in steps of the table, of the search for the stated pillar that is closest to a changed one.
 const MOST_ALIKE: isize = 14;
 
-/// Where the ratio of two pillars bends by so much within a step of the table, there is a resonance.
+/// A second difference of the ratio of two pillars above this, over one step of the table, indicates a resonance.
 const BENT: f64 = 0.06;
 
-/// Few orders put a resonance within so many steps of where it is.
+/// With few orders, a resonance is found at most this many steps from its true width.
 const BESIDE: usize = 1;
 
 /// Transmissions over width at one wavelength.
@@ -32,7 +32,7 @@ pub fn carried_over(fine: &[Complex64], coarse: &[Complex64], changed: &[Complex
     let by_orders: Vec<Complex64> = (0..=last).map(|k| fine[like(k)] / coarse[like(k)]).collect();
     let bends = |ratio: &[Complex64], k: usize| {
         let beside = (ratio[k.saturating_sub(1)] + ratio[(k + 1).min(last)]) * 0.5;
-        // Where light all but vanishes, a ratio is no number.
+        // Where the transmission is close to zero, the ratio is undefined.
         let bend = (ratio[k] - beside).norm();
         !bend.is_finite() || bend > BENT
     };
@@ -49,7 +49,7 @@ pub fn carried_over(fine: &[Complex64], coarse: &[Complex64], changed: &[Complex
     }
 }
 
-/// Steps to the stated pillar that a changed one is most like, but for one phase.
+/// Steps to the stated pillar that is closest to a changed one, up to a common phase.
 fn most_alike(stated: &[Complex64], changed: &[Complex64]) -> isize {
     let last = stated.len() - 1;
     let unlike = |shift: isize| -> f64 {
@@ -57,7 +57,7 @@ fn most_alike(stated: &[Complex64], changed: &[Complex64]) -> isize {
         let pairs = pairs.map(|(k, t)| (t, stated[k.saturating_add_signed(shift).min(last)]));
         let sum: Complex64 = pairs.clone().map(|(t, s)| t * s.conj()).sum();
         let turn = Complex64::cis(sum.arg());
-        // Moduli, not their squares: resonances shall not decide.
+        // Moduli, not their squares: less weight on resonances.
         pairs.map(|(t, s)| (t - turn * s).norm()).sum()
     };
     let shifts = -MOST_ALIKE..=MOST_ALIKE;

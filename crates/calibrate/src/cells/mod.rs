@@ -1,7 +1,7 @@
-//! Transmission of pillars of any width, as etched, at the wavelengths of a set.
+//! Transmission of etched pillars of any width at the wavelengths of a set.
 //!
 //! The stated cell is solved with many orders. A change of the pillar (height, index, walls, corners, mask) is
-//! solved with fewer, and corrected by what they err by on the stated pillar that it is most like.
+//! solved with fewer, and corrected by their error on the stated pillar that is closest to the changed one.
 
 mod carry;
 mod table;
@@ -26,27 +26,27 @@ use metalith_rcwa::{Incidence, Orders, Outline, Side, solve};
 /// Orders along an axis for the stated cell: errs by about 0.005 rad.
 const FINE: usize = 13;
 
-/// Orders along an axis for what a change of the pillar makes of it.
+/// Orders along an axis for a changed pillar.
 const COARSE: usize = 9;
 
-/// The same for leaning walls, which take six layers; they are very like upright ones.
+/// The same for tapered walls, which take six layers and are close to upright ones.
 const LEANING: usize = 7;
 
-/// And for pillars that are wider one way, which twins alone are made of.
+/// And for pillars with unequal sides, which only synthetic sets contain.
 const ANISOTROPIC: usize = 9;
 
-/// Widths are tabulated this far apart (nm); resonances are a few nanometres wide.
+/// Step of the tabulated widths (nm); resonances are a few nanometres wide.
 const STEP_NM: f64 = 2.0;
 
-/// Where tables come from.
+/// Source of the tables.
 pub enum CellSource {
     /// The rigorous cell and its changes.
     Rigorous(Box<RigorousCells>),
-    /// A model of fewer virtues; it knows no changes of the pillar.
+    /// A model of lower fidelity, which cannot represent changes of the pillar.
     Model(Box<dyn CellModel + Send>),
 }
 
-/// Tables of the rigorous cell at the wavelengths of a set, made when first asked for.
+/// Tables of the rigorous cell at the wavelengths of a set, computed on first use.
 pub struct RigorousCells {
     stack: CellStack,
     wavelengths_nm: Vec<f64>,
@@ -59,7 +59,7 @@ pub struct RigorousCells {
 }
 
 impl RigorousCells {
-    /// Tables of `stack` for widths within a range. They are kept in `folder` for the next run, if there is one.
+    /// Tables of `stack` for widths within a range. They are cached in `folder`, if one is given.
     pub fn new(stack: CellStack, wavelengths_nm: Vec<f64>, widths_nm: (f64, f64), folder: Option<PathBuf>) -> Self {
         Self {
             stack,
@@ -73,17 +73,17 @@ impl RigorousCells {
         }
     }
 
-    /// The same with other orders, for upright pillars in full: for twins that must not share what fits are
-    /// short of. Leaning walls take six layers, and fewer orders.
+    /// The same with other orders, and no correction for upright pillars: for synthetic sets, which must not share the
+    /// truncation error of the fits. Tapered walls take six layers, and fewer orders.
     pub fn with_orders(mut self, fine: usize, leaning: usize) -> Self {
         (self.fine, self.coarse, self.leaning) = (fine, fine, leaning);
         self
     }
 
-    /// The table of the cell with a change.
+    /// The table of the changed cell.
     ///
     /// # Errors
-    /// If a pillar cannot be (a foot wider than the pitch), or the user stopped it.
+    /// If a pillar is impossible (a foot wider than the pitch), or the user stopped it.
     pub fn table(&self, change: &CellChange, progress: &dyn Progress) -> Result<Arc<PillarTable>> {
         let stated = CellChange::default();
         let (alike, coarse) = if change.taper_deg == 0.0 {
@@ -103,7 +103,7 @@ impl RigorousCells {
         })
     }
 
-    /// What a change makes of `alike`, solved with fewer orders.
+    /// The changed pillars, solved with fewer orders and corrected by `alike`.
     fn carried(
         &self,
         change: &CellChange,
@@ -178,7 +178,7 @@ impl RigorousCells {
         self.kept(change, orders as f64, || self.solve(change, orders, progress))
     }
 
-    /// A table as it was made before, or made now; `how` tells ways of making it apart.
+    /// A table from the cache, or computed now; `how` identifies the method in the key of the cache.
     fn kept(
         &self,
         change: &CellChange,
@@ -271,13 +271,13 @@ impl RigorousCells {
 
     /// Transmission of entry `k` at wavelength `l`.
     fn solve_one(&self, stack: &CellStack, l: usize, k: usize, orders: Orders) -> Result<Complex64> {
-        // Where leaning walls would meet, the widest pillar that has room stands in.
+        // Where tapered walls would meet, the widest possible pillar is used instead.
         off_cutoff(possible_width_nm(stack, self.width_nm(k)), |width| {
             stack.transmission(width, self.wavelengths_nm[l] * 1e-3, orders)
         })
     }
 
-    /// Names a table by everything that decides it.
+    /// The name of a table in the cache, from all of its inputs.
     fn digest(&self, key: &[u64; 6]) -> String {
         let mut hash = Sha256::new();
         hash.update(env!("CARGO_PKG_VERSION"));
@@ -290,7 +290,7 @@ impl RigorousCells {
         for bits in numbers.map(f64::to_bits).chain(key.iter().copied()) {
             hash.update(bits.to_le_bytes());
         }
-        // Materials serialise by content; indices are sampled as well, so that a table of the same name differs.
+        // Materials serialise by content; sampled indices make the name depend on tables of the index too.
         for nm in &self.wavelengths_nm {
             let index = self.stack.film.index(nm * 1e-3).unwrap_or_default();
             hash.update(index.re.to_le_bytes());
@@ -301,7 +301,7 @@ impl RigorousCells {
 }
 
 impl CellSource {
-    /// The table at `wavelengths_nm` of the cell with a change.
+    /// The table of the changed cell at `wavelengths_nm`.
     ///
     /// # Errors
     /// As [`RigorousCells::table`]; for a model, if it does not cover a wavelength.
@@ -341,8 +341,8 @@ mod tests {
     use metalith_cell::Material;
     use metalith_core::Silent;
 
-    /// Root mean square of t over widths and three colours, resonances among them: what the orders of the
-    /// stated cell err by themselves.
+    /// Root mean square error of t over widths and three wavelengths, with resonances: the truncation error of the
+    /// stated cell itself.
     const TOLERANCE: f64 = 0.005;
 
     #[test]

@@ -4,7 +4,7 @@ use metalith_cell::kept;
 use metalith_made::lagrange;
 use num_complex::Complex64;
 
-/// Of the kept file.
+/// Version of the cached file.
 const MAGIC: [u8; 8] = *b"MLETCH\0\x01";
 
 /// Transmission over wavelength and width.
@@ -14,13 +14,13 @@ pub struct PillarTable {
     pub step_nm: f64,
     /// For each wavelength, the transmissions of all widths.
     pub t: Vec<Vec<Complex64>>,
-    /// For each wavelength, that of a site without pillar.
+    /// For each wavelength, the transmission of a site without a pillar.
     pub bare: Vec<Complex64>,
 }
 
 impl PillarTable {
-    /// Transmission of a pillar of any width (nm) at one of the wavelengths, by cubics through the table; beyond
-    /// its ends, that of the end.
+    /// Transmission of a pillar of any width (nm) at one of the wavelengths, by cubic interpolation; beyond the ends
+    /// of the table, the value at the end.
     pub fn at(&self, wavelength: usize, width_nm: f64) -> Complex64 {
         let row = &self.t[wavelength];
         let x = ((width_nm - self.first_nm) / self.step_nm).clamp(0.0, (row.len() - 1) as f64);
@@ -29,7 +29,7 @@ impl PillarTable {
         row[i - 1..i + 3].iter().zip(weights).map(|(t, w)| t * w).sum()
     }
 
-    /// As it is kept on disk: with what it was made for, the number of the solver, and a checksum.
+    /// The bytes of the cached file: the inputs, the version of the solver, and a checksum.
     pub fn bytes(&self) -> Vec<u8> {
         let count = self.t.first().map_or(0, Vec::len);
         let inputs = inputs(self.t.len(), count, self.first_nm, self.step_nm);
@@ -42,7 +42,7 @@ impl PillarTable {
         kept::seal(MAGIC, &inputs, &content)
     }
 
-    /// From what was kept: so many widths from the first on, at so many wavelengths; nothing if it is not that.
+    /// From the cached bytes, if they hold this number of widths and wavelengths; else `None`.
     pub fn from_bytes(bytes: &[u8], wavelengths: usize, count: usize, first_nm: f64, step_nm: f64) -> Option<Self> {
         let content = kept::open(bytes, MAGIC, &inputs(wavelengths, count, first_nm, step_nm)).ok()?;
         if content.len() != wavelengths * (count + 1) * 16 {
@@ -70,7 +70,7 @@ impl PillarTable {
     }
 }
 
-/// What a kept table was made for; the cell itself is in the name of its file.
+/// Inputs of a cached table; the cell itself is in the name of its file.
 fn inputs(wavelengths: usize, count: usize, first_nm: f64, step_nm: f64) -> Vec<u8> {
     let mut bytes = kept::SOLVER.to_le_bytes().to_vec();
     for number in [wavelengths as u64, count as u64, first_nm.to_bits(), step_nm.to_bits()] {

@@ -1,4 +1,4 @@
-//! The aperture is not where the pillars are: overlay of the second exposure.
+//! Overlay error: the aperture is shifted against the pillars by the second exposure.
 
 use super::{Effect, Parameter, Stage};
 use metalith_made::Perturbation;
@@ -25,7 +25,7 @@ impl Effect for ApertureOffset {
     }
 
     fn kinked(&self) -> bool {
-        // Which pillars the rim covers: others on either side.
+        // The derivative jumps at zero: the rim covers other pillars on either side.
         true
     }
 

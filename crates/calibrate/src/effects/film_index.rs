@@ -1,4 +1,4 @@
-//! The film has another index than ellipsometry found: another place on the wafer, or densified since.
+//! The refractive index of the film differs from the ellipsometry: another position on the wafer, or densified since.
 
 use super::{Effect, Parameter, Stage};
 use metalith_made::Perturbation;

@@ -1,11 +1,11 @@
-//! The spectrum of one LED is centred elsewhere than stated: temperature, current, or the batch.
+//! The centre wavelength of one LED differs from the stated one: temperature, current, or batch.
 
 use super::{Effect, Parameter, Stage};
 use metalith_made::Perturbation;
 
 /// Added to the centre of one LED.
 pub struct LedCentre {
-    /// Its place in the set.
+    /// Index of the LED in the set.
     pub led: usize,
     /// `led_centre_` and its stated centre.
     pub name: String,

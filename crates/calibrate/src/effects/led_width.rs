@@ -4,7 +4,7 @@ use super::{Effect, Parameter, Stage};
 use crate::set::MeasuredSet;
 use metalith_made::Perturbation;
 
-/// Width of all spectra over what is stated; less one is fitted.
+/// Ratio of the width of all spectra to the stated one; the ratio less one is fitted.
 pub struct LedWidth;
 
 impl Effect for LedWidth {

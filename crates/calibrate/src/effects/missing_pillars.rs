@@ -1,9 +1,9 @@
-//! Pillars fell or never stood, at random places.
+//! Pillars are missing at random positions.
 
 use super::{Effect, Parameter, Stage};
 use metalith_made::Perturbation;
 
-/// Share of the pillars that are not there.
+/// Share of the pillars that are missing.
 pub struct MissingPillars;
 
 impl Effect for MissingPillars {

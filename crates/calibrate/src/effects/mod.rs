@@ -1,4 +1,4 @@
-//! What chips and benches are known to do to light, one file each.
+//! Known errors of chips and benches, one file each.
 //!
 //! An effect has a name, a unit, a range that physics allows, and sets one or two numbers of a
 //! [`Perturbation`]. Adding one touches its file and [`all`].
@@ -30,22 +30,22 @@ use metalith_made::Perturbation;
 pub enum Stage {
     /// Where pillars and apertures are, and how wide.
     Geometry,
-    /// What a pillar is: its cell has to be solved again.
+    /// The pillar itself: its cell has to be solved again.
     Stack,
-    /// The way of the light.
+    /// The light path.
     Diffraction,
-    /// The lamps.
+    /// The LEDs.
     Source,
     /// The camera.
     Camera,
 }
 
-/// A number that an effect sets. It is chosen so that the image answers to it about linearly.
+/// A parameter of an effect, chosen so that the image depends on it almost linearly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
-    /// What physics allows.
+    /// Physical limits.
     pub range: (f64, f64),
-    /// A size that is not unusual.
+    /// A typical magnitude.
     pub typical: f64,
 }
 
@@ -63,7 +63,7 @@ impl Parameter {
     }
 }
 
-/// Something that a chip or a bench may do.
+/// An error that a chip or a bench may have.
 pub trait Effect: Send + Sync {
     /// The name it is reported by.
     fn name(&self) -> String;
@@ -74,29 +74,29 @@ pub trait Effect: Send + Sync {
     /// Where it acts.
     fn stage(&self) -> Stage;
 
-    /// The numbers that it sets; zero for each is no effect.
+    /// Its parameters; zero for each is no effect.
     fn parameters(&self) -> Vec<Parameter>;
 
-    /// Whether its derivative jumps at zero, so that one side says nothing about the other.
+    /// Whether its derivative jumps at zero, so that the derivative for one sign does not hold for the other.
     fn kinked(&self) -> bool {
         false
     }
 
-    /// Whether it acts on single pillars at random, so that no number of its own determines what a capture shows.
+    /// Whether it acts on single pillars at random, so that its parameters do not determine the capture.
     fn random(&self) -> bool {
         false
     }
 
-    /// Set its numbers.
+    /// Set its parameters.
     fn apply(&self, parameters: &[f64], to: &mut Perturbation);
 
-    /// The value that is reported for one of its numbers.
+    /// The value that is reported for one of its parameters.
     fn value(&self, parameter: f64, _set: &MeasuredSet) -> f64 {
         parameter
     }
 
-    /// What is reported, with the ends of its interval: one value for each number, unless several numbers make
-    /// one value. `half_widths` are those of the numbers.
+    /// The reported values with their confidence intervals: one value for each parameter, unless several parameters
+    /// make one value. `half_widths` are those of the parameters.
     fn reported(&self, numbers: &[f64], half_widths: &[f64], set: &MeasuredSet) -> Vec<(f64, [f64; 2])> {
         let ranges = self.parameters();
         numbers
@@ -111,14 +111,13 @@ pub trait Effect: Send + Sync {
             .collect()
     }
 
-    /// Effects that are known to look alike on this kind of data, each with the measurement that tells them
-    /// apart.
+    /// Effects that this kind of data cannot distinguish from it, each with the measurement that can.
     fn confusions(&self) -> &'static [(&'static str, &'static str)] {
         &[]
     }
 }
 
-/// The measurement that would split two effects, as either of them knows it.
+/// The measurement that can distinguish two effects, as listed by either of them.
 pub fn separate_by(a: &dyn Effect, b: &str) -> Option<&'static str> {
     let root = |name: &str| {
         if name.starts_with("led_centre") {
@@ -133,7 +132,7 @@ pub fn separate_by(a: &dyn Effect, b: &str) -> Option<&'static str> {
         .map(|c| c.1)
 }
 
-/// Every effect that is tried on a set.
+/// All effects that are tried on a set.
 pub fn all(set: &MeasuredSet) -> Vec<Box<dyn Effect>> {
     let mut effects: Vec<Box<dyn Effect>> = vec![
         Box::new(cd_bias::CdBias),

@@ -3,7 +3,7 @@
 use super::{Effect, Parameter, Stage};
 use metalith_made::Perturbation;
 
-/// Thickness of what is left.
+/// Thickness of the residual alumina.
 pub struct ResidualMask;
 
 impl Effect for ResidualMask {

@@ -1,9 +1,9 @@
-//! Walls lean: the top keeps its width, the foot is wider or narrower.
+//! Sidewall taper: the top keeps its width, the foot is wider or narrower.
 
 use super::{Effect, Parameter, Stage};
 use metalith_made::Perturbation;
 
-/// Lean from upright; positive is wider at the foot.
+/// Angle of the wall from the vertical; positive if the foot is wider.
 pub struct SidewallTaper;
 
 impl Effect for SidewallTaper {

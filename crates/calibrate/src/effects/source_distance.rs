@@ -1,10 +1,10 @@
-//! The source is not at infinity: light arrives as a sphere.
+//! The source is not at infinity: the incident wave is spherical.
 
 use super::{Effect, Parameter, Stage};
 use crate::set::MeasuredSet;
 use metalith_made::Perturbation;
 
-/// One over its distance is fitted (1/m), the distance itself is reported.
+/// The reciprocal distance is fitted (1/m); the distance itself is reported.
 pub struct SourceDistance;
 
 impl Effect for SourceDistance {

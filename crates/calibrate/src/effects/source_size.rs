@@ -4,7 +4,7 @@ use super::{Effect, Parameter, Stage};
 use crate::set::MeasuredSet;
 use metalith_made::Perturbation;
 
-/// Diameter over what is stated; less one is fitted.
+/// Ratio of the diameter to the stated one; the ratio less one is fitted.
 pub struct SourceSize;
 
 impl Effect for SourceSize {

@@ -1,4 +1,4 @@
-//! A share of the light is spread evenly: scatter in the relay.
+//! A share of the light is spread uniformly: scatter in the relay.
 
 use super::{Effect, Parameter, Stage};
 use metalith_made::Perturbation;

@@ -1,4 +1,4 @@
-//! Light arrives at another angle than stated, the same for every capture.
+//! The angle of incidence differs from the stated one, by the same angle for every capture.
 
 use super::{Effect, Parameter, Stage};
 use metalith_made::Perturbation;

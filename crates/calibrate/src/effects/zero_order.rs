@@ -1,10 +1,10 @@
-//! Light passes the aperture without seeing pillars.
+//! Light passes the aperture without interacting with pillars.
 
 use super::{Effect, Parameter, Stage};
 use crate::set::MeasuredSet;
 use metalith_made::Perturbation;
 
-/// Amplitude of that light over what arrives.
+/// Amplitude of that light relative to the incident wave.
 pub struct ZeroOrder;
 
 impl Effect for ZeroOrder {
@@ -21,7 +21,7 @@ impl Effect for ZeroOrder {
     }
 
     fn parameters(&self) -> Vec<Parameter> {
-        // In phase with what arrives, and a quarter ahead of it: by which way that light comes is not known.
+        // In phase with the incident wave and in quadrature: the path of that light is not known.
         vec![Parameter::new(-0.6, 0.6, 0.05); 2]
     }
 

@@ -3,7 +3,4 @@
 mod spectrum;
 
 pub use metalith_wave::camera::{Optic, PixelGrid, Reading};
-pub use metalith_wave::propagation::{
-    Distances as Planes, DistancesPlan as Planned, DistancesScratch as Scratch, FillRow as Passed,
-};
 pub use spectrum::Quadrature;

@@ -1,4 +1,4 @@
-//! Wavelengths and weights that stand for the spectrum of an LED.
+//! Quadrature over the spectrum of an LED.
 
 use crate::set::Led;
 
@@ -11,7 +11,7 @@ pub struct Quadrature {
     led: Led,
 }
 
-/// Reach on both sides in standard deviations; leaves room for an LED that is shifted or wider than stated.
+/// Half range in standard deviations, with margin for an LED that is shifted or wider than stated.
 const REACH_SIGMAS: f64 = 3.6;
 
 impl Quadrature {
@@ -27,7 +27,7 @@ impl Quadrature {
         Self { wavelengths_nm, led }
     }
 
-    /// Weights, adding up to one, of an LED whose centre is off by `shift_nm` and whose width by a factor.
+    /// Weights, with a sum of one, of an LED whose centre is shifted by `shift_nm` and whose width is scaled.
     pub fn weights(&self, shift_nm: f64, width: f64) -> Vec<f64> {
         let sigma = self.led.sigma_nm() * width;
         let raw: Vec<f64> = self

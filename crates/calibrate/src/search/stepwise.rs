@@ -96,7 +96,7 @@ impl Rejection {
 }
 
 /// The outcome of a step.
-pub struct Step {
+pub struct SelectionStep {
     pub tried: Vec<TriedEffect>,
     /// Effects that were fitted in full.
     pub leaders: Vec<usize>,
@@ -122,7 +122,7 @@ pub fn step_forward(
     chosen: &[usize],
     extend: bool,
     progress: &dyn Progress,
-) -> Result<Step> {
+) -> Result<SelectionStep> {
     let mut candidates = fitted_candidates(state, chosen);
     if extend {
         follow_leaders(state, &mut candidates, progress)?;
@@ -138,7 +138,7 @@ pub fn step_forward(
         let Candidate { tried, fitted } = candidates.swap_remove(place);
         fitted.map(|(fit, held)| (tried, fit, held))
     });
-    Ok(Step {
+    Ok(SelectionStep {
         tried,
         leaders,
         taken,

@@ -42,6 +42,8 @@ fn between_its_samples_the_table_is_the_solver() {
     let spec = spec();
     let table = CellTable::compute(&spec, &Silent).unwrap();
     let orders = Orders::new(spec.orders).unwrap();
+    // Two ways through the same samples: rounding of a cubic of numbers of size one.
+    const ROUNDING: f64 = 1e-12;
     let mut errors = Vec::new();
     for width in [195_u16, 200, 204] {
         for i in 0..160 {
@@ -49,7 +51,7 @@ fn between_its_samples_the_table_is_the_solver() {
             let want = spec.stack.transmission(f64::from(width), wavelength, orders).unwrap();
             let got = table.transmission(f64::from(width), wavelength).unwrap();
             let all = table.transmissions(wavelength, 205).unwrap();
-            assert!((got - all[usize::from(width)]).norm() < 1e-12);
+            assert!((got - all[usize::from(width)]).norm() < ROUNDING);
             errors.push((got - want).norm());
         }
     }
@@ -63,7 +65,9 @@ fn between_its_samples_the_table_is_the_solver() {
         table.transmission(102.0, 0.55).unwrap(),
         spec.stack.transmission(102.0, 0.55, orders).unwrap(),
     );
-    assert!((coarse.0 - coarse.1).norm() < 0.01, "{coarse:?}");
+    // The tolerance of a table for a whole design; that of this test is for wavelengths alone.
+    const BETWEEN_WIDTHS: f64 = 0.01;
+    assert!((coarse.0 - coarse.1).norm() < BETWEEN_WIDTHS, "{coarse:?}");
     assert!(table.transmission(351.0, 0.55).is_err() && table.transmissions(0.5, 200).is_err());
 }
 

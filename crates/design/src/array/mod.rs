@@ -3,7 +3,7 @@
 mod symmetry;
 mod widths;
 
-pub use symmetry::{DomainPart, Group, Symmetry};
+pub use symmetry::{DomainPart, Symmetry, SymmetryGroup};
 pub use widths::WidthRule;
 
 use crate::phase::{ElementPhase, LensPhase};
@@ -18,12 +18,12 @@ pub struct Class {
     /// Pillars of the first element of the class.
     pub widths: WidthMap,
     /// The symmetries of those pillars, each proven by comparing every site.
-    pub group: Group,
+    pub group: SymmetryGroup,
 }
 
 /// One element, as a copy of a class.
 #[derive(Clone, Copy, Debug)]
-pub struct Placed {
+pub struct PlacedElement {
     pub element: Element,
     /// Index into [`PillarArray::classes`].
     pub class: usize,
@@ -36,7 +36,7 @@ pub struct Placed {
 pub struct PillarArray {
     pub lattice: Lattice,
     pub classes: Vec<Class>,
-    pub placed: Vec<Placed>,
+    pub placed: Vec<PlacedElement>,
     /// Whether widths were moved on purpose, for what a process makes of them, from those that the mapping gives.
     pub compensated: bool,
 }
@@ -76,7 +76,7 @@ impl PillarArray {
     }
 
     /// The pillars of one element.
-    pub fn widths(&self, placed: &Placed) -> WidthMap {
+    pub fn widths(&self, placed: &PlacedElement) -> WidthMap {
         placed.symmetry.apply(&self.classes[placed.class].widths)
     }
 
@@ -86,11 +86,11 @@ impl PillarArray {
             Some((class, symmetry))
         });
         let (class, symmetry) = copy.unwrap_or_else(|| {
-            let group = Group::of(&widths);
+            let group = SymmetryGroup::of(&widths);
             self.classes.push(Class { widths, group });
             (self.classes.len() - 1, Symmetry::IDENTITY)
         });
-        self.placed.push(Placed {
+        self.placed.push(PlacedElement {
             element,
             class,
             symmetry,

@@ -77,7 +77,7 @@ impl Symmetry {
 
 /// The symmetries that leave a lens as it is.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Group {
+pub struct SymmetryGroup {
     members: Vec<Symmetry>,
 }
 
@@ -95,7 +95,7 @@ pub struct DomainPart {
 /// Bit `k` is set if member `k` of the group leaves a site where it is.
 type Stabiliser = u8;
 
-impl Group {
+impl SymmetryGroup {
     /// The group of a lens: each symmetry is tried on every site.
     pub fn of(widths: &WidthMap) -> Self {
         Self {
@@ -191,7 +191,7 @@ mod tests {
     }
 
     /// The domain's copies give every pillar of the lens once.
-    fn unfold(map: &WidthMap, group: &Group) {
+    fn unfold(map: &WidthMap, group: &SymmetryGroup) {
         let n = map.lattice.sites();
         let mut seen = WidthMap::empty(map.lattice);
         for part in group.domain(map) {
@@ -212,7 +212,7 @@ mod tests {
     #[test]
     fn a_round_lens_folds_to_an_octant() {
         let map = lens(|x, y| (100 + x * x + y * y) as u16);
-        let group = Group::of(&map);
+        let group = SymmetryGroup::of(&map);
         assert_eq!(group.members().len(), 8);
         let counts = group
             .domain(&map)
@@ -231,7 +231,7 @@ mod tests {
             lens(|x, y| (500 + x * x + y * y + 2 * (x + y)) as u16),
             lens(|x, y| (500 + x * x + y * y - 2 * y) as u16),
         ] {
-            let group = Group::of(&map);
+            let group = SymmetryGroup::of(&map);
             assert_eq!(group.members().len(), 2);
             unfold(&map, &group);
         }
@@ -241,8 +241,8 @@ mod tests {
     fn one_pillar_that_differs_breaks_the_symmetry() {
         let mut map = lens(|x, y| (100 + x * x + y * y) as u16);
         map.width_nm[[3, 4]] += 2;
-        let group = Group::of(&map);
-        assert_eq!(group, Group::trivial());
+        let group = SymmetryGroup::of(&map);
+        assert_eq!(group, SymmetryGroup::trivial());
         unfold(&map, &group);
     }
 

@@ -21,14 +21,14 @@ pub enum Hierarchy {
 
 /// A GDSII layer, and what it is for.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Layer {
+pub struct LayoutLayer {
     pub layer: i16,
     pub datatype: i16,
     /// For people: shown in the viewer and in the hand-off.
     pub purpose: String,
 }
 
-impl Layer {
+impl LayoutLayer {
     /// Its number as readers of layouts know it.
     pub fn number(&self) -> LayerNumber {
         // Both are 0 to 255, checked when the design was read.
@@ -40,17 +40,17 @@ impl Layer {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Layers {
     /// Pillars: exposed in the first step.
-    pub pillars: Layer,
+    pub pillars: LayoutLayer,
     /// Openings of the metal: exposed in the second step.
-    pub apertures: Layer,
+    pub apertures: LayoutLayer,
     /// Marks written with the pillars.
-    pub pillar_marks: Layer,
+    pub pillar_marks: LayoutLayer,
     /// Marks written with the apertures.
-    pub aperture_marks: Layer,
+    pub aperture_marks: LayoutLayer,
     /// Outline of the chip; not exposed.
-    pub outline: Layer,
+    pub outline: LayoutLayer,
     /// Text for people; not exposed.
-    pub label: Layer,
+    pub label: LayoutLayer,
 }
 
 /// Circular openings in the metal, one round each lens.
@@ -142,7 +142,7 @@ impl LayoutSpec {
 
 impl Layers {
     /// All layers with their key in the design file, in the order of both steps.
-    pub fn all(&self) -> [(&'static str, &Layer); 6] {
+    pub fn all(&self) -> [(&'static str, &LayoutLayer); 6] {
         [
             ("pillars", &self.pillars),
             ("pillar_marks", &self.pillar_marks),
@@ -156,7 +156,7 @@ impl Layers {
     fn read(s: &Section<'_, '_>) -> Self {
         let one = |key: &str| {
             let layer = s.section(key);
-            let read = Layer {
+            let read = LayoutLayer {
                 layer: layer.integer("layer", 0..=255, "") as i16,
                 datatype: layer.integer("datatype", 0..=255, "") as i16,
                 purpose: layer.text("purpose"),
@@ -174,7 +174,7 @@ impl Layers {
         };
         let all = layers.all();
         for (k, (key, layer)) in all.iter().enumerate() {
-            let number = |l: &Layer| (l.layer, l.datatype);
+            let number = |l: &LayoutLayer| (l.layer, l.datatype);
             if let Some((other, _)) = all[..k].iter().find(|(_, l)| number(l) == number(layer))
                 && s.has(key)
                 && s.has(other)

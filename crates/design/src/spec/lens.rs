@@ -55,24 +55,24 @@ impl LensSpec {
 
 fn read_phase(s: &Section<'_, '_>, focal_length_um: f64, radius_um: f64) -> RadialPhase {
     #[derive(Clone, Copy)]
-    enum Source {
+    enum PhaseSource {
         Hyperbola,
         EvenPowers,
         Table,
     }
     let sources = [
-        ("hyperbola", Source::Hyperbola),
-        ("even_powers", Source::EvenPowers),
-        ("table", Source::Table),
+        ("hyperbola", PhaseSource::Hyperbola),
+        ("even_powers", PhaseSource::EvenPowers),
+        ("table", PhaseSource::Table),
     ];
     let phase = match s.choice("source", &sources, None) {
-        Source::Hyperbola => RadialPhase::Hyperbola {
+        PhaseSource::Hyperbola => RadialPhase::Hyperbola {
             wavelength_um: s.float("wavelength_nm", WAVELENGTH) * 1e-3,
             focal_length_um: s
                 .optional_float("focal_length_um", Limits::new(1.0..=100_000.0, "um"))
                 .unwrap_or(focal_length_um),
         },
-        Source::EvenPowers => {
+        PhaseSource::EvenPowers => {
             let coefficients_rad = s.floats("coefficients_rad", COEFFICIENT);
             if coefficients_rad.is_empty() {
                 s.fault(
@@ -88,7 +88,7 @@ fn read_phase(s: &Section<'_, '_>, focal_length_um: f64, radius_um: f64) -> Radi
                     .unwrap_or(radius_um),
             }
         }
-        Source::Table => RadialPhase::table(
+        PhaseSource::Table => RadialPhase::table(
             s.file("file"),
             s.choice(
                 "interpolation",

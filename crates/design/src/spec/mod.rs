@@ -10,7 +10,7 @@ mod verify;
 
 pub use array::{ArraySpec, Element};
 pub use cell::CellSpec;
-pub use layout::{ApertureSpec, ChipSpec, Hierarchy, Layer, Layers, LayoutSpec, MarkSpec};
+pub use layout::{ApertureSpec, ChipSpec, Hierarchy, Layers, LayoutLayer, LayoutSpec, MarkSpec};
 pub use lens::LensSpec;
 pub use mapping::MappingSpec;
 pub use optimise::{MeritSpec, OptimiseSpec, RobustSpec, SolverSpec, StartSpec, ViewSpec};

@@ -2,7 +2,7 @@
 
 use super::DiffPlan;
 use super::area::{MOST_SIDES, Sides};
-use super::content::{Content, Outlines, PlacedText, Ring};
+use super::content::{Content, Outlines, Ring, TextCopy};
 use super::report::{Change, ChangeMap, ElementDiff, LayerDiff, LayoutDiff, TextAt, TreeDiff};
 use metalith_core::text::printable_bytes;
 use metalith_gds::extract::ExtractedElement;
@@ -41,9 +41,9 @@ pub(super) fn compare(a: Content, b: Content, strings: &[Box<[u8]>], unit_nm: f6
         .collect();
     let (texts_a, texts_b) = apart(&a.texts, &b.texts);
     let texts_apart = [texts_a.len() as u64, texts_b.len() as u64];
-    let texts = |list: Vec<&PlacedText>| -> Vec<TextAt> {
+    let texts = |list: Vec<&TextCopy>| -> Vec<TextAt> {
         let at = |p: Point| [p.x as f64 * unit_nm, p.y as f64 * unit_nm];
-        let text = |t: &PlacedText| TextAt {
+        let text = |t: &TextCopy| TextAt {
             layer: t.layer,
             string: shortened(&strings[t.string as usize]),
             at_nm: at(t.at),
@@ -246,7 +246,7 @@ fn corners(r: &[i32; 4]) -> [Point; 4] {
     [(x0, y0), (x1, y0), (x1, y1), (x0, y1)].map(|(x, y)| Point::new(x, y))
 }
 
-/// What only one of two sorted lists has, equal items counted.
+/// Difference of two sorted lists as multisets.
 fn apart<'a, T: Ord>(a: &'a [T], b: &'a [T]) -> (Vec<&'a T>, Vec<&'a T>) {
     let (mut only_a, mut only_b) = (Vec::new(), Vec::new());
     let (mut i, mut j) = (0, 0);

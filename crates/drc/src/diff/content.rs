@@ -1,4 +1,4 @@
-//! What a layout holds, in an order that does not depend on how it is nested.
+//! Content of a layout, in an order that does not depend on its hierarchy.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -7,7 +7,7 @@ use metalith_core::Progress;
 use metalith_core::{Error, Result};
 use metalith_gds::extract::{ElementSite, ExtractedElement, Filler, Scale, Why};
 use metalith_gds::{
-    Cell, LayerNumber, Layout, Point, Rect, Selection, Shape, Text, Transform, Visitor, rectangle_of, simplified,
+    LayerNumber, Layout, LayoutCell, Point, Rect, Selection, Shape, Text, Transform, Visitor, rectangle_of, simplified,
 };
 
 /// Vertices that may be placed for each that may be held: most corners of rectangles are not.
@@ -30,12 +30,12 @@ pub(super) struct Content {
     pub outlines: BTreeMap<LayerNumber, Outlines>,
     pub counts: BTreeMap<LayerNumber, u64>,
     /// Sorted.
-    pub texts: Vec<PlacedText>,
+    pub texts: Vec<TextCopy>,
 }
 
 /// One copy of a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct PlacedText {
+pub(super) struct TextCopy {
     pub layer: LayerNumber,
     /// Its string, by its number in [`Strings`].
     pub string: u32,
@@ -43,7 +43,7 @@ pub(super) struct PlacedText {
     pub at: Point,
 }
 
-/// The strings of both layouts, each once however often it stands in them.
+/// The strings of both layouts, each stored once.
 #[derive(Default)]
 pub(super) struct Strings(HashMap<Box<[u8]>, u32>);
 
@@ -129,7 +129,7 @@ struct ContentReader<'s> {
     moved: u64,
     pillar_shapes: u64,
     counts: BTreeMap<LayerNumber, u64>,
-    texts: Vec<PlacedText>,
+    texts: Vec<TextCopy>,
 }
 
 impl ContentReader<'_> {
@@ -222,7 +222,7 @@ pub(super) fn area2(ring: &[Point]) -> i128 {
 }
 
 impl Visitor for ContentReader<'_> {
-    fn cell(&mut self, _cell: &Cell, placements: &[Transform]) -> Result<()> {
+    fn cell(&mut self, _cell: &LayoutCell, placements: &[Transform]) -> Result<()> {
         self.filler.begin(placements.len());
         Ok(())
     }
@@ -256,7 +256,7 @@ impl Visitor for ContentReader<'_> {
         for placement in placements {
             let at = placement.apply(text.at);
             let at = Point::new(at.x.saturating_mul(self.factor), at.y.saturating_mul(self.factor));
-            self.texts.push(PlacedText {
+            self.texts.push(TextCopy {
                 layer: text.layer,
                 string,
                 at,

@@ -1,4 +1,4 @@
-//! Two layouts -> what is different, whatever their cells are called and however they are nested.
+//! Two layouts -> their differences, independent of cell names and hierarchy.
 //!
 //! Pillars on the lattice of an element are compared site by site as width maps; everything else, on every
 //! layer, as sorted lists of outlines, and where those differ in how they are cut up, by the area they
@@ -23,7 +23,7 @@ use metalith_core::{Error, Progress, Result};
 use metalith_gds::extract::{Scale, discover};
 use metalith_gds::{LayerNumber, Layout, Selection};
 
-/// What to compare by.
+/// Options of a comparison.
 #[derive(Clone, Copy, Debug)]
 pub struct DiffPlan {
     /// Layer that the pillars are on.

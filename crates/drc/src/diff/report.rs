@@ -1,4 +1,4 @@
-//! What is different.
+//! The report of a comparison.
 
 use std::fmt::Write;
 
@@ -15,9 +15,9 @@ pub struct ElementDiff {
     pub sites: usize,
     pub pitch_nm: u32,
     pub pillars: [u64; 2],
-    /// Sites with a pillar in the second layout alone.
+    /// Sites with a pillar only in the second layout.
     pub added: u64,
-    /// Sites with a pillar in the first layout alone.
+    /// Sites with a pillar only in the first layout.
     pub removed: u64,
     pub widened: u64,
     pub narrowed: u64,
@@ -101,7 +101,7 @@ pub struct ChangeMap {
     pub counts: Vec<u64>,
 }
 
-/// What is different between two layouts.
+/// Differences of two layouts.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LayoutDiff {
     pub a: String,
@@ -124,7 +124,7 @@ pub struct LayoutDiff {
     pub map: ChangeMap,
 }
 
-/// For people.
+/// Plain text.
 pub fn text(diff: &LayoutDiff) -> String {
     const SHOWN: usize = 10;
     let mut out = String::new();

@@ -3,7 +3,9 @@
 use std::collections::{BTreeMap, HashMap};
 
 use super::sites::Scale;
-use crate::{Cell, Error, ExtractionError, LayerNumber, Layout, Rect, Result, Selection, Shape, Transform, Visitor};
+use crate::{
+    Error, ExtractionError, LayerNumber, Layout, LayoutCell, Rect, Result, Selection, Shape, Transform, Visitor,
+};
 use metalith_core::ElementSite;
 use metalith_core::{Lattice, Progress};
 
@@ -247,7 +249,7 @@ fn most_common(counts: BTreeMap<i64, u64>) -> Option<i64> {
 }
 
 impl Visitor for Map {
-    fn cell(&mut self, _cell: &Cell, placements: &[Transform]) -> metalith_core::Result<()> {
+    fn cell(&mut self, _cell: &LayoutCell, placements: &[Transform]) -> metalith_core::Result<()> {
         self.guesses.clear();
         self.guesses.resize(placements.len(), 0);
         Ok(())

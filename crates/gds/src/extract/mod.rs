@@ -20,7 +20,7 @@ use std::path::Path;
 use crate::{Error, ExtractionError, Layout, Result};
 pub use metalith_core::ElementSite;
 use metalith_core::{LayerNumber, PillarReader, Progress, WidthMap};
-use pillars::Pillars;
+use pillars::PillarCollector;
 
 pub use discover::discover;
 pub use pillars::Filler;
@@ -80,7 +80,7 @@ pub fn extract(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) 
         Elements::Discover => discover(layout, &plan.selection(), &[plan.pillar_layer], scale, progress)?,
     };
     fits(layout.path(), &sites)?;
-    let mut pillars = Pillars::new(plan, sites, scale);
+    let mut pillars = PillarCollector::new(plan, sites, scale);
     layout.visit(&selection, &mut pillars, progress)?;
     Ok(pillars.finish(layout.cells()[roots[0]].name.clone()))
 }

@@ -4,7 +4,7 @@ use super::oddity::{Oddities, Oddity, Why};
 use super::plan::{ExtractedElement, Extraction, ExtractionPlan};
 use super::sites::{Scale, Sites, Standing};
 use super::survey::Surveyor;
-use crate::{Cell, LayerNumber, Point, Rect, Shape, Text, Transform, Visitor, rectangle_of, simplified};
+use crate::{LayerNumber, LayoutCell, Point, Rect, Shape, Text, Transform, Visitor, rectangle_of, simplified};
 use metalith_core::ElementSite;
 use metalith_core::WidthMap;
 
@@ -100,7 +100,7 @@ impl Filler {
 }
 
 /// Fills width maps from the shapes of a layout, and lists what is no pillar.
-pub(super) struct Pillars {
+pub(super) struct PillarCollector {
     layer: LayerNumber,
     listed: usize,
     scale: Scale,
@@ -109,7 +109,7 @@ pub(super) struct Pillars {
     surveyor: Surveyor,
 }
 
-impl Pillars {
+impl PillarCollector {
     pub fn new(plan: &ExtractionPlan, sites: Vec<ElementSite>, scale: Scale) -> Self {
         Self {
             layer: plan.pillar_layer,
@@ -165,8 +165,8 @@ impl Pillars {
     }
 }
 
-impl Visitor for Pillars {
-    fn cell(&mut self, _cell: &Cell, placements: &[Transform]) -> metalith_core::Result<()> {
+impl Visitor for PillarCollector {
+    fn cell(&mut self, _cell: &LayoutCell, placements: &[Transform]) -> metalith_core::Result<()> {
         self.surveyor.begin(placements);
         self.filler.begin(placements.len());
         Ok(())

@@ -14,7 +14,7 @@ use metalith_report::{Cell, Column, Page, Table, Verdict, count, sig};
 /// Rows of long tables that the page shows; all are in the CSV files.
 const SHOWN: usize = 40;
 
-/// Write `index.html` and the pictures that stand alone.
+/// Write `index.html` and the separate picture files.
 ///
 /// # Errors
 /// If a file cannot be written.

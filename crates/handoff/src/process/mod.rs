@@ -23,11 +23,11 @@ pub(super) const DOSES: usize = 9;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Process {
     pub name: String,
-    /// One line for people.
+    /// One line of description.
     pub title: String,
     pub writer: Writer,
     pub resist: Resist,
-    pub transfer: Transfer,
+    pub transfer: PatternTransfer,
     pub proximity: Proximity,
     pub apertures: ApertureStep,
     pub dose_matrix: DoseMatrixSpec,
@@ -99,9 +99,9 @@ pub enum Method {
     DirectEtch,
 }
 
-/// What becomes of what was exposed.
+/// Pattern transfer from the resist into the film.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Transfer {
+pub struct PatternTransfer {
     pub method: Method,
     pub mask: String,
     pub mask_thickness_nm: f64,
@@ -110,7 +110,7 @@ pub struct Transfer {
     pub films: Vec<String>,
 }
 
-/// Backscatter of electrons: range (um) and ratio to the direct dose, with limits on what is not known.
+/// Backscatter of electrons: range (um) and ratio to the direct dose, with their uncertainty.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Proximity {
     pub range_um: f64,
@@ -166,7 +166,7 @@ pub struct TestSpec {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MetrologySpec {
     pub sites_per_width: i64,
-    /// One standard deviation of the width that this process holds (nm).
+    /// Standard deviation of the width in this process (nm).
     pub width_tolerance_nm: f64,
 }
 
@@ -185,7 +185,7 @@ pub struct CheckSpec {
     pub test_opening_rules: PathBuf,
 }
 
-/// What the draft of the job says and staff must confirm.
+/// Values of the draft job that the staff must confirm.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct JobSpec {
     pub substrate_inch: f64,
@@ -246,7 +246,7 @@ impl Process {
         }
     }
 
-    /// What stays on the chip where the first step exposes, in words.
+    /// Description of what remains on the chip where the first step exposes.
     pub fn exposed_becomes(&self) -> &'static str {
         match (self.resist.tone, self.transfer.method) {
             (Tone::Positive, Method::LiftOff) | (Tone::Negative, Method::DirectEtch) => {
@@ -256,7 +256,7 @@ impl Process {
         }
     }
 
-    /// Whether pillars are what the first step exposes; else the tone of the layout is the wrong one.
+    /// Whether the first step exposes the pillars; if not, the tone of the layout is wrong.
     pub fn exposes_pillars(&self) -> bool {
         self.exposed_becomes().ends_with("pillar")
     }

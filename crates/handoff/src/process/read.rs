@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use super::{
-    ApertureStep, CheckSpec, DOSES, DoseMatrixSpec, JobSpec, Method, MetrologySpec, Process, Proximity, Resist,
-    TestSpec, Tone, Transfer, Writer,
+    ApertureStep, CheckSpec, DOSES, DoseMatrixSpec, JobSpec, Method, MetrologySpec, PatternTransfer, Process,
+    Proximity, Resist, TestSpec, Tone, Writer,
 };
 use metalith_core::Result;
 use metalith_core::document::{Document, Limits, Section};
@@ -124,9 +124,9 @@ fn resist(s: &Section<'_, '_>) -> Resist {
     }
 }
 
-fn transfer(s: &Section<'_, '_>) -> Transfer {
+fn transfer(s: &Section<'_, '_>) -> PatternTransfer {
     let methods = [("lift_off", Method::LiftOff), ("direct_etch", Method::DirectEtch)];
-    Transfer {
+    PatternTransfer {
         method: s.choice("method", &methods, None),
         mask: s.text("mask"),
         mask_thickness_nm: within(s, "mask_thickness_nm", 0.0, 10_000.0, "nm"),

@@ -5,32 +5,32 @@ use std::path::Path;
 mod rows;
 mod verniers;
 
-use super::drawing::{Drawing, LayerNumber, RectNm, Sheet, nm, number};
+use super::drawing::{Drawing, LayerPair, RectNm, Sheet, nm, number};
 use super::process::Process;
 use metalith_core::Result;
 use metalith_design::Design;
 
-/// Room between structures (nm).
+/// Space between structures (nm).
 const APART: i64 = 40_000;
 /// Height of the numbers beside structures (nm).
 const NUMERAL: i64 = 15_000;
-/// Room between a pad and its number (nm).
+/// Space between a pad and its number (nm).
 const BESIDE: i64 = 8_000;
 /// How far from the middle of the reference lens its phase is level (nm): a window of density and its neighbours.
 const LEVEL_REACH: i64 = 50_000;
 
-/// A structure and what to do with it.
+/// A test structure and its use.
 #[derive(Clone, Debug, serde::Serialize)]
 pub(super) struct Structure {
     pub id: String,
-    /// What it is and what is measured on it.
+    /// Description, and what is measured on it.
     pub purpose: String,
     /// On the chip of the test structures, whose lower left corner is the origin (nm).
     #[serde(rename = "bounds_nm")]
     pub bounds: RectNm,
     /// Width drawn, where one is to be measured (nm).
     pub width_nm: Option<i64>,
-    /// Checks that it breaks because it is what it is, each with the reason.
+    /// Rules that it breaks by intention, each with the reason.
     pub on_purpose: &'static [(&'static str, &'static str)],
 }
 
@@ -53,12 +53,12 @@ struct PillarCell {
 }
 
 struct StructureLayers {
-    pillars: LayerNumber,
-    marks: LayerNumber,
-    openings: LayerNumber,
-    step2: LayerNumber,
-    outline: LayerNumber,
-    label: LayerNumber,
+    pillars: LayerPair,
+    marks: LayerPair,
+    openings: LayerPair,
+    step2: LayerPair,
+    outline: LayerPair,
+    label: LayerPair,
 }
 
 impl Structures {
@@ -125,7 +125,7 @@ impl Structures {
         });
     }
 
-    /// What the structure recorded last breaks on purpose.
+    /// Rules that the structure recorded last breaks by intention.
     fn breaks(&mut self, on_purpose: &'static [(&'static str, &'static str)]) {
         if let Some(last) = self.list.last_mut() {
             last.on_purpose = on_purpose;

@@ -22,7 +22,7 @@ pub(super) struct Geometry<'l> {
 }
 
 /// One site above the x axis, and with it its mirror image below.
-pub(super) struct Site {
+pub(super) struct SitePair {
     pub ring: u32,
     /// Direction in cells.
     pub q: (f64, f64),
@@ -57,7 +57,7 @@ impl<'l> Geometry<'l> {
         extent
     }
 
-    fn site(&self, x: f64, y: f64, ring: u32, with_value: bool) -> Site {
+    fn site(&self, x: f64, y: f64, ring: u32, with_value: bool) -> SitePair {
         let (z, x0) = (self.lens.gap_um, self.landing_um);
         let dx = x0 - x;
         let r2 = dx * dx + y * y + z * z;
@@ -66,7 +66,7 @@ impl<'l> Geometry<'l> {
         // The field is even in y: of a site and its mirror image, one stands for both.
         let q = (q_x * self.side_um, y / r / self.wavelength_um * self.side_um);
         if !with_value {
-            return Site {
+            return SitePair {
                 ring,
                 q,
                 value: Complex64::ZERO,
@@ -79,10 +79,10 @@ impl<'l> Geometry<'l> {
         let area = self.lens.rings.lattice().pitch_um().powi(2);
         let amplitude = self.scale * area * z / (TAU * r2);
         let value = amplitude * Complex64::new(1.0 / r, -k) * Complex64::cis(TAU * (turns - turns.round()));
-        Site { ring, q, value }
+        SitePair { ring, q, value }
     }
 
-    pub(super) fn for_each(&self, with_value: bool, mut visit: impl FnMut(&Site)) {
+    pub(super) fn for_each(&self, with_value: bool, mut visit: impl FnMut(&SitePair)) {
         let lattice = self.lens.rings.lattice();
         let half = lattice.sites() / 2;
         for iy in half..lattice.sites() {

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use metalith_wave::kernels::raised_cosine;
 
-use super::geometry::Site;
+use super::geometry::SitePair;
 
 /// Cells an axis that a site is spread over.
 pub(super) const SPREAD: usize = 4;
@@ -45,7 +45,13 @@ impl Spreading {
     }
 
     /// Visit every cell at y >= 0 that a site and its mirror image touch.
-    pub(super) fn spread(&self, site: &Site, first_x: i32, cells: (usize, usize), mut visit: impl FnMut(usize, f32)) {
+    pub(super) fn spread(
+        &self,
+        site: &SitePair,
+        first_x: i32,
+        cells: (usize, usize),
+        mut visit: impl FnMut(usize, f32),
+    ) {
         let (n_x, w_x) = self.weights(site.q.0);
         let (n_y, w_y) = self.weights(site.q.1);
         for (j, w_y) in w_y.iter().enumerate() {

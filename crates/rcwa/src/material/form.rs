@@ -4,7 +4,7 @@ use num_complex::Complex64;
 use serde::Serialize;
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(super) enum Form {
+pub(super) enum Dispersion {
     Constant {
         n: f64,
         k: f64,
@@ -25,7 +25,7 @@ pub(super) enum Form {
     },
 }
 
-impl Form {
+impl Dispersion {
     /// Wavelengths it is known for (um).
     pub fn range_um(&self) -> (f64, f64) {
         match self {

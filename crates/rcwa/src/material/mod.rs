@@ -13,14 +13,14 @@ use num_complex::Complex64;
 use serde::Serialize;
 
 use crate::{Error, Result, TableError};
-use form::Form;
+use form::Dispersion;
 use known::KNOWN;
 
 /// An optical material: complex index n + i k over the wavelength.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Material {
     name: String,
-    form: Form,
+    form: Dispersion,
     /// Added to n at every wavelength.
     offset: f64,
 }
@@ -78,7 +78,7 @@ impl Material {
             } else {
                 format!("n = {n} + {k} i")
             },
-            form: Form::Constant { n, k },
+            form: Dispersion::Constant { n, k },
             offset: 0.0,
         })
     }
@@ -112,7 +112,7 @@ impl Material {
             .map_or_else(String::new, |n| n.to_string_lossy().into());
         Ok(Self {
             name,
-            form: Form::Table { samples },
+            form: Dispersion::Table { samples },
             offset: 0.0,
         })
     }

@@ -4,10 +4,10 @@ use crate::TableError;
 use metalith_core::text::quoted;
 
 /// Line, counted from one, and what is wrong there.
-type Fault = (Option<usize>, TableError);
+type TableFault = (Option<usize>, TableError);
 
 /// Samples (L (um), n, k) of the text of a table, wavelengths rising.
-pub(super) fn parse(text: &str) -> Result<Vec<[f64; 3]>, Fault> {
+pub(super) fn parse(text: &str) -> Result<Vec<[f64; 3]>, TableFault> {
     let mut lines = text
         .lines()
         .enumerate()
@@ -32,7 +32,7 @@ pub(super) fn parse(text: &str) -> Result<Vec<[f64; 3]>, Fault> {
     let mut samples: Vec<[f64; 3]> = Vec::new();
     for (number, line) in lines {
         let cells: Vec<_> = line.split(',').map(str::trim).collect();
-        let value = |at: usize| -> Result<f64, Fault> {
+        let value = |at: usize| -> Result<f64, TableFault> {
             let text = cells.get(at).ok_or((Some(number), TableError::Missing))?;
             let value: f64 = text
                 .parse()

@@ -10,7 +10,6 @@ mod waves;
 
 use std::f64::consts::TAU;
 
-use faer::Mat;
 use num_complex::Complex64;
 
 pub use response::{SupercellOrder, SupercellResponse};
@@ -18,8 +17,8 @@ pub use sites::SiteLattice;
 
 use crate::basis::Space;
 use crate::error::{Error, Result};
-use crate::layer::{Medium, Modes};
-use crate::propagate::{Ends, Slab, propagate};
+use crate::layer::Modes;
+use crate::propagate::{Ends, propagate_wave};
 use crate::{Incidence, Layer, LayerStack, MOST_UNKNOWNS, Orders, Outline, Side};
 use permittivity::permittivity;
 use waves::Waves;
@@ -146,7 +145,7 @@ impl Supercell {
 /// # Errors
 /// As [`crate::solve`].
 pub fn solve_supercell(cell: &Supercell, incidence: &Incidence, highest: usize) -> Result<SupercellResponse> {
-    let problem = Problem::new(cell, incidence, highest)?;
+    let problem = SupercellProblem::new(cell, incidence, highest)?;
     let unit = [[Complex64::ONE, Complex64::ZERO], [Complex64::ZERO, Complex64::ONE]];
     let parts = if cell.lattice.is_row() && incidence.sines[1] == 0.0 {
         vec![
@@ -160,7 +159,7 @@ pub fn solve_supercell(cell: &Supercell, incidence: &Incidence, highest: usize) 
 }
 
 /// A supercell with the wave's side below.
-struct Problem {
+struct SupercellProblem {
     cell: Supercell,
     highest: usize,
     k: [f64; 2],
@@ -170,14 +169,14 @@ struct Problem {
 }
 
 /// The fields of one symmetry.
-struct Part {
+struct SupercellPart {
     waves: Waves,
     ends: Ends,
     /// Transverse amplitudes of the incident zero order, for each column.
     incident: Vec<[Complex64; 2]>,
 }
 
-impl Problem {
+impl SupercellProblem {
     fn new(cell: &Supercell, incidence: &Incidence, highest: usize) -> Result<Self> {
         cell.check()?;
         incidence.check()?;
@@ -199,7 +198,7 @@ impl Problem {
         })
     }
 
-    fn part(&self, y: Space, incident: &[[Complex64; 2]]) -> Result<Part> {
+    fn part(&self, y: Space, incident: &[[Complex64; 2]]) -> Result<SupercellPart> {
         let Supercell { lattice, pitch_nm, .. } = &self.cell;
         let unknowns = Waves::unknowns(lattice, self.highest, y);
         if unknowns > MOST_UNKNOWNS {
@@ -212,35 +211,20 @@ impl Problem {
         }
         let waves = Waves::new(lattice, self.highest, y, self.k, self.step);
         let rows = &waves.rows;
-        let below = Medium::new(self.cell.below * self.cell.below, rows);
-        let above = Medium::new(self.cell.above * self.cell.above, rows);
-        let slabs = self
-            .cell
-            .layers
-            .iter()
-            .map(|layer| {
-                let plain = layer.inside == layer.outside || layer.outlines.iter().all(Outline::is_empty);
-                let modes = if plain {
-                    Modes::uniform(layer.outside * layer.outside, rows)
-                } else {
-                    Modes::structured(&permittivity(layer, *pitch_nm, lattice, &waves), rows)?
-                };
-                Ok(Slab {
-                    modes,
-                    depth: layer.height_nm * self.k0_per_nm,
-                })
-            })
-            .collect::<Result<Vec<_>>>()?;
-        let mut arriving = Mat::zeros(rows.len(), incident.len());
-        for (column, amplitudes) in incident.iter().enumerate() {
-            for (component, amplitude) in amplitudes.iter().enumerate() {
-                if let Some((row, factor)) = waves.plane_wave(component, [0, 0]) {
-                    arriving[(row, column)] = amplitude / factor;
-                }
-            }
-        }
-        let ends = propagate(rows, &below, &slabs, &above, &arriving);
-        Ok(Part {
+        let layers = self.cell.layers.iter().map(|layer| {
+            let plain = layer.inside == layer.outside || layer.outlines.iter().all(Outline::is_empty);
+            let modes = if plain {
+                Modes::uniform(layer.outside * layer.outside, rows)
+            } else {
+                Modes::structured(&permittivity(layer, *pitch_nm, lattice, &waves), rows)?
+            };
+            Ok((modes, layer.height_nm))
+        });
+        let indices = [self.cell.below, self.cell.above];
+        let ends = propagate_wave(rows, indices, layers, self.k0_per_nm, incident, |component| {
+            waves.plane_wave(component, [0, 0])
+        })?;
+        Ok(SupercellPart {
             waves,
             ends,
             incident: incident.to_vec(),

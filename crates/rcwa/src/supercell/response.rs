@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use super::{Part, Problem};
+use super::{SupercellPart, SupercellProblem};
 use crate::Incidence;
 use crate::error::Result;
 use crate::response::{finite, flux};
@@ -70,7 +70,7 @@ impl SupercellResponse {
         self.orders.iter().find(|o| o.wave == wave)
     }
 
-    pub(super) fn new(problem: &Problem, incidence: &Incidence, parts: &[Part]) -> Result<Self> {
+    pub(super) fn new(problem: &SupercellProblem, incidence: &Incidence, parts: &[SupercellPart]) -> Result<Self> {
         // Unit vectors that do not turn over as the wave passes the normal.
         let [x, y] = incidence.direction();
         let sign = if x < 0.0 || (x == 0.0 && y < 0.0) { -1.0 } else { 1.0 };
@@ -111,7 +111,7 @@ impl SupercellResponse {
 }
 
 /// Transverse amplitudes [transmitted, reflected] of a wave, for a unit transverse field along `incident`.
-fn amplitudes(parts: &[Part], incident: [f64; 2], wave: [i32; 2]) -> [[Complex64; 2]; 2] {
+fn amplitudes(parts: &[SupercellPart], incident: [f64; 2], wave: [i32; 2]) -> [[Complex64; 2]; 2] {
     let mut sum = [[Complex64::ZERO; 2]; 2];
     for part in parts {
         for (column, unit) in part.incident.iter().enumerate() {

@@ -117,7 +117,7 @@ fn the_mirror_of_a_row_loses_nothing() {
     let cell = supercell(SiteLattice::row(3).unwrap(), &[110.0, 170.0, 260.0], 1);
     let incidence = arriving([-0.2, 0.0]);
     let with = solve_supercell(&cell, &incidence, 2).unwrap();
-    let problem = Problem::new(&cell, &incidence, 2).unwrap();
+    let problem = SupercellProblem::new(&cell, &incidence, 2).unwrap();
     let unit = [[Complex64::ONE, Complex64::ZERO], [Complex64::ZERO, Complex64::ONE]];
     let part = problem.part(Space::Full, &unit).unwrap();
     let without = SupercellResponse::new(&problem, &incidence, &[part]).unwrap();

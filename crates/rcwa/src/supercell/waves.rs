@@ -6,7 +6,7 @@ use faer::Mat;
 use num_complex::Complex64;
 
 use super::sites::SiteLattice;
-use crate::basis::{Row, Rows, Space};
+use crate::basis::{FieldRow, Rows, Space};
 
 /// The transverse field of a supercell: all plane waves, or for a row along x the combinations that are
 /// even or odd in y. Ex and Ez are in the space `y`, Ey in its derived space.
@@ -49,7 +49,7 @@ impl Waves {
                     let place: &HashMap<[i32; 2], usize> = &place[c];
                     place.get(wave).copied()
                 };
-                list.push(Row {
+                list.push(FieldRow {
                     component,
                     k: [0, 1].map(|axis| k[axis] + f64::from(wave[axis]) * part),
                     partner: find(1 - component).map(|p| if component == 0 { of_x + p } else { p }),

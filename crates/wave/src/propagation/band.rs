@@ -56,7 +56,7 @@ const FAST_PERIOD: f64 = 1.19;
 const MOST_BINS: usize = 1 << 16;
 
 /// The frequency bins that count: `bins` an axis in a period, of which a disc (in landing points) is kept.
-pub(super) struct Band {
+pub(super) struct FrequencyBand {
     pub bins: usize,
     /// First kept bin of each axis, counted from zero frequency; may be outside the transform's own period.
     pub first: [i64; 2],
@@ -67,7 +67,7 @@ pub(super) struct Band {
     pub fade: Fade,
 }
 
-impl Band {
+impl FrequencyBand {
     pub fn choose(
         lattice: Lattice,
         radius_um: f64,

@@ -22,7 +22,7 @@ pub(super) struct Transfer<'a> {
 
 /// One column of frequencies: kx is the same for all, ky rises by one.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Column {
+pub(super) struct FrequencyColumn {
     /// Frequencies of the first [cycles a period].
     pub first: [i64; 2],
     pub count: usize,
@@ -43,7 +43,7 @@ const GRAZING: f64 = 1e-12;
 impl Transfer<'_> {
     /// Works out how much each frequency of a column counts for the window, by where its ray from the element's
     /// centre lands `distance_um` behind it: a raised cosine from `full_um` to `zero_um` of the window's middle.
-    pub fn fade(&self, distance_um: f64, column: Column, faded: &mut FadedColumn) {
+    pub fn fade(&self, distance_um: f64, column: FrequencyColumn, faded: &mut FadedColumn) {
         let df = 1.0 / self.fade.period_um;
         let [fx, first] = column.first.map(|f| f as f64 * df);
         let rest = self.wavelength_um.powi(-2) - fx * fx;
@@ -67,7 +67,7 @@ impl Transfer<'_> {
     }
 
     /// `out[i]` is what multiplies frequency `i` of a column on its way to `distance_um`.
-    pub fn to_distance(&self, distance_um: f64, column: Column, faded: &FadedColumn, out: &mut [Complex32]) {
+    pub fn to_distance(&self, distance_um: f64, column: FrequencyColumn, faded: &FadedColumn, out: &mut [Complex32]) {
         let df = 1.0 / self.fade.period_um;
         let [fx, first] = column.first.map(|f| f as f64 * df);
         let along_x = fx * self.shift_um[0];

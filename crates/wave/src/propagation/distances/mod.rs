@@ -73,7 +73,7 @@ pub type FillRow<'a> = dyn Fn(usize, &mut [Complex32]) + 'a;
 
 /// Frequencies that are kept, in whole cycles a period.
 #[derive(Clone, Copy)]
-struct Kept {
+struct KeptFrequencies {
     first: [i64; 2],
     count: [usize; 2],
 }
@@ -135,10 +135,10 @@ impl DistancesPlan {
     }
 
     /// Frequencies whose rays land within the end of the fade at any of the distances.
-    fn kept(&self, wavelength_um: f64, distances_um: &[f64]) -> Kept {
+    fn kept(&self, wavelength_um: f64, distances_um: &[f64]) -> KeptFrequencies {
         let end = self.fade_end_um();
         let z = distances_um.iter().copied().fold(f64::MAX, f64::min);
-        let mut kept = Kept {
+        let mut kept = KeptFrequencies {
             first: [0; 2],
             count: [0; 2],
         };

@@ -2,9 +2,9 @@
 
 use num_complex::Complex32;
 
-use super::{DistancesPlan, DistancesScratch, FillRow, Kept};
+use super::{DistancesPlan, DistancesScratch, FillRow, KeptFrequencies};
 use crate::kernels::{gather, multiply_to, process};
-use crate::propagation::transfer::{Column, Transfer};
+use crate::propagation::transfer::{FrequencyColumn, Transfer};
 
 /// Columns that go through one call of a transform: enough to fill cache lines.
 const LANES: usize = 8;
@@ -15,7 +15,7 @@ impl DistancesPlan {
         &self,
         wavelength_um: f64,
         distances_um: &[f64],
-        kept: &Kept,
+        kept: &KeptFrequencies,
         scratch: &mut DistancesScratch,
     ) {
         let [kx, ky] = kept.count;
@@ -33,7 +33,7 @@ impl DistancesPlan {
         };
         scratch.transfer.resize(distances_um.len() * kx * ky, Complex32::ZERO);
         for k in 0..kx {
-            let column = Column {
+            let column = FrequencyColumn {
                 first: [kept.first[0] + k as i64, kept.first[1]],
                 count: ky,
             };
@@ -46,7 +46,7 @@ impl DistancesPlan {
     }
 
     /// Forward transform of the element, cut to the kept frequencies: `spectrum[kx][ky]`.
-    pub(super) fn transform(&self, kept: &Kept, fill_row: &FillRow<'_>, scratch: &mut DistancesScratch) {
+    pub(super) fn transform(&self, kept: &KeptFrequencies, fill_row: &FillRow<'_>, scratch: &mut DistancesScratch) {
         let (n, m) = (self.wanted.lattice.sites(), self.sites);
         let [kx, ky] = kept.count;
         scratch.row.resize(m.max(scratch.row.len()), Complex32::ZERO);
@@ -80,7 +80,7 @@ impl DistancesPlan {
 
     /// Multiply the spectrum with the transfer function and transform its columns back:
     /// `lines[distance][row][kx]`.
-    pub(super) fn propagate(&self, distances: usize, kept: &Kept, scratch: &mut DistancesScratch) {
+    pub(super) fn propagate(&self, distances: usize, kept: &KeptFrequencies, scratch: &mut DistancesScratch) {
         let [kx, ky] = kept.count;
         let (samples, window) = (self.samples, self.window);
         let start = kept.first[1].rem_euclid(samples as i64) as usize;
@@ -118,7 +118,13 @@ impl DistancesPlan {
     }
 
     /// Transform the rows of one distance back and square them.
-    pub(super) fn square(&self, kept: &Kept, distance: usize, scratch: &mut DistancesScratch, out: &mut Vec<f32>) {
+    pub(super) fn square(
+        &self,
+        kept: &KeptFrequencies,
+        distance: usize,
+        scratch: &mut DistancesScratch,
+        out: &mut Vec<f32>,
+    ) {
         let kx = kept.count[0];
         let (samples, window) = (self.samples, self.window);
         out.resize(window * window, 0.0);

@@ -19,9 +19,9 @@ use ndarray::{Array2, ArrayViewMut2};
 use num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
-use super::band::Band;
+use super::band::FrequencyBand;
 use super::propagator::{check_shape, check_wave};
-use super::transfer::{Column, FadedColumn, Transfer};
+use super::transfer::{FadedColumn, FrequencyColumn, Transfer};
 use super::zoom::Zoom;
 use super::{Accuracy, Aperture, Fade, Field, PlaneWave, Propagator, Scratch, Window};
 use crate::error::{Result, WaveError};
@@ -38,7 +38,7 @@ pub struct Fold {
     wavelength_um: f64,
     window: Window,
     accuracy: Accuracy,
-    band: Band,
+    band: FrequencyBand,
     forward: Arc<dyn Fft<f32>>,
     inverse: Arc<dyn Fft<f32>>,
     zoom: [Zoom; 2],
@@ -58,7 +58,7 @@ impl Fold {
         accuracy: Accuracy,
     ) -> Result<Self> {
         window.check(wavelength_um)?;
-        let band = Band::choose(lattice, radius_um, wavelength_um, &window, accuracy)?;
+        let band = FrequencyBand::choose(lattice, radius_um, wavelength_um, &window, accuracy)?;
         Ok(Self::with_band(lattice, wavelength_um, window, accuracy, band))
     }
 
@@ -74,7 +74,7 @@ impl Fold {
         bins: usize,
         fade_um: [f64; 2],
     ) -> Result<Self> {
-        let band = Band::new(lattice, wavelength_um, &window, bins, fade_um)?;
+        let band = FrequencyBand::new(lattice, wavelength_um, &window, bins, fade_um)?;
         Ok(Self::with_band(
             lattice,
             wavelength_um,
@@ -84,7 +84,13 @@ impl Fold {
         ))
     }
 
-    fn with_band(lattice: Lattice, wavelength_um: f64, window: Window, accuracy: Accuracy, band: Band) -> Self {
+    fn with_band(
+        lattice: Lattice,
+        wavelength_um: f64,
+        window: Window,
+        accuracy: Accuracy,
+        band: FrequencyBand,
+    ) -> Self {
         let mut planner = FftPlanner::new();
         let cycles = window.step_um / band.fade.period_um;
         let zoom = [0, 1].map(|a| Zoom::new(&mut planner, band.count[a], band.first[a], window.samples, cycles));
@@ -181,7 +187,7 @@ impl Fold {
             fade: &self.band.fade,
             pitch_um: self.lattice.pitch_um(),
         };
-        let column = Column {
+        let column = FrequencyColumn {
             first: [
                 self.band.first[0] + k as i64,
                 self.band.first[1] + self.band.rows[k].start as i64,

@@ -1,13 +1,14 @@
 //! Mappings without a polynomial: for every phase the width that answers it best.
 
-use std::fs;
-use std::path::Path;
+mod csv;
+mod simplex;
 
 use num_complex::Complex64;
 use serde::Serialize;
 
-use super::{CellModel, InversePolynomial, MappingError, PhaseCurve};
+use crate::{CellModel, InversePolynomial, MappingError, PhaseCurve};
 use metalith_core::{Error, Result};
+use simplex::simplex;
 
 /// Width for each of equal parts of a turn.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -18,10 +19,6 @@ pub struct MappingTable {
 
 /// Parts of a turn of an exact mapping: finer than the phase of one step of 2 nm in width.
 const PARTS: usize = 512;
-
-/// Longest mapping that is read (bytes), and the rounding of its phases in print.
-const LONGEST_CSV: u64 = 4 << 20;
-const PRINTED_TURNS: f64 = 1e-6;
 
 /// Rounds of exchange after which a mapping is as good as it gets; each round only ever gains.
 const MOST_ROUNDS: usize = 200;
@@ -46,73 +43,6 @@ impl MappingTable {
     pub fn width_nm(&self, u: f64) -> u16 {
         let n = self.widths_nm.len();
         self.widths_nm[((u * n as f64) as usize).min(n - 1)]
-    }
-
-    /// The table as text: the phase in the middle of each part (turns) and its width.
-    pub fn to_csv(&self) -> String {
-        let n = self.widths_nm.len() as f64;
-        let mut text = "turns,width_nm\n".to_owned();
-        for (i, width) in self.widths_nm.iter().enumerate() {
-            text += &format!("{:.6},{width}\n", (i as f64 + 0.5) / n);
-        }
-        text
-    }
-
-    /// Reads what [`MappingTable::to_csv`] writes: parts of equal length, in order, of the widths `allowed`
-    /// (nm), which rise.
-    ///
-    /// # Errors
-    /// If the file cannot be read, has too few or too many rows, or a row is not such a part.
-    pub fn read_csv(path: &Path, allowed: &[u16]) -> Result<Self> {
-        let fault = |line: Option<usize>, what: String| Error::Table {
-            path: path.to_owned(),
-            line,
-            what,
-            hint: "give columns turns and width_nm: equal parts of a turn by their middles, widths that may be written"
-                .into(),
-        };
-        let size = fs::metadata(path).map_err(Error::io("read", path))?.len();
-        if size > LONGEST_CSV {
-            return Err(fault(None, format!("{size} bytes are not a mapping")));
-        }
-        let bytes = fs::read(path).map_err(Error::io("read", path))?;
-        let text = String::from_utf8_lossy(&bytes);
-        let mut rows = text
-            .lines()
-            .enumerate()
-            .map(|(i, line)| (i + 1, line.trim()))
-            .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
-        if rows.next().is_none_or(|(_, header)| header != "turns,width_nm") {
-            return Err(fault(Some(1), "the header is not `turns,width_nm`".into()));
-        }
-        let rows: Vec<_> = rows.collect();
-        if rows.len() < 2 {
-            return Err(fault(None, "fewer than two parts of a turn".into()));
-        }
-        let n = rows.len() as f64;
-        let widths_nm = rows
-            .iter()
-            .enumerate()
-            .map(|(i, &(line, row))| {
-                let not_a_part = || fault(Some(line), format!("\"{row}\" is not a phase and a width"));
-                let (turns, width) = row.split_once(',').ok_or_else(not_a_part)?;
-                let turns: f64 = turns.trim().parse().map_err(|_| not_a_part())?;
-                let width: u16 = width.trim().parse().map_err(|_| not_a_part())?;
-                let middle = (i as f64 + 0.5) / n;
-                let near = (turns - middle).abs() < 0.01 / n + PRINTED_TURNS;
-                if !near {
-                    return Err(fault(
-                        Some(line),
-                        format!("{turns} turns stand where {middle:.6} should"),
-                    ));
-                }
-                if allowed.binary_search(&width).is_err() {
-                    return Err(fault(Some(line), format!("a width of {width} nm may not be written")));
-                }
-                Ok(width)
-            })
-            .collect::<Result<Vec<_>>>()?;
-        Ok(Self { widths_nm })
     }
 
     /// The width whose phase is nearest, of the widths of `curve` that are not in `avoid`. The phase of
@@ -274,59 +204,6 @@ impl MappingTable {
             passed,
         })
     }
-}
-
-/// Steps of the simplex; by then it has shrunk to nothing for degrees up to six.
-const SIMPLEX_STEPS: usize = 1500;
-
-/// Where `loss` is least near `start`.
-fn simplex(start: &[f64], loss: impl Fn(&[f64]) -> f64) -> Vec<f64> {
-    let n = start.len();
-    let mut corners: Vec<(f64, Vec<f64>)> = (0..=n)
-        .map(|k| {
-            let mut x = start.to_vec();
-            if k > 0 {
-                x[k - 1] += 0.05;
-            }
-            (loss(&x), x)
-        })
-        .collect();
-    let along = |from: &[f64], to: &[f64], share: f64| -> Vec<f64> {
-        from.iter().zip(to).map(|(a, b)| a + share * (b - a)).collect()
-    };
-    for _ in 0..SIMPLEX_STEPS {
-        corners.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let centre: Vec<f64> = (0..n)
-            .map(|i| corners[..n].iter().map(|c| c.1[i]).sum::<f64>() / n as f64)
-            .collect();
-        let tried = |share: f64, worst: &[f64]| {
-            let x = along(&centre, worst, share);
-            (loss(&x), x)
-        };
-        let worst = corners[n].1.clone();
-        let mirrored = tried(-1.0, &worst);
-        let next = if mirrored.0 < corners[0].0 {
-            let further = tried(-2.0, &worst);
-            if further.0 < mirrored.0 { further } else { mirrored }
-        } else if mirrored.0 < corners[n - 1].0 {
-            mirrored
-        } else {
-            let nearer = tried(if mirrored.0 < corners[n].0 { -0.5 } else { 0.5 }, &worst);
-            if nearer.0 < corners[n].0.min(mirrored.0) {
-                nearer
-            } else {
-                let best = corners[0].1.clone();
-                for corner in &mut corners[1..] {
-                    let x = along(&best, &corner.1, 0.5);
-                    *corner = (loss(&x), x);
-                }
-                continue;
-            }
-        };
-        corners[n] = next;
-    }
-    corners.sort_by(|a, b| a.0.total_cmp(&b.0));
-    corners.swap_remove(0).1
 }
 
 fn phases() -> impl Iterator<Item = f64> {

@@ -1,12 +1,16 @@
 //! `measurement.toml` and the files that it names, with every fault found in one go.
 
+mod captures;
+mod elements;
+
 use std::path::Path;
 
-use super::{Capture, Led, MeasuredElement, MeasuredSet, RelayCamera, Stack, frame, sem};
-use super::{ElementIndex, LedIndex, PerElement, PerLed};
+use super::{Led, MeasuredSet, PerElement, PerLed, RelayCamera, Stack};
+use captures::{captures, widths};
+use elements::elements;
 use metalith_cell::Material;
 use metalith_core::document::{Document, Limits, Section, load};
-use metalith_core::{ElementSite, Lattice, LayerNumber, PillarReader, Progress, Result, WidthMap};
+use metalith_core::{ElementSite, LayerNumber, PillarReader, Progress, Result};
 
 /// Version of the format that is read.
 const SCHEMA: i64 = 1;
@@ -176,169 +180,4 @@ fn leds(root: &Section<'_, '_>, film: Option<&Material>) -> Vec<Led> {
         root.fault("led", "no light source", "add one [[led]] for each colour");
     }
     leds
-}
-
-fn elements(
-    root: &Section<'_, '_>,
-    stack: &Stack,
-    layout: &Path,
-    read: &dyn Fn(&[ElementSite]) -> Result<Vec<WidthMap>>,
-) -> Vec<MeasuredElement> {
-    let sections = root.sections("element");
-    if sections.is_empty() {
-        root.fault(
-            "element",
-            "no element",
-            "add one [[element]] for each lens that was measured",
-        );
-    }
-    let mut elements: Vec<MeasuredElement> = Vec::new();
-    for s in &sections {
-        let index = s
-            .array::<2>("index", Limits::new(-1000.0..=1000.0, ""))
-            .map(|v| v as i64);
-        let centre_um = s.array("centre_um", Limits::new(-1e6..=1e6, "um"));
-        let aperture_diameter_um = s.float("aperture_diameter_um", Limits::new(1.0..=2000.0, "um"));
-        s.finish();
-        if elements.iter().any(|e| e.index == index) {
-            s.fault("index", format!("element {index:?} is there twice"), "leave one out");
-        }
-        let diameter_nm = (stack.lens_diameter_um * 1e3).round() as u32;
-        let lattice = Lattice::covering(diameter_nm, stack.pitch_nm).expect("an even pitch and a positive diameter");
-        elements.push(MeasuredElement {
-            index,
-            centre_um,
-            aperture_diameter_um,
-            pillars: WidthMap::empty(lattice),
-        });
-    }
-    if !layout.is_file() {
-        return elements;
-    }
-    let sites: Vec<_> = elements
-        .iter()
-        .map(|e| ElementSite {
-            name: format!("({}, {})", e.index[0], e.index[1]),
-            centre_nm: e.centre_um.map(|c| (c * 1e3).round() as i64),
-            lattice: e.pillars.lattice,
-        })
-        .collect();
-    match read(&sites) {
-        Err(e) => root.fault("layout", e.to_string(), "give the layout that was written"),
-        Ok(found) => {
-            for ((element, found), s) in elements.iter_mut().zip(found).zip(&sections) {
-                element.pillars = found;
-                if element.pillars.pillars() == 0 {
-                    s.fault(
-                        "centre_um",
-                        format!("the layout has no pillars of element {:?} here", element.index),
-                        "correct its centre or its layer, or give the layout that was written",
-                    );
-                }
-            }
-        }
-    }
-    elements
-}
-
-fn captures(
-    root: &Section<'_, '_>,
-    camera: &RelayCamera,
-    leds: &PerLed<Led>,
-    elements: &PerElement<MeasuredElement>,
-) -> Vec<Capture> {
-    let mut captures = Vec::new();
-    for s in root.sections("capture") {
-        let path = s.file("file");
-        let index = s
-            .array::<2>("element", Limits::new(-1000.0..=1000.0, ""))
-            .map(|v| v as i64);
-        let known = elements.iter_enumerated().find(|(_, e)| e.index == index);
-        let element = known.map(|(e, _)| e).unwrap_or_else(|| {
-            s.fault(
-                "element",
-                format!("no [[element]] has the index {index:?}"),
-                "add it, or correct the index",
-            );
-            ElementIndex::from(0)
-        });
-        let led_nm = s.float("led_nm", Limits::new(200.0..=3000.0, "nm"));
-        let known = leds.iter_enumerated().find(|(_, l)| l.centre_nm == led_nm);
-        let led = known.map(|(l, _)| l).unwrap_or_else(|| {
-            s.fault(
-                "led_nm",
-                format!("no [[led]] has its centre at {led_nm} nm"),
-                "add it, or correct the wavelength",
-            );
-            LedIndex::from(0)
-        });
-        let aoi_deg: [f64; 2] = s.array("aoi_deg", Limits::new(-80.0..=80.0, "degrees"));
-        let distance_um = s.float("distance_um", Limits::new(1.0..=100_000.0, "um"));
-        let window_centre_um = s.array("window_centre_um", Limits::new(-10_000.0..=10_000.0, "um"));
-        let scale_dn = s.float("scale_dn", Limits::new(f64::MIN_POSITIVE..=1e12, "DN"));
-        let frames = s.integer("frames", 1..=1_000_000, "frames") as u32;
-        s.finish();
-        let dn = match frame::read(&path, camera.rows, camera.cols) {
-            Ok(dn) => dn,
-            Err(what) => {
-                // A file that is not there has been named as such already.
-                if path.is_file() {
-                    s.fault(
-                        "file",
-                        what,
-                        "save it as float32 [rows, cols] without gaps, or leave the capture out",
-                    );
-                }
-                ndarray::Array2::zeros((camera.rows, camera.cols))
-            }
-        };
-        captures.push(Capture {
-            name: path
-                .file_stem()
-                .map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
-            element,
-            led,
-            aoi_rad: aoi_deg.map(f64::to_radians),
-            distance_um,
-            window_centre_um,
-            scale_dn,
-            frames,
-            dn,
-        });
-    }
-    if captures.is_empty() {
-        root.fault("capture", "no capture", "add one [[capture]] for each frame");
-    }
-    captures
-}
-
-fn widths(root: &Section<'_, '_>, elements: &PerElement<MeasuredElement>) -> (Vec<super::SemSite>, f64) {
-    let Some(s) = root.optional_section("cd_sem") else {
-        return (Vec::new(), 1.0);
-    };
-    let path = s.file("file");
-    let offset = s.float("edge_offset_nm", Limits::new(f64::MIN_POSITIVE..=100.0, "nm"));
-    s.finish();
-    if !path.is_file() {
-        return (Vec::new(), offset);
-    }
-    match sem::read(&path) {
-        Err(e) => {
-            s.fault("file", e.to_string(), "mend the table of widths");
-            (Vec::new(), offset)
-        }
-        Ok(sites) => {
-            for site in &sites {
-                if !elements.iter().any(|e| e.index == site.element) {
-                    s.fault(
-                        "file",
-                        format!("it names element {:?}, which is not described", site.element),
-                        "add an [[element]] for it",
-                    );
-                    break;
-                }
-            }
-            (sites, offset)
-        }
-    }
 }

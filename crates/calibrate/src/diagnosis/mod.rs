@@ -1,0 +1,170 @@
+//! What `calibrate` answers: `diagnosis.json`.
+
+mod assemble;
+
+use std::path::Path;
+
+use metalith_core::{Result, WholeFile};
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::fidelity::Rung;
+
+/// The verdict on a set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SetVerdict {
+    /// The captures agree with what was stated, to within their noise.
+    NoResidual,
+    /// The effects that were found explain the residual.
+    Explained,
+    /// One of a few effects that this set cannot distinguish.
+    OneOf,
+    /// The effects that were found explain a part of the residual.
+    Partly,
+    /// There is a residual that no known effect explains.
+    Unexplained,
+    /// More than half of the captures cannot be used.
+    DataUnfit,
+}
+
+/// An effect that was found.
+#[derive(Clone, Debug, Serialize)]
+pub struct FoundEffect {
+    pub name: String,
+    /// In `unit`; a list for an effect along two axes.
+    pub value: Value,
+    pub unit: String,
+    /// 95 % interval; a list of them for an effect along two axes.
+    pub interval: Value,
+    pub confounded_with: Vec<String>,
+    pub separate_by: Option<String>,
+}
+
+impl FoundEffect {
+    /// Whether the interval of an effect with one value contains this value; none for an effect along two axes.
+    pub fn holds(&self, value: f64) -> Option<bool> {
+        let ends = self.interval.as_array()?;
+        Some((ends.first()?.as_f64()?..=ends.get(1)?.as_f64()?).contains(&value))
+    }
+}
+
+/// Fit and held-out error.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct ErrorPair {
+    pub fit: f64,
+    pub held_out: f64,
+}
+
+/// The error before and after.
+#[derive(Clone, Debug, Serialize)]
+pub struct ErrorReport {
+    pub measure: String,
+    pub before: ErrorPair,
+    pub after: ErrorPair,
+    pub noise_floor: f64,
+    pub placebo_held_out: f64,
+}
+
+/// A candidate that was tried.
+#[derive(Clone, Debug, Serialize)]
+pub struct Ranked {
+    pub name: String,
+    /// Share of the residual that its signature alone explains, nuisances projected out.
+    pub score: f64,
+    pub held_out_gain: Option<f64>,
+    pub held_out_gain_interval: Option<[f64; 2]>,
+    pub value: Option<Value>,
+    pub rejected: Option<String>,
+    /// The reason for the rejection in a few words.
+    #[serde(skip)]
+    pub remark: String,
+}
+
+/// A capture that was left out.
+#[derive(Clone, Debug, Serialize)]
+pub struct LeftOut {
+    pub capture: String,
+    pub reason: String,
+}
+
+/// The answer for a set.
+#[derive(Clone, Debug, Serialize)]
+pub struct Diagnosis {
+    pub set: String,
+    pub verdict: SetVerdict,
+    pub effects: Vec<FoundEffect>,
+    pub error: ErrorReport,
+    pub ranking: Vec<Ranked>,
+    /// Candidates on top of each effect that was taken.
+    pub later_rankings: Vec<Vec<Ranked>>,
+    /// Share of the error above noise that is left.
+    pub unexplained_share: f64,
+    /// Share of missing pillars by their speckle, where the speckle counts as noise in the error after.
+    pub missing_by_grain: Option<f64>,
+    pub left_out: Vec<LeftOut>,
+    /// Held-out error of each capture before and after.
+    pub captures: Vec<CaptureError>,
+    /// The three fidelities of the cell, nuisances fitted.
+    pub ladder: Vec<Rung>,
+}
+
+/// The error of one capture when it was left out.
+#[derive(Clone, Debug, Serialize)]
+pub struct CaptureError {
+    pub capture: String,
+    pub before: Option<f64>,
+    pub after: Option<f64>,
+}
+
+impl Diagnosis {
+    /// Write it as `diagnosis.json`.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let mut text = serde_json::to_string_pretty(self).expect("plain data serialises");
+        text.push('\n');
+        WholeFile::write(path, text.as_bytes())
+    }
+
+    /// One line for a person.
+    pub fn sentence(&self) -> String {
+        let one = |e: &FoundEffect| {
+            let unit = if e.unit.is_empty() {
+                String::new()
+            } else {
+                format!(" {}", e.unit)
+            };
+            format!(
+                "{} = {}{unit}, interval {}",
+                e.name,
+                rounded(&e.value),
+                rounded(&e.interval)
+            )
+        };
+        let list: Vec<String> = self.effects.iter().map(one).collect();
+        match self.verdict {
+            SetVerdict::NoResidual => {
+                "no residual: the captures agree with what was stated, to within their noise".into()
+            }
+            SetVerdict::Explained => format!("explained by {}", list.join("; ")),
+            SetVerdict::OneOf => format!("one of these, which this set cannot distinguish: {}", list.join("; ")),
+            SetVerdict::Partly => format!(
+                "partly explained by {}; {:.0} % of the error above noise is left",
+                list.join("; "),
+                100.0 * self.unexplained_share
+            ),
+            SetVerdict::Unexplained => "unexplained: there is a residual that no known effect explains".into(),
+            SetVerdict::DataUnfit => format!("data unfit: {} captures cannot be used", self.left_out.len()),
+        }
+    }
+}
+
+fn rounded(value: &Value) -> String {
+    match value {
+        Value::Array(items) => format!("[{}]", items.iter().map(rounded).collect::<Vec<_>>().join(", ")),
+        Value::Number(n) => metalith_report::sig(n.as_f64().unwrap_or(f64::NAN), 4),
+        other => other.to_string(),
+    }
+}
