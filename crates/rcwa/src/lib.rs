@@ -139,6 +139,16 @@ pub fn solve_without_symmetry(stack: &LayerStack, incidence: &Incidence, orders:
 }
 
 fn solve_with(stack: &LayerStack, incidence: &Incidence, orders: Orders, symmetric: bool) -> Result<Response> {
+    off_cutoff(incidence.wavelength_um, |wavelength_um| {
+        let incidence = Incidence {
+            wavelength_um,
+            ..*incidence
+        };
+        solve_once(stack, &incidence, orders, symmetric)
+    })
+}
+
+fn solve_once(stack: &LayerStack, incidence: &Incidence, orders: Orders, symmetric: bool) -> Result<Response> {
     let mut problem = Problem::new(stack, incidence, orders)?;
     let [kx, ky] = incidence.sines;
     if !symmetric && kx == 0.0 && ky == 0.0 {
@@ -175,9 +185,24 @@ pub fn transmit(stack: &LayerStack, wavelength_um: f64, side: Side, orders: Orde
     if !stack.is_square() {
         return Err(Error::Polarising);
     }
-    let problem = Problem::new(stack, &Incidence::normal(wavelength_um, side), orders)?;
-    let part = problem.part(Space::Even, Space::Even, &[[Complex64::ONE, Complex64::ZERO]])?;
-    response::finite(part.amplitude(&part.ends.transmitted, 0, 0, 0)[0])
+    off_cutoff(wavelength_um, |wavelength_um| {
+        let problem = Problem::new(stack, &Incidence::normal(wavelength_um, side), orders)?;
+        let part = problem.part(Space::Even, Space::Even, &[[Complex64::ONE, Complex64::ZERO]])?;
+        response::finite(part.amplitude(&part.ends.transmitted, 0, 0, 0)[0])
+    })
+}
+
+/// Where a mode or an order is at its very cutoff the formulas divide zero by zero. The field itself is finite: it is
+/// the limit of those at the wavelengths beside it, which are tried then.
+fn off_cutoff<T>(wavelength_um: f64, solve: impl Fn(f64) -> Result<T>) -> Result<T> {
+    /// Relative, the closest that works. What vanishes at the cutoff goes with the root of the distance: 1e-6 of the
+    /// answer for the first.
+    const BESIDE: [f64; 3] = [1e-12, 1e-10, 1e-8];
+    let at = |share: f64| solve(wavelength_um * (1.0 + share));
+    BESIDE.into_iter().fold(at(0.0), |found, share| match found {
+        Err(Error::Cutoff) => at(share),
+        found => found,
+    })
 }
 
 /// A checked stack with the wave's side below, and the lengths over 1 / k0.

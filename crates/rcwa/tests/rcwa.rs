@@ -383,8 +383,19 @@ fn what_cannot_be_is_refused_with_its_reason() {
     for n in [0, 4, 129] {
         assert!(Orders::new(n).unwrap_err().to_string().contains("orders"));
     }
-    // The wavelength at which a substrate order grazes gives a number all the same.
-    let (_, silica) = indices(0.5);
-    let t = transmit(&good, 0.35 * silica.re, Side::Below, orders(5)).unwrap();
-    assert!(t.norm().is_finite());
+}
+
+/// Where an order of the substrate or of the ambient grazes, the answer is the limit of those beside it.
+#[test]
+fn a_grazing_order_gives_the_limit() {
+    // The answer goes with the root of the distance, 1e-9 of the wavelength.
+    const ROOT: f64 = 2e-4;
+    let mut good = pillar(200.0, 0.5);
+    good.below = Complex64::from(1.5);
+    for grazing in [0.35 * 1.5, 0.35] {
+        let t = |share: f64| transmit(&good, grazing * (1.0 + share), Side::Below, orders(5)).unwrap();
+        let at = t(0.0);
+        let beside = 0.5 * (t(1e-9) + t(-1e-9));
+        assert!((at - beside).norm() < ROOT, "{at} {beside}");
+    }
 }

@@ -19,7 +19,7 @@ use crate::basis::Space;
 use crate::error::{Error, Result};
 use crate::layer::Modes;
 use crate::propagate::{Ends, propagate_wave};
-use crate::{Incidence, Layer, LayerStack, MOST_UNKNOWNS, Orders, Outline, Side};
+use crate::{Incidence, Layer, LayerStack, MOST_UNKNOWNS, Orders, Outline, Side, off_cutoff};
 use permittivity::permittivity;
 use waves::Waves;
 
@@ -145,6 +145,16 @@ impl Supercell {
 /// # Errors
 /// As [`crate::solve`].
 pub fn solve_supercell(cell: &Supercell, incidence: &Incidence, highest: usize) -> Result<SupercellResponse> {
+    off_cutoff(incidence.wavelength_um, |wavelength_um| {
+        let incidence = Incidence {
+            wavelength_um,
+            ..*incidence
+        };
+        solve_once(cell, &incidence, highest)
+    })
+}
+
+fn solve_once(cell: &Supercell, incidence: &Incidence, highest: usize) -> Result<SupercellResponse> {
     let problem = SupercellProblem::new(cell, incidence, highest)?;
     let unit = [[Complex64::ONE, Complex64::ZERO], [Complex64::ZERO, Complex64::ONE]];
     let parts = if cell.lattice.is_row() && incidence.sines[1] == 0.0 {
