@@ -12,20 +12,46 @@
 //! - [`RealRow`]: consecutive pillars of an element, solved together; it measures how far any model of single sites, such
 //!   as the local cell, is from the supercell. [`site_transmissions`] are the values it compares with.
 //!
+//! - [`GratingTable`]: amplitudes of the orders of local gratings in one light, solved at chosen grating vectors and
+//!   smooth between them; kept in a folder.
+//! - [`GratingPillars`]: an element as an aperture whose sites transmit as in the local grating of [`SlopeMap`], read
+//!   from the widths by [`Mapping`].
+//!
+//! ```text
+//! mapping, light, disc of grating vectors  ->  GratingTable
+//! phase of a design                        ->  SlopeMap
+//! both, widths as read                     ->  GratingPillars, an aperture for any propagator
+//! ```
+//!
 //! This is a prediction by a solver that is held to an independent one (`golden/truth/supercell.csv`). It is not a stage
-//! of any command: `metalith run`, `verify` and `optimise` judge by single cells. A model that gives every site of an
-//! element the transmission that it has among its neighbours is under evaluation; it is not part of this crate.
+//! of any command: `metalith run`, `verify` and `optimise` judge by single cells. Tables give what a place of a lens sends
+//! out, where all phases of the grating occur. They do not give how the orders of a row of three to nine pillars that
+//! repeats exactly change with where its phase starts; that is [`Blaze`].
 //! `examples/blazed_rows.rs` prints the shares by the truth, by single cells and by [`Blaze`].
 //!
 //! Conventions are those of `metalith-rcwa`: exp(-i w t), light arrives from the substrate, phases are counted from the
 //! middle of site 0 in the plane of the pillar tops.
 
+mod aperture;
 mod blaze;
 mod cell;
+mod mapping;
+mod node;
+mod orientation;
 mod rows;
 mod sites;
+mod slopes;
+mod surface;
+mod table;
 
+pub use aperture::{GratingPillars, LocalCell};
 pub use blaze::{Blaze, BlazeOrder, BlazeOrders};
 pub use cell::{COARSE, CoarseCell};
+pub use mapping::Mapping;
+pub use node::{FIRST_KEPT, GratingVector, KEPT, OrderAmplitudes};
+pub use orientation::Orientation;
 pub use rows::RealRow;
 pub use sites::site_transmissions;
+pub use slopes::SlopeMap;
+pub use surface::Surface;
+pub use table::{GratingTable, GratingTableSpec};

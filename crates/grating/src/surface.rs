@@ -1,0 +1,143 @@
+//! Smooth surfaces through scattered values over the plane of grating vectors.
+
+use num_complex::Complex64;
+
+use metalith_core::{Error, Result};
+
+/// The cubic spline in two dimensions: sum of |K - K_i|^3 weights and a plane through places K_i, by solving the dense
+/// equations (Duchon 1977; Wendland, Scattered Data Approximation, 2004, chapter 8).
+#[derive(Clone, Debug)]
+pub struct Surface<const N: usize> {
+    places: Vec<[f64; 2]>,
+    /// Weight of each place, then constant and slopes of the plane.
+    weights: Vec<[Complex64; N]>,
+}
+
+/// Unknowns of the plane.
+const PLANE: usize = 3;
+
+impl<const N: usize> Surface<N> {
+    /// The surface through values at places; with `smoothing` above zero, near them: it is added to the diagonal of
+    /// the equations, where the cubes of distances stand elsewhere.
+    ///
+    /// # Errors
+    /// If places coincide, or all lie on a line.
+    pub fn through(places: &[[f64; 2]], values: &[[Complex64; N]], smoothing: f64) -> Result<Self> {
+        let n = places.len();
+        let size = n + PLANE;
+        let mut matrix = vec![vec![0.0; size]; size];
+        for (i, a) in places.iter().enumerate() {
+            for (j, b) in places.iter().enumerate() {
+                matrix[i][j] = cube(a, b);
+            }
+            matrix[i][i] += smoothing;
+            for (k, value) in plane(a).into_iter().enumerate() {
+                matrix[i][n + k] = value;
+                matrix[n + k][i] = value;
+            }
+        }
+        let mut weights = values.to_vec();
+        weights.resize(size, [Complex64::ZERO; N]);
+        eliminate(&mut matrix, &mut weights)?;
+        Ok(Self {
+            places: places.to_vec(),
+            weights,
+        })
+    }
+
+    /// Its values at a place.
+    pub fn at(&self, place: [f64; 2]) -> [Complex64; N] {
+        let kernels = self.places.iter().map(|own| cube(own, &place)).chain(plane(&place));
+        let mut sum = [Complex64::ZERO; N];
+        for (kernel, weights) in kernels.zip(&self.weights) {
+            for (sum, weight) in sum.iter_mut().zip(weights) {
+                *sum += weight * kernel;
+            }
+        }
+        sum
+    }
+}
+
+fn cube(a: &[f64; 2], b: &[f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1]).powi(3)
+}
+
+fn plane([x, y]: &[f64; 2]) -> [f64; PLANE] {
+    [1.0, *x, *y]
+}
+
+/// Gauss's elimination with partial pivots; the solution takes the place of the right-hand sides.
+fn eliminate<const N: usize>(matrix: &mut [Vec<f64>], right: &mut [[Complex64; N]]) -> Result<()> {
+    /// Pivots below this are those of a singular matrix: distances between places are 0.01 to 1.
+    const LEAST_PIVOT: f64 = 1e-12;
+    let size = matrix.len();
+    for column in 0..size {
+        let pivot = (column..size)
+            .max_by(|&a, &b| matrix[a][column].abs().total_cmp(&matrix[b][column].abs()))
+            .expect("rows are left");
+        if matrix[pivot][column].abs() < LEAST_PIVOT {
+            return Err(Error::invalid(
+                "grating vectors that coincide or lie on one line",
+                "give at least three that span the plane",
+            ));
+        }
+        matrix.swap(column, pivot);
+        right.swap(column, pivot);
+        let (above, below) = matrix.split_at_mut(column + 1);
+        let (right_above, right_below) = right.split_at_mut(column + 1);
+        let (own, right_own) = (&above[column], &right_above[column]);
+        for (row, right) in below.iter_mut().zip(right_below) {
+            let factor = row[column] / own[column];
+            if factor == 0.0 {
+                continue;
+            }
+            for (value, own) in row[column..].iter_mut().zip(&own[column..]) {
+                *value -= factor * own;
+            }
+            for (value, own) in right.iter_mut().zip(right_own) {
+                *value -= own * factor;
+            }
+        }
+    }
+    for row in (0..size).rev() {
+        let (left, solved) = right.split_at_mut(row + 1);
+        let own = &mut left[row];
+        for (solved, factor) in solved.iter().zip(&matrix[row][row + 1..]) {
+            for (value, solved) in own.iter_mut().zip(solved) {
+                *value -= solved * factor;
+            }
+        }
+        for value in own {
+            *value /= matrix[row][row];
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn planes_are_reproduced_and_values_met() {
+        let places = [[0.0, 0.0], [0.1, 0.0], [0.0, 0.1], [0.13, 0.08], [0.05, 0.21]];
+        let value = |[x, y]: [f64; 2]| [Complex64::new(1.0 + 2.0 * x, 3.0 * y - x), Complex64::I];
+        let surface = Surface::through(&places, &places.map(value), 1e-4).unwrap();
+        for place in [[0.03, 0.04], [0.2, -0.1]] {
+            let (found, wanted) = (surface.at(place), value(place));
+            for (f, w) in found.iter().zip(wanted) {
+                assert!((f - w).norm() < 1e-10, "{f} {w}");
+            }
+        }
+        let mut values = places.map(value);
+        values[3][0] += 1.0;
+        let surface = Surface::through(&places, &values, 0.0).unwrap();
+        assert!((surface.at(places[3])[0] - values[3][0]).norm() < 1e-10);
+    }
+
+    #[test]
+    fn places_on_a_line_are_refused() {
+        let line = [[0.0, 0.0], [0.1, 0.1], [0.2, 0.2], [0.3, 0.3]];
+        assert!(Surface::through(&line, &[[Complex64::ONE]; 4], 0.0).is_err());
+    }
+}
