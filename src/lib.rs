@@ -76,6 +76,7 @@
 //! ```
 
 pub use metalith_calibrate as calibrate;
+pub use metalith_camera as camera;
 pub use metalith_cell as cell;
 pub use metalith_cell_study as cell_study;
 pub use metalith_compensate as compensate;

@@ -113,6 +113,17 @@ impl TransmissionTables {
         })
     }
 
+    /// The same for one of many wavelengths of a band.
+    ///
+    /// # Errors
+    /// As [`TransmissionTables::new`].
+    pub fn in_band(cell: &dyn CellModel, wavelength_um: f64, widest_nm: u16) -> Result<Self> {
+        Ok(Self {
+            normal: cell.transmissions_in_band(wavelength_um, widest_nm)?,
+            oblique: HashMap::new(),
+        })
+    }
+
     /// Solve it for more directions, those that are alike by symmetry once.
     ///
     /// # Errors
