@@ -42,6 +42,19 @@ fn numbers(report: &Value) -> Value {
         };
         element["spots"].as_array().unwrap().iter().map(of).collect::<Vec<_>>()
     };
+    let white = |element: &Value| {
+        let of = |w: &Value| {
+            json!({
+                "channel": w["channel"],
+                "spread_um": round(&w["spread_um"]),
+                "energy_2_pixels": round(&w["energy_2_pixels"]),
+                "energy_passed": round(&w["energy_passed"]),
+                "contrast": w["contrast"].as_array().unwrap().iter()
+                    .map(|c| json!([c["lp_mm"], round(&c["mtf"][0]), round(&c["mtf"][1])])).collect::<Vec<_>>(),
+            })
+        };
+        element["white"].as_array().unwrap().iter().map(of).collect::<Vec<_>>()
+    };
     let element = |e: &Value| {
         json!({
             "index": e["element"]["index"],
@@ -49,6 +62,7 @@ fn numbers(report: &Value) -> Value {
             "rounding_rms_rad": round(&e["phase"]["rounding"]["rms_rad"]),
             "mapping_rms_rad": round(&e["phase"]["mapping"]["rms_rad"]),
             "spots": spots(e),
+            "white": white(e),
         })
     };
     let found = &report["verification"];

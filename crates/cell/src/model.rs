@@ -99,6 +99,20 @@ pub trait CellModel: Sync {
         Ok(None)
     }
 
+    /// As [`CellModel::oblique`], for one of many wavelengths that a band is averaged over; a model may solve it more
+    /// coarsely.
+    ///
+    /// # Errors
+    /// As [`CellModel::oblique`].
+    fn oblique_in_band(
+        &self,
+        wavelength_um: f64,
+        sines: [f64; 2],
+        max_width_nm: u16,
+    ) -> Result<Option<[Vec<Complex64>; 2]>> {
+        self.oblique(wavelength_um, sines, max_width_nm)
+    }
+
     /// |t| of a cell that passes all its power in the zero order: sqrt(n) of the substrate for the
     /// rigorous cell, 1 for one without amplitude. Strehl ratios are against this.
     ///

@@ -7,7 +7,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::stack::{off_cutoff, possible_width_nm};
-use metalith_cell::{BAND_ORDERS, CellStack, OBLIQUE_ORDERS, ORDERS};
+use metalith_cell::{BAND_ORDERS, CellStack, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS};
 use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::Orders;
 
@@ -126,7 +126,12 @@ impl RealisedCells {
         sines: [f64; 2],
         progress: &dyn Progress,
     ) -> Result<SolvedWidths> {
-        self.solve_with(BAND_ORDERS, widths_nm, wavelength_um, sines, progress)
+        let orders = if sines == [0.0; 2] {
+            BAND_ORDERS
+        } else {
+            OBLIQUE_BAND_ORDERS
+        };
+        self.solve_with(orders, widths_nm, wavelength_um, sines, progress)
     }
 
     fn solve_with(
