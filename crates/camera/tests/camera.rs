@@ -13,7 +13,10 @@ fn shipped(name: &str) -> PathBuf {
 fn shipped_cameras_are_read() {
     let bayer = Camera::read(&shipped("gt1930.toml")).unwrap();
     assert_eq!(bayer.sensor.filter, ColourFilter::Rggb);
-    assert_eq!((bayer.sensor.columns, bayer.sensor.rows, bayer.sensor.pixel_um), (1936, 1216, 5.86));
+    assert_eq!(
+        (bayer.sensor.columns, bayer.sensor.rows, bayer.sensor.pixel_um),
+        (1936, 1216, 5.86)
+    );
     assert_eq!(bayer.illuminant, Illuminant::D65);
     assert_eq!(bayer.files.len(), 4);
     let names: Vec<_> = bayer.channels.iter().map(|c| c.name.as_str()).collect();
@@ -73,9 +76,18 @@ fn all_mistakes_are_found_at_once() {
         Err(Error::Text(faults)) => {
             let words = faults.to_string();
             assert_eq!(faults.count(), 6, "{words}");
-            for (line, what) in [(4, "pixel_um"), (7, "filter"), (8, "bit"), (13, "a band must end"), (14, "time_ms"), (17, "source")] {
+            for (line, what) in [
+                (4, "pixel_um"),
+                (7, "filter"),
+                (8, "bit"),
+                (13, "a band must end"),
+                (14, "time_ms"),
+                (17, "source"),
+            ] {
                 assert!(
-                    words.lines().any(|l| l.contains(&format!("camera.toml:{line}:")) && l.contains(what)),
+                    words
+                        .lines()
+                        .any(|l| l.contains(&format!("camera.toml:{line}:")) && l.contains(what)),
                     "{line} {what}: {words}"
                 );
             }
@@ -88,11 +100,23 @@ fn all_mistakes_are_found_at_once() {
 fn what_does_not_fit_together_is_said() {
     for (from, to, what) in [
         ("filter = \"none\"", "filter = \"rggb\"", "does not fit the channels"),
-        ("full_well_e = 10000", "full_well_e = 10000\nnoise_photon = 1e-4\nnoise_read = 0", "noise is given twice"),
+        (
+            "full_well_e = 10000",
+            "full_well_e = 10000\nnoise_photon = 1e-4\nnoise_read = 0",
+            "noise is given twice",
+        ),
         ("band_nm = [450, 650]", "", "band_nm"),
-        ("band_nm = [450, 650]", "quantum_efficiency = \"none.csv\"", "there is no file"),
+        (
+            "band_nm = [450, 650]",
+            "quantum_efficiency = \"none.csv\"",
+            "there is no file",
+        ),
         ("source = \"equal_energy\"", "source = \"leds\"", "there is no diode"),
-        ("source = \"equal_energy\"", "source = \"d65\"\nfile = \"x.csv\"", "of no use"),
+        (
+            "source = \"equal_energy\"",
+            "source = \"d65\"\nfile = \"x.csv\"",
+            "of no use",
+        ),
         (
             "source = \"equal_energy\"",
             "source = \"leds\"\n[[illuminant.led]]\ncentre_nm = 900\nwidth_nm = 10",

@@ -9,6 +9,7 @@ mod page;
 mod phase;
 mod psf_metrics;
 mod single;
+mod single_white;
 mod white;
 mod white_page;
 mod widths;
@@ -35,6 +36,7 @@ pub use page::write_report;
 pub use phase::{PhaseError, PhaseErrors, PillarResponse};
 pub use psf_metrics::{Orders, PsfImages, PsfPair, PsfResult};
 pub use single::{Lighting, SinglePsf, SinglePsfReport, single_psfs, write_single_psf_report};
+pub use single_white::{SingleWhite, single_white};
 pub use white::{CameraStatement, Contrast, WhiteChannel};
 pub use widths::WidthCheck;
 

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::case::{SimulationCase, TransmissionTables};
 use super::optics::ReadElement;
 use metalith_camera::{Camera, ChannelSampling, Sampling};
-use metalith_core::{Error, Lattice, Progress, Result};
+use metalith_core::{Error, Lattice, Progress, Result, Wedge};
 use metalith_design::{CellIncidence, Design, Element};
 use metalith_made::MadeView;
 use metalith_wave::propagation::landing_um;
@@ -20,7 +20,7 @@ use metalith_wave::{Accuracy, Fold, Matched, PhaseFunction, Pillars, PlaneWave, 
 
 /// Largest distance of the wavelengths that are simulated (nm): eight intervals over a channel of 100 nm. How much
 /// this weighs is reported for each channel.
-const STEP_NM: f64 = 12.5;
+pub(super) const STEP_NM: f64 = 12.5;
 
 /// The camera and the light that figures are for.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -31,6 +31,17 @@ pub struct CameraStatement {
     pub pixel_um: f64,
     /// Wavelengths that were simulated (nm), common to all channels.
     pub wavelengths_nm: Vec<f64>,
+}
+
+impl CameraStatement {
+    pub(super) fn of(camera: &Camera, sampling: &Sampling) -> Self {
+        Self {
+            name: camera.name.clone(),
+            illuminant: camera.illuminant.name(),
+            pixel_um: camera.sensor.pixel_um,
+            wavelengths_nm: sampling.wavelengths_nm.clone(),
+        }
+    }
 }
 
 /// Contrast along x and y, pixel included.
@@ -202,8 +213,12 @@ impl<'a> WhiteSimulator<'a> {
             "solving cells as they are lit by white light",
             (elements.len() * self.colours.len()) as u64,
         );
+        let distance_um = self.design.lens.focal_length_um;
         for colour in &mut self.colours {
-            let waves: Vec<_> = elements.iter().map(|e| from_point(e, colour.wavelength_um)).collect();
+            let waves: Vec<_> = elements
+                .iter()
+                .map(|e| Point::of(e, distance_um).wave(colour.wavelength_um))
+                .collect();
             if let Some(tables) = &mut colour.tables {
                 tables.add_directions(cell, &waves, self.design.cell.pitch_nm as u16, progress)?;
             }
@@ -218,12 +233,7 @@ impl<'a> WhiteSimulator<'a> {
 
     /// What the figures are for.
     pub fn statement(&self) -> CameraStatement {
-        CameraStatement {
-            name: self.camera.name.clone(),
-            illuminant: self.camera.illuminant.name(),
-            pixel_um: self.camera.sensor.pixel_um,
-            wavelengths_nm: self.sampling.wavelengths_nm.clone(),
-        }
+        CameraStatement::of(&self.camera, &self.sampling)
     }
 
     /// All channels of one element, in the case that judges.
@@ -239,7 +249,7 @@ impl<'a> WhiteSimulator<'a> {
         let as_lit = self.design.verify.incidence == CellIncidence::AsLit;
         let view = |colour: &Colour| match (self.judge, &read.made[0]) {
             (SimulationCase::Made(chip), Some(made)) => {
-                let wave = from_point(element, colour.wavelength_um);
+                let wave = self.point(element).wave(colour.wavelength_um);
                 chip.view_in_band(made, &wave, as_lit, progress).map(Some)
             }
             _ => Ok(None),
@@ -258,10 +268,14 @@ impl<'a> WhiteSimulator<'a> {
                 sample
             })
             .collect::<Result<Vec<_>>>()?;
+        let shown = Channels {
+            point: self.point(element),
+            samples: &samples,
+            lp_mm: &self.lp_mm,
+            pixel_um: self.camera.sensor.pixel_um,
+        };
         let channels = self.sampling.channels.par_iter();
-        channels
-            .map(|channel| self.channel(element, channel, &samples))
-            .collect()
+        channels.map(|channel| shown.channel(channel)).collect()
     }
 
     /// The PSF of one wavelength about its own chief ray, per unit of light that arrives at the element.
@@ -274,11 +288,12 @@ impl<'a> WhiteSimulator<'a> {
         scratch: &mut Scratch,
     ) -> Result<BandSample> {
         let (lens, spec) = (&self.design.lens, &self.design.verify);
-        let wave = from_point(element, colour.wavelength_um);
-        let landing = landing_um(&element.wedge, &wave, lens.focal_length_um)?;
+        let point = self.point(element);
+        let wave = point.wave(colour.wavelength_um);
+        let landing = point.landing_um(colour.wavelength_um)?;
         let pitch = self.lattice.pitch_um();
         let window = Window::about(landing, pitch, spec.window_samples, lens.focal_length_um);
-        let mut psf = match (view, &colour.tables) {
+        let psf = match (view, &colour.tables) {
             (Some(view), _) => view.psf(window, Accuracy::Fast, &self.lp_mm, scratch)?,
             (None, Some(tables)) => {
                 let radius_um = lens.radius_um();
@@ -291,24 +306,42 @@ impl<'a> WhiteSimulator<'a> {
             }
             (None, None) => unreachable!("a case is a cell or a made chip"),
         };
-        let per_light = 1.0 / (colour.full * colour.full * self.area_um2);
-        psf.values *= per_light;
-        if let Some(otf) = &mut psf.otf {
-            otf.scale(|_| per_light);
-            otf.power_um2 *= per_light;
-        }
-        Ok(BandSample {
-            landing_um: landing,
-            psf,
-        })
+        Ok(per_light(landing, psf, colour.full * colour.full * self.area_um2))
     }
 
+    fn point(&self, element: &Element) -> Point {
+        Point::of(element, self.design.lens.focal_length_um)
+    }
+}
+
+/// A PSF per unit of light that arrives at an element whose matched twin passes this power (um^2).
+pub(super) fn per_light(landing_um: [f64; 2], mut psf: Psf, power_um2: f64) -> BandSample {
+    let share = 1.0 / power_um2;
+    psf.values *= share;
+    if let Some(otf) = &mut psf.otf {
+        otf.scale(|_| share);
+        otf.power_um2 *= share;
+    }
+    BandSample { landing_um, psf }
+}
+
+/// What channels are made of.
+pub(super) struct Channels<'a> {
+    pub point: Point,
+    /// One at each wavelength of the sampling.
+    pub samples: &'a [BandSample],
+    /// Frequencies of the contrasts (line pairs a millimetre), those of the samples.
+    pub lp_mm: &'a [f64],
+    pub pixel_um: f64,
+}
+
+impl Channels<'_> {
     /// One channel from the PSFs of all wavelengths.
-    fn channel(&self, element: &Element, channel: &ChannelSampling, samples: &[BandSample]) -> Result<WhiteChannel> {
-        let landing = |nm: f64| {
-            let wave = from_point(element, nm * 1e-3);
-            landing_um(&element.wedge, &wave, self.design.lens.focal_length_um)
-        };
+    ///
+    /// # Errors
+    /// If a wavelength does not reach the sensor.
+    pub fn channel(&self, channel: &ChannelSampling) -> Result<WhiteChannel> {
+        let landing = |nm: f64| self.point.landing_um(nm * 1e-3);
         let parts = channel.parts.iter().map(|p| {
             Ok(BandPart {
                 weight: p.weight,
@@ -317,8 +350,8 @@ impl<'a> WhiteSimulator<'a> {
             })
         });
         let parts = parts.collect::<Result<Vec<_>>>()?;
-        let found = polychromatic(samples, &parts)?;
-        let pixel_um = self.camera.sensor.pixel_um;
+        let found = polychromatic(self.samples, &parts)?;
+        let pixel_um = self.pixel_um;
         let psf = &found.psf;
         let contrast: Vec<Contrast> = self
             .lp_mm
@@ -339,10 +372,7 @@ impl<'a> WhiteSimulator<'a> {
         Ok(WhiteChannel {
             channel: channel.name.clone(),
             counted: channel.counted,
-            incidence_sin: {
-                let wave = from_point(element, element.wedge.wavelength_um);
-                [wave.sin_x, wave.sin_y]
-            },
+            incidence_sin: self.point.sines,
             wavelengths_nm: found.at_part.map(nm),
             chief_ray_um: found.landing_um,
             spread_um: dx.hypot(dy),
@@ -351,7 +381,7 @@ impl<'a> WhiteSimulator<'a> {
             energy_1_pixel: psf.energy_in_square_um2(peak_um, pixel_um),
             energy_2_pixels: psf.energy_in_square_um2(peak_um, 2.0 * pixel_um),
             energy_passed: psf.otf.as_ref().map_or_else(|| psf.energy_um2(), |otf| otf.power_um2),
-            sampling_mtf: self.sampling_error(samples, &parts, &contrast)?,
+            sampling_mtf: self.sampling_error(&parts, &contrast)?,
             contrast,
             image: psf.values.mapv(|v| v.max(0.0) as f32),
             step_um: psf.window.step_um,
@@ -359,8 +389,8 @@ impl<'a> WhiteSimulator<'a> {
     }
 
     /// Largest change of the contrasts without every second wavelength.
-    fn sampling_error(&self, samples: &[BandSample], parts: &[BandPart], contrast: &[Contrast]) -> Result<f64> {
-        let half: Vec<BandSample> = samples.iter().step_by(2).cloned().collect();
+    fn sampling_error(&self, parts: &[BandPart], contrast: &[Contrast]) -> Result<f64> {
+        let half: Vec<BandSample> = self.samples.iter().step_by(2).cloned().collect();
         let parts: Vec<BandPart> = parts
             .iter()
             .map(|p| BandPart {
@@ -371,22 +401,49 @@ impl<'a> WhiteSimulator<'a> {
         let Some(otf) = band_otf(&half, &parts)? else {
             return Ok(0.0);
         };
-        let pixel_um = self.camera.sensor.pixel_um;
         let changes = contrast.iter().enumerate().flat_map(|(j, c)| {
-            let coarse = otf.contrast(j).map(|m| m * pixel_mtf(pixel_um, c.lp_mm));
+            let coarse = otf.contrast(j).map(|m| m * pixel_mtf(self.pixel_um, c.lp_mm));
             [0, 1].map(|axis| (coarse[axis] - c.mtf[axis]).abs())
         });
         Ok(changes.fold(0.0, f64::max))
     }
 }
 
-/// Light of any wavelength from the direction in which an element looks at the wavelength of its wedge.
-fn from_point(element: &Element, wavelength_um: f64) -> PlaneWave {
-    let (sin_x, sin_y) = element.wedge.looks_at(element.wedge.wavelength_um);
-    PlaneWave {
-        wavelength_um,
-        sin_x,
-        sin_y,
+/// A point of the scene, and where an element sends its light.
+pub(super) struct Point {
+    pub wedge: Wedge,
+    /// Direction sines of the light of all wavelengths.
+    pub sines: [f64; 2],
+    /// From the pillar tops to the sensor (um).
+    pub distance_um: f64,
+}
+
+impl Point {
+    /// In the direction in which an element looks at the wavelength of its wedge.
+    fn of(element: &Element, distance_um: f64) -> Self {
+        let (x, y) = element.wedge.looks_at(element.wedge.wavelength_um);
+        Self {
+            wedge: element.wedge,
+            sines: [x, y],
+            distance_um,
+        }
+    }
+
+    /// Its light of one wavelength.
+    pub fn wave(&self, wavelength_um: f64) -> PlaneWave {
+        PlaneWave {
+            wavelength_um,
+            sin_x: self.sines[0],
+            sin_y: self.sines[1],
+        }
+    }
+
+    /// Where its chief ray of one wavelength lands, from the element's axis (um).
+    ///
+    /// # Errors
+    /// If it does not reach the sensor.
+    pub fn landing_um(&self, wavelength_um: f64) -> Result<[f64; 2]> {
+        Ok(landing_um(&self.wedge, &self.wave(wavelength_um), self.distance_um)?)
     }
 }
 

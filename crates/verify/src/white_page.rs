@@ -4,7 +4,7 @@ use metalith_core::part;
 use metalith_report::{Axis, Cell, Chart, Column, ImageGrid, Page, Table, exact, fixed, sig};
 use ndarray::Array2;
 
-use super::{DistinctElement, Verification, WhiteChannel};
+use super::{CameraStatement, DistinctElement, PsfResult, Verification, WhiteChannel};
 
 /// Decades of a PSF that are shown.
 const DECADES: f64 = 4.0;
@@ -21,19 +21,39 @@ pub(super) fn write(page: &mut Page, found: &Verification, element: &DistinctEle
         element.element.label()
     ));
     page.paragraph(format!(
-        "A point of the scene in the direction in which the element looks at {} nm. A wedge sends each wavelength to another place. Camera: {}; illuminant: {}; pixels of {} um.",
+        "A point of the scene in the direction in which the element looks at {} nm, by the `{}` cell.",
         exact(element.element.wedge.wavelength_um * 1e3),
+        found.fidelity,
+    ));
+    let alone: Vec<(String, &PsfResult)> = element
+        .spots
+        .iter()
+        .filter(|s| s.images().is_some())
+        .map(|s| (format!("{} nm alone", exact(s.wavelength_um * 1e3)), s.judged()))
+        .collect();
+    channels(page, camera, &element.white, &alone);
+}
+
+/// The same of the channels of any element, beside contrasts of single wavelengths.
+pub(super) fn channels(
+    page: &mut Page,
+    camera: &CameraStatement,
+    channels: &[WhiteChannel],
+    alone: &[(String, &PsfResult)],
+) {
+    page.paragraph(format!(
+        "A wedge sends each wavelength to another place. Camera: {}; illuminant: {}; pixels of {} um.",
         camera.name,
         camera.illuminant,
         exact(camera.pixel_um),
     ));
-    page.table(table(&element.white));
-    let mut images = ImageGrid::new("PSF of each channel", element.white.len())
+    page.table(table(channels));
+    let mut images = ImageGrid::new("PSF of each channel", channels.len())
         .values("share of the light that arrives", "1/um²")
         .log(DECADES)
-        .side((760.0 / element.white.len().max(1) as f64).min(230.0));
-    let samples = element.white.iter().map(|w| w.image.nrows()).min().unwrap_or(1);
-    for white in &element.white {
+        .side((760.0 / channels.len().max(1) as f64).min(230.0));
+    let samples = channels.iter().map(|w| w.image.nrows()).min().unwrap_or(1);
+    for white in channels {
         let (picture, step_um) = shown(white, samples);
         images = images.pixel_um(step_um);
         images.image(format!("channel {}", white.channel), picture);
@@ -43,20 +63,18 @@ pub(super) fn write(page: &mut Page, found: &Verification, element: &DistinctEle
         Axis::linear("spatial frequency", "1/mm"),
         Axis::linear("MTF", "").range(0.0, 1.0),
     );
-    for white in &element.white {
+    for white in channels {
         chart.line(format!("white light, {}", white.channel), white.curve());
     }
-    for spot in element.spots.iter().filter(|s| s.images().is_some()) {
-        let name = format!("{} nm alone", exact(spot.wavelength_um * 1e3));
-        chart.line(name, spot.judged().mtf_curve.iter().copied());
+    for (name, psf) in alone {
+        chart.line(name.as_str(), psf.mtf_curve.iter().copied());
     }
-    page.figure(images.caption(format!(
-        "The middle of the window of each channel, {DECADES} decades, by the `{}` cell.",
-        found.fidelity
-    )));
-    page.figure(chart.caption(
-        "Mean of x and y. White light from one direction beside single wavelengths, each from the direction that suits it.",
-    ));
+    page.figure(images.caption(format!("The middle of the window of each channel, {DECADES} decades.")));
+    page.figure(chart.caption(if alone.is_empty() {
+        "Mean of x and y."
+    } else {
+        "Mean of x and y. White light from one direction beside single wavelengths, each from the direction that suits it."
+    }));
 }
 
 fn table(channels: &[WhiteChannel]) -> Table {

@@ -129,7 +129,10 @@ fn eight_intervals_and_their_chief_rays_are_every_nanometre() {
         for j in 0..LP_MM.len() {
             for axis in 0..2 {
                 let [got, want] = [otf, exact_otf].map(|o| o.contrast(j)[axis]);
-                println!("{intervals} intervals, {} lp/mm, axis {axis}: {got}, brute force {want}", LP_MM[j]);
+                println!(
+                    "{intervals} intervals, {} lp/mm, axis {axis}: {got}, brute force {want}",
+                    LP_MM[j]
+                );
                 assert!((got - want).abs() < most, "{intervals}: {got}, not {want}");
                 assert!((alone.contrast(j)[axis] - got).abs() < 1e-9);
             }
@@ -140,6 +143,10 @@ fn eight_intervals_and_their_chief_rays_are_every_nanometre() {
         assert!((share(&found.psf) - share(&exact)).abs() < ENERGY);
         // The band is named where brute force has it: the chief ray of the wavelengths in the middle of the light.
         let middle = landing(550.0 + 6.2);
-        assert!((found.landing_um[1][0] - middle[0]).abs() < 1.0, "{:?} {middle:?}", found.landing_um);
+        assert!(
+            (found.landing_um[1][0] - middle[0]).abs() < 1.0,
+            "{:?} {middle:?}",
+            found.landing_um
+        );
     }
 }
