@@ -107,10 +107,12 @@ fn limits_on_white_light_decide_and_name_the_channel() {
     let said = String::from_utf8(output.stdout).unwrap();
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("FAILS: contrast in white light, element "), "{said}");
-    assert!(said.contains("holds: share of white light in a square of 2 pixels, element"), "{said}");
+    assert!(
+        said.contains("holds: share of white light in a square of 2 pixels, element"),
+        "{said}"
+    );
     assert!(said.contains("channel mono"), "{said}");
-    let report = report(folder.path());
-    let found = &report["verification"];
+    let found = report(folder.path());
     assert_eq!(found["camera"]["name"], "gt1930_mono");
     // Light of three diodes from 455 to 660 nm, drawn out by the wedge: f sin(psi) / lambda_w times as much.
     for element in found["distinct"].as_array().unwrap() {
