@@ -76,6 +76,7 @@
 //! ```
 
 pub use metalith_calibrate as calibrate;
+pub use metalith_camera as camera;
 pub use metalith_cell as cell;
 pub use metalith_cell_study as cell_study;
 pub use metalith_compensate as compensate;
@@ -96,7 +97,7 @@ pub use metalith_verify as verify;
 pub use metalith_wave as wave;
 
 pub use metalith_cell::{CellModel, Fidelity};
-pub use metalith_core::{Error, Fault, Faults, Lattice, Progress, Result, Silent, WholeFile, WidthMap, text};
+pub use metalith_core::{Error, Fault, Faults, Lattice, Progress, Result, Silent, Wedge, WholeFile, WidthMap, text};
 pub use metalith_design::{Design, Hierarchy, PillarArray, cell_models};
 pub use metalith_gds::Layout;
 pub use metalith_gds::extract::{Extraction, ExtractionPlan, extract};

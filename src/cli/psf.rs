@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use metalith::camera::Camera;
 use metalith::cell::{CellStack, FittedCell, PointwiseCell, PublishedCell};
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::rcwa::Material;
 use metalith::report::{count, sig};
-use metalith::verify::{Lighting, SimulationCase, SinglePsfReport, single_psfs, write_single_psf_report};
+use metalith::verify::{Lighting, SimulationCase, SinglePsfReport, single_psfs, single_white, write_single_psf_report};
 use metalith::{
-    Accuracy, CalibratedModel, CellModel, Error, Extraction, ExtractionPlan, Layout, MadeChip, Result, extract,
+    Accuracy, CalibratedModel, CellModel, Error, Extraction, ExtractionPlan, Layout, MadeChip, Result, Wedge, extract,
 };
 
 use super::verify::FidelityArg;
@@ -96,6 +97,23 @@ pub struct PsfArgs {
     /// Simulate with errors of 1e-3 instead of 1e-5 of the peak, several times faster.
     #[arg(long)]
     fast: bool,
+
+    /// Simulate white light for the camera of this file too: all wavelengths from the angle of incidence.
+    #[arg(long, value_name = "CAMERA")]
+    camera: Option<PathBuf>,
+
+    /// Angle in the x-z plane by which the elements steer at --wedge-wavelength-nm (degrees); with --camera it says
+    /// where each wavelength lands, which a layout does not.
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, requires = "camera")]
+    wedge_x_deg: f64,
+
+    /// The same in the y-z plane.
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, requires = "camera")]
+    wedge_y_deg: f64,
+
+    /// Wavelength at which the elements steer by these angles (nm).
+    #[arg(long, default_value_t = 550.0, requires = "camera")]
+    wedge_wavelength_nm: f64,
 
     /// Only read the pillars; simulate nothing.
     #[arg(long)]
@@ -207,6 +225,22 @@ impl PsfArgs {
         Ok(Box::new(PointwiseCell::new(stack, widths)))
     }
 
+    /// The wedge of the elements, by the options.
+    fn wedge(&self) -> Result<Wedge> {
+        let sines = [self.wedge_x_deg, self.wedge_y_deg].map(|deg| deg.to_radians().sin());
+        if !(self.wedge_wavelength_nm > 0.0 && sines[0].hypot(sines[1]) < 1.0) {
+            return Err(Error::invalid(
+                "a wedge that steers beyond the horizon or at no wavelength",
+                "give smaller --wedge-x-deg and --wedge-y-deg, and a positive --wedge-wavelength-nm",
+            ));
+        }
+        Ok(Wedge {
+            wavelength_um: self.wedge_wavelength_nm * 1e-3,
+            sin_x: sines[0],
+            sin_y: sines[1],
+        })
+    }
+
     fn lighting(&self) -> Lighting {
         Lighting {
             wavelengths_um: self.wavelengths_nm.iter().map(|nm| nm * 1e-3).collect(),
@@ -254,13 +288,20 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
         Some(path) => Some(MadeChip::new(&args.stack(&found)?, &CalibratedModel::read(path)?)?),
         None => None,
     };
-    let psfs = match &made {
-        _ if args.extract_only => Vec::new(),
-        Some(chip) => single_psfs(&found, SimulationCase::Made(chip), &args.lighting(), terminal)?,
-        None => {
-            let cell = args.cell(&found)?;
-            single_psfs(&found, SimulationCase::Cell(cell.as_ref()), &args.lighting(), terminal)?
-        }
+    let camera = args.camera.as_deref().map(Camera::read).transpose()?;
+    let simulate = |case: SimulationCase<'_>| -> Result<_> {
+        let light = args.lighting();
+        let psfs = single_psfs(&found, case, &light, terminal)?;
+        let white = match &camera {
+            Some(camera) => Some(single_white(&found, case, &light, camera, args.wedge()?, terminal)?),
+            None => None,
+        };
+        Ok((psfs, white))
+    };
+    let (psfs, white) = match &made {
+        _ if args.extract_only => (Vec::new(), None),
+        Some(chip) => simulate(SimulationCase::Made(chip))?,
+        None => simulate(SimulationCase::Cell(args.cell(&found)?.as_ref()))?,
     };
     let model = made.as_ref().map(MadeChip::statement);
     if let Some(folder) = &args.out {
@@ -274,6 +315,7 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             psfs: &psfs,
             assumptions: &assumptions,
             model: model.as_ref(),
+            white: white.as_ref(),
         };
         write_single_psf_report(&report, folder)?;
     }
@@ -295,6 +337,8 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             "psfs": psfs,
             "assumptions": assumptions.iter().map(|(k, v)| (*k, v.as_str())).collect::<BTreeMap<_, _>>(),
             "model": model,
+            "camera": white.as_ref().map(|w| &w.0),
+            "white": white.as_ref().map(|w| &w.1),
         });
         print_line!("{json:#}");
         return Ok(Outcome::Fine);
@@ -329,6 +373,17 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             sig(psf.metrics.peak_um[0], 5),
             sig(psf.metrics.peak_um[1], 5),
         );
+    }
+    for element in white.iter().flat_map(|w| &w.1) {
+        for channel in &element.channels {
+            print_line!(
+                "{}, white light, channel {}: {} % in a square of two pixels, spread {} um",
+                element.element,
+                channel.channel,
+                sig(channel.energy_2_pixels * 100.0, 3),
+                sig(channel.spread_um, 3),
+            );
+        }
     }
     if let Some(folder) = &args.out {
         print_line!("report: {}", folder.join("report.html").display());

@@ -42,6 +42,19 @@ fn numbers(report: &Value) -> Value {
         };
         element["spots"].as_array().unwrap().iter().map(of).collect::<Vec<_>>()
     };
+    let white = |element: &Value| {
+        let of = |w: &Value| {
+            json!({
+                "channel": w["channel"],
+                "spread_um": round(&w["spread_um"]),
+                "energy_2_pixels": round(&w["energy_2_pixels"]),
+                "energy_passed": round(&w["energy_passed"]),
+                "contrast": w["contrast"].as_array().unwrap().iter()
+                    .map(|c| json!([c["lp_mm"], round(&c["mtf"][0]), round(&c["mtf"][1])])).collect::<Vec<_>>(),
+            })
+        };
+        element["white"].as_array().unwrap().iter().map(of).collect::<Vec<_>>()
+    };
     let element = |e: &Value| {
         json!({
             "index": e["element"]["index"],
@@ -49,6 +62,7 @@ fn numbers(report: &Value) -> Value {
             "rounding_rms_rad": round(&e["phase"]["rounding"]["rms_rad"]),
             "mapping_rms_rad": round(&e["phase"]["mapping"]["rms_rad"]),
             "spots": spots(e),
+            "white": white(e),
         })
     };
     let found = &report["verification"];
@@ -77,6 +91,45 @@ fn golden_numbers_of_the_mini_design() {
         !html.contains("src=\"http") && !html.contains("href=\"http"),
         "the page needs a network"
     );
+}
+
+#[test]
+fn limits_on_white_light_decide_and_name_the_channel() {
+    let folder = tempfile::tempdir().unwrap();
+    let camera = metalith_testing::root().join("cameras/gt1930_mono.toml");
+    let text = fs::read_to_string(design("mini_3x3")).unwrap();
+    let text = text.replace("pixel_um = 5.86", &format!("pixel_um = 5.86\ncamera = {camera:?}"))
+        + "white_mtf_min = 0.9\nwhite_mtf_lp_mm = 30\nwhite_energy_2_pixels_min = 0.05\n";
+    let path = folder.path().join("white.toml");
+    fs::write(&path, &text).unwrap();
+    let fast = ["run", "--fast", "--fidelity", "published", "--out"];
+    let output = metalith(&fast, &[folder.path(), &path]);
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("FAILS: contrast in white light, element "), "{said}");
+    assert!(
+        said.contains("holds: share of white light in a square of 2 pixels, element"),
+        "{said}"
+    );
+    assert!(said.contains("channel mono"), "{said}");
+    let found = report(folder.path());
+    assert_eq!(found["camera"]["name"], "gt1930_mono");
+    // Light of three diodes from 455 to 660 nm, drawn out by the wedge: f sin(psi) / lambda_w times as much.
+    for element in found["distinct"].as_array().unwrap() {
+        let wedge = &element["element"]["wedge"];
+        let sine = |key: &str| wedge[key].as_f64().unwrap();
+        let way = 144.0 * sine("sin_x").hypot(sine("sin_y")) / 550.0;
+        let white = &element["white"][0];
+        let nm = |i: usize| white["wavelengths_nm"][i].as_f64().unwrap();
+        let spread = white["spread_um"].as_f64().unwrap();
+        // The tangent of a direction is longer than its sine by 1 % at most.
+        assert!((spread - way * (nm(2) - nm(0))).abs() <= 0.01 * spread, "{spread} um");
+    }
+    // A camera that is not there is a mistake of the design, and nothing is written.
+    fs::write(&path, text.replace("gt1930_mono", "gt1931")).unwrap();
+    let output = metalith(&["run", "--out"], &[&folder.path().join("none"), &path]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(!folder.path().join("none").exists());
 }
 
 #[test]

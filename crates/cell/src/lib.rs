@@ -23,7 +23,7 @@ pub use fit::{
 pub use metalith_rcwa::Material;
 pub use model::{CellModel, Fidelity};
 pub use pointwise::PointwiseCell;
-pub use pointwise::{OBLIQUE_ORDERS, ORDERS, tabulate};
+pub use pointwise::{BAND_ORDERS, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, tabulate};
 pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};
 pub use published::PublishedCell;
 pub use rigorous::RigorousCell;

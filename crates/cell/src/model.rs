@@ -72,7 +72,16 @@ pub trait CellModel: Sync {
     /// If the wavelength is outside what the model or its materials cover, or a width does not fit.
     fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>>;
 
-    /// The same for light that arrives obliquely: one table for light polarised across the plane of incidence
+    /// The same for one of many wavelengths that a band is averaged over, where a resonance that is off its place by a
+    /// fraction of a nanometre does not show: a model may solve it more coarsely.
+    ///
+    /// # Errors
+    /// As [`CellModel::transmissions`].
+    fn transmissions_in_band(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
+        self.transmissions(wavelength_um, max_width_nm)
+    }
+
+    /// The same as [`CellModel::transmissions`] for light that arrives obliquely: one table for light polarised across the plane of incidence
     /// (s) and one for light polarised in it (p). `sines` are those of the direction in air along x and y.
     ///
     /// Scaled so that |t| of a cell that passes all its power in the zero order is that of
@@ -88,6 +97,20 @@ pub trait CellModel: Sync {
         _max_width_nm: u16,
     ) -> Result<Option<[Vec<Complex64>; 2]>> {
         Ok(None)
+    }
+
+    /// As [`CellModel::oblique`], for one of many wavelengths that a band is averaged over; a model may solve it more
+    /// coarsely.
+    ///
+    /// # Errors
+    /// As [`CellModel::oblique`].
+    fn oblique_in_band(
+        &self,
+        wavelength_um: f64,
+        sines: [f64; 2],
+        max_width_nm: u16,
+    ) -> Result<Option<[Vec<Complex64>; 2]>> {
+        self.oblique(wavelength_um, sines, max_width_nm)
     }
 
     /// |t| of a cell that passes all its power in the zero order: sqrt(n) of the substrate for the

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::listing::Listing;
 use super::options::HandoffOptions;
 use super::process::Process;
+use metalith_camera::Camera;
 use metalith_core::file::read_at_most;
 use metalith_core::text::is_printable;
 use metalith_core::{Error, Result};
@@ -188,6 +189,11 @@ fn files_of(path: &Path, design: &Design) -> Result<Vec<Named>> {
     }
     if let RadialPhase::Table { file, .. } = &design.lens.phase {
         files.push((file.clone(), "", "phase of the lens over its radius"));
+    }
+    if let Some(camera) = &design.verify.camera {
+        for file in Camera::read(camera)?.files {
+            files.push((file, "camera_", "the camera that white light was simulated for"));
+        }
     }
     let folder = path.parent().unwrap_or(Path::new(""));
     for text in [&design.cell.pillar_material, &design.cell.substrate_material] {

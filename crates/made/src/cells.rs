@@ -7,7 +7,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::stack::{off_cutoff, possible_width_nm};
-use metalith_cell::{CellStack, OBLIQUE_ORDERS, ORDERS};
+use metalith_cell::{BAND_ORDERS, CellStack, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS};
 use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::Orders;
 
@@ -37,8 +37,8 @@ enum Solve {
     Width(u64),
 }
 
-/// Wavelength and direction, bit by bit.
-type WaveKey = [u64; 3];
+/// Wavelength and direction, bit by bit, and orders along an axis.
+type WaveKey = [u64; 4];
 
 /// Cells of one stack by realised width. What was solved is kept for as long as this lives.
 pub struct RealisedCells {
@@ -111,7 +111,39 @@ impl RealisedCells {
         sines: [f64; 2],
         progress: &dyn Progress,
     ) -> Result<SolvedWidths> {
-        let place = [wavelength_um, sines[0], sines[1]].map(f64::to_bits);
+        let orders = if sines == [0.0; 2] { ORDERS } else { OBLIQUE_ORDERS };
+        self.solve_with(orders, widths_nm, wavelength_um, sines, progress)
+    }
+
+    /// The same for one of many wavelengths that a band is averaged over, as `CellModel::transmissions_in_band`.
+    ///
+    /// # Errors
+    /// As [`RealisedCells::solve`].
+    pub fn solve_in_band(
+        &self,
+        widths_nm: &[f64],
+        wavelength_um: f64,
+        sines: [f64; 2],
+        progress: &dyn Progress,
+    ) -> Result<SolvedWidths> {
+        let orders = if sines == [0.0; 2] {
+            BAND_ORDERS
+        } else {
+            OBLIQUE_BAND_ORDERS
+        };
+        self.solve_with(orders, widths_nm, wavelength_um, sines, progress)
+    }
+
+    fn solve_with(
+        &self,
+        orders: usize,
+        widths_nm: &[f64],
+        wavelength_um: f64,
+        sines: [f64; 2],
+        progress: &dyn Progress,
+    ) -> Result<SolvedWidths> {
+        let [um, x, y] = [wavelength_um, sines[0], sines[1]].map(f64::to_bits);
+        let place = [um, x, y, orders as u64];
         let places: Vec<Among> = widths_nm.iter().map(|w| among(*w, self.offset_nm)).collect();
         // A width between nodes takes four of them, and two more to tell whether that is enough.
         let nodes = places.iter().flat_map(|a| match *a {
@@ -174,19 +206,17 @@ impl RealisedCells {
     }
 
     fn solve_one(&self, place: WaveKey, what: Solve) -> Result<Polarised> {
-        let [wavelength_um, x, y] = place.map(f64::from_bits);
-        let sines = [x, y];
+        let [wavelength_um, x, y] = [place[0], place[1], place[2]].map(f64::from_bits);
+        let (sines, orders) = ([x, y], Orders::new(place[3] as usize)?);
         let width = match what {
             Solve::Bare => 0.0,
             Solve::Node(k) => possible_width_nm(&self.stack, self.offset_nm + k as f64 * NODE_STEP_NM),
             Solve::Width(bits) => possible_width_nm(&self.stack, f64::from_bits(bits)),
         };
         if sines == [0.0; 2] {
-            let orders = Orders::new(ORDERS)?;
             let t = off_cutoff(width, |w| self.stack.transmission(w, wavelength_um, orders))?;
             return Ok([t; 2]);
         }
-        let orders = Orders::new(OBLIQUE_ORDERS)?;
         off_cutoff(width, |w| self.stack.oblique(w, wavelength_um, sines, orders))
     }
 }

@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 use serde::Serialize;
 
-use super::cells::RealisedCells;
+use super::cells::{RealisedCells, SolvedWidths};
 use super::stack::perturbed;
 use super::{
     ArrivingLight, CalibratedModel, CameraChange, ClassTable, DrawnElement, MadeElement, NotApplied, Perturbation,
@@ -106,19 +106,50 @@ impl MadeChip {
         as_lit: bool,
         progress: &dyn Progress,
     ) -> Result<MadeView<'a>> {
-        let light = ArrivingLight::new(stated, &self.perturbation().path);
-        let sines = if as_lit { cell_direction(&light.plane) } else { [0.0; 2] };
+        let sines = self.cell_sines(stated, as_lit);
         let solved = self
             .cells
             .solve(element.widths_nm(), stated.wavelength_um, sines, progress)?;
+        Ok(self.viewed(element, stated, &solved))
+    }
+
+    /// The same for one of many wavelengths that a band is averaged over: cells are solved more coarsely, see
+    /// [`RealisedCells::solve_in_band`].
+    ///
+    /// # Errors
+    /// As [`MadeChip::view`].
+    pub fn view_in_band<'a>(
+        &self,
+        element: &'a MadeElement,
+        stated: &PlaneWave,
+        as_lit: bool,
+        progress: &dyn Progress,
+    ) -> Result<MadeView<'a>> {
+        let sines = self.cell_sines(stated, as_lit);
+        let solved = self
+            .cells
+            .solve_in_band(element.widths_nm(), stated.wavelength_um, sines, progress)?;
+        Ok(self.viewed(element, stated, &solved))
+    }
+
+    /// The direction that cells are solved for.
+    fn cell_sines(&self, stated: &PlaneWave, as_lit: bool) -> [f64; 2] {
+        if as_lit {
+            cell_direction(&ArrivingLight::new(stated, &self.perturbation().path).plane)
+        } else {
+            [0.0; 2]
+        }
+    }
+
+    fn viewed<'a>(&self, element: &'a MadeElement, stated: &PlaneWave, solved: &SolvedWidths) -> MadeView<'a> {
         let polarisations = solved.pillars.iter().zip(&solved.bare);
-        Ok(MadeView {
+        MadeView {
             element,
             tables: polarisations.map(|(t, bare)| element.table_of(t, *bare)).collect(),
-            light,
+            light: ArrivingLight::new(stated, &self.perturbation().path),
             gap_um: self.perturbation().path.gap_um,
             camera: self.perturbation().camera,
-        })
+        }
     }
 }
 

@@ -59,7 +59,7 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
         "power of all pillars against the energy of the window",
     );
     row(
-        "Each wavelength comes from the direction that suits it",
+        "In the tables by wavelength, each wavelength comes from the direction that suits it; those of white light have one direction",
         dispersion(design),
         "f sin(psi) / lambda_w: light of a band from one direction is spread by so much",
     );

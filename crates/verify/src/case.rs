@@ -99,6 +99,8 @@ pub(super) struct TransmissionTables {
     pub normal: Vec<Complex64>,
     /// By direction, for s and p; empty where the design asks for normal incidence, or the cell knows no angles.
     oblique: HashMap<[u64; 2], [Vec<Complex64>; 2]>,
+    /// Whether it is one of many wavelengths of a band.
+    in_band: bool,
 }
 
 impl TransmissionTables {
@@ -110,6 +112,19 @@ impl TransmissionTables {
         Ok(Self {
             normal: cell.transmissions(wavelength_um, widest_nm)?,
             oblique: HashMap::new(),
+            in_band: false,
+        })
+    }
+
+    /// The same for one of many wavelengths of a band.
+    ///
+    /// # Errors
+    /// As [`TransmissionTables::new`].
+    pub fn in_band(cell: &dyn CellModel, wavelength_um: f64, widest_nm: u16) -> Result<Self> {
+        Ok(Self {
+            normal: cell.transmissions_in_band(wavelength_um, widest_nm)?,
+            oblique: HashMap::new(),
+            in_band: true,
         })
     }
 
@@ -129,11 +144,15 @@ impl TransmissionTables {
                 return Err(Error::Interrupted);
             }
             let sines = cell_direction(wave);
-            if sines != [0.0; 2]
-                && !self.oblique.contains_key(&key(sines))
-                && let Some(tables) = cell.oblique(wave.wavelength_um, sines, widest_nm)?
-            {
-                self.oblique.insert(key(sines), tables);
+            if sines != [0.0; 2] && !self.oblique.contains_key(&key(sines)) {
+                let tables = if self.in_band {
+                    cell.oblique_in_band(wave.wavelength_um, sines, widest_nm)?
+                } else {
+                    cell.oblique(wave.wavelength_um, sines, widest_nm)?
+                };
+                if let Some(tables) = tables {
+                    self.oblique.insert(key(sines), tables);
+                }
             }
             progress.advance(1);
         }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{PsfPair, Verification};
+use super::{PsfPair, Verification, WhiteChannel};
 use metalith_design::LimitSpec;
 
 /// One limit and what was reached.
@@ -123,8 +123,48 @@ pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
             sense: Sense::AtLeast,
         });
     }
+    let white = |of: fn(&LimitSpec, &WhiteChannel) -> f64| {
+        let mut all = Vec::new();
+        for d in &found.distinct {
+            for w in &d.white {
+                let place = format!("element {}, channel {}", d.element.label(), w.channel);
+                all.push((place, -of(limits, w)));
+            }
+        }
+        worst(all.into_iter())
+    };
+    let whites: [White; 2] = [
+        (
+            "contrast in white light",
+            "white_mtf_min",
+            limits.white_mtf_min,
+            |l, w| w.least_contrast(l.white_mtf_lp_mm),
+        ),
+        (
+            "share of white light in a square of 2 pixels",
+            "white_energy_2_pixels_min",
+            limits.white_energy_2_pixels_min,
+            |_, w| w.energy_2_pixels,
+        ),
+    ];
+    for (name, key, limit, reached) in whites {
+        if limit > 0.0 {
+            // A limit on what could not be simulated does not hold.
+            let (place, least) = white(reached).unwrap_or_else(|| ("not simulated".into(), f64::NAN));
+            checks.push(Check {
+                what: format!("{name}, {place}"),
+                key,
+                reached: -least,
+                limit,
+                sense: Sense::AtLeast,
+            });
+        }
+    }
     checks
 }
+
+/// Name, key and limit of what is measured of a channel in white light.
+type White = (&'static str, &'static str, f64, fn(&LimitSpec, &WhiteChannel) -> f64);
 
 /// Name, key and limit of what is measured of a spot.
 type Optical<'a> = (&'static str, &'static str, f64, &'a dyn Fn(&PsfPair) -> f64);

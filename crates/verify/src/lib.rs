@@ -9,6 +9,9 @@ mod page;
 mod phase;
 mod psf_metrics;
 mod single;
+mod single_white;
+mod white;
+mod white_page;
 mod widths;
 
 use std::path::Path;
@@ -33,6 +36,8 @@ pub use page::write_report;
 pub use phase::{PhaseError, PhaseErrors, PillarResponse};
 pub use psf_metrics::{OrderEfficiencies, PsfImages, PsfPair, PsfResult};
 pub use single::{Lighting, SinglePsf, SinglePsfReport, single_psfs, write_single_psf_report};
+pub use single_white::{SingleWhite, single_white};
+pub use white::{CameraStatement, Contrast, WhiteChannel};
 pub use widths::WidthCheck;
 
 /// Most elements that are simulated because their pillars are not as intended.
@@ -74,6 +79,8 @@ pub struct DistinctElement {
     pub orders: Vec<OrderEfficiencies>,
     /// One entry for each wavelength and field angle.
     pub spots: Vec<PsfPair>,
+    /// A point of the scene in white light, one entry for each channel of the camera.
+    pub white: Vec<WhiteChannel>,
     /// The pillars that were read back, for pictures.
     #[serde(skip)]
     pub widths: WidthMap,
@@ -94,6 +101,9 @@ pub struct Verification {
     pub compensated: bool,
     /// `accurate` or `fast`.
     pub accuracy: &'static str,
+    /// The camera and the light that the figures of white light are for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub camera: Option<CameraStatement>,
     pub layout: LayoutFacts,
     pub elements: Vec<ElementCheck>,
     pub foreign: Oddities,
@@ -112,7 +122,8 @@ impl Verification {
 /// Whether a layout of this design, at `path`, can be held to it: asked before work is spent on one that cannot.
 ///
 /// # Errors
-/// If the elements have more lattice sites together than are held at a time.
+/// If the elements have more lattice sites together than are held at a time, or the camera of the design cannot be
+/// used.
 pub fn fits(design: &Design, path: &Path) -> Result<()> {
     let lattice = design.lattice();
     let site = |element: Element| ElementSite {
@@ -121,7 +132,9 @@ pub fn fits(design: &Design, path: &Path) -> Result<()> {
         lattice,
     };
     let sites: Vec<ElementSite> = design.elements().into_iter().map(site).collect();
-    Ok(metalith_gds::extract::fits(path, &sites)?)
+    metalith_gds::extract::fits(path, &sites)?;
+    white::camera_of(design)?;
+    Ok(())
 }
 
 /// Read the layout at `path` back and hold it to its design.
@@ -163,7 +176,14 @@ pub fn verify_layout(
     let chosen = distinct(&elements);
     let shown = chosen.iter().map(|(k, _)| elements[*k].element).collect::<Vec<_>>();
     simulator.add_directions(&shown, progress)?;
-    progress.begin("simulating elements", (chosen.len() * simulator.psfs()) as u64);
+    let mut white = white::WhiteSimulator::new(design, array.lattice, cases.judge)?;
+    if let Some(white) = &mut white {
+        white.add_directions(&shown, progress)?;
+    }
+    progress.begin(
+        "simulating elements",
+        (chosen.len() * (simulator.psfs() + white.as_ref().map_or(0, white::WhiteSimulator::psfs))) as u64,
+    );
     let mut simulated = Vec::new();
     for (k, copies) in chosen {
         let element = elements[k].element;
@@ -177,6 +197,10 @@ pub fn verify_layout(
             steepness: Steepness::of(array.lattice.sites(), |ix, iy| phase.turns(ix, iy)),
             orders: simulator.orders(&rule, &read, progress)?,
             spots: simulator.simulate(&element, &phase, &read, progress)?,
+            white: match &white {
+                Some(white) => white.simulate(&element, &read, progress)?,
+                None => Vec::new(),
+            },
             widths,
         });
     }
@@ -193,6 +217,7 @@ pub fn verify_layout(
             Accuracy::Accurate => "accurate",
             Accuracy::Fast => "fast",
         },
+        camera: white.as_ref().map(white::WhiteSimulator::statement),
         layout: facts(layout, &extraction, layout.path()),
         elements,
         foreign: extraction.oddities,

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use ndarray::Array2;
 
-use super::{DistinctElement, PsfResult, Sense, Verification, assumptions};
+use super::{DistinctElement, PsfResult, Sense, Verification, assumptions, white_page};
 use metalith_core::Result;
 use metalith_design::array::PillarArray;
 use metalith_design::phase::{ElementPhase, LensPhase};
@@ -337,6 +337,7 @@ fn simulated(page: &mut Page, found: &Verification, element: &DistinctElement) {
     page.table(orders.caption(
         "Where light goes by the mapping's own account: the first order is the image, the zero order passes the element as if it had no phase.",
     ));
+    white_page::write(page, found, element);
 }
 
 fn steepness(element: &DistinctElement) -> String {

@@ -11,6 +11,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::case::{SimulationCase, TransmissionTables};
+use super::single_white::SingleWhite;
+use super::white::CameraStatement;
+use super::white_page;
 use metalith_cell::{CellModel, Fidelity};
 use metalith_core::{Error, Lattice, Progress, Result, Silent, WholeFile, WidthMap};
 use metalith_gds::extract::{ElementSite, Extraction};
@@ -173,13 +176,13 @@ fn as_made(
 }
 
 /// Radius of the circle about the element's centre that holds all of its pillars (um).
-fn circle_um(widths: &WidthMap) -> f64 {
+pub(super) fn circle_um(widths: &WidthMap) -> f64 {
     let standing = widths.width_nm.indexed_iter().filter(|(_, w)| **w > 0);
     let radius2 = standing.map(|((iy, ix), _)| widths.lattice.half_radius2(ix, iy)).max();
     (radius2.unwrap_or(0) as f64).sqrt() * 0.5 * widths.lattice.pitch_um()
 }
 
-fn widest_nm(elements: &[(&ElementSite, &WidthMap)]) -> u16 {
+pub(super) fn widest_nm(elements: &[(&ElementSite, &WidthMap)]) -> u16 {
     let all = elements.iter().flat_map(|(_, w)| w.width_nm.iter().copied());
     all.max().unwrap_or(0)
 }
@@ -199,7 +202,7 @@ impl Lighting {
 }
 
 /// Elements whose pillars differ from those of all before them.
-fn distinct(found: &Extraction) -> Vec<(&ElementSite, &WidthMap)> {
+pub(super) fn distinct(found: &Extraction) -> Vec<(&ElementSite, &WidthMap)> {
     let mut kept: Vec<(&ElementSite, &WidthMap)> = Vec::new();
     for element in &found.elements {
         if kept.iter().all(|(_, widths)| **widths != element.widths) {
@@ -219,6 +222,8 @@ pub struct SinglePsfReport<'a> {
     pub assumptions: &'a [(&'static str, String)],
     /// Of the model that chips were made by, if any.
     pub model: Option<&'a ModelStatement>,
+    /// White light for a camera, if one was named.
+    pub white: Option<&'a (CameraStatement, Vec<SingleWhite>)>,
 }
 
 /// Write `report.html`, `report.json` and each PSF as an NPY array (float64, rows along +y) into a folder.
@@ -232,6 +237,7 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
         psfs,
         assumptions,
         model,
+        white,
     } = *report;
     let elements = distinct(found);
     let mut page = Page::new(
@@ -289,6 +295,13 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
     page.section("PSFs");
     page.table(table);
     page.figure(images.caption("The whole window, four decades."));
+    if let Some((camera, elements)) = white {
+        page.section("White light, from one direction");
+        for element in elements {
+            page.subsection(&element.element);
+            white_page::channels(&mut page, camera, &element.channels, &[]);
+        }
+    }
     page.section("Pillars");
     let zooms = elements.iter().take(4).map(|(site, widths)| {
         PillarZoom::new(format!("Middle of {}", site.name), widths, (0.0, 0.0), 10.0).caption("As read, to scale.")
@@ -305,6 +318,8 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
                 .collect(),
             oddities: &found.oddities,
             model,
+            camera: white.map(|w| &w.0),
+            white: white.map(|w| w.1.as_slice()),
         },
     )?;
     page.write(&folder.join("report.html"))
@@ -317,6 +332,10 @@ struct Numbers<'a> {
     oddities: &'a metalith_gds::extract::Oddities,
     #[serde(skip_serializing_if = "Option::is_none")]
     model: Option<&'a ModelStatement>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    camera: Option<&'a CameraStatement>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    white: Option<&'a [SingleWhite]>,
 }
 
 fn write_npy(path: &Path, values: &Array2<f64>) -> Result<()> {

@@ -34,6 +34,10 @@ pub enum WaveError {
     #[error("an aperture on {given:?}, planned for {planned:?}")]
     Lattice { given: Lattice, planned: Lattice },
 
+    /// A band of wavelengths without light.
+    #[error("no PSF of a band can be had from {samples} wavelengths and {parts} parts: one of them must have a weight")]
+    Band { samples: usize, parts: usize },
+
     /// An array of another shape than it must have, or with rows that are not contiguous.
     #[error("{what} of shape {given:?} where {wanted:?} is needed")]
     Shape {
@@ -110,6 +114,9 @@ impl WaveError {
             Self::Fade { .. } => "make the lens or the window smaller, or the fade wider".into(),
             Self::Wave { .. } => "plan one propagator a wavelength, and keep the sine of the angle below one".into(),
             Self::Lattice { .. } => "plan one propagator a lattice".into(),
+            Self::Band { .. } => {
+                "give at least one wavelength, and parts with finite weights, one of them positive".into()
+            }
             Self::Shape { .. } => "give a contiguous array of that shape".into(),
             Self::Count { .. } => "give one transmission a ring, and one value a point".into(),
             Self::Width { .. } => "make the table up to the widest pillar of the layout".into(),

@@ -1,5 +1,7 @@
 //! `[verify]`: what is computed from the written file, and what must hold of it.
 
+use std::path::PathBuf;
+
 use serde::Serialize;
 
 use super::lens::WAVELENGTH;
@@ -18,6 +20,8 @@ pub struct VerifySpec {
     pub window_samples: usize,
     /// Edge of a sensor pixel (um).
     pub pixel_um: f64,
+    /// Camera file that the figures of white light are for; three flat bands where none is named.
+    pub camera: Option<PathBuf>,
     pub limits: LimitSpec,
 }
 
@@ -56,6 +60,13 @@ pub struct LimitSpec {
     pub mtf_difference_max: f64,
     /// Root mean square difference of the PSFs over that of the designed one.
     pub psf_difference_max: f64,
+    /// Least contrast of a point of the scene in white light in any channel of the camera, pixel included, along the
+    /// worse of x and y.
+    pub white_mtf_min: f64,
+    /// Frequency that it counts at (line pairs a millimetre).
+    pub white_mtf_lp_mm: f64,
+    /// Least share of the light of a point, of what arrives in any channel of the camera, in a square of two pixels.
+    pub white_energy_2_pixels_min: f64,
 }
 
 impl VerifySpec {
@@ -101,6 +112,7 @@ impl VerifySpec {
             pixel_um: s
                 .optional_float("pixel_um", Limits::new(0.1..=100.0, "um"))
                 .unwrap_or(5.86),
+            camera: s.has("camera").then(|| s.file("camera")),
             limits: LimitSpec::read(s.optional_section("limits").as_ref()),
         };
         s.finish();
@@ -118,6 +130,9 @@ impl LimitSpec {
             centroid_shift_max_um: f64::MAX,
             mtf_difference_max: f64::MAX,
             psf_difference_max: f64::MAX,
+            white_mtf_min: 0.0,
+            white_mtf_lp_mm: 42.7,
+            white_energy_2_pixels_min: 0.0,
         };
         let Some(s) = section else { return limits };
         let count = |key, default: u64| s.optional_integer(key, 0..=i64::MAX, "").map_or(default, |v| v as u64);
@@ -133,6 +148,12 @@ impl LimitSpec {
         limits.centroid_shift_max_um = real("centroid_shift_max_um", "um", limits.centroid_shift_max_um);
         limits.mtf_difference_max = real("mtf_difference_max", "", limits.mtf_difference_max);
         limits.psf_difference_max = real("psf_difference_max", "", limits.psf_difference_max);
+        let share = |key| s.optional_float(key, Limits::new(0.0..=1.0, "")).unwrap_or(0.0);
+        limits.white_mtf_min = share("white_mtf_min");
+        limits.white_energy_2_pixels_min = share("white_energy_2_pixels_min");
+        if let Some(lp_mm) = s.optional_float("white_mtf_lp_mm", Limits::new(1.0..=1000.0, "line pairs a millimetre")) {
+            limits.white_mtf_lp_mm = lp_mm;
+        }
         s.finish();
         limits
     }

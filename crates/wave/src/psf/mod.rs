@@ -8,6 +8,7 @@
 //! | all numbers that are reported | `metrics` |
 //! | what the best element of the same shape would do | `reference` |
 //! | how much two differ | `difference` |
+//! | a band of wavelengths from one direction | `polychromatic` |
 //! | shares of light in diffraction orders of a mapping | `orders` |
 
 mod difference;
@@ -15,6 +16,7 @@ mod energy;
 mod metrics;
 mod mtf;
 mod orders;
+mod polychromatic;
 mod reference;
 
 use metalith_core::part;
@@ -26,6 +28,7 @@ use crate::propagation::{Aperture, Field, Otf, PlaneWave, Propagator, Scratch, W
 pub use metrics::PsfMetrics;
 pub use mtf::{CONTRAST_LP_MM, CURVE_LP_MM, HALF_NYQUIST_LP_MM, NYQUIST_LP_MM, pixel_mtf};
 pub use orders::order_shares;
+pub use polychromatic::{BandPart, BandSample, Polychromatic, band_otf, polychromatic};
 pub use reference::Matched;
 
 /// |E|^2 / |E_inc|^2 on a window of the sensor's plane, E_inc in the medium of incidence.

@@ -1,0 +1,396 @@
+//! The camera file, read with a place for every mistake.
+
+use std::path::{Path, PathBuf};
+
+use metalith_core::document::{Document, Limits, Section, load};
+use metalith_core::{Error, Result};
+use serde::Serialize;
+
+use crate::{Channel, ColourFilter, Illuminant, Led, Response, Sensor, SensorNoise, Spectrum};
+
+/// Version of the format of camera files that this program reads.
+const SCHEMA: i64 = 1;
+
+/// Most channels of a sensor, and diodes of an illuminant.
+const MOST: usize = 16;
+
+/// A camera: sensor, channels, exposure and the light of the scene.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Camera {
+    /// Name of it, for reports.
+    pub name: String,
+    pub sensor: Sensor,
+    pub channels: Vec<Channel>,
+    pub illuminant: Illuminant,
+    pub exposure: Exposure,
+    /// The files that it was read from, itself first; none for the camera that is assumed where none is named.
+    #[serde(skip)]
+    pub files: Vec<PathBuf>,
+}
+
+/// How much light is let in.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Exposure {
+    /// Time (s).
+    pub time_s: f64,
+    /// Signal of a white surface of the scene, of full scale.
+    pub white: f64,
+}
+
+impl Camera {
+    /// Read the camera file at `path`, and the curves that it names.
+    ///
+    /// # Errors
+    /// [`Error::Text`] with every mistake of the file, each with line, column and remedy; [`Error::Table`] for a
+    /// curve that cannot be used; if a channel counts none of the light.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = load(path)?;
+        Document::read(path, &text, Draft::read)?.with_files(path)
+    }
+
+    /// The camera that is assumed where none is named: three channels of flat response, 400 to 500, 500 to 600 and
+    /// 600 to 700 nm, in light of equal energy, with the noise of Tseng et al. (2021).
+    pub fn three_bands(pixel_um: f64) -> Self {
+        let band = |name: &str, low: f64| Channel {
+            name: name.to_owned(),
+            response: Response::Band {
+                band_nm: [low, low + 100.0],
+                efficiency: 1.0,
+            },
+        };
+        let noise = metalith_wave::camera::Noise::default();
+        Self {
+            name: "three flat bands".into(),
+            sensor: Sensor {
+                pixel_um,
+                columns: 1936,
+                rows: 1216,
+                offset_um: [0.0; 2],
+                tilt_rad: [0.0; 2],
+                filter: ColourFilter::None,
+                bits: 12,
+                gain_e: 1.0,
+                noise: SensorNoise::FullScale {
+                    photon: noise.photon,
+                    read: noise.read,
+                },
+            },
+            channels: vec![band("blue", 400.0), band("green", 500.0), band("red", 600.0)],
+            illuminant: Illuminant::EqualEnergy,
+            exposure: Exposure {
+                time_s: 0.01,
+                white: 0.9,
+            },
+            files: Vec::new(),
+        }
+    }
+
+    /// Every channel must count something.
+    fn check_light(self, path: &Path) -> Result<Self> {
+        let dark = self.channels.iter().find(|c| !c.counts_any(&self.illuminant));
+        match dark {
+            None => Ok(self),
+            Some(channel) => Err(Error::Table {
+                path: path.to_owned(),
+                line: None,
+                what: format!("channel `{}` counts none of the light of the illuminant", channel.name),
+                hint: "let the efficiency of each channel and the illuminant overlap in wavelength".into(),
+            }),
+        }
+    }
+}
+
+/// What the file says, before the curves that it names are read.
+struct Draft {
+    name: String,
+    sensor: Sensor,
+    channels: Vec<(String, DraftResponse)>,
+    illuminant: DraftIlluminant,
+    exposure: Exposure,
+}
+
+enum DraftResponse {
+    Known(Response),
+    File(PathBuf),
+}
+
+enum DraftIlluminant {
+    Known(Illuminant),
+    File(PathBuf),
+}
+
+impl Draft {
+    fn read(root: &Section<'_, '_>) -> Self {
+        root.integer("schema", SCHEMA..=SCHEMA, "");
+        let name = root.text("name");
+        let sensor_section = root.section("sensor");
+        let sensor = read_sensor(&sensor_section);
+        let channels = read_channels(root, &sensor_section, &sensor);
+        Self {
+            name,
+            channels,
+            sensor,
+            illuminant: read_illuminant(&root.section("illuminant")),
+            exposure: read_exposure(&root.section("exposure")),
+        }
+    }
+
+    fn with_files(self, path: &Path) -> Result<Camera> {
+        let mut files = vec![path.to_owned()];
+        let mut channels = Vec::new();
+        for (name, response) in self.channels {
+            let response = match response {
+                DraftResponse::Known(response) => response,
+                DraftResponse::File(file) => {
+                    let curve = Spectrum::read_csv(&file, 1.0)?;
+                    files.push(file);
+                    Response::Curve(curve)
+                }
+            };
+            channels.push(Channel { name, response });
+        }
+        let illuminant = match self.illuminant {
+            DraftIlluminant::Known(illuminant) => illuminant,
+            DraftIlluminant::File(file) => {
+                let curve = Spectrum::read_csv(&file, f64::MAX)?;
+                files.push(file);
+                Illuminant::File(curve)
+            }
+        };
+        files.dedup();
+        let camera = Camera {
+            name: self.name,
+            sensor: self.sensor,
+            channels,
+            illuminant,
+            exposure: self.exposure,
+            files,
+        };
+        camera.check_light(path)
+    }
+}
+
+fn read_sensor(s: &Section<'_, '_>) -> Sensor {
+    let positive = |key: &str, least: f64, most: f64, unit: &'static str| s.float(key, Limits::new(least..=most, unit));
+    let optional = |key: &str, range, unit: &'static str, default: f64| {
+        s.optional_float(key, Limits::new(range, unit)).unwrap_or(default)
+    };
+    let bits = s.integer("bits", 1..=32, "bits") as u32;
+    let in_paper_terms = s.has("noise_photon") || s.has("noise_read");
+    let noise = if in_paper_terms {
+        for key in ["full_well_e", "read_noise_e", "dark_current_e_s"] {
+            // Read, so that the key is known; said to be one too many.
+            if s.optional_float(key, Limits::new(0.0..=f64::MAX, "electrons"))
+                .is_some()
+            {
+                s.fault(
+                    key,
+                    format!("noise is given twice: `{key}`, and in units of full scale"),
+                    "keep `noise_photon` and `noise_read`, or the numbers in electrons",
+                );
+            }
+        }
+        SensorNoise::FullScale {
+            photon: s.float("noise_photon", Limits::new(0.0..=1.0, "of full scale")),
+            read: s.float("noise_read", Limits::new(0.0..=1.0, "of full scale")),
+        }
+    } else {
+        SensorNoise::Electrons {
+            full_well_e: positive("full_well_e", 1.0, 1e9, "electrons"),
+            read_noise_e: positive("read_noise_e", 0.0, 1e6, "electrons"),
+            dark_current_e_s: optional("dark_current_e_s", 0.0..=1e9, "electrons a second", 0.0),
+        }
+    };
+    let full = match noise {
+        SensorNoise::Electrons { full_well_e, .. } => full_well_e,
+        SensorNoise::FullScale { photon, .. } if photon > 0.0 => 1.0 / photon,
+        SensorNoise::FullScale { .. } => f64::from(bits).exp2(),
+    };
+    let sensor = Sensor {
+        pixel_um: positive("pixel_um", 0.1, 100.0, "um"),
+        columns: s.integer("columns", 1..=100_000, "pixels") as u32,
+        rows: s.integer("rows", 1..=100_000, "pixels") as u32,
+        offset_um: s
+            .optional_array("offset_um", Limits::new(-1e5..=1e5, "um"))
+            .unwrap_or([0.0; 2]),
+        tilt_rad: s
+            .optional_array("tilt_deg", Limits::new(-20.0..=20.0, "degrees"))
+            .unwrap_or([0.0_f64; 2])
+            .map(f64::to_radians),
+        filter: s.choice(
+            "filter",
+            &[
+                ("none", ColourFilter::None),
+                ("rggb", ColourFilter::Rggb),
+                ("bggr", ColourFilter::Bggr),
+                ("grbg", ColourFilter::Grbg),
+                ("gbrg", ColourFilter::Gbrg),
+            ],
+            None,
+        ),
+        bits,
+        // Full scale is the whole of the well, unless the file says otherwise.
+        gain_e: optional("gain_e", 1e-6..=1e6, "electrons a step", full / f64::from(bits).exp2()),
+        noise,
+    };
+    s.finish();
+    sensor
+}
+
+fn read_channels(
+    root: &Section<'_, '_>,
+    sensor_section: &Section<'_, '_>,
+    sensor: &Sensor,
+) -> Vec<(String, DraftResponse)> {
+    let sections = root.sections("channel");
+    let mut channels: Vec<(String, DraftResponse)> = Vec::new();
+    for s in sections.iter().take(MOST) {
+        let name = s.text("name");
+        if channels.iter().any(|(known, _)| *known == name) {
+            s.fault(
+                "name",
+                format!("a second channel `{name}`"),
+                "give each channel a name of its own",
+            );
+        }
+        channels.push((name, read_response(s)));
+        s.finish();
+    }
+    if sections.is_empty() && !root.has("channel") {
+        root.fault(
+            "channel",
+            "a camera without channels counts no light",
+            "add one or more sections [[channel]]",
+        );
+    }
+    if sections.len() > MOST {
+        sections[MOST].fault("name", format!("more than {MOST} channels"), "leave some out");
+    }
+    let wanted = sensor.filter.channels();
+    let has = |name: &str| channels.iter().any(|(known, _)| known == name);
+    if let Some(wanted) = wanted
+        && !(channels.len() == wanted.len() && wanted.iter().all(|w| has(w)))
+        && sections.iter().all(|s| s.sound(&["channel.name"]))
+    {
+        sensor_section.fault(
+            "filter",
+            "this colour filter array does not fit the channels",
+            "name three channels red, green and blue, or use `filter = \"none\"`",
+        );
+    }
+    channels
+}
+
+fn read_response(s: &Section<'_, '_>) -> DraftResponse {
+    if s.has("quantum_efficiency") {
+        let file = s.file("quantum_efficiency");
+        for key in ["band_nm", "efficiency"] {
+            if s.has(key) {
+                s.floats("band_nm", WAVELENGTH);
+                s.optional_float("efficiency", Limits::new(0.0..=1.0, "electrons a photon"));
+                s.fault(
+                    key,
+                    "a channel has a curve or a band",
+                    format!("keep one of `quantum_efficiency` and `{key}`"),
+                );
+            }
+        }
+        return DraftResponse::File(file);
+    }
+    let band_nm: [f64; 2] = s.array("band_nm", WAVELENGTH);
+    if band_nm[0] >= band_nm[1] {
+        s.fault(
+            "band_nm",
+            "a band must end after it begins",
+            "give its shortest and its longest wavelength",
+        );
+    }
+    DraftResponse::Known(Response::Band {
+        band_nm,
+        efficiency: s
+            .optional_float("efficiency", Limits::new(1e-6..=1.0, "electrons a photon"))
+            .unwrap_or(1.0),
+    })
+}
+
+fn read_illuminant(s: &Section<'_, '_>) -> DraftIlluminant {
+    #[derive(Clone, Copy, PartialEq)]
+    enum Source {
+        D65,
+        A,
+        EqualEnergy,
+        File,
+        Leds,
+    }
+    let source = s.choice(
+        "source",
+        &[
+            ("d65", Source::D65),
+            ("a", Source::A),
+            ("equal_energy", Source::EqualEnergy),
+            ("file", Source::File),
+            ("leds", Source::Leds),
+        ],
+        None,
+    );
+    let illuminant = match source {
+        Source::D65 => DraftIlluminant::Known(Illuminant::D65),
+        Source::A => DraftIlluminant::Known(Illuminant::A),
+        Source::EqualEnergy => DraftIlluminant::Known(Illuminant::EqualEnergy),
+        Source::File => DraftIlluminant::File(s.file("file")),
+        Source::Leds => DraftIlluminant::Known(Illuminant::Leds(read_leds(s))),
+    };
+    for (key, of) in [("file", Source::File), ("led", Source::Leds)] {
+        if s.has(key) && source != of {
+            // Asked for, so that this is its one fault.
+            s.sections("led");
+            s.fault(
+                key,
+                format!("`{key}` is of no use with this source"),
+                "remove it, or change `source`",
+            );
+        }
+    }
+    s.finish();
+    illuminant
+}
+
+fn read_leds(s: &Section<'_, '_>) -> Vec<Led> {
+    let sections = s.sections("led");
+    if sections.is_empty() && !s.has("led") {
+        s.fault(
+            "source",
+            "there is no diode",
+            "add one or more sections [[illuminant.led]]",
+        );
+    }
+    if sections.len() > MOST {
+        sections[MOST].fault("centre_nm", format!("more than {MOST} diodes"), "leave some out");
+    }
+    let led = |s: &Section<'_, '_>| {
+        let led = Led {
+            centre_nm: s.float("centre_nm", WAVELENGTH),
+            width_nm: s.float("width_nm", Limits::new(0.1..=500.0, "nm")),
+            power: s.optional_float("power", Limits::new(1e-6..=1e6, "")).unwrap_or(1.0),
+        };
+        s.finish();
+        led
+    };
+    sections.iter().take(MOST).map(led).collect()
+}
+
+fn read_exposure(s: &Section<'_, '_>) -> Exposure {
+    let exposure = Exposure {
+        time_s: s.float("time_ms", Limits::new(1e-3..=1e6, "ms")) * 1e-3,
+        white: s
+            .optional_float("white", Limits::new(1e-6..=1.0, "of full scale"))
+            .unwrap_or(0.9),
+    };
+    s.finish();
+    exposure
+}
+
+const WAVELENGTH: Limits = Limits {
+    range: 200.0..=5000.0,
+    unit: "nm",
+};

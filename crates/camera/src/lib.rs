@@ -1,0 +1,27 @@
+//! The camera file: what stands behind a chip, and in which light.
+//!
+//! | question | file |
+//! | --- | --- |
+//! | which keys a camera file has | `file`; the table is in `docs/guide/verify.md` |
+//! | what a sensor is, and which noise it has | `sensor` |
+//! | which light a channel counts | `channel` |
+//! | the light of the scene | `illuminant` |
+//! | curves over wavelength, from CSV | `spectrum` |
+//! | a camera cut into wavelengths that are simulated | `sampling` |
+//!
+//! A channel counts photons: what it sees of a wavelength is the spectral power of the illuminant times the wavelength,
+//! times its quantum efficiency.
+
+mod channel;
+mod file;
+mod illuminant;
+mod sampling;
+mod sensor;
+mod spectrum;
+
+pub use channel::{Channel, Response};
+pub use file::{Camera, Exposure};
+pub use illuminant::{Illuminant, Led};
+pub use sampling::{ChannelPart, ChannelSampling, Sampling};
+pub use sensor::{ColourFilter, Sensor, SensorNoise};
+pub use spectrum::Spectrum;

@@ -1,0 +1,105 @@
+//! The sensor.
+
+use metalith_wave::camera::Noise;
+use serde::Serialize;
+
+/// The sensor and where it stands.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Sensor {
+    /// Edge of a pixel (um).
+    pub pixel_um: f64,
+    pub columns: u32,
+    pub rows: u32,
+    /// Middle of the sensor from the middle of the chip, x and y (um).
+    pub offset_um: [f64; 2],
+    /// Tilt of the sensor against the chip about the y and the x axis: the distance grows with x and with y (rad).
+    pub tilt_rad: [f64; 2],
+    pub filter: ColourFilter,
+    /// Bits of a pixel value.
+    pub bits: u32,
+    /// Electrons of one step of the pixel value.
+    pub gain_e: f64,
+    pub noise: SensorNoise,
+}
+
+/// Which channel each pixel counts: the square of two by two pixels in the corner of the first row and column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ColourFilter {
+    /// Every pixel counts all channels; a sensor without a filter has one.
+    None,
+    Rggb,
+    Bggr,
+    Grbg,
+    Gbrg,
+}
+
+/// What noise comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SensorNoise {
+    /// By the numbers of a data sheet.
+    Electrons {
+        /// Electrons that fill a pixel; full scale.
+        full_well_e: f64,
+        /// Standard deviation of reading (electrons).
+        read_noise_e: f64,
+        /// Electrons a second without light.
+        dark_current_e_s: f64,
+    },
+    /// By the two numbers of a paper, in units of full scale.
+    FullScale {
+        /// Signal of one photon, a_p.
+        photon: f64,
+        /// Standard deviation of reading, sigma_g.
+        read: f64,
+    },
+}
+
+impl SensorNoise {
+    /// For images between zero and full scale, exposed for so long (s). Electrons that come without light vary by the
+    /// root of their number, which is taken for part of reading; their mean is subtracted by every camera.
+    pub fn of_exposure(&self, time_s: f64) -> Noise {
+        match *self {
+            Self::Electrons {
+                full_well_e,
+                read_noise_e,
+                dark_current_e_s,
+            } => Noise {
+                photon: 1.0 / full_well_e,
+                read: (read_noise_e.powi(2) + dark_current_e_s * time_s).sqrt() / full_well_e,
+            },
+            Self::FullScale { photon, read } => Noise { photon, read },
+        }
+    }
+}
+
+impl ColourFilter {
+    /// Names of the channels that a sensor with this filter has; nothing without a filter, where any name will do.
+    pub fn channels(self) -> Option<[&'static str; 3]> {
+        (self != Self::None).then_some(["red", "green", "blue"])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_of_a_data_sheet_is_that_of_its_electrons() {
+        let sheet = SensorNoise::Electrons {
+            full_well_e: 10_000.0,
+            read_noise_e: 6.0,
+            dark_current_e_s: 64.0,
+        };
+        let noise = sheet.of_exposure(1.0);
+        // Half of full scale: 5000 photons, 36 of reading and 64 of the dark.
+        let electrons2 = noise.variance(0.5) * 1e8;
+        assert!((electrons2 - 5100.0).abs() < 1e-6, "{electrons2}");
+        let paper = SensorNoise::FullScale {
+            photon: 4e-5,
+            read: 1e-5,
+        };
+        assert_eq!(paper.of_exposure(7.0), Noise::default());
+    }
+}

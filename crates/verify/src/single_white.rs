@@ -1,0 +1,135 @@
+//! White light through the elements of a layout without a design.
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::case::{SimulationCase, TransmissionTables};
+use super::single::{Lighting, circle_um, distinct, widest_nm};
+use super::white::{CameraStatement, Channels, Point, STEP_NM, WhiteChannel, per_light};
+use metalith_camera::Camera;
+use metalith_core::{Error, Progress, Result, Wedge};
+use metalith_gds::extract::Extraction;
+use metalith_made::DrawnElement;
+use metalith_wave::psf::{BandSample, CURVE_LP_MM, Matched};
+use metalith_wave::{Accuracy, Fold, Pillars, Psf, Scratch, Window};
+
+/// One distinct element of a layout in white light.
+#[derive(Clone, Debug, Serialize)]
+pub struct SingleWhite {
+    /// Name of the element: of several with the same pillars, the first.
+    pub element: String,
+    pub channels: Vec<WhiteChannel>,
+}
+
+/// Simulate every distinct element of a layout in the light of a point of the scene, for a camera. The direction is
+/// that of the [`Lighting`]; `wedge` is that of the elements, which a layout does not tell: it decides where each
+/// wavelength lands.
+///
+/// # Errors
+/// If a cell has no answer at a wavelength of the camera, a wavelength does not reach the sensor, or the user stopped it.
+pub fn single_white(
+    found: &Extraction,
+    case: SimulationCase<'_>,
+    light: &Lighting,
+    camera: &Camera,
+    wedge: Wedge,
+    progress: &dyn Progress,
+) -> Result<(CameraStatement, Vec<SingleWhite>)> {
+    let sampling = camera.sampling(VISIBLE_NM, STEP_NM)?;
+    let elements = distinct(found);
+    let widest = widest_nm(&elements);
+    progress.begin(
+        "simulating white light",
+        (elements.len() * sampling.wavelengths_nm.len()) as u64,
+    );
+    let point = || Point {
+        wedge,
+        sines: light.incidence_sin,
+        distance_um: light.distance_um,
+    };
+    let tables = sampling.wavelengths_nm.iter().map(|nm| match case {
+        SimulationCase::Made(_) => Ok(None),
+        SimulationCase::Cell(cell) => {
+            let mut tables = TransmissionTables::in_band(cell, nm * 1e-3, widest)?;
+            if light.cells_as_lit {
+                tables.add_directions(cell, &[point().wave(nm * 1e-3)], widest, &metalith_core::Silent)?;
+            }
+            Ok(Some(tables))
+        }
+    });
+    let tables = tables.collect::<Result<Vec<_>>>()?;
+    let mut all = Vec::new();
+    for (site, widths) in elements {
+        let made = match case {
+            SimulationCase::Cell(_) => None,
+            SimulationCase::Made(chip) => {
+                let radius = light.aperture_radius_um.unwrap_or_else(|| circle_um(widths));
+                Some((chip, chip.element(&DrawnElement::new(widths, radius))?))
+            }
+        };
+        let views = sampling.wavelengths_nm.iter().map(|nm| match &made {
+            Some((chip, element)) => {
+                let wave = point().wave(nm * 1e-3);
+                chip.view_in_band(element, &wave, light.cells_as_lit, progress)
+                    .map(Some)
+            }
+            None => Ok(None),
+        });
+        let views = views.collect::<Result<Vec<_>>>()?;
+        let sample = |scratch: &mut Scratch, (nm, tables, view): (&f64, &Option<TransmissionTables>, _)| {
+            if progress.stopped() {
+                return Err(Error::Interrupted);
+            }
+            let (point, um) = (point(), nm * 1e-3);
+            let (wave, landing) = (point.wave(um), point.landing_um(um)?);
+            let pitch = widths.lattice.pitch_um();
+            let window = Window::about(landing, pitch, light.samples, light.distance_um);
+            let psf = match (view, tables) {
+                (Some(view), _) => metalith_made::MadeView::psf(view, window, Accuracy::Fast, &CURVE_LP_MM, scratch)?,
+                (None, Some(tables)) => {
+                    let mut of = |table: &Vec<Complex64>| {
+                        let pillars = Pillars::new(widths, table)?;
+                        let radius = metalith_wave::Aperture::radius_um(&pillars);
+                        let fold = Fold::plan(widths.lattice, radius, um, window, Accuracy::Fast)?;
+                        Ok::<_, Error>(Psf::formed(&fold, &pillars, &wave, &CURVE_LP_MM, scratch)?)
+                    };
+                    Psf::mean(tables.of(&wave).iter().map(&mut of).collect::<Result<_>>()?)
+                }
+                (None, None) => unreachable!("a case is a cell or a made chip"),
+            };
+            // Sites as drawn, whatever they transmit.
+            let ones = vec![Complex64::ONE; usize::from(widest) + 1];
+            let focus = [landing[0], landing[1], light.distance_um];
+            let full = case.full_transmission(um)?;
+            let matched = Matched::of(&Pillars::new(widths, &ones)?, focus, um, full);
+            progress.advance(1);
+            Ok(per_light(landing, psf, matched.power_um2))
+        };
+        let tasks: Vec<_> = sampling.wavelengths_nm.iter().zip(&tables).zip(&views).collect();
+        let samples: Vec<BandSample> = tasks
+            .into_par_iter()
+            .map_init(Scratch::default, |scratch, ((nm, tables), view)| {
+                sample(scratch, (nm, tables, view.as_ref()))
+            })
+            .collect::<Result<_>>()?;
+        let shown = Channels {
+            point: point(),
+            samples: &samples,
+            lp_mm: &CURVE_LP_MM,
+            pixel_um: camera.sensor.pixel_um,
+        };
+        all.push(SingleWhite {
+            element: site.name.clone(),
+            channels: sampling
+                .channels
+                .iter()
+                .map(|c| shown.channel(c))
+                .collect::<Result<_>>()?,
+        });
+    }
+    Ok((CameraStatement::of(camera, &sampling), all))
+}
+
+/// Wavelengths that cells of a layout without a design are asked for (nm).
+const VISIBLE_NM: [f64; 2] = [400.0, 700.0];

@@ -1,0 +1,460 @@
+//! A point of the scene in white light: all wavelengths of a channel arrive from one direction.
+//!
+//! A wedge sends each wavelength to another place of the sensor, so a point becomes a line. The direction is the one
+//! in which the element looks at the wavelength of its wedge. What is reported is for a channel of a camera: photons
+//! of the illuminant, times quantum efficiency, times what the element passes.
+
+use ndarray::Array2;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::case::{SimulationCase, TransmissionTables};
+use super::optics::ReadElement;
+use metalith_camera::{Camera, ChannelSampling, Sampling};
+use metalith_core::{Error, Lattice, Progress, Result, Wedge};
+use metalith_design::{CellIncidence, Design, Element};
+use metalith_made::MadeView;
+use metalith_wave::propagation::landing_um;
+use metalith_wave::psf::{BandPart, BandSample, CURVE_LP_MM, band_otf, pixel_mtf, polychromatic};
+use metalith_wave::{Accuracy, Fold, Matched, PhaseFunction, Pillars, PlaneWave, Psf, Scratch, Window};
+
+/// Largest distance of the wavelengths that are simulated (nm): eight intervals over a channel of 100 nm. How much
+/// this weighs is reported for each channel.
+pub(super) const STEP_NM: f64 = 12.5;
+
+/// The camera and the light that figures are for.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CameraStatement {
+    pub name: String,
+    pub illuminant: &'static str,
+    /// Edge of a pixel (um).
+    pub pixel_um: f64,
+    /// Wavelengths that were simulated (nm), common to all channels.
+    pub wavelengths_nm: Vec<f64>,
+}
+
+impl CameraStatement {
+    pub(super) fn of(camera: &Camera, sampling: &Sampling) -> Self {
+        Self {
+            name: camera.name.clone(),
+            illuminant: camera.illuminant.name(),
+            pixel_um: camera.sensor.pixel_um,
+            wavelengths_nm: sampling.wavelengths_nm.clone(),
+        }
+    }
+}
+
+/// Contrast along x and y, pixel included.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Contrast {
+    /// Frequency (line pairs a millimetre).
+    pub lp_mm: f64,
+    pub mtf: [f64; 2],
+}
+
+/// A point of the scene in one channel.
+#[derive(Clone, Debug, Serialize)]
+pub struct WhiteChannel {
+    pub channel: String,
+    /// Share of what the channel counts that lies within the wavelengths simulated.
+    pub counted: f64,
+    /// Direction sines of the point, for all wavelengths.
+    pub incidence_sin: [f64; 2],
+    /// Wavelengths up to which 10, 50 and 90 % of the light that passes have come (nm).
+    pub wavelengths_nm: [f64; 3],
+    /// Where the chief ray lands at these three, from the element's axis (um).
+    pub chief_ray_um: [[f64; 2]; 3],
+    /// From the first to the last of these places (um).
+    pub spread_um: f64,
+    /// Direction of the line between them, from the x axis (degrees, above -90 to 90); none where there is no spread.
+    pub spread_direction_deg: Option<f64>,
+    /// Place of the brightest sample from the element's axis (um).
+    pub peak_um: [f64; 2],
+    /// Share of the light that arrives at the element in a square of one pixel about the brightest place.
+    pub energy_1_pixel: f64,
+    /// The same in a square of two pixels an edge.
+    pub energy_2_pixels: f64,
+    /// Share of the light that arrives at the element and passes it.
+    pub energy_passed: f64,
+    /// Contrast over all light that passes.
+    pub contrast: Vec<Contrast>,
+    /// Largest change of the contrasts if every second wavelength is left out: an upper bound for the error of
+    /// sampling.
+    pub sampling_mtf: f64,
+    /// Share of light a um^2, for pictures.
+    #[serde(skip)]
+    pub(super) image: Array2<f32>,
+    /// Distance of its samples (um).
+    #[serde(skip)]
+    pub(super) step_um: f64,
+}
+
+impl WhiteChannel {
+    /// Contrast at a frequency (line pairs a millimetre) along the worse of x and y; not a number if it is not one of
+    /// those that were computed.
+    pub fn least_contrast(&self, lp_mm: f64) -> f64 {
+        let found = self.contrast.iter().find(|c| c.lp_mm == lp_mm);
+        found.map_or(f64::NAN, |c| c.mtf[0].min(c.mtf[1]))
+    }
+
+    /// Mean contrast of x and y at each frequency, from zero on.
+    pub(super) fn curve(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        let points = self.contrast.iter().map(|c| (c.lp_mm, 0.5 * (c.mtf[0] + c.mtf[1])));
+        std::iter::once((0.0, 1.0)).chain(points)
+    }
+}
+
+/// The camera of a design, and the wavelengths that it is simulated at. Nothing if the design names no camera and its
+/// materials are not known for visible light.
+///
+/// # Errors
+/// If the camera file cannot be used, or one of its channels counts no light at which the design's materials are known.
+pub(super) fn camera_of(design: &Design) -> Result<Option<(Camera, Sampling)>> {
+    let range_nm = range_nm(design)?;
+    if let Some(file) = &design.verify.camera {
+        let camera = Camera::read(file)?;
+        let sampling = camera.sampling(range_nm, STEP_NM)?;
+        return Ok(Some((camera, sampling)));
+    }
+    let camera = Camera::three_bands(design.verify.pixel_um);
+    let sampling = camera.sampling(range_nm, STEP_NM).ok();
+    Ok(sampling.map(|sampling| (camera, sampling)))
+}
+
+/// The visible and the wavelengths that the design names, where its materials are known (nm).
+fn range_nm(design: &Design) -> Result<[f64; 2]> {
+    let spec = design.table_spec()?;
+    let materials = [spec.stack.film.range_um(), spec.stack.substrate.range_um()];
+    let (low, high) = materials
+        .iter()
+        .fold(spec.band_um, |(low, high), (a, b)| (low.max(*a), high.min(*b)));
+    Ok([low * 1e3, high * 1e3])
+}
+
+/// One wavelength, with what all elements share.
+struct Colour {
+    wavelength_um: f64,
+    /// |t| of a cell that passes everything.
+    full: f64,
+    /// Of a cell, by drawn width; a chip as made has its own by site.
+    tables: Option<TransmissionTables>,
+}
+
+/// What the elements of a design are simulated with in white light.
+pub(super) struct WhiteSimulator<'a> {
+    design: &'a Design,
+    lattice: Lattice,
+    judge: SimulationCase<'a>,
+    camera: Camera,
+    sampling: Sampling,
+    colours: Vec<Colour>,
+    lp_mm: Vec<f64>,
+    /// Area of the sites of the lens (um^2).
+    area_um2: f64,
+}
+
+impl<'a> WhiteSimulator<'a> {
+    /// Solve the cells along the normal at the wavelengths of the camera; nothing if there is no camera to be had.
+    ///
+    /// # Errors
+    /// As [`camera_of`]; also if a cell cannot be solved.
+    pub fn new(design: &'a Design, lattice: Lattice, judge: SimulationCase<'a>) -> Result<Option<Self>> {
+        let Some((camera, sampling)) = camera_of(design)? else {
+            return Ok(None);
+        };
+        let widest_nm = design.cell.pitch_nm as u16;
+        let colour = |nm: &f64| {
+            let wavelength_um = nm * 1e-3;
+            let tables = match judge {
+                SimulationCase::Made(_) => None,
+                SimulationCase::Cell(cell) => Some(TransmissionTables::in_band(cell, wavelength_um, widest_nm)?),
+            };
+            Ok(Colour {
+                wavelength_um,
+                full: judge.full_transmission(wavelength_um)?,
+                tables,
+            })
+        };
+        let open = PhaseFunction {
+            lattice,
+            radius_um: design.lens.radius_um(),
+            amplitude: 1.0,
+            phase_rad: |_, _| 0.0,
+        };
+        let focus = [0.0, 0.0, design.lens.focal_length_um];
+        let mut lp_mm = CURVE_LP_MM.to_vec();
+        lp_mm.push(design.verify.limits.white_mtf_lp_mm);
+        lp_mm.sort_by(f64::total_cmp);
+        lp_mm.dedup();
+        Ok(Some(Self {
+            colours: sampling.wavelengths_nm.iter().map(colour).collect::<Result<_>>()?,
+            area_um2: Matched::of(&open, focus, design.mapping.wavelength_um, 1.0).power_um2,
+            design,
+            lattice,
+            judge,
+            camera,
+            sampling,
+            lp_mm,
+        }))
+    }
+
+    /// Solve the cells for light as it arrives at these elements, if the design asks for it.
+    ///
+    /// # Errors
+    /// If a cell has no answer, or the user stopped it.
+    pub fn add_directions(&mut self, elements: &[Element], progress: &dyn Progress) -> Result<()> {
+        let SimulationCase::Cell(cell) = self.judge else {
+            return Ok(());
+        };
+        if self.design.verify.incidence != CellIncidence::AsLit {
+            return Ok(());
+        }
+        progress.begin(
+            "solving cells as they are lit by white light",
+            (elements.len() * self.colours.len()) as u64,
+        );
+        let distance_um = self.design.lens.focal_length_um;
+        for colour in &mut self.colours {
+            let waves: Vec<_> = elements
+                .iter()
+                .map(|e| Point::of(e, distance_um).wave(colour.wavelength_um))
+                .collect();
+            if let Some(tables) = &mut colour.tables {
+                tables.add_directions(cell, &waves, self.design.cell.pitch_nm as u16, progress)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Number of PSFs of one element.
+    pub fn psfs(&self) -> usize {
+        self.colours.len()
+    }
+
+    /// What the figures are for.
+    pub fn statement(&self) -> CameraStatement {
+        CameraStatement::of(&self.camera, &self.sampling)
+    }
+
+    /// All channels of one element, in the case that judges.
+    ///
+    /// # Errors
+    /// If a cell cannot be solved, a wavelength does not reach the sensor, or the user stopped it.
+    pub fn simulate(
+        &self,
+        element: &Element,
+        read: &ReadElement<'_>,
+        progress: &dyn Progress,
+    ) -> Result<Vec<WhiteChannel>> {
+        let as_lit = self.design.verify.incidence == CellIncidence::AsLit;
+        let view = |colour: &Colour| match (self.judge, &read.made[0]) {
+            (SimulationCase::Made(chip), Some(made)) => {
+                let wave = self.point(element).wave(colour.wavelength_um);
+                chip.view_in_band(made, &wave, as_lit, progress).map(Some)
+            }
+            _ => Ok(None),
+        };
+        let views = self.colours.iter().map(view).collect::<Result<Vec<_>>>()?;
+        let samples = self
+            .colours
+            .par_iter()
+            .zip(views)
+            .map_init(Scratch::default, |scratch, (colour, view)| {
+                if progress.stopped() {
+                    return Err(Error::Interrupted);
+                }
+                let sample = self.sample(element, colour, view.as_ref(), read, scratch);
+                progress.advance(1);
+                sample
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let shown = Channels {
+            point: self.point(element),
+            samples: &samples,
+            lp_mm: &self.lp_mm,
+            pixel_um: self.camera.sensor.pixel_um,
+        };
+        let channels = self.sampling.channels.par_iter();
+        channels.map(|channel| shown.channel(channel)).collect()
+    }
+
+    /// The PSF of one wavelength about its own chief ray, per unit of light that arrives at the element.
+    fn sample(
+        &self,
+        element: &Element,
+        colour: &Colour,
+        view: Option<&MadeView<'_>>,
+        read: &ReadElement<'_>,
+        scratch: &mut Scratch,
+    ) -> Result<BandSample> {
+        let (lens, spec) = (&self.design.lens, &self.design.verify);
+        let point = self.point(element);
+        let wave = point.wave(colour.wavelength_um);
+        let landing = point.landing_um(colour.wavelength_um)?;
+        let pitch = self.lattice.pitch_um();
+        let window = Window::about(landing, pitch, spec.window_samples, lens.focal_length_um);
+        let psf = match (view, &colour.tables) {
+            (Some(view), _) => view.psf(window, Accuracy::Fast, &self.lp_mm, scratch)?,
+            (None, Some(tables)) => {
+                let radius_um = lens.radius_um();
+                let fold = Fold::plan(self.lattice, radius_um, colour.wavelength_um, window, Accuracy::Fast)?;
+                let mut of = |table: &Vec<num_complex::Complex64>| {
+                    let pillars = Pillars::new(read.drawn.pillars(), table)?;
+                    Ok::<_, Error>(Psf::formed(&fold, &pillars, &wave, &self.lp_mm, scratch)?)
+                };
+                Psf::mean(tables.of(&wave).iter().map(&mut of).collect::<Result<_>>()?)
+            }
+            (None, None) => unreachable!("a case is a cell or a made chip"),
+        };
+        Ok(per_light(landing, psf, colour.full * colour.full * self.area_um2))
+    }
+
+    fn point(&self, element: &Element) -> Point {
+        Point::of(element, self.design.lens.focal_length_um)
+    }
+}
+
+/// A PSF per unit of light that arrives at an element whose matched twin passes this power (um^2).
+pub(super) fn per_light(landing_um: [f64; 2], mut psf: Psf, power_um2: f64) -> BandSample {
+    let share = 1.0 / power_um2;
+    psf.values *= share;
+    if let Some(otf) = &mut psf.otf {
+        otf.scale(|_| share);
+        otf.power_um2 *= share;
+    }
+    BandSample { landing_um, psf }
+}
+
+/// What channels are made of.
+pub(super) struct Channels<'a> {
+    pub point: Point,
+    /// One at each wavelength of the sampling.
+    pub samples: &'a [BandSample],
+    /// Frequencies of the contrasts (line pairs a millimetre), those of the samples.
+    pub lp_mm: &'a [f64],
+    pub pixel_um: f64,
+}
+
+impl Channels<'_> {
+    /// One channel from the PSFs of all wavelengths.
+    ///
+    /// # Errors
+    /// If a wavelength does not reach the sensor.
+    pub fn channel(&self, channel: &ChannelSampling) -> Result<WhiteChannel> {
+        let landing = |nm: f64| self.point.landing_um(nm * 1e-3);
+        let parts = channel.parts.iter().map(|p| {
+            Ok(BandPart {
+                weight: p.weight,
+                landing_um: [landing(p.nm[0])?, landing(p.nm[1])?],
+                place: p.place,
+            })
+        });
+        let parts = parts.collect::<Result<Vec<_>>>()?;
+        let found = polychromatic(self.samples, &parts)?;
+        let pixel_um = self.pixel_um;
+        let psf = &found.psf;
+        let contrast: Vec<Contrast> = self
+            .lp_mm
+            .iter()
+            .map(|&lp_mm| Contrast {
+                lp_mm,
+                mtf: [0, 1].map(|axis| psf.contrast(axis, lp_mm) * pixel_mtf(pixel_um, lp_mm)),
+            })
+            .collect();
+        let [first, _, last] = found.landing_um;
+        let (dx, dy) = (last[0] - first[0], last[1] - first[1]);
+        let (_, peak_um) = psf.peak();
+        let nm = |at: f64| {
+            let i = (at as usize).min(channel.parts.len() - 1);
+            let [from, to] = channel.parts[i].nm;
+            from + (at - i as f64) * (to - from)
+        };
+        Ok(WhiteChannel {
+            channel: channel.name.clone(),
+            counted: channel.counted,
+            incidence_sin: self.point.sines,
+            wavelengths_nm: found.at_part.map(nm),
+            chief_ray_um: found.landing_um,
+            spread_um: dx.hypot(dy),
+            spread_direction_deg: (dx != 0.0 || dy != 0.0).then(|| line_direction_deg(dx, dy)),
+            peak_um,
+            energy_1_pixel: psf.energy_in_square_um2(peak_um, pixel_um),
+            energy_2_pixels: psf.energy_in_square_um2(peak_um, 2.0 * pixel_um),
+            energy_passed: psf.otf.as_ref().map_or_else(|| psf.energy_um2(), |otf| otf.power_um2),
+            sampling_mtf: self.sampling_error(&parts, &contrast)?,
+            contrast,
+            image: psf.values.mapv(|v| v.max(0.0) as f32),
+            step_um: psf.window.step_um,
+        })
+    }
+
+    /// Largest change of the contrasts without every second wavelength.
+    fn sampling_error(&self, parts: &[BandPart], contrast: &[Contrast]) -> Result<f64> {
+        let half: Vec<BandSample> = self.samples.iter().step_by(2).cloned().collect();
+        let parts: Vec<BandPart> = parts
+            .iter()
+            .map(|p| BandPart {
+                place: 0.5 * p.place,
+                ..*p
+            })
+            .collect();
+        let Some(otf) = band_otf(&half, &parts)? else {
+            return Ok(0.0);
+        };
+        let changes = contrast.iter().enumerate().flat_map(|(j, c)| {
+            let coarse = otf.contrast(j).map(|m| m * pixel_mtf(self.pixel_um, c.lp_mm));
+            [0, 1].map(|axis| (coarse[axis] - c.mtf[axis]).abs())
+        });
+        Ok(changes.fold(0.0, f64::max))
+    }
+}
+
+/// A point of the scene, and where an element sends its light.
+pub(super) struct Point {
+    pub wedge: Wedge,
+    /// Direction sines of the light of all wavelengths.
+    pub sines: [f64; 2],
+    /// From the pillar tops to the sensor (um).
+    pub distance_um: f64,
+}
+
+impl Point {
+    /// In the direction in which an element looks at the wavelength of its wedge.
+    fn of(element: &Element, distance_um: f64) -> Self {
+        let (x, y) = element.wedge.looks_at(element.wedge.wavelength_um);
+        Self {
+            wedge: element.wedge,
+            sines: [x, y],
+            distance_um,
+        }
+    }
+
+    /// Its light of one wavelength.
+    pub fn wave(&self, wavelength_um: f64) -> PlaneWave {
+        PlaneWave {
+            wavelength_um,
+            sin_x: self.sines[0],
+            sin_y: self.sines[1],
+        }
+    }
+
+    /// Where its chief ray of one wavelength lands, from the element's axis (um).
+    ///
+    /// # Errors
+    /// If it does not reach the sensor.
+    pub fn landing_um(&self, wavelength_um: f64) -> Result<[f64; 2]> {
+        Ok(landing_um(&self.wedge, &self.wave(wavelength_um), self.distance_um)?)
+    }
+}
+
+/// Direction of a line from the x axis (degrees), above -90 to 90.
+fn line_direction_deg(dx: f64, dy: f64) -> f64 {
+    let angle = dy.atan2(dx).to_degrees();
+    if angle > 90.0 {
+        angle - 180.0
+    } else if angle <= -90.0 {
+        angle + 180.0
+    } else {
+        angle
+    }
+}
