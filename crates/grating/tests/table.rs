@@ -18,20 +18,16 @@ use num_complex::{Complex32, Complex64};
 use truth_rows::Row;
 
 /// Differences from the truth, root mean square over gratings, with the grating itself left out of the table: share of
-/// the first order, mean of s and p (measured: 0.017, over all of the truth 0.017) and each polarisation (0.025, 0.021), share of the zero order (0.010, 0.018),
-/// phase of the first order (rad) less its mean over all of one wavelength and incidence (0.028, 0.026). The truth has two to four
-/// offsets of each row, which is 12 to 36 phases; the table has 24.
+/// the first order, mean of s and p (measured: 0.017) and each polarisation (0.021), share of the zero order (0.018),
+/// phase of the first order (rad) less its mean over all of one wavelength and incidence (0.026). The truth has two to
+/// four offsets of each row, which is 12 to 36 phases; the table has 24.
 const FIRST: f64 = 0.02;
-const FIRST_OF_ONE: f64 = 0.035;
+const FIRST_OF_ONE: f64 = 0.025;
 const ZERO: f64 = 0.02;
 const PHASE_RAD: f64 = 0.05;
 
 /// Gratings about that of a truth row that its table is made of (turns a site).
 const RADIUS: f64 = 0.1;
-
-/// The wavelength of the test, with light as a steered element sees it; the variable `METALITH_TEST_ALL` asks for all
-/// of the truth (minutes).
-const WAVELENGTH_NM: u32 = 530;
 
 /// Share of an order of a finite prism against that of its grating: the row ends within a turn, and its vector is 0.002
 /// from that of the grating.
@@ -70,15 +66,12 @@ fn over_offsets(rows: &[&Row], polarisation: usize) -> [f64; 3] {
 }
 
 #[test]
+#[ignore = "second tier: tables for every row of the truth take four CPU minutes"]
 fn truth_rows_follow_from_their_neighbours_in_the_table() {
     let prototype = Prototype::new();
-    let all = std::env::var_os("METALITH_TEST_ALL").is_some();
     let rows = truth_rows::read();
     let mut groups: BTreeMap<(u32, bool, usize, i32), Vec<&Row>> = BTreeMap::new();
-    for row in rows
-        .iter()
-        .filter(|r| all || (r.wavelength_nm == WAVELENGTH_NM && r.looks))
-    {
+    for row in &rows {
         let key = (row.wavelength_nm, row.looks, row.cells, row.turns);
         groups.entry(key).or_default().push(row);
     }
