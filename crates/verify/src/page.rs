@@ -13,6 +13,7 @@ use metalith_design::{CellIncidence, Design};
 use metalith_report::{
     Axis, Cell, Chart, Column, ImageGrid, Page, PillarZoom, Plan, Table, Verdict, count, exact, sig, write_json,
 };
+use metalith_wave::psf::HALF_NYQUIST_LP_MM;
 
 /// Decades of a PSF that are shown: below lies what a camera's noise hides.
 const PSF_DECADES: f64 = 4.0;
@@ -47,7 +48,8 @@ fn page(design: &Design, array: &PillarArray, found: &Verification) -> Page {
         ("Elements", found.elements.len().to_string()),
         ("of them distinct", found.distinct.len().to_string()),
         ("Strehl ratio, least to greatest", strehl(found)),
-        ("MTF at 42.7 lp/mm", contrast(found)),
+        ("MTF at 42.7 lp/mm, one wavelength", contrast(found)),
+        ("a whole channel from one direction", white_contrast(found)),
         ("File", format!("{} MB", sig(found.layout.bytes as f64 * 1e-6, 3))),
     ]);
     limits(&mut page, found);
@@ -74,10 +76,26 @@ fn contrast(found: &Verification) -> String {
     range(found, |psf| psf.mtf()[0])
 }
 
+/// The same in the light of each channel of the camera, along both axes.
+fn white_contrast(found: &Verification) -> String {
+    let channels = found.distinct.iter().flat_map(|d| &d.white);
+    let contrasts = channels.flat_map(|channel| &channel.contrast);
+    between(contrasts.filter(|c| c.lp_mm == HALF_NYQUIST_LP_MM).flat_map(|c| c.mtf))
+}
+
 fn range(found: &Verification, of: impl Fn(&PsfResult) -> f64) -> String {
-    let all = found.distinct.iter().flat_map(|d| &d.spots).map(|s| of(s.judged()));
-    let (least, most) = all.fold((f64::MAX, 0.0), |(a, b), v| (f64::min(a, v), f64::max(b, v)));
-    format!("{} to {}", sig(least, 2), sig(most, 2))
+    between(found.distinct.iter().flat_map(|d| &d.spots).map(|s| of(s.judged())))
+}
+
+/// Least and greatest in words.
+fn between(values: impl Iterator<Item = f64>) -> String {
+    let ends = values.fold(None, |ends: Option<(f64, f64)>, v| {
+        Some(ends.map_or((v, v), |(a, b)| (a.min(v), b.max(v))))
+    });
+    ends.map_or_else(
+        || "none".into(),
+        |(least, most)| format!("{} to {}", sig(least, 2), sig(most, 2)),
+    )
 }
 
 fn limits(page: &mut Page, found: &Verification) {

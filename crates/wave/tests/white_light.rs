@@ -126,13 +126,10 @@ fn eight_intervals_and_their_chief_rays_are_every_nanometre() {
         let otf = found.psf.otf.as_ref().unwrap();
         assert!((otf.power_um2 / exact_otf.power_um2 - 1.0).abs() < 1e-6);
         let alone = band_otf(&samples, &parts).unwrap().unwrap();
-        for j in 0..LP_MM.len() {
+        for (j, lp_mm) in LP_MM.iter().enumerate() {
             for axis in 0..2 {
                 let [got, want] = [otf, exact_otf].map(|o| o.contrast(j)[axis]);
-                println!(
-                    "{intervals} intervals, {} lp/mm, axis {axis}: {got}, brute force {want}",
-                    LP_MM[j]
-                );
+                println!("{intervals} intervals, {lp_mm} lp/mm, axis {axis}: {got}, brute force {want}");
                 assert!((got - want).abs() < most, "{intervals}: {got}, not {want}");
                 assert!((alone.contrast(j)[axis] - got).abs() < 1e-9);
             }

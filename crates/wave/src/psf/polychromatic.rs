@@ -411,8 +411,8 @@ mod tests {
             assert!((otf.power_um2 - 2.0).abs() < ROUNDING);
             for (j, f) in LP_MM.iter().enumerate() {
                 let own = (-2.0 * (std::f64::consts::PI * narrow * f * 1e-3).powi(2)).exp();
-                for axis in 0..2 {
-                    let way = ends[1][axis] - ends[0][axis];
+                let way = [0, 1].map(|axis| ends[1][axis] - ends[0][axis]);
+                for (axis, way) in way.into_iter().enumerate() {
                     let want = own * sinc(f * 1e-3 * way).abs();
                     assert!((otf.contrast(j)[axis] - want).abs() < ROUNDING, "{parts} parts, {f}");
                     // The image is that of the same light.
