@@ -212,6 +212,7 @@ fn every_effect_is_the_same_in_every_command() {
 }
 
 #[test]
+#[ignore = "second tier: CPU time, run by .ci/run"]
 fn cells_as_lit_are_the_same_in_every_command() {
     let folder = tempfile::tempdir().unwrap();
     let mut files = Files::write(folder.path());
@@ -226,6 +227,7 @@ fn cells_as_lit_are_the_same_in_every_command() {
 }
 
 #[test]
+#[ignore = "second tier: CPU time, run by .ci/run"]
 fn the_program_applies_what_it_once_left_out_and_names_what_it_cannot() {
     let folder = tempfile::tempdir().unwrap();
     let files = Files::write(folder.path());

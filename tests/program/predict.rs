@@ -65,6 +65,7 @@ fn a_bias_of_whole_steps_is_drawn_the_other_way() {
 }
 
 #[test]
+#[ignore = "second tier: CPU time, run by .ci/run"]
 fn what_cannot_be_undone_is_made_less() {
     let design = mini();
     let array = PillarArray::build(&design, &Silent).unwrap();
@@ -89,6 +90,7 @@ fn what_cannot_be_undone_is_made_less() {
 }
 
 #[test]
+#[ignore = "second tier: CPU time, run by .ci/run"]
 fn the_program_predicts_and_compensates() {
     let folder = tempfile::tempdir().unwrap();
     let narrow = folder.path().join("narrow.toml");

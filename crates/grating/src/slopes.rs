@@ -11,7 +11,7 @@ use metalith_core::Lattice;
 /// a site over them; where the phase of rings jumps, the mean over so many is needed.
 pub const BLOCK: usize = 32;
 
-/// Grating vectors over an element (turns a site along x and y), one for each block of [`BLOCK`] by [`BLOCK`] sites.
+/// Grating vectors over an element (turns a site along x and y), one for each block of 32 by 32 sites.
 #[derive(Clone, Debug)]
 pub struct SlopeMap {
     blocks: usize,
