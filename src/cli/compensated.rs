@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metalith::compensate::compensate;
+use metalith::compensate::{compensate, compensated_name};
 use metalith::{CalibratedModel, Design, PillarArray, Result};
 
 use super::Terminal;
@@ -13,7 +13,7 @@ use super::Terminal;
 pub struct CompensatedFor {
     /// The layout was made by `metalith layout --compensate MODEL`: its pillars are compared with those of the
     /// compensated design.
-    #[arg(long = "compensated", value_name = "MODEL")]
+    #[arg(long = "compensated", value_name = "MODEL", requires = "design")]
     pub model: Option<PathBuf>,
 }
 
@@ -29,7 +29,7 @@ impl CompensatedFor {
             None => Ok(array),
             Some(model) => {
                 let compensated = compensate(design, &array, &model, terminal)?;
-                design.name.push_str("_compensated");
+                design.name = compensated_name(&design.name);
                 Ok(compensated.array)
             }
         }

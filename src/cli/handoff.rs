@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use metalith::compensate::compensated_name;
 use metalith::handoff::{Handoff, HandoffOptions, HandoffVerification, handoff, verify_handoff};
 use metalith::report::Verdict;
 use metalith::{Accuracy, Design, Result};
@@ -71,8 +72,13 @@ fn make(design: &Path, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcom
     let out = match &args.out {
         Some(out) => out.clone(),
         None => {
-            let suffix = if args.compensate.is_some() { "_compensated" } else { "" };
-            PathBuf::from("out").join(format!("{}{suffix}_handoff", Design::read(design)?.name))
+            let design = Design::read(design)?.name;
+            let name = if args.compensate.is_some() {
+                compensated_name(&design)
+            } else {
+                design
+            };
+            PathBuf::from("out").join(format!("{name}_handoff"))
         }
     };
     let options = HandoffOptions {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use metalith::CalibratedModel;
-use metalith::compensate::{compensate, write_compensation_report};
+use metalith::compensate::{compensate, compensated_name, write_compensation_report};
 use metalith::layout::Written;
 use metalith::report::{count, sig};
 use metalith::{Design, Hierarchy, PillarArray, Result, write_apertures, write_layer_properties, write_pillars};
@@ -107,7 +107,7 @@ pub fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
     if let Some(path) = &args.compensate {
         let model = CalibratedModel::read(path)?;
         let compensated = compensate(&design, &array, &model, terminal)?;
-        design.name.push_str("_compensated");
+        design.name = compensated_name(&design.name);
         let intended = std::mem::replace(&mut array, compensated.array.clone());
         compensation = Some((model, intended, compensated));
     }

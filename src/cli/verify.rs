@@ -6,7 +6,7 @@ use clap::Args;
 use metalith::design::CellIncidence;
 use metalith::report::sig;
 use metalith::{
-    Accuracy, CalibratedModel, Design, Fidelity, MadeChip, PillarArray, Result, SimulationCases, Verification,
+    Accuracy, CalibratedModel, Design, Error, Fidelity, MadeChip, PillarArray, Result, SimulationCases, Verification,
     cell_models, verify, write_report,
 };
 
@@ -44,9 +44,9 @@ pub struct Judging {
     #[arg(long)]
     fast: bool,
 
-    /// The cell that the layout is judged by.
-    #[arg(long, value_enum, default_value = "rigorous")]
-    fidelity: FidelityArg,
+    /// The cell that the layout is judged by; `rigorous` if left out.
+    #[arg(long, value_enum)]
+    fidelity: Option<FidelityArg>,
 
     /// Judge the chip as a measured line and bench make it: the `model.toml` that `metalith calibrate` wrote. What
     /// it says of lamps cannot be applied to PSFs of one wavelength and point, and is listed.
@@ -103,7 +103,7 @@ impl Judging {
             Some(model) => Some(MadeChip::new(&design.cell_stack()?, model)?),
             None => None,
         };
-        let judge = Fidelity::from(self.fidelity);
+        let judge = self.fidelity.map_or(Fidelity::Rigorous, Fidelity::from);
         let beside = [Fidelity::Rigorous, Fidelity::Fitted, Fidelity::Published];
         let beside = beside.into_iter().filter(|f| *f != judge);
         let wanted = std::iter::once(judge).chain(beside).collect::<Vec<_>>();
@@ -167,6 +167,12 @@ pub fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
         .out
         .clone()
         .unwrap_or_else(|| args.layout.parent().map_or_else(PathBuf::new, Path::to_owned));
+    if args.compensated.model.is_some() && args.judging.fidelity.is_some() {
+        return Err(Error::invalid(
+            "`--fidelity` describes pillars as drawn, and a compensated layout is judged as it is made",
+            "leave out `--fidelity`, or give the original design's layout without `--compensated`",
+        ));
+    }
     // A compensated layout is right when it is made, not as it is drawn.
     let judging = Judging {
         model: args.judging.model.clone().or_else(|| args.compensated.model.clone()),

@@ -81,8 +81,9 @@ pub trait CellModel: Sync {
         self.transmissions(wavelength_um, max_width_nm)
     }
 
-    /// The same as [`CellModel::transmissions`] for light that arrives obliquely: one table for light polarised across the plane of incidence
-    /// (s) and one for light polarised in it (p). `sines` are those of the direction in air along x and y.
+    /// The same as [`CellModel::transmissions`] for light that arrives obliquely: one table for light polarised across
+    /// the plane of incidence (s) and one for light polarised in it (p). `sines` are those of the direction in air
+    /// along x and y.
     ///
     /// Scaled so that |t| of a cell that passes all its power in the zero order is that of
     /// [`CellModel::full_transmission`], as at normal incidence. What little is turned from one polarisation

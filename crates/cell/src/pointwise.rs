@@ -50,6 +50,30 @@ impl PointwiseCell {
             orders,
         }
     }
+
+    /// At most as many orders as the cell was made with.
+    fn at_most(&self, orders: usize) -> Result<Orders> {
+        Ok(Orders::new(orders.min(self.orders.along_axis()))?)
+    }
+
+    fn normal(&self, orders: usize, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
+        let orders = self.at_most(orders)?;
+        let solve = |w| Ok([self.stack.transmission(f64::from(w), wavelength_um, orders)?]);
+        let [table] = tabulate(&self.widths_nm, max_width_nm, solve)?;
+        Ok(table)
+    }
+
+    fn tilted(
+        &self,
+        orders: usize,
+        wavelength_um: f64,
+        sines: [f64; 2],
+        max_width_nm: u16,
+    ) -> Result<[Vec<Complex64>; 2]> {
+        let orders = self.at_most(orders)?;
+        let solve = |w| self.stack.oblique(f64::from(w), wavelength_um, sines, orders);
+        tabulate(&self.widths_nm, max_width_nm, solve)
+    }
 }
 
 impl CellModel for PointwiseCell {
@@ -58,22 +82,16 @@ impl CellModel for PointwiseCell {
     }
 
     fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
-        let solve = |w| Ok([self.stack.transmission(f64::from(w), wavelength_um, self.orders)?]);
-        let [table] = tabulate(&self.widths_nm, max_width_nm, solve)?;
-        Ok(table)
+        self.normal(self.orders.along_axis(), wavelength_um, max_width_nm)
     }
 
     fn transmissions_in_band(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
-        let orders = Orders::new(BAND_ORDERS.min(self.orders.along_axis()))?;
-        let solve = |w| Ok([self.stack.transmission(f64::from(w), wavelength_um, orders)?]);
-        let [table] = tabulate(&self.widths_nm, max_width_nm, solve)?;
-        Ok(table)
+        self.normal(BAND_ORDERS, wavelength_um, max_width_nm)
     }
 
     fn oblique(&self, wavelength_um: f64, sines: [f64; 2], max_width_nm: u16) -> Result<Option<[Vec<Complex64>; 2]>> {
-        let orders = Orders::new(OBLIQUE_ORDERS.min(self.orders.along_axis()))?;
-        let solve = |w| self.stack.oblique(f64::from(w), wavelength_um, sines, orders);
-        tabulate(&self.widths_nm, max_width_nm, solve).map(Some)
+        self.tilted(OBLIQUE_ORDERS, wavelength_um, sines, max_width_nm)
+            .map(Some)
     }
 
     fn oblique_in_band(
@@ -82,9 +100,8 @@ impl CellModel for PointwiseCell {
         sines: [f64; 2],
         max_width_nm: u16,
     ) -> Result<Option<[Vec<Complex64>; 2]>> {
-        let orders = Orders::new(OBLIQUE_BAND_ORDERS.min(self.orders.along_axis()))?;
-        let solve = |w| self.stack.oblique(f64::from(w), wavelength_um, sines, orders);
-        tabulate(&self.widths_nm, max_width_nm, solve).map(Some)
+        self.tilted(OBLIQUE_BAND_ORDERS, wavelength_um, sines, max_width_nm)
+            .map(Some)
     }
 
     fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {

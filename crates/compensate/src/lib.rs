@@ -24,6 +24,14 @@ pub use page::write_compensation_report;
 /// Passes over the layout: the second sees the density of what the first has drawn.
 const PASSES: usize = 2;
 
+/// What the name of a design ends in when its layout is compensated.
+const SUFFIX: &str = "_compensated";
+
+/// The name of the compensated layout of a design, and of its folder.
+pub fn compensated_name(design: &str) -> String {
+    format!("{design}{SUFFIX}")
+}
+
 /// A compensated array and what it is worth.
 pub struct Compensated {
     /// Widths to draw.

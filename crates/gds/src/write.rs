@@ -26,6 +26,7 @@ impl SquareRecord {
     }
 
     /// Append the square of an even width about a centre, both in database units, corners counter-clockwise from the lower left.
+    #[inline]
     pub fn append(&self, out: &mut Vec<u8>, x: i32, y: i32, width: u16) {
         let half = i32::from(width) / 2;
         let (left, low, right, high) = (x - half, y - half, x + half, y + half);
@@ -67,6 +68,7 @@ impl ReferenceRecord {
     }
 
     /// Append the reference at a place in database units.
+    #[inline]
     pub fn append(&self, out: &mut Vec<u8>, x: i32, y: i32) {
         let start = out.len() + self.place;
         out.extend_from_slice(&self.record);

@@ -98,7 +98,7 @@ impl<'a> GratingPillars<'a> {
             bins.push(number);
         }
         Ok(Self {
-            radius_um: radius_um(widths),
+            radius_um: widths.circle_um(),
             blocks: widths.lattice.sites().div_ceil(BLOCK),
             widths,
             slopes,
@@ -155,18 +155,6 @@ fn drawn_widths(widths: &WidthMap) -> Vec<u16> {
         .filter(|(w, n)| *w == 0 || *n > 0)
         .map(|(w, _)| w as u16)
         .collect()
-}
-
-/// Radius of the circle about the centre that holds all pillars (um).
-fn radius_um(widths: &WidthMap) -> f64 {
-    let mut radius2 = 0;
-    for (iy, row) in widths.width_nm.outer_iter().enumerate() {
-        let mut ends = row.iter().enumerate().filter(|(_, w)| **w != 0).map(|(ix, _)| ix);
-        for ix in ends.next().into_iter().chain(ends.next_back()) {
-            radius2 = radius2.max(widths.lattice.half_radius2(ix, iy));
-        }
-    }
-    (radius2 as f64).sqrt() * 0.5 * widths.lattice.pitch_um()
 }
 
 fn single(t: Complex64) -> Complex32 {

@@ -7,9 +7,10 @@ use super::listing::Listing;
 use super::options::HandoffOptions;
 use super::process::Process;
 use metalith_camera::Camera;
+use metalith_compensate::compensated_name;
 use metalith_core::file::read_at_most;
 use metalith_core::text::is_printable;
-use metalith_core::{Error, Result};
+use metalith_core::{Error, Result, document};
 use metalith_design::Design;
 use metalith_design::phase::RadialPhase;
 use metalith_drc::{Deck, Waivers};
@@ -82,11 +83,11 @@ impl Sources {
         let model = match &options.compensate {
             None => None,
             Some(path) => {
-                let bytes = read_at_most(path, LONGEST, "a model file")?;
+                let text = document::load(path)?;
                 let purpose = "the calibrated model that the layout is compensated for";
-                kept.push(InputCopy::new("model_", path, purpose, &bytes));
-                design.name.push_str("_compensated");
-                Some(CalibratedModel::read(path)?)
+                kept.push(InputCopy::new("model_", path, purpose, text.as_bytes()));
+                design.name = compensated_name(&design.name);
+                Some(CalibratedModel::parse(path, &text)?)
             }
         };
         Ok(Self {

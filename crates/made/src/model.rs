@@ -38,16 +38,23 @@ impl CalibratedModel {
     /// Read a model file.
     ///
     /// # Errors
-    /// If it cannot be read or is not such a file; all numbers that cannot be at once.
+    /// If it cannot be read; as [`CalibratedModel::parse`].
     pub fn read(path: &Path) -> Result<Self> {
-        let text = document::load(path)?;
+        Self::parse(path, &document::load(path)?)
+    }
+
+    /// A model from the text of the file at `path`.
+    ///
+    /// # Errors
+    /// If it is not such a file; all numbers that cannot be at once.
+    pub fn parse(path: &Path, text: &str) -> Result<Self> {
         let fault = |what: String| Error::Table {
             path: path.to_owned(),
             line: None,
             what,
             hint: "give the `model.toml` that `metalith calibrate` has written".into(),
         };
-        let model: Self = toml::from_str(&text).map_err(|e| fault(e.to_string()))?;
+        let model: Self = toml::from_str(text).map_err(|e| fault(e.to_string()))?;
         if !(1..=SCHEMA).contains(&model.schema) {
             return Err(fault(format!(
                 "this is a model of schema {}, 1 to {SCHEMA} are known",

@@ -6,9 +6,9 @@ use num_complex::Complex64;
 
 use metalith_cell::{CellModel, Fidelity};
 use metalith_core::Progress;
-use metalith_core::{Error, Result};
+use metalith_core::{Error, Result, WidthMap};
 use metalith_made::{MadeChip, cell_direction};
-use metalith_wave::PlaneWave;
+use metalith_wave::{Fold, Pillars, PlaneWave, Psf, Scratch};
 
 /// What the pillars of a layout are simulated as.
 #[derive(Clone, Copy)]
@@ -159,8 +159,24 @@ impl TransmissionTables {
         Ok(())
     }
 
+    /// The PSF of pillars for a wave on a window: the mean over polarisations where cells are solved at its angle.
+    ///
+    /// # Errors
+    /// As [`Psf::formed`].
+    pub fn psf(
+        &self,
+        widths: &WidthMap,
+        wave: &PlaneWave,
+        fold: &Fold,
+        lp_mm: &[f64],
+        scratch: &mut Scratch,
+    ) -> Result<Psf> {
+        let of = |table: &Vec<Complex64>| Ok(Psf::formed(fold, &Pillars::new(widths, table)?, wave, lp_mm, scratch)?);
+        Ok(Psf::mean(self.of(wave).iter().map(of).collect::<Result<_>>()?))
+    }
+
     /// The tables whose PSFs are to be averaged: one along the normal, one for each polarisation else.
-    pub fn of(&self, wave: &PlaneWave) -> &[Vec<Complex64>] {
+    fn of(&self, wave: &PlaneWave) -> &[Vec<Complex64>] {
         match self.oblique.get(&key(cell_direction(wave))) {
             Some(both) => both,
             None => std::slice::from_ref(&self.normal),

@@ -16,7 +16,7 @@ use metalith_design::{CellIncidence, Design, Element, FieldAngle};
 use metalith_made::{DrawnElement, MadeChip, MadeElement, MadeView};
 use metalith_wave::propagation::{incident, landing_um};
 use metalith_wave::psf::{CONTRAST_LP_MM, CURVE_LP_MM};
-use metalith_wave::{Accuracy, Fold, Matched, PhaseFunction, PhaseMap, Pillars, PlaneWave, Psf, Scratch, Window};
+use metalith_wave::{Accuracy, Fold, Matched, PhaseFunction, PhaseMap, PlaneWave, Psf, Scratch, Window};
 
 /// One wavelength, with what all elements and angles share.
 struct Colour {
@@ -275,12 +275,7 @@ impl<'a> ElementSimulator<'a> {
             };
             let found = match (&at.tables, view) {
                 (_, Some(view)) => view.psf(window, self.accuracy, lp_mm, scratch)?,
-                (Some(tables), None) => {
-                    let mut of = |table: &Vec<Complex64>| {
-                        Ok::<_, Error>(Psf::formed(&fold, &Pillars::new(widths, table)?, wave, lp_mm, scratch)?)
-                    };
-                    Psf::mean(tables.of(wave).iter().map(&mut of).collect::<Result<_>>()?)
-                }
+                (Some(tables), None) => tables.psf(widths, wave, &fold, lp_mm, scratch)?,
                 (None, None) => unreachable!("a case is a cell or a made chip"),
             };
             let matched = scaled(&perfect, at.full);

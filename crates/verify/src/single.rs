@@ -20,7 +20,7 @@ use metalith_gds::extract::{ElementSite, Extraction};
 use metalith_made::{DrawnElement, MadeChip, ModelStatement};
 use metalith_report::{Cell, Column, ImageGrid, Page, PillarZoom, Table, count, sig, write_json};
 use metalith_wave::psf::{CONTRAST_LP_MM, Matched, Psf, PsfMetrics};
-use metalith_wave::{Accuracy, Aperture, Fold, Pillars, PlaneWave, Scratch, Window};
+use metalith_wave::{Accuracy, Fold, Pillars, PlaneWave, Scratch, Window};
 
 /// In what light, and where on the sensor.
 #[derive(Clone, Debug)]
@@ -117,19 +117,9 @@ fn by_cell(
             if progress.stopped() {
                 return Err(Error::Interrupted);
             }
-            let mut of = |table: &Vec<Complex64>| {
-                let pillars = Pillars::new(widths, table)?;
-                let window = light.window(widths.lattice);
-                let fold = Fold::plan(
-                    widths.lattice,
-                    pillars.radius_um(),
-                    wavelength_um,
-                    window,
-                    light.accuracy,
-                )?;
-                Ok(Psf::formed(&fold, &pillars, &wave, &CONTRAST_LP_MM, scratch)?)
-            };
-            let psf = Psf::mean(tables.of(&wave).iter().map(&mut of).collect::<Result<_>>()?);
+            let (window, radius_um) = (light.window(widths.lattice), widths.circle_um());
+            let fold = Fold::plan(widths.lattice, radius_um, wavelength_um, window, light.accuracy)?;
+            let psf = tables.psf(widths, &wave, &fold, &CONTRAST_LP_MM, scratch)?;
             progress.advance(1);
             Ok(psf)
         })
@@ -147,7 +137,7 @@ fn as_made(
     let wave = light.wave(wavelength_um);
     let radius_um = |widths: &WidthMap| match light.aperture_radius_um {
         Some(radius) => radius,
-        None => circle_um(widths),
+        None => widths.circle_um(),
     };
     let made = elements
         .iter()
@@ -173,13 +163,6 @@ fn as_made(
             Ok(psf)
         })
         .collect()
-}
-
-/// Radius of the circle about the element's centre that holds all of its pillars (um).
-pub(super) fn circle_um(widths: &WidthMap) -> f64 {
-    let standing = widths.width_nm.indexed_iter().filter(|(_, w)| **w > 0);
-    let radius2 = standing.map(|((iy, ix), _)| widths.lattice.half_radius2(ix, iy)).max();
-    (radius2.unwrap_or(0) as f64).sqrt() * 0.5 * widths.lattice.pitch_um()
 }
 
 pub(super) fn widest_nm(elements: &[(&ElementSite, &WidthMap)]) -> u16 {

@@ -5,14 +5,14 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::case::{SimulationCase, TransmissionTables};
-use super::single::{Lighting, circle_um, distinct, widest_nm};
+use super::single::{Lighting, distinct, widest_nm};
 use super::white::{CameraStatement, Channels, Point, STEP_NM, WhiteChannel, per_light};
 use metalith_camera::Camera;
 use metalith_core::{Error, Progress, Result, Wedge};
 use metalith_gds::extract::Extraction;
 use metalith_made::DrawnElement;
 use metalith_wave::psf::{BandSample, CURVE_LP_MM, Matched};
-use metalith_wave::{Accuracy, Fold, Pillars, Psf, Scratch, Window};
+use metalith_wave::{Accuracy, Fold, Pillars, Scratch, Window};
 
 /// One distinct element of a layout in white light.
 #[derive(Clone, Debug, Serialize)]
@@ -64,7 +64,7 @@ pub fn single_white(
         let made = match case {
             SimulationCase::Cell(_) => None,
             SimulationCase::Made(chip) => {
-                let radius = light.aperture_radius_um.unwrap_or_else(|| circle_um(widths));
+                let radius = light.aperture_radius_um.unwrap_or_else(|| widths.circle_um());
                 Some((chip, chip.element(&DrawnElement::new(widths, radius))?))
             }
         };
@@ -88,13 +88,8 @@ pub fn single_white(
             let psf = match (view, tables) {
                 (Some(view), _) => metalith_made::MadeView::psf(view, window, Accuracy::Fast, &CURVE_LP_MM, scratch)?,
                 (None, Some(tables)) => {
-                    let mut of = |table: &Vec<Complex64>| {
-                        let pillars = Pillars::new(widths, table)?;
-                        let radius = metalith_wave::Aperture::radius_um(&pillars);
-                        let fold = Fold::plan(widths.lattice, radius, um, window, Accuracy::Fast)?;
-                        Ok::<_, Error>(Psf::formed(&fold, &pillars, &wave, &CURVE_LP_MM, scratch)?)
-                    };
-                    Psf::mean(tables.of(&wave).iter().map(&mut of).collect::<Result<_>>()?)
+                    let fold = Fold::plan(widths.lattice, widths.circle_um(), um, window, Accuracy::Fast)?;
+                    tables.psf(widths, &wave, &fold, &CURVE_LP_MM, scratch)?
                 }
                 (None, None) => unreachable!("a case is a cell or a made chip"),
             };

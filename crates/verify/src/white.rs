@@ -16,7 +16,7 @@ use metalith_design::{CellIncidence, Design, Element};
 use metalith_made::MadeView;
 use metalith_wave::propagation::landing_um;
 use metalith_wave::psf::{BandPart, BandSample, CURVE_LP_MM, band_otf, pixel_mtf, polychromatic};
-use metalith_wave::{Accuracy, Fold, Matched, PhaseFunction, Pillars, PlaneWave, Psf, Scratch, Window};
+use metalith_wave::{Accuracy, Fold, Matched, PhaseFunction, PlaneWave, Psf, Scratch, Window};
 
 /// Largest distance of the wavelengths that are simulated (nm): eight intervals over a channel of 100 nm. How much
 /// this weighs is reported for each channel.
@@ -298,11 +298,7 @@ impl<'a> WhiteSimulator<'a> {
             (None, Some(tables)) => {
                 let radius_um = lens.radius_um();
                 let fold = Fold::plan(self.lattice, radius_um, colour.wavelength_um, window, Accuracy::Fast)?;
-                let mut of = |table: &Vec<num_complex::Complex64>| {
-                    let pillars = Pillars::new(read.drawn.pillars(), table)?;
-                    Ok::<_, Error>(Psf::formed(&fold, &pillars, &wave, &self.lp_mm, scratch)?)
-                };
-                Psf::mean(tables.of(&wave).iter().map(&mut of).collect::<Result<_>>()?)
+                tables.psf(read.drawn.pillars(), &wave, &fold, &self.lp_mm, scratch)?
             }
             (None, None) => unreachable!("a case is a cell or a made chip"),
         };

@@ -3,6 +3,8 @@
 mod symmetry;
 mod widths;
 
+use std::borrow::Cow;
+
 pub use symmetry::{DomainPart, Symmetry, SymmetryGroup};
 pub use widths::WidthRule;
 
@@ -75,9 +77,13 @@ impl PillarArray {
         self.placed.iter().map(|p| of_class[p.class]).sum()
     }
 
-    /// The pillars of one element.
-    pub fn widths(&self, placed: &PlacedElement) -> WidthMap {
-        placed.symmetry.apply(&self.classes[placed.class].widths)
+    /// The pillars of one element; those of its class where nothing is turned.
+    pub fn widths(&self, placed: &PlacedElement) -> Cow<'_, WidthMap> {
+        let widths = &self.classes[placed.class].widths;
+        if placed.symmetry == Symmetry::IDENTITY {
+            return Cow::Borrowed(widths);
+        }
+        Cow::Owned(placed.symmetry.apply(widths))
     }
 
     fn place(&mut self, element: Element, widths: WidthMap) {

@@ -1,6 +1,7 @@
 //! The eight symmetries of the square, and the part of a lens that they leave unique.
 
 use metalith_core::WidthMap;
+use ndarray::{Array2, ArrayView2, Axis};
 
 /// One of the eight symmetries of the square, as GDSII writes it: mirrored about the x axis first
 /// (y to -y), then turned counter-clockwise.
@@ -32,14 +33,13 @@ impl Symmetry {
     };
 
     /// Where a point goes.
+    #[inline]
     pub fn point(self, x: i64, y: i64) -> (i64, i64) {
-        let y = if self.mirrored { -y } else { y };
-        match self.quarter_turns {
-            0 => (x, y),
-            1 => (-y, x),
-            2 => (-x, -y),
-            _ => (y, -x),
-        }
+        // Cosine and sine of the turn; no branches, since sites by the million come here.
+        const TURNS: [(i64, i64); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
+        let (cos, sin) = TURNS[usize::from(self.quarter_turns % 4)];
+        let y = y * (1 - 2 * i64::from(self.mirrored));
+        (cos * x - sin * y, sin * x + cos * y)
     }
 
     /// Where a site of a lattice of `n` sites an axis goes.
@@ -51,27 +51,54 @@ impl Symmetry {
 
     /// The pillars after this symmetry.
     pub fn apply(self, widths: &WidthMap) -> WidthMap {
-        let n = widths.lattice.sites();
-        let mut moved = WidthMap::empty(widths.lattice);
-        for ((iy, ix), &w) in widths.width_nm.indexed_iter() {
-            let (jx, jy) = self.site(n, ix, iy);
-            moved.width_nm[[jy, jx]] = w;
+        WidthMap {
+            lattice: widths.lattice,
+            width_nm: self.seen(&widths.width_nm).as_standard_layout().into_owned(),
         }
-        moved
+    }
+
+    /// A square of sites, `[row along +y, column along +x]`, after this symmetry.
+    fn seen(self, sites: &Array2<u16>) -> ArrayView2<'_, u16> {
+        let mut seen = sites.view();
+        if self.mirrored {
+            seen.invert_axis(Axis(0));
+        }
+        // A quarter turn exchanges the axes and mirrors one of them, half a turn mirrors both.
+        let turned: &[usize] = match self.quarter_turns {
+            0 => &[],
+            1 => &[1],
+            2 => &[0, 1],
+            _ => &[0],
+        };
+        if self.quarter_turns % 2 == 1 {
+            seen = seen.reversed_axes();
+        }
+        for &axis in turned {
+            seen.invert_axis(Axis(axis));
+        }
+        seen
+    }
+
+    /// This symmetry after another one.
+    fn after(self, first: Self) -> Self {
+        let turns = if self.mirrored {
+            4 - first.quarter_turns
+        } else {
+            first.quarter_turns
+        };
+        Self {
+            mirrored: self.mirrored != first.mirrored,
+            quarter_turns: (self.quarter_turns + turns) % 4,
+        }
     }
 
     /// Whether this symmetry turns the pillars `from` into `to`, every site compared.
     pub fn maps(self, from: &WidthMap, to: &WidthMap) -> bool {
         let n = from.lattice.sites();
+        let seen = self.seen(&from.width_nm);
         // From the middle outwards: sites that differ are found at once there, the rim is mostly empty.
-        let rows = (0..n).map(|k| if k % 2 == 0 { n / 2 + k / 2 } else { n / 2 - 1 - k / 2 });
-        from.lattice == to.lattice
-            && rows.filter(|&iy| iy < n).all(|iy| {
-                (0..n).all(|ix| {
-                    let (jx, jy) = self.site(n, ix, iy);
-                    from.width_nm[[iy, ix]] == to.width_nm[[jy, jx]]
-                })
-            })
+        let mut rows = (0..n).map(|k| if k % 2 == 0 { n / 2 + k / 2 } else { n / 2 - 1 - k / 2 });
+        from.lattice == to.lattice && rows.all(|iy| iy >= n || seen.row(iy) == to.width_nm.row(iy))
     }
 }
 
@@ -79,6 +106,12 @@ impl Symmetry {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SymmetryGroup {
     members: Vec<Symmetry>,
+}
+
+/// A symmetry that two of these make together and that is not among them.
+fn composed(members: &[Symmetry]) -> Option<Symmetry> {
+    let pairs = members.iter().flat_map(|a| members.iter().map(move |b| a.after(*b)));
+    pairs.into_iter().find(|c| !members.contains(c))
 }
 
 /// A part of a fundamental domain that the same copies cover the lens with.
@@ -96,11 +129,21 @@ pub struct DomainPart {
 type Stabiliser = u8;
 
 impl SymmetryGroup {
-    /// The group of a lens: each symmetry is tried on every site.
+    /// The group of a lens: each symmetry is tried on every site, or follows from two that hold.
     pub fn of(widths: &WidthMap) -> Self {
-        Self {
-            members: Symmetry::ALL.into_iter().filter(|s| s.maps(widths, widths)).collect(),
+        let mut members = vec![Symmetry::IDENTITY];
+        for tried in Symmetry::ALL {
+            if members.contains(&tried) || !tried.maps(widths, widths) {
+                continue;
+            }
+            members.push(tried);
+            // What is held is closed under composition.
+            while let Some(next) = composed(&members) {
+                members.push(next);
+            }
         }
+        members.sort_unstable();
+        Self { members }
     }
 
     /// No symmetry but the identity: nothing is folded.
@@ -137,17 +180,23 @@ impl SymmetryGroup {
     }
 
     /// Whether a site of a lattice of `n` sites an axis belongs to a part of the domain.
+    #[inline]
     pub fn holds(&self, part: &DomainPart, n: usize, ix: usize, iy: usize) -> bool {
         self.stabiliser(n, ix, iy) == Some(part.stabiliser)
     }
 
     /// What leaves a site where it is; none if another copy of the site, the first in reading order,
     /// stands for it.
+    #[inline]
     fn stabiliser(&self, n: usize, ix: usize, iy: usize) -> Option<Stabiliser> {
-        let mut stays = 0;
-        for (k, member) in self.members.iter().enumerate() {
-            let (jx, jy) = member.site(n, ix, iy);
-            match (jy, jx).cmp(&(iy, ix)) {
+        // Twice the place from the centre: exact for any number of sites.
+        let last = n as i64 - 1;
+        let (x, y) = (2 * ix as i64 - last, 2 * iy as i64 - last);
+        // The identity, the first member, leaves every site.
+        let mut stays = 1;
+        for (k, member) in self.members.iter().enumerate().skip(1) {
+            let (mx, my) = member.point(x, y);
+            match (my, mx).cmp(&(y, x)) {
                 std::cmp::Ordering::Less => return None,
                 std::cmp::Ordering::Equal => stays |= 1 << k,
                 std::cmp::Ordering::Greater => {}
@@ -253,9 +302,17 @@ mod tests {
             quarter_turns: 1,
         };
         assert_eq!(mirror_then_turn.point(3, 1), (1, 3));
+        let map = lens(|x, y| (400 + 7 * x + 3 * y) as u16);
         for s in Symmetry::ALL {
-            let map = lens(|x, y| (400 + 7 * x + 3 * y) as u16);
-            assert!(s.maps(&map, &s.apply(&map)));
+            let moved = s.apply(&map);
+            assert!(s.maps(&map, &moved));
+            for ((iy, ix), w) in map.width_nm.indexed_iter() {
+                let (jx, jy) = s.site(12, ix, iy);
+                assert_eq!(moved.width_nm[[jy, jx]], *w, "{s:?}");
+            }
+            for t in Symmetry::ALL {
+                assert_eq!(t.apply(&moved), t.after(s).apply(&map), "{t:?} after {s:?}");
+            }
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use metalith_wave::kernels::raised_cosine;
+use metalith_wave::kernels::fade;
 
 use super::geometry::SitePair;
 
@@ -99,7 +99,7 @@ pub(super) fn intensity_weights(size: usize) -> Vec<f32> {
                 .map(|z| spreading(z) * (TAU * z * x).cos())
                 .sum::<f64>()
                 * step;
-            let faded = raised_cosine((2.0 * x - FADE) / (USED - FADE));
+            let faded = f64::from(fade(((2.0 * x - FADE) / (USED - FADE)) as f32));
             (faded / transform.powi(2)) as f32
         })
         .collect()

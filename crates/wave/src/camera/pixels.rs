@@ -9,7 +9,7 @@ use num_complex::Complex32;
 use rustfft::FftPlanner;
 
 use super::Optic;
-use crate::kernels::{cis, raised_cosine};
+use crate::kernels::{cis, fade};
 
 /// The intensity around one window, as a spectrum.
 #[derive(Clone, Debug)]
@@ -41,10 +41,10 @@ impl PixelGrid {
             let ends = (0..n).flat_map(|i| [i, (n - 1) * n + i, i * n, i * n + n - 1]);
             ends.map(|i| intensity[i]).sum::<f32>() / (4 * n) as f32
         };
-        let fade: Vec<f32> = (0..n)
+        let counts: Vec<f32> = (0..n)
             .map(|i| {
                 let depth = (i.min(n - 1 - i) as f64 + 0.5) / ramp as f64;
-                raised_cosine(1.0 - depth) as f32
+                fade(1.0 - depth as f32)
             })
             .collect();
         let mut planner = FftPlanner::<f32>::new();
@@ -52,7 +52,7 @@ impl PixelGrid {
         let mut rows_of: Vec<Complex32> = intensity
             .iter()
             .enumerate()
-            .map(|(i, v)| Complex32::new(border + (v - border) * fade[i / n] * fade[i % n], 0.0))
+            .map(|(i, v)| Complex32::new(border + (v - border) * counts[i / n] * counts[i % n], 0.0))
             .collect();
         fft.process(&mut rows_of);
         let mut columns = vec![Complex32::ZERO; n * n];

@@ -5,7 +5,7 @@
 //! | `cis` | exp(2 pi i x), good to 1.5e-7, and products of complex samples |
 //! | `fft` | the sizes of all transforms, and transforms of lines |
 //! | `fourier` | transforms of images, with the border rule |
-//! | `taper` | the raised cosine that ends every fade, and sinc |
+//! | `taper` | the one fade, and sinc |
 //! | `bessel` | J0, J1 and the transform of a disc |
 
 mod bessel;
@@ -17,7 +17,7 @@ mod taper;
 pub use bessel::{Bessel, jinc};
 pub use cis::{CIS_ERROR, cis, cis_all};
 pub use fft::fft_size;
-pub use taper::{raised_cosine, sinc};
+pub use taper::{fade, sinc};
 
 pub(crate) use cis::{accumulate, cis_where, multiply, multiply_conj, multiply_to, product_sum};
 pub(crate) use fft::{gather, process, scatter};

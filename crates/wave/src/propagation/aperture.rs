@@ -43,17 +43,8 @@ impl<'a> Pillars<'a> {
     /// # Errors
     /// If a width is beyond the table.
     pub fn new(widths: &'a WidthMap, table: &[Complex64]) -> Result<Self> {
-        let n = widths.lattice.sites();
-        let mut largest = 0;
-        let mut radius2 = 0;
-        for (iy, row) in widths.width_nm.outer_iter().enumerate() {
-            largest = row.iter().fold(largest, |m, &w| m.max(usize::from(w)));
-            let mut ends = row.iter().enumerate().filter(|(_, w)| **w != 0).map(|(ix, _)| ix);
-            for ix in ends.next().into_iter().chain(ends.next_back()) {
-                radius2 = radius2.max(widths.lattice.half_radius2(ix, iy));
-            }
-        }
-        if largest >= table.len() && n > 0 {
+        let largest = widths.width_nm.iter().fold(0, |m, &w| m.max(usize::from(w)));
+        if largest >= table.len() {
             return Err(WaveError::Width {
                 width_nm: largest,
                 last_nm: table.len().saturating_sub(1),
@@ -62,7 +53,7 @@ impl<'a> Pillars<'a> {
         Ok(Self {
             widths,
             table: by_width(table),
-            radius_um: (radius2 as f64).sqrt() * 0.5 * widths.lattice.pitch_um(),
+            radius_um: widths.circle_um(),
         })
     }
 }

@@ -37,7 +37,7 @@ pub struct Fade {
 /// Measured over whole windows of lenses of 1 mm, 140 um and 60 um, steered, at 450 to 660 nm: errors of 1e-6 of
 /// the matched peak for 1 mm, 1e-5 for 60 um.
 const FADE_WIDTHS: f64 = 5.5;
-/// What a raised cosine lets through falls with the cube of its width and counts against the gain of the focus:
+/// What a fade lets through falls with the cube of its width and counts against the gain of the focus:
 /// below this gain the fade is made wider to match, at most twice.
 const FADE_GAIN: f64 = 100.0;
 /// How far beyond the last needed ray the fade begins, and how far before the first ray that would come back it

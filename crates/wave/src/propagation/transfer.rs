@@ -6,7 +6,7 @@
 use num_complex::Complex32;
 
 use super::Fade;
-use crate::kernels::cis;
+use crate::kernels::{cis, fade};
 
 /// The transfer function on a grid of frequencies, one wavelength and window.
 pub(super) struct Transfer<'a> {
@@ -42,14 +42,14 @@ const GRAZING: f64 = 1e-12;
 
 impl Transfer<'_> {
     /// Works out how much each frequency of a column counts for the window, by where its ray from the element's
-    /// centre lands `distance_um` behind it: a raised cosine from `full_um` to `zero_um` of the window's middle.
+    /// centre lands `distance_um` behind it: it fades from `full_um` to `zero_um` of the window's middle.
     pub fn fade(&self, distance_um: f64, column: FrequencyColumn, faded: &mut FadedColumn) {
         let df = 1.0 / self.fade.period_um;
         let [fx, first] = column.first.map(|f| f as f64 * df);
         let rest = self.wavelength_um.powi(-2) - fx * fx;
         let [cx, cy] = self.centre_um;
         let Fade { full_um, zero_um, .. } = *self.fade;
-        let slope = 0.5 / (zero_um - full_um);
+        let slope = 1.0 / (zero_um - full_um);
         // Pitch^2 of the sum over the aperture, 1 / period^2 of that over frequencies.
         let scale = (self.pitch_um * df).powi(2) as f32;
         faded.axial.resize(column.count, 0.0);
@@ -59,9 +59,9 @@ impl Transfer<'_> {
                 let fy = first + i as f64 * df;
                 let fz = (rest - fy * fy).max(GRAZING).sqrt();
                 let (sx, sy) = (distance_um * fx / fz - cx, distance_um * fy / fz - cy);
-                let half_turn = ((sx * sx + sy * sy).sqrt() - full_um) * slope;
+                let share = ((sx * sx + sy * sy).sqrt() - full_um) * slope;
                 *axial = fz;
-                *weight = (0.5 + 0.5 * cis(half_turn.clamp(0.0, 0.5)).re) * scale;
+                *weight = fade(share as f32) * scale;
             }
         });
     }

@@ -1,7 +1,7 @@
 //! The field through frequencies, on a period no longer than the window needs.
 //!
 //! Samples of the aperture are added up modulo the period and transformed; each frequency goes its way to
-//! the sensor, weighed by a raised cosine of where its ray lands; the window alone is formed, by chirps.
+//! the sensor, weighed by a fade of where its ray lands; the window alone is formed, by chirps.
 //! A lattice of point samples is periodic in frequency with 1 / pitch: each frequency that lands near the
 //! window takes the bin it is equal to modulo 1 / pitch, so a steep wedge needs no finer lattice.
 //!
