@@ -8,6 +8,7 @@ mod completions;
 mod diff;
 mod handoff;
 mod layout;
+mod new;
 mod optimise;
 mod output;
 mod paths;
@@ -63,6 +64,7 @@ struct Arguments {
 /// One file in this folder for each.
 #[derive(Subcommand)]
 enum Command {
+    New(new::NewArgs),
     Run(run::RunArgs),
     Layout(layout::LayoutArgs),
     #[command(visible_alias = "optimize")]
@@ -112,6 +114,7 @@ pub fn run() -> ExitCode {
 
 fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome> {
     match command {
+        Command::New(args) => new::run(args, terminal),
         Command::Run(args) => run::run(args, terminal),
         Command::Layout(args) => layout::run(args, terminal),
         Command::Optimise(args) => optimise::run(args, terminal),

@@ -5,6 +5,7 @@ mod cells;
 mod check;
 mod handoff;
 mod made;
+mod new;
 mod optimise;
 mod predict;
 mod run;

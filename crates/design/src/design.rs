@@ -41,8 +41,15 @@ impl Design {
     /// [`metalith_core::Error::Text`] with every mistake of the file, each with line, column and remedy;
     /// [`metalith_core::Error::Table`] for a phase table that cannot be used.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = load(path)?;
-        let design = Document::read(path, &text, |root| Self::sections(path, root))?;
+        Self::parse(path, &load(path)?)
+    }
+
+    /// The design of a text, as if it stood in the file at `path`; the files that it names are read.
+    ///
+    /// # Errors
+    /// As [`Design::read`], but for reading the file itself.
+    pub fn parse(path: &Path, text: &str) -> Result<Self> {
+        let design = Document::read(path, text, |root| Self::sections(path, root))?;
         design?.with_files()
     }
 

@@ -1,0 +1,102 @@
+//! `metalith new`: a commented design to start from.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use metalith::{Design, Error, Result, WholeFile};
+
+use super::{Outcome, Terminal, print_line};
+
+/// The design, with braces around what is filled in.
+const TEMPLATE: &str = include_str!("new.toml");
+
+/// Marks and the edge of the chip lie this far outside the outermost lens (um): local marks, global marks, edge.
+const OUTSIDE_UM: [f64; 3] = [60.0, 150.0, 220.0];
+
+/// From the rim of a lens to the metal (um).
+const MARGIN_UM: f64 = 2.0;
+
+/// Sides of an opening, below the 200 vertices that the template allows.
+const MOST_SIDES: u32 = 190;
+
+/// Finer than this no writer places an edge of metal (nm).
+const FINEST_CHORD_NM: f64 = 5.0;
+
+/// Write a commented design file to start from.
+#[derive(Args)]
+#[command(
+    after_help = "Example:\n  metalith new mine.toml --diameter-um 200 --focal-length-um 480\n  metalith run mine.toml"
+)]
+pub struct NewArgs {
+    /// The file to write; the design has its name. An existing file is never replaced.
+    design: PathBuf,
+
+    /// Elements along an axis; odd.
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    elements: u32,
+
+    /// Diameter of a lens (um).
+    #[arg(long, value_name = "UM", default_value_t = 60.0)]
+    diameter_um: f64,
+
+    /// Focal length (um); 2.4 times the diameter if left out.
+    #[arg(long, value_name = "UM")]
+    focal_length_um: Option<f64>,
+
+    /// Wavelength that the phase focuses and the wedges are made for (nm).
+    #[arg(long, value_name = "NM", default_value_t = 550.0)]
+    wavelength_nm: f64,
+
+    /// Angle that each step from the centre element adds (degrees).
+    #[arg(long, value_name = "DEG", default_value_t = 15.0)]
+    steering_deg: f64,
+}
+
+impl NewArgs {
+    /// The text of the design.
+    fn text(&self, name: &str) -> String {
+        // Lenses as far apart as in `designs/prototype_3x3.toml`: 2.42 times their diameter, on whole nanometres.
+        let spacing_um = (2.42 * self.diameter_um * 1e3).round() * 1e-3;
+        let outermost_um = 0.5 * f64::from(self.elements.saturating_sub(1)) * spacing_um + 0.5 * self.diameter_um;
+        let [local_um, global_um, edge_um] = OUTSIDE_UM.map(|d| (outermost_um + d).ceil());
+        let focal_length_um = self.focal_length_um.unwrap_or(2.4 * self.diameter_um);
+        // A polygon of n sides is off its circle by R (pi / n)^2 / 2; a few sides fewer than are allowed.
+        let side_angle = std::f64::consts::PI / f64::from(MOST_SIDES);
+        let opening_nm = (0.5 * self.diameter_um + MARGIN_UM) * 1e3;
+        let chord_nm = (0.5 * opening_nm * side_angle.powi(2)).ceil().max(FINEST_CHORD_NM);
+        let values = [
+            ("{name}", name.to_owned()),
+            ("{elements}", self.elements.to_string()),
+            ("{diameter_um}", self.diameter_um.to_string()),
+            ("{focal_length_um}", focal_length_um.to_string()),
+            ("{wavelength_nm}", self.wavelength_nm.to_string()),
+            ("{chord_nm}", chord_nm.to_string()),
+            ("{margin_um}", MARGIN_UM.to_string()),
+            ("{steering_deg}", self.steering_deg.to_string()),
+            ("{spacing_um}", format!("{spacing_um:.3}")),
+            ("{chip_um}", (2.0 * edge_um).to_string()),
+            ("{global_um}", global_um.to_string()),
+            ("{local_um}", local_um.to_string()),
+        ];
+        values
+            .iter()
+            .fold(TEMPLATE.to_owned(), |text, (place, value)| text.replace(place, value))
+    }
+}
+
+pub fn run(args: &NewArgs, _terminal: &Terminal) -> Result<Outcome> {
+    if args.design.exists() {
+        return Err(Error::invalid(
+            format!("{} exists", args.design.display()),
+            "give another name, or move the file away",
+        ));
+    }
+    let name = args.design.file_stem().unwrap_or_default().to_string_lossy();
+    let text = args.text(&name);
+    // What cannot be is said before a file stands there.
+    Design::parse(&args.design, &text)?;
+    WholeFile::write(&args.design, text.as_bytes())?;
+    print_line!("{}", args.design.display());
+    print_line!("next: metalith run {}", args.design.display());
+    Ok(Outcome::Fine)
+}

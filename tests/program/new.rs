@@ -1,0 +1,63 @@
+//! A first design.
+
+use std::fs;
+
+use assert_cmd::Command;
+use predicates::str::contains;
+
+fn metalith() -> Command {
+    Command::cargo_bin("metalith").unwrap()
+}
+
+/// What `new` writes passes its own run and the design rules, at more than one size.
+#[test]
+fn a_new_design_can_be_run_and_checked() {
+    for options in [
+        &[][..],
+        &["--elements", "1", "--diameter-um", "80.3", "--wavelength-nm", "532"],
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let run = |arguments: &[&str]| metalith().current_dir(folder.path()).args(arguments).assert().success();
+        run(&[&["new", "mine.toml"], options].concat());
+        assert!(
+            fs::read_to_string(folder.path().join("mine.toml"))
+                .unwrap()
+                .contains("# ")
+        );
+        run(&["run", "mine.toml", "--fast", "--fidelity", "published", "--quiet"]);
+        let pillars = "out/mine/mine_pillars.gds";
+        run(&["check", pillars, "--design", "mine.toml", "--quiet"]);
+        let apertures = "out/mine/mine_apertures.gds";
+        let rules = concat!(env!("CARGO_MANIFEST_DIR"), "/rules/sin_apertures.toml");
+        run(&[
+            "check",
+            apertures,
+            "--rules",
+            rules,
+            "--design",
+            "mine.toml",
+            "--with",
+            pillars,
+            "--quiet",
+        ]);
+    }
+}
+
+#[test]
+fn a_new_design_replaces_nothing_and_says_what_cannot_be() {
+    let folder = tempfile::tempdir().unwrap();
+    let new = |arguments: &[&str]| {
+        metalith()
+            .current_dir(folder.path())
+            .arg("new")
+            .args(arguments)
+            .assert()
+            .code(2)
+    };
+    fs::write(folder.path().join("mine.toml"), "mine").unwrap();
+    new(&["mine.toml"]).stderr(contains("mine.toml exists"));
+    assert_eq!(fs::read_to_string(folder.path().join("mine.toml")).unwrap(), "mine");
+    new(&["even.toml", "--elements", "2"]).stderr(contains("elements"));
+    new(&["nan.toml", "--diameter-um", "nan"]);
+    assert!(!folder.path().join("even.toml").exists() && !folder.path().join("nan.toml").exists());
+}
