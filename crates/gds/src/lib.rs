@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod cell;
+mod cells;
 mod element;
 mod error;
 pub mod extract;
@@ -9,6 +10,7 @@ mod input;
 mod layout;
 mod limits;
 mod names;
+mod oasis;
 mod outline;
 mod place;
 mod real;
@@ -22,6 +24,7 @@ mod walk;
 pub mod write;
 
 pub use cell::{Child, LayerTally, LayoutCell};
+pub use cells::FileFormat;
 pub use error::{Error, ExtractionError, LayoutError, Limit, Result};
 pub use layout::{Faulty, Layout};
 pub use limits::ReadLimits;

@@ -6,7 +6,8 @@ use std::path::Path;
 
 use metalith_core::{Silent, WholeFile};
 use metalith_design::{Design, Hierarchy, PillarArray};
-use metalith_layout::{write_apertures, write_pillars};
+use metalith_layout::{OasisEncoding, write_apertures, write_pillars, write_pillars_oasis};
+use metalith_oasis::{CellReference, OasisItem, OasisLimits, OasisReader, OasisShape};
 use metalith_testing::{design, golden};
 use serde_json::json;
 use sha2::{Digest, Sha256};
@@ -145,4 +146,83 @@ fn an_unfinished_file_replaces_nothing() {
     WholeFile::write(&path, b"new").unwrap();
     assert_eq!(fs::read(&path).unwrap(), b"new");
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+const ENCODINGS: [OasisEncoding; 3] = [OasisEncoding::Compact, OasisEncoding::Plain, OasisEncoding::Smallest];
+
+/// OASIS in every encoding has every pillar, counted record by record, and is the same on any number of threads.
+#[test]
+fn oasis_has_every_pillar_on_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let mini = Design::read(&design("mini_3x3")).unwrap();
+    let array = PillarArray::build(&mini, &Silent).unwrap();
+    for encoding in ENCODINGS {
+        for hierarchy in [Hierarchy::Folded, Hierarchy::Flat] {
+            let on = |threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let path = folder.path().join("pillars.oas");
+                pool.install(|| write_pillars_oasis(&mini, &array, hierarchy, encoding, &path, &Silent))
+                    .unwrap();
+                fs::read(path).unwrap()
+            };
+            let one = on(1);
+            assert!(one == on(2) && one == on(5));
+            assert_eq!(count_oasis(&one), array.pillars(), "{encoding:?} {hierarchy:?}");
+        }
+    }
+    // Plain files have one layer each, and no repetition.
+    let path = folder.path().join("plain.oas");
+    let written = write_pillars_oasis(&mini, &array, Hierarchy::Folded, OasisEncoding::Plain, &path, &Silent).unwrap();
+    assert_eq!(written.beside.len(), 2, "marks and outline: {:?}", written.beside);
+    for path in written.beside.iter().chain([&path]) {
+        let bytes = fs::read(path).unwrap();
+        let mut layers = Vec::new();
+        let mut reader = OasisReader::new(std::io::Cursor::new(&bytes), OasisLimits::default()).unwrap();
+        loop {
+            match reader.read_item().unwrap() {
+                OasisItem::Element(e) => {
+                    assert!(e.repetition.is_none());
+                    if !matches!(e.shape, OasisShape::Placement { .. }) && !layers.contains(&e.layer) {
+                        layers.push(e.layer);
+                    }
+                }
+                OasisItem::End => break,
+                _ => {}
+            }
+        }
+        assert_eq!(layers.len(), 1, "{}", path.display());
+    }
+}
+
+/// Squares on the pillar layer in the top cell and all it refers to.
+fn count_oasis(bytes: &[u8]) -> u64 {
+    let mut reader = OasisReader::new(std::io::Cursor::new(bytes), OasisLimits::default()).unwrap();
+    fn number(reference: CellReference<'_>) -> u64 {
+        match reference {
+            CellReference::Number(number) => number,
+            CellReference::Name(_) => panic!("strict files refer by number"),
+        }
+    }
+    let (mut cells, mut current, mut top) = (BTreeMap::<u64, (u64, Vec<(u64, u64)>)>::new(), 0, 0);
+    loop {
+        match reader.read_item().unwrap() {
+            OasisItem::Cell(name) => current = number(name),
+            OasisItem::Element(e) => {
+                let (squares, below) = cells.entry(current).or_default();
+                match e.shape {
+                    OasisShape::Rectangle { .. } if e.layer == 1 => *squares += e.copies,
+                    OasisShape::Placement { cell, .. } => below.push((number(cell), e.copies)),
+                    _ => {}
+                }
+            }
+            OasisItem::Name(entry) if entry.name == b"MINI_3X3" => top = entry.number,
+            OasisItem::End => return squares_below(&cells, top),
+            _ => {}
+        }
+    }
+}
+
+fn squares_below(cells: &BTreeMap<u64, (u64, Vec<(u64, u64)>)>, cell: u64) -> u64 {
+    let (squares, below) = &cells[&cell];
+    squares + below.iter().map(|(c, n)| n * squares_below(cells, *c)).sum::<u64>()
 }

@@ -322,6 +322,17 @@ fn bombs() {
     assert_eq!(limit(fault_of(&zeros).1), OasisLimit::Unpacked);
 }
 
+/// An END that is filled by padding the length of an empty padding, as KLayout does.
+#[test]
+fn an_end_padded_by_an_integer() {
+    let mut bytes = file(&cell(SQUARE));
+    let begin = bytes.len() - 243;
+    bytes.truncate(begin);
+    bytes.extend([0x80; 241]);
+    bytes.extend([0, 0]);
+    assert_eq!(outlines(&bytes).len(), 1);
+}
+
 /// The sum of bytes is the other checksum that the format knows.
 #[test]
 fn a_sum_of_bytes_is_a_checksum_too() {

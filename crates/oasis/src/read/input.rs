@@ -13,6 +13,9 @@ const FILE_BYTES: usize = 1 << 18;
 /// Bytes of a CBLOCK that are unpacked at a time.
 const BLOCK_BYTES: usize = 1 << 16;
 
+/// Bits of the longest integer that is padded: all of END.
+const PADDED_BITS: u32 = 7 * 256;
+
 /// A stretch of a stream of bytes.
 struct Window {
     bytes: Vec<u8>,
@@ -345,7 +348,8 @@ impl<R: Read + Seek> Input<R> {
         self.longer(first, false)
     }
 
-    /// An unsigned integer that may have zeros above: counts and offsets that a writer fills in afterwards.
+    /// An unsigned integer that may have zeros above: counts and offsets that a writer fills in afterwards, and the
+    /// length of an empty padding of END, which some writers pad instead.
     pub fn unsigned_padded(&mut self) -> Result<u64, OasisError> {
         let first = self.byte()?;
         if first < 0x80 {
@@ -356,14 +360,17 @@ impl<R: Read + Seek> Input<R> {
 
     fn longer(&mut self, first: u8, padded: bool) -> Result<u64, OasisError> {
         let mut value = u64::from(first & 0x7F);
-        let mut shift = 7;
+        let mut shift = 7u32;
         loop {
             let byte = self.byte()?;
             let bits = u64::from(byte & 0x7F);
-            if shift > 63 || (shift == 63 && bits > 1) {
+            let fits = shift < 63 || (shift == 63 && bits <= 1) || (padded && bits == 0 && shift < PADDED_BITS);
+            if !fits {
                 return Err(self.fault(OasisFault::IntegerSize));
             }
-            value |= bits << shift;
+            if shift <= 63 {
+                value |= bits << shift;
+            }
             if byte < 0x80 {
                 if byte == 0 && !padded {
                     return Err(self.fault(OasisFault::IntegerPadded));

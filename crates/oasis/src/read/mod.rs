@@ -38,6 +38,10 @@ pub struct OasisReader<R> {
     modal: Modal,
     in_cell: bool,
     ended: bool,
+    /// The CELL record read last, if nothing was read since.
+    at_cell: Option<OasisPlace>,
+    /// It is to be handed out again.
+    again: bool,
 }
 
 impl<R: Read + Seek> OasisReader<R> {
@@ -87,6 +91,8 @@ impl<R: Read + Seek> OasisReader<R> {
             modal: Modal::default(),
             in_cell: false,
             ended: false,
+            at_cell: None,
+            again: false,
         })
     }
 
@@ -116,7 +122,12 @@ impl<R: Read + Seek> OasisReader<R> {
     /// # Errors
     /// If the file changed.
     pub fn seek(&mut self, place: OasisPlace) -> Result<(), OasisError> {
-        (self.in_cell, self.ended) = (false, false);
+        if self.at_cell == Some(place) {
+            // Whoever reads one cell to its end has read the head of the next.
+            self.again = true;
+            return Ok(());
+        }
+        (self.in_cell, self.ended, self.at_cell) = (false, false, None);
         let Some(inner) = place.inner else {
             return self.input.seek(place.offset);
         };
@@ -152,10 +163,14 @@ impl<R: Read + Seek> OasisReader<R> {
             if self.ended {
                 return Ok(OasisItem::End);
             }
+            if std::mem::take(&mut self.again) {
+                break Step::Cell;
+            }
             if let Some(step) = self.record()? {
                 break step;
             }
         };
+        self.at_cell = matches!(step, Step::Cell).then(|| self.input.record());
         Ok(self.view(step))
     }
 
