@@ -61,11 +61,20 @@ pub struct FormatArgs {
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
-enum FormatArg {
+pub enum FormatArg {
     /// GDSII: what every writer of masks takes.
     Gds,
     /// OASIS: a hundredth of the size.
     Oasis,
+}
+
+impl From<FormatArg> for LayoutFormat {
+    fn from(format: FormatArg) -> Self {
+        match format {
+            FormatArg::Gds => Self::Gds,
+            FormatArg::Oasis => Self::Oasis(OasisEncoding::Compact),
+        }
+    }
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]

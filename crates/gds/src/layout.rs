@@ -240,7 +240,7 @@ impl Layout {
     }
 
     /// Whether every reference leads to a cell, and none round in a circle.
-    fn sound(&self) -> Result<()> {
+    pub(super) fn sound(&self) -> Result<()> {
         let cause = |f: Faulty, of: fn(String, String) -> LayoutError| self.fault(f.offset, of(f.cell, f.name));
         if let Some(f) = self.circles().into_iter().next() {
             return Err(cause(f, |cell, name| LayoutError::Circle { cell, name }));

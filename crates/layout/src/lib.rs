@@ -5,6 +5,7 @@
 //! [`metalith_oasis`].
 
 mod aperture;
+mod convert;
 mod fixed;
 mod format;
 mod frame;
@@ -24,6 +25,7 @@ use metalith_design::array::PillarArray;
 use metalith_design::{Design, Hierarchy, LayoutLayer};
 use pillars::PillarWriter;
 
+pub use convert::convert;
 pub use format::{LayoutFormat, OasisEncoding};
 pub use oasis::{write_apertures_oasis, write_pillars_oasis};
 pub use properties::write_layer_properties;

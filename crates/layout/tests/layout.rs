@@ -6,8 +6,9 @@ use std::path::Path;
 
 use metalith_core::{Silent, WholeFile};
 use metalith_design::{Design, Hierarchy, PillarArray};
-use metalith_layout::{OasisEncoding, write_apertures, write_pillars, write_pillars_oasis};
-use metalith_oasis::{CellReference, OasisItem, OasisLimits, OasisReader, OasisShape};
+use metalith_gds::{LayerNumber, Layout, Point, Selection, Shape, Transform, Visitor};
+use metalith_layout::{LayoutFormat, OasisEncoding, convert, write_apertures, write_pillars, write_pillars_oasis};
+use metalith_oasis::{CellReference, NameTable, OasisItem, OasisLimits, OasisReader, OasisShape};
 use metalith_testing::{design, golden};
 use serde_json::json;
 use sha2::{Digest, Sha256};
@@ -215,7 +216,9 @@ fn count_oasis(bytes: &[u8]) -> u64 {
                     _ => {}
                 }
             }
-            OasisItem::Name(entry) if entry.name == b"MINI_3X3" => top = entry.number,
+            OasisItem::Name(entry) if entry.table == NameTable::Cells && entry.name == b"MINI_3X3" => {
+                top = entry.number
+            }
             OasisItem::End => return squares_below(&cells, top),
             _ => {}
         }
@@ -225,4 +228,57 @@ fn count_oasis(bytes: &[u8]) -> u64 {
 fn squares_below(cells: &BTreeMap<u64, (u64, Vec<(u64, u64)>)>, cell: u64) -> u64 {
     let (squares, below) = &cells[&cell];
     squares + below.iter().map(|(c, n)| n * squares_below(cells, *c)).sum::<u64>()
+}
+
+/// From one format into the other and back: the same geometry, cell by cell, of layouts of this program and of others.
+#[test]
+fn converted_layouts_are_the_same_geometry() {
+    let folder = tempfile::tempdir().unwrap();
+    let mini = Design::read(&design("mini_3x3")).unwrap();
+    let array = PillarArray::build(&mini, &Silent).unwrap();
+    let own = folder.path().join("own.gds");
+    write_pillars(&mini, &array, Hierarchy::Folded, &own, &Silent).unwrap();
+    let foreign = metalith_testing::root().join("golden/foreign");
+    let mut files: Vec<_> = fs::read_dir(foreign).unwrap().map(|e| e.unwrap().path()).collect();
+    files.sort();
+    files.push(own);
+    for file in files {
+        let original = Layout::open(&file).unwrap();
+        let (oasis, gds) = (folder.path().join("a.oas"), folder.path().join("b.gds"));
+        convert(&original, LayoutFormat::Oasis(OasisEncoding::Compact), &oasis, &Silent).unwrap();
+        let oasis = Layout::open(&oasis).unwrap();
+        convert(&oasis, LayoutFormat::Gds, &gds, &Silent).unwrap();
+        let gds = Layout::open(&gds).unwrap();
+        let expected = corners(&original);
+        assert!(!expected.is_empty());
+        for (name, converted) in [("oasis", &oasis), ("gds", &gds)] {
+            assert_eq!(
+                converted.cells().len(),
+                original.cells().len(),
+                "{name} {}",
+                file.display()
+            );
+            assert!(corners(converted) == expected, "{name} {}", file.display());
+        }
+    }
+}
+
+/// Layers and corners of all areas where they stand, in one order.
+fn corners(layout: &Layout) -> Vec<(LayerNumber, Vec<Point>)> {
+    struct Areas(Vec<(LayerNumber, Vec<Point>)>);
+    impl Visitor for Areas {
+        fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> metalith_core::Result<()> {
+            for placement in placements {
+                let mut corners: Vec<Point> = shape.points.iter().map(|&p| placement.apply(p)).collect();
+                corners.sort_unstable();
+                corners.dedup();
+                self.0.push((shape.layer, corners));
+            }
+            Ok(())
+        }
+    }
+    let mut areas = Areas(Vec::new());
+    layout.visit(&Selection::default(), &mut areas, &Silent).unwrap();
+    areas.0.sort_unstable();
+    areas.0
 }

@@ -78,7 +78,7 @@ fn places(repetition: Option<&Repetition>) -> Copies {
 }
 
 fn written(elements: &[(Drawn, Option<Repetition>)], relative: bool, level: u32) -> Vec<u8> {
-    let mut writer = OasisWriter::new(Vec::new(), 1000.0, &["TOP"]).unwrap();
+    let mut writer = OasisWriter::new(Vec::new(), 1000.0, &["TOP"], true).unwrap();
     let (top, _) = (writer.cell_number("TOP"), writer.cell_number("OTHER"));
     for text in ["a", "b c", ""] {
         writer.text_number(text);
@@ -219,7 +219,7 @@ fn offsets_lead_to_cells_and_end_is_256_bytes() {
 /// A cell that was met is read again from its place, in and out of CBLOCKs.
 #[test]
 fn cells_are_found_again() {
-    let mut writer = OasisWriter::new(Vec::new(), 1000.0, &["A", "B"]).unwrap();
+    let mut writer = OasisWriter::new(Vec::new(), 1000.0, &["A", "B"], true).unwrap();
     for (k, name) in ["A", "B"].into_iter().enumerate() {
         let number = writer.cell_number(name);
         let mut records = RecordBuffer::relative();

@@ -129,7 +129,7 @@ fn numbers_and_names_are_one() {
 /// Copies of squares, texts, polygons and cells stand where the lists say.
 #[test]
 fn copies_stand_where_they_are_said_to() {
-    let mut writer = OasisWriter::new(Vec::new(), 1000.0, &["TOP"]).unwrap();
+    let mut writer = OasisWriter::new(Vec::new(), 1000.0, &["TOP"], true).unwrap();
     let (top, cell) = (writer.cell_number("TOP"), writer.cell_number("CELL"));
     let list = Repetition::List {
         grid: 100,

@@ -150,7 +150,7 @@ impl<'a> OasisFile<'a> {
     fn create(design: &Design, path: &'a Path) -> Result<Self> {
         let top = top_cell(design);
         let out = BufWriter::new(WholeFile::create(path)?);
-        let writer = OasisWriter::new(out, GRID_PER_UM, &[&top]).map_err(Error::io("write", path))?;
+        let writer = OasisWriter::new(out, GRID_PER_UM, &[&top], true).map_err(Error::io("write", path))?;
         Ok(Self { writer, path, top })
     }
 
@@ -342,10 +342,11 @@ impl Elements<'_, '_> {
 
     /// The encoding that takes fewer bytes for a part of the pillars.
     fn smallest<P: Fn(usize, usize) -> Option<usize> + Sync>(
-        &mut self,
+        &self,
         pillars: &mut ElementPillars<'_, P>,
     ) -> PillarEncoding {
-        pillars.width_cells = self.numbers_of_widths(pillars.widths, PillarEncoding::References);
+        // Any numbers will do to see how small it gets.
+        pillars.width_cells = (0..=u64::from(u16::MAX)).collect();
         let candidates = [PillarEncoding::Lists, PillarEncoding::References];
         match candidates.map(|encoding| pillars.bytes_of_sample(encoding)) {
             [Some(lists), Some(references)] if references < lists => PillarEncoding::References,

@@ -14,6 +14,8 @@ use crate::record::{END_BYTES, kind, validation};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CellBounds {
     Empty,
+    /// Not known: nothing is said of it.
+    Unknown,
     /// Left, bottom, right, top (grid steps).
     Box([i64; 4]),
 }
@@ -61,11 +63,12 @@ pub struct OasisWriter<W> {
 }
 
 impl<W: Write> OasisWriter<W> {
-    /// Begin a file of `grid_per_um` grid steps a micrometre with these cells at the top.
+    /// Begin a file of `grid_per_um` grid steps a micrometre with these cells at the top. `boxes` says whether the
+    /// bounds of all cells will be known.
     ///
     /// # Errors
     /// If the bytes cannot be written.
-    pub fn new(out: W, grid_per_um: f64, tops: &[&str]) -> io::Result<Self> {
+    pub fn new(out: W, grid_per_um: f64, tops: &[&str], boxes: bool) -> io::Result<Self> {
         let mut writer = Self {
             out,
             crc: Crc::new(),
@@ -90,7 +93,7 @@ impl<W: Write> OasisWriter<W> {
         }
         put_property(&mut start, BOXES_AVAILABLE, 1);
         start.push(UNSIGNED);
-        put_unsigned(&mut start, ALL_BOXES);
+        put_unsigned(&mut start, if boxes { ALL_BOXES } else { 0 });
         writer.put(&start)?;
         Ok(writer)
     }
@@ -228,10 +231,19 @@ fn put_cell(out: &mut Vec<u8>, cell: &CellEntry) {
     out.push(kind::CELLNAME);
     put_string(out, cell.name.as_bytes());
     let Some((offset, bounds)) = cell.written else { return };
+    if bounds != CellBounds::Unknown {
+        put_bounds(out, bounds);
+    }
+    put_property(out, CELL_OFFSET, 1);
+    out.push(UNSIGNED);
+    put_unsigned(out, offset);
+}
+
+fn put_bounds(out: &mut Vec<u8>, bounds: CellBounds) {
     put_property(out, BOUNDING_BOX, 5);
     let (empty, [x0, y0, x1, y1]) = match bounds {
-        CellBounds::Empty => (2, [0; 4]),
         CellBounds::Box(corners) => (0, corners),
+        CellBounds::Empty | CellBounds::Unknown => (2, [0; 4]),
     };
     for (unsigned, value) in [
         (true, empty),
@@ -248,9 +260,6 @@ fn put_cell(out: &mut Vec<u8>, cell: &CellEntry) {
             put_signed(out, value);
         }
     }
-    put_property(out, CELL_OFFSET, 1);
-    out.push(UNSIGNED);
-    put_unsigned(out, offset);
 }
 
 /// The string that makes END 256 bytes long, before scheme and checksum.
