@@ -204,7 +204,7 @@ fn count_oasis(bytes: &[u8]) -> u64 {
             CellReference::Name(_) => panic!("strict files refer by number"),
         }
     }
-    let (mut cells, mut current, mut top) = (BTreeMap::<u64, (u64, Vec<(u64, u64)>)>::new(), 0, 0);
+    let (mut cells, mut current, mut top) = (CellCounts::new(), 0, 0);
     loop {
         match reader.read_item().unwrap() {
             OasisItem::Cell(name) => current = number(name),
@@ -225,7 +225,10 @@ fn count_oasis(bytes: &[u8]) -> u64 {
     }
 }
 
-fn squares_below(cells: &BTreeMap<u64, (u64, Vec<(u64, u64)>)>, cell: u64) -> u64 {
+/// For each cell its squares, and cells below it with their number.
+type CellCounts = BTreeMap<u64, (u64, Vec<(u64, u64)>)>;
+
+fn squares_below(cells: &CellCounts, cell: u64) -> u64 {
     let (squares, below) = &cells[&cell];
     squares + below.iter().map(|(c, n)| n * squares_below(cells, *c)).sum::<u64>()
 }
