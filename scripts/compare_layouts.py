@@ -2,11 +2,15 @@
 
 usage: compare_layouts.py METALITH FOLDER
 
-Writes the three hierarchies of mini_3x3 and of one full-size lens, XORs them with KLayout to nothing, counts
-their pillars with KLayout and (the small one) with gdstk, and looks at the aperture file. Exit code 1 on the first difference.
+Writes the three hierarchies of mini_3x3 and of one full-size lens, and their three encodings in OASIS, XORs them with
+KLayout to nothing, counts their pillars with KLayout and (the small one) with gdstk, and looks at the aperture file.
+OASIS files are validated by gdstk, and read by KLayout in strict mode with all its warnings, of which there must be
+none. Sizes and CPU seconds of OASIS are printed beside those of KLayout's writer and of both readers. Exit code 1 on the
+first difference.
 """
 
 import pathlib
+import resource
 import subprocess
 import sys
 
@@ -14,6 +18,7 @@ import gdstk
 import klayout.db as db
 
 HIERARCHIES = ("flat", "folded", "sref")
+ENCODINGS = ("compact", "plain", "smallest")
 PILLARS, APERTURES = (1, 0), (2, 0)
 # Counted once by brute force over the lattice: sites whose centre is inside the circle.
 COUNTS = {"mini_3x3": 9 * 23092, "one_lens": 6_411_448}
@@ -36,7 +41,19 @@ def main(program, folder):
             subprocess.run([program, "layout", design, "--hierarchy", hierarchy, "--out", out, "--quiet"], check=True,
                            stdout=subprocess.DEVNULL)
             files[hierarchy] = out / f"{name}_pillars.gds"
+        for encoding in ENCODINGS:
+            out = folder / name / encoding
+            subprocess.run([program, "layout", design, "--oasis", encoding, "--out", out, "--quiet"], check=True,
+                           stdout=subprocess.DEVNULL)
+            files[encoding] = out / f"{name}_pillars.oas"
+            look_at_oasis(f"{name} {encoding}", files[encoding])
+            subprocess.run([program, "diff", files["folded"], files[encoding], "--quiet"],
+                           check=encoding != "plain", stdout=subprocess.DEVNULL)
+        back = folder / name / "back.gds"
+        subprocess.run([program, "convert", files["compact"], back, "--quiet"], check=True, stdout=subprocess.DEVNULL)
+        files["converted"] = back
         compare(name, files)
+        time_oasis(name, program, files, folder)
         if name == "mini_3x3":
             count_with_gdstk(name, files)
         look_at_apertures(files["flat"].with_name(f"{name}_apertures.gds"))
@@ -55,7 +72,7 @@ def compare(name, files):
     # Layouts stay referenced: a region does not outlive its layout.
     flat_layout, flat = pillars(files["flat"])
     expect(f"{name} flat: pillars", flat.count(), COUNTS[name])
-    for hierarchy in HIERARCHIES[1:]:
+    for hierarchy in [h for h in files if h != "flat"]:
         layout, region = pillars(files[hierarchy])
         expect(f"{name} {hierarchy}: pillars", region.count(), COUNTS[name])
         expect(f"{name} {hierarchy}: polygons of the XOR with flat", (flat ^ region).count(), 0)
@@ -63,9 +80,51 @@ def compare(name, files):
 
 def count_with_gdstk(name, files):
     for hierarchy, path in files.items():
-        top = gdstk.read_gds(str(path)).top_level()[0]
+        read = gdstk.read_oas if path.suffix == ".oas" else gdstk.read_gds
+        top = read(str(path)).top_level()[0]
         polygons = top.get_polygons(layer=PILLARS[0], datatype=PILLARS[1])
         expect(f"{name} {hierarchy}: pillars in gdstk", len(polygons), COUNTS[name])
+
+
+def look_at_oasis(what, path):
+    """Validation by gdstk, and no word of KLayout in strict mode."""
+    expect(f"{what}: checksum in gdstk", gdstk.oas_validate(str(path))[0], True)
+    said = run(f"""
+        options = db.LoadLayoutOptions()
+        options.warn_level, options.oasis_expect_strict_mode = 3, 1
+        db.Layout().read({str(path)!r}, options)""")[1]
+    expect(f"{what}: warnings of KLayout", said, "")
+
+
+def run(code):
+    """CPU seconds of a piece of Python in a process of its own, and what it said."""
+    lines = "\n".join(line.strip() for line in code.strip().splitlines())
+    return timed([sys.executable, "-c", f"import gdstk\nimport klayout.db as db\n{lines}"])
+
+
+def timed(command):
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, done.stdout.strip()
+
+
+def time_oasis(name, program, files, folder):
+    """Sizes and CPU seconds, less what an empty process takes."""
+    own, theirs, empty = folder / name / "own.oas", folder / name / "klayout.oas", run("")[0]
+    ours = timed([program, "convert", files["folded"], own, "--quiet"])[0]
+    seconds = run(f"""
+        layout = db.Layout()
+        layout.read({str(files["folded"])!r})
+        layout.write({str(theirs)!r})""")[0] - empty
+    print(f"{name}: KLayout reads GDSII and writes OASIS: {theirs.stat().st_size} bytes, {seconds:.2f} CPU s; "
+          f"metalith convert: {own.stat().st_size} bytes, {ours:.2f} CPU s")
+    for encoding in ENCODINGS:
+        path = str(files[encoding])
+        klayout = run(f"db.Layout().read({path!r})")[0] - empty
+        theirs = run(f"gdstk.read_oas({path!r})")[0] - empty
+        print(f"{name} {encoding}: {files[encoding].stat().st_size} bytes; "
+              f"read by KLayout in {klayout:.2f}, by gdstk in {theirs:.2f} CPU s")
 
 
 def look_at_apertures(path):

@@ -39,14 +39,17 @@ def gdstk_square(x, y, w):
     return gdstk.rectangle(((x - w / 2) * UM, (y - w / 2) * UM), ((x + w / 2) * UM, (y + w / 2) * UM), layer=1)
 
 
-def gdstk_file(path, fill, unit=1e-6, precision=1e-9):
+def gdstk_file(path, fill, unit=1e-6, precision=1e-9, compression=6):
     library = Library("FOREIGN", unit, precision)
     top, lens = library.new_cell("TOP"), library.new_cell("LENS")
     fill(library, lens)
     lens.add(gdstk.Polygon([(x * UM, y * UM) for x, y in RING], layer=2))
     lens.add(gdstk.Label("lens", (0, 0), layer=10))
     top.add(gdstk.Reference(lens, (CENTRE[0] * UM, CENTRE[1] * UM)))
-    library.write_gds(path, timestamp=datetime.datetime(2026, 1, 1))
+    if path.suffix == ".oas":
+        library.write_oas(path, compression_level=compression, validation="crc32" if compression else "checksum32")
+    else:
+        library.write_gds(path, timestamp=datetime.datetime(2026, 1, 1))
 
 
 def gdstk_flat(_library, lens):
@@ -99,7 +102,7 @@ def gdstk_arrays(library, lens):
             lens.add(gdstk.Reference(cells[w], (x * UM, y * UM), columns=n, rows=1, spacing=(PITCH * UM, PITCH * UM)))
 
 
-def klayout_file(path, fill, dbu=0.001):
+def klayout_file(path, fill, dbu=0.001, compression=0, strict=True, blocks=True):
     layout = db.Layout()
     layout.dbu = dbu
     nm = round(0.001 / dbu)
@@ -109,7 +112,9 @@ def klayout_file(path, fill, dbu=0.001):
     lens.shapes(layout.layer(10, 0)).insert(db.Text("lens", 0, 0))
     top.insert(db.CellInstArray(lens.cell_index(), db.Trans(CENTRE[0] * nm, CENTRE[1] * nm)))
     options = db.SaveLayoutOptions()
-    options.format, options.gds2_write_timestamps, options.write_context_info = "GDS2", False, False
+    options.gds2_write_timestamps, options.write_context_info = False, False
+    options.format = "OASIS" if path.suffix == ".oas" else "GDS2"
+    options.oasis_compression_level, options.oasis_strict_mode, options.oasis_write_cblocks = compression, strict, blocks
     layout.write(str(path), options)
 
 
@@ -165,6 +170,78 @@ def main():
     klayout_file(out / "klayout_octants.gds", klayout_octants)
     klayout_file(out / "klayout_paths.gds", klayout_paths)
     klayout_file(out / "klayout_quarter_nm.gds", klayout_flat, dbu=0.00025)
+    # Names in tables and not, behind and before their use, blocks and none, lists and none, with and without checksums.
+    gdstk_file(out / "gdstk_flat.oas", gdstk_flat)
+    gdstk_file(out / "gdstk_sref.oas", gdstk_sref, compression=0)
+    gdstk_file(out / "gdstk_magnified.oas", gdstk_magnified)
+    gdstk_file(out / "gdstk_octants.oas", gdstk_octants)
+    gdstk_file(out / "gdstk_arrays.oas", gdstk_arrays)
+    klayout_file(out / "klayout_flat.oas", klayout_flat)
+    klayout_file(out / "klayout_lists.oas", klayout_flat, compression=10)
+    klayout_file(out / "klayout_sref.oas", klayout_sref, compression=2, strict=False, blocks=False)
+    klayout_file(out / "klayout_octants.oas", klayout_octants, strict=False)
+    klayout_file(out / "klayout_paths.oas", klayout_paths, compression=1)
+    klayout_file(out / "klayout_quarter_nm.oas", klayout_flat, dbu=0.00025)
+    (out / "forms.oas").write_bytes(oasis_file(forms()))
+    layout = db.Layout()
+    layout.read(str(out / "forms.oas"))
+    options = db.SaveLayoutOptions()
+    options.gds2_write_timestamps, options.write_context_info = False, False
+    layout.write(str(out / "forms.gds"), options)
+
+
+def unsigned(value):
+    out = bytearray()
+    while value >= 0x80:
+        out.append(value & 0x7F | 0x80)
+        value >>= 7
+    return bytes([*out, value])
+
+
+def signed(value):
+    return unsigned(abs(value) << 1 | (value < 0))
+
+
+def forms():
+    """Records of one cell, each form 1000 further right."""
+    records, x = [b"\x0e\x03TOP"], 0
+
+    def place():
+        nonlocal x
+        x += 1000
+        return signed(x) + signed(-500)
+
+    for vertical in (0x80, 0):
+        for a, b in ((30, 20), (-30, 20), (30, -20), (-30, -20), (0, 40)):
+            size = unsigned(200) + unsigned(100)
+            info = bytes([0x7B | vertical, 1, 0])
+            records.append(b"\x17" + info + size + signed(a) + signed(b) + place())
+            records.append(b"\x18" + info + size + signed(a) + place())
+            records.append(b"\x19" + info + size + signed(b) + place())
+    for form in range(26):
+        width, height = (300, 100) if form < 8 else (100, 300)
+        size = (0x40, unsigned(width)) if form in (16, 17, 18, 19, 22, 23, 25) else \
+            (0x20, unsigned(height)) if form in (20, 21) else (0x60, unsigned(width) + unsigned(height))
+        records.append(b"\x1a" + bytes([0x9B | size[0], 1, 0, form]) + size[1] + place())
+    lists = [  # a type and what follows it
+        (0, [signed(100), signed(50), signed(40), signed(70)]),
+        (1, [signed(100), signed(50), signed(40), signed(70)]),
+        (2, [unsigned(100 << 2), unsigned(50 << 2 | 1), unsigned(30 << 2 | 2)]),
+        (3, [unsigned(100 << 3), unsigned(50 << 3 | 5), unsigned(50 << 3 | 6)]),
+        (4, [unsigned(100 << 4), unsigned(50 << 2 | 3) + signed(77), unsigned(20 << 4 | 5 << 1)]),
+        (5, [unsigned(100 << 4), unsigned(50 << 2 | 3) + signed(77), unsigned(90 << 4 | 2 << 1)]),
+    ]
+    for kind, points in lists:
+        listed = unsigned(kind) + unsigned(len(points)) + b"".join(points)
+        records.append(b"\x15" + bytes([0x3B, 1, 0]) + listed + place())
+    return b"".join(records)
+
+
+def oasis_file(records):
+    start = b"%SEMI-OASIS\r\n\x01\x031.0\x00" + unsigned(1000) + b"\x01"
+    end = b"\x02" + bytes(12)
+    padding = 256 - len(end) - 2 - 1
+    return start + records + end + unsigned(padding) + bytes(padding) + b"\x00"
 
 
 main()

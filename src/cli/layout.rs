@@ -5,16 +5,16 @@ use std::path::PathBuf;
 use clap::Args;
 use metalith::CalibratedModel;
 use metalith::compensate::{compensate, compensated_name, write_compensation_report};
-use metalith::layout::Written;
+use metalith::layout::{LayoutFormat, OasisEncoding, Written, write_apertures_as, write_pillars_as};
 use metalith::report::{count, sig};
-use metalith::{Design, Hierarchy, PillarArray, Result, write_apertures, write_layer_properties, write_pillars};
+use metalith::{Design, Hierarchy, PillarArray, Result, write_layer_properties};
 
 use super::{Outcome, Terminal, print_line};
 
 /// Write the pillar layout, the aperture layout and the layer colours of a design.
 #[derive(Args)]
 #[command(
-    after_help = "Examples:\n  metalith layout designs/mini_3x3.toml --out out/mini --hierarchy flat\n  metalith layout designs/mini_3x3.toml --compensate out/calibrate/session-1/model.toml"
+    after_help = "Examples:\n  metalith layout designs/mini_3x3.toml --out out/mini --hierarchy flat\n  metalith layout designs/mini_3x3.toml --format oasis\n  metalith layout designs/mini_3x3.toml --compensate out/calibrate/session-1/model.toml"
 )]
 pub struct LayoutArgs {
     /// The design file.
@@ -43,6 +43,71 @@ pub struct Target {
     /// How the geometry is nested, instead of what the design says.
     #[arg(long, value_enum)]
     hierarchy: Option<HierarchyArg>,
+
+    #[command(flatten)]
+    format: FormatArgs,
+}
+
+/// The format of layouts that are written.
+#[derive(Args, Clone, Copy)]
+pub struct FormatArgs {
+    /// Format of the layouts; GDSII if left out.
+    #[arg(long, value_enum)]
+    format: Option<FormatArg>,
+
+    /// How pillars are encoded in OASIS; implies `--format oasis`.
+    #[arg(long, value_enum, value_name = "ENCODING")]
+    oasis: Option<EncodingArg>,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+pub enum FormatArg {
+    /// GDSII: what every writer of masks takes.
+    Gds,
+    /// OASIS: a hundredth of the size.
+    Oasis,
+}
+
+impl From<FormatArg> for LayoutFormat {
+    fn from(format: FormatArg) -> Self {
+        match format {
+            FormatArg::Gds => Self::Gds,
+            FormatArg::Oasis => Self::Oasis(OasisEncoding::Compact),
+        }
+    }
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum EncodingArg {
+    /// Lists of places.
+    Compact,
+    /// A rectangle for each pillar, no repetitions, one layer a file: what mask tools take.
+    Plain,
+    /// Whichever of lists and references is smaller, cell by cell.
+    Smallest,
+}
+
+impl FormatArgs {
+    /// The format that is asked for, if one is.
+    ///
+    /// # Errors
+    /// If an encoding of OASIS is asked for in GDSII.
+    pub fn asked(&self) -> Result<Option<LayoutFormat>> {
+        let encoding = match self.oasis {
+            Some(EncodingArg::Compact) | None => OasisEncoding::Compact,
+            Some(EncodingArg::Plain) => OasisEncoding::Plain,
+            Some(EncodingArg::Smallest) => OasisEncoding::Smallest,
+        };
+        match (self.format, self.oasis) {
+            (Some(FormatArg::Gds), Some(_)) => Err(metalith::Error::invalid(
+                "--oasis and --format gds",
+                "leave one of them out",
+            )),
+            (Some(FormatArg::Gds), None) => Ok(Some(LayoutFormat::Gds)),
+            (None, None) => Ok(None),
+            (Some(FormatArg::Oasis), _) | (None, Some(_)) => Ok(Some(LayoutFormat::Oasis(encoding))),
+        }
+    }
 }
 
 /// What was written.
@@ -75,8 +140,11 @@ impl Target {
         let folder = self.folder(design);
         let file = |suffix: &str| folder.join(format!("{}{suffix}", design.name));
         let properties = file(".lyp");
-        let pillars = write_pillars(design, array, self.hierarchy(design), &file("_pillars.gds"), terminal)?;
-        let apertures = write_apertures(design, &file("_apertures.gds"))?;
+        let format = self.format.asked()?.unwrap_or_default();
+        let named = |what: &str| file(&format!("_{what}.{}", format.extension()));
+        let hierarchy = self.hierarchy(design);
+        let pillars = write_pillars_as(design, array, hierarchy, format, &named("pillars"), terminal)?;
+        let apertures = write_apertures_as(design, format, &named("apertures"))?;
         write_layer_properties(design, &properties)?;
         for remark in &pillars.remarks {
             terminal.say(&format!("note: {remark}"));
@@ -133,6 +201,9 @@ pub fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
     } else {
         for file in [&written.pillars, &written.apertures] {
             print_line!("{}  {:.3} MB", file.path.display(), file.bytes as f64 * 1e-6);
+            for beside in &file.beside {
+                print_line!("{}  a further layer of it", beside.display());
+            }
         }
         print_line!(
             "{}  for KLayout: names and colours of the layers",

@@ -5,6 +5,7 @@ mod cells;
 mod check;
 mod compensated;
 mod completions;
+mod convert;
 mod diff;
 mod handoff;
 mod layout;
@@ -76,6 +77,7 @@ enum Command {
     Cells(cells::CellsArgs),
     Check(check::CheckArgs),
     Diff(diff::DiffArgs),
+    Convert(convert::ConvertArgs),
     Calibrate(calibrate::CalibrateArgs),
     Completions(completions::CompletionsArgs),
     #[command(hide = true)]
@@ -125,6 +127,7 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::Cells(args) => cells::run(args, terminal),
         Command::Check(args) => check::run(args, terminal),
         Command::Diff(args) => diff::run(args, terminal),
+        Command::Convert(args) => convert::run(args, terminal),
         Command::Calibrate(args) => calibrate::run(args, terminal),
         Command::Completions(args) => completions::run(args, terminal),
         Command::Manual(args) => completions::manual(args, terminal),

@@ -61,6 +61,9 @@ fn files_of_other_tools_are_the_same_geometry() {
         "gdstk_magnified.gds",
         "klayout_paths.gds",
         "gdstk_half_nm.gds",
+        "klayout_lists.oas",
+        "gdstk_octants.oas",
+        "klayout_quarter_nm.oas",
     ] {
         let found = compare(&flat, &folder.join(other));
         assert!(found.same_geometry, "{other}: {}", text(&found));

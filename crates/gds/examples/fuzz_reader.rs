@@ -1,11 +1,11 @@
-//! Feeds damaged layouts to the reader until told otherwise: `cargo run --release --example fuzz_reader -- 1000000`
+//! Feeds damaged layouts, GDSII and OASIS in turn, to the reader until told otherwise: `cargo run --release --example fuzz_reader -- 1000000`
 //!
 //! Needs no other tool. The n-th mutant is the same in every run (a second argument is another seed), so a
 //! failure is reproduced by its number, which is printed with the panic.
 
 use std::time::{Duration, Instant};
 
-use metalith_testing::{gds, mutate};
+use metalith_testing::{gds, mutate, oasis};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -38,13 +38,16 @@ fn corpus() -> Vec<Vec<u8>> {
 fn main() {
     let mut arguments = std::env::args().skip(1).map(|a| a.parse::<u64>().expect("a number"));
     let (count, seed) = (arguments.next().unwrap_or(100_000), arguments.next().unwrap_or(1));
-    let corpus = corpus();
+    let (corpus, records) = (corpus(), oasis::corpus());
     let start = Instant::now();
     let (mut read, mut slowest) = (0u64, Duration::ZERO);
     for n in 0..count {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(n);
-        let bytes = mutate::mutate(&mut rng, &corpus);
+        let bytes = match n % 2 {
+            0 => mutate::mutate(&mut rng, &corpus),
+            _ => oasis::mutant(&mut rng, &records),
+        };
         let began = Instant::now();
         match std::panic::catch_unwind(|| mutate::survives(&bytes)) {
             Ok(whole) => read += u64::from(whole),

@@ -8,7 +8,8 @@ use metalith_core::LayerNumber;
 pub struct LayoutCell {
     /// Printable: see [`metalith_core::text::printable_bytes`].
     pub name: String,
-    /// Its bytes in the file, from BGNSTR to behind ENDSTR.
+    /// Its bytes in the file, from BGNSTR to behind ENDSTR. In OASIS from its record CELL, or the CBLOCK that has it,
+    /// to the next cell or CBLOCK.
     pub bytes: std::ops::Range<u64>,
     /// What is drawn in it, by layer, in the order of first use.
     pub layers: Vec<(LayerNumber, LayerTally)>,
@@ -20,6 +21,8 @@ pub struct LayoutCell {
     pub placements: u64,
     /// Longest chain of references that ends here; a top cell has zero.
     pub depth: u32,
+    /// Place of its record in what the CBLOCK at `bytes.start` unpacks to.
+    pub(super) inner: Option<u64>,
     /// Small and without references: placed shape by shape.
     pub(super) inline: bool,
 }
@@ -27,12 +30,16 @@ pub struct LayoutCell {
 impl LayoutCell {
     /// Areas drawn in the cell itself.
     pub fn shapes(&self) -> u64 {
-        self.layers.iter().map(|(_, t)| t.shapes()).sum()
+        self.layers
+            .iter()
+            .fold(0, |sum: u64, (_, t)| sum.saturating_add(t.shapes()))
     }
 
     /// Texts of the cell itself.
     pub fn texts(&self) -> u64 {
-        self.layers.iter().map(|(_, t)| t.texts).sum()
+        self.layers
+            .iter()
+            .fold(0, |sum: u64, (_, t)| sum.saturating_add(t.texts))
     }
 
     /// References in the cell, an array being one.
@@ -87,6 +94,6 @@ impl LayerTally {
 
     /// Areas.
     pub fn shapes(&self) -> u64 {
-        self.boundaries + self.boxes + self.paths
+        self.boundaries.saturating_add(self.boxes).saturating_add(self.paths)
     }
 }

@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use metalith_core::text::quoted;
 
+use metalith_oasis::OasisFault;
+
 use super::record;
 
 /// Result of reading a layout.
@@ -120,6 +122,19 @@ pub enum LayoutError {
     },
     #[error("a reference inside references whose magnifications multiply beyond 1e6 or 1e-6")]
     Magnifications,
+    /// A file that breaks OASIS; `inner` is the byte of what the CBLOCK at the place unpacks to.
+    #[error("{}{fault}", in_block(*inner))]
+    Oasis {
+        inner: Option<u64>,
+        #[source]
+        fault: OasisFault,
+    },
+    #[error("layer {layer}/{datatype}")]
+    LayerNumber { layer: u32, datatype: u32 },
+    #[error("a cell of number {number}")]
+    CellNumber { number: u64 },
+    #[error("a text of number {number}, which is in no table")]
+    TextNumber { number: u64 },
     /// The bytes at a place are not those of the first reading.
     #[error("the file changed while it was read")]
     Rewritten,
@@ -233,6 +248,10 @@ const REPORT: &str = "the tool that wrote this file breaks the format: report it
 const CUT_SHORT: &str = "the file is cut short: copy or write it again";
 const BEING_WRITTEN: &str = "wait until whoever writes it is done";
 
+fn in_block(inner: Option<u64>) -> String {
+    inner.map_or_else(String::new, |inner| format!("byte {inner} of the CBLOCK there: "))
+}
+
 impl LayoutError {
     /// What to do about it.
     pub fn remedy(&self) -> String {
@@ -248,7 +267,11 @@ impl LayoutError {
             Self::NotText { .. } => {
                 "it must be text (data type 6): the tool that wrote this file breaks the format".into()
             }
-            Self::NoHeader => "is this a GDSII file? OASIS and compressed files are not read".into(),
+            Self::NoHeader => "is this a GDSII or OASIS file? Compressed files are not read".into(),
+            Self::Oasis { fault, .. } => fault.remedy().into(),
+            Self::LayerNumber { .. } => "layers and datatypes up to 65535 are read".into(),
+            Self::CellNumber { .. } => "numbers of cells below 2^56 are read".into(),
+            Self::TextNumber { .. } => REPORT.into(),
             Self::RecordBody { .. }
             | Self::NoUnits
             | Self::UnitsMissingBeforeCell
@@ -341,7 +364,7 @@ impl From<Error> for metalith_core::Error {
                     source: Some(Box::new(error)),
                 };
             }
-            Error::NotAFile { .. } => (error.to_string(), "name a GDSII file (.gds)".into()),
+            Error::NotAFile { .. } => (error.to_string(), "name a GDSII or OASIS file".into()),
             Error::Changed { .. } => (error.to_string(), BEING_WRITTEN.into()),
             Error::Extraction { ref cause, .. } => (error.to_string(), cause.remedy()),
         };

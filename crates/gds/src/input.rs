@@ -5,6 +5,8 @@ use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::cells::FileFormat;
+use super::oasis::ReadSeek;
 use super::record::{self, Record};
 use crate::error::{Error, LayoutError, Result};
 use metalith_core::file::{Ahead, Block};
@@ -25,9 +27,6 @@ pub(super) enum Source {
     File { path: PathBuf, bytes: u64 },
     Memory { name: PathBuf, bytes: Arc<[u8]> },
 }
-
-trait ReadSeek: Read + Seek + Send {}
-impl<T: Read + Seek + Send> ReadSeek for T {}
 
 enum Stream {
     Plain(Box<dyn ReadSeek>),
@@ -60,19 +59,32 @@ impl Source {
         }
     }
 
+    /// The file as it is, to be read in OASIS.
+    pub fn raw(&self) -> Result<Box<dyn ReadSeek>> {
+        Ok(match self {
+            Self::File { path, bytes } => Box::new(unchanged(path, *bytes)?),
+            Self::Memory { bytes, .. } => Box::new(Cursor::new(bytes.clone())),
+        })
+    }
+
+    /// Which format the first bytes are those of; GDSII has no mark of its own.
+    pub fn format(&self) -> Result<FileFormat> {
+        let mut first = Vec::new();
+        let most = metalith_oasis::MAGIC.len() as u64;
+        let read = self.raw()?.take(most).read_to_end(&mut first);
+        read.map_err(Error::io("read", self.path()))?;
+        Ok(if first == metalith_oasis::MAGIC {
+            FileFormat::Oasis
+        } else {
+            FileFormat::Gds
+        })
+    }
+
     /// Start reading at the first byte.
     pub fn open(&self) -> Result<Input> {
         let stream = match self {
             Self::File { path, bytes } => {
-                let file = File::open(path).map_err(Error::io("open", path))?;
-                let now = file.metadata().map_err(Error::io("read", path))?.len();
-                if now != *bytes {
-                    return Err(Error::Changed {
-                        path: path.clone(),
-                        before: *bytes,
-                        now,
-                    });
-                }
+                let file = unchanged(path, *bytes)?;
                 let large = (*bytes >= LARGE).then(|| Ahead::open(path, LONGEST)).flatten();
                 large.map_or_else(|| Stream::Plain(Box::new(file)), Stream::Large)
             }
@@ -89,6 +101,20 @@ impl Source {
             ended: false,
         })
     }
+}
+
+/// Open a file that must be as long as it was.
+fn unchanged(path: &Path, bytes: u64) -> Result<File> {
+    let file = File::open(path).map_err(Error::io("open", path))?;
+    let now = file.metadata().map_err(Error::io("read", path))?.len();
+    if now == bytes {
+        return Ok(file);
+    }
+    Err(Error::Changed {
+        path: path.to_owned(),
+        before: bytes,
+        now,
+    })
 }
 
 /// A place in the bytes, and a buffer that holds at least the record that begins there.

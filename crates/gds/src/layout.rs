@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use super::cell::LayoutCell;
-use super::input::{Input, Source};
+use super::cells::{CellInput, FileFormat};
+use super::input::Source;
 use super::limits::ReadLimits;
 use super::names::Names;
-use super::record::kind;
+use super::oasis::Texts;
 use super::scan::{Scan, scan};
 use super::tree::{self, Tree};
 use super::visit::Selection;
@@ -16,7 +17,7 @@ use metalith_core::{Progress, Silent};
 /// Cells at the top that a message names.
 const TOPS_NAMED: usize = 8;
 
-/// A GDSII file of which every byte has been looked at once: cells in number, their tree, their faults.
+/// A GDSII or OASIS file of which every byte has been looked at once: cells in number, their tree, their faults.
 /// Shapes are not held; [`Layout::visit`] reads them again.
 pub struct Layout {
     source: Source,
@@ -27,6 +28,8 @@ pub struct Layout {
     names: Names,
     tree: Tree,
     trailing: (u64, bool),
+    format: FileFormat,
+    texts: Texts,
 }
 
 /// A reference that leads nowhere or round in a circle, or a second cell of the same name.
@@ -44,7 +47,7 @@ impl Layout {
     /// Read the file at `path` once.
     ///
     /// # Errors
-    /// If it cannot be read, is not GDSII, or is beyond [`ReadLimits::default`].
+    /// If it cannot be read, is neither GDSII nor OASIS, or is beyond [`ReadLimits::default`].
     pub fn open(path: &Path) -> Result<Self> {
         Self::open_with(path, ReadLimits::default(), &Silent)
     }
@@ -85,6 +88,8 @@ impl Layout {
             names: scan.names,
             tree,
             trailing: scan.trailing,
+            format: scan.format,
+            texts: scan.texts,
         }
     }
 
@@ -103,7 +108,12 @@ impl Layout {
         self.trailing
     }
 
-    /// Name of the library.
+    /// Which format it is in.
+    pub fn format(&self) -> FileFormat {
+        self.format
+    }
+
+    /// Name of the library; OASIS has none.
     pub fn library(&self) -> &str {
         &self.title
     }
@@ -230,7 +240,7 @@ impl Layout {
     }
 
     /// Whether every reference leads to a cell, and none round in a circle.
-    fn sound(&self) -> Result<()> {
+    pub(super) fn sound(&self) -> Result<()> {
         let cause = |f: Faulty, of: fn(String, String) -> LayoutError| self.fault(f.offset, of(f.cell, f.name));
         if let Some(f) = self.circles().into_iter().next() {
             return Err(cause(f, |cell, name| LayoutError::Circle { cell, name }));
@@ -263,8 +273,9 @@ impl Layout {
         }
     }
 
-    pub(super) fn source(&self) -> &Source {
-        &self.source
+    /// Start reading its cells again.
+    pub(super) fn reopen(&self) -> Result<CellInput> {
+        CellInput::open(&self.source, self.format, &self.texts)
     }
 
     pub(super) fn tree(&self) -> &Tree {
@@ -282,15 +293,5 @@ impl Layout {
             .and_then(|number| self.tree.definitions[number as usize])
             .filter(|&index| self.cells[index].inline)
             .map_or(u32::MAX, |index| index as u32)
-    }
-
-    /// Go to the first element of a cell.
-    pub(super) fn seek_cell(&self, input: &mut Input, index: usize) -> Result<()> {
-        input.seek(self.cells[index].bytes.start)?;
-        let (begin, name) = (input.next()?, input.next()?);
-        if begin.kind != kind::BGNSTR || name.kind != kind::STRNAME {
-            return Err(input.fault(begin.offset, LayoutError::Rewritten));
-        }
-        Ok(())
     }
 }

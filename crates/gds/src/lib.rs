@@ -1,14 +1,17 @@
 #![doc = include_str!("../README.md")]
 
 mod cell;
+mod cells;
 mod element;
 mod error;
 pub mod extract;
 mod fast;
 mod input;
+mod items;
 mod layout;
 mod limits;
 mod names;
+mod oasis;
 mod outline;
 mod place;
 mod real;
@@ -22,7 +25,9 @@ mod walk;
 pub mod write;
 
 pub use cell::{Child, LayerTally, LayoutCell};
+pub use cells::FileFormat;
 pub use error::{Error, ExtractionError, LayoutError, Limit, Result};
+pub use items::{CellConsumer, CellItem};
 pub use layout::{Faulty, Layout};
 pub use limits::ReadLimits;
 pub use metalith_core::LayerNumber;

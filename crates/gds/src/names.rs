@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use super::oasis::numbered;
+
 const SLOTS: usize = 1024;
 
 /// Names met so far, numbered in the order they were met.
@@ -29,6 +31,23 @@ impl Names {
     /// The number of a name, if it was met.
     pub fn find(&self, name: &[u8]) -> Option<u32> {
         self.numbers.get(name).copied()
+    }
+
+    /// Names with numbered ones replaced by those of `table`, found by either, and for each number of before its
+    /// number now: that of the first with the same name. One that is not in the table is called by its number.
+    pub fn resolve(&self, table: &HashMap<u64, Vec<u8>>) -> (Self, Vec<u32>) {
+        let mut resolved = Self::default();
+        let renumbered = self.list.iter().map(|name| match numbered(name) {
+            None => resolved.number(name),
+            Some(number) => {
+                let unnamed = || format!("#{number}").into_bytes();
+                let now = resolved.number(&table.get(&number).cloned().unwrap_or_else(unnamed));
+                resolved.numbers.insert(name.clone(), now);
+                now
+            }
+        });
+        let renumbered = renumbered.collect();
+        (resolved, renumbered)
     }
 
     /// The number of a name, a new one if it is new.

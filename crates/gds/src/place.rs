@@ -1,9 +1,10 @@
 //! Where every cell stands: the transforms of its copies, from the top down.
 
+use super::cells::CellInput;
 use super::element::{ElementContent, ElementKind};
-use super::input::Input;
 use super::layout::Layout;
 use super::names::Recent;
+use super::oasis::Copies;
 use super::shape::Point;
 use super::transform::Transform;
 use super::tree;
@@ -12,51 +13,91 @@ use crate::error::{Error, LayoutError, Result};
 use metalith_core::{LayerNumber, Silent};
 
 /// Placements of each cell that is not placed shape by shape, by index of the cell.
-pub(super) fn placements(layout: &Layout, input: &mut Input, roots: &[usize]) -> Result<Vec<Vec<Transform>>> {
+pub(super) fn placements(layout: &Layout, input: &mut CellInput, roots: &[usize]) -> Result<Vec<Vec<Transform>>> {
     let cells = layout.cells();
     let (counts, _) = tree::count(cells, &layout.tree().order, roots);
     let mut placed: Vec<Vec<Transform>> = vec![Vec::new(); cells.len()];
     for &root in roots {
         placed[root].push(Transform::IDENTITY);
     }
+    let whole = |index: usize| tree::followed(&cells[index]).filter(|&(target, _)| !cells[target].inline);
+    let needed = |index: usize| counts[index] > 0 && whole(index).next().is_some();
     let mut walk = Walk::new(layout.limits(), &Silent);
-    for &index in &layout.tree().order {
-        let cell = &cells[index];
-        let whole = |target: usize| !cells[target].inline;
-        if placed[index].is_empty() || !tree::followed(cell).any(|(target, _)| whole(target)) {
-            continue;
+    let mut read = |index: usize| {
+        let mut placer = Placer {
+            layout,
+            index,
+            found: Vec::new(),
+            recent: Recent::new(),
+        };
+        input.seek(&cells[index])?;
+        walk.cell(input, &mut placer)?;
+        Ok::<_, Error>(placer.found)
+    };
+    // Cells inside CBLOCKs are read in the order of the file, or blocks would be unpacked again and again.
+    let mut gathered: Vec<Option<Vec<OwnPlacement>>> = vec![None; cells.len()];
+    if cells.iter().any(|cell| cell.inner.is_some()) {
+        for index in (0..cells.len()).filter(|&index| needed(index)) {
+            gathered[index] = Some(read(index)?);
         }
-        for (target, _) in tree::followed(cell).filter(|&(target, _)| whole(target)) {
+    }
+    for &index in layout.tree().order.iter().filter(|&&index| needed(index)) {
+        for (target, _) in whole(index) {
             // The count is bounded by `ReadLimits::placements`, checked before.
             let room = counts[target] as usize - placed[target].len();
             placed[target].reserve_exact(room);
         }
+        let found = match gathered[index].take() {
+            Some(found) => found,
+            None => read(index)?,
+        };
         let parents = std::mem::take(&mut placed[index]);
-        layout.seek_cell(input, index)?;
-        walk.cell(
-            input,
-            &mut Placer {
-                layout,
-                index,
-                parents: &parents,
-                placed: &mut placed,
-                recent: Recent::new(),
-            },
-        )?;
+        for own in &found {
+            for parent in &parents {
+                let chain = parent
+                    .after(&own.transform)
+                    .ok_or_else(|| magnified(layout, own.offset))?;
+                placed[own.child].push(chain);
+            }
+        }
         placed[index] = parents;
     }
     Ok(placed)
 }
 
+/// One copy of a cell in another.
+#[derive(Clone, Copy)]
+struct OwnPlacement {
+    child: usize,
+    transform: Transform,
+    offset: u64,
+}
+
 struct Placer<'a> {
     layout: &'a Layout,
     index: usize,
-    parents: &'a [Transform],
-    placed: &'a mut [Vec<Transform>],
+    found: Vec<OwnPlacement>,
     recent: Recent,
 }
 
 impl Placer<'_> {
+    fn push(&mut self, child: usize, element: &ElementContent, transform: Transform) {
+        let offset = element.offset;
+        self.found.push(OwnPlacement {
+            child,
+            transform,
+            offset,
+        });
+    }
+
+    /// The cell that an element refers to and that is placed as a whole.
+    fn target_of(&self, element: &ElementContent) -> Option<usize> {
+        if !matches!(element.kind, ElementKind::Reference | ElementKind::Array) {
+            return None;
+        }
+        self.target(self.layout.names().find(&element.name))
+    }
+
     fn target(&self, number: Option<u32>) -> Option<usize> {
         let number = number?;
         let child = self.layout.tree().definitions[number as usize]?;
@@ -81,33 +122,34 @@ impl Sink for Placer<'_> {
         let Some(child) = self.target((number != u32::MAX).then_some(number)) else {
             return Ok(());
         };
-        let own = Transform::Square {
+        let transform = Transform::Square {
             orientation: 0,
             dx: at.x,
             dy: at.y,
         };
-        for parent in self.parents {
-            let chain = parent.after(&own).ok_or_else(|| magnified(self.layout, offset))?;
-            self.placed[child].push(chain);
+        self.found.push(OwnPlacement {
+            child,
+            transform,
+            offset,
+        });
+        Ok(())
+    }
+
+    fn element(&mut self, element: &ElementContent) -> Result<(), SinkError> {
+        if let Some(child) = self.target_of(element) {
+            for k in 0..element.copies() {
+                self.push(child, element, element.copy(k));
+            }
         }
         Ok(())
     }
 
-    fn element(&mut self, _input: &Input, element: &ElementContent) -> Result<()> {
-        if !matches!(element.kind, ElementKind::Reference | ElementKind::Array) {
-            return Ok(());
-        }
-        let Some(child) = self.target(self.layout.names().find(&element.name)) else {
-            return Ok(());
-        };
-        for k in 0..element.copies() {
-            let own = element.copy(k);
-            for parent in self.parents {
-                let chain = parent
-                    .after(&own)
-                    .ok_or_else(|| magnified(self.layout, element.offset))?;
-                self.placed[child].push(chain);
-            }
+    fn repeated(&mut self, element: &ElementContent, copies: &Copies<'_>) -> Result<(), SinkError> {
+        if let Some(child) = self.target_of(element) {
+            copies.each(|place| {
+                self.push(child, element, element.copy(0).moved(place));
+                Ok::<_, SinkError>(())
+            })?;
         }
         Ok(())
     }

@@ -3,10 +3,12 @@
 use std::collections::HashMap;
 
 use super::cell::{Child, LayerTally, LayoutCell};
+use super::cells::FileFormat;
 use super::element::{ElementContent, ElementKind};
 use super::input::{Input, Source};
 use super::limits::ReadLimits;
 use super::names::{Names, Recent};
+use super::oasis::{self, Copies, Texts};
 use super::outline::outline;
 use super::record::{self, kind};
 use super::shape::{Point, Rect};
@@ -26,10 +28,16 @@ pub(super) struct Scan {
     pub numbers: Vec<u32>,
     /// Bytes behind ENDLIB, and whether any of them is not zero.
     pub trailing: (u64, bool),
+    pub format: FileFormat,
+    /// Texts that elements refer to by number.
+    pub texts: Texts,
 }
 
 /// Read the file once.
 pub(super) fn scan(source: &Source, limits: &ReadLimits, progress: &dyn Progress) -> Result<Scan> {
+    if source.format()? == FileFormat::Oasis {
+        return oasis::scan(source, limits, progress);
+    }
     let mut input = source.open()?;
     progress.begin("reading cells", source.bytes());
     let mut walk = Walk::new(limits, progress);
@@ -57,7 +65,7 @@ pub(super) fn scan_with(input: &mut Input, bytes: u64, walk: &mut Walk<'_>) -> R
                     return Err(input.fault(record.offset, LayoutError::UnitsMissingBeforeCell));
                 }
                 tally.begin(input, record.offset)?;
-                walk.cell(input, &mut tally)?;
+                walk.gds_cell(input, &mut tally)?;
                 tally.end(input.offset());
             }
             kind::ENDLIB => break,
@@ -87,6 +95,8 @@ pub(super) fn scan_with(input: &mut Input, bytes: u64, walk: &mut Walk<'_>) -> R
         names: tally.names,
         numbers: tally.numbers,
         trailing: (trailing, nonzero),
+        format: FileFormat::Gds,
+        texts: Texts::default(),
     })
 }
 
@@ -110,7 +120,7 @@ fn read_units(input: &Input, record: record::Record) -> Result<[f64; 2]> {
 }
 
 /// What is kept of the cells met so far, and the counts of the one being read.
-struct Tally {
+pub(super) struct Tally {
     limits: ReadLimits,
     cells: Vec<LayoutCell>,
     names: Names,
@@ -126,7 +136,7 @@ struct Tally {
 }
 
 impl Tally {
-    fn new(limits: ReadLimits) -> Self {
+    pub fn new(limits: ReadLimits) -> Self {
         Self {
             limits,
             cells: Vec::new(),
@@ -150,12 +160,17 @@ impl Tally {
             return Err(input.fault(record.offset, LayoutError::NoCellName { kind }));
         }
         let name = input.text(record)?;
+        self.begin_cell(name, offset, None)
+            .map_err(|cause| input.fault(record.offset, cause))
+    }
+
+    /// A cell with this name begins.
+    pub fn begin_cell(&mut self, name: &[u8], offset: u64, inner: Option<u64>) -> Result<(), LayoutError> {
         if name.is_empty() || name.len() > self.limits.name_bytes {
-            return Err(input.fault(record.offset, LayoutError::CellName { bytes: name.len() }));
+            return Err(LayoutError::CellName { bytes: name.len() });
         }
         if self.cells.len() >= self.limits.cells {
-            let cause = too_many(Limit::Cells, self.cells.len() + 1, self.limits.cells);
-            return Err(input.fault(record.offset, cause));
+            return Err(too_many(Limit::Cells, self.cells.len() + 1, self.limits.cells));
         }
         self.numbers.push(self.names.number(name));
         self.cells.push(LayoutCell {
@@ -166,6 +181,7 @@ impl Tally {
             with_properties: 0,
             placements: 0,
             depth: 0,
+            inner,
             inline: false,
         });
         self.layers.clear();
@@ -173,8 +189,50 @@ impl Tally {
         Ok(())
     }
 
+    /// An element of the current cell has properties.
+    pub fn count_properties(&mut self) {
+        self.cells.last_mut().expect("a cell was begun").with_properties += 1;
+    }
+
+    /// What was found in a file whose cells may have numbers, with the names of these.
+    pub fn finish_numbered(
+        mut self,
+        units: [f64; 2],
+        names: &HashMap<u64, Vec<u8>>,
+        texts: HashMap<u64, Vec<u8>>,
+    ) -> Scan {
+        let (resolved, renumbered) = self.names.resolve(names);
+        for number in &mut self.numbers {
+            *number = renumbered[*number as usize];
+        }
+        // Texts whose table came after them: at most the longest of it.
+        let longest = texts.values().map(Vec::len).max().unwrap_or(0) as u64;
+        for (cell, &number) in self.cells.iter_mut().zip(&self.numbers) {
+            cell.name = printable_bytes(resolved.name(number));
+            for child in &mut cell.children {
+                child.number = renumbered[child.number as usize];
+                child.name = printable_bytes(resolved.name(child.number));
+            }
+            for (_, tally) in &mut cell.layers {
+                if tally.texts > 0 {
+                    tally.text_bytes = tally.text_bytes.max(longest.saturating_mul(tally.texts));
+                }
+            }
+        }
+        Scan {
+            title: String::new(),
+            units,
+            cells: self.cells,
+            names: resolved,
+            numbers: self.numbers,
+            trailing: (0, false),
+            format: FileFormat::Oasis,
+            texts: Texts::new(texts),
+        }
+    }
+
     /// The current cell is complete.
-    fn end(&mut self, offset: u64) {
+    pub fn end(&mut self, offset: u64) {
         let cell = self.cells.last_mut().expect("a cell was begun");
         cell.bytes.end = offset;
         for number in self.touched.drain(..) {
@@ -260,14 +318,23 @@ impl Sink for Tally {
         Ok(self.reference(number, 1, offset)?)
     }
 
-    fn element(&mut self, input: &Input, element: &ElementContent) -> Result<()> {
-        let located = |cause| input.fault(element.offset, cause);
+    fn element(&mut self, element: &ElementContent) -> Result<(), SinkError> {
+        Ok(self.add(element, 1, [0; 4])?)
+    }
+
+    fn repeated(&mut self, element: &ElementContent, copies: &Copies<'_>) -> Result<(), SinkError> {
+        Ok(self.add(element, copies.count, copies.reach)?)
+    }
+}
+
+impl Tally {
+    /// Count an element with so many copies; `reach` is left, bottom, right, top of their places from the first.
+    fn add(&mut self, element: &ElementContent, copies: u64, reach: [i64; 4]) -> Result<(), LayoutError> {
         self.cells.last_mut().expect("a cell was begun").with_properties += u64::from(element.properties > 0);
         if matches!(element.kind, ElementKind::Reference | ElementKind::Array) {
             let number = self.names.number(&element.name);
-            return self
-                .reference(number, element.copies(), element.offset)
-                .map_err(located);
+            let copies = element.copies().saturating_mul(copies);
+            return self.reference(number, copies, element.offset);
         }
         if element.kind == ElementKind::Path {
             let width = i64::from(element.width);
@@ -280,7 +347,7 @@ impl Sink for Tally {
             );
         }
         let path = Rect::around(&self.path);
-        let tally = self.layer(element.layer).map_err(located)?;
+        let tally = self.layer(element.layer)?;
         let count = match element.kind {
             ElementKind::Boundary => &mut tally.boundaries,
             ElementKind::Box => &mut tally.boxes,
@@ -288,17 +355,27 @@ impl Sink for Tally {
             ElementKind::Text => &mut tally.texts,
             _ => &mut tally.nodes,
         };
-        *count += 1;
-        match element.kind {
-            ElementKind::Text => tally.text_bytes += element.string.len() as u64,
-            ElementKind::Path => tally.bounds.unite(&path),
-            ElementKind::Boundary | ElementKind::Box => element.points.iter().for_each(|&p| tally.bounds.include(p)),
-            _ => {}
+        *count = count.saturating_add(copies);
+        let bounds = match element.kind {
+            ElementKind::Text => {
+                let bytes = copies.saturating_mul(element.string.len() as u64);
+                tally.text_bytes = tally.text_bytes.saturating_add(bytes);
+                return Ok(());
+            }
+            ElementKind::Path => path,
+            ElementKind::Boundary | ElementKind::Box => Rect::around(&element.points),
+            _ => return Ok(()),
+        };
+        let vertices = copies.saturating_mul(element.points.len() as u64);
+        tally.vertices = tally.vertices.saturating_add(vertices);
+        if !bounds.is_empty() {
+            tally.bounds.unite(&Rect {
+                x0: bounds.x0 + reach[0],
+                y0: bounds.y0 + reach[1],
+                x1: bounds.x1 + reach[2],
+                y1: bounds.y1 + reach[3],
+            });
         }
-        if matches!(element.kind, ElementKind::Text | ElementKind::Node) {
-            return Ok(());
-        }
-        tally.vertices += element.points.len() as u64;
         Ok(())
     }
 }

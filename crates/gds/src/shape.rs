@@ -63,6 +63,16 @@ impl Rect {
         }
     }
 
+    /// The same, farther by a step.
+    pub(super) fn moved(&self, by: Point) -> Self {
+        Self {
+            x0: self.x0 + by.x,
+            y0: self.y0 + by.y,
+            x1: self.x1 + by.x,
+            y1: self.y1 + by.y,
+        }
+    }
+
     /// The smallest rectangle around points.
     pub fn around(points: &[Point]) -> Self {
         let mut rect = Self::EMPTY;

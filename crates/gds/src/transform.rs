@@ -55,6 +55,22 @@ impl Transform {
         })
     }
 
+    /// The same, farther by a step.
+    pub(super) fn moved(self, by: Point) -> Self {
+        match self {
+            Self::Square { orientation, dx, dy } => Self::Square {
+                orientation,
+                dx: dx + by.x,
+                dy: dy + by.y,
+            },
+            Self::General { matrix, dx, dy } => Self::General {
+                matrix,
+                dx: dx + by.x as f64,
+                dy: dy + by.y as f64,
+            },
+        }
+    }
+
     /// Where a point of the cell stands.
     #[inline]
     pub fn apply(&self, p: Point) -> Point {

@@ -60,7 +60,10 @@ pub(super) fn resolve(cells: &mut [LayoutCell], names: &Names, numbers: &[u32]) 
     let mut inline_total = 0;
     for (cell, (placements, depth)) in cells.iter_mut().zip(placements.into_iter().zip(depths)) {
         (cell.placements, cell.depth) = (placements, depth);
-        let vertices = cell.layers.iter().map(|(_, t)| t.vertices).sum::<u64>();
+        let vertices = cell
+            .layers
+            .iter()
+            .fold(0, |sum: u64, (_, t)| sum.saturating_add(t.vertices));
         cell.inline = cell.children.is_empty()
             && (1..=INLINE_SHAPES).contains(&cell.shapes())
             && cell.texts() == 0
@@ -162,8 +165,8 @@ fn flat_text_bytes(cells: &[LayoutCell], placements: &[u64]) -> u64 {
         let texts = cell
             .layers
             .iter()
-            .map(|(_, t)| t.text_bytes + TEXT_BYTES * t.texts)
-            .sum::<u64>();
+            .map(|(_, t)| t.text_bytes.saturating_add(TEXT_BYTES.saturating_mul(t.texts)))
+            .fold(0, u64::saturating_add);
         sum.saturating_add(n.saturating_mul(texts))
     })
 }

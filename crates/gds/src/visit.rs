@@ -1,10 +1,11 @@
 //! The second reading: every shape once, with all places it stands at.
 
 use super::cell::LayoutCell;
+use super::cells::CellInput;
 use super::element::{ElementContent, ElementKind};
-use super::input::Input;
 use super::layout::Layout;
 use super::names::Recent;
+use super::oasis::Copies;
 use super::outline::outline;
 use super::place::{self, magnified};
 use super::shape::{Point, Rect, Shape, ShapeKind, Text, rectangle_of};
@@ -79,9 +80,9 @@ impl Layout {
         if let Some(cause) = tree::beyond(self.cells(), &counts, &depths, self.limits(), self.bytes()) {
             return Err(self.fault(0, cause));
         }
-        let mut input = self.source().open()?;
+        let mut input = self.reopen()?;
         let placed = place::placements(self, &mut input, &roots)?;
-        let mut own_input = self.source().open()?;
+        let mut own_input = self.reopen()?;
         let small = self.inline_shapes(&mut own_input, &counts)?;
         drop(own_input);
         let wanted = |layer: LayerNumber| selection.layers.as_ref().is_none_or(|l| l.contains(&layer));
@@ -108,7 +109,7 @@ impl Layout {
         for index in chosen {
             spread.placements = &placed[index];
             spread.visitor.cell(&self.cells()[index], &placed[index])?;
-            self.seek_cell(&mut input, index)?;
+            input.seek(&self.cells()[index])?;
             walk.start_at(input.offset());
             walk.cell(&mut input, &mut spread)?;
         }
@@ -116,13 +117,13 @@ impl Layout {
     }
 
     /// Decode the cells that are placed shape by shape.
-    fn inline_shapes(&self, input: &mut Input, counts: &[u64]) -> Result<Vec<Vec<InlineShape>>> {
+    fn inline_shapes(&self, input: &mut CellInput, counts: &[u64]) -> Result<Vec<Vec<InlineShape>>> {
         let mut small = vec![Vec::new(); self.cells().len()];
         let mut walk = Walk::new(self.limits(), &Silent);
         for (index, cell) in self.cells().iter().enumerate() {
             if cell.inline && counts[index] > 0 {
                 let mut keep = Keep::default();
-                self.seek_cell(input, index)?;
+                input.seek(cell)?;
                 walk.cell(input, &mut keep)?;
                 small[index] = keep.0;
             }
@@ -158,7 +159,7 @@ impl Sink for Keep {
         Ok(())
     }
 
-    fn element(&mut self, _input: &Input, element: &ElementContent) -> Result<()> {
+    fn element(&mut self, element: &ElementContent) -> Result<(), SinkError> {
         let mut points = Vec::new();
         if let Some(kind) = outline_of(element, &mut points) {
             self.0.push(InlineShape {
@@ -169,6 +170,23 @@ impl Sink for Keep {
             });
         }
         Ok(())
+    }
+
+    fn repeated(&mut self, element: &ElementContent, copies: &Copies<'_>) -> Result<(), SinkError> {
+        let mut points = Vec::new();
+        let Some(kind) = outline_of(element, &mut points) else {
+            return Ok(());
+        };
+        copies.each(|by| {
+            let points: Vec<Point> = points.iter().map(|p| Point::new(p.x + by.x, p.y + by.y)).collect();
+            self.0.push(InlineShape {
+                kind,
+                layer: element.layer,
+                rect: rectangle_of(&points),
+                points,
+            });
+            Ok(())
+        })
     }
 }
 
@@ -275,7 +293,7 @@ impl<V: Visitor> Sink for Spread<'_, V> {
         Ok(self.copy(inline as usize, own, offset)?)
     }
 
-    fn element(&mut self, _input: &Input, element: &ElementContent) -> Result<()> {
+    fn element(&mut self, element: &ElementContent) -> Result<(), SinkError> {
         match element.kind {
             ElementKind::Reference | ElementKind::Array => {
                 let inline = self.layout.inline_cell(&element.name);
@@ -311,6 +329,51 @@ impl<V: Visitor> Sink for Spread<'_, V> {
                 Ok(())
             }
             _ => Ok(()),
+        }
+    }
+
+    fn repeated(&mut self, element: &ElementContent, copies: &Copies<'_>) -> Result<(), SinkError> {
+        match element.kind {
+            ElementKind::Reference | ElementKind::Array => {
+                let inline = self.layout.inline_cell(&element.name);
+                if inline == u32::MAX {
+                    return Ok(());
+                }
+                copies.each(|by| Ok(self.copy(inline as usize, element.copy(0).moved(by), element.offset)?))
+            }
+            _ if !self.wants(element.layer) => Ok(()),
+            ElementKind::Text => copies.each(|by| {
+                let at = element.points[0];
+                let text = Text {
+                    layer: element.layer,
+                    string: &element.string,
+                    at: Point::new(at.x + by.x, at.y + by.y),
+                    offset: element.offset,
+                };
+                Ok(self.visitor.text(&text, self.placements)?)
+            }),
+            _ => {
+                let (mut points, mut moved) = (std::mem::take(&mut self.path), std::mem::take(&mut self.moved));
+                if let Some(kind) = outline_of(element, &mut points) {
+                    let rect = rectangle_of(&points);
+                    moved.clone_from(&points);
+                    copies.each(|by| {
+                        for (to, from) in moved.iter_mut().zip(&points) {
+                            *to = Point::new(from.x + by.x, from.y + by.y);
+                        }
+                        let shape = Shape {
+                            kind,
+                            layer: element.layer,
+                            rect: rect.map(|r| r.moved(by)),
+                            points: &moved,
+                            offset: element.offset,
+                        };
+                        self.visitor.shape(&shape, self.placements)
+                    })?;
+                }
+                (self.path, self.moved) = (points, moved);
+                Ok(())
+            }
         }
     }
 }

@@ -1,9 +1,11 @@
 //! The elements of one cell, one after the other.
 
+use super::cells::CellInput;
 use super::element::{ElementContent, ElementKind};
 use super::fast;
 use super::input::Input;
 use super::limits::ReadLimits;
+use super::oasis::Copies;
 use super::record::kind;
 use super::shape::Point;
 use crate::error::{Error, LayoutError, Result};
@@ -18,7 +20,10 @@ pub(super) trait Sink {
     fn plain_reference(&mut self, offset: u64, key: u64, at: Point) -> Result<(), SinkError>;
 
     /// Any other element.
-    fn element(&mut self, input: &Input, element: &ElementContent) -> Result<()>;
+    fn element(&mut self, element: &ElementContent) -> Result<(), SinkError>;
+
+    /// Any element with all its copies.
+    fn repeated(&mut self, element: &ElementContent, copies: &Copies<'_>) -> Result<(), SinkError>;
 }
 
 /// Why a sink ends the reading: a cause at the element that it was given, or an error as it is.
@@ -45,7 +50,7 @@ impl From<metalith_core::Error> for SinkError {
     }
 }
 
-/// Reads elements from behind STRNAME to behind ENDSTR.
+/// Reads the elements of a cell: in GDSII from behind STRNAME to behind ENDSTR.
 pub(super) struct Walk<'a> {
     pub limits: &'a ReadLimits,
     pub progress: &'a dyn Progress,
@@ -91,8 +96,16 @@ impl<'a> Walk<'a> {
         self.reported = offset;
     }
 
+    /// Hand the elements up to the end of the cell to `sink`.
+    pub fn cell<S: Sink>(&mut self, input: &mut CellInput, sink: &mut S) -> Result<()> {
+        match input {
+            CellInput::Gds(input) => self.gds_cell(input, sink),
+            CellInput::Oasis(cells) => cells.cell(self.limits, sink, |offset| self.report(offset)),
+        }
+    }
+
     /// Hand the elements up to ENDSTR to `sink`.
-    pub fn cell<S: Sink>(&mut self, input: &mut Input, sink: &mut S) -> Result<()> {
+    pub fn gds_cell<S: Sink>(&mut self, input: &mut Input, sink: &mut S) -> Result<()> {
         loop {
             if self.fast {
                 self.fast_run(input, sink)?;
@@ -100,7 +113,10 @@ impl<'a> Walk<'a> {
             let record = input.next()?;
             if let Some(kind) = ElementKind::of(record.kind) {
                 self.element.read(input, record, kind, self.limits)?;
-                sink.element(input, &self.element)?;
+                sink.element(&self.element).map_err(|error| match error {
+                    SinkError::Here(cause) => input.fault(self.element.offset, cause),
+                    SinkError::With(error) => error,
+                })?;
             } else if record.kind == kind::ENDSTR {
                 return self.report(input.offset());
             } else if matches!(record.kind, kind::BGNSTR | kind::ENDLIB | kind::BGNLIB | kind::HEADER) {

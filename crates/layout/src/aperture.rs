@@ -2,23 +2,18 @@
 
 use std::f64::consts::TAU;
 
-use gds21::GdsElement;
-
-use super::polygon;
 use metalith_design::Design;
 
 /// One polygon round each lens. It encloses the circle and is nowhere further from it than the chord
 /// error (and half a nanometre of rounding).
-pub(super) fn openings(design: &Design) -> Vec<GdsElement> {
-    let layer = &design.layout.layers.apertures;
+pub(super) fn openings(design: &Design) -> Vec<Vec<(i64, i64)>> {
     let corners = circle(design);
     design
         .elements()
         .iter()
         .map(|element| {
             let (cx, cy) = element.centre_nm;
-            let moved = corners.iter().map(|&(x, y)| (cx + x, cy + y)).collect::<Vec<_>>();
-            polygon(layer, &moved)
+            corners.iter().map(|&(x, y)| (cx + x, cy + y)).collect()
         })
         .collect()
 }

@@ -1,11 +1,16 @@
-//! From pillars to the bytes that a cleanroom writes: GDSII, streamed.
+//! From pillars to the bytes that a cleanroom writes: GDSII or OASIS, streamed.
 //!
-//! gds21 builds and encodes the library, the cells, references, marks and labels; the pillars, of which
-//! there are millions, are records of our own between the bytes that it made.
+//! In GDSII gds21 builds and encodes the library, the cells, references, marks and labels; the pillars, of which
+//! there are millions, are records of our own between the bytes that it made. In OASIS all is written by
+//! [`metalith_oasis`].
 
 mod aperture;
+mod convert;
+mod fixed;
+mod format;
 mod frame;
 mod mark;
+mod oasis;
 mod pillars;
 mod properties;
 
@@ -13,12 +18,16 @@ use std::path::{Path, PathBuf};
 
 use gds21::GdsElement;
 
+use fixed::FixedShapes;
 use frame::LibraryFrame;
 use metalith_core::{Error, Progress, Result, WholeFile};
 use metalith_design::array::PillarArray;
 use metalith_design::{Design, Hierarchy, LayoutLayer};
 use pillars::PillarWriter;
 
+pub use convert::convert;
+pub use format::{LayoutFormat, OasisEncoding};
+pub use oasis::{write_apertures_oasis, write_pillars_oasis};
 pub use properties::write_layer_properties;
 
 /// A file that was written.
@@ -30,6 +39,8 @@ pub struct Written {
     pub top_cell: String,
     /// What a person should know of how it was written, such as why nothing was folded.
     pub remarks: Vec<String>,
+    /// Further files that belong to it: one for each further layer, where a file may have one only.
+    pub beside: Vec<PathBuf>,
 }
 
 /// Write the pillar layout of a design: pillars, marks of the first step, chip outline and label.
@@ -48,18 +59,14 @@ pub fn write_pillars(
 ) -> Result<Written> {
     let frame = LibraryFrame::new(design)?;
     let layers = &design.layout.layers;
-    let mut fixed = mark::crosses(&design.layout.marks, &layers.pillar_marks);
-    fixed.push(mark::outline(&design.layout.chip, &layers.outline));
-    fixed.push(label(design, &layers.label));
+    let fixed = FixedShapes::of_pillars(design).gds();
     progress.begin("writing pillars", array.pillars());
     let mut writer = PillarWriter::create(path, &frame, &layers.pillars, progress)?;
     let mut remarks = Vec::new();
     match hierarchy {
         Hierarchy::Folded => {
             let folded = writer.folded(array)?;
-            if array.placed.len() == array.classes.len() && array.placed.len() > 1 {
-                remarks.push("no two elements are copies of one another: each is written by itself".into());
-            }
+            remarks.extend(no_copies(array));
             remarks.extend(folded);
         }
         Hierarchy::Sref => writer.referenced(array)?,
@@ -72,6 +79,53 @@ pub fn write_pillars(
         bytes,
         top_cell: top_cell(design),
         remarks,
+        beside: Vec::new(),
+    })
+}
+
+/// Write the pillar layout of a design in a format.
+///
+/// # Errors
+/// As [`write_pillars`].
+pub fn write_pillars_as(
+    design: &Design,
+    array: &PillarArray,
+    hierarchy: Hierarchy,
+    format: LayoutFormat,
+    path: &Path,
+    progress: &dyn Progress,
+) -> Result<Written> {
+    match format {
+        LayoutFormat::Gds => write_pillars(design, array, hierarchy, path, progress),
+        LayoutFormat::Oasis(encoding) => write_pillars_oasis(design, array, hierarchy, encoding, path, progress),
+    }
+}
+
+/// Write the aperture layout of a design in a format.
+///
+/// # Errors
+/// As [`write_apertures`].
+pub fn write_apertures_as(design: &Design, format: LayoutFormat, path: &Path) -> Result<Written> {
+    match format {
+        LayoutFormat::Gds => write_apertures(design, path),
+        LayoutFormat::Oasis(encoding) => write_apertures_oasis(design, encoding, path),
+    }
+}
+
+/// What a person should know if nothing could be copied.
+fn no_copies(array: &PillarArray) -> Option<String> {
+    (array.placed.len() == array.classes.len() && array.placed.len() > 1)
+        .then(|| "no two elements are copies of one another: each is written by itself".into())
+}
+
+/// What a person should know of a class that has no symmetry.
+fn no_symmetry(array: &PillarArray, class: usize) -> Option<String> {
+    let first = array.placed.iter().find(|p| p.class == class)?;
+    (array.classes[class].group.members().len() == 1).then(|| {
+        format!(
+            "element {} has no symmetry: all its pillars are written",
+            first.element.label()
+        )
     })
 }
 
@@ -81,11 +135,7 @@ pub fn write_pillars(
 /// If the file cannot be written; the old file is then as it was.
 pub fn write_apertures(design: &Design, path: &Path) -> Result<Written> {
     let frame = LibraryFrame::new(design)?;
-    let layers = &design.layout.layers;
-    let mut elements = aperture::openings(design);
-    elements.extend(mark::crosses(&design.layout.marks, &layers.aperture_marks));
-    elements.push(label(design, &layers.label));
-    let (begin, end) = frame.cell(&top_cell(design), elements)?;
+    let (begin, end) = frame.cell(&top_cell(design), FixedShapes::of_apertures(design).gds())?;
     let bytes = [frame.head(), &begin, &end, frame.tail()].concat();
     WholeFile::write(path, &bytes)?;
     Ok(Written {
@@ -93,26 +143,13 @@ pub fn write_apertures(design: &Design, path: &Path) -> Result<Written> {
         bytes: bytes.len() as u64,
         top_cell: top_cell(design),
         remarks: Vec::new(),
+        beside: Vec::new(),
     })
 }
 
 /// The design's name as a cell name, in the characters that GDSII allows.
 fn top_cell(design: &Design) -> String {
     design.name.replace('-', "_").to_ascii_uppercase()
-}
-
-/// Name and digest of the design, at the lower left of the chip.
-fn label(design: &Design, layer: &LayoutLayer) -> GdsElement {
-    let (x, y) = design.layout.chip.size_nm;
-    let inset = x.min(y) / 50;
-    gds21::GdsTextElem {
-        string: format!("{} sha256:{}", design.name, design.digest()),
-        layer: layer.layer,
-        texttype: layer.datatype,
-        xy: point(-x / 2 + inset, -y / 2 + inset),
-        ..Default::default()
-    }
-    .into()
 }
 
 /// A point of the layout. Designs are limited to 300 mm, far inside the 2.1 m of a 32-bit nanometre.

@@ -84,17 +84,7 @@ impl<'a> PillarWriter<'a> {
                 self.put(&end)?;
                 references.extend(part.copies.iter().map(|s| reference(&name, *s, (0, 0))));
             }
-            if class.group.members().len() == 1 {
-                let first = array
-                    .placed
-                    .iter()
-                    .find(|p| p.class == k)
-                    .expect("a class has an element");
-                remarks.push(format!(
-                    "element {} has no symmetry: all its pillars are written",
-                    first.element.label()
-                ));
-            }
+            remarks.extend(super::no_symmetry(array, k));
             let (begin, end) = self.frame.cell(&lens, references)?;
             self.put(&begin)?;
             self.put(&end)?;
@@ -212,7 +202,7 @@ fn lens_name(class: usize) -> String {
     format!("LENS{class}")
 }
 
-fn width_name(width: usize) -> String {
+pub(super) fn width_name(width: usize) -> String {
     format!("W{width}")
 }
 

@@ -6,7 +6,9 @@ use std::path::Path;
 
 use metalith_core::{Silent, WholeFile};
 use metalith_design::{Design, Hierarchy, PillarArray};
-use metalith_layout::{write_apertures, write_pillars};
+use metalith_gds::{LayerNumber, Layout, Point, Selection, Shape, Transform, Visitor};
+use metalith_layout::{LayoutFormat, OasisEncoding, convert, write_apertures, write_pillars, write_pillars_oasis};
+use metalith_oasis::{CellReference, NameTable, OasisItem, OasisLimits, OasisReader, OasisShape};
 use metalith_testing::{design, golden};
 use serde_json::json;
 use sha2::{Digest, Sha256};
@@ -145,4 +147,141 @@ fn an_unfinished_file_replaces_nothing() {
     WholeFile::write(&path, b"new").unwrap();
     assert_eq!(fs::read(&path).unwrap(), b"new");
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+const ENCODINGS: [OasisEncoding; 3] = [OasisEncoding::Compact, OasisEncoding::Plain, OasisEncoding::Smallest];
+
+/// OASIS in every encoding has every pillar, counted record by record, and is the same on any number of threads.
+#[test]
+fn oasis_has_every_pillar_on_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let mini = Design::read(&design("mini_3x3")).unwrap();
+    let array = PillarArray::build(&mini, &Silent).unwrap();
+    for encoding in ENCODINGS {
+        for hierarchy in [Hierarchy::Folded, Hierarchy::Flat] {
+            let on = |threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let path = folder.path().join("pillars.oas");
+                pool.install(|| write_pillars_oasis(&mini, &array, hierarchy, encoding, &path, &Silent))
+                    .unwrap();
+                fs::read(path).unwrap()
+            };
+            let one = on(1);
+            assert!(one == on(2) && one == on(5));
+            assert_eq!(count_oasis(&one), array.pillars(), "{encoding:?} {hierarchy:?}");
+        }
+    }
+    // Plain files have one layer each, and no repetition.
+    let path = folder.path().join("plain.oas");
+    let written = write_pillars_oasis(&mini, &array, Hierarchy::Folded, OasisEncoding::Plain, &path, &Silent).unwrap();
+    assert_eq!(written.beside.len(), 2, "marks and outline: {:?}", written.beside);
+    for path in written.beside.iter().chain([&path]) {
+        let bytes = fs::read(path).unwrap();
+        let mut layers = Vec::new();
+        let mut reader = OasisReader::new(std::io::Cursor::new(&bytes), OasisLimits::default()).unwrap();
+        loop {
+            match reader.read_item().unwrap() {
+                OasisItem::Element(e) => {
+                    assert!(e.repetition.is_none());
+                    if !matches!(e.shape, OasisShape::Placement { .. }) && !layers.contains(&e.layer) {
+                        layers.push(e.layer);
+                    }
+                }
+                OasisItem::End => break,
+                _ => {}
+            }
+        }
+        assert_eq!(layers.len(), 1, "{}", path.display());
+    }
+}
+
+/// Squares on the pillar layer in the top cell and all it refers to.
+fn count_oasis(bytes: &[u8]) -> u64 {
+    let mut reader = OasisReader::new(std::io::Cursor::new(bytes), OasisLimits::default()).unwrap();
+    fn number(reference: CellReference<'_>) -> u64 {
+        match reference {
+            CellReference::Number(number) => number,
+            CellReference::Name(_) => panic!("strict files refer by number"),
+        }
+    }
+    let (mut cells, mut current, mut top) = (CellCounts::new(), 0, 0);
+    loop {
+        match reader.read_item().unwrap() {
+            OasisItem::Cell(name) => current = number(name),
+            OasisItem::Element(e) => {
+                let (squares, below) = cells.entry(current).or_default();
+                match e.shape {
+                    OasisShape::Rectangle { .. } if e.layer == 1 => *squares += e.copies,
+                    OasisShape::Placement { cell, .. } => below.push((number(cell), e.copies)),
+                    _ => {}
+                }
+            }
+            OasisItem::Name(entry) if entry.table == NameTable::Cells && entry.name == b"MINI_3X3" => {
+                top = entry.number
+            }
+            OasisItem::End => return squares_below(&cells, top),
+            _ => {}
+        }
+    }
+}
+
+/// For each cell its squares, and cells below it with their number.
+type CellCounts = BTreeMap<u64, (u64, Vec<(u64, u64)>)>;
+
+fn squares_below(cells: &CellCounts, cell: u64) -> u64 {
+    let (squares, below) = &cells[&cell];
+    squares + below.iter().map(|(c, n)| n * squares_below(cells, *c)).sum::<u64>()
+}
+
+/// From one format into the other and back: the same geometry, cell by cell, of layouts of this program and of others.
+#[test]
+fn converted_layouts_are_the_same_geometry() {
+    let folder = tempfile::tempdir().unwrap();
+    let mini = Design::read(&design("mini_3x3")).unwrap();
+    let array = PillarArray::build(&mini, &Silent).unwrap();
+    let own = folder.path().join("own.gds");
+    write_pillars(&mini, &array, Hierarchy::Folded, &own, &Silent).unwrap();
+    let foreign = metalith_testing::root().join("golden/foreign");
+    let mut files: Vec<_> = fs::read_dir(foreign).unwrap().map(|e| e.unwrap().path()).collect();
+    files.sort();
+    files.push(own);
+    for file in files {
+        let original = Layout::open(&file).unwrap();
+        let (oasis, gds) = (folder.path().join("a.oas"), folder.path().join("b.gds"));
+        convert(&original, LayoutFormat::Oasis(OasisEncoding::Compact), &oasis, &Silent).unwrap();
+        let oasis = Layout::open(&oasis).unwrap();
+        convert(&oasis, LayoutFormat::Gds, &gds, &Silent).unwrap();
+        let gds = Layout::open(&gds).unwrap();
+        let expected = corners(&original);
+        assert!(!expected.is_empty());
+        for (name, converted) in [("oasis", &oasis), ("gds", &gds)] {
+            assert_eq!(
+                converted.cells().len(),
+                original.cells().len(),
+                "{name} {}",
+                file.display()
+            );
+            assert!(corners(converted) == expected, "{name} {}", file.display());
+        }
+    }
+}
+
+/// Layers and corners of all areas where they stand, in one order.
+fn corners(layout: &Layout) -> Vec<(LayerNumber, Vec<Point>)> {
+    struct Areas(Vec<(LayerNumber, Vec<Point>)>);
+    impl Visitor for Areas {
+        fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> metalith_core::Result<()> {
+            for placement in placements {
+                let mut corners: Vec<Point> = shape.points.iter().map(|&p| placement.apply(p)).collect();
+                corners.sort_unstable();
+                corners.dedup();
+                self.0.push((shape.layer, corners));
+            }
+            Ok(())
+        }
+    }
+    let mut areas = Areas(Vec::new());
+    layout.visit(&Selection::default(), &mut areas, &Silent).unwrap();
+    areas.0.sort_unstable();
+    areas.0
 }

@@ -4,6 +4,7 @@ pub mod gds;
 mod golden;
 pub mod lens;
 pub mod mutate;
+pub mod oasis;
 #[cfg(feature = "session")]
 pub mod session;
 

@@ -185,6 +185,13 @@ impl SymmetryGroup {
         self.stabiliser(n, ix, iy) == Some(part.stabiliser)
     }
 
+    /// Which of the parts of the domain a site belongs to, if any.
+    #[inline]
+    pub fn part_of(&self, parts: &[DomainPart], n: usize, ix: usize, iy: usize) -> Option<usize> {
+        let stabiliser = self.stabiliser(n, ix, iy)?;
+        parts.iter().position(|part| part.stabiliser == stabiliser)
+    }
+
     /// What leaves a site where it is; none if another copy of the site, the first in reading order,
     /// stands for it.
     #[inline]

@@ -1,5 +1,6 @@
 //! The reader and the extraction: hand-built bytes, files of other tools, random trees, damaged bytes.
 
+mod oasis;
 mod trees;
 
 use std::path::PathBuf;
@@ -82,15 +83,17 @@ fn foreign_lens() -> (ElementSite, WidthMap) {
     (site, widths)
 }
 
+/// Layouts of the lens by other tools: 11 in each format.
 fn foreign_files() -> Vec<PathBuf> {
     let folder = metalith_testing::root().join("golden/foreign");
     let mut files: Vec<_> = std::fs::read_dir(folder)
         .unwrap()
         .map(|e| e.unwrap().path())
-        .filter(|p| p.extension().is_some_and(|e| e == "gds"))
+        .filter(|p| p.extension().is_some_and(|e| e == "gds" || e == "oas"))
+        .filter(|p| p.file_stem().is_some_and(|s| s != "forms"))
         .collect();
     files.sort();
-    assert_eq!(files.len(), 11);
+    assert_eq!(files.len(), 22);
     files
 }
 
@@ -396,7 +399,10 @@ fn a_lenient_visit_goes_round_faults() {
 #[test]
 fn damaged_bytes_never_panic() {
     let mut corpus = vec![gds::everything(), gds::everything()];
-    corpus.extend(foreign_files().iter().map(|f| {
+    let gds = foreign_files()
+        .into_iter()
+        .filter(|f| f.extension().is_some_and(|e| e == "gds"));
+    corpus.extend(gds.map(|f| {
         let mut bytes = std::fs::read(f).unwrap();
         if bytes.len() > 8192 {
             bytes.drain(3000..bytes.len() - 3000);

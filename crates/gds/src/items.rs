@@ -1,0 +1,214 @@
+//! The content of cells as it is drawn, for whoever writes it to another file.
+
+use metalith_core::{LayerNumber, Progress};
+use metalith_oasis::Repetition;
+
+use super::cell::LayoutCell;
+use super::element::{ElementContent, ElementKind};
+use super::layout::Layout;
+use super::names::Recent;
+use super::oasis::Copies;
+use super::outline::outline;
+use super::shape::Point;
+use super::walk::{Sink, SinkError, Walk};
+use crate::error::Result;
+
+/// One element of a cell, in the coordinates of the cell.
+#[derive(Clone, Copy, Debug)]
+pub enum CellItem<'a> {
+    /// A closed outline, its first point repeated at the end where the format is kept.
+    Area { layer: LayerNumber, points: &'a [Point] },
+    /// A pen of this width drawn along a line of at least two points, longer than it by `extensions`. Paths with round
+    /// ends come as areas.
+    Line {
+        layer: LayerNumber,
+        points: &'a [Point],
+        width: i64,
+        extensions: [i64; 2],
+    },
+    Text {
+        layer: LayerNumber,
+        string: &'a [u8],
+        at: Point,
+    },
+    /// A cell, by its index in [`Layout::cells`].
+    Reference {
+        cell: usize,
+        at: Point,
+        mirrored: bool,
+        magnification: f64,
+        angle_deg: f64,
+    },
+}
+
+/// What takes the content of cells.
+pub trait CellConsumer {
+    /// A cell begins; what follows up to the next call is in it.
+    ///
+    /// # Errors
+    /// Any error ends the reading.
+    fn cell(&mut self, index: usize, cell: &LayoutCell) -> metalith_core::Result<()>;
+
+    /// An element, and its copies if it has any. An array of GDSII is a repetition.
+    ///
+    /// # Errors
+    /// Any error ends the reading.
+    fn item(&mut self, item: &CellItem<'_>, repetition: Option<&Repetition>) -> metalith_core::Result<()>;
+}
+
+impl Layout {
+    /// Hand all cells, in the order of the file, to `consumer`. Copies are not multiplied, references not followed;
+    /// properties and nodes are left out.
+    ///
+    /// # Errors
+    /// If the tree of cells has faults, if the file cannot be read again, and what the consumer returns.
+    pub fn cell_items<C: CellConsumer>(&self, consumer: &mut C, progress: &dyn Progress) -> Result<()> {
+        self.sound()?;
+        let mut input = self.reopen()?;
+        let mut walk = Walk::new(self.limits(), progress);
+        progress.begin("reading cells again", self.bytes());
+        for (index, cell) in self.cells().iter().enumerate() {
+            consumer.cell(index, cell)?;
+            input.seek(cell)?;
+            walk.start_at(input.offset());
+            let mut pass = Pass {
+                layout: self,
+                consumer,
+                recent: Recent::new(),
+                outline: Vec::new(),
+            };
+            walk.cell(&mut input, &mut pass)?;
+        }
+        Ok(())
+    }
+}
+
+/// Hands elements on.
+struct Pass<'a, C> {
+    layout: &'a Layout,
+    consumer: &'a mut C,
+    recent: Recent,
+    outline: Vec<Point>,
+}
+
+impl<C: CellConsumer> Pass<'_, C> {
+    fn cell_of(&self, name: &[u8]) -> Option<usize> {
+        let number = self.layout.names().find(name)?;
+        self.layout.tree().definitions[number as usize]
+    }
+
+    fn put(&mut self, element: &ElementContent, repetition: Option<&Repetition>) -> Result<(), SinkError> {
+        let layer = element.layer;
+        let item = match element.kind {
+            ElementKind::Boundary | ElementKind::Box => CellItem::Area {
+                layer,
+                points: &element.points,
+            },
+            ElementKind::Path => {
+                let width = i64::from(element.width).abs();
+                let distinct = element.points.windows(2).any(|w| w[0] != w[1]);
+                let extensions = match element.path_type {
+                    0 => Some([0; 2]),
+                    2 => Some([width / 2; 2]),
+                    4 => Some(element.extensions.map(i64::from)),
+                    _ => None,
+                };
+                // OASIS has half widths, and no pen has an area where it does not move.
+                match extensions.filter(|_| distinct && width % 2 == 0) {
+                    Some(extensions) => CellItem::Line {
+                        layer,
+                        points: &element.points,
+                        width,
+                        extensions,
+                    },
+                    None => {
+                        let (ends, points) = (element.extensions, &element.points);
+                        outline(points, width, element.path_type, ends, &mut self.outline);
+                        CellItem::Area {
+                            layer,
+                            points: &self.outline,
+                        }
+                    }
+                }
+            }
+            ElementKind::Text => CellItem::Text {
+                layer,
+                string: &element.string,
+                at: element.points[0],
+            },
+            ElementKind::Reference | ElementKind::Array => {
+                let Some(cell) = self.cell_of(&element.name) else {
+                    return Ok(());
+                };
+                CellItem::Reference {
+                    cell,
+                    at: element.points[0],
+                    mirrored: element.mirror,
+                    magnification: element.magnification,
+                    angle_deg: element.angle_deg,
+                }
+            }
+            ElementKind::Node => return Ok(()),
+        };
+        Ok(self.consumer.item(&item, repetition)?)
+    }
+}
+
+impl<C: CellConsumer> Sink for Pass<'_, C> {
+    fn five_points(&mut self, _offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<(), SinkError> {
+        Ok(self.consumer.item(&CellItem::Area { layer, points }, None)?)
+    }
+
+    fn plain_reference(&mut self, _offset: u64, key: u64, at: Point) -> Result<(), SinkError> {
+        let layout = self.layout;
+        let cell = self.recent.number(key, |name| {
+            let number = layout.names().find(name);
+            let cell = number.and_then(|n| layout.tree().definitions[n as usize]);
+            cell.map_or(u32::MAX, |c| c as u32)
+        });
+        if cell == u32::MAX {
+            return Ok(());
+        }
+        let item = CellItem::Reference {
+            cell: cell as usize,
+            at,
+            mirrored: false,
+            magnification: 1.0,
+            angle_deg: 0.0,
+        };
+        Ok(self.consumer.item(&item, None)?)
+    }
+
+    fn element(&mut self, element: &ElementContent) -> Result<(), SinkError> {
+        if element.kind != ElementKind::Array {
+            return self.put(element, None);
+        }
+        let (columns, rows) = (u64::from(element.columns), u64::from(element.rows));
+        let from = |k: u64| {
+            let (place, first) = (element.origin(k), element.points[0]);
+            [place.x - first.x, place.y - first.y]
+        };
+        let (along, up) = (from(u64::from(columns > 1)), from(if rows > 1 { columns } else { 0 }));
+        let grid = Repetition::Grid {
+            count: [columns, rows],
+            step: [along, up],
+        };
+        let last = from(columns * rows - 1);
+        let at_end: [i64; 2] =
+            std::array::from_fn(|axis| (columns as i64 - 1) * along[axis] + (rows as i64 - 1) * up[axis]);
+        if last == at_end && columns > 1 {
+            return self.put(element, Some(&grid));
+        }
+        // Steps that are no whole units, or one column.
+        for k in 0..columns * rows {
+            let mut copy = element.clone();
+            copy.points[0] = element.origin(k);
+            self.put(&copy, None)?;
+        }
+        Ok(())
+    }
+
+    fn repeated(&mut self, element: &ElementContent, copies: &Copies<'_>) -> Result<(), SinkError> {
+        self.put(element, Some(copies.repetition))
+    }
+}

@@ -1,0 +1,75 @@
+//! What a layout has beside its pillars: polygons and a label, in no format yet.
+
+use gds21::GdsElement;
+use metalith_design::{Design, LayoutLayer};
+
+use super::{mark, point};
+
+/// Polygons and texts of a top cell.
+#[derive(Clone, Debug)]
+pub(super) struct FixedShapes<'a> {
+    /// Corners (nm), the first not repeated.
+    pub polygons: Vec<(&'a LayoutLayer, Vec<(i64, i64)>)>,
+    pub texts: Vec<(&'a LayoutLayer, String, (i64, i64))>,
+}
+
+impl<'a> FixedShapes<'a> {
+    /// Marks of the first step, outline of the chip and label.
+    pub fn of_pillars(design: &'a Design) -> Self {
+        let layers = &design.layout.layers;
+        let mut fixed = Self {
+            polygons: Vec::new(),
+            texts: Vec::new(),
+        };
+        fixed.add(&layers.pillar_marks, mark::crosses(&design.layout.marks));
+        fixed.add(&layers.outline, [mark::outline(&design.layout.chip).to_vec()]);
+        fixed.label(design);
+        fixed
+    }
+
+    /// Openings, marks of the second step and label.
+    pub fn of_apertures(design: &'a Design) -> Self {
+        let layers = &design.layout.layers;
+        let mut fixed = Self {
+            polygons: Vec::new(),
+            texts: Vec::new(),
+        };
+        fixed.add(&layers.apertures, super::aperture::openings(design));
+        fixed.add(&layers.aperture_marks, mark::crosses(&design.layout.marks));
+        fixed.label(design);
+        fixed
+    }
+
+    fn add(&mut self, layer: &'a LayoutLayer, polygons: impl IntoIterator<Item = Vec<(i64, i64)>>) {
+        self.polygons
+            .extend(polygons.into_iter().map(|corners| (layer, corners)));
+    }
+
+    /// The design's name and digest, at the lower left of the chip.
+    fn label(&mut self, design: &'a Design) {
+        let (x, y) = design.layout.chip.size_nm;
+        let inset = x.min(y) / 50;
+        let text = format!("{} sha256:{}", design.name, design.digest());
+        self.texts
+            .push((&design.layout.layers.label, text, (-x / 2 + inset, -y / 2 + inset)));
+    }
+
+    /// As elements of GDSII.
+    pub fn gds(&self) -> Vec<GdsElement> {
+        let polygons = self
+            .polygons
+            .iter()
+            .map(|(layer, corners)| super::polygon(layer, corners));
+        let texts = self.texts.iter().map(|(layer, text, at)| {
+            gds21::GdsTextElem {
+                string: text.clone(),
+                layer: layer.layer,
+                texttype: layer.datatype,
+                xy: point(at.0, at.1),
+                ..Default::default()
+            }
+            .into()
+        });
+        polygons.chain(texts).collect()
+    }
+}

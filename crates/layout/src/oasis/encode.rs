@@ -1,0 +1,316 @@
+//! The pillars of one cell as compressed blocks, made side by side.
+
+use std::ops::Range;
+
+use metalith_core::{Error, LayerNumber, Progress, Result, WidthMap};
+use metalith_oasis::{CellBounds, CompressedBlock, Placing, RecordBuffer, Repetition};
+use rayon::prelude::*;
+
+use super::rings;
+
+/// Bytes of records that are compressed together: smaller blocks cost size, larger ones memory.
+const BLOCK_BYTES: usize = 4 << 20;
+/// Columns of a strip: a step of up to 31 columns is one byte in a list.
+const STRIP: usize = 32;
+/// Pieces that are encoded side by side before they are written in order.
+const SIDE_BY_SIDE: usize = 8;
+
+/// Pieces for each one that is encoded to see how small it gets.
+const SAMPLE: usize = 6;
+
+/// How the pillars of a cell are encoded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum PillarEncoding {
+    /// Lists of places.
+    Lists,
+    /// A rectangle for each.
+    Rectangles,
+    /// A reference for each, to cells of one width.
+    References,
+}
+
+impl PillarEncoding {
+    /// Bytes of the records of a pillar, about.
+    fn bytes_of_pillar(self) -> u64 {
+        match self {
+            Self::Lists => 2,
+            Self::Rectangles | Self::References => 6,
+        }
+    }
+
+    /// Pieces that are encoded by themselves: strips, or sectors.
+    fn pieces(self, n: usize) -> usize {
+        match self {
+            Self::Lists => n.div_ceil(STRIP),
+            _ => rings::SECTORS,
+        }
+    }
+}
+
+/// Pillars of an element, each in one of several cells.
+pub(super) struct ElementPillars<'a, P> {
+    pub widths: &'a WidthMap,
+    /// Which cell a site (column, row) with a pillar belongs to, if to any.
+    pub part_of: P,
+    /// Pillars of each cell.
+    pub parts: Vec<u64>,
+    pub layer: LayerNumber,
+    /// Number of the cell of each width, for references.
+    pub width_cells: Vec<u64>,
+    /// Of compression, 1 to 9.
+    pub level: u32,
+}
+
+/// Blocks of a cell and the box around its pillars.
+pub(super) struct Encoded {
+    pub blocks: Vec<CompressedBlock>,
+    pub bounds: [i64; 4],
+    pillars: u64,
+}
+
+impl Encoded {
+    pub const EMPTY: Self = Self {
+        blocks: Vec::new(),
+        bounds: NOTHING,
+        pillars: 0,
+    };
+
+    fn append(&mut self, mut other: Self) {
+        self.blocks.append(&mut other.blocks);
+        self.bounds = unite(self.bounds, other.bounds);
+        self.pillars += other.pillars;
+    }
+}
+
+/// A box around nothing.
+pub(super) const NOTHING: [i64; 4] = [i64::MAX, i64::MAX, i64::MIN, i64::MIN];
+
+/// A box around two.
+pub(super) fn unite(a: [i64; 4], b: [i64; 4]) -> [i64; 4] {
+    [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])]
+}
+
+/// A box as the file has it.
+pub(super) fn bounds_of(corners: [i64; 4]) -> CellBounds {
+    if corners[0] > corners[2] {
+        CellBounds::Empty
+    } else {
+        CellBounds::Box(corners)
+    }
+}
+
+impl<P: Fn(usize, usize) -> Option<usize> + Sync> ElementPillars<'_, P> {
+    /// The cell with most pillars: its blocks are not held.
+    pub fn largest(&self) -> usize {
+        (0..self.parts.len()).max_by_key(|&k| self.parts[k]).unwrap_or(0)
+    }
+
+    /// Encode all pillars; blocks of the largest cell are handed to `put` in order, those of the others returned.
+    pub fn encode(
+        &self,
+        encoding: PillarEncoding,
+        progress: &dyn Progress,
+        mut put: impl FnMut(&CompressedBlock) -> Result<()>,
+    ) -> Result<Vec<Encoded>> {
+        let pieces = encoding.pieces(self.widths.lattice.sites());
+        let bytes = self
+            .parts
+            .iter()
+            .sum::<u64>()
+            .saturating_mul(encoding.bytes_of_pillar());
+        let groups = (bytes.div_ceil(BLOCK_BYTES as u64) as usize).clamp(1, pieces);
+        let ranges: Vec<Range<usize>> = (0..groups)
+            .map(|k| k * pieces / groups..(k + 1) * pieces / groups)
+            .collect();
+        let (largest, rings) = (self.largest(), self.rings());
+        let mut cells: Vec<Encoded> = self.parts.iter().map(|_| Encoded::EMPTY).collect();
+        for batch in ranges.chunks(SIDE_BY_SIDE) {
+            if progress.stopped() {
+                return Err(Error::Interrupted);
+            }
+            let encoded: Vec<Vec<Encoded>> = batch
+                .par_iter()
+                .map(|range| self.pieces(encoding, rings, range.clone()))
+                .collect();
+            for part in encoded {
+                for (k, cell) in part.into_iter().enumerate() {
+                    progress.advance(cell.pillars);
+                    cells[k].append(cell);
+                }
+                cells[largest].blocks.iter().try_for_each(&mut put)?;
+                cells[largest].blocks.clear();
+            }
+        }
+        Ok(cells)
+    }
+
+    /// Rings that hold all pillars.
+    fn rings(&self) -> i64 {
+        let rows = self.widths.width_nm.rows().into_iter();
+        let extents = rows.map(|row| {
+            let first = row.iter().position(|&w| w != 0)?;
+            Some((first, row.iter().rposition(|&w| w != 0)?))
+        });
+        rings::rings_of(self.widths.lattice.sites(), extents)
+    }
+
+    /// Bytes of a pillar, from a part of the pieces; none if no pillar is in that.
+    pub fn bytes_of_sample(&self, encoding: PillarEncoding) -> Option<f64> {
+        let pieces: Vec<usize> = (SAMPLE / 3..encoding.pieces(self.widths.lattice.sites()))
+            .step_by(SAMPLE)
+            .collect();
+        let rings = self.rings();
+        let encoded: Vec<Encoded> = pieces
+            .par_iter()
+            .flat_map_iter(|&k| self.pieces(encoding, rings, k..k + 1))
+            .collect();
+        let pillars: u64 = encoded.iter().map(|e| e.pillars).sum();
+        let length: usize = encoded
+            .iter()
+            .flat_map(|e| &e.blocks)
+            .map(CompressedBlock::length)
+            .sum();
+        (pillars > 0).then(|| length as f64 / pillars as f64)
+    }
+
+    /// Encode some pieces of all cells.
+    fn pieces(&self, encoding: PillarEncoding, rings: i64, range: Range<usize>) -> Vec<Encoded> {
+        let mut out: Vec<Packer> = self.parts.iter().map(|_| Packer::new(self.level)).collect();
+        for piece in range {
+            match encoding {
+                PillarEncoding::Lists => self.strip(piece, &mut out),
+                _ => self.sector(encoding, piece, rings, &mut out),
+            }
+        }
+        out.into_iter().map(Packer::finish).collect()
+    }
+
+    /// Pillars of a strip of columns, a list for each width, rows from below.
+    fn strip(&self, strip: usize, out: &mut [Packer]) {
+        let n = self.widths.lattice.sites();
+        let columns = strip * STRIP..((strip + 1) * STRIP).min(n);
+        for (iy, row) in self.widths.width_nm.rows().into_iter().enumerate() {
+            for ix in columns.clone() {
+                let width = usize::from(row[ix]);
+                if width != 0
+                    && let Some(part) = (self.part_of)(ix, iy)
+                {
+                    let lists = &mut out[part].lists;
+                    if width >= lists.len() {
+                        lists.resize(width + 1, Vec::new());
+                    }
+                    lists[width].push([ix as i32, iy as i32]);
+                }
+            }
+        }
+        out.iter_mut().for_each(|packer| self.put_lists(packer));
+    }
+
+    /// Write the lists of a strip and empty them.
+    fn put_lists(&self, out: &mut Packer) {
+        let lattice = self.widths.lattice;
+        let at = |ix: i32, iy: i32| [ix, iy].map(|i| lattice.coordinate_nm(i as usize));
+        for width in 1..out.lists.len() {
+            let mut places = std::mem::take(&mut out.lists[width]);
+            let (Some(&first), Some(&end)) = (places.first(), places.last()) else {
+                continue;
+            };
+            let side = width as i64;
+            let columns = places.iter().map(|p| p[0]);
+            let (left, right) = columns.fold((first[0], first[0]), |(l, r), x| (l.min(x), r.max(x)));
+            out.include(at(left, first[1]), side);
+            out.include(at(right, end[1]), side);
+            let count = places.len() as u64;
+            places.remove(0);
+            places.iter_mut().for_each(|p| *p = [p[0] - first[0], p[1] - first[1]]);
+            let grid = i64::from(lattice.pitch_nm());
+            let list = Repetition::List { grid, places };
+            let corner = at(first[0], first[1]).map(|c| c - side / 2);
+            out.records
+                .rectangle(self.layer(), corner, [side; 2], (count > 1).then_some(&list));
+            out.written(count);
+            if let Repetition::List { mut places, .. } = list {
+                places.clear();
+                out.lists[width] = places;
+            }
+        }
+    }
+
+    /// Pillars of a sector, one record each, ring by ring.
+    fn sector(&self, encoding: PillarEncoding, sector: usize, rings: i64, out: &mut [Packer]) {
+        let lattice = self.widths.lattice;
+        rings::walk(lattice.sites(), sector, rings, |ix, iy| {
+            let width = self.widths.width_nm[[iy, ix]];
+            if width != 0
+                && let Some(part) = (self.part_of)(ix, iy)
+            {
+                let out = &mut out[part];
+                let centre = [lattice.coordinate_nm(ix), lattice.coordinate_nm(iy)];
+                let side = i64::from(width);
+                if encoding == PillarEncoding::References {
+                    let cell = self.width_cells[usize::from(width)];
+                    out.records.placement(cell, centre, &Placing::PLAIN, None);
+                } else {
+                    out.records
+                        .rectangle(self.layer(), centre.map(|c| c - side / 2), [side; 2], None);
+                }
+                out.include(centre, side);
+                out.written(1);
+            }
+        });
+    }
+
+    fn layer(&self) -> [u32; 2] {
+        [self.layer.layer.into(), self.layer.datatype.into()]
+    }
+}
+
+/// Records that become blocks as they fill up.
+struct Packer {
+    records: RecordBuffer,
+    level: u32,
+    encoded: Encoded,
+    /// Places of each width in a strip: memory that is asked for once.
+    lists: Vec<Vec<[i32; 2]>>,
+}
+
+impl Packer {
+    fn new(level: u32) -> Self {
+        Self {
+            records: RecordBuffer::relative(),
+            level,
+            encoded: Encoded::EMPTY,
+            lists: Vec::new(),
+        }
+    }
+
+    #[inline]
+    fn include(&mut self, centre: [i64; 2], width: i64) {
+        let half = width / 2;
+        let [x, y] = centre;
+        self.encoded.bounds = unite(self.encoded.bounds, [x - half, y - half, x + half, y + half]);
+    }
+
+    /// So many pillars are in the records.
+    #[inline]
+    fn written(&mut self, pillars: u64) {
+        self.encoded.pillars += pillars;
+        if self.records.bytes().len() >= BLOCK_BYTES {
+            self.flush();
+        }
+    }
+
+    fn finish(mut self) -> Encoded {
+        self.flush();
+        self.encoded
+    }
+
+    fn flush(&mut self) {
+        if !self.records.bytes().is_empty() {
+            self.encoded
+                .blocks
+                .push(CompressedBlock::of(self.records.bytes(), self.level));
+            self.records.clear();
+        }
+    }
+}

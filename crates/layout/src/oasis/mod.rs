@@ -1,0 +1,387 @@
+//! Layouts as OASIS.
+
+mod encode;
+mod rings;
+
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use metalith_core::{Error, Progress, Result, WholeFile, WidthMap};
+use metalith_design::array::{PillarArray, Symmetry, SymmetryGroup};
+use metalith_design::{Design, Hierarchy, LayoutLayer};
+use metalith_oasis::{CompressedBlock, OasisWriter, Placing, RecordBuffer};
+
+use super::fixed::FixedShapes;
+use super::{OasisEncoding, Written, no_copies, no_symmetry, top_cell};
+use encode::{ElementPillars, NOTHING, PillarEncoding, bounds_of, unite};
+
+/// Steps of the grid in a micrometre: 1 nm.
+const GRID_PER_UM: f64 = 1000.0;
+
+/// A sample tells sizes to a few percent: what is not smaller by more is written as lists, which read faster.
+const SURE: f64 = 0.97;
+
+/// Compression of cells with few records.
+const LEVEL: u32 = 6;
+
+/// Write the pillar layout of a design as OASIS: pillars, marks of the first step, chip outline and label. In the
+/// plain encoding each further layer has a file of its own beside it, with its numbers in the name.
+///
+/// Folded layouts have a cell for each part that symmetry leaves unique, all others a cell for each element, which is
+/// placed without turn or mirror. The same design gives the same bytes on any number of threads; memory does not grow
+/// with the number of pillars.
+///
+/// # Errors
+/// If the file cannot be written, or the user stopped it; the old file is then as it was.
+pub fn write_pillars_oasis(
+    design: &Design,
+    array: &PillarArray,
+    hierarchy: Hierarchy,
+    encoding: OasisEncoding,
+    path: &Path,
+    progress: &dyn Progress,
+) -> Result<Written> {
+    let fixed = FixedShapes::of_pillars(design);
+    let pillars = &design.layout.layers.pillars;
+    progress.begin("writing pillars", array.pillars());
+    let mut file = OasisFile::create(design, path)?;
+    let mut remarks = Vec::new();
+    let mut elements = Elements {
+        file: &mut file,
+        layer: pillars,
+        encoding,
+        width_cells: vec![None; usize::from(u16::MAX) + 1],
+        progress,
+    };
+    let placed = if hierarchy == Hierarchy::Folded {
+        remarks.extend(no_copies(array));
+        remarks.extend((0..array.classes.len()).filter_map(|k| no_symmetry(array, k)));
+        elements.folded(array)?
+    } else {
+        elements.apart(array)?
+    };
+    elements.width_cells()?;
+    if encoding == OasisEncoding::Plain {
+        file.top(&fixed, &placed, |layer| layer.number() == pillars.number())?;
+        let mut written = file.finish(remarks)?;
+        written.beside = layers_apart(design, &fixed, pillars, path)?;
+        return Ok(written);
+    }
+    file.top(&fixed, &placed, |_| true)?;
+    file.finish(remarks)
+}
+
+/// Write the aperture layout of a design as OASIS: one flat cell, in the plain encoding for each layer a file.
+///
+/// # Errors
+/// If the file cannot be written; the old file is then as it was.
+pub fn write_apertures_oasis(design: &Design, encoding: OasisEncoding, path: &Path) -> Result<Written> {
+    let fixed = FixedShapes::of_apertures(design);
+    let openings = &design.layout.layers.apertures;
+    let mut file = OasisFile::create(design, path)?;
+    let plain = encoding == OasisEncoding::Plain;
+    file.top(&fixed, &[], |layer| !plain || layer.number() == openings.number())?;
+    let mut written = file.finish(Vec::new())?;
+    if plain {
+        written.beside = layers_apart(design, &fixed, openings, path)?;
+    }
+    Ok(written)
+}
+
+/// A file for each layer of polygons but one; texts for people are left out.
+fn layers_apart(design: &Design, fixed: &FixedShapes<'_>, but: &LayoutLayer, path: &Path) -> Result<Vec<PathBuf>> {
+    let mut numbers: Vec<_> = fixed.polygons.iter().map(|(layer, _)| layer.number()).collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    numbers.retain(|&number| number != but.number());
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let mut paths = Vec::new();
+    for number in numbers {
+        let name = format!("{stem}_{}_{}.oas", number.layer, number.datatype);
+        let path = path.with_file_name(name);
+        let mut file = OasisFile::create(design, &path)?;
+        file.top(fixed, &[], |layer| layer.number() == number)?;
+        paths.push(file.finish(Vec::new())?.path);
+    }
+    Ok(paths)
+}
+
+/// A cell that is placed in another, and the box around it where it stands.
+struct PlacedCell {
+    cell: u64,
+    symmetry: Symmetry,
+    at_nm: (i64, i64),
+    bounds: [i64; 4],
+}
+
+impl PlacedCell {
+    fn new(cell: u64, symmetry: Symmetry, at_nm: (i64, i64), own: [i64; 4]) -> Self {
+        let mut bounds = NOTHING;
+        if own[0] <= own[2] {
+            for (x, y) in [(own[0], own[1]), (own[2], own[3])] {
+                let (x, y) = symmetry.point(x, y);
+                let (x, y) = (x + at_nm.0, y + at_nm.1);
+                bounds = unite(bounds, [x, y, x, y]);
+            }
+        }
+        Self {
+            cell,
+            symmetry,
+            at_nm,
+            bounds,
+        }
+    }
+
+    fn put(&self, records: &mut RecordBuffer) {
+        let placing = Placing {
+            mirrored: self.symmetry.mirrored,
+            angle_deg: 90.0 * f64::from(self.symmetry.quarter_turns),
+            ..Placing::PLAIN
+        };
+        records.placement(self.cell, [self.at_nm.0, self.at_nm.1], &placing, None);
+    }
+}
+
+/// The file that is written.
+struct OasisFile<'a> {
+    writer: OasisWriter<BufWriter<WholeFile>>,
+    path: &'a Path,
+    top: String,
+}
+
+impl<'a> OasisFile<'a> {
+    fn create(design: &Design, path: &'a Path) -> Result<Self> {
+        let top = top_cell(design);
+        let out = BufWriter::new(WholeFile::create(path)?);
+        let writer = OasisWriter::new(out, GRID_PER_UM, &[&top], true).map_err(Error::io("write", path))?;
+        Ok(Self { writer, path, top })
+    }
+
+    fn begin(&mut self, name: &str) -> Result<u64> {
+        let number = self.writer.cell_number(name);
+        self.writer.begin_cell(number).map_err(Error::io("write", self.path))?;
+        Ok(number)
+    }
+
+    fn block(&mut self, block: &CompressedBlock) -> Result<()> {
+        self.writer.block(block).map_err(Error::io("write", self.path))
+    }
+
+    /// A cell with few records.
+    fn cell(&mut self, name: &str, records: &RecordBuffer, bounds: [i64; 4]) -> Result<u64> {
+        let number = self.begin(name)?;
+        self.block(&CompressedBlock::of(records.bytes(), LEVEL))?;
+        self.writer.end_cell(bounds_of(bounds));
+        Ok(number)
+    }
+
+    /// The top cell: placed cells, and what of the fixed shapes is on layers that are wanted.
+    fn top(
+        &mut self,
+        fixed: &FixedShapes<'_>,
+        placed: &[PlacedCell],
+        wants: impl Fn(&LayoutLayer) -> bool,
+    ) -> Result<()> {
+        let mut records = RecordBuffer::absolute();
+        let mut bounds = NOTHING;
+        for (layer, corners) in fixed.polygons.iter().filter(|(layer, _)| wants(layer)) {
+            let corners: Vec<[i64; 2]> = corners.iter().map(|&(x, y)| [x, y]).collect();
+            for &[x, y] in &corners {
+                bounds = unite(bounds, [x, y, x, y]);
+            }
+            records.polygon(numbers(layer), &corners, None);
+        }
+        for (layer, text, (x, y)) in fixed.texts.iter().filter(|(layer, _, _)| wants(layer)) {
+            let text = self.writer.text_number(text);
+            records.text(numbers(layer), text, [*x, *y], None);
+            bounds = unite(bounds, [*x, *y, *x, *y]);
+        }
+        for cell in placed {
+            cell.put(&mut records);
+            bounds = unite(bounds, cell.bounds);
+        }
+        let name = self.top.clone();
+        self.cell(&name, &records, bounds)?;
+        Ok(())
+    }
+
+    fn finish(self, remarks: Vec<String>) -> Result<Written> {
+        let io = |error| Error::io("write", self.path)(error);
+        let (mut out, bytes) = self.writer.finish().map_err(io)?;
+        out.flush().map_err(io)?;
+        let file = out.into_inner().map_err(|e| io(e.into_error()))?;
+        file.commit()?;
+        Ok(Written {
+            path: self.path.to_owned(),
+            bytes,
+            top_cell: self.top,
+            remarks,
+            beside: Vec::new(),
+        })
+    }
+}
+
+fn numbers(layer: &LayoutLayer) -> [u32; 2] {
+    let number = layer.number();
+    [number.layer.into(), number.datatype.into()]
+}
+
+/// Writes the cells of the elements.
+struct Elements<'f, 'p> {
+    file: &'f mut OasisFile<'p>,
+    layer: &'f LayoutLayer,
+    encoding: OasisEncoding,
+    /// Cells of one width that were referred to.
+    width_cells: Vec<Option<u64>>,
+    progress: &'f dyn Progress,
+}
+
+impl Elements<'_, '_> {
+    /// Level of compression.
+    fn level(&self) -> u32 {
+        if self.encoding == OasisEncoding::Smallest {
+            9
+        } else {
+            LEVEL
+        }
+    }
+
+    /// Each class once, in the parts that symmetry leaves unique.
+    fn folded(&mut self, array: &PillarArray) -> Result<Vec<PlacedCell>> {
+        let mut classes = Vec::new();
+        for (k, class) in array.classes.iter().enumerate() {
+            classes.push(self.lens(&format!("LENS{k}"), &class.widths, &class.group)?);
+        }
+        Ok(array
+            .placed
+            .iter()
+            .map(|p| {
+                let (cell, bounds) = classes[p.class];
+                PlacedCell::new(cell, p.symmetry, p.element.centre_nm, bounds)
+            })
+            .collect())
+    }
+
+    /// Each element by itself, neither turned nor mirrored.
+    fn apart(&mut self, array: &PillarArray) -> Result<Vec<PlacedCell>> {
+        let mut placed = Vec::new();
+        for (k, element) in array.placed.iter().enumerate() {
+            let widths = array.widths(element);
+            let mut pillars = ElementPillars {
+                part_of: |_, _| Some(0),
+                parts: vec![widths.pillars()],
+                widths: &widths,
+                layer: self.layer.number(),
+                width_cells: Vec::new(),
+                level: self.level(),
+            };
+            let (cell, bounds) = self.pillars(&[format!("E{k}")], &mut pillars)?[0];
+            placed.push(PlacedCell::new(
+                cell,
+                Symmetry::IDENTITY,
+                element.element.centre_nm,
+                bounds,
+            ));
+        }
+        Ok(placed)
+    }
+
+    /// A lens of parts.
+    fn lens(&mut self, name: &str, widths: &WidthMap, group: &SymmetryGroup) -> Result<(u64, [i64; 4])> {
+        let n = widths.lattice.sites();
+        let parts = group.domain(widths);
+        let mut pillars = ElementPillars {
+            part_of: |ix, iy| group.part_of(&parts, n, ix, iy),
+            parts: parts.iter().map(|p| p.pillars).collect(),
+            widths,
+            layer: self.layer.number(),
+            width_cells: Vec::new(),
+            level: self.level(),
+        };
+        let names: Vec<String> = (b'A'..)
+            .take(parts.len())
+            .map(|j| format!("{name}_{}", char::from(j)))
+            .collect();
+        let cells = self.pillars(&names, &mut pillars)?;
+        let (mut records, mut bounds) = (RecordBuffer::absolute(), NOTHING);
+        for (part, (cell, own)) in parts.iter().zip(cells) {
+            for &copy in &part.copies {
+                let placed = PlacedCell::new(cell, copy, (0, 0), own);
+                placed.put(&mut records);
+                bounds = unite(bounds, placed.bounds);
+            }
+        }
+        Ok((self.file.cell(name, &records, bounds)?, bounds))
+    }
+
+    /// Write the cells of an element. Returns number and box of each.
+    fn pillars<P: Fn(usize, usize) -> Option<usize> + Sync>(
+        &mut self,
+        names: &[String],
+        pillars: &mut ElementPillars<'_, P>,
+    ) -> Result<Vec<(u64, [i64; 4])>> {
+        let encoding = match self.encoding {
+            OasisEncoding::Compact => PillarEncoding::Lists,
+            OasisEncoding::Plain => PillarEncoding::Rectangles,
+            OasisEncoding::Smallest => self.smallest(pillars),
+        };
+        pillars.width_cells = self.numbers_of_widths(pillars.widths, encoding);
+        let largest = pillars.largest();
+        let mut numbers = vec![0; names.len()];
+        let file = &mut *self.file;
+        let Some(name) = names.get(largest) else {
+            return Ok(Vec::new());
+        };
+        numbers[largest] = file.begin(name)?;
+        let cells = pillars.encode(encoding, self.progress, |block| file.block(block))?;
+        file.writer.end_cell(bounds_of(cells[largest].bounds));
+        for (k, cell) in cells.iter().enumerate().filter(|(k, _)| *k != largest) {
+            numbers[k] = file.begin(&names[k])?;
+            cell.blocks.iter().try_for_each(|block| file.block(block))?;
+            file.writer.end_cell(bounds_of(cell.bounds));
+        }
+        Ok(numbers.into_iter().zip(cells.iter().map(|c| c.bounds)).collect())
+    }
+
+    /// The encoding that takes fewer bytes for a part of the pillars.
+    fn smallest<P: Fn(usize, usize) -> Option<usize> + Sync>(
+        &self,
+        pillars: &mut ElementPillars<'_, P>,
+    ) -> PillarEncoding {
+        // Any numbers will do to see how small it gets.
+        pillars.width_cells = (0..=u64::from(u16::MAX)).collect();
+        let candidates = [PillarEncoding::Lists, PillarEncoding::References];
+        match candidates.map(|encoding| pillars.bytes_of_sample(encoding)) {
+            [Some(lists), Some(references)] if references < SURE * lists => PillarEncoding::References,
+            _ => PillarEncoding::Lists,
+        }
+    }
+
+    /// Numbers of the cells of all widths, by width, if the encoding refers to them.
+    fn numbers_of_widths(&mut self, widths: &WidthMap, encoding: PillarEncoding) -> Vec<u64> {
+        if encoding != PillarEncoding::References {
+            return Vec::new();
+        }
+        let counts = widths.histogram();
+        let mut numbers = vec![0; counts.len()];
+        for (width, _) in counts.iter().enumerate().skip(1).filter(|(_, count)| **count > 0) {
+            numbers[width] = *self.width_cells[width]
+                .get_or_insert_with(|| self.file.writer.cell_number(&super::pillars::width_name(width)));
+        }
+        numbers
+    }
+
+    /// Write the cells of one width that were referred to.
+    fn width_cells(self) -> Result<()> {
+        for (width, number) in self.width_cells.iter().enumerate() {
+            if number.is_some() {
+                let half = width as i64 / 2;
+                let mut records = RecordBuffer::absolute();
+                records.rectangle(numbers(self.layer), [-half; 2], [width as i64; 2], None);
+                let name = super::pillars::width_name(width);
+                self.file.cell(&name, &records, [-half, -half, half, half])?;
+            }
+        }
+        Ok(())
+    }
+}

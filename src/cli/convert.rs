@@ -1,0 +1,43 @@
+//! `metalith convert`: a layout in the other format.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use metalith::gds::ReadLimits;
+use metalith::layout::{LayoutFormat, convert};
+use metalith::{Layout, Result};
+
+use super::layout::FormatArg;
+use super::{Outcome, Terminal, print_line};
+
+/// Write a layout in GDSII or OASIS: the same cells, streamed from one file into the other.
+#[derive(Args)]
+#[command(
+    after_help = "Examples:\n  metalith convert out/lens_pillars.gds out/lens_pillars.oas\n  \
+    metalith convert from_elsewhere.oas lens.gds"
+)]
+pub struct ConvertArgs {
+    /// The layout to read; its format is told by its first bytes.
+    from: PathBuf,
+
+    /// The layout to write, in OASIS if its name ends in .oas.
+    to: PathBuf,
+
+    /// Format to write, whatever the name.
+    #[arg(long, value_enum)]
+    format: Option<FormatArg>,
+}
+
+pub fn run(args: &ConvertArgs, terminal: &Terminal) -> Result<Outcome> {
+    super::paths::apart([args.from.as_path()], &[&args.to])?;
+    let format = args.format.map_or_else(|| LayoutFormat::of_name(&args.to), Into::into);
+    terminal.stop_on_interrupt();
+    let layout = Layout::open_with(&args.from, ReadLimits::default(), terminal)?;
+    let written = convert(&layout, format, &args.to, terminal)?;
+    terminal.clear();
+    for remark in &written.remarks {
+        terminal.say(&format!("note: {remark}"));
+    }
+    print_line!("{}  {:.3} MB", written.path.display(), written.bytes as f64 * 1e-6);
+    Ok(Outcome::Fine)
+}
