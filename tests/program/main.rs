@@ -6,5 +6,6 @@ mod check;
 mod handoff;
 mod made;
 mod optimise;
+mod picture;
 mod predict;
 mod run;
