@@ -91,6 +91,7 @@ pub use metalith_handoff as handoff;
 pub use metalith_layout as layout;
 pub use metalith_made as made;
 pub use metalith_optimise as optimise;
+pub use metalith_picture as picture;
 pub use metalith_rcwa as rcwa;
 pub use metalith_report as report;
 pub use metalith_verify as verify;

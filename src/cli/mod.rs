@@ -14,6 +14,7 @@ mod optimise;
 mod output;
 mod paths;
 mod photographs;
+mod picture;
 mod psf;
 mod run;
 mod terminal;
@@ -71,6 +72,7 @@ enum Command {
     #[command(visible_alias = "optimize")]
     Optimise(optimise::OptimiseArgs),
     Photographs(photographs::PhotographsArgs),
+    Picture(picture::PictureArgs),
     Verify(verify::VerifyArgs),
     Psf(psf::PsfArgs),
     Handoff(handoff::HandoffArgs),
@@ -121,6 +123,7 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::Layout(args) => layout::run(args, terminal),
         Command::Optimise(args) => optimise::run(args, terminal),
         Command::Photographs(args) => photographs::run(args, terminal),
+        Command::Picture(args) => picture::run(args, terminal),
         Command::Handoff(args) => handoff::run(args, terminal),
         Command::Verify(args) => verify::run(args, terminal),
         Command::Psf(args) => psf::run(args, terminal),

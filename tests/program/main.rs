@@ -7,5 +7,6 @@ mod handoff;
 mod made;
 mod new;
 mod optimise;
+mod picture;
 mod predict;
 mod run;

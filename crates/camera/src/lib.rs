@@ -6,6 +6,7 @@
 //! | what a sensor is, and which noise it has | `sensor` |
 //! | which light a channel counts | `channel` |
 //! | the light of the scene | `illuminant` |
+//! | how a person sees it | `observer` |
 //! | curves over wavelength, from CSV | `spectrum` |
 //! | a camera cut into wavelengths that are simulated | `sampling` |
 //!
@@ -15,6 +16,7 @@
 mod channel;
 mod file;
 mod illuminant;
+mod observer;
 mod sampling;
 mod sensor;
 mod spectrum;
@@ -22,6 +24,7 @@ mod spectrum;
 pub use channel::{Channel, Response};
 pub use file::{Camera, Exposure};
 pub use illuminant::{Illuminant, Led};
+pub use observer::observer;
 pub use sampling::{ChannelPart, ChannelSampling, Sampling};
 pub use sensor::{ColourFilter, Sensor, SensorNoise};
 pub use spectrum::Spectrum;

@@ -9,6 +9,7 @@
 //! | [`Ranking`] | horizontal bars with an interval and a remark each |
 //! | [`HeatMap`] | a matrix over two axes, with colour bar; sequential, logarithmic, diverging or cyclic |
 //! | [`ImageGrid`] | images on one common scale, such as PSFs designed beside extracted |
+//! | [`PhotoRow`] | pictures in colour, side by side |
 //! | [`Matrix`] | shares of named rows by named columns, such as what was taken for what |
 //! | [`Plan`] | shapes of a layout to scale: circles, rectangles, polygons, crosses |
 //! | [`PillarZoom`] | real pillars of a [`WidthMap`](metalith_core::WidthMap), to scale |
@@ -47,6 +48,7 @@ mod json;
 mod matrix;
 mod number;
 mod page;
+mod photo;
 mod plan;
 mod ranking;
 mod raster;
@@ -63,6 +65,7 @@ pub use json::write_json;
 pub use matrix::Matrix;
 pub use number::{count, exact, fixed, sig};
 pub use page::Page;
+pub use photo::PhotoRow;
 pub use plan::{Plan, PlanLayer};
 pub use ranking::Ranking;
 pub use table::{Cell, Column, Table, Verdict};

@@ -85,21 +85,14 @@ fn incandescent(nm: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Chromaticity in the CIE 1931 standard observer, by the fit of Wyman, Sloan and Shirley, Journal of Computer
-    /// Graphics Techniques 2 (2), 1 (2013), table 1.
+    /// Chromaticity for the CIE 1931 standard observer.
     fn chromaticity(illuminant: &Illuminant) -> [f64; 2] {
-        let lobe = |nm: f64, a: f64, centre: f64, below: f64, above: f64| {
-            let sigma = if nm < centre { below } else { above };
-            a * (-0.5 * ((nm - centre) / sigma).powi(2)).exp()
-        };
         let mut xyz = [0.0; 3];
         for nm in (360..=830).map(f64::from) {
             let p = illuminant.power(nm);
-            xyz[0] += p
-                * (lobe(nm, 1.056, 599.8, 37.9, 31.0) + lobe(nm, 0.362, 442.0, 16.0, 26.7)
-                    - lobe(nm, 0.065, 501.1, 20.4, 26.2));
-            xyz[1] += p * (lobe(nm, 0.821, 568.8, 46.9, 40.5) + lobe(nm, 0.286, 530.9, 16.3, 31.1));
-            xyz[2] += p * (lobe(nm, 1.217, 437.0, 11.8, 36.0) + lobe(nm, 0.681, 459.0, 26.0, 13.8));
+            for (sum, v) in xyz.iter_mut().zip(crate::observer(nm)) {
+                *sum += p * v;
+            }
         }
         let sum: f64 = xyz.iter().sum();
         [xyz[0] / sum, xyz[1] / sum]

@@ -17,9 +17,9 @@ use crate::error::{Result, WaveError};
 use crate::kernels::cis_all;
 
 /// Sites an axis of a tile: 22 um at a pitch of 350 nm, two thirds of the best size for 2.4 mm, and a power of two.
-const TILE: usize = 64;
+pub(super) const TILE: usize = 64;
 /// From one tile to the next [sites]: sine windows that overlap by half add up to one when squared.
-const HOP: usize = TILE / 2;
+pub(super) const HOP: usize = TILE / 2;
 /// Most cells of a map.
 const MOST_CELLS: usize = 1 << 24;
 
@@ -139,7 +139,7 @@ impl Landing {
 }
 
 impl LandingGrid {
-    fn check(&self) -> Result<()> {
+    pub(super) fn check(&self) -> Result<()> {
         let sane =
             self.cell_um > 0.0 && self.distance_um > 0.0 && self.cell_um.is_finite() && self.distance_um.is_finite();
         if sane && self.cells > 0 && self.cells.saturating_mul(self.cells) <= MOST_CELLS {
@@ -182,7 +182,7 @@ impl Rays {
 }
 
 /// Cuts a tapered tile out of a strip of rows of `n` sites. Whether there is light in it.
-fn cut(strip: &[Complex32], n: usize, first: i64, taper: &[f32], tile: &mut [Complex32]) -> bool {
+pub(super) fn cut(strip: &[Complex32], n: usize, first: i64, taper: &[f32], tile: &mut [Complex32]) -> bool {
     let mut light = false;
     for ((row, out), wy) in strip.chunks_exact(n).zip(tile.chunks_exact_mut(TILE)).zip(taper) {
         for ((k, to), wx) in out.iter_mut().enumerate().zip(taper) {
@@ -197,7 +197,7 @@ fn cut(strip: &[Complex32], n: usize, first: i64, taper: &[f32], tile: &mut [Com
     light
 }
 
-fn transpose(tile: &[Complex32], turned: &mut [Complex32]) {
+pub(super) fn transpose(tile: &[Complex32], turned: &mut [Complex32]) {
     for (i, row) in tile.chunks_exact(TILE).enumerate() {
         for (j, value) in row.iter().enumerate() {
             turned[j * TILE + i] = *value;

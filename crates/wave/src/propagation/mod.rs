@@ -9,11 +9,12 @@
 //! | through frequencies, on one window | `fold`, with `band`, `transfer`, `zoom` |
 //! | by the rings of a round element | `hankel` |
 //! | at several distances at once | `distances` |
-//! | where all the light lands, coarsely | `landing` |
+//! | where all the light lands, coarsely | `landing`; for many directions of arrival `departure` |
 //! | where a phase is too steep for its lattice | `steepness` |
 
 mod aperture;
 mod band;
+mod departure;
 mod direct;
 mod distances;
 mod fold;
@@ -29,6 +30,7 @@ mod zoom;
 
 pub use aperture::{Aperture, PillarFunction, Pillars};
 pub use band::{Accuracy, Fade};
+pub use departure::Departure;
 pub use direct::Direct;
 pub use distances::{Distances, DistancesPlan, DistancesScratch, FillRow};
 pub use fold::{Fold, Otf};

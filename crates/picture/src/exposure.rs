@@ -1,0 +1,203 @@
+//! From light in the pixels to the numbers that a camera gives out.
+
+use metalith_camera::{Camera, ColourFilter, SensorNoise};
+use metalith_core::{Error, Result};
+use metalith_wave::camera::Noise;
+use ndarray::Array2;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// A frame as it was recorded.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Of full scale, quantised; one plane for a sensor with a colour filter array, else one for each channel.
+    pub planes: Vec<Array2<f32>>,
+    pub filter: ColourFilter,
+    /// Signal, of full scale, of a unit of light in each channel.
+    pub gain: Vec<f64>,
+    pub noise: Noise,
+    /// Largest signal that is recorded, of full scale.
+    pub full: f64,
+    /// Pixels at full scale.
+    pub saturated: usize,
+}
+
+/// What each channel counts of the light of the scene, against the one that counts most.
+pub fn sensitivity(camera: &Camera, channels: &[metalith_camera::ChannelSampling]) -> Vec<f64> {
+    let counted: Vec<f64> = channels
+        .iter()
+        .map(|c| c.parts.iter().map(|p| p.weight).sum())
+        .collect();
+    let most = counted.iter().copied().fold(0.0, f64::max);
+    debug_assert_eq!(camera.channels.len(), channels.len());
+    counted.iter().map(|c| c / most).collect()
+}
+
+/// Which channel a pixel counts; none for a sensor whose pixels count all.
+pub fn channel_at(filter: ColourFilter, names: &[String], row: usize, column: usize) -> Option<usize> {
+    let pattern = match filter {
+        ColourFilter::None => return None,
+        ColourFilter::Rggb => ["red", "green", "green", "blue"],
+        ColourFilter::Bggr => ["blue", "green", "green", "red"],
+        ColourFilter::Grbg => ["green", "red", "blue", "green"],
+        ColourFilter::Gbrg => ["green", "blue", "red", "green"],
+    };
+    let wanted = pattern[(row % 2) * 2 + column % 2];
+    names.iter().position(|n| n == wanted)
+}
+
+/// Signal of a unit of light in each channel, so that the brightest pixel of a white scene has the signal that the camera
+/// file states.
+///
+/// # Errors
+/// If no light of a white scene reaches the sensor.
+pub fn gains(camera: &Camera, sensitivity: &[f64], white: &[Array2<f32>]) -> Result<Vec<f64>> {
+    let brightest = white
+        .iter()
+        .zip(sensitivity)
+        .map(|(frame, s)| f64::from(frame.iter().copied().fold(0.0, f32::max)) * s)
+        .fold(0.0, f64::max);
+    if brightest <= 0.0 {
+        return Err(Error::invalid(
+            "no light of the scene reaches the sensor",
+            "check `offset_um`, `columns` and `rows` of the sensor against the chip, and the field of the scene",
+        ));
+    }
+    Ok(sensitivity
+        .iter()
+        .map(|s| s * camera.exposure.white / brightest)
+        .collect())
+}
+
+/// Expose a sensor to the light of each channel: photons and reading, full well, whole steps.
+///
+/// Noise of all pixels is drawn from `seed`, in reading order, channel by channel.
+pub fn expose(camera: &Camera, gain: &[f64], light: &[Array2<f32>], seed: u64) -> Frame {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let noise = camera.sensor.noise.of_exposure(camera.exposure.time_s);
+    expose_with(camera, gain, light, |plane| noise.expose(plane, &mut random))
+}
+
+/// The same without the noise, which the frame still states.
+pub fn expose_quietly(camera: &Camera, gain: &[f64], light: &[Array2<f32>]) -> Frame {
+    expose_with(camera, gain, light, Array2::clone)
+}
+
+fn expose_with(
+    camera: &Camera,
+    gain: &[f64],
+    light: &[Array2<f32>],
+    mut record: impl FnMut(&Array2<f64>) -> Array2<f64>,
+) -> Frame {
+    let sensor = &camera.sensor;
+    let full_e = match sensor.noise {
+        SensorNoise::Electrons { full_well_e, .. } => full_well_e,
+        SensorNoise::FullScale { photon, .. } if photon > 0.0 => 1.0 / photon,
+        SensorNoise::FullScale { .. } => sensor.gain_e * f64::from(sensor.bits).exp2(),
+    };
+    // Steps of the pixel value, and where they or the well end.
+    let step = sensor.gain_e / full_e;
+    let full = (step * (f64::from(sensor.bits).exp2() - 1.0)).min(1.0);
+    let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();
+    let signal = |channel: usize, i: (usize, usize)| gain[channel] * f64::from(light[channel][i]);
+    let ideal: Vec<Array2<f64>> = match sensor.filter {
+        ColourFilter::None => (0..light.len())
+            .map(|c| Array2::from_shape_fn(light[c].dim(), |i| signal(c, i)))
+            .collect(),
+        filter => vec![Array2::from_shape_fn(light[0].dim(), |(y, x)| {
+            channel_at(filter, &names, y, x).map_or(0.0, |c| signal(c, (y, x)))
+        })],
+    };
+    let mut saturated = 0;
+    let planes = ideal.iter().map(|plane| {
+        record(plane).mapv(|v| {
+            saturated += usize::from(v >= full);
+            // Below zero stays: cameras add a level and subtract it again.
+            ((v.min(full) / step).round() * step) as f32
+        })
+    });
+    Frame {
+        planes: planes.collect(),
+        filter: sensor.filter,
+        gain: gain.to_vec(),
+        noise: sensor.noise.of_exposure(camera.exposure.time_s),
+        full,
+        saturated,
+    }
+}
+
+impl Frame {
+    /// Light of each channel, and how much each pixel is to be trusted: one over the variance of its light, zero where it
+    /// does not count the channel or is at full scale.
+    pub fn light(&self, camera: &Camera) -> (Vec<Array2<f32>>, Vec<Array2<f32>>) {
+        let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();
+        let (mut light, mut trust) = (Vec::new(), Vec::new());
+        for (channel, gain) in self.gain.iter().enumerate() {
+            let plane = &self.planes[if self.filter == ColourFilter::None { channel } else { 0 }];
+            let counts = |y: usize, x: usize| {
+                channel_at(self.filter, &names, y, x).is_none_or(|c| c == channel)
+                    && f64::from(plane[[y, x]]) < self.full
+            };
+            light.push(Array2::from_shape_fn(plane.dim(), |(y, x)| {
+                if counts(y, x) {
+                    (f64::from(plane[[y, x]]) / gain) as f32
+                } else {
+                    0.0
+                }
+            }));
+            trust.push(Array2::from_shape_fn(plane.dim(), |(y, x)| {
+                let variance = self.noise.variance(f64::from(plane[[y, x]])).max(f64::MIN_POSITIVE);
+                if counts(y, x) {
+                    (gain * gain / variance) as f32
+                } else {
+                    0.0
+                }
+            }));
+        }
+        (light, trust)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_has_its_mosaic_its_steps_and_its_full_scale() {
+        let mut camera = Camera::three_bands(5.86);
+        camera.sensor.filter = ColourFilter::Rggb;
+        camera.sensor.bits = 8;
+        camera.sensor.noise = SensorNoise::Electrons {
+            full_well_e: 10_000.0,
+            read_noise_e: 0.0,
+            dark_current_e_s: 0.0,
+        };
+        camera.sensor.gain_e = 10_000.0 / 256.0;
+        for (channel, name) in camera.channels.iter_mut().zip(["blue", "green", "red"]) {
+            channel.name = name.into();
+        }
+        let light: Vec<Array2<f32>> = [0.2, 0.5, 2.0].map(|v| Array2::from_elem((40, 40), v)).into();
+        let frame = expose(&camera, &[1.0, 1.0, 1.0], &light, 3);
+        let plane = &frame.planes[0];
+        assert_eq!(frame.saturated, 400, "red is above full scale");
+        let step = 1.0 / 256.0;
+        assert!(
+            plane
+                .iter()
+                .all(|v| ((f64::from(*v) / step).fract()).min(1.0 - (f64::from(*v) / step).fract()) < 1e-4)
+        );
+        let mean = |y: usize, x: usize| {
+            plane
+                .indexed_iter()
+                .filter(|((i, j), _)| (i % 2, j % 2) == (y, x))
+                .map(|(_, v)| f64::from(*v))
+                .sum::<f64>()
+                / 400.0
+        };
+        // 400 pixels with noise of 0.007: three standard errors.
+        assert!((mean(1, 1) - 0.2).abs() < 1e-3 && (mean(0, 1) - 0.5).abs() < 1.2e-3);
+        assert_eq!(expose(&camera, &[1.0, 1.0, 1.0], &light, 3).planes, frame.planes);
+        let (light, trust) = frame.light(&camera);
+        assert!(light[0][[1, 1]] > 0.1 && trust[0][[1, 1]] > 0.0 && trust[0][[0, 0]] == 0.0 && trust[2][[0, 0]] == 0.0);
+    }
+}

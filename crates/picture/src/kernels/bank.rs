@@ -1,0 +1,211 @@
+//! The kernels of all elements over their fields.
+
+use metalith_design::array::Symmetry;
+use serde::{Deserialize, Serialize};
+
+/// What a bank is sampled with.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BankSpec {
+    /// Edge of a sensor pixel (um).
+    pub pixel_um: f64,
+    /// Pixels an axis of a kernel, even. What lands outside is the veil's.
+    pub window: usize,
+    /// Places an axis of the field of each element, odd, at which kernels are formed.
+    pub nodes: usize,
+    /// From the element's axis to the last of these places (um): light whose chief ray lands farther off is the veil's.
+    pub reach_um: f64,
+    /// Fields to 1e-5 of the matched peak instead of 1e-3; see [`metalith_wave::Accuracy`].
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub accurate: bool,
+}
+
+impl BankSpec {
+    /// Where node `i` of an axis is, from the element's axis (um).
+    pub fn node_um(&self, i: usize) -> f64 {
+        match self.nodes {
+            1 => 0.0,
+            n => self.reach_um * (2.0 * i as f64 / (n as f64 - 1.0) - 1.0),
+        }
+    }
+
+    /// Place among the nodes of a place on the sensor from the element's axis (um).
+    pub fn place(&self, um: f64) -> f64 {
+        match self.nodes {
+            1 => 0.0,
+            n => 0.5 * (um / self.reach_um + 1.0) * (n as f64 - 1.0),
+        }
+    }
+
+    /// Values an axis of a kernel.
+    pub fn side(&self) -> usize {
+        2 * self.window
+    }
+}
+
+/// Kernels of every element, channel and spectrum of the scene, on a grid over the field of the element.
+///
+/// The place of a node is where light of the wedge's wavelength lands; the middle of a kernel is where light of the
+/// channel's own wavelength lands from there. A kernel holds the energy in a pixel, as a share of the light of its
+/// channel that arrives at the element, with pixels at every half of one; see
+/// [`KernelPlan::kernels`](super::KernelPlan::kernels).
+#[derive(Clone, Debug)]
+pub struct KernelBank {
+    pub spec: BankSpec,
+    /// Wavelength about whose chief ray the kernels of each channel are (um).
+    pub channel_um: Vec<f64>,
+    /// Spectra of the scene.
+    pub bases: usize,
+    /// Elements that are copies of one another share kernels: index into `distinct`, and what turns that one into this.
+    pub elements: Vec<(usize, Symmetry)>,
+    pub distinct: Vec<DistinctKernels>,
+}
+
+/// The kernels of one distinct element.
+#[derive(Clone, Debug)]
+pub struct DistinctKernels {
+    /// For each node, row by row: which kernels, and what turns them into those of the node.
+    pub nodes: Vec<(usize, Symmetry)>,
+    /// Unique node, channel, spectrum, then rows of `side` values.
+    pub values: Vec<f32>,
+    /// Share of the light of each wavelength that lands in the window of its own chief ray: unique node, wavelength.
+    pub in_window: Vec<f32>,
+}
+
+/// A kernel where it is, and how it is turned.
+#[derive(Clone, Copy)]
+pub struct TurnedKernel<'a> {
+    values: &'a [f32],
+    side: usize,
+    /// Turns an offset in this kernel back to one in the kept values.
+    back: Symmetry,
+}
+
+impl TurnedKernel<'_> {
+    /// The value at row `i` and column `j`.
+    pub fn at(&self, i: usize, j: usize) -> f32 {
+        let last = self.side as i64 - 1;
+        let (x, y) = self.back.point(2 * j as i64 - last, 2 * i as i64 - last);
+        self.values[((y + last) / 2) as usize * self.side + ((x + last) / 2) as usize]
+    }
+
+    /// Energy in all pixels of the window.
+    pub fn energy(&self) -> f64 {
+        // Pixels stand at every half of one along both axes: each place counts four times.
+        self.values.iter().map(|v| f64::from(*v)).sum::<f64>() / 4.0
+    }
+}
+
+impl KernelBank {
+    /// Index of the unique node of an element at a node of its own, and what turns that into this.
+    fn unique(&self, element: usize, row: usize, column: usize) -> (usize, usize, Symmetry) {
+        let (base, turn) = self.elements[element];
+        let (row, column) = self.turned_node(inverse(turn), row, column);
+        let (unique, own) = self.distinct[base].nodes[row * self.spec.nodes + column];
+        (base, unique, after(own, turn))
+    }
+
+    fn turned_node(&self, turn: Symmetry, row: usize, column: usize) -> (usize, usize) {
+        let last = self.spec.nodes as i64 - 1;
+        let (x, y) = turn.point(2 * column as i64 - last, 2 * row as i64 - last);
+        (((y + last) / 2) as usize, ((x + last) / 2) as usize)
+    }
+
+    /// The kernel of a node.
+    pub fn kernel(&self, element: usize, node: [usize; 2], channel: usize, basis: usize) -> TurnedKernel<'_> {
+        let (base, unique, turn) = self.unique(element, node[0], node[1]);
+        let side = self.spec.side();
+        let at = ((unique * self.channel_um.len() + channel) * self.bases + basis) * side * side;
+        TurnedKernel {
+            values: &self.distinct[base].values[at..at + side * side],
+            side,
+            back: inverse(turn),
+        }
+    }
+
+    /// Share of the light of a wavelength (by its index) that lands in its window, at any place of the field of an
+    /// element: between nodes as kernels are.
+    pub fn in_window(&self, element: usize, place: [f64; 2], wavelength: usize, wavelengths: usize) -> f64 {
+        self.blend(place, |row, column| {
+            let (base, unique, _) = self.unique(element, row, column);
+            f64::from(self.distinct[base].in_window[unique * wavelengths + wavelength])
+        })
+    }
+
+    /// Energy of the kernel in force at a place among the nodes (row, column).
+    pub fn energy(&self, element: usize, place: [f64; 2], channel: usize, basis: usize) -> f64 {
+        self.blend(place, |row, column| {
+            self.kernel(element, [row, column], channel, basis).energy()
+        })
+    }
+
+    fn blend(&self, place: [f64; 2], value: impl Fn(usize, usize) -> f64) -> f64 {
+        let last = (self.spec.nodes - 1) as f64;
+        let at = place.map(|p| p.clamp(0.0, last));
+        let low = at.map(|p| (p as usize).min(self.spec.nodes.saturating_sub(2)));
+        let share = [at[0] - low[0] as f64, at[1] - low[1] as f64];
+        let mut sum = 0.0;
+        for (k, weight) in [(0, 1.0 - share[0]), (1, share[0])] {
+            for (l, other) in [(0, 1.0 - share[1]), (1, share[1])] {
+                if weight * other > 0.0 {
+                    sum += weight * other * value(low[0] + k, low[1] + l);
+                }
+            }
+        }
+        sum
+    }
+}
+
+/// What undoes a symmetry.
+pub fn inverse(turn: Symmetry) -> Symmetry {
+    let undone = |other: &Symmetry| {
+        let (x, y) = turn.point(1, 0);
+        let (u, v) = turn.point(0, 1);
+        other.point(x, y) == (1, 0) && other.point(u, v) == (0, 1)
+    };
+    Symmetry::ALL
+        .into_iter()
+        .find(undone)
+        .expect("the symmetries are a group")
+}
+
+/// First one symmetry, then another.
+pub fn after(first: Symmetry, then: Symmetry) -> Symmetry {
+    let same = |other: &Symmetry| {
+        [(1, 0), (0, 1)].into_iter().all(|(x, y)| {
+            let (u, v) = first.point(x, y);
+            other.point(x, y) == then.point(u, v)
+        })
+    };
+    Symmetry::ALL
+        .into_iter()
+        .find(same)
+        .expect("the symmetries are a group")
+}
+
+/// A vector after a symmetry.
+pub fn turned(turn: Symmetry, vector: [f64; 2]) -> [f64; 2] {
+    let (ax, ay) = turn.point(1, 0);
+    let (bx, by) = turn.point(0, 1);
+    [
+        ax as f64 * vector[0] + bx as f64 * vector[1],
+        ay as f64 * vector[0] + by as f64 * vector[1],
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn symmetries_are_a_group() {
+        for a in Symmetry::ALL {
+            assert_eq!(after(a, inverse(a)), Symmetry::IDENTITY);
+            for b in Symmetry::ALL {
+                let (x, y) = a.point(3, 5);
+                assert_eq!(after(a, b).point(3, 5), b.point(x, y));
+            }
+            let (x, y) = a.point(3, 5);
+            assert_eq!(turned(a, [3.0, 5.0]), [x as f64, y as f64]);
+        }
+    }
+}

@@ -1,0 +1,229 @@
+//! Kernels from the field behind each element.
+
+use metalith_core::{Error, Progress, Result};
+use metalith_wave::{Accuracy, Scratch, Window};
+use rayon::prelude::*;
+
+use super::bank::{BankSpec, DistinctKernels, KernelBank};
+use super::spectrum::{KernelPlan, MovedPart, QUARTERS};
+use crate::chip::ChipInLight;
+use crate::operator::FftScratch;
+use crate::spectra::SceneSpectrum;
+
+impl KernelBank {
+    /// Simulate the kernels of a chip for the spectra of a scene.
+    ///
+    /// # Errors
+    /// If light cannot be brought to a window, or the user stopped it.
+    pub fn build(chip: &ChipInLight, basis: &[SceneSpectrum], spec: BankSpec, progress: &dyn Progress) -> Result<Self> {
+        let channel_um = channel_um(chip);
+        let mut tasks = Vec::new();
+        let mut maps = Vec::new();
+        for (k, distinct) in chip.distinct.iter().enumerate() {
+            let (unique, nodes) = orbits(spec.nodes, &distinct.symmetries);
+            tasks.extend(unique.into_iter().map(|node| (k, node)));
+            maps.push(nodes);
+        }
+        progress.begin(
+            "simulating kernels",
+            (tasks.len() * chip.sampling.wavelengths_nm.len()) as u64,
+        );
+        let plan = KernelPlan::new(spec.window);
+        let found: Vec<NodeKernels> = tasks
+            .par_iter()
+            .map_init(
+                || (Scratch::default(), FftScratch::default()),
+                |(scratch, fft), (k, node)| {
+                    let builder = Builder {
+                        chip,
+                        basis,
+                        spec: &spec,
+                        plan: &plan,
+                        channel_um: &channel_um,
+                    };
+                    builder.node(*k, *node, scratch, fft, progress)
+                },
+            )
+            .collect::<Result<_>>()?;
+        let mut distinct: Vec<DistinctKernels> = maps
+            .into_iter()
+            .map(|nodes| DistinctKernels {
+                nodes,
+                values: Vec::new(),
+                in_window: Vec::new(),
+            })
+            .collect();
+        for ((k, _), node) in tasks.iter().zip(found) {
+            distinct[*k].values.extend(node.values);
+            distinct[*k].in_window.extend(node.in_window);
+        }
+        Ok(Self {
+            spec,
+            channel_um,
+            bases: basis.len(),
+            elements: chip.copies.clone(),
+            distinct,
+        })
+    }
+}
+
+/// Mean wavelength of the light that each channel counts (um).
+fn channel_um(chip: &ChipInLight) -> Vec<f64> {
+    let mean = |channel: &metalith_camera::ChannelSampling| {
+        let sums = channel.parts.iter().fold((0.0, 0.0), |(a, b), p| {
+            (a + p.weight, b + p.weight * 0.5 * (p.nm[0] + p.nm[1]))
+        });
+        sums.1 / sums.0 * 1e-3
+    };
+    chip.sampling.channels.iter().map(mean).collect()
+}
+
+type Turned = (usize, metalith_design::array::Symmetry);
+
+/// Nodes that no symmetry turns into one another, and for each node which of them it is, and turned how.
+fn orbits(n: usize, symmetries: &[metalith_design::array::Symmetry]) -> (Vec<[usize; 2]>, Vec<Turned>) {
+    let last = n as i64 - 1;
+    let mut unique = Vec::new();
+    let mut nodes: Vec<Option<Turned>> = vec![None; n * n];
+    for i in 0..n * n {
+        if nodes[i].is_some() {
+            continue;
+        }
+        for turn in symmetries {
+            let (x, y) = turn.point(2 * (i % n) as i64 - last, 2 * (i / n) as i64 - last);
+            let at = ((y + last) / 2) as usize * n + ((x + last) / 2) as usize;
+            nodes[at].get_or_insert((unique.len(), *turn));
+        }
+        unique.push([i / n, i % n]);
+    }
+    let nodes = nodes.into_iter().map(|node| node.expect("the identity is a symmetry"));
+    (unique, nodes.collect())
+}
+
+struct NodeKernels {
+    values: Vec<f32>,
+    in_window: Vec<f32>,
+}
+
+struct Builder<'a> {
+    chip: &'a ChipInLight,
+    basis: &'a [SceneSpectrum],
+    spec: &'a BankSpec,
+    plan: &'a KernelPlan,
+    channel_um: &'a [f64],
+}
+
+impl Builder<'_> {
+    fn node(
+        &self,
+        distinct: usize,
+        node: [usize; 2],
+        scratch: &mut Scratch,
+        fft: &mut FftScratch,
+        progress: &dyn Progress,
+    ) -> Result<NodeKernels> {
+        let view = self.chip.distinct[distinct].view;
+        let place = [self.spec.node_um(node[1]), self.spec.node_um(node[0])];
+        let sines = view.sines_of_landing(place, view.wedge.wavelength_um);
+        let (mut spectra, mut in_window) = (Vec::new(), Vec::new());
+        for (i, nm) in self.chip.sampling.wavelengths_nm.iter().enumerate() {
+            if progress.stopped() {
+                return Err(Error::Interrupted);
+            }
+            let quarters = self.quarters(distinct, i, nm * 1e-3, sines, scratch)?;
+            in_window.push(quarters.iter().map(|v| f64::from(*v)).sum::<f64>() as f32);
+            spectra.push(self.plan.spectrum(&quarters, fft));
+            progress.advance(1);
+        }
+        let mut values = Vec::new();
+        for (channel, reference_um) in self.chip.sampling.channels.iter().zip(self.channel_um) {
+            let parts = self.parts(distinct, sines, channel, *reference_um);
+            let kernels = self.plan.kernels(&spectra, &parts, self.basis, fft);
+            values.extend(kernels.into_iter().flatten());
+        }
+        Ok(NodeKernels { values, in_window })
+    }
+
+    fn parts(
+        &self,
+        distinct: usize,
+        sines: [f64; 2],
+        channel: &metalith_camera::ChannelSampling,
+        reference_um: f64,
+    ) -> Vec<MovedPart> {
+        let view = self.chip.distinct[distinct].view;
+        let Some(from) = view.landing_um(sines, reference_um) else {
+            return Vec::new();
+        };
+        let total: f64 = channel.parts.iter().map(|p| p.weight).sum();
+        let parts = channel.parts.iter().filter_map(|part| {
+            let to = view.landing_um(sines, 0.5e-3 * (part.nm[0] + part.nm[1]))?;
+            let offset = [0, 1].map(|a| (to[a] - from[a]) / self.spec.pixel_um);
+            Some(MovedPart::new(part, total, offset))
+        });
+        parts.collect()
+    }
+
+    /// Share of the light of one wavelength in each quarter of the pixels about its chief ray; nothing where that does
+    /// not reach the sensor.
+    fn quarters(
+        &self,
+        distinct: usize,
+        wavelength: usize,
+        um: f64,
+        sines: [f64; 2],
+        scratch: &mut Scratch,
+    ) -> Result<Vec<f32>> {
+        let side = self.spec.window * QUARTERS;
+        let view = self.chip.distinct[distinct].view;
+        let mut quarters = vec![0.0f32; side * side];
+        if sines[0].hypot(sines[1]) >= 1.0 {
+            return Ok(quarters);
+        }
+        let Some(landing) = view.landing_um(sines, um) else {
+            return Ok(quarters);
+        };
+        let lit = self.chip.lit(distinct, wavelength, sines);
+        // The PSF has no structure finer than wavelength / (2 NA).
+        let aperture = (lit.element.radius_um() / view.focal_um).atan().sin();
+        let quarter = self.spec.pixel_um / QUARTERS as f64;
+        let within = (quarter * 4.0 * aperture / um).ceil().max(1.0) as usize;
+        let window = Window {
+            centre_um: landing,
+            step_um: quarter / within as f64,
+            samples: side * within,
+            distance_um: view.distance_um(landing),
+        };
+        let accuracy = match self.spec.accurate {
+            true => Accuracy::Accurate,
+            false => Accuracy::Fast,
+        };
+        let psf = lit.psf(window, accuracy, &[], scratch)?;
+        let share = window.step_um.powi(2) / self.chip.arriving_um2[wavelength];
+        for (iy, row) in psf.values.rows().into_iter().enumerate() {
+            let out = &mut quarters[iy / within * side..][..side];
+            for (ix, v) in row.iter().enumerate() {
+                out[ix / within] += (v * share) as f32;
+            }
+        }
+        Ok(quarters)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metalith_design::array::Symmetry;
+
+    #[test]
+    fn nodes_fall_into_orbits() {
+        let (unique, nodes) = orbits(5, &Symmetry::ALL);
+        assert_eq!(unique.len(), 6);
+        for (i, (k, turn)) in nodes.iter().enumerate() {
+            let [row, column] = unique[*k];
+            let (x, y) = turn.point(2 * column as i64 - 4, 2 * row as i64 - 4);
+            assert_eq!([(y + 4) / 2, (x + 4) / 2], [(i / 5) as i64, (i % 5) as i64]);
+        }
+        assert_eq!(orbits(5, &[Symmetry::IDENTITY]).0.len(), 25);
+    }
+}

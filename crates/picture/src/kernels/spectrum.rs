@@ -1,0 +1,217 @@
+//! Images of a point in a channel, from those of single wavelengths.
+//!
+//! The PSF of a wavelength about its chief ray, summed over squares of a quarter of a pixel, is transformed. Between two
+//! wavelengths it is the mean of both with weights that change linearly, and moves with its chief ray, as in
+//! [`metalith_wave::psf::polychromatic`]; here the band is a sum over points 1 nm apart, which a pixel cannot tell from
+//! a line.
+
+use metalith_camera::ChannelPart;
+use num_complex::Complex32;
+
+use crate::operator::{FftScratch, SquareFft};
+use crate::spectra::SceneSpectrum;
+
+/// Squares an axis of a pixel.
+pub const QUARTERS: usize = 4;
+
+/// What kernels are made with: transforms of one window size.
+pub struct KernelPlan {
+    /// Pixels an axis of a kernel, even.
+    pub window: usize,
+    fft: SquareFft,
+}
+
+/// The spectrum of the PSF of one wavelength on quarters of pixels, the chief ray in the middle.
+pub struct PsfSpectrum(Vec<Complex32>);
+
+/// A part of a channel, as it acts in one direction.
+#[derive(Clone, Copy, Debug)]
+pub struct MovedPart {
+    /// Share of the channel's light.
+    pub weight: f64,
+    /// Wavelength (nm).
+    pub nm: f64,
+    /// Place among the wavelengths, see [`ChannelPart::place`].
+    pub place: f64,
+    /// From the chief ray of the channel to that of the part (pixels).
+    pub offset: [f64; 2],
+}
+
+impl MovedPart {
+    /// Of a part whose chief ray lands there.
+    pub fn new(part: &ChannelPart, total: f64, offset: [f64; 2]) -> Self {
+        Self {
+            weight: part.weight / total,
+            nm: 0.5 * (part.nm[0] + part.nm[1]),
+            place: part.place,
+            offset,
+        }
+    }
+
+    /// Whether its PSF is in a kernel of so many pixels: parts that land farther off belong to the veil.
+    pub fn inside(&self, window: usize) -> bool {
+        self.offset.iter().all(|o| o.abs() <= 0.5 * window as f64)
+    }
+}
+
+impl KernelPlan {
+    /// For kernels of `window` pixels an axis, an even number.
+    pub fn new(window: usize) -> Self {
+        // Half a window more than the kernel: what parts that have moved put beyond it comes back outside of it.
+        Self {
+            window,
+            fft: SquareFft::new(window * QUARTERS * 3 / 2),
+        }
+    }
+
+    /// Of the energies in quarters of the pixels of a window, row by row, its chief ray in the middle.
+    pub fn spectrum(&self, quarters: &[f32], scratch: &mut FftScratch) -> PsfSpectrum {
+        let (inner, size) = (self.window * QUARTERS, self.fft.size());
+        let from = (size - inner) / 2;
+        let mut square = vec![0.0; size * size];
+        for (iy, row) in quarters.chunks_exact(inner).enumerate() {
+            square[(iy + from) * size + from..][..inner].copy_from_slice(row);
+        }
+        let mut spectrum = vec![Complex32::ZERO; self.fft.entries()];
+        self.fft.forward(&mut square, size, &mut spectrum, scratch);
+        PsfSpectrum(spectrum)
+    }
+
+    /// Kernels of a channel for each spectrum of the scene: energy in a pixel whose middle is at
+    /// `(i - window + 1/2) / 2` pixels from the chief ray, i from 0 to 2 window - 1 along x and along y.
+    pub fn kernels(
+        &self,
+        spectra: &[PsfSpectrum],
+        parts: &[MovedPart],
+        basis: &[SceneSpectrum],
+        scratch: &mut FftScratch,
+    ) -> Vec<Vec<f32>> {
+        let (size, half) = (self.fft.size(), self.fft.size() / 2 + 1);
+        let mut sums = vec![vec![Complex32::ZERO; self.fft.entries()]; basis.len()];
+        let last = spectra.len() - 1;
+        let weakest = WEAKEST * parts.iter().map(|p| p.weight).fold(0.0, f64::max);
+        let mut mixed = vec![Complex32::ZERO; size];
+        for part in parts.iter().filter(|p| p.weight > weakest && p.inside(self.window)) {
+            let low = (part.place.floor() as usize).min(last);
+            let (from, to) = (&spectra[low].0, &spectra[(low + 1).min(last)].0);
+            let upper = part.place.fract() as f32;
+            let turn = |axis: usize, k: usize| {
+                let signed = if 2 * k > size { k as f64 - size as f64 } else { k as f64 };
+                let turns = signed / size as f64 * part.offset[axis] * QUARTERS as f64;
+                let turn = num_complex::Complex64::cis(-std::f64::consts::TAU * turns);
+                Complex32::new(turn.re as f32, turn.im as f32)
+            };
+            let along_y: Vec<Complex32> = (0..size).map(|k| turn(1, k)).collect();
+            let weights: Vec<f32> = basis.iter().map(|b| (part.weight * b.at(part.nm)) as f32).collect();
+            for kx in 0..half {
+                let x = turn(0, kx);
+                let at = kx * size..(kx + 1) * size;
+                for (m, (y, (a, b))) in mixed
+                    .iter_mut()
+                    .zip(along_y.iter().zip(from[at.clone()].iter().zip(&to[at.clone()])))
+                {
+                    *m = (a + (b - a) * upper) * (x * y);
+                }
+                for (sum, weight) in sums.iter_mut().zip(&weights) {
+                    for (s, m) in sum[at.clone()].iter_mut().zip(&mixed) {
+                        *s += m * weight;
+                    }
+                }
+            }
+        }
+        let mut square = vec![0.0; size * size];
+        let finished = sums.iter_mut().map(|sum| {
+            self.fft.inverse(sum, &mut square, scratch);
+            self.pixels(&square)
+        });
+        finished.collect()
+    }
+
+    /// Sums over whole pixels of what lies in their quarters.
+    fn pixels(&self, square: &[f32]) -> Vec<f32> {
+        let (window, size) = (self.window, self.fft.size());
+        let side = 2 * window;
+        // Pixel i begins two quarters before its middle.
+        let first = |i: usize| window + 2 * i - 1;
+        let mut lines = vec![0.0f32; size * side];
+        for (row, line) in square.chunks_exact(size).zip(lines.chunks_exact_mut(side)) {
+            for (i, v) in line.iter_mut().enumerate() {
+                *v = row[first(i)..first(i) + QUARTERS].iter().sum();
+            }
+        }
+        let mut kernel = vec![0.0f32; side * side];
+        for (i, out) in kernel.chunks_exact_mut(side).enumerate() {
+            for k in 0..QUARTERS {
+                let line = &lines[(first(i) + k) * side..][..side];
+                out.iter_mut().zip(line).for_each(|(o, v)| *o += v);
+            }
+        }
+        kernel
+    }
+}
+
+/// Parts with a smaller share of the strongest are left out.
+const WEAKEST: f64 = 1e-5;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A Gaussian that the light of two wavelengths moves: closed form on pixels by a fine sum.
+    #[test]
+    fn kernels_are_pixels_of_the_moved_psf() {
+        /// Of the peak: single precision, and a Gaussian of 3 quarters that is summed over them.
+        const SHARE: f32 = 2e-3;
+        let window = 16;
+        let plan = KernelPlan::new(window);
+        let mut scratch = FftScratch::default();
+        let sigma = 0.8;
+        let n = window * QUARTERS;
+        let gauss = |x: f64, y: f64| (-(x * x + y * y) / (2.0 * sigma * sigma)).exp();
+        // Energy of each quarter of a pixel, by points within it.
+        let quarter = |ix: usize, iy: usize| {
+            let at = |i: usize, k: usize| (i as f64 - 0.5 * n as f64 + (k as f64 + 0.5) / 4.0) / QUARTERS as f64;
+            (0..16).map(|k| gauss(at(ix, k % 4), at(iy, k / 4))).sum::<f64>() / 256.0
+        };
+        let quarters: Vec<f32> = (0..n * n).map(|i| quarter(i % n, i / n) as f32).collect();
+        let spectra = [
+            plan.spectrum(&quarters, &mut scratch),
+            plan.spectrum(&quarters, &mut scratch),
+        ];
+        let flat = SceneSpectrum {
+            nm: vec![400.0, 700.0],
+            values: vec![1.0, 1.0],
+        };
+        let part = |weight: f64, offset: [f64; 2]| MovedPart {
+            weight,
+            nm: 500.0,
+            place: 0.3,
+            offset,
+        };
+        let parts = [part(0.75, [1.3, -0.4]), part(0.25, [-2.1, 0.9]), part(9.0, [20.0, 0.0])];
+        let kernel = plan
+            .kernels(&spectra, &parts, std::slice::from_ref(&flat), &mut scratch)
+            .remove(0);
+        let side = 2 * window;
+        let mut worst = 0.0f32;
+        for (i, got) in kernel.iter().enumerate() {
+            let middle = |i: usize| (i as f64 - window as f64 + 0.5) / 2.0;
+            let (x, y) = (middle(i % side), middle(i / side));
+            let want: f64 = parts[..2]
+                .iter()
+                .map(|p| {
+                    let points = (0..400).map(|k| {
+                        let (a, b) = ((k % 20) as f64, (k / 20) as f64);
+                        gauss(
+                            x + (a + 0.5) / 20.0 - 0.5 - p.offset[0],
+                            y + (b + 0.5) / 20.0 - 0.5 - p.offset[1],
+                        )
+                    });
+                    p.weight * points.sum::<f64>() / 400.0
+                })
+                .sum();
+            worst = worst.max((got - want as f32).abs());
+        }
+        assert!(worst < SHARE, "{worst}");
+    }
+}

@@ -1,0 +1,35 @@
+//! The picture that the camera of a layout takes, and the picture restored from it.
+//!
+//! ```text
+//! layout as read, camera       ->  ChipInLight
+//! spectra of a scene           ->  KernelBank: images of a point over the field; Veil: all other light
+//! both, and a view             ->  FrameOperator: planes of the scene to the frame, and its adjoint
+//! ```
+
+mod cache;
+mod chip;
+mod colour;
+mod exposure;
+mod geometry;
+mod kernels;
+mod operator;
+mod page;
+mod report;
+pub mod restore;
+pub mod scene;
+mod score;
+pub mod spectra;
+mod studio;
+mod veil;
+
+pub use chip::{ChipCase, ChipInLight, element_views, read_pillars, sampling_of};
+pub use colour::ChannelColours;
+pub use exposure::{Frame, channel_at, expose, gains, sensitivity};
+pub use geometry::{ElementView, SceneView};
+pub use kernels::{BankSpec, KernelBank};
+pub use operator::{Detail, FrameOperator};
+pub use page::{PicturePages, shown, write_pages};
+pub use report::{Assumption, ChannelBudget, HomographyResidual, PictureReport, RestorationReport};
+pub use score::{Zone, ZoneScore, scores};
+pub use studio::Studio;
+pub use veil::{LightShares, Veil};

@@ -1,0 +1,151 @@
+//! Transforms of real squares.
+
+use std::sync::Arc;
+
+use num_complex::Complex32;
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use rustfft::{Fft, FftPlanner};
+
+/// Transforms of squares of `size` real values an axis. A spectrum holds the columns of half of the frequencies along x,
+/// each with all those along y: `size / 2 + 1` times `size` values.
+pub struct SquareFft {
+    size: usize,
+    rows: Arc<dyn RealToComplex<f32>>,
+    rows_back: Arc<dyn ComplexToReal<f32>>,
+    columns: Arc<dyn Fft<f32>>,
+    columns_back: Arc<dyn Fft<f32>>,
+}
+
+/// Working memory of a transform.
+#[derive(Default)]
+pub struct FftScratch {
+    lines: Vec<Complex32>,
+    work: Vec<Complex32>,
+}
+
+impl SquareFft {
+    /// For squares of an even `size`.
+    pub fn new(size: usize) -> Self {
+        let mut real = RealFftPlanner::new();
+        let mut complex = FftPlanner::new();
+        Self {
+            size,
+            rows: real.plan_fft_forward(size),
+            rows_back: real.plan_fft_inverse(size),
+            columns: complex.plan_fft_forward(size),
+            columns_back: complex.plan_fft_inverse(size),
+        }
+    }
+
+    /// Values an axis.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Entries of a spectrum.
+    pub fn entries(&self) -> usize {
+        (self.size / 2 + 1) * self.size
+    }
+
+    fn prepare(&self, scratch: &mut FftScratch) {
+        let most = [
+            self.rows.get_scratch_len(),
+            self.rows_back.get_scratch_len(),
+            self.columns.get_inplace_scratch_len(),
+            self.columns_back.get_inplace_scratch_len(),
+        ];
+        let most = most.into_iter().max().unwrap_or(0);
+        scratch.work.resize(most.max(scratch.work.len()), Complex32::ZERO);
+        scratch.lines.resize(self.entries(), Complex32::ZERO);
+    }
+
+    /// Spectrum of a square, which is used up; rows from `filled` on are taken to be zero.
+    pub fn forward(&self, square: &mut [f32], filled: usize, spectrum: &mut [Complex32], scratch: &mut FftScratch) {
+        self.prepare(scratch);
+        let (n, half) = (self.size, self.size / 2 + 1);
+        let FftScratch { lines, work } = scratch;
+        for (row, line) in square
+            .chunks_exact_mut(n)
+            .zip(lines.chunks_exact_mut(half))
+            .take(filled)
+        {
+            // Fails for wrong lengths alone.
+            self.rows
+                .process_with_scratch(row, line, &mut work[..self.rows.get_scratch_len()])
+                .expect("lengths are those of the plan");
+        }
+        lines[filled * half..].fill(Complex32::ZERO);
+        transpose(lines, spectrum, n, half);
+        let need = self.columns.get_inplace_scratch_len();
+        self.columns.process_with_scratch(spectrum, &mut work[..need]);
+    }
+
+    /// The square of a spectrum, which is used up. Scaled so that it undoes [`SquareFft::forward`].
+    pub fn inverse(&self, spectrum: &mut [Complex32], square: &mut [f32], scratch: &mut FftScratch) {
+        self.prepare(scratch);
+        let (n, half) = (self.size, self.size / 2 + 1);
+        let FftScratch { lines, work } = scratch;
+        let need = self.columns_back.get_inplace_scratch_len();
+        self.columns_back.process_with_scratch(spectrum, &mut work[..need]);
+        transpose(spectrum, lines, half, n);
+        let scale = 1.0 / (n * n) as f32;
+        for (row, line) in square.chunks_exact_mut(n).zip(lines.chunks_exact_mut(half)) {
+            // Rounding leaves next to nothing where a real square has exactly none.
+            line[0].im = 0.0;
+            line[half - 1].im = 0.0;
+            self.rows_back
+                .process_with_scratch(line, row, &mut work[..self.rows_back.get_scratch_len()])
+                .expect("lengths are those of the plan");
+            row.iter_mut().for_each(|v| *v *= scale);
+        }
+    }
+}
+
+/// `to[j][i] = from[i][j]`, for `rows` x `columns` values, by blocks that fit the cache.
+fn transpose(from: &[Complex32], to: &mut [Complex32], rows: usize, columns: usize) {
+    const BLOCK: usize = 16;
+    for i0 in (0..rows).step_by(BLOCK) {
+        for j0 in (0..columns).step_by(BLOCK) {
+            for j in j0..(j0 + BLOCK).min(columns) {
+                for i in i0..(i0 + BLOCK).min(rows) {
+                    to[j * rows + i] = from[i * columns + j];
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_product_of_spectra_is_a_convolution() {
+        // Single precision of sums over some hundred values of size one.
+        const SINGLE: f32 = 1e-4;
+        let n = 24;
+        let fft = SquareFft::new(n);
+        let mut scratch = FftScratch::default();
+        let a: Vec<f32> = (0..n * n)
+            .map(|i| if i / n < 9 { ((i * 7) % 11) as f32 / 11.0 } else { 0.0 })
+            .collect();
+        let b: Vec<f32> = (0..n * n).map(|i| ((i * i) % 13) as f32 / 13.0 - 0.5).collect();
+        let mut spectra = [
+            vec![Complex32::ZERO; fft.entries()],
+            vec![Complex32::ZERO; fft.entries()],
+        ];
+        fft.forward(&mut a.clone(), 9, &mut spectra[0], &mut scratch);
+        fft.forward(&mut b.clone(), n, &mut spectra[1], &mut scratch);
+        let mut product: Vec<Complex32> = spectra[0].iter().zip(&spectra[1]).map(|(x, y)| x * y).collect();
+        let mut got = vec![0.0; n * n];
+        fft.inverse(&mut product, &mut got, &mut scratch);
+        for (y, x) in [(0, 0), (3, 20), (17, 5)] {
+            let mut want = 0.0;
+            for (i, a) in a.iter().enumerate() {
+                let (dy, dx) = ((y + n - i / n) % n, (x + n - i % n) % n);
+                want += a * b[dy * n + dx];
+            }
+            assert!((got[y * n + x] - want).abs() < SINGLE, "{} {want}", got[y * n + x]);
+        }
+    }
+}

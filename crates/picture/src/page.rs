@@ -1,0 +1,261 @@
+//! The page of a picture.
+
+use std::path::Path;
+
+use metalith_camera::ColourFilter;
+use metalith_core::{Result, part, srgb};
+use metalith_report::{Axis, Cell, Column, HeatMap, Page, PhotoRow, Table, fixed, write_json};
+use ndarray::{Array2, Array3, Axis as Along};
+
+use crate::exposure::Frame;
+use crate::report::{Assumption, PictureReport};
+use crate::score::Zone;
+
+/// Pictures beside the numbers.
+pub struct PicturePages<'a> {
+    pub report: &'a PictureReport,
+    /// Linear sRGB.
+    pub scene: &'a Array3<f64>,
+    pub frame: &'a Frame,
+    /// The first method's picture, linear sRGB.
+    pub restored: &'a Array3<f64>,
+    pub channel_names: &'a [String],
+}
+
+/// Edge of a zoom (pixels of the scene).
+const ZOOM: usize = 96;
+
+/// Write `picture.html` and `picture.json` into a folder.
+///
+/// # Errors
+/// If they cannot be written.
+pub fn write_pages(pages: &PicturePages<'_>, folder: &Path) -> Result<()> {
+    write_json(&folder.join("picture.json"), "picture", pages.report)?;
+    page(pages).write(&folder.join("picture.html"))
+}
+
+/// The three pictures of the head of the page.
+pub fn head(pages: &PicturePages<'_>) -> PhotoRow {
+    let mut row = PhotoRow::new("Scene, frame, picture", 250.0);
+    row.photo("scene", &pages.scene.mapv(srgb::encoded));
+    row.photo("frame as recorded", &shown(pages.frame, pages.channel_names));
+    row.photo("picture restored", &pages.restored.mapv(srgb::encoded));
+    row
+}
+
+/// A frame as a person would look at it: colours of its mosaic, brightness of sRGB.
+pub fn shown(frame: &Frame, names: &[String]) -> Array3<f64> {
+    let (rows, columns) = frame.planes[0].dim();
+    let at = |y: usize, x: usize, c: usize| -> f64 {
+        let v = match frame.filter {
+            ColourFilter::None => {
+                let wanted = ["red", "green", "blue"][c];
+                let plane = names.iter().position(|n| n == wanted).unwrap_or(0);
+                f64::from(frame.planes[plane.min(frame.planes.len() - 1)][[y, x]]) * frame.gain[0] / frame.gain[plane]
+            }
+            filter => {
+                // The mean of those of the square of two by two pixels that count this colour.
+                let (y0, x0) = (y & !1, x & !1);
+                let (mut sum, mut count, mut gain) = (0.0, 0.0, 1.0);
+                for k in 0..4 {
+                    let (py, px) = ((y0 + k / 2).min(rows - 1), (x0 + k % 2).min(columns - 1));
+                    let channel = crate::exposure::channel_at(filter, names, py, px);
+                    if channel.is_some_and(|c2| names[c2] == ["red", "green", "blue"][c]) {
+                        sum += f64::from(frame.planes[0][[py, px]]);
+                        count += 1.0;
+                        gain = frame.gain[channel.unwrap_or(0)];
+                    }
+                }
+                let most = frame.gain.iter().copied().fold(0.0, f64::max);
+                sum / f64::max(count, 1.0) * most / gain
+            }
+        };
+        srgb::encoded(v)
+    };
+    Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| at(y, x, c))
+}
+
+fn page(pages: &PicturePages<'_>) -> Page {
+    let report = pages.report;
+    let mut page = Page::new(
+        format!("The picture that {} will take", report.design),
+        format!(
+            "{} through {}, behind the bytes of {}",
+            report.scene, report.camera, report.layout
+        ),
+    );
+    page.figure(head(pages).caption(
+        "The frame is what the sensor records, neighbours' light and veil included; its mosaic is shown as colours. The picture is restored from this frame alone.",
+    ));
+    let first = &report.restorations[0];
+    let whole = &first.scores[0];
+    page.facts(&[
+        ("Method of the picture", first.method.clone()),
+        ("PSNR", format!("{} dB", fixed(whole.psnr_db, 1))),
+        ("SSIM", fixed(whole.ssim, 3)),
+        (
+            "Forecast for natural scenes, linear light",
+            first
+                .forecast_db
+                .first()
+                .map_or_else(|| "none".into(), |f| format!("{} dB", fixed(*f, 1))),
+        ),
+        (
+            "Light in images, of all that arrives",
+            report
+                .budget
+                .iter()
+                .map(|b| format!("{} %", fixed(100.0 * b.shares.in_kernels / b.shares.arrives, 0)))
+                .collect::<Vec<_>>()
+                .join(", "),
+        ),
+        ("Pixels at full scale", report.saturated.to_string()),
+    ]);
+    zooms(&mut page, pages);
+    errors(&mut page, pages);
+    scores(&mut page, report);
+    budget(&mut page, report);
+    geometry(&mut page, report);
+    assumptions(&mut page, &report.assumptions);
+    page
+}
+
+fn zooms(page: &mut Page, pages: &PicturePages<'_>) {
+    page.section("Centre, edge and corner");
+    let (rows, columns, _) = pages.scene.dim();
+    let side = ZOOM.min(rows / 3).min(columns / 3);
+    for (name, row, column) in [
+        ("Centre", (rows - side) / 2, (columns - side) / 2),
+        ("Edge", (rows - side) / 2, columns - side),
+        ("Corner", rows - side, columns - side),
+    ] {
+        let cut = |picture: &Array3<f64>| {
+            let planes: Vec<_> = (0..3)
+                .map(|c| {
+                    let plane = picture.index_axis(Along(2), c);
+                    part(plane, row..row + side, column..column + side).insert_axis(Along(2))
+                })
+                .collect();
+            ndarray::concatenate(Along(2), &planes)
+                .expect("planes of one shape")
+                .mapv(srgb::encoded)
+        };
+        let mut zoom = PhotoRow::new(name, 240.0);
+        zoom.photo("scene", &cut(pages.scene))
+            .photo("picture", &cut(pages.restored));
+        page.figure(zoom.caption(format!("{side} x {side} pixels of the scene.")));
+    }
+}
+
+fn errors(page: &mut Page, pages: &PicturePages<'_>) {
+    let (rows, columns, _) = pages.scene.dim();
+    // The first row of a map is at the bottom, that of a picture at the top.
+    let error = Array2::from_shape_fn((rows, columns), |(y, x)| {
+        let at = [rows - 1 - y, x];
+        let sum = (0..3).map(|c| {
+            let d = srgb::encoded(pages.restored[[at[0], at[1], c]]) - srgb::encoded(pages.scene[[at[0], at[1], c]]);
+            d * d
+        });
+        (sum.sum::<f64>() / 3.0).sqrt()
+    });
+    let axis = |name: &str, n: usize| (Axis::linear(name, ""), 0.0, n as f64);
+    let map = HeatMap::new(
+        "Error of the picture",
+        error,
+        axis("column", columns),
+        axis("row from below", rows),
+    )
+    .values("error", "");
+    page.section("Errors");
+    page.figure(map.caption("Root mean square over the colours, of sRGB values from 0 to 1."));
+}
+
+fn scores(page: &mut Page, report: &PictureReport) {
+    page.section("Scores");
+    let mut columns = vec![Column::text("Method"), Column::text("Elements")];
+    for zone in Zone::ALL {
+        columns.push(Column::number(format!("PSNR, {}", zone.name()), "dB"));
+    }
+    columns.push(Column::number("SSIM, whole", ""));
+    columns.push(Column::number("Forecast for linear light, whole", "dB"));
+    columns.push(Column::number("PSNR of linear light, whole", "dB"));
+    let mut table = Table::new(columns);
+    for found in &report.restorations {
+        let mut row = vec![
+            Cell::from(found.method.as_str()),
+            Cell::from(if found.joint { "joint" } else { "each alone" }),
+        ];
+        row.extend(found.scores.iter().map(|s| Cell::fixed(s.psnr_db, 2)));
+        row.push(Cell::fixed(found.scores[0].ssim, 3));
+        row.push(
+            found
+                .forecast_db
+                .first()
+                .map_or_else(Cell::none, |f| Cell::fixed(*f, 2)),
+        );
+        row.push(Cell::fixed(found.scores[0].psnr_linear_db, 2));
+        table.row(row);
+    }
+    page.table(table.caption(
+        "Zones are the middle, the four edges and the four corners of a division by three. PSNR and SSIM are of sRGB values against what an ideal camera of these channels gives.",
+    ));
+}
+
+fn budget(page: &mut Page, report: &PictureReport) {
+    page.section("Where the light goes");
+    let mut table = Table::new([
+        Column::text("Channel"),
+        Column::number("Images", "%"),
+        Column::number("Veil on the sensor", "%"),
+        Column::number("Beside the sensor", "%"),
+        Column::number("Not passed", "%"),
+        Column::number("Not travelling", "%"),
+        Column::number("Sum", "%"),
+        Column::number("Undiffracted", "%"),
+    ]);
+    for channel in &report.budget {
+        let s = &channel.shares;
+        let share = |v: f64| 100.0 * v / s.arrives;
+        let sum = s.in_kernels + s.veil + s.beyond + s.evanescent + s.not_passed;
+        table.row([
+            Cell::from(channel.channel.as_str()),
+            Cell::fixed(share(s.in_kernels), 2),
+            Cell::fixed(share(s.veil), 2),
+            Cell::fixed(share(s.beyond), 2),
+            Cell::fixed(share(s.not_passed), 2),
+            Cell::fixed(share(s.evanescent), 2),
+            Cell::fixed(share(sum), 2),
+            Cell::fixed(share(s.zero_order), 2),
+        ]);
+    }
+    page.table(table.caption(
+        "Of the light that arrives at the openings of all elements from a white scene. Images are what lands within the kernels' windows; undiffracted light is a part of veil and of what lands beside the sensor.",
+    ));
+}
+
+fn geometry(page: &mut Page, report: &PictureReport) {
+    if report.homographies.is_empty() {
+        return;
+    }
+    page.section("What a homography would miss");
+    let mut table = Table::new([
+        Column::text("Element"),
+        Column::text("Channel"),
+        Column::number("rms", "pixels"),
+        Column::number("largest", "pixels"),
+    ]);
+    for h in &report.homographies {
+        table.row([
+            Cell::from(h.element.as_str()),
+            Cell::from(h.channel.as_str()),
+            Cell::sig(h.rms_pixels, 2),
+            Cell::sig(h.largest_pixels, 2),
+        ]);
+    }
+    page.table(table.caption("Distance of the chief rays from the best homography of scene and sub-image."));
+}
+
+fn assumptions(page: &mut Page, all: &[Assumption]) {
+    page.section("What was assumed");
+    page.list(all.iter().map(|a| format!("{}: {}", a.what, a.value)));
+}

@@ -1,0 +1,231 @@
+//! What is found of a picture.
+
+use nalgebra::DMatrix;
+use serde::Serialize;
+
+use crate::restore::RestorationMethod;
+use crate::score::ZoneScore;
+use crate::studio::Studio;
+use crate::veil::LightShares;
+
+/// Everything that the page of a picture says, in numbers.
+#[derive(Clone, Debug, Serialize)]
+pub struct PictureReport {
+    pub design: String,
+    pub layout: String,
+    pub camera: String,
+    pub scene: String,
+    pub field_deg: f64,
+    /// Distance of the scene (mm); none for one that is far.
+    pub distance_mm: Option<f64>,
+    pub saturated: usize,
+    pub restorations: Vec<RestorationReport>,
+    pub budget: Vec<ChannelBudget>,
+    pub homographies: Vec<HomographyResidual>,
+    pub assumptions: Vec<Assumption>,
+}
+
+/// One way of restoring.
+#[derive(Clone, Debug, Serialize)]
+pub struct RestorationReport {
+    pub method: String,
+    /// By all elements at once, or each alone.
+    pub joint: bool,
+    pub scores: Vec<ZoneScore>,
+    /// Expected PSNR of linear light in each zone (dB), where there is a forecast.
+    pub forecast_db: Vec<f64>,
+}
+
+/// Where the light of one channel goes.
+#[derive(Clone, Debug, Serialize)]
+pub struct ChannelBudget {
+    pub channel: String,
+    pub shares: LightShares,
+}
+
+/// How far chief rays are from the best homography.
+#[derive(Clone, Debug, Serialize)]
+pub struct HomographyResidual {
+    pub element: String,
+    pub channel: String,
+    pub rms_pixels: f64,
+    pub largest_pixels: f64,
+}
+
+/// One thing that was assumed.
+#[derive(Clone, Debug, Serialize)]
+pub struct Assumption {
+    pub what: String,
+    pub value: String,
+}
+
+impl RestorationReport {
+    /// Of a method.
+    pub fn new(method: RestorationMethod, joint: bool, scores: Vec<ZoneScore>) -> Self {
+        Self {
+            method: method.name().to_owned(),
+            joint,
+            scores,
+            forecast_db: Vec::new(),
+        }
+    }
+}
+
+impl Studio {
+    /// Light budget of each channel for a white scene.
+    pub fn budget(&self) -> Vec<ChannelBudget> {
+        let channels = self.channels.iter().zip(self.veil.budget.chunks(self.bank.bases));
+        channels
+            .map(|(channel, shares)| ChannelBudget {
+                channel: channel.name.clone(),
+                shares: LightShares::sum(shares),
+            })
+            .collect()
+    }
+
+    /// What the best homography between scene and sub-image misses, for each element and channel.
+    pub fn homographies(&self) -> Vec<HomographyResidual> {
+        let mut all = Vec::new();
+        for (k, element) in self.design.elements().iter().enumerate() {
+            for (channel, um) in self.channels.iter().zip(&self.bank.channel_um) {
+                let points = self.chief_rays(k, *um);
+                if let Some((rms, largest)) = homography_residual(&points) {
+                    all.push(HomographyResidual {
+                        element: element.label(),
+                        channel: channel.name.clone(),
+                        rms_pixels: rms,
+                        largest_pixels: largest,
+                    });
+                }
+            }
+        }
+        all
+    }
+
+    /// Tangents of the scene and pixels of the sub-image of an element, over its field.
+    fn chief_rays(&self, element: usize, um: f64) -> Vec<([f64; 2], [f64; 2])> {
+        const POINTS: usize = 13;
+        let (view, spec) = (&self.elements[element], &self.bank.spec);
+        let at = |k: usize| spec.reach_um * (2.0 * k as f64 / (POINTS as f64 - 1.0) - 1.0);
+        let mut points = Vec::new();
+        for k in 0..POINTS * POINTS {
+            let sines = view.sines_of_landing([at(k % POINTS), at(k / POINTS)], view.wedge.wavelength_um);
+            let seen = view
+                .tangents(sines, self.view.distance_um)
+                .zip(view.landing_um(sines, um));
+            if let Some((tangents, landing)) = seen {
+                let [row, column] = self.view.place(tangents);
+                let inside =
+                    (0.0..self.view.rows as f64).contains(&row) && (0.0..self.view.columns as f64).contains(&column);
+                if inside {
+                    points.push((tangents, landing.map(|l| l / spec.pixel_um)));
+                }
+            }
+        }
+        points
+    }
+
+    /// What was assumed, in words.
+    pub fn assumptions(&self, fidelity: &str) -> Vec<Assumption> {
+        let assumption = |what: &str, value: String| Assumption {
+            what: what.to_owned(),
+            value,
+        };
+        let spec = &self.bank.spec;
+        vec![
+            assumption("cell", format!("`{fidelity}`, solved along the normal, whatever the angle of arrival")),
+            assumption(
+                "field of the kernels",
+                format!(
+                    "{} degrees from the axis of each element, at {} x {} places; between them kernels are blended; steeper light is traced as rays",
+                    fixed((spec.reach_um / self.design.lens.focal_length_um).atan().to_degrees()),
+                    spec.nodes,
+                    spec.nodes
+                ),
+            ),
+            assumption(
+                "window of a kernel",
+                format!("{} pixels; what lands outside is the veil, in squares of {} pixels", spec.window, crate::veil::CELL_PIXELS),
+            ),
+            assumption("wavelengths", format!("{} nm apart; between them the PSF is blended and moves with the chief ray", crate::chip::STEP_NM)),
+            assumption("illuminant", self.camera.illuminant.name().to_owned()),
+            assumption("spectra of the scene", "smooth reflectances of sRGB after Mallett and Yuksel (2019)".into()),
+            assumption(
+                "exposure",
+                format!("the brightest pixel of a white scene has {} of full scale", self.camera.exposure.white),
+            ),
+            assumption(
+                "restoration",
+                "knows the kernels of a grey surface at every second place of the field, and none of the scene's spectra".into(),
+            ),
+            assumption("metal", "opaque; light passes the openings alone, and nothing is reflected twice".into()),
+        ]
+    }
+}
+
+fn fixed(value: f64) -> String {
+    format!("{value:.0}")
+}
+
+/// Root mean square and largest distance of pairs of points from the best homography, fitted without the weights that its
+/// denominator brings (direct linear transformation, twice, the second time with them).
+fn homography_residual(points: &[([f64; 2], [f64; 2])]) -> Option<(f64, f64)> {
+    const LEAST: usize = 8;
+    if points.len() < LEAST {
+        return None;
+    }
+    let mut h = [0.0; 8];
+    for _ in 0..3 {
+        let weight = |t: &[f64; 2]| 1.0 / (1.0 + h[6] * t[0] + h[7] * t[1]).abs().max(1e-6);
+        let mut a = DMatrix::zeros(2 * points.len(), 8);
+        let mut b = DMatrix::zeros(2 * points.len(), 1);
+        for (i, (t, p)) in points.iter().enumerate() {
+            let w = weight(t);
+            for axis in 0..2 {
+                let row = 2 * i + axis;
+                for (k, v) in [t[0], t[1], 1.0].into_iter().enumerate() {
+                    a[(row, 3 * axis + k)] = w * v;
+                }
+                a[(row, 6)] = -w * t[0] * p[axis];
+                a[(row, 7)] = -w * t[1] * p[axis];
+                b[(row, 0)] = w * p[axis];
+            }
+        }
+        let found = a.svd(true, true).solve(&b, 1e-12).ok()?;
+        h.copy_from_slice(found.as_slice());
+    }
+    let miss = |(t, p): &([f64; 2], [f64; 2])| {
+        let below = 1.0 + h[6] * t[0] + h[7] * t[1];
+        let at = [0, 1].map(|k| (h[3 * k] * t[0] + h[3 * k + 1] * t[1] + h[3 * k + 2]) / below);
+        (at[0] - p[0]).hypot(at[1] - p[1])
+    };
+    let misses: Vec<f64> = points.iter().map(miss).collect();
+    let rms = (misses.iter().map(|m| m * m).sum::<f64>() / misses.len() as f64).sqrt();
+    Some((rms, misses.into_iter().fold(0.0, f64::max)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_homography_is_found_and_what_is_none_is_not() {
+        let map = |t: [f64; 2], bend: f64| {
+            let below = 1.0 + 0.2 * t[0] - 0.1 * t[1];
+            [
+                (100.0 * t[0] + 3.0 * t[1] + 7.0) / below + bend * t[1].powi(3),
+                (90.0 * t[1] - 2.0) / below,
+            ]
+        };
+        let points = |bend: f64| -> Vec<_> {
+            (0..49)
+                .map(|k| [(k % 7) as f64 / 6.0 - 0.5, (k / 7) as f64 / 6.0 - 0.5])
+                .map(|t| (t, map(t, bend)))
+                .collect()
+        };
+        // Rounding of a system of hundred rows.
+        assert!(homography_residual(&points(0.0)).unwrap().1 < 1e-6);
+        assert!(homography_residual(&points(20.0)).unwrap().0 > 0.1);
+        assert!(homography_residual(&points(0.0)[..5]).is_none());
+    }
+}

@@ -1,0 +1,117 @@
+//! How near a restored picture comes to its scene.
+
+use metalith_core::srgb::encoded;
+use metalith_core::{Result, part};
+use metalith_wave::restore::{psnr_db, ssim_colour};
+use ndarray::{Array3, Axis};
+use serde::Serialize;
+
+/// A part of the field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Zone {
+    Whole,
+    Centre,
+    Edge,
+    Corner,
+}
+
+impl Zone {
+    /// All of them, as they are listed.
+    pub const ALL: [Self; 4] = [Self::Whole, Self::Centre, Self::Edge, Self::Corner];
+
+    /// Name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Whole => "whole",
+            Self::Centre => "centre",
+            Self::Edge => "edge",
+            Self::Corner => "corner",
+        }
+    }
+
+    /// Rectangles of a picture of this shape: of a division by three along both axes the middle, the four beside it, the
+    /// four in the corners.
+    pub fn rectangles(self, rows: usize, columns: usize) -> Vec<[std::ops::Range<usize>; 2]> {
+        let third = |n: usize, k: usize| k * n / 3..(k + 1) * n / 3;
+        let cells: &[(usize, usize)] = match self {
+            Self::Whole => return vec![[0..rows, 0..columns]],
+            Self::Centre => &[(1, 1)],
+            Self::Edge => &[(0, 1), (1, 0), (1, 2), (2, 1)],
+            Self::Corner => &[(0, 0), (0, 2), (2, 0), (2, 2)],
+        };
+        cells
+            .iter()
+            .map(|(y, x)| [third(rows, *y), third(columns, *x)])
+            .collect()
+    }
+}
+
+/// Scores of one zone.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ZoneScore {
+    pub zone: Zone,
+    /// Peak signal to noise ratio of sRGB values (dB).
+    pub psnr_db: f64,
+    /// The same of linear light (dB).
+    pub psnr_linear_db: f64,
+    /// Structural similarity of sRGB values, mean over the colours.
+    pub ssim: f64,
+}
+
+/// Scores of linear sRGB against a truth in linear sRGB, `[row, column, colour]`, in all zones.
+///
+/// # Errors
+/// If the shapes differ, or the picture is too small for the window of the similarity.
+pub fn scores(picture: &Array3<f64>, truth: &Array3<f64>) -> Result<Vec<ZoneScore>> {
+    let (rows, columns, _) = truth.dim();
+    let (shown, wanted) = (picture.mapv(encoded), truth.mapv(encoded));
+    let score = |zone: Zone| {
+        let parts = zone.rectangles(rows, columns);
+        let (mut error, mut linear, mut ssim) = (0.0, 0.0, 0.0);
+        for [y, x] in &parts {
+            let cut = |a: &Array3<f64>| {
+                let planes: Vec<_> = (0..3)
+                    .map(|c| part(a.index_axis(Axis(2), c), y.clone(), x.clone()).insert_axis(Axis(2)))
+                    .collect();
+                ndarray::concatenate(Axis(2), &planes).expect("planes of one shape")
+            };
+            let share = 1.0 / parts.len() as f64;
+            let mean = |db: f64| 10f64.powf(-0.1 * db) * share;
+            error += mean(psnr_db(cut(&shown).view(), cut(&wanted).view())?);
+            linear += mean(psnr_db(cut(picture).view(), cut(truth).view())?);
+            ssim += ssim_colour(cut(&shown).view(), cut(&wanted).view())? * share;
+        }
+        Ok(ZoneScore {
+            zone,
+            psnr_db: -10.0 * error.log10(),
+            psnr_linear_db: -10.0 * linear.log10(),
+            ssim,
+        })
+    };
+    Zone::ALL.into_iter().map(score).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zones_tell_where_a_picture_is_wrong() {
+        let truth = Array3::from_shape_fn((60, 60, 3), |(y, x, c)| {
+            0.3 + 0.2 * ((y * 3 + x * 5 + c) % 7) as f64 / 7.0
+        });
+        let mut wrong = truth.clone();
+        for y in 40..60 {
+            for x in 40..60 {
+                wrong[[y, x, 1]] += 0.1;
+            }
+        }
+        let found = scores(&wrong, &truth).unwrap();
+        let at = |zone: Zone| *found.iter().find(|s| s.zone == zone).unwrap();
+        assert_eq!(at(Zone::Centre).psnr_linear_db, f64::INFINITY);
+        // A tenth in one of three colours of one of four corners: 0.01 / 12.
+        assert!((at(Zone::Corner).psnr_linear_db + 10.0 * (0.01f64 / 12.0).log10()).abs() < 1e-9);
+        assert!(at(Zone::Corner).ssim < at(Zone::Edge).ssim);
+    }
+}

@@ -1,0 +1,336 @@
+//! A chip, its camera and the field of a scene: everything that pictures of it need, made once or taken from the disk.
+
+use std::path::Path;
+
+use metalith_camera::{Camera, ChannelSampling};
+use metalith_cell::{Fidelity, cache_folder};
+use metalith_core::{Error, Progress, Result};
+use metalith_design::{Design, cell_models};
+use metalith_made::{CalibratedModel, MadeChip};
+use ndarray::{Array2, Array3};
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use crate::exposure::{Frame, expose, expose_quietly, gains, sensitivity};
+use crate::kernels::{BankSpec, KernelBank};
+use crate::operator::{Detail, FrameOperator};
+use crate::restore::{Recorded, RestorationMethod, expected_variances, restore_joint, restore_separate};
+use crate::scene::SceneImage;
+use crate::score::Zone;
+use crate::spectra::SceneSpectrum;
+use crate::veil::Veil;
+use crate::{
+    ChannelColours, ChipCase, ChipInLight, ElementView, SceneView, cache, element_views, read_pillars, sampling_of,
+};
+
+/// What pictures are taken with.
+pub struct Studio {
+    pub design: Design,
+    pub camera: Camera,
+    pub bank: KernelBank,
+    pub veil: Veil,
+    pub elements: Vec<ElementView>,
+    pub channels: Vec<ChannelSampling>,
+    pub view: SceneView,
+    /// Signal of a unit of light in each channel.
+    pub gain: Vec<f64>,
+    pub colours: ChannelColours,
+    /// Whether kernels and veil were found on the disk.
+    pub from_cache: [bool; 2],
+}
+
+/// Field of an element that kernels are made for: the angle from its axis, behind it (degrees). Light that leaves more
+/// steeply is the veil's. A lens of the paper sees 60 degrees.
+const FIELD_DEG: f64 = 30.0;
+/// Nodes an axis of this field.
+const NODES: usize = 9;
+/// Radius of lenses whose accurate fields cost next to nothing, and whose fast ones err by more (um).
+const SMALL_UM: f64 = 150.0;
+/// Pixels an axis of a kernel.
+const WINDOW: usize = 64;
+
+impl BankSpec {
+    /// For the elements of a design before a camera.
+    pub fn standard(design: &Design, camera: &Camera) -> Self {
+        Self {
+            pixel_um: camera.sensor.pixel_um,
+            window: WINDOW,
+            nodes: NODES,
+            reach_um: design.lens.focal_length_um * FIELD_DEG.to_radians().tan(),
+            accurate: design.lens.radius_um() < SMALL_UM,
+        }
+    }
+}
+
+/// What decides a bank, as text.
+#[derive(Serialize)]
+struct Inputs<'a> {
+    solver: u32,
+    layout: &'a str,
+    design: &'a str,
+    lens_um: [f64; 2],
+    elements: &'a [ElementView],
+    camera: &'a Camera,
+    model: &'a str,
+    basis: &'a [SceneSpectrum],
+    spec: &'a BankSpec,
+    scene_distance_um: f64,
+}
+
+/// SHA-256 of a file, read piece by piece.
+fn digest(path: &Path) -> Result<String> {
+    let mut file = std::fs::File::open(path).map_err(Error::io("read", path))?;
+    let mut hasher = Sha256::new();
+    std::io::copy(&mut file, &mut hasher).map_err(Error::io("read", path))?;
+    Ok(hasher.finalize().iter().map(|b| format!("{b:02x}")).collect())
+}
+
+impl Studio {
+    /// For a layout of a design behind a camera file, as drawn or as a calibrated model says, and scenes of a field.
+    ///
+    /// # Errors
+    /// If the layout cannot be read, the camera does not see the chip, a scene is wider than the array sees, or the user
+    /// stopped it.
+    pub fn open(
+        design: &Design,
+        layout: &Path,
+        camera: &Camera,
+        model: Option<&CalibratedModel>,
+        scene: &SceneImage,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let elements = element_views(design, camera);
+        let channels = sampling_of(design, camera)?.channels;
+        let spec = BankSpec::standard(design, camera);
+        check_view(&elements, &spec, camera, &scene.view)?;
+        progress.begin("reading the layout", 1);
+        let layout_digest = digest(layout)?;
+        let model_text = model.map_or_else(String::new, |m| format!("{:?}", m.perturbation));
+        let mut unexposed = camera.clone();
+        // What only acts after the light has landed, and the colour of the filter, do not decide kernels.
+        unexposed.name = String::new();
+        unexposed.exposure = Camera::three_bands(1.0).exposure;
+        let inputs = Inputs {
+            solver: metalith_cell::kept::SOLVER,
+            layout: &layout_digest,
+            design: &design.digest(),
+            lens_um: [design.lens.radius_um(), design.lens.focal_length_um],
+            elements: &elements,
+            camera: &unexposed,
+            model: &model_text,
+            basis: &scene.basis,
+            spec: &spec,
+            // JSON knows no infinity.
+            scene_distance_um: scene.view.distance_um.min(f64::MAX),
+        };
+        let inputs = serde_json::to_vec(&inputs).map_err(|e| Error::invalid(e.to_string(), "report this"))?;
+        let field = format!("{}x{} {}", scene.view.rows, scene.view.columns, scene.view.field_deg);
+        let veil_inputs = [&inputs[..], field.as_bytes()].concat();
+        let folder = cache_folder();
+        let bank = folder.as_deref().and_then(|f| cache::kept_bank(f, &inputs));
+        let veil = folder.as_deref().and_then(|f| cache::kept_veil(f, &veil_inputs));
+        let from_cache = [bank.is_some(), veil.is_some()];
+        let (bank, veil) = match (bank, veil) {
+            (Some(bank), Some(veil)) => (bank, veil),
+            (bank, _) => {
+                let extraction = read_pillars(design, layout, progress)?;
+                let models;
+                let made;
+                let case = match model {
+                    Some(model) => {
+                        made = MadeChip::new(&design.cell_stack()?, model)?;
+                        ChipCase::Made(&made)
+                    }
+                    None => {
+                        models = cell_models(design, &[Fidelity::Rigorous])?;
+                        ChipCase::Cell(models[0].as_ref())
+                    }
+                };
+                let chip = ChipInLight::new(design, &extraction, case, camera, scene.view.distance_um, progress)?;
+                let bank = match bank {
+                    Some(bank) => bank,
+                    None => {
+                        let bank = KernelBank::build(&chip, &scene.basis, spec, progress)?;
+                        if let Some(folder) = &folder {
+                            cache::keep_bank(folder, &inputs, &bank)?;
+                        }
+                        bank
+                    }
+                };
+                let veil = Veil::build(&chip, &bank, &scene.basis, &camera.sensor, &scene.view, progress)?;
+                if let Some(folder) = &folder {
+                    cache::keep_veil(folder, &veil_inputs, &veil)?;
+                }
+                (bank, veil)
+            }
+        };
+        let mut studio = Self {
+            design: design.clone(),
+            camera: camera.clone(),
+            bank,
+            veil,
+            elements,
+            colours: ChannelColours::of(&channels),
+            channels,
+            view: scene.view,
+            gain: Vec::new(),
+            from_cache,
+        };
+        let grey = studio.operator(Detail::Restoration);
+        let ones = vec![Array2::<f32>::ones((scene.view.rows, scene.view.columns)); grey.inputs()];
+        let white = grey.apply(&ones);
+        drop(grey);
+        studio.gain = gains(camera, &sensitivity(camera, &studio.channels), &white)?;
+        Ok(studio)
+    }
+
+    /// The way from scenes to frames.
+    pub fn operator(&self, detail: Detail) -> FrameOperator<'_> {
+        FrameOperator::new(
+            &self.bank,
+            &self.veil,
+            &self.elements,
+            &self.camera.sensor,
+            &self.view,
+            detail,
+        )
+    }
+
+    /// The frame that the sensor records of a scene, noise drawn from a seed.
+    ///
+    /// # Errors
+    /// If the scene has other spectra or another field than this was opened for.
+    pub fn record(&self, operator: &FrameOperator<'_>, scene: &SceneImage, seed: u64) -> Result<Frame> {
+        if scene.view != self.view || scene.basis.len() != self.bank.bases {
+            return Err(Error::invalid(
+                format!(
+                    "the scene `{}` has another size, field or spectra than the first",
+                    scene.name
+                ),
+                "give scenes of one size and field at a time",
+            ));
+        }
+        let light = operator.apply(&scene.planes);
+        Ok(expose(&self.camera, &self.gain, &light, seed))
+    }
+
+    /// The picture restored from a frame, linear sRGB `[row, column, colour]`.
+    ///
+    /// # Errors
+    /// If the frame is of another camera, or the user stopped it.
+    pub fn restore(
+        &self,
+        operator: &FrameOperator<'_>,
+        frame: &Frame,
+        method: RestorationMethod,
+        joint: bool,
+        progress: &dyn Progress,
+    ) -> Result<Array3<f64>> {
+        let size = operator.frame();
+        if frame.gain.len() != self.gain.len() || frame.planes.iter().any(|p| p.dim() != (size[0], size[1])) {
+            return Err(Error::invalid(
+                "the frame is of another camera: its size or its channels differ",
+                "give the camera that it was recorded with",
+            ));
+        }
+        let (light, trust) = frame.light(&self.camera);
+        let recorded = Recorded {
+            operator,
+            light: &light,
+            trust: &trust,
+        };
+        let planes = match joint {
+            true => restore_joint(&recorded, method, progress)?,
+            false => restore_separate(&recorded, method, progress)?,
+        };
+        Ok(self.colours.rgb(&planes))
+    }
+
+    /// Expected PSNR of linear light in each zone (dB), without any picture: of scenes as bright as photographs are on the
+    /// mean, whose spectra fall as 1 / f^2, restored by all elements.
+    pub fn forecast(&self, operator: &FrameOperator<'_>) -> Vec<f64> {
+        let shape = (self.view.rows, self.view.columns);
+        let mean = metalith_wave::restore::Scene::default().mean as f32;
+        let grey = vec![Array2::<f32>::from_elem(shape, mean); operator.inputs()];
+        let light = operator.apply(&grey);
+        let (light, trust) = expose_quietly(&self.camera, &self.gain, &light).light(&self.camera);
+        let recorded = Recorded {
+            operator,
+            light: &light,
+            trust: &trust,
+        };
+        let places: Vec<Vec<(usize, usize)>> = Zone::ALL.iter().map(|z| samples(*z, shape)).collect();
+        let all: Vec<(usize, usize)> = places.iter().flatten().copied().collect();
+        let variances = expected_variances(&recorded, &all);
+        let mut rest = &variances[..];
+        let forecast = places.iter().map(|zone| {
+            let (own, later) = rest.split_at(zone.len());
+            rest = later;
+            let mean = own.iter().map(|v| self.colours.variance(v)).sum::<f64>() / own.len() as f64;
+            -10.0 * mean.log10()
+        });
+        forecast.collect()
+    }
+
+    /// What a perfect camera with these channels would give of a scene: the truth that pictures are held to.
+    pub fn truth(&self, scene: &SceneImage) -> Array3<f64> {
+        self.colours.rgb(&ChannelColours::ideal(&self.channels, scene))
+    }
+}
+
+/// Places of a zone, four by four in each of its rectangles.
+fn samples(zone: Zone, shape: (usize, usize)) -> Vec<(usize, usize)> {
+    const POINTS: usize = 4;
+    let within = |range: &std::ops::Range<usize>, k: usize| range.start + (2 * k + 1) * range.len() / (2 * POINTS);
+    let rectangles = zone.rectangles(shape.0, shape.1);
+    let places = rectangles
+        .iter()
+        .flat_map(|[y, x]| (0..POINTS * POINTS).map(move |k| (within(y, k / POINTS), within(x, k % POINTS))));
+    places.collect()
+}
+
+/// A camera must see the chip, and the array the scene.
+fn check_view(elements: &[ElementView], spec: &BankSpec, camera: &Camera, view: &SceneView) -> Result<()> {
+    if !(view.field_deg > 0.0 && view.field_deg < 175.0 && view.distance_um > 0.0) {
+        return Err(Error::invalid(
+            format!(
+                "a field of {} degrees at a distance of {} um",
+                view.field_deg, view.distance_um
+            ),
+            "give a field from 1 to 174 degrees and a positive distance",
+        ));
+    }
+    let sensor = &camera.sensor;
+    let half = [f64::from(sensor.columns), f64::from(sensor.rows)].map(|n| 0.5 * n * sensor.pixel_um);
+    // Places of the scene along its border and its middle.
+    let seen = |row: f64, column: f64| {
+        elements.iter().any(|e| {
+            let sines = e.sines(view.tangents(row, column), view.distance_um);
+            let um = e.wedge.wavelength_um;
+            e.landing_um(sines, um).is_some_and(|p| {
+                let on = |a: usize| (p[a] + e.centre_um[a] - sensor.offset_um[a]).abs() <= half[a];
+                p.iter().all(|v| v.abs() <= spec.reach_um) && on(0) && on(1)
+            })
+        })
+    };
+    let (last_row, last_column) = (view.rows as f64 - 1.0, view.columns as f64 - 1.0);
+    if !seen(0.5 * last_row, 0.5 * last_column) {
+        return Err(Error::invalid(
+            "the camera does not see the chip: the middle of the scene falls beside the sensor",
+            "check `offset_um`, `columns` and `rows` of the sensor",
+        ));
+    }
+    let corners = [(0.0, 0.0), (0.0, last_column), (last_row, 0.0), (last_row, last_column)];
+    if let Some((row, column)) = corners.into_iter().find(|(r, c)| !seen(*r, *c)) {
+        let [tx, ty] = view.tangents(row, column);
+        return Err(Error::invalid(
+            format!(
+                "the scene is wider than the array sees: no element sees its corner at ({:.1}, {:.1}) degrees on the sensor",
+                tx.atan().to_degrees(),
+                ty.atan().to_degrees()
+            ),
+            "give a smaller field of the scene",
+        ));
+    }
+    Ok(())
+}

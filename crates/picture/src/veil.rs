@@ -1,0 +1,509 @@
+//! The veil: all light that lands outside of the kernels' windows, laid over the sensor coarsely.
+//!
+//! Where light of a direction lands follows from the local spectra of the element, by rays
+//! ([`metalith_wave::propagation::Departure`]). What the kernel of that direction holds is taken out of it, so that image
+//! and veil together are all the light that travels to the sensor.
+
+use metalith_camera::{ChannelSampling, Sensor};
+use metalith_core::{Error, Progress, Result};
+use metalith_wave::PlaneWave;
+use metalith_wave::propagation::{Departure, LandingGrid, leaving};
+use ndarray::{Array2, ArrayView2};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::chip::ChipInLight;
+use crate::kernels::{KernelBank, inverse, turned};
+use crate::spectra::SceneSpectrum;
+use crate::{ElementView, SceneView};
+
+/// Squares an axis into which the light of a scene is gathered.
+pub const SCENE_CELLS: usize = 20;
+/// Pixels an axis of a square of the sensor.
+pub const CELL_PIXELS: usize = 16;
+/// Blocks an axis of an element.
+const BLOCKS: usize = 8;
+/// Wavelengths of the veil are at most so far apart (nm): it moves with the chief ray by less than a square.
+const VEIL_STEP_NM: f64 = 38.0;
+
+/// Where a channel's light of a scene's squares goes that no kernel holds.
+#[derive(Clone, Debug)]
+pub struct Veil {
+    /// Rows and columns of squares of the sensor.
+    pub cells: [usize; 2],
+    /// Channels and spectra of the scene.
+    pub channels: usize,
+    pub bases: usize,
+    /// Channel, spectrum, square of the scene, square of the sensor: light on it, of what a lens receives from a white
+    /// surface of that square.
+    pub values: Vec<f32>,
+    /// By channel and spectrum: shares of the light that arrives.
+    pub budget: Vec<LightShares>,
+}
+
+/// Where the light goes that arrives at all elements from a white scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LightShares {
+    /// Light that arrives, of any scale.
+    pub arrives: f64,
+    /// Of it, what kernels hold, on or off the sensor.
+    pub in_kernels: f64,
+    /// On the sensor, outside of kernels.
+    pub veil: f64,
+    /// In the sensor's plane or beyond, but not on the sensor.
+    pub beyond: f64,
+    /// Held in frequencies that do not travel.
+    pub evanescent: f64,
+    /// Undiffracted: a part of the veil and of what lands beyond.
+    pub zero_order: f64,
+    /// Reflected or absorbed, or diffracted into the glass.
+    pub not_passed: f64,
+}
+
+/// Gather the light of a plane of the scene into squares: hats about their middles, times projected solid angle.
+pub fn gather(view: &SceneView, plane: ArrayView2<'_, f32>) -> Vec<f64> {
+    let mut cells = vec![0.0; SCENE_CELLS * SCENE_CELLS];
+    for_scene(view, |y, x, weight, cell| {
+        cells[cell] += weight * f64::from(plane[[y, x]])
+    });
+    cells
+}
+
+/// The adjoint of [`gather`]: adds to a plane.
+pub fn spread(view: &SceneView, cells: &[f64], plane: &mut Array2<f32>) {
+    for_scene(view, |y, x, weight, cell| {
+        plane[[y, x]] += (weight * cells[cell]) as f32
+    });
+}
+
+fn for_scene(view: &SceneView, mut act: impl FnMut(usize, usize, f64, usize)) {
+    let axis = |n: usize| -> Vec<[(usize, f64); 2]> {
+        (0..n)
+            .map(|i| {
+                let place =
+                    ((i as f64 + 0.5) / n as f64 * SCENE_CELLS as f64 - 0.5).clamp(0.0, (SCENE_CELLS - 1) as f64);
+                let low = (place as usize).min(SCENE_CELLS - 2);
+                let share = place - low as f64;
+                [(low, 1.0 - share), (low + 1, share)]
+            })
+            .collect()
+    };
+    let (rows, columns) = (axis(view.rows), axis(view.columns));
+    for (y, row) in rows.iter().enumerate() {
+        for (x, column) in columns.iter().enumerate() {
+            let solid = solid_angle(view, y as f64, x as f64);
+            for (cy, wy) in row {
+                for (cx, wx) in column {
+                    act(y, x, wy * wx * solid, cy * SCENE_CELLS + cx);
+                }
+            }
+        }
+    }
+}
+
+/// Projected solid angle of a pixel of the scene.
+pub fn solid_angle(view: &SceneView, row: f64, column: f64) -> f64 {
+    let [tx, ty] = view.tangents(row, column);
+    (view.pixel() / (1.0 + tx * tx + ty * ty)).powi(2)
+}
+
+/// From squares to the pixels of the sensor: straight lines between the middles of squares.
+pub fn lay(cells: &[f64], shape: [usize; 2], frame: &mut Array2<f32>) {
+    for_sensor(frame.dim().into(), shape, |y, x, weight, cell| {
+        frame[[y, x]] += (weight * cells[cell]) as f32
+    });
+}
+
+/// The adjoint of [`lay`].
+pub fn lift(frame: &Array2<f32>, shape: [usize; 2]) -> Vec<f64> {
+    let mut cells = vec![0.0; shape[0] * shape[1]];
+    for_sensor(frame.dim().into(), shape, |y, x, weight, cell| {
+        cells[cell] += weight * f64::from(frame[[y, x]])
+    });
+    cells
+}
+
+fn for_sensor(frame: [usize; 2], shape: [usize; 2], mut act: impl FnMut(usize, usize, f64, usize)) {
+    let axis = |n: usize, cells: usize| -> Vec<[(usize, f64); 2]> {
+        (0..n)
+            .map(|i| {
+                let place = ((i as f64 + 0.5) / CELL_PIXELS as f64 - 0.5).clamp(0.0, (cells - 1) as f64);
+                let low = (place as usize).min(cells.saturating_sub(2));
+                let share = place - low as f64;
+                [(low, 1.0 - share), ((low + 1).min(cells - 1), share)]
+            })
+            .collect()
+    };
+    let scale = 1.0 / (CELL_PIXELS * CELL_PIXELS) as f64;
+    let (rows, columns) = (axis(frame[0], shape[0]), axis(frame[1], shape[1]));
+    for (y, row) in rows.iter().enumerate() {
+        for (x, column) in columns.iter().enumerate() {
+            for (cy, wy) in row {
+                for (cx, wx) in column {
+                    act(y, x, scale * wy * wx, cy * shape[1] + cx);
+                }
+            }
+        }
+    }
+}
+
+/// Squares that cover a sensor.
+pub fn sensor_cells(sensor: &Sensor) -> [usize; 2] {
+    [sensor.rows, sensor.columns].map(|n| (n as usize).div_ceil(CELL_PIXELS))
+}
+
+impl Veil {
+    /// Trace the veil of a scene's field.
+    ///
+    /// # Errors
+    /// If the user stopped it, or a map is too large.
+    pub fn build(
+        chip: &ChipInLight,
+        bank: &KernelBank,
+        basis: &[SceneSpectrum],
+        sensor: &Sensor,
+        view: &SceneView,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let stride = (VEIL_STEP_NM / crate::chip::STEP_NM) as usize;
+        let all = &chip.sampling.wavelengths_nm;
+        let mut chosen: Vec<usize> = (0..all.len()).step_by(stride.max(1)).collect();
+        chosen.extend((chosen.last() != Some(&(all.len() - 1))).then_some(all.len() - 1));
+        progress.begin("tracing the veil", (chosen.len() * chip.elements.len()) as u64);
+        let weights = weights(chip, basis, &chosen);
+        let cells = sensor_cells(sensor);
+        let tracer = Tracer {
+            chip,
+            bank,
+            sensor,
+            view,
+            cells,
+            chosen: &chosen,
+            weights: &weights,
+        };
+        let pairs = chip.sampling.channels.len() * basis.len();
+        let size = SCENE_CELLS * SCENE_CELLS * cells[0] * cells[1];
+        let mut values = vec![0.0f32; pairs * size];
+        let mut budget = vec![LightShares::default(); pairs];
+        for distinct in 0..chip.distinct.len() {
+            if progress.stopped() {
+                return Err(Error::Interrupted);
+            }
+            let departures: Vec<Departure> = chosen
+                .par_iter()
+                .map(|i| {
+                    let lit = chip.lit(distinct, *i, [0.0; 2]);
+                    // One polarisation stands for both: their tables differ in obliquely lit cells alone.
+                    let aperture = lit.element.lit_aperture(&lit.tables[0], &lit.light);
+                    Departure::of(&aperture, all[*i] * 1e-3, BLOCKS)
+                })
+                .collect();
+            for element in (0..chip.elements.len()).filter(|e| chip.copies[*e].0 == distinct) {
+                let traced: Vec<Traced> = (0..SCENE_CELLS * SCENE_CELLS)
+                    .into_par_iter()
+                    .map(|cell| tracer.trace(element, cell, &departures))
+                    .collect::<Result<_>>()?;
+                for (cell, one) in traced.iter().enumerate() {
+                    for (pair, total) in budget.iter_mut().enumerate() {
+                        let from = (pair * SCENE_CELLS * SCENE_CELLS + cell) * cells[0] * cells[1];
+                        let to = &mut values[from..from + cells[0] * cells[1]];
+                        to.iter_mut().zip(&one.light[pair]).for_each(|(a, b)| *a += *b as f32);
+                        total.add(&one.shares[pair], tracer.solid(cell));
+                    }
+                }
+                progress.advance(chosen.len() as u64);
+            }
+        }
+        Ok(Self {
+            cells,
+            channels: chip.sampling.channels.len(),
+            bases: basis.len(),
+            values,
+            budget,
+        })
+    }
+
+    /// No veil, for tests and for those who leave it out.
+    pub fn none(sensor: &Sensor, channels: usize, bases: usize) -> Self {
+        let cells = sensor_cells(sensor);
+        Self {
+            cells,
+            channels,
+            bases,
+            values: vec![0.0; channels * bases * SCENE_CELLS * SCENE_CELLS * cells[0] * cells[1]],
+            budget: vec![LightShares::default(); channels * bases],
+        }
+    }
+
+    fn block(&self, channel: usize, basis: usize) -> ArrayView2<'_, f32> {
+        let shape = (SCENE_CELLS * SCENE_CELLS, self.cells[0] * self.cells[1]);
+        let from = (channel * self.bases + basis) * shape.0 * shape.1;
+        ArrayView2::from_shape(shape, &self.values[from..from + shape.0 * shape.1]).expect("as it was made")
+    }
+
+    /// Light on the squares of the sensor, from that of the scene's squares.
+    pub fn apply(&self, channel: usize, basis: usize, scene: &[f64]) -> Vec<f64> {
+        let mut cells = vec![0.0; self.cells[0] * self.cells[1]];
+        for (light, row) in scene.iter().zip(self.block(channel, basis).rows()) {
+            cells.iter_mut().zip(row).for_each(|(c, v)| *c += light * f64::from(*v));
+        }
+        cells
+    }
+
+    /// The adjoint of [`Veil::apply`].
+    pub fn adjoint(&self, channel: usize, basis: usize, cells: &[f64]) -> Vec<f64> {
+        let block = self.block(channel, basis);
+        let sum = |row: ndarray::ArrayView1<'_, f32>| row.iter().zip(cells).map(|(v, c)| f64::from(*v) * c).sum();
+        block.rows().into_iter().map(sum).collect()
+    }
+
+    /// The veil of a surface whose spectrum is the sum of all of the basis, in each channel.
+    pub fn grey(&self) -> Self {
+        let size = SCENE_CELLS * SCENE_CELLS * self.cells[0] * self.cells[1];
+        let mut values = vec![0.0f32; self.channels * size];
+        for (channel, to) in values.chunks_exact_mut(size).enumerate() {
+            for basis in 0..self.bases {
+                let from = &self.values[(channel * self.bases + basis) * size..][..size];
+                to.iter_mut().zip(from).for_each(|(a, b)| *a += b);
+            }
+        }
+        Self {
+            values,
+            bases: 1,
+            budget: Vec::new(),
+            ..*self
+        }
+    }
+}
+
+impl LightShares {
+    fn add(&mut self, other: &Self, weight: f64) {
+        self.arrives += weight * other.arrives;
+        self.in_kernels += weight * other.in_kernels;
+        self.veil += weight * other.veil;
+        self.beyond += weight * other.beyond;
+        self.evanescent += weight * other.evanescent;
+        self.zero_order += weight * other.zero_order;
+        self.not_passed += weight * other.not_passed;
+    }
+
+    /// The sum of those of several spectra.
+    pub fn sum<'a>(all: impl IntoIterator<Item = &'a Self>) -> Self {
+        let mut sum = Self::default();
+        all.into_iter().for_each(|s| sum.add(s, 1.0));
+        sum
+    }
+}
+
+/// Shares of a channel's light at the chosen wavelengths, for each spectrum: channel, spectrum, wavelength.
+fn weights(chip: &ChipInLight, basis: &[SceneSpectrum], chosen: &[usize]) -> Vec<Vec<f64>> {
+    let nm: Vec<f64> = chosen.iter().map(|i| chip.sampling.wavelengths_nm[*i]).collect();
+    let of = |channel: &ChannelSampling, spectrum: &SceneSpectrum| {
+        let total: f64 = channel.parts.iter().map(|p| p.weight).sum();
+        let mut sums = vec![0.0; nm.len()];
+        for part in &channel.parts {
+            let at = 0.5 * (part.nm[0] + part.nm[1]);
+            let weight = part.weight / total * spectrum.at(at);
+            let above = nm.partition_point(|n| *n <= at).clamp(1, nm.len() - 1);
+            let share = ((at - nm[above - 1]) / (nm[above] - nm[above - 1])).clamp(0.0, 1.0);
+            sums[above - 1] += weight * (1.0 - share);
+            sums[above] += weight * share;
+        }
+        sums
+    };
+    let channels = chip.sampling.channels.iter();
+    channels.flat_map(|c| basis.iter().map(move |b| of(c, b))).collect()
+}
+
+struct Tracer<'a> {
+    chip: &'a ChipInLight,
+    bank: &'a KernelBank,
+    sensor: &'a Sensor,
+    view: &'a SceneView,
+    cells: [usize; 2],
+    chosen: &'a [usize],
+    weights: &'a [Vec<f64>],
+}
+
+/// The veil of one square of the scene through one element.
+struct Traced {
+    /// By channel and spectrum: light on each square of the sensor.
+    light: Vec<Vec<f64>>,
+    shares: Vec<LightShares>,
+}
+
+impl Tracer<'_> {
+    /// Middle of a square of the scene, in pixels of its picture.
+    fn middle(&self, cell: usize) -> [f64; 2] {
+        let at = |i: usize, n: usize| (i as f64 + 0.5) / SCENE_CELLS as f64 * n as f64 - 0.5;
+        [
+            at(cell / SCENE_CELLS, self.view.rows),
+            at(cell % SCENE_CELLS, self.view.columns),
+        ]
+    }
+
+    /// Projected solid angle of a square of the scene.
+    fn solid(&self, cell: usize) -> f64 {
+        let [row, column] = self.middle(cell);
+        let pixels = (self.view.rows * self.view.columns) as f64 / (SCENE_CELLS * SCENE_CELLS) as f64;
+        solid_angle(self.view, row, column) * pixels
+    }
+
+    fn trace(&self, element: usize, cell: usize, departures: &[Departure]) -> Result<Traced> {
+        let pairs = self.weights.len();
+        let view: &ElementView = &self.chip.elements[element];
+        let [row, column] = self.middle(cell);
+        let sines = view.sines(self.view.tangents(row, column), self.view.distance_um);
+        let size = self.cells[0] * self.cells[1];
+        let mut traced = Traced {
+            light: vec![vec![0.0; size]; pairs],
+            shares: vec![LightShares::default(); pairs],
+        };
+        let spec = &self.bank.spec;
+        // The field of the kernels, by the wavelength of the wedge.
+        let place = view
+            .landing_um(sines, view.wedge.wavelength_um)
+            .filter(|p| p.iter().all(|v| v.abs() <= spec.reach_um))
+            .map(|p| [spec.place(p[1]), spec.place(p[0])]);
+        let maps: Vec<LandedLight> = self
+            .chosen
+            .iter()
+            .zip(departures)
+            .map(|(i, departure)| self.landed(element, *i, sines, departure, place))
+            .collect::<Result<_>>()?;
+        let bases = self.bank.bases;
+        for pair in 0..pairs {
+            let weights = &self.weights[pair];
+            let in_kernel = place.map_or(0.0, |p| self.bank.energy(element, p, pair / bases, pair % bases));
+            let masked = place.is_some();
+            let sum = |of: &dyn Fn(&LandedLight) -> f64| weights.iter().zip(&maps).map(|(w, m)| w * of(m)).sum::<f64>();
+            let travelling = sum(&|m| m.travelling);
+            let outside = sum(&|m| if masked { m.outside } else { m.travelling });
+            // What the kernel holds has been taken from the map where the image is: the rest has all that is left.
+            let scale = ((travelling - in_kernel).max(0.0) / outside.max(f64::MIN_POSITIVE)).min(MOST_SCALE);
+            let light = &mut traced.light[pair];
+            for (w, map) in weights.iter().zip(&maps) {
+                let cells = if masked { &map.cells_outside } else { &map.cells };
+                for (at, v) in cells {
+                    light[*at as usize] += w * scale * f64::from(*v);
+                }
+            }
+            let on_sensor: f64 = light.iter().sum();
+            let arrives: f64 = weights.iter().sum();
+            traced.shares[pair] = LightShares {
+                arrives,
+                in_kernels: in_kernel,
+                veil: on_sensor,
+                beyond: scale * outside - on_sensor,
+                evanescent: sum(&|m| m.evanescent),
+                zero_order: sum(&|m| m.zero_order),
+                not_passed: arrives - sum(&|m| m.travelling + m.evanescent),
+            };
+        }
+        Ok(traced)
+    }
+
+    fn landed(
+        &self,
+        element: usize,
+        wavelength: usize,
+        sines: [f64; 2],
+        departure: &Departure,
+        place: Option<[f64; 2]>,
+    ) -> Result<LandedLight> {
+        let view = &self.chip.elements[element];
+        let um = self.chip.sampling.wavelengths_nm[wavelength] * 1e-3;
+        let (base, turn) = self.chip.copies[element];
+        let own = turned(inverse(turn), sines);
+        let wave = PlaneWave {
+            wavelength_um: um,
+            sin_x: own[0],
+            sin_y: own[1],
+        };
+        let towards = leaving(&self.chip.distinct[base].view.wedge, &wave);
+        let pixel = self.sensor.pixel_um;
+        let cell_um = pixel * CELL_PIXELS as f64;
+        // The middle of the sensor from this element's axis, and how far any of its corners is.
+        let middle = [0, 1].map(|a| self.sensor.offset_um[a] - view.centre_um[a]);
+        let half = [self.sensor.columns, self.sensor.rows].map(|n| 0.5 * f64::from(n) * pixel);
+        let far = (0..2).map(|a| middle[a].abs() + half[a]).fold(0.0, f64::max);
+        let grid = LandingGrid {
+            cell_um,
+            cells: 2 * (far / cell_um).ceil() as usize + 2,
+            distance_um: view.distance_um([0.0; 2]),
+        };
+        let landing = departure.landing(own, towards, grid)?;
+        let share = 1.0 / self.chip.arriving_um2[wavelength];
+        let chief = place.and_then(|_| view.landing_um(sines, um));
+        let window = 0.5 * self.bank.spec.window as f64 * pixel;
+        let mut found = LandedLight {
+            travelling: landing.travelling_um2() * share,
+            evanescent: landing.evanescent_um2 * share,
+            ..LandedLight::default()
+        };
+        let mut inside = 0.0;
+        let (mut all, mut outside) = (
+            vec![0.0f32; self.cells[0] * self.cells[1]],
+            vec![0.0f32; self.cells[0] * self.cells[1]],
+        );
+        for ((iy, ix), power) in landing.power_um2.indexed_iter() {
+            if *power == 0.0 {
+                continue;
+            }
+            let at = |i: usize| (i as f64 + 0.5 - 0.5 * grid.cells as f64) * cell_um;
+            let here = turned(turn, [at(ix), at(iy)]);
+            let in_window = chief.is_some_and(|c| (0..2).all(|a| (here[a] - c[a]).abs() <= window));
+            let power = power * share;
+            if in_window {
+                inside += power;
+            }
+            // Corner of the sensor's first square.
+            let place = [0, 1].map(|a| (here[a] - middle[a] + half[a]) / cell_um - 0.5);
+            for (cy, wy) in neighbours(place[1], self.cells[0]) {
+                for (cx, wx) in neighbours(place[0], self.cells[1]) {
+                    let value = (power * wy * wx) as f32;
+                    all[cy * self.cells[1] + cx] += value;
+                    if !in_window {
+                        outside[cy * self.cells[1] + cx] += value;
+                    }
+                }
+            }
+        }
+        found.outside = found.travelling - inside;
+        found.cells = sparse(&all);
+        found.cells_outside = sparse(&outside);
+        found.zero_order = self.chip.zero_order(base, wavelength);
+        Ok(found)
+    }
+}
+
+/// More than this a masked map is not scaled up: where rays see next to nothing outside of a window, what a window
+/// lacks has left it by diffraction, and is near it.
+const MOST_SCALE: f64 = 50.0;
+
+/// Where the light of one wavelength, square of the scene and element lands, as shares of what arrives.
+#[derive(Default)]
+struct LandedLight {
+    cells: Vec<(u32, f32)>,
+    /// Without the window of the kernel.
+    cells_outside: Vec<(u32, f32)>,
+    travelling: f64,
+    outside: f64,
+    evanescent: f64,
+    zero_order: f64,
+}
+
+fn sparse(cells: &[f32]) -> Vec<(u32, f32)> {
+    let lit = cells.iter().enumerate().filter(|(_, v)| **v > 0.0);
+    lit.map(|(i, v)| (i as u32, *v)).collect()
+}
+
+/// The squares on both sides of a place, with their weights; those that are there.
+fn neighbours(place: f64, cells: usize) -> impl Iterator<Item = (usize, f64)> {
+    let low = place.floor();
+    let share = place - low;
+    [(low, 1.0 - share), (low + 1.0, share)]
+        .into_iter()
+        .filter(move |(at, weight)| *at >= 0.0 && *at < cells as f64 && *weight > 0.0)
+        .map(|(at, weight)| (at as usize, weight))
+}

@@ -1,0 +1,292 @@
+//! The operator against a direct sum over points of the scene and wavelengths, and against its adjoint.
+
+use metalith_camera::{Camera, Channel, Illuminant, Response, Sensor};
+use metalith_core::Silent;
+use metalith_design::array::PillarArray;
+use metalith_design::{Design, cell_models};
+use metalith_layout::write_pillars;
+use metalith_picture::scene::SceneImage;
+use metalith_picture::{
+    BankSpec, ChipCase, ChipInLight, Detail, FrameOperator, KernelBank, Veil, element_views, read_pillars,
+};
+use metalith_wave::{Accuracy, Scratch, Window};
+use ndarray::{Array2, Array3};
+use rayon::prelude::*;
+
+/// The middle element, and its neighbour below and to the left.
+const MIDDLE: usize = 4;
+const BELOW: usize = 1;
+const LEFT: usize = 3;
+
+/// Pixels of 2 um an axis: the middle element and two of its neighbours.
+const ROWS: u32 = 120;
+
+fn camera(bands: &[[f64; 2]]) -> Camera {
+    let plain = Camera::three_bands(2.0);
+    Camera {
+        sensor: Sensor {
+            columns: ROWS,
+            rows: ROWS,
+            offset_um: [-75.0, -75.0],
+            ..plain.sensor
+        },
+        channels: bands
+            .iter()
+            .map(|band| Channel {
+                name: format!("{}", band[0]),
+                response: Response::Band {
+                    band_nm: *band,
+                    efficiency: 1.0,
+                },
+            })
+            .collect(),
+        illuminant: Illuminant::EqualEnergy,
+        ..plain
+    }
+}
+
+struct Setup {
+    design: Design,
+    camera: Camera,
+    chip: ChipInLight,
+    scene: SceneImage,
+}
+
+fn setup(bands: &[[f64; 2]], size: usize) -> Setup {
+    let design = Design::read("../../designs/mini_3x3.toml".as_ref()).unwrap();
+    let array = PillarArray::build(&design, &Silent).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let layout = folder.path().join("mini.gds");
+    write_pillars(&design, &array, design.layout.hierarchy, &layout, &Silent).unwrap();
+    let extraction = read_pillars(&design, &layout, &Silent).unwrap();
+    let camera = camera(bands);
+    let cells = cell_models(&design, &[metalith_cell::Fidelity::Published]).unwrap();
+    let case = ChipCase::Cell(cells[0].as_ref());
+    let chip = ChipInLight::new(&design, &extraction, case, &camera, f64::INFINITY, &Silent).unwrap();
+    let scene = waves(size, [0.0; 2]);
+    Setup {
+        design,
+        camera,
+        chip,
+        scene,
+    }
+}
+
+/// Waves of three colours within four degrees of a direction (degrees), fading towards there.
+fn waves(size: usize, about_deg: [f64; 2]) -> SceneImage {
+    let empty = SceneImage::of_rgb("", &Array3::zeros((size, size, 3)), 44.0, f64::INFINITY);
+    let rgb = Array3::from_shape_fn((size, size, 3), |(y, x, c)| {
+        let t = empty.view.tangents(y as f64, x as f64);
+        let off = [0, 1].map(|a| (t[a].atan().to_degrees() - about_deg[a]) / 4.0);
+        let fade = 0.5 + 0.5 * (std::f64::consts::PI * off[0].hypot(off[1]).min(1.0)).cos();
+        fade * (0.5 + 0.4 * (0.9 * x as f64 + c as f64).sin() * (0.7 * y as f64 - c as f64).cos())
+    });
+    SceneImage::of_rgb("waves", &rgb, 44.0, f64::INFINITY)
+}
+
+fn spec(window: usize, nodes: usize) -> BankSpec {
+    BankSpec {
+        pixel_um: 2.0,
+        window,
+        nodes,
+        reach_um: 26.0,
+        accurate: true,
+    }
+}
+
+/// A plane at a place between the middles of its pixels.
+fn value(plane: &Array2<f32>, row: f64, column: f64) -> f64 {
+    let (rows, columns) = plane.dim();
+    let (y, x) = (
+        row.clamp(0.0, rows as f64 - 1.0),
+        column.clamp(0.0, columns as f64 - 1.0),
+    );
+    let (iy, ix) = ((y as usize).min(rows - 2), (x as usize).min(columns - 2));
+    let (sy, sx) = (y - iy as f64, x - ix as f64);
+    let v = |a: usize, b: usize| f64::from(plane[[iy + a, ix + b]]);
+    (v(0, 0) * (1.0 - sx) + v(0, 1) * sx) * (1.0 - sy) + (v(1, 0) * (1.0 - sx) + v(1, 1) * sx) * sy
+}
+
+/// Each point of the scene at each wavelength, through each element, onto every pixel of the sensor.
+fn direct_sum(setup: &Setup, scene: &SceneImage, elements: &[usize], points: usize, nm: &[f64]) -> Array2<f64> {
+    let Setup { camera, chip, .. } = setup;
+    let (view, sensor) = (&scene.view, &camera.sensor);
+    let views = element_views(&setup.design, camera);
+    let weights: Vec<f64> = nm
+        .iter()
+        .map(|nm| camera.channels[0].weight(&camera.illuminant, *nm))
+        .collect();
+    let all: f64 = weights.iter().sum();
+    let n = view.rows * points;
+    let mut jobs = Vec::new();
+    for e in elements {
+        for i in 0..n * n {
+            jobs.push((*e, i));
+        }
+    }
+    let middle = [0, 1].map(|a| sensor.offset_um[a]);
+    let frames: Vec<Array2<f64>> = jobs
+        .par_chunks(256)
+        .map(|chunk| {
+            let mut scratch = Scratch::default();
+            let mut frame = Array2::zeros((ROWS as usize, ROWS as usize));
+            for (e, i) in chunk {
+                let at = |k: usize| (k as f64 + 0.5) / points as f64 - 0.5;
+                let (row, column) = (at(i / n), at(i % n));
+                let sines = views[*e].sines(view.tangents(row, column), view.distance_um);
+                let [tx, ty] = view.tangents(row, column);
+                let solid = (view.pixel() / points as f64 / (1.0 + tx * tx + ty * ty)).powi(2);
+                if scene.planes.iter().all(|p| value(p, row, column) == 0.0) {
+                    continue;
+                }
+                for (nm, weight) in nm.iter().zip(&weights) {
+                    let light: f64 = scene
+                        .basis
+                        .iter()
+                        .zip(&scene.planes)
+                        .map(|(b, p)| b.at(*nm) * value(p, row, column))
+                        .sum();
+                    let (distinct, _) = chip.copies[*e];
+                    assert_eq!(
+                        chip.distinct[distinct].view.centre_um, views[*e].centre_um,
+                        "an element of its own"
+                    );
+                    let index = chip.sampling.wavelengths_nm.iter().position(|w| w == nm).unwrap();
+                    let lit = chip.lit(distinct, index, sines);
+                    let window = Window {
+                        centre_um: [0, 1].map(|a| middle[a] - views[*e].centre_um[a]),
+                        step_um: 0.5,
+                        samples: 480,
+                        distance_um: views[*e].focal_um,
+                    };
+                    let psf = lit.psf(window, Accuracy::Accurate, &[], &mut scratch).unwrap();
+                    let share = light * solid * weight / all * 0.25 / chip.arriving_um2[index];
+                    for ((iy, ix), v) in psf.values.indexed_iter() {
+                        frame[[iy / 4, ix / 4]] += share * v;
+                    }
+                }
+            }
+            frame
+        })
+        .collect();
+    frames
+        .into_iter()
+        .fold(Array2::zeros((ROWS as usize, ROWS as usize)), |a, b| a + b)
+}
+
+/// Overlapping patches, kernels between nodes, spectra of the scene and of the channel, against some
+/// thousand fields over the whole sensor.
+#[test]
+#[ignore = "a minute"]
+fn a_frame_is_the_direct_sum_over_points_and_wavelengths() {
+    /// The target of the whole chain.
+    const OF_RANGE: f64 = 1e-3;
+    // Two wavelengths, both simulated.
+    let setup = setup(&[[550.0, 551.0]], 40);
+    let nm = setup.chip.sampling.wavelengths_nm.clone();
+    assert_eq!(nm.len(), 2);
+    let bank = KernelBank::build(&setup.chip, &setup.scene.basis, spec(96, 9), &Silent).unwrap();
+    let veil = Veil::none(&setup.camera.sensor, 1, 3);
+    let views = element_views(&setup.design, &setup.camera);
+    // The neighbour below looks up.
+    for (element, about) in [(MIDDLE, [0.0, 0.0]), (BELOW, [0.0, 15.0])] {
+        let scene = waves(40, about);
+        let operator = FrameOperator::new(
+            &bank,
+            &veil,
+            &views,
+            &setup.camera.sensor,
+            &scene.view,
+            Detail::Simulation,
+        );
+        let got = operator.apply_elements(&scene.planes, &[element], false).remove(0);
+        // Points 0.6 um apart on the sensor: finer than half of what the lens resolves, so that their sum is the integral.
+        let want = direct_sum(&setup, &scene, &[element], 5, &nm);
+        let range = want.iter().copied().fold(0.0, f64::max);
+        let worst = got
+            .iter()
+            .zip(&want)
+            .map(|(a, b)| (f64::from(*a) - b).abs())
+            .fold(0.0, f64::max);
+        println!("element {element}: worst {:.2e} of the range", worst / range);
+        assert!(worst < OF_RANGE * range, "{element}: {}", worst / range);
+        if element == BELOW {
+            // The neighbour to the left is a copy of it, mirrored at the diagonal.
+            let planes: Vec<Array2<f32>> = scene.planes.iter().map(|p| p.t().to_owned()).collect();
+            let copy = operator.apply_elements(&planes, &[LEFT], false).remove(0);
+            // Single precision.
+            const SINGLE: f64 = 1e-5;
+            let turned = copy.t();
+            let off = turned.iter().zip(&got).map(|(a, b)| f64::from((a - b).abs()));
+            assert!(off.fold(0.0, f64::max) < SINGLE * range);
+        }
+    }
+}
+
+#[test]
+fn the_adjoint_is_that_of_the_operator() {
+    /// Single precision of sums over some ten thousand products of both signs.
+    const ADJOINT: f64 = 1e-6;
+    let setup = setup(&[[450.0, 470.0], [520.0, 560.0]], 20);
+    let bank = KernelBank::build(&setup.chip, &setup.scene.basis, spec(24, 5), &Silent).unwrap();
+    let veil = Veil::build(
+        &setup.chip,
+        &bank,
+        &setup.scene.basis,
+        &setup.camera.sensor,
+        &setup.scene.view,
+        &Silent,
+    )
+    .unwrap();
+    let views = element_views(&setup.design, &setup.camera);
+    for detail in [Detail::Simulation, Detail::Restoration] {
+        let operator = FrameOperator::new(&bank, &veil, &views, &setup.camera.sensor, &setup.scene.view, detail);
+        let x: Vec<Array2<f32>> = (0..operator.inputs())
+            .map(|c| {
+                Array2::from_shape_fn((20, 20), |(i, j)| {
+                    (1.0 + ((i * 31 + j * 17 + c * 5) % 13) as f32) / 13.0
+                })
+            })
+            .collect();
+        let y: Vec<Array2<f32>> = (0..operator.channels())
+            .map(|c| {
+                Array2::from_shape_fn((ROWS as usize, ROWS as usize), |(i, j)| {
+                    (1.0 + ((i * 7 + j * 29 + c * 3) % 11) as f32) / 11.0
+                })
+            })
+            .collect();
+        let dot = |a: &[Array2<f32>], b: &[Array2<f32>]| -> f64 {
+            let pairs = a.iter().zip(b).flat_map(|(a, b)| a.iter().zip(b));
+            pairs.map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
+        };
+        let (forward, back) = (operator.apply(&x), operator.adjoint(&y));
+        let (a, b) = (dot(&forward, &y), dot(&x, &back));
+        println!("{detail:?}: {a} {b} {:.1e}", (a / b - 1.0).abs());
+        assert!((a / b - 1.0).abs() < ADJOINT, "{detail:?}: {a} {b}");
+    }
+}
+
+/// Kernels, veil and what is lost are all the light, and the veil's total is what kernels leave.
+#[test]
+fn all_light_is_accounted_for() {
+    /// The target, of the light that arrives.
+    const ACCOUNT: f64 = 0.01;
+    let setup = setup(&[[450.0, 470.0], [520.0, 560.0]], 20);
+    let bank = KernelBank::build(&setup.chip, &setup.scene.basis, spec(24, 5), &Silent).unwrap();
+    let veil = Veil::build(
+        &setup.chip,
+        &bank,
+        &setup.scene.basis,
+        &setup.camera.sensor,
+        &setup.scene.view,
+        &Silent,
+    )
+    .unwrap();
+    for shares in veil.budget.chunks(3) {
+        let all = metalith_picture::LightShares::sum(shares);
+        let found = all.in_kernels + all.veil + all.beyond + all.evanescent + all.not_passed;
+        println!("{all:?}");
+        assert!((found / all.arrives - 1.0).abs() < ACCOUNT);
+        assert!(all.in_kernels > 0.1 * all.arrives && all.veil > 0.0 && all.beyond > 0.0);
+    }
+}

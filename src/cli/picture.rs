@@ -1,0 +1,192 @@
+//! `metalith picture`: the picture that a layout will take.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use metalith::camera::Camera;
+use metalith::picture::restore::RestorationMethod;
+use metalith::picture::scene::{BuiltIn, SceneFile, SceneImage, chart, read_scene};
+use metalith::picture::{Detail, Frame, PicturePages, PictureReport, RestorationReport, Studio, scores, write_pages};
+use metalith::{CalibratedModel, Design, Error, Fidelity, Result};
+
+use super::paths::apart;
+use super::{Outcome, Terminal, print_json, print_line};
+
+/// Simulate the frame that the camera of a layout records of a scene, and restore the picture from it.
+#[derive(Args)]
+#[command(
+    after_help = "Example:\n  metalith picture out/prototype_3x3/prototype_3x3_pillars.gds --camera cameras/gt1930.toml \\\n    --design designs/prototype_3x3.toml scene.png --out out/picture\n\n\
+    The scene is a PNG or JPEG in sRGB, an NPY of linear light, an NPY cube with --wavelengths-nm, or one of the built-in\n\
+    scenes chart, star and edge. Kernels are kept on the disk and used again."
+)]
+pub struct PictureArgs {
+    /// The pillar layout.
+    layout: PathBuf,
+
+    /// The scene: an image file, or `chart`, `star`, `edge`.
+    scene: String,
+
+    /// The design that the layout is of: elements, wedges, cell.
+    #[arg(long)]
+    design: PathBuf,
+
+    /// The camera file.
+    #[arg(long)]
+    camera: PathBuf,
+
+    /// The chip as a measured line and bench make it: the `model.toml` that `metalith calibrate` wrote.
+    #[arg(long, value_name = "MODEL")]
+    model: Option<PathBuf>,
+
+    /// Angle from the left to the right edge of the scene (degrees).
+    #[arg(long, default_value_t = 90.0)]
+    field_deg: f64,
+
+    /// Distance of the scene (mm); far if left out.
+    #[arg(long)]
+    distance_mm: Option<f64>,
+
+    /// Wavelengths of the bands of a spectral cube (nm), separated by commas.
+    #[arg(long, value_delimiter = ',', value_name = "NM,NM,...")]
+    wavelengths_nm: Option<Vec<f64>>,
+
+    /// Pixels an axis of a built-in scene.
+    #[arg(long, default_value_t = 800, value_parser = clap::value_parser!(u16).range(64..=4096))]
+    pixels: u16,
+
+    /// Ways to restore: tikhonov, tv, richardson-lucy, hqs; the picture of the page is that of the first.
+    #[arg(long, value_delimiter = ',', default_value = "tikhonov")]
+    method: Vec<String>,
+
+    /// Restore by each element alone too.
+    #[arg(long)]
+    separate: bool,
+
+    /// Seed of the noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+
+    /// Folder for `picture.html` and `picture.json`.
+    #[arg(long, short, default_value = "out/picture", value_name = "FOLDER")]
+    out: PathBuf,
+
+    /// Print `picture.json` to standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+impl PictureArgs {
+    fn scene(&self) -> Result<SceneImage> {
+        let distance_um = self.distance_mm.map_or(f64::INFINITY, |mm| mm * 1e3);
+        if distance_um.is_nan() || distance_um <= 0.0 {
+            return Err(Error::invalid(
+                "a scene at no distance",
+                "give a positive --distance-mm",
+            ));
+        }
+        match self.scene.parse::<BuiltIn>() {
+            Ok(kind) => Ok(chart(kind, self.pixels.into(), self.field_deg, distance_um)),
+            Err(_) => read_scene(&SceneFile {
+                path: PathBuf::from(&self.scene),
+                wavelengths_nm: self.wavelengths_nm.clone(),
+                field_deg: self.field_deg,
+                distance_um,
+            }),
+        }
+    }
+}
+
+pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
+    terminal.stop_on_interrupt();
+    let methods: Vec<RestorationMethod> = args.method.iter().map(|m| m.parse()).collect::<Result<_>>()?;
+    let design = Design::read(&args.design)?;
+    let camera = Camera::read(&args.camera)?;
+    let model = args.model.as_deref().map(CalibratedModel::read).transpose()?;
+    let scene = args.scene()?;
+    let (page, numbers) = (args.out.join("picture.html"), args.out.join("picture.json"));
+    let inputs = [&args.layout, &args.design, &args.camera].map(PathBuf::as_path);
+    apart(inputs.into_iter().chain([args.scene.as_ref()]), &[&page, &numbers])?;
+    let studio = Studio::open(&design, &args.layout, &camera, model.as_ref(), &scene, terminal)?;
+    let frame = studio.record(&studio.operator(Detail::Simulation), &scene, args.seed)?;
+    let truth = studio.truth(&scene);
+    let operator = studio.operator(Detail::Restoration);
+    let mut pictures = Vec::new();
+    let mut found = Vec::new();
+    for method in methods {
+        for joint in [true, false] {
+            if joint || args.separate {
+                let picture = studio.restore(&operator, &frame, method, joint, terminal)?;
+                let mut restoration = RestorationReport::new(method, joint, scores(&picture, &truth)?);
+                // The forecast is of the picture that normal slopes expect.
+                if method == RestorationMethod::Tikhonov && joint {
+                    restoration.forecast_db = studio.forecast(&operator);
+                }
+                found.push(restoration);
+                pictures.push(picture);
+            }
+        }
+    }
+    let fidelity = if model.is_some() {
+        Fidelity::Calibrated
+    } else {
+        Fidelity::Rigorous
+    };
+    let report = report(args, &studio, &scene, &frame, found, fidelity.name());
+    let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();
+    let pages = PicturePages {
+        report: &report,
+        scene: &truth,
+        frame: &frame,
+        restored: &pictures[0],
+        channel_names: &names,
+    };
+    write_pages(&pages, &args.out)?;
+    terminal.clear();
+    if args.json {
+        print_json(&report);
+        return Ok(Outcome::Fine);
+    }
+    for restoration in &report.restorations {
+        let whole = &restoration.scores[0];
+        print_line!(
+            "{}, {}: PSNR {:.2} dB, SSIM {:.3}",
+            restoration.method,
+            if restoration.joint {
+                "joint"
+            } else {
+                "each element alone"
+            },
+            whole.psnr_db,
+            whole.ssim
+        );
+    }
+    print_line!("page: {}", page.display());
+    Ok(Outcome::Fine)
+}
+
+fn report(
+    args: &PictureArgs,
+    studio: &Studio,
+    scene: &SceneImage,
+    frame: &Frame,
+    restorations: Vec<RestorationReport>,
+    fidelity: &str,
+) -> PictureReport {
+    let name = |path: &PathBuf| {
+        path.file_name()
+            .map_or_else(String::new, |n| n.to_string_lossy().into_owned())
+    };
+    PictureReport {
+        design: studio.design.name.clone(),
+        layout: name(&args.layout),
+        camera: studio.camera.name.clone(),
+        scene: scene.name.clone(),
+        field_deg: args.field_deg,
+        distance_mm: args.distance_mm,
+        saturated: frame.saturated,
+        restorations,
+        budget: studio.budget(),
+        homographies: studio.homographies(),
+        assumptions: studio.assumptions(fidelity),
+    }
+}
