@@ -52,7 +52,9 @@ def main(program, folder):
         back = folder / name / "back.gds"
         subprocess.run([program, "convert", files["compact"], back, "--quiet"], check=True, stdout=subprocess.DEVNULL)
         files["converted"] = back
-        compare(name, files)
+        # An XOR of a full lens takes KLayout minutes; of the encodings it sees the default, `diff` saw the others.
+        compared = files if name == "mini_3x3" else {h: files[h] for h in (*HIERARCHIES, "compact")}
+        compare(name, compared)
         time_oasis(name, program, files, folder)
         if name == "mini_3x3":
             count_with_gdstk(name, files)

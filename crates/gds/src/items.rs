@@ -11,7 +11,7 @@ use super::oasis::Copies;
 use super::outline::outline;
 use super::shape::Point;
 use super::walk::{Sink, SinkError, Walk};
-use crate::error::Result;
+use crate::error::{LayoutError, Limit, Result};
 
 /// One element of a cell, in the coordinates of the cell.
 #[derive(Clone, Copy, Debug)]
@@ -57,6 +57,25 @@ pub trait CellConsumer {
 }
 
 impl Layout {
+    /// Whether all elements can be written one by one: copies multiplied, references not followed, within the limits
+    /// of a file of this size.
+    ///
+    /// # Errors
+    /// [`LayoutError::Limit`] if not.
+    pub fn copies_fit(&self) -> Result<()> {
+        let of_cell = |cell: &LayoutCell| {
+            let copies = cell.children.iter().fold(0u64, |sum, c| sum.saturating_add(c.copies));
+            copies.saturating_add(cell.shapes()).saturating_add(cell.texts())
+        };
+        let found = self.cells().iter().map(of_cell).fold(0, u64::saturating_add);
+        let most = self.limits().shapes_of(self.bytes());
+        if found <= most {
+            return Ok(());
+        }
+        let limit = Limit::FlatShapesOfShortFile;
+        Err(self.fault(0, LayoutError::Limit { limit, found, most }))
+    }
+
     /// Hand all cells, in the order of the file, to `consumer`. Copies are not multiplied, references not followed;
     /// properties and nodes are left out.
     ///

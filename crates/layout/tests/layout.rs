@@ -266,6 +266,25 @@ fn converted_layouts_are_the_same_geometry() {
     }
 }
 
+/// A few bytes that would become a file of any size are refused before anything is written.
+#[test]
+fn bombs_are_not_converted() {
+    let many = [0xFE, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0x3F];
+    // A cell A with 2^62 x 2^62 squares on one place.
+    let records = [
+        b"\x0e\x01A\x14\xdf\x01\x00\x0a\x00\x00\x01".as_slice(),
+        &many,
+        &many,
+        &[0, 0],
+    ]
+    .concat();
+    let bytes = metalith_testing::oasis::around(&records, false);
+    let layout = Layout::from_bytes("bomb.oas", bytes, metalith_gds::ReadLimits::default()).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out.gds");
+    assert!(convert(&layout, LayoutFormat::Gds, &out, &Silent).is_err() && !out.exists());
+}
+
 /// Layers and corners of all areas where they stand, in one order.
 fn corners(layout: &Layout) -> Vec<(LayerNumber, Vec<Point>)> {
     struct Areas(Vec<(LayerNumber, Vec<Point>)>);

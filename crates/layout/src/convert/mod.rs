@@ -14,7 +14,8 @@ use super::{LayoutFormat, Written};
 /// and so are nodes of GDSII and private records of OASIS; paths with round ends or odd widths become polygons, circles
 /// too. OASIS is written as it comes, whatever encoding of pillars is asked for: cells are copied, not made.
 ///
-/// Both files are streamed; nothing is held but one block.
+/// Both files are streamed; nothing is held but one block. GDSII has no lists of copies: a layout of more copies than are
+/// read of a file of its size is not written in it.
 ///
 /// # Errors
 /// If the tree of cells has faults, if something does not fit the format, or if a file cannot be read or written; the
@@ -22,7 +23,11 @@ use super::{LayoutFormat, Written};
 pub fn convert(layout: &Layout, format: LayoutFormat, path: &Path, progress: &dyn Progress) -> Result<Written> {
     let tops: Vec<&str> = layout.tops().iter().map(|&t| layout.cells()[t].name.as_str()).collect();
     let bytes = match format {
-        LayoutFormat::Gds => to_gds::write(layout, path, progress)?,
+        LayoutFormat::Gds => {
+            // Lists of copies are written one by one.
+            layout.copies_fit()?;
+            to_gds::write(layout, path, progress)?
+        }
         LayoutFormat::Oasis(_) => to_oasis::write(layout, &tops, path, progress)?,
     };
     let mut remarks = Vec::new();

@@ -220,13 +220,7 @@ impl CellConsumer for Target<'_> {
                 .into(),
             );
         }
-        let most = self.layout.limits().flat_shapes;
-        if repetition.copies() > most {
-            return Err(does_not_fit(
-                format!("a shape with {} copies", repetition.copies()),
-                "GDSII has repetitions of cells only: write the shape as a cell",
-            ));
-        }
+        // So many copies fit: see `Layout::copies_fit`.
         repetition.each(|by| self.copy(item, by))
     }
 }
