@@ -5,6 +5,7 @@ mod cells;
 mod check;
 mod compensated;
 mod completions;
+mod dataset;
 mod diff;
 mod handoff;
 mod layout;
@@ -70,6 +71,7 @@ enum Command {
     Optimise(optimise::OptimiseArgs),
     Photographs(photographs::PhotographsArgs),
     Picture(picture::PictureArgs),
+    Dataset(dataset::DatasetArgs),
     Verify(verify::VerifyArgs),
     Psf(psf::PsfArgs),
     Handoff(handoff::HandoffArgs),
@@ -118,6 +120,7 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::Layout(args) => layout::run(args, terminal),
         Command::Optimise(args) => optimise::run(args, terminal),
         Command::Photographs(args) => photographs::run(args, terminal),
+        Command::Dataset(args) => dataset::run(args, terminal),
         Command::Picture(args) => picture::run(args, terminal),
         Command::Handoff(args) => handoff::run(args, terminal),
         Command::Verify(args) => verify::run(args, terminal),
