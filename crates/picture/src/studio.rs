@@ -393,12 +393,16 @@ fn check_view(elements: &[ElementView], spec: &BankSpec, camera: &Camera, view: 
             "check `offset_um`, `columns` and `rows` of the sensor",
         ));
     }
-    let corners = [(0.0, 0.0), (0.0, last_column), (last_row, 0.0), (last_row, last_column)];
-    if let Some((row, column)) = corners.into_iter().find(|(r, c)| !seen(*r, *c)) {
+    // Corners and the middles of the edges: sines grow less than tangents, so that either may be the farther off.
+    let (middle_row, middle_column) = (0.5 * last_row, 0.5 * last_column);
+    let border = [0.0, middle_row, last_row]
+        .into_iter()
+        .flat_map(|row| [0.0, middle_column, last_column].map(|column| (row, column)));
+    if let Some((row, column)) = border.into_iter().find(|(r, c)| !seen(*r, *c)) {
         let [tx, ty] = view.tangents(row, column);
         return Err(Error::invalid(
             format!(
-                "the scene is wider than the array sees: no element sees its corner at ({:.1}, {:.1}) degrees on the sensor",
+                "the scene is wider than the array sees: no element sees its border at ({:.1}, {:.1}) degrees and has it on the sensor",
                 tx.atan().to_degrees(),
                 ty.atan().to_degrees()
             ),
