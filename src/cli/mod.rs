@@ -6,6 +6,7 @@ mod check;
 mod compensated;
 mod completions;
 mod convert;
+mod dataset;
 mod diff;
 mod handoff;
 mod layout;
@@ -73,6 +74,7 @@ enum Command {
     Optimise(optimise::OptimiseArgs),
     Photographs(photographs::PhotographsArgs),
     Picture(picture::PictureArgs),
+    Dataset(dataset::DatasetArgs),
     Verify(verify::VerifyArgs),
     Psf(psf::PsfArgs),
     Handoff(handoff::HandoffArgs),
@@ -123,6 +125,7 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::Layout(args) => layout::run(args, terminal),
         Command::Optimise(args) => optimise::run(args, terminal),
         Command::Photographs(args) => photographs::run(args, terminal),
+        Command::Dataset(args) => dataset::run(args, terminal),
         Command::Picture(args) => picture::run(args, terminal),
         Command::Handoff(args) => handoff::run(args, terminal),
         Command::Verify(args) => verify::run(args, terminal),

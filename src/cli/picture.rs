@@ -107,19 +107,22 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     let inputs = [&args.layout, &args.design, &args.camera].map(PathBuf::as_path);
     apart(inputs.into_iter().chain([args.scene.as_ref()]), &[&page, &numbers])?;
     let studio = Studio::open(&design, &args.layout, &camera, model.as_ref(), &scene, terminal)?;
-    let frame = studio.record(&studio.operator(Detail::Simulation), &scene, args.seed)?;
+    let simulation = studio.operator(Detail::Simulation);
+    let frame = studio.record(&simulation, &scene, args.seed)?;
     let truth = studio.truth(&scene);
     let operator = studio.operator(Detail::Restoration);
+    let error = studio.operator_error(&simulation, &operator);
+    drop(simulation);
     let mut pictures = Vec::new();
     let mut found = Vec::new();
     for method in methods {
         for joint in [true, false] {
             if joint || args.separate {
-                let picture = studio.restore(&operator, &frame, method, joint, terminal)?;
+                let picture = studio.restore(&operator, &error, &frame, method, joint, terminal)?;
                 let mut restoration = RestorationReport::new(method, joint, scores(&picture, &truth)?);
                 // The forecast is of the picture that normal slopes expect.
                 if method == RestorationMethod::Tikhonov && joint {
-                    restoration.forecast_db = studio.forecast(&operator);
+                    restoration.forecast_db = studio.forecast(&operator, &error);
                 }
                 found.push(restoration);
                 pictures.push(picture);
@@ -131,7 +134,8 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     } else {
         Fidelity::Rigorous
     };
-    let report = report(args, &studio, &scene, &frame, found, fidelity.name());
+    let mut report = report(args, &studio, &scene, &frame, found, fidelity.name());
+    report.operator_error = error;
     let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();
     let pages = PicturePages {
         report: &report,
@@ -185,6 +189,7 @@ fn report(
         distance_mm: args.distance_mm,
         saturated: frame.saturated,
         restorations,
+        operator_error: Vec::new(),
         budget: studio.budget(),
         homographies: studio.homographies(),
         assumptions: studio.assumptions(fidelity),

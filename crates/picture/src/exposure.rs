@@ -128,8 +128,9 @@ fn expose_with(
 
 impl Frame {
     /// Light of each channel, and how much each pixel is to be trusted: one over the variance of its light, zero where it
-    /// does not count the channel or is at full scale.
-    pub fn light(&self, camera: &Camera) -> (Vec<Array2<f32>>, Vec<Array2<f32>>) {
+    /// does not count the channel or is at full scale. To the noise comes what the operator of a restoration errs by, as
+    /// a share of the light, by channel.
+    pub fn light(&self, camera: &Camera, error: &[f64]) -> (Vec<Array2<f32>>, Vec<Array2<f32>>) {
         let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();
         let (mut light, mut trust) = (Vec::new(), Vec::new());
         for (channel, gain) in self.gain.iter().enumerate() {
@@ -146,7 +147,9 @@ impl Frame {
                 }
             }));
             trust.push(Array2::from_shape_fn(plane.dim(), |(y, x)| {
-                let variance = self.noise.variance(f64::from(plane[[y, x]])).max(f64::MIN_POSITIVE);
+                let signal = f64::from(plane[[y, x]]);
+                let variance = self.noise.variance(signal) + (error[channel] * signal).powi(2);
+                let variance = variance.max(f64::MIN_POSITIVE);
                 if counts(y, x) {
                     (gain * gain / variance) as f32
                 } else {
@@ -197,7 +200,7 @@ mod tests {
         // 400 pixels with noise of 0.007: three standard errors.
         assert!((mean(1, 1) - 0.2).abs() < 1e-3 && (mean(0, 1) - 0.5).abs() < 1.2e-3);
         assert_eq!(expose(&camera, &[1.0, 1.0, 1.0], &light, 3).planes, frame.planes);
-        let (light, trust) = frame.light(&camera);
+        let (light, trust) = frame.light(&camera, &[0.0; 3]);
         assert!(light[0][[1, 1]] > 0.1 && trust[0][[1, 1]] > 0.0 && trust[0][[0, 0]] == 0.0 && trust[2][[0, 0]] == 0.0);
     }
 }

@@ -9,6 +9,7 @@
 mod cache;
 mod chip;
 mod colour;
+mod dataset;
 mod exposure;
 mod geometry;
 mod kernels;
@@ -24,6 +25,7 @@ mod veil;
 
 pub use chip::{ChipCase, ChipInLight, element_views, read_pillars, sampling_of};
 pub use colour::ChannelColours;
+pub use dataset::{DatasetManifest, DatasetPair, write_dataset};
 pub use exposure::{Frame, channel_at, expose, gains, sensitivity};
 pub use geometry::{ElementView, SceneView};
 pub use kernels::{BankSpec, KernelBank};

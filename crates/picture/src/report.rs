@@ -20,6 +20,8 @@ pub struct PictureReport {
     pub distance_mm: Option<f64>,
     pub saturated: usize,
     pub restorations: Vec<RestorationReport>,
+    /// What the operator of the restoration errs by, by channel; see [`Studio::operator_error`].
+    pub operator_error: Vec<f64>,
     pub budget: Vec<ChannelBudget>,
     pub homographies: Vec<HomographyResidual>,
     pub assumptions: Vec<Assumption>,
@@ -133,7 +135,10 @@ impl Studio {
         };
         let spec = &self.bank.spec;
         vec![
-            assumption("cell", format!("`{fidelity}`, solved along the normal, whatever the angle of arrival")),
+            assumption(
+                "cell",
+                format!("`{fidelity}`, solved along the normal, whatever the angle of arrival"),
+            ),
             assumption(
                 "field of the kernels",
                 format!(
@@ -145,20 +150,39 @@ impl Studio {
             ),
             assumption(
                 "window of a kernel",
-                format!("{} pixels; what lands outside is the veil, in squares of {} pixels", spec.window, crate::veil::CELL_PIXELS),
+                format!(
+                    "{} pixels; what lands outside is the veil, in squares of {} pixels",
+                    spec.window,
+                    crate::veil::CELL_PIXELS
+                ),
             ),
-            assumption("wavelengths", format!("{} nm apart; between them the PSF is blended and moves with the chief ray", crate::chip::STEP_NM)),
+            assumption(
+                "wavelengths",
+                format!(
+                    "{} nm apart; between them the PSF is blended and moves with the chief ray",
+                    crate::chip::STEP_NM
+                ),
+            ),
             assumption("illuminant", self.camera.illuminant.name().to_owned()),
-            assumption("spectra of the scene", "smooth reflectances of sRGB after Mallett and Yuksel (2019)".into()),
+            assumption(
+                "spectra of the scene",
+                "smooth reflectances of sRGB after Mallett and Yuksel (2019)".into(),
+            ),
             assumption(
                 "exposure",
-                format!("the brightest pixel of a white scene has {} of full scale", self.camera.exposure.white),
+                format!(
+                    "the brightest pixel of a white scene has {} of full scale",
+                    self.camera.exposure.white
+                ),
             ),
             assumption(
                 "restoration",
-                "knows the kernels of a grey surface at every second place of the field, and none of the scene's spectra".into(),
+                "knows the kernels of a grey surface and one point a pixel, and none of the scene's spectra".into(),
             ),
-            assumption("metal", "opaque; light passes the openings alone, and nothing is reflected twice".into()),
+            assumption(
+                "metal",
+                "opaque; light passes the openings alone, and nothing is reflected twice".into(),
+            ),
         ]
     }
 }

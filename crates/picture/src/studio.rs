@@ -4,13 +4,14 @@ use std::path::Path;
 
 use metalith_camera::{Camera, ChannelSampling};
 use metalith_cell::{Fidelity, cache_folder};
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Error, Progress, Result, part};
 use metalith_design::{Design, cell_models};
 use metalith_made::{CalibratedModel, MadeChip};
 use ndarray::{Array2, Array3};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
+use crate::colour::share;
 use crate::exposure::{Frame, expose, expose_quietly, gains, sensitivity};
 use crate::kernels::{BankSpec, KernelBank};
 use crate::operator::{Detail, FrameOperator};
@@ -31,6 +32,8 @@ pub struct Studio {
     pub veil: Veil,
     pub elements: Vec<ElementView>,
     pub channels: Vec<ChannelSampling>,
+    /// Spectra of the scenes.
+    pub basis: Vec<SceneSpectrum>,
     pub view: SceneView,
     /// Signal of a unit of light in each channel.
     pub gain: Vec<f64>,
@@ -172,6 +175,7 @@ impl Studio {
             elements,
             colours: ChannelColours::of(&channels),
             channels,
+            basis: scene.basis.clone(),
             view: scene.view,
             gain: Vec::new(),
             from_cache,
@@ -194,6 +198,45 @@ impl Studio {
             &self.view,
             detail,
         )
+    }
+
+    /// What the operator of a restoration errs by, as a share of the light in a pixel (root mean square), by channel, if
+    /// errors of neighbouring pixels are taken to be independent of one another: those of sums over blocks are as large
+    /// as they are found. It knows neither the colours of a scene nor where in a pixel they are. Measured on discs that cover one another, whose
+    /// statistics are those of natural scenes (Lee, Mumford and Huang, Int. J. Comput. Vis. 41, 35 (2001)), seeded.
+    pub fn operator_error(&self, simulation: &FrameOperator<'_>, restoration: &FrameOperator<'_>) -> Vec<f64> {
+        let leaves = dead_leaves(&self.view);
+        // In the basis of the bank, colours of a picture stand for its spectra.
+        let mut planes = leaves.planes.clone();
+        planes.resize(self.bank.bases, Array2::zeros((self.view.rows, self.view.columns)));
+        let ideal: Vec<Array2<f32>> = self
+            .channels
+            .iter()
+            .map(|channel| {
+                let mut sum = Array2::<f32>::zeros((self.view.rows, self.view.columns));
+                for (spectrum, plane) in self.basis.iter().zip(&planes) {
+                    sum.scaled_add(share(channel, spectrum) as f32, plane);
+                }
+                sum
+            })
+            .collect();
+        let (truth, known) = (simulation.apply(&planes), restoration.apply(&ideal));
+        let error = |(a, b): (&Array2<f32>, &Array2<f32>)| {
+            let light = a.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
+            let (rows, columns) = a.dim();
+            let mut blocks = 0.0;
+            for y in (0..rows).step_by(BLOCK) {
+                for x in (0..columns).step_by(BLOCK) {
+                    let cut = |f: &Array2<f32>| {
+                        let block = part(f.view(), y..(y + BLOCK).min(rows), x..(x + BLOCK).min(columns));
+                        block.iter().map(|v| f64::from(*v)).sum::<f64>()
+                    };
+                    blocks += (cut(a) - cut(b)).powi(2);
+                }
+            }
+            (blocks / light).sqrt()
+        };
+        truth.iter().zip(&known).map(error).collect()
     }
 
     /// The frame that the sensor records of a scene, noise drawn from a seed.
@@ -221,6 +264,7 @@ impl Studio {
     pub fn restore(
         &self,
         operator: &FrameOperator<'_>,
+        error: &[f64],
         frame: &Frame,
         method: RestorationMethod,
         joint: bool,
@@ -233,7 +277,7 @@ impl Studio {
                 "give the camera that it was recorded with",
             ));
         }
-        let (light, trust) = frame.light(&self.camera);
+        let (light, trust) = frame.light(&self.camera, error);
         let recorded = Recorded {
             operator,
             light: &light,
@@ -248,12 +292,12 @@ impl Studio {
 
     /// Expected PSNR of linear light in each zone (dB), without any picture: of scenes as bright as photographs are on the
     /// mean, whose spectra fall as 1 / f^2, restored by all elements.
-    pub fn forecast(&self, operator: &FrameOperator<'_>) -> Vec<f64> {
+    pub fn forecast(&self, operator: &FrameOperator<'_>, error: &[f64]) -> Vec<f64> {
         let shape = (self.view.rows, self.view.columns);
         let mean = metalith_wave::restore::Scene::default().mean as f32;
         let grey = vec![Array2::<f32>::from_elem(shape, mean); operator.inputs()];
         let light = operator.apply(&grey);
-        let (light, trust) = expose_quietly(&self.camera, &self.gain, &light).light(&self.camera);
+        let (light, trust) = expose_quietly(&self.camera, &self.gain, &light).light(&self.camera, error);
         let recorded = Recorded {
             operator,
             light: &light,
@@ -276,6 +320,35 @@ impl Studio {
     pub fn truth(&self, scene: &SceneImage) -> Array3<f64> {
         self.colours.rgb(&ChannelColours::ideal(&self.channels, scene))
     }
+}
+
+/// Pixels an axis over which errors of an operator are summed: about what a kernel reaches.
+const BLOCK: usize = 16;
+
+/// Discs of random colours that cover one another, radii by a law of the third power.
+fn dead_leaves(view: &SceneView) -> SceneImage {
+    use rand::{Rng, SeedableRng};
+    const LEAVES: usize = 4000;
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+    let mut rgb = Array3::from_elem((view.rows, view.columns, 3), 0.4);
+    let size = view.rows.max(view.columns) as f64;
+    for _ in 0..LEAVES {
+        let colour: [f64; 3] = std::array::from_fn(|_| 0.05 + 0.85 * random.random::<f64>().powi(2));
+        let [y, x] = [view.rows, view.columns].map(|n| random.random::<f64>() * n as f64);
+        // Between 1/200 and 1/6 of the picture.
+        let (small, large) = (size / 200.0, size / 6.0);
+        let u: f64 = random.random();
+        let radius = (small.powi(-2) * (1.0 - u) + large.powi(-2) * u).powf(-0.5);
+        let range = |at: f64, n: usize| ((at - radius).max(0.0) as usize)..((at + radius + 1.0) as usize).min(n);
+        for i in range(y, view.rows) {
+            for j in range(x, view.columns) {
+                if (i as f64 - y).hypot(j as f64 - x) <= radius {
+                    (0..3).for_each(|c| rgb[[i, j, c]] = colour[c]);
+                }
+            }
+        }
+    }
+    SceneImage::of_rgb("dead leaves", &rgb, view.field_deg, view.distance_um)
 }
 
 /// Places of a zone, four by four in each of its rectangles.
@@ -320,12 +393,16 @@ fn check_view(elements: &[ElementView], spec: &BankSpec, camera: &Camera, view: 
             "check `offset_um`, `columns` and `rows` of the sensor",
         ));
     }
-    let corners = [(0.0, 0.0), (0.0, last_column), (last_row, 0.0), (last_row, last_column)];
-    if let Some((row, column)) = corners.into_iter().find(|(r, c)| !seen(*r, *c)) {
+    // Corners and the middles of the edges: sines grow less than tangents, so that either may be the farther off.
+    let (middle_row, middle_column) = (0.5 * last_row, 0.5 * last_column);
+    let border = [0.0, middle_row, last_row]
+        .into_iter()
+        .flat_map(|row| [0.0, middle_column, last_column].map(|column| (row, column)));
+    if let Some((row, column)) = border.into_iter().find(|(r, c)| !seen(*r, *c)) {
         let [tx, ty] = view.tangents(row, column);
         return Err(Error::invalid(
             format!(
-                "the scene is wider than the array sees: no element sees its corner at ({:.1}, {:.1}) degrees on the sensor",
+                "the scene is wider than the array sees: no element sees its border at ({:.1}, {:.1}) degrees and has it on the sensor",
                 tx.atan().to_degrees(),
                 ty.atan().to_degrees()
             ),

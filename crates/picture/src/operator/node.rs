@@ -15,28 +15,15 @@ use crate::{ElementView, SceneView};
 pub struct KernelSource<'a> {
     bank: &'a KernelBank,
     detail: Detail,
-    /// Grid of the nodes that are used.
     spec: BankSpec,
-    /// Of all nodes, every so many are used.
-    stride: usize,
 }
 
 impl<'a> KernelSource<'a> {
     pub fn new(bank: &'a KernelBank, detail: Detail) -> Self {
-        let all = bank.spec.nodes;
-        // Every second node, where the ends stay.
-        let stride = match detail {
-            Detail::Restoration if all >= 5 && (all - 1).is_multiple_of(4) => 2,
-            _ => 1,
-        };
         Self {
             bank,
             detail,
-            spec: BankSpec {
-                nodes: (all - 1) / stride + 1,
-                ..bank.spec
-            },
-            stride,
+            spec: bank.spec,
         }
     }
 
@@ -62,7 +49,6 @@ impl<'a> KernelSource<'a> {
         let window = self.spec.window;
         let side = window + 1;
         let mut out = vec![0.0f32; side * side];
-        let node = node.map(|n| n * self.stride);
         // A kernel value `i` stands at (i - window + 1/2) / 2 pixels; light at a quarter of a pixel beyond the middle is
         // half a value nearer to what lies there.
         let phases: &[[usize; 2]] = match self.detail {

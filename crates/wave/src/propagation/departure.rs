@@ -191,8 +191,8 @@ mod tests {
 
     #[test]
     fn lands_where_the_map_of_one_direction_has_it() {
-        /// Of all power: tiles gathered into blocks of 18 um, on squares of 40 um, move a ray by up to 9 um.
-        const BLOCKS: f64 = 0.12;
+        /// Of all power, what lands in a neighbouring square: blocks of 18 um move a ray by up to 9 um, squares have 40 um.
+        const BLOCKS: f64 = 0.2;
         /// Powers of a few hundred thousand single-precision amplitudes.
         const ROUNDING: f64 = 1e-4;
         let (z, um) = (336.0, 0.53);

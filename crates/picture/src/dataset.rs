@@ -1,0 +1,174 @@
+//! Pairs for learning: frames, and the scenes that they are of.
+//!
+//! The noise of an image follows from its own bytes and the seed of the set, so that its frame is the same whatever the
+//! order, the number of threads or the machine. Files appear whole; what is there already is kept, so that a set that was
+//! stopped goes on where it was.
+
+use std::path::{Path, PathBuf};
+
+use metalith_core::file::read_at_most;
+use metalith_core::{Error, Progress, Result, WholeFile, srgb};
+use ndarray::{Array2, Array3};
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use crate::operator::FrameOperator;
+use crate::scene::SceneImage;
+use crate::studio::Studio;
+
+/// Images of one shard: a folder named by the range of their numbers.
+const SHARD: usize = 1000;
+/// Longest file of a set (bytes).
+const LONGEST: u64 = 1 << 30;
+
+/// What stands in `manifest.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct DatasetManifest {
+    pub design: String,
+    pub camera: String,
+    pub seed: u64,
+    pub field_deg: f64,
+    /// Signal of a unit of light in each channel, of full scale: what a frame is to be divided by.
+    pub gain: Vec<f64>,
+    pub pairs: Vec<DatasetPair>,
+}
+
+/// One frame and its scene.
+#[derive(Clone, Debug, Serialize)]
+pub struct DatasetPair {
+    /// File name of the image that it is of.
+    pub image: String,
+    /// SHA-256 of the image.
+    pub image_sha256: String,
+    /// 16-bit PNG, full scale being 65535; with a colour filter array the mosaic, else channel by channel below one another.
+    pub frame: String,
+    pub frame_sha256: String,
+    /// 16-bit PNG in sRGB: what an ideal camera of the same channels gives.
+    pub truth: String,
+    pub truth_sha256: String,
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// Folder of the shard that image number `i` is in.
+fn shard(i: usize) -> String {
+    let first = i / SHARD * SHARD;
+    format!("{first:06}-{:06}", first + SHARD - 1)
+}
+
+/// Write one pair for each image into a folder, and the manifest when all are there. `read` gives the scene of an image.
+///
+/// # Errors
+/// If an image cannot be read or is not of the size that the studio was opened for, a file cannot be written, or the user
+/// stopped it; what is complete is kept.
+pub fn write_dataset(
+    studio: &Studio,
+    operator: &FrameOperator<'_>,
+    images: &[PathBuf],
+    read: &dyn Fn(&Path) -> Result<SceneImage>,
+    seed: u64,
+    folder: &Path,
+    progress: &dyn Progress,
+) -> Result<DatasetManifest> {
+    progress.begin("recording frames", images.len() as u64);
+    let mut pairs = Vec::new();
+    for (i, image) in images.iter().enumerate() {
+        if progress.stopped() {
+            return Err(Error::Interrupted);
+        }
+        let bytes = read_at_most(image, LONGEST, "an image")?;
+        let mut hasher = Sha256::new();
+        hasher.update(&bytes);
+        let image_digest = hasher.clone().finalize();
+        hasher.update(seed.to_le_bytes());
+        let own = hasher.finalize();
+        let own_seed = u64::from_le_bytes(own[..8].try_into().expect("eight bytes"));
+        let name = format!("{}/{i:06}", shard(i));
+        let (frame, truth) = (format!("{name}.frame.png"), format!("{name}.truth.png"));
+        if !folder.join(&frame).exists() || !folder.join(&truth).exists() {
+            let scene = read(image)?;
+            let recorded = studio.record(operator, &scene, own_seed)?;
+            WholeFile::write(&folder.join(&frame), &frame_png(&recorded.planes))?;
+            WholeFile::write(&folder.join(&truth), &truth_png(&studio.truth(&scene)))?;
+        }
+        let digest = |file: &str| {
+            let bytes = read_at_most(&folder.join(file), LONGEST, "a picture of the set")?;
+            Ok::<_, Error>(hex(&Sha256::digest(bytes)))
+        };
+        pairs.push(DatasetPair {
+            image: image
+                .file_name()
+                .map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
+            image_sha256: hex(&image_digest),
+            frame_sha256: digest(&frame)?,
+            truth_sha256: digest(&truth)?,
+            frame,
+            truth,
+        });
+        progress.advance(1);
+    }
+    let manifest = DatasetManifest {
+        design: studio.design.name.clone(),
+        camera: studio.camera.name.clone(),
+        seed,
+        field_deg: studio.view.field_deg,
+        gain: studio.gain.clone(),
+        pairs,
+    };
+    metalith_report::write_json(&folder.join("manifest.json"), "dataset", &manifest)?;
+    Ok(manifest)
+}
+
+fn sixteen(value: f64) -> [u8; 2] {
+    ((value.clamp(0.0, 1.0) * 65535.0).round() as u16).to_be_bytes()
+}
+
+fn frame_png(planes: &[Array2<f32>]) -> Vec<u8> {
+    let (rows, columns) = planes[0].dim();
+    let data: Vec<u8> = planes.iter().flatten().flat_map(|v| sixteen(f64::from(*v))).collect();
+    encode(rows * planes.len(), columns, png::ColorType::Grayscale, &data)
+}
+
+fn truth_png(rgb: &Array3<f64>) -> Vec<u8> {
+    let (rows, columns, _) = rgb.dim();
+    let data: Vec<u8> = rgb.iter().flat_map(|v| sixteen(srgb::encoded(*v))).collect();
+    encode(rows, columns, png::ColorType::Rgb, &data)
+}
+
+fn encode(rows: usize, columns: usize, colour: png::ColorType, data: &[u8]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, columns as u32, rows as u32);
+    encoder.set_color(colour);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    // Writing to memory fails only for a wrong size, which is ours to keep.
+    let mut writer = encoder.write_header().expect("a header fits in memory");
+    writer.write_image_data(data).expect("as many bytes as pixels");
+    writer.finish().expect("an end fits in memory");
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shards_are_named_by_their_range() {
+        assert_eq!(shard(0), "000000-000999");
+        assert_eq!(shard(1999), "001000-001999");
+    }
+
+    #[test]
+    fn frames_keep_sixteen_bits() {
+        let plane = Array2::from_shape_fn((4, 6), |(y, x)| (y * 6 + x) as f32 / 24.0);
+        let bytes = frame_png(&[plane.clone(), plane.clone()]);
+        let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
+        let mut data = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut data).unwrap();
+        assert_eq!((reader.info().width, reader.info().height), (6, 8));
+        let value = f64::from(u16::from_be_bytes([data[2 * 29], data[2 * 29 + 1]])) / 65535.0;
+        // Half a step of sixteen bits, and single precision.
+        assert!((value - 5.0 / 24.0).abs() < 1e-5);
+    }
+}

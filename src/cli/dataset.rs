@@ -1,0 +1,99 @@
+//! `metalith dataset`: frames and scenes for those who train a restoration.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use metalith::camera::Camera;
+use metalith::picture::scene::{SceneFile, read_scene};
+use metalith::picture::{Detail, Studio, write_dataset};
+use metalith::{CalibratedModel, Design, Error, Result};
+
+use super::{Outcome, Terminal, print_line};
+
+/// Record the frame of every image of a folder, for learning: frames, what an ideal camera gives, and a manifest.
+///
+/// Images are taken in the order of their names and must be of one size. The noise of each follows from its bytes and the
+/// seed. Pairs that are there are kept: a set that was stopped goes on.
+#[derive(Args)]
+#[command(
+    after_help = "Example:\n  metalith dataset photographs --layout out/prototype_3x3/prototype_3x3_pillars.gds \\\n    --camera cameras/gt1930.toml --design designs/prototype_3x3.toml --out out/pairs"
+)]
+pub struct DatasetArgs {
+    /// Folder of PNG, JPEG or NPY images.
+    images: PathBuf,
+
+    /// The pillar layout.
+    #[arg(long)]
+    layout: PathBuf,
+
+    /// The design that the layout is of.
+    #[arg(long)]
+    design: PathBuf,
+
+    /// The camera file.
+    #[arg(long)]
+    camera: PathBuf,
+
+    /// The chip as a measured line and bench make it.
+    #[arg(long, value_name = "MODEL")]
+    model: Option<PathBuf>,
+
+    /// Angle from the left to the right edge of each image (degrees).
+    #[arg(long, default_value_t = 90.0)]
+    field_deg: f64,
+
+    /// Seed of the set.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+
+    /// Folder for the pairs.
+    #[arg(long, short, value_name = "FOLDER")]
+    out: PathBuf,
+}
+
+pub fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
+    terminal.stop_on_interrupt();
+    let design = Design::read(&args.design)?;
+    let camera = Camera::read(&args.camera)?;
+    let model = args.model.as_deref().map(CalibratedModel::read).transpose()?;
+    let images = images(&args.images)?;
+    let read = |path: &Path| {
+        read_scene(&SceneFile {
+            path: path.to_owned(),
+            wavelengths_nm: None,
+            field_deg: args.field_deg,
+            distance_um: f64::INFINITY,
+        })
+    };
+    let studio = Studio::open(
+        &design,
+        &args.layout,
+        &camera,
+        model.as_ref(),
+        &read(&images[0])?,
+        terminal,
+    )?;
+    let operator = studio.operator(Detail::Simulation);
+    let manifest = write_dataset(&studio, &operator, &images, &read, args.seed, &args.out, terminal)?;
+    terminal.clear();
+    print_line!("{} pairs in {}", manifest.pairs.len(), args.out.display());
+    Ok(Outcome::Fine)
+}
+
+/// Images of a folder by name.
+fn images(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder).map_err(Error::io("read", folder))?;
+    let known = |path: &PathBuf| {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        extension.is_some_and(|e| ["png", "jpg", "jpeg", "npy"].contains(&e.as_str()))
+    };
+    let mut images: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(known).collect();
+    images.sort();
+    if images.is_empty() {
+        return Err(Error::invalid(
+            format!("{} holds no image", folder.display()),
+            "give a folder of PNG, JPEG or NPY files",
+        ));
+    }
+    Ok(images)
+}
