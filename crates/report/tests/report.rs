@@ -225,7 +225,12 @@ fn a_page_needs_nothing_but_itself_and_is_the_same_every_time() {
             &to[..40]
         );
     }
-    assert!(!html.contains("NaN") && !html.contains("inf\""));
+    // Images are base64, in which any three letters may meet.
+    const IMAGE: &str = "data:image/png;base64,";
+    let written = html.split(IMAGE).map(|part| part.trim_start_matches(|c| c != '"'));
+    for part in written.chain(html.split(IMAGE).take(1)) {
+        assert!(!part.contains("NaN") && !part.contains("inf\""));
+    }
 }
 
 #[test]
