@@ -46,8 +46,7 @@ impl BankSpec {
 ///
 /// The place of a node is where light of the wedge's wavelength lands; the middle of a kernel is where light of the
 /// channel's own wavelength lands from there. A kernel holds the energy in a pixel, as a share of the light of its
-/// channel that arrives at the element, with pixels at every half of one; see
-/// [`KernelPlan::kernels`](super::KernelPlan::kernels).
+/// channel that arrives at the element, with pixels at every half of one.
 #[derive(Clone, Debug)]
 pub struct KernelBank {
     pub spec: BankSpec,
