@@ -21,6 +21,7 @@
 //! [`MadeElement::aperture`] gives a [`metalith_wave::Aperture`], so that every propagator runs from it.
 
 mod camera;
+mod case;
 mod cells;
 mod chip;
 mod density;
@@ -33,6 +34,7 @@ mod stack;
 pub mod zernike;
 
 pub use camera::veiled;
+pub use case::SimulationCase;
 pub use cells::{NODE_STEP_NM, RealisedCells, SolvedWidths, lagrange};
 pub use chip::{MadeChip, MadeView, ModelStatement, spread};
 pub use density::{RANGE_UM, fill};

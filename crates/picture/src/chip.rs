@@ -1,28 +1,18 @@
 //! The chip before its sensor: elements as read from a layout, in light.
 
 use metalith_camera::{Camera, Sampling};
-use metalith_cell::CellModel;
 use metalith_core::{Error, Progress, Result, WidthMap};
 use metalith_design::Design;
 use metalith_design::array::{Symmetry, SymmetryGroup};
 use metalith_gds::extract::{ElementSite, Extraction, ExtractionPlan, extract};
 use metalith_gds::{Layout, ReadLimits};
 use metalith_made::{
-    ArrivingLight, CameraChange, ClassTable, DrawnElement, MadeChip, MadeElement, MadeView, PathChange, Perturbation,
+    ArrivingLight, CameraChange, ClassTable, DrawnElement, MadeElement, MadeView, PathChange, Perturbation,
+    SimulationCase,
 };
 use metalith_wave::{Matched, PhaseFunction, PlaneWave};
 
 use crate::ElementView;
-use crate::kernels::turned;
-
-/// What the pillars transmit.
-#[derive(Clone, Copy)]
-pub enum ChipCase<'a> {
-    /// As drawn, by a cell.
-    Cell(&'a dyn CellModel),
-    /// As made on a measured line and bench.
-    Made(&'a MadeChip),
-}
 
 /// An element that differs from all others by more than a symmetry.
 pub struct DistinctChipElement {
@@ -108,7 +98,7 @@ impl ChipInLight {
     pub fn new(
         design: &Design,
         extraction: &Extraction,
-        case: ChipCase<'_>,
+        case: SimulationCase<'_>,
         camera: &Camera,
         scene_distance_um: f64,
         progress: &dyn Progress,
@@ -116,8 +106,8 @@ impl ChipInLight {
         let sampling = sampling_of(design, camera)?;
         let elements = element_views(design, camera);
         let perturbation = match case {
-            ChipCase::Cell(_) => Perturbation::default(),
-            ChipCase::Made(chip) => chip.perturbation().clone(),
+            SimulationCase::Cell(_) => Perturbation::default(),
+            SimulationCase::Made(chip) => chip.perturbation().clone(),
         };
         let symmetric = keeps_symmetry(&perturbation) && elements.iter().all(|e| e.slope == [0.0; 2]);
         let turns = if symmetric { &Symmetry::ALL[..] } else { &[] };
@@ -142,10 +132,7 @@ impl ChipInLight {
             "solving the cells",
             (distinct.len() * sampling.wavelengths_nm.len()) as u64,
         );
-        let full = |um: f64| match case {
-            ChipCase::Cell(cell) => cell.full_transmission(um),
-            ChipCase::Made(chip) => chip.full_transmission(um),
-        };
+        let full = |um: f64| case.full_transmission(um);
         let ones = PhaseFunction {
             lattice: design.lattice(),
             radius_um: design.lens.radius_um(),
@@ -252,23 +239,23 @@ fn keeps_symmetry(perturbation: &Perturbation) -> bool {
 fn same_wedge(turn: Symmetry, from: &ElementView, to: &ElementView) -> bool {
     /// Sines of the same angle, computed for both signs.
     const ROUNDING: f64 = 1e-12;
-    let wedge = turned(turn, [from.wedge.sin_x, from.wedge.sin_y]);
+    let wedge = turn.vector([from.wedge.sin_x, from.wedge.sin_y]);
     (wedge[0] - to.wedge.sin_x).abs() < ROUNDING && (wedge[1] - to.wedge.sin_y).abs() < ROUNDING
 }
 
 /// Cells along the normal at all wavelengths.
 struct CellTables<'a> {
-    case: ChipCase<'a>,
+    case: SimulationCase<'a>,
     by_width: Vec<Vec<num_complex::Complex64>>,
 }
 
 impl<'a> CellTables<'a> {
-    fn new(case: ChipCase<'a>, sampling: &Sampling, design: &Design, progress: &dyn Progress) -> Result<Self> {
+    fn new(case: SimulationCase<'a>, sampling: &Sampling, design: &Design, progress: &dyn Progress) -> Result<Self> {
         use rayon::prelude::*;
         let widest = design.cell.pitch_nm as u16;
         let by_width = match case {
-            ChipCase::Made(_) => Vec::new(),
-            ChipCase::Cell(cell) => sampling
+            SimulationCase::Made(_) => Vec::new(),
+            SimulationCase::Cell(cell) => sampling
                 .wavelengths_nm
                 .par_iter()
                 .map(|nm| {
@@ -284,7 +271,7 @@ impl<'a> CellTables<'a> {
 
     fn of(&self, made: &MadeElement, index: usize, um: f64, progress: &dyn Progress) -> Result<Tables> {
         match self.case {
-            ChipCase::Cell(_) => {
+            SimulationCase::Cell(_) => {
                 let table = &self.by_width[index];
                 let pillar = |width: f64| table.get(width.round() as usize).copied().unwrap_or_default();
                 Ok(Tables {
@@ -294,7 +281,7 @@ impl<'a> CellTables<'a> {
                     camera: CameraChange::default(),
                 })
             }
-            ChipCase::Made(chip) => {
+            SimulationCase::Made(chip) => {
                 let view = chip.view_in_band(made, &PlaneWave::normal(um), false, progress)?;
                 Ok(Tables {
                     zero_order: 0.0,

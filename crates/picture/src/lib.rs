@@ -23,7 +23,7 @@ pub mod spectra;
 mod studio;
 mod veil;
 
-pub use chip::{ChipCase, ChipInLight, element_views, read_pillars, sampling_of};
+pub use chip::{ChipInLight, element_views, read_pillars, sampling_of};
 pub use colour::ChannelColours;
 pub use dataset::{DatasetManifest, DatasetPair, write_dataset};
 pub use exposure::{Frame, channel_at, expose, gains, sensitivity};

@@ -6,7 +6,7 @@ use metalith_camera::{Camera, ChannelSampling};
 use metalith_cell::{Fidelity, cache_folder};
 use metalith_core::{Error, Progress, Result, part};
 use metalith_design::{Design, cell_models};
-use metalith_made::{CalibratedModel, MadeChip};
+use metalith_made::{CalibratedModel, MadeChip, SimulationCase};
 use ndarray::{Array2, Array3};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -20,9 +20,7 @@ use crate::scene::SceneImage;
 use crate::score::Zone;
 use crate::spectra::SceneSpectrum;
 use crate::veil::Veil;
-use crate::{
-    ChannelColours, ChipCase, ChipInLight, ElementView, SceneView, cache, element_views, read_pillars, sampling_of,
-};
+use crate::{ChannelColours, ChipInLight, ElementView, SceneView, cache, element_views, read_pillars, sampling_of};
 
 /// What pictures are taken with.
 pub struct Studio {
@@ -142,11 +140,11 @@ impl Studio {
                 let case = match model {
                     Some(model) => {
                         made = MadeChip::new(&design.cell_stack()?, model)?;
-                        ChipCase::Made(&made)
+                        SimulationCase::Made(&made)
                     }
                     None => {
                         models = cell_models(design, &[Fidelity::Rigorous])?;
-                        ChipCase::Cell(models[0].as_ref())
+                        SimulationCase::Cell(models[0].as_ref())
                     }
                 };
                 let chip = ChipInLight::new(design, &extraction, case, camera, scene.view.distance_um, progress)?;

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::chip::ChipInLight;
-use crate::kernels::{KernelBank, inverse, turned};
+use crate::kernels::KernelBank;
 use crate::spectra::SceneSpectrum;
 use crate::{ElementView, SceneView};
 
@@ -414,7 +414,7 @@ impl Tracer<'_> {
         let view = &self.chip.elements[element];
         let um = self.chip.sampling.wavelengths_nm[wavelength] * 1e-3;
         let (base, turn) = self.chip.copies[element];
-        let own = turned(inverse(turn), sines);
+        let own = turn.inverse().vector(sines);
         let wave = PlaneWave {
             wavelength_um: um,
             sin_x: own[0],
@@ -451,7 +451,7 @@ impl Tracer<'_> {
                 continue;
             }
             let at = |i: usize| (i as f64 + 0.5 - 0.5 * grid.cells as f64) * cell_um;
-            let here = turned(turn, [at(ix), at(iy)]);
+            let here = turn.vector([at(ix), at(iy)]);
             let in_window = chief.is_some_and(|c| (0..2).all(|a| (here[a] - c[a]).abs() <= window));
             let power = power * share;
             if in_window {

@@ -5,10 +5,9 @@ use metalith_core::Silent;
 use metalith_design::array::PillarArray;
 use metalith_design::{Design, cell_models};
 use metalith_layout::write_pillars;
+use metalith_made::SimulationCase;
 use metalith_picture::scene::SceneImage;
-use metalith_picture::{
-    BankSpec, ChipCase, ChipInLight, Detail, FrameOperator, KernelBank, Veil, element_views, read_pillars,
-};
+use metalith_picture::{BankSpec, ChipInLight, Detail, FrameOperator, KernelBank, Veil, element_views, read_pillars};
 use metalith_wave::{Accuracy, Scratch, Window};
 use ndarray::{Array2, Array3};
 use rayon::prelude::*;
@@ -52,6 +51,13 @@ struct Setup {
     scene: SceneImage,
 }
 
+impl Setup {
+    fn veil(&self, bank: &KernelBank) -> Veil {
+        let (sensor, scene) = (&self.camera.sensor, &self.scene);
+        Veil::build(&self.chip, bank, &scene.basis, sensor, &scene.view, &Silent).unwrap()
+    }
+}
+
 fn setup(bands: &[[f64; 2]], size: usize) -> Setup {
     let design = Design::read("../../designs/mini_3x3.toml".as_ref()).unwrap();
     let array = PillarArray::build(&design, &Silent).unwrap();
@@ -61,7 +67,7 @@ fn setup(bands: &[[f64; 2]], size: usize) -> Setup {
     let extraction = read_pillars(&design, &layout, &Silent).unwrap();
     let camera = camera(bands);
     let cells = cell_models(&design, &[metalith_cell::Fidelity::Published]).unwrap();
-    let case = ChipCase::Cell(cells[0].as_ref());
+    let case = SimulationCase::Cell(cells[0].as_ref());
     let chip = ChipInLight::new(&design, &extraction, case, &camera, f64::INFINITY, &Silent).unwrap();
     let scene = waves(size, [0.0; 2]);
     Setup {
@@ -177,7 +183,7 @@ fn direct_sum(setup: &Setup, scene: &SceneImage, elements: &[usize], points: usi
 /// Overlapping patches, kernels between nodes, spectra of the scene and of the channel, against some
 /// thousand fields over the whole sensor.
 #[test]
-#[ignore = "a minute"]
+#[ignore = "second tier: a minute of CPU time, run by .ci/run"]
 fn a_frame_is_the_direct_sum_over_points_and_wavelengths() {
     /// Root mean square over the image of the scene, of the range. The goal is 1e-3; 2e-3 is reached behind the middle
     /// element and 3e-3 behind one that steers, whatever the number of nodes, the window and the accuracy of the fields.
@@ -264,15 +270,7 @@ fn the_adjoint_is_that_of_the_operator() {
     const ADJOINT: f64 = 1e-6;
     let setup = setup(&[[450.0, 470.0], [520.0, 560.0]], 20);
     let bank = KernelBank::build(&setup.chip, &setup.scene.basis, spec(24, 5), &Silent).unwrap();
-    let veil = Veil::build(
-        &setup.chip,
-        &bank,
-        &setup.scene.basis,
-        &setup.camera.sensor,
-        &setup.scene.view,
-        &Silent,
-    )
-    .unwrap();
+    let veil = setup.veil(&bank);
     let views = element_views(&setup.design, &setup.camera);
     for detail in [Detail::Simulation, Detail::Restoration] {
         let operator = FrameOperator::new(&bank, &veil, &views, &setup.camera.sensor, &setup.scene.view, detail);
@@ -308,15 +306,7 @@ fn all_light_is_accounted_for() {
     const ACCOUNT: f64 = 0.01;
     let setup = setup(&[[450.0, 470.0], [520.0, 560.0]], 20);
     let bank = KernelBank::build(&setup.chip, &setup.scene.basis, spec(24, 5), &Silent).unwrap();
-    let veil = Veil::build(
-        &setup.chip,
-        &bank,
-        &setup.scene.basis,
-        &setup.camera.sensor,
-        &setup.scene.view,
-        &Silent,
-    )
-    .unwrap();
+    let veil = setup.veil(&bank);
     for shares in veil.budget.chunks(3) {
         let all = metalith_picture::LightShares::sum(shares);
         let found = all.in_kernels + all.veil + all.beyond + all.evanescent + all.not_passed;

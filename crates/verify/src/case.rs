@@ -4,59 +4,17 @@ use std::collections::HashMap;
 
 use num_complex::Complex64;
 
-use metalith_cell::{CellModel, Fidelity};
+use metalith_cell::CellModel;
 use metalith_core::Progress;
 use metalith_core::{Error, Result, WidthMap};
-use metalith_made::{MadeChip, cell_direction};
+use metalith_made::{SimulationCase, cell_direction};
 use metalith_wave::{Fold, Pillars, PlaneWave, Psf, Scratch};
-
-/// What the pillars of a layout are simulated as.
-#[derive(Clone, Copy)]
-pub enum SimulationCase<'a> {
-    /// As drawn, by a cell; chip, light and sensor are where the design has them.
-    Cell(&'a dyn CellModel),
-    /// As made on a measured line and bench.
-    Made(&'a MadeChip),
-}
 
 /// The case that judges, and those that are simulated beside it.
 #[derive(Clone)]
 pub struct SimulationCases<'a> {
     pub judge: SimulationCase<'a>,
     pub beside: Vec<SimulationCase<'a>>,
-}
-
-impl<'a> From<&'a dyn CellModel> for SimulationCase<'a> {
-    fn from(cell: &'a dyn CellModel) -> Self {
-        Self::Cell(cell)
-    }
-}
-
-impl<'a> From<&'a MadeChip> for SimulationCase<'a> {
-    fn from(chip: &'a MadeChip) -> Self {
-        Self::Made(chip)
-    }
-}
-
-impl SimulationCase<'_> {
-    /// How truly the cell is described.
-    pub fn fidelity(&self) -> Fidelity {
-        match self {
-            Self::Cell(cell) => cell.fidelity(),
-            Self::Made(_) => Fidelity::Calibrated,
-        }
-    }
-
-    /// |t| of a cell that passes all its power in the zero order.
-    ///
-    /// # Errors
-    /// If the wavelength is outside what the cell covers.
-    pub fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {
-        match self {
-            Self::Cell(cell) => cell.full_transmission(wavelength_um),
-            Self::Made(chip) => chip.full_transmission(wavelength_um),
-        }
-    }
 }
 
 impl<'a> SimulationCases<'a> {

@@ -30,8 +30,9 @@ use metalith_made::{MadeChip, ModelStatement};
 use metalith_wave::propagation::Steepness;
 use metalith_wave::{Accuracy, PlaneWave};
 
-pub use case::{SimulationCase, SimulationCases};
+pub use case::SimulationCases;
 pub use check::{Check, Sense};
+pub use metalith_made::SimulationCase;
 pub use page::write_report;
 pub use phase::{PhaseError, PhaseErrors, PillarResponse};
 pub use psf_metrics::{OrderEfficiencies, PsfImages, PsfPair, PsfResult};

@@ -4,7 +4,7 @@ use ndarray::Array2;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::case::{SimulationCase, SimulationCases, TransmissionTables};
+use super::case::{SimulationCases, TransmissionTables};
 use super::psf_metrics::{OrderEfficiencies, PsfImages, PsfPair, PsfResult};
 use metalith_cell::Fidelity;
 use metalith_core::Progress;
@@ -13,7 +13,7 @@ use metalith_core::{Lattice, WidthMap};
 use metalith_design::array::WidthRule;
 use metalith_design::phase::ElementPhase;
 use metalith_design::{CellIncidence, Design, Element, FieldAngle};
-use metalith_made::{DrawnElement, MadeChip, MadeElement, MadeView};
+use metalith_made::{DrawnElement, MadeChip, MadeElement, MadeView, SimulationCase};
 use metalith_wave::propagation::{incident, landing_um};
 use metalith_wave::psf::{CONTRAST_LP_MM, CURVE_LP_MM};
 use metalith_wave::{Accuracy, Fold, Matched, PhaseFunction, PhaseMap, PlaneWave, Psf, Scratch, Window};

@@ -10,14 +10,14 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::case::{SimulationCase, TransmissionTables};
+use super::case::TransmissionTables;
 use super::single_white::SingleWhite;
 use super::white::CameraStatement;
 use super::white_page;
 use metalith_cell::{CellModel, Fidelity};
 use metalith_core::{Error, Lattice, Progress, Result, Silent, WholeFile, WidthMap};
 use metalith_gds::extract::{ElementSite, Extraction};
-use metalith_made::{DrawnElement, MadeChip, ModelStatement};
+use metalith_made::{DrawnElement, MadeChip, ModelStatement, SimulationCase};
 use metalith_report::{Cell, Column, ImageGrid, Page, PillarZoom, Table, count, sig, write_json};
 use metalith_wave::psf::{CONTRAST_LP_MM, Matched, Psf, PsfMetrics};
 use metalith_wave::{Accuracy, Fold, Pillars, PlaneWave, Scratch, Window};

@@ -4,13 +4,13 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::case::{SimulationCase, TransmissionTables};
+use super::case::TransmissionTables;
 use super::single::{Lighting, distinct, widest_nm};
 use super::white::{CameraStatement, Channels, Point, STEP_NM, WhiteChannel, per_light};
 use metalith_camera::Camera;
 use metalith_core::{Error, Progress, Result, Wedge};
 use metalith_gds::extract::Extraction;
-use metalith_made::DrawnElement;
+use metalith_made::{DrawnElement, SimulationCase};
 use metalith_wave::psf::{BandSample, CURVE_LP_MM, Matched};
 use metalith_wave::{Accuracy, Fold, Pillars, Scratch, Window};
 

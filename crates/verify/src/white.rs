@@ -8,12 +8,12 @@ use ndarray::Array2;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::case::{SimulationCase, TransmissionTables};
+use super::case::TransmissionTables;
 use super::optics::ReadElement;
 use metalith_camera::{Camera, ChannelSampling, Sampling};
 use metalith_core::{Error, Lattice, Progress, Result, Wedge};
 use metalith_design::{CellIncidence, Design, Element};
-use metalith_made::MadeView;
+use metalith_made::{MadeView, SimulationCase};
 use metalith_wave::propagation::landing_um;
 use metalith_wave::psf::{BandPart, BandSample, CURVE_LP_MM, band_otf, pixel_mtf, polychromatic};
 use metalith_wave::{Accuracy, Fold, Matched, PhaseFunction, PlaneWave, Psf, Scratch, Window};

@@ -79,8 +79,26 @@ impl Symmetry {
         seen
     }
 
+    /// Where a vector that is no whole number of anything goes.
+    pub fn vector(self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let ((ax, ay), (bx, by)) = (self.point(1, 0), self.point(0, 1));
+        [ax as f64 * x + bx as f64 * y, ay as f64 * x + by as f64 * y]
+    }
+
+    /// What undoes this symmetry: a mirror undoes itself, however it is turned.
+    pub fn inverse(self) -> Self {
+        Self {
+            quarter_turns: if self.mirrored {
+                self.quarter_turns
+            } else {
+                (4 - self.quarter_turns) % 4
+            },
+            ..self
+        }
+    }
+
     /// This symmetry after another one.
-    fn after(self, first: Self) -> Self {
+    pub fn after(self, first: Self) -> Self {
         let turns = if self.mirrored {
             4 - first.quarter_turns
         } else {
@@ -317,8 +335,13 @@ mod tests {
                 let (jx, jy) = s.site(12, ix, iy);
                 assert_eq!(moved.width_nm[[jy, jx]], *w, "{s:?}");
             }
+            assert_eq!(s.after(s.inverse()), Symmetry::IDENTITY);
+            assert_eq!(s.inverse().after(s), Symmetry::IDENTITY);
+            let (x, y) = s.point(3, 5);
+            assert_eq!(s.vector([3.0, 5.0]), [x as f64, y as f64]);
             for t in Symmetry::ALL {
                 assert_eq!(t.apply(&moved), t.after(s).apply(&map), "{t:?} after {s:?}");
+                assert_eq!(t.after(s).point(3, 5), t.point(x, y));
             }
         }
     }

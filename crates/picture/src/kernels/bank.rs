@@ -98,9 +98,9 @@ impl KernelBank {
     /// Index of the unique node of an element at a node of its own, and what turns that into this.
     fn unique(&self, element: usize, row: usize, column: usize) -> (usize, usize, Symmetry) {
         let (base, turn) = self.elements[element];
-        let (row, column) = self.turned_node(inverse(turn), row, column);
+        let (row, column) = self.turned_node(turn.inverse(), row, column);
         let (unique, own) = self.distinct[base].nodes[row * self.spec.nodes + column];
-        (base, unique, after(own, turn))
+        (base, unique, turn.after(own))
     }
 
     fn turned_node(&self, turn: Symmetry, row: usize, column: usize) -> (usize, usize) {
@@ -117,7 +117,7 @@ impl KernelBank {
         TurnedKernel {
             values: &self.distinct[base].values[at..at + side * side],
             side,
-            back: inverse(turn),
+            back: turn.inverse(),
         }
     }
 
@@ -151,60 +151,5 @@ impl KernelBank {
             }
         }
         sum
-    }
-}
-
-/// What undoes a symmetry.
-pub fn inverse(turn: Symmetry) -> Symmetry {
-    let undone = |other: &Symmetry| {
-        let (x, y) = turn.point(1, 0);
-        let (u, v) = turn.point(0, 1);
-        other.point(x, y) == (1, 0) && other.point(u, v) == (0, 1)
-    };
-    Symmetry::ALL
-        .into_iter()
-        .find(undone)
-        .expect("the symmetries are a group")
-}
-
-/// First one symmetry, then another.
-pub fn after(first: Symmetry, then: Symmetry) -> Symmetry {
-    let same = |other: &Symmetry| {
-        [(1, 0), (0, 1)].into_iter().all(|(x, y)| {
-            let (u, v) = first.point(x, y);
-            other.point(x, y) == then.point(u, v)
-        })
-    };
-    Symmetry::ALL
-        .into_iter()
-        .find(same)
-        .expect("the symmetries are a group")
-}
-
-/// A vector after a symmetry.
-pub fn turned(turn: Symmetry, vector: [f64; 2]) -> [f64; 2] {
-    let (ax, ay) = turn.point(1, 0);
-    let (bx, by) = turn.point(0, 1);
-    [
-        ax as f64 * vector[0] + bx as f64 * vector[1],
-        ay as f64 * vector[0] + by as f64 * vector[1],
-    ]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn symmetries_are_a_group() {
-        for a in Symmetry::ALL {
-            assert_eq!(after(a, inverse(a)), Symmetry::IDENTITY);
-            for b in Symmetry::ALL {
-                let (x, y) = a.point(3, 5);
-                assert_eq!(after(a, b).point(3, 5), b.point(x, y));
-            }
-            let (x, y) = a.point(3, 5);
-            assert_eq!(turned(a, [3.0, 5.0]), [x as f64, y as f64]);
-        }
     }
 }

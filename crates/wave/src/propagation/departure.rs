@@ -4,14 +4,10 @@
 //! the power spectra of the tiles are formed once; where the light lands for a direction of arrival follows from them
 //! alone. [`Landing::of`] does the same for one direction, tile by tile; here tiles are gathered into blocks.
 
-use std::f64::consts::PI;
-
-use ndarray::Array2;
 use num_complex::Complex32;
-use rustfft::FftPlanner;
 
-use super::landing::{HOP, TILE, cut, transpose};
-use super::{Aperture, Landing, LandingGrid, PlaneWave};
+use super::tiles::{HOP, TILE, for_tiles, power_scale};
+use super::{Aperture, Landing, LandingGrid};
 use crate::error::Result;
 
 /// Power of the blocks of an element by direction.
@@ -42,57 +38,36 @@ impl Departure {
     /// Of an element at one wavelength (um), its tiles gathered into `blocks` x `blocks` squares over its lattice.
     pub fn of(aperture: &dyn Aperture, wavelength_um: f64, blocks: usize) -> Self {
         let lattice = aperture.lattice();
-        let (n, pitch) = (lattice.sites(), lattice.pitch_um());
-        let blocks = blocks.max(1);
-        let fft = FftPlanner::<f32>::new().plan_fft_forward(TILE);
-        let mut work = vec![Complex32::ZERO; fft.get_inplace_scratch_len()];
-        let taper: Vec<f32> = (0..TILE)
-            .map(|i| (PI * (i as f64 + 0.5) / TILE as f64).sin() as f32)
-            .collect();
+        let (n, blocks) = (lattice.sites(), blocks.max(1));
         let mut spectra = vec![vec![0.0f64; 0]; blocks * blocks];
         let mut moments = vec![[0.0f64; 3]; blocks * blocks];
-        let mut strip = vec![Complex32::ZERO; TILE * n];
-        let mut tile = vec![Complex32::ZERO; TILE * TILE];
-        let mut turned = tile.clone();
-        let scale = pitch * pitch / (TILE * TILE) as f64;
+        let scale = power_scale(&lattice);
         let block_of = |first: i64| ((first + HOP as i64) as usize * blocks / (n + HOP)).min(blocks - 1);
-        for first_row in (-(HOP as i64)..n as i64).step_by(HOP) {
-            strip.copy_within(HOP * n.., 0);
-            for (k, row) in strip.chunks_exact_mut(n).enumerate().skip(HOP) {
-                match usize::try_from(first_row + k as i64).ok().filter(|iy| *iy < n) {
-                    Some(iy) => aperture.fill_row(iy, row),
-                    None => row.fill(Complex32::ZERO),
-                }
+        let fill_row = |iy: usize, row: &mut [Complex32]| aperture.fill_row(iy, row);
+        for_tiles(&lattice, fill_row, |tile| {
+            let [column, row] = tile.first.map(block_of);
+            let block = row * blocks + column;
+            let sums = &mut spectra[block];
+            sums.resize(TILE * TILE, 0.0);
+            let mut power = 0.0;
+            for (to, value) in sums.iter_mut().zip(tile.spectrum) {
+                let own = f64::from(value.norm_sqr()) * scale;
+                *to += own;
+                power += own;
             }
-            for first in (-(HOP as i64)..n as i64).step_by(HOP) {
-                if !cut(&strip, n, first, &taper, &mut tile) {
-                    continue;
-                }
-                fft.process_with_scratch(&mut tile, &mut work);
-                transpose(&tile, &mut turned);
-                fft.process_with_scratch(&mut turned, &mut work);
-                let block = block_of(first_row) * blocks + block_of(first);
-                let sums = &mut spectra[block];
-                sums.resize(TILE * TILE, 0.0);
-                let mut power = 0.0;
-                for (to, value) in sums.iter_mut().zip(&turned) {
-                    let own = f64::from(value.norm_sqr()) * scale;
-                    *to += own;
-                    power += own;
-                }
-                let middle = [first, first_row]
-                    .map(|i| lattice.coordinate_um(0) + (i as f64 + 0.5 * (TILE as f64 - 1.0)) * pitch);
-                for (to, value) in moments[block].iter_mut().zip([middle[0], middle[1], 1.0]) {
-                    *to += value * power;
-                }
+            for (to, value) in moments[block]
+                .iter_mut()
+                .zip([tile.middle_um[0], tile.middle_um[1], 1.0])
+            {
+                *to += value * power;
             }
-        }
+        });
         let blocks = spectra.iter().zip(&moments).filter(|(_, m)| m[2] > 0.0);
         let blocks: Vec<Block> = blocks.map(|(s, m)| Block::of(s, *m)).collect();
         Self {
             power_um2: moments.iter().map(|m| m[2]).sum(),
             blocks,
-            pitch_um: pitch,
+            pitch_um: lattice.pitch_um(),
             wavelength_um,
         }
     }
@@ -108,20 +83,8 @@ impl Departure {
     /// If the map is none or too large.
     pub fn landing(&self, sines: [f64; 2], towards: [f64; 2], grid: LandingGrid) -> Result<Landing> {
         grid.check()?;
-        let wave = PlaneWave {
-            wavelength_um: self.wavelength_um,
-            sin_x: sines[0],
-            sin_y: sines[1],
-        };
-        let leaves = [0, 1].map(|a| self.leaving([wave.sin_x, wave.sin_y][a], towards[a]));
-        let mut landing = Landing {
-            grid,
-            power_um2: Array2::zeros((grid.cells, grid.cells)),
-            beyond_um2: 0.0,
-            evanescent_um2: 0.0,
-        };
-        let cells = landing.power_um2.as_slice_mut().expect("made in standard layout");
-        let half = 0.5 * grid.cells as f64;
+        let leaves = [0, 1].map(|a| self.leaving(sines[a], towards[a]));
+        let mut landing = Landing::empty(grid);
         for block in &self.blocks {
             let kept: f64 = block.bins.iter().map(|b| f64::from(b.1)).sum();
             let fill = 1.0 + block.rest_um2 / kept.max(f64::MIN_POSITIVE);
@@ -129,18 +92,8 @@ impl Departure {
                 let power = f64::from(*power) * fill;
                 let [sx, sy] = [leaves[0][usize::from(*kx)], leaves[1][usize::from(*ky)]];
                 let cosine2 = 1.0 - sx * sx - sy * sy;
-                if cosine2 <= 0.0 {
-                    landing.evanescent_um2 += power;
-                    continue;
-                }
-                let reach = grid.distance_um / cosine2.sqrt();
-                let x = (block.place_um[0] + reach * sx) / grid.cell_um + half;
-                let y = (block.place_um[1] + reach * sy) / grid.cell_um + half;
-                if x >= 0.0 && y >= 0.0 && x < grid.cells as f64 && y < grid.cells as f64 {
-                    cells[y as usize * grid.cells + x as usize] += power;
-                } else {
-                    landing.beyond_um2 += power;
-                }
+                let shift = (cosine2 > 0.0).then(|| [sx, sy].map(|s| grid.distance_um / cosine2.sqrt() * s));
+                landing.add(block.place_um, shift, power);
             }
         }
         Ok(landing)
@@ -185,7 +138,7 @@ impl Block {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::PhaseFunction;
+    use crate::{PhaseFunction, PlaneWave};
     use metalith_core::Lattice;
     use std::f64::consts::TAU;
 

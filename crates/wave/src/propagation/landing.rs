@@ -6,20 +6,14 @@
 //! less than the size of a tile and its diffraction is not resolved. That is sqrt(wavelength * distance) at best,
 //! 35 um for a lens of 2.4 mm focal length, and for what is finer there is [`Fold`](crate::Fold).
 
-use std::f64::consts::PI;
-
 use ndarray::Array2;
 use num_complex::Complex32;
-use rustfft::FftPlanner;
 
+use super::tiles::{TILE, for_tiles, power_scale};
 use super::{Aperture, PlaneWave};
 use crate::error::{Result, WaveError};
 use crate::kernels::cis_all;
 
-/// Sites an axis of a tile: 22 um at a pitch of 350 nm, two thirds of the best size for 2.4 mm, and a power of two.
-pub(super) const TILE: usize = 64;
-/// From one tile to the next [sites]: sine windows that overlap by half add up to one when squared.
-pub(super) const HOP: usize = TILE / 2;
 /// Most cells of a map.
 const MOST_CELLS: usize = 1 << 24;
 
@@ -55,10 +49,8 @@ impl Landing {
     pub fn of(aperture: &dyn Aperture, wave: &PlaneWave, towards: [f64; 2], grid: LandingGrid) -> Result<Self> {
         grid.check()?;
         let lattice = aperture.lattice();
-        let (n, pitch) = (lattice.sites(), lattice.pitch_um());
-        let rays = Rays::new(pitch, wave, towards, grid.distance_um);
-        let fft = FftPlanner::<f32>::new().plan_fft_forward(TILE);
-        let mut work = vec![Complex32::ZERO; fft.get_inplace_scratch_len()];
+        let n = lattice.sites();
+        let rays = Rays::new(lattice.pitch_um(), wave, towards, grid.distance_um);
         let arriving = [wave.sin_x, wave.sin_y].map(|sine| {
             let turns: Vec<f64> = (0..n)
                 .map(|i| lattice.coordinate_um(i) * sine / wave.wavelength_um)
@@ -67,47 +59,21 @@ impl Landing {
             cis_all(&turns, &mut phasors);
             phasors
         });
-        let taper: Vec<f32> = (0..TILE)
-            .map(|i| (PI * (i as f64 + 0.5) / TILE as f64).sin() as f32)
-            .collect();
-        let mut landing = Self {
-            grid,
-            power_um2: Array2::zeros((grid.cells, grid.cells)),
-            beyond_um2: 0.0,
-            evanescent_um2: 0.0,
+        let fill_row = |iy: usize, row: &mut [Complex32]| {
+            aperture.fill_row(iy, row);
+            let wy = arriving[1][iy];
+            for (t, wx) in row.iter_mut().zip(&arriving[0]) {
+                *t *= wx * wy;
+            }
         };
-        // Rows of the tiles of one strip; half of them serve the next strip as well.
-        let mut strip = vec![Complex32::ZERO; TILE * n];
-        let mut tile = vec![Complex32::ZERO; TILE * TILE];
-        let mut turned = tile.clone();
-        let scale = pitch * pitch / (TILE * TILE) as f64;
-        // The first strip begins half a tile before the lattice, so that every site is in two of them.
-        for first_row in (-(HOP as i64)..n as i64).step_by(HOP) {
-            strip.copy_within(HOP * n.., 0);
-            for (k, row) in strip.chunks_exact_mut(n).enumerate().skip(HOP) {
-                let iy = first_row + k as i64;
-                if !(0..n as i64).contains(&iy) {
-                    row.fill(Complex32::ZERO);
-                    continue;
-                }
-                aperture.fill_row(iy as usize, row);
-                let wy = arriving[1][iy as usize];
-                for (t, wx) in row.iter_mut().zip(&arriving[0]) {
-                    *t *= wx * wy;
-                }
+        let mut landing = Self::empty(grid);
+        let scale = power_scale(&lattice);
+        for_tiles(&lattice, fill_row, |tile| {
+            for (value, shift) in tile.spectrum.iter().zip(&rays.shift_um) {
+                let power = f64::from(value.norm_sqr()) * scale;
+                landing.add(tile.middle_um, *shift, power);
             }
-            for first in (-(HOP as i64)..n as i64).step_by(HOP) {
-                if !cut(&strip, n, first, &taper, &mut tile) {
-                    continue;
-                }
-                fft.process_with_scratch(&mut tile, &mut work);
-                transpose(&tile, &mut turned);
-                fft.process_with_scratch(&mut turned, &mut work);
-                let middle = [first, first_row]
-                    .map(|i| lattice.coordinate_um(0) + (i as f64 + 0.5 * (TILE as f64 - 1.0)) * pitch);
-                landing.add(&turned, &rays, middle, scale);
-            }
-        }
+        });
         Ok(landing)
     }
 
@@ -116,24 +82,29 @@ impl Landing {
         self.power_um2.sum() + self.beyond_um2
     }
 
-    fn add(&mut self, spectrum: &[Complex32], rays: &Rays, middle_um: [f64; 2], scale: f64) {
-        let grid = self.grid;
-        let cells = self.power_um2.as_slice_mut().expect("made in standard layout");
-        let half = 0.5 * grid.cells as f64;
-        for (value, shift) in spectrum.iter().zip(&rays.shift_um) {
-            let power = f64::from(value.norm_sqr()) * scale;
-            let Some([dx, dy]) = shift else {
-                self.evanescent_um2 += power;
-                continue;
-            };
-            let x = (middle_um[0] + dx) / grid.cell_um + half;
-            let y = (middle_um[1] + dy) / grid.cell_um + half;
-            let inside = x >= 0.0 && y >= 0.0 && x < grid.cells as f64 && y < grid.cells as f64;
-            if inside {
-                cells[y as usize * grid.cells + x as usize] += power;
-            } else {
-                self.beyond_um2 += power;
-            }
+    /// A map without light.
+    pub(super) fn empty(grid: LandingGrid) -> Self {
+        Self {
+            grid,
+            power_um2: Array2::zeros((grid.cells, grid.cells)),
+            beyond_um2: 0.0,
+            evanescent_um2: 0.0,
+        }
+    }
+
+    /// Adds the power of a ray from a place of the element, by how far it lands from there (um); evanescent without.
+    #[inline]
+    pub(super) fn add(&mut self, from_um: [f64; 2], shift_um: Option<[f64; 2]>, power: f64) {
+        let Some(shift) = shift_um else {
+            self.evanescent_um2 += power;
+            return;
+        };
+        let cells = self.grid.cells as f64;
+        let [x, y] = [0, 1].map(|a| (from_um[a] + shift[a]) / self.grid.cell_um + 0.5 * cells);
+        if x >= 0.0 && y >= 0.0 && x < cells && y < cells {
+            self.power_um2[[y as usize, x as usize]] += power;
+        } else {
+            self.beyond_um2 += power;
         }
     }
 }
@@ -181,30 +152,6 @@ impl Rays {
     }
 }
 
-/// Cuts a tapered tile out of a strip of rows of `n` sites. Whether there is light in it.
-pub(super) fn cut(strip: &[Complex32], n: usize, first: i64, taper: &[f32], tile: &mut [Complex32]) -> bool {
-    let mut light = false;
-    for ((row, out), wy) in strip.chunks_exact(n).zip(tile.chunks_exact_mut(TILE)).zip(taper) {
-        for ((k, to), wx) in out.iter_mut().enumerate().zip(taper) {
-            let at = first + k as i64;
-            *to = match usize::try_from(at).ok().and_then(|at| row.get(at)) {
-                Some(t) => t * (wx * wy),
-                None => Complex32::ZERO,
-            };
-            light |= *to != Complex32::ZERO;
-        }
-    }
-    light
-}
-
-pub(super) fn transpose(tile: &[Complex32], turned: &mut [Complex32]) {
-    for (i, row) in tile.chunks_exact(TILE).enumerate() {
-        for (j, value) in row.iter().enumerate() {
-            turned[j * TILE + i] = *value;
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -212,7 +159,7 @@ mod tests {
     use crate::{Accuracy, Fold, PhaseFunction, Propagator, Scratch, Window};
     use metalith_core::Lattice;
     use rand::{Rng, SeedableRng};
-    use std::f64::consts::TAU;
+    use std::f64::consts::{PI, TAU};
 
     /// Powers of a few hundred thousand single-precision amplitudes, added in double precision.
     const ROUNDING: f64 = 1e-5;

@@ -23,6 +23,7 @@ mod landing;
 mod phase;
 mod propagator;
 mod steepness;
+mod tiles;
 mod transfer;
 mod wave;
 mod window;
