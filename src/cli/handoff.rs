@@ -8,6 +8,7 @@ use metalith::handoff::{Handoff, HandoffOptions, HandoffVerification, handoff, v
 use metalith::report::Verdict;
 use metalith::{Accuracy, Design, Result};
 
+use super::layout::FormatArg;
 use super::verify::FidelityArg;
 use super::{Outcome, Terminal, print_line};
 
@@ -41,6 +42,10 @@ pub struct HandoffArgs {
     /// as the process makes it.
     #[arg(long, value_name = "MODEL")]
     compensate: Option<PathBuf>,
+
+    /// Format of the layouts; GDSII if left out.
+    #[arg(long, value_enum)]
+    format: Option<FormatArg>,
 
     /// Simulate with errors of 1e-3 instead of 1e-5 of the peak, several times faster.
     #[arg(long)]
@@ -91,6 +96,7 @@ fn make(design: &Path, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcom
             .join(" "),
         waivers: args.waivers.clone(),
         compensate: args.compensate.clone(),
+        format: args.format.map_or_else(Default::default, Into::into),
         fidelity: args.fidelity.into(),
         accuracy: if args.fast { Accuracy::Fast } else { Accuracy::Accurate },
     };

@@ -141,17 +141,25 @@ struct InlineShape {
     rect: Option<Rect>,
 }
 
+impl InlineShape {
+    fn new(kind: ShapeKind, layer: LayerNumber, points: Vec<Point>) -> Self {
+        let rect = rectangle_of(&points);
+        Self {
+            kind,
+            layer,
+            points,
+            rect,
+        }
+    }
+}
+
 #[derive(Default)]
 struct Keep(Vec<InlineShape>);
 
 impl Sink for Keep {
     fn five_points(&mut self, _offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<(), SinkError> {
-        self.0.push(InlineShape {
-            kind: ShapeKind::Boundary,
-            layer,
-            points: points.to_vec(),
-            rect: rectangle_of(points),
-        });
+        self.0
+            .push(InlineShape::new(ShapeKind::Boundary, layer, points.to_vec()));
         Ok(())
     }
 
@@ -162,12 +170,7 @@ impl Sink for Keep {
     fn element(&mut self, element: &ElementContent) -> Result<(), SinkError> {
         let mut points = Vec::new();
         if let Some(kind) = outline_of(element, &mut points) {
-            self.0.push(InlineShape {
-                kind,
-                layer: element.layer,
-                rect: rectangle_of(&points),
-                points,
-            });
+            self.0.push(InlineShape::new(kind, element.layer, points));
         }
         Ok(())
     }
@@ -179,12 +182,7 @@ impl Sink for Keep {
         };
         copies.each(|by| {
             let points: Vec<Point> = points.iter().map(|p| Point::new(p.x + by.x, p.y + by.y)).collect();
-            self.0.push(InlineShape {
-                kind,
-                layer: element.layer,
-                rect: rectangle_of(&points),
-                points,
-            });
+            self.0.push(InlineShape::new(kind, element.layer, points));
             Ok(())
         })
     }

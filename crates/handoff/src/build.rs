@@ -63,7 +63,7 @@ fn fill(
     progress: &dyn Progress,
 ) -> Result<Vec<HandoffCheck>> {
     let (design, process) = (&sources.design, &sources.process);
-    let layouts = layouts::write(files, sources, progress)?;
+    let layouts = layouts::write(files, sources, options.format, progress)?;
     let opened = layouts.paths.open(progress)?;
     let census = opened.census(progress)?;
     let documents = documents::write(files, design, process, &layouts, &census)?;

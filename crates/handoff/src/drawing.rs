@@ -8,10 +8,11 @@ use gds21::{
     GdsTextElem, GdsUnits,
 };
 
-use metalith_core::WholeFile;
-use metalith_core::{Error, Result};
+use metalith_core::{Error, Result, Silent, WholeFile};
 use metalith_design::LayoutLayer;
 use metalith_design::array::{Class, Symmetry};
+use metalith_gds::Layout;
+use metalith_layout::{LayoutFormat, convert};
 
 /// Layer and datatype.
 pub(super) type LayerPair = (i16, i16);
@@ -239,11 +240,22 @@ impl Drawing {
         self.add(whole);
     }
 
-    /// Write the file.
+    /// Write the file, in the format that its name asks for.
     ///
     /// # Errors
     /// If it cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
+        let format = LayoutFormat::of_name(path);
+        if format == LayoutFormat::Gds {
+            return self.write_gds(path);
+        }
+        let made = path.with_extension(LayoutFormat::Gds.extension());
+        self.write_gds(&made)?;
+        convert(&Layout::open(&made)?, format, path, &Silent)?;
+        std::fs::remove_file(&made).map_err(Error::io("remove", &made))
+    }
+
+    fn write_gds(&self, path: &Path) -> Result<()> {
         let mut bytes = Vec::new();
         self.tree.write(&mut bytes).map_err(|e| {
             Error::invalid(

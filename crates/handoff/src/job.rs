@@ -67,7 +67,7 @@ pub(super) fn job_deck(design: &Design, process: &Process, crosses: &[Cross], be
     let _ = writeln!(text, "PATH {}", process.job.path);
     text.push_str(
         "; One chip in the middle of the substrate. Repeat it by count and pitch: (first,count,pitch)/(first,count,pitch),\n\
-         ; x to the right, rows downwards. The origin of a chip is the middle of its pattern: convert the GDSII file with a\n\
+         ; x to the right, rows downwards. The origin of a chip is the middle of its pattern: convert the layout with a\n\
          ; chip size that has (0, 0) in its middle.\n",
     );
     text.push_str(" ARRAY (0,1,0)/(0,1,0)\n");
@@ -88,7 +88,7 @@ pub(super) fn job_deck(design: &Design, process: &Process, crosses: &[Cross], be
     for (k, what) in ["pillars", "dose_matrix", "tests_pillars"].iter().enumerate() {
         let _ = writeln!(
             text,
-            " P({}) '{}_{what}.v30'   ; converted from the GDSII file of that name",
+            " P({}) '{}_{what}.v30'   ; converted from the layout of that name",
             k + 1,
             design.name
         );

@@ -14,7 +14,7 @@ use metalith_core::{Progress, Result};
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
 use metalith_gds::{Layout, ReadLimits};
-use metalith_layout::{write_apertures, write_layer_properties, write_pillars};
+use metalith_layout::{LayoutFormat, write_apertures_as, write_layer_properties, write_pillars_as};
 
 /// The files that were written.
 pub(super) struct Layouts {
@@ -83,20 +83,25 @@ impl OfEach<Layout> {
 ///
 /// # Errors
 /// If one cannot be written, or the user stopped it.
-pub(super) fn write(files: &mut Listing, sources: &Sources, progress: &dyn Progress) -> Result<Layouts> {
+pub(super) fn write(
+    files: &mut Listing,
+    sources: &Sources,
+    format: LayoutFormat,
+    progress: &dyn Progress,
+) -> Result<Layouts> {
     let (design, process) = (&sources.design, &sources.process);
-    let named = |folder: &str, rest: &str| format!("{folder}/{}_{rest}", design.name);
+    let named = |folder: &str, rest: &str| format!("{folder}/{}_{rest}.{}", design.name, format.extension());
     let mut array = PillarArray::build(design, progress)?;
     if let Some(model) = &sources.model {
         array = compensate(design, &array, model, progress)?.array;
     }
-    let pillars = files.add(named("layout", "pillars.gds"), "layout of step 1: pillars and marks");
-    write_pillars(design, &array, design.layout.hierarchy, &pillars, progress)?;
+    let pillars = files.add(named("layout", "pillars"), "layout of step 1: pillars and marks");
+    write_pillars_as(design, &array, design.layout.hierarchy, format, &pillars, progress)?;
     let apertures = files.add(
-        named("layout", "apertures.gds"),
+        named("layout", "apertures"),
         "layout of step 2: openings in the metal and marks, flat",
     );
-    write_apertures(design, &apertures)?;
+    write_apertures_as(design, format, &apertures)?;
     let properties = files.add(
         format!("layout/{}.lyp", design.name),
         "layer names and colours for KLayout",
@@ -104,34 +109,32 @@ pub(super) fn write(files: &mut Listing, sources: &Sources, progress: &dyn Progr
     write_layer_properties(design, &properties)?;
 
     let dose_matrix = files.add(
-        named("dose", "dose_matrix.gds"),
+        named("dose", "dose_matrix"),
         "dose matrix for step 1: nine doses, datatype is the dose",
     );
     let blocks = matrix::write(&dose_matrix, design, process)?;
     let structures = Structures::new(design, process);
     let tests_frame = (structures.frame, structures.field_border);
-    let tests = files.add(named("tests", "tests_pillars.gds"), "test structures of step 1");
-    let test_openings = files.add(named("tests", "tests_apertures.gds"), "test structures of step 2, flat");
+    let tests = files.add(named("tests", "tests_pillars"), "test structures of step 1");
+    let test_openings = files.add(named("tests", "tests_apertures"), "test structures of step 2, flat");
     let structures = structures.write(design, &tests, &test_openings)?;
 
     let reference = reference_design(design, process);
     let reference_array = PillarArray::build(&reference, progress)?;
-    let reference_pillars = files.add(
-        named("tests", "reference_pillars.gds"),
-        "hyperbolic reference lens, step 1",
-    );
-    write_pillars(
+    let reference_pillars = files.add(named("tests", "reference_pillars"), "hyperbolic reference lens, step 1");
+    write_pillars_as(
         &reference,
         &reference_array,
         reference.layout.hierarchy,
+        format,
         &reference_pillars,
         progress,
     )?;
     let reference_openings = files.add(
-        named("tests", "reference_apertures.gds"),
+        named("tests", "reference_apertures"),
         "hyperbolic reference lens, step 2",
     );
-    write_apertures(&reference, &reference_openings)?;
+    write_apertures_as(&reference, format, &reference_openings)?;
     Ok(Layouts {
         array,
         reference,

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use metalith_cell::Fidelity;
+use metalith_layout::LayoutFormat;
 use metalith_wave::Accuracy;
 
 /// Inputs and destination of a hand-off.
@@ -16,6 +17,8 @@ pub struct HandoffOptions {
     pub out: PathBuf,
     /// The command as it was given, for the manifest.
     pub command: String,
+    /// Format of all layouts.
+    pub format: LayoutFormat,
     /// The cell that the layout is judged by; the published polynomials are shown beside it.
     pub fidelity: Fidelity,
     /// How closely the layout is simulated.

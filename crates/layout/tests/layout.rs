@@ -278,7 +278,7 @@ fn bombs_are_not_converted() {
         &[0, 0],
     ]
     .concat();
-    let bytes = metalith_testing::oasis::around(&records, false);
+    let bytes = metalith_testing::oasis::around(&records);
     let layout = Layout::from_bytes("bomb.oas", bytes, metalith_gds::ReadLimits::default()).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out.gds");

@@ -14,29 +14,32 @@ pub const LIMITS: OasisLimits = OasisLimits {
     unpacked_per_byte: 0,
 };
 
-/// A file of these records on a grid of 1 nm, with no offsets of tables and no checksum, so that damage to the records
-/// is found by what reads them; in one CBLOCK if `compressed`.
-pub fn around(records: &[u8], compressed: bool) -> Vec<u8> {
-    let mut bytes = MAGIC.to_vec();
-    bytes.extend(b"\x01\x031.0\x00\xe8\x07\x01");
-    if compressed {
-        use flate2::{Compression, write::DeflateEncoder};
-        use std::io::Write;
-        let mut deflate = DeflateEncoder::new(Vec::new(), Compression::fast());
-        deflate.write_all(records).expect("memory grows");
-        let packed = deflate.finish().expect("memory grows");
-        bytes.extend([34, 0]);
-        for mut value in [records.len(), packed.len()] {
-            while value >= 0x80 {
-                bytes.push(value as u8 | 0x80);
-                value >>= 7;
-            }
-            bytes.push(value as u8);
+/// These records in a CBLOCK.
+pub fn block(records: &[u8]) -> Vec<u8> {
+    use flate2::{Compression, write::DeflateEncoder};
+    use std::io::Write;
+    let mut deflate = DeflateEncoder::new(Vec::new(), Compression::fast());
+    deflate.write_all(records).expect("memory grows");
+    let packed = deflate.finish().expect("memory grows");
+    let mut bytes = vec![34, 0];
+    for mut value in [records.len(), packed.len()] {
+        while value >= 0x80 {
+            bytes.push(value as u8 | 0x80);
+            value >>= 7;
         }
-        bytes.extend(packed);
-    } else {
-        bytes.extend(records);
+        bytes.push(value as u8);
     }
+    bytes.extend(packed);
+    bytes
+}
+
+/// A file of these records on a grid of 1 nm, with no offsets of tables and no checksum, so that damage to the records
+/// is found by what reads them.
+pub fn around(records: &[u8]) -> Vec<u8> {
+    let mut bytes = MAGIC.to_vec();
+    // START: version, 1000 steps a micrometre, offsets in END.
+    bytes.extend(b"\x01\x031.0\x00\xe8\x07\x01");
+    bytes.extend(records);
     // END: no offsets, 240 bytes of padding, no checksum.
     bytes.push(2);
     bytes.extend([0; 12]);
@@ -112,11 +115,15 @@ pub fn corpus() -> Vec<Vec<u8>> {
 /// A damaged file: records changed, and then in a CBLOCK or not; or a file changed as it is.
 pub fn mutant<R: Rng>(rng: &mut R, corpus: &[Vec<u8>]) -> Vec<u8> {
     let compressed = rng.random_range(0..4) == 0;
+    let file = |records: &[u8]| match compressed {
+        true => around(&block(records)),
+        false => around(records),
+    };
     if rng.random_range(0..4) == 0 {
-        let whole: Vec<Vec<u8>> = corpus.iter().map(|records| around(records, compressed)).collect();
+        let whole: Vec<Vec<u8>> = corpus.iter().map(|records| file(records)).collect();
         return super::mutate::mutate(rng, &whole);
     }
-    around(&super::mutate::mutate(rng, corpus), compressed)
+    file(&super::mutate::mutate(rng, corpus))
 }
 
 /// Read all records. Whether they can be read; an error must name a place in the file.

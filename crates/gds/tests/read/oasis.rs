@@ -40,7 +40,10 @@ fn file(cells: &[(&str, &[u8])], in_one_block: bool) -> Vec<u8> {
         records.extend(name.bytes());
         records.extend_from_slice(bytes);
     }
-    oasis::around(&records, in_one_block)
+    match in_one_block {
+        true => oasis::around(&oasis::block(&records)),
+        false => oasis::around(&records),
+    }
 }
 
 /// A reference by name.
@@ -112,17 +115,14 @@ fn numbers_and_names_are_one() {
     let table: &[u8] = b"\x04\x01B\x07\x04\x03TOP\x02";
     let cells = [&[13, 2][..], &[17, 0xF0, 7, 20, 0], &placed("B", &[]), &[13, 7], SQUARE].concat();
     for records in [[table, &cells].concat(), [&cells[..], table].concat()] {
-        let layout = layout(oasis::around(&records, true));
+        let layout = layout(oasis::around(&oasis::block(&records)));
         let names: Vec<&str> = layout.cells().iter().map(|c| c.name.as_str()).collect();
         assert_eq!(names, ["TOP", "B"]);
         assert!(layout.dangling().is_empty() && layout.doubled().is_empty());
         assert_eq!(boxes(&layout), [[0, 0, 10, 10], [10, 0, 20, 10]]);
         assert_eq!(layout.cell_index("B"), Some(1));
     }
-    let dangling = layout(oasis::around(
-        &[&[13, 2][..], &[17, 0xF0, 9, 0, 0], table].concat(),
-        false,
-    ));
+    let dangling = layout(oasis::around(&[&[13, 2][..], &[17, 0xF0, 9, 0, 0], table].concat()));
     assert_eq!(dangling.dangling()[0].name, "#9");
 }
 

@@ -1,5 +1,6 @@
 //! The hand-off as the one who receives it meets it: read from its files, by the readers of the library.
 
+mod formats;
 mod job;
 mod publish;
 mod trust;
@@ -15,6 +16,7 @@ use metalith_core::{Error, Lattice, Progress, Result, Silent};
 use metalith_design::{Design, PillarArray};
 use metalith_gds::{LayerNumber, Layout, Selection, Shape, Transform, Visitor};
 use metalith_handoff::{Census, HandoffOptions, Manifest, handoff, verify_handoff};
+use metalith_layout::LayoutFormat;
 use metalith_wave::Accuracy;
 
 const DESIGN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/mini_3x3.toml");
@@ -37,6 +39,7 @@ fn options(out: &Path) -> HandoffOptions {
         process: Some(PROCESS.into()),
         out: out.to_owned(),
         command: "metalith handoff designs/mini_3x3.toml".into(),
+        format: LayoutFormat::Gds,
         // What is simulated is not the matter here.
         fidelity: Fidelity::Published,
         accuracy: Accuracy::Fast,
