@@ -8,7 +8,7 @@ TITLE is how the title of a figure begins, WIDTH its width in the picture in pix
     metalith run designs/mini_3x3.toml --out out/mini
     picture.py out/mini/report.html docs/report.png "The chip=280" "Pillars in the middle=280" "PSF designed=540"
     picture.py out/calibrate/control/report.html docs/ladder.png "Residual under three=760"
-    picture.py out/calibrate/control/validation.html docs/proof.png "What is taken=800"
+    picture.py out/calibrate/control/validation.html docs/proof.png "Confusion matrix=800"
 
 Needs Chromium on the path and nothing else. The figures are cut out of the report as they are; this script only
 arranges them.

@@ -208,13 +208,13 @@ fn oblique_light_sees_another_cell_and_the_normal_is_its_limit() {
     let stack = CellStack::paper(350.0, 700.0).unwrap();
     let orders = metalith::rcwa::Orders::new(9).unwrap();
     let along = stack.transmission(180.0, 0.53, orders).unwrap();
-    for t in stack.oblique(180.0, 0.53, [0.0, 0.0], orders).unwrap() {
-        assert!((t - along).norm() < SOLVED);
-    }
+    let [[ss, sp], [ps, pp]] = stack.oblique(180.0, 0.53, [0.0, 0.0], orders).unwrap();
+    assert!((ss - along).norm() < SOLVED && (pp - along).norm() < SOLVED);
+    assert!(sp.norm() < SOLVED && ps.norm() < SOLVED);
     let tilted = stack.oblique(180.0, 0.53, [0.25, 0.0], orders).unwrap();
     // Fourteen degrees in the substrate are felt, far above what the solver errs by.
     const TILTED: f64 = 0.02;
-    assert!((tilted[0] - along).norm() > TILTED);
+    assert!((tilted[0][0] - along).norm() > TILTED);
     // Bare glass: the share of power that Fresnel's coefficients pass, s and p.
     let n = stack.full_transmission(0.53).unwrap().powi(2);
     let (sine, air) = (0.5_f64, 0.75_f64.sqrt());
@@ -224,10 +224,21 @@ fn oblique_light_sees_another_cell_and_the_normal_is_its_limit() {
         (n * glass - air) / (n * glass + air),
         (glass - n * air) / (glass + n * air),
     ];
-    for (t, r) in bare.iter().zip(reflected) {
+    for (t, r) in [bare[0][0], bare[1][1]].iter().zip(reflected) {
         assert!((t.norm_sqr() / n - (1.0 - r * r)).abs() < SOLVED);
     }
     assert!(stack.oblique(180.0, 0.53, [1.0, 0.0], orders).is_err());
+    // In no plane of symmetry some light is turned from s to p; the power of the zero order counts it.
+    let (x, y) = (0.25, 0.1);
+    let turned = stack.oblique(180.0, 0.455, [x, y], orders).unwrap();
+    let incidence = metalith::rcwa::Incidence::of_sines(0.455, metalith::rcwa::Side::Below, [x, y]);
+    let solved = metalith::rcwa::solve(&stack.layers(180.0, 0.455).unwrap(), &incidence, orders).unwrap();
+    let n = stack.full_transmission(0.455).unwrap().powi(2);
+    const TURNED: f64 = 1e-4;
+    for (out, power) in turned.iter().zip(solved.zero_order()) {
+        assert!((out.iter().map(|t| t.norm_sqr()).sum::<f64>() / n - power).abs() < SOLVED);
+    }
+    assert!(turned[0][1].norm_sqr() > TURNED && turned[1][0].norm_sqr() > TURNED);
 }
 
 #[test]

@@ -21,7 +21,7 @@ pub use fit::{
     FittedCell, ForwardFit, InverseFit, MappingError, curves_over, fit_forward, fit_inverse, forward_errors, round_trip,
 };
 pub use metalith_rcwa::Material;
-pub use model::{CellModel, Fidelity};
+pub use model::{CellModel, Fidelity, ObliqueTables, dark};
 pub use pointwise::PointwiseCell;
 pub use pointwise::{BAND_ORDERS, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, tabulate};
 pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};

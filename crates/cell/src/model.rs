@@ -56,6 +56,35 @@ impl FromStr for Fidelity {
     }
 }
 
+/// Transmissions of obliquely lit cells by the width of the pillar (nm).
+///
+/// Fields that arrive in different polarisations, or leave in different ones, do not interfere: unpolarised light is the
+/// mean over those that arrive of the sum over those that leave.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObliqueTables {
+    /// What leaves in the polarisation in which it arrived: across the plane of incidence (s), and in it (p).
+    pub kept: [Vec<Complex64>; 2],
+    /// What arrives as s and leaves as p, and what arrives as p and leaves as s. All zero in planes of symmetry of the
+    /// cell.
+    pub turned: [Vec<Complex64>; 2],
+}
+
+impl ObliqueTables {
+    /// The tables that light passes by, each for half of the light that arrives.
+    pub fn passed(&self) -> impl Iterator<Item = &Vec<Complex64>> {
+        let turned = self.turned.iter().filter(|t| !dark(t));
+        self.kept.iter().chain(turned)
+    }
+}
+
+/// Transmissions below this are rounding errors of what symmetry forbids.
+const DARK: f64 = 1e-9;
+
+/// Whether a table passes nothing.
+pub fn dark(table: &[Complex64]) -> bool {
+    table.iter().all(|t| t.norm() < DARK)
+}
+
 /// How a cell of the lattice passes light into its zero order, by the width of its pillar.
 pub trait CellModel: Sync {
     /// What the model is.
@@ -81,22 +110,15 @@ pub trait CellModel: Sync {
         self.transmissions(wavelength_um, max_width_nm)
     }
 
-    /// The same as [`CellModel::transmissions`] for light that arrives obliquely: one table for light polarised across
-    /// the plane of incidence (s) and one for light polarised in it (p). `sines` are those of the direction in air
-    /// along x and y.
+    /// The same as [`CellModel::transmissions`] for light that arrives obliquely, by polarisation. `sines` are those of
+    /// the direction in air along x and y.
     ///
     /// Scaled so that |t| of a cell that passes all its power in the zero order is that of
-    /// [`CellModel::full_transmission`], as at normal incidence. What little is turned from one polarisation
-    /// into the other is left out. Nothing if the model knows no angles.
+    /// [`CellModel::full_transmission`], as at normal incidence. Nothing if the model knows no angles.
     ///
     /// # Errors
     /// As [`CellModel::transmissions`]; also if no light arrives so steeply.
-    fn oblique(
-        &self,
-        _wavelength_um: f64,
-        _sines: [f64; 2],
-        _max_width_nm: u16,
-    ) -> Result<Option<[Vec<Complex64>; 2]>> {
+    fn oblique(&self, _wavelength_um: f64, _sines: [f64; 2], _max_width_nm: u16) -> Result<Option<ObliqueTables>> {
         Ok(None)
     }
 
@@ -105,12 +127,7 @@ pub trait CellModel: Sync {
     ///
     /// # Errors
     /// As [`CellModel::oblique`].
-    fn oblique_in_band(
-        &self,
-        wavelength_um: f64,
-        sines: [f64; 2],
-        max_width_nm: u16,
-    ) -> Result<Option<[Vec<Complex64>; 2]>> {
+    fn oblique_in_band(&self, wavelength_um: f64, sines: [f64; 2], max_width_nm: u16) -> Result<Option<ObliqueTables>> {
         self.oblique(wavelength_um, sines, max_width_nm)
     }
 

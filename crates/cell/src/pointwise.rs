@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::{CellModel, CellStack, Fidelity};
+use super::{CellModel, CellStack, Fidelity, ObliqueTables};
 use metalith_core::Result;
 use metalith_rcwa::Orders;
 
@@ -63,16 +63,17 @@ impl PointwiseCell {
         Ok(table)
     }
 
-    fn tilted(
-        &self,
-        orders: usize,
-        wavelength_um: f64,
-        sines: [f64; 2],
-        max_width_nm: u16,
-    ) -> Result<[Vec<Complex64>; 2]> {
+    fn tilted(&self, orders: usize, wavelength_um: f64, sines: [f64; 2], max_width_nm: u16) -> Result<ObliqueTables> {
         let orders = self.at_most(orders)?;
-        let solve = |w| self.stack.oblique(f64::from(w), wavelength_um, sines, orders);
-        tabulate(&self.widths_nm, max_width_nm, solve)
+        let solve = |w| {
+            let [[ss, sp], [ps, pp]] = self.stack.oblique(f64::from(w), wavelength_um, sines, orders)?;
+            Ok([ss, pp, sp, ps])
+        };
+        let [ss, pp, sp, ps] = tabulate(&self.widths_nm, max_width_nm, solve)?;
+        Ok(ObliqueTables {
+            kept: [ss, pp],
+            turned: [sp, ps],
+        })
     }
 }
 
@@ -89,17 +90,12 @@ impl CellModel for PointwiseCell {
         self.normal(BAND_ORDERS, wavelength_um, max_width_nm)
     }
 
-    fn oblique(&self, wavelength_um: f64, sines: [f64; 2], max_width_nm: u16) -> Result<Option<[Vec<Complex64>; 2]>> {
+    fn oblique(&self, wavelength_um: f64, sines: [f64; 2], max_width_nm: u16) -> Result<Option<ObliqueTables>> {
         self.tilted(OBLIQUE_ORDERS, wavelength_um, sines, max_width_nm)
             .map(Some)
     }
 
-    fn oblique_in_band(
-        &self,
-        wavelength_um: f64,
-        sines: [f64; 2],
-        max_width_nm: u16,
-    ) -> Result<Option<[Vec<Complex64>; 2]>> {
+    fn oblique_in_band(&self, wavelength_um: f64, sines: [f64; 2], max_width_nm: u16) -> Result<Option<ObliqueTables>> {
         self.tilted(OBLIQUE_BAND_ORDERS, wavelength_um, sines, max_width_nm)
             .map(Some)
     }
@@ -179,10 +175,10 @@ mod tests {
         /// Of the mean power that passes over 410 to 690 nm, some widths and both polarisations.
         const POWER: f64 = 0.02;
         let cell = PointwiseCell::new(crate::stack::tests::paper(), [120, 160, 200, 240]);
-        let power = |tables: Option<[Vec<Complex64>; 2]>| -> f64 {
+        let power = |tables: Option<ObliqueTables>| -> f64 {
             let tables = tables.expect("the cell knows angles");
             let widths = [120, 160, 200, 240];
-            tables.iter().flat_map(|t| widths.map(|w| t[w].norm_sqr())).sum()
+            tables.passed().flat_map(|t| widths.map(|w| t[w].norm_sqr())).sum()
         };
         let (mut coarse, mut fine) = (0.0, 0.0);
         for um in (0..8).map(|i| 0.41 + 0.04 * f64::from(i)) {

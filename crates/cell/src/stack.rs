@@ -114,8 +114,8 @@ impl CellStack {
         )?)
     }
 
-    /// Zero-order transmission of light whose direction has these sines in air, along x and y: for light
-    /// polarised across the plane of incidence (s) and in it (p), each into its own kind.
+    /// Zero-order transmission of light whose direction has these sines in air, along x and y: of light
+    /// polarised across the plane of incidence (s) into s and p, and of light polarised in it (p) into s and p.
     ///
     /// Scaled by the cosines of the ray on both sides, so that the share of power in the zero order follows
     /// from |t| as it does along the normal.
@@ -128,7 +128,7 @@ impl CellStack {
         wavelength_um: f64,
         sines: [f64; 2],
         orders: Orders,
-    ) -> Result<[Complex64; 2]> {
+    ) -> Result<[[Complex64; 2]; 2]> {
         let layers = self.layers(width_nm, wavelength_um)?;
         let cosine = |index: Complex64| (1.0 - (sines[0].powi(2) + sines[1].powi(2)) / index.re.powi(2)).sqrt();
         let (below, above) = (cosine(layers.below), cosine(layers.above));
@@ -140,7 +140,8 @@ impl CellStack {
         }
         let incidence = Incidence::of_sines(wavelength_um, Side::Below, sines);
         let jones = solve(&layers, &incidence, orders)?.transmission;
-        Ok([jones[0][0], jones[1][1]].map(|t| t * (above / below).sqrt()))
+        let scale = (above / below).sqrt();
+        Ok([0, 1].map(|arrives| [0, 1].map(|leaves| jones[leaves][arrives] * scale)))
     }
 
     /// [`CellStack::transmission`] of all pairs of widths (nm) and wavelengths (um), in parallel. Shape

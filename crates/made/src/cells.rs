@@ -7,7 +7,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::stack::{off_cutoff, possible_width_nm};
-use metalith_cell::{BAND_ORDERS, CellStack, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS};
+use metalith_cell::{BAND_ORDERS, CellStack, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, dark};
 use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::Orders;
 
@@ -23,8 +23,8 @@ const ROUGH: f64 = 0.01;
 /// A width this near to a node is that node [steps].
 const ON_NODE: f64 = 1e-6;
 
-/// One for light along the normal, one each for s and p else.
-type Polarised = [Complex64; 2];
+/// The same four times for light along the normal; else s into s, p into p, s into p and p into s.
+type Polarised = [Complex64; 4];
 
 /// What is solved of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -49,11 +49,13 @@ pub struct RealisedCells {
     known: Mutex<HashMap<(WaveKey, Solve), Polarised>>,
 }
 
-/// What sites of some widths transmit, one table for each polarisation that is to be averaged over.
+/// What sites of some widths transmit: one table for light along the normal; else one for each polarisation that is
+/// kept (s, p), and one for each that is turned into the other where the direction is in no plane of symmetry of the
+/// cell. See [`super::MadeView::share`].
 pub struct SolvedWidths {
     /// In the order of the widths that were asked for.
     pub pillars: Vec<Vec<Complex64>>,
-    /// Of a site without pillar, for each polarisation.
+    /// Of a site without pillar, for each table.
     pub bare: Vec<Complex64>,
 }
 
@@ -169,13 +171,18 @@ impl RealisedCells {
             (None, Among::On(node)) => at(node, p),
             (None, Among::Between(node, u)) => (-1..).zip(lagrange(u)).map(|(k, w)| at(node + k, p) * w).sum(),
         };
-        let polarisations = if sines == [0.0; 2] { 0..1 } else { 0..2 };
+        let of = |p: usize| -> Vec<Complex64> {
+            let pairs = widths_nm.iter().zip(&places);
+            pairs.map(|(w, a)| value(*w, *a, p)).collect()
+        };
+        let polarisations = if sines == [0.0; 2] { 0..1 } else { 0..4 };
+        let (columns, pillars) = polarisations
+            .map(|p| (p, of(p)))
+            .filter(|(p, t)| *p < 2 || !dark(t))
+            .unzip::<_, _, Vec<_>, Vec<_>>();
         Ok(SolvedWidths {
-            pillars: polarisations
-                .clone()
-                .map(|p| widths_nm.iter().zip(&places).map(|(w, a)| value(*w, *a, p)).collect())
-                .collect(),
-            bare: polarisations.map(|p| known[&(place, Solve::Bare)][p]).collect(),
+            pillars,
+            bare: columns.iter().map(|&p| known[&(place, Solve::Bare)][p]).collect(),
         })
     }
 
@@ -215,16 +222,20 @@ impl RealisedCells {
         };
         if sines == [0.0; 2] {
             let t = off_cutoff(width, |w| self.stack.transmission(w, wavelength_um, orders))?;
-            return Ok([t; 2]);
+            return Ok([t; 4]);
         }
-        off_cutoff(width, |w| self.stack.oblique(w, wavelength_um, sines, orders))
+        let polarised = |w| {
+            let [[ss, sp], [ps, pp]] = self.stack.oblique(w, wavelength_um, sines, orders)?;
+            Ok([ss, pp, sp, ps])
+        };
+        off_cutoff(width, polarised)
     }
 }
 
-/// Whether a node is off the cubic through its four neighbours, for either polarisation.
+/// Whether a node is off the cubic through its four neighbours, for any polarisation.
 fn rough(node: i64, at: &impl Fn(i64) -> Polarised) -> bool {
     let [a, b, c, d, e] = [-2, -1, 0, 1, 2].map(|k| at(node + k));
-    (0..2).any(|p| ((b[p] + d[p]) * (2.0 / 3.0) - (a[p] + e[p]) / 6.0 - c[p]).norm() > ROUGH)
+    (0..4).any(|p| ((b[p] + d[p]) * (2.0 / 3.0) - (a[p] + e[p]) / 6.0 - c[p]).norm() > ROUGH)
 }
 
 #[cfg(test)]

@@ -34,7 +34,7 @@ pub struct ModelStatement {
 /// One made element in one light: everything between a wave that arrives and the PSF on the sensor.
 pub struct MadeView<'a> {
     pub element: &'a MadeElement,
-    /// What sites transmit, one for each polarisation that is averaged over.
+    /// What sites transmit, as [`SolvedWidths`] has it.
     pub tables: Vec<ClassTable>,
     pub light: ArrivingLight,
     /// Added to the distance of the sensor (um).
@@ -217,9 +217,15 @@ impl MadeView<'_> {
                 Ok(psf)
             })
             .collect::<Result<Vec<_>>>()?;
-        let mut psf = Psf::mean(psfs);
+        let mut psf = Psf::sum(psfs, self.share());
         self.camera.apply(&mut psf);
         Ok(psf)
+    }
+
+    /// Of light that is not polarised, what arrives in the polarisation of each table. What leaves by different tables
+    /// does not interfere: intensities are added.
+    pub fn share(&self) -> f64 {
+        1.0 / self.tables.len().min(2) as f64
     }
 
     fn scattered(&self, table: &ClassTable, at_um: [f64; 2], distance_um: f64) -> f64 {

@@ -48,6 +48,13 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
             "--as-lit solves them at the angle at which light arrives, both polarisations",
         );
     }
+    if found.fidelity == Fidelity::Rigorous {
+        row(
+            "Cells are solved with 17 diffraction orders an axis",
+            "0.004 rms in |t|, 0.03 beside resonances".into(),
+            "against 27 orders, widths of 100 to 295 nm at 455, 530 and 660 nm",
+        );
+    }
     let (least, most) = outside(found);
     row(
         "PSFs and energies are of a window about the chief ray; MTF counts all light that passes",

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use num_complex::Complex64;
 
-use metalith_cell::CellModel;
+use metalith_cell::{CellModel, ObliqueTables};
 use metalith_core::Progress;
 use metalith_core::{Error, Result, WidthMap};
 use metalith_made::{SimulationCase, cell_direction};
@@ -51,12 +51,15 @@ impl<'a> SimulationCases<'a> {
     }
 }
 
+/// Of light that is not polarised, that which arrives in either polarisation.
+const POLARISATION_SHARE: f64 = 0.5;
+
 /// Transmissions by drawn width of one cell at one wavelength.
 pub(super) struct TransmissionTables {
     /// Along the normal.
     pub normal: Vec<Complex64>,
     /// By direction, for s and p; empty where the design asks for normal incidence, or the cell knows no angles.
-    oblique: HashMap<[u64; 2], [Vec<Complex64>; 2]>,
+    oblique: HashMap<[u64; 2], ObliqueTables>,
     /// Whether it is one of many wavelengths of a band.
     in_band: bool,
 }
@@ -129,15 +132,14 @@ impl TransmissionTables {
         lp_mm: &[f64],
         scratch: &mut Scratch,
     ) -> Result<Psf> {
-        let of = |table: &Vec<Complex64>| Ok(Psf::formed(fold, &Pillars::new(widths, table)?, wave, lp_mm, scratch)?);
-        Ok(Psf::mean(self.of(wave).iter().map(of).collect::<Result<_>>()?))
-    }
-
-    /// The tables whose PSFs are to be averaged: one along the normal, one for each polarisation else.
-    fn of(&self, wave: &PlaneWave) -> &[Vec<Complex64>] {
+        let mut of =
+            |table: &Vec<Complex64>| Ok(Psf::formed(fold, &Pillars::new(widths, table)?, wave, lp_mm, scratch)?);
         match self.oblique.get(&key(cell_direction(wave))) {
-            Some(both) => both,
-            None => std::slice::from_ref(&self.normal),
+            Some(tables) => Ok(Psf::sum(
+                tables.passed().map(of).collect::<Result<_>>()?,
+                POLARISATION_SHARE,
+            )),
+            None => of(&self.normal),
         }
     }
 }

@@ -75,22 +75,21 @@ impl Psf {
         })
     }
 
-    /// Mean of PSFs on the same window, as of light that is not polarised.
+    /// Sum of PSFs on the same window that do not interfere, times a share: as of light that is not polarised.
     ///
     /// # Panics
     /// If there is none, or their windows are of different sizes.
-    pub fn mean(psfs: Vec<Self>) -> Self {
-        let share = 1.0 / psfs.len() as f64;
+    pub fn sum(psfs: Vec<Self>, share: f64) -> Self {
         let otfs: Option<Vec<Otf>> = psfs.iter().map(|p| p.otf.clone()).collect();
         let mut all = psfs.into_iter();
-        let mut sum = all.next().expect("a PSF to take the mean of");
+        let mut sum = all.next().expect("a PSF to take the sum of");
         for psf in all {
             sum.values += &psf.values;
         }
-        if share < 1.0 {
+        if share != 1.0 {
             sum.values *= share;
         }
-        sum.otf = otfs.map(|all| Otf::mean(&all));
+        sum.otf = otfs.map(|all| Otf::sum(&all, share));
         sum
     }
 

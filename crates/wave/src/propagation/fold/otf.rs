@@ -26,20 +26,19 @@ pub struct Otf {
 }
 
 impl Otf {
-    /// Mean of those of two polarisations.
+    /// Sum of those of fields that do not interfere, times a share.
     ///
     /// # Panics
     /// If there is none, or they are at other frequencies.
-    pub fn mean(all: &[Self]) -> Self {
-        let weight = 1.0 / all.len() as f64;
-        let mut mean = all[0].clone();
-        mean.power_um2 = all.iter().map(|o| o.power_um2).sum::<f64>() * weight;
-        for (axis, values) in mean.transform_um2.iter_mut().enumerate() {
+    pub fn sum(all: &[Self], share: f64) -> Self {
+        let mut sum = all[0].clone();
+        sum.power_um2 = all.iter().map(|o| o.power_um2).sum::<f64>() * share;
+        for (axis, values) in sum.transform_um2.iter_mut().enumerate() {
             for (i, value) in values.iter_mut().enumerate() {
-                *value = all.iter().map(|o| o.transform_um2[axis][i]).sum::<Complex64>() * weight;
+                *value = all.iter().map(|o| o.transform_um2[axis][i]).sum::<Complex64>() * share;
             }
         }
-        mean
+        sum
     }
 
     /// Multiply the transform at each frequency (line pairs a millimetre) by what a camera leaves of it.
