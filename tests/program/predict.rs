@@ -234,11 +234,13 @@ fn oblique_light_sees_another_cell_and_the_normal_is_its_limit() {
     let incidence = metalith::rcwa::Incidence::of_sines(0.455, metalith::rcwa::Side::Below, [x, y]);
     let solved = metalith::rcwa::solve(&stack.layers(180.0, 0.455).unwrap(), &incidence, orders).unwrap();
     let n = stack.full_transmission(0.455).unwrap().powi(2);
-    const TURNED: f64 = 1e-4;
+    // Far above what rounding leaves of what symmetry forbids.
+    const TURNED: f64 = 1e-9;
     for (out, power) in turned.iter().zip(solved.zero_order()) {
         assert!((out.iter().map(|t| t.norm_sqr()).sum::<f64>() / n - power).abs() < SOLVED);
     }
-    assert!(turned[0][1].norm_sqr() > TURNED && turned[1][0].norm_sqr() > TURNED);
+    let powers = [turned[0][1], turned[1][0]].map(|t| t.norm_sqr());
+    assert!(powers.iter().all(|p| *p > TURNED), "{powers:?}");
 }
 
 #[test]
