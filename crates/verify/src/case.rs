@@ -4,11 +4,12 @@ use std::collections::HashMap;
 
 use num_complex::Complex64;
 
-use metalith_cell::CellModel;
+use metalith_cell::{CellModel, NeighbourResponse};
 use metalith_core::Progress;
 use metalith_core::{Error, Result, WidthMap};
+use metalith_grating::NeighbourPillars;
 use metalith_made::{SimulationCase, cell_direction};
-use metalith_wave::{Fold, Pillars, PlaneWave, Psf, Scratch};
+use metalith_wave::{Aperture, Fold, Pillars, PlaneWave, Psf, Scratch};
 
 /// The case that judges, and those that are simulated beside it.
 #[derive(Clone)]
@@ -57,6 +58,8 @@ pub(super) struct TransmissionTables {
     pub normal: Vec<Complex64>,
     /// By direction, for s and p; empty where the design asks for normal incidence, or the cell knows no angles.
     oblique: HashMap<[u64; 2], [Vec<Complex64>; 2]>,
+    /// By direction, for s and p, of a cell that knows unlike neighbours.
+    neighbours: HashMap<[u64; 2], [NeighbourResponse; 2]>,
     /// Whether it is one of many wavelengths of a band.
     in_band: bool,
 }
@@ -70,6 +73,7 @@ impl TransmissionTables {
         Ok(Self {
             normal: cell.transmissions(wavelength_um, widest_nm)?,
             oblique: HashMap::new(),
+            neighbours: HashMap::new(),
             in_band: false,
         })
     }
@@ -82,6 +86,7 @@ impl TransmissionTables {
         Ok(Self {
             normal: cell.transmissions_in_band(wavelength_um, widest_nm)?,
             oblique: HashMap::new(),
+            neighbours: HashMap::new(),
             in_band: true,
         })
     }
@@ -117,7 +122,41 @@ impl TransmissionTables {
         Ok(())
     }
 
-    /// The PSF of pillars for a wave on a window: the mean over polarisations where cells are solved at its angle.
+    /// Obtain what pillars transmit among unlike neighbours in light of these directions, if the cell knows.
+    ///
+    /// # Errors
+    /// If the cell has no answer, or the user stopped it.
+    pub fn add_neighbours(&mut self, cell: &dyn CellModel, waves: &[PlaneWave], progress: &dyn Progress) -> Result<()> {
+        for wave in waves {
+            let sines = cell_direction(wave);
+            if !self.neighbours.contains_key(&key(sines)) {
+                let Some(responses) = cell.among_neighbours(wave.wavelength_um, sines, progress)? else {
+                    return Ok(());
+                };
+                self.neighbours.insert(key(sines), responses);
+            }
+        }
+        Ok(())
+    }
+
+    /// An element among its own neighbours for s and p, in light for which that is known.
+    ///
+    /// # Errors
+    /// If it has too many widths.
+    pub fn among_neighbours<'w>(
+        &self,
+        widths: &'w WidthMap,
+        lit: &PlaneWave,
+    ) -> Result<Option<[NeighbourPillars<'w>; 2]>> {
+        let Some(responses) = self.neighbours.get(&key(cell_direction(lit))) else {
+            return Ok(None);
+        };
+        let of = |polarisation| NeighbourPillars::new(widths, responses, [lit.sin_x, lit.sin_y], polarisation);
+        Ok(Some([of(0)?, of(1)?]))
+    }
+
+    /// The PSF of pillars for a wave on a window: the mean over polarisations where cells are solved at an angle. `lit` is
+    /// the wave that they are solved for where they are.
     ///
     /// # Errors
     /// As [`Psf::formed`].
@@ -125,12 +164,17 @@ impl TransmissionTables {
         &self,
         widths: &WidthMap,
         wave: &PlaneWave,
+        lit: &PlaneWave,
         fold: &Fold,
         lp_mm: &[f64],
         scratch: &mut Scratch,
     ) -> Result<Psf> {
-        let of = |table: &Vec<Complex64>| Ok(Psf::formed(fold, &Pillars::new(widths, table)?, wave, lp_mm, scratch)?);
-        Ok(Psf::mean(self.of(wave).iter().map(of).collect::<Result<_>>()?))
+        let mut of = |aperture: &dyn Aperture| Ok(Psf::formed(fold, aperture, wave, lp_mm, scratch)?);
+        if let Some(both) = self.among_neighbours(widths, lit)? {
+            return Ok(Psf::mean(both.iter().map(|a| of(a)).collect::<Result<_>>()?));
+        }
+        let of = |table: &Vec<Complex64>| of(&Pillars::new(widths, table)?);
+        Ok(Psf::mean(self.of(lit).iter().map(of).collect::<Result<_>>()?))
     }
 
     /// The tables whose PSFs are to be averaged: one along the normal, one for each polarisation else.
