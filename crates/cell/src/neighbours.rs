@@ -29,8 +29,8 @@ pub const NEIGHBOURS: [[i32; 2]; 12] = [
 
 /// Highest polynomial in the own width, of a(w) and of b_d, and in the neighbour's.
 const OWN_DEGREE: usize = 12;
-const PAIR_DEGREE: usize = 4;
-const NEIGHBOUR_DEGREE: usize = 3;
+const PAIR_DEGREE: usize = 6;
+const NEIGHBOUR_DEGREE: usize = 4;
 
 /// Number of terms of a(w), and of each b_d.
 const OWN_TERMS: usize = OWN_DEGREE + 1;

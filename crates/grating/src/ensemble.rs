@@ -25,6 +25,10 @@ const MULTIPLES: [f64; 6] = [1.0, 2.0, 3.0, -1.0, -2.0, -3.0];
 
 const SEED: u64 = 0x6d65_7461;
 
+/// Lattices of equal pillars, of this many widths: where the phase is slow, neighbours are nearly equal. They are a tenth of
+/// all sites, so that resonances of equal pillars weigh little.
+const EQUAL: usize = 96;
+
 /// Different pillars side by side.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RandomSupercell {
@@ -71,6 +75,21 @@ pub(crate) fn ensemble(mapping: &Mapping, count: usize) -> Result<Vec<RandomSupe
         all.push(RandomSupercell { lattice, widths_nm });
     }
     Ok(all)
+}
+
+/// Supercells of one site: pillars whose neighbours are all equal.
+///
+/// # Errors
+/// None, as for [`ensemble`].
+pub(crate) fn equal_pillars(mapping: &Mapping) -> Result<Vec<RandomSupercell>> {
+    (0..EQUAL)
+        .map(|i| {
+            Ok(RandomSupercell {
+                lattice: SiteLattice::row(1)?,
+                widths_nm: vec![mapping.width_nm((i as f64 + 0.5) / EQUAL as f64)],
+            })
+        })
+        .collect()
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use metalith_cell::{CellStack, NEIGHBOUR_TERMS, NeighbourBasis, NeighbourRespons
 use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::SiteLattice;
 
-use crate::ensemble::ensemble;
+use crate::ensemble::{ensemble, equal_pillars};
 use crate::fit::{Fitted, fit, neighbours_nm, samples};
 use crate::{COARSE, CoarseCell, Mapping, site_transmissions};
 
@@ -19,7 +19,7 @@ use crate::{COARSE, CoarseCell, Mapping, site_transmissions};
 const SUPERCELLS: [usize; 2] = [120, 240];
 
 /// Raised whenever the supercells or the fit change: kept tables are then of no use.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 const MAGIC: [u8; 8] = *b"MLNEIG\0\x01";
 
@@ -121,7 +121,8 @@ fn solve(
     basis: NeighbourBasis,
     progress: &dyn Progress,
 ) -> Result<Fitted> {
-    let cells = ensemble(mapping, SUPERCELLS[usize::from(spec.sines != [0.0; 2])])?;
+    let mut cells = ensemble(mapping, SUPERCELLS[usize::from(spec.sines != [0.0; 2])])?;
+    cells.extend(equal_pillars(mapping)?);
     progress.begin(
         &format!("solving unlike neighbours at {:.0} nm", spec.wavelength_um * 1e3),
         cells.len() as u64,
@@ -149,6 +150,7 @@ fn inputs(spec: &NeighbourTableSpec, stack: &CellStack, mapping: &Mapping) -> Ve
     struct Inputs<'a> {
         solver: u32,
         version: u32,
+        terms: usize,
         coarse: usize,
         supercells: [usize; 2],
         spec: &'a NeighbourTableSpec,
@@ -158,6 +160,7 @@ fn inputs(spec: &NeighbourTableSpec, stack: &CellStack, mapping: &Mapping) -> Ve
     serde_json::to_vec(&Inputs {
         solver: kept::SOLVER,
         version: VERSION,
+        terms: NEIGHBOUR_TERMS,
         coarse: COARSE,
         supercells: SUPERCELLS,
         spec,

@@ -1,6 +1,7 @@
 //! What a layout is judged by: a cell, or a chip as made.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 use num_complex::Complex64;
 
@@ -129,11 +130,11 @@ impl TransmissionTables {
     pub fn add_neighbours(&mut self, cell: &dyn CellModel, waves: &[PlaneWave], progress: &dyn Progress) -> Result<()> {
         for wave in waves {
             let sines = cell_direction(wave);
-            if !self.neighbours.contains_key(&key(sines)) {
+            if let Entry::Vacant(place) = self.neighbours.entry(key(sines)) {
                 let Some(responses) = cell.among_neighbours(wave.wavelength_um, sines, progress)? else {
                     return Ok(());
                 };
-                self.neighbours.insert(key(sines), responses);
+                place.insert(responses);
             }
         }
         Ok(())
