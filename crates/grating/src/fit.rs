@@ -9,8 +9,8 @@ use metalith_rcwa::SiteLattice;
 use crate::linear::eliminate;
 use crate::table::images;
 
-/// Added to the mean square of each term: sites are fewer than a hundred for a weight, and widths of neighbours are
-/// nearly those of a grating. Of 1e-4 and 1e-3 the results cannot be told apart.
+/// Added to the mean square of each term, as a part of it: sites are a few for each weight, and widths of neighbours are
+/// often nearly those of a grating. Of 1e-4 and 1e-3 the results cannot be told apart.
 const RIDGE: f64 = 1e-4;
 
 /// Every sixth supercell is left out in turn to see the error.
