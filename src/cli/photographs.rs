@@ -55,6 +55,12 @@ pub fn run(args: &PhotographsArgs, terminal: &Terminal) -> Result<Outcome> {
         .collect::<Result<Vec<_>>>()?;
     let phases = phases(args, &task)?;
     let fidelity = Fidelity::from(args.fidelity);
+    if fidelity == Fidelity::Neighbours {
+        return Err(Error::invalid(
+            "photographs of a lens by pillars among unlike neighbours",
+            "rings are added up one by one here; use another --fidelity, and `metalith run --fidelity neighbours` for PSFs",
+        ));
+    }
     let cell: Box<dyn CellModel> = match fidelity {
         // The table, which a run of many wavelengths repays.
         Fidelity::Rigorous => {

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::camera::Camera;
-use metalith::cell::{CellStack, FittedCell, PointwiseCell, PublishedCell};
+use metalith::cell::{CellStack, FittedCell, PointwiseCell, PublishedCell, cache_folder};
 use metalith::gds::{LayerNumber, ReadLimits};
+use metalith::grating::{Mapping, NeighbourCell};
 use metalith::rcwa::Material;
 use metalith::report::{count, sig};
 use metalith::verify::{Lighting, SimulationCase, SinglePsfReport, single_psfs, single_white, write_single_psf_report};
@@ -185,6 +186,9 @@ impl PsfArgs {
             (Some(model), _) => format!("as made, by {}", model.display()),
             (None, FidelityArg::Published) => "published polynomials for pillars of the paper, no amplitude".into(),
             (None, FidelityArg::Fitted) => "polynomials fitted to the rigorous cell, no amplitude".into(),
+            (None, FidelityArg::Neighbours) => {
+                "each pillar among its neighbours, fitted to supercells of the layout's own widths".into()
+            }
             (None, FidelityArg::Rigorous) => "rigorous coupled-wave analysis of a lattice of equal pillars".into(),
         };
         all.push(("cell", cell));
@@ -205,6 +209,10 @@ impl PsfArgs {
         let stack = self.stack(found)?;
         if matches!(self.fidelity, FidelityArg::Published) {
             return Ok(Box::new(PublishedCell::new(stack.pitch_nm as u32)));
+        }
+        if matches!(self.fidelity, FidelityArg::Neighbours) {
+            let mapping = Mapping::of_widths(found.elements.iter().map(|e| e.widths.histogram()))?;
+            return Ok(Box::new(NeighbourCell::new(stack, mapping, cache_folder())));
         }
         let mut widths = found
             .elements

@@ -69,8 +69,12 @@ pub enum FidelityArg {
     Published,
     /// Phase by polynomials fitted to the rigorous cell, no amplitude.
     Fitted,
-    /// Complex transmission by rigorous coupled-wave analysis.
+    /// Complex transmission by rigorous coupled-wave analysis of a lattice of equal pillars.
     Rigorous,
+    /// Each pillar among the unlike neighbours that it has, fitted to rigorous supercells; solved once for a design in some
+    /// minutes, then kept.
+    #[value(alias = "grating")]
+    Neighbours,
 }
 
 impl From<FidelityArg> for Fidelity {
@@ -79,6 +83,7 @@ impl From<FidelityArg> for Fidelity {
             FidelityArg::Published => Self::Published,
             FidelityArg::Fitted => Self::Fitted,
             FidelityArg::Rigorous => Self::Rigorous,
+            FidelityArg::Neighbours => Self::Neighbours,
         }
     }
 }

@@ -7,6 +7,7 @@ mod exact;
 mod fit;
 pub mod kept;
 mod model;
+mod neighbours;
 mod pointwise;
 mod polynomial;
 mod published;
@@ -22,6 +23,7 @@ pub use fit::{
 };
 pub use metalith_rcwa::Material;
 pub use model::{CellModel, Fidelity, ObliqueTables, dark};
+pub use neighbours::{NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourBasis, NeighbourResponse};
 pub use pointwise::PointwiseCell;
 pub use pointwise::{BAND_ORDERS, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, tabulate};
 pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};

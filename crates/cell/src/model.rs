@@ -6,7 +6,9 @@ use std::str::FromStr;
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
-use metalith_core::{Error, Result};
+use metalith_core::{Error, Progress, Result};
+
+use crate::NeighbourResponse;
 
 /// How truly a cell is described. Every result names the one it was made with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -18,13 +20,15 @@ pub enum Fidelity {
     Fitted,
     /// Complex transmission of the zero order by rigorous coupled-wave analysis.
     Rigorous,
+    /// Each pillar among the neighbours that it has, by a sum over pairs fitted to rigorous supercells of unlike pillars.
+    Neighbours,
     /// The rigorous cell of the pillars as a measured line makes them, by a model that `calibrate` wrote.
     Calibrated,
 }
 
 impl Fidelity {
     /// Those that a design alone has, from the least to the most true.
-    pub const ALL: [Self; 3] = [Self::Published, Self::Fitted, Self::Rigorous];
+    pub const ALL: [Self; 4] = [Self::Published, Self::Fitted, Self::Rigorous, Self::Neighbours];
 
     /// The name used in options, files and reports.
     pub fn name(self) -> &'static str {
@@ -32,6 +36,7 @@ impl Fidelity {
             Self::Published => "published",
             Self::Fitted => "fitted",
             Self::Rigorous => "rigorous",
+            Self::Neighbours => "neighbours",
             Self::Calibrated => "calibrated",
         }
     }
@@ -50,7 +55,7 @@ impl FromStr for Fidelity {
         Self::ALL.into_iter().find(|f| f.name() == text).ok_or_else(|| {
             Error::invalid(
                 format!("`{text}` is not a fidelity of the cell"),
-                "use published, fitted or rigorous",
+                "use published, fitted, rigorous or neighbours",
             )
         })
     }
@@ -129,6 +134,21 @@ pub trait CellModel: Sync {
     /// As [`CellModel::oblique`].
     fn oblique_in_band(&self, wavelength_um: f64, sines: [f64; 2], max_width_nm: u16) -> Result<Option<ObliqueTables>> {
         self.oblique(wavelength_um, sines, max_width_nm)
+    }
+
+    /// What pillars transmit among unlike neighbours, for light that arrives from the direction with these sines in air
+    /// along x and y, x >= y >= 0: one response for s and one for p. Nothing if the model takes all neighbours for
+    /// equals; one that does not gives the answers above as a lattice of equal pillars would.
+    ///
+    /// # Errors
+    /// As [`CellModel::transmissions`]; also if no light arrives so steeply, or the user stopped it.
+    fn among_neighbours(
+        &self,
+        _wavelength_um: f64,
+        _sines: [f64; 2],
+        _progress: &dyn Progress,
+    ) -> Result<Option<[NeighbourResponse; 2]>> {
+        Ok(None)
     }
 
     /// |t| of a cell that passes all its power in the zero order: sqrt(n) of the substrate for the

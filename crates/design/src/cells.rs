@@ -2,11 +2,14 @@
 
 use std::path::Path;
 
-use metalith_cell::{CellModel, CellStack, Fidelity, FittedCell, PointwiseCell, PublishedCell, TableSpec};
+use metalith_cell::{
+    CellModel, CellStack, Fidelity, FittedCell, PointwiseCell, PublishedCell, TableSpec, cache_folder,
+};
 use metalith_core::{Error, Result};
+use metalith_grating::{Mapping, NeighbourCell};
 use metalith_rcwa::Material;
 
-use crate::Design;
+use crate::{Design, WidthRule};
 
 /// The band that every design's table spans (um).
 const VISIBLE_UM: (f64, f64) = (0.4, 0.7);
@@ -68,6 +71,15 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
                 Fidelity::Rigorous => {
                     let stack = design.cell_stack()?;
                     Ok(Box::new(PointwiseCell::new(stack, design.cell.widths_nm())))
+                }
+                Fidelity::Neighbours => {
+                    let rule = WidthRule::new(&design.cell, &design.mapping);
+                    let mapping = Mapping::new(|u| rule.width_nm(u));
+                    Ok(Box::new(NeighbourCell::new(
+                        design.cell_stack()?,
+                        mapping,
+                        cache_folder(),
+                    )))
                 }
                 Fidelity::Calibrated => Err(Error::invalid(
                     "a calibrated cell without the model it is calibrated by",

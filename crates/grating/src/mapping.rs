@@ -1,5 +1,7 @@
 //! The mapping of phase to width of a design, forth and back.
 
+use metalith_core::{Error, Result};
+
 /// Phases at which the mapping is sampled over one turn: ten for each of a hundred widths.
 const SAMPLES: usize = 1024;
 
@@ -35,6 +37,34 @@ impl Mapping {
             phases: runs.iter().map(middle).collect(),
             widths_nm,
         }
+    }
+
+    /// Of pillars whose phase is not known: each stands for the share of the pillars that are narrower. `counts` are
+    /// numbers of pillars with the width (nm) as index, of one element each; the first entry counts sites without one.
+    ///
+    /// # Errors
+    /// If there are no pillars.
+    pub fn of_widths(counts: impl IntoIterator<Item = Vec<u64>>) -> Result<Self> {
+        let mut sums: Vec<u64> = Vec::new();
+        for counts in counts {
+            sums.resize(sums.len().max(counts.len()), 0);
+            sums.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+        }
+        let mut up_to = 0;
+        for (width, sum) in sums.iter_mut().enumerate() {
+            up_to += if width == 0 { 0 } else { *sum };
+            *sum = up_to;
+        }
+        if up_to == 0 {
+            return Err(Error::invalid(
+                "a layout without pillars",
+                "name the layer of the pillars",
+            ));
+        }
+        Ok(Self::new(|u| {
+            let narrower = (u * up_to as f64) as u64;
+            sums.partition_point(|sum| *sum <= narrower) as u16
+        }))
     }
 
     /// Drawn width (nm) for a phase (turns, 0 <= u < 1).
@@ -84,6 +114,19 @@ mod tests {
             (None, None, None)
         );
         assert_eq!(mapping.range_nm(), (100.0, 298.0));
+    }
+
+    #[test]
+    fn widths_alone_make_a_mapping_that_draws_each_as_often() {
+        let mut counts = vec![0; 301];
+        (counts[0], counts[100], counts[200], counts[300]) = (999, 1, 2, 1);
+        let mapping = Mapping::of_widths([counts.clone(), counts]).unwrap();
+        assert_eq!(
+            [0.1, 0.3, 0.7, 0.8].map(|u| mapping.width_nm(u)),
+            [100.0, 200.0, 200.0, 300.0]
+        );
+        assert!(Mapping::of_widths([vec![7]]).is_err());
+        assert!(Mapping::of_widths([]).is_err());
     }
 
     #[test]

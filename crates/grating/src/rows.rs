@@ -19,21 +19,57 @@ pub struct RealRow {
     pub widths_nm: Vec<f64>,
 }
 
-impl RealRow {
+/// A row whose supercell is solved.
+#[derive(Clone, Debug)]
+pub struct SolvedRow {
+    /// The sites of its supercell.
+    pub lattice: SiteLattice,
+    /// Width of each site (nm), in their order.
+    pub widths_nm: Vec<f64>,
+    /// What each site transmits, `[polarisation][site]`.
+    transmitted: [Vec<Complex64>; 2],
+    full: f64,
+}
+
+impl SolvedRow {
     /// Light that a model puts elsewhere than the supercell does: sum of |t - t'|^2 over the sites, over that of full
-    /// transmission; mean of s and p.
+    /// transmission; mean of s and p. `found` is the transmission of every site by the model, `[polarisation][site]`,
+    /// scaled as that of a single cell.
+    pub fn misfit(&self, found: &[Vec<Complex64>; 2]) -> f64 {
+        let wanted = self.transmitted.iter().flatten();
+        let sum: f64 = found
+            .iter()
+            .flatten()
+            .zip(wanted)
+            .map(|(a, b)| (a - b).norm_sqr())
+            .sum();
+        sum / (2.0 * self.widths_nm.len() as f64 * self.full * self.full)
+    }
+}
+
+impl RealRow {
+    /// Light that a model puts elsewhere than the supercell does, as [`SolvedRow::misfit`].
     ///
     /// `sines` is the direction of arrival in air. `model` gives the transmission of every site of the lattice from
-    /// its widths (nm), `[polarisation][site]`, scaled as that of a single cell.
+    /// its widths (nm).
     ///
     /// # Errors
-    /// If the direction makes fewer sites than there are pillars, or as the solver.
+    /// As [`RealRow::solve`], or those of the model.
     pub fn misfit(
         &self,
         cell: &CoarseCell<'_>,
         sines: [f64; 2],
         model: impl Fn(&SiteLattice, &[f64]) -> Result<[Vec<Complex64>; 2]>,
     ) -> Result<f64> {
+        let solved = self.solve(cell, sines)?;
+        Ok(solved.misfit(&model(&solved.lattice, &solved.widths_nm)?))
+    }
+
+    /// Solve its supercell for light from a direction (sines in air).
+    ///
+    /// # Errors
+    /// If the direction makes fewer sites than there are pillars, or as the solver.
+    pub fn solve(&self, cell: &CoarseCell<'_>, sines: [f64; 2]) -> Result<SolvedRow> {
         let pillars = self.widths_nm.len();
         let lattice = SiteLattice::of_grating(self.direction, pillars)?;
         if lattice.len() != pillars {
@@ -51,14 +87,11 @@ impl RealRow {
             .collect();
         let full = cell.full_transmission()?;
         let response = cell.solve(lattice, &widths, sines)?;
-        let wanted = site_transmissions(&lattice, &response, cell.wavelength_over_pitch(), full);
-        let found = model(&lattice, &widths)?;
-        let sum: f64 = found
-            .iter()
-            .flatten()
-            .zip(wanted.iter().flatten())
-            .map(|(a, b)| (a - b).norm_sqr())
-            .sum();
-        Ok(sum / (2.0 * pillars as f64 * full * full))
+        Ok(SolvedRow {
+            transmitted: site_transmissions(&lattice, &response, cell.wavelength_over_pitch(), full),
+            lattice,
+            widths_nm: widths,
+            full,
+        })
     }
 }

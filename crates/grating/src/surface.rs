@@ -4,6 +4,8 @@ use num_complex::Complex64;
 
 use metalith_core::{Error, Result};
 
+use crate::linear::eliminate;
+
 /// The cubic spline in two dimensions: sum of |K - K_i|^3 weights and a plane through places K_i, by solving the dense
 /// equations (Duchon 1977; Wendland, Scattered Data Approximation, 2004, chapter 8).
 #[derive(Clone, Debug)]
@@ -12,6 +14,9 @@ pub struct Surface<const N: usize> {
     /// Weight of each place, then constant and slopes of the plane.
     weights: Vec<[Complex64; N]>,
 }
+
+/// Pivots below this are those of a singular matrix: distances between places are 0.01 to 1.
+const LEAST_PIVOT: f64 = 1e-12;
 
 /// Unknowns of the plane.
 const PLANE: usize = 3;
@@ -38,7 +43,12 @@ impl<const N: usize> Surface<N> {
         }
         let mut weights = values.to_vec();
         weights.resize(size, [Complex64::ZERO; N]);
-        eliminate(&mut matrix, &mut weights)?;
+        eliminate(&mut matrix, &mut weights, LEAST_PIVOT).ok_or_else(|| {
+            Error::invalid(
+                "grating vectors that coincide or lie on one line",
+                "give at least three that span the plane",
+            )
+        })?;
         Ok(Self {
             places: places.to_vec(),
             weights,
@@ -64,54 +74,6 @@ fn cube(a: &[f64; 2], b: &[f64; 2]) -> f64 {
 
 fn plane([x, y]: &[f64; 2]) -> [f64; PLANE] {
     [1.0, *x, *y]
-}
-
-/// Gauss's elimination with partial pivots; the solution takes the place of the right-hand sides.
-fn eliminate<const N: usize>(matrix: &mut [Vec<f64>], right: &mut [[Complex64; N]]) -> Result<()> {
-    /// Pivots below this are those of a singular matrix: distances between places are 0.01 to 1.
-    const LEAST_PIVOT: f64 = 1e-12;
-    let size = matrix.len();
-    for column in 0..size {
-        let pivot = (column..size)
-            .max_by(|&a, &b| matrix[a][column].abs().total_cmp(&matrix[b][column].abs()))
-            .expect("rows are left");
-        if matrix[pivot][column].abs() < LEAST_PIVOT {
-            return Err(Error::invalid(
-                "grating vectors that coincide or lie on one line",
-                "give at least three that span the plane",
-            ));
-        }
-        matrix.swap(column, pivot);
-        right.swap(column, pivot);
-        let (above, below) = matrix.split_at_mut(column + 1);
-        let (right_above, right_below) = right.split_at_mut(column + 1);
-        let (own, right_own) = (&above[column], &right_above[column]);
-        for (row, right) in below.iter_mut().zip(right_below) {
-            let factor = row[column] / own[column];
-            if factor == 0.0 {
-                continue;
-            }
-            for (value, own) in row[column..].iter_mut().zip(&own[column..]) {
-                *value -= factor * own;
-            }
-            for (value, own) in right.iter_mut().zip(right_own) {
-                *value -= own * factor;
-            }
-        }
-    }
-    for row in (0..size).rev() {
-        let (left, solved) = right.split_at_mut(row + 1);
-        let own = &mut left[row];
-        for (solved, factor) in solved.iter().zip(&matrix[row][row + 1..]) {
-            for (value, solved) in own.iter_mut().zip(solved) {
-                *value -= solved * factor;
-            }
-        }
-        for value in own {
-            *value /= matrix[row][row];
-        }
-    }
-    Ok(())
 }
 
 #[cfg(test)]

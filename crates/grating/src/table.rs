@@ -227,7 +227,7 @@ fn chosen(spec: &GratingTableSpec) -> Result<Vec<GratingVector>> {
 
 /// A grating vector and its mirror images that are the same to light of this direction; whether s and p change
 /// places.
-fn images(sines: [f64; 2], k: [f64; 2]) -> Vec<([f64; 2], bool)> {
+pub(crate) fn images(sines: [f64; 2], k: [f64; 2]) -> Vec<([f64; 2], bool)> {
     let mut all = vec![(k, false)];
     for axis in [0, 1] {
         if sines[axis] == 0.0 {

@@ -4,7 +4,7 @@ use metalith_cell::Fidelity;
 use metalith_design::{CellIncidence, Design, Element};
 use metalith_report::{Cell, Column, Page, Table, fixed, sig};
 
-use super::{PsfResult, Verification};
+use super::{OrderEfficiencies, PsfResult, Verification};
 
 /// Share by which a cell in an infinite lattice of equal pillars overstates the first order of a blazed row at 455,
 /// 530 and 660 nm, by the turns of phase a pitch: rows of 18, 6, 3 and 2.5 pillars a turn of the shipped mapping,
@@ -28,7 +28,13 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
     let mut row = |what: &str, size: String, how: &str| {
         table.row([Cell::from(what), Cell::from(size), Cell::from(how)]);
     };
-    if found.fidelity != Fidelity::Published && found.fidelity != Fidelity::Fitted {
+    if found.fidelity == Fidelity::Neighbours {
+        row(
+            "Each pillar passes light by its own width and those of its twelve nearest neighbours",
+            equal_neighbours(found),
+            "a sum over pairs, fitted to supercells of unlike pillars; rows of real pillars are met to some hundredths of the light. Figures of white light still take neighbours for equals",
+        );
+    } else if found.fidelity != Fidelity::Published && found.fidelity != Fidelity::Fitted {
         row(
             "Each pillar passes light as in an infinite lattice of equal pillars",
             neighbours(design),
@@ -41,7 +47,13 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
             "--fidelity rigorous shows them",
         );
     }
-    if design.verify.incidence == CellIncidence::Normal {
+    if design.verify.incidence == CellIncidence::Normal && found.fidelity == Fidelity::Neighbours {
+        row(
+            "Cells are lit from the middle of each element's field",
+            "not computed in this run".into(),
+            "--as-lit solves them for each field angle",
+        );
+    } else if design.verify.incidence == CellIncidence::Normal {
         row(
             "Cells are lit along the normal",
             "not computed in this run".into(),
@@ -79,6 +91,26 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
         "direct sums in double precision; polarisation of the field behind the lens is left out",
     );
     page.table(table);
+}
+
+/// Share of the light in the first order by equal neighbours over that by the neighbours that there are.
+fn equal_neighbours(found: &Verification) -> String {
+    let of = |orders: &[OrderEfficiencies], fidelity, um: f64| {
+        let same = |o: &&OrderEfficiencies| o.fidelity == fidelity && o.wavelength_um == um;
+        orders.iter().find(same).map(|o| o.first)
+    };
+    let each = found.distinct.iter().map(|element| {
+        let orders = &element.orders;
+        let own = orders.iter().filter(|o| o.fidelity == Fidelity::Neighbours);
+        let ratios = own.filter_map(|o| Some(of(orders, Fidelity::Rigorous, o.wavelength_um)? / o.first));
+        let ratios: Vec<String> = ratios.map(|r| fixed(r, 2)).collect();
+        format!("{} times in element {}", ratios.join(", "), element.element.label())
+    });
+    let each: Vec<String> = each.collect();
+    format!(
+        "equal neighbours would have in the first order, by wavelength, {}",
+        each.join("; ")
+    )
 }
 
 /// By how much the first order is overstated, for the wedges of the middle and of the outermost element.

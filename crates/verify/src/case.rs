@@ -1,14 +1,16 @@
 //! What a layout is judged by: a cell, or a chip as made.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 use num_complex::Complex64;
 
-use metalith_cell::{CellModel, ObliqueTables};
+use metalith_cell::{CellModel, NeighbourResponse, ObliqueTables};
 use metalith_core::Progress;
 use metalith_core::{Error, Result, WidthMap};
+use metalith_grating::NeighbourPillars;
 use metalith_made::{SimulationCase, cell_direction};
-use metalith_wave::{Fold, Pillars, PlaneWave, Psf, Scratch};
+use metalith_wave::{Aperture, Fold, Pillars, PlaneWave, Psf, Scratch};
 
 /// The case that judges, and those that are simulated beside it.
 #[derive(Clone)]
@@ -60,6 +62,8 @@ pub(super) struct TransmissionTables {
     pub normal: Vec<Complex64>,
     /// By direction, for s and p; empty where the design asks for normal incidence, or the cell knows no angles.
     oblique: HashMap<[u64; 2], ObliqueTables>,
+    /// By direction, for s and p, of a cell that knows unlike neighbours.
+    neighbours: HashMap<[u64; 2], [NeighbourResponse; 2]>,
     /// Whether it is one of many wavelengths of a band.
     in_band: bool,
 }
@@ -73,6 +77,7 @@ impl TransmissionTables {
         Ok(Self {
             normal: cell.transmissions(wavelength_um, widest_nm)?,
             oblique: HashMap::new(),
+            neighbours: HashMap::new(),
             in_band: false,
         })
     }
@@ -85,6 +90,7 @@ impl TransmissionTables {
         Ok(Self {
             normal: cell.transmissions_in_band(wavelength_um, widest_nm)?,
             oblique: HashMap::new(),
+            neighbours: HashMap::new(),
             in_band: true,
         })
     }
@@ -120,7 +126,41 @@ impl TransmissionTables {
         Ok(())
     }
 
-    /// The PSF of pillars for a wave on a window: the mean over polarisations where cells are solved at its angle.
+    /// Obtain what pillars transmit among unlike neighbours in light of these directions, if the cell knows.
+    ///
+    /// # Errors
+    /// If the cell has no answer, or the user stopped it.
+    pub fn add_neighbours(&mut self, cell: &dyn CellModel, waves: &[PlaneWave], progress: &dyn Progress) -> Result<()> {
+        for wave in waves {
+            let sines = cell_direction(wave);
+            if let Entry::Vacant(place) = self.neighbours.entry(key(sines)) {
+                let Some(responses) = cell.among_neighbours(wave.wavelength_um, sines, progress)? else {
+                    return Ok(());
+                };
+                place.insert(responses);
+            }
+        }
+        Ok(())
+    }
+
+    /// An element among its own neighbours for s and p, in light for which that is known.
+    ///
+    /// # Errors
+    /// If it has too many widths.
+    pub fn among_neighbours<'w>(
+        &self,
+        widths: &'w WidthMap,
+        lit: &PlaneWave,
+    ) -> Result<Option<[NeighbourPillars<'w>; 2]>> {
+        let Some(responses) = self.neighbours.get(&key(cell_direction(lit))) else {
+            return Ok(None);
+        };
+        let of = |polarisation| NeighbourPillars::new(widths, responses, [lit.sin_x, lit.sin_y], polarisation);
+        Ok(Some([of(0)?, of(1)?]))
+    }
+
+    /// The PSF of pillars for a wave on a window: the mean over polarisations where cells are solved at an angle. `lit` is
+    /// the wave that they are solved for where they are.
     ///
     /// # Errors
     /// As [`Psf::formed`].
@@ -128,13 +168,18 @@ impl TransmissionTables {
         &self,
         widths: &WidthMap,
         wave: &PlaneWave,
+        lit: &PlaneWave,
         fold: &Fold,
         lp_mm: &[f64],
         scratch: &mut Scratch,
     ) -> Result<Psf> {
-        let mut of =
-            |table: &Vec<Complex64>| Ok(Psf::formed(fold, &Pillars::new(widths, table)?, wave, lp_mm, scratch)?);
-        match self.oblique.get(&key(cell_direction(wave))) {
+        let mut of = |aperture: &dyn Aperture| Ok(Psf::formed(fold, aperture, wave, lp_mm, scratch)?);
+        if let Some(both) = self.among_neighbours(widths, lit)? {
+            let psfs = both.iter().map(|a| of(a)).collect::<Result<_>>()?;
+            return Ok(Psf::sum(psfs, POLARISATION_SHARE));
+        }
+        let mut of = |table: &Vec<Complex64>| of(&Pillars::new(widths, table)?);
+        match self.oblique.get(&key(cell_direction(lit))) {
             Some(tables) => Ok(Psf::sum(
                 tables.passed().map(of).collect::<Result<_>>()?,
                 POLARISATION_SHARE,

@@ -10,6 +10,7 @@ mod phase;
 mod psf_metrics;
 mod single;
 mod single_white;
+mod site_orders;
 mod white;
 mod white_page;
 mod widths;
@@ -196,7 +197,7 @@ pub fn verify_layout(
             copies,
             phase: responses.errors(&read, &phase, &rule, progress)?,
             steepness: Steepness::of(array.lattice.sites(), |ix, iy| phase.turns(ix, iy)),
-            orders: simulator.orders(&rule, &read, progress)?,
+            orders: simulator.orders(&element, &phase, &rule, &read, progress)?,
             spots: simulator.simulate(&element, &phase, &read, progress)?,
             white: match &white {
                 Some(white) => white.simulate(&element, &read, progress)?,

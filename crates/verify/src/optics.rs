@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::case::{SimulationCases, TransmissionTables};
 use super::psf_metrics::{OrderEfficiencies, PsfImages, PsfPair, PsfResult};
+use super::site_orders::site_shares;
 use metalith_cell::Fidelity;
 use metalith_core::Progress;
 use metalith_core::{Error, Result};
@@ -16,7 +17,10 @@ use metalith_design::{CellIncidence, Design, Element, FieldAngle};
 use metalith_made::{DrawnElement, MadeChip, MadeElement, MadeView, SimulationCase};
 use metalith_wave::propagation::{incident, landing_um};
 use metalith_wave::psf::{CONTRAST_LP_MM, CURVE_LP_MM};
-use metalith_wave::{Accuracy, Fold, Matched, PhaseFunction, PhaseMap, PlaneWave, Psf, Scratch, Window};
+use metalith_wave::{Accuracy, Aperture, Fold, Matched, PhaseFunction, PhaseMap, PlaneWave, Psf, Scratch, Window};
+
+/// Where an element looks.
+const MIDDLE: FieldAngle = FieldAngle { x_deg: 0.0, y_deg: 0.0 };
 
 /// One wavelength, with what all elements and angles share.
 struct Colour {
@@ -85,6 +89,7 @@ impl<'a> ElementSimulator<'a> {
     /// # Errors
     /// If a cell has no answer, or the user stopped it.
     pub fn add_directions(&mut self, elements: &[Element], progress: &dyn Progress) -> Result<()> {
+        self.add_neighbours(elements, progress)?;
         let spec = &self.design.verify;
         let cells = self
             .cases
@@ -109,6 +114,34 @@ impl<'a> ElementSimulator<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Obtain what pillars transmit among unlike neighbours, from the cells that know: in light from the middle of an
+    /// element's field, or from each of its field angles if the design asks for cells as they are lit.
+    fn add_neighbours(&mut self, elements: &[Element], progress: &dyn Progress) -> Result<()> {
+        let spec = &self.design.verify;
+        let angles: &[FieldAngle] = if self.as_lit() { &spec.field_angles } else { &[MIDDLE] };
+        for colour in &mut self.colours {
+            let wavelength_um = colour.wavelength_um;
+            let waves = elements
+                .iter()
+                .flat_map(|e| angles.iter().map(move |a| arriving(e, wavelength_um, *a)))
+                .collect::<Result<Vec<_>>>()?;
+            for (at, case) in colour.cases.iter_mut().zip(&self.cases) {
+                if let (Some(tables), SimulationCase::Cell(cell)) = (&mut at.tables, case) {
+                    tables.add_neighbours(*cell, &waves, progress)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The light that cells with unlike neighbours are solved for where this wave arrives.
+    fn lit(&self, element: &Element, wave: &PlaneWave) -> Result<PlaneWave> {
+        if self.as_lit() {
+            return Ok(*wave);
+        }
+        arriving(element, wave.wavelength_um, MIDDLE)
     }
 
     /// The lens with the perfect phase for the place where a chief ray lands, all sites of modulus one: what Strehl ratios
@@ -150,24 +183,43 @@ impl<'a> ElementSimulator<'a> {
     }
 
     /// Where light goes, at each wavelength in each case, along the normal. Where widths follow density, their
-    /// mean over the element counts.
+    /// mean over the element counts; where cells know unlike neighbours, the sites of the element in light from the middle
+    /// of its field.
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
     pub fn orders(
         &self,
+        element: &Element,
+        phase: &ElementPhase<'_>,
         rule: &WidthRule,
-        element: &ReadElement<'_>,
+        read: &ReadElement<'_>,
         progress: &dyn Progress,
     ) -> Result<Vec<OrderEfficiencies>> {
         let mut all = Vec::new();
         for colour in &self.colours {
+            let middle = arriving(element, colour.wavelength_um, MIDDLE)?;
             for (at, case) in colour.cases.iter().zip(&self.cases) {
+                if let Some(tables) = &at.tables
+                    && let Some(both) = tables.among_neighbours(read.drawn.pillars(), &middle)?
+                {
+                    let both = both.each_ref().map(|a| -> &dyn Aperture { a });
+                    let found = site_shares(&both, phase, at.full);
+                    all.push(OrderEfficiencies {
+                        wavelength_um: colour.wavelength_um,
+                        fidelity: at.fidelity,
+                        first: found.orders[1],
+                        zero: found.orders[0],
+                        second: found.orders[2],
+                        transmitted: found.transmitted,
+                    });
+                    continue;
+                }
                 let made;
                 let table = match (&at.tables, case) {
                     (Some(tables), _) => &tables.normal,
                     (None, SimulationCase::Made(chip)) => {
-                        made = by_drawn_width(chip, rule, &element.drawn, colour.wavelength_um, progress)?;
+                        made = by_drawn_width(chip, rule, &read.drawn, colour.wavelength_um, progress)?;
                         &made
                     }
                     (None, SimulationCase::Cell(_)) => unreachable!("every cell has its tables"),
@@ -254,6 +306,7 @@ impl<'a> ElementSimulator<'a> {
             colour, field, wave, ..
         } = task;
         let wavelength_um = colour.wavelength_um;
+        let lit = self.lit(element, wave)?;
         let chief = landing_um(&element.wedge, wave, lens.focal_length_um)?;
         let window = Window::about(
             chief,
@@ -275,7 +328,7 @@ impl<'a> ElementSimulator<'a> {
             };
             let found = match (&at.tables, view) {
                 (_, Some(view)) => view.psf(window, self.accuracy, lp_mm, scratch)?,
-                (Some(tables), None) => tables.psf(widths, wave, &fold, lp_mm, scratch)?,
+                (Some(tables), None) => tables.psf(widths, wave, &lit, &fold, lp_mm, scratch)?,
                 (None, None) => unreachable!("a case is a cell or a made chip"),
             };
             let matched = scaled(&perfect, at.full);

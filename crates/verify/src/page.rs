@@ -6,6 +6,7 @@ use std::path::Path;
 use ndarray::Array2;
 
 use super::{DistinctElement, PsfResult, Sense, Verification, assumptions, white_page};
+use metalith_cell::Fidelity;
 use metalith_core::Result;
 use metalith_design::array::PillarArray;
 use metalith_design::phase::{ElementPhase, LensPhase};
@@ -352,9 +353,14 @@ fn simulated(page: &mut Page, found: &Verification, element: &DistinctElement) {
             Cell::fixed(entry.transmitted * 100.0, 1),
         ]);
     }
-    page.table(orders.caption(
-        "Where light goes by the mapping's own account: the first order is the image, the zero order passes the element as if it had no phase.",
-    ));
+    let whose = if found.fidelity == Fidelity::Neighbours {
+        "the mapping's own account, for `neighbours` by that of the element's pillars"
+    } else {
+        "the mapping's own account"
+    };
+    page.table(orders.caption(format!(
+        "Where light goes by {whose}: the first order is the image, the zero order passes the element as if it had no phase.",
+    )));
     white_page::write(page, found, element);
 }
 
@@ -449,6 +455,9 @@ fn method(page: &mut Page, design: &Design, found: &Verification) {
         "The cell that judges is `{}`, lit {}; wavelengths {} nm; windows of {} x {} samples of one pitch about the chief ray; sensor pixels of {} um.",
         found.fidelity,
         match design.verify.incidence {
+            CellIncidence::Normal if found.fidelity == Fidelity::Neighbours => {
+                "from the middle of each element's field"
+            }
             CellIncidence::Normal => "along the normal at all field angles",
             CellIncidence::AsLit => "at the angle that light arrives at, both polarisations",
         },

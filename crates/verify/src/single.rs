@@ -111,6 +111,7 @@ fn by_cell(
     if light.cells_as_lit {
         tables.add_directions(cell, &[wave], widest, &Silent)?;
     }
+    tables.add_neighbours(cell, &[wave], progress)?;
     elements
         .par_iter()
         .map_init(Scratch::default, |scratch, (_, widths)| {
@@ -119,7 +120,7 @@ fn by_cell(
             }
             let (window, radius_um) = (light.window(widths.lattice), widths.circle_um());
             let fold = Fold::plan(widths.lattice, radius_um, wavelength_um, window, light.accuracy)?;
-            let psf = tables.psf(widths, &wave, &fold, &CONTRAST_LP_MM, scratch)?;
+            let psf = tables.psf(widths, &wave, &wave, &fold, &CONTRAST_LP_MM, scratch)?;
             progress.advance(1);
             Ok(psf)
         })

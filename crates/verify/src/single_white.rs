@@ -89,7 +89,7 @@ pub fn single_white(
                 (Some(view), _) => metalith_made::MadeView::psf(view, window, Accuracy::Fast, &CURVE_LP_MM, scratch)?,
                 (None, Some(tables)) => {
                     let fold = Fold::plan(widths.lattice, widths.circle_um(), um, window, Accuracy::Fast)?;
-                    tables.psf(widths, &wave, &fold, &CURVE_LP_MM, scratch)?
+                    tables.psf(widths, &wave, &wave, &fold, &CURVE_LP_MM, scratch)?
                 }
                 (None, None) => unreachable!("a case is a cell or a made chip"),
             };

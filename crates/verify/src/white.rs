@@ -298,7 +298,7 @@ impl<'a> WhiteSimulator<'a> {
             (None, Some(tables)) => {
                 let radius_um = lens.radius_um();
                 let fold = Fold::plan(self.lattice, radius_um, colour.wavelength_um, window, Accuracy::Fast)?;
-                tables.psf(read.drawn.pillars(), &wave, &fold, &self.lp_mm, scratch)?
+                tables.psf(read.drawn.pillars(), &wave, &wave, &fold, &self.lp_mm, scratch)?
             }
             (None, None) => unreachable!("a case is a cell or a made chip"),
         };

@@ -19,7 +19,7 @@ pub struct Row {
     pub share_zero: f64,
     pub share_first: f64,
     pub first: Complex64,
-    local_normal: f64,
+    pub local_normal: f64,
     local_as_lit: f64,
 }
 

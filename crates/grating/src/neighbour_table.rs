@@ -1,0 +1,221 @@
+//! Responses of pillars among unlike neighbours for one light: fitted to supercells, and kept.
+
+use std::path::Path;
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use metalith_cell::{CellStack, NEIGHBOUR_TERMS, NeighbourBasis, NeighbourResponse, kept};
+use metalith_core::{Error, Progress, Result};
+use metalith_rcwa::SiteLattice;
+
+use crate::ensemble::{ensemble, equal_pillars};
+use crate::fit::{Fitted, fit, neighbours_nm, samples};
+use crate::{COARSE, CoarseCell, Mapping, site_transmissions};
+
+/// Supercells along the normal, where each of their sites counts for eight by symmetry, and for other directions. With
+/// half as many, what is left over grows by a tenth.
+const SUPERCELLS: [usize; 2] = [120, 240];
+
+/// Raised whenever the supercells or the fit change: kept tables are then of no use.
+const VERSION: u32 = 2;
+
+const MAGIC: [u8; 8] = *b"MLNEIG\0\x01";
+
+/// The light that a table is for.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct NeighbourTableSpec {
+    pub wavelength_um: f64,
+    /// Direction of arrival, sines in air along x and y; x >= y >= 0 shares tables between directions that are alike.
+    pub sines: [f64; 2],
+}
+
+/// What pillars transmit among unlike neighbours in one light.
+#[derive(Clone, Debug)]
+pub struct NeighbourTable {
+    /// For s and p; |t| of a site that passes all its light is 1.
+    responses: [NeighbourResponse; 2],
+    left_out: f64,
+}
+
+impl NeighbourTable {
+    /// The table of a light: from the folder `cache` if it is kept there, else solved, and kept there.
+    ///
+    /// # Errors
+    /// If no such light arrives, a supercell cannot be solved, or the user stopped it.
+    pub fn obtain(
+        spec: &NeighbourTableSpec,
+        stack: &CellStack,
+        mapping: &Mapping,
+        cache: Option<&Path>,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        if ![spec.wavelength_um, spec.sines[0], spec.sines[1]]
+            .iter()
+            .all(|v| v.is_finite())
+        {
+            return Err(Error::invalid(
+                format!("a table of neighbours for {spec:?}"),
+                "give finite numbers",
+            ));
+        }
+        let basis = NeighbourBasis::new(mapping.samples_nm().iter().map(|w| f64::from(*w)));
+        let inputs = inputs(spec, stack, mapping);
+        let file = cache.map(|folder| folder.join(format!("neighbours-{}.bin", kept::name_of(&inputs))));
+        if let Some(file) = &file {
+            // Weights and inputs are a few thousand bytes each.
+            let longest = 1 << 20;
+            match kept::read(file, MAGIC, &inputs, longest) {
+                Ok(Some(content)) => match decode(&content, basis) {
+                    Some(table) => return Ok(table),
+                    None => progress.note(&format!("{} is not used: it holds other weights", file.display())),
+                },
+                Ok(None) => {}
+                Err(why) => progress.note(&format!("{} is not used: {why}", file.display())),
+            }
+        }
+        let Fitted { responses, left_out } = solve(spec, stack, mapping, basis, progress)?;
+        let table = Self { responses, left_out };
+        if let Some(file) = &file
+            && let Err(error) = kept::write(file, MAGIC, &inputs, &encode(&table))
+        {
+            progress.note(&format!("the table of neighbours is not kept: {error}"));
+        }
+        Ok(table)
+    }
+
+    /// The responses for s and p, where |t| of a site that passes all its light is `full`.
+    pub fn responses(&self, full: f64) -> [NeighbourResponse; 2] {
+        self.responses.clone().map(|mut response| {
+            response.weights.iter_mut().for_each(|w| *w *= full);
+            response
+        })
+    }
+
+    /// What the sites of a supercell transmit by the sum over pairs, `[polarisation][site]`, where |t| of a site that
+    /// passes all its light is `full`; one width (nm) for each site.
+    pub fn sites(&self, lattice: &SiteLattice, widths_nm: &[f64], full: f64) -> [Vec<Complex64>; 2] {
+        self.responses(full).map(|response| {
+            let site = |i: usize| {
+                let terms = response
+                    .basis
+                    .terms(widths_nm[i], &neighbours_nm(lattice, widths_nm, i));
+                response.weights.iter().zip(terms).map(|(w, t)| w * t).sum()
+            };
+            (0..lattice.len()).map(site).collect()
+        })
+    }
+
+    /// Light that the sum over pairs puts elsewhere than supercells do that it was not fitted to: mean of |t - t'|^2 over
+    /// sites, s and p.
+    pub fn left_out(&self) -> f64 {
+        self.left_out
+    }
+}
+
+fn solve(
+    spec: &NeighbourTableSpec,
+    stack: &CellStack,
+    mapping: &Mapping,
+    basis: NeighbourBasis,
+    progress: &dyn Progress,
+) -> Result<Fitted> {
+    let mut cells = ensemble(mapping, SUPERCELLS[usize::from(spec.sines != [0.0; 2])])?;
+    cells.extend(equal_pillars(mapping)?);
+    progress.begin(
+        &format!("solving unlike neighbours at {:.0} nm", spec.wavelength_um * 1e3),
+        cells.len() as u64,
+    );
+    let coarse = CoarseCell::new(stack, spec.wavelength_um, mapping.range_nm())?;
+    let sites = cells
+        .par_iter()
+        .enumerate()
+        .map(|(number, cell)| {
+            if progress.stopped() {
+                return Err(Error::Interrupted);
+            }
+            let response = coarse.solve(cell.lattice, &cell.widths_nm, spec.sines)?;
+            let t = site_transmissions(&cell.lattice, &response, coarse.wavelength_over_pitch(), 1.0);
+            progress.advance(1);
+            Ok(samples(number, &cell.lattice, &cell.widths_nm, &t))
+        })
+        .collect::<Result<Vec<_>>>()?;
+    fit(basis, spec.sines, &sites.concat())
+}
+
+/// The inputs as text: equal if and only if the table is the same.
+fn inputs(spec: &NeighbourTableSpec, stack: &CellStack, mapping: &Mapping) -> Vec<u8> {
+    #[derive(Serialize)]
+    struct Inputs<'a> {
+        solver: u32,
+        version: u32,
+        terms: usize,
+        coarse: usize,
+        supercells: [usize; 2],
+        spec: &'a NeighbourTableSpec,
+        stack: &'a CellStack,
+        widths_nm: &'a [u16],
+    }
+    serde_json::to_vec(&Inputs {
+        solver: kept::SOLVER,
+        version: VERSION,
+        terms: NEIGHBOUR_TERMS,
+        coarse: COARSE,
+        supercells: SUPERCELLS,
+        spec,
+        stack,
+        widths_nm: mapping.samples_nm(),
+    })
+    .expect("plain data serialises")
+}
+
+/// What was left out, then Re and Im of each weight, s then p (f64, little-endian).
+fn encode(table: &NeighbourTable) -> Vec<u8> {
+    let weights = table.responses.iter().flat_map(|r| &r.weights);
+    let numbers = std::iter::once(table.left_out).chain(weights.flat_map(|w| [w.re, w.im]));
+    numbers.flat_map(f64::to_le_bytes).collect()
+}
+
+/// The table of these bytes; none if they are not so many, or not finite.
+fn decode(content: &[u8], basis: NeighbourBasis) -> Option<NeighbourTable> {
+    let (numbers, rest) = content.as_chunks::<8>();
+    let numbers: Vec<f64> = numbers.iter().map(|b| f64::from_le_bytes(*b)).collect();
+    if numbers.len() != 1 + 4 * NEIGHBOUR_TERMS || !rest.is_empty() || numbers.iter().any(|v| !v.is_finite()) {
+        return None;
+    }
+    let weight = |i: usize| Complex64::new(numbers[1 + 2 * i], numbers[2 + 2 * i]);
+    Some(NeighbourTable {
+        left_out: numbers[0],
+        responses: [0, 1].map(|pol| NeighbourResponse {
+            basis,
+            weights: (0..NEIGHBOUR_TERMS)
+                .map(|i| weight(pol * NEIGHBOUR_TERMS + i))
+                .collect(),
+        }),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kept_weights_come_back() {
+        let basis = NeighbourBasis::new([100.0, 300.0].into_iter());
+        let weights = |pol: usize| (0..NEIGHBOUR_TERMS).map(move |i| Complex64::new(i as f64, pol as f64));
+        let table = NeighbourTable {
+            left_out: 0.02,
+            responses: [0, 1].map(|pol| NeighbourResponse {
+                basis,
+                weights: weights(pol).collect(),
+            }),
+        };
+        let mut bytes = encode(&table);
+        let back = decode(&bytes, basis).unwrap();
+        assert_eq!((back.left_out, &back.responses), (table.left_out, &table.responses));
+        assert!(decode(&bytes[8..], basis).is_none());
+        bytes[..8].copy_from_slice(&f64::NAN.to_le_bytes());
+        assert!(decode(&bytes, basis).is_none());
+    }
+}
