@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::camera::Camera;
 use metalith::picture::scene::{SceneFile, read_scene};
-use metalith::picture::{Detail, Studio, write_dataset};
-use metalith::{CalibratedModel, Design, Error, Result};
+use metalith::picture::{Studio, write_dataset};
+use metalith::{Error, Result};
 
+use super::camera_args::{CameraArgs, CameraFiles};
 use super::{Outcome, Terminal, print_line};
 
 /// Record the frame of every image of a folder, for learning: frames, what an ideal camera gives, and a manifest.
@@ -26,25 +26,8 @@ pub struct DatasetArgs {
     #[arg(long)]
     layout: PathBuf,
 
-    /// The design that the layout is of.
-    #[arg(long)]
-    design: PathBuf,
-
-    /// The camera file.
-    #[arg(long)]
-    camera: PathBuf,
-
-    /// The chip as a measured line and bench make it.
-    #[arg(long, value_name = "MODEL")]
-    model: Option<PathBuf>,
-
-    /// Angle from the left to the right edge of each image (degrees).
-    #[arg(long, default_value_t = 90.0)]
-    field_deg: f64,
-
-    /// Seed of the set.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
+    #[command(flatten)]
+    with: CameraArgs,
 
     /// Folder for the pairs.
     #[arg(long, short, value_name = "FOLDER")]
@@ -53,15 +36,13 @@ pub struct DatasetArgs {
 
 pub fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
-    let design = Design::read(&args.design)?;
-    let camera = Camera::read(&args.camera)?;
-    let model = args.model.as_deref().map(CalibratedModel::read).transpose()?;
+    let CameraFiles { design, camera, model } = args.with.read()?;
     let images = images(&args.images)?;
     let read = |path: &Path| {
         read_scene(&SceneFile {
             path: path.to_owned(),
             wavelengths_nm: None,
-            field_deg: args.field_deg,
+            field_deg: args.with.field_deg,
             distance_um: f64::INFINITY,
         })
     };
@@ -73,8 +54,8 @@ pub fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
         &read(&images[0])?,
         terminal,
     )?;
-    let operator = studio.operator(Detail::Simulation);
-    let manifest = write_dataset(&studio, &operator, &images, &read, args.seed, &args.out, terminal)?;
+    let operator = studio.simulation();
+    let manifest = write_dataset(&studio, &operator, &images, &read, args.with.seed, &args.out, terminal)?;
     terminal.clear();
     print_line!("{} pairs in {}", manifest.pairs.len(), args.out.display());
     Ok(Outcome::Fine)

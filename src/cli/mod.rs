@@ -1,6 +1,7 @@
 //! The program: arguments in, exit code out. Everything it does is a call of the library.
 
 mod calibrate;
+mod camera_args;
 mod cells;
 mod check;
 mod compensated;

@@ -3,12 +3,14 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metalith::camera::Camera;
 use metalith::picture::restore::RestorationMethod;
 use metalith::picture::scene::{BuiltIn, SceneFile, SceneImage, chart, read_scene};
-use metalith::picture::{Detail, Frame, PicturePages, PictureReport, RestorationReport, Studio, scores, write_pages};
-use metalith::{CalibratedModel, Design, Error, Fidelity, Result};
+use metalith::picture::{
+    Frame, PicturePages, PictureReport, Rehearsal, RestorationReport, Studio, scores, write_pages,
+};
+use metalith::{Error, Fidelity, Result};
 
+use super::camera_args::{CameraArgs, CameraFiles};
 use super::paths::apart;
 use super::{Outcome, Terminal, print_json, print_line};
 
@@ -26,21 +28,8 @@ pub struct PictureArgs {
     /// The scene: an image file, or `chart`, `star`, `edge`.
     scene: String,
 
-    /// The design that the layout is of: elements, wedges, cell.
-    #[arg(long)]
-    design: PathBuf,
-
-    /// The camera file.
-    #[arg(long)]
-    camera: PathBuf,
-
-    /// The chip as a measured line and bench make it: the `model.toml` that `metalith calibrate` wrote.
-    #[arg(long, value_name = "MODEL")]
-    model: Option<PathBuf>,
-
-    /// Angle from the left to the right edge of the scene (degrees).
-    #[arg(long, default_value_t = 90.0)]
-    field_deg: f64,
+    #[command(flatten)]
+    with: CameraArgs,
 
     /// Distance of the scene (mm); far if left out.
     #[arg(long)]
@@ -62,10 +51,6 @@ pub struct PictureArgs {
     #[arg(long)]
     separate: bool,
 
-    /// Seed of the noise.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-
     /// Folder for `picture.html` and `picture.json`.
     #[arg(long, short, default_value = "out/picture", value_name = "FOLDER")]
     out: PathBuf,
@@ -85,11 +70,11 @@ impl PictureArgs {
             ));
         }
         match self.scene.parse::<BuiltIn>() {
-            Ok(kind) => Ok(chart(kind, self.pixels.into(), self.field_deg, distance_um)),
+            Ok(kind) => Ok(chart(kind, self.pixels.into(), self.with.field_deg, distance_um)),
             Err(_) => read_scene(&SceneFile {
                 path: PathBuf::from(&self.scene),
                 wavelengths_nm: self.wavelengths_nm.clone(),
-                field_deg: self.field_deg,
+                field_deg: self.with.field_deg,
                 distance_um,
             }),
         }
@@ -99,30 +84,29 @@ impl PictureArgs {
 pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let methods: Vec<RestorationMethod> = args.method.iter().map(|m| m.parse()).collect::<Result<_>>()?;
-    let design = Design::read(&args.design)?;
-    let camera = Camera::read(&args.camera)?;
-    let model = args.model.as_deref().map(CalibratedModel::read).transpose()?;
+    let CameraFiles { design, camera, model } = args.with.read()?;
     let scene = args.scene()?;
     let (page, numbers) = (args.out.join("picture.html"), args.out.join("picture.json"));
-    let inputs = [&args.layout, &args.design, &args.camera].map(PathBuf::as_path);
+    let inputs = [&args.layout, &args.with.design, &args.with.camera].map(PathBuf::as_path);
     apart(inputs.into_iter().chain([args.scene.as_ref()]), &[&page, &numbers])?;
     let studio = Studio::open(&design, &args.layout, &camera, model.as_ref(), &scene, terminal)?;
-    let simulation = studio.operator(Detail::Simulation);
-    let frame = studio.record(&simulation, &scene, args.seed)?;
+    let simulation = studio.simulation();
+    let frame = studio.record(&simulation, &scene, args.with.seed)?;
     let truth = studio.truth(&scene);
-    let operator = studio.operator(Detail::Restoration);
-    let error = studio.operator_error(&simulation, &operator);
     drop(simulation);
+    let operator = studio.restoration();
+    let rehearsal = Rehearsal::new(&studio, &operator);
+    let error = &rehearsal.operator_error;
     let mut pictures = Vec::new();
     let mut found = Vec::new();
     for method in methods {
         for joint in [true, false] {
             if joint || args.separate {
-                let picture = studio.restore(&operator, &error, &frame, method, joint, terminal)?;
+                let picture = studio.restore(&operator, error, &frame, method, joint, terminal)?;
                 let mut restoration = RestorationReport::new(method, joint, scores(&picture, &truth)?);
                 // The forecast is of the picture that normal slopes expect.
                 if method == RestorationMethod::Tikhonov && joint {
-                    restoration.forecast_db = studio.forecast(&operator, &error);
+                    restoration.forecast_db = rehearsal.forecast(&studio, &operator, terminal)?;
                 }
                 found.push(restoration);
                 pictures.push(picture);
@@ -135,7 +119,7 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         Fidelity::Rigorous
     };
     let mut report = report(args, &studio, &scene, &frame, found, fidelity.name());
-    report.operator_error = error;
+    report.operator_error.clone_from(error);
     let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();
     let pages = PicturePages {
         report: &report,
@@ -185,7 +169,7 @@ fn report(
         layout: name(&args.layout),
         camera: studio.camera.name.clone(),
         scene: scene.name.clone(),
-        field_deg: args.field_deg,
+        field_deg: args.with.field_deg,
         distance_mm: args.distance_mm,
         saturated: frame.saturated,
         restorations,

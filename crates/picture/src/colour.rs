@@ -65,20 +65,6 @@ impl ChannelColours {
             None => light.iter().map(|l| f64::from(l[[y, x]])).sum::<f64>() / light.len() as f64,
         })
     }
-
-    /// Mean variance of linear sRGB where the light of each channel has these, independent of one another.
-    pub fn variance(&self, channels: &[f64]) -> f64 {
-        match &self.to_rgb {
-            Some(to) => {
-                let of = |c: usize| {
-                    let all = channels.iter().enumerate();
-                    all.map(|(k, v)| to[(c, k)].powi(2) * v).sum::<f64>()
-                };
-                (0..3).map(of).sum::<f64>() / 3.0
-            }
-            None => channels.iter().sum::<f64>() / (channels.len() * channels.len()) as f64,
-        }
-    }
 }
 
 #[cfg(test)]

@@ -75,20 +75,6 @@ pub fn gains(camera: &Camera, sensitivity: &[f64], white: &[Array2<f32>]) -> Res
 pub fn expose(camera: &Camera, gain: &[f64], light: &[Array2<f32>], seed: u64) -> Frame {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let noise = camera.sensor.noise.of_exposure(camera.exposure.time_s);
-    expose_with(camera, gain, light, |plane| noise.expose(plane, &mut random))
-}
-
-/// The same without the noise, which the frame still states.
-pub fn expose_quietly(camera: &Camera, gain: &[f64], light: &[Array2<f32>]) -> Frame {
-    expose_with(camera, gain, light, Array2::clone)
-}
-
-fn expose_with(
-    camera: &Camera,
-    gain: &[f64],
-    light: &[Array2<f32>],
-    mut record: impl FnMut(&Array2<f64>) -> Array2<f64>,
-) -> Frame {
     let sensor = &camera.sensor;
     let full_e = match sensor.noise {
         SensorNoise::Electrons { full_well_e, .. } => full_well_e,
@@ -110,7 +96,7 @@ fn expose_with(
     };
     let mut saturated = 0;
     let planes = ideal.iter().map(|plane| {
-        record(plane).mapv(|v| {
+        noise.expose(plane, &mut random).mapv(|v| {
             saturated += usize::from(v >= full);
             // Below zero stays: cameras add a level and subtract it again.
             ((v.min(full) / step).round() * step) as f32
@@ -120,7 +106,7 @@ fn expose_with(
         planes: planes.collect(),
         filter: sensor.filter,
         gain: gain.to_vec(),
-        noise: sensor.noise.of_exposure(camera.exposure.time_s),
+        noise,
         full,
         saturated,
     }
@@ -129,7 +115,9 @@ fn expose_with(
 impl Frame {
     /// Light of each channel, and how much each pixel is to be trusted: one over the variance of its light, zero where it
     /// does not count the channel or is at full scale. To the noise comes what the operator of a restoration errs by, as
-    /// a share of the light, by channel.
+    /// a share of the light, by channel, and of no less than the mean light of the frame: light in dark places comes from
+    /// bright ones. Both follow from the mean signal about a pixel: by its own, one that noise has
+    /// made dark would be trusted more than its neighbours.
     pub fn light(&self, camera: &Camera, error: &[f64]) -> (Vec<Array2<f32>>, Vec<Array2<f32>>) {
         let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();
         let (mut light, mut trust) = (Vec::new(), Vec::new());
@@ -139,26 +127,42 @@ impl Frame {
                 channel_at(self.filter, &names, y, x).is_none_or(|c| c == channel)
                     && f64::from(plane[[y, x]]) < self.full
             };
-            light.push(Array2::from_shape_fn(plane.dim(), |(y, x)| {
-                if counts(y, x) {
-                    (f64::from(plane[[y, x]]) / gain) as f32
-                } else {
-                    0.0
-                }
-            }));
-            trust.push(Array2::from_shape_fn(plane.dim(), |(y, x)| {
-                let signal = f64::from(plane[[y, x]]);
-                let variance = self.noise.variance(signal) + (error[channel] * signal).powi(2);
-                let variance = variance.max(f64::MIN_POSITIVE);
-                if counts(y, x) {
-                    (gain * gain / variance) as f32
-                } else {
-                    0.0
-                }
+            let known = Array2::from_shape_fn(plane.dim(), |(y, x)| f64::from(u8::from(counts(y, x))));
+            let signal = &known * &plane.mapv(f64::from);
+            let (sums, numbers) = (box_sums(&signal, NEAR), box_sums(&known, NEAR));
+            let overall = signal.sum() / known.sum().max(1.0);
+            light.push(signal.mapv(|v| (v / gain) as f32));
+            trust.push(Array2::from_shape_fn(plane.dim(), |at| {
+                let mean = (sums[at] / numbers[at].max(1.0)).max(0.0);
+                let variance = self.noise.variance(mean) + (error[channel] * mean.max(overall)).powi(2);
+                (known[at] * gain * gain / variance.max(f64::MIN_POSITIVE)) as f32
             }));
         }
         (light, trust)
     }
+}
+
+/// Pixels on both sides over which a mean signal is taken: about what the window of a kernel holds.
+const NEAR: usize = 16;
+
+/// Sums over squares about each pixel, as far as they are in the plane.
+fn box_sums(plane: &Array2<f64>, near: usize) -> Array2<f64> {
+    let along = |line: ndarray::ArrayView1<'_, f64>| -> Vec<f64> {
+        let mut running = vec![0.0];
+        line.iter().for_each(|v| running.push(running[running.len() - 1] + v));
+        let n = line.len();
+        (0..n)
+            .map(|i| running[(i + near + 1).min(n)] - running[i.saturating_sub(near)])
+            .collect()
+    };
+    let mut out = plane.clone();
+    for axis in [1, 0] {
+        for mut lane in out.lanes_mut(ndarray::Axis(axis)) {
+            let sums = along(lane.view());
+            lane.iter_mut().zip(sums).for_each(|(to, sum)| *to = sum);
+        }
+    }
+    out
 }
 
 #[cfg(test)]

@@ -94,11 +94,11 @@ fn page(pages: &PicturePages<'_>) -> Page {
         ("PSNR", format!("{} dB", fixed(whole.psnr_db, 1))),
         ("SSIM", fixed(whole.ssim, 3)),
         (
-            "Forecast for natural scenes, linear light",
-            first
-                .forecast_db
-                .first()
-                .map_or_else(|| "none".into(), |f| format!("{} dB", fixed(*f, 1))),
+            "Linear light: PSNR, forecast for natural scenes",
+            first.forecast_db.first().map_or_else(
+                || format!("{} dB", fixed(whole.psnr_linear_db, 1)),
+                |f| format!("{} dB, {} dB", fixed(whole.psnr_linear_db, 1), fixed(*f, 1)),
+            ),
         ),
         (
             "Light in images, of all that arrives",
@@ -172,42 +172,43 @@ fn errors(page: &mut Page, pages: &PicturePages<'_>) {
 
 fn scores(page: &mut Page, report: &PictureReport) {
     page.section("Scores");
+    let zones = |what: &str, unit: &str| Zone::ALL.map(|z| Column::number(format!("{what}, {}", z.name()), unit));
+    let way = |joint: bool| Cell::from(if joint { "joint" } else { "each alone" });
     let mut columns = vec![Column::text("Method"), Column::text("Elements")];
-    for zone in Zone::ALL {
-        columns.push(Column::number(format!("PSNR, {}", zone.name()), "dB"));
-    }
-    columns.push(Column::number("SSIM, whole", ""));
-    columns.push(Column::number("Forecast for linear light, whole", "dB"));
-    columns.push(Column::number("PSNR of linear light, whole", "dB"));
+    columns.extend(zones("PSNR", "dB"));
+    columns.extend(zones("SSIM", ""));
     let mut table = Table::new(columns);
     for found in &report.restorations {
-        let mut row = vec![
-            Cell::from(found.method.as_str()),
-            Cell::from(if found.joint { "joint" } else { "each alone" }),
-        ];
+        let mut row = vec![Cell::from(found.method.as_str()), way(found.joint)];
         row.extend(found.scores.iter().map(|s| Cell::fixed(s.psnr_db, 2)));
-        row.push(Cell::fixed(found.scores[0].ssim, 3));
-        row.push(
-            found
-                .forecast_db
-                .first()
-                .map_or_else(Cell::none, |f| Cell::fixed(*f, 2)),
-        );
-        row.push(Cell::fixed(found.scores[0].psnr_linear_db, 2));
+        row.extend(found.scores.iter().map(|s| Cell::fixed(s.ssim, 3)));
         table.row(row);
+    }
+    page.table(table.caption(
+        "Zones are the middle, the four edges and the four corners of a division by three. PSNR and SSIM are of sRGB values against what an ideal camera of these channels gives.",
+    ));
+    let mut columns = vec![Column::text("Linear light"), Column::text("Elements")];
+    columns.extend(zones("PSNR", "dB"));
+    let mut table = Table::new(columns);
+    for found in &report.restorations {
+        let mut row = vec![Cell::from(found.method.as_str()), way(found.joint)];
+        row.extend(found.scores.iter().map(|s| Cell::fixed(s.psnr_linear_db, 2)));
+        table.row(row);
+        if !found.forecast_db.is_empty() {
+            let mut row = vec![Cell::from(format!("{}, forecast", found.method)), way(found.joint)];
+            row.extend(found.forecast_db.iter().map(|db| Cell::fixed(*db, 2)));
+            table.row(row);
+        }
     }
     let errors: Vec<String> = report
         .operator_error
         .iter()
         .map(|e| format!("{} %", fixed(100.0 * e, 2)))
         .collect();
-    page.paragraph(format!(
-        "The restoration knows less than the simulation: on a scene of coloured discs its operator errs by {} of the light of a pixel, channel by channel, counted as if pixels erred independently. This is taken for noise.",
+    page.table(table.caption(format!(
+        "The forecast is the mean over scenes with the brightness and the spectra of photographs; a single picture with more or less detail is worse or better. The restoration knows less than the simulation: on such a scene its operator errs by {} of the light of a pixel (root mean square), channel by channel, which is taken for noise.",
         errors.join(", ")
-    ));
-    page.table(table.caption(
-        "Zones are the middle, the four edges and the four corners of a division by three. PSNR and SSIM are of sRGB values against what an ideal camera of these channels gives.",
-    ));
+    )));
 }
 
 fn budget(page: &mut Page, report: &PictureReport) {
@@ -247,19 +248,21 @@ fn geometry(page: &mut Page, report: &PictureReport) {
         return;
     }
     page.section("What a homography would miss");
-    let mut table = Table::new([
-        Column::text("Element"),
-        Column::text("Channel"),
-        Column::number("rms", "pixels"),
-        Column::number("largest", "pixels"),
-    ]);
-    for h in &report.homographies {
-        table.row([
-            Cell::from(h.element.as_str()),
-            Cell::from(h.channel.as_str()),
-            Cell::sig(h.rms_pixels, 2),
-            Cell::sig(h.largest_pixels, 2),
-        ]);
+    let channels: Vec<&str> = report.budget.iter().map(|b| b.channel.as_str()).collect();
+    let mut columns = vec![Column::text("Element")];
+    for channel in &channels {
+        columns.push(Column::number(format!("{channel}, rms"), "pixels"));
+        columns.push(Column::number(format!("{channel}, largest"), "pixels"));
+    }
+    let mut table = Table::new(columns);
+    for own in report.homographies.chunk_by(|a, b| a.element == b.element) {
+        let mut row = vec![Cell::from(own[0].element.as_str())];
+        for channel in &channels {
+            let found = own.iter().find(|h| h.channel == *channel);
+            row.push(found.map_or_else(Cell::none, |h| Cell::sig(h.rms_pixels, 2)));
+            row.push(found.map_or_else(Cell::none, |h| Cell::sig(h.largest_pixels, 2)));
+        }
+        table.row(row);
     }
     page.table(table.caption("Distance of the chief rays from the best homography of scene and sub-image."));
 }

@@ -20,7 +20,7 @@ pub struct PictureReport {
     pub distance_mm: Option<f64>,
     pub saturated: usize,
     pub restorations: Vec<RestorationReport>,
-    /// What the operator of the restoration errs by, by channel; see [`Studio::operator_error`].
+    /// What the operator of the restoration errs by, by channel; see [`crate::Rehearsal::operator_error`].
     pub operator_error: Vec<f64>,
     pub budget: Vec<ChannelBudget>,
     pub homographies: Vec<HomographyResidual>,

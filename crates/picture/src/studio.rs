@@ -4,21 +4,19 @@ use std::path::Path;
 
 use metalith_camera::{Camera, ChannelSampling};
 use metalith_cell::{Fidelity, cache_folder};
-use metalith_core::{Error, Progress, Result, part};
+use metalith_core::{Error, Progress, Result};
 use metalith_design::{Design, cell_models};
 use metalith_made::{CalibratedModel, MadeChip, SimulationCase};
 use ndarray::{Array2, Array3};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use crate::colour::share;
-use crate::exposure::{Frame, expose, expose_quietly, gains, sensitivity};
+use crate::exposure::{Frame, expose, gains, sensitivity};
 use crate::kernels::{BankSpec, KernelBank};
-use crate::operator::{Detail, FrameOperator};
-use crate::restore::{Recorded, RestorationMethod, expected_variances, restore_joint, restore_separate};
+use crate::operator::{Detail, FrameOperator, SceneInputs};
+use crate::restore::{Recorded, RestorationMethod, restore_joint, restore_separate};
 use crate::scene::SceneImage;
-use crate::score::Zone;
-use crate::spectra::SceneSpectrum;
+use crate::spectra::{SceneSpectrum, rgb_basis};
 use crate::veil::Veil;
 use crate::{ChannelColours, ChipInLight, ElementView, SceneView, cache, element_views, read_pillars, sampling_of};
 
@@ -30,8 +28,12 @@ pub struct Studio {
     pub veil: Veil,
     pub elements: Vec<ElementView>,
     pub channels: Vec<ChannelSampling>,
-    /// Spectra of the scenes.
+    /// Spectra of the bank: those of the scenes, and the primaries of the restoration among or after them.
     pub basis: Vec<SceneSpectrum>,
+    /// How many of them are the scenes'.
+    scene_spectra: usize,
+    /// Where the primaries begin.
+    primaries: usize,
     pub view: SceneView,
     /// Signal of a unit of light in each channel.
     pub gain: Vec<f64>,
@@ -44,7 +46,7 @@ pub struct Studio {
 /// steeply is the veil's. A lens of the paper sees 60 degrees.
 const FIELD_DEG: f64 = 30.0;
 /// Nodes an axis of this field.
-const NODES: usize = 9;
+const NODES: usize = 17;
 /// Radius of lenses whose accurate fields cost next to nothing, and whose fast ones err by more (um).
 const SMALL_UM: f64 = 150.0;
 /// Pixels an axis of a kernel.
@@ -102,6 +104,11 @@ impl Studio {
     ) -> Result<Self> {
         let elements = element_views(design, camera);
         let channels = sampling_of(design, camera)?.channels;
+        let mut basis = scene.basis.clone();
+        let primaries = if basis == rgb_basis() { 0 } else { basis.len() };
+        if primaries > 0 {
+            basis.extend_from_slice(rgb_basis());
+        }
         let spec = BankSpec::standard(design, camera);
         check_view(&elements, &spec, camera, &scene.view)?;
         progress.begin("reading the layout", 1);
@@ -119,7 +126,7 @@ impl Studio {
             elements: &elements,
             camera: &unexposed,
             model: &model_text,
-            basis: &scene.basis,
+            basis: &basis,
             spec: &spec,
             // JSON knows no infinity.
             scene_distance_um: scene.view.distance_um.min(f64::MAX),
@@ -151,14 +158,14 @@ impl Studio {
                 let bank = match bank {
                     Some(bank) => bank,
                     None => {
-                        let bank = KernelBank::build(&chip, &scene.basis, spec, progress)?;
+                        let bank = KernelBank::build(&chip, &basis, spec, progress)?;
                         if let Some(folder) = &folder {
                             cache::keep_bank(folder, &inputs, &bank)?;
                         }
                         bank
                     }
                 };
-                let veil = Veil::build(&chip, &bank, &scene.basis, &camera.sensor, &scene.view, progress)?;
+                let veil = Veil::build(&chip, &bank, &basis, &camera.sensor, &scene.view, progress)?;
                 if let Some(folder) = &folder {
                     cache::keep_veil(folder, &veil_inputs, &veil)?;
                 }
@@ -173,12 +180,14 @@ impl Studio {
             elements,
             colours: ChannelColours::of(&channels),
             channels,
-            basis: scene.basis.clone(),
+            basis,
+            scene_spectra: scene.basis.len(),
+            primaries,
             view: scene.view,
             gain: Vec::new(),
             from_cache,
         };
-        let grey = studio.operator(Detail::Restoration);
+        let grey = studio.restoration();
         let ones = vec![Array2::<f32>::ones((scene.view.rows, scene.view.columns)); grey.inputs()];
         let white = grey.apply(&ones);
         drop(grey);
@@ -186,7 +195,7 @@ impl Studio {
         Ok(studio)
     }
 
-    /// The way from scenes to frames.
+    /// The way from the planes of a scene to a frame.
     pub fn operator(&self, detail: Detail) -> FrameOperator<'_> {
         FrameOperator::new(
             &self.bank,
@@ -198,43 +207,24 @@ impl Studio {
         )
     }
 
-    /// What the operator of a restoration errs by, as a share of the light in a pixel (root mean square), by channel, if
-    /// errors of neighbouring pixels are taken to be independent of one another: those of sums over blocks are as large
-    /// as they are found. It knows neither the colours of a scene nor where in a pixel they are. Measured on discs that cover one another, whose
-    /// statistics are those of natural scenes (Lee, Mumford and Huang, Int. J. Comput. Vis. 41, 35 (2001)), seeded.
-    pub fn operator_error(&self, simulation: &FrameOperator<'_>, restoration: &FrameOperator<'_>) -> Vec<f64> {
-        let leaves = dead_leaves(&self.view);
-        // In the basis of the bank, colours of a picture stand for its spectra.
-        let mut planes = leaves.planes.clone();
-        planes.resize(self.bank.bases, Array2::zeros((self.view.rows, self.view.columns)));
-        let ideal: Vec<Array2<f32>> = self
-            .channels
-            .iter()
-            .map(|channel| {
-                let mut sum = Array2::<f32>::zeros((self.view.rows, self.view.columns));
-                for (spectrum, plane) in self.basis.iter().zip(&planes) {
-                    sum.scaled_add(share(channel, spectrum) as f32, plane);
-                }
-                sum
-            })
-            .collect();
-        let (truth, known) = (simulation.apply(&planes), restoration.apply(&ideal));
-        let error = |(a, b): (&Array2<f32>, &Array2<f32>)| {
-            let light = a.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
-            let (rows, columns) = a.dim();
-            let mut blocks = 0.0;
-            for y in (0..rows).step_by(BLOCK) {
-                for x in (0..columns).step_by(BLOCK) {
-                    let cut = |f: &Array2<f32>| {
-                        let block = part(f.view(), y..(y + BLOCK).min(rows), x..(x + BLOCK).min(columns));
-                        block.iter().map(|v| f64::from(*v)).sum::<f64>()
-                    };
-                    blocks += (cut(a) - cut(b)).powi(2);
-                }
-            }
-            (blocks / light).sqrt()
-        };
-        truth.iter().zip(&known).map(error).collect()
+    /// The way from scenes to frames, as finely as it is known: what is taken for the truth.
+    pub fn simulation(&self) -> FrameOperator<'_> {
+        self.operator(Detail::simulation(self.scene_spectra))
+    }
+
+    /// What a restoration knows of the same way: to it, colours of a scene are sums of three primaries. A camera that
+    /// tells no colours apart sees grey.
+    pub fn restoration(&self) -> FrameOperator<'_> {
+        let primaries = self.primaries();
+        self.operator(Detail::restoration(match self.colours.has_colours() {
+            true => SceneInputs::Spectra(primaries),
+            false => SceneInputs::Channels(primaries),
+        }))
+    }
+
+    /// Which spectra of the bank are the primaries of a restoration: red, green and blue.
+    pub fn primaries(&self) -> std::ops::Range<usize> {
+        self.primaries..self.primaries + rgb_basis().len()
     }
 
     /// The frame that the sensor records of a scene, noise drawn from a seed.
@@ -242,7 +232,7 @@ impl Studio {
     /// # Errors
     /// If the scene has other spectra or another field than this was opened for.
     pub fn record(&self, operator: &FrameOperator<'_>, scene: &SceneImage, seed: u64) -> Result<Frame> {
-        if scene.view != self.view || scene.basis.len() != self.bank.bases {
+        if scene.view != self.view || scene.basis.len() != self.scene_spectra {
             return Err(Error::invalid(
                 format!(
                     "the scene `{}` has another size, field or spectra than the first",
@@ -285,79 +275,18 @@ impl Studio {
             true => restore_joint(&recorded, method, progress)?,
             false => restore_separate(&recorded, method, progress)?,
         };
-        Ok(self.colours.rgb(&planes))
-    }
-
-    /// Expected PSNR of linear light in each zone (dB), without any picture: of scenes as bright as photographs are on the
-    /// mean, whose spectra fall as 1 / f^2, restored by all elements.
-    pub fn forecast(&self, operator: &FrameOperator<'_>, error: &[f64]) -> Vec<f64> {
-        let shape = (self.view.rows, self.view.columns);
-        let mean = metalith_wave::restore::Scene::default().mean as f32;
-        let grey = vec![Array2::<f32>::from_elem(shape, mean); operator.inputs()];
-        let light = operator.apply(&grey);
-        let (light, trust) = expose_quietly(&self.camera, &self.gain, &light).light(&self.camera, error);
-        let recorded = Recorded {
-            operator,
-            light: &light,
-            trust: &trust,
-        };
-        let places: Vec<Vec<(usize, usize)>> = Zone::ALL.iter().map(|z| samples(*z, shape)).collect();
-        let all: Vec<(usize, usize)> = places.iter().flatten().copied().collect();
-        let variances = expected_variances(&recorded, &all);
-        let mut rest = &variances[..];
-        let forecast = places.iter().map(|zone| {
-            let (own, later) = rest.split_at(zone.len());
-            rest = later;
-            let mean = own.iter().map(|v| self.colours.variance(v)).sum::<f64>() / own.len() as f64;
-            -10.0 * mean.log10()
-        });
-        forecast.collect()
+        Ok(match operator.sees_colours() {
+            true => Array3::from_shape_fn((self.view.rows, self.view.columns, 3), |(y, x, c)| {
+                f64::from(planes[c][[y, x]])
+            }),
+            false => self.colours.rgb(&planes),
+        })
     }
 
     /// What a perfect camera with these channels would give of a scene: the truth that pictures are held to.
     pub fn truth(&self, scene: &SceneImage) -> Array3<f64> {
         self.colours.rgb(&ChannelColours::ideal(&self.channels, scene))
     }
-}
-
-/// Pixels an axis over which errors of an operator are summed: about what a kernel reaches.
-const BLOCK: usize = 16;
-
-/// Discs of random colours that cover one another, radii by a law of the third power.
-fn dead_leaves(view: &SceneView) -> SceneImage {
-    use rand::{Rng, SeedableRng};
-    const LEAVES: usize = 4000;
-    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1);
-    let mut rgb = Array3::from_elem((view.rows, view.columns, 3), 0.4);
-    let size = view.rows.max(view.columns) as f64;
-    for _ in 0..LEAVES {
-        let colour: [f64; 3] = std::array::from_fn(|_| 0.05 + 0.85 * random.random::<f64>().powi(2));
-        let [y, x] = [view.rows, view.columns].map(|n| random.random::<f64>() * n as f64);
-        // Between 1/200 and 1/6 of the picture.
-        let (small, large) = (size / 200.0, size / 6.0);
-        let u: f64 = random.random();
-        let radius = (small.powi(-2) * (1.0 - u) + large.powi(-2) * u).powf(-0.5);
-        let range = |at: f64, n: usize| ((at - radius).max(0.0) as usize)..((at + radius + 1.0) as usize).min(n);
-        for i in range(y, view.rows) {
-            for j in range(x, view.columns) {
-                if (i as f64 - y).hypot(j as f64 - x) <= radius {
-                    (0..3).for_each(|c| rgb[[i, j, c]] = colour[c]);
-                }
-            }
-        }
-    }
-    SceneImage::of_rgb("dead leaves", &rgb, view.field_deg, view.distance_um)
-}
-
-/// Places of a zone, four by four in each of its rectangles.
-fn samples(zone: Zone, shape: (usize, usize)) -> Vec<(usize, usize)> {
-    const POINTS: usize = 4;
-    let within = |range: &std::ops::Range<usize>, k: usize| range.start + (2 * k + 1) * range.len() / (2 * POINTS);
-    let rectangles = zone.rectangles(shape.0, shape.1);
-    let places = rectangles
-        .iter()
-        .flat_map(|[y, x]| (0..POINTS * POINTS).map(move |k| (within(y, k / POINTS), within(x, k % POINTS))));
-    places.collect()
 }
 
 /// A camera must see the chip, and the array the scene.

@@ -14,6 +14,8 @@ mod fft2;
 mod node;
 mod warp;
 
+use std::borrow::Cow;
+
 use metalith_camera::Sensor;
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -26,14 +28,44 @@ pub use fft2::{FftScratch, SquareFft};
 use node::{ElementOperator, KernelSource};
 pub use warp::{Warp, hat};
 
+/// Which planes of the scene go into an operator, out of the spectra of its bank.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SceneInputs {
+    /// One plane for each of these spectra; every channel sees all of them.
+    Spectra(std::ops::Range<usize>),
+    /// One plane for each channel: the light that it counts, spread as that of a surface whose spectrum is the sum of
+    /// these.
+    Channels(std::ops::Range<usize>),
+}
+
 /// How finely an operator samples the scene, and which kernels it knows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Detail {
-    /// Every node and every spectrum, the scene at four points a pixel: what is taken for the truth.
-    Simulation,
-    /// The kernel of a grey surface for each channel, the scene at one point a pixel: what a restoration knows. Planes
-    /// go in and out by channel.
-    Restoration,
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Detail {
+    /// Points along each axis of a pixel at which the scene is sampled: one or two.
+    pub points: usize,
+    /// Every how many-th node of the bank along each axis is used; it divides the steps between the nodes.
+    pub node_step: usize,
+    pub inputs: SceneInputs,
+}
+
+impl Detail {
+    /// Every node and the scene at four points a pixel: what is taken for the truth.
+    pub fn simulation(spectra: usize) -> Self {
+        Self {
+            points: 2,
+            node_step: 1,
+            inputs: SceneInputs::Spectra(0..spectra),
+        }
+    }
+
+    /// What a restoration knows: the mean over each pixel, on a coarser grid over the field.
+    pub fn restoration(inputs: SceneInputs) -> Self {
+        Self {
+            points: 1,
+            node_step: 2,
+            inputs,
+        }
+    }
 }
 
 /// The way from planes of the scene to the frame of each channel.
@@ -41,13 +73,13 @@ pub struct FrameOperator<'a> {
     view: SceneView,
     frame: [usize; 2],
     channels: usize,
-    inputs: usize,
+    inputs: SceneInputs,
     elements: Vec<ElementOperator<'a>>,
-    veil: std::borrow::Cow<'a, Veil>,
+    veil: Cow<'a, Veil>,
 }
 
 impl<'a> FrameOperator<'a> {
-    /// For the elements of a bank before a sensor. With `Detail::Restoration` spectra of kernels are kept in memory.
+    /// For the elements of a bank before a sensor. With one point a pixel spectra of kernels are kept in memory.
     pub fn new(
         bank: &'a KernelBank,
         veil: &'a Veil,
@@ -56,7 +88,7 @@ impl<'a> FrameOperator<'a> {
         view: &SceneView,
         detail: Detail,
     ) -> Self {
-        let source = KernelSource::new(bank, detail);
+        let source = KernelSource::new(bank, &detail);
         let elements = elements
             .par_iter()
             .enumerate()
@@ -66,21 +98,26 @@ impl<'a> FrameOperator<'a> {
             view: *view,
             frame: [sensor.rows as usize, sensor.columns as usize],
             channels: bank.channel_um.len(),
-            inputs: match detail {
-                Detail::Simulation => bank.bases,
-                Detail::Restoration => bank.channel_um.len(),
+            veil: match &detail.inputs {
+                SceneInputs::Spectra(_) => Cow::Borrowed(veil),
+                SceneInputs::Channels(spectra) => Cow::Owned(veil.grey(spectra.clone())),
             },
+            inputs: detail.inputs,
             elements,
-            veil: match detail {
-                Detail::Simulation => std::borrow::Cow::Borrowed(veil),
-                Detail::Restoration => std::borrow::Cow::Owned(veil.grey()),
-            },
         }
     }
 
     /// Number of planes that go in.
     pub fn inputs(&self) -> usize {
-        self.inputs
+        match &self.inputs {
+            SceneInputs::Spectra(spectra) => spectra.len(),
+            SceneInputs::Channels(_) => self.channels,
+        }
+    }
+
+    /// Whether the planes that go in are red, green and blue.
+    pub fn sees_colours(&self) -> bool {
+        matches!(&self.inputs, SceneInputs::Spectra(spectra) if spectra.len() == 3)
     }
 
     /// Number of channels that come out.
@@ -112,7 +149,7 @@ impl<'a> FrameOperator<'a> {
 
     /// The same of some of the elements, with or without the veil of all.
     pub fn apply_elements(&self, scene: &[Array2<f32>], elements: &[usize], veil: bool) -> Vec<Array2<f32>> {
-        assert_eq!(scene.len(), self.inputs, "one plane for each spectrum of the scene");
+        assert_eq!(scene.len(), self.inputs(), "one plane for each spectrum of the scene");
         let images: Vec<_> = elements
             .par_iter()
             .map_init(FftScratch::default, |scratch, e| {
@@ -145,10 +182,9 @@ impl<'a> FrameOperator<'a> {
 
     /// Which spectrum of the veil takes an input to a channel.
     fn veil_basis(&self, channel: usize, input: usize) -> Option<usize> {
-        if self.veil.bases == self.inputs && self.veil.bases > 1 || self.channels == 1 && self.inputs == 1 {
-            Some(input)
-        } else {
-            (channel == input).then_some(0)
+        match &self.inputs {
+            SceneInputs::Spectra(spectra) => Some(spectra.start + input),
+            SceneInputs::Channels(_) => (channel == input).then_some(0),
         }
     }
 
@@ -162,11 +198,11 @@ impl<'a> FrameOperator<'a> {
     pub fn adjoint_elements(&self, frames: &[Array2<f32>], elements: &[usize], veil: bool) -> Vec<Array2<f32>> {
         assert_eq!(frames.len(), self.channels, "one frame for each channel");
         let shape = (self.view.rows, self.view.columns);
-        let mut planes = vec![Array2::zeros(shape); self.inputs];
+        let mut planes = vec![Array2::zeros(shape); self.inputs()];
         let found: Vec<Vec<Array2<f32>>> = elements
             .par_iter()
             .map_init(FftScratch::default, |scratch, e| {
-                self.elements[*e].adjoint(frames, shape, self.inputs, scratch)
+                self.elements[*e].adjoint(frames, shape, self.inputs(), scratch)
             })
             .collect();
         for own in found {

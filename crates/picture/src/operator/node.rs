@@ -1,5 +1,7 @@
 //! One element: its warps, and the kernels of its nodes.
 
+use std::borrow::Cow;
+use std::ops::Range;
 use std::sync::Arc;
 
 use metalith_camera::Sensor;
@@ -7,57 +9,71 @@ use metalith_wave::kernels::fft_size;
 use ndarray::Array2;
 use num_complex::Complex32;
 
-use super::{Detail, FftScratch, SquareFft, Warp, hat};
+use super::{Detail, FftScratch, SceneInputs, SquareFft, Warp, hat};
 use crate::kernels::{BankSpec, KernelBank};
 use crate::{ElementView, SceneView};
 
 /// Where kernels come from.
+#[derive(Clone)]
 pub struct KernelSource<'a> {
     bank: &'a KernelBank,
-    detail: Detail,
+    points: usize,
+    node_step: usize,
+    inputs: SceneInputs,
+    /// That of the bank, with the nodes that are used.
     spec: BankSpec,
 }
 
 impl<'a> KernelSource<'a> {
-    pub fn new(bank: &'a KernelBank, detail: Detail) -> Self {
+    pub fn new(bank: &'a KernelBank, detail: &Detail) -> Self {
+        assert!(matches!(detail.points, 1 | 2), "one or two points an axis");
+        let steps = bank.spec.nodes - 1;
+        assert!(steps.is_multiple_of(detail.node_step), "every step ends at a node");
         Self {
             bank,
-            detail,
-            spec: bank.spec,
+            points: detail.points,
+            node_step: detail.node_step,
+            inputs: detail.inputs.clone(),
+            spec: BankSpec {
+                nodes: steps / detail.node_step + 1,
+                ..bank.spec
+            },
         }
     }
 
-    /// Points within a pixel at which the scene is sampled: shifts from the middle (pixels), and their parts of a pixel.
-    fn points(&self) -> Vec<[f64; 2]> {
-        match self.detail {
-            Detail::Simulation => [[-0.25, -0.25], [0.25, -0.25], [-0.25, 0.25], [0.25, 0.25]].to_vec(),
-            Detail::Restoration => vec![[0.0; 2]],
+    /// Points within a pixel at which the scene is sampled: shifts from the middle (pixels).
+    fn points(&self) -> &'static [[f64; 2]] {
+        match self.points {
+            1 => &[[0.0; 2]],
+            _ => &[[-0.25, -0.25], [0.25, -0.25], [-0.25, 0.25], [0.25, 0.25]],
         }
     }
 
     /// Which planes of the scene a channel sees, each with the spectra whose kernels act on it.
-    fn inputs(&self, channel: usize) -> Vec<(usize, Vec<usize>)> {
-        match self.detail {
-            Detail::Simulation => (0..self.bank.bases).map(|b| (b, vec![b])).collect(),
-            Detail::Restoration => vec![(channel, (0..self.bank.bases).collect())],
+    fn inputs(&self, channel: usize) -> Vec<(usize, Range<usize>)> {
+        match &self.inputs {
+            SceneInputs::Spectra(all) => all.clone().enumerate().map(|(i, b)| (i, b..b + 1)).collect(),
+            SceneInputs::Channels(all) => vec![(channel, all.clone())],
         }
     }
 
     /// The kernel of a node on whole pixels, for light at a point of a pixel, `window + 1` values an axis: the middle one
     /// is the pixel itself.
-    fn pixels(&self, element: usize, node: [usize; 2], channel: usize, bases: &[usize], point: usize) -> Vec<f32> {
+    fn pixels(&self, element: usize, node: [usize; 2], channel: usize, bases: Range<usize>, point: usize) -> Vec<f32> {
         let window = self.spec.window;
         let side = window + 1;
         let mut out = vec![0.0f32; side * side];
         // A kernel value `i` stands at (i - window + 1/2) / 2 pixels; light at a quarter of a pixel beyond the middle is
-        // half a value nearer to what lies there.
-        let phases: &[[usize; 2]] = match self.detail {
-            Detail::Simulation => &[[[0, 0], [1, 0], [0, 1], [1, 1]][point]],
-            Detail::Restoration => &[[0, 0], [1, 0], [0, 1], [1, 1]],
+        // half a value nearer to what lies there. For one point a pixel, the mean of all four.
+        const PHASES: [[usize; 2]; 4] = [[0, 0], [1, 0], [0, 1], [1, 1]];
+        let phases = match self.points {
+            1 => &PHASES[..],
+            _ => &PHASES[point..=point],
         };
         let share = 1.0 / phases.len() as f32;
+        let node = node.map(|n| n * self.node_step);
         for basis in bases {
-            let kernel = self.bank.kernel(element, node, channel, *basis);
+            let kernel = self.bank.kernel(element, node, channel, basis);
             for [px, py] in phases {
                 for (y, row) in out.chunks_exact_mut(side).enumerate() {
                     let Some(i) = (2 * y).checked_sub(*py).filter(|i| *i < 2 * window) else {
@@ -140,7 +156,7 @@ impl<'a> ElementOperator<'a> {
         let mut own = Self {
             element,
             view: *view,
-            source: KernelSource { ..*source },
+            source: source.clone(),
             sensor: sensor.clone(),
             scene: *scene,
             channels: Vec::new(),
@@ -183,12 +199,12 @@ impl<'a> ElementOperator<'a> {
         let longest = nodes.iter().flat_map(|n| n.shape).max().unwrap_or(1);
         let fft = Arc::new(SquareFft::new(fft_size(longest + self.source.spec.window + 1)));
         let mut warps = Vec::new();
-        if self.source.detail == Detail::Restoration {
+        if self.source.points == 1 {
             let mut scratch = FftScratch::default();
             for node in &mut nodes {
                 for (_, bases) in self.source.inputs(channel) {
                     node.spectra
-                        .extend(self.spectrum(node.node, channel, &bases, 0, &fft, &mut scratch));
+                        .extend(self.spectrum(node.node, channel, bases, 0, &fft, &mut scratch));
                 }
             }
             warps.push(middle);
@@ -201,7 +217,7 @@ impl<'a> ElementOperator<'a> {
         &self,
         node: [usize; 2],
         channel: usize,
-        bases: &[usize],
+        bases: Range<usize>,
         point: usize,
         fft: &SquareFft,
         scratch: &mut FftScratch,
@@ -218,7 +234,10 @@ impl<'a> ElementOperator<'a> {
     }
 
     /// Warps of a channel at all points within a pixel: those that are kept, or made now.
-    fn warps(&self, channel: usize) -> Vec<Warp> {
+    fn warps<'b>(&self, channel: usize, plan: &'b ChannelPlan) -> Cow<'b, [Warp]> {
+        if !plan.warps.is_empty() {
+            return Cow::Borrowed(&plan.warps);
+        }
         let points = self.source.points();
         let area = 1.0 / points.len() as f64;
         points.iter().map(|shift| self.warp(channel, *shift, area)).collect()
@@ -228,12 +247,7 @@ impl<'a> ElementOperator<'a> {
         let half = self.source.spec.window / 2;
         let mut images = Vec::new();
         for (channel, plan) in self.channels.iter().enumerate() {
-            let made = if plan.warps.is_empty() {
-                self.warps(channel)
-            } else {
-                Vec::new()
-            };
-            let warps = if made.is_empty() { &plan.warps } else { &made };
+            let warps = self.warps(channel, plan);
             let inputs = self.source.inputs(channel);
             let shape = warps[0].shape;
             // Sampled once: light of each input at each point.
@@ -261,7 +275,8 @@ impl<'a> ElementOperator<'a> {
                     lit = true;
                     plan.fft.forward(&mut square, node.shape[0], &mut spectrum, scratch);
                     if node.spectra.is_empty() {
-                        let kernel = self.spectrum(node.node, channel, &inputs[input].1, point, &plan.fft, scratch);
+                        let kernel =
+                            self.spectrum(node.node, channel, inputs[input].1.clone(), point, &plan.fft, scratch);
                         multiply_add(&mut sum, &spectrum, &kernel);
                     } else {
                         multiply_add(&mut sum, &spectrum, &node.spectra[input * entries..][..entries]);
@@ -296,12 +311,7 @@ impl<'a> ElementOperator<'a> {
         let half = self.source.spec.window / 2;
         let mut planes = vec![Array2::zeros(shape); inputs];
         for (channel, plan) in self.channels.iter().enumerate() {
-            let made = if plan.warps.is_empty() {
-                self.warps(channel)
-            } else {
-                Vec::new()
-            };
-            let warps = if made.is_empty() { &plan.warps } else { &made };
+            let warps = self.warps(channel, plan);
             let own = self.source.inputs(channel);
             let size = plan.fft.size();
             let entries = plan.fft.entries();
@@ -319,7 +329,7 @@ impl<'a> ElementOperator<'a> {
                     let (input, point) = (k / warps.len(), k % warps.len());
                     let mut product = spectrum.clone();
                     if node.spectra.is_empty() {
-                        let kernel = self.spectrum(node.node, channel, &own[input].1, point, &plan.fft, scratch);
+                        let kernel = self.spectrum(node.node, channel, own[input].1.clone(), point, &plan.fft, scratch);
                         multiply_conj(&mut product, &kernel);
                     } else {
                         multiply_conj(&mut product, &node.spectra[input * entries..][..entries]);

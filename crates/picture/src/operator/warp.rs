@@ -7,6 +7,7 @@ use crate::kernels::BankSpec;
 use crate::{ElementView, SceneView};
 
 /// The sub-image of one element in one channel: a rectangle of pixels of the sensor's grid, on or off the sensor.
+#[derive(Clone)]
 pub struct Warp {
     /// Row and column of its first pixel.
     pub origin: [i64; 2],

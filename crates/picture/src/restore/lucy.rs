@@ -23,10 +23,12 @@ pub fn restore(recorded: &Recorded<'_>, elements: &[usize], veil: bool, progress
     // A grey picture with the light of the frame.
     let mut x: Planes = vec![Array2::ones((view.rows, view.columns)); operator.inputs()];
     let seen = operator.apply_elements(&x, elements, veil);
-    for c in 0..x.len() {
-        let sum = |f: &Array2<f32>| f.iter().zip(&known[c]).map(|(v, k)| f64::from(v * k)).sum::<f64>();
-        x[c] *= (sum(&recorded.light[c]) / sum(&seen[c]).max(f64::MIN_POSITIVE)).max(1e-6) as f32;
-    }
+    let sum = |frames: &[Array2<f32>]| {
+        let pairs = frames.iter().zip(&known).flat_map(|(f, k)| f.iter().zip(k));
+        pairs.map(|(v, k)| f64::from(v * k)).sum::<f64>()
+    };
+    let level = (sum(recorded.light) / sum(&seen).max(f64::MIN_POSITIVE)).max(1e-6) as f32;
+    x.iter_mut().for_each(|plane| *plane *= level);
     for _ in 0..ROUNDS {
         if progress.stopped() {
             return Err(Error::Interrupted);

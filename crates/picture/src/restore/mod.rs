@@ -2,7 +2,8 @@
 //!
 //! | method | file |
 //! | --- | --- |
-//! | Tikhonov: the most likely picture where slopes are normal, as a Wiener filter has it for a spectrum of 1 / f^2 | `tikhonov` |
+//! | what is known of pictures beforehand | `prior` |
+//! | Tikhonov: the most likely picture where light is normal, as a Wiener filter has it | `tikhonov` |
 //! | total variation, by the alternating direction method of multipliers | `total_variation` |
 //! | Richardson and Lucy | `lucy` |
 //! | half-quadratic splitting with any denoiser | `splitting` |
@@ -13,6 +14,7 @@
 
 mod lucy;
 mod normal;
+mod prior;
 mod separate;
 mod splitting;
 mod tikhonov;
@@ -25,6 +27,7 @@ use ndarray::Array2;
 
 use crate::operator::FrameOperator;
 
+pub use prior::SceneStatistics;
 pub use splitting::{Denoiser, SlopeDenoiser};
 
 /// How a picture is restored.
@@ -78,11 +81,8 @@ pub struct Recorded<'a> {
     pub trust: &'a [Array2<f32>],
 }
 
-/// Root mean square difference of neighbouring pixels of a picture, in linear light, that is expected: photographs of 500
-/// to 800 pixels an axis have 0.03 to 0.08.
-pub const EXPECTED_SLOPE: f64 = 0.05;
-
-/// Restore by all elements at once: one scene that explains the whole frame. Planes by channel, white being one.
+/// Restore by all elements at once: one scene that explains the whole frame. Planes as those that go into the operator, white
+/// being one.
 ///
 /// # Errors
 /// If the user stopped it.
@@ -107,16 +107,6 @@ pub fn restore_separate(
     separate::restore(recorded, method, progress)
 }
 
-/// Variance of the light of each channel at some places of a picture restored by all elements, without any picture: by
-/// place, then channel. Trust is that of a frame like the one that is expected.
-pub fn expected_variances(recorded: &Recorded<'_>, places: &[(usize, usize)]) -> Vec<Vec<f64>> {
-    use rayon::prelude::*;
-    let all: Vec<usize> = (0..recorded.operator.elements()).collect();
-    let system = normal::NormalSystem::new(recorded, &all, true);
-    let terms = tikhonov::terms(&system);
-    places.par_iter().map(|p| system.expected_variance(*p, terms)).collect()
-}
-
 fn restore_by(
     recorded: &Recorded<'_>,
     method: RestorationMethod,
@@ -128,11 +118,12 @@ fn restore_by(
         RestorationMethod::RichardsonLucy => lucy::restore(recorded, elements, veil, progress),
         _ => {
             let system = normal::NormalSystem::new(recorded, elements, veil);
-            match method {
+            let independent = match method {
                 RestorationMethod::Tikhonov => tikhonov::restore(&system, progress),
                 RestorationMethod::TotalVariation => total_variation::restore(&system, progress),
                 _ => splitting::restore(&system, &SlopeDenoiser::default(), progress),
-            }
+            };
+            Ok(system.statistics.picture(&independent?))
         }
     }
 }

@@ -1,16 +1,16 @@
-//! The linear systems of restoration: A* W A x + a D* D x + m x = b, with D the slopes along rows and columns.
+//! The linear systems of restoration: A* W A x + a D* D x + b (D* D)^2 x + m x = r, with D the slopes along rows and columns,
+//! for planes that vary independently ([`SceneStatistics`]).
 //!
-//! They are solved by conjugate gradients. The preconditioner is the system of a scene that is seen everywhere as it is on
-//! the mean: a diagonal of how much light each place of the scene sends into the frame, on both sides of a circular
-//! convolution with the mean response of A* W A to a point, in closed form.
+//! They are solved by conjugate gradients, preconditioned by how much light each place of the scene sends into the frame.
+//! Preconditioners that know the response to a point do worse: the veil is not in it, and what one plane then puts into
+//! another is many times what belongs there.
 
 use metalith_core::{Error, Progress, Result};
-use metalith_wave::kernels::fft_size;
 use ndarray::Array2;
-use num_complex::Complex32;
 
 use super::Recorded;
-use crate::operator::{FftScratch, FrameOperator, SquareFft};
+use super::prior::SceneStatistics;
+use crate::operator::FrameOperator;
 
 /// Planes of a picture.
 pub type Planes = Vec<Array2<f32>>;
@@ -22,19 +22,14 @@ pub struct NormalSystem<'a> {
     veil: bool,
     /// Weights of the pixels, scaled.
     weight: Planes,
+    /// What the planes are.
+    pub statistics: SceneStatistics,
     /// A* W S.
     pub data: Planes,
     /// What one unit of the data term is, in units of the inverse variance of the picture.
     pub scale: f64,
-    /// How much light of each place counts, about one where most does.
-    share: Planes,
-    response: Response,
-}
-
-/// Mean response of A* W A to a point, as a spectrum over periodic squares.
-struct Response {
-    fft: SquareFft,
-    spectrum: Vec<Vec<f32>>,
+    /// How much light of each place counts, one where most does.
+    share: Array2<f32>,
 }
 
 /// Strengths of a system.
@@ -42,14 +37,12 @@ struct Response {
 pub struct Terms {
     /// Of squared slopes.
     pub slopes: f64,
+    /// Of squared sums of the slopes that meet at a pixel.
+    pub bends: f64,
     /// Of the picture itself.
     pub identity: f64,
 }
 
-/// Points an axis at which the response is measured.
-const POINTS: usize = 3;
-/// Reach of a response (pixels of the scene).
-const REACH: usize = 24;
 /// A place that sends less light than this share of the best is preconditioned as if it sent so much.
 const LEAST_SHARE: f32 = 0.02;
 
@@ -63,33 +56,27 @@ impl<'a> NormalSystem<'a> {
         let seen = operator.apply_elements(&ones, elements, veil);
         let weighted: Planes = seen.iter().zip(recorded.trust).map(|(s, t)| s * t).collect();
         let lumped = operator.adjoint_elements(&weighted, elements, veil);
-        let most = lumped
+        let mut light = Array2::<f32>::zeros(shape);
+        lumped
             .iter()
-            .flatten()
-            .copied()
-            .fold(0.0f32, f32::max)
-            .max(f32::MIN_POSITIVE);
-        let scale = f64::from(most);
+            .for_each(|p| light.scaled_add(1.0 / lumped.len() as f32, p));
+        let most = light.iter().copied().fold(0.0f32, f32::max).max(f32::MIN_POSITIVE);
         let weight: Planes = recorded.trust.iter().map(|t| t.mapv(|v| v / most)).collect();
         let products: Planes = weight.iter().zip(recorded.light).map(|(w, s)| w * s).collect();
-        let mut system = Self {
+        let statistics = match operator.sees_colours() {
+            true => SceneStatistics::colours(),
+            false => SceneStatistics::grey(operator.inputs()),
+        };
+        Self {
             operator,
             elements: elements.to_vec(),
             veil,
-            data: operator.adjoint_elements(&products, elements, veil),
+            data: statistics.adjoint(&operator.adjoint_elements(&products, elements, veil)),
+            statistics,
             weight,
-            scale,
-            share: lumped
-                .iter()
-                .map(|p| p.mapv(|v| (v / most).max(LEAST_SHARE).sqrt()))
-                .collect(),
-            response: Response {
-                fft: SquareFft::new(fft_size(shape.0.max(shape.1) + REACH)),
-                spectrum: Vec::new(),
-            },
-        };
-        system.measure(shape);
-        system
+            scale: f64::from(most),
+            share: light.mapv(|v| (v / most).max(LEAST_SHARE)),
+        }
     }
 
     /// Rows and columns of the picture.
@@ -98,132 +85,44 @@ impl<'a> NormalSystem<'a> {
         (view.rows, view.columns)
     }
 
-    /// Channels.
-    pub fn channels(&self) -> usize {
-        self.data.len()
-    }
-
-    /// The picture of back-projected light over how much of it there is: where iterations begin.
-    pub fn start(&self) -> Planes {
-        let pairs = self.data.iter().zip(&self.share);
-        pairs
-            .map(|(d, s)| ndarray::Zip::from(d).and(s).map_collect(|d, s| d / (s * s)))
-            .collect()
+    /// A black picture.
+    pub fn black(&self) -> Planes {
+        vec![Array2::zeros(self.shape()); self.data.len()]
     }
 
     /// How much light counts, mean over the picture; one where most does.
     pub fn mean_share(&self) -> f64 {
-        let all = self.share.iter().flatten();
-        let count = self.share.iter().map(Array2::len).sum::<usize>().max(1);
-        all.map(|s| f64::from(s * s)).sum::<f64>() / count as f64
-    }
-
-    /// Variance that noise and unknown detail leave at a place of the picture, by channel, in the most likely picture
-    /// where slopes are normal: one over what data and prior know at each frequency, mean over the frequencies. The data
-    /// know as much as the mean response says, times the light of the place.
-    pub fn expected_variance(&self, place: (usize, usize), terms: Terms) -> Vec<f64> {
-        let (size, half) = (self.response.fft.size(), self.response.fft.size() / 2 + 1);
-        let slope = |k: usize| 2.0 - 2.0 * (std::f64::consts::TAU * k as f64 / size as f64).cos();
-        let slopes: Vec<f64> = (0..size).map(slope).collect();
-        let channels = self.share.iter().zip(&self.response.spectrum);
-        channels
-            .map(|(share, response)| {
-                let light = f64::from(share[place]).powi(2);
-                let mut sum = 0.0;
-                for kx in 0..half {
-                    // Half of the frequencies stand for two.
-                    let pair = if kx == 0 || kx + 1 == half { 1.0 } else { 2.0 };
-                    for ky in 0..size {
-                        let prior = terms.slopes * (slopes[kx] + slopes[ky]);
-                        let known = light * f64::from(response[kx * size + ky]) + prior;
-                        sum += pair / known.max(f64::MIN_POSITIVE);
-                    }
-                }
-                sum / (size * size) as f64 / self.scale
-            })
-            .collect()
+        self.share.iter().map(|s| f64::from(*s)).sum::<f64>() / self.share.len().max(1) as f64
     }
 
     fn data_term(&self, x: &[Array2<f32>]) -> Planes {
-        let mut seen = self.operator.apply_elements(x, &self.elements, self.veil);
+        let picture = self.statistics.picture(x);
+        let mut seen = self.operator.apply_elements(&picture, &self.elements, self.veil);
         seen.iter_mut().zip(&self.weight).for_each(|(s, w)| *s *= w);
-        self.operator.adjoint_elements(&seen, &self.elements, self.veil)
+        let back = self.operator.adjoint_elements(&seen, &self.elements, self.veil);
+        self.statistics.adjoint(&back)
     }
 
     /// The left side of the system.
     pub fn apply(&self, x: &[Array2<f32>], terms: Terms) -> Planes {
         let mut out = self.data_term(x);
         for (to, x) in out.iter_mut().zip(x) {
-            add_slopes(to, x, terms.slopes as f32);
+            add_prior(to, x, terms);
             to.scaled_add(terms.identity as f32, x);
         }
         out
     }
 
-    /// Measure the mean response to a point over the share of its place.
-    fn measure(&mut self, shape: (usize, usize)) {
-        let at = |k: usize, n: usize| (k + 1) * n / (POINTS + 1);
-        let mut points = Array2::<f32>::zeros(shape);
-        for k in 0..POINTS * POINTS {
-            points[[at(k / POINTS, shape.0), at(k % POINTS, shape.1)]] = 1.0;
-        }
-        let responses = self.data_term(&vec![points; self.data.len()]);
-        let size = self.response.fft.size();
-        let reach = REACH.min(shape.0 / (2 * POINTS + 2)).min(shape.1 / (2 * POINTS + 2)) as i64;
-        let mut scratch = FftScratch::default();
-        for (response, share) in responses.iter().zip(&self.share) {
-            let mut square = vec![0.0f32; size * size];
-            for k in 0..POINTS * POINTS {
-                let (y, x) = (at(k / POINTS, shape.0) as i64, at(k % POINTS, shape.1) as i64);
-                let own = share[[y as usize, x as usize]].powi(2) * (POINTS * POINTS) as f32;
-                for dy in -reach..=reach {
-                    for dx in -reach..=reach {
-                        let value = response[[(y + dy) as usize, (x + dx) as usize]] / own;
-                        let to = dy.rem_euclid(size as i64) as usize * size + dx.rem_euclid(size as i64) as usize;
-                        square[to] += value;
-                    }
-                }
-            }
-            let mut spectrum = vec![Complex32::ZERO; self.response.fft.entries()];
-            self.response
-                .fft
-                .forward(&mut square, size, &mut spectrum, &mut scratch);
-            self.response.spectrum.push(spectrum.iter().map(|v| v.norm()).collect());
-        }
-    }
-
-    /// An approximate inverse of the system.
+    /// An approximate inverse of the system: of its diagonal, all light of a place being counted there.
     fn precondition(&self, residual: &[Array2<f32>], terms: Terms) -> Planes {
-        use rayon::prelude::*;
-        let fft = &self.response.fft;
-        let (size, half) = (fft.size(), fft.size() / 2 + 1);
-        let shape = self.shape();
-        let slope = |k: usize| 2.0 - 2.0 * (std::f64::consts::TAU * k as f64 / size as f64).cos();
-        let slopes: Vec<f32> = (0..size).map(|k| slope(k) as f32).collect();
-        let one = |(plane, (share, response)): (&Array2<f32>, (&Array2<f32>, &Vec<f32>))| {
-            let mean = share.iter().map(|s| s * s).sum::<f32>() / share.len() as f32;
-            let mut square = vec![0.0f32; size * size];
-            for ((y, x), v) in plane.indexed_iter() {
-                square[y * size + x] = v / share[[y, x]];
-            }
-            let mut spectrum = vec![Complex32::ZERO; fft.entries()];
-            let mut scratch = FftScratch::default();
-            fft.forward(&mut square, shape.0, &mut spectrum, &mut scratch);
-            for kx in 0..half {
-                for ky in 0..size {
-                    let prior = terms.slopes as f32 * (slopes[kx] + slopes[ky]) + terms.identity as f32;
-                    let at = kx * size + ky;
-                    spectrum[at] /= response[at] + prior / mean + 1e-6;
-                }
-            }
-            fft.inverse(&mut spectrum, &mut square, &mut scratch);
-            Array2::from_shape_fn(shape, |(y, x)| square[y * size + x] / share[[y, x]])
+        // Within a picture D* D has 4 on its diagonal, and its square 4^2 + 4.
+        let prior = (4.0 * terms.slopes + 20.0 * terms.bends + terms.identity) as f32;
+        let one = |r: &Array2<f32>| {
+            ndarray::Zip::from(r)
+                .and(&self.share)
+                .map_collect(|r, s| r / (s + prior))
         };
-        residual
-            .par_iter()
-            .zip(self.share.par_iter().zip(&self.response.spectrum))
-            .map(one)
-            .collect()
+        residual.iter().map(one).collect()
     }
 
     /// Conjugate gradients from a picture towards the solution of the system with this right side.
@@ -314,9 +213,14 @@ pub fn slopes_adjoint([down, right]: &[Array2<f32>; 2]) -> Array2<f32> {
     })
 }
 
-fn add_slopes(to: &mut Array2<f32>, x: &Array2<f32>, strength: f32) {
-    if strength != 0.0 {
-        to.scaled_add(strength, &slopes_adjoint(&slopes(x)));
+fn add_prior(to: &mut Array2<f32>, x: &Array2<f32>, terms: Terms) {
+    if terms.slopes == 0.0 && terms.bends == 0.0 {
+        return;
+    }
+    let bent = slopes_adjoint(&slopes(x));
+    to.scaled_add(terms.slopes as f32, &bent);
+    if terms.bends != 0.0 {
+        to.scaled_add(terms.bends as f32, &slopes_adjoint(&slopes(&bent)));
     }
 }
 

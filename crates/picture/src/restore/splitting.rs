@@ -80,6 +80,7 @@ pub fn restore(system: &NormalSystem<'_>, denoiser: &dyn Denoiser, progress: &dy
         }
         let terms = Terms {
             slopes: 0.0,
+            bends: 0.0,
             identity: weight,
         };
         x = system.solve(clean, &right, terms, STEPS, progress)?;

@@ -5,19 +5,22 @@ use metalith_core::{Progress, Result};
 use ndarray::Array2;
 
 use super::normal::{NormalSystem, Planes, Terms, slopes, slopes_adjoint};
-use super::{EXPECTED_SLOPE, tikhonov};
+use super::tikhonov;
 
 /// Rounds, and steps of conjugate gradients in each.
 const ROUNDS: usize = 6;
 const STEPS: usize = 2;
+/// Root mean square slope of the grey plane of the statistics of scenes along one axis, and so of the others: photographs
+/// have 0.075.
+const EXPECTED_SLOPE: f64 = 0.075;
 /// Slopes are split with a penalty of so many times that of normal slopes: the threshold is then a fifth of what is
 /// expected.
 const PENALTY: f64 = 5.0;
 
 pub fn restore(system: &NormalSystem<'_>, progress: &dyn Progress) -> Result<Planes> {
-    let normal = tikhonov::terms(system).slopes;
     let terms = Terms {
-        slopes: PENALTY * normal,
+        slopes: PENALTY / (EXPECTED_SLOPE.powi(2) * system.scale),
+        bends: 0.0,
         identity: 0.0,
     };
     // An exponential law with the same mean square: the price of a slope over its penalty.
@@ -25,7 +28,7 @@ pub fn restore(system: &NormalSystem<'_>, progress: &dyn Progress) -> Result<Pla
     let mut x = tikhonov::restore(system, progress)?;
     progress.begin("restoring by total variation", (ROUNDS * STEPS) as u64);
     let zero = || Array2::<f32>::zeros(system.shape());
-    let mut prices: Vec<[Array2<f32>; 2]> = (0..system.channels()).map(|_| [zero(), zero()]).collect();
+    let mut prices: Vec<[Array2<f32>; 2]> = (0..system.data.len()).map(|_| [zero(), zero()]).collect();
     for _ in 0..ROUNDS {
         let mut right = system.data.clone();
         for (c, price) in prices.iter_mut().enumerate() {

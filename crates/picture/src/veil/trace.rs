@@ -1,156 +1,22 @@
-//! The veil: all light that lands outside of the kernels' windows, laid over the sensor coarsely.
-//!
-//! Where light of a direction lands follows from the local spectra of the element, by rays
-//! ([`metalith_wave::propagation::Departure`]). What the kernel of that direction holds is taken out of it, so that image
-//! and veil together are all the light that travels to the sensor.
+//! Where the light of each square of the scene lands, by rays.
 
 use metalith_camera::{ChannelSampling, Sensor};
 use metalith_core::{Error, Progress, Result};
 use metalith_wave::PlaneWave;
 use metalith_wave::propagation::{Departure, LandingGrid, leaving};
-use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
+use super::squares::solid_angle;
+use super::{CELL_PIXELS, LightShares, SCENE_CELLS, Veil, sensor_cells};
 use crate::chip::ChipInLight;
 use crate::kernels::KernelBank;
 use crate::spectra::SceneSpectrum;
 use crate::{ElementView, SceneView};
 
-/// Squares an axis into which the light of a scene is gathered.
-pub const SCENE_CELLS: usize = 20;
-/// Pixels an axis of a square of the sensor.
-pub const CELL_PIXELS: usize = 16;
 /// Blocks an axis of an element.
 const BLOCKS: usize = 8;
 /// Wavelengths of the veil are at most so far apart (nm): it moves with the chief ray by less than a square.
 const VEIL_STEP_NM: f64 = 38.0;
-
-/// Where a channel's light of a scene's squares goes that no kernel holds.
-#[derive(Clone, Debug)]
-pub struct Veil {
-    /// Rows and columns of squares of the sensor.
-    pub cells: [usize; 2],
-    /// Channels and spectra of the scene.
-    pub channels: usize,
-    pub bases: usize,
-    /// Channel, spectrum, square of the scene, square of the sensor: light on it, of what a lens receives from a white
-    /// surface of that square.
-    pub values: Vec<f32>,
-    /// By channel and spectrum: shares of the light that arrives.
-    pub budget: Vec<LightShares>,
-}
-
-/// Where the light goes that arrives at all elements from a white scene.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct LightShares {
-    /// Light that arrives, of any scale.
-    pub arrives: f64,
-    /// Of it, what kernels hold, on or off the sensor.
-    pub in_kernels: f64,
-    /// On the sensor, outside of kernels.
-    pub veil: f64,
-    /// In the sensor's plane or beyond, but not on the sensor.
-    pub beyond: f64,
-    /// Held in frequencies that do not travel.
-    pub evanescent: f64,
-    /// Undiffracted: a part of the veil and of what lands beyond.
-    pub zero_order: f64,
-    /// Reflected or absorbed, or diffracted into the glass.
-    pub not_passed: f64,
-}
-
-/// Gather the light of a plane of the scene into squares: hats about their middles, times projected solid angle.
-pub fn gather(view: &SceneView, plane: ArrayView2<'_, f32>) -> Vec<f64> {
-    let mut cells = vec![0.0; SCENE_CELLS * SCENE_CELLS];
-    for_scene(view, |y, x, weight, cell| {
-        cells[cell] += weight * f64::from(plane[[y, x]])
-    });
-    cells
-}
-
-/// The adjoint of [`gather`]: adds to a plane.
-pub fn spread(view: &SceneView, cells: &[f64], plane: &mut Array2<f32>) {
-    for_scene(view, |y, x, weight, cell| {
-        plane[[y, x]] += (weight * cells[cell]) as f32
-    });
-}
-
-fn for_scene(view: &SceneView, mut act: impl FnMut(usize, usize, f64, usize)) {
-    let axis = |n: usize| -> Vec<[(usize, f64); 2]> {
-        (0..n)
-            .map(|i| {
-                let place =
-                    ((i as f64 + 0.5) / n as f64 * SCENE_CELLS as f64 - 0.5).clamp(0.0, (SCENE_CELLS - 1) as f64);
-                let low = (place as usize).min(SCENE_CELLS - 2);
-                let share = place - low as f64;
-                [(low, 1.0 - share), (low + 1, share)]
-            })
-            .collect()
-    };
-    let (rows, columns) = (axis(view.rows), axis(view.columns));
-    for (y, row) in rows.iter().enumerate() {
-        for (x, column) in columns.iter().enumerate() {
-            let solid = solid_angle(view, y as f64, x as f64);
-            for (cy, wy) in row {
-                for (cx, wx) in column {
-                    act(y, x, wy * wx * solid, cy * SCENE_CELLS + cx);
-                }
-            }
-        }
-    }
-}
-
-/// Projected solid angle of a pixel of the scene.
-pub fn solid_angle(view: &SceneView, row: f64, column: f64) -> f64 {
-    let [tx, ty] = view.tangents(row, column);
-    (view.pixel() / (1.0 + tx * tx + ty * ty)).powi(2)
-}
-
-/// From squares to the pixels of the sensor: straight lines between the middles of squares.
-pub fn lay(cells: &[f64], shape: [usize; 2], frame: &mut Array2<f32>) {
-    for_sensor(frame.dim().into(), shape, |y, x, weight, cell| {
-        frame[[y, x]] += (weight * cells[cell]) as f32
-    });
-}
-
-/// The adjoint of [`lay`].
-pub fn lift(frame: &Array2<f32>, shape: [usize; 2]) -> Vec<f64> {
-    let mut cells = vec![0.0; shape[0] * shape[1]];
-    for_sensor(frame.dim().into(), shape, |y, x, weight, cell| {
-        cells[cell] += weight * f64::from(frame[[y, x]])
-    });
-    cells
-}
-
-fn for_sensor(frame: [usize; 2], shape: [usize; 2], mut act: impl FnMut(usize, usize, f64, usize)) {
-    let axis = |n: usize, cells: usize| -> Vec<[(usize, f64); 2]> {
-        (0..n)
-            .map(|i| {
-                let place = ((i as f64 + 0.5) / CELL_PIXELS as f64 - 0.5).clamp(0.0, (cells - 1) as f64);
-                let low = (place as usize).min(cells.saturating_sub(2));
-                let share = place - low as f64;
-                [(low, 1.0 - share), ((low + 1).min(cells - 1), share)]
-            })
-            .collect()
-    };
-    let scale = 1.0 / (CELL_PIXELS * CELL_PIXELS) as f64;
-    let (rows, columns) = (axis(frame[0], shape[0]), axis(frame[1], shape[1]));
-    for (y, row) in rows.iter().enumerate() {
-        for (x, column) in columns.iter().enumerate() {
-            for (cy, wy) in row {
-                for (cx, wx) in column {
-                    act(y, x, scale * wy * wx, cy * shape[1] + cx);
-                }
-            }
-        }
-    }
-}
-
-/// Squares that cover a sensor.
-pub fn sensor_cells(sensor: &Sensor) -> [usize; 2] {
-    [sensor.rows, sensor.columns].map(|n| (n as usize).div_ceil(CELL_PIXELS))
-}
 
 impl Veil {
     /// Trace the veil of a scene's field.
@@ -221,77 +87,6 @@ impl Veil {
             values,
             budget,
         })
-    }
-
-    /// No veil, for tests and for those who leave it out.
-    pub fn none(sensor: &Sensor, channels: usize, bases: usize) -> Self {
-        let cells = sensor_cells(sensor);
-        Self {
-            cells,
-            channels,
-            bases,
-            values: vec![0.0; channels * bases * SCENE_CELLS * SCENE_CELLS * cells[0] * cells[1]],
-            budget: vec![LightShares::default(); channels * bases],
-        }
-    }
-
-    fn block(&self, channel: usize, basis: usize) -> ArrayView2<'_, f32> {
-        let shape = (SCENE_CELLS * SCENE_CELLS, self.cells[0] * self.cells[1]);
-        let from = (channel * self.bases + basis) * shape.0 * shape.1;
-        ArrayView2::from_shape(shape, &self.values[from..from + shape.0 * shape.1]).expect("as it was made")
-    }
-
-    /// Light on the squares of the sensor, from that of the scene's squares.
-    pub fn apply(&self, channel: usize, basis: usize, scene: &[f64]) -> Vec<f64> {
-        let mut cells = vec![0.0; self.cells[0] * self.cells[1]];
-        for (light, row) in scene.iter().zip(self.block(channel, basis).rows()) {
-            cells.iter_mut().zip(row).for_each(|(c, v)| *c += light * f64::from(*v));
-        }
-        cells
-    }
-
-    /// The adjoint of [`Veil::apply`].
-    pub fn adjoint(&self, channel: usize, basis: usize, cells: &[f64]) -> Vec<f64> {
-        let block = self.block(channel, basis);
-        let sum = |row: ndarray::ArrayView1<'_, f32>| row.iter().zip(cells).map(|(v, c)| f64::from(*v) * c).sum();
-        block.rows().into_iter().map(sum).collect()
-    }
-
-    /// The veil of a surface whose spectrum is the sum of all of the basis, in each channel.
-    pub fn grey(&self) -> Self {
-        let size = SCENE_CELLS * SCENE_CELLS * self.cells[0] * self.cells[1];
-        let mut values = vec![0.0f32; self.channels * size];
-        for (channel, to) in values.chunks_exact_mut(size).enumerate() {
-            for basis in 0..self.bases {
-                let from = &self.values[(channel * self.bases + basis) * size..][..size];
-                to.iter_mut().zip(from).for_each(|(a, b)| *a += b);
-            }
-        }
-        Self {
-            values,
-            bases: 1,
-            budget: Vec::new(),
-            ..*self
-        }
-    }
-}
-
-impl LightShares {
-    fn add(&mut self, other: &Self, weight: f64) {
-        self.arrives += weight * other.arrives;
-        self.in_kernels += weight * other.in_kernels;
-        self.veil += weight * other.veil;
-        self.beyond += weight * other.beyond;
-        self.evanescent += weight * other.evanescent;
-        self.zero_order += weight * other.zero_order;
-        self.not_passed += weight * other.not_passed;
-    }
-
-    /// The sum of those of several spectra.
-    pub fn sum<'a>(all: impl IntoIterator<Item = &'a Self>) -> Self {
-        let mut sum = Self::default();
-        all.into_iter().for_each(|s| sum.add(s, 1.0));
-        sum
     }
 }
 

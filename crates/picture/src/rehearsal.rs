@@ -1,0 +1,82 @@
+//! A camera tried on a random scene: what a restoration may know of its own errors, and what it will reach, before there is
+//! any picture.
+
+use metalith_core::{Progress, Result};
+use ndarray::Array2;
+
+use crate::exposure::expose;
+use crate::operator::{Detail, FrameOperator, SceneInputs};
+use crate::restore::{RestorationMethod, SceneStatistics};
+use crate::scene::SceneImage;
+use crate::score::scores;
+use crate::spectra::rgb_basis;
+use crate::studio::Studio;
+
+/// A scene of the statistics of natural ones, and the light that it brings to the sensor.
+pub struct Rehearsal {
+    scene: SceneImage,
+    light: Vec<Array2<f32>>,
+    /// What the operator of the restoration errs by against the simulation, as a share of the light (root mean square), by
+    /// channel.
+    pub operator_error: Vec<f64>,
+}
+
+/// Of the scene and of its noise.
+const SEED: u64 = 1;
+
+impl Rehearsal {
+    /// For the operator of a restoration.
+    pub fn new(studio: &Studio, restoration: &FrameOperator<'_>) -> Self {
+        let scene = SceneImage {
+            name: "random".into(),
+            view: studio.view,
+            basis: rgb_basis().to_vec(),
+            planes: SceneStatistics::colours().random_scene(&studio.view, SEED),
+            left_out: 0.0,
+        };
+        let simulation = studio.operator(Detail {
+            inputs: SceneInputs::Spectra(studio.primaries()),
+            ..Detail::simulation(0)
+        });
+        let light = simulation.apply(&scene.planes);
+        drop(simulation);
+        let known = match restoration.sees_colours() {
+            true => restoration.apply(&scene.planes),
+            false => restoration.apply(&crate::ChannelColours::ideal(&studio.channels, &scene)),
+        };
+        let operator_error = light.iter().zip(&known).map(|(a, b)| relative(a, b)).collect();
+        Self {
+            scene,
+            light,
+            operator_error,
+        }
+    }
+
+    /// Expected PSNR of linear light in each zone (dB) by Tikhonov and all elements: of scenes with the mean and the
+    /// spectra of photographs, with everything that the simulation knows and the restoration does not.
+    ///
+    /// # Errors
+    /// If the user stopped it.
+    pub fn forecast(
+        &self,
+        studio: &Studio,
+        restoration: &FrameOperator<'_>,
+        progress: &dyn Progress,
+    ) -> Result<Vec<f64>> {
+        let frame = expose(&studio.camera, &studio.gain, &self.light, SEED);
+        let method = RestorationMethod::Tikhonov;
+        let picture = studio.restore(restoration, &self.operator_error, &frame, method, true, progress)?;
+        let found = scores(&picture, &studio.truth(&self.scene))?;
+        Ok(found.iter().map(|s| s.psnr_linear_db).collect())
+    }
+}
+
+/// Root mean square difference over that of the first.
+fn relative(a: &Array2<f32>, b: &Array2<f32>) -> f64 {
+    let (mut off, mut all) = (0.0, 0.0);
+    for (a, b) in a.iter().zip(b) {
+        off += f64::from(a - b).powi(2);
+        all += f64::from(*a).powi(2);
+    }
+    (off / f64::max(all, f64::MIN_POSITIVE)).sqrt()
+}

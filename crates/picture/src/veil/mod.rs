@@ -1,0 +1,100 @@
+//! The veil: all light that lands outside of the kernels' windows, laid over the sensor coarsely.
+//!
+//! Where light of a direction lands follows from the local spectra of the element, by rays
+//! ([`metalith_wave::propagation::Departure`]). What the kernel of that direction holds is taken out of it, so that image
+//! and veil together are all the light that travels to the sensor.
+//!
+//! | question | file |
+//! | --- | --- |
+//! | from pixels to squares and back | `squares` |
+//! | where the light of one square of the scene goes | `trace` |
+//! | how much light goes where in all | `shares` |
+
+mod shares;
+mod squares;
+mod trace;
+
+use metalith_camera::Sensor;
+use ndarray::ArrayView2;
+
+pub use shares::LightShares;
+pub use squares::{gather, lay, lift, spread};
+
+/// Squares an axis into which the light of a scene is gathered.
+pub const SCENE_CELLS: usize = 20;
+/// Pixels an axis of a square of the sensor.
+pub const CELL_PIXELS: usize = 16;
+
+/// Where a channel's light of a scene's squares goes that no kernel holds.
+#[derive(Clone, Debug)]
+pub struct Veil {
+    /// Rows and columns of squares of the sensor.
+    pub cells: [usize; 2],
+    /// Channels and spectra of the scene.
+    pub channels: usize,
+    pub bases: usize,
+    /// Channel, spectrum, square of the scene, square of the sensor: light on it, of what a lens receives from a white
+    /// surface of that square.
+    pub values: Vec<f32>,
+    /// By channel and spectrum: shares of the light that arrives.
+    pub budget: Vec<LightShares>,
+}
+
+/// Squares that cover a sensor.
+pub fn sensor_cells(sensor: &Sensor) -> [usize; 2] {
+    [sensor.rows, sensor.columns].map(|n| (n as usize).div_ceil(CELL_PIXELS))
+}
+
+impl Veil {
+    /// No veil, for tests and for those who leave it out.
+    pub fn none(sensor: &Sensor, channels: usize, bases: usize) -> Self {
+        let cells = sensor_cells(sensor);
+        Self {
+            cells,
+            channels,
+            bases,
+            values: vec![0.0; channels * bases * SCENE_CELLS * SCENE_CELLS * cells[0] * cells[1]],
+            budget: vec![LightShares::default(); channels * bases],
+        }
+    }
+
+    fn block(&self, channel: usize, basis: usize) -> ArrayView2<'_, f32> {
+        let shape = (SCENE_CELLS * SCENE_CELLS, self.cells[0] * self.cells[1]);
+        let from = (channel * self.bases + basis) * shape.0 * shape.1;
+        ArrayView2::from_shape(shape, &self.values[from..from + shape.0 * shape.1]).expect("as it was made")
+    }
+
+    /// Light on the squares of the sensor, from that of the scene's squares.
+    pub fn apply(&self, channel: usize, basis: usize, scene: &[f64]) -> Vec<f64> {
+        let mut cells = vec![0.0; self.cells[0] * self.cells[1]];
+        for (light, row) in scene.iter().zip(self.block(channel, basis).rows()) {
+            cells.iter_mut().zip(row).for_each(|(c, v)| *c += light * f64::from(*v));
+        }
+        cells
+    }
+
+    /// The adjoint of [`Veil::apply`].
+    pub fn adjoint(&self, channel: usize, basis: usize, cells: &[f64]) -> Vec<f64> {
+        let block = self.block(channel, basis);
+        let sum = |row: ndarray::ArrayView1<'_, f32>| row.iter().zip(cells).map(|(v, c)| f64::from(*v) * c).sum();
+        block.rows().into_iter().map(sum).collect()
+    }
+
+    /// The veil of a surface whose spectrum is the sum of some of the basis, in each channel.
+    pub fn grey(&self, spectra: std::ops::Range<usize>) -> Self {
+        let size = SCENE_CELLS * SCENE_CELLS * self.cells[0] * self.cells[1];
+        let mut values = vec![0.0f32; self.channels * size];
+        for (channel, to) in values.chunks_exact_mut(size).enumerate() {
+            for basis in spectra.clone() {
+                let from = &self.values[(channel * self.bases + basis) * size..][..size];
+                to.iter_mut().zip(from).for_each(|(a, b)| *a += b);
+            }
+        }
+        Self {
+            values,
+            bases: 1,
+            budget: Vec::new(),
+            ..*self
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! Options of all commands that take pictures.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use metalith::camera::Camera;
+use metalith::{CalibratedModel, Design, Result};
+
+/// The chip, the camera that it is in, and the field of its scenes.
+#[derive(Args)]
+pub struct CameraArgs {
+    /// The design that the layout is of: elements, wedges, cell.
+    #[arg(long)]
+    pub design: PathBuf,
+
+    /// The camera file.
+    #[arg(long)]
+    pub camera: PathBuf,
+
+    /// The chip as a measured line and bench make it: the `model.toml` that `metalith calibrate` wrote.
+    #[arg(long, value_name = "MODEL")]
+    pub model: Option<PathBuf>,
+
+    /// Angle from the left to the right edge of a scene (degrees).
+    #[arg(long, default_value_t = 90.0)]
+    pub field_deg: f64,
+
+    /// Seed of the noise.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+}
+
+/// What the files of [`CameraArgs`] hold.
+pub struct CameraFiles {
+    pub design: Design,
+    pub camera: Camera,
+    pub model: Option<CalibratedModel>,
+}
+
+impl CameraArgs {
+    /// Read all files.
+    ///
+    /// # Errors
+    /// If one cannot be read.
+    pub fn read(&self) -> Result<CameraFiles> {
+        Ok(CameraFiles {
+            design: Design::read(&self.design)?,
+            camera: Camera::read(&self.camera)?,
+            model: self.model.as_deref().map(CalibratedModel::read).transpose()?,
+        })
+    }
+}
