@@ -18,7 +18,7 @@ pub const LIMITS: OasisLimits = OasisLimits {
 pub fn block(records: &[u8]) -> Vec<u8> {
     use flate2::{Compression, write::DeflateEncoder};
     use std::io::Write;
-    let mut deflate = DeflateEncoder::new(Vec::new(), Compression::fast());
+    let mut deflate = DeflateEncoder::new(Vec::new(), Compression::best());
     deflate.write_all(records).expect("memory grows");
     let packed = deflate.finish().expect("memory grows");
     let mut bytes = vec![34, 0];
