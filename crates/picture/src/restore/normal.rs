@@ -1,16 +1,19 @@
 //! The linear systems of restoration: A* W A x + a D* D x + b (D* D)^2 x + m x = r, with D the slopes along rows and columns,
 //! for planes that vary independently ([`SceneStatistics`]).
 //!
-//! They are solved by conjugate gradients, preconditioned by how much light each place of the scene sends into the frame.
-//! Preconditioners that know the response to a point do worse: the veil is not in it, and what one plane then puts into
-//! another is many times what belongs there.
+//! They are solved by conjugate gradients, preconditioned by how much light each place of the scene sends into the frame and
+//! by how scenes vary: the first steps are smooth pictures, and what a frame says of fine detail follows. Without the
+//! second, the patterns in which back-projected pixels overlap stay in the picture.
 
 use metalith_core::{Error, Progress, Result};
+use metalith_wave::kernels::fft_size;
 use ndarray::Array2;
+use num_complex::Complex32;
+use rayon::prelude::*;
 
 use super::Recorded;
-use super::prior::SceneStatistics;
-use crate::operator::FrameOperator;
+use super::prior::{SceneStatistics, squared_frequencies};
+use crate::operator::{FftScratch, FrameOperator, SquareFft};
 
 /// Planes of a picture.
 pub type Planes = Vec<Array2<f32>>;
@@ -30,6 +33,8 @@ pub struct NormalSystem<'a> {
     pub scale: f64,
     /// How much light of each place counts, one where most does.
     share: Array2<f32>,
+    /// For the spectra of pictures.
+    fft: SquareFft,
 }
 
 /// Strengths of a system.
@@ -42,6 +47,13 @@ pub struct Terms {
     /// Of the picture itself.
     pub identity: f64,
 }
+
+/// Pixels between a picture and its periodic copies: beyond them little of it is correlated.
+const BORDER: usize = 40;
+
+/// What is added to the prior for all frequencies, over that of the highest. With less the first steps are spent on what is
+/// smooth: of 1e-4, 1e-3 and 1e-2 the last has the most of a photograph after 16 steps (17.7, 18.1 and 18.3 dB).
+const FLAT: f64 = 1e-2;
 
 /// A place that sends less light than this share of the best is preconditioned as if it sent so much.
 const LEAST_SHARE: f32 = 0.02;
@@ -76,6 +88,7 @@ impl<'a> NormalSystem<'a> {
             weight,
             scale: f64::from(most),
             share: light.mapv(|v| (v / most).max(LEAST_SHARE)),
+            fft: SquareFft::new(fft_size(shape.0.max(shape.1) + BORDER)),
         }
     }
 
@@ -113,16 +126,37 @@ impl<'a> NormalSystem<'a> {
         out
     }
 
-    /// An approximate inverse of the system: of its diagonal, all light of a place being counted there.
+    /// An approximate inverse of the system: the inverse of the prior between two roots of the light of each place. The
+    /// two are in one unit where a place counts most.
     fn precondition(&self, residual: &[Array2<f32>], terms: Terms) -> Planes {
-        // Within a picture D* D has 4 on its diagonal, and its square 4^2 + 4.
-        let prior = (4.0 * terms.slopes + 20.0 * terms.bends + terms.identity) as f32;
-        let one = |r: &Array2<f32>| {
-            ndarray::Zip::from(r)
-                .and(&self.share)
-                .map_collect(|r, s| r / (s + prior))
+        let size = self.fft.size();
+        let squared = squared_frequencies(size);
+        let most = 8.0 * terms.slopes + 64.0 * terms.bends + terms.identity;
+        let filter = |s: f64| match most {
+            // Nothing is known of the picture.
+            0.0 => 1.0,
+            _ => 1.0 / (terms.slopes * s + terms.bends * s * s + terms.identity + FLAT * most),
         };
-        residual.iter().map(one).collect()
+        let one = |r: &Array2<f32>| {
+            let mut scratch = FftScratch::default();
+            let mut square = vec![0.0f32; size * size];
+            let mut spectrum = vec![Complex32::ZERO; self.fft.entries()];
+            let (rows, columns) = r.dim();
+            for y in 0..rows {
+                for x in 0..columns {
+                    square[y * size + x] = r[[y, x]] / self.share[[y, x]].sqrt();
+                }
+            }
+            self.fft.forward(&mut square, rows, &mut spectrum, &mut scratch);
+            for (i, v) in spectrum.iter_mut().enumerate() {
+                *v *= filter(squared[i / size] + squared[i % size]) as f32;
+            }
+            self.fft.inverse(&mut spectrum, &mut square, &mut scratch);
+            Array2::from_shape_fn((rows, columns), |(y, x)| {
+                square[y * size + x] / self.share[[y, x]].sqrt()
+            })
+        };
+        residual.par_iter().map(one).collect()
     }
 
     /// Conjugate gradients from a picture towards the solution of the system with this right side.
