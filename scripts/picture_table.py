@@ -26,13 +26,15 @@ def mean_db(values: list[float]) -> float:
     return -10 * math.log10(sum(10 ** (-v / 10) for v in values) / len(values))
 
 
-def report_of(args: argparse.Namespace, photograph: Path) -> dict:
-    """The report of one photograph."""
+def report_of(args: argparse.Namespace, photograph: Path, forecast: bool) -> dict:
+    """The report of one photograph, with the forecast, which is the same for all, if it is wanted."""
     out = args.folder / photograph.stem
     command = [args.metalith, "picture", args.layout, photograph, "--design", args.design, "--camera", args.camera]
     command += ["--field-deg", args.field_deg, "--method", args.methods, "--out", out]
     if not args.joint:
         command.append("--separate")
+    if not forecast:
+        command.append("--no-forecast")
     subprocess.run([str(part) for part in command], check=True, stdout=subprocess.DEVNULL)
     return json.loads((out / "picture.json").read_text(encoding="utf-8"))
 
@@ -52,7 +54,7 @@ def main() -> int:
     found = defaultdict(lambda: defaultdict(list))
     forecast = defaultdict(list)
     for photograph in photographs:
-        report = report_of(args, photograph)
+        report = report_of(args, photograph, not forecast)
         for one in report["restorations"]:
             way = (one["method"], "joint" if one["joint"] else "each alone")
             for score in one["scores"]:
@@ -71,7 +73,7 @@ def main() -> int:
         cells = [row("psnr_db", "{:.2f}", mean_db), row("ssim", "{:.3f}", plain), row("psnr_linear_db", "{:.2f}", mean_db)]
         print(f"| {method} | {elements} | {' | '.join(cells)} |")
     if forecast:
-        print(f"| forecast | joint | | | {', '.join(f'{mean_db(forecast[zone]):.2f}' for zone in ZONES)} |")
+        print(f"| forecast | joint | | | {', '.join(f'{forecast[zone][0]:.2f}' for zone in ZONES)} |")
     return 0
 
 

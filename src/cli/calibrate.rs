@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use metalith::Result;
 use metalith::calibrate::{
-    Calibration, MeasuredSet, SetVerdict, Settings, ValidationPlan, calibrate, validate, write_validation,
+    Calibration, DeclaredEffect, MeasuredSet, SetVerdict, Settings, ValidationPlan, calibrate, validate,
+    write_validation,
 };
 use metalith::cell::cache_folder;
 use metalith::extract::GdsPillars;
@@ -30,6 +31,10 @@ pub struct CalibrateArgs {
     /// Try these effects alone, separated by commas; all of them if left out.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     effects: Vec<String>,
+
+    /// Try the effects that this file declares by expressions as well: `[[effect]]` with name, stage and expression.
+    #[arg(long, value_name = "FILE")]
+    declare: Option<PathBuf>,
 
     /// Validate the calibration itself instead, on synthetic sets like this one: without effects, with each
     /// effect at three sizes, with pairs, and with effects that are not listed. Takes half an hour; writes
@@ -72,6 +77,10 @@ pub fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> {
             Vec::new()
         } else {
             args.effects.clone()
+        },
+        declared: match &args.declare {
+            Some(path) => DeclaredEffect::read(path)?,
+            None => Vec::new(),
         },
         ..Settings::default()
     };

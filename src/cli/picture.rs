@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use metalith::picture::restore::RestorationMethod;
-use metalith::picture::scene::{BuiltIn, SceneFile, SceneImage, chart, read_scene};
+use metalith::picture::scene::{BuiltIn, SceneFile, SceneImage, chart, read_depth, read_scene};
 use metalith::picture::{
-    Frame, PicturePages, PictureReport, Rehearsal, RestorationReport, Studio, scores, write_pages,
+    Frame, PicturePages, PictureReport, Rehearsal, RestorationReport, Studio, contrast_curves, scores,
+    worth_of_assumptions, write_pages,
 };
 use metalith::{Error, Fidelity, Result};
 
@@ -35,6 +36,10 @@ pub struct PictureArgs {
     #[arg(long)]
     distance_mm: Option<f64>,
 
+    /// Distance of each pixel of the scene: an NPY of millimetres, or a grey PNG of 16 bits with whole millimetres.
+    #[arg(long, value_name = "FILE")]
+    depth: Option<PathBuf>,
+
     /// Wavelengths of the bands of a spectral cube (nm), separated by commas.
     #[arg(long, value_delimiter = ',', value_name = "NM,NM,...")]
     wavelengths_nm: Option<Vec<f64>>,
@@ -47,9 +52,17 @@ pub struct PictureArgs {
     #[arg(long, value_delimiter = ',', default_value = "tikhonov")]
     method: Vec<String>,
 
+    /// Leave the forecast out: it costs as much as a restoration.
+    #[arg(long)]
+    no_forecast: bool,
+
     /// Restore by each element alone too.
     #[arg(long)]
     separate: bool,
+
+    /// Say too what the assumptions of others are worth: `paper`, those of the array that the prototype follows.
+    #[arg(long, value_name = "WHOSE")]
+    assume: Option<Assume>,
 
     /// Folder for `picture.html` and `picture.json`.
     #[arg(long, short, default_value = "out/picture", value_name = "FOLDER")]
@@ -58,6 +71,12 @@ pub struct PictureArgs {
     /// Print `picture.json` to standard output.
     #[arg(long)]
     json: bool,
+}
+
+/// Whose assumptions are compared with the physics.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Assume {
+    Paper,
 }
 
 impl PictureArgs {
@@ -69,14 +88,18 @@ impl PictureArgs {
                 "give a positive --distance-mm",
             ));
         }
-        match self.scene.parse::<BuiltIn>() {
-            Ok(kind) => Ok(chart(kind, self.pixels.into(), self.with.field_deg, distance_um)),
+        let scene = match self.scene.parse::<BuiltIn>() {
+            Ok(kind) => chart(kind, self.pixels.into(), self.with.field_deg, distance_um),
             Err(_) => read_scene(&SceneFile {
                 path: PathBuf::from(&self.scene),
                 wavelengths_nm: self.wavelengths_nm.clone(),
                 field_deg: self.with.field_deg,
                 distance_um,
-            }),
+            })?,
+        };
+        match &self.depth {
+            Some(path) => scene.with_depth(read_depth(path)?),
+            None => Ok(scene),
         }
     }
 }
@@ -90,7 +113,7 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     let inputs = [&args.layout, &args.with.design, &args.with.camera].map(PathBuf::as_path);
     apart(inputs.into_iter().chain([args.scene.as_ref()]), &[&page, &numbers])?;
     let studio = Studio::open(&design, &args.layout, &camera, model.as_ref(), &scene, terminal)?;
-    let simulation = studio.simulation();
+    let simulation = studio.simulation_of(&scene);
     let frame = studio.record(&simulation, &scene, args.with.seed)?;
     let truth = studio.truth(&scene);
     drop(simulation);
@@ -105,7 +128,7 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
                 let picture = studio.restore(&operator, error, &frame, method, joint, terminal)?;
                 let mut restoration = RestorationReport::new(method, joint, scores(&picture, &truth)?);
                 // The forecast is of the picture that normal slopes expect.
-                if method == RestorationMethod::Tikhonov && joint {
+                if method == RestorationMethod::Tikhonov && joint && !args.no_forecast {
                     restoration.forecast_db = rehearsal.forecast(&studio, &operator, terminal)?;
                 }
                 found.push(restoration);
@@ -120,6 +143,14 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     };
     let mut report = report(args, &studio, &scene, &frame, found, fidelity.name());
     report.operator_error.clone_from(error);
+    if let Ok(kind) = args.scene.parse::<BuiltIn>() {
+        report.contrast = contrast_curves(&studio, kind, &truth, &frame, &pictures[0]);
+    }
+    if let Some(Assume::Paper) = args.assume {
+        drop(operator);
+        let narrow = studio.open_without_dispersion(&design, &args.layout, model.as_ref(), &scene, terminal)?;
+        report.worth = worth_of_assumptions(&studio, &narrow, &scene, args.with.seed, terminal)?;
+    }
     let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();
     let pages = PicturePages {
         report: &report,
@@ -177,5 +208,7 @@ fn report(
         budget: studio.budget(),
         homographies: studio.homographies(),
         assumptions: studio.assumptions(fidelity),
+        contrast: Vec::new(),
+        worth: Vec::new(),
     }
 }

@@ -212,7 +212,7 @@ impl PsfArgs {
         }
         if matches!(self.fidelity, FidelityArg::Neighbours) {
             let mapping = Mapping::of_widths(found.elements.iter().map(|e| e.widths.histogram()))?;
-            return Ok(Box::new(NeighbourCell::new(stack, mapping, cache_folder())));
+            return Ok(Box::new(NeighbourCell::new(stack, vec![mapping], cache_folder())));
         }
         let mut widths = found
             .elements

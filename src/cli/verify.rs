@@ -7,7 +7,7 @@ use metalith::design::CellIncidence;
 use metalith::report::sig;
 use metalith::{
     Accuracy, CalibratedModel, Design, Error, Fidelity, MadeChip, PillarArray, Result, SimulationCases, Verification,
-    cell_models, verify, write_report,
+    cell_models, verify, verify::verify_pillars, write_report,
 };
 
 use super::compensated::CompensatedFor;
@@ -58,6 +58,11 @@ pub struct Judging {
     #[arg(long)]
     as_lit: bool,
 
+    /// Memory that reading back and simulating may take (MB). A layout that takes more is compared with its design
+    /// pillar by pillar, and not simulated.
+    #[arg(long, value_name = "MB", default_value_t = 8000.0)]
+    memory_mb: f64,
+
     /// Print `report.json` to standard output.
     #[arg(long)]
     json: bool,
@@ -89,6 +94,23 @@ impl From<FidelityArg> for Fidelity {
 }
 
 impl Judging {
+    /// Why a layout of this design, at `path`, will not be simulated, if it will not be; asked before work is spent.
+    ///
+    /// # Errors
+    /// If it could be neither simulated nor compared with its design.
+    pub fn not_simulated(&self, design: &Design, path: &Path) -> Result<Option<String>> {
+        let needed = metalith::verify::simulation_mb(design);
+        if needed <= self.memory_mb {
+            metalith::verify::fits(design, path)?;
+            return Ok(None);
+        }
+        metalith::verify::fits_folded(design, path)?;
+        Ok(Some(format!(
+            "that takes about {needed:.0} MB of memory, and --memory-mb allows {:.0}",
+            self.memory_mb
+        )))
+    }
+
     /// Read back, simulate, write the report into `folder`, and say what came out.
     pub fn judge(
         &self,
@@ -103,6 +125,12 @@ impl Judging {
             design.verify.incidence = CellIncidence::AsLit;
         }
         let design = &design;
+        if let Some(why) = self.not_simulated(design, layout)? {
+            terminal.say(&format!("note: every pillar is compared, nothing is simulated: {why}"));
+            let fidelity = self.fidelity.map_or(Fidelity::Rigorous, Fidelity::from);
+            let found = verify_pillars(design, array, layout, fidelity, why, terminal)?;
+            return self.report(design, array, &found, folder, terminal);
+        }
         let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
         let made = match &model {
             Some(model) => Some(MadeChip::new(&design.cell_stack()?, model)?),
@@ -119,12 +147,23 @@ impl Judging {
         };
         let accuracy = if self.fast { Accuracy::Fast } else { Accuracy::Accurate };
         let found = verify(design, array, layout, &cases, accuracy, terminal)?;
-        write_report(design, array, &found, folder)?;
+        self.report(design, array, &found, folder, terminal)
+    }
+
+    fn report(
+        &self,
+        design: &Design,
+        array: &PillarArray,
+        found: &Verification,
+        folder: &Path,
+        terminal: &Terminal,
+    ) -> Result<Outcome> {
+        write_report(design, array, found, folder)?;
         terminal.clear();
         if self.json {
-            print_json(&found);
+            print_json(found);
         } else {
-            summary(&found, folder);
+            summary(found, folder);
         }
         Ok(if found.passed() {
             Outcome::Fine
@@ -165,7 +204,7 @@ fn summary(found: &Verification, folder: &Path) {
 
 pub fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
     let mut design = Design::read(&args.design)?;
-    metalith::verify::fits(&design, &args.layout)?;
+    args.judging.not_simulated(&design, &args.layout)?;
     terminal.stop_on_interrupt();
     let array = args.compensated.array(&mut design, terminal)?;
     let folder = args

@@ -299,6 +299,11 @@ fn a_compensated_layout_reads_back_as_compensated() {
     assert_eq!(found.pillars, array.pillars());
     let narrowest = |widths: &metalith::WidthMap| widths.width_nm.iter().copied().filter(|w| *w > 0).min();
     let drawn = found.elements.iter().filter_map(|e| narrowest(&e.widths)).min();
-    let meant = done.array.classes.iter().filter_map(|c| narrowest(&c.widths)).min();
+    let meant = done
+        .array
+        .classes
+        .iter()
+        .filter_map(|c| narrowest(&c.widths.map()))
+        .min();
     assert_eq!(drawn, meant);
 }

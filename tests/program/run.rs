@@ -93,6 +93,49 @@ fn golden_numbers_of_the_mini_design() {
     );
 }
 
+/// A layout that may not be simulated in the memory that is allowed is compared pillar by pillar, which is said before.
+#[test]
+fn what_is_too_large_to_be_simulated_is_compared_all_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let mini = design("mini_3x3");
+    let output = metalith(
+        &["run", "--memory-mb", "1", "--oasis", "compact", "--out"],
+        &[folder.path(), &mini],
+    );
+    let (said, found) = (String::from_utf8(output.stderr).unwrap(), report(folder.path()));
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    let notes: Vec<_> = said
+        .lines()
+        .filter(|line| line.contains("--memory-mb allows 1"))
+        .collect();
+    assert!(notes[0].contains("will not be simulated"), "{said}");
+    let none = found["distinct"].as_array().unwrap();
+    assert!(none.is_empty() && found["not_simulated"].is_string());
+    let elements = found["elements"].as_array().unwrap();
+    let pillars: u64 = elements.iter().map(|e| e["widths"]["pillars"].as_u64().unwrap()).sum();
+    assert_eq!(
+        (elements.len(), Some(pillars)),
+        (9, found["layout"]["pillars"].as_u64())
+    );
+    // A pillar that is off its site is found; limits that only a simulation could judge fail in any case.
+    let right = |found: &Value| found["checks"][0]["reached"].as_f64() == Some(0.0);
+    assert!(right(&found) && found["checks"][2]["key"] == "rounding_phase_rms_max_rad");
+    let gds = metalith(&["layout", "--hierarchy", "flat", "--out"], &[folder.path(), &mini]);
+    assert!(gds.status.success());
+    let path = folder.path().join("mini_3x3_pillars.gds");
+    let mut bytes = fs::read(&path).unwrap();
+    // The last but one boundary of five points moves by half a pitch: off its site.
+    let at = bytes.windows(4).rposition(|w| w == [0, 0x2C, 0x10, 3]).unwrap();
+    let pillar = bytes[..at].windows(4).rposition(|w| w == [0, 0x2C, 0x10, 3]).unwrap();
+    for x in (0..5).map(|k| pillar + 4 + 8 * k) {
+        let moved = i32::from_be_bytes(bytes[x..x + 4].try_into().unwrap()) + 175;
+        bytes[x..x + 4].copy_from_slice(&moved.to_be_bytes());
+    }
+    fs::write(&path, bytes).unwrap();
+    metalith(&["verify", "--memory-mb", "1", "--out"], &[folder.path(), &mini, &path]);
+    assert!(!right(&report(folder.path())));
+}
+
 #[test]
 fn limits_on_white_light_decide_and_name_the_channel() {
     let folder = tempfile::tempdir().unwrap();

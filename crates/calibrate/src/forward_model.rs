@@ -33,21 +33,24 @@ pub enum SmoothTerm {
     Path(usize),
     /// Legendre polynomial of the relative amplitude over width, counted from zero.
     Transmission(usize),
+    /// The same of the phase over width.
+    Phase(usize),
 }
 
 impl SmoothTerm {
-    /// All of them, paths first.
+    /// All of them: paths, amplitudes, phases.
     pub fn all() -> impl Iterator<Item = Self> {
         let paths = (0..PATH_TERMS).map(Self::Path);
-        paths.chain((0..TRANSMISSION_TERMS).map(Self::Transmission))
+        let amplitudes = (0..TRANSMISSION_TERMS).map(Self::Transmission);
+        paths.chain(amplitudes).chain((0..TRANSMISSION_TERMS).map(Self::Phase))
     }
 
-    /// Coefficient at which a term is simulated, small enough for images to be linear in it: nm of path, or a
-    /// relative change of amplitude.
+    /// Coefficient at which a term is simulated, small enough for images to be linear in it: nm of path, a relative
+    /// change of amplitude, or rad.
     pub fn step(self) -> f64 {
         match self {
             Self::Path(_) => 8.0,
-            Self::Transmission(_) => 0.03,
+            Self::Transmission(_) | Self::Phase(_) => 0.03,
         }
     }
 }
@@ -88,9 +91,23 @@ pub trait ForwardModel: Send + Sync {
     /// of the other.
     fn kinked(&self, effect: usize) -> bool;
 
+    /// Whether some parameters of an effect change nothing while all are zero.
+    fn dormant(&self, _effect: usize) -> bool {
+        false
+    }
+
+    /// By how much the change of an image by an effect may be wrong, relative: what correct programs differ by.
+    fn error_share(&self, _effect: usize) -> f64 {
+        0.0
+    }
+
     /// Step of a parameter on whose multiples simulations are cheap, because parts of them are likely to be
     /// stored; none where every value costs the same.
     fn cheap_step(&self, slot: usize) -> Option<f64>;
+
+    /// Whether simulating other values of a parameter beside those in `about` is so dear that its changes are
+    /// rather taken to add to theirs.
+    fn is_dear_beside(&self, about: &[f64], slot: usize) -> bool;
 
     /// Images of all captures at each point, before registration, flux and black level.
     ///

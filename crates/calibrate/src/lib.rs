@@ -39,8 +39,10 @@ mod surrogate;
 mod validate;
 
 pub use bench::{Bench, Sampling};
-pub use diagnosis::{Diagnosis, ErrorPair, ErrorReport, FoundEffect, LeftOut, Ranked, SetVerdict};
-pub use effects::{Effect, Parameter, Stage, all as all_effects};
+pub use diagnosis::{
+    Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePattern, GroupValue, LeftOut, Ranked, SetVerdict,
+};
+pub use effects::{DeclaredEffect, DeclaredParameter, Effect, Parameter, Stage, all as all_effects};
 pub use fidelity::Rung;
 pub use run::{Calibration, calibrate};
 pub use session::{Screening, Session, Settings, Simulations};

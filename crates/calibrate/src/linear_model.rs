@@ -123,12 +123,18 @@ impl LinearModel {
             let amplitude = (term.amplitude)(*theta);
             waves.extend(term.patterns.iter().map(|(p, factor)| (*p, factor * amplitude)));
         }
-        if let Some(SmoothTerm::Path(k)) = point.smooth {
-            waves.push((smooth_periods(k), SMOOTH_STEP));
+        match point.smooth {
+            Some(SmoothTerm::Path(k)) => waves.push((smooth_periods(k), SMOOTH_STEP)),
+            Some(SmoothTerm::Phase(0)) => waves.push((PHASE_PERIODS, SMOOTH_STEP)),
+            _ => {}
         }
         image(1.0, &waves)
     }
 }
+
+/// Periods of the pattern of the first phase over width: what a model may err by. Effects with this pattern have wide
+/// intervals.
+pub const PHASE_PERIODS: [u32; 2] = [6, 7];
 
 /// Amplitude of the pattern of a smooth term at its step.
 pub const SMOOTH_STEP: f64 = 0.05;
@@ -197,6 +203,10 @@ impl ForwardModel for LinearModel {
 
     fn cheap_step(&self, _: usize) -> Option<f64> {
         None
+    }
+
+    fn is_dear_beside(&self, _: &[f64], _: usize) -> bool {
+        false
     }
 
     fn images(&self, points: &[ParameterPoint], _: &dyn Progress) -> Result<Vec<PerCapture<PixelGrid>>> {

@@ -40,7 +40,7 @@ pub fn calibrate(
         .map(|p| MeasuredSet::read(p, layouts, progress))
         .collect::<Result<Vec<_>>>()?;
     for set in &sets {
-        check_effects(&effects::all(set), &settings.only)?;
+        check_effects(&effects::with_declared(set, &settings.declared)?, &settings.only)?;
     }
     let mut known: Option<(usize, Simulations)> = None;
     let mut done = Vec::new();

@@ -8,7 +8,7 @@ use metalith_core::{Error, Progress, Result};
 use crate::bench::{Bench, Sampling};
 use crate::cells::{CellSource, RigorousCells};
 use crate::diagnosis::Diagnosis;
-use crate::effects::{self, Effect};
+use crate::effects::{self, DeclaredEffect, Effect};
 use crate::fidelity::compare_fidelities;
 use crate::fit::{Data, Fit, FitProblem};
 use crate::names::unknown_names;
@@ -25,6 +25,8 @@ pub struct Settings {
     pub cache: Option<PathBuf>,
     /// Try these effects alone; all if empty.
     pub only: Vec<String>,
+    /// Effects that are tried beside those of the library.
+    pub declared: Vec<DeclaredEffect>,
     /// Compare the three fidelities of the cell first.
     pub compare_fidelities: bool,
     /// Simulate smooth terms, which null tests are made of as well.
@@ -39,6 +41,7 @@ impl Default for Settings {
             sampling: Sampling::default(),
             cache: None,
             only: Vec::new(),
+            declared: Vec::new(),
             compare_fidelities: true,
             smooth_terms: true,
             refine: true,
@@ -82,7 +85,7 @@ impl<'a> Session<'a> {
     /// # Errors
     /// If an effect or a material is not known.
     pub fn new(set: &'a MeasuredSet, settings: Settings) -> Result<Self> {
-        let tried = tried_effects(set, &settings.only)?;
+        let tried = tried_effects(set, &settings)?;
         let bench = Bench::new(set, settings.sampling);
         let (low, high) = bench.widths_nm();
         let cells = RigorousCells::new(
@@ -189,8 +192,9 @@ impl<'a> Session<'a> {
 }
 
 /// The effects of a set that are called `only`; all if none are named.
-fn tried_effects(set: &MeasuredSet, only: &[String]) -> Result<Vec<Box<dyn Effect>>> {
-    let mut tried = effects::all(set);
+fn tried_effects(set: &MeasuredSet, settings: &Settings) -> Result<Vec<Box<dyn Effect>>> {
+    let only = &settings.only;
+    let mut tried = effects::with_declared(set, &settings.declared)?;
     check_effects(&tried, only)?;
     if !only.is_empty() {
         tried.retain(|e| only.contains(&e.name()));

@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use metalith_calibrate::{
-    Diagnosis, MeasuredSet, Sampling, Session, SetVerdict, Settings, Simulations, Synthesizer, UnlistedEffect,
-    ValidationPlan, calibrate, validate,
+    DeclaredEffect, Diagnosis, MeasuredSet, Sampling, Session, SetVerdict, Settings, Simulations, Synthesizer,
+    UnlistedEffect, ValidationPlan, calibrate, validate,
 };
 use metalith_core::Silent;
 use metalith_gds::extract::GdsPillars;
+use metalith_made::CalibratedModel;
 use metalith_testing::session::{PIXELS, small_set, write_npy};
 use ndarray::Array2;
 
@@ -158,6 +159,117 @@ fn two_effects_at_once_are_both_found() {
     let d = session.diagnose(&SIMULATIONS, &Silent).unwrap().0;
     assert_eq!(names(&d), ["cd_bias", "gap"], "{}", d.sentence());
     assert_eq!(d.verdict, SetVerdict::Explained);
+}
+
+/// Far from what was stated, what one effect changes depends on the other: the second is looked for beside the first.
+#[test]
+fn a_bias_beside_a_large_gap_is_found() {
+    /// Relative: two colours of a coarse spectrum, and synthetic sets have another sampling.
+    const TOLERANCE: f64 = 0.08;
+    let truth = [("cd_bias", -8.0), ("gap", 9.0)];
+    let parts = truth.each_ref().map(|(n, v)| (*n, std::slice::from_ref(v)));
+    let set = synthetic(&parts, 23);
+    let session = Session::new(&set, settings()).unwrap();
+    let d = session.diagnose(&SIMULATIONS, &Silent).unwrap().0;
+    assert_eq!(
+        names(&d),
+        ["cd_bias", "gap"],
+        "{} {:?} {:#?}",
+        d.sentence(),
+        d.error,
+        d.later_rankings
+    );
+    assert_eq!(d.verdict, SetVerdict::Explained, "{}", d.sentence());
+    for (name, value) in truth {
+        let found = d.effects.iter().find(|e| e.name == name).unwrap();
+        assert!(
+            (found.value.as_f64().unwrap() / value - 1.0).abs() < TOLERANCE,
+            "{}",
+            d.sentence()
+        );
+    }
+}
+
+/// Two elements side by side at unlike distances from a tilted sensor.
+#[test]
+fn a_tilt_of_the_sensor_is_found() {
+    const TILT_MRAD: f64 = 40.0;
+    let set = synthetic(&[("sensor_tilt_x", &[TILT_MRAD])], 24);
+    let session = Session::new(&set, with_effects(&["sensor_tilt_x", "gap", "tilt", "cd_bias"])).unwrap();
+    let simulations = session.simulate(&Silent).unwrap();
+    let d = session.diagnose(&simulations, &Silent).unwrap().0;
+    assert_eq!(names(&d), ["sensor_tilt_x"], "{}", d.sentence());
+    assert_eq!(d.effects[0].holds(TILT_MRAD), Some(true), "{}", d.sentence());
+    // Without the tilt in the list, the page says that the gap differs by element.
+    let session = Session::new(&set, with_effects(&["gap", "tilt", "cd_bias"])).unwrap();
+    let d = session
+        .diagnose(&session.simulate(&Silent).unwrap(), &Silent)
+        .unwrap()
+        .0;
+    let pattern = d.patterns.first().unwrap_or_else(|| panic!("{}", d.sentence()));
+    assert_eq!((pattern.quantity.as_str(), pattern.by.as_str()), ("gap", "element"));
+    let apart_um = pattern.values[1].value - pattern.values[0].value;
+    // 40 mrad over the 150 um between the elements.
+    assert!((apart_um / 6.0 - 1.0).abs() < 0.05, "{}", pattern.sentence());
+}
+
+/// An effect that is in no list, declared by an expression: found, with its value, and written into the model.
+#[test]
+fn a_declared_effect_is_found_and_kept_in_the_model() {
+    const BOW_NM: f64 = 60.0;
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("effects.toml");
+    fs::write(
+        &file,
+        "[[effect]]\nname = \"bow\"\nunit = \"nm\"\nrange = [-300.0, 300.0]\nprior = 30.0\n\
+         stage = \"pupil\"\nopd_nm = \"a * (x^2 - y^2) / R^2\"\n",
+    )
+    .unwrap();
+    let settings = Settings {
+        declared: DeclaredEffect::read(&file).unwrap(),
+        ..with_effects(&["bow", "gap", "cd_bias"])
+    };
+    let synthesizer = Synthesizer::new(&LIKE, &settings).unwrap();
+    let images = synthesizer.with_effect("bow", &[BOW_NM], &Silent).unwrap();
+    let set = synthesizer.draw(&images, 25);
+    let session = Session::new(&set, settings).unwrap();
+    let simulations = session.simulate(&Silent).unwrap();
+    let (d, evidence) = session.diagnose(&simulations, &Silent).unwrap();
+    assert_eq!(names(&d), ["bow"], "{}", d.sentence());
+    assert_eq!(d.effects[0].holds(BOW_NM), Some(true), "{}", d.sentence());
+    let made = session.simulator.perturbation(&evidence.unwrap().finding.after.theta);
+    let path = folder.path().join("model.toml");
+    CalibratedModel::new("set".into(), d.sentence(), made.clone())
+        .write(&path)
+        .unwrap();
+    assert_eq!(CalibratedModel::read(&path).unwrap().perturbation, made);
+    assert!((made.geometry.declared[0].values["a"] / BOW_NM - 1.0).abs() < 0.1);
+}
+
+/// What surrounds a saturated peak still tells of the distance: pixels are masked, and no capture is lost.
+#[test]
+fn saturated_peaks_are_masked() {
+    const GAP_UM: f64 = 5.0;
+    let mut set = synthetic(&[("gap", &[GAP_UM])], 26);
+    let peak = set
+        .captures
+        .iter()
+        .map(|c| c.dn.fold(0.0f32, |a, b| a.max(*b)))
+        .fold(0.0, f32::max);
+    let full = 0.8 * peak;
+    set.camera.saturation_dn = f64::from(full);
+    set.captures.iter_mut().for_each(|c| c.dn.mapv_inplace(|v| v.min(full)));
+    let session = Session::new(&set, settings()).unwrap();
+    assert!(
+        session
+            .data
+            .captures()
+            .any(|c| session.data.pixels(c) < PIXELS * PIXELS)
+    );
+    let d = session.diagnose(&SIMULATIONS, &Silent).unwrap().0;
+    assert_eq!(d.left_out.len(), 0);
+    assert_eq!(names(&d), ["gap"], "{}", d.sentence());
+    assert_eq!(d.effects[0].holds(GAP_UM), Some(true), "{}", d.sentence());
 }
 
 /// A bias and another index change the phase of blue and green differently: a fit of either alone fails on captures

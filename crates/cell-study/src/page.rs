@@ -4,6 +4,7 @@ use std::path::Path;
 
 use ndarray::Array2;
 
+use super::steered::SteeredStudy;
 use super::study::{CellStudy, LED_UM, MappingStudy};
 use metalith_cell::{Basis, MappingError};
 use metalith_core::{Result, WholeFile};
@@ -32,7 +33,63 @@ pub fn write_cell_report(study: &CellStudy, folder: &Path) -> Result<()> {
             mapping.table.to_csv().as_bytes(),
         )?;
     }
+    if !study.steered.is_empty() {
+        WholeFile::write(
+            &folder.join("mapping_steered.toml"),
+            steered_toml(&study.steered).as_bytes(),
+        )?;
+    }
     Ok(())
+}
+
+/// The mappings as a design file takes them.
+fn steered_toml(steered: &[SteeredStudy]) -> String {
+    let mut text = String::from(
+        "# Most light in the first order, mean of 455, 530, 590 and 660 nm, among unlike neighbours:\n# metalith cells --steered\n",
+    );
+    for study in steered {
+        let coefficients: Vec<String> = study.coefficients.iter().map(|c| format!("{c}")).collect();
+        let (first, second) = study.steps;
+        text += &format!(
+            "\n[[mapping.steered]]\nsteps = [{first}, {second}]\ncoefficients = [{}]   # {} times the light of the common mapping\n",
+            coefficients.join(", "),
+            fixed(study.gain(), 3)
+        );
+    }
+    text
+}
+
+fn steered(page: &mut Page, steered: &[SteeredStudy]) {
+    page.section("Mappings of steered elements");
+    page.paragraph(
+        "Where the phase is steep, unlike pillars stand side by side. For the elements that are so many steps from the \
+         centre these mappings bring most light into the first order, seen from where the element looks. Shares are of the \
+         arriving light, with the common mapping and with the element's own: by supercells of rows of the element's pillars, \
+         and by the sum over pairs that the mapping was chosen by. `mapping_steered.toml` has the coefficients as a design \
+         file takes them.",
+    );
+    let mut columns = vec![
+        Column::text("Steps"),
+        Column::number("Gain, mean of the wavelengths", ""),
+    ];
+    for l in LED_UM {
+        columns.push(Column::text(format!("Supercells at {:.0} nm", l * 1e3)));
+    }
+    for l in LED_UM {
+        columns.push(Column::text(format!("Pairs at {:.0} nm", l * 1e3)));
+    }
+    let mut table = Table::new(columns);
+    let pair = |[before, after]: [f64; 2]| Cell::from(format!("{} to {}", fixed(before, 3), fixed(after, 3)));
+    for study in steered {
+        let mut row = vec![
+            Cell::from(format!("{}, {}", study.steps.0, study.steps.1)),
+            Cell::from(fixed(study.gain(), 3)),
+        ];
+        row.extend(study.light.iter().map(|l| pair(l.supercells)));
+        row.extend(study.light.iter().map(|l| pair(l.pairs)));
+        table.row(row);
+    }
+    page.table(table);
 }
 
 fn page(study: &CellStudy) -> Page {
@@ -56,6 +113,9 @@ fn page(study: &CellStudy) -> Page {
     ]);
     maps(&mut page, study);
     mappings(&mut page, study);
+    if !study.steered.is_empty() {
+        steered(&mut page, &study.steered);
+    }
     inverse(&mut page, study);
     forward(&mut page, study);
     bad(&mut page, study);

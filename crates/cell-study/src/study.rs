@@ -13,6 +13,8 @@ use metalith_core::{Error, Result};
 use metalith_design::Design;
 use metalith_design::array::WidthRule;
 
+use crate::SteeredStudy;
+
 /// Wavelengths that mappings are compared at (um): LEDs of a colour camera.
 pub const LED_UM: [f64; 4] = [0.455, 0.530, 0.590, 0.660];
 
@@ -99,6 +101,8 @@ pub struct CellStudy {
     /// Every 10 nm.
     pub bad: Vec<BadCell>,
     pub mappings: Vec<MappingStudy>,
+    /// Mappings of steered elements, where they were asked for.
+    pub steered: Vec<SteeredStudy>,
     /// Every 2 nm of the band and of the widths, for the maps.
     #[serde(skip)]
     pub curves: Vec<PhaseCurve>,
@@ -158,6 +162,7 @@ impl CellStudy {
             forward,
             bad,
             mappings,
+            steered: Vec::new(),
             curves,
         })
     }

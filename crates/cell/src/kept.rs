@@ -5,11 +5,11 @@
 //! Magic, inputs or checksum that do not agree mean that the file is not what is needed; it is then made again.
 //! The inputs hold [`SOLVER`], so that nothing outlives the solver that made it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-use metalith_core::{Error, Result, WholeFile, file::read_at_most};
+use metalith_core::{Error, Progress, Result, WholeFile, file::read_at_most};
 
 /// Raised whenever the solver or the sampling changes what it answers: kept results are then of no use.
 pub const SOLVER: u32 = 1;
@@ -89,6 +89,55 @@ pub fn read(file: &Path, magic: [u8; 8], inputs: &[u8], longest: u64) -> Result<
     };
     let content = open(&bytes, magic, inputs).map_err(|why| why.to_string())?;
     Ok(Some(content.to_vec()))
+}
+
+/// A small table that is kept in a folder under the name of its inputs, if there is a folder. That it cannot be read or kept
+/// is said as a note, and no reason to stop.
+#[derive(Clone, Debug)]
+pub struct KeptTable {
+    file: Option<PathBuf>,
+    magic: [u8; 8],
+    inputs: Vec<u8>,
+    what: &'static str,
+}
+
+/// Longest file of a [`KeptTable`] that is read (bytes): weights and inputs are some hundred thousand at most.
+const LONGEST_TABLE: u64 = 1 << 20;
+
+impl KeptTable {
+    /// A table of `what`, such as "gratings": `kind` begins the name of its file.
+    pub fn new(folder: Option<&Path>, kind: &str, magic: [u8; 8], inputs: Vec<u8>, what: &'static str) -> Self {
+        Self {
+            file: folder.map(|folder| folder.join(format!("{kind}-{}.bin", name_of(&inputs)))),
+            magic,
+            inputs,
+            what,
+        }
+    }
+
+    /// What is kept, if it is there and `decode` knows it.
+    pub fn read<T>(&self, decode: impl FnOnce(&[u8]) -> Option<T>, progress: &dyn Progress) -> Option<T> {
+        let file = self.file.as_ref()?;
+        let found = read(file, self.magic, &self.inputs, LONGEST_TABLE).and_then(|content| match content {
+            Some(content) => decode(&content)
+                .map(Some)
+                .ok_or_else(|| format!("it holds other {}", self.what)),
+            None => Ok(None),
+        });
+        found.unwrap_or_else(|why| {
+            progress.note(&format!("{} is not used: {why}", file.display()));
+            None
+        })
+    }
+
+    /// Keep it.
+    pub fn write(&self, content: &[u8], progress: &dyn Progress) {
+        if let Some(file) = &self.file
+            && let Err(error) = write(file, self.magic, &self.inputs, content)
+        {
+            progress.note(&format!("the table of {} is not kept: {error}", self.what));
+        }
+    }
 }
 
 /// Sixteen hexadecimal digits that name a file by the inputs of its content.

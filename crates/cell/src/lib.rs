@@ -17,12 +17,12 @@ mod table;
 
 pub use cache::cache_folder;
 pub use curve::{BadCell, PhaseCurve, bad_cells};
-pub use exact::{MappingTable, RampOrders};
+pub use exact::{MappingTable, RampOrders, simplex};
 pub use fit::{
     FittedCell, ForwardFit, InverseFit, MappingError, curves_over, fit_forward, fit_inverse, forward_errors, round_trip,
 };
 pub use metalith_rcwa::Material;
-pub use model::{CellModel, Fidelity, ObliqueTables, dark};
+pub use model::{CellModel, Fidelity, ObliqueTables, POLARISATION_SHARE, dark};
 pub use neighbours::{NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourBasis, NeighbourResponse};
 pub use pointwise::PointwiseCell;
 pub use pointwise::{BAND_ORDERS, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, tabulate};

@@ -74,6 +74,9 @@ pub struct ObliqueTables {
     pub turned: [Vec<Complex64>; 2],
 }
 
+/// Of light that is not polarised, what arrives in either polarisation.
+pub const POLARISATION_SHARE: f64 = 0.5;
+
 impl ObliqueTables {
     /// The tables that light passes by, each for half of the light that arrives.
     pub fn passed(&self) -> impl Iterator<Item = &Vec<Complex64>> {

@@ -81,7 +81,9 @@ fn of_element(
     ];
     let made: Vec<MadeElement> = chips
         .iter()
-        .map(|(_, chip, widths)| chip.element(&DrawnElement::new(widths, line.aperture_radius_um)))
+        .map(|(_, chip, widths)| {
+            chip.element(&DrawnElement::new(widths, line.aperture_radius_um).placed(element.centre_um()))
+        })
         .collect::<Result<_>>()?;
     let as_lit = design.verify.incidence == CellIncidence::AsLit;
     let mut scratch = Scratch::default();

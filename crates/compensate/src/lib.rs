@@ -79,10 +79,10 @@ pub fn compensate(
         if progress.stopped() {
             return Err(Error::Interrupted);
         }
-        let steps: Vec<Vec<i32>> = drawn.classes.iter().map(|c| line.steps(&c.widths)).collect();
+        let steps: Vec<Vec<i32>> = drawn.classes.iter().map(|c| line.steps(&c.widths.map())).collect();
         let mut kinds = Kinds::default();
         for (k, (class, steps)) in array.classes.iter().zip(&steps).enumerate() {
-            kinds.count(&class.widths, steps, copies(k));
+            kinds.count(&class.widths.map(), steps, copies(k));
         }
         let (least, most) = kinds.steps();
         line.solve(least, most, progress)?;
@@ -92,27 +92,29 @@ pub fn compensate(
         }
         error[1] = choice.after;
         for ((to, class), steps) in drawn.classes.iter_mut().zip(&array.classes).zip(&steps) {
-            for ((to, &w), &step) in to.widths.width_nm.iter_mut().zip(&class.widths.width_nm).zip(steps) {
+            let (to, from) = (to.widths.map_mut(), class.widths.map());
+            for ((to, &w), &step) in to.width_nm.iter_mut().zip(&from.width_nm).zip(steps) {
                 if w > 0 {
                     *to = choice.drawn[&(w, step)];
                 }
             }
         }
-        if !line.follows_density() {
+        if !line.varies_by_site() {
             break;
         }
     }
     let (narrow, wide) = design.cell.width_range_nm;
     let (mut moved, mut pillars, mut at_limit) = (0.0, 0, 0);
     for (k, (new, old)) in drawn.classes.iter_mut().zip(&array.classes).enumerate() {
-        for (&d, &w) in new.widths.width_nm.iter().zip(&old.widths.width_nm) {
+        let (drawn, intended) = (new.widths.map_mut(), old.widths.map());
+        for (&d, &w) in drawn.width_nm.iter().zip(&intended.width_nm) {
             if w > 0 {
                 moved += copies(k) as f64 * (f64::from(d) - f64::from(w)).powi(2);
                 pillars += copies(k);
                 at_limit += copies(k) * u64::from(d != w && (d == narrow || d == wide));
             }
         }
-        new.group = SymmetryGroup::of(&new.widths);
+        new.group = SymmetryGroup::of(drawn);
     }
     Ok(Compensated {
         array: drawn,

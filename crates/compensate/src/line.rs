@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 
 use metalith_cell::{CellModel, PointwiseCell};
-use metalith_core::{Progress, Result, WidthMap};
+use metalith_core::{Error, Progress, Result, WidthMap};
 use metalith_design::Design;
 use metalith_made::{CalibratedModel, DrawnElement, MadeChip, Perturbation};
 
@@ -42,6 +42,16 @@ impl Line {
     pub fn new(design: &Design, model: &CalibratedModel) -> Result<Self> {
         let drawn_nm: Vec<u16> = design.cell.widths_nm().collect();
         let (_, wide) = design.cell.width_range_nm;
+        let directed = model.perturbation.geometry.directed_widths();
+        if !directed.is_empty() {
+            return Err(Error::invalid(
+                format!(
+                    "widths as declared by `{}` differ between copies of an element",
+                    directed.join("`, `")
+                ),
+                "compensate for widths that depend on `w`, `fill` and `r` alone, or take the term out of the model",
+            ));
+        }
         let stack = design.cell_stack()?;
         let chip = MadeChip::new(&stack, model)?;
         let nothing = CalibratedModel::new(String::new(), String::new(), Perturbation::default());
@@ -66,14 +76,14 @@ impl Line {
     }
 
     /// Whether the width of a pillar depends on what is drawn around it.
-    pub fn follows_density(&self) -> bool {
-        self.chip.perturbation().geometry.follows_density()
+    pub fn varies_by_site(&self) -> bool {
+        self.chip.perturbation().geometry.varies_by_site()
     }
 
     /// Steps that density adds to the width at every site of a layout as drawn, row by row.
     pub fn steps(&self, drawn: &WidthMap) -> Vec<i32> {
         let element = DrawnElement::new(drawn, self.aperture_radius_um);
-        let steps = element.density_steps(&self.chip.perturbation().geometry);
+        let steps = element.site_steps(&self.chip.perturbation().geometry);
         steps.unwrap_or_else(|| vec![0; drawn.width_nm.len()])
     }
 

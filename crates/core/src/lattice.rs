@@ -2,6 +2,7 @@
 
 use ndarray::Array2;
 
+use crate::WidthRows;
 use crate::error::{Error, Result};
 
 /// A square lattice of `sites` x `sites` places about the centre of an element.
@@ -108,7 +109,7 @@ impl WidthMap {
 
     /// Number of sites with a pillar.
     pub fn pillars(&self) -> u64 {
-        self.width_nm.iter().filter(|&&w| w != 0).count() as u64
+        WidthRows::pillars(self)
     }
 
     /// Radius of the circle about the element's centre that holds the centres of all of its pillars (um); zero
@@ -126,14 +127,6 @@ impl WidthMap {
 
     /// Number of pillars of each width; index is the width (nm), the first entry counts empty sites.
     pub fn histogram(&self) -> Vec<u64> {
-        let mut counts = Vec::new();
-        for &w in &self.width_nm {
-            let w = usize::from(w);
-            if w >= counts.len() {
-                counts.resize(w + 1, 0);
-            }
-            counts[w] += 1;
-        }
-        counts
+        WidthRows::histogram(self)
     }
 }

@@ -3,6 +3,7 @@
 mod cross;
 #[cfg(feature = "documents")]
 pub mod document;
+mod eighth;
 mod error;
 pub mod file;
 mod lattice;
@@ -12,6 +13,7 @@ pub mod npy;
 mod pillars;
 mod plane;
 mod progress;
+mod rows;
 pub mod srgb;
 pub mod text;
 mod wedge;
@@ -19,6 +21,7 @@ mod wedge;
 pub use cross::cross_corners;
 #[cfg(feature = "documents")]
 pub use document::{Fault, Faults};
+pub use eighth::EighthMap;
 pub use error::{Error, Result};
 pub use file::{WholeFile, WholeFolder};
 pub use lattice::{Lattice, WidthMap};
@@ -26,4 +29,5 @@ pub use layer::LayerNumber;
 pub use pillars::{ElementSite, PillarReader};
 pub use plane::part;
 pub use progress::{Progress, Silent};
+pub use rows::WidthRows;
 pub use wedge::Wedge;

@@ -26,7 +26,7 @@ pub enum NpyError {
     Nested,
     #[error("it holds an array of shape {shape:?}{}", if *columns_first { " in Fortran order" } else { "" })]
     Shape { shape: Vec<u64>, columns_first: bool },
-    #[error("its entries are neither float32 nor float64")]
+    #[error("its entries are neither float32, float64, uint8 nor uint16")]
     Type,
     #[error("it ends early: {0}")]
     Short(io::Error),
@@ -38,7 +38,7 @@ const LONGEST_HEADER: usize = 1 << 12;
 /// Most entries of an array: no file that is read has as many.
 const MOST_ENTRIES: u64 = 1 << 40;
 
-/// Read an array of float32 or float64 in C order, if its shape is one that the caller takes: nothing is read or
+/// Read an array of float32, float64, uint8 or uint16 in C order, if its shape is one that the caller takes: nothing is read or
 /// set aside for entries before that.
 ///
 /// # Errors
@@ -64,11 +64,16 @@ pub fn read_from(mut from: impl Read, takes: impl FnOnce(&[u64]) -> bool) -> Res
     }
     let values = match npy.try_data::<f64>() {
         Ok(data) => data.collect::<io::Result<Vec<f64>>>(),
-        Err(npy) => npy
-            .try_data::<f32>()
-            .map_err(|_| NpyError::Type)?
-            .map(|v| v.map(f64::from))
-            .collect(),
+        Err(npy) => match npy.try_data::<f32>() {
+            Ok(data) => data.map(|v| v.map(f64::from)).collect(),
+            Err(npy) => match npy.try_data::<u16>() {
+                Ok(data) => data.map(|v| v.map(f64::from)).collect(),
+                Err(npy) => {
+                    let data = npy.try_data::<u8>().map_err(|_| NpyError::Type)?;
+                    data.map(|v| v.map(f64::from)).collect()
+                }
+            },
+        },
     };
     Ok(Array {
         shape,

@@ -73,11 +73,11 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
                     Ok(Box::new(PointwiseCell::new(stack, design.cell.widths_nm())))
                 }
                 Fidelity::Neighbours => {
-                    let rule = WidthRule::new(&design.cell, &design.mapping);
-                    let mapping = Mapping::new(|u| rule.width_nm(u));
+                    let rules = WidthRule::all(design);
+                    let mappings = rules.iter().map(|rule| Mapping::new(|u| rule.width_nm(u))).collect();
                     Ok(Box::new(NeighbourCell::new(
                         design.cell_stack()?,
-                        mapping,
+                        mappings,
                         cache_folder(),
                     )))
                 }

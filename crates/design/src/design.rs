@@ -69,7 +69,7 @@ impl Design {
         let lens = LensSpec::read(&root.section("lens"), &root.section("phase"), &cell);
         let array_section = root.section("array");
         let array = ArraySpec::read(&array_section, &lens);
-        let mapping = MappingSpec::read(&root.section("mapping"), &cell);
+        let mapping = MappingSpec::read(&root.section("mapping"), &cell, &array);
         let layout = LayoutSpec::read(root, &lens, &array);
         let verify = VerifySpec::read(&root.section("verify"));
         check_directions(&array_section, &array, &verify);

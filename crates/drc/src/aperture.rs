@@ -1,7 +1,5 @@
 //! Openings in the metal against the lenses under them.
 
-use ndarray::{ArrayView1, Axis};
-
 use super::context::Context;
 use super::findings::Findings;
 use super::flat::{FlatLayout, Loose};
@@ -9,6 +7,7 @@ use super::polygon::{point_segment, ring_of};
 use super::rule::{NotRun, Rule, RuleOutcome};
 use super::tolerance::EQUAL_NM;
 use super::work::Stop;
+use metalith_core::WidthRows;
 use metalith_core::document::{Limits, Section};
 use metalith_gds::{LayerNumber, Point, Rect};
 
@@ -41,18 +40,28 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Optio
 
 /// Corners of the outermost pillars of each row and each column: their hull is that of the lens.
 fn rim(flat: &FlatLayout<'_>, element: usize) -> Vec<Point> {
-    let widths = &flat.elements[element].widths.width_nm;
-    let ends = |line: ArrayView1<'_, u16>| {
-        let first = line.iter().position(|&w| w != 0);
-        let last = line.iter().rposition(|&w| w != 0);
-        first.into_iter().chain(last)
-    };
-    let rows = widths.outer_iter().enumerate();
-    let columns = widths.axis_iter(Axis(1)).enumerate();
-    let at_ends = rows
-        .flat_map(|(row, line)| ends(line).map(move |column| (row, column)))
-        .chain(columns.flat_map(|(column, line)| ends(line).map(move |row| (row, column))));
+    let widths = &flat.elements[element].widths;
+    let n = widths.lattice().sites();
+    let mut at_ends = Vec::new();
+    let mut of_columns: Vec<Option<(usize, usize)>> = vec![None; n];
+    let mut room = Vec::new();
+    for row in 0..n {
+        let line = widths.row(row, 0..n, &mut room);
+        let ends = [line.iter().position(|&w| w != 0), line.iter().rposition(|&w| w != 0)];
+        at_ends.extend(ends.into_iter().flatten().map(|column| (row, column)));
+        for (ends, _) in of_columns.iter_mut().zip(line).filter(|(_, w)| **w != 0) {
+            ends.get_or_insert((row, row)).1 = row;
+        }
+    }
+    for (column, (first, last)) in of_columns
+        .iter()
+        .enumerate()
+        .filter_map(|(k, ends)| Some((k, (*ends)?)))
+    {
+        at_ends.extend([(first, column), (last, column)]);
+    }
     at_ends
+        .into_iter()
         .flat_map(|(row, column)| {
             let [a, b, c, d, _] = ring_of(&flat.pillar(element, row, column));
             [a, b, c, d]

@@ -4,8 +4,8 @@ use super::context::Context;
 use super::findings::Findings;
 use super::flat::FlatLayout;
 use super::rule::{NotRun, Rule, RuleOutcome};
+use metalith_core::WidthRows;
 use metalith_core::document::{Limits, Section};
-use metalith_core::part;
 use metalith_gds::{Point, Rect};
 
 struct FillRule {
@@ -49,20 +49,24 @@ impl Windows {
         let beside = (n as i64 - sites as i64).max(-1).div_euclid(2 * sites as i64);
         let first = (n as i64 - sites as i64) / 2 - beside * sites as i64;
         let count = if n < sites { 0 } else { (2 * beside + 1) as usize };
-        let fill = (0..count * count)
-            .map(|k| {
-                let (row, column) = (first as usize + k / count * sites, first as usize + k % count * sites);
-                let w = part(e.widths.width_nm.view(), row..row + sites, column..column + sites);
-                let mut area = 0u64;
-                for &w in w {
-                    if w == 0 {
-                        return None;
-                    }
-                    area += u64::from(w) * u64::from(w);
-                }
-                Some(area as f64 / (sites as f64 * pitch * 1e3).powi(2))
-            })
-            .collect();
+        // Area of the pillars of each window (nm^2); none where a site is empty.
+        let mut areas: Vec<Option<u64>> = vec![Some(0); count * count];
+        let mut room = Vec::new();
+        for k in 0..count * sites {
+            let row = e.widths.row(
+                first as usize + k,
+                first as usize..first as usize + count * sites,
+                &mut room,
+            );
+            let windows = &mut areas[k / sites * count..][..count];
+            for (area, part) in windows.iter_mut().zip(row.chunks(sites)) {
+                let full = part.iter().all(|&w| w != 0);
+                let more: u64 = part.iter().map(|&w| u64::from(w) * u64::from(w)).sum();
+                *area = area.filter(|_| full).map(|area| area + more);
+            }
+        }
+        let share = |area: u64| area as f64 / (sites as f64 * pitch * 1e3).powi(2);
+        let fill = areas.into_iter().map(|area| area.map(share)).collect();
         Self {
             sites,
             first,

@@ -4,10 +4,10 @@ use super::context::Context;
 use super::findings::Findings;
 use super::flat::FlatLayout;
 use super::rule::{Needs, NotRun, Rule, RuleOutcome};
-use super::work::Stop;
+use super::work::{Stop, Work};
 
-use metalith_core::Lattice;
 use metalith_core::document::{Limits, Section};
+use metalith_core::{Lattice, WidthRows};
 use metalith_design::Design;
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_rcwa::Material;
@@ -63,11 +63,11 @@ impl Against {
     fn compare(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
         let array = flat.array.expect("made where a rule needs it");
         for (k, (read, placed)) in flat.elements.iter().zip(&array.placed).enumerate() {
-            flat.work.spend(read.widths.width_nm.len() as u64)?;
-            let designed = array.widths(placed);
+            let n = read.site.lattice.sites();
+            flat.work.spend((n as u64).pow(2))?;
             let name = &read.site.name;
             if let Self::Count = self {
-                let (there, wanted) = (read.widths.pillars(), designed.pillars());
+                let (there, wanted) = (read.widths.pillars(), array.rows(placed).pillars());
                 if there != wanted {
                     found.plain(&format!("{name} {there}"), || {
                         format!("{there} pillars in {name}, {wanted} designed")
@@ -75,16 +75,21 @@ impl Against {
                 }
                 continue;
             }
-            if read.widths.width_nm == designed.width_nm {
-                continue;
-            }
-            for ((row, column), &w) in read.widths.width_nm.indexed_iter() {
-                let wanted = designed.width_nm[[row, column]];
-                // Missing and additional pillars are a matter of count.
-                if w != wanted && w != 0 && wanted != 0 {
-                    found.rect(&flat.pillar(k, row, column), || {
-                        format!("{w} nm wide, {wanted} nm designed")
-                    });
+            let designed = array.all_rows(placed);
+            let [mut room, mut other_room] = [Vec::new(), Vec::new()];
+            for row in 0..n {
+                let there = read.widths.row(row, 0..n, &mut room);
+                let wanted = designed.row(row, 0..n, &mut other_room);
+                if there == wanted {
+                    continue;
+                }
+                for (column, (&w, &wanted)) in there.iter().zip(wanted).enumerate() {
+                    // Missing and additional pillars are a matter of count.
+                    if w != wanted && w != 0 && wanted != 0 {
+                        found.rect(&flat.pillar(k, row, column), || {
+                            format!("{w} nm wide, {wanted} nm designed")
+                        });
+                    }
                 }
             }
         }
@@ -97,7 +102,7 @@ fn phase_step(flat: &FlatLayout<'_>, design: &Design, most: f64, found: &mut Fin
     let lens = LensPhase::new(lattice, design.lens.diameter_nm, &design.lens.phase);
     for element in design.elements() {
         let phase = ElementPhase::new(&lens, &element.wedge);
-        let (steps, steep) = steps(flat, lattice, &phase)?;
+        let (steps, steep) = steps(flat.work, lattice, &phase)?;
         let share = steep as f64 / steps.max(1) as f64;
         found
             .facts
@@ -115,24 +120,60 @@ fn phase_step(flat: &FlatLayout<'_>, design: &Design, most: f64, found: &mut Fin
 }
 
 /// Steps between neighbouring sites, and those beyond half a turn.
-fn steps(flat: &FlatLayout<'_>, lattice: Lattice, phase: &ElementPhase<'_>) -> Result<(u64, u64), Stop> {
+fn steps(work: &Work<'_>, lattice: Lattice, phase: &ElementPhase<'_>) -> Result<(u64, u64), Stop> {
+    if phase.is_radial() {
+        return radial_steps(work, lattice, phase);
+    }
+    all_steps(work, lattice, phase)
+}
+
+/// As [`steps`], of any phase.
+fn all_steps(work: &Work<'_>, lattice: Lattice, phase: &ElementPhase<'_>) -> Result<(u64, u64), Stop> {
     let (mut all, mut steep) = (0, 0);
+    // Phases of the row before; every site is computed once.
+    let mut before = vec![None; lattice.sites()];
     for iy in 0..lattice.sites() {
-        flat.work.look()?;
-        for ix in 0..lattice.sites() {
-            let Some(own) = phase.turns(ix, iy) else { continue };
-            for (x, y) in [(ix + 1, iy), (ix, iy + 1)] {
-                if x < lattice.sites()
-                    && y < lattice.sites()
-                    && let Some(other) = phase.turns(x, y)
-                {
+        work.look()?;
+        let mut left = None;
+        for (ix, below) in before.iter_mut().enumerate() {
+            let own: Option<f64> = phase.turns(ix, iy);
+            if let Some(own) = own {
+                for other in [left, *below].into_iter().flatten() {
+                    let step: f64 = own - other;
                     all += 1;
-                    steep += u64::from((own - other).abs() > 0.5);
+                    steep += u64::from(step.abs() > 0.5);
                 }
             }
+            left = own;
+            *below = own;
         }
     }
     Ok((all, steep))
+}
+
+/// As [`steps`] of a phase that is the same in all eighths: steps along the rows of a quarter stand for all.
+fn radial_steps(work: &Work<'_>, lattice: Lattice, phase: &ElementPhase<'_>) -> Result<(u64, u64), Stop> {
+    let (n, mut all, mut steep) = (lattice.sites(), 0, 0);
+    let odd = n % 2;
+    for iy in n / 2..n {
+        work.look()?;
+        // An even row has a step between its halves, of nothing.
+        let middle = phase.turns(n / 2, iy);
+        let (mut along, mut beyond) = (u64::from(odd == 0 && middle.is_some()), 0);
+        let mut left = middle;
+        for ix in n / 2 + 1..n {
+            let own: Option<f64> = phase.turns(ix, iy);
+            if let (Some(own), Some(left)) = (own, left) {
+                along += 2;
+                beyond += 2 * u64::from((own - left).abs() > 0.5);
+            }
+            left = own;
+        }
+        let rows = if odd == 1 && iy == n / 2 { 1 } else { 2 };
+        (all, steep) = (all + rows * along, steep + rows * beyond);
+    }
+    // As many along columns.
+    Ok((2 * all, 2 * steep))
 }
 
 fn lattice_orders(design: &Design, found: &mut Findings) -> RuleOutcome {
@@ -156,4 +197,35 @@ fn lattice_orders(design: &Design, found: &mut Findings) -> RuleOutcome {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::work::{Allowance, Work};
+    use super::*;
+    use metalith_core::{Silent, Wedge};
+    use metalith_design::phase::RadialPhase;
+
+    /// A quarter of an unsteered lens counts as all of it: even and odd lattices.
+    #[test]
+    fn a_quarter_has_the_steps_of_the_whole() {
+        let radial = RadialPhase::Hyperbola {
+            wavelength_um: 0.55,
+            focal_length_um: 4.0,
+        };
+        for sites in [1, 2, 3, 40, 41] {
+            let lattice = Lattice::new(350, sites).unwrap();
+            let lens = LensPhase::new(lattice, 350 * sites as u32, &radial);
+            let wedge = Wedge {
+                wavelength_um: 0.55,
+                sin_x: 0.0,
+                sin_y: 0.0,
+            };
+            let phase = ElementPhase::new(&lens, &wedge);
+            let work = Work::new(&Allowance::of([]), &Silent);
+            let whole = all_steps(&work, lattice, &phase).unwrap();
+            assert_eq!(radial_steps(&work, lattice, &phase).unwrap(), whole);
+            assert!(sites < 40 || (whole.1 > 0 && whole.1 < whole.0));
+        }
+    }
 }

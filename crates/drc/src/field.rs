@@ -5,8 +5,10 @@ use super::findings::Findings;
 use super::flat::FlatLayout;
 use super::rule::{NotRun, Rule, RuleOutcome};
 use super::tolerance::ROUNDING_NM;
+use metalith_core::WidthRows;
 use metalith_core::document::{Limits, Section};
 use metalith_gds::Rect;
+use metalith_gds::extract::{ExtractedElement, HeldWidths};
 
 /// Fields of one size, in a grid about the centre of each element or of the layout.
 struct FieldRule {
@@ -80,16 +82,17 @@ impl FieldRule {
         for (k, e) in flat.elements.iter().enumerate() {
             let columns = self.lines(flat, k, 0);
             let rows = self.lines(flat, k, 1);
-            let w = &e.widths.width_nm;
+            let (n, mut room) = (e.site.lattice.sites(), Vec::new());
             let cut = |w: u16, distance: f64| w != 0 && distance < f64::from(w) / 2.0 - ROUNDING_NM;
             let words = || "cut by a field boundary".to_owned();
             for &(column, distance) in &columns {
-                for (row, _) in w.column(column).iter().enumerate().filter(|(_, w)| cut(**w, distance)) {
+                for row in (0..n).filter(|&row| cut(e.widths.width(column, row), distance)) {
                     found.rect(&flat.pillar(k, row, column), words);
                 }
             }
             for &(row, distance) in &rows {
-                for (column, &w) in w.row(row).iter().enumerate().filter(|(_, w)| cut(**w, distance)) {
+                let line = e.widths.row(row, 0..n, &mut room).iter();
+                for (column, &w) in line.enumerate().filter(|(_, w)| cut(**w, distance)) {
                     if !columns.iter().any(|&(c, d)| c == column && cut(w, d)) {
                         found.rect(&flat.pillar(k, row, column), words);
                     }
@@ -109,7 +112,7 @@ impl FieldRule {
             let nm = |v: i64| v as f64 * flat.unit_nm;
             let middle = [nm(r.x0 + r.x1) / 2.0, nm(r.y0 + r.y1) / 2.0];
             let nearest = flat.elements.iter().min_by(|a, b| {
-                let far = |e: &metalith_gds::extract::ExtractedElement| {
+                let far = |e: &ExtractedElement<HeldWidths>| {
                     let c = e.site.centre_nm;
                     (c[0] as f64 - middle[0]).hypot(c[1] as f64 - middle[1])
                 };

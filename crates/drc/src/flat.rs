@@ -5,9 +5,10 @@ use std::sync::Arc;
 
 use super::body::Body;
 use super::work::Work;
+use metalith_core::WidthRows;
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
-use metalith_gds::extract::ExtractedElement;
+use metalith_gds::extract::{ExtractedElement, HeldWidths};
 use metalith_gds::{LayerNumber, Layout, Point, Rect};
 
 /// Everything on one layer that is not a pillar on the lattice of an element.
@@ -71,7 +72,7 @@ pub(super) struct FlatLayout<'a> {
     pub unit_nm: f64,
     pub pillars: LayerNumber,
     /// Elements with the pillars on their lattices.
-    pub elements: Vec<ExtractedElement>,
+    pub elements: Vec<ExtractedElement<HeldWidths>>,
     /// Why there are none, if there are none.
     pub no_elements: String,
     pub loose: BTreeMap<LayerNumber, Loose>,
@@ -98,7 +99,7 @@ impl FlatLayout<'_> {
     /// The rectangle of the pillar at a site, in database units.
     pub fn pillar(&self, element: usize, row: usize, column: usize) -> Rect {
         let e = &self.elements[element];
-        let half = f64::from(e.widths.width_nm[[row, column]]) / 2.0;
+        let half = f64::from(e.widths.width(column, row)) / 2.0;
         let x = (e.site.centre_nm[0] + e.site.lattice.coordinate_nm(column)) as f64;
         let y = (e.site.centre_nm[1] + e.site.lattice.coordinate_nm(row)) as f64;
         let unit = |nm: f64| self.units(nm).round() as i64;

@@ -81,6 +81,10 @@ pub(super) fn gather<'a>(
     if visit.pillar_shapes > 0 {
         *visit.counts.entry(pillars).or_default() += visit.pillar_shapes;
     }
+    let (elements, unheld) = match visit.filler.finish() {
+        Ok(elements) => (elements, None),
+        Err(cause) => (Vec::new(), Some(format!("{cause}; {}", cause.remedy()))),
+    };
     Ok(FlatLayout {
         work,
         layout,
@@ -89,7 +93,7 @@ pub(super) fn gather<'a>(
         array: None,
         unit_nm,
         pillars,
-        elements: visit.filler.elements,
+        elements,
         no_elements,
         loose: visit.loose,
         off_lattice: visit.off_lattice,
@@ -97,7 +101,7 @@ pub(super) fn gather<'a>(
         texts: visit.texts,
         text_count: visit.text_count,
         counts: visit.counts,
-        incomplete: unread.clone().or(visit.incomplete),
+        incomplete: unread.clone().or(visit.incomplete).or(unheld),
         unread,
     })
 }
@@ -224,7 +228,7 @@ impl Gather<'_, '_> {
 
 impl Visitor for Gather<'_, '_> {
     fn cell(&mut self, _cell: &LayoutCell, placements: &[Transform]) -> Result<()> {
-        self.filler.begin(placements.len());
+        self.filler.begin(placements);
         Ok(())
     }
 
@@ -243,6 +247,9 @@ impl Visitor for Gather<'_, '_> {
             let known = rect.width() == rect.height() && table.get(rect.width() as usize).is_some_and(|&p| p);
             if !known {
                 self.show(shape, placements)?;
+            }
+            if self.filler.put_orbits(rect, placements, |width| width % 2 == 0) {
+                return Ok(());
             }
             for (k, placement) in placements.iter().enumerate() {
                 let placed = placement.apply_rect(rect).unwrap_or(*rect);

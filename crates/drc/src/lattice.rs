@@ -5,6 +5,7 @@ use super::findings::Findings;
 use super::flat::FlatLayout;
 use super::rule::{NotRun, Rule, RuleOutcome};
 use super::tolerance::{EQUAL_NM, ROUNDING_NM};
+use metalith_core::WidthRows;
 use metalith_core::document::{Limits, Section};
 use metalith_gds::{LayerNumber, Point};
 
@@ -105,12 +106,12 @@ impl Rule for GridRule {
 impl GridRule {
     fn pillars(&self, flat: &FlatLayout<'_>, found: &mut Findings) {
         for (k, e) in flat.elements.iter().enumerate() {
-            for ((row, column), _) in e.widths.width_nm.indexed_iter().filter(|(_, w)| **w != 0) {
+            e.widths.each_pillar(|row, column, _| {
                 let r = flat.pillar(k, row, column);
                 if self.off(Point::new(r.x0, r.y0), flat.unit_nm) || self.off(Point::new(r.x1, r.y1), flat.unit_nm) {
                     found.rect(&r, || format!("a corner off the grid of {} nm", self.step_nm));
                 }
-            }
+            });
         }
     }
 }
@@ -161,13 +162,13 @@ impl Rule for ExposureGrid {
             if !off.iter().any(|&o| o) {
                 continue;
             }
-            for ((row, column), &w) in e.widths.width_nm.indexed_iter() {
+            e.widths.each_pillar(|row, column, w| {
                 if off[usize::from(w)] {
                     found.rect(&flat.pillar(k, row, column), || {
                         format!("{w} nm wide is no multiple of {} nm", self.step_nm)
                     });
                 }
-            }
+            });
         }
         if let Some(loose) = flat.loose(flat.pillars) {
             for k in 0..loose.rects.len() {

@@ -4,6 +4,7 @@ use super::context::Context;
 use super::findings::Findings;
 use super::flat::FlatLayout;
 use super::rule::{NotRun, Rule, RuleOutcome};
+use metalith_core::WidthRows;
 use metalith_core::document::{Limits, Section};
 use metalith_gds::{LayerNumber, Rect};
 
@@ -160,11 +161,11 @@ fn pillars_out(flat: &FlatLayout<'_>, out: &impl Fn(&Rect) -> bool, found: &mut 
         if !out(&lens) {
             continue;
         }
-        for ((row, column), _) in e.widths.width_nm.indexed_iter().filter(|(_, w)| **w != 0) {
+        e.widths.each_pillar(|row, column, _| {
             let r = flat.pillar(k, row, column);
             if out(&r) {
                 found.rect(&r, || "a pillar outside the active area".into());
             }
-        }
+        });
     }
 }

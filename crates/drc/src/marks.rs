@@ -4,6 +4,7 @@ use super::context::Context;
 use super::findings::Findings;
 use super::flat::{FlatLayout, Loose};
 use super::rule::{NotRun, Rule, RuleOutcome};
+use metalith_core::WidthRows;
 use metalith_core::document::{Limits, Section};
 use metalith_design::MarkSpec;
 use metalith_gds::{LayerNumber, Point, Rect};
@@ -128,13 +129,13 @@ fn pillars_near(flat: &FlatLayout<'_>, zone: &Rect, found: &mut Findings) -> Rul
         if apart {
             continue;
         }
-        flat.work.spend(e.widths.width_nm.len() as u64)?;
-        for ((row, column), _) in e.widths.width_nm.indexed_iter().filter(|(_, w)| **w != 0) {
+        flat.work.spend((e.site.lattice.sites() as u64).pow(2))?;
+        e.widths.each_pillar(|row, column, _| {
             let r = flat.pillar(k, row, column);
             if r.x0 < zone.x1 && zone.x0 < r.x1 && r.y0 < zone.y1 && zone.y0 < r.y1 {
                 found.rect(&r, || "a pillar too near to a mark".into());
             }
-        }
+        });
     }
     Ok(())
 }

@@ -6,6 +6,7 @@ use std::ops::Range;
 use super::body::Body;
 use super::flat::FlatLayout;
 use super::work::{Stop, Work};
+use metalith_core::WidthRows;
 use metalith_gds::{LayerNumber, Rect};
 
 /// The rectangle between two shapes, or where they overlap: where to look.
@@ -95,7 +96,7 @@ fn pillars_in<'s>(
     r: Rect,
 ) -> impl Iterator<Item = Rect> + 's {
     rows.flat_map(move |row| columns.clone().map(move |column| (row as usize, column as usize)))
-        .filter(move |&(row, column)| flat.elements[element].widths.width_nm[[row, column]] != 0)
+        .filter(move |&(row, column)| flat.elements[element].widths.width(column, row) != 0)
         .map(move |(row, column)| flat.pillar(element, row, column))
         .filter(move |p| p.x0 <= r.x1 && r.x0 <= p.x1 && p.y0 <= r.y1 && r.y0 <= p.y1)
 }

@@ -7,6 +7,7 @@ use super::flat::FlatLayout;
 use super::pairs::{near, place};
 use super::rule::{NotRun, Rule, RuleOutcome};
 use super::tolerance::ROUNDING_NM;
+use metalith_core::WidthRows;
 use metalith_core::document::{Limits, Section};
 use metalith_gds::LayerNumber;
 
@@ -119,25 +120,33 @@ fn on_lattices(flat: &FlatLayout<'_>, nm: f64, height_nm: Option<f64>, found: &m
         if pitch - widest >= nm {
             continue;
         }
-        let w = &e.widths.width_nm;
         let n = e.site.lattice.sites();
-        for ((row, column), &own) in w.indexed_iter().filter(|(_, w)| **w != 0) {
-            for (up, right) in [(0, 1), (1, 0), (1, 1), (1, -1)] {
-                let (r, c) = (row + up, column as i64 + right);
-                if r >= n || c < 0 || c >= n as i64 {
-                    continue;
-                }
-                let other = w[[r, c as usize]];
-                let along = pitch - (f64::from(own) + f64::from(other)) / 2.0;
-                let gap = if up == 1 && right != 0 {
-                    along * std::f64::consts::SQRT_2
-                } else {
-                    along
-                };
-                if other != 0 && gap < nm - ROUNDING_NM {
-                    let body = |row, column| Body::Rect(flat.pillar(k, row, column));
-                    let (a, b) = (body(row, column), body(r, c as usize));
-                    report_gap(flat, &a, &b, gap / flat.unit_nm, height_nm, found);
+        // This row and the one above it.
+        let mut room = Vec::new();
+        let mut lines = [Vec::new(), e.widths.row(0, 0..n, &mut room).to_vec()];
+        for row in 0..n {
+            lines.swap(0, 1);
+            lines[1].clear();
+            if row + 1 < n {
+                lines[1].extend_from_slice(e.widths.row(row + 1, 0..n, &mut room));
+            }
+            for (column, &own) in lines[0].iter().enumerate().filter(|(_, w)| **w != 0) {
+                for (up, right) in [(0, 1), (1, 0), (1, 1), (1, -1)] {
+                    let Some(c) = column.checked_add_signed(right) else {
+                        continue;
+                    };
+                    let Some(&other) = lines[up].get(c) else { continue };
+                    let along = pitch - (f64::from(own) + f64::from(other)) / 2.0;
+                    let gap = if up == 1 && right != 0 {
+                        along * std::f64::consts::SQRT_2
+                    } else {
+                        along
+                    };
+                    if other != 0 && gap < nm - ROUNDING_NM {
+                        let body = |row, column| Body::Rect(flat.pillar(k, row, column));
+                        let (a, b) = (body(row, column), body(row + up, c));
+                        report_gap(flat, &a, &b, gap / flat.unit_nm, height_nm, found);
+                    }
                 }
             }
         }

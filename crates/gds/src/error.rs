@@ -307,7 +307,10 @@ impl ExtractionError {
     pub fn remedy(&self) -> String {
         match self {
             Self::Sites { most, .. } => {
-                format!("up to {most} sites are held at a time: a smaller lens, or fewer elements in one layout")
+                format!(
+                    "up to {most} sites are held at a time, an eighth of an element that is folded by all eight \
+                     symmetries: a smaller lens, or fewer elements in one layout"
+                )
             }
             Self::NoElements { .. } => "name the layer that the pillars are on, or give the design".into(),
             Self::Groups { most, .. } => format!("up to {most} elements are read; is this the layer of the pillars?"),

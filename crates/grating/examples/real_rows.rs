@@ -3,8 +3,9 @@
 //!
 //! Rows of 20 consecutive pillars along x and of 12 along y or the diagonal, at four radii; of the centre element in light
 //! along the normal, and of an element that is steered by the angle asked for in light from where it looks. Prints the
-//! share of the light that each model puts elsewhere than the supercell of the row does. From the folder
-//! `crates/grating`: `cargo run --release --example real_rows -- 15`; some minutes on one core.
+//! share of the light that each model puts elsewhere than the supercell of the row does, and of all rows together the first
+//! order by equal neighbours, neighbours and supercells. From the folder `crates/grating`: `cargo run --release --example
+//! real_rows -- 0 15 15,15`; some minutes on one core.
 
 #[path = "../tests/prototype_rows/mod.rs"]
 mod prototype_rows;
@@ -15,12 +16,15 @@ fn main() {
     let prototype = Prototype::new();
     println!(
         "| element | nm | equal neighbours along the normal | as lit | neighbours | of supercells left out | neighbours by \
-         radius, {RADII_UM:?} um | worst row: as lit, neighbours |"
+         radius, {RADII_UM:?} um | worst row: as lit, neighbours | first order: as lit, neighbours, supercells |"
     );
-    println!("| --- |{}", " ---: |".repeat(7));
-    let asked = std::env::args()
-        .skip(1)
-        .map(|angle| angle.parse().expect("an angle in degrees"));
+    println!("| --- |{}", " ---: |".repeat(8));
+    let asked = std::env::args().skip(1).map(|angles| {
+        let mut angles = angles
+            .split(',')
+            .map(|a| a.parse().expect("angles in degrees, such as 15,0"));
+        [angles.next().unwrap_or(0.0), angles.next().unwrap_or(0.0)]
+    });
     for steered_deg in asked {
         for nm in [455.0, 530.0, 660.0] {
             let found = prototype.misfits(nm, steered_deg);
@@ -39,14 +43,15 @@ fn main() {
                 .max_by(|a, b| gain(a).total_cmp(&gain(b)))
                 .expect("rows");
             println!(
-                "| {steered_deg} deg | {nm} | {normal:.3} | {as_lit:.3} | {neighbours:.3} | {:.3} | {} | {:?} at {} um: \
-                 {:.3}, {:.3} |",
+                "| {steered_deg:?} deg | {nm} | {normal:.3} | {as_lit:.3} | {neighbours:.3} | {:.3} | {} | {:?} at {} um: \
+                 {:.3}, {:.3} | {} |",
                 found.left_out,
                 by_radius.join(" "),
                 worst.direction,
                 worst.radius_um,
                 worst.as_lit,
                 worst.neighbours,
+                found.first.map(|share| format!("{share:.3}")).join(" "),
             );
         }
     }

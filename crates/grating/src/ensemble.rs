@@ -37,12 +37,12 @@ pub(crate) struct RandomSupercell {
     pub widths_nm: Vec<f64>,
 }
 
-/// Some supercells: each a grating of any vector, whose phases are off by chance. The first of a longer list are those of
-/// a shorter one.
+/// Some supercells: each a grating of any vector, whose phases are off by chance, drawn by the mappings in turn. The first
+/// of a longer list are those of a shorter one.
 ///
 /// # Errors
 /// None, as all are within what lattices allow.
-pub(crate) fn ensemble(mapping: &Mapping, count: usize) -> Result<Vec<RandomSupercell>> {
+pub(crate) fn ensemble(mappings: &[Mapping], count: usize) -> Result<Vec<RandomSupercell>> {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
     let mut all = Vec::with_capacity(count);
     while all.len() < count {
@@ -64,6 +64,8 @@ pub(crate) fn ensemble(mapping: &Mapping, count: usize) -> Result<Vec<RandomSupe
         // Not the same jumps for all rows.
         let jump = JUMPS_TURNS[number / JUMPS_TURNS.len() % JUMPS_TURNS.len()];
         let start: f64 = rng.random();
+        // Not the same mapping for all rows, nor for all jumps.
+        let mapping = &mappings[number / (ROW_EVERY * JUMPS_TURNS.len()) % mappings.len()];
         let widths_nm = (0..sites)
             .map(|i| {
                 let place = lattice.site(i).map(|v| v as f64);
@@ -81,12 +83,12 @@ pub(crate) fn ensemble(mapping: &Mapping, count: usize) -> Result<Vec<RandomSupe
 ///
 /// # Errors
 /// None, as for [`ensemble`].
-pub(crate) fn equal_pillars(mapping: &Mapping) -> Result<Vec<RandomSupercell>> {
+pub(crate) fn equal_pillars(mappings: &[Mapping]) -> Result<Vec<RandomSupercell>> {
     (0..EQUAL)
         .map(|i| {
             Ok(RandomSupercell {
                 lattice: SiteLattice::row(1)?,
-                widths_nm: vec![mapping.width_nm((i as f64 + 0.5) / EQUAL as f64)],
+                widths_nm: vec![mappings[i % mappings.len()].width_nm((i as f64 + 0.5) / EQUAL as f64)],
             })
         })
         .collect()
@@ -99,9 +101,9 @@ mod tests {
     #[test]
     fn supercells_are_many_sided_and_the_same_each_time() {
         let mapping = Mapping::new(|u| 100 + (u * 200.0) as u16);
-        let all = ensemble(&mapping, 64).unwrap();
-        assert_eq!(all, ensemble(&mapping, 64).unwrap());
-        assert_eq!(all[..10], ensemble(&mapping, 10).unwrap());
+        let all = ensemble(std::slice::from_ref(&mapping), 64).unwrap();
+        assert_eq!(all, ensemble(std::slice::from_ref(&mapping), 64).unwrap());
+        assert_eq!(all[..10], ensemble(std::slice::from_ref(&mapping), 10).unwrap());
         let mut widths: Vec<u16> = all.iter().flat_map(|c| &c.widths_nm).map(|w| *w as u16).collect();
         assert!(all.iter().all(|c| c.widths_nm.len() == c.lattice.len()));
         widths.sort_unstable();

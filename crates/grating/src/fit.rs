@@ -210,7 +210,7 @@ mod tests {
                 .map(|i| Complex64::cis((i * (pol + 2)) as f64) / (1.0 + i as f64))
                 .collect(),
         });
-        let all: Vec<SiteSample> = ensemble(&mapping, 300)
+        let all: Vec<SiteSample> = ensemble(std::slice::from_ref(&mapping), 300)
             .unwrap()
             .iter()
             .enumerate()
@@ -238,7 +238,7 @@ mod tests {
     fn along_the_normal_s_is_p_turned_by_a_right_angle() {
         let mapping = Mapping::new(|u| 100 + 2 * (u * 100.0) as u16);
         let mut all = Vec::new();
-        for (number, cell) in ensemble(&mapping, 60).unwrap().iter().enumerate() {
+        for (number, cell) in ensemble(std::slice::from_ref(&mapping), 60).unwrap().iter().enumerate() {
             let t = [0, 1].map(|pol| {
                 let each = cell.widths_nm.iter().enumerate();
                 each.map(|(i, w)| Complex64::cis(w * (0.02 + 0.01 * pol as f64) + i as f64))

@@ -15,18 +15,19 @@ use crate::{Mapping, NeighbourTable, NeighbourTableSpec};
 pub struct NeighbourCell {
     equal: PointwiseCell,
     stack: CellStack,
-    mapping: Mapping,
+    mappings: Vec<Mapping>,
     cache: Option<PathBuf>,
 }
 
 impl NeighbourCell {
-    /// `mapping` says how often each width is drawn beside which others; tables are kept in the folder `cache`.
-    pub fn new(stack: CellStack, mapping: Mapping, cache: Option<PathBuf>) -> Self {
-        let widths_nm = mapping.samples_nm().iter().copied();
+    /// `mappings`, at least one, say how often each width is drawn beside which others; tables are kept in the folder
+    /// `cache`.
+    pub fn new(stack: CellStack, mappings: Vec<Mapping>, cache: Option<PathBuf>) -> Self {
+        let widths_nm = mappings.iter().flat_map(|m| m.samples_nm().iter().copied());
         Self {
             equal: PointwiseCell::new(stack.clone(), widths_nm),
             stack,
-            mapping,
+            mappings,
             cache,
         }
     }
@@ -60,7 +61,7 @@ impl CellModel for NeighbourCell {
         progress: &dyn Progress,
     ) -> Result<Option<[NeighbourResponse; 2]>> {
         let spec = NeighbourTableSpec { wavelength_um, sines };
-        let table = NeighbourTable::obtain(&spec, &self.stack, &self.mapping, self.cache.as_deref(), progress)?;
+        let table = NeighbourTable::obtain(&spec, &self.stack, &self.mappings, self.cache.as_deref(), progress)?;
         Ok(Some(table.responses(self.full_transmission(wavelength_um)?)))
     }
 

@@ -1,5 +1,7 @@
 //! How far a model of single sites is from rows of real pillars.
 
+use std::f64::consts::TAU;
+
 use num_complex::Complex64;
 
 use metalith_core::{Error, Result};
@@ -9,11 +11,10 @@ use crate::{CoarseCell, site_transmissions};
 
 /// Consecutive pillars of an element, in a direction across which its widths hardly change.
 ///
-/// The row is closed to a ring, and repeated across: along y for a row along x, and along (1, -1) for one along the
-/// diagonal. Its supercell has as many sites as the row.
+/// The row is closed to a ring, and repeated across: along y for a row along x, and along (1, -1) for one along (1, 1). Its supercell has as many sites as the row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RealRow {
-    /// Direction: (1, 0), (0, 1) or (1, 1).
+    /// Direction: (1, 0), (0, 1), (1, 1) or (1, -1).
     pub direction: [i32; 2],
     /// Width of each pillar (nm); a diagonal row has a site at every step of x + y.
     pub widths_nm: Vec<f64>,
@@ -26,12 +27,34 @@ pub struct SolvedRow {
     pub lattice: SiteLattice,
     /// Width of each site (nm), in their order.
     pub widths_nm: Vec<f64>,
+    /// Number of the pillar of the row that each site is.
+    pub pillars: Vec<usize>,
     /// What each site transmits, `[polarisation][site]`.
     transmitted: [Vec<Complex64>; 2],
     full: f64,
 }
 
 impl SolvedRow {
+    /// What each site transmits, `[polarisation][site]`, scaled as a single cell.
+    pub fn transmitted(&self) -> &[Vec<Complex64>; 2] {
+        &self.transmitted
+    }
+
+    /// Amplitude of the first order for s and p, its squared modulus a share of the light: the mean over the sites of what
+    /// they transmit, `found` (`[polarisation][site]`, scaled as a single cell), less the phase that is asked of each
+    /// pillar of the row (turns).
+    pub fn first_order(&self, found: &[Vec<Complex64>; 2], turns: &[f64]) -> [Complex64; 2] {
+        let back = |pillar: &usize| Complex64::cis(-TAU * turns[*pillar]) / self.full;
+        found.each_ref().map(|found| {
+            let sum: Complex64 = found
+                .iter()
+                .zip(&self.pillars)
+                .map(|(t, pillar)| t * back(pillar))
+                .sum();
+            sum / found.len() as f64
+        })
+    }
+
     /// Light that a model puts elsewhere than the supercell does: sum of |t - t'|^2 over the sites, over that of full
     /// transmission; mean of s and p. `found` is the transmission of every site by the model, `[polarisation][site]`,
     /// scaled as that of a single cell.
@@ -75,22 +98,24 @@ impl RealRow {
         if lattice.len() != pillars {
             return Err(Error::invalid(
                 format!("a row of {pillars} pillars in the direction {:?}", self.direction),
-                "use (1, 0), (0, 1) or (1, 1)",
+                "use (1, 0), (0, 1), (1, 1) or (1, -1)",
             ));
         }
-        let widths: Vec<f64> = (0..pillars)
+        let order: Vec<usize> = (0..pillars)
             .map(|i| {
                 let [x, y] = lattice.site(i).map(|v| v as i64);
                 let [p, q] = self.direction.map(i64::from);
-                self.widths_nm[(p * x + q * y).rem_euclid(pillars as i64) as usize]
+                (p * x + q * y).rem_euclid(pillars as i64) as usize
             })
             .collect();
+        let widths: Vec<f64> = order.iter().map(|i| self.widths_nm[*i]).collect();
         let full = cell.full_transmission()?;
         let response = cell.solve(lattice, &widths, sines)?;
         Ok(SolvedRow {
             transmitted: site_transmissions(&lattice, &response, cell.wavelength_over_pitch(), full),
             lattice,
             widths_nm: widths,
+            pillars: order,
             full,
         })
     }

@@ -6,7 +6,8 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use metalith_cell::{CellStack, kept};
+use metalith_cell::CellStack;
+use metalith_cell::kept::{self, KeptTable};
 use metalith_core::{Error, Progress, Result};
 
 use crate::node::{KEPT, PHASES};
@@ -61,30 +62,14 @@ impl GratingTable {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let vectors = chosen(spec)?;
-        let inputs = inputs(spec, stack, mapping);
-        let file = cache.map(|folder| folder.join(format!("grating-{}.bin", kept::name_of(&inputs))));
-        if let Some(file) = &file {
-            // Under 400 bytes for each of a few hundred vectors; the inputs are a few thousand.
-            let longest = 1 << 20;
-            match kept::read(file, MAGIC, &inputs, longest) {
-                Ok(Some(content)) => match decode(&content, vectors.len()) {
-                    Some(amplitudes) => {
-                        progress.advance(vectors.len() as u64);
-                        return Self::of(spec, vectors.into_iter().zip(amplitudes).collect());
-                    }
-                    None => progress.note(&format!("{} is not used: it holds other gratings", file.display())),
-                },
-                Ok(None) => {}
-                Err(why) => progress.note(&format!("{} is not used: {why}", file.display())),
-            }
+        let kept = KeptTable::new(cache, "grating", MAGIC, inputs(spec, stack, mapping), "gratings");
+        if let Some(amplitudes) = kept.read(|content| decode(content, vectors.len()), progress) {
+            progress.advance(vectors.len() as u64);
+            return Self::of(spec, vectors.into_iter().zip(amplitudes).collect());
         }
         let solved = solve(spec, stack, mapping, &vectors, progress)?;
-        if let Some(file) = &file {
-            let content: Vec<u8> = solved.iter().flat_map(|(_, amplitudes)| encode(amplitudes)).collect();
-            if let Err(error) = kept::write(file, MAGIC, &inputs, &content) {
-                progress.note(&format!("the table of gratings is not kept: {error}"));
-            }
-        }
+        let content: Vec<u8> = solved.iter().flat_map(|(_, amplitudes)| encode(amplitudes)).collect();
+        kept.write(&content, progress);
         Self::of(spec, solved)
     }
 

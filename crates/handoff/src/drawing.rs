@@ -8,7 +8,7 @@ use gds21::{
     GdsTextElem, GdsUnits,
 };
 
-use metalith_core::{Error, Result, Silent, WholeFile};
+use metalith_core::{Error, Result, Silent, WholeFile, WidthRows};
 use metalith_design::LayoutLayer;
 use metalith_design::array::{Class, Symmetry};
 use metalith_gds::Layout;
@@ -221,13 +221,17 @@ impl Drawing {
 
     /// Add the pillars of a lens as a cell of this name, folded by its symmetries.
     pub fn add_lens(&mut self, name: &str, layer: LayerPair, class: &Class) {
-        let lattice = class.widths.lattice;
-        let n = lattice.sites();
+        let lattice = class.widths.lattice();
+        let (n, mut room) = (lattice.sites(), Vec::new());
         let mut whole = Sheet::new(name);
         for (j, part) in class.group.domain(&class.widths).iter().enumerate() {
             let mut sheet = Sheet::new(format!("{name}_{}", (b'A' + j as u8) as char));
-            for ((iy, ix), &width) in class.widths.width_nm.indexed_iter() {
-                if width != 0 && class.group.holds(part, n, ix, iy) {
+            for (iy, run) in (0..n).flat_map(|iy| class.group.runs(part, n, iy).map(|run| (iy, run))) {
+                for (ix, &width) in run
+                    .clone()
+                    .zip(class.widths.row(iy, run, &mut room))
+                    .filter(|(_, w)| **w != 0)
+                {
                     let at = (lattice.coordinate_nm(ix), lattice.coordinate_nm(iy));
                     sheet.square(layer, at, i64::from(width));
                 }

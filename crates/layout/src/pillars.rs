@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::io::Write;
+use std::ops::Range;
 use std::path::Path;
 
 use gds21::{GdsElement, GdsStrans, GdsStructRef};
@@ -9,13 +10,13 @@ use rayon::prelude::*;
 
 use super::frame::LibraryFrame;
 use super::{coordinate, point, polygon};
-use metalith_core::{Error, Progress, Result, WholeFile, WidthMap};
+use metalith_core::{Error, Progress, Result, WholeFile, WidthRows};
 use metalith_design::LayoutLayer;
 use metalith_design::array::{PillarArray, PlacedElement, Symmetry};
 use metalith_gds::write::{ReferenceRecord, SquareRecord};
 
-/// Rows of a lattice that are encoded as one block: a megabyte of a full-size lens.
-const ROWS: usize = 4;
+/// Sites of the rows that are encoded as one block, about: a megabyte.
+const SITES: usize = 12_000;
 
 /// Blocks that are encoded side by side before they are written in order.
 const BLOCKS: usize = 8;
@@ -33,10 +34,8 @@ pub(super) struct PillarWriter<'a> {
     buffers: [Vec<u8>; BLOCKS],
 }
 
-/// One pillar of a lens: its site, its centre from the lens's (nm), its width (nm).
+/// One pillar of a lens: its centre from the lens's (nm), its width (nm).
 struct PlacedPillar {
-    ix: usize,
-    iy: usize,
     x: i32,
     y: i32,
     width: u16,
@@ -76,11 +75,8 @@ impl<'a> PillarWriter<'a> {
                 let name = format!("{lens}_{}", (b'A' + j as u8) as char);
                 let (begin, end) = self.frame.cell(&name, Vec::new())?;
                 self.put(&begin)?;
-                self.rows(&class.widths, |out, s| {
-                    if class.group.holds(part, n, s.ix, s.iy) {
-                        square.append(out, s.x, s.y, s.width);
-                    }
-                })?;
+                let runs = |iy| class.group.runs(part, n, iy);
+                self.rows(&class.widths, runs, |out, s| square.append(out, s.x, s.y, s.width))?;
                 self.put(&end)?;
                 references.extend(part.copies.iter().map(|s| reference(&name, *s, (0, 0))));
             }
@@ -118,10 +114,14 @@ impl<'a> PillarWriter<'a> {
         }
         for (k, placed) in array.placed.iter().enumerate() {
             let name = format!("E{k}");
-            let widths = array.widths(placed);
+            let widths = array.rows(placed);
             let (begin, end) = self.frame.cell(&name, Vec::new())?;
             self.put(&begin)?;
-            self.rows(&widths, |out, s| cells[&s.width].append(out, s.x, s.y))?;
+            self.rows(
+                widths.as_ref(),
+                |_| [all_of(array), 0..0],
+                |out, s| cells[&s.width].append(out, s.x, s.y),
+            )?;
             self.put(&end)?;
             self.placed
                 .push(reference(&name, Symmetry::IDENTITY, placed.element.centre_nm));
@@ -138,10 +138,14 @@ impl<'a> PillarWriter<'a> {
         if let Some(array) = flat {
             let square = SquareRecord::on(self.layer.number());
             for placed in &array.placed {
-                let widths = array.widths(placed);
+                let widths = array.rows(placed);
                 let (cx, cy) = placed.element.centre_nm;
                 let (cx, cy) = (coordinate(cx), coordinate(cy));
-                self.rows(&widths, |out, s| square.append(out, cx + s.x, cy + s.y, s.width))?;
+                self.rows(
+                    widths.as_ref(),
+                    |_| [all_of(array), 0..0],
+                    |out, s| square.append(out, cx + s.x, cy + s.y, s.width),
+                )?;
             }
         }
         self.put(&end)?;
@@ -151,32 +155,33 @@ impl<'a> PillarWriter<'a> {
         Ok(bytes)
     }
 
-    /// Encode the pillars of a lens row by row: blocks side by side on all threads, written in order.
-    fn rows(&mut self, widths: &WidthMap, encode: impl Fn(&mut Vec<u8>, PlacedPillar) + Sync) -> Result<()> {
-        let n = widths.lattice.sites();
-        let places = (0..n)
-            .map(|i| coordinate(widths.lattice.coordinate_nm(i)))
-            .collect::<Vec<_>>();
-        let all = widths.width_nm.as_slice().expect("rows are contiguous");
-        let blocks = all.chunks(n * ROWS).collect::<Vec<_>>();
-        for (batch, side_by_side) in blocks.chunks(BLOCKS).enumerate() {
+    /// Encode the pillars of a lens row by row, those in the runs of columns that `runs` gives for a row: blocks side by
+    /// side on all threads, written in order.
+    fn rows(
+        &mut self,
+        widths: &impl WidthRows,
+        runs: impl Fn(usize) -> [Range<usize>; 2] + Sync,
+        encode: impl Fn(&mut Vec<u8>, PlacedPillar) + Sync,
+    ) -> Result<()> {
+        let lattice = widths.lattice();
+        let n = lattice.sites();
+        let places = (0..n).map(|i| coordinate(lattice.coordinate_nm(i))).collect::<Vec<_>>();
+        for side_by_side in blocks(n, &runs).chunks(BLOCKS) {
             if self.progress.stopped() {
                 return Err(Error::Interrupted);
             }
-            let first = batch * BLOCKS * ROWS;
             let mut buffers = std::mem::take(&mut self.buffers);
             let pillars = side_by_side
                 .par_iter()
                 .zip(&mut buffers)
-                .enumerate()
-                .map(|(k, (block, out))| {
+                .map(|(rows, out)| {
                     out.clear();
-                    let mut pillars = 0;
-                    for (row, line) in block.chunks(n).enumerate() {
-                        let iy = first + k * ROWS + row;
-                        for (ix, &width) in line.iter().enumerate().filter(|(_, w)| **w != 0) {
+                    let (mut pillars, mut room) = (0, Vec::new());
+                    for (iy, run) in rows.clone().flat_map(|iy| runs(iy).map(|run| (iy, run))) {
+                        let row = widths.row(iy, run.clone(), &mut room);
+                        for (ix, &width) in run.zip(row).filter(|(_, w)| **w != 0) {
                             let (x, y) = (places[ix], places[iy]);
-                            encode(out, PlacedPillar { ix, iy, x, y, width });
+                            encode(out, PlacedPillar { x, y, width });
                             pillars += 1;
                         }
                     }
@@ -196,6 +201,25 @@ impl<'a> PillarWriter<'a> {
         self.bytes += bytes.len() as u64;
         self.file.write_all(bytes).map_err(Error::io("write", self.path))
     }
+}
+
+/// All columns of an element.
+fn all_of(array: &PillarArray) -> Range<usize> {
+    0..array.lattice.sites()
+}
+
+/// Rows in blocks of about [`SITES`] sites.
+fn blocks(n: usize, runs: impl Fn(usize) -> [Range<usize>; 2]) -> Vec<Range<usize>> {
+    let mut blocks = Vec::new();
+    let (mut first, mut sites) = (0, 0);
+    for iy in 0..n {
+        sites += runs(iy).iter().map(ExactSizeIterator::len).sum::<usize>();
+        if sites >= SITES || iy + 1 == n {
+            blocks.push(first..iy + 1);
+            (first, sites) = (iy + 1, 0);
+        }
+    }
+    blocks
 }
 
 fn lens_name(class: usize) -> String {

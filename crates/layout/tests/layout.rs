@@ -4,10 +4,13 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use metalith_core::{Silent, WholeFile};
+use metalith_core::{Silent, WholeFile, WidthRows};
+use metalith_design::array::ClassWidths;
 use metalith_design::{Design, Hierarchy, PillarArray};
 use metalith_gds::{LayerNumber, Layout, Point, Selection, Shape, Transform, Visitor};
-use metalith_layout::{LayoutFormat, OasisEncoding, convert, write_apertures, write_pillars, write_pillars_oasis};
+use metalith_layout::{
+    LayoutFormat, OasisEncoding, convert, write_apertures, write_pillars, write_pillars_as, write_pillars_oasis,
+};
 use metalith_oasis::{CellReference, NameTable, OasisItem, OasisLimits, OasisReader, OasisShape};
 use metalith_testing::{design, golden};
 use serde_json::json;
@@ -78,6 +81,42 @@ fn golden_digests_of_the_full_size_designs() {
         fs::remove_file(path).unwrap();
     }
     golden("full_size.json", format!("{:#}\n", json!(all)).as_bytes());
+}
+
+/// Elements that are made row by row, as large ones are, give the bytes of those that are held: a lens of 1 mm, and
+/// steered elements that are copies of one another, in every hierarchy and format.
+#[test]
+fn elements_that_are_not_held_give_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let mini = Design::read(&design("mini_3x3")).unwrap();
+    let mut lens = Design::read(&design("prototype_3x3")).unwrap();
+    lens.array.count = (1, 1);
+    let held = |design: &Design| PillarArray::build(design, &Silent).unwrap();
+    let computed = |design: &Design| PillarArray::build_within(design, 0, &Silent).unwrap();
+    let bytes = |design: &Design, array: &PillarArray, hierarchy, format| {
+        let path = folder.path().join("layout");
+        write_pillars_as(design, array, hierarchy, format, &path, &Silent).unwrap();
+        fs::read(path).unwrap()
+    };
+    let compact = LayoutFormat::Oasis(OasisEncoding::Compact);
+    let mut cases = vec![
+        (&lens, Hierarchy::Folded, LayoutFormat::Gds),
+        (&lens, Hierarchy::Folded, compact),
+    ];
+    for (_, hierarchy) in HIERARCHIES {
+        for encoding in [OasisEncoding::Compact, OasisEncoding::Plain, OasisEncoding::Smallest] {
+            cases.push((&mini, hierarchy, LayoutFormat::Oasis(encoding)));
+        }
+        cases.push((&mini, hierarchy, LayoutFormat::Gds));
+    }
+    for (design, hierarchy, format) in cases {
+        let (held, computed) = (held(design), computed(design));
+        assert!(matches!(held.classes[0].widths, ClassWidths::Held(_)));
+        assert!(matches!(computed.classes[0].widths, ClassWidths::Computed(_)));
+        assert_eq!(held.pillars(), computed.pillars());
+        let same = bytes(design, &held, hierarchy, format) == bytes(design, &computed, hierarchy, format);
+        assert!(same, "{} {hierarchy:?} {format:?}", design.name);
+    }
 }
 
 #[test]

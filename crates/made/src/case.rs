@@ -35,6 +35,14 @@ impl SimulationCase<'_> {
         }
     }
 
+    /// Whether what is seen of an element depends on where on the chip it stands.
+    pub fn depends_on_place(&self) -> bool {
+        match self {
+            Self::Cell(_) => false,
+            Self::Made(chip) => chip.perturbation().depends_on_place(),
+        }
+    }
+
     /// |t| of a cell that passes all its power in the zero order.
     ///
     /// # Errors

@@ -9,7 +9,7 @@ use super::{
     ArrivingLight, CalibratedModel, CameraChange, ClassTable, DrawnElement, MadeElement, NotApplied, Perturbation,
     cell_direction, mixed, realised_nm,
 };
-use metalith_cell::CellStack;
+use metalith_cell::{CellStack, POLARISATION_SHARE};
 use metalith_core::{Error, Progress, Result};
 use metalith_wave::Psf;
 use metalith_wave::{Accuracy, Fold, PlaneWave, Propagator, Scratch, Window};
@@ -142,14 +142,8 @@ impl MadeChip {
     }
 
     fn viewed<'a>(&self, element: &'a MadeElement, stated: &PlaneWave, solved: &SolvedWidths) -> MadeView<'a> {
-        let polarisations = solved.pillars.iter().zip(&solved.bare);
-        MadeView {
-            element,
-            tables: polarisations.map(|(t, bare)| element.table_of(t, *bare)).collect(),
-            light: ArrivingLight::new(stated, &self.perturbation().path),
-            gap_um: self.perturbation().path.gap_um,
-            camera: self.perturbation().camera,
-        }
+        let light = ArrivingLight::new(stated, &self.perturbation().path);
+        MadeView::new(element, light, self.perturbation(), solved)
     }
 }
 
@@ -175,14 +169,31 @@ impl MadeChip {
         let pairs = solved.pillars[0].iter().zip(&widths);
         Ok(pairs
             .map(|(t, w)| {
-                let pillar = t * geometry.amplitude(*w);
+                let pillar = t * geometry.transmission_factor(*w);
                 mixed(geometry, geometry.missing_pillars, pillar, solved.bare[0])
             })
             .collect())
     }
 }
 
-impl MadeView<'_> {
+impl<'a> MadeView<'a> {
+    /// A made element in a light, behind the path and before the camera of a chip; `solved`: transmission of its widths.
+    pub fn new(
+        element: &'a MadeElement,
+        light: ArrivingLight,
+        perturbation: &Perturbation,
+        solved: &SolvedWidths,
+    ) -> Self {
+        let polarisations = solved.pillars.iter().zip(&solved.bare);
+        Self {
+            element,
+            tables: polarisations.map(|(t, bare)| element.table_of(t, *bare)).collect(),
+            light,
+            gap_um: perturbation.path.added_distance_um(element.centre_um()),
+            camera: perturbation.camera.clone(),
+        }
+    }
+
     /// The PSF on a window at the stated distance of the sensor; where the sensor stands farther off, the window
     /// keeps its place in it; with the transfer of all light at `lp_mm` (line pairs a millimetre). Missing pillars scatter evenly over the window, blur and veil of the camera follow.
     ///
@@ -225,7 +236,10 @@ impl MadeView<'_> {
     /// Of light that is not polarised, what arrives in the polarisation of each table. What leaves by different tables
     /// does not interfere: intensities are added.
     pub fn share(&self) -> f64 {
-        1.0 / self.tables.len().min(2) as f64
+        match self.tables.len() {
+            1 => 1.0,
+            _ => POLARISATION_SHARE,
+        }
     }
 
     fn scattered(&self, table: &ClassTable, at_um: [f64; 2], distance_um: f64) -> f64 {

@@ -7,6 +7,9 @@ use num_complex::{Complex32, Complex64};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::declared::{CompiledTerm, DeclaredQuantity, RowPlaces, compiled};
+use super::expression::Input;
+use super::pupil::PupilTerms;
 use super::{ArrivingLight, GeometryChange, NODE_STEP_NM, density, zernike};
 use metalith_core::{Error, Lattice, Result, WidthMap};
 use metalith_wave::Aperture;
@@ -23,6 +26,8 @@ const STEPS_PER_NM: f64 = 10.0;
 pub struct DrawnElement<'a> {
     pillars: &'a WidthMap,
     aperture_radius_um: f64,
+    /// Centre of the element on the chip (um).
+    centre_um: [f64; 2],
     /// Area fraction around each site, made when first asked for.
     fill: OnceLock<Vec<f32>>,
 }
@@ -33,8 +38,15 @@ impl<'a> DrawnElement<'a> {
         Self {
             pillars,
             aperture_radius_um,
+            centre_um: [0.0; 2],
             fill: OnceLock::new(),
         }
+    }
+
+    /// The same with its centre at a place on the chip (um), instead of on the chip's axis.
+    #[must_use]
+    pub fn placed(self, centre_um: [f64; 2]) -> Self {
+        Self { centre_um, ..self }
     }
 
     /// The pillars.
@@ -47,42 +59,73 @@ impl<'a> DrawnElement<'a> {
         self.fill.get_or_init(|| density::fill(self.pillars))
     }
 
-    /// Width added to the pillar at a site, counted row by row, by bias and density (nm).
+    /// Width added to the pillar at a site, counted row by row, by bias, density and declared terms (nm).
     pub fn bias_nm(&self, site: usize, geometry: &GeometryChange) -> f64 {
-        if geometry.follows_density() {
-            geometry.bias_nm(f64::from(self.fill()[site]))
-        } else {
-            geometry.cd_bias_nm
+        if !geometry.varies_by_site() {
+            return geometry.cd_bias_nm;
         }
+        let n = self.pillars.lattice.sites();
+        let own = self.added_nm(site / n, geometry, &width_terms(geometry));
+        geometry.cd_bias_nm + own[site % n]
     }
 
-    /// Steps of [`BIAS_STEP_NM`] that density adds to the width at each site, row by row; nothing if it adds none
-    /// anywhere.
-    pub fn density_steps(&self, geometry: &GeometryChange) -> Option<Vec<i32>> {
-        let steps = |f: &f32| (geometry.cd_bias_density_nm * f64::from(*f) * STEPS_PER_NM).round() as i32;
+    /// What density and declared terms add to the widths of a row (nm).
+    fn added_nm(&self, iy: usize, geometry: &GeometryChange, terms: &[CompiledTerm]) -> Vec<f64> {
+        let lattice = self.pillars.lattice;
+        let n = lattice.sites();
+        let fill: Vec<f64> = self.fill()[iy * n..][..n].iter().map(|f| f64::from(*f)).collect();
+        let mut added: Vec<f64> = fill.iter().map(|f| geometry.cd_bias_density_nm * f).collect();
+        if terms.is_empty() {
+            return added;
+        }
+        let places = RowPlaces::new(lattice, iy, self.aperture_radius_um, self.centre_um);
+        let drawn: Vec<f64> = self.pillars.width_nm.row(iy).iter().map(|w| f64::from(*w)).collect();
+        let inputs: Vec<Input<'_>> = [Input::Row(&drawn), Input::Row(&fill)]
+            .into_iter()
+            .chain(places.inputs())
+            .collect();
+        let mut own = vec![0.0; n];
+        for term in terms {
+            term.row(&inputs, &mut own);
+            added.iter_mut().zip(&own).for_each(|(to, v)| *to += v);
+        }
+        added
+    }
+
+    /// Steps of [`BIAS_STEP_NM`] that density and declared terms add to the width at each site, row by row; nothing if
+    /// they add none anywhere.
+    pub fn site_steps(&self, geometry: &GeometryChange) -> Option<Vec<i32>> {
+        let terms = width_terms(geometry);
+        let row = |iy| self.added_nm(iy, geometry, &terms);
+        let steps = |nm: f64| (nm * STEPS_PER_NM).round() as i32;
+        let rows = 0..self.pillars.lattice.sites();
         geometry
-            .follows_density()
-            .then(|| self.fill().iter().map(steps).collect())
+            .varies_by_site()
+            .then(|| rows.flat_map(row).map(steps).collect())
     }
 }
 
 impl DrawnElement<'_> {
-    /// What density adds to the widths, mean over the pillars and rounded to the next node of the cells, in steps
-    /// of [`BIAS_STEP_NM`]: for accounts that know drawn widths but no places.
-    pub fn mean_density_steps(&self, geometry: &GeometryChange) -> i32 {
-        if !geometry.follows_density() {
+    /// What density and declared terms add to the widths, mean over the pillars and rounded to the next node of the
+    /// cells, in steps of [`BIAS_STEP_NM`]: for accounts that know drawn widths but no places.
+    pub fn mean_site_steps(&self, geometry: &GeometryChange) -> i32 {
+        let Some(steps) = self.site_steps(geometry) else {
             return 0;
-        }
+        };
         let (mut sum, mut pillars) = (0.0, 0.0);
-        for (fill, w) in self.fill().iter().zip(&self.pillars.width_nm) {
+        for (step, w) in steps.iter().zip(&self.pillars.width_nm) {
             if *w > 0 {
-                sum += f64::from(*fill);
+                sum += f64::from(*step);
                 pillars += 1.0;
             }
         }
-        let nodes = geometry.cd_bias_density_nm * sum / f64::max(pillars, 1.0) / NODE_STEP_NM;
+        let nodes = sum / f64::max(pillars, 1.0) / (NODE_STEP_NM * STEPS_PER_NM);
         (nodes.round() * NODE_STEP_NM * STEPS_PER_NM).round() as i32
     }
+}
+
+fn width_terms(geometry: &GeometryChange) -> Vec<CompiledTerm> {
+    compiled(&geometry.declared, |q| q == DeclaredQuantity::WidthNm)
 }
 
 /// Width of a pillar drawn this wide, so many steps of density on top of the common bias (nm).
@@ -96,6 +139,7 @@ pub fn realised_nm(drawn_nm: u16, geometry: &GeometryChange, density_steps: i32)
 pub struct MadeElement {
     lattice: Lattice,
     radius_um: f64,
+    centre_um: [f64; 2],
     geometry: GeometryChange,
     /// Share of the pillars that are missing and counted with their mean.
     missing: f64,
@@ -107,6 +151,8 @@ pub struct MadeElement {
     count: Vec<u32>,
     /// Optical path added over the lens (um); empty for none.
     path_um: Vec<f32>,
+    /// Declared terms of the light that leaves each site.
+    pupil: PupilTerms,
 }
 
 /// What the sites of each class transmit at one wavelength and polarisation.
@@ -128,7 +174,7 @@ impl MadeElement {
     pub fn new(drawn: &DrawnElement<'_>, geometry: &GeometryChange) -> Result<Self> {
         let lattice = drawn.pillars.lattice;
         let n = lattice.sites();
-        let steps = drawn.density_steps(geometry);
+        let steps = drawn.site_steps(geometry);
         let [ox, oy] = geometry.aperture_offset_um;
         let covered = |site: usize| {
             let (x, y) = (
@@ -160,14 +206,23 @@ impl MadeElement {
             count[usize::from(own)] += 1;
             radius2 = radius2.max(lattice.half_radius2(site % n, site / n));
         }
-        let path_um = if geometry.wavefront_nm.is_empty() {
+        let mut path_um = if geometry.wavefront_nm.is_empty() {
             Vec::new()
         } else {
             zernike::map(&geometry.wavefront_nm, lattice, drawn.aperture_radius_um)
         };
+        let pupil = PupilTerms::new(
+            geometry,
+            lattice,
+            drawn.aperture_radius_um,
+            drawn.centre_um,
+            &mut path_um,
+        );
         Ok(Self {
             lattice,
+            pupil,
             radius_um: (radius2 as f64).sqrt() * 0.5 * lattice.pitch_um(),
+            centre_um: drawn.centre_um,
             geometry: geometry.clone(),
             missing: geometry.missing_pillars,
             class,
@@ -196,6 +251,11 @@ impl MadeElement {
     /// Where the sites are.
     pub fn lattice(&self) -> Lattice {
         self.lattice
+    }
+
+    /// Centre of the element on the chip (um).
+    pub fn centre_um(&self) -> [f64; 2] {
+        self.centre_um
     }
 
     /// Distance of the outermost open site from the element's centre (um).
@@ -230,7 +290,7 @@ impl MadeElement {
         let (mut t, mut scattered) = (vec![Complex32::ZERO], 0.0);
         for ((pillar, width), count) in open.iter().zip(&self.width_nm[1..]).zip(&self.count[1..]) {
             let pillar = if *width > 0.0 {
-                pillar * self.geometry.amplitude(*width)
+                pillar * self.geometry.transmission_factor(*width)
             } else {
                 *pillar
             };
@@ -306,6 +366,7 @@ impl Aperture for MadeAperture<'_> {
                 *to *= cis(f64::from(*path) / self.wavelength_um);
             }
         }
+        self.element.pupil.multiply(iy, self.wavelength_um, row);
         if let Some(sphere) = &self.sphere {
             for (to, along_x) in row.iter_mut().zip(sphere) {
                 *to *= along_x * sphere[iy];

@@ -12,10 +12,10 @@
 //!
 //! | part | applied to |
 //! | --- | --- |
-//! | `geometry` | width of each site (bias, bias by the density around it), open sites (aperture offset), transmission of each class (missing pillars, light that sees no pillar, free amplitude), optical path of each site (free wavefront) |
+//! | `geometry` | width of each site (bias, bias by the density around it, declared terms), open sites (aperture offset), transmission of each class (missing pillars, light that sees no pillar, free amplitude), path, phase and amplitude of each site (wavefront, declared terms) |
 //! | `cell` | the stack that every realised width is solved with |
-//! | `path` | the wave that arrives (tilt, curvature) and the distance of the sensor (gap) |
-//! | `camera` | the PSF: Gaussian blur, veil over its window |
+//! | `path` | the wave that arrives (tilt, curvature) and the distance of the sensor (gap, tilt of the sensor, declared terms) |
+//! | `camera` | the PSF: declared kernels, Gaussian blur, veil over its window |
 //! | `light` | spectra and source of a bench; a PSF of one wavelength and one point names them with [`Perturbation::not_applied`] |
 //!
 //! [`MadeElement::aperture`] gives a [`metalith_wave::Aperture`], so that every propagator runs from it.
@@ -24,12 +24,15 @@ mod camera;
 mod case;
 mod cells;
 mod chip;
+mod declared;
 mod density;
 mod element;
+pub mod expression;
 mod light;
 mod model;
 mod not_applied;
 mod perturbation;
+mod pupil;
 mod stack;
 pub mod zernike;
 
@@ -37,6 +40,7 @@ pub use camera::veiled;
 pub use case::SimulationCase;
 pub use cells::{NODE_STEP_NM, RealisedCells, SolvedWidths, lagrange};
 pub use chip::{MadeChip, MadeView, ModelStatement, spread};
+pub use declared::{CompiledTerm, DeclaredQuantity, DeclaredTerm};
 pub use density::{RANGE_UM, fill};
 pub use element::{BIAS_STEP_NM, ClassTable, DrawnElement, MadeAperture, MadeElement, mixed, realised_nm};
 pub use light::{ArrivingLight, cell_direction};

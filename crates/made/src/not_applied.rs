@@ -56,6 +56,8 @@ impl Perturbation {
             format!("{shifts:?}"),
             SPECTRUM,
         );
+        let declared: Vec<&str> = light.declared.iter().map(|t| t.name.as_str()).collect();
+        note(declared.is_empty(), "light.declared", declared.join(", "), SPECTRUM);
         note(
             light.led_width == 0.0,
             "light.led_width",

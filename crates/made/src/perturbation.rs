@@ -3,6 +3,9 @@
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
+use super::declared::{CompiledTerm, DeclaredQuantity, DeclaredTerm, compiled};
+use super::zernike;
+
 /// How chip and bench differ from what was drawn and stated. The default differs in nothing.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -30,13 +33,18 @@ pub struct GeometryChange {
     pub zero_order_phase: f64,
     /// From the pillars to their aperture along x and y (um).
     pub aperture_offset_um: [f64; 2],
-    /// Free terms, which are no effect: optical path over the lens (nm), by Zernike polynomial from Noll's
-    /// fifth on, normalised to an rms of one over the aperture.
+    /// Optical path over the lens (nm), by Zernike polynomial from Noll's fifth on, normalised to an rms of one over
+    /// the aperture: aberrations, and the free terms that are no effect.
     pub wavefront_nm: Vec<f64>,
-    /// Relative change of amplitude over the range of widths, by Legendre polynomial from the first on.
+    /// A free term: relative change of amplitude over the range of widths, by Legendre polynomial from the first on.
     pub transmission: Vec<f64>,
+    /// The same for its phase (rad).
+    pub transmission_phase_rad: Vec<f64>,
     /// Widths that stand at -1 and +1 of those polynomials (nm).
     pub transmission_range_nm: [f64; 2],
+    /// Terms declared by expressions: widths, and what sites do to light.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub declared: Vec<DeclaredTerm>,
 }
 
 /// The pillar itself.
@@ -56,7 +64,7 @@ pub struct CellChange {
 }
 
 /// The path of the light to the chip and from it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PathChange {
     /// Added to every distance of chip and sensor (um).
@@ -65,6 +73,24 @@ pub struct PathChange {
     pub tilt_mrad: [f64; 2],
     /// One over the distance of the source (1/m); zero for collimated light.
     pub source_per_m: f64,
+    /// Tilt of the sensor against the chip along x and y (mrad): an element is farther from the sensor by this times
+    /// its place from the pivot.
+    pub sensor_tilt_mrad: [f64; 2],
+    /// Place on the chip about which the sensor is tilted (um).
+    pub sensor_pivot_um: [f64; 2],
+    /// Terms declared by expressions: distances.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub declared: Vec<DeclaredTerm>,
+}
+
+impl PathChange {
+    /// What is added to the distance of chip and sensor at an element whose centre is at this place on the chip (um).
+    pub fn added_distance_um(&self, centre_um: [f64; 2]) -> f64 {
+        let lean = |axis: usize| 1e-3 * self.sensor_tilt_mrad[axis] * (centre_um[axis] - self.sensor_pivot_um[axis]);
+        let declared = compiled(&self.declared, |_| true);
+        let declared: f64 = declared.iter().map(|t| t.value(&centre_um)).sum();
+        self.gap_um + lean(0) + lean(1) + declared
+    }
 }
 
 /// The lamps.
@@ -77,19 +103,36 @@ pub struct LightChange {
     pub led_width: f64,
     /// Diameter of the source over what is stated, less one.
     pub source_size: f64,
+    /// Terms declared by expressions: spectra.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub declared: Vec<DeclaredTerm>,
 }
 
 /// The camera.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CameraChange {
     /// Standard deviation of a Gaussian blur (um).
     pub pixel_blur_um: f64,
     /// Share of the light of a window that is spread evenly over it.
     pub stray_light: f64,
+    /// Terms declared by expressions: images.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub declared: Vec<DeclaredTerm>,
 }
 
 impl GeometryChange {
+    /// Add to the optical path over the lens (nm) by Noll's polynomial `j`, from the fifth on. Zero adds nothing.
+    pub fn add_wavefront(&mut self, j: u32, nm: f64) {
+        let at = (j - zernike::FIRST) as usize;
+        if nm != 0.0 && self.wavefront_nm.len() <= at {
+            self.wavefront_nm.resize(at + 1, 0.0);
+        }
+        if let Some(to) = self.wavefront_nm.get_mut(at) {
+            *to += nm;
+        }
+    }
+
     /// Amplitude that passes without seeing pillars, over that which arrives.
     pub fn unstructured(&self) -> Complex64 {
         Complex64::from_polar(self.zero_order, self.zero_order_phase)
@@ -101,19 +144,41 @@ impl GeometryChange {
     }
 
     /// Whether the bias differs from site to site.
-    pub fn follows_density(&self) -> bool {
-        self.cd_bias_density_nm != 0.0
+    pub fn varies_by_site(&self) -> bool {
+        self.cd_bias_density_nm != 0.0 || self.declared.iter().any(|t| t.quantity == DeclaredQuantity::WidthNm)
     }
 
-    /// Factor of the amplitude of a pillar that came out this wide (nm).
-    pub fn amplitude(&self, width_nm: f64) -> f64 {
+    /// Declared widths that depend on more than the pillar, the fill around it and its distance from the middle: what
+    /// symmetric copies of an element do not share.
+    pub fn directed_widths(&self) -> Vec<&str> {
+        let directed = |t: &&DeclaredTerm| {
+            let turned = |c: &CompiledTerm| ["x", "y", "theta", "X", "Y"].iter().any(|v| c.uses(v));
+            t.quantity == DeclaredQuantity::WidthNm && t.compiled().is_ok_and(|c| turned(&c))
+        };
+        self.declared.iter().filter(directed).map(|t| t.name.as_str()).collect()
+    }
+
+    /// Factor of the transmission of a pillar that came out this wide (nm). Polynomials keep the values at their ends
+    /// beyond them.
+    pub fn transmission_factor(&self, width_nm: f64) -> Complex64 {
+        if self.transmission.is_empty() && self.transmission_phase_rad.is_empty() {
+            return Complex64::ONE;
+        }
         let [narrow, wide] = self.transmission_range_nm;
-        let place = (2.0 * width_nm - narrow - wide) / (wide - narrow).max(1.0);
-        1.0 + legendre(&self.transmission, place)
+        let place = ((2.0 * width_nm - narrow - wide) / (wide - narrow).max(1.0)).clamp(-1.0, 1.0);
+        let amplitude = 1.0 + legendre(&self.transmission, place);
+        Complex64::from_polar(amplitude, legendre(&self.transmission_phase_rad, place))
     }
 }
 
 impl LightChange {
+    /// Factor by which declared terms change the spectrum of a lamp at a wavelength; never negative.
+    pub fn spectral_factor(&self, wavelength_nm: f64, centre_nm: f64) -> f64 {
+        let terms = compiled(&self.declared, |_| true);
+        let factors = terms.iter().map(|t| t.value(&[wavelength_nm, centre_nm]).max(0.0));
+        factors.product()
+    }
+
     /// Shift of one LED (nm).
     pub fn shift_nm(&self, led: usize) -> f64 {
         self.led_shift_nm.get(led).copied().unwrap_or(0.0)
@@ -146,6 +211,29 @@ struct Bound {
 }
 
 impl Perturbation {
+    /// Whether what is made of an element depends on where on the chip it stands, or on which way it is turned by
+    /// declared terms, of which it may.
+    pub fn depends_on_place(&self) -> bool {
+        self.path.sensor_tilt_mrad != [0.0; 2] || self.declared().next().is_some()
+    }
+
+    /// Add a term to the part that it acts on.
+    pub fn declare(&mut self, term: DeclaredTerm) {
+        match term.quantity {
+            DeclaredQuantity::DistanceUm => self.path.declared.push(term),
+            DeclaredQuantity::Spectrum => self.light.declared.push(term),
+            DeclaredQuantity::Kernel => self.camera.declared.push(term),
+            _ => self.geometry.declared.push(term),
+        }
+    }
+
+    /// All declared terms.
+    pub fn declared(&self) -> impl Iterator<Item = &DeclaredTerm> {
+        let (geometry, path) = (&self.geometry.declared, &self.path.declared);
+        let (light, camera) = (&self.light.declared, &self.camera.declared);
+        [geometry, path, light, camera].into_iter().flatten()
+    }
+
     /// Every number that is outside of what can be simulated, in words; none for a sound perturbation. The
     /// limits are several times what any process or bench does, and keep work and memory bounded.
     pub fn faults(&self) -> Vec<String> {
@@ -155,7 +243,7 @@ impl Perturbation {
             range: (low, high),
         };
         let one = |v: f64| vec![v];
-        let checked: [(Bound, Vec<f64>); 20] = [
+        let checked: [(Bound, Vec<f64>); 23] = [
             (bound("geometry.cd_bias_nm", -500.0, 500.0), one(g.cd_bias_nm)),
             (
                 bound("geometry.cd_bias_density_nm", -500.0, 500.0),
@@ -174,6 +262,10 @@ impl Perturbation {
             (bound("geometry.wavefront_nm", -1e5, 1e5), g.wavefront_nm.clone()),
             (bound("geometry.transmission", -10.0, 10.0), g.transmission.clone()),
             (
+                bound("geometry.transmission_phase_rad", -100.0, 100.0),
+                g.transmission_phase_rad.clone(),
+            ),
+            (
                 bound("geometry.transmission_range_nm", 0.0, 1e5),
                 g.transmission_range_nm.to_vec(),
             ),
@@ -185,6 +277,11 @@ impl Perturbation {
             (bound("path.gap_um", -1e5, 1e5), one(p.gap_um)),
             (bound("path.tilt_mrad", -1000.0, 1000.0), p.tilt_mrad.to_vec()),
             (bound("path.source_per_m", -1e4, 1e4), one(p.source_per_m)),
+            (
+                bound("path.sensor_tilt_mrad", -1000.0, 1000.0),
+                p.sensor_tilt_mrad.to_vec(),
+            ),
+            (bound("path.sensor_pivot_um", -1e6, 1e6), p.sensor_pivot_um.to_vec()),
             (bound("light.led_shift_nm", -500.0, 500.0), l.led_shift_nm.clone()),
             (bound("camera.pixel_blur_um", 0.0, 1e3), one(k.pixel_blur_um)),
             (bound("camera.stray_light", 0.0, 1.0), one(k.stray_light)),
@@ -200,13 +297,24 @@ impl Perturbation {
                 faults.push(format!("`{name}` is {v}, not within -1 to 100"));
             }
         }
-        if g.wavefront_nm.len() > MOST_TERMS || g.transmission.len() > MOST_TERMS {
+        let terms = [&g.wavefront_nm, &g.transmission, &g.transmission_phase_rad];
+        if terms.iter().any(|t| t.len() > MOST_TERMS) {
             faults.push(format!(
-                "`geometry.wavefront_nm` and `geometry.transmission` have at most {MOST_TERMS} terms"
+                "`geometry.wavefront_nm`, `transmission` and `transmission_phase_rad` have at most {MOST_TERMS} terms"
             ));
         }
+        for term in self.declared() {
+            if let Err(fault) = term.compiled() {
+                faults.push(format!(
+                    "the expression of `{}`, column {}: {}",
+                    term.name,
+                    fault.at + 1,
+                    fault.what
+                ));
+            }
+        }
         let [narrow, wide] = g.transmission_range_nm;
-        if !g.transmission.is_empty() && wide - narrow < 1.0 {
+        if !(g.transmission.is_empty() && g.transmission_phase_rad.is_empty()) && wide - narrow < 1.0 {
             faults.push("`geometry.transmission` has no `transmission_range_nm = [narrowest, widest]`".into());
         }
         faults

@@ -135,6 +135,7 @@ pub mod tests {
             polynomial,
             table_file: None,
             table: None,
+            steered: Vec::new(),
         };
         WidthRule::new(&cell, &mapping)
     }

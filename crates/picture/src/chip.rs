@@ -111,6 +111,11 @@ impl ChipInLight {
         };
         let symmetric = keeps_symmetry(&perturbation) && elements.iter().all(|e| e.slope == [0.0; 2]);
         let turns = if symmetric { &Symmetry::ALL[..] } else { &[] };
+        let centres: Vec<[f64; 2]> = design
+            .elements()
+            .iter()
+            .map(metalith_design::Element::centre_um)
+            .collect();
         let widths: Vec<&WidthMap> = extraction.elements.iter().map(|e| &e.widths).collect();
         let (mut distinct, mut copies): (Vec<(usize, Vec<Symmetry>)>, Vec<_>) = (Vec::new(), Vec::new());
         for (k, view) in elements.iter().enumerate() {
@@ -152,7 +157,7 @@ impl ChipInLight {
         let mut tables = Vec::new();
         let cells = CellTables::new(case, &sampling, design, progress)?;
         for (k, symmetries) in distinct {
-            let drawn = DrawnElement::new(widths[k], design.aperture_radius_um());
+            let drawn = DrawnElement::new(widths[k], design.aperture_radius_um()).placed(centres[k]);
             let made = MadeElement::new(&drawn, &perturbation.geometry)?;
             let mut own = Vec::new();
             for (i, nm) in sampling.wavelengths_nm.iter().enumerate() {
@@ -193,14 +198,14 @@ impl ChipInLight {
         let tables = &self.tables[distinct][wavelength];
         let path = PathChange {
             source_per_m: self.perturbation.path.source_per_m + self.source_per_m,
-            ..self.perturbation.path
+            ..self.perturbation.path.clone()
         };
         MadeView {
             element: &self.distinct[distinct].made,
             tables: tables.classes.clone(),
             light: ArrivingLight::new(&stated, &path),
             gap_um: tables.gap_um,
-            camera: tables.camera,
+            camera: tables.camera.clone(),
         }
     }
 
@@ -232,7 +237,10 @@ fn zero_order(made: &MadeElement, classes: &[ClassTable], full: f64, area_um2: f
 /// Whether what a process and a bench do has no direction of its own.
 fn keeps_symmetry(perturbation: &Perturbation) -> bool {
     let (geometry, path) = (&perturbation.geometry, &perturbation.path);
-    geometry.aperture_offset_um == [0.0; 2] && geometry.wavefront_nm.is_empty() && path.tilt_mrad == [0.0; 2]
+    geometry.aperture_offset_um == [0.0; 2]
+        && geometry.wavefront_nm.is_empty()
+        && path.tilt_mrad == [0.0; 2]
+        && !perturbation.depends_on_place()
 }
 
 /// Whether a symmetry turns the wedge of one element into that of another.

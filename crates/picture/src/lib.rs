@@ -6,6 +6,7 @@
 //! both, and a view             ->  FrameOperator: planes of the scene to the frame, and its adjoint
 //! ```
 
+mod assumed;
 mod cache;
 mod chip;
 mod colour;
@@ -17,6 +18,7 @@ mod operator;
 mod page;
 mod rehearsal;
 mod report;
+mod resolution;
 pub mod restore;
 pub mod scene;
 mod score;
@@ -24,16 +26,18 @@ pub mod spectra;
 mod studio;
 mod veil;
 
+pub use assumed::{Assumed, AssumedScore, worth_of_assumptions};
 pub use chip::{ChipInLight, element_views, read_pillars, sampling_of};
 pub use colour::ChannelColours;
 pub use dataset::{DatasetManifest, DatasetPair, write_dataset};
 pub use exposure::{Frame, channel_at, expose, gains, sensitivity};
-pub use geometry::{ElementView, SceneView};
+pub use geometry::{ElementView, SceneSpace, SceneView};
 pub use kernels::{BankSpec, KernelBank};
-pub use operator::{Detail, FrameOperator, SceneInputs};
+pub use operator::{Detail, FrameOperator, SceneInputs, ScenePoints};
 pub use page::{PicturePages, shown, write_pages};
 pub use rehearsal::Rehearsal;
 pub use report::{Assumption, ChannelBudget, HomographyResidual, PictureReport, RestorationReport};
+pub use resolution::{ContrastCurve, contrast_curves};
 pub use score::{Zone, ZoneScore, scores};
 pub use studio::Studio;
 pub use veil::{LightShares, Veil};

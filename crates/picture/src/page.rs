@@ -4,11 +4,13 @@ use std::path::Path;
 
 use metalith_camera::ColourFilter;
 use metalith_core::{Result, part, srgb};
-use metalith_report::{Axis, Cell, Column, HeatMap, Page, PhotoRow, Table, fixed, write_json};
+use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, PhotoRow, Table, fixed, write_json};
 use ndarray::{Array2, Array3, Axis as Along};
 
+use crate::assumed::AssumedScore;
 use crate::exposure::Frame;
 use crate::report::{Assumption, PictureReport};
+use crate::resolution::ContrastCurve;
 use crate::score::Zone;
 
 /// Pictures beside the numbers.
@@ -113,9 +115,11 @@ fn page(pages: &PicturePages<'_>) -> Page {
     ]);
     zooms(&mut page, pages);
     errors(&mut page, pages);
+    contrast(&mut page, &report.contrast);
     scores(&mut page, report);
     budget(&mut page, report);
     geometry(&mut page, report);
+    worth(&mut page, &report.worth);
     assumptions(&mut page, &report.assumptions);
     page
 }
@@ -270,4 +274,46 @@ fn geometry(page: &mut Page, report: &PictureReport) {
 fn assumptions(page: &mut Page, all: &[Assumption]) {
     page.section("What was assumed");
     page.list(all.iter().map(|a| format!("{}: {}", a.what, a.value)));
+}
+
+fn worth(page: &mut Page, cases: &[AssumedScore]) {
+    let Some(physics) = cases.first() else { return };
+    page.section("What the assumptions of others are worth");
+    let mut columns = vec![Column::text("Assumed")];
+    for zone in Zone::ALL {
+        columns.push(Column::number(format!("PSNR, {}", zone.name()), "dB"));
+    }
+    columns.push(Column::number("Worth, whole", "dB"));
+    columns.push(Column::number("SSIM, whole", ""));
+    columns.push(Column::number("Linear light, whole", "dB"));
+    let mut table = Table::new(columns);
+    for case in cases {
+        let mut row = vec![Cell::from(case.assumption)];
+        row.extend(case.scores.iter().map(|s| Cell::fixed(s.psnr_db, 2)));
+        row.push(Cell::fixed(case.scores[0].psnr_db - physics.scores[0].psnr_db, 2));
+        row.push(Cell::fixed(case.scores[0].ssim, 3));
+        row.push(Cell::fixed(case.scores[0].psnr_linear_db, 2));
+        table.row(row);
+    }
+    page.table(table.caption(
+        "The same scene, recorded and restored as if something simpler were so (Chakravarthula et al. 2023): by Tikhonov and all elements. A picture that is better than the first has it from the assumption, not from the chip.",
+    ));
+}
+
+fn contrast(page: &mut Page, curves: &[ContrastCurve]) {
+    if curves.is_empty() {
+        return;
+    }
+    page.section("Contrast of fine detail");
+    let mut chart = Chart::new(
+        "Contrast over that of the scene",
+        Axis::linear("frequency", "cycles a degree"),
+        Axis::linear("contrast", ""),
+    );
+    for curve in curves {
+        chart.line(curve.of.as_str(), curve.points.iter().copied());
+    }
+    page.figure(chart.caption(
+        "In the middle of the field. The frame is read behind the element that looks ahead, by the pixels that count a channel, as it was recorded, noise included; the picture is the mean of its colours in linear light. A restoration may raise contrast beyond one, and what it adds by itself counts here as if it were seen.",
+    ));
 }

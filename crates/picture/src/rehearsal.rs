@@ -4,7 +4,7 @@
 use metalith_core::{Progress, Result};
 use ndarray::Array2;
 
-use crate::exposure::expose;
+use crate::exposure::{channel_at, expose};
 use crate::operator::{Detail, FrameOperator, SceneInputs};
 use crate::restore::{RestorationMethod, SceneStatistics};
 use crate::scene::SceneImage;
@@ -33,6 +33,7 @@ impl Rehearsal {
             basis: rgb_basis().to_vec(),
             planes: SceneStatistics::colours().random_scene(&studio.view, SEED),
             left_out: 0.0,
+            depth_um: None,
         };
         let simulation = studio.operator(Detail {
             inputs: SceneInputs::Spectra(studio.primaries()),
@@ -44,7 +45,13 @@ impl Rehearsal {
             true => restoration.apply(&scene.planes),
             false => restoration.apply(&crate::ChannelColours::ideal(&studio.channels, &scene)),
         };
-        let operator_error = light.iter().zip(&known).map(|(a, b)| relative(a, b)).collect();
+        let names: Vec<String> = studio.camera.channels.iter().map(|c| c.name.clone()).collect();
+        let filter = studio.camera.sensor.filter;
+        let error = |(channel, (a, b))| {
+            let counts = |y, x| channel_at(filter, &names, y, x).is_none_or(|c| c == channel);
+            relative(a, b, counts)
+        };
+        let operator_error = light.iter().zip(&known).enumerate().map(error).collect();
         Self {
             scene,
             light,
@@ -71,12 +78,14 @@ impl Rehearsal {
     }
 }
 
-/// Root mean square difference over that of the first.
-fn relative(a: &Array2<f32>, b: &Array2<f32>) -> f64 {
+/// Root mean square difference over that of the first, of the pixels that count.
+fn relative(a: &Array2<f32>, b: &Array2<f32>, counts: impl Fn(usize, usize) -> bool) -> f64 {
     let (mut off, mut all) = (0.0, 0.0);
-    for (a, b) in a.iter().zip(b) {
-        off += f64::from(a - b).powi(2);
-        all += f64::from(*a).powi(2);
+    for (((y, x), a), b) in a.indexed_iter().zip(b) {
+        if counts(y, x) {
+            off += f64::from(a - b).powi(2);
+            all += f64::from(*a).powi(2);
+        }
     }
     (off / f64::max(all, f64::MIN_POSITIVE)).sqrt()
 }

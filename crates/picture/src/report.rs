@@ -3,6 +3,8 @@
 use nalgebra::DMatrix;
 use serde::Serialize;
 
+use crate::assumed::AssumedScore;
+use crate::resolution::ContrastCurve;
 use crate::restore::RestorationMethod;
 use crate::score::ZoneScore;
 use crate::studio::Studio;
@@ -25,6 +27,12 @@ pub struct PictureReport {
     pub budget: Vec<ChannelBudget>,
     pub homographies: Vec<HomographyResidual>,
     pub assumptions: Vec<Assumption>,
+    /// Contrast of fine detail, for scenes that say it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub contrast: Vec<ContrastCurve>,
+    /// What the assumptions of others are worth, if asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub worth: Vec<AssumedScore>,
 }
 
 /// One way of restoring.
@@ -177,7 +185,7 @@ impl Studio {
             ),
             assumption(
                 "restoration",
-                "knows the kernels of a grey surface and one point a pixel, and none of the scene's spectra".into(),
+                "knows the kernels of three primaries at half of the places, one point of the scene for four pixels, and none of its spectra".into(),
             ),
             assumption(
                 "metal",

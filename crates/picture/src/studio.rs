@@ -11,16 +11,20 @@ use ndarray::{Array2, Array3};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
+use crate::assumed::Assumed;
 use crate::exposure::{Frame, expose, gains, sensitivity};
 use crate::kernels::{BankSpec, KernelBank};
-use crate::operator::{Detail, FrameOperator, SceneInputs};
+use crate::operator::{Detail, FrameOperator, SceneInputs, ScenePoints};
 use crate::restore::{Recorded, RestorationMethod, restore_joint, restore_separate};
 use crate::scene::SceneImage;
 use crate::spectra::{SceneSpectrum, rgb_basis};
 use crate::veil::Veil;
-use crate::{ChannelColours, ChipInLight, ElementView, SceneView, cache, element_views, read_pillars, sampling_of};
+use crate::{
+    ChannelColours, ChipInLight, ElementView, SceneSpace, SceneView, cache, element_views, read_pillars, sampling_of,
+};
 
 /// What pictures are taken with.
+#[derive(Clone)]
 pub struct Studio {
     pub design: Design,
     pub camera: Camera,
@@ -40,6 +44,8 @@ pub struct Studio {
     pub colours: ChannelColours,
     /// Whether kernels and veil were found on the disk.
     pub from_cache: [bool; 2],
+    /// What is assumed instead of what is known; nothing, unless asked for.
+    pub assumed: Assumed,
 }
 
 /// Field of an element that kernels are made for: the angle from its axis, behind it (degrees). Light that leaves more
@@ -172,7 +178,7 @@ impl Studio {
                 (bank, veil)
             }
         };
-        let mut studio = Self {
+        let studio = Self {
             design: design.clone(),
             camera: camera.clone(),
             bank,
@@ -186,40 +192,57 @@ impl Studio {
             view: scene.view,
             gain: Vec::new(),
             from_cache,
+            assumed: Assumed::default(),
         };
-        let grey = studio.restoration();
-        let ones = vec![Array2::<f32>::ones((scene.view.rows, scene.view.columns)); grey.inputs()];
-        let white = grey.apply(&ones);
-        drop(grey);
-        studio.gain = gains(camera, &sensitivity(camera, &studio.channels), &white)?;
-        Ok(studio)
+        studio.exposed()
+    }
+
+    /// With the gain of each channel that the exposure of the camera asks for.
+    pub(crate) fn exposed(mut self) -> Result<Self> {
+        let operator = self.restoration();
+        let ones = vec![Array2::<f32>::ones((self.view.rows, self.view.columns)); operator.inputs()];
+        let white = operator.apply(&ones);
+        drop(operator);
+        self.gain = gains(&self.camera, &sensitivity(&self.camera, &self.channels), &white)?;
+        Ok(self)
     }
 
     /// The way from the planes of a scene to a frame.
     pub fn operator(&self, detail: Detail) -> FrameOperator<'_> {
-        FrameOperator::new(
-            &self.bank,
-            &self.veil,
-            &self.elements,
-            &self.camera.sensor,
-            &self.view,
-            detail,
-        )
+        self.operator_in(&SceneSpace::flat(&self.view), detail)
     }
 
-    /// The way from scenes to frames, as finely as it is known: what is taken for the truth.
+    fn operator_in(&self, space: &SceneSpace, detail: Detail) -> FrameOperator<'_> {
+        let detail = Detail {
+            assumed: self.assumed,
+            ..detail
+        };
+        FrameOperator::new(&self.bank, &self.veil, &self.elements, &self.camera, space, detail)
+    }
+
+    /// The way from flat scenes to frames, as finely as it is known: what is taken for the truth.
     pub fn simulation(&self) -> FrameOperator<'_> {
         self.operator(Detail::simulation(self.scene_spectra))
+    }
+
+    /// The same for one scene, with the distances of its pixels if it has them.
+    pub fn simulation_of(&self, scene: &SceneImage) -> FrameOperator<'_> {
+        let space = match &scene.depth_um {
+            Some(depth) => SceneSpace::with_depth(&self.view, depth),
+            None => SceneSpace::flat(&self.view),
+        };
+        self.operator_in(&space, Detail::simulation(self.scene_spectra))
     }
 
     /// What a restoration knows of the same way: to it, colours of a scene are sums of three primaries. A camera that
     /// tells no colours apart sees grey.
     pub fn restoration(&self) -> FrameOperator<'_> {
         let primaries = self.primaries();
-        self.operator(Detail::restoration(match self.colours.has_colours() {
+        let inputs = match self.colours.has_colours() {
             true => SceneInputs::Spectra(primaries),
             false => SceneInputs::Channels(primaries),
-        }))
+        };
+        self.operator(Detail::restoration(ScenePoints::OneASquare, inputs))
     }
 
     /// Which spectra of the bank are the primaries of a restoration: red, green and blue.

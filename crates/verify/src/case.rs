@@ -5,7 +5,7 @@ use std::collections::hash_map::Entry;
 
 use num_complex::Complex64;
 
-use metalith_cell::{CellModel, NeighbourResponse, ObliqueTables};
+use metalith_cell::{CellModel, NeighbourResponse, ObliqueTables, POLARISATION_SHARE};
 use metalith_core::Progress;
 use metalith_core::{Error, Result, WidthMap};
 use metalith_grating::NeighbourPillars;
@@ -52,9 +52,6 @@ impl<'a> SimulationCases<'a> {
         std::iter::once(self.judge).chain(self.beside.iter().copied())
     }
 }
-
-/// Of light that is not polarised, that which arrives in either polarisation.
-const POLARISATION_SHARE: f64 = 0.5;
 
 /// Transmissions by drawn width of one cell at one wavelength.
 pub(super) struct TransmissionTables {

@@ -78,6 +78,10 @@ pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
             limits.rounding_phase_rms_max_rad,
         ));
     }
+    if let Some(why) = &found.not_simulated {
+        checks.extend(not_simulated(limits, why));
+        return checks;
+    }
     let spots = || {
         found
             .distinct
@@ -161,6 +165,39 @@ pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
         }
     }
     checks
+}
+
+/// The limits on phase and light that a design sets, none of which holds of a layout that is not simulated.
+fn not_simulated(limits: &LimitSpec, why: &str) -> Vec<Check> {
+    let most = [
+        ("rounding_phase_rms_max_rad", limits.rounding_phase_rms_max_rad),
+        ("centroid_shift_max_um", limits.centroid_shift_max_um),
+        ("mtf_difference_max", limits.mtf_difference_max),
+        ("psf_difference_max", limits.psf_difference_max),
+    ];
+    let least = [
+        ("strehl_ratio_min", limits.strehl_ratio_min),
+        ("white_mtf_min", limits.white_mtf_min),
+        ("white_energy_2_pixels_min", limits.white_energy_2_pixels_min),
+    ];
+    let set = most
+        .into_iter()
+        .filter(|(_, limit)| *limit != f64::MAX)
+        .map(|l| (l, Sense::AtMost));
+    let set = set.chain(
+        least
+            .into_iter()
+            .filter(|(_, limit)| *limit > 0.0)
+            .map(|l| (l, Sense::AtLeast)),
+    );
+    set.map(|((key, limit), sense)| Check {
+        what: format!("not simulated: {why}"),
+        key,
+        reached: f64::NAN,
+        limit,
+        sense,
+    })
+    .collect()
 }
 
 /// Name, key and limit of what is measured of a channel in white light.

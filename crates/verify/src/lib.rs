@@ -7,6 +7,7 @@ mod check;
 mod optics;
 mod page;
 mod phase;
+mod pillars_only;
 mod psf_metrics;
 mod single;
 mod single_white;
@@ -21,7 +22,7 @@ use num_complex::{Complex32, Complex64};
 use serde::Serialize;
 
 use metalith_cell::Fidelity;
-use metalith_core::{Progress, Result, WidthMap};
+use metalith_core::{Progress, Result, WidthMap, WidthRows};
 use metalith_design::array::{PillarArray, PlacedElement, WidthRule};
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, Element};
@@ -36,6 +37,7 @@ pub use check::{Check, Sense};
 pub use metalith_made::SimulationCase;
 pub use page::write_report;
 pub use phase::{PhaseError, PhaseErrors, PillarResponse};
+pub use pillars_only::{fits_folded, simulation_mb, verify_pillars};
 pub use psf_metrics::{OrderEfficiencies, PsfImages, PsfPair, PsfResult};
 pub use single::{Lighting, SinglePsf, SinglePsfReport, single_psfs, write_single_psf_report};
 pub use single_white::{SingleWhite, single_white};
@@ -110,6 +112,9 @@ pub struct Verification {
     pub elements: Vec<ElementCheck>,
     pub foreign: Oddities,
     pub distinct: Vec<DistinctElement>,
+    /// Why nothing was simulated, if nothing was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub not_simulated: Option<String>,
     /// Every limit of the design, held or not.
     pub checks: Vec<Check>,
 }
@@ -121,22 +126,26 @@ impl Verification {
     }
 }
 
-/// Whether a layout of this design, at `path`, can be held to it: asked before work is spent on one that cannot.
+/// Whether a layout of this design, at `path`, can be simulated: asked before work is spent on one that cannot.
 ///
 /// # Errors
 /// If the elements have more lattice sites together than are held at a time, or the camera of the design cannot be
 /// used.
 pub fn fits(design: &Design, path: &Path) -> Result<()> {
+    metalith_gds::extract::fits(path, &sites(design))?;
+    white::camera_of(design)?;
+    Ok(())
+}
+
+/// The elements of a design on their lattices.
+fn sites(design: &Design) -> Vec<ElementSite> {
     let lattice = design.lattice();
     let site = |element: Element| ElementSite {
         name: element.label(),
         centre_nm: [element.centre_nm.0, element.centre_nm.1],
         lattice,
     };
-    let sites: Vec<ElementSite> = design.elements().into_iter().map(site).collect();
-    metalith_gds::extract::fits(path, &sites)?;
-    white::camera_of(design)?;
-    Ok(())
+    design.elements().into_iter().map(site).collect()
 }
 
 /// Read the layout at `path` back and hold it to its design.
@@ -172,10 +181,9 @@ pub fn verify_layout(
     let mut extraction = extract(layout, &plan(design, array), progress)?;
     let elements = compare(array, &extraction);
     let lens = LensPhase::new(array.lattice, design.lens.diameter_nm, &design.lens.phase);
-    let rule = WidthRule::new(&design.cell, &design.mapping);
     let responses = MappingResponse::new(design, cases.judge)?;
     let mut simulator = optics::ElementSimulator::new(design, array.lattice, cases, accuracy)?;
-    let chosen = distinct(&elements);
+    let chosen = distinct(&elements, cases.judge.depends_on_place());
     let shown = chosen.iter().map(|(k, _)| elements[*k].element).collect::<Vec<_>>();
     simulator.add_directions(&shown, progress)?;
     let mut white = white::WhiteSimulator::new(design, array.lattice, cases.judge)?;
@@ -191,7 +199,8 @@ pub fn verify_layout(
         let element = elements[k].element;
         let widths = std::mem::replace(&mut extraction.elements[k].widths, WidthMap::empty(array.lattice));
         let phase = ElementPhase::new(&lens, &element.wedge);
-        let read = simulator.read(&widths)?;
+        let rule = WidthRule::of_element(design, element.index);
+        let read = simulator.read(&element, &widths)?;
         simulated.push(DistinctElement {
             element,
             copies,
@@ -224,6 +233,7 @@ pub fn verify_layout(
         elements,
         foreign: extraction.oddities,
         distinct: simulated,
+        not_simulated: None,
         checks: Vec::new(),
     };
     verification.checks = check::all(&design.verify.limits, &verification);
@@ -296,11 +306,11 @@ fn plan(design: &Design, array: &PillarArray) -> ExtractionPlan {
     ExtractionPlan::given(design.layout.layers.pillars.number(), sites)
 }
 
-fn compare(array: &PillarArray, extraction: &Extraction) -> Vec<ElementCheck> {
+fn compare<W: WidthRows>(array: &PillarArray, extraction: &Extraction<W>) -> Vec<ElementCheck> {
     let mut first_of_class = vec![None; array.classes.len()];
     let mut distinct = 0;
-    let mut check = |(placed, found): (&PlacedElement, &ExtractedElement)| {
-        let widths = WidthCheck::compare(&array.widths(placed), &found.widths);
+    let mut check = |(placed, found): (&PlacedElement, &ExtractedElement<W>)| {
+        let widths = WidthCheck::compare(array.all_rows(placed).as_ref(), &found.widths);
         let copy_of = if widths.faults() == 0 {
             let place = &mut first_of_class[placed.class];
             if place.is_none() {
@@ -321,13 +331,13 @@ fn compare(array: &PillarArray, extraction: &Extraction) -> Vec<ElementCheck> {
 }
 
 /// Which elements are simulated, and for how many each stands: one of each kind, and the first of those
-/// that are not as intended.
-fn distinct(elements: &[ElementCheck]) -> Vec<(usize, usize)> {
+/// that are not as intended; each by itself where light depends on `place`.
+fn distinct(elements: &[ElementCheck], place: bool) -> Vec<(usize, usize)> {
     let mut chosen: Vec<(usize, usize, Option<usize>)> = Vec::new();
     let mut faulty = 0;
     for (k, check) in elements.iter().enumerate() {
         match check.copy_of {
-            Some(class) => match chosen.iter_mut().find(|c| c.2 == Some(class)) {
+            Some(class) => match chosen.iter_mut().find(|c| !place && c.2 == Some(class)) {
                 Some(known) => known.1 += 1,
                 None => chosen.push((k, 1, Some(class))),
             },
@@ -341,7 +351,7 @@ fn distinct(elements: &[ElementCheck]) -> Vec<(usize, usize)> {
     chosen.into_iter().map(|(k, copies, _)| (k, copies)).collect()
 }
 
-fn facts(layout: &Layout, extraction: &Extraction, path: &Path) -> LayoutFacts {
+fn facts<W>(layout: &Layout, extraction: &Extraction<W>, path: &Path) -> LayoutFacts {
     LayoutFacts {
         file: path
             .file_name()

@@ -170,8 +170,8 @@ impl<'a> ElementSimulator<'a> {
     ///
     /// # Errors
     /// As [`MadeElement::new`].
-    pub fn read<'w>(&self, widths: &'w WidthMap) -> Result<ReadElement<'w>> {
-        let drawn = DrawnElement::new(widths, self.design.aperture_radius_um());
+    pub fn read<'w>(&self, element: &Element, widths: &'w WidthMap) -> Result<ReadElement<'w>> {
+        let drawn = DrawnElement::new(widths, self.design.aperture_radius_um()).placed(element.centre_um());
         let made = |case: &SimulationCase<'_>| match case {
             SimulationCase::Cell(_) => Ok(None),
             SimulationCase::Made(chip) => chip.element(&drawn).map(Some),
@@ -375,7 +375,7 @@ fn by_drawn_width(
     progress: &dyn Progress,
 ) -> Result<Vec<Complex64>> {
     let widths = OrderEfficiencies::drawn_nm(rule);
-    let steps = drawn.mean_density_steps(&chip.perturbation().geometry);
+    let steps = drawn.mean_site_steps(&chip.perturbation().geometry);
     let t = chip.drawn_widths(&widths, steps, wavelength_um, progress)?;
     let mut table = vec![Complex64::ZERO; usize::from(widths.last().copied().unwrap_or(0)) + 1];
     for (w, t) in widths.iter().zip(t) {

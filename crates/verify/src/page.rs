@@ -7,7 +7,7 @@ use ndarray::Array2;
 
 use super::{DistinctElement, PsfResult, Sense, Verification, assumptions, white_page};
 use metalith_cell::Fidelity;
-use metalith_core::Result;
+use metalith_core::{Lattice, Result, WidthMap, WidthRows};
 use metalith_design::array::PillarArray;
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{CellIncidence, Design};
@@ -35,6 +35,9 @@ fn page(design: &Design, array: &PillarArray, found: &Verification) -> Page {
         &design.title,
         format!("{}, computed from the bytes of {}", design.name, found.layout.file),
     );
+    if let Some(why) = &found.not_simulated {
+        page.paragraph(format!("Every pillar was compared; nothing was simulated: {why}."));
+    }
     let failed = found.checks.iter().filter(|c| !c.passed()).count();
     let words = match failed {
         0 => format!(
@@ -142,7 +145,8 @@ fn designed(page: &mut Page, design: &Design, array: &PillarArray) {
         .iter()
         .find(|p| p.element.index == (0, 0))
         .expect("the count of elements is odd");
-    let zoomed = array.widths(centre);
+    let rows = array.rows(centre);
+    let zoomed = middle(rows.as_ref());
     page.row([
         chip(design).caption("The chip from above: openings, pillars, marks and outline as they are written."),
         PillarZoom::new("Pillars in the middle of the centre element", &zoomed, (0.0, 0.0), 12.0)
@@ -171,7 +175,7 @@ fn designed(page: &mut Page, design: &Design, array: &PillarArray) {
     )
     .size(420.0, 260.0);
     let last = along(&|ix| phase.turns(ix, n / 2)).len();
-    let shown = along(&|ix| Some(f64::from(zoomed.width_nm[[n / 2, ix]])).filter(|w| *w > 0.0));
+    let shown = along(&|ix| Some(f64::from(rows.width(ix, n / 2))).filter(|w| *w > 0.0));
     widths.points("as written", shown.into_iter().take(last.min(RADIUS_POINTS)));
     page.row([
         turns.caption("Centre element, before the modulo."),
@@ -184,6 +188,19 @@ fn designed(page: &mut Page, design: &Design, array: &PillarArray) {
 
 /// Sites along a radius that can be told apart in a figure.
 const RADIUS_POINTS: usize = 600;
+
+/// The sites about the middle of an element that figures show.
+fn middle(rows: &impl WidthRows) -> WidthMap {
+    let lattice = rows.lattice();
+    let n = lattice.sites();
+    let beside = n.saturating_sub(2 * RADIUS_POINTS) / 2;
+    let shown = Lattice::new(lattice.pitch_nm(), n - 2 * beside).expect("a part of a lattice is one");
+    let mut map = WidthMap::empty(shown);
+    for ((iy, ix), width) in map.width_nm.indexed_iter_mut() {
+        *width = rows.width(ix + beside, iy + beside);
+    }
+    map
+}
 
 fn chip(design: &Design) -> Plan {
     let layout = &design.layout;

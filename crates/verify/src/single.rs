@@ -142,7 +142,10 @@ fn as_made(
     };
     let made = elements
         .iter()
-        .map(|(_, widths)| chip.element(&DrawnElement::new(widths, radius_um(widths))))
+        .map(|(site, widths)| {
+            let drawn = DrawnElement::new(widths, radius_um(widths));
+            chip.element(&drawn.placed(site.centre_nm.map(|c| c as f64 * 1e-3)))
+        })
         .collect::<Result<Vec<_>>>()?;
     let views = made
         .iter()

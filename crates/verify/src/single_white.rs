@@ -65,7 +65,8 @@ pub fn single_white(
             SimulationCase::Cell(_) => None,
             SimulationCase::Made(chip) => {
                 let radius = light.aperture_radius_um.unwrap_or_else(|| widths.circle_um());
-                Some((chip, chip.element(&DrawnElement::new(widths, radius))?))
+                let drawn = DrawnElement::new(widths, radius).placed(site.centre_nm.map(|c| c as f64 * 1e-3));
+                Some((chip, chip.element(&drawn)?))
             }
         };
         let views = sampling.wavelengths_nm.iter().map(|nm| match &made {

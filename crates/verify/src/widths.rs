@@ -1,9 +1,8 @@
 //! Pillars as they were read back against pillars as they were meant.
 
-use ndarray::Zip;
 use serde::Serialize;
 
-use metalith_core::WidthMap;
+use metalith_core::WidthRows;
 
 /// How the pillars of one element differ from the intended ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -25,28 +24,32 @@ impl WidthCheck {
     ///
     /// # Panics
     /// If the two are on different lattices.
-    pub fn compare(intended: &WidthMap, found: &WidthMap) -> Self {
-        assert_eq!(
-            intended.lattice, found.lattice,
-            "an element is read back on its own lattice"
-        );
+    pub fn compare(intended: &impl WidthRows, found: &impl WidthRows) -> Self {
+        let lattice = intended.lattice();
+        assert_eq!(lattice, found.lattice(), "an element is read back on its own lattice");
         let mut check = Self::default();
-        Zip::from(&intended.width_nm)
-            .and(&found.width_nm)
-            .for_each(|&meant, &got| {
-                check.pillars += u64::from(got != 0);
-                if meant != got {
-                    match (meant, got) {
-                        (_, 0) => check.missing += 1,
-                        (0, _) => check.extra += 1,
-                        _ => {
-                            check.wrong += 1;
-                            check.largest_nm = check.largest_nm.max(meant.abs_diff(got));
-                        }
-                    }
-                }
-            });
+        let (n, mut room, mut other_room) = (lattice.sites(), Vec::new(), Vec::new());
+        for iy in 0..n {
+            let meant = intended.row(iy, 0..n, &mut room);
+            let got = found.row(iy, 0..n, &mut other_room);
+            meant.iter().zip(got).for_each(|(&meant, &got)| check.site(meant, got));
+        }
         check
+    }
+
+    #[inline]
+    fn site(&mut self, meant: u16, got: u16) {
+        self.pillars += u64::from(got != 0);
+        if meant != got {
+            match (meant, got) {
+                (_, 0) => self.missing += 1,
+                (0, _) => self.extra += 1,
+                _ => {
+                    self.wrong += 1;
+                    self.largest_nm = self.largest_nm.max(meant.abs_diff(got));
+                }
+            }
+        }
     }
 
     /// Sites that are not as intended, for whatever reason.
@@ -58,7 +61,7 @@ impl WidthCheck {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metalith_core::Lattice;
+    use metalith_core::{Lattice, WidthMap};
 
     #[test]
     fn every_kind_of_difference_is_counted_once() {

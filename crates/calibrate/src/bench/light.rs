@@ -87,16 +87,17 @@ impl Bench<'_> {
         path: &PathChange,
     ) -> Vec<Vec<Vec<Vec<f32>>>> {
         let lattice = self.set.elements[group.element].pillars.lattice;
+        let farther_um = path.added_distance_um(self.set.elements[group.element].centre_um);
         let distances: Vec<f64> = group
             .captures
             .iter()
-            .map(|&c| self.set.captures[c].distance_um + path.gap_um)
+            .map(|&c| self.set.captures[c].distance_um + farther_um)
             .collect();
         let quadrature = &self.quadratures[group.led];
         let weights: Vec<Vec<Vec<f64>>> = chips
             .iter()
             .map(|chip| {
-                let of = |l: &&LightChange| quadrature.weights(l.shift_nm(group.led.into()), 1.0 + l.led_width);
+                let of = |l: &&LightChange| quadrature.weights(group.led.into(), l);
                 chip.lights.iter().map(of).collect()
             })
             .collect();

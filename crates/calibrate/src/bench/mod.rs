@@ -3,13 +3,16 @@
 mod light;
 mod view;
 
+use std::borrow::Cow;
+
+use ndarray::Array2;
 use rayon::prelude::*;
 
 pub use light::Lit;
 
 use super::optics::{Optic, PixelGrid, Quadrature};
 use super::set::{CaptureIndex, ElementIndex, LedIndex, MeasuredSet, PerCapture, PerElement, PerLed, RelayCamera};
-use metalith_made::{DrawnElement, GeometryChange, Perturbation, veiled};
+use metalith_made::{CameraChange, DrawnElement, GeometryChange, Perturbation, veiled};
 use metalith_wave::propagation::{Distances, DistancesPlan};
 
 /// Sampling of the simulated bench.
@@ -114,7 +117,7 @@ impl<'a> Bench<'a> {
             drawn: set
                 .elements
                 .iter()
-                .map(|e| DrawnElement::new(&e.pillars, 0.5 * e.aperture_diameter_um))
+                .map(|e| DrawnElement::new(&e.pillars, 0.5 * e.aperture_diameter_um).placed(e.centre_um))
                 .collect(),
             follows: true,
         }
@@ -162,29 +165,26 @@ impl<'a> Bench<'a> {
         };
         work.par_iter()
             .map(|(group, capture)| {
-                let z = self.set.captures[*capture].distance_um + perturbation.path.gap_um;
+                let centre = self.set.elements[group.element].centre_um;
+                let z = self.set.captures[*capture].distance_um + perturbation.path.added_distance_um(centre);
                 let optic = Optic {
                     pixel_um: camera.pixel_um,
                     disc_um: self.disc_um(group, z, perturbation),
                     blur_um: perturbation.camera.pixel_blur_um,
                 };
                 let stray = perturbation.camera.stray_light;
-                let step = group.plan.step_um();
+                let (step, n) = (group.plan.step_um(), group.plan.window());
                 let off = self.off_um(group, z, perturbation);
-                if stray == 0.0 {
-                    return PixelGrid::new(&intensities[*capture], step, &optic, camera.rows, camera.cols).moved(off);
+                let mut light = Cow::Borrowed(intensities[*capture].as_slice());
+                if !perturbation.camera.declared.is_empty() {
+                    light = Cow::Owned(with_kernels(&perturbation.camera, &light, n, step));
                 }
-                let mean = window_mean(
-                    &intensities[*capture],
-                    group.plan.window(),
-                    self.set.camera.pixel_um / step,
-                    camera,
-                );
-                let veiled: Vec<f32> = intensities[*capture]
-                    .iter()
-                    .map(|v| veiled(f64::from(*v), mean, stray) as f32)
-                    .collect();
-                PixelGrid::new(&veiled, step, &optic, camera.rows, camera.cols).moved(off)
+                if stray != 0.0 {
+                    let mean = window_mean(&light, n, self.set.camera.pixel_um / step, camera);
+                    let veiled = light.iter().map(|v| veiled(f64::from(*v), mean, stray) as f32);
+                    light = Cow::Owned(veiled.collect());
+                }
+                PixelGrid::new(&light, step, &optic, camera.rows, camera.cols).moved(off)
             })
             .collect()
     }
@@ -219,6 +219,13 @@ impl<'a> Bench<'a> {
         let [tx, ty] = perturbation.path.tilt_mrad.map(|t| t * 1e-3);
         [0, 1].map(|axis| x[axis] * tx + y[axis] * ty)
     }
+}
+
+/// The light of a square of samples with what declared kernels add.
+fn with_kernels(camera: &CameraChange, light: &[f32], n: usize, step_um: f64) -> Vec<f32> {
+    let mut image = Array2::from_shape_fn((n, n), |(y, x)| f64::from(light[y * n + x]));
+    camera.add_kernels(&mut image, step_um);
+    image.iter().map(|v| *v as f32).collect()
 }
 
 /// Mean intensity over each pixel of a window that is centred in `n` x `n` samples.

@@ -25,14 +25,8 @@ impl Bench<'_> {
         wavelength_um: f64,
         solved: &SolvedWidths,
     ) -> MadeView<'a> {
-        let polarisations = solved.pillars.iter().zip(&solved.bare);
-        MadeView {
-            element,
-            tables: polarisations.map(|(t, bare)| element.table_of(t, *bare)).collect(),
-            light: self.direction_of(capture, perturbation, wavelength_um),
-            gap_um: perturbation.path.gap_um,
-            camera: perturbation.camera,
-        }
+        let light = self.direction_of(capture, perturbation, wavelength_um);
+        MadeView::new(element, light, perturbation, solved)
     }
 
     /// The incident wave at the element of a capture, at one wavelength (um).
@@ -96,7 +90,8 @@ mod tests {
         let simulator = Simulator::new(bench, CellSource::Model(Box::new(published())), effects::all(&set));
         let pixel = set.camera.pixel_um;
         for effect in &simulator.effects {
-            if OF_THE_STACK.contains(&effect.name().as_str()) {
+            // A shifted line has none of the one wavelength that is simulated.
+            if OF_THE_STACK.contains(&effect.name().as_str()) || effect.name().starts_with("led_centre") {
                 continue;
             }
             let typical: Vec<f64> = effect.parameters().iter().map(|p| p.typical).collect();
@@ -141,6 +136,7 @@ mod tests {
                 want.mapv_inplace(|v| metalith_made::veiled(v, mean, stray));
                 let peak = want.iter().copied().fold(0.0, f64::max);
                 let got = grid.pixels([0.0; 2]);
+                assert!(got.iter().all(|v| v.is_finite()), "{}", effect.name());
                 let worst = got.iter().zip(&want).map(|(a, b)| (f64::from(*a) - b).abs());
                 let worst = worst.fold(0.0, f64::max) / peak;
                 println!("{}, {}: {worst:.1e}", effect.name(), capture.name);

@@ -3,11 +3,15 @@
 use serde::Serialize;
 use serde_json::Value;
 
-use super::{CaptureError, Diagnosis, ErrorPair, ErrorReport, FoundEffect, LeftOut, Ranked, SetVerdict};
+use super::{
+    CaptureError, Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePattern, GroupValue, LeftOut, Ranked, SetVerdict,
+};
 use crate::fidelity::Rung;
 use crate::fit::{Fit, HeldOutErrors, mean_error};
-use crate::search::{Evidence, Finding, RESIDUAL, Rejection, TriedEffect, UnusableCapture};
-use crate::set::MeasuredSet;
+use crate::search::{
+    Evidence, Finding, Grouping, Pattern, RESIDUAL, Rejection, TriedEffect, UnusableCapture, patterns,
+};
+use crate::set::{CaptureIndex, MeasuredSet};
 use crate::simulator::Simulator;
 use crate::simulator_model::separating_measurement;
 
@@ -51,6 +55,12 @@ impl Diagnosis {
         };
         let unexplained_share = unexplained_share(&error, finding);
         let verdict = verdict(&error, finding, unexplained_share);
+        let left = matches!(verdict, SetVerdict::Partly | SetVerdict::Unexplained);
+        let patterns = if left {
+            free_patterns(simulator, evidence)
+        } else {
+            Vec::new()
+        };
         let ranked = |tried: &Vec<TriedEffect>| tried.iter().map(|t| Ranked::new(simulator, finding, t)).collect();
         let captures = set.captures.iter_enumerated().map(|(c, capture)| CaptureError {
             capture: capture.name.clone(),
@@ -64,6 +74,7 @@ impl Diagnosis {
             error,
             ranking: ranked(&finding.ranking),
             later_rankings: finding.later.iter().map(ranked).collect(),
+            patterns,
             unexplained_share,
             missing_by_grain: evidence.missing_by_speckle,
             left_out: left_out(set, unusable),
@@ -91,6 +102,7 @@ impl Diagnosis {
             },
             ranking: Vec::new(),
             later_rankings: Vec::new(),
+            patterns: Vec::new(),
             unexplained_share: 1.0,
             missing_by_grain: None,
             left_out: left_out(set, unusable),
@@ -98,6 +110,54 @@ impl Diagnosis {
             ladder: Vec::new(),
         }
     }
+}
+
+fn free_patterns(simulator: &Simulator<'_>, evidence: &Evidence) -> Vec<FreePattern> {
+    let set = simulator.bench.set();
+    let problem = evidence.problem(simulator);
+    let label = |by: Grouping, c: CaptureIndex| {
+        let capture = &set.captures[c];
+        match by {
+            Grouping::Element => format!("{:?}", set.elements[capture.element].index),
+            Grouping::Colour => format!("{} nm", set.leds[capture.led].name()),
+            Grouping::Distance => format!("{} um", capture.distance_um),
+            Grouping::Angle => format!("{:.1?} deg", capture.aoi_rad.map(f64::to_degrees)),
+        }
+    };
+    let one = |p: Pattern| {
+        let slot = simulator.slots[p.slot];
+        let effect = &simulator.effects[slot.effect];
+        let plane = p.plane(set);
+        let values = p.groups.iter().zip(&p.values);
+        FreePattern {
+            quantity: match effect.parameters().len() {
+                1 => effect.name(),
+                _ => format!("{}[{}]", effect.name(), slot.index),
+            },
+            // Some effects report another number than the one that is fitted.
+            unit: if effect.value(1.0, set) == 1.0 {
+                effect.unit().into()
+            } else {
+                "of its parameter".into()
+            },
+            by: p.by.word().into(),
+            values: values
+                .map(|(&c, &(value, sigma))| GroupValue {
+                    group: label(p.by, c),
+                    value,
+                    sigma,
+                })
+                .collect(),
+            before: p.chi2.1,
+            after: p.chi2.0,
+            slope_per_mm: plane.map(|(slopes, _)| slopes.map(|s| 1e3 * s)),
+            off_plane: plane.map(|p| p.1),
+        }
+    };
+    patterns(&problem, &evidence.finding.after)
+        .into_iter()
+        .map(one)
+        .collect()
 }
 
 /// Share of the error above noise that the finding leaves.

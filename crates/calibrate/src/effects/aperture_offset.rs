@@ -12,7 +12,7 @@ impl Effect for ApertureOffset {
         "aperture_offset".into()
     }
 
-    fn unit(&self) -> &'static str {
+    fn unit(&self) -> &str {
         "um"
     }
 

@@ -11,7 +11,7 @@ impl Effect for CdBias {
         "cd_bias".into()
     }
 
-    fn unit(&self) -> &'static str {
+    fn unit(&self) -> &str {
         "nm"
     }
 

@@ -11,7 +11,7 @@ impl Effect for CdBiasDensity {
         "cd_bias_density".into()
     }
 
-    fn unit(&self) -> &'static str {
+    fn unit(&self) -> &str {
         "nm"
     }
 

@@ -12,7 +12,7 @@ impl Effect for CornerRounding {
         "corner_rounding".into()
     }
 
-    fn unit(&self) -> &'static str {
+    fn unit(&self) -> &str {
         "nm"
     }
 

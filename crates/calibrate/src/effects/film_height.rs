@@ -12,7 +12,7 @@ impl Effect for FilmHeight {
         "film_height".into()
     }
 
-    fn unit(&self) -> &'static str {
+    fn unit(&self) -> &str {
         "nm"
     }
 

@@ -11,7 +11,7 @@ impl Effect for FilmIndex {
         "film_index".into()
     }
 
-    fn unit(&self) -> &'static str {
+    fn unit(&self) -> &str {
         "delta n"
     }
 

@@ -11,7 +11,7 @@ impl Effect for Gap {
         "gap".into()
     }
 
-    fn unit(&self) -> &'static str {
+    fn unit(&self) -> &str {
         "um"
     }
 

@@ -16,7 +16,7 @@ impl Effect for LedCentre {
         self.name.clone()
     }
 
-    fn unit(&self) -> &'static str {
+    fn unit(&self) -> &str {
         "nm"
     }
 

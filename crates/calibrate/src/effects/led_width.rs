@@ -12,7 +12,7 @@ impl Effect for LedWidth {
         "led_width".into()
     }
 
-    fn unit(&self) -> &'static str {
+    fn unit(&self) -> &str {
         ""
     }
 

@@ -11,7 +11,7 @@ impl Effect for MissingPillars {
         "missing_pillars".into()
     }
 
-    fn unit(&self) -> &'static str {
+    fn unit(&self) -> &str {
         ""
     }
 

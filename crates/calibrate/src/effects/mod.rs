@@ -3,10 +3,12 @@
 //! An effect has a name, a unit, a range that physics allows, and sets one or two numbers of a
 //! [`Perturbation`]. Adding one touches its file and [`all`].
 
+mod aberration;
 mod aperture_offset;
 mod cd_bias;
 mod cd_bias_density;
 mod corner_rounding;
+mod declared;
 mod film_height;
 mod film_index;
 mod gap;
@@ -15,6 +17,7 @@ mod led_width;
 mod missing_pillars;
 mod pixel_blur;
 mod residual_mask;
+mod sensor_tilt;
 mod sidewall_taper;
 mod source_distance;
 mod source_size;
@@ -22,7 +25,10 @@ mod stray_light;
 mod tilt;
 mod zero_order;
 
+pub use declared::{DeclaredEffect, DeclaredParameter};
+
 use super::set::MeasuredSet;
+use metalith_core::{Error, Result};
 use metalith_made::Perturbation;
 
 /// Where in the model an effect acts.
@@ -69,7 +75,7 @@ pub trait Effect: Send + Sync {
     fn name(&self) -> String;
 
     /// Unit of the value that is reported.
-    fn unit(&self) -> &'static str;
+    fn unit(&self) -> &str;
 
     /// Where it acts.
     fn stage(&self) -> Stage;
@@ -79,6 +85,11 @@ pub trait Effect: Send + Sync {
 
     /// Whether its derivative jumps at zero, so that the derivative for one sign does not hold for the other.
     fn kinked(&self) -> bool {
+        false
+    }
+
+    /// Whether some of its parameters change nothing while all are zero.
+    fn dormant(&self) -> bool {
         false
     }
 
@@ -153,6 +164,8 @@ pub fn all(set: &MeasuredSet) -> Vec<Box<dyn Effect>> {
         Box::new(stray_light::StrayLight),
         Box::new(aperture_offset::ApertureOffset),
     ];
+    effects.extend(sensor_tilt::SensorTilt::of(set).map(|e| Box::new(e) as Box<dyn Effect>));
+    effects.extend(aberration::ABERRATIONS.map(|e| Box::new(e) as Box<dyn Effect>));
     for (led, lamp) in set.leds.iter().enumerate() {
         effects.push(Box::new(led_centre::LedCentre {
             led,
@@ -160,4 +173,20 @@ pub fn all(set: &MeasuredSet) -> Vec<Box<dyn Effect>> {
         }));
     }
     effects
+}
+
+/// All effects of the library that are tried on a set, and those that were declared.
+///
+/// # Errors
+/// If a declared effect has the name of another.
+pub fn with_declared(set: &MeasuredSet, declared: &[DeclaredEffect]) -> Result<Vec<Box<dyn Effect>>> {
+    let mut effects = all(set);
+    for own in declared {
+        if effects.iter().any(|e| e.name() == own.name) {
+            let what = format!("there is an effect `{}` already", own.name);
+            return Err(Error::invalid(what, "give the declared effect another name"));
+        }
+        effects.push(Box::new(own.clone()));
+    }
+    Ok(effects)
 }

@@ -12,7 +12,7 @@ impl Effect for PixelBlur {
         "pixel_blur".into()
     }
 
-    fn unit(&self) -> &'static str {
+    fn unit(&self) -> &str {
         "um"
     }
 

@@ -11,7 +11,7 @@ impl Effect for ResidualMask {
         "residual_mask".into()
     }
 
-    fn unit(&self) -> &'static str {
+    fn unit(&self) -> &str {
         "nm"
     }
 

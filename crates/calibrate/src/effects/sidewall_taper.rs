@@ -11,7 +11,7 @@ impl Effect for SidewallTaper {
         "sidewall_taper".into()
     }
 
-    fn unit(&self) -> &'static str {
+    fn unit(&self) -> &str {
         "deg"
     }
 

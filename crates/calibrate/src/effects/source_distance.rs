@@ -12,7 +12,7 @@ impl Effect for SourceDistance {
         "source_distance".into()
     }
 
-    fn unit(&self) -> &'static str {
+    fn unit(&self) -> &str {
         "um"
     }
 

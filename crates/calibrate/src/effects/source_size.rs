@@ -12,7 +12,7 @@ impl Effect for SourceSize {
         "source_size".into()
     }
 
-    fn unit(&self) -> &'static str {
+    fn unit(&self) -> &str {
         ""
     }
 

@@ -11,7 +11,7 @@ impl Effect for StrayLight {
         "stray_light".into()
     }
 
-    fn unit(&self) -> &'static str {
+    fn unit(&self) -> &str {
         ""
     }
 

@@ -11,7 +11,7 @@ impl Effect for Tilt {
         "tilt".into()
     }
 
-    fn unit(&self) -> &'static str {
+    fn unit(&self) -> &str {
         "mrad"
     }
 

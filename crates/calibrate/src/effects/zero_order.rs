@@ -12,7 +12,7 @@ impl Effect for ZeroOrder {
         "zero_order".into()
     }
 
-    fn unit(&self) -> &'static str {
+    fn unit(&self) -> &str {
         ""
     }
 

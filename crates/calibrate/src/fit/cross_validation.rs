@@ -8,6 +8,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::data::{CaptureSetup, Data};
+use super::model_error::model_half_widths;
 use super::normal_equations::{NormalEquations, covariance, hold, minimise};
 use super::problem::{Fit, FitProblem};
 use crate::set::{CaptureIndex, PerCapture};
@@ -190,9 +191,22 @@ pub fn beam_groups(problem: &FitProblem<'_>) -> Vec<Vec<CaptureIndex>> {
     groups
 }
 
-/// 95 % half-widths of the active parameters of a fit: by a bootstrap over groups of captures, and never less
-/// than the noise alone gives.
+/// 95 % half-widths of the active parameters of a fit: by a bootstrap over groups of captures, never less than the
+/// noise alone gives, and wider by the error of the model.
 pub fn half_widths(problem: &FitProblem<'_>, fit: &Fit) -> Vec<f64> {
+    let slots = problem.model.slots();
+    let sampled = sampled_half_widths(problem, fit).into_iter();
+    let both = sampled.zip(model_half_widths(problem, fit)).zip(&fit.active);
+    both.map(|((sampled, of_model), &s)| {
+        let (least, most) = slots[s].parameter.range;
+        // A parameter that changes nothing here may have any value.
+        sampled.hypot(of_model).min(most - least)
+    })
+    .collect()
+}
+
+/// By the bootstrap and the noise.
+fn sampled_half_widths(problem: &FitProblem<'_>, fit: &Fit) -> Vec<f64> {
     let shared = problem.shared();
     let all: Vec<usize> = (0..fit.equations.size() - 1).collect();
     let groups = beam_groups(problem);

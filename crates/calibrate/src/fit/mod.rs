@@ -6,6 +6,7 @@
 mod capture_equations;
 mod cross_validation;
 mod data;
+mod model_error;
 mod normal_equations;
 mod nuisances;
 mod null_test;
@@ -15,9 +16,8 @@ mod registration;
 mod widths;
 
 pub use cross_validation::{Gain, HeldOutErrors, beam_groups, gain, half_widths, held_out, mean_error};
-#[cfg(test)]
-pub use data::CaptureSetup;
-pub use data::Data;
+pub use data::{CaptureSetup, Data};
+pub use model_error::change_energy;
 pub use normal_equations::{covariance, minimise};
 pub use nuisances::Nuisances;
 pub use null_test::null_gain;

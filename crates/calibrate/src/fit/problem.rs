@@ -181,6 +181,26 @@ impl FitProblem<'_> {
         out
     }
 
+    /// The normal equations of each capture over flux, black level and one parameter, where this has a value of its own in
+    /// each capture; and the nuisances with the registration that fits it.
+    pub fn with_own_values(
+        &self,
+        fit: &Fit,
+        slot: usize,
+        nuisances: &Nuisances,
+        value: impl Fn(CaptureIndex) -> Option<f64> + Sync,
+    ) -> (PerCapture<DMatrix<f64>>, Nuisances) {
+        let captures = self.data.for_captures(|c| {
+            let mut theta = fit.theta.clone();
+            theta[slot] = value(c).unwrap_or(theta[slot]);
+            let slope = self.surrogate.slope(&theta, slot, c);
+            CaptureEquations::new(self.data, c, nuisances, &self.image(&theta, c), &[slope])
+        });
+        let mut after = nuisances.clone();
+        after.advance(self.data, &captures, &DVector::zeros(self.shared() + 1));
+        (captures.iter().map(CaptureEquations::reduced).collect(), after)
+    }
+
     /// Predicted image of a capture.
     pub fn image(&self, theta: &[f64], capture: CaptureIndex) -> PixelGrid {
         let image = self.surrogate.image(theta, capture);

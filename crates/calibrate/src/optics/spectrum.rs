@@ -1,6 +1,7 @@
 //! Quadrature over the spectrum of an LED.
 
 use crate::set::Led;
+use metalith_made::LightChange;
 
 /// Equidistant wavelengths over a Gaussian: for smooth integrands this sum converges faster than any power
 /// of its step.
@@ -27,15 +28,17 @@ impl Quadrature {
         Self { wavelengths_nm, led }
     }
 
-    /// Weights, with a sum of one, of an LED whose centre is shifted by `shift_nm` and whose width is scaled.
-    pub fn weights(&self, shift_nm: f64, width: f64) -> Vec<f64> {
-        let sigma = self.led.sigma_nm() * width;
+    /// Weights, with a sum of one, of this LED, the `led`-th of its set, where lamps are changed: shifted, scaled in
+    /// width, and as declared.
+    pub fn weights(&self, led: usize, change: &LightChange) -> Vec<f64> {
+        let (sigma, centre) = (self.led.sigma_nm() * (1.0 + change.led_width), self.led.centre_nm);
+        let gaussian = |l: &f64| (-0.5 * ((l - centre - change.shift_nm(led)) / sigma).powi(2)).exp();
         let raw: Vec<f64> = self
             .wavelengths_nm
             .iter()
-            .map(|l| (-0.5 * ((l - self.led.centre_nm - shift_nm) / sigma).powi(2)).exp())
+            .map(|l| gaussian(l) * change.spectral_factor(*l, centre))
             .collect();
-        let sum: f64 = raw.iter().sum();
+        let sum = raw.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         raw.iter().map(|w| w / sum).collect()
     }
 }

@@ -9,7 +9,7 @@ use captures::{SIGMAS, captures, widths};
 use ndarray::Array2;
 use residual::{confusable, nuisances, smooth_residual};
 
-use crate::diagnosis::{Diagnosis, Ranked, SetVerdict};
+use crate::diagnosis::{Diagnosis, FreePattern, Ranked, SetVerdict};
 use crate::search::Evidence;
 use crate::session::{Session, Simulations};
 use metalith_core::Result;
@@ -60,6 +60,13 @@ pub fn write_page(
         ));
     }
     effects(&mut page, diagnosis);
+    if !diagnosis.patterns.is_empty() {
+        page.section("Patterns of what is left");
+        page.paragraph(
+            "Each quantity was also fitted free for each element, colour, distance and angle. These remove most of what is left; how the values follow the group says which effect is missing.",
+        );
+        page.list(diagnosis.patterns.iter().map(FreePattern::sentence));
+    }
     ladder(&mut page, session, diagnosis);
     if let Some(evidence) = evidence {
         ranking(&mut page, diagnosis);

@@ -3,8 +3,9 @@
 use crate::fit::{FitProblem, Nuisances};
 use crate::set::{CaptureIndex, MeasuredSet};
 
-/// Share of saturated pixels past which a capture has lost what matters: its peak.
-const MOST_SATURATED: f64 = 2e-4;
+/// Share of pixels that are saturated or beside such past which a capture is left out; fewer are masked. What surrounds a
+/// lost peak still tells of distance, path and width, but a window this full was exposed for something else.
+const MOST_SATURATED: f64 = 0.05;
 
 /// Share of the expected light below which a shutter was closed or a lamp off.
 const LEAST_LIGHT: f64 = 0.1;
@@ -32,7 +33,7 @@ pub fn unusable_captures(set: &MeasuredSet, problem: &FitProblem<'_>, nuisances:
         let expected = f64::from(model.iter().sum::<f32>()) * capture.scale_dn;
         let seen = f64::from(problem.data.signal[c].iter().sum::<f32>());
         let reason = if lost as f64 > MOST_SATURATED * pixels as f64 {
-            format!("{lost} of its {pixels} pixels are saturated")
+            format!("{lost} of its {pixels} pixels are saturated or beside one that is")
         } else if seen < LEAST_LIGHT * expected {
             format!("it holds {:.1} % of the expected light", 100.0 * seen / expected)
         } else if beyond > MOST_SIGMAS * registration {

@@ -1,5 +1,4 @@
-//! The search on a whole set: recentred where effects are large, repeated with defect noise where pillars are
-//! missing.
+//! The search on a whole set, repeated with defect noise where pillars are missing.
 
 use metalith_core::{Progress, Result};
 
@@ -9,12 +8,6 @@ use super::stepwise::RESIDUAL;
 use crate::fit::{Data, FitProblem, mean_error};
 use crate::forward_model::ForwardModel;
 use crate::set::PerCapture;
-
-/// Times that the surrogate is recentred on what was found, where this is far from what was stated.
-const RECENTRED: usize = 2;
-
-/// Recentring has converged when the error falls by less than this share.
-const RECENTRING_CONVERGED: f64 = 0.05;
 
 /// Times that effects and defect noise are fitted in turn.
 const ROUNDS: usize = 4;
@@ -73,7 +66,7 @@ pub fn attribute_set(
     defects: Option<(usize, &DefectNoise)>,
     progress: &dyn Progress,
 ) -> Result<Evidence> {
-    let plain = attribute_recentred(problem, full, progress)?;
+    let plain = attribute(problem.clone(), full, progress)?;
     let with_noise = match defects {
         Some((effect, noise)) if mean_error(&plain.held_after) >= RESIDUAL => {
             attribute_with_defects(problem, full, effect, noise, &plain, progress)?
@@ -86,33 +79,6 @@ pub fn attribute_set(
         used: problem.used.clone(),
         missing_by_speckle: None,
     }))
-}
-
-/// Where something is found and a residual is left, repeat on a surrogate about what was found.
-fn attribute_recentred(problem: &FitProblem<'_>, full: bool, progress: &dyn Progress) -> Result<Finding> {
-    let mut finding = attribute(problem.clone(), full, None, progress)?;
-    for _ in 0..RECENTRED {
-        if !full || finding.chosen.is_empty() || mean_error(&finding.held_after) < RESIDUAL {
-            break;
-        }
-        let after = &finding.after;
-        let nearer = FitProblem {
-            surrogate: finding
-                .surrogate
-                .recentred(problem.model, &after.theta, &after.active, progress)?,
-            ..problem.clone()
-        };
-        let next = attribute(nearer, full, Some(&finding), progress)?;
-        let (before, after) = (mean_error(&finding.held_after), mean_error(&next.held_after));
-        if after >= before {
-            break;
-        }
-        finding = next;
-        if before - after < RECENTRING_CONVERGED * after {
-            break;
-        }
-    }
-    Ok(finding)
 }
 
 /// The finding with the speckle of missing pillars treated as noise, if this explains what is left and the mean
@@ -149,7 +115,7 @@ fn attribute_with_defects(
             data: &data,
             ..problem.clone()
         };
-        let mut found = attribute(with_noise, full, None, progress)?;
+        let mut found = attribute(with_noise, full, progress)?;
         // The speckle is estimated against the noise of the camera alone.
         let bare = problem_of(model, camera_noise, &problem.used, &found);
         let next = noise.share(&bare, &found.after);

@@ -31,6 +31,20 @@ impl<'a> SearchState<'a> {
         self.fit = fit;
     }
 
+    /// Continue about the fit: its parameters are simulated anew, and all others beside them.
+    ///
+    /// # Errors
+    /// As [`Surrogate::recentred`](crate::surrogate::Surrogate::recentred).
+    pub fn recentre(&mut self, progress: &dyn Progress) -> Result<()> {
+        let Fit { theta, active, .. } = &self.fit;
+        let surrogate = &self.problem.surrogate;
+        self.problem.surrogate = surrogate.recentred(self.problem.model, theta, active, progress)?;
+        self.problem.correction = None;
+        let fit = self.problem.fit(&self.fit.active, &self.fit);
+        self.move_to(fit);
+        Ok(())
+    }
+
     /// Refine the fit with full simulations.
     ///
     /// # Errors

@@ -4,7 +4,9 @@ use metalith_core::{Progress, Result};
 
 use super::signatures::score_effects;
 use super::state::SearchState;
-use crate::fit::{Fit, FitProblem, Gain, HeldOutErrors, gain, half_widths, held_out, mean_error, null_gain};
+use crate::fit::{
+    Fit, FitProblem, Gain, HeldOutErrors, change_energy, gain, half_widths, held_out, mean_error, null_gain,
+};
 
 /// Candidates that are fitted in full at each step.
 const LEADERS: usize = 6;
@@ -319,7 +321,8 @@ impl Candidate {
         let (fit, _) = self.fitted.as_ref()?;
         let above_noise = (mean_error(errors_now) - 1.0).max(LEAST_ERROR);
         let slots = problem.model.slots_of(self.tried.effect);
-        if value < LEAST_GAIN {
+        // What was found, and what is tried, may each be wrong by a share of what it changes.
+        if value < LEAST_GAIN + change_energy(problem, fit) / problem.pixels().max(1.0) {
             return Some(Rejection::Little(value));
         }
         if low <= 0.0 {

@@ -15,6 +15,9 @@ pub use sem::SemSite;
 use metalith_cell::{CellStack, Material};
 use metalith_core::{Result, WidthMap};
 
+/// A mean of frames this near to saturation contains clipped frames.
+pub const SATURATED: f64 = 0.97;
+
 /// One bench session, read and checked.
 #[derive(Clone, Debug)]
 pub struct MeasuredSet {

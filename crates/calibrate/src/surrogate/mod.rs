@@ -1,8 +1,8 @@
 //! A surrogate of the forward model: every parameter simulated at a few values, and interpolated between them.
 //!
 //! Between the simulated values of a parameter, the change of an image is a polynomial. Changes of different
-//! parameters add. This holds where effects are small; a fit that moves far continues on a surrogate that is
-//! centred on its new position.
+//! parameters add. This holds where effects are small; once an effect is found and a residual is left, the search
+//! continues on a surrogate that is centred on what was found, with all other parameters simulated anew.
 
 mod curve;
 
@@ -26,6 +26,14 @@ const ONE_SIDED: [f64; 3] = [0.8, 1.8, 3.5];
 /// And about a position that a fit has come to.
 const NEAR: [f64; 4] = [-0.6, -0.3, 0.3, 0.6];
 
+/// And beside what was found, on both sides, and where it can only be positive.
+const BESIDE: [f64; 2] = [-1.25, 1.25];
+const BESIDE_ONE_SIDED: [f64; 2] = [0.8, 2.2];
+
+/// No effect is simulated by itself if no other value is nearer (typical sizes): polynomials through nodes closer
+/// together magnify rounding.
+const APART: f64 = 0.3;
+
 /// How far a fit may extrapolate, as a multiple of the simulated range.
 const EXTRAPOLATION: f64 = 1.6;
 
@@ -38,7 +46,7 @@ pub struct Surrogate {
     pub base: Arc<PerCapture<PixelGrid>>,
     /// Changes with each parameter, by slot.
     curves: Vec<Curve>,
-    /// Changes for a unit of each smooth term: paths (1/nm), then transmissions of each LED.
+    /// Changes for a unit of each smooth term: paths (1/nm), then amplitudes and phases over width of each LED.
     smooth: Arc<Vec<SmoothChange>>,
 }
 
@@ -88,7 +96,7 @@ impl Surrogate {
                 let changes = change(&images, &base, 1.0 / term.step() as f32);
                 match term {
                     SmoothTerm::Path(_) => terms.push(changes.into_iter().map(Some).collect()),
-                    SmoothTerm::Transmission(_) => terms.extend(by_led(&changes, led, leds)),
+                    SmoothTerm::Transmission(_) | SmoothTerm::Phase(_) => terms.extend(by_led(&changes, led, leds)),
                 }
             }
         }
@@ -100,8 +108,9 @@ impl Surrogate {
         })
     }
 
-    /// A surrogate about other values: parameters in `slots` are simulated anew close to these, the changes of
-    /// all others are taken to add as before.
+    /// A surrogate about other values. Parameters in `found` are simulated anew close to these, and at no effect, so
+    /// that another may take their place. All others are simulated anew beside them, because what they change
+    /// depends on what was found; where that is dear, their changes are taken to add as before.
     ///
     /// # Errors
     /// As [`ForwardModel::images`].
@@ -109,24 +118,45 @@ impl Surrogate {
         &self,
         model: &dyn ForwardModel,
         about: &[f64],
-        slots: &[usize],
+        found: &[usize],
         progress: &dyn Progress,
     ) -> Result<Self> {
         let mut points = vec![ParameterPoint::new(about.to_vec())];
-        let nodes: Vec<Vec<f64>> = slots
-            .iter()
-            .map(|&s| add_nodes(model, about, s, &NEAR, &mut points))
-            .collect();
+        let mut simulated: Vec<(usize, Vec<f64>)> = Vec::new();
+        for (s, slot) in model.slots().iter().enumerate() {
+            let is_found = found.contains(&s);
+            if !is_found && model.is_dear_beside(about, s) {
+                continue;
+            }
+            let multiples: &[f64] = match (is_found, slot.parameter.one_sided() && about[s] == 0.0) {
+                (true, _) => &NEAR,
+                (false, true) => &BESIDE_ONE_SIDED,
+                (false, false) => &BESIDE,
+            };
+            let mut nodes = add_nodes(model, about, s, multiples, &mut points);
+            if is_found
+                && nodes
+                    .iter()
+                    .all(|n| (n + about[s]).abs() > APART * slot.parameter.typical)
+            {
+                let mut theta = about.to_vec();
+                theta[s] = 0.0;
+                points.push(ParameterPoint::new(theta));
+                nodes.push(-about[s]);
+            }
+            simulated.push((s, nodes));
+        }
         let mut images = model.images(&points, progress)?.into_iter();
         let base = images.next().expect("the first point is the base");
         let mut out = self.clone();
-        for (&s, nodes) in slots.iter().zip(nodes) {
+        for (s, nodes) in simulated {
             let changes: Vec<_> = images
                 .by_ref()
                 .take(nodes.len())
                 .map(|i| change(&i, &base, 1.0))
                 .collect();
-            out.curves[s] = Curve::new(nodes, changes, false);
+            let kinked = model.kinked(model.slots()[s].effect) && about[s] == 0.0;
+            out.curves[s] = Curve::new(nodes, changes, kinked);
         }
         out.about = about.to_vec();
         out.base = Arc::new(base);
@@ -188,7 +218,8 @@ impl Surrogate {
         PixelGrid::combine(&parts)
     }
 
-    /// Number of smooth terms that were simulated: the paths, then the transmissions of each LED.
+    /// Number of smooth terms that were simulated: the paths, then amplitudes and phases over width of each
+    /// LED.
     pub fn smooth_terms(&self) -> usize {
         self.smooth.len()
     }

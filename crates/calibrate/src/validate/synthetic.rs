@@ -75,7 +75,8 @@ impl<'a> Synthesizer<'a> {
             settings.cache.clone(),
         )
         .with_orders(ORDERS, TAPER_ORDERS);
-        let mut simulator = Simulator::new(bench, CellSource::Rigorous(Box::new(cells)), effects::all(like));
+        let effects = effects::with_declared(like, &settings.declared)?;
+        let mut simulator = Simulator::new(bench, CellSource::Rigorous(Box::new(cells)), effects);
         // Fits use the mean of missing pillars; here single ones are missing.
         simulator.scatter = Some(MISSING_SEED);
         Ok(Self { simulator })

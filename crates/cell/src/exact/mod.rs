@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::{CellModel, InversePolynomial, MappingError, PhaseCurve};
 use metalith_core::{Error, Result};
-use simplex::simplex;
+pub use simplex::simplex;
 
 /// Width for each of equal parts of a turn.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]

@@ -4,7 +4,7 @@
 const SIMPLEX_STEPS: usize = 1500;
 
 /// Where `loss` is least near `start`.
-pub(super) fn simplex(start: &[f64], loss: impl Fn(&[f64]) -> f64) -> Vec<f64> {
+pub fn simplex(start: &[f64], loss: impl Fn(&[f64]) -> f64) -> Vec<f64> {
     let n = start.len();
     let mut corners: Vec<(f64, Vec<f64>)> = (0..=n)
         .map(|k| {

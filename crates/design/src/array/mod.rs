@@ -1,25 +1,37 @@
 //! From phase to pillars: the widths of every element, and which of them are copies of one another.
 
+mod computed;
+mod domain;
 mod symmetry;
 mod widths;
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
-pub use symmetry::{DomainPart, Symmetry, SymmetryGroup};
+pub use computed::{ClassWidths, ComputedWidths};
+pub use domain::DomainPart;
+pub use symmetry::{Symmetry, SymmetryGroup};
 pub use widths::WidthRule;
 
 use crate::phase::{ElementPhase, LensPhase};
 use crate::{Design, Element};
 use metalith_core::Progress;
+use metalith_core::{EighthMap, Lattice, WidthMap, WidthRows};
 use metalith_core::{Error, Result};
-use metalith_core::{Lattice, WidthMap};
+
+/// Sites of an element that is held (128 MB): one of 2.8 mm. The pillars of a larger one are made as they are asked for.
+const MOST_HELD: u64 = 1 << 26;
+
+/// Widths of an eighth of an element that is held to be read whole (268 MB): one of 11 mm.
+const MOST_EIGHTH: u64 = 1 << 27;
 
 /// Elements that are the same pillars up to a symmetry of the square.
 #[derive(Clone, Debug)]
 pub struct Class {
     /// Pillars of the first element of the class.
-    pub widths: WidthMap,
-    /// The symmetries of those pillars, each proven by comparing every site.
+    pub widths: ClassWidths,
+    /// The symmetries of those pillars: each proven by comparing every site, or, of an element that is not held, by its
+    /// phase.
     pub group: SymmetryGroup,
 }
 
@@ -49,9 +61,17 @@ impl PillarArray {
     /// # Errors
     /// [`Error::Interrupted`] if the user stopped it.
     pub fn build(design: &Design, progress: &dyn Progress) -> Result<Self> {
+        Self::build_within(design, MOST_HELD, progress)
+    }
+
+    /// As [`PillarArray::build`]; elements of more than `most_held` sites are not held but made row by row.
+    ///
+    /// # Errors
+    /// As [`PillarArray::build`].
+    pub fn build_within(design: &Design, most_held: u64, progress: &dyn Progress) -> Result<Self> {
         let lattice = design.lattice();
-        let lens = LensPhase::new(lattice, design.lens.diameter_nm, &design.lens.phase);
-        let rule = WidthRule::new(&design.cell, &design.mapping);
+        let lens = Arc::new(LensPhase::new(lattice, design.lens.diameter_nm, &design.lens.phase));
+        let held = (lattice.sites() as u64).pow(2) <= most_held;
         let elements = design.elements();
         progress.begin("widths of the elements", elements.len() as u64);
         let mut array = Self {
@@ -64,8 +84,15 @@ impl PillarArray {
             if progress.stopped() {
                 return Err(Error::Interrupted);
             }
-            let widths = rule.widths(&ElementPhase::new(&lens, &element.wedge));
-            array.place(element, widths);
+            let rule = Arc::new(WidthRule::of_element(design, element.index));
+            array.place(
+                element,
+                if held {
+                    ClassWidths::Held(rule.widths(&ElementPhase::new(&lens, &element.wedge)))
+                } else {
+                    ClassWidths::Computed(ComputedWidths::new(lens.clone(), rule, element.wedge))
+                },
+            );
             progress.advance(1);
         }
         Ok(array)
@@ -77,22 +104,47 @@ impl PillarArray {
         self.placed.iter().map(|p| of_class[p.class]).sum()
     }
 
-    /// The pillars of one element; those of its class where nothing is turned.
+    /// The pillars of one element as a map; those of its class where nothing is turned.
     pub fn widths(&self, placed: &PlacedElement) -> Cow<'_, WidthMap> {
-        let widths = &self.classes[placed.class].widths;
-        if placed.symmetry == Symmetry::IDENTITY {
-            return Cow::Borrowed(widths);
+        match self.rows(placed) {
+            Cow::Borrowed(rows) => rows.map(),
+            Cow::Owned(ClassWidths::Held(map)) => Cow::Owned(map),
+            Cow::Owned(other) => Cow::Owned(other.whole()),
         }
-        Cow::Owned(placed.symmetry.apply(widths))
     }
 
-    fn place(&mut self, element: Element, widths: WidthMap) {
+    /// The pillars of one element, to be read row by row.
+    pub fn rows(&self, placed: &PlacedElement) -> Cow<'_, ClassWidths> {
+        let widths = &self.classes[placed.class].widths;
+        match widths {
+            _ if placed.symmetry == Symmetry::IDENTITY => Cow::Borrowed(widths),
+            ClassWidths::Held(map) => Cow::Owned(ClassWidths::Held(placed.symmetry.apply(map))),
+            // No symmetry turns it.
+            ClassWidths::Eighth(_) => Cow::Borrowed(widths),
+            ClassWidths::Computed(class) => Cow::Owned(ClassWidths::Computed(class.steered(placed.element.wedge))),
+        }
+    }
+
+    /// As [`PillarArray::rows`], for who reads all rows: an element that is not held but has all eight symmetries is made
+    /// once, as an eighth.
+    pub fn all_rows(&self, placed: &PlacedElement) -> Cow<'_, ClassWidths> {
+        let rows = self.rows(placed);
+        let eighth = EighthMap::sites(self.lattice);
+        match rows.as_ref() {
+            ClassWidths::Computed(computed) if computed.group().members().len() == 8 && eighth <= MOST_EIGHTH => {
+                Cow::Owned(ClassWidths::Eighth(EighthMap::of(computed)))
+            }
+            _ => rows,
+        }
+    }
+
+    fn place(&mut self, element: Element, widths: ClassWidths) {
         let copy = self.classes.iter().enumerate().find_map(|(class, known)| {
-            let symmetry = Symmetry::ALL.into_iter().find(|s| s.maps(&known.widths, &widths))?;
+            let symmetry = Symmetry::ALL.into_iter().find(|s| widths.is_copy(*s, &known.widths))?;
             Some((class, symmetry))
         });
         let (class, symmetry) = copy.unwrap_or_else(|| {
-            let group = SymmetryGroup::of(&widths);
+            let group = widths.group();
             self.classes.push(Class { widths, group });
             (self.classes.len() - 1, Symmetry::IDENTITY)
         });

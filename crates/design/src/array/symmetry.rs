@@ -1,4 +1,4 @@
-//! The eight symmetries of the square, and the part of a lens that they leave unique.
+//! The eight symmetries of the square, and those of them that leave a lens as it is.
 
 use metalith_core::WidthMap;
 use ndarray::{Array2, ArrayView2, Axis};
@@ -43,7 +43,7 @@ impl Symmetry {
     }
 
     /// Where a site of a lattice of `n` sites an axis goes.
-    fn site(self, n: usize, ix: usize, iy: usize) -> (usize, usize) {
+    pub(super) fn site(self, n: usize, ix: usize, iy: usize) -> (usize, usize) {
         let last = n as i64 - 1;
         let (x, y) = self.point(2 * ix as i64 - last, 2 * iy as i64 - last);
         (((x + last) / 2) as usize, ((y + last) / 2) as usize)
@@ -123,7 +123,7 @@ impl Symmetry {
 /// The symmetries that leave a lens as it is.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SymmetryGroup {
-    members: Vec<Symmetry>,
+    pub(super) members: Vec<Symmetry>,
 }
 
 /// A symmetry that two of these make together and that is not among them.
@@ -132,26 +132,17 @@ fn composed(members: &[Symmetry]) -> Option<Symmetry> {
     pairs.into_iter().find(|c| !members.contains(c))
 }
 
-/// A part of a fundamental domain that the same copies cover the lens with.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct DomainPart {
-    /// Which symmetries of the group leave the sites of this part where they are.
-    stabiliser: Stabiliser,
-    /// The symmetries that, applied to the part, give all its copies, each once.
-    pub copies: Vec<Symmetry>,
-    /// Number of pillars of the part.
-    pub pillars: u64,
-}
-
-/// Bit `k` is set if member `k` of the group leaves a site where it is.
-type Stabiliser = u8;
-
 impl SymmetryGroup {
     /// The group of a lens: each symmetry is tried on every site, or follows from two that hold.
     pub fn of(widths: &WidthMap) -> Self {
+        Self::of_those(|s| s.maps(widths, widths))
+    }
+
+    /// The group of what these symmetries, and those that follow from them, leave as it is.
+    pub(super) fn of_those(holds: impl Fn(Symmetry) -> bool) -> Self {
         let mut members = vec![Symmetry::IDENTITY];
         for tried in Symmetry::ALL {
-            if members.contains(&tried) || !tried.maps(widths, widths) {
+            if members.contains(&tried) || !holds(tried) {
                 continue;
             }
             members.push(tried);
@@ -175,82 +166,15 @@ impl SymmetryGroup {
     pub fn members(&self) -> &[Symmetry] {
         &self.members
     }
-
-    /// The pillars that the group leaves unique, in parts of equally many copies: inside a lens with
-    /// all eight symmetries an octant with eight copies and its diagonal with four.
-    pub fn domain(&self, widths: &WidthMap) -> Vec<DomainPart> {
-        let n = widths.lattice.sites();
-        let mut parts: Vec<DomainPart> = Vec::new();
-        for ((iy, ix), _) in widths.width_nm.indexed_iter().filter(|(_, w)| **w != 0) {
-            let Some(stabiliser) = self.stabiliser(n, ix, iy) else {
-                continue;
-            };
-            match parts.iter_mut().find(|part| part.stabiliser == stabiliser) {
-                Some(part) => part.pillars += 1,
-                None => parts.push(DomainPart {
-                    stabiliser,
-                    copies: self.copies(n, ix, iy),
-                    pillars: 1,
-                }),
-            }
-        }
-        parts
-    }
-
-    /// Whether a site of a lattice of `n` sites an axis belongs to a part of the domain.
-    #[inline]
-    pub fn holds(&self, part: &DomainPart, n: usize, ix: usize, iy: usize) -> bool {
-        self.stabiliser(n, ix, iy) == Some(part.stabiliser)
-    }
-
-    /// Which of the parts of the domain a site belongs to, if any.
-    #[inline]
-    pub fn part_of(&self, parts: &[DomainPart], n: usize, ix: usize, iy: usize) -> Option<usize> {
-        let stabiliser = self.stabiliser(n, ix, iy)?;
-        parts.iter().position(|part| part.stabiliser == stabiliser)
-    }
-
-    /// What leaves a site where it is; none if another copy of the site, the first in reading order,
-    /// stands for it.
-    #[inline]
-    fn stabiliser(&self, n: usize, ix: usize, iy: usize) -> Option<Stabiliser> {
-        // Twice the place from the centre: exact for any number of sites.
-        let last = n as i64 - 1;
-        let (x, y) = (2 * ix as i64 - last, 2 * iy as i64 - last);
-        // The identity, the first member, leaves every site.
-        let mut stays = 1;
-        for (k, member) in self.members.iter().enumerate().skip(1) {
-            let (mx, my) = member.point(x, y);
-            match (my, mx).cmp(&(y, x)) {
-                std::cmp::Ordering::Less => return None,
-                std::cmp::Ordering::Equal => stays |= 1 << k,
-                std::cmp::Ordering::Greater => {}
-            }
-        }
-        Some(stays)
-    }
-
-    /// One symmetry for each distinct place that the group moves a site to.
-    fn copies(&self, n: usize, ix: usize, iy: usize) -> Vec<Symmetry> {
-        let mut seen = Vec::new();
-        let mut copies = Vec::new();
-        for member in &self.members {
-            let place = member.site(n, ix, iy);
-            if !seen.contains(&place) {
-                seen.push(place);
-                copies.push(*member);
-            }
-        }
-        copies
-    }
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use metalith_core::Lattice;
 
-    fn lens(f: impl Fn(i64, i64) -> u16) -> WidthMap {
+    /// A lens of 12 sites across, whose widths follow from twice the place from the middle.
+    pub fn lens(f: impl Fn(i64, i64) -> u16) -> WidthMap {
         let lattice = Lattice::new(350, 12).unwrap();
         let mut map = WidthMap::empty(lattice);
         for iy in 0..12 {
@@ -262,62 +186,6 @@ mod tests {
             }
         }
         map
-    }
-
-    /// The domain's copies give every pillar of the lens once.
-    fn unfold(map: &WidthMap, group: &SymmetryGroup) {
-        let n = map.lattice.sites();
-        let mut seen = WidthMap::empty(map.lattice);
-        for part in group.domain(map) {
-            for (iy, ix) in (0..n * n).map(|k| (k / n, k % n)) {
-                if map.width_nm[[iy, ix]] == 0 || !group.holds(&part, n, ix, iy) {
-                    continue;
-                }
-                for s in &part.copies {
-                    let (jx, jy) = s.site(n, ix, iy);
-                    assert_eq!(seen.width_nm[[jy, jx]], 0, "a site covered twice");
-                    seen.width_nm[[jy, jx]] = map.width_nm[[iy, ix]];
-                }
-            }
-        }
-        assert_eq!(&seen, map);
-    }
-
-    #[test]
-    fn a_round_lens_folds_to_an_octant() {
-        let map = lens(|x, y| (100 + x * x + y * y) as u16);
-        let group = SymmetryGroup::of(&map);
-        assert_eq!(group.members().len(), 8);
-        let counts = group
-            .domain(&map)
-            .iter()
-            .map(|p| (p.pillars, p.copies.len() as u64))
-            .collect::<Vec<_>>();
-        assert_eq!(counts.iter().map(|(s, c)| s * c).sum::<u64>(), map.pillars());
-        assert!(counts.iter().any(|c| c.1 == 8) && counts.iter().any(|c| c.1 == 4));
-        unfold(&map, &group);
-    }
-
-    #[test]
-    fn a_wedge_leaves_one_mirror() {
-        for map in [
-            lens(|x, y| (500 + x * x + y * y + 2 * x) as u16),
-            lens(|x, y| (500 + x * x + y * y + 2 * (x + y)) as u16),
-            lens(|x, y| (500 + x * x + y * y - 2 * y) as u16),
-        ] {
-            let group = SymmetryGroup::of(&map);
-            assert_eq!(group.members().len(), 2);
-            unfold(&map, &group);
-        }
-    }
-
-    #[test]
-    fn one_pillar_that_differs_breaks_the_symmetry() {
-        let mut map = lens(|x, y| (100 + x * x + y * y) as u16);
-        map.width_nm[[3, 4]] += 2;
-        let group = SymmetryGroup::of(&map);
-        assert_eq!(group, SymmetryGroup::trivial());
-        unfold(&map, &group);
     }
 
     #[test]

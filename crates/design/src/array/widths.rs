@@ -3,12 +3,12 @@
 use rayon::prelude::*;
 
 use crate::phase::ElementPhase;
-use crate::{CellSpec, MappingSpec};
+use crate::{CellSpec, Design, MappingSpec};
 use metalith_cell::{InversePolynomial, MappingTable};
 use metalith_core::WidthMap;
 
 /// Rounds the duty cycle that a mapping asks for to a width that may be written.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct WidthRule {
     polynomial: InversePolynomial,
     table: Option<MappingTable>,
@@ -18,7 +18,29 @@ pub struct WidthRule {
 }
 
 impl WidthRule {
-    /// The rule of a cell and a mapping.
+    /// The rule of the element of a design that is so many steps from the centre.
+    pub fn of_element(design: &Design, index: (i32, i32)) -> Self {
+        let common = Self::new(&design.cell, &design.mapping);
+        match design.mapping.steered(index) {
+            Some(steered) => Self {
+                polynomial: steered.polynomial.clone(),
+                table: None,
+                ..common
+            },
+            None => common,
+        }
+    }
+
+    /// The rules of all elements of a design, each once: the common one first.
+    pub fn all(design: &Design) -> Vec<Self> {
+        let steered = design.mapping.steered.iter();
+        let of = |steps: (u32, u32)| Self::of_element(design, (steps.0 as i32, steps.1 as i32));
+        std::iter::once(Self::new(&design.cell, &design.mapping))
+            .chain(steered.map(|m| of(m.steps)))
+            .collect()
+    }
+
+    /// The common rule of a cell and a mapping, which elements follow that have none of their own.
     pub fn new(cell: &CellSpec, mapping: &MappingSpec) -> Self {
         Self {
             polynomial: mapping.polynomial.clone(),
@@ -56,5 +78,70 @@ impl WidthRule {
             }
         });
         map
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::PillarArray;
+    use metalith_core::Silent;
+
+    fn mini(steered: &str) -> metalith_core::Result<Design> {
+        let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/mini_3x3.toml"));
+        let text = std::fs::read_to_string(path).unwrap();
+        Design::parse(path, &text.replacen("[layout]", &format!("{steered}\n[layout]"), 1))
+    }
+
+    #[test]
+    fn steered_elements_follow_their_own_mapping_and_stay_copies_of_one_another() {
+        let (common, own) = (
+            mini("").unwrap(),
+            mini("[[mapping.steered]]\nsteps = [1, 0]\ncoefficients = [0.3, 0.5]\n").unwrap(),
+        );
+        let [before, after] = [&common, &own].map(|design| PillarArray::build(design, &Silent).unwrap());
+        assert_eq!(before.classes.len(), after.classes.len());
+        assert_ne!(common.digest(), own.digest());
+        let mut changed = 0;
+        for (a, b) in before.placed.iter().zip(&after.placed) {
+            let along_an_axis = (a.element.index.0 == 0) != (a.element.index.1 == 0);
+            assert_eq!(
+                before.widths(a) != after.widths(b),
+                along_an_axis,
+                "{:?}",
+                a.element.index
+            );
+            changed += usize::from(along_an_axis);
+            if along_an_axis {
+                // A phase of u turns is a duty cycle of 0.3 + 0.5 u on a pitch of 350 nm.
+                let drawn = after.widths(b).width_nm.iter().copied().max().unwrap();
+                assert_eq!(drawn, 280);
+            }
+        }
+        assert_eq!(changed, 4);
+        assert_eq!(WidthRule::all(&own).len(), 2);
+        // A design without them is what it was.
+        assert!(!serde_json::to_string(&common.mapping).unwrap().contains("steered"));
+    }
+
+    #[test]
+    fn steps_that_no_element_has_and_steps_given_twice_are_faults() {
+        for (steps, wanted) in [
+            ("[0, 0]", "no steered elements"),
+            ("[2, 0]", "no steered elements"),
+            ("[0, 1]", "no steered elements"),
+            ("[1, 0.5]", "no steered elements"),
+        ] {
+            let text = format!("[[mapping.steered]]\nsteps = {steps}\ncoefficients = [0.3, 0.5]\n");
+            let error = mini(&text).unwrap_err().to_string();
+            assert!(error.contains(wanted), "{steps}: {error}");
+        }
+        let one = "[[mapping.steered]]\nsteps = [1, 1]\ncoefficients = [0.3, 0.5]\n";
+        let error = mini(&format!("{one}{one}")).unwrap_err().to_string();
+        assert!(error.contains("have a mapping already"), "{error}");
+        let error = mini(&one.replace("0.5", "0.9")).unwrap_err().to_string();
+        assert!(error.contains("asks for widths from 105.0 to 420.0 nm"), "{error}");
     }
 }

@@ -3,7 +3,11 @@
 use super::RadialPhase;
 use metalith_core::{Lattice, Wedge};
 
-/// The radial phase on the sites of a lattice, tabulated once for all elements.
+/// Radii that are tabulated at most: 64 MB. A lens of 1 mm has a million.
+const MOST_ENTRIES: i64 = 1 << 23;
+
+/// The radial phase on the sites of a lattice, tabulated once for all elements, or, for lenses with more radii than a
+/// table is kept of, computed site by site. It is the same number either way.
 ///
 /// The square of a site's radius is a whole number of squared half pitches, and squares of odd numbers
 /// are one more than a multiple of eight: so one entry for each eighth serves all sites, and sites at
@@ -13,15 +17,26 @@ pub struct LensPhase {
     lattice: Lattice,
     /// Greatest squared radius inside the lens, in squared half pitches.
     limit: i64,
-    turns: Vec<f64>,
+    turns: TurnsOfRadius,
     /// Entries are this power of two apart in squared half pitches: a shift, since this is done for each pillar.
     stride_log2: u32,
     offset: i64,
 }
 
+/// Phase (turns) of a squared radius.
+#[derive(Clone, Debug)]
+enum TurnsOfRadius {
+    Tabulated(Vec<f64>),
+    Computed(RadialPhase),
+}
+
 impl LensPhase {
     /// Tabulate `radial` for a lens of this diameter on this lattice.
     pub fn new(lattice: Lattice, diameter_nm: u32, radial: &RadialPhase) -> Self {
+        Self::with_entries(lattice, diameter_nm, radial, MOST_ENTRIES)
+    }
+
+    fn with_entries(lattice: Lattice, diameter_nm: u32, radial: &RadialPhase, most: i64) -> Self {
         // r^2 <= R^2 in half pitches: (2 R / p)^2, floored; exact in integers.
         let (d, p) = (i128::from(diameter_nm), i128::from(lattice.pitch_nm()));
         let limit = (d * d / (p * p)) as i64;
@@ -30,15 +45,17 @@ impl LensPhase {
         } else {
             (2, 0)
         };
-        let half_pitch_um = lattice.pitch_um() / 2.0;
         let entries = if limit < offset {
             0
         } else {
             ((limit - offset) >> stride_log2) + 1
         };
-        let turns = (0..entries)
-            .map(|k| radial.turns(((k << stride_log2) + offset) as f64 * half_pitch_um * half_pitch_um))
-            .collect();
+        let turns = if entries > most {
+            TurnsOfRadius::Computed(radial.clone())
+        } else {
+            let at = |k: i64| radial.turns(radius2_um2(lattice, (k << stride_log2) + offset));
+            TurnsOfRadius::Tabulated((0..entries).map(at).collect())
+        };
         Self {
             lattice,
             limit,
@@ -56,8 +73,22 @@ impl LensPhase {
     /// Phase at a site (turns), not reduced; none outside the lens.
     pub fn turns(&self, ix: usize, iy: usize) -> Option<f64> {
         let r2 = self.lattice.half_radius2(ix, iy);
-        (r2 <= self.limit).then(|| self.turns[((r2 - self.offset) >> self.stride_log2) as usize])
+        (r2 <= self.limit).then(|| match &self.turns {
+            TurnsOfRadius::Tabulated(turns) => turns[((r2 - self.offset) >> self.stride_log2) as usize],
+            TurnsOfRadius::Computed(radial) => radial.turns(radius2_um2(self.lattice, r2)),
+        })
     }
+
+    /// Whether a site is inside the lens.
+    pub fn holds(&self, ix: usize, iy: usize) -> bool {
+        self.lattice.half_radius2(ix, iy) <= self.limit
+    }
+}
+
+/// Squared radius (um^2) of one in squared half pitches.
+fn radius2_um2(lattice: Lattice, r2: i64) -> f64 {
+    let half_pitch_um = lattice.pitch_um() / 2.0;
+    r2 as f64 * half_pitch_um * half_pitch_um
 }
 
 /// The phase of one element: that of the lens and its wedge.
@@ -83,6 +114,11 @@ impl<'a> ElementPhase<'a> {
         self.lens.lattice
     }
 
+    /// Whether no wedge is on the lens: its phase is the same at sites of one radius.
+    pub fn is_radial(&self) -> bool {
+        self.step == (0.0, 0.0)
+    }
+
     /// Phase at a site (turns), not reduced; none outside the lens.
     pub fn turns(&self, ix: usize, iy: usize) -> Option<f64> {
         let radial = self.lens.turns(ix, iy)?;
@@ -101,6 +137,26 @@ impl<'a> ElementPhase<'a> {
             // A tiny negative phase rounds up to one whole turn.
             if u < 1.0 { u } else { 0.0 }
         })
+    }
+
+    /// Phases modulo one turn of consecutive sites from a distance to the middle (um) on; the direction is along an axis
+    /// or a diagonal, where there is a site at every step along either axis. None if the lens ends before.
+    pub fn row(&self, radius_um: f64, direction: [i32; 2], sites: usize) -> Option<Vec<f64>> {
+        let lattice = self.lattice();
+        let [dx, dy] = direction;
+        let steps = radius_um / lattice.pitch_um() / f64::from(dx).hypot(f64::from(dy));
+        let middle = lattice.sites() as i32 / 2;
+        let [x, y] = direction.map(|d| middle + (steps * f64::from(d)) as i32);
+        (0..sites as i32)
+            .map(|k| {
+                let (x, y) = if dx != 0 && dy != 0 {
+                    (x + dx * ((k + 1) / 2), y + dy * (k / 2))
+                } else {
+                    (x + dx * k, y + dy * k)
+                };
+                self.wrapped(usize::try_from(x).ok()?, usize::try_from(y).ok()?)
+            })
+            .collect()
     }
 }
 
@@ -121,6 +177,26 @@ mod tests {
             .flat_map(|iy| (0..n).map(move |ix| (ix, iy)))
             .filter(|&(x, y)| lens.turns(x, y).is_some());
         assert_eq!((n, inside.count()), (2858, 6_411_448));
+    }
+
+    /// Large lenses, whose radii are not tabulated, have the phases of small ones.
+    #[test]
+    fn a_computed_phase_is_the_tabulated_one() {
+        let radial = RadialPhase::Hyperbola {
+            wavelength_um: 0.55,
+            focal_length_um: 30.0,
+        };
+        for diameter_nm in [20_000, 20_400] {
+            let lattice = Lattice::covering(diameter_nm, 350).unwrap();
+            let table = LensPhase::new(lattice, diameter_nm, &radial);
+            let computed = LensPhase::with_entries(lattice, diameter_nm, &radial, 0);
+            assert!(matches!(computed.turns, TurnsOfRadius::Computed(_)));
+            let n = lattice.sites();
+            for (ix, iy) in (0..n * n).map(|k| (k % n, k / n)) {
+                assert_eq!(table.turns(ix, iy), computed.turns(ix, iy));
+                assert_eq!(table.holds(ix, iy), table.turns(ix, iy).is_some());
+            }
+        }
     }
 
     #[test]

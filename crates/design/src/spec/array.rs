@@ -36,6 +36,11 @@ impl Element {
     pub fn label(&self) -> String {
         format!("({}, {})", self.index.0, self.index.1)
     }
+
+    /// Centre on the chip (um).
+    pub fn centre_um(&self) -> [f64; 2] {
+        [self.centre_nm.0 as f64 * 1e-3, self.centre_nm.1 as f64 * 1e-3]
+    }
 }
 
 impl ArraySpec {

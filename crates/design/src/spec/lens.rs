@@ -20,7 +20,7 @@ pub struct LensSpec {
 
 impl LensSpec {
     pub fn read(lens: &Section<'_, '_>, phase: &Section<'_, '_>, cell: &CellSpec) -> Self {
-        let diameter_um = lens.float("diameter_um", Limits::new(5.0..=20_000.0, "um"));
+        let diameter_um = lens.float("diameter_um", Limits::new(5.0..=100_000.0, "um"));
         let diameter_nm = (diameter_um * 1e3).round() as u32;
         if (diameter_um * 1e3 - f64::from(diameter_nm)).abs() > 1e-6 {
             lens.fault(

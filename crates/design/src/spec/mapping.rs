@@ -4,11 +4,13 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::CellSpec;
 use super::lens::WAVELENGTH;
+use super::{ArraySpec, CellSpec};
 use metalith_cell::{Basis, InversePolynomial, MappingTable};
 use metalith_core::Result;
 use metalith_core::document::{Limits, Section};
+
+const COEFFICIENT: Limits = Limits::new(-100.0..=100.0, "(duty cycle over turns)");
 
 /// How phase becomes width.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -23,10 +25,23 @@ pub struct MappingSpec {
     /// What that file holds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<MappingTable>,
+    /// Mappings of steered elements, where they have their own.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub steered: Vec<SteeredMapping>,
+}
+
+/// The mapping of the elements that are steered by so many steps, to whichever side: their phase is steep, and what a pillar
+/// does depends on its neighbours.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SteeredMapping {
+    /// Steps from the centre element along the two axes, the larger first.
+    pub steps: (u32, u32),
+    /// Duty cycle over phase.
+    pub polynomial: InversePolynomial,
 }
 
 impl MappingSpec {
-    pub(crate) fn read(s: &Section<'_, '_>, cell: &CellSpec) -> Self {
+    pub(crate) fn read(s: &Section<'_, '_>, cell: &CellSpec, array: &ArraySpec) -> Self {
         let published = InversePolynomial::published();
         let wavelength_um = s
             .optional_float("wavelength_nm", WAVELENGTH)
@@ -37,7 +52,7 @@ impl MappingSpec {
             Some(published.basis),
         );
         let coefficients = if s.has("coefficients") {
-            s.floats("coefficients", Limits::new(-100.0..=100.0, "(duty cycle over turns)"))
+            s.floats("coefficients", COEFFICIENT)
         } else {
             published.coefficients
         };
@@ -53,19 +68,7 @@ impl MappingSpec {
             basis,
             coefficients,
         };
-        let (low, high) = polynomial.range();
-        let pitch = f64::from(cell.pitch_nm);
-        let (narrow, wide) = cell.width_range_nm;
-        let half_step = f64::from(cell.width_step_nm) / 2.0;
-        let fits = low * pitch >= f64::from(narrow) - half_step && high * pitch <= f64::from(wide) + half_step;
-        if !fits && !polynomial.coefficients.is_empty() {
-            s.fault_given(
-                &["cell.pitch_nm", "cell.width_min_nm", "cell.width_max_nm", "cell.width_step_nm", "mapping.basis"],
-                "coefficients",
-                format!("this mapping asks for widths from {:.1} to {:.1} nm", low * pitch, high * pitch),
-                format!("the cell allows {narrow} to {wide} nm: change the coefficients or [cell] width_min_nm, width_max_nm"),
-            );
-        }
+        check_widths(s, cell, &polynomial);
         let table_file = s.has("table").then(|| s.file("table"));
         if table_file.is_some() && s.has("coefficients") {
             s.fault(
@@ -74,13 +77,33 @@ impl MappingSpec {
                 "keep one of `table` and `coefficients`",
             );
         }
+        let steered = s.sections("steered");
+        let steered: Vec<_> = steered
+            .iter()
+            .map(|s| SteeredMapping::read(s, cell, array, &polynomial))
+            .collect();
+        let twice = (1..steered.len()).find(|i| steered[..*i].iter().any(|m| m.steps == steered[*i].steps));
+        if let Some(i) = twice {
+            s.sections("steered")[i].fault(
+                "steps",
+                "these elements have a mapping already",
+                "give one `[[mapping.steered]]` for each pair of steps",
+            );
+        }
         s.finish();
         Self {
             wavelength_um,
             polynomial,
             table_file,
             table: None,
+            steered,
         }
+    }
+
+    /// The mapping of the element that is so many steps from the centre, if it has its own.
+    pub fn steered(&self, index: (i32, i32)) -> Option<&SteeredMapping> {
+        let (x, y) = (index.0.unsigned_abs(), index.1.unsigned_abs());
+        self.steered.iter().find(|m| m.steps == (x.max(y), x.min(y)))
     }
 
     /// Read the table, if there is one.
@@ -90,5 +113,77 @@ impl MappingSpec {
             self.table = Some(MappingTable::read_csv(file, &allowed)?);
         }
         Ok(())
+    }
+}
+
+impl SteeredMapping {
+    fn read(s: &Section<'_, '_>, cell: &CellSpec, array: &ArraySpec, common: &InversePolynomial) -> Self {
+        let steps = s.array::<2>("steps", Limits::new(0.0..=49.0, "steps from the centre element"));
+        let [first, second] = steps.map(|v| v as u32);
+        let outermost = (
+            array.count.0.max(array.count.1) / 2,
+            array.count.0.min(array.count.1) / 2,
+        );
+        let is_whole = steps.iter().all(|v| v.fract() == 0.0);
+        if !is_whole || first == 0 || second > first || first > outermost.0 || second > outermost.1 {
+            s.fault_given(
+                &["array.elements"],
+                "steps",
+                format!(
+                    "no steered elements are {} and {} steps from the centre",
+                    steps[0], steps[1]
+                ),
+                "give whole steps of elements that there are, the larger first, such as [1, 0]",
+            );
+        }
+        let polynomial = InversePolynomial {
+            coefficients: s.floats("coefficients", COEFFICIENT),
+            ..common.clone()
+        };
+        if polynomial.coefficients.is_empty() && s.has("coefficients") {
+            s.fault(
+                "coefficients",
+                "a mapping of no coefficients gives no width",
+                "list those of u^0, u^1, ...",
+            );
+        }
+        check_widths(s, cell, &polynomial);
+        s.finish();
+        Self {
+            steps: (first, second),
+            polynomial,
+        }
+    }
+}
+
+/// A mapping must ask for widths that the cell allows.
+fn check_widths(s: &Section<'_, '_>, cell: &CellSpec, polynomial: &InversePolynomial) {
+    if polynomial.coefficients.is_empty() {
+        return;
+    }
+    let (low, high) = polynomial.range();
+    let pitch = f64::from(cell.pitch_nm);
+    let (narrow, wide) = cell.width_range_nm;
+    let half_step = f64::from(cell.width_step_nm) / 2.0;
+    let fits = low * pitch >= f64::from(narrow) - half_step && high * pitch <= f64::from(wide) + half_step;
+    if !fits {
+        s.fault_given(
+            &[
+                "cell.pitch_nm",
+                "cell.width_min_nm",
+                "cell.width_max_nm",
+                "cell.width_step_nm",
+                "mapping.basis",
+            ],
+            "coefficients",
+            format!(
+                "this mapping asks for widths from {:.1} to {:.1} nm",
+                low * pitch,
+                high * pitch
+            ),
+            format!(
+                "the cell allows {narrow} to {wide} nm: change the coefficients or [cell] width_min_nm, width_max_nm"
+            ),
+        );
     }
 }

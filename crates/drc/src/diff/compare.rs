@@ -4,8 +4,9 @@ use super::DiffPlan;
 use super::area::{MOST_SIDES, Sides};
 use super::content::{Content, Outlines, Ring, TextCopy};
 use super::report::{Change, ChangeMap, ElementDiff, LayerDiff, LayoutDiff, TextAt, TreeDiff};
+use metalith_core::WidthRows;
 use metalith_core::text::printable_bytes;
-use metalith_gds::extract::ExtractedElement;
+use metalith_gds::extract::{ExtractedElement, HeldWidths};
 use metalith_gds::{LayerNumber, Point, Rect};
 
 /// Tiles along the longer side of the map of changes.
@@ -141,7 +142,7 @@ fn map_over(a: &Content, b: &Content, unit_nm: f64) -> ChangeMap {
     }
 }
 
-fn element(a: &ExtractedElement, b: &ExtractedElement, changes: &mut Changes) -> ElementDiff {
+fn element(a: &ExtractedElement<HeldWidths>, b: &ExtractedElement<HeldWidths>, changes: &mut Changes) -> ElementDiff {
     let lattice = a.site.lattice;
     let mut diff = ElementDiff {
         name: a.site.name.clone(),
@@ -158,11 +159,11 @@ fn element(a: &ExtractedElement, b: &ExtractedElement, changes: &mut Changes) ->
     };
     let (mut both, mut squares) = (0u64, 0u64);
     let layer = changes.plan.pillar_layer;
-    for ((row, column), &from) in a.widths.width_nm.indexed_iter() {
-        let to = b.widths.width_nm[[row, column]];
+    let (n, [mut room, mut other_room]) = (lattice.sites(), [Vec::new(), Vec::new()]);
+    let mut site = |row: usize, column: usize, from: u16, to: u16| {
         both += u64::from(from != 0 && to != 0);
         if from == to {
-            continue;
+            return;
         }
         let (count, what) = match (from, to) {
             (0, _) => (&mut diff.added, "added"),
@@ -180,6 +181,13 @@ fn element(a: &ExtractedElement, b: &ExtractedElement, changes: &mut Changes) ->
         let y = (a.site.centre_nm[1] + lattice.coordinate_nm(row)) as f64;
         let half = f64::from(from.max(to)) / 2.0;
         changes.add(what, layer, [x - half, y - half, x + half, y + half], Some([from, to]));
+    };
+    for row in 0..n {
+        let from = a.widths.row(row, 0..n, &mut room);
+        let to = b.widths.row(row, 0..n, &mut other_room);
+        for (column, (&from, &to)) in from.iter().zip(to).enumerate() {
+            site(row, column, from, to);
+        }
     }
     diff.rms_change_nm = (squares as f64 / both.max(1) as f64).sqrt();
     diff

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use super::super::work::Allowance;
 use metalith_core::Progress;
 use metalith_core::{Error, Result};
-use metalith_gds::extract::{ElementSite, ExtractedElement, Filler, Scale, Why};
+use metalith_gds::extract::{ElementSite, ExtractedElement, Filler, HeldWidths, Scale, Why};
 use metalith_gds::{
     LayerNumber, Layout, LayoutCell, Point, Rect, Selection, Shape, Text, Transform, Visitor, rectangle_of, simplified,
 };
@@ -26,7 +26,7 @@ pub(super) struct Outlines {
 
 /// One layout.
 pub(super) struct Content {
-    pub elements: Vec<ExtractedElement>,
+    pub elements: Vec<ExtractedElement<HeldWidths>>,
     pub outlines: BTreeMap<LayerNumber, Outlines>,
     pub counts: BTreeMap<LayerNumber, u64>,
     /// Sorted.
@@ -108,8 +108,12 @@ impl Content {
         if reader.pillar_shapes > 0 {
             *reader.counts.entry(pillars).or_default() += reader.pillar_shapes;
         }
+        let elements = reader.filler.finish().map_err(|cause| {
+            let what = format!("{}: {cause}", layout.path().display());
+            Error::invalid(what, cause.remedy())
+        })?;
         Ok(Self {
-            elements: reader.filler.elements,
+            elements,
             outlines: reader.outlines,
             counts: reader.counts,
             texts: reader.texts,
@@ -223,7 +227,7 @@ pub(super) fn area2(ring: &[Point]) -> i128 {
 
 impl Visitor for ContentReader<'_> {
     fn cell(&mut self, _cell: &LayoutCell, placements: &[Transform]) -> Result<()> {
-        self.filler.begin(placements.len());
+        self.filler.begin(placements);
         Ok(())
     }
 
@@ -233,6 +237,9 @@ impl Visitor for ContentReader<'_> {
         match &shape.rect {
             Some(rect) if square && shape.layer == self.pillars => {
                 self.pillar_shapes += placements.len() as u64;
+                if self.filler.put_orbits(rect, placements, |width| width % 2 == 0) {
+                    return Ok(());
+                }
                 for (k, placement) in placements.iter().enumerate() {
                     let placed = placement.apply_rect(rect).unwrap_or(*rect);
                     self.pillar(&placed, k)?;

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use super::sites::Scale;
 use crate::{
-    Error, ExtractionError, LayerNumber, Layout, LayoutCell, Rect, Result, Selection, Shape, Transform, Visitor,
+    Error, ExtractionError, LayerNumber, Layout, LayoutCell, Point, Rect, Result, Selection, Shape, Transform, Visitor,
 };
 use metalith_core::ElementSite;
 use metalith_core::{Lattice, Progress};
@@ -14,6 +14,8 @@ use metalith_core::{Lattice, Progress};
 const TILE_NM: i64 = 1 << 13;
 /// Tiles of the map: 5 x 5 lenses of 1 mm occupy 300,000.
 const MOST_TILES: usize = 1 << 21;
+/// Bits of the place of a tile along an axis by which it is looked up first: 128 x 128 tiles are 1 mm.
+const LATELY: u32 = 7;
 /// Centres remembered a tile, to tell pitch and phase from.
 const SAMPLES: usize = 24;
 /// Wider squares are pads or marks (nm).
@@ -25,20 +27,33 @@ const MOST_ELEMENTS: usize = 4096;
 /// Lattice sites for each square found: a lens fills 0.79 of its lattice.
 const SITES_PER_PILLAR: u64 = 64;
 
-/// Squares in one tile; centres doubled (half nm).
-#[derive(Clone, Debug, Default)]
+/// Squares in one tile; centres from the tile's corner, doubled (half nm). Small, because every square comes here.
+#[derive(Clone, Debug)]
 struct Tile {
     squares: u64,
-    bounds: Option<Rect>,
-    /// Centres from the tile's corner, doubled (half nm); so many of them.
-    samples: [(u16, u16); SAMPLES],
+    low: (u16, u16),
+    high: (u16, u16),
+    /// Number of its samples.
     sampled: u8,
+}
+
+impl Tile {
+    const EMPTY: Self = Self {
+        squares: 0,
+        low: (u16::MAX, u16::MAX),
+        high: (0, 0),
+        sampled: 0,
+    };
 }
 
 struct Map {
     scale: Scale,
     numbers: HashMap<(i64, i64), u32>,
     tiles: Vec<((i64, i64), Tile)>,
+    /// Some centres in each tile, as in the tile.
+    samples: Vec<[(u16, u16); SAMPLES]>,
+    /// Tiles met lately, by the low bits of their place: most squares are looked up here, without a hash.
+    lately: Vec<u32>,
     /// Tile that each placement of the current cell met last.
     guesses: Vec<u32>,
     /// There are more tiles than are held.
@@ -57,6 +72,8 @@ pub fn discover(
         scale,
         numbers: HashMap::new(),
         tiles: Vec::new(),
+        samples: Vec::new(),
+        lately: vec![0; 1 << (2 * LATELY)],
         guesses: Vec::new(),
         scattered: false,
     };
@@ -114,24 +131,26 @@ impl Map {
         let key = (x.div_euclid(2 * TILE_NM), y.div_euclid(2 * TILE_NM));
         let guess = &mut self.guesses[placement];
         if self.tiles.get(*guess as usize).is_none_or(|(k, _)| *k != key) {
-            let next = self.tiles.len() as u32;
-            *guess = *self.numbers.entry(key).or_insert(next);
-            if *guess == next {
-                self.tiles.push((key, Tile::default()));
+            let low = |v: i64| (v & ((1 << LATELY) - 1)) as usize;
+            let lately = &mut self.lately[low(key.1) << LATELY | low(key.0)];
+            if self.tiles.get(*lately as usize).is_none_or(|(k, _)| *k != key) {
+                let next = self.tiles.len() as u32;
+                *lately = *self.numbers.entry(key).or_insert(next);
+                if *lately == next {
+                    self.tiles.push((key, Tile::EMPTY));
+                    self.samples.push([(0, 0); SAMPLES]);
+                }
             }
+            *guess = *lately;
         }
+        let from_corner = |v: i64| v.rem_euclid(2 * TILE_NM) as u16;
+        let (x, y) = (from_corner(x), from_corner(y));
         let tile = &mut self.tiles[*guess as usize].1;
         tile.squares += 1;
-        let centre = Rect {
-            x0: x,
-            y0: y,
-            x1: x,
-            y1: y,
-        };
-        tile.bounds.get_or_insert(centre).unite(&centre);
+        tile.low = (tile.low.0.min(x), tile.low.1.min(y));
+        tile.high = (tile.high.0.max(x), tile.high.1.max(y));
         if usize::from(tile.sampled) < SAMPLES && width % 2 == 0 {
-            let from_corner = |v: i64| v.rem_euclid(2 * TILE_NM) as u16;
-            tile.samples[usize::from(tile.sampled)] = (from_corner(x), from_corner(y));
+            self.samples[*guess as usize][usize::from(tile.sampled)] = (x, y);
             tile.sampled += 1;
         }
     }
@@ -162,12 +181,16 @@ impl Map {
         clusters
     }
 
+    /// A place in a tile, doubled (half nm).
+    fn place(&self, tile: usize, (x, y): (u16, u16)) -> (i64, i64) {
+        let (column, row) = self.tiles[tile].0;
+        (2 * TILE_NM * column + i64::from(x), 2 * TILE_NM * row + i64::from(y))
+    }
+
     /// Centres remembered of a tile, doubled (half nm).
     fn samples(&self, tile: usize) -> impl Iterator<Item = (i64, i64)> + '_ {
-        let ((x, y), tile) = &self.tiles[tile];
-        tile.samples[..usize::from(tile.sampled)]
-            .iter()
-            .map(move |s| (2 * TILE_NM * x + i64::from(s.0), 2 * TILE_NM * y + i64::from(s.1)))
+        let sampled = usize::from(self.tiles[tile].1.sampled);
+        self.samples[tile][..sampled].iter().map(move |&s| self.place(tile, s))
     }
 
     /// The lattice of one cluster; none if it is too small to be an element.
@@ -192,9 +215,9 @@ impl Map {
         };
         let bounds = cluster
             .iter()
-            .filter_map(|&k| self.tiles[k].1.bounds)
-            .fold(Rect::EMPTY, |mut sum, b| {
-                sum.unite(&b);
+            .flat_map(|&k| [self.tiles[k].1.low, self.tiles[k].1.high].map(|place| self.place(k, place)))
+            .fold(Rect::EMPTY, |mut sum, (x, y)| {
+                sum.include(Point::new(x, y));
                 sum
             });
         let axis = |of: fn((i64, i64)) -> i64, from: i64, to: i64| {

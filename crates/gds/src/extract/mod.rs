@@ -5,6 +5,8 @@
 //! squares on a common lattice are found ([`Elements::Discover`]).
 
 mod discover;
+mod filler;
+mod held;
 mod oddity;
 mod pillars;
 mod plan;
@@ -19,11 +21,12 @@ use std::path::Path;
 
 use crate::{Error, ExtractionError, Layout, Result};
 pub use metalith_core::ElementSite;
-use metalith_core::{LayerNumber, PillarReader, Progress, WidthMap};
+use metalith_core::{EighthMap, LayerNumber, PillarReader, Progress, WidthMap};
 use pillars::PillarCollector;
 
 pub use discover::discover;
-pub use pillars::Filler;
+pub use filler::Filler;
+pub use held::HeldWidths;
 pub use sites::Scale;
 
 /// Sites of all elements together: 5 x 5 lenses of 1 mm have 204 million.
@@ -34,7 +37,28 @@ const MOST_SITES: u64 = 1 << 28;
 /// # Errors
 /// [`ExtractionError::Sites`] if they have too many sites together.
 pub fn fits(path: &Path, elements: &[ElementSite]) -> Result<()> {
-    let sites = elements.iter().map(|e| (e.lattice.sites() as u64).pow(2)).sum();
+    fits_as(path, elements, &vec![Holding::Whole; elements.len()])
+}
+
+/// How an element is held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Holding {
+    /// All sites.
+    Whole,
+    /// An eighth of them, which symmetry makes whole.
+    Eighth,
+}
+
+/// As [`fits`], with how each element is held.
+///
+/// # Errors
+/// As [`fits`].
+pub fn fits_as(path: &Path, elements: &[ElementSite], holdings: &[Holding]) -> Result<()> {
+    let held = |(e, holding): (&ElementSite, &Holding)| match holding {
+        Holding::Whole => (e.lattice.sites() as u64).pow(2),
+        Holding::Eighth => EighthMap::sites(e.lattice),
+    };
+    let sites = elements.iter().zip(holdings).map(held).sum();
     if sites <= MOST_SITES {
         return Ok(());
     }
@@ -72,15 +96,63 @@ impl PillarReader for GdsPillars {
 /// If the layout has no single top cell, dangling or circular references, if no element is found or one is
 /// out of all proportion, or if the file cannot be read.
 pub fn extract(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) -> Result<Extraction> {
-    let scale = Scale::of(layout)?;
-    let selection = plan.selection();
-    let roots = layout.roots(&selection)?;
-    let sites = match &plan.elements {
-        Elements::Given(sites) => sites.clone(),
-        Elements::Discover => discover(layout, &plan.selection(), &[plan.pillar_layer], scale, progress)?,
+    let found = sites_of(layout, plan, progress)?;
+    fits(layout.path(), &found)?;
+    let folded = extract_from(layout, plan, found, progress)?;
+    let whole = |e: ExtractedElement<HeldWidths>| ExtractedElement {
+        site: e.site,
+        widths: e.widths.into_map(),
     };
-    fits(layout.path(), &sites)?;
-    let mut pillars = PillarCollector::new(plan, sites, scale);
+    Ok(Extraction {
+        top: folded.top,
+        elements: folded.elements.into_iter().map(whole).collect(),
+        pillars: folded.pillars,
+        oddities: folded.oddities,
+        survey: folded.survey,
+    })
+}
+
+/// As [`extract`]; elements that are folded by all symmetries of the square stay so, which makes room for larger ones.
+///
+/// # Errors
+/// As [`extract`].
+pub fn extract_folded(
+    layout: &Layout,
+    plan: &ExtractionPlan,
+    progress: &dyn Progress,
+) -> Result<Extraction<HeldWidths>> {
+    let found = sites_of(layout, plan, progress)?;
+    extract_from(layout, plan, found, progress)
+}
+
+/// The elements of a layout: as given, or as found.
+fn sites_of(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) -> Result<Vec<ElementSite>> {
+    layout.roots(&plan.selection())?;
+    Ok(match &plan.elements {
+        Elements::Given(sites) => sites.clone(),
+        Elements::Discover => discover(
+            layout,
+            &plan.selection(),
+            &[plan.pillar_layer],
+            Scale::of(layout)?,
+            progress,
+        )?,
+    })
+}
+
+fn extract_from(
+    layout: &Layout,
+    plan: &ExtractionPlan,
+    sites: Vec<ElementSite>,
+    progress: &dyn Progress,
+) -> Result<Extraction<HeldWidths>> {
+    let selection = plan.selection();
+    let top = layout.roots(&selection)?[0];
+    let mut pillars = PillarCollector::new(plan, sites, Scale::of(layout)?);
     layout.visit(&selection, &mut pillars, progress)?;
-    Ok(pillars.finish(layout.cells()[roots[0]].name.clone()))
+    let name = layout.cells()[top].name.clone();
+    pillars.finish(name).map_err(|cause| Error::Extraction {
+        path: layout.path().to_owned(),
+        cause,
+    })
 }

@@ -1,103 +1,15 @@
 //! The visitor that fills the width maps.
 
+use super::filler::Filler;
+use super::held::HeldWidths;
 use super::oddity::{Oddities, Oddity, Why};
-use super::plan::{ExtractedElement, Extraction, ExtractionPlan};
-use super::sites::{Scale, Sites, Standing};
+use super::plan::{Extraction, ExtractionPlan};
+use super::sites::Scale;
 use super::survey::Surveyor;
-use crate::{LayerNumber, LayoutCell, Point, Rect, Shape, Text, Transform, Visitor, rectangle_of, simplified};
+use crate::{
+    ExtractionError, LayerNumber, LayoutCell, Point, Rect, Shape, Text, Transform, Visitor, rectangle_of, simplified,
+};
 use metalith_core::ElementSite;
-use metalith_core::WidthMap;
-
-/// Puts squares on the sites of elements.
-pub struct Filler {
-    scale: Scale,
-    sites: Sites,
-    pub elements: Vec<ExtractedElement>,
-    /// Element that each placement of the current cell met last.
-    guesses: Vec<u32>,
-    pub pillars: u64,
-}
-
-impl Filler {
-    pub fn new(sites: Vec<ElementSite>, scale: Scale) -> Self {
-        let index = Sites::new(&sites, scale);
-        let empty = |site: ElementSite| ExtractedElement {
-            widths: WidthMap::empty(site.lattice),
-            site,
-        };
-        Self {
-            scale,
-            sites: index,
-            elements: sites.into_iter().map(empty).collect(),
-            guesses: Vec::new(),
-            pillars: 0,
-        }
-    }
-
-    /// A cell with so many placements begins.
-    pub fn begin(&mut self, placements: usize) {
-        self.guesses.clear();
-        self.guesses.resize(placements, 0);
-    }
-
-    /// Put an upright rectangle of the layout on its site if `takes` its width in database units, and say
-    /// whether it was taken, or why it has no site.
-    #[inline]
-    pub fn put(&mut self, r: &Rect, placement: usize, takes: impl Fn(i64) -> bool) -> Result<bool, Why> {
-        if !self.scale.reaches(r) {
-            return Err(Why::OutsideElements);
-        }
-        if r.width() != r.height() {
-            return Err(Why::NotSquare);
-        }
-        let width_nm = self.scale.whole_nm(r.width()).ok_or(Why::OddShape)?;
-        let (element, row, column) = match self.sites.stand(r, &mut self.guesses[placement]) {
-            Standing::Site(element, row, column) => (element, row, column),
-            Standing::Between(element) if width_nm > self.sites.pitch_nm(element) => return Err(Why::TooWide),
-            Standing::Between(_) => return Err(Why::OffLattice),
-            Standing::Outside => return Err(Why::OutsideElements),
-        };
-        if width_nm > self.sites.pitch_nm(element) || width_nm > i64::from(u16::MAX) {
-            return Err(Why::TooWide);
-        }
-        if !takes(r.width()) {
-            return Ok(false);
-        }
-        let place = &mut self.elements[element as usize].widths.width_nm[[row, column]];
-        if *place != 0 {
-            return Err(Why::DuplicateSite);
-        }
-        *place = width_nm as u16;
-        self.pillars += 1;
-        Ok(true)
-    }
-}
-
-impl Filler {
-    /// Of a square and the one that is on its site already, leave the wider there; the other, as a
-    /// rectangle about the same site. Both have even widths.
-    pub fn keep_wider(&mut self, r: &Rect, placement: usize) -> Rect {
-        let Standing::Site(element, row, column) = self.sites.stand(r, &mut self.guesses[placement]) else {
-            return *r;
-        };
-        let Some(width_nm) = self.scale.whole_nm(r.width()) else {
-            return *r;
-        };
-        let place = &mut self.elements[element as usize].widths.width_nm[[row, column]];
-        let there = i64::from(*place);
-        if width_nm <= there {
-            return *r;
-        }
-        *place = width_nm as u16;
-        let less = r.width() - there * r.width() / width_nm;
-        Rect {
-            x0: r.x0 + less / 2,
-            y0: r.y0 + less / 2,
-            x1: r.x1 - less / 2,
-            y1: r.y1 - less / 2,
-        }
-    }
-}
 
 /// Fills width maps from the shapes of a layout, and lists what is no pillar.
 pub(super) struct PillarCollector {
@@ -121,14 +33,14 @@ impl PillarCollector {
         }
     }
 
-    pub fn finish(self, top: String) -> Extraction {
-        Extraction {
+    pub fn finish(self, top: String) -> Result<Extraction<HeldWidths>, ExtractionError> {
+        Ok(Extraction {
             top,
-            elements: self.filler.elements,
-            pillars: self.filler.pillars,
+            pillars: self.filler.pillars(),
+            elements: self.filler.finish()?,
             oddities: self.oddities,
             survey: self.surveyor.finish(self.scale),
-        }
+        })
     }
 
     /// An upright rectangle of the layout.
@@ -168,7 +80,7 @@ impl PillarCollector {
 impl Visitor for PillarCollector {
     fn cell(&mut self, _cell: &LayoutCell, placements: &[Transform]) -> metalith_core::Result<()> {
         self.surveyor.begin(placements);
-        self.filler.begin(placements.len());
+        self.filler.begin(placements);
         Ok(())
     }
 
@@ -180,6 +92,9 @@ impl Visitor for PillarCollector {
         }
         match &shape.rect {
             Some(rect) if placements.iter().all(Transform::is_square) => {
+                if self.filler.put_orbits(rect, placements, |_| true) {
+                    return Ok(());
+                }
                 for (k, placement) in placements.iter().enumerate() {
                     let placed = placement.apply_rect(rect).unwrap_or(*rect);
                     self.rectangle(&placed, k, shape.offset);

@@ -57,17 +57,17 @@ impl ExtractionPlan {
 
 /// The pillars of one element as the layout has them.
 #[derive(Clone, Debug)]
-pub struct ExtractedElement {
+pub struct ExtractedElement<W = WidthMap> {
     pub site: ElementSite,
-    pub widths: WidthMap,
+    pub widths: W,
 }
 
 /// What a layout holds.
 #[derive(Clone, Debug)]
-pub struct Extraction {
+pub struct Extraction<W = WidthMap> {
     /// Name of the cell that was read.
     pub top: String,
-    pub elements: Vec<ExtractedElement>,
+    pub elements: Vec<ExtractedElement<W>>,
     /// Squares on a lattice, over all elements.
     pub pillars: u64,
     /// Everything on the pillar layer that is not a square on the lattice of an element.

@@ -1,5 +1,6 @@
 //! The reader and the extraction: hand-built bytes, files of other tools, random trees, damaged bytes.
 
+mod folded;
 mod oasis;
 mod trees;
 

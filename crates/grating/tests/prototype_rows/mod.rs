@@ -6,6 +6,7 @@ use metalith_core::{Silent, Wedge};
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, WidthRule};
 use metalith_grating::{CoarseCell, Mapping, NeighbourTable, NeighbourTableSpec, RealRow};
+use num_complex::Complex64;
 
 /// Pillars of a row along x, where a mirror plane halves the unknowns, and of others.
 const PILLARS: usize = 20;
@@ -16,7 +17,7 @@ pub const RADII_UM: [f64; 4] = [60.0, 180.0, 300.0, 440.0];
 
 /// Directions away from the middle: of a centre element, whose axes are all alike, and of one that is steered along x.
 const CENTRE: [[i32; 2]; 2] = [[1, 0], [1, 1]];
-const STEERED: [[i32; 2]; 3] = [[1, 0], [-1, 0], [0, 1]];
+const STEERED: [[i32; 2]; 5] = [[1, 0], [-1, 0], [0, 1], [1, 1], [1, -1]];
 
 /// Share of the light that models put elsewhere than the supercell of a row, mean of s and p.
 pub struct RowMisfit {
@@ -34,6 +35,9 @@ pub struct RowMisfit {
 pub struct Misfits {
     pub rows: Vec<RowMisfit>,
     pub left_out: f64,
+    /// Share of the light in the first order of all rows together, mean of s and p: by equal neighbours lit as the rows
+    /// are, by the neighbours that there are, by the supercells.
+    pub first: [f64; 3],
 }
 
 impl Misfits {
@@ -60,26 +64,28 @@ impl Prototype {
     pub fn neighbours(&self, wavelength_um: f64, sines: [f64; 2]) -> NeighbourTable {
         let spec = NeighbourTableSpec { wavelength_um, sines };
         let stack = self.design.cell_stack().unwrap();
-        NeighbourTable::obtain(&spec, &stack, &self.mapping, None, &Silent).unwrap()
+        NeighbourTable::obtain(&spec, &stack, std::slice::from_ref(&self.mapping), None, &Silent).unwrap()
     }
 
-    /// Rows of an element that is steered by this angle along x, in light from where it looks.
-    pub fn misfits(&self, wavelength_nm: f64, steered_deg: f64) -> Misfits {
+    /// Rows of an element that is steered by these angles along x and y, in light from where it looks.
+    pub fn misfits(&self, wavelength_nm: f64, steered_deg: [f64; 2]) -> Misfits {
         let um = wavelength_nm * 1e-3;
-        // Steered towards -x, so that light arrives from +x as tables have it.
+        // Steered towards -x and -y, so that light arrives from the other side as tables have it.
+        let [sin_x, sin_y] = steered_deg.map(|deg| -deg.to_radians().sin());
         let wedge = Wedge {
             wavelength_um: 0.55,
-            sin_x: -steered_deg.to_radians().sin(),
-            sin_y: 0.0,
+            sin_x,
+            sin_y,
         };
-        let sines = [-wedge.sin_x * um / wedge.wavelength_um, 0.0];
+        let sines = [sin_x, sin_y].map(|sine| -sine * um / wedge.wavelength_um);
+        let along_normal = steered_deg == [0.0; 2];
         let stack = self.design.cell_stack().unwrap();
         let coarse = CoarseCell::new(&stack, um, self.mapping.range_nm()).unwrap();
         let full = coarse.full_transmission().unwrap();
         let equal = PointwiseCell::new(stack.clone(), self.design.cell.widths_nm());
         let widest = self.design.cell.pitch_nm as u16;
         let normal = equal.transmissions(um, widest).unwrap();
-        let as_lit = if steered_deg == 0.0 {
+        let as_lit = if along_normal {
             [normal.clone(), normal.clone()]
         } else {
             equal.oblique(um, sines, widest).unwrap().unwrap().kept
@@ -87,56 +93,53 @@ impl Prototype {
         let normal = [normal.clone(), normal];
         let table = self.neighbours(um, sines);
 
+        let rule = WidthRule::new(&self.design.cell, &self.design.mapping);
         let mut rows = Vec::new();
+        let mut first = [[Complex64::ZERO; 2]; 3];
         for radius_um in RADII_UM {
-            let directions: &[_] = if steered_deg == 0.0 { &CENTRE } else { &STEERED };
+            let directions: &[_] = if along_normal { &CENTRE } else { &STEERED };
             for &direction in directions {
+                let turns = self.turns(&wedge, radius_um, direction);
                 let row = RealRow {
                     direction,
-                    widths_nm: self.widths_nm(&wedge, radius_um, direction),
+                    widths_nm: turns.iter().map(|u| f64::from(rule.width_nm(*u))).collect(),
                 };
                 let row = row.solve(&coarse, sines).unwrap();
-                let single = |t: &[Vec<_>; 2]| {
-                    let sites = t
-                        .clone()
-                        .map(|t| row.widths_nm.iter().map(|w| t[*w as usize]).collect());
-                    row.misfit(&sites)
+                let single = |t: &[Vec<Complex64>; 2]| -> [Vec<Complex64>; 2] {
+                    t.clone()
+                        .map(|t| row.widths_nm.iter().map(|w| t[*w as usize]).collect())
                 };
+                let (as_lit, neighbours) = (single(&as_lit), table.sites(&row.lattice, &row.widths_nm, full));
+                for (sum, found) in first.iter_mut().zip([&as_lit, &neighbours, row.transmitted()]) {
+                    let amplitude = row.first_order(found, &turns);
+                    sum.iter_mut().zip(amplitude).for_each(|(sum, a)| *sum += a);
+                }
                 rows.push(RowMisfit {
                     radius_um,
                     direction,
-                    normal: single(&normal),
-                    as_lit: single(&as_lit),
-                    neighbours: row.misfit(&table.sites(&row.lattice, &row.widths_nm, full)),
+                    normal: row.misfit(&single(&normal)),
+                    as_lit: row.misfit(&as_lit),
+                    neighbours: row.misfit(&neighbours),
                 });
             }
         }
+        let count = rows.len() as f64;
         Misfits {
-            rows,
             left_out: table.left_out(),
+            first: first.map(|amplitude| amplitude.iter().map(|a| (a / count).norm_sqr()).sum::<f64>() / 2.0),
+            rows,
         }
     }
 
-    fn widths_nm(&self, wedge: &Wedge, radius_um: f64, direction: [i32; 2]) -> Vec<f64> {
-        let lattice = self.design.lattice();
-        let lens = LensPhase::new(lattice, self.design.lens.diameter_nm, &self.design.lens.phase);
-        let phase = ElementPhase::new(&lens, wedge);
-        let rule = WidthRule::new(&self.design.cell, &self.design.mapping);
-        let [dx, dy] = direction;
-        let steps = radius_um / lattice.pitch_um() / f64::from(dx).hypot(f64::from(dy));
-        let middle = lattice.sites() as i32 / 2;
-        let [x, y] = direction.map(|d| middle + (steps * f64::from(d)) as i32);
-        let pillars = if dy == 0 { PILLARS } else { PILLARS_ACROSS };
-        (0..pillars as i32)
-            .map(|k| {
-                // A diagonal row has a site at every step of x + y.
-                let (x, y) = match direction {
-                    [1, 1] => (x + (k + 1) / 2, y + k / 2),
-                    _ => (x + dx * k, y + dy * k),
-                };
-                let turns = phase.wrapped(x as usize, y as usize).expect("a site of the lens");
-                f64::from(rule.width_nm(turns))
-            })
-            .collect()
+    /// Phases of a row (turns).
+    fn turns(&self, wedge: &Wedge, radius_um: f64, direction: [i32; 2]) -> Vec<f64> {
+        let lens = LensPhase::new(
+            self.design.lattice(),
+            self.design.lens.diameter_nm,
+            &self.design.lens.phase,
+        );
+        let pillars = if direction[1] == 0 { PILLARS } else { PILLARS_ACROSS };
+        let row = ElementPhase::new(&lens, wedge).row(radius_um, direction, pillars);
+        row.expect("a row within the lens")
     }
 }

@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use metalith_core::{Error, LayerNumber, Progress, Result, WidthMap};
+use metalith_core::{Error, LayerNumber, Progress, Result, WidthRows};
+use metalith_design::array::{DomainPart, SymmetryGroup};
 use metalith_oasis::{CellBounds, CompressedBlock, Placing, RecordBuffer, Repetition};
 use rayon::prelude::*;
 
@@ -47,18 +48,18 @@ impl PillarEncoding {
     }
 }
 
-/// Pillars of an element, each in one of several cells.
-pub(super) struct ElementPillars<'a, P> {
-    pub widths: &'a WidthMap,
-    /// Which cell a site (column, row) with a pillar belongs to, if to any.
-    pub part_of: P,
-    /// Pillars of each cell.
-    pub parts: Vec<u64>,
-    pub layer: LayerNumber,
+/// Pillars of an element, those that its symmetries leave unique, in a cell for each part of them.
+pub(super) struct ElementPillars<'a> {
+    pub widths: &'a dyn WidthRows,
+    group: &'a SymmetryGroup,
+    parts: &'a [DomainPart],
+    /// Columns of each part in each row.
+    runs: Vec<Vec<[Range<usize>; 2]>>,
+    layer: LayerNumber,
     /// Number of the cell of each width, for references.
     pub width_cells: Vec<u64>,
     /// Of compression, 1 to 9.
-    pub level: u32,
+    level: u32,
 }
 
 /// Blocks of a cell and the box around its pillars.
@@ -99,10 +100,37 @@ pub(super) fn bounds_of(corners: [i64; 4]) -> CellBounds {
     }
 }
 
-impl<P: Fn(usize, usize) -> Option<usize> + Sync> ElementPillars<'_, P> {
+impl<'a> ElementPillars<'a> {
+    pub fn new(
+        widths: &'a dyn WidthRows,
+        group: &'a SymmetryGroup,
+        parts: &'a [DomainPart],
+        layer: LayerNumber,
+        level: u32,
+    ) -> Self {
+        let n = widths.lattice().sites();
+        let runs = |part| (0..n).map(|iy| group.runs(part, n, iy)).collect();
+        Self {
+            widths,
+            group,
+            parts,
+            runs: parts.iter().map(runs).collect(),
+            layer,
+            width_cells: Vec::new(),
+            level,
+        }
+    }
+
+    /// Whether there is no pillar.
+    pub fn is_empty(&self) -> bool {
+        self.parts.is_empty()
+    }
+
     /// The cell with most pillars: its blocks are not held.
     pub fn largest(&self) -> usize {
-        (0..self.parts.len()).max_by_key(|&k| self.parts[k]).unwrap_or(0)
+        (0..self.parts.len())
+            .max_by_key(|&k| self.parts[k].pillars)
+            .unwrap_or(0)
     }
 
     /// Encode all pillars; blocks of the largest cell are handed to `put` in order, those of the others returned.
@@ -112,17 +140,18 @@ impl<P: Fn(usize, usize) -> Option<usize> + Sync> ElementPillars<'_, P> {
         progress: &dyn Progress,
         mut put: impl FnMut(&CompressedBlock) -> Result<()>,
     ) -> Result<Vec<Encoded>> {
-        let pieces = encoding.pieces(self.widths.lattice.sites());
+        let pieces = encoding.pieces(self.widths.lattice().sites());
         let bytes = self
             .parts
             .iter()
+            .map(|part| part.pillars)
             .sum::<u64>()
             .saturating_mul(encoding.bytes_of_pillar());
         let groups = (bytes.div_ceil(BLOCK_BYTES as u64) as usize).clamp(1, pieces);
         let ranges: Vec<Range<usize>> = (0..groups)
             .map(|k| k * pieces / groups..(k + 1) * pieces / groups)
             .collect();
-        let (largest, rings) = (self.largest(), self.rings());
+        let (largest, rings) = (self.largest(), self.rings(encoding));
         let mut cells: Vec<Encoded> = self.parts.iter().map(|_| Encoded::EMPTY).collect();
         for batch in ranges.chunks(SIDE_BY_SIDE) {
             if progress.stopped() {
@@ -144,22 +173,34 @@ impl<P: Fn(usize, usize) -> Option<usize> + Sync> ElementPillars<'_, P> {
         Ok(cells)
     }
 
-    /// Rings that hold all pillars.
-    fn rings(&self) -> i64 {
-        let rows = self.widths.width_nm.rows().into_iter();
-        let extents = rows.map(|row| {
-            let first = row.iter().position(|&w| w != 0)?;
-            Some((first, row.iter().rposition(|&w| w != 0)?))
+    /// Rings that hold all pillars; none for strips.
+    fn rings(&self, encoding: PillarEncoding) -> i64 {
+        if encoding == PillarEncoding::Lists {
+            return 0;
+        }
+        let n = self.widths.lattice().sites();
+        let mut room = Vec::new();
+        let extents = (0..n).map(|iy| {
+            let runs = self.runs.iter().flat_map(|rows| rows[iy].clone());
+            runs.fold(None, |extent: Option<(usize, usize)>, run| {
+                let row = self.widths.occupied(iy, run.clone(), &mut room);
+                let Some(first) = row.iter().position(|&w| w != 0) else {
+                    return extent;
+                };
+                let last = row.iter().rposition(|&w| w != 0).unwrap_or(first);
+                let (first, last) = (run.start + first, run.start + last);
+                Some(extent.map_or((first, last), |(l, r)| (l.min(first), r.max(last))))
+            })
         });
-        rings::rings_of(self.widths.lattice.sites(), extents)
+        rings::rings_of(n, extents)
     }
 
     /// Bytes of a pillar, from a part of the pieces; none if no pillar is in that.
     pub fn bytes_of_sample(&self, encoding: PillarEncoding) -> Option<f64> {
-        let pieces: Vec<usize> = (SAMPLE / 3..encoding.pieces(self.widths.lattice.sites()))
+        let pieces: Vec<usize> = (SAMPLE / 3..encoding.pieces(self.widths.lattice().sites()))
             .step_by(SAMPLE)
             .collect();
-        let rings = self.rings();
+        let rings = self.rings(encoding);
         let encoded: Vec<Encoded> = pieces
             .par_iter()
             .flat_map_iter(|&k| self.pieces(encoding, rings, k..k + 1))
@@ -187,28 +228,36 @@ impl<P: Fn(usize, usize) -> Option<usize> + Sync> ElementPillars<'_, P> {
 
     /// Pillars of a strip of columns, a list for each width, rows from below.
     fn strip(&self, strip: usize, out: &mut [Packer]) {
-        let n = self.widths.lattice.sites();
+        let n = self.widths.lattice().sites();
         let columns = strip * STRIP..((strip + 1) * STRIP).min(n);
-        for (iy, row) in self.widths.width_nm.rows().into_iter().enumerate() {
-            for ix in columns.clone() {
-                let width = usize::from(row[ix]);
-                if width != 0
-                    && let Some(part) = (self.part_of)(ix, iy)
-                {
-                    let lists = &mut out[part].lists;
+        let mut room = Vec::new();
+        for (packer, rows) in out.iter_mut().zip(&self.runs) {
+            let lists = &mut packer.lists;
+            for (iy, run) in rows
+                .iter()
+                .enumerate()
+                .flat_map(|(iy, runs)| runs.iter().map(move |r| (iy, r)))
+            {
+                let run = run.start.max(columns.start)..run.end.min(columns.end);
+                if run.is_empty() {
+                    continue;
+                }
+                let row = self.widths.row(iy, run.clone(), &mut room);
+                for (ix, &width) in run.zip(row).filter(|(_, w)| **w != 0) {
+                    let width = usize::from(width);
                     if width >= lists.len() {
                         lists.resize(width + 1, Vec::new());
                     }
                     lists[width].push([ix as i32, iy as i32]);
                 }
             }
+            self.put_lists(packer);
         }
-        out.iter_mut().for_each(|packer| self.put_lists(packer));
     }
 
     /// Write the lists of a strip and empty them.
     fn put_lists(&self, out: &mut Packer) {
-        let lattice = self.widths.lattice;
+        let lattice = self.widths.lattice();
         let at = |ix: i32, iy: i32| [ix, iy].map(|i| lattice.coordinate_nm(i as usize));
         for width in 1..out.lists.len() {
             let mut places = std::mem::take(&mut out.lists[width]);
@@ -238,11 +287,11 @@ impl<P: Fn(usize, usize) -> Option<usize> + Sync> ElementPillars<'_, P> {
 
     /// Pillars of a sector, one record each, ring by ring.
     fn sector(&self, encoding: PillarEncoding, sector: usize, rings: i64, out: &mut [Packer]) {
-        let lattice = self.widths.lattice;
+        let lattice = self.widths.lattice();
         rings::walk(lattice.sites(), sector, rings, |ix, iy| {
-            let width = self.widths.width_nm[[iy, ix]];
-            if width != 0
-                && let Some(part) = (self.part_of)(ix, iy)
+            if let Some(part) = self.group.part_of(self.parts, lattice.sites(), ix, iy)
+                && let width = self.widths.width(ix, iy)
+                && width != 0
             {
                 let out = &mut out[part];
                 let centre = [lattice.coordinate_nm(ix), lattice.coordinate_nm(iy)];

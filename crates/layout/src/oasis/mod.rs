@@ -6,8 +6,8 @@ mod rings;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use metalith_core::{Error, Progress, Result, WholeFile, WidthMap};
-use metalith_design::array::{PillarArray, Symmetry, SymmetryGroup};
+use metalith_core::{Error, Progress, Result, WholeFile, WidthRows};
+use metalith_design::array::{DomainPart, PillarArray, Symmetry, SymmetryGroup};
 use metalith_design::{Design, Hierarchy, LayoutLayer};
 use metalith_oasis::{CompressedBlock, OasisWriter, Placing, RecordBuffer};
 
@@ -266,15 +266,10 @@ impl Elements<'_, '_> {
     fn apart(&mut self, array: &PillarArray) -> Result<Vec<PlacedCell>> {
         let mut placed = Vec::new();
         for (k, element) in array.placed.iter().enumerate() {
-            let widths = array.widths(element);
-            let mut pillars = ElementPillars {
-                part_of: |_, _| Some(0),
-                parts: vec![widths.pillars()],
-                widths: &widths,
-                layer: self.layer.number(),
-                width_cells: Vec::new(),
-                level: self.level(),
-            };
+            let widths = array.rows(element);
+            let alone = SymmetryGroup::trivial();
+            let parts = alone.domain(widths.as_ref());
+            let mut pillars = self.element(widths.as_ref(), &alone, &parts);
             let (cell, bounds) = self.pillars(&[format!("E{k}")], &mut pillars)?[0];
             placed.push(PlacedCell::new(
                 cell,
@@ -286,18 +281,19 @@ impl Elements<'_, '_> {
         Ok(placed)
     }
 
+    fn element<'e>(
+        &self,
+        widths: &'e dyn WidthRows,
+        group: &'e SymmetryGroup,
+        parts: &'e [DomainPart],
+    ) -> ElementPillars<'e> {
+        ElementPillars::new(widths, group, parts, self.layer.number(), self.level())
+    }
+
     /// A lens of parts.
-    fn lens(&mut self, name: &str, widths: &WidthMap, group: &SymmetryGroup) -> Result<(u64, [i64; 4])> {
-        let n = widths.lattice.sites();
+    fn lens(&mut self, name: &str, widths: &dyn WidthRows, group: &SymmetryGroup) -> Result<(u64, [i64; 4])> {
         let parts = group.domain(widths);
-        let mut pillars = ElementPillars {
-            part_of: |ix, iy| group.part_of(&parts, n, ix, iy),
-            parts: parts.iter().map(|p| p.pillars).collect(),
-            widths,
-            layer: self.layer.number(),
-            width_cells: Vec::new(),
-            level: self.level(),
-        };
+        let mut pillars = self.element(widths, group, &parts);
         let names: Vec<String> = (b'A'..)
             .take(parts.len())
             .map(|j| format!("{name}_{}", char::from(j)))
@@ -315,11 +311,7 @@ impl Elements<'_, '_> {
     }
 
     /// Write the cells of an element. Returns number and box of each.
-    fn pillars<P: Fn(usize, usize) -> Option<usize> + Sync>(
-        &mut self,
-        names: &[String],
-        pillars: &mut ElementPillars<'_, P>,
-    ) -> Result<Vec<(u64, [i64; 4])>> {
+    fn pillars(&mut self, names: &[String], pillars: &mut ElementPillars<'_>) -> Result<Vec<(u64, [i64; 4])>> {
         let encoding = match self.encoding {
             OasisEncoding::Compact => PillarEncoding::Lists,
             OasisEncoding::Plain => PillarEncoding::Rectangles,
@@ -329,10 +321,11 @@ impl Elements<'_, '_> {
         let largest = pillars.largest();
         let mut numbers = vec![0; names.len()];
         let file = &mut *self.file;
-        let Some(name) = names.get(largest) else {
-            return Ok(Vec::new());
-        };
-        numbers[largest] = file.begin(name)?;
+        if pillars.is_empty() {
+            let empty = |name: &String| Ok((file.cell(name, &RecordBuffer::absolute(), NOTHING)?, NOTHING));
+            return names.iter().map(empty).collect();
+        }
+        numbers[largest] = file.begin(&names[largest])?;
         let cells = pillars.encode(encoding, self.progress, |block| file.block(block))?;
         file.writer.end_cell(bounds_of(cells[largest].bounds));
         for (k, cell) in cells.iter().enumerate().filter(|(k, _)| *k != largest) {
@@ -344,10 +337,7 @@ impl Elements<'_, '_> {
     }
 
     /// The encoding that takes fewer bytes for a part of the pillars.
-    fn smallest<P: Fn(usize, usize) -> Option<usize> + Sync>(
-        &self,
-        pillars: &mut ElementPillars<'_, P>,
-    ) -> PillarEncoding {
+    fn smallest(&self, pillars: &mut ElementPillars<'_>) -> PillarEncoding {
         // Any numbers will do to see how small it gets.
         pillars.width_cells = (0..=u64::from(u16::MAX)).collect();
         let candidates = [PillarEncoding::Lists, PillarEncoding::References];
@@ -358,7 +348,7 @@ impl Elements<'_, '_> {
     }
 
     /// Numbers of the cells of all widths, by width, if the encoding refers to them.
-    fn numbers_of_widths(&mut self, widths: &WidthMap, encoding: PillarEncoding) -> Vec<u64> {
+    fn numbers_of_widths(&mut self, widths: &dyn WidthRows, encoding: PillarEncoding) -> Vec<u64> {
         if encoding != PillarEncoding::References {
             return Vec::new();
         }

@@ -10,4 +10,4 @@ mod bank;
 mod build;
 mod spectrum;
 
-pub use bank::{BankSpec, DistinctKernels, KernelBank};
+pub use bank::{BankSpec, DistinctKernels, KernelBank, TurnedKernel};

@@ -7,26 +7,32 @@
 //! | question | file |
 //! | --- | --- |
 //! | which place of the scene a pixel looks at | `warp` |
+//! | kernels on the pixels of a grid | `source` |
 //! | kernels of a node as spectra | `node` |
+//! | a scene without what its grid cannot hold | `smooth` |
 //! | transforms | `fft2` |
 
 mod fft2;
 mod node;
+mod smooth;
+mod source;
 mod warp;
 
 use std::borrow::Cow;
 
-use metalith_camera::Sensor;
+use metalith_camera::Camera;
 use ndarray::Array2;
 use rayon::prelude::*;
 
+use crate::assumed::Assumed;
 use crate::kernels::KernelBank;
 use crate::veil::{self, Veil};
-use crate::{ElementView, SceneView};
+use crate::{ElementView, SceneSpace, SceneView};
 
 pub use fft2::{FftScratch, SquareFft};
-use node::{ElementOperator, KernelSource};
-pub use warp::{Warp, hat};
+use node::ElementOperator;
+use smooth::Smoothing;
+use source::KernelSource;
 
 /// Which planes of the scene go into an operator, out of the spectra of its bank.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -38,32 +44,62 @@ pub enum SceneInputs {
     Channels(std::ops::Range<usize>),
 }
 
+/// At how many points the scene is sampled for the pixels of the sensor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ScenePoints {
+    FourAPixel,
+    OneAPixel,
+    /// One for a square of two by two pixels, of a scene without what is finer; with a colour filter array light is then
+    /// found for the pixels alone that count a channel.
+    OneASquare,
+}
+
+impl ScenePoints {
+    /// Pixels an axis of a cell: what shares its points.
+    pub fn cell(self) -> usize {
+        match self {
+            Self::FourAPixel | Self::OneAPixel => 1,
+            Self::OneASquare => 2,
+        }
+    }
+
+    /// Points of a cell from its middle along x and y (pixels).
+    pub fn offsets(self) -> &'static [[f64; 2]] {
+        match self {
+            Self::FourAPixel => &[[-0.25, -0.25], [0.25, -0.25], [-0.25, 0.25], [0.25, 0.25]],
+            Self::OneAPixel | Self::OneASquare => &[[0.0; 2]],
+        }
+    }
+}
+
 /// How finely an operator samples the scene, and which kernels it knows.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Detail {
-    /// Points along each axis of a pixel at which the scene is sampled: one or two.
-    pub points: usize,
+    pub points: ScenePoints,
     /// Every how many-th node of the bank along each axis is used; it divides the steps between the nodes.
     pub node_step: usize,
     pub inputs: SceneInputs,
+    pub assumed: Assumed,
 }
 
 impl Detail {
     /// Every node and the scene at four points a pixel: what is taken for the truth.
     pub fn simulation(spectra: usize) -> Self {
         Self {
-            points: 2,
+            points: ScenePoints::FourAPixel,
             node_step: 1,
             inputs: SceneInputs::Spectra(0..spectra),
+            assumed: Assumed::default(),
         }
     }
 
-    /// What a restoration knows: the mean over each pixel, on a coarser grid over the field.
-    pub fn restoration(inputs: SceneInputs) -> Self {
+    /// What a restoration knows: kernels on a coarser grid over the field, and no more of the scene than they pass.
+    pub fn restoration(points: ScenePoints, inputs: SceneInputs) -> Self {
         Self {
-            points: 1,
+            points,
             node_step: 2,
             inputs,
+            assumed: Assumed::default(),
         }
     }
 }
@@ -76,23 +112,35 @@ pub struct FrameOperator<'a> {
     inputs: SceneInputs,
     elements: Vec<ElementOperator<'a>>,
     veil: Cow<'a, Veil>,
+    smoothing: Smoothing,
 }
 
 impl<'a> FrameOperator<'a> {
-    /// For the elements of a bank before a sensor. With one point a pixel spectra of kernels are kept in memory.
+    /// For the elements of a bank before the sensor of a camera. With one point a cell spectra of kernels are kept in
+    /// memory.
     pub fn new(
         bank: &'a KernelBank,
         veil: &'a Veil,
         elements: &[ElementView],
-        sensor: &Sensor,
-        view: &SceneView,
+        camera: &Camera,
+        space: &SceneSpace,
         detail: Detail,
     ) -> Self {
-        let source = KernelSource::new(bank, &detail);
+        let view = &space.view;
+        let sensor = &camera.sensor;
+        let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();
+        let source = KernelSource::new(bank, &detail, sensor, &names);
+        // Pixels of the scene from one point to the next, in the middle of the field.
+        let step = match elements.first() {
+            Some(element) if detail.points == ScenePoints::OneASquare => {
+                sensor.pixel_um * detail.points.cell() as f64 / (element.focal_um * view.pixel())
+            }
+            _ => 0.0,
+        };
         let elements = elements
             .par_iter()
             .enumerate()
-            .map(|(i, e)| ElementOperator::new(i, e, &source, sensor, view))
+            .map(|(i, e)| ElementOperator::new(i, e, &source, sensor, space))
             .collect();
         Self {
             view: *view,
@@ -104,6 +152,7 @@ impl<'a> FrameOperator<'a> {
             },
             inputs: detail.inputs,
             elements,
+            smoothing: Smoothing::new(step),
         }
     }
 
@@ -150,10 +199,11 @@ impl<'a> FrameOperator<'a> {
     /// The same of some of the elements, with or without the veil of all.
     pub fn apply_elements(&self, scene: &[Array2<f32>], elements: &[usize], veil: bool) -> Vec<Array2<f32>> {
         assert_eq!(scene.len(), self.inputs(), "one plane for each spectrum of the scene");
+        let smooth: Vec<_> = scene.par_iter().map(|p| self.smoothing.apply(p)).collect();
         let images: Vec<_> = elements
             .par_iter()
             .map_init(FftScratch::default, |scratch, e| {
-                self.elements[*e].apply(scene, scratch)
+                self.elements[*e].apply(&smooth, scratch)
             })
             .collect();
         let mut frames = vec![Array2::zeros(self.frame); self.channels];
@@ -208,6 +258,7 @@ impl<'a> FrameOperator<'a> {
         for own in found {
             planes.iter_mut().zip(&own).for_each(|(p, o)| *p += o);
         }
+        planes.par_iter_mut().for_each(|p| *p = self.smoothing.adjoint(p));
         if veil {
             let lifted: Vec<Vec<f64>> = frames.par_iter().map(|f| veil::lift(f, self.veil.cells)).collect();
             planes.par_iter_mut().enumerate().for_each(|(input, plane)| {

@@ -1,7 +1,6 @@
 //! One element: its warps, and the kernels of its nodes.
 
 use std::borrow::Cow;
-use std::ops::Range;
 use std::sync::Arc;
 
 use metalith_camera::Sensor;
@@ -9,87 +8,11 @@ use metalith_wave::kernels::fft_size;
 use ndarray::Array2;
 use num_complex::Complex32;
 
-use super::{Detail, FftScratch, SceneInputs, SquareFft, Warp, hat};
-use crate::kernels::{BankSpec, KernelBank};
-use crate::{ElementView, SceneView};
-
-/// Where kernels come from.
-#[derive(Clone)]
-pub struct KernelSource<'a> {
-    bank: &'a KernelBank,
-    points: usize,
-    node_step: usize,
-    inputs: SceneInputs,
-    /// That of the bank, with the nodes that are used.
-    spec: BankSpec,
-}
-
-impl<'a> KernelSource<'a> {
-    pub fn new(bank: &'a KernelBank, detail: &Detail) -> Self {
-        assert!(matches!(detail.points, 1 | 2), "one or two points an axis");
-        let steps = bank.spec.nodes - 1;
-        assert!(steps.is_multiple_of(detail.node_step), "every step ends at a node");
-        Self {
-            bank,
-            points: detail.points,
-            node_step: detail.node_step,
-            inputs: detail.inputs.clone(),
-            spec: BankSpec {
-                nodes: steps / detail.node_step + 1,
-                ..bank.spec
-            },
-        }
-    }
-
-    /// Points within a pixel at which the scene is sampled: shifts from the middle (pixels).
-    fn points(&self) -> &'static [[f64; 2]] {
-        match self.points {
-            1 => &[[0.0; 2]],
-            _ => &[[-0.25, -0.25], [0.25, -0.25], [-0.25, 0.25], [0.25, 0.25]],
-        }
-    }
-
-    /// Which planes of the scene a channel sees, each with the spectra whose kernels act on it.
-    fn inputs(&self, channel: usize) -> Vec<(usize, Range<usize>)> {
-        match &self.inputs {
-            SceneInputs::Spectra(all) => all.clone().enumerate().map(|(i, b)| (i, b..b + 1)).collect(),
-            SceneInputs::Channels(all) => vec![(channel, all.clone())],
-        }
-    }
-
-    /// The kernel of a node on whole pixels, for light at a point of a pixel, `window + 1` values an axis: the middle one
-    /// is the pixel itself.
-    fn pixels(&self, element: usize, node: [usize; 2], channel: usize, bases: Range<usize>, point: usize) -> Vec<f32> {
-        let window = self.spec.window;
-        let side = window + 1;
-        let mut out = vec![0.0f32; side * side];
-        // A kernel value `i` stands at (i - window + 1/2) / 2 pixels; light at a quarter of a pixel beyond the middle is
-        // half a value nearer to what lies there. For one point a pixel, the mean of all four.
-        const PHASES: [[usize; 2]; 4] = [[0, 0], [1, 0], [0, 1], [1, 1]];
-        let phases = match self.points {
-            1 => &PHASES[..],
-            _ => &PHASES[point..=point],
-        };
-        let share = 1.0 / phases.len() as f32;
-        let node = node.map(|n| n * self.node_step);
-        for basis in bases {
-            let kernel = self.bank.kernel(element, node, channel, basis);
-            for [px, py] in phases {
-                for (y, row) in out.chunks_exact_mut(side).enumerate() {
-                    let Some(i) = (2 * y).checked_sub(*py).filter(|i| *i < 2 * window) else {
-                        continue;
-                    };
-                    for (x, v) in row.iter_mut().enumerate() {
-                        if let Some(j) = (2 * x).checked_sub(*px).filter(|j| *j < 2 * window) {
-                            *v += share * kernel.at(i, j);
-                        }
-                    }
-                }
-            }
-        }
-        out
-    }
-}
+use super::source::KernelSource;
+use super::warp::{CellPoint, Warp, hat};
+use super::{FftScratch, SquareFft};
+use crate::ElementView;
+use crate::geometry::SceneSpace;
 
 /// One element of an operator.
 pub struct ElementOperator<'a> {
@@ -97,7 +20,7 @@ pub struct ElementOperator<'a> {
     view: ElementView,
     source: KernelSource<'a>,
     sensor: Sensor,
-    scene: SceneView,
+    scene: SceneSpace,
     channels: Vec<ChannelPlan>,
 }
 
@@ -117,10 +40,13 @@ struct NodePlan {
     spectra: Vec<Complex32>,
 }
 
-/// The sub-image of an element, by channel.
+/// The sub-image of an element: the pixels of one phase of its cells, in one channel.
 pub struct SubImage {
     channel: usize,
+    /// Row and column of the first of its pixels on the sensor.
     origin: [i64; 2],
+    /// Pixels of the sensor from one of its pixels to the next.
+    step: usize,
     light: Array2<f32>,
 }
 
@@ -129,20 +55,22 @@ impl SubImage {
     pub fn add_to(&self, frames: &mut [Array2<f32>]) {
         let frame = &mut frames[self.channel];
         let (rows, columns) = frame.dim();
-        let (own_rows, own_columns) = self.light.dim();
-        for y in 0..own_rows {
-            let row = self.origin[0] + y as i64;
-            if !(0..rows as i64).contains(&row) {
+        for (y, line) in self.light.outer_iter().enumerate() {
+            let Some(row) = inside(self.origin[0] + (y * self.step) as i64, rows) else {
                 continue;
-            }
-            for x in 0..own_columns {
-                let column = self.origin[1] + x as i64;
-                if (0..columns as i64).contains(&column) {
-                    frame[[row as usize, column as usize]] += self.light[[y, x]];
+            };
+            for (x, value) in line.iter().enumerate() {
+                if let Some(column) = inside(self.origin[1] + (x * self.step) as i64, columns) {
+                    frame[[row, column]] += value;
                 }
             }
         }
     }
+}
+
+/// An index, if it is below a length.
+fn inside(index: i64, length: usize) -> Option<usize> {
+    usize::try_from(index).ok().filter(|i| *i < length)
 }
 
 impl<'a> ElementOperator<'a> {
@@ -151,35 +79,36 @@ impl<'a> ElementOperator<'a> {
         view: &ElementView,
         source: &KernelSource<'a>,
         sensor: &Sensor,
-        scene: &SceneView,
+        scene: &SceneSpace,
     ) -> Self {
         let mut own = Self {
             element,
             view: *view,
             source: source.clone(),
             sensor: sensor.clone(),
-            scene: *scene,
+            scene: scene.clone(),
             channels: Vec::new(),
         };
         own.channels = (0..source.bank.channel_um.len()).map(|c| own.channel(c)).collect();
         own
     }
 
-    fn warp(&self, channel: usize, shift: [f64; 2], area: f64) -> Warp {
+    fn warp(&self, channel: usize, point: CellPoint) -> Warp {
         let um = self.source.bank.channel_um[channel];
-        Warp::new(
-            &self.view,
-            &self.sensor,
-            &self.source.spec,
-            &self.scene,
-            um,
-            shift,
-            area,
-        )
+        Warp::new(&self.view, &self.sensor, &self.source.spec, &self.scene, um, point)
     }
 
     fn channel(&self, channel: usize) -> ChannelPlan {
-        let middle = self.warp(channel, [0.0; 2], 1.0);
+        let cell = self.source.points.cell();
+        let middle = self.warp(
+            channel,
+            CellPoint {
+                cell,
+                shift: [0.0; 2],
+                area: (cell * cell) as f64,
+                assumed: self.source.assumed,
+            },
+        );
         let n = self.source.spec.nodes;
         let mut nodes: Vec<NodePlan> = Vec::new();
         for i in 0..n * n {
@@ -197,14 +126,17 @@ impl<'a> ElementOperator<'a> {
             }
         }
         let longest = nodes.iter().flat_map(|n| n.shape).max().unwrap_or(1);
-        let fft = Arc::new(SquareFft::new(fft_size(longest + self.source.spec.window + 1)));
+        let fft = Arc::new(SquareFft::new(fft_size(longest + 2 * self.source.reach() + 1)));
         let mut warps = Vec::new();
-        if self.source.points == 1 {
+        if self.source.points.offsets().len() == 1 {
             let mut scratch = FftScratch::default();
             for node in &mut nodes {
-                for (_, bases) in self.source.inputs(channel) {
-                    node.spectra
-                        .extend(self.spectrum(node.node, channel, bases, 0, &fft, &mut scratch));
+                for phase in 0..self.source.phases(channel).len() {
+                    for input in 0..self.source.inputs(channel).len() {
+                        let at = KernelAt { input, point: 0, phase };
+                        node.spectra
+                            .extend(self.spectrum(node.node, channel, at, &fft, &mut scratch));
+                    }
                 }
             }
             warps.push(middle);
@@ -217,13 +149,14 @@ impl<'a> ElementOperator<'a> {
         &self,
         node: [usize; 2],
         channel: usize,
-        bases: Range<usize>,
-        point: usize,
+        at: KernelAt,
         fft: &SquareFft,
         scratch: &mut FftScratch,
     ) -> Vec<Complex32> {
-        let kernel = self.source.pixels(self.element, node, channel, bases, point);
-        let (side, size) = (self.source.spec.window + 1, fft.size());
+        let bases = self.source.inputs(channel)[at.input].1.clone();
+        let phase = self.source.phases(channel)[at.phase];
+        let kernel = self.source.pixels(self.element, node, channel, bases, at.point, phase);
+        let (side, size) = (2 * self.source.reach() + 1, fft.size());
         let mut square = vec![0.0; size * size];
         for (row, to) in kernel.chunks_exact(side).zip(square.chunks_exact_mut(size)) {
             to[..side].copy_from_slice(row);
@@ -233,22 +166,49 @@ impl<'a> ElementOperator<'a> {
         spectrum
     }
 
-    /// Warps of a channel at all points within a pixel: those that are kept, or made now.
+    /// Warps of a channel at all points within a cell: those that are kept, or made now.
     fn warps<'b>(&self, channel: usize, plan: &'b ChannelPlan) -> Cow<'b, [Warp]> {
         if !plan.warps.is_empty() {
             return Cow::Borrowed(&plan.warps);
         }
-        let points = self.source.points();
-        let area = 1.0 / points.len() as f64;
-        points.iter().map(|shift| self.warp(channel, *shift, area)).collect()
+        let (cell, points) = (self.source.points.cell(), self.source.points.offsets());
+        let area = (cell * cell) as f64 / points.len() as f64;
+        let warp = |shift: &[f64; 2]| {
+            self.warp(
+                channel,
+                CellPoint {
+                    cell,
+                    shift: *shift,
+                    area,
+                    assumed: self.source.assumed,
+                },
+            )
+        };
+        points.iter().map(warp).collect()
+    }
+
+    /// The kept spectrum of a node for one of its phases and inputs, or one that is made now.
+    fn kernel<'b>(
+        &self,
+        channel: usize,
+        plan: &'b ChannelPlan,
+        node: &'b NodePlan,
+        at: KernelAt,
+        scratch: &mut FftScratch,
+    ) -> Cow<'b, [Complex32]> {
+        if node.spectra.is_empty() {
+            return Cow::Owned(self.spectrum(node.node, channel, at, &plan.fft, scratch));
+        }
+        let (inputs, entries) = (self.source.inputs(channel).len(), plan.fft.entries());
+        Cow::Borrowed(&node.spectra[(at.phase * inputs + at.input) * entries..][..entries])
     }
 
     pub fn apply(&self, scene: &[Array2<f32>], scratch: &mut FftScratch) -> Vec<SubImage> {
-        let half = self.source.spec.window / 2;
+        let (reach, cell) = (self.source.reach(), self.source.points.cell());
         let mut images = Vec::new();
         for (channel, plan) in self.channels.iter().enumerate() {
             let warps = self.warps(channel, plan);
-            let inputs = self.source.inputs(channel);
+            let (inputs, phases) = (self.source.inputs(channel), self.source.phases(channel));
             let shape = warps[0].shape;
             // Sampled once: light of each input at each point.
             let sampled: Vec<Vec<f32>> = inputs
@@ -261,42 +221,51 @@ impl<'a> ElementOperator<'a> {
                 })
                 .collect();
             let (size, entries) = (plan.fft.size(), plan.fft.entries());
-            let mut image = Array2::zeros([shape[0] + 2 * half, shape[1] + 2 * half]);
+            let mut own: Vec<Array2<f32>> = vec![Array2::zeros(shape.map(|s| s + 2 * reach)); phases.len()];
             let mut square = vec![0.0; size * size];
             let mut spectrum = vec![Complex32::ZERO; entries];
+            let mut hats = Vec::new();
+            let mut sums = vec![vec![Complex32::ZERO; entries]; phases.len()];
             for node in &plan.nodes {
-                let mut sum = vec![Complex32::ZERO; entries];
+                sums.iter_mut().for_each(|s| s.fill(Complex32::ZERO));
                 let mut lit = false;
                 for (k, light) in sampled.iter().enumerate() {
                     let (input, point) = (k / warps.len(), k % warps.len());
-                    if !cut(light, &warps[point], node, &mut square, size) {
+                    if k == 0 || warps.len() > 1 {
+                        node.hats(&warps[point], &mut hats);
+                    }
+                    if !node.cut(light, shape[1], &hats, &mut square, size) {
                         continue;
                     }
                     lit = true;
                     plan.fft.forward(&mut square, node.shape[0], &mut spectrum, scratch);
-                    if node.spectra.is_empty() {
-                        let kernel =
-                            self.spectrum(node.node, channel, inputs[input].1.clone(), point, &plan.fft, scratch);
-                        multiply_add(&mut sum, &spectrum, &kernel);
-                    } else {
-                        multiply_add(&mut sum, &spectrum, &node.spectra[input * entries..][..entries]);
+                    for (phase, sum) in sums.iter_mut().enumerate() {
+                        let at = KernelAt { input, point, phase };
+                        multiply_add(sum, &spectrum, &self.kernel(channel, plan, node, at, scratch));
                     }
                 }
                 if !lit {
                     continue;
                 }
-                plan.fft.inverse(&mut sum, &mut square, scratch);
-                for y in 0..node.shape[0] + 2 * half {
-                    for x in 0..node.shape[1] + 2 * half {
-                        image[[node.first[0] + y, node.first[1] + x]] += square[y * size + x];
+                for (sum, image) in sums.iter_mut().zip(&mut own) {
+                    plan.fft.inverse(sum, &mut square, scratch);
+                    let lines = node.shape.map(|s| s + 2 * reach);
+                    for y in 0..lines[0] {
+                        let from = &square[y * size..][..lines[1]];
+                        let mut to = image.row_mut(node.first[0] + y);
+                        let to = to.as_slice_mut().expect("rows are whole");
+                        let to = &mut to[node.first[1]..][..lines[1]];
+                        to.iter_mut().zip(from).for_each(|(t, f)| *t += f);
                     }
                 }
             }
-            images.push(SubImage {
+            let origin = warps[0].origin.map(|o| (o - reach as i64) * cell as i64);
+            images.extend(phases.iter().zip(own).map(|(phase, light)| SubImage {
                 channel,
-                origin: warps[0].origin.map(|o| o - half as i64),
-                light: image,
-            });
+                origin: [0, 1].map(|a| origin[a] + phase[a] as i64),
+                step: cell,
+                light,
+            }));
         }
         images
     }
@@ -308,39 +277,47 @@ impl<'a> ElementOperator<'a> {
         inputs: usize,
         scratch: &mut FftScratch,
     ) -> Vec<Array2<f32>> {
-        let half = self.source.spec.window / 2;
+        let (reach, cell) = (self.source.reach(), self.source.points.cell());
         let mut planes = vec![Array2::zeros(shape); inputs];
         for (channel, plan) in self.channels.iter().enumerate() {
             let warps = self.warps(channel, plan);
-            let own = self.source.inputs(channel);
-            let size = plan.fft.size();
-            let entries = plan.fft.entries();
-            let origin = warps[0].origin.map(|o| o - half as i64);
-            let mut gathered = vec![vec![0.0f32; warps[0].shape[0] * warps[0].shape[1]]; own.len() * warps.len()];
+            let (own, phases) = (self.source.inputs(channel), self.source.phases(channel));
+            let (size, entries) = (plan.fft.size(), plan.fft.entries());
+            let columns = warps[0].shape[1];
+            let origin = warps[0].origin.map(|o| (o - reach as i64) * cell as i64);
+            let mut gathered = vec![vec![0.0f32; warps[0].shape[0] * columns]; own.len() * warps.len()];
             let mut square = vec![0.0; size * size];
-            let mut spectrum = vec![Complex32::ZERO; entries];
+            let mut spectra = vec![vec![Complex32::ZERO; entries]; phases.len()];
+            let mut product = vec![Complex32::ZERO; entries];
+            let mut hats = Vec::new();
             for node in &plan.nodes {
-                let lines = node.shape.map(|s| s + 2 * half);
-                if !window_of(&frames[channel], origin, node, lines, &mut square, size) {
+                let lines = node.shape.map(|s| s + 2 * reach);
+                let mut any = false;
+                for (phase, spectrum) in phases.iter().zip(&mut spectra) {
+                    let first = [0, 1].map(|a| origin[a] + (node.first[a] * cell + phase[a]) as i64);
+                    any |= window_of(&frames[channel], first, cell, lines, &mut square, size);
+                    plan.fft.forward(&mut square, lines[0], spectrum, scratch);
+                }
+                if !any {
                     continue;
                 }
-                plan.fft.forward(&mut square, lines[0], &mut spectrum, scratch);
                 for (k, light) in gathered.iter_mut().enumerate() {
                     let (input, point) = (k / warps.len(), k % warps.len());
-                    let mut product = spectrum.clone();
-                    if node.spectra.is_empty() {
-                        let kernel = self.spectrum(node.node, channel, own[input].1.clone(), point, &plan.fft, scratch);
-                        multiply_conj(&mut product, &kernel);
-                    } else {
-                        multiply_conj(&mut product, &node.spectra[input * entries..][..entries]);
+                    product.fill(Complex32::ZERO);
+                    for (phase, spectrum) in spectra.iter().enumerate() {
+                        let at = KernelAt { input, point, phase };
+                        multiply_conj_add(&mut product, spectrum, &self.kernel(channel, plan, node, at, scratch));
                     }
                     plan.fft.inverse(&mut product, &mut square, scratch);
-                    let warp = &warps[point];
-                    for y in 0..node.shape[0] {
-                        let row = (node.first[0] + y) * warp.shape[1] + node.first[1];
-                        for x in 0..node.shape[1] {
-                            light[row + x] += hat(warp.nodes[row + x], node.node) * square[y * size + x];
-                        }
+                    if k == 0 || warps.len() > 1 {
+                        node.hats(&warps[point], &mut hats);
+                    }
+                    for (y, hats) in hats.chunks_exact(node.shape[1]).enumerate() {
+                        let to = &mut light[(node.first[0] + y) * columns + node.first[1]..][..node.shape[1]];
+                        let from = &square[y * size..][..node.shape[1]];
+                        to.iter_mut()
+                            .zip(from.iter().zip(hats))
+                            .for_each(|(t, (f, h))| *t += f * h);
                     }
                 }
             }
@@ -352,28 +329,49 @@ impl<'a> ElementOperator<'a> {
     }
 }
 
-/// The light under the hat of a node, in the corner of a square. Whether there is any.
-fn cut(light: &[f32], warp: &Warp, node: &NodePlan, square: &mut [f32], size: usize) -> bool {
-    square.fill(0.0);
-    let mut lit = false;
-    for y in 0..node.shape[0] {
-        let row = (node.first[0] + y) * warp.shape[1] + node.first[1];
-        for x in 0..node.shape[1] {
-            let value = light[row + x];
-            if value != 0.0 {
-                square[y * size + x] = value * hat(warp.nodes[row + x], node.node);
-                lit = true;
-            }
-        }
-    }
-    lit
+/// Which of the kernels of a node.
+#[derive(Clone, Copy)]
+struct KernelAt {
+    input: usize,
+    point: usize,
+    phase: usize,
 }
 
-/// The part of a frame that a node reaches, in the corner of a square. Whether any of it is on the sensor.
+impl NodePlan {
+    /// Weights of the node over its rectangle.
+    fn hats(&self, warp: &Warp, hats: &mut Vec<f32>) {
+        hats.clear();
+        for y in 0..self.shape[0] {
+            let row = (self.first[0] + y) * warp.shape[1] + self.first[1];
+            hats.extend(
+                warp.nodes[row..][..self.shape[1]]
+                    .iter()
+                    .map(|place| hat(*place, self.node)),
+            );
+        }
+    }
+
+    /// The light under the hat, in the corner of a square. Whether there is any.
+    fn cut(&self, light: &[f32], columns: usize, hats: &[f32], square: &mut [f32], size: usize) -> bool {
+        square.fill(0.0);
+        let mut lit = false;
+        for (y, hats) in hats.chunks_exact(self.shape[1]).enumerate() {
+            let from = &light[(self.first[0] + y) * columns + self.first[1]..][..self.shape[1]];
+            let to = &mut square[y * size..][..self.shape[1]];
+            for (to, (v, h)) in to.iter_mut().zip(from.iter().zip(hats)) {
+                *to = v * h;
+                lit |= *to != 0.0;
+            }
+        }
+        lit
+    }
+}
+
+/// Every `step`-th pixel of a frame from `first` on, in the corner of a square. Whether any of it is on the sensor.
 fn window_of(
     frame: &Array2<f32>,
-    origin: [i64; 2],
-    node: &NodePlan,
+    first: [i64; 2],
+    step: usize,
     lines: [usize; 2],
     square: &mut [f32],
     size: usize,
@@ -382,14 +380,12 @@ fn window_of(
     let (rows, columns) = frame.dim();
     let mut any = false;
     for y in 0..lines[0] {
-        let row = origin[0] + (node.first[0] + y) as i64;
-        if !(0..rows as i64).contains(&row) {
+        let Some(row) = inside(first[0] + (y * step) as i64, rows) else {
             continue;
-        }
+        };
         for x in 0..lines[1] {
-            let column = origin[1] + (node.first[1] + x) as i64;
-            if (0..columns as i64).contains(&column) {
-                square[y * size + x] = frame[[row as usize, column as usize]];
+            if let Some(column) = inside(first[1] + (x * step) as i64, columns) {
+                square[y * size + x] = frame[[row, column]];
                 any = true;
             }
         }
@@ -401,6 +397,9 @@ fn multiply_add(sum: &mut [Complex32], a: &[Complex32], b: &[Complex32]) {
     sum.iter_mut().zip(a.iter().zip(b)).for_each(|(s, (a, b))| *s += a * b);
 }
 
-fn multiply_conj(a: &mut [Complex32], b: &[Complex32]) {
-    a.iter_mut().zip(b).for_each(|(a, b)| *a *= b.conj());
+/// Adds the products of `a` with the conjugates of `b`.
+fn multiply_conj_add(sum: &mut [Complex32], a: &[Complex32], b: &[Complex32]) {
+    sum.iter_mut()
+        .zip(a.iter().zip(b))
+        .for_each(|(s, (a, b))| *s += a * b.conj());
 }

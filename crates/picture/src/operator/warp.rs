@@ -3,38 +3,68 @@
 use metalith_camera::Sensor;
 use ndarray::Array2;
 
+use crate::ElementView;
+use crate::assumed::{Assumed, butterworth};
+use crate::geometry::SceneSpace;
 use crate::kernels::BankSpec;
-use crate::{ElementView, SceneView};
 
-/// The sub-image of one element in one channel: a rectangle of pixels of the sensor's grid, on or off the sensor.
+/// The sub-image of one element in one channel: a rectangle of cells, squares of pixels of the sensor's grid, on or off the
+/// sensor.
 #[derive(Clone)]
 pub struct Warp {
-    /// Row and column of its first pixel.
+    /// Row and column of its first cell.
     pub origin: [i64; 2],
-    /// Rows and columns.
+    /// Rows and columns of cells.
     pub shape: [usize; 2],
-    /// For each pixel: place in the scene's picture (row, column).
+    /// For each cell: place in the scene's picture (row, column).
     scene: Vec<[f32; 2]>,
-    /// For each pixel: place among the nodes of the kernels (row, column).
+    /// For each cell: place among the nodes of the kernels (row, column).
     pub nodes: Vec<[f32; 2]>,
-    /// For each pixel: projected solid angle, zero where the scene or the field of the kernels ends.
+    /// For each cell: projected solid angle, zero where the scene or the field of the kernels ends.
     flux: Vec<f32>,
     /// Rows and columns of the scene.
     size: [usize; 2],
 }
 
+/// Where in each cell the scene is sampled.
+#[derive(Clone, Copy)]
+pub struct CellPoint {
+    /// Pixels an axis of a cell.
+    pub cell: usize,
+    /// From the middle of the cell along x and y (pixels).
+    pub shift: [f64; 2],
+    /// Pixels whose light the point stands for.
+    pub area: f64,
+    /// What is assumed of the brightness over the field.
+    pub assumed: Assumed,
+}
+
 impl Warp {
-    /// For light of a wavelength (um), with the pixels' middles moved by `shift` pixels along x and y. The flux of a
-    /// pixel is that of `area` of it.
+    /// For light of a wavelength (um), one point of each cell.
     pub fn new(
         element: &ElementView,
         sensor: &Sensor,
         spec: &BankSpec,
-        view: &SceneView,
+        space: &SceneSpace,
         channel_um: f64,
-        shift: [f64; 2],
-        area: f64,
+        point: CellPoint,
     ) -> Self {
+        let CellPoint {
+            cell,
+            shift,
+            area,
+            assumed,
+        } = point;
+        let patch_um = assumed
+            .patch_pixels
+            .map_or(f64::INFINITY, |n| 0.5 * f64::from(n) * spec.pixel_um);
+        let brightness = |place: [f64; 2]| match assumed.butterworth {
+            true => {
+                let tangent = place[0].hypot(place[1]) / element.focal_um;
+                element.projected_per_um2([0.0; 2]) * butterworth(tangent)
+            }
+            false => element.projected_per_um2(place),
+        };
         let pixel = spec.pixel_um;
         // Row and column of the element's axis.
         let axis = [
@@ -42,8 +72,9 @@ impl Warp {
             0.5 * (f64::from(sensor.columns) - 1.0) + (element.centre_um[0] - sensor.offset_um[0]) / pixel,
         ];
         let (low, high) = extent(element, spec, channel_um);
-        let first = [1, 0].map(|a| (axis[1 - a] + low[a] / pixel).floor() as i64);
-        let last = [1, 0].map(|a| (axis[1 - a] + high[a] / pixel).ceil() as i64);
+        let step = cell as f64;
+        let first = [1, 0].map(|a| ((axis[1 - a] + low[a] / pixel) / step).floor() as i64);
+        let last = [1, 0].map(|a| ((axis[1 - a] + high[a] / pixel) / step).ceil() as i64);
         let shape = [0, 1].map(|a| (last[a] - first[a] + 1).max(1) as usize);
         let mut warp = Self {
             origin: first,
@@ -51,25 +82,26 @@ impl Warp {
             scene: vec![[0.0; 2]; shape[0] * shape[1]],
             nodes: vec![[0.0; 2]; shape[0] * shape[1]],
             flux: vec![0.0; shape[0] * shape[1]],
-            size: [view.rows, view.columns],
+            size: [space.view.rows, space.view.columns],
         };
         for i in 0..shape[0] * shape[1] {
             let at = [i / shape[1], i % shape[1]];
             let place = [0, 1].map(|a| {
-                let index = (first[1 - a] + at[1 - a] as i64) as f64 + shift[a] - axis[1 - a];
-                index * pixel
+                let middle = step * (first[1 - a] + at[1 - a] as i64) as f64 + 0.5 * (step - 1.0);
+                (middle + shift[a] - axis[1 - a]) * pixel
             });
             let sines = element.sines_of_landing(place, channel_um);
             let found = element
                 .landing_um(sines, element.wedge.wavelength_um)
-                .zip(element.tangents(sines, view.distance_um));
+                .zip(space.tangents(element, sines));
             let Some((landing, tangents)) = found else { continue };
-            let scene = view.place(tangents);
+            let scene = space.view.place(tangents);
             let inside = (0..2).all(|a| scene[a] >= -0.5 && scene[a] <= warp.size[a] as f64 - 0.5);
+            let inside = inside && place.iter().all(|v| v.abs() <= patch_um);
             if inside && landing.iter().all(|v| v.abs() <= spec.reach_um) {
                 warp.scene[i] = scene.map(|v| v as f32);
                 warp.nodes[i] = [spec.place(landing[1]) as f32, spec.place(landing[0]) as f32];
-                warp.flux[i] = (element.projected_per_um2(place) * pixel * pixel * area) as f32;
+                warp.flux[i] = (brightness(place) * pixel * pixel * area) as f32;
             }
         }
         warp
@@ -87,7 +119,7 @@ impl Warp {
         ([y.0, x.0], [y.1, x.1], [y.2, x.2])
     }
 
-    /// Light of a plane of the scene on each pixel.
+    /// Light of a plane of the scene on each cell.
     pub fn sample(&self, plane: &Array2<f32>, out: &mut [f32]) {
         for (i, (to, flux)) in out.iter_mut().zip(&self.flux).enumerate() {
             if *flux == 0.0 {

@@ -10,10 +10,11 @@
 //! | each element alone, blended | `separate` |
 //!
 //! What is beyond the sensor is not known: pixels that do not exist have no weight, and none is made up. The linear
-//! systems of all of them are one, in `normal`.
+//! systems of all of them are one, in `normal`, and `precondition` makes them easier.
 
 mod lucy;
 mod normal;
+mod precondition;
 mod prior;
 mod separate;
 mod splitting;
@@ -123,7 +124,7 @@ fn restore_by(
                 RestorationMethod::TotalVariation => total_variation::restore(&system, progress),
                 _ => splitting::restore(&system, &SlopeDenoiser::default(), progress),
             };
-            Ok(system.statistics.picture(&independent?))
+            Ok(system.statistics().picture(&independent?))
         }
     }
 }

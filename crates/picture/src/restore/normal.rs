@@ -1,40 +1,49 @@
 //! The linear systems of restoration: A* W A x + a D* D x + b (D* D)^2 x + m x = r, with D the slopes along rows and columns,
 //! for planes that vary independently ([`SceneStatistics`]).
 //!
-//! They are solved by conjugate gradients, preconditioned by how much light each place of the scene sends into the frame and
-//! by how scenes vary: the first steps are smooth pictures, and what a frame says of fine detail follows. Without the
-//! second, the patterns in which back-projected pixels overlap stay in the picture.
+//! They are solved by conjugate gradients, preconditioned by what `precondition` says.
 
 use metalith_core::{Error, Progress, Result};
-use metalith_wave::kernels::fft_size;
 use ndarray::Array2;
-use num_complex::Complex32;
-use rayon::prelude::*;
 
 use super::Recorded;
-use super::prior::{SceneStatistics, squared_frequencies};
-use crate::operator::{FftScratch, FrameOperator, SquareFft};
+use super::precondition::Preconditioner;
+use super::prior::SceneStatistics;
+use crate::operator::FrameOperator;
 
 /// Planes of a picture.
 pub type Planes = Vec<Array2<f32>>;
 
-/// The data term of a frame.
-pub struct NormalSystem<'a> {
+/// A* W A of a frame, for independent planes.
+struct DataTerm<'a> {
     operator: &'a FrameOperator<'a>,
     elements: Vec<usize>,
     veil: bool,
     /// Weights of the pixels, scaled.
     weight: Planes,
-    /// What the planes are.
-    pub statistics: SceneStatistics,
+    statistics: SceneStatistics,
+}
+
+impl DataTerm<'_> {
+    fn apply(&self, x: &[Array2<f32>]) -> Planes {
+        let picture = self.statistics.picture(x);
+        let mut seen = self.operator.apply_elements(&picture, &self.elements, self.veil);
+        seen.iter_mut().zip(&self.weight).for_each(|(s, w)| *s *= w);
+        let back = self.operator.adjoint_elements(&seen, &self.elements, self.veil);
+        self.statistics.adjoint(&back)
+    }
+}
+
+/// The systems of a frame.
+pub struct NormalSystem<'a> {
+    term: DataTerm<'a>,
     /// A* W S.
     pub data: Planes,
     /// What one unit of the data term is, in units of the inverse variance of the picture.
     pub scale: f64,
-    /// How much light of each place counts, one where most does.
-    share: Array2<f32>,
-    /// For the spectra of pictures.
-    fft: SquareFft,
+    /// How much light counts, mean over the picture; one where most does.
+    pub mean_share: f64,
+    preconditioner: Preconditioner,
 }
 
 /// Strengths of a system.
@@ -47,13 +56,6 @@ pub struct Terms {
     /// Of the picture itself.
     pub identity: f64,
 }
-
-/// Pixels between a picture and its periodic copies: beyond them little of it is correlated.
-const BORDER: usize = 40;
-
-/// What is added to the prior for all frequencies, over that of the highest. With less the first steps are spent on what is
-/// smooth: of 1e-4, 1e-3 and 1e-2 the last has the most of a photograph after 16 steps (17.7, 18.1 and 18.3 dB).
-const FLAT: f64 = 1e-2;
 
 /// A place that sends less light than this share of the best is preconditioned as if it sent so much.
 const LEAST_SHARE: f32 = 0.02;
@@ -79,22 +81,28 @@ impl<'a> NormalSystem<'a> {
             true => SceneStatistics::colours(),
             false => SceneStatistics::grey(operator.inputs()),
         };
-        Self {
+        let share = light.mapv(|v| (v / most).max(LEAST_SHARE));
+        let term = DataTerm {
             operator,
             elements: elements.to_vec(),
             veil,
-            data: statistics.adjoint(&operator.adjoint_elements(&products, elements, veil)),
-            statistics,
             weight,
+            statistics,
+        };
+        Self {
+            data: term
+                .statistics
+                .adjoint(&operator.adjoint_elements(&products, elements, veil)),
             scale: f64::from(most),
-            share: light.mapv(|v| (v / most).max(LEAST_SHARE)),
-            fft: SquareFft::new(fft_size(shape.0.max(shape.1) + BORDER)),
+            mean_share: share.iter().map(|s| f64::from(*s)).sum::<f64>() / share.len().max(1) as f64,
+            preconditioner: Preconditioner::new(&share),
+            term,
         }
     }
 
     /// Rows and columns of the picture.
     pub fn shape(&self) -> (usize, usize) {
-        let view = self.operator.view();
+        let view = self.term.operator.view();
         (view.rows, view.columns)
     }
 
@@ -103,60 +111,19 @@ impl<'a> NormalSystem<'a> {
         vec![Array2::zeros(self.shape()); self.data.len()]
     }
 
-    /// How much light counts, mean over the picture; one where most does.
-    pub fn mean_share(&self) -> f64 {
-        self.share.iter().map(|s| f64::from(*s)).sum::<f64>() / self.share.len().max(1) as f64
-    }
-
-    fn data_term(&self, x: &[Array2<f32>]) -> Planes {
-        let picture = self.statistics.picture(x);
-        let mut seen = self.operator.apply_elements(&picture, &self.elements, self.veil);
-        seen.iter_mut().zip(&self.weight).for_each(|(s, w)| *s *= w);
-        let back = self.operator.adjoint_elements(&seen, &self.elements, self.veil);
-        self.statistics.adjoint(&back)
+    /// What the planes are.
+    pub fn statistics(&self) -> &SceneStatistics {
+        &self.term.statistics
     }
 
     /// The left side of the system.
     pub fn apply(&self, x: &[Array2<f32>], terms: Terms) -> Planes {
-        let mut out = self.data_term(x);
+        let mut out = self.term.apply(x);
         for (to, x) in out.iter_mut().zip(x) {
             add_prior(to, x, terms);
             to.scaled_add(terms.identity as f32, x);
         }
         out
-    }
-
-    /// An approximate inverse of the system: the inverse of the prior between two roots of the light of each place. The
-    /// two are in one unit where a place counts most.
-    fn precondition(&self, residual: &[Array2<f32>], terms: Terms) -> Planes {
-        let size = self.fft.size();
-        let squared = squared_frequencies(size);
-        let most = 8.0 * terms.slopes + 64.0 * terms.bends + terms.identity;
-        let filter = |s: f64| match most {
-            // Nothing is known of the picture.
-            0.0 => 1.0,
-            _ => 1.0 / (terms.slopes * s + terms.bends * s * s + terms.identity + FLAT * most),
-        };
-        let one = |r: &Array2<f32>| {
-            let mut scratch = FftScratch::default();
-            let mut square = vec![0.0f32; size * size];
-            let mut spectrum = vec![Complex32::ZERO; self.fft.entries()];
-            let (rows, columns) = r.dim();
-            for y in 0..rows {
-                for x in 0..columns {
-                    square[y * size + x] = r[[y, x]] / self.share[[y, x]].sqrt();
-                }
-            }
-            self.fft.forward(&mut square, rows, &mut spectrum, &mut scratch);
-            for (i, v) in spectrum.iter_mut().enumerate() {
-                *v *= filter(squared[i / size] + squared[i % size]) as f32;
-            }
-            self.fft.inverse(&mut spectrum, &mut square, &mut scratch);
-            Array2::from_shape_fn((rows, columns), |(y, x)| {
-                square[y * size + x] / self.share[[y, x]].sqrt()
-            })
-        };
-        residual.par_iter().map(one).collect()
     }
 
     /// Conjugate gradients from a picture towards the solution of the system with this right side.
@@ -173,7 +140,8 @@ impl<'a> NormalSystem<'a> {
     ) -> Result<Planes> {
         let mut residual: Planes = self.apply(&x, terms);
         residual.iter_mut().zip(right).for_each(|(r, b)| *r = b - &*r);
-        let mut z = self.precondition(&residual, terms);
+        let filter = self.preconditioner.filter(terms);
+        let mut z = self.preconditioner.apply(&residual, &filter);
         let mut direction = z.clone();
         let mut old = dot(&residual, &z);
         for _ in 0..iterations {
@@ -192,7 +160,7 @@ impl<'a> NormalSystem<'a> {
                 residual[c].scaled_add(-step, &image[c]);
             }
             let before = z;
-            z = self.precondition(&residual, terms);
+            z = self.preconditioner.apply(&residual, &filter);
             let new = dot(&residual, &z);
             // Polak and Ribiere: the preconditioner is not exactly the same for both signs of rounding.
             let turn = ((new - dot(&residual, &before)) / old).max(0.0) as f32;

@@ -3,8 +3,9 @@
 use metalith_wave::kernels::fft_size;
 use ndarray::Array2;
 use num_complex::Complex32;
-use rand::{Rng, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 
 use super::normal::{Planes, Terms};
 use crate::SceneView;
@@ -86,7 +87,7 @@ impl SceneStatistics {
         let mut scratch = FftScratch::default();
         let squared = squared_frequencies(size);
         let mut plane = || {
-            let mut square: Vec<f32> = (0..size * size).map(|_| normal(&mut random)).collect();
+            let mut square: Vec<f32> = StandardNormal.sample_iter(&mut random).take(size * size).collect();
             let mut spectrum = vec![Complex32::ZERO; fft.entries()];
             fft.forward(&mut square, size, &mut spectrum, &mut scratch);
             for (i, v) in spectrum.iter_mut().enumerate() {
@@ -106,12 +107,6 @@ impl SceneStatistics {
         picture.iter_mut().for_each(|p| *p += MEAN);
         picture
     }
-}
-
-/// A normal number (Box and Muller).
-fn normal(random: &mut impl Rng) -> f32 {
-    let (u, v): (f64, f64) = (random.random(), random.random());
-    ((-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()) as f32
 }
 
 fn weighted(weights: impl Iterator<Item = f32>, planes: &[Array2<f32>]) -> Array2<f32> {

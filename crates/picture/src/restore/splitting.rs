@@ -70,7 +70,7 @@ pub fn restore(system: &NormalSystem<'_>, denoiser: &dyn Denoiser, progress: &dy
     use rayon::prelude::*;
     let mut x = tikhonov::restore(system, progress)?;
     progress.begin("restoring by splitting", (ROUNDS * STEPS) as u64);
-    let mut weight = FIRST * system.mean_share();
+    let mut weight = FIRST * system.mean_share;
     let mut deviation = FIRST_DEVIATION;
     for _ in 0..ROUNDS {
         let clean: Planes = x.par_iter().map(|p| denoiser.denoise(p, deviation)).collect();

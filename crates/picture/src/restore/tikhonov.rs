@@ -9,6 +9,6 @@ pub const ITERATIONS: usize = 32;
 
 pub fn restore(system: &NormalSystem<'_>, progress: &dyn Progress) -> Result<Planes> {
     progress.begin("restoring", ITERATIONS as u64);
-    let terms = system.statistics.terms(system.scale);
+    let terms = system.statistics().terms(system.scale);
     system.solve(system.black(), &system.data, terms, ITERATIONS, progress)
 }

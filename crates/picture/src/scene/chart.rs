@@ -38,9 +38,11 @@ impl FromStr for BuiltIn {
 const DARK: f64 = 0.05;
 const BRIGHT: f64 = 0.9;
 /// Spokes of the star.
-const SPOKES: f64 = 36.0;
+pub(crate) const SPOKES: f64 = 36.0;
+/// Radius of the star over the side of the scene.
+pub(crate) const STAR: f64 = 0.45;
 /// Lean of the edge (degrees).
-const LEAN_DEG: f64 = 5.0;
+pub(crate) const LEAN_DEG: f64 = 5.0;
 /// Points an axis that a pixel is the mean of.
 const WITHIN: usize = 4;
 /// Widths of a bar, in pixels of the scene.
@@ -53,7 +55,7 @@ pub fn chart(kind: BuiltIn, size: usize, field_deg: f64, distance_um: f64) -> Sc
         BuiltIn::Star => Box::new(move |x, y| {
             let radius = x.hypot(y);
             let spokes = (y.atan2(x) * SPOKES / std::f64::consts::TAU).rem_euclid(1.0) < 0.5;
-            radius > 0.45 * size as f64 || spokes
+            radius > STAR * size as f64 || spokes
         }),
         BuiltIn::Edge => Box::new(|x, y| x + y * LEAN_DEG.to_radians().tan() > 0.0),
     };

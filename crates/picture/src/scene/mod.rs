@@ -5,9 +5,11 @@
 //! | which files can be read | `read` |
 //! | scenes that need no file | `chart` |
 //! | a spectral cube as a few planes | `cube` |
+//! | how far each pixel is | `depth` |
 
 mod chart;
 mod cube;
+mod depth;
 mod read;
 
 use ndarray::{Array2, Array3};
@@ -16,6 +18,8 @@ use crate::SceneView;
 use crate::spectra::{SceneSpectrum, linear_rgb, rgb_basis};
 
 pub use chart::{BuiltIn, chart};
+pub(crate) use chart::{LEAN_DEG, SPOKES, STAR};
+pub use depth::read_depth;
 pub use read::{SceneFile, read_scene};
 
 /// A scene: planes of light, each with the spectrum of its reflectance.
@@ -32,6 +36,8 @@ pub struct SceneImage {
     pub planes: Vec<Array2<f32>>,
     /// Share of the light of a cube that the basis leaves out (root mean square); zero for what is read as colours.
     pub left_out: f64,
+    /// Distance of each pixel from the chip (um); without it the scene is flat and as far as the view says.
+    pub depth_um: Option<Array2<f32>>,
 }
 
 impl SceneImage {
@@ -51,6 +57,7 @@ impl SceneImage {
                 .map(|c| Array2::from_shape_fn((rows, columns), |(y, x)| rgb[[y, x, c]] as f32))
                 .collect(),
             left_out: 0.0,
+            depth_um: None,
         }
     }
 

@@ -17,7 +17,7 @@ use crate::SceneView;
 /// Shortest and longest side of a picture of a scene (pixels).
 const SIDES: std::ops::RangeInclusive<usize> = 16..=4096;
 /// Longest file (bytes): a cube of 1024 x 1024 with 31 bands in double precision, and some more.
-const LONGEST: u64 = 512 << 20;
+pub(super) const LONGEST: u64 = 512 << 20;
 
 /// A file, and what it does not say of its scene.
 #[derive(Clone, Debug)]
@@ -70,6 +70,7 @@ pub fn read_scene(file: &SceneFile) -> Result<SceneImage> {
                 basis,
                 planes,
                 left_out,
+                depth_um: None,
             })
         }
         (None, _) => {
@@ -108,7 +109,7 @@ fn check_sides(path: &Path, rows: usize, columns: usize) -> Result<()> {
 }
 
 /// An array of two or three axes; one of two gets a third of one entry.
-fn array(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
+pub(super) fn array(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
     let sides = |shape: &[u64]| (2..=3).contains(&shape.len()) && shape.iter().all(|n| *n <= *SIDES.end() as u64);
     let found = npy::read_from(Cursor::new(bytes), sides).map_err(|e| fault(path, e.to_string()))?;
     let shape: Vec<usize> = found.shape.iter().map(|n| *n as usize).collect();
@@ -133,6 +134,11 @@ fn grey_or_colour(path: &Path, array: Array3<f64>) -> Result<Array3<f64>> {
 }
 
 fn png(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
+    Ok(png_values(path, bytes)?.0.mapv(srgb::linear))
+}
+
+/// Red, green and blue of an opaque PNG as they are stored, full scale being one; and whether values have 16 bits.
+pub(super) fn png_values(path: &Path, bytes: &[u8]) -> Result<(Array3<f64>, bool)> {
     let wrong = |e: png::DecodingError| fault(path, e.to_string());
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
     decoder.set_transformations(png::Transformations::EXPAND);
@@ -157,9 +163,10 @@ fn png(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
     if samples % 2 == 0 && (0..rows).any(|y| (0..columns).any(|x| value(y, x, samples - 1) < 1.0)) {
         return Err(fault(path, "parts of it are transparent"));
     }
-    Ok(Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| {
-        srgb::linear(value(y, x, if samples < 3 { 0 } else { c }))
-    }))
+    let colours = Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| {
+        value(y, x, if samples < 3 { 0 } else { c })
+    });
+    Ok((colours, deep))
 }
 
 fn jpeg(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
@@ -180,7 +187,7 @@ fn jpeg(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     fn file(path: &Path, nm: Option<Vec<f64>>) -> SceneFile {
@@ -203,7 +210,8 @@ mod tests {
         bytes
     }
 
-    fn npy_bytes(shape: &str, values: &[f64]) -> Vec<u8> {
+    /// An NPY file of doubles in rows; `shape` as Python writes it.
+    pub fn npy_bytes(shape: &str, values: &[f64]) -> Vec<u8> {
         let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
         let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
         bytes.extend((header.len() as u16).to_le_bytes());

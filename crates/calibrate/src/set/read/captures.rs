@@ -1,5 +1,6 @@
 //! The measurements of a set: captures, and widths by SEM.
 
+use crate::set::frame::SensorFrames;
 use crate::set::{
     Capture, ElementIndex, Led, LedIndex, MeasuredElement, PerElement, PerLed, RelayCamera, SemSite, frame, sem,
 };
@@ -8,6 +9,7 @@ use metalith_core::document::{Limits, Section};
 pub(super) fn captures(
     root: &Section<'_, '_>,
     camera: &RelayCamera,
+    sensor: &SensorFrames,
     leds: &PerLed<Led>,
     elements: &PerElement<MeasuredElement>,
 ) -> Vec<Capture> {
@@ -43,14 +45,17 @@ pub(super) fn captures(
         let frames = s.integer("frames", 1..=1_000_000, "frames") as u32;
         s.finish();
         let dn = match frame::read(&path, camera.rows, camera.cols) {
-            Ok(dn) => dn,
+            Ok(mut dn) => {
+                sensor.take_out(&mut dn, camera);
+                dn
+            }
             Err(what) => {
                 // A file that is not there has been named as such already.
                 if path.is_file() {
                     s.fault(
                         "file",
                         what,
-                        "save it as float32 [rows, cols] without gaps, or leave the capture out",
+                        "save it as NPY [rows, cols] or as grey PNG, or leave the capture out",
                     );
                 }
                 ndarray::Array2::zeros((camera.rows, camera.cols))

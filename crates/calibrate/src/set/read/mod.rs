@@ -5,6 +5,7 @@ mod elements;
 
 use std::path::Path;
 
+use super::frame::{self, SensorFrames};
 use super::{Led, MeasuredSet, PerElement, PerLed, RelayCamera, Stack};
 use captures::{captures, widths};
 use elements::elements;
@@ -53,14 +54,14 @@ fn sections(path: &Path, root: &Section<'_, '_>, layouts: &dyn PillarReader, pro
 
     let (stack, film_is_known) = stack(&root.section("stack"));
     let divergence_rad = source(&root.section("source"));
-    let camera = camera(&root.section("camera"));
+    let (camera, frames) = camera(&root.section("camera"));
     let leds: PerLed<_> = leds(root, film_is_known.then_some(&stack.film)).into();
     let layout = root.file("layout");
     let elements: PerElement<_> = {
         let read = |sites: &[ElementSite]| layouts.pillars(&layout, pillar_layer, sites, progress);
         elements(root, &stack, &layout, &read).into()
     };
-    let captures = captures(root, &camera, &leds, &elements);
+    let captures = captures(root, &camera, &frames, &leds, &elements);
     let (sem, sem_offset_sigma_nm) = widths(root, &elements);
     MeasuredSet {
         path: path.to_owned(),
@@ -126,7 +127,7 @@ fn source(s: &Section<'_, '_>) -> f64 {
     mrad * 1e-3
 }
 
-fn camera(s: &Section<'_, '_>) -> RelayCamera {
+fn camera(s: &Section<'_, '_>) -> (RelayCamera, SensorFrames) {
     let positive = |key, high, unit| s.float(key, Limits::new(f64::MIN_POSITIVE..=high, unit));
     let camera = RelayCamera {
         pixel_um: positive("pixel_um", 100.0, "um"),
@@ -139,8 +140,22 @@ fn camera(s: &Section<'_, '_>) -> RelayCamera {
         registration_sigma_px: positive("registration_sigma_px", 8.0, "pixels"),
         flux_sigma: positive("flux_sigma", 1.0, ""),
     };
+    let sensor_frame = |key| {
+        s.has(key)
+            .then(|| s.file(key))
+            .filter(|path| path.is_file())
+            .and_then(|path| {
+                let read = frame::read(&path, camera.rows, camera.cols);
+                read.map_err(|what| s.fault(key, what, "give a frame as large as the captures"))
+                    .ok()
+            })
+    };
+    let frames = SensorFrames {
+        dark: sensor_frame("dark_frame"),
+        flat: sensor_frame("flat_frame"),
+    };
     s.finish();
-    camera
+    (camera, frames)
 }
 
 fn leds(root: &Section<'_, '_>, film: Option<&Material>) -> Vec<Led> {

@@ -23,7 +23,7 @@ pub struct Limits {
 
 impl Limits {
     /// `Limits::new(100.0..=1000.0, "nm")`; the unit may be empty.
-    pub fn new(range: RangeInclusive<f64>, unit: &'static str) -> Self {
+    pub const fn new(range: RangeInclusive<f64>, unit: &'static str) -> Self {
         Self { range, unit }
     }
 }
@@ -72,6 +72,18 @@ impl<'d, 't> Section<'d, 't> {
         let path = self.place_of(key);
         if !self.vacant && !self.document.is_replaced(&path) {
             self.document.fault(self.span_of(key), what, hint);
+            self.document.doubt(path);
+        }
+    }
+
+    /// As [`Section::fault`], at a byte within the text that stands at a key.
+    pub fn fault_in_text(&self, key: &str, byte: usize, what: impl Into<String>, hint: impl Into<String>) {
+        let path = self.place_of(key);
+        if !self.vacant && !self.document.is_replaced(&path) {
+            let span = self.span_of(key);
+            // After the quotation mark.
+            let at = (span.start + 1 + byte).min(span.end.saturating_sub(1));
+            self.document.fault(at..at + 1, what, hint);
             self.document.doubt(path);
         }
     }

@@ -40,7 +40,8 @@ fn replace(parent: &Path, version: &str) {
 /// As a killed process leaves it: nothing is removed, and the lock is no longer held.
 fn kill(mut new: WholeFolder) {
     new.part = PathBuf::new();
-    drop(new.lock.take());
+    // Closing alone would not do: a process that another test is starting shares the open file until it executes.
+    new.lock.take().unwrap().unlock().unwrap();
     std::mem::forget(new);
 }
 

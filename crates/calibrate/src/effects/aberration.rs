@@ -1,0 +1,63 @@
+//! The wavefront behind the lens is bent: by the substrate, by stress, or by the writer.
+
+use super::{Effect, Parameter, Stage};
+use metalith_made::Perturbation;
+
+/// Optical path over every lens by some Zernike polynomials of one kind, the same at all colours.
+pub struct Aberration {
+    pub name: &'static str,
+    /// Noll's numbers of the polynomials, each normalised to an rms of one over the aperture.
+    pub noll: &'static [u32],
+}
+
+/// Aberrations through third order; tilts are registration, defocus is a gap.
+pub const ABERRATIONS: [Aberration; 4] = [
+    Aberration {
+        name: "astigmatism",
+        noll: &[5, 6],
+    },
+    Aberration {
+        name: "coma",
+        noll: &[7, 8],
+    },
+    Aberration {
+        name: "trefoil",
+        noll: &[9, 10],
+    },
+    Aberration {
+        name: "spherical_aberration",
+        noll: &[11],
+    },
+];
+
+impl Effect for Aberration {
+    fn name(&self) -> String {
+        self.name.into()
+    }
+
+    fn unit(&self) -> &str {
+        "nm"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Geometry
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        vec![Parameter::new(-200.0, 200.0, 12.0); self.noll.len()]
+    }
+
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
+        for (j, nm) in self.noll.iter().zip(parameters) {
+            to.geometry.add_wavefront(*j, *nm);
+        }
+    }
+
+    fn confusions(&self) -> &'static [(&'static str, &'static str)] {
+        &[
+            ("gap", "captures at more distances"),
+            ("source_distance", "captures at two distances of the source"),
+            ("tilt", "captures at more angles"),
+        ]
+    }
+}

@@ -1,0 +1,336 @@
+//! Effects that a person declares in a file, by an expression, without compiling anything.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::{Effect, Parameter, Stage};
+use crate::set::MeasuredSet;
+use metalith_core::Result;
+use metalith_core::document::{Document, Limits, Section, load};
+use metalith_made::{DeclaredQuantity, DeclaredTerm, Perturbation};
+
+/// Most parameters of one effect: a step of the search fits all of them at once.
+const MOST_PARAMETERS: usize = 6;
+
+/// Largest number that a file may ask for, in any unit.
+const LARGEST: f64 = 1e6;
+
+/// One parameter of a declared effect.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DeclaredParameter {
+    /// Its name in the expression.
+    pub name: String,
+    /// Physical limits.
+    pub range: (f64, f64),
+    /// A typical distance from its start.
+    pub prior: f64,
+    /// Its value where there is no effect.
+    pub start: f64,
+}
+
+/// An effect of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DeclaredEffect {
+    pub name: String,
+    /// Unit of its first parameter, for people.
+    pub unit: String,
+    pub quantity: DeclaredQuantity,
+    pub expression: String,
+    pub parameters: Vec<DeclaredParameter>,
+}
+
+/// Where an expression acts, by the word of the file.
+const STAGES: [(&str, Stage); 5] = [
+    ("pupil", Stage::Geometry),
+    ("width", Stage::Geometry),
+    ("distance", Stage::Diffraction),
+    ("spectrum", Stage::Source),
+    ("kernel", Stage::Camera),
+];
+
+/// The word for where a quantity acts.
+fn stage_word(quantity: DeclaredQuantity) -> &'static str {
+    match quantity {
+        DeclaredQuantity::OpdNm | DeclaredQuantity::PhaseRad | DeclaredQuantity::Amplitude => "pupil",
+        DeclaredQuantity::WidthNm => "width",
+        DeclaredQuantity::DistanceUm => "distance",
+        DeclaredQuantity::Spectrum => "spectrum",
+        DeclaredQuantity::Kernel => "kernel",
+    }
+}
+
+impl DeclaredEffect {
+    /// The effects of a file.
+    ///
+    /// # Errors
+    /// All faults of the file at once, each with its line and column.
+    pub fn read(path: &Path) -> Result<Vec<Self>> {
+        let text = load(path)?;
+        Document::read(path, &text, |root| {
+            let sections = root.sections("effect");
+            if sections.is_empty() {
+                root.fault("effect", "no effect is declared", "add one [[effect]] for each");
+            }
+            let mut effects: Vec<Self> = Vec::new();
+            for section in &sections {
+                let effect = declared(section);
+                if effects.iter().any(|e| e.name == effect.name) {
+                    section.fault("name", format!("`{}` is declared twice", effect.name), "rename one");
+                }
+                effects.push(effect);
+            }
+            effects
+        })
+    }
+
+    /// The effects as a file that [`DeclaredEffect::read`] reads.
+    pub fn text(effects: &[Self]) -> String {
+        let quoted = |text: &str| toml::Value::String(text.into()).to_string();
+        let mut out = String::new();
+        for e in effects {
+            let key = DeclaredQuantity::ALL
+                .iter()
+                .find(|(_, q)| *q == e.quantity)
+                .map_or("", |q| q.0);
+            out.push_str(&format!(
+                "[[effect]]\nname = {}\nunit = {}\nstage = \"{}\"\n{key} = {}\n",
+                quoted(&e.name),
+                quoted(&e.unit),
+                stage_word(e.quantity),
+                quoted(&e.expression)
+            ));
+            for p in &e.parameters {
+                out.push_str(&format!(
+                    "\n[[effect.parameter]]\nname = {}\nrange = [{:?}, {:?}]\nprior = {:?}\nstart = {:?}\n",
+                    quoted(&p.name),
+                    p.range.0,
+                    p.range.1,
+                    p.prior,
+                    p.start
+                ));
+            }
+            out.push('\n');
+        }
+        out
+    }
+
+    fn term(&self, values: BTreeMap<String, f64>) -> DeclaredTerm {
+        DeclaredTerm {
+            name: self.name.clone(),
+            quantity: self.quantity,
+            expression: self.expression.clone(),
+            values,
+        }
+    }
+}
+
+fn declared(s: &Section<'_, '_>) -> DeclaredEffect {
+    let name = s.text("name");
+    let is_word = |name: &str| {
+        name.starts_with(|c: char| c.is_ascii_alphabetic())
+            && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+    };
+    if !name.is_empty() && !is_word(&name) {
+        s.fault(
+            "name",
+            format!("`{name}` is no name"),
+            "write letters, digits and _, a letter first",
+        );
+    }
+    let unit = s.optional_text("unit").unwrap_or_default();
+    let stages = STAGES.map(|(word, _)| (word, word));
+    let stage = s.choice("stage", &stages, None);
+    let keys: Vec<_> = DeclaredQuantity::ALL.iter().filter(|(key, _)| s.has(key)).collect();
+    let own: Vec<&str> = DeclaredQuantity::ALL
+        .iter()
+        .filter(|(_, q)| stage_word(*q) == stage)
+        .map(|(key, _)| *key)
+        .collect();
+    let (key, quantity) = match keys.as_slice() {
+        [(key, quantity)] => (*key, *quantity),
+        _ => {
+            let what = format!("an effect has one expression, this one has {}", keys.len());
+            s.fault(
+                "name",
+                what,
+                format!("for the stage `{stage}`, give {}", own.join(" or ")),
+            );
+            keys.first().map_or(("opd_nm", DeclaredQuantity::OpdNm), |k| **k)
+        }
+    };
+    if !keys.is_empty() && stage_word(quantity) != stage {
+        s.fault(
+            key,
+            format!("`{key}` does not act at the stage `{stage}`"),
+            format!(
+                "the stage of `{key}` is `{}`; that stage has {}",
+                stage_word(quantity),
+                own.join(", ")
+            ),
+        );
+    }
+    let expression = if keys.is_empty() { "0".into() } else { s.text(key) };
+    for (other, _) in keys.iter().skip(1) {
+        let _ = s.optional_text(other);
+    }
+    let parts = s.sections("parameter");
+    let parameters: Vec<DeclaredParameter> = if parts.is_empty() {
+        vec![parameter(s, "a".into())]
+    } else {
+        parts.iter().map(|p| parameter(p, p.text("name"))).collect()
+    };
+    for (p, part) in parameters.iter().zip(&parts) {
+        let taken = quantity.variables().contains(&p.name.as_str())
+            || parameters.iter().filter(|o| o.name == p.name).count() > 1;
+        if taken || !is_word(&p.name) {
+            part.fault(
+                "name",
+                format!("`{}` cannot name a parameter", p.name),
+                "choose another name",
+            );
+        }
+        part.finish();
+    }
+    if parameters.len() > MOST_PARAMETERS {
+        s.fault(
+            "parameter",
+            format!("more than {MOST_PARAMETERS} parameters"),
+            "split it into two effects",
+        );
+    }
+    s.finish();
+    let effect = DeclaredEffect {
+        name,
+        unit,
+        quantity,
+        expression,
+        parameters,
+    };
+    let start = effect.parameters.iter().map(|p| (p.name.clone(), p.start)).collect();
+    if let Err(fault) = effect.term(start).compiled() {
+        s.fault_in_text(key, fault.at, fault.what, fault.hint);
+    }
+    effect
+}
+
+/// The parameter of a section.
+fn parameter(s: &Section<'_, '_>, name: String) -> DeclaredParameter {
+    let any = || Limits::new(-LARGEST..=LARGEST, "");
+    let [low, high] = s.array("range", any());
+    let prior = s.float("prior", Limits::new(1e-9..=LARGEST, ""));
+    let start = s.optional_float("start", any()).unwrap_or(0.0);
+    if !(low <= start && start <= high && low < high) {
+        s.fault(
+            "range",
+            format!("the start {start} is not within {low} to {high}"),
+            "give the lower end first, and a start between the ends",
+        );
+    }
+    DeclaredParameter {
+        name,
+        range: (low, high),
+        prior,
+        start,
+    }
+}
+
+impl Effect for DeclaredEffect {
+    fn name(&self) -> String {
+        self.name.clone()
+    }
+
+    fn unit(&self) -> &str {
+        &self.unit
+    }
+
+    fn stage(&self) -> Stage {
+        let word = stage_word(self.quantity);
+        STAGES.iter().find(|s| s.0 == word).map_or(Stage::Geometry, |s| s.1)
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        let of = |p: &DeclaredParameter| Parameter::new(p.range.0 - p.start, p.range.1 - p.start, p.prior);
+        self.parameters.iter().map(of).collect()
+    }
+
+    fn dormant(&self) -> bool {
+        // An amplitude with places and widths of its own, which do nothing where it is zero.
+        self.parameters.len() > 1
+    }
+
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
+        if parameters.iter().any(|p| *p != 0.0) {
+            let pairs = self.parameters.iter().zip(parameters);
+            to.declare(self.term(pairs.map(|(p, v)| (p.name.clone(), p.start + v)).collect()));
+        }
+    }
+
+    fn reported(&self, numbers: &[f64], half_widths: &[f64], _set: &MeasuredSet) -> Vec<(f64, [f64; 2])> {
+        let parts = self.parameters.iter().zip(numbers).zip(half_widths);
+        parts
+            .map(|((p, v), w)| {
+                let at = p.start + v;
+                (at, [(at - w).max(p.range.0), (at + w).min(p.range.1)])
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SOUND: &str = r#"
+[[effect]]
+name = "bow"
+unit = "nm"
+range = [-200.0, 200.0]
+prior = 15.0
+stage = "pupil"
+opd_nm = "a * (x^2 - y^2) / R^2"
+
+[[effect]]
+name = "ghost"
+stage = "kernel"
+kernel = "a * exp(-((x - u)^2 + y^2) / 0.5) / (0.5 * pi)"
+[[effect.parameter]]
+name = "a"
+range = [-0.5, 0.5]
+prior = 0.05
+[[effect.parameter]]
+name = "u"
+range = [-20.0, 20.0]
+prior = 1.0
+start = 5.0
+"#;
+
+    fn read(text: &str) -> Result<Vec<DeclaredEffect>> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("effects.toml");
+        std::fs::write(&path, text).unwrap();
+        DeclaredEffect::read(&path)
+    }
+
+    #[test]
+    fn a_file_is_read_and_written_back() {
+        let effects = read(SOUND).unwrap();
+        assert_eq!(effects.len(), 2);
+        assert_eq!(read(&DeclaredEffect::text(&effects)).unwrap(), effects);
+        let mut made = Perturbation::default();
+        effects[1].apply(&[0.1, 0.0], &mut made);
+        assert_eq!(made.camera.declared[0].values["u"], 5.0);
+        assert_eq!(effects[1].parameters()[1].range, (-25.0, 15.0));
+    }
+
+    #[test]
+    fn faults_have_a_line_and_a_column() {
+        let text = SOUND
+            .replace("y^2) / R^2", "q^2) / R^2")
+            .replace("stage = \"kernel\"", "stage = \"width\"");
+        let error = read(&text).unwrap_err().to_string();
+        // The eighth line, where `q` stands within the text.
+        for part in [":8:22", "`q` is not known", "does not act at the stage `width`"] {
+            assert!(error.contains(part), "{part} is not in:\n{error}");
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! Mappings for steered elements, chosen by what their pillars do among unlike neighbours.
+//!
+//! Where the phase is steep, neighbours differ from one to the next, and the mapping that brings most light into the first
+//! order of equal neighbours is not the best one. Here the pillars of a sample of sites, drawn by a polynomial, transmit by
+//! the sum over pairs ([`NeighbourTable`]); the coefficients are those with most light in the first order, mean of
+//! [`LED_UM`](crate::LED_UM). What is found is judged by supercells of rows of the element's own pillars.
+
+mod judge;
+mod sample;
+
+use std::cell::RefCell;
+use std::collections::{BTreeMap, HashMap};
+use std::path::Path;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use metalith_cell::{CellStack, InversePolynomial, NeighbourResponse, simplex};
+use metalith_core::{Error, Progress, Result, Wedge};
+use metalith_design::Design;
+use metalith_design::phase::LensPhase;
+use metalith_grating::{Mapping, NeighbourTable, NeighbourTableSpec};
+
+use crate::LED_UM;
+use judge::judge;
+use sample::SiteSample;
+
+/// Share of the light in the first order at one wavelength, with the common mapping and with the element's own.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SteeredLight {
+    pub wavelength_um: f64,
+    /// By the sum over pairs, mean of s and p, over a sample of the element's sites.
+    pub pairs: [f64; 2],
+    /// By supercells of rows of the element's pillars, all rows together.
+    pub supercells: [f64; 2],
+}
+
+/// The mapping of the elements that are steered by so many steps.
+#[derive(Clone, Debug, Serialize)]
+pub struct SteeredStudy {
+    /// Steps from the centre element along the two axes, the larger first.
+    pub steps: (u32, u32),
+    pub coefficients: Vec<f64>,
+    /// At each of [`LED_UM`](crate::LED_UM).
+    pub light: Vec<SteeredLight>,
+}
+
+impl SteeredStudy {
+    /// First order with the element's own mapping over that with the common one: means over the wavelengths, by supercells.
+    pub fn gain(&self) -> f64 {
+        let sum = |k: usize| self.light.iter().map(|l| l.supercells[k]).sum::<f64>();
+        sum(1) / sum(0)
+    }
+}
+
+/// Find a mapping for each distinct steered element of a design; tables of neighbours are kept in the folder `cache`.
+///
+/// # Errors
+/// If the common mapping is a table, a cell cannot be solved, or the user stopped it.
+pub fn study_steered(design: &Design, cache: Option<&Path>, progress: &dyn Progress) -> Result<Vec<SteeredStudy>> {
+    if design.mapping.table.is_some() {
+        return Err(Error::invalid(
+            "mappings of steered elements start from the polynomial of the design, which has a table instead",
+            "give `coefficients` in [mapping]",
+        ));
+    }
+    let stack = design.cell_stack()?;
+    let lens = LensPhase::new(design.lattice(), design.lens.diameter_nm, &design.lens.phase);
+    steered(design)
+        .into_iter()
+        .map(|(steps, wedge)| study(design, &stack, &lens, steps, &wedge, cache, progress))
+        .collect()
+}
+
+/// The wedge of each pair of steps but none, turned so that light arrives as tables have it: from +x more than from +y.
+fn steered(design: &Design) -> BTreeMap<(u32, u32), Wedge> {
+    let elements = design.elements().into_iter().map(|element| {
+        let steps = [element.index.0, element.index.1].map(i32::unsigned_abs);
+        let sines = [element.wedge.sin_x, element.wedge.sin_y].map(f64::abs);
+        let wedge = Wedge {
+            sin_x: -sines[0].max(sines[1]),
+            sin_y: -sines[0].min(sines[1]),
+            ..element.wedge
+        };
+        ((steps[0].max(steps[1]), steps[0].min(steps[1])), wedge)
+    });
+    elements.filter(|(steps, _)| *steps != (0, 0)).collect()
+}
+
+fn study(
+    design: &Design,
+    stack: &CellStack,
+    lens: &LensPhase,
+    steps: (u32, u32),
+    wedge: &Wedge,
+    cache: Option<&Path>,
+    progress: &dyn Progress,
+) -> Result<SteeredStudy> {
+    let sines = |um: f64| <[f64; 2]>::from(wedge.looks_at(um));
+    // Any width that may be written, whatever mapping is found.
+    let writable: Vec<u16> = design.cell.widths_nm().collect();
+    let mapping = Mapping::new(|u| writable[(u * writable.len() as f64) as usize]);
+    let tables = LED_UM
+        .iter()
+        .map(|&um| {
+            let spec = NeighbourTableSpec {
+                wavelength_um: um,
+                sines: sines(um),
+            };
+            let table = NeighbourTable::obtain(&spec, stack, std::slice::from_ref(&mapping), cache, progress)?;
+            Ok(table.responses(1.0))
+        })
+        .collect::<Result<Vec<[NeighbourResponse; 2]>>>()?;
+    let sample = SiteSample::new(lens, wedge);
+    let common = &design.mapping.polynomial;
+    progress.begin(
+        &format!("mapping of elements {} and {} steps off", steps.0, steps.1),
+        STARTS as u64,
+    );
+    let found: Vec<InversePolynomial> = starts(design)
+        .into_par_iter()
+        .map(|start| {
+            let best = best(design, &start, &sample, &tables);
+            progress.advance(1);
+            best
+        })
+        .collect();
+    if progress.stopped() {
+        return Err(Error::Interrupted);
+    }
+    let shares = |polynomial: &InversePolynomial| sample.shares(|u| width_nm(design, polynomial, u), &tables);
+    let mean = |polynomial: &InversePolynomial| shares(polynomial).iter().sum::<f64>();
+    let best = found
+        .into_iter()
+        .max_by(|a, b| mean(a).total_cmp(&mean(b)))
+        .expect("there are starts");
+    let pairs = [shares(common), shares(&best)];
+    let mut light = Vec::new();
+    for (k, um) in LED_UM.into_iter().enumerate() {
+        let judged = [common, &best].map(|polynomial| {
+            let width_nm = |u| width_nm(design, polynomial, u);
+            judge(stack, lens, wedge, (um, sines(um)), &width_nm, progress)
+        });
+        let [before, after] = judged;
+        light.push(SteeredLight {
+            wavelength_um: um,
+            pairs: [pairs[0][k], pairs[1][k]],
+            supercells: [before?, after?],
+        });
+    }
+    Ok(SteeredStudy {
+        steps,
+        coefficients: best.coefficients,
+        light,
+    })
+}
+
+/// Number of polynomials that the search starts from.
+const STARTS: usize = 2;
+
+/// The common mapping, and widths that rise evenly from the narrowest to the widest, of the same degree.
+fn starts(design: &Design) -> [InversePolynomial; STARTS] {
+    let common = design.mapping.polynomial.clone();
+    let (low, high) = design.cell.width_range_nm;
+    let [low, high] = [low, high].map(|w| f64::from(w) / f64::from(design.cell.pitch_nm));
+    let mut even = vec![0.0; common.coefficients.len().max(2)];
+    // A tenth of the range stays free at either end, or the search would begin at its border.
+    even[0] = low + 0.1 * (high - low);
+    even[1] = 0.8 * (high - low);
+    let even = InversePolynomial {
+        coefficients: even,
+        ..common.clone()
+    };
+    [common, even]
+}
+
+fn best(
+    design: &Design,
+    start: &InversePolynomial,
+    sample: &SiteSample,
+    tables: &[[NeighbourResponse; 2]],
+) -> InversePolynomial {
+    let rounded = |coefficients: &[f64]| coefficients.iter().map(|c| (c * ROUNDED).round() as i64).collect();
+    let with = |rounded: &[i64]| InversePolynomial {
+        coefficients: rounded.iter().map(|c| *c as f64 / ROUNDED).collect(),
+        ..start.clone()
+    };
+    let pitch_nm = f64::from(design.cell.pitch_nm);
+    let (low, high) = design.cell.width_range_nm;
+    let loss = |polynomial: &InversePolynomial| {
+        let (narrow, wide) = polynomial.range();
+        // A mapping that leaves the widths is not one, however well its clamped form does.
+        let outside = (f64::from(low) - narrow * pitch_nm)
+            .max(wide * pitch_nm - f64::from(high))
+            .max(0.0);
+        let shares = sample.shares(|u| width_nm(design, polynomial, u), tables);
+        outside - shares.iter().sum::<f64>() / shares.len() as f64
+    };
+    // The simplex shrinks below what coefficients are rounded to: most of its steps ask for what is known.
+    let known: RefCell<HashMap<Vec<i64>, f64>> = RefCell::default();
+    let kept = |coefficients: &[f64]| {
+        let key: Vec<i64> = rounded(coefficients);
+        if let Some(loss) = known.borrow().get(&key) {
+            return *loss;
+        }
+        let found = loss(&with(&key));
+        known.borrow_mut().insert(key, found);
+        found
+    };
+    let best: Vec<i64> = rounded(&simplex(&start.coefficients, kept));
+    with(&best)
+}
+
+/// Coefficients are found to this part of one, as design files have them.
+const ROUNDED: f64 = 1e4;
+
+/// Width before rounding (nm), within those that may be written, for a phase (turns).
+fn width_nm(design: &Design, polynomial: &InversePolynomial, u: f64) -> f64 {
+    let (low, high) = design.cell.width_range_nm;
+    (polynomial.duty(u) * f64::from(design.cell.pitch_nm)).clamp(f64::from(low), f64::from(high))
+}

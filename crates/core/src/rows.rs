@@ -1,0 +1,88 @@
+//! Widths of an element, row by row: held, or made when they are asked for.
+
+use std::ops::Range;
+
+use crate::{Lattice, WidthMap};
+
+/// Pillar widths of one element. An element of 10 mm has 800 million sites: who reads it row by row needs none but a row
+/// of them in memory.
+pub trait WidthRows: Sync {
+    /// Where the sites are.
+    fn lattice(&self) -> Lattice;
+
+    /// Width of the pillar in column `ix` of row `iy` (nm), zero where there is none.
+    fn width(&self, ix: usize, iy: usize) -> u16;
+
+    /// Widths of some columns of row `iy` (nm). What is not held anyway is made in `room`.
+    fn row<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16];
+
+    /// As [`WidthRows::row`], for who asks only where pillars are: any number but zero stands for a width.
+    fn occupied<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16] {
+        self.row(iy, columns, room)
+    }
+
+    /// Call `with` with row, column and width (nm) of every pillar, rows from below.
+    fn each_pillar(&self, mut with: impl FnMut(usize, usize, u16))
+    where
+        Self: Sized,
+    {
+        let n = self.lattice().sites();
+        let mut room = Vec::new();
+        for iy in 0..n {
+            let row = self.row(iy, 0..n, &mut room).iter().enumerate();
+            row.filter(|(_, w)| **w != 0).for_each(|(ix, &w)| with(iy, ix, w));
+        }
+    }
+
+    /// Number of sites with a pillar.
+    fn pillars(&self) -> u64 {
+        let n = self.lattice().sites();
+        let mut room = Vec::new();
+        let in_row = |iy| self.occupied(iy, 0..n, &mut room).iter().filter(|&&w| w != 0).count() as u64;
+        (0..n).map(in_row).sum()
+    }
+
+    /// Number of pillars of each width; index is the width (nm), the first entry counts empty sites.
+    fn histogram(&self) -> Vec<u64> {
+        let n = self.lattice().sites();
+        let (mut counts, mut room) = (Vec::new(), Vec::new());
+        for iy in 0..n {
+            for &w in self.row(iy, 0..n, &mut room) {
+                let w = usize::from(w);
+                if w >= counts.len() {
+                    counts.resize(w + 1, 0);
+                }
+                counts[w] += 1;
+            }
+        }
+        counts
+    }
+
+    /// All of them, held.
+    fn whole(&self) -> WidthMap {
+        let mut map = WidthMap::empty(self.lattice());
+        let mut room = Vec::new();
+        let n = map.lattice.sites();
+        for (iy, mut to) in map.width_nm.outer_iter_mut().enumerate() {
+            let row = self.row(iy, 0..n, &mut room);
+            to.iter_mut().zip(row).for_each(|(to, from)| *to = *from);
+        }
+        map
+    }
+}
+
+impl WidthRows for WidthMap {
+    fn lattice(&self) -> Lattice {
+        self.lattice
+    }
+
+    fn width(&self, ix: usize, iy: usize) -> u16 {
+        self.width_nm[[iy, ix]]
+    }
+
+    fn row<'r>(&'r self, iy: usize, columns: Range<usize>, _room: &'r mut Vec<u16>) -> &'r [u16] {
+        let n = self.lattice.sites();
+        let all = self.width_nm.as_slice().expect("rows are contiguous");
+        &all[iy * n..(iy + 1) * n][columns]
+    }
+}

@@ -1,0 +1,158 @@
+//! Pillars of an element that are made when they are asked for.
+
+use std::borrow::Cow;
+use std::ops::Range;
+use std::sync::Arc;
+
+use metalith_core::{EighthMap, Lattice, Wedge, WidthMap, WidthRows};
+
+use super::{Symmetry, SymmetryGroup, WidthRule};
+use crate::phase::{ElementPhase, LensPhase};
+
+/// The pillars of one element as a function of the site: no memory but that of the lens's phase, which all elements
+/// share.
+#[derive(Clone, Debug)]
+pub struct ComputedWidths {
+    lens: Arc<LensPhase>,
+    rule: Arc<WidthRule>,
+    wedge: Wedge,
+}
+
+impl ComputedWidths {
+    pub(super) fn new(lens: Arc<LensPhase>, rule: Arc<WidthRule>, wedge: Wedge) -> Self {
+        Self { lens, rule, wedge }
+    }
+
+    /// The element of the same lens with another wedge.
+    pub(super) fn steered(&self, wedge: Wedge) -> Self {
+        Self { wedge, ..self.clone() }
+    }
+
+    fn phase(&self) -> ElementPhase<'_> {
+        ElementPhase::new(&self.lens, &self.wedge)
+    }
+
+    fn directions(&self) -> [f64; 2] {
+        [self.wedge.sin_x, self.wedge.sin_y]
+    }
+
+    /// Whether a symmetry turns this element into another of the same lens and mapping. The phase is a function of the exact radius
+    /// and of the sum of two products with the wedge, so a symmetry that turns one wedge into the other turns one
+    /// element into the other to the last bit.
+    pub fn maps(&self, symmetry: Symmetry, to: &Self) -> bool {
+        self.rule == to.rule
+            && self.wedge.wavelength_um == to.wedge.wavelength_um
+            && symmetry.vector(self.directions()) == to.directions()
+    }
+
+    /// The symmetries that leave the element as it is.
+    pub fn group(&self) -> SymmetryGroup {
+        SymmetryGroup::of_those(|s| self.maps(s, self))
+    }
+
+    fn fill<'r>(
+        &self,
+        iy: usize,
+        columns: Range<usize>,
+        room: &'r mut Vec<u16>,
+        width: impl Fn(usize, usize) -> u16,
+    ) -> &'r [u16] {
+        room.clear();
+        room.extend(columns.map(|ix| width(ix, iy)));
+        room
+    }
+}
+
+impl WidthRows for ComputedWidths {
+    fn lattice(&self) -> Lattice {
+        self.lens.lattice()
+    }
+
+    fn width(&self, ix: usize, iy: usize) -> u16 {
+        self.phase().wrapped(ix, iy).map_or(0, |u| self.rule.width_nm(u))
+    }
+
+    fn row<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16] {
+        let phase = self.phase();
+        let width = |ix, iy| phase.wrapped(ix, iy).map_or(0, |u| self.rule.width_nm(u));
+        self.fill(iy, columns, room, width)
+    }
+
+    fn occupied<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16] {
+        self.fill(iy, columns, room, |ix, iy| u16::from(self.lens.holds(ix, iy)))
+    }
+}
+
+/// Pillars of a class of elements.
+#[derive(Clone, Debug)]
+pub enum ClassWidths {
+    Held(WidthMap),
+    /// Of an element that all eight symmetries leave as it is.
+    Eighth(EighthMap),
+    Computed(ComputedWidths),
+}
+
+impl ClassWidths {
+    /// Whether a symmetry turns `known` into these pillars: every site is compared if both are held.
+    pub(super) fn is_copy(&self, symmetry: Symmetry, known: &Self) -> bool {
+        match (known, self) {
+            (Self::Held(from), Self::Held(to)) => symmetry.maps(from, to),
+            (Self::Computed(from), Self::Computed(to)) => from.maps(symmetry, to),
+            _ => false,
+        }
+    }
+
+    /// The symmetries that leave the pillars as they are.
+    pub(super) fn group(&self) -> SymmetryGroup {
+        match self {
+            Self::Held(map) => SymmetryGroup::of(map),
+            Self::Computed(computed) => computed.group(),
+            Self::Eighth(_) => SymmetryGroup::of_those(|_| true),
+        }
+    }
+
+    /// The pillars as a map, to be changed.
+    pub fn map_mut(&mut self) -> &mut WidthMap {
+        if !matches!(self, Self::Held(_)) {
+            *self = Self::Held(self.whole());
+        }
+        match self {
+            Self::Held(map) => map,
+            Self::Eighth(_) | Self::Computed(_) => unreachable!("it is held by now"),
+        }
+    }
+
+    /// The pillars as a map, made if they are not held.
+    pub fn map(&self) -> Cow<'_, WidthMap> {
+        match self {
+            Self::Held(map) => Cow::Borrowed(map),
+            other => Cow::Owned(other.whole()),
+        }
+    }
+
+    fn rows(&self) -> &dyn WidthRows {
+        match self {
+            Self::Held(map) => map,
+            Self::Eighth(map) => map,
+            Self::Computed(computed) => computed,
+        }
+    }
+}
+
+impl WidthRows for ClassWidths {
+    fn lattice(&self) -> Lattice {
+        self.rows().lattice()
+    }
+
+    fn width(&self, ix: usize, iy: usize) -> u16 {
+        self.rows().width(ix, iy)
+    }
+
+    fn row<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16] {
+        self.rows().row(iy, columns, room)
+    }
+
+    fn occupied<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16] {
+        self.rows().occupied(iy, columns, room)
+    }
+}

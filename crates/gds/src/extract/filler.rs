@@ -1,0 +1,290 @@
+//! Squares onto the sites of elements.
+
+use std::collections::HashMap;
+
+use super::MOST_SITES;
+use super::held::HeldWidths;
+use super::oddity::Why;
+use super::plan::ExtractedElement;
+use super::sites::{Scale, Sites, Standing};
+use crate::{ExtractionError, Rect, Transform};
+use metalith_core::{EighthMap, ElementSite, WidthRows};
+
+/// Puts squares on the sites of elements.
+///
+/// A cell that is placed by all symmetries of the square about the middle of an element, as folded layouts have it, is
+/// put there once: of an element with no other pillars an eighth is held.
+pub struct Filler {
+    scale: Scale,
+    sites: Sites,
+    elements: Vec<ExtractedElement<HeldWidths>>,
+    /// Element that each placement of the current cell met last.
+    guesses: Vec<u32>,
+    /// Placements of the current cell about the middles of elements, if all of them are.
+    orbits: Vec<Orbit>,
+    /// The first placement that these were found with.
+    first: Transform,
+    pillars: u64,
+    held: u64,
+    /// More is to be held than may be.
+    refused: bool,
+}
+
+/// Placements that symmetry takes into one another, eight or four.
+struct Orbit {
+    element: u32,
+    placements: Vec<usize>,
+}
+
+impl Filler {
+    pub fn new(sites: Vec<ElementSite>, scale: Scale) -> Self {
+        let index = Sites::new(&sites, scale);
+        let empty = |site: ElementSite| ExtractedElement {
+            widths: HeldWidths::Empty(site.lattice),
+            site,
+        };
+        Self {
+            scale,
+            sites: index,
+            elements: sites.into_iter().map(empty).collect(),
+            guesses: Vec::new(),
+            orbits: Vec::new(),
+            first: Transform::IDENTITY,
+            pillars: 0,
+            held: 0,
+            refused: false,
+        }
+    }
+
+    /// Pillars that were put, over all elements.
+    pub fn pillars(&self) -> u64 {
+        self.pillars
+    }
+
+    /// The elements with their pillars.
+    ///
+    /// # Errors
+    /// [`ExtractionError::Sites`] if they have more sites than are held: what was put after that is lost.
+    pub fn finish(self) -> Result<Vec<ExtractedElement<HeldWidths>>, ExtractionError> {
+        if !self.refused {
+            return Ok(self.elements);
+        }
+        Err(ExtractionError::Sites {
+            elements: self.elements.len(),
+            sites: self
+                .elements
+                .iter()
+                .map(|e| (e.site.lattice.sites() as u64).pow(2))
+                .sum(),
+            most: MOST_SITES,
+        })
+    }
+
+    /// A cell with these placements begins.
+    pub fn begin(&mut self, placements: &[Transform]) {
+        self.guesses.clear();
+        self.guesses.resize(placements.len(), 0);
+        self.orbits = self.orbits_of(placements).unwrap_or_default();
+        if !self
+            .orbits
+            .iter()
+            .all(|o| self.elements[o.element as usize].widths.is_folded())
+        {
+            self.orbits.clear();
+        }
+        for k in 0..self.orbits.len() {
+            self.hold_eighth(self.orbits[k].element);
+        }
+        self.first = placements.first().copied().unwrap_or(Transform::IDENTITY);
+    }
+
+    /// Hold an eighth of an element of which nothing is held, unless that is too much.
+    fn hold_eighth(&mut self, element: u32) {
+        let widths = &mut self.elements[element as usize].widths;
+        let HeldWidths::Empty(lattice) = *widths else { return };
+        let held = self.held + EighthMap::sites(lattice);
+        if held <= MOST_SITES {
+            self.held = held;
+            *widths = HeldWidths::Eighth(EighthMap::empty(lattice));
+        }
+    }
+
+    /// Placements in sets about the middle of an element; none if any of them is not in such a set.
+    fn orbits_of(&self, placements: &[Transform]) -> Option<Vec<Orbit>> {
+        if !placements.len().is_multiple_of(4) || placements.len() > 8 * self.elements.len() {
+            return None;
+        }
+        let mut sets: HashMap<(i64, i64), (u8, Vec<usize>)> = HashMap::new();
+        for (k, placement) in placements.iter().enumerate() {
+            let Transform::Square { orientation, dx, dy } = *placement else {
+                return None;
+            };
+            let (seen, members) = sets.entry((dx, dy)).or_default();
+            let bit = 1 << (orientation & 7);
+            if *seen & bit != 0 {
+                return None;
+            }
+            *seen |= bit;
+            members.push(k);
+        }
+        let mut orbits = Vec::new();
+        for (k, element) in self.elements.iter().enumerate() {
+            let [x, y] = element.site.centre_nm.map(|c| c * self.scale.den);
+            if x % self.scale.num != 0 || y % self.scale.num != 0 {
+                continue;
+            }
+            if let Some((_, placements)) = sets.remove(&(x / self.scale.num, y / self.scale.num)) {
+                orbits.push(Orbit {
+                    element: k as u32,
+                    placements,
+                });
+            }
+        }
+        let whole = |o: &Orbit| o.placements.len() == 8 || o.placements.len() == 4;
+        (sets.is_empty() && orbits.iter().all(whole)).then_some(orbits)
+    }
+
+    /// Put a square of the current cell on its sites in all of its `placements`, if symmetry makes one of them stand for
+    /// all; else nothing is put and they are to be put one by one.
+    #[inline]
+    pub fn put_orbits(&mut self, r: &Rect, placements: &[Transform], takes: impl Fn(i64) -> bool) -> bool {
+        if self.orbits.is_empty() || placements.first() != Some(&self.first) || !takes(r.width()) {
+            return false;
+        }
+        let site = |filler: &Self, orbit: &Orbit| filler.site_of(orbit, r, placements);
+        if !self.orbits.iter().all(|orbit| site(self, orbit).is_some()) {
+            return false;
+        }
+        for k in 0..self.orbits.len() {
+            let orbit = &self.orbits[k];
+            if let Some((row, column, width_nm)) = site(self, orbit) {
+                let (element, copies) = (orbit.element as usize, orbit.placements.len() as u64);
+                if let HeldWidths::Eighth(map) = &mut self.elements[element].widths {
+                    *map.at(column, row) = width_nm;
+                    self.pillars += copies;
+                }
+            }
+        }
+        true
+    }
+
+    /// Site (row, column) and width (nm) of a square in the first placement of an orbit, if the others put it on all
+    /// copies of that site, all of them free.
+    #[inline]
+    fn site_of(&self, orbit: &Orbit, r: &Rect, placements: &[Transform]) -> Option<(usize, usize, u16)> {
+        let element = orbit.element;
+        let HeldWidths::Eighth(map) = &self.elements[element as usize].widths else {
+            return None;
+        };
+        let placed = placements.get(orbit.placements[0])?.apply_rect(r)?;
+        let mut guess = element;
+        let (found, row, column, width_nm) = self.standing(&placed, &mut guess).ok()?;
+        let copies = map.copies(column, row);
+        if found != element || copies != orbit.placements.len() || map.width(column, row) != 0 {
+            return None;
+        }
+        // Four sites about the middle are met by four placements only if no two of these put them on one site.
+        if copies == 4 {
+            let at = |k: &usize| placements.get(*k)?.apply_rect(r).map(|r| (r.x0, r.y0));
+            let places: Vec<_> = orbit.placements.iter().map(at).collect();
+            if (1..4).any(|k| places[..k].contains(&places[k])) {
+                return None;
+            }
+        }
+        Some((row, column, width_nm))
+    }
+
+    /// Element, row, column and width (nm) of a square on a site.
+    #[inline]
+    fn standing(&self, r: &Rect, guess: &mut u32) -> Result<(u32, usize, usize, u16), Why> {
+        if !self.scale.reaches(r) {
+            return Err(Why::OutsideElements);
+        }
+        if r.width() != r.height() {
+            return Err(Why::NotSquare);
+        }
+        let width_nm = self.scale.whole_nm(r.width()).ok_or(Why::OddShape)?;
+        let (element, row, column) = match self.sites.stand(r, guess) {
+            Standing::Site(element, row, column) => (element, row, column),
+            Standing::Between(element) if width_nm > self.sites.pitch_nm(element) => return Err(Why::TooWide),
+            Standing::Between(_) => return Err(Why::OffLattice),
+            Standing::Outside => return Err(Why::OutsideElements),
+        };
+        if width_nm > self.sites.pitch_nm(element) || width_nm > i64::from(u16::MAX) {
+            return Err(Why::TooWide);
+        }
+        Ok((element, row, column, width_nm as u16))
+    }
+
+    /// Put an upright rectangle of the layout on its site if `takes` its width in database units, and say
+    /// whether it was taken, or why it has no site.
+    #[inline]
+    pub fn put(&mut self, r: &Rect, placement: usize, takes: impl Fn(i64) -> bool) -> Result<bool, Why> {
+        let mut guess = self.guesses[placement];
+        let standing = self.standing(r, &mut guess);
+        self.guesses[placement] = guess;
+        let (element, row, column, width_nm) = standing?;
+        if !takes(r.width()) {
+            return Ok(false);
+        }
+        if self.elements[element as usize].widths.width(column, row) != 0 {
+            return Err(Why::DuplicateSite);
+        }
+        if let Some(place) = self.place(element, row, column) {
+            *place = width_nm;
+            self.pillars += 1;
+        }
+        Ok(true)
+    }
+
+    /// The width at one site alone; none if its element cannot be held.
+    #[inline]
+    fn place(&mut self, element: u32, row: usize, column: usize) -> Option<&mut u16> {
+        if !matches!(self.elements[element as usize].widths, HeldWidths::Whole(_)) {
+            self.hold_whole(element);
+        }
+        match &mut self.elements[element as usize].widths {
+            HeldWidths::Whole(map) => Some(&mut map.width_nm[[row, column]]),
+            _ => None,
+        }
+    }
+
+    /// Hold all sites of an element, unless these are too many.
+    #[cold]
+    fn hold_whole(&mut self, element: u32) {
+        let widths = &mut self.elements[element as usize].widths;
+        let sites = (widths.lattice().sites() as u64).pow(2);
+        let held = self.held - widths.sites() + sites;
+        self.refused |= held > MOST_SITES;
+        if !self.refused {
+            self.held = held;
+            *widths = HeldWidths::Whole(widths.whole());
+        }
+    }
+
+    /// Of a square and the one that is on its site already, leave the wider there; the other, as a
+    /// rectangle about the same site. Both have even widths.
+    pub fn keep_wider(&mut self, r: &Rect, placement: usize) -> Rect {
+        let Standing::Site(element, row, column) = self.sites.stand(r, &mut self.guesses[placement]) else {
+            return *r;
+        };
+        let Some(width_nm) = self.scale.whole_nm(r.width()) else {
+            return *r;
+        };
+        let there = i64::from(self.elements[element as usize].widths.width(column, row));
+        if width_nm <= there {
+            return *r;
+        }
+        let Some(place) = self.place(element, row, column) else {
+            return *r;
+        };
+        *place = width_nm as u16;
+        let less = r.width() - there * r.width() / width_nm;
+        Rect {
+            x0: r.x0 + less / 2,
+            y0: r.y0 + less / 2,
+            x1: r.x1 - less / 2,
+            y1: r.y1 - less / 2,
+        }
+    }
+}

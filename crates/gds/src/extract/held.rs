@@ -1,0 +1,87 @@
+//! Widths of an element as they are read: nothing, an eighth that symmetry makes whole, or all.
+
+use std::ops::Range;
+
+use metalith_core::{EighthMap, Lattice, WidthMap, WidthRows};
+
+/// Pillars that were read of one element.
+#[derive(Clone, Debug)]
+pub enum HeldWidths {
+    /// No pillar yet: no memory.
+    Empty(Lattice),
+    /// All pillars came with all copies of them by the symmetries of the square.
+    Eighth(EighthMap),
+    Whole(WidthMap),
+}
+
+impl HeldWidths {
+    /// Sites that are held.
+    pub fn sites(&self) -> u64 {
+        match self {
+            Self::Empty(_) => 0,
+            Self::Eighth(map) => EighthMap::sites(map.lattice()),
+            Self::Whole(map) => map.width_nm.len() as u64,
+        }
+    }
+
+    /// Whether no pillar is without its copies.
+    pub fn is_folded(&self) -> bool {
+        !matches!(self, Self::Whole(_))
+    }
+
+    /// The pillars as a map.
+    pub fn into_map(self) -> WidthMap {
+        match self {
+            Self::Whole(map) => map,
+            other => other.whole(),
+        }
+    }
+
+    fn rows(&self) -> Option<&dyn WidthRows> {
+        match self {
+            Self::Empty(_) => None,
+            Self::Eighth(map) => Some(map),
+            Self::Whole(map) => Some(map),
+        }
+    }
+}
+
+impl WidthRows for HeldWidths {
+    fn lattice(&self) -> Lattice {
+        match self {
+            Self::Empty(lattice) => *lattice,
+            Self::Eighth(map) => map.lattice(),
+            Self::Whole(map) => map.lattice,
+        }
+    }
+
+    #[inline]
+    fn width(&self, ix: usize, iy: usize) -> u16 {
+        match self {
+            Self::Empty(_) => 0,
+            Self::Eighth(map) => map.width(ix, iy),
+            Self::Whole(map) => map.width_nm[[iy, ix]],
+        }
+    }
+
+    fn row<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16] {
+        match self {
+            Self::Empty(_) => {
+                room.clear();
+                room.resize(columns.len(), 0);
+                room
+            }
+            Self::Eighth(map) => map.row(iy, columns, room),
+            Self::Whole(map) => map.row(iy, columns, room),
+        }
+    }
+
+    fn pillars(&self) -> u64 {
+        self.rows().map_or(0, WidthRows::pillars)
+    }
+
+    fn histogram(&self) -> Vec<u64> {
+        let nothing = || vec![(self.lattice().sites() as u64).pow(2)];
+        self.rows().map_or_else(nothing, WidthRows::histogram)
+    }
+}
