@@ -36,6 +36,11 @@ pub struct CalibrateArgs {
     #[arg(long, value_name = "FILE")]
     declare: Option<PathBuf>,
 
+    /// Where something is left that no effect explains, try the effects that are proposed for it (`proposal.toml`) as
+    /// well, and answer with them.
+    #[arg(long, conflicts_with = "validate")]
+    adopt: bool,
+
     /// Validate the calibration itself instead, on synthetic sets like this one: without effects, with each
     /// effect at three sizes, with pairs, and with effects that are not listed. Takes half an hour; writes
     /// validation.html, validation.json and validation.txt.
@@ -82,6 +87,7 @@ pub fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> {
             Some(path) => DeclaredEffect::read(path)?,
             None => Vec::new(),
         },
+        adopt: args.adopt,
         ..Settings::default()
     };
     if args.validate {
@@ -126,6 +132,9 @@ fn describe(done: &Calibration) {
         error.before.held_out,
         error.after.held_out
     );
+    if let Some(proposal) = &done.diagnosis.proposal {
+        print_line!("{}", proposal.sentence(&done.diagnosis));
+    }
     print_line!("{}", done.answer.display());
     print_line!("{}", done.report.display());
     if let Some(model) = &done.model {

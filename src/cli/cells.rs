@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use metalith::Result;
 use metalith::cell::{CellTable, Origin, RigorousCell, cache_folder};
 use metalith::cell_study::{CellStudy, StudyOptions, study_steered, write_cell_report};
 use metalith::report::{fixed, sig};
-use metalith::{Design, Result};
 
-use super::{Outcome, Terminal, print_json, print_line};
+use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
 /// Tabulate the cell of a design by rigorous theory, fit it, and report what its mapping does with light.
 #[derive(Args)]
@@ -50,7 +50,7 @@ pub struct CellsArgs {
 /// Do it.
 pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
-    let design = Design::read(&args.design)?;
+    let design = standard_input::design(&args.design)?;
     let folder = args
         .out
         .clone()

@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use metalith::drc::{self, CheckInput, Date, Deck, DrcReport, Waivers};
 use metalith::gds::ReadLimits;
-use metalith::{Design, Layout, Result, WholeFile};
+use metalith::{Error, Layout, Result, WholeFile};
 
 use super::compensated::CompensatedFor;
-use super::{Outcome, Terminal, print_line};
+use super::output::is_standard_output;
+use super::standard_input::InputFile;
+use super::{Outcome, Terminal, print_line, standard_input};
 
 /// Check a layout against design rules.
 #[derive(Args)]
@@ -17,7 +19,7 @@ use super::{Outcome, Terminal, print_line};
     Example:\n  metalith check out/mini_3x3/mini_3x3_pillars.gds --design designs/mini_3x3.toml --sarif check.sarif"
 )]
 pub struct CheckArgs {
-    /// The layout, in any hierarchy, by any tool.
+    /// The layout, in any hierarchy, by any tool; `-` for standard input.
     layout: PathBuf,
 
     /// The rules; those of the program (rules/sin_pillars.toml) if left out.
@@ -47,7 +49,7 @@ pub struct CheckArgs {
     #[arg(long)]
     json: bool,
 
-    /// Write a report database for KLayout's marker browser.
+    /// Write a report database for KLayout's marker browser; `-` prints it instead of the summary, as for the next two.
     #[arg(long, value_name = "FILE.lyrdb")]
     lyrdb: Option<PathBuf>,
 
@@ -60,14 +62,35 @@ pub struct CheckArgs {
     sarif: Option<PathBuf>,
 }
 
+type Form = fn(&DrcReport) -> String;
+
 impl CheckArgs {
-    /// Refuse to overwrite what is read.
+    /// Refuse to overwrite what is read, and to print two things at once.
     fn paths_are_apart(&self) -> Result<()> {
         let inputs = [&self.rules, &self.design, &self.waivers, &self.compensated.model];
         let inputs = inputs.into_iter().flatten().chain(&self.with).chain([&self.layout]);
-        let outputs = [&self.lyrdb, &self.junit, &self.sarif].into_iter().flatten();
-        let outputs: Vec<&Path> = outputs.map(PathBuf::as_path).collect();
-        super::paths::apart(inputs.map(PathBuf::as_path), &outputs)
+        let (printed, files): (Vec<&Path>, Vec<&Path>) = self
+            .outputs()
+            .map(|(path, _)| path)
+            .partition(|path| is_standard_output(path));
+        if printed.len() + usize::from(self.json) > 1 {
+            return Err(Error::invalid(
+                "two results for standard output",
+                "give `-` to one of --lyrdb, --junit and --sarif, without --json",
+            ));
+        }
+        super::paths::apart(inputs.map(PathBuf::as_path), &files)
+    }
+
+    /// Where to write the result in which form.
+    fn outputs(&self) -> impl Iterator<Item = (&Path, Form)> {
+        let all: [(&Option<PathBuf>, Form); 3] = [
+            (&self.lyrdb, drc::lyrdb),
+            (&self.junit, drc::junit),
+            (&self.sarif, drc::sarif),
+        ];
+        all.into_iter()
+            .filter_map(|(path, form)| Some((path.as_deref()?, form)))
     }
 }
 
@@ -75,11 +98,12 @@ pub fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
     args.paths_are_apart()?;
     let deck = args.rules.as_deref().map_or_else(|| Ok(Deck::standard()), Deck::read)?;
     let waivers = args.waivers.as_deref().map(Waivers::read).transpose()?;
-    let mut design = args.design.as_deref().map(Design::read).transpose()?;
+    let mut design = args.design.as_deref().map(standard_input::design).transpose()?;
     terminal.stop_on_interrupt();
-    let open = |path: &PathBuf| Layout::open_with(path, ReadLimits::default(), terminal);
-    let layout = open(&args.layout)?;
-    let with = args.with.iter().map(open).collect::<Result<Vec<_>, _>>()?;
+    let file = InputFile::of(&args.layout)?;
+    let open = |path: &Path| Layout::open_with(path, ReadLimits::default(), terminal);
+    let layout = open(&file)?;
+    let with = args.with.iter().map(|path| open(path)).collect::<Result<Vec<_>, _>>()?;
     let array = match &mut design {
         Some(design) if args.compensated.model.is_some() => Some(args.compensated.array(design, terminal)?),
         _ => None,
@@ -94,22 +118,15 @@ pub fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
     };
     let report = drc::check(&layout, &deck, &input, terminal)?;
     terminal.clear();
-    type Form = fn(&DrcReport) -> String;
-    let files: [(&Option<PathBuf>, Form); 3] = [
-        (&args.lyrdb, drc::lyrdb),
-        (&args.junit, drc::junit),
-        (&args.sarif, drc::sarif),
-    ];
-    for (path, form) in files {
-        if let Some(path) = path {
-            write(path, &form(&report))?;
+    let mut text: Form = if args.json { json } else { drc::text };
+    for (path, form) in args.outputs() {
+        if is_standard_output(path) {
+            text = form;
+        } else {
+            WholeFile::write(path, form(&report).as_bytes())?;
         }
     }
-    if args.json {
-        print_line!("{:#}", serde_json::to_value(&report).expect("a report is plain data"));
-    } else {
-        print_line!("{}", drc::text(&report).trim_end());
-    }
+    print_line!("{}", text(&report).trim_end());
     Ok(match report.exit_code() {
         0 => Outcome::Fine,
         1 => Outcome::OutsideLimits,
@@ -117,6 +134,6 @@ pub fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
     })
 }
 
-fn write(path: &Path, text: &str) -> Result<()> {
-    WholeFile::write(path, text.as_bytes())
+fn json(report: &DrcReport) -> String {
+    format!("{:#}", serde_json::to_value(report).expect("a report is plain data"))
 }

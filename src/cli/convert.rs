@@ -8,6 +8,7 @@ use metalith::layout::{LayoutFormat, convert};
 use metalith::{Layout, Result};
 
 use super::layout::FormatArg;
+use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_line};
 
 /// Write a layout in GDSII or OASIS: the same cells, streamed from one file into the other.
@@ -32,7 +33,7 @@ pub fn run(args: &ConvertArgs, terminal: &Terminal) -> Result<Outcome> {
     super::paths::apart([args.from.as_path()], &[&args.to])?;
     let format = args.format.map_or_else(|| LayoutFormat::of_name(&args.to), Into::into);
     terminal.stop_on_interrupt();
-    let layout = Layout::open_with(&args.from, ReadLimits::default(), terminal)?;
+    let layout = Layout::open_with(&InputFile::of(&args.from)?, ReadLimits::default(), terminal)?;
     let written = convert(&layout, format, &args.to, terminal)?;
     terminal.clear();
     for remark in &written.remarks {

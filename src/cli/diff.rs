@@ -1,12 +1,13 @@
 //! `metalith diff`: what is different between two layouts.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::diff::{self, DiffPlan};
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::{Error, Layout, Result};
 
+use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_line};
 
 /// Tell two layouts apart: by geometry, whatever their hierarchy.
@@ -48,12 +49,13 @@ pub fn run(args: &DiffArgs, terminal: &Terminal) -> Result<Outcome> {
     let report: Vec<_> = args.report.as_deref().into_iter().collect();
     super::paths::apart([args.a.as_path(), &args.b], &report)?;
     terminal.stop_on_interrupt();
-    let open = |path: &PathBuf| Layout::open_with(path, ReadLimits::default(), terminal);
+    let files = [InputFile::of(&args.a)?, InputFile::of(&args.b)?];
+    let open = |path: &Path| Layout::open_with(path, ReadLimits::default(), terminal);
     let plan = DiffPlan {
         pillar_layer: LayerNumber::new(layer, datatype),
         listed: args.listed,
     };
-    let found = diff::diff(&open(&args.a)?, &open(&args.b)?, &plan, terminal)?;
+    let found = diff::diff(&open(&files[0])?, &open(&files[1])?, &plan, terminal)?;
     terminal.clear();
     if let Some(path) = &args.report {
         diff::page(&found).write(path)?;

@@ -51,9 +51,9 @@ pub struct HandoffArgs {
     #[arg(long)]
     fast: bool,
 
-    /// The cell that the layout is judged by.
-    #[arg(long, value_enum, default_value = "rigorous")]
-    fidelity: FidelityArg,
+    /// The cell that the layout is judged by; what `fidelity` in [verify] of the design says if left out.
+    #[arg(long, value_enum)]
+    fidelity: Option<FidelityArg>,
 
     /// Violations of the design rules that have been accepted.
     #[arg(long, value_name = "FILE")]
@@ -97,7 +97,7 @@ fn make(design: &Path, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcom
         waivers: args.waivers.clone(),
         compensate: args.compensate.clone(),
         format: args.format.map_or_else(Default::default, Into::into),
-        fidelity: args.fidelity.into(),
+        fidelity: args.fidelity.map(Into::into),
         accuracy: if args.fast { Accuracy::Fast } else { Accuracy::Accurate },
     };
     let made = handoff(&options, terminal)?;

@@ -9,7 +9,7 @@ use metalith::layout::{LayoutFormat, OasisEncoding, Written, write_apertures_as,
 use metalith::report::{count, sig};
 use metalith::{Design, Hierarchy, PillarArray, Result, write_layer_properties};
 
-use super::{Outcome, Terminal, print_line};
+use super::{Outcome, Terminal, print_line, standard_input};
 
 /// Write the pillar layout, the aperture layout and the layer colours of a design.
 #[derive(Args)]
@@ -168,7 +168,7 @@ impl Target {
 }
 
 pub fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
-    let mut design = Design::read(&args.design)?;
+    let mut design = standard_input::design(&args.design)?;
     terminal.stop_on_interrupt();
     let mut array = PillarArray::build(&design, terminal)?;
     let mut compensation = None;

@@ -19,6 +19,7 @@ mod photographs;
 mod picture;
 mod psf;
 mod run;
+mod standard_input;
 mod terminal;
 mod verify;
 

@@ -12,7 +12,7 @@ use metalith::report::sig;
 use metalith::verify::read_back;
 use metalith::{CellModel, Design, Fidelity, Hierarchy, PillarArray, Result, cell_models, write_pillars};
 
-use super::{Outcome, Terminal, print_json, print_line};
+use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
 /// Find the phase of every ring that makes the lens work over the whole band, and report what was gained.
 #[derive(Args)]
@@ -94,7 +94,7 @@ impl Cells {
 }
 
 pub fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
-    let design = Design::read(&args.design)?;
+    let design = standard_input::design(&args.design)?;
     terminal.stop_on_interrupt();
     let folder = args
         .out

@@ -2,6 +2,7 @@
 
 use std::fmt::Arguments;
 use std::io::{ErrorKind, Write, stdout};
+use std::path::Path;
 use std::sync::OnceLock;
 
 use serde::Serialize;
@@ -19,6 +20,11 @@ pub(super) use print_line;
 pub fn print_json(value: &impl Serialize) {
     let text = serde_json::to_string_pretty(value).expect("plain data serialises");
     line(format_args!("{text}"));
+}
+
+/// Whether the path of an output means standard output.
+pub fn is_standard_output(path: &Path) -> bool {
+    path.as_os_str() == "-"
 }
 
 /// What [`print_line!`] calls.

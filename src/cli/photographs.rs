@@ -10,12 +10,12 @@ use metalith::optimise::{Deconvolution, OptimiseTask, Start, StepLimit, blurs_of
 use metalith::phase::{Interpolation, RadialPhase};
 use metalith::wave::Photograph;
 use metalith::wave::restore::Restoration;
-use metalith::{CellModel, Design, Error, Fidelity, Result, cell_models};
+use metalith::{CellModel, Error, Fidelity, Result, cell_models};
 use ndarray::Array3;
 use rayon::prelude::*;
 
 use super::verify::FidelityArg;
-use super::{Outcome, Terminal, print_line};
+use super::{Outcome, Terminal, print_line, standard_input};
 
 /// Take photographs of images through a lens with each of several phases, restore them, and print how close
 /// they come, as a table in Markdown.
@@ -45,7 +45,7 @@ pub struct PhotographsArgs {
 }
 
 pub fn run(args: &PhotographsArgs, terminal: &Terminal) -> Result<Outcome> {
-    let design = Design::read(&args.design)?;
+    let design = standard_input::design(&args.design)?;
     terminal.stop_on_interrupt();
     let task = OptimiseTask::of(&design)?;
     let images = args

@@ -15,6 +15,7 @@ use metalith::{
     Accuracy, CalibratedModel, CellModel, Error, Extraction, ExtractionPlan, Layout, MadeChip, Result, Wedge, extract,
 };
 
+use super::standard_input::InputFile;
 use super::verify::FidelityArg;
 use super::{Outcome, Terminal, print_line};
 
@@ -284,7 +285,7 @@ fn mostly_pillars(args: &PsfArgs, found: &Extraction) -> Result<()> {
 
 pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
-    let layout = Layout::open_with(&args.layout, ReadLimits::default(), terminal)?;
+    let layout = Layout::open_with(&InputFile::of(&args.layout)?, ReadLimits::default(), terminal)?;
     let plan = ExtractionPlan {
         top: args.top.clone(),
         ..ExtractionPlan::discover(args.layer)

@@ -4,11 +4,11 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::{Design, Error, PillarArray, Result};
+use metalith::{Error, PillarArray, Result};
 
 use super::layout::Target;
 use super::verify::Judging;
-use super::{Outcome, Terminal};
+use super::{Outcome, Terminal, standard_input};
 
 /// Write the layouts of a design, read them back, simulate what was written, and report.
 #[derive(Args)]
@@ -27,7 +27,7 @@ pub struct RunArgs {
 }
 
 pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
-    let design = Design::read(&args.design)?;
+    let design = standard_input::design(&args.design)?;
     // What could not be read back is not written; `metalith layout` writes it.
     if let Some(why) = args.judging.not_simulated(&design, &args.target.folder(&design))? {
         terminal.say(&format!("note: the layout will not be simulated: {why}"));

@@ -11,7 +11,8 @@ use metalith::{
 };
 
 use super::compensated::CompensatedFor;
-use super::{Outcome, Terminal, print_json, print_line};
+use super::standard_input::InputFile;
+use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
 /// Read a layout back, compare every pillar with its design, simulate it, and write the report.
 #[derive(Args)]
@@ -23,7 +24,7 @@ pub struct VerifyArgs {
     /// The design file.
     design: PathBuf,
 
-    /// The pillar layout, by whatever program it was written.
+    /// The pillar layout, by whatever program it was written; `-` for standard input.
     layout: PathBuf,
 
     /// Folder for `report.html` and `report.json`; that of the layout if left out.
@@ -44,7 +45,8 @@ pub struct Judging {
     #[arg(long)]
     fast: bool,
 
-    /// The cell that the layout is judged by; `rigorous` if left out.
+    /// The cell that the layout is judged by; what `fidelity` in [verify] of the design says if left out, which is
+    /// `neighbours` unless it says otherwise.
     #[arg(long, value_enum)]
     fidelity: Option<FidelityArg>,
 
@@ -127,8 +129,7 @@ impl Judging {
         let design = &design;
         if let Some(why) = self.not_simulated(design, layout)? {
             terminal.say(&format!("note: every pillar is compared, nothing is simulated: {why}"));
-            let fidelity = self.fidelity.map_or(Fidelity::Rigorous, Fidelity::from);
-            let found = verify_pillars(design, array, layout, fidelity, why, terminal)?;
+            let found = verify_pillars(design, array, layout, self.fidelity(design), why, terminal)?;
             return self.report(design, array, &found, folder, terminal);
         }
         let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
@@ -136,7 +137,11 @@ impl Judging {
             Some(model) => Some(MadeChip::new(&design.cell_stack()?, model)?),
             None => None,
         };
-        let judge = self.fidelity.map_or(Fidelity::Rigorous, Fidelity::from);
+        let judge = match &made {
+            // It judges, and cells of the pillars as drawn stand beside it.
+            Some(_) => Fidelity::Rigorous,
+            None => self.fidelity(design),
+        };
         let beside = [Fidelity::Rigorous, Fidelity::Fitted, Fidelity::Published];
         let beside = beside.into_iter().filter(|f| *f != judge);
         let wanted = std::iter::once(judge).chain(beside).collect::<Vec<_>>();
@@ -148,6 +153,11 @@ impl Judging {
         let accuracy = if self.fast { Accuracy::Fast } else { Accuracy::Accurate };
         let found = verify(design, array, layout, &cases, accuracy, terminal)?;
         self.report(design, array, &found, folder, terminal)
+    }
+
+    /// The cell of the pillars as drawn that judges a layout of this design.
+    fn fidelity(&self, design: &Design) -> Fidelity {
+        self.fidelity.map_or(design.verify.fidelity, Fidelity::from)
     }
 
     fn report(
@@ -203,8 +213,9 @@ fn summary(found: &Verification, folder: &Path) {
 }
 
 pub fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
-    let mut design = Design::read(&args.design)?;
-    args.judging.not_simulated(&design, &args.layout)?;
+    let mut design = standard_input::design(&args.design)?;
+    let layout = InputFile::of(&args.layout)?;
+    args.judging.not_simulated(&design, &layout)?;
     terminal.stop_on_interrupt();
     let array = args.compensated.array(&mut design, terminal)?;
     let folder = args
@@ -222,5 +233,5 @@ pub fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
         model: args.judging.model.clone().or_else(|| args.compensated.model.clone()),
         ..args.judging.clone()
     };
-    judging.judge(&design, &array, &args.layout, &folder, terminal)
+    judging.judge(&design, &array, &layout, &folder, terminal)
 }

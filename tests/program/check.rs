@@ -40,3 +40,31 @@ fn the_program_answers_with_exit_codes() {
     let sarif = std::fs::read_to_string(sarif).unwrap();
     assert!(sarif.contains("pillar.width.min"));
 }
+
+/// `-` is what is piped in, and what is printed; both are as with files.
+#[test]
+fn a_dash_is_standard_input_or_output() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut broken = Chip::clean();
+    broken.at(60, 60).4 = 98;
+    let layout = folder.path().join("broken.gds");
+    std::fs::write(&layout, broken.bytes()).unwrap();
+    let run = |args: &[&str]| {
+        let mut program = assert_cmd::Command::new(env!("CARGO_BIN_EXE_metalith"));
+        program.current_dir(folder.path()).args(args);
+        program.write_stdin(broken.bytes()).assert()
+    };
+    let printed = |args: &[&str], code: i32| run(args).code(code).get_output().stdout.clone();
+    let piped = String::from_utf8(printed(&["check", "-"], 1)).unwrap();
+    assert!(
+        piped.contains("standard input: 14409 shapes") && piped.contains("1 violations"),
+        "{piped}"
+    );
+    printed(&["diff", "-", "broken.gds"], 0);
+    printed(&["check", "broken.gds", "--junit", "broken.xml"], 1);
+    let file = std::fs::read_to_string(folder.path().join("broken.xml")).unwrap();
+    let junit = printed(&["check", "broken.gds", "--junit", "-"], 1);
+    assert_eq!(String::from_utf8(junit).unwrap().trim_end(), file.trim_end());
+    printed(&["check", "broken.gds", "--junit", "-", "--json"], 2);
+    assert!(!folder.path().join("-").exists());
+}

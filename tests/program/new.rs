@@ -61,3 +61,28 @@ fn a_new_design_replaces_nothing_and_says_what_cannot_be() {
     new(&["nan.toml", "--diameter-um", "nan"]);
     assert!(!folder.path().join("even.toml").exists() && !folder.path().join("nan.toml").exists());
 }
+
+/// A design that is piped in makes the layout of the same design in a file.
+#[test]
+fn a_design_may_come_by_standard_input() {
+    let folder = tempfile::tempdir().unwrap();
+    let design = std::fs::read(metalith_testing::design("mini_3x3")).unwrap();
+    let bytes = |from: &str, out: &str| {
+        let mut program = Command::cargo_bin("metalith").unwrap();
+        program
+            .current_dir(folder.path())
+            .args(["layout", from, "--quiet", "--out", out]);
+        program.write_stdin(design.clone()).assert().success();
+        std::fs::read(folder.path().join(out).join("mini_3x3_pillars.gds")).unwrap()
+    };
+    std::fs::write(folder.path().join("mini.toml"), &design).unwrap();
+    assert!(bytes("-", "piped") == bytes("mini.toml", "named"));
+    let mut program = Command::cargo_bin("metalith").unwrap();
+    let failed = program
+        .args(["layout", "-"])
+        .write_stdin("schema = 2\n")
+        .assert()
+        .code(2);
+    let said = String::from_utf8_lossy(&failed.get_output().stderr).into_owned();
+    assert!(said.contains("standard input"), "{said}");
+}

@@ -13,6 +13,7 @@
 //! | `surrogate` | the forward model, interpolated | `forward_model` |
 //! | `fit` | least squares, cross-validation, null test | `surrogate` |
 //! | `search` | which effects explain a residual | `fit` |
+//! | `proposal` | effects for what is left | `search`, `session` |
 //! | `session`, `diagnosis`, `page`, `run` | a set from its files to its answer | all above |
 //! | `validate` | the calibration judged on synthetic sets | all above |
 
@@ -28,6 +29,7 @@ mod linear_model;
 mod names;
 mod optics;
 mod page;
+mod proposal;
 mod run;
 mod search;
 mod session;
@@ -40,10 +42,11 @@ mod validate;
 
 pub use bench::{Bench, Sampling};
 pub use diagnosis::{
-    Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePattern, GroupValue, LeftOut, Ranked, SetVerdict,
+    Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePattern, GroupValue, LeftOut, Proposal, Ranked, SetVerdict,
 };
 pub use effects::{DeclaredEffect, DeclaredParameter, Effect, Parameter, Stage, all as all_effects};
 pub use fidelity::Rung;
+pub use proposal::propose;
 pub use run::{Calibration, calibrate};
 pub use session::{Screening, Session, Settings, Simulations};
 pub use set::{Capture, Led, MeasuredElement, MeasuredSet, RelayCamera, SemSite, Stack};

@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::diagnosis::{Diagnosis, SetVerdict};
-use crate::effects;
+use crate::diagnosis::{Diagnosis, Proposal, SetVerdict};
+use crate::effects::{self, DeclaredEffect};
 use crate::page::write_page;
+use crate::proposal::propose;
+use crate::search::Evidence;
 use crate::session::{Session, Settings, Simulations, check_effects};
 use crate::set::MeasuredSet;
-use metalith_core::{PillarReader, Progress, Result};
+use metalith_core::{PillarReader, Progress, Result, WholeFile};
 use metalith_made::CalibratedModel;
 
 /// The files of a calibration.
@@ -57,7 +59,8 @@ pub fn calibrate(
     Ok(done)
 }
 
-/// Diagnose a session with its simulations, and write the answer.
+/// Diagnose a session with its simulations, propose effects for what is left, adopt them if that is wanted, and write the
+/// answer.
 ///
 /// # Errors
 /// As [`calibrate`].
@@ -67,7 +70,42 @@ fn finish(
     out: &Path,
     progress: &dyn Progress,
 ) -> Result<Calibration> {
-    let (diagnosis, evidence) = session.diagnose(simulations, progress)?;
+    let (mut diagnosis, evidence) = session.diagnose(simulations, progress)?;
+    let left = matches!(diagnosis.verdict, SetVerdict::Partly | SetVerdict::Unexplained);
+    let proposed = match &evidence {
+        Some(evidence) if left => propose(session, evidence),
+        _ => Vec::new(),
+    };
+    if proposed.is_empty() {
+        return write(session, simulations, diagnosis, evidence, out);
+    }
+    let file = out.join("proposal.toml");
+    WholeFile::write(&file, DeclaredEffect::text(&proposed).as_bytes())?;
+    let mut proposal = Proposal {
+        file: file.display().to_string(),
+        effects: proposed.iter().map(|e| e.name.clone()).collect(),
+        held_out_without: None,
+    };
+    if !session.settings.adopt {
+        diagnosis.proposal = Some(proposal);
+        return write(session, simulations, diagnosis, evidence, out);
+    }
+    proposal.held_out_without = Some(diagnosis.error.after.held_out);
+    let wider = session.adopting(proposed)?;
+    let simulations = wider.simulate(progress)?;
+    let (mut diagnosis, evidence) = wider.diagnose(&simulations, progress)?;
+    diagnosis.proposal = Some(proposal);
+    write(&wider, &simulations, diagnosis, evidence, out)
+}
+
+/// Write diagnosis, report and model.
+fn write(
+    session: &Session<'_>,
+    simulations: &Simulations,
+    diagnosis: Diagnosis,
+    evidence: Option<Evidence>,
+    out: &Path,
+) -> Result<Calibration> {
     let answer = out.join("diagnosis.json");
     let report = out.join("report.html");
     diagnosis.write(&answer)?;

@@ -27,6 +27,8 @@ pub struct Settings {
     pub only: Vec<String>,
     /// Effects that are tried beside those of the library.
     pub declared: Vec<DeclaredEffect>,
+    /// Try the effects that are proposed for what is left as well.
+    pub adopt: bool,
     /// Compare the three fidelities of the cell first.
     pub compare_fidelities: bool,
     /// Simulate smooth terms, which null tests are made of as well.
@@ -42,6 +44,7 @@ impl Default for Settings {
             cache: None,
             only: Vec::new(),
             declared: Vec::new(),
+            adopt: false,
             compare_fidelities: true,
             smooth_terms: true,
             refine: true,
@@ -99,6 +102,19 @@ impl<'a> Session<'a> {
             data: Data::new(set),
             settings,
         })
+    }
+
+    /// The same set, with these effects tried beside the others.
+    ///
+    /// # Errors
+    /// As [`Session::new`].
+    pub fn adopting(&self, proposed: Vec<DeclaredEffect>) -> Result<Self> {
+        let mut settings = self.settings.clone();
+        if !settings.only.is_empty() {
+            settings.only.extend(proposed.iter().map(|e| e.name.clone()));
+        }
+        settings.declared.extend(proposed);
+        Self::new(self.set(), settings)
     }
 
     /// The set.

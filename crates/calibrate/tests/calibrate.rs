@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use metalith_calibrate::{
     DeclaredEffect, Diagnosis, MeasuredSet, Sampling, Session, SetVerdict, Settings, Simulations, Synthesizer,
-    UnlistedEffect, ValidationPlan, calibrate, validate,
+    UnlistedEffect, ValidationPlan, calibrate, propose, validate,
 };
 use metalith_core::Silent;
 use metalith_gds::extract::GdsPillars;
@@ -244,6 +244,45 @@ fn a_declared_effect_is_found_and_kept_in_the_model() {
         .unwrap();
     assert_eq!(CalibratedModel::read(&path).unwrap().perturbation, made);
     assert!((made.geometry.declared[0].values["a"] / BOW_NM - 1.0).abs() < 0.1);
+}
+
+/// What is left leads to the effect that the list lacks: proposed, adopted, and it explains the set.
+#[test]
+fn an_effect_outside_the_list_is_proposed_and_adopted() {
+    /// Reduced chi-square per pixel that may be left on captures left out: the aim, and what the coarse spectrum of these
+    /// tests leaves.
+    const EXPLAINED: f64 = 1.1 + 0.1;
+    /// Relative: synthetic sets have another sampling.
+    const TOLERANCE: f64 = 0.1;
+    let tried = ["gap", "cd_bias"];
+    for (unlisted, name, expected) in [
+        (UnlistedEffect::Ghost(0.1, [4.0, -3.0]), "ghost", vec![0.1, 4.0, -3.0]),
+        (UnlistedEffect::Astigmatism(25.0), "wavefront_path", vec![25.0]),
+    ] {
+        let set = SYNTHESIZER.draw(&SYNTHESIZER.off_list(unlisted, &Silent).unwrap(), 27);
+        let session = Session::new(&set, with_effects(&tried)).unwrap();
+        let (before, evidence) = session.diagnose(&session.simulate(&Silent).unwrap(), &Silent).unwrap();
+        assert!(
+            matches!(before.verdict, SetVerdict::Unexplained | SetVerdict::Partly),
+            "{}",
+            before.sentence()
+        );
+        let proposed = propose(&session, &evidence.unwrap());
+        assert!(proposed.iter().any(|e| e.name == name), "{proposed:?}");
+        let wider = session.adopting(proposed).unwrap();
+        let (after, _) = wider.diagnose(&wider.simulate(&Silent).unwrap(), &Silent).unwrap();
+        assert_eq!(names(&after), [name], "{} {:?}", after.sentence(), after.error);
+        assert!(after.error.after.held_out < EXPLAINED, "{:?}", after.error);
+        let values = &after.effects[0].value;
+        let values: Vec<f64> = match values.as_array() {
+            Some(all) => all.iter().map(|v| v.as_f64().unwrap()).collect(),
+            None => vec![values.as_f64().unwrap()],
+        };
+        for truth in expected {
+            let is_found = values.iter().any(|found| (found / truth - 1.0).abs() < TOLERANCE);
+            assert!(is_found, "{}", after.sentence());
+        }
+    }
 }
 
 /// What surrounds a saturated peak still tells of the distance: pixels are masked, and no capture is lost.

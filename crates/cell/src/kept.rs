@@ -95,7 +95,9 @@ pub fn read(file: &Path, magic: [u8; 8], inputs: &[u8], longest: u64) -> Result<
 /// is said as a note, and no reason to stop.
 #[derive(Clone, Debug)]
 pub struct KeptTable {
-    file: Option<PathBuf>,
+    name: String,
+    folder: Option<PathBuf>,
+    shipped: Option<&'static [u8]>,
     magic: [u8; 8],
     inputs: Vec<u8>,
     what: &'static str,
@@ -108,16 +110,42 @@ impl KeptTable {
     /// A table of `what`, such as "gratings": `kind` begins the name of its file.
     pub fn new(folder: Option<&Path>, kind: &str, magic: [u8; 8], inputs: Vec<u8>, what: &'static str) -> Self {
         Self {
-            file: folder.map(|folder| folder.join(format!("{kind}-{}.bin", name_of(&inputs)))),
+            name: format!("{kind}-{}.bin", name_of(&inputs)),
+            folder: folder.map(Path::to_owned),
+            shipped: None,
             magic,
             inputs,
             what,
         }
     }
 
+    /// The same table, which may have come with the program: `find` gives the bytes of a file by its name. These count before
+    /// those of the folder, so that every machine has the same.
+    #[must_use]
+    pub fn or_shipped(mut self, find: impl FnOnce(&str) -> Option<&'static [u8]>) -> Self {
+        self.shipped = find(&self.name);
+        self
+    }
+
+    /// Whether it came with the program.
+    pub fn is_shipped(&self) -> bool {
+        self.shipped_content().is_some()
+    }
+
+    fn shipped_content(&self) -> Option<&'static [u8]> {
+        open(self.shipped?, self.magic, &self.inputs).ok()
+    }
+
+    fn file(&self) -> Option<PathBuf> {
+        Some(self.folder.as_ref()?.join(&self.name))
+    }
+
     /// What is kept, if it is there and `decode` knows it.
-    pub fn read<T>(&self, decode: impl FnOnce(&[u8]) -> Option<T>, progress: &dyn Progress) -> Option<T> {
-        let file = self.file.as_ref()?;
+    pub fn read<T>(&self, decode: impl Fn(&[u8]) -> Option<T>, progress: &dyn Progress) -> Option<T> {
+        if let Some(table) = self.shipped_content().and_then(&decode) {
+            return Some(table);
+        }
+        let file = &self.file()?;
         let found = read(file, self.magic, &self.inputs, LONGEST_TABLE).and_then(|content| match content {
             Some(content) => decode(&content)
                 .map(Some)
@@ -132,8 +160,8 @@ impl KeptTable {
 
     /// Keep it.
     pub fn write(&self, content: &[u8], progress: &dyn Progress) {
-        if let Some(file) = &self.file
-            && let Err(error) = write(file, self.magic, &self.inputs, content)
+        if let Some(file) = self.file()
+            && let Err(error) = write(&file, self.magic, &self.inputs, content)
         {
             progress.note(&format!("the table of {} is not kept: {error}", self.what));
         }

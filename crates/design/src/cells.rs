@@ -72,15 +72,11 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
                     let stack = design.cell_stack()?;
                     Ok(Box::new(PointwiseCell::new(stack, design.cell.widths_nm())))
                 }
-                Fidelity::Neighbours => {
-                    let rules = WidthRule::all(design);
-                    let mappings = rules.iter().map(|rule| Mapping::new(|u| rule.width_nm(u))).collect();
-                    Ok(Box::new(NeighbourCell::new(
-                        design.cell_stack()?,
-                        mappings,
-                        cache_folder(),
-                    )))
-                }
+                Fidelity::Neighbours => Ok(Box::new(NeighbourCell::new(
+                    design.cell_stack()?,
+                    mappings(design),
+                    cache_folder(),
+                ))),
                 Fidelity::Calibrated => Err(Error::invalid(
                     "a calibrated cell without the model it is calibrated by",
                     "read the model that `metalith calibrate` wrote and make a `MadeChip` of it",
@@ -96,4 +92,10 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
             }
         })
         .collect()
+}
+
+/// How often the elements of a design draw each width beside which others: one mapping for each rule.
+pub fn mappings(design: &Design) -> Vec<Mapping> {
+    let rules = WidthRule::all(design);
+    rules.iter().map(|rule| Mapping::new(|u| rule.width_nm(u))).collect()
 }

@@ -7,6 +7,6 @@ pub mod phase;
 mod spec;
 
 pub use array::{PillarArray, WidthRule};
-pub use cells::cell_models;
+pub use cells::{cell_models, mappings};
 pub use design::Design;
 pub use spec::*;

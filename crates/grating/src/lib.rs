@@ -23,8 +23,9 @@
 //! both, widths as read                     ->  GratingPillars, an aperture for any propagator
 //! ```
 //!
-//! This is a prediction by a solver that is held to an independent one (`golden/truth/supercell.csv`). It is not a stage
-//! of any command: `metalith run`, `verify` and `optimise` judge by single cells. Tables give what a place of a lens sends
+//! This is a prediction by a solver that is held to an independent one (`golden/truth/supercell.csv`). `metalith run` and
+//! `verify` judge by [`NeighbourCell`], whose tables for the shipped designs come with this crate; gratings are a stage of no
+//! command. [`GratingTable`]s give what a place of a lens sends
 //! out, where all phases of the grating occur. They do not give how the orders of a row of three to nine pillars that
 //! repeats exactly change with where its phase starts; that is [`Blaze`].
 //! `examples/blazed_rows.rs` prints the shares by the truth, by single cells and by [`Blaze`].
@@ -45,6 +46,7 @@ mod neighbour_table;
 mod node;
 mod orientation;
 mod rows;
+mod shipped;
 mod sites;
 mod slopes;
 mod surface;

@@ -13,6 +13,7 @@ use metalith_rcwa::SiteLattice;
 
 use crate::ensemble::{ensemble, equal_pillars};
 use crate::fit::{Fitted, fit, neighbours_nm, samples};
+use crate::shipped;
 use crate::{COARSE, CoarseCell, Mapping, site_transmissions};
 
 /// Supercells along the normal, where each of their sites counts for eight by symmetry, and for other directions. With
@@ -63,7 +64,7 @@ impl NeighbourTable {
         }
         let samples = mappings.iter().flat_map(|m| m.samples_nm());
         let basis = NeighbourBasis::new(samples.map(|w| f64::from(*w)));
-        let kept = KeptTable::new(cache, "neighbours", MAGIC, inputs(spec, stack, mappings), "neighbours");
+        let kept = kept(spec, stack, mappings, cache);
         if let Some(table) = kept.read(|content| decode(content, basis), progress) {
             return Ok(table);
         }
@@ -71,6 +72,11 @@ impl NeighbourTable {
         let table = Self { responses, left_out };
         kept.write(&encode(&table), progress);
         Ok(table)
+    }
+
+    /// Whether the table of a light comes with the program, as it does for the designs that do.
+    pub fn is_shipped(spec: &NeighbourTableSpec, stack: &CellStack, mappings: &[Mapping]) -> bool {
+        kept(spec, stack, mappings, None).is_shipped()
     }
 
     /// The responses for s and p, where |t| of a site that passes all its light is `full`.
@@ -100,6 +106,10 @@ impl NeighbourTable {
     pub fn left_out(&self) -> f64 {
         self.left_out
     }
+}
+
+fn kept(spec: &NeighbourTableSpec, stack: &CellStack, mappings: &[Mapping], cache: Option<&Path>) -> KeptTable {
+    KeptTable::new(cache, "neighbours", MAGIC, inputs(spec, stack, mappings), "neighbours").or_shipped(shipped::file)
 }
 
 fn solve(

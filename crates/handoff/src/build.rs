@@ -117,12 +117,16 @@ fn verification(
     progress: &dyn Progress,
 ) -> Result<HandoffCheck> {
     let design = &sources.design;
-    let mut wanted = vec![options.fidelity];
-    if options.fidelity != Fidelity::Published {
+    // A compensated layout is right when it is made, not as it is drawn.
+    let judge = match &sources.model {
+        Some(_) => Fidelity::Rigorous,
+        None => options.fidelity.unwrap_or(design.verify.fidelity),
+    };
+    let mut wanted = vec![judge];
+    if judge != Fidelity::Published {
         wanted.push(Fidelity::Published);
     }
     let models = cell_models(design, &wanted)?;
-    // A compensated layout is right when it is made, not as it is drawn.
     let stack = design.cell_stack()?;
     let made = sources
         .model

@@ -19,8 +19,9 @@ pub struct HandoffOptions {
     pub command: String,
     /// Format of all layouts.
     pub format: LayoutFormat,
-    /// The cell that the layout is judged by; the published polynomials are shown beside it.
-    pub fidelity: Fidelity,
+    /// The cell that the layout is judged by, that of the design if left out; the published polynomials are shown beside
+    /// it.
+    pub fidelity: Option<Fidelity>,
     /// How closely the layout is simulated.
     pub accuracy: Accuracy,
     /// The calibrated model that the layout is compensated for, and judged by, if any.

@@ -155,6 +155,9 @@ pub struct Diagnosis {
     pub later_rankings: Vec<Vec<Ranked>>,
     /// Quantities that explain most of what is left if they differ by element, colour, distance or angle; best first.
     pub patterns: Vec<FreePattern>,
+    /// Effects that are proposed for what is left; none where nothing stands out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub proposal: Option<Proposal>,
     /// Share of the error above noise that is left.
     pub unexplained_share: f64,
     /// Share of missing pillars by their speckle, where the speckle counts as noise in the error after.
@@ -164,6 +167,45 @@ pub struct Diagnosis {
     pub captures: Vec<CaptureError>,
     /// The three fidelities of the cell, nuisances fitted.
     pub ladder: Vec<Rung>,
+}
+
+/// Effects for what no effect of the list explains, in a file that can be declared.
+#[derive(Clone, Debug, Serialize)]
+pub struct Proposal {
+    /// The file.
+    pub file: String,
+    /// Names of the effects in it.
+    pub effects: Vec<String>,
+    /// The error on captures left out without them, where they were tried.
+    pub held_out_without: Option<f64>,
+}
+
+impl Proposal {
+    /// One line for a person.
+    pub fn sentence(&self, diagnosis: &Diagnosis) -> String {
+        let names = self.effects.join(", ");
+        let Some(without) = self.held_out_without else {
+            return format!(
+                "proposed for what is left: {names} in {}; --adopt tries them, --declare with an edited copy as well",
+                self.file
+            );
+        };
+        let taken: Vec<&str> = diagnosis
+            .effects
+            .iter()
+            .map(|e| e.name.as_str())
+            .filter(|name| self.effects.iter().any(|own| own == name))
+            .collect();
+        let [without, with] = [without, diagnosis.error.after.held_out].map(|error| metalith_report::sig(error, 4));
+        if taken.is_empty() {
+            format!("proposed for what is left, tried and not taken: {names}")
+        } else {
+            format!(
+                "adopted: {}; error on captures left out {without} without, {with} with",
+                taken.join(", ")
+            )
+        }
+    }
 }
 
 /// The error of one capture when it was left out.

@@ -67,6 +67,10 @@ pub fn write_page(
         );
         page.list(diagnosis.patterns.iter().map(FreePattern::sentence));
     }
+    if let Some(proposal) = &diagnosis.proposal {
+        page.section("Proposal");
+        page.paragraph(capitalised(&proposal.sentence(diagnosis)));
+    }
     ladder(&mut page, session, diagnosis);
     if let Some(evidence) = evidence {
         ranking(&mut page, diagnosis);

@@ -195,7 +195,8 @@ impl<'a> Synthesizer<'a> {
             let shift = [reach * normal(&mut rng), reach * normal(&mut rng)];
             let mut light: Array2<f32> = grid.pixels(shift);
             if let Some((share, at)) = exposed.ghost {
-                light.scaled_add(share as f32, &grid.pixels([shift[0] + at[0], shift[1] + at[1]]));
+                // A window that is off by the negative shows what is displaced.
+                light.scaled_add(share as f32, &grid.pixels([shift[0] - at[0], shift[1] - at[1]]));
             }
             let factor = capture.scale_dn * flux[capture.led];
             capture.dn = light.mapv(|v| {

@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::lens::WAVELENGTH;
+use metalith_cell::Fidelity;
 use metalith_core::document::{Limits, Section};
+
+use super::lens::WAVELENGTH;
 
 /// What is simulated from the layout that was read back, and the limits it is held to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -14,6 +16,8 @@ pub struct VerifySpec {
     pub wavelengths_um: Vec<f64>,
     /// Field angles, counted from where an element looks.
     pub field_angles: Vec<FieldAngle>,
+    /// The cell that the layout is judged by.
+    pub fidelity: Fidelity,
     /// At which angle light is taken to pass the cells.
     pub incidence: CellIncidence,
     /// Edge of the square window about the chief ray, in samples of one pitch.
@@ -101,6 +105,16 @@ impl VerifySpec {
         let spec = Self {
             wavelengths_um: wavelengths_nm.iter().map(|nm| nm * 1e-3).collect(),
             field_angles,
+            fidelity: s.choice(
+                "fidelity",
+                &[
+                    ("neighbours", Fidelity::Neighbours),
+                    ("rigorous", Fidelity::Rigorous),
+                    ("fitted", Fidelity::Fitted),
+                    ("published", Fidelity::Published),
+                ],
+                Some(Fidelity::Neighbours),
+            ),
             incidence: s.choice(
                 "incidence",
                 &[("normal", CellIncidence::Normal), ("as_lit", CellIncidence::AsLit)],

@@ -12,6 +12,9 @@ pub struct Row {
     pub cells: usize,
     pub turns: i32,
     pub wavelength_nm: u32,
+    /// Highest order of a single cell that was kept along each axis.
+    #[allow(dead_code, reason = "one test solves with as many")]
+    pub highest_order: usize,
     pub looks: bool,
     /// 0 for s, 1 for p.
     pub polarisation: usize,
@@ -54,6 +57,7 @@ pub fn read() -> Vec<Row> {
                 cells: f[0].parse().unwrap(),
                 turns: f[1].parse().unwrap(),
                 wavelength_nm: f[2].parse().unwrap(),
+                highest_order: f[3].parse().unwrap(),
                 looks: f[4] == "looks",
                 polarisation: usize::from(f[5] == "p"),
                 offset: number(6),

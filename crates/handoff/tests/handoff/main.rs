@@ -41,7 +41,7 @@ fn options(out: &Path) -> HandoffOptions {
         command: "metalith handoff designs/mini_3x3.toml".into(),
         format: LayoutFormat::Gds,
         // What is simulated is not the matter here.
-        fidelity: Fidelity::Published,
+        fidelity: Some(Fidelity::Published),
         accuracy: Accuracy::Fast,
         waivers: None,
     }

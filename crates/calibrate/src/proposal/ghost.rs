@@ -1,0 +1,175 @@
+//! A second image: a share of all light again, displaced by the same distance in every capture.
+
+use ndarray::Array2;
+use rayon::prelude::*;
+
+use crate::effects::{DeclaredEffect, DeclaredParameter};
+use crate::fit::{Fit, FitProblem};
+use metalith_made::DeclaredQuantity;
+
+/// Part of a frame's edge that displacements go to: light from farther is not in the frame.
+const REACH: f64 = 0.25;
+
+/// Nearest displacement (pixels): what is nearer is a blur.
+const NEAREST: i32 = 2;
+
+/// Added to distances from the middle of the kernel (um), whose value would be 0 / 0 there.
+const OFF_ZERO_UM: f64 = 1e-6;
+
+/// Largest share of a ghost: beyond, it is the image.
+const MOST_SHARE: f64 = 0.5;
+
+/// How far the place of a proposed ghost may be off (pixels).
+const ROOM_PIXELS: f64 = 4.0;
+
+/// The displaced copy that removes most of what is left.
+pub(super) struct Ghost {
+    /// Its light over that of the image.
+    share: f64,
+    /// Displacement along x and y (pixels).
+    at: [i32; 2],
+    /// By how much it lowers chi-square.
+    pub removed: f64,
+}
+
+/// Whitened pixels of one capture, with what nuisances explain taken out of the residual.
+struct Frame {
+    /// The image as predicted, in DN.
+    model: Array2<f32>,
+    weight: Array2<f32>,
+    residual: Vec<f32>,
+    /// Orthonormal: flux, black level, registration along x and y.
+    nuisances: Vec<Vec<f32>>,
+}
+
+impl Frame {
+    fn new(model: Array2<f32>, weight: &Array2<f32>, residual: &Array2<f32>) -> Self {
+        let (rows, cols) = model.dim();
+        let at = |y: usize, x: usize| model[[y.min(rows - 1), x.min(cols - 1)]];
+        let slope = |along: [usize; 2]| {
+            Array2::from_shape_fn((rows, cols), |(y, x)| {
+                at(y + along[1], x + along[0]) - at(y.saturating_sub(along[1]), x.saturating_sub(along[0]))
+            })
+        };
+        let columns = [
+            model.clone(),
+            Array2::from_elem((rows, cols), 1.0),
+            slope([1, 0]),
+            slope([0, 1]),
+        ];
+        let mut nuisances: Vec<Vec<f32>> = Vec::new();
+        for column in columns {
+            let mut own: Vec<f32> = column.iter().zip(weight).map(|(v, w)| v * w).collect();
+            take_out(&mut own, &nuisances);
+            let norm = dot(&own, &own).sqrt();
+            if norm > 0.0 {
+                own.iter_mut().for_each(|v| *v = (f64::from(*v) / norm) as f32);
+                nuisances.push(own);
+            }
+        }
+        let mut residual: Vec<f32> = residual.iter().copied().collect();
+        take_out(&mut residual, &nuisances);
+        Self {
+            model,
+            weight: weight.clone(),
+            residual,
+            nuisances,
+        }
+    }
+
+    /// Product of the displaced image with the residual, and with itself, nuisances taken out.
+    fn products(&self, [dx, dy]: [i32; 2]) -> [f64; 2] {
+        let (rows, cols) = self.model.dim();
+        let from = |place: usize, by: i32, size: usize| {
+            let place = place as i64 - i64::from(by);
+            usize::try_from(place).ok().filter(|p| *p < size)
+        };
+        let displaced = Array2::from_shape_fn((rows, cols), |(y, x)| {
+            let source = from(y, dy, rows).zip(from(x, dx, cols));
+            source.map_or(0.0, |(y, x)| self.model[[y, x]])
+        });
+        let column: Vec<f32> = displaced.iter().zip(&self.weight).map(|(v, w)| v * w).collect();
+        let taken: f64 = self.nuisances.iter().map(|n| dot(n, &column).powi(2)).sum();
+        [dot(&column, &self.residual), dot(&column, &column) - taken]
+    }
+}
+
+/// The displacement whose copy removes most of the residual of a fit; none if no copy adds light.
+pub(super) fn strongest(problem: &FitProblem<'_>, fit: &Fit) -> Option<Ghost> {
+    let data = problem.data;
+    let frames: Vec<Frame> = data
+        .captures()
+        .filter(|&c| problem.used[c])
+        .map(|c| {
+            let pixels = problem.image(&fit.theta, c).pixels(fit.nuisances.shift_um[c]);
+            let residual = fit.nuisances.whitened(data, c, &pixels);
+            let dn = (data.scale[c] * fit.nuisances.flux[data.beam[c].led]) as f32;
+            Frame::new(pixels.mapv(|v| v * dn), &data.weight[c], &residual)
+        })
+        .collect();
+    let (rows, cols) = frames.first()?.model.dim();
+    let reach = |edge: usize| (REACH * edge as f64) as i32;
+    let places: Vec<[i32; 2]> = (-reach(rows)..=reach(rows))
+        .flat_map(|dy| (-reach(cols)..=reach(cols)).map(move |dx| [dx, dy]))
+        .filter(|at| at.iter().any(|d| d.abs() >= NEAREST))
+        .collect();
+    let tried: Vec<Ghost> = places
+        .into_par_iter()
+        .filter_map(|at| {
+            let sum = frames
+                .iter()
+                .map(|f| f.products(at))
+                .fold([0.0; 2], |sum, one| [sum[0] + one[0], sum[1] + one[1]]);
+            (sum[0] > 0.0 && sum[1] > 0.0).then(|| Ghost {
+                share: sum[0] / sum[1],
+                at,
+                removed: sum[0] * sum[0] / sum[1],
+            })
+        })
+        .collect();
+    tried.into_iter().max_by(|a, b| a.removed.total_cmp(&b.removed))
+}
+
+impl Ghost {
+    /// As an effect to be fitted. The kernel is sin(pi x) / (pi x) along both axes, x in pixels: it displaces all that pixels resolve and
+    /// changes nothing else.
+    pub fn declared(&self, pixel_um: f64) -> DeclaredEffect {
+        let sinc = |axis: &str, at: &str| {
+            let turn = format!("pi * ({axis} - {at} + {OFF_ZERO_UM:?}) / {pixel_um:?}");
+            format!("sin({turn}) / ({turn})")
+        };
+        let place = |name: &str, at: i32| {
+            let (start, room) = (f64::from(at) * pixel_um, ROOM_PIXELS * pixel_um);
+            DeclaredParameter {
+                name: name.into(),
+                range: (start - room, start + room),
+                prior: 0.5 * pixel_um,
+                start,
+            }
+        };
+        let share = DeclaredParameter {
+            name: "a".into(),
+            range: (-MOST_SHARE, MOST_SHARE),
+            prior: self.share.clamp(1e-3, MOST_SHARE),
+            start: 0.0,
+        };
+        DeclaredEffect {
+            name: "ghost".into(),
+            unit: "fraction".into(),
+            quantity: DeclaredQuantity::Kernel,
+            expression: format!("a * {} * {} / {pixel_um:?}^2", sinc("x", "u"), sinc("y", "v")),
+            parameters: vec![share, place("u", self.at[0]), place("v", self.at[1])],
+        }
+    }
+}
+
+fn take_out(column: &mut [f32], basis: &[Vec<f32>]) {
+    for own in basis {
+        let part = dot(own, column) as f32;
+        column.iter_mut().zip(own).for_each(|(v, o)| *v -= part * o);
+    }
+}
+
+fn dot(a: &[f32], b: &[f32]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
+}

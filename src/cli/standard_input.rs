@@ -1,0 +1,78 @@
+//! `-` as the name of an input: what another program pipes in.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::ops::Deref;
+use std::path::{Path, PathBuf};
+
+use metalith::{Design, Error, Result};
+use tempfile::TempDir;
+
+/// What standard input is called in messages.
+const NAME: &str = "standard input";
+
+/// Most bytes of a design that is piped in: thousands of times what a person writes.
+const LONGEST_DESIGN: u64 = 16 << 20;
+
+fn is_standard_input(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+/// A file that is read: that of its path, or for `-` a copy of standard input, which is removed with this. Layouts are read
+/// more than once and from many places, which a pipe cannot.
+pub struct InputFile {
+    path: PathBuf,
+    _copy: Option<TempDir>,
+}
+
+impl InputFile {
+    /// The file at `path`; waits for the end of standard input where that is meant.
+    ///
+    /// # Errors
+    /// If there is no room for the copy in the folder of temporary files.
+    pub fn of(path: &Path) -> Result<Self> {
+        if !is_standard_input(path) {
+            return Ok(Self {
+                path: path.to_owned(),
+                _copy: None,
+            });
+        }
+        let folder = TempDir::new().map_err(Error::io("create a folder in", &std::env::temp_dir()))?;
+        let path = folder.path().join(NAME);
+        let copied = File::create(&path).and_then(|mut copy| io::copy(&mut io::stdin().lock(), &mut copy));
+        copied.map_err(Error::io("copy standard input to", &path))?;
+        Ok(Self {
+            path,
+            _copy: Some(folder),
+        })
+    }
+}
+
+impl Deref for InputFile {
+    type Target = Path;
+
+    fn deref(&self) -> &Path {
+        &self.path
+    }
+}
+
+/// The design at `path`, or for `-` that of standard input; files that such a one names count from the current folder.
+///
+/// # Errors
+/// As [`Design::read`]; also if standard input is no text, or too long.
+pub fn design(path: &Path) -> Result<Design> {
+    if !is_standard_input(path) {
+        return Design::read(path);
+    }
+    let name = Path::new(NAME);
+    let mut text = String::new();
+    let read = io::stdin().lock().take(LONGEST_DESIGN + 1).read_to_string(&mut text);
+    read.map_err(Error::io("read", name))?;
+    if text.len() as u64 > LONGEST_DESIGN {
+        return Err(Error::invalid(
+            format!("a design of more than {LONGEST_DESIGN} bytes on standard input"),
+            "pipe in the text of a design file",
+        ));
+    }
+    Design::parse(name, &text)
+}
