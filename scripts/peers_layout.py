@@ -1,7 +1,7 @@
 """Time the writing and reading of one full-size lens (6.4 million pillars) with this program and with what a
 user would pick instead. Prints CPU seconds, peak memory and ratios.
 
-usage: peers_layout.py METALITH FOLDER          needs: pip install gdstk klayout numpy
+usage: peers_layout.py METALITH FOLDER [gds|oasis]      needs: pip install gdstk klayout numpy
                                                 and cargo build --release --example write_layout
 
 Every tool writes the same pillars: the centre element of prototype_3x3, with a hyperbolic phase. All get them as
@@ -101,6 +101,66 @@ def klayout_flat(path):
     return cpu() - start
 
 
+def gdstk_oasis(path):
+    def place(_, top, width, at, repetition, rectangle):
+        square = rectangle(tuple(at[0]), tuple(at[0] + width), layer=1)
+        square.repetition = repetition
+        top.add(square)
+
+    library, start = gdstk_library(place, corner=True)
+    library.write_oas(path, compression_level=6)
+    return cpu() - start
+
+
+def klayout_oasis(path):
+    """With all that its writer has to make files small; filling its database included, as a user must."""
+    return klayout_write_oasis(path)[0]
+
+
+def klayout_oasis_writer(path):
+    """The same, its writer alone."""
+    return klayout_write_oasis(path)[1]
+
+
+def klayout_write_oasis(path):
+    import klayout.db as db
+    x, y, w = lens()
+    start = cpu()
+    layout = db.Layout()
+    layout.dbu = 0.001
+    insert, box = layout.create_cell("TOP").shapes(layout.layer(1, 0)).insert, db.Box
+    for a, b, h in zip(x.tolist(), y.tolist(), (w // 2).tolist()):
+        insert(box(a - h, b - h, a + h, b + h))
+    filled = cpu()
+    options = db.SaveLayoutOptions()
+    options.format, options.oasis_compression_level, options.oasis_write_cblocks = "OASIS", 10, True
+    layout.write(path, options)
+    return cpu() - start, cpu() - filled
+
+
+def klayout_multiplies(path):
+    """Every copy of every pillar as a box of its own, made by the program itself: nothing is done in Python."""
+    import klayout.db as db
+    start = cpu()
+    layout = db.Layout()
+    layout.read(path)
+    region = db.Region(layout.top_cell().begin_shapes_rec(layout.layer(1, 0)))
+    region.merged_semantics = False
+    region.flatten()
+    check_count(region.count())
+    return cpu() - start
+
+
+def gdstk_multiplies(path):
+    """Every copy of every pillar as a polygon of its own."""
+    from gdstk import read_gds, read_oas
+    start = cpu()
+    read = read_oas if path.endswith(".oas") else read_gds
+    polygons = read(path).top_level()[0].get_polygons(layer=1, datatype=0)
+    check_count(len(polygons))
+    return cpu() - start
+
+
 def gdstk_read(path):
     from gdstk import read_gds
     start = cpu()
@@ -174,7 +234,7 @@ def measure(command):
     return used.ru_utime + used.ru_stime, time.perf_counter() - start, used.ru_maxrss / 1024, output
 
 
-def main(program, folder):
+def main(program, folder, only=""):
     folder = pathlib.Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     designs = pathlib.Path(__file__).resolve().parent.parent / "designs"
@@ -183,23 +243,57 @@ def main(program, folder):
     design.write_text(text.replace("elements = [3, 3]", "elements = [1, 1]").replace('"prototype_3x3"', '"one_lens"')
                       .replace('file = "', f'file = "{designs}/'))
     writer = pathlib.Path(program).resolve().parent / "examples" / "write_layout"
+
+    def write(kind, path):
+        _, _, memory, output = measure([writer, design, path, kind])
+        seconds = json.loads(output)["cpu_s"]
+        print(f"{'metalith ' + kind:44} {seconds:7.2f} {memory:7.0f}   {path.stat().st_size:,} bytes")
+        return seconds
+
+    def read(path):
+        seconds, _, memory, _ = measure([program, "psf", path, "--extract-only", "--json"])
+        print(f"{'metalith ' + path.name:44} {seconds:7.2f} {memory:7.0f}", flush=True)
+        return seconds
+
+    if only != "oasis":
+        gds(folder, write, read)
+    if only != "gds":
+        oasis(folder, write, read)
+
+
+def gds(folder, write, read):
     ours = {}
     print(f"{'writing one lens, 6.4 million pillars':44} {'CPU s':>7} {'MB':>7}")
     for hierarchy in ("folded", "sref", "flat"):
         path = folder / f"{hierarchy}.gds"
-        _, _, memory, output = measure([writer, design, path, hierarchy])
-        ours[hierarchy] = json.loads(output)["cpu_s"]
-        print(f"{'metalith ' + hierarchy:44} {ours[hierarchy]:7.2f} {memory:7.0f}")
+        ours[hierarchy] = write(hierarchy, path)
         for peer in ("copy", "copy_past_cache"):
             run_peer(peer, path, ours[hierarchy])
     for peer, against in (("gdstk_flat", "flat"), ("gdstk_sref", "sref"), ("gdstk_objects", "flat"), ("klayout_flat", "flat")):
         run_peer(peer, folder / f"{peer}.gds", ours[against])
     flat = folder / "flat.gds"
     print(f"\n{'reading its flat file':44} {'CPU s':>7} {'MB':>7}")
-    seconds, _, memory, _ = measure([program, "psf", flat, "--extract-only", "--json"])
-    print(f"{'metalith, every pillar on its site':44} {seconds:7.2f} {memory:7.0f}")
+    seconds = read(flat)
     for peer in ("gdstk_read", "klayout_read"):
         run_peer(peer, flat, seconds)
+
+
+def oasis(folder, write, read):
+    print(f"\n{'writing one lens in OASIS':44} {'CPU s':>7} {'MB':>7}")
+    ours = {kind: write(kind, folder / f"{kind}.oas") for kind in ("compact", "smallest")}
+    for peer in ("gdstk_oasis", "klayout_oasis", "klayout_oasis_writer"):
+        path = folder / f"{peer}.oas"
+        run_peer(peer, path, ours["compact"])
+        size = path.stat().st_size
+        shares = [size / (folder / f"{kind}.oas").stat().st_size for kind in ours]
+        print(f"{'':44} {size:,} bytes: {shares[0]:.2f} x ours compact, {shares[1]:.2f} x smallest")
+    write("folded", folder / "folded.gds")
+    # Readers that leave copies as copies have not read pillars: all are made to have each of them.
+    print(f"\n{'reading every copy of every pillar':44} {'CPU s':>7} {'MB':>7}")
+    for name in ("compact.oas", "smallest.oas", "klayout_oasis.oas", "folded.gds"):
+        seconds = read(folder / name)
+        for peer in ("klayout_multiplies", "gdstk_multiplies"):
+            run_peer(peer, folder / name, seconds)
 
 
 def run_peer(peer, path, ours):
@@ -212,4 +306,4 @@ if __name__ == "__main__":
     if sys.argv[1] == "--peer":
         print(json.dumps(globals()[sys.argv[2]](sys.argv[3])))
     else:
-        main(sys.argv[1], sys.argv[2])
+        main(*sys.argv[1:4])

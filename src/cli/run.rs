@@ -29,9 +29,8 @@ pub struct RunArgs {
 pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
     let design = standard_input::design(&args.design)?;
     // What could not be read back is not written; `metalith layout` writes it.
-    if let Some(why) = args.judging.not_simulated(&design, &args.target.folder(&design))? {
-        terminal.say(&format!("note: the layout will not be simulated: {why}"));
-    }
+    let simulation = args.judging.simulation(&design, &args.target.folder(&design))?;
+    Judging::announce(&simulation, terminal);
     terminal.stop_on_interrupt();
     let array = PillarArray::build(&design, terminal)?;
     let folder = args.target.folder(&design);

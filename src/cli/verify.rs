@@ -7,7 +7,9 @@ use metalith::design::CellIncidence;
 use metalith::report::sig;
 use metalith::{
     Accuracy, CalibratedModel, Design, Error, Fidelity, MadeChip, PillarArray, Result, SimulationCases, Verification,
-    cell_models, verify, verify::verify_pillars, write_report,
+    cell_models, verify,
+    verify::{Simulation, verify_in_parts, verify_pillars},
+    write_report,
 };
 
 use super::compensated::CompensatedFor;
@@ -60,8 +62,8 @@ pub struct Judging {
     #[arg(long)]
     as_lit: bool,
 
-    /// Memory that reading back and simulating may take (MB). A layout that takes more is compared with its design
-    /// pillar by pillar, and not simulated.
+    /// Memory that reading back and simulating may take (MB). What takes more is simulated in parts, in more time, by the
+    /// cell that judges alone; what takes more even so is compared with its design pillar by pillar, and not simulated.
     #[arg(long, value_name = "MB", default_value_t = 8000.0)]
     memory_mb: f64,
 
@@ -96,21 +98,32 @@ impl From<FidelityArg> for Fidelity {
 }
 
 impl Judging {
-    /// Why a layout of this design, at `path`, will not be simulated, if it will not be; asked before work is spent.
+    /// How a layout of this design, at `path`, will be simulated; asked before work is spent.
     ///
     /// # Errors
     /// If it could be neither simulated nor compared with its design.
-    pub fn not_simulated(&self, design: &Design, path: &Path) -> Result<Option<String>> {
-        let needed = metalith::verify::simulation_mb(design);
-        if needed <= self.memory_mb {
-            metalith::verify::fits(design, path)?;
-            return Ok(None);
+    pub fn simulation(&self, design: &Design, path: &Path) -> Result<Simulation> {
+        let by_site = self.model.is_some() || self.fidelity(design) == Fidelity::Neighbours;
+        Simulation::choose(design, path, self.accuracy(), by_site, self.memory_mb)
+    }
+
+    /// Say how a layout will be simulated, if not as usual.
+    pub fn announce(simulation: &Simulation, terminal: &Terminal) {
+        match simulation {
+            Simulation::Whole => {}
+            Simulation::InParts { parts, needed_mb, .. } => terminal.say(&format!(
+                "note: large elements: about {needed_mb:.0} MB of memory, each field in at most {parts} part{}, by the cell \
+                 that judges alone",
+                if *parts == 1 { "" } else { "s" }
+            )),
+            Simulation::Not(why) => {
+                terminal.say(&format!("note: every pillar is compared, nothing is simulated: {why}"));
+            }
         }
-        metalith::verify::fits_folded(design, path)?;
-        Ok(Some(format!(
-            "that takes about {needed:.0} MB of memory, and --memory-mb allows {:.0}",
-            self.memory_mb
-        )))
+    }
+
+    fn accuracy(&self) -> Accuracy {
+        if self.fast { Accuracy::Fast } else { Accuracy::Accurate }
     }
 
     /// Read back, simulate, write the report into `folder`, and say what came out.
@@ -127,21 +140,28 @@ impl Judging {
             design.verify.incidence = CellIncidence::AsLit;
         }
         let design = &design;
-        if let Some(why) = self.not_simulated(design, layout)? {
-            terminal.say(&format!("note: every pillar is compared, nothing is simulated: {why}"));
-            let found = verify_pillars(design, array, layout, self.fidelity(design), why, terminal)?;
-            return self.report(design, array, &found, folder, terminal);
+        let judge = self.fidelity(design);
+        match self.simulation(design, layout)? {
+            Simulation::Whole => {}
+            Simulation::InParts { part_bytes, .. } => {
+                let models = cell_models(design, &[judge])?;
+                let cases = SimulationCases::of_cells(&models)?;
+                let accuracy = self.accuracy();
+                let found = verify_in_parts(design, array, layout, &cases, accuracy, part_bytes, terminal)?;
+                return self.report(design, array, &found, folder, terminal);
+            }
+            Simulation::Not(why) => {
+                let found = verify_pillars(design, array, layout, judge, why, terminal)?;
+                return self.report(design, array, &found, folder, terminal);
+            }
         }
         let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
         let made = match &model {
             Some(model) => Some(MadeChip::new(&design.cell_stack()?, model)?),
             None => None,
         };
-        let judge = match &made {
-            // It judges, and cells of the pillars as drawn stand beside it.
-            Some(_) => Fidelity::Rigorous,
-            None => self.fidelity(design),
-        };
+        // A made chip judges, and cells of the pillars as drawn stand beside it.
+        let judge = if made.is_some() { Fidelity::Rigorous } else { judge };
         let beside = [Fidelity::Rigorous, Fidelity::Fitted, Fidelity::Published];
         let beside = beside.into_iter().filter(|f| *f != judge);
         let wanted = std::iter::once(judge).chain(beside).collect::<Vec<_>>();
@@ -150,8 +170,7 @@ impl Judging {
             Some(chip) => SimulationCases::judged_by(chip).with_cells(&models),
             None => SimulationCases::of_cells(&models)?,
         };
-        let accuracy = if self.fast { Accuracy::Fast } else { Accuracy::Accurate };
-        let found = verify(design, array, layout, &cases, accuracy, terminal)?;
+        let found = verify(design, array, layout, &cases, self.accuracy(), terminal)?;
         self.report(design, array, &found, folder, terminal)
     }
 
@@ -215,7 +234,7 @@ fn summary(found: &Verification, folder: &Path) {
 pub fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
     let mut design = standard_input::design(&args.design)?;
     let layout = InputFile::of(&args.layout)?;
-    args.judging.not_simulated(&design, &layout)?;
+    Judging::announce(&args.judging.simulation(&design, &layout)?, terminal);
     terminal.stop_on_interrupt();
     let array = args.compensated.array(&mut design, terminal)?;
     let folder = args

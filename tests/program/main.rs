@@ -6,6 +6,7 @@ mod check;
 mod handoff;
 mod made;
 mod new;
+mod oasis;
 mod optimise;
 mod picture;
 mod predict;

@@ -86,6 +86,27 @@ impl EighthMap {
     }
 }
 
+impl EighthMap {
+    /// Widths of row `iy` from the first column at or right of the middle to the diagonal (nm), for a row at or above the
+    /// middle: with all rows, each set of copies once.
+    pub fn to_diagonal<'r>(&self, iy: usize, room: &'r mut Vec<u16>) -> &'r [u16] {
+        let y = self.distance(iy);
+        room.clear();
+        room.resize(y + 1, 0);
+        self.along(y, room);
+        room
+    }
+
+    /// The row `y` of the triangle.
+    #[inline]
+    fn along(&self, y: usize, row: &mut [u16]) {
+        for (k, part) in row.chunks_mut(TILE).enumerate() {
+            let start = Self::index(y, k * TILE);
+            part.copy_from_slice(&self.width_nm[start..start + part.len()]);
+        }
+    }
+}
+
 impl WidthRows for EighthMap {
     fn lattice(&self) -> Lattice {
         self.lattice
@@ -103,10 +124,7 @@ impl WidthRows for EighthMap {
         // From the middle to the right: along a row of the triangle up to the diagonal, down its columns beyond.
         let right = &mut room[n / 2..];
         let (along, beyond) = right.split_at_mut(y + 1);
-        for (k, part) in along.chunks_mut(TILE).enumerate() {
-            let start = Self::index(y, k * TILE);
-            part.copy_from_slice(&self.width_nm[start..start + part.len()]);
-        }
+        self.along(y, along);
         let mut x = y + 1;
         let mut beyond = beyond.iter_mut();
         while x < n.div_ceil(2) {

@@ -115,14 +115,7 @@ impl WidthMap {
     /// Radius of the circle about the element's centre that holds the centres of all of its pillars (um); zero
     /// without pillars.
     pub fn circle_um(&self) -> f64 {
-        let mut radius2 = 0;
-        for (iy, row) in self.width_nm.outer_iter().enumerate() {
-            let mut ends = row.iter().enumerate().filter(|(_, w)| **w != 0).map(|(ix, _)| ix);
-            for ix in ends.next().into_iter().chain(ends.next_back()) {
-                radius2 = radius2.max(self.lattice.half_radius2(ix, iy));
-            }
-        }
-        (radius2 as f64).sqrt() * 0.5 * self.lattice.pitch_um()
+        WidthRows::circle_um(self)
     }
 
     /// Number of pillars of each width; index is the width (nm), the first entry counts empty sites.

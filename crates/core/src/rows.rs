@@ -42,6 +42,34 @@ pub trait WidthRows: Sync {
         (0..n).map(in_row).sum()
     }
 
+    /// Width of the widest pillar (nm); zero without pillars.
+    fn widest_nm(&self) -> u16 {
+        let n = self.lattice().sites();
+        let mut room = Vec::new();
+        let in_row = |iy| self.row(iy, 0..n, &mut room).iter().copied().max().unwrap_or(0);
+        (0..n).map(in_row).max().unwrap_or(0)
+    }
+
+    /// Radius of the circle about the element's centre that holds the centres of all of its pillars (um); zero without
+    /// pillars.
+    fn circle_um(&self) -> f64 {
+        let lattice = self.lattice();
+        let (n, mut radius2, mut room) = (lattice.sites(), 0, Vec::new());
+        for iy in 0..n {
+            let row = self.occupied(iy, 0..n, &mut room);
+            let mut ends = row.iter().enumerate().filter(|(_, w)| **w != 0).map(|(ix, _)| ix);
+            for ix in ends.next().into_iter().chain(ends.next_back()) {
+                radius2 = radius2.max(lattice.half_radius2(ix, iy));
+            }
+        }
+        (radius2 as f64).sqrt() * 0.5 * lattice.pitch_um()
+    }
+
+    /// All of them as a map, if that is how they are held.
+    fn held(&self) -> Option<&WidthMap> {
+        None
+    }
+
     /// Number of pillars of each width; index is the width (nm), the first entry counts empty sites.
     fn histogram(&self) -> Vec<u64> {
         let n = self.lattice().sites();
@@ -78,6 +106,10 @@ impl WidthRows for WidthMap {
 
     fn width(&self, ix: usize, iy: usize) -> u16 {
         self.width_nm[[iy, ix]]
+    }
+
+    fn held(&self) -> Option<&WidthMap> {
+        Some(self)
     }
 
     fn row<'r>(&'r self, iy: usize, columns: Range<usize>, _room: &'r mut Vec<u16>) -> &'r [u16] {

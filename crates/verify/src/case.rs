@@ -7,7 +7,7 @@ use num_complex::Complex64;
 
 use metalith_cell::{CellModel, NeighbourResponse, ObliqueTables, POLARISATION_SHARE};
 use metalith_core::Progress;
-use metalith_core::{Error, Result, WidthMap};
+use metalith_core::{Error, Result, WidthRows};
 use metalith_grating::NeighbourPillars;
 use metalith_made::{SimulationCase, cell_direction};
 use metalith_wave::{Aperture, Fold, Pillars, PlaneWave, Psf, Scratch};
@@ -143,15 +143,16 @@ impl TransmissionTables {
     /// An element among its own neighbours for s and p, in light for which that is known.
     ///
     /// # Errors
-    /// If it has too many widths.
+    /// If it has too many widths, or they are not held as a map.
     pub fn among_neighbours<'w>(
         &self,
-        widths: &'w WidthMap,
+        widths: &'w dyn WidthRows,
         lit: &PlaneWave,
     ) -> Result<Option<[NeighbourPillars<'w>; 2]>> {
         let Some(responses) = self.neighbours.get(&key(cell_direction(lit))) else {
             return Ok(None);
         };
+        let widths = widths.held().ok_or_else(not_held)?;
         let of = |polarisation| NeighbourPillars::new(widths, responses, [lit.sin_x, lit.sin_y], polarisation);
         Ok(Some([of(0)?, of(1)?]))
     }
@@ -163,7 +164,7 @@ impl TransmissionTables {
     /// As [`Psf::formed`].
     pub fn psf(
         &self,
-        widths: &WidthMap,
+        widths: &dyn WidthRows,
         wave: &PlaneWave,
         lit: &PlaneWave,
         fold: &Fold,
@@ -184,6 +185,14 @@ impl TransmissionTables {
             None => of(&self.normal),
         }
     }
+}
+
+/// Neighbours and chips as made are looked at site by site in all directions.
+pub(super) fn not_held() -> Error {
+    Error::invalid(
+        "an element whose pillars are too many to be held is judged as made, or among its unlike neighbours",
+        "judge it by the cell of a lattice of equal pillars, as drawn",
+    )
 }
 
 fn key(sines: [f64; 2]) -> [u64; 2] {

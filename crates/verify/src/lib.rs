@@ -4,10 +4,11 @@
 mod assumptions;
 mod case;
 mod check;
+mod large;
+mod memory;
 mod optics;
 mod page;
 mod phase;
-mod pillars_only;
 mod psf_metrics;
 mod single;
 mod single_white;
@@ -22,7 +23,7 @@ use num_complex::{Complex32, Complex64};
 use serde::Serialize;
 
 use metalith_cell::Fidelity;
-use metalith_core::{Progress, Result, WidthMap, WidthRows};
+use metalith_core::{Progress, Result, WidthRows};
 use metalith_design::array::{PillarArray, PlacedElement, WidthRule};
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, Element};
@@ -34,10 +35,11 @@ use metalith_wave::{Accuracy, PlaneWave};
 
 pub use case::SimulationCases;
 pub use check::{Check, Sense};
+pub use large::{verify_in_parts, verify_pillars};
+pub use memory::Simulation;
 pub use metalith_made::SimulationCase;
 pub use page::write_report;
 pub use phase::{PhaseError, PhaseErrors, PillarResponse};
-pub use pillars_only::{fits_folded, simulation_mb, verify_pillars};
 pub use psf_metrics::{OrderEfficiencies, PsfImages, PsfPair, PsfResult};
 pub use single::{Lighting, SinglePsf, SinglePsfReport, single_psfs, write_single_psf_report};
 pub use single_white::{SingleWhite, single_white};
@@ -85,9 +87,9 @@ pub struct DistinctElement {
     pub spots: Vec<PsfPair>,
     /// A point of the scene in white light, one entry for each channel of the camera.
     pub white: Vec<WhiteChannel>,
-    /// The pillars that were read back, for pictures.
+    /// Number of pillars of each width that were read back; index is the width (nm), the first entry counts empty sites.
     #[serde(skip)]
-    pub widths: WidthMap,
+    pub histogram: Vec<u64>,
 }
 
 /// All that was found about a layout.
@@ -178,15 +180,46 @@ pub fn verify_layout(
     progress: &dyn Progress,
 ) -> Result<Verification> {
     fits(design, layout.path())?;
-    let mut extraction = extract(layout, &plan(design, array), progress)?;
-    let elements = compare(array, &extraction);
+    let extraction = extract(layout, &plan(design, array), progress)?;
+    let found = Found {
+        layout: facts(layout, &extraction, layout.path()),
+        elements: compare(array, &extraction, |placed, found| {
+            WidthCheck::compare(array.rows(placed).as_ref(), found)
+        }),
+        widths: extraction.elements.iter().map(|e| &e.widths as _).collect(),
+        foreign: extraction.oddities.clone(),
+    };
+    judge(design, array, found, cases, accuracy, None, progress)
+}
+
+/// What was read of a layout.
+struct Found<'a> {
+    layout: LayoutFacts,
+    elements: Vec<ElementCheck>,
+    /// Pillars of each element.
+    widths: Vec<&'a dyn WidthRows>,
+    foreign: Oddities,
+}
+
+/// Simulate what was read of a layout and hold it to the limits of its design; a thread holds spectra of at most
+/// `part_bytes` at a time, if that is given.
+fn judge(
+    design: &Design,
+    array: &PillarArray,
+    found: Found<'_>,
+    cases: &SimulationCases<'_>,
+    accuracy: Accuracy,
+    part_bytes: Option<usize>,
+    progress: &dyn Progress,
+) -> Result<Verification> {
+    let elements = found.elements;
     let lens = LensPhase::new(array.lattice, design.lens.diameter_nm, &design.lens.phase);
     let responses = MappingResponse::new(design, cases.judge)?;
-    let mut simulator = optics::ElementSimulator::new(design, array.lattice, cases, accuracy)?;
+    let mut simulator = optics::ElementSimulator::new(design, array.lattice, cases, accuracy, part_bytes)?;
     let chosen = distinct(&elements, cases.judge.depends_on_place());
     let shown = chosen.iter().map(|(k, _)| elements[*k].element).collect::<Vec<_>>();
     simulator.add_directions(&shown, progress)?;
-    let mut white = white::WhiteSimulator::new(design, array.lattice, cases.judge)?;
+    let mut white = white::WhiteSimulator::new(design, array.lattice, cases.judge, part_bytes)?;
     if let Some(white) = &mut white {
         white.add_directions(&shown, progress)?;
     }
@@ -197,10 +230,10 @@ pub fn verify_layout(
     let mut simulated = Vec::new();
     for (k, copies) in chosen {
         let element = elements[k].element;
-        let widths = std::mem::replace(&mut extraction.elements[k].widths, WidthMap::empty(array.lattice));
+        let widths = found.widths[k];
         let phase = ElementPhase::new(&lens, &element.wedge);
         let rule = WidthRule::of_element(design, element.index);
-        let read = simulator.read(&element, &widths)?;
+        let read = simulator.read(&element, widths)?;
         simulated.push(DistinctElement {
             element,
             copies,
@@ -212,7 +245,7 @@ pub fn verify_layout(
                 Some(white) => white.simulate(&element, &read, progress)?,
                 None => Vec::new(),
             },
-            widths,
+            histogram: widths.histogram(),
         });
     }
     let mut verification = Verification {
@@ -229,9 +262,9 @@ pub fn verify_layout(
             Accuracy::Fast => "fast",
         },
         camera: white.as_ref().map(white::WhiteSimulator::statement),
-        layout: facts(layout, &extraction, layout.path()),
+        layout: found.layout,
         elements,
-        foreign: extraction.oddities,
+        foreign: found.foreign,
         distinct: simulated,
         not_simulated: None,
         checks: Vec::new(),
@@ -263,7 +296,7 @@ impl<'a> MappingResponse<'a> {
         rule: &WidthRule,
         progress: &dyn Progress,
     ) -> Result<PhaseErrors> {
-        let widths = read.drawn.pillars();
+        let widths = read.widths;
         let errors = |wavelength_um: &f64, table: &[Complex64], class: &(dyn Fn(usize, u16) -> usize + Sync)| {
             let response = PillarResponse {
                 wavelength_um: *wavelength_um,
@@ -306,11 +339,15 @@ fn plan(design: &Design, array: &PillarArray) -> ExtractionPlan {
     ExtractionPlan::given(design.layout.layers.pillars.number(), sites)
 }
 
-fn compare<W: WidthRows>(array: &PillarArray, extraction: &Extraction<W>) -> Vec<ElementCheck> {
+fn compare<W>(
+    array: &PillarArray,
+    extraction: &Extraction<W>,
+    widths: impl Fn(&PlacedElement, &W) -> WidthCheck,
+) -> Vec<ElementCheck> {
     let mut first_of_class = vec![None; array.classes.len()];
     let mut distinct = 0;
     let mut check = |(placed, found): (&PlacedElement, &ExtractedElement<W>)| {
-        let widths = WidthCheck::compare(array.all_rows(placed).as_ref(), &found.widths);
+        let widths = widths(placed, &found.widths);
         let copy_of = if widths.faults() == 0 {
             let place = &mut first_of_class[placed.class];
             if place.is_none() {

@@ -4,20 +4,22 @@ use ndarray::Array2;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::case::{SimulationCases, TransmissionTables};
+use super::case::{SimulationCases, TransmissionTables, not_held};
 use super::psf_metrics::{OrderEfficiencies, PsfImages, PsfPair, PsfResult};
 use super::site_orders::site_shares;
 use metalith_cell::Fidelity;
 use metalith_core::Progress;
 use metalith_core::{Error, Result};
-use metalith_core::{Lattice, WidthMap};
+use metalith_core::{Lattice, WidthRows};
 use metalith_design::array::WidthRule;
 use metalith_design::phase::ElementPhase;
 use metalith_design::{CellIncidence, Design, Element, FieldAngle};
 use metalith_made::{DrawnElement, MadeChip, MadeElement, MadeView, SimulationCase};
 use metalith_wave::propagation::{incident, landing_um};
 use metalith_wave::psf::{CONTRAST_LP_MM, CURVE_LP_MM};
-use metalith_wave::{Accuracy, Aperture, Fold, Matched, PhaseFunction, PhaseMap, PlaneWave, Psf, Scratch, Window};
+use metalith_wave::{
+    Accuracy, Aperture, Fold, Matched, PhaseFunction, PhaseMap, PhaseSites, PlaneWave, Psf, Scratch, Window,
+};
 
 /// Where an element looks.
 const MIDDLE: FieldAngle = FieldAngle { x_deg: 0.0, y_deg: 0.0 };
@@ -44,18 +46,28 @@ pub(super) struct ElementSimulator<'a> {
     lattice: Lattice,
     cases: Vec<SimulationCase<'a>>,
     accuracy: Accuracy,
+    /// Spectra that a thread may hold at a time, if not all (bytes): see [`Fold::within`].
+    part_bytes: Option<usize>,
     colours: Vec<Colour>,
 }
 
 /// An element as read from a layout, and as made in each case that is a made chip.
 pub(super) struct ReadElement<'a> {
-    pub drawn: DrawnElement<'a>,
+    pub widths: &'a dyn WidthRows,
+    /// What chips are made of, if the pillars are held as a map.
+    drawn: Option<DrawnElement<'a>>,
     pub made: Vec<Option<MadeElement>>,
 }
 
 impl<'a> ElementSimulator<'a> {
     /// Look up the cells at all wavelengths.
-    pub fn new(design: &'a Design, lattice: Lattice, cases: &SimulationCases<'a>, accuracy: Accuracy) -> Result<Self> {
+    pub fn new(
+        design: &'a Design,
+        lattice: Lattice,
+        cases: &SimulationCases<'a>,
+        accuracy: Accuracy,
+        part_bytes: Option<usize>,
+    ) -> Result<Self> {
         let cases: Vec<_> = cases.iter().collect();
         let colour = |&wavelength_um: &f64| {
             let at = |case: &SimulationCase<'_>| {
@@ -79,6 +91,7 @@ impl<'a> ElementSimulator<'a> {
             design,
             lattice,
             accuracy,
+            part_bytes,
             colours: design.verify.wavelengths_um.iter().map(colour).collect::<Result<_>>()?,
             cases,
         })
@@ -169,14 +182,19 @@ impl<'a> ElementSimulator<'a> {
     /// An element as read, with what each made chip makes of it.
     ///
     /// # Errors
-    /// As [`MadeElement::new`].
-    pub fn read<'w>(&self, element: &Element, widths: &'w WidthMap) -> Result<ReadElement<'w>> {
-        let drawn = DrawnElement::new(widths, self.design.aperture_radius_um()).placed(element.centre_um());
-        let made = |case: &SimulationCase<'_>| match case {
-            SimulationCase::Cell(_) => Ok(None),
-            SimulationCase::Made(chip) => chip.element(&drawn).map(Some),
+    /// As [`MadeElement::new`]; also if a chip is to be made of pillars that are not held as a map.
+    pub fn read<'w>(&self, element: &Element, widths: &'w dyn WidthRows) -> Result<ReadElement<'w>> {
+        let drawn = widths.held().map(|map| {
+            let drawn = DrawnElement::new(map, self.design.aperture_radius_um());
+            drawn.placed(element.centre_um())
+        });
+        let made = |case: &SimulationCase<'_>| match (case, &drawn) {
+            (SimulationCase::Cell(_), _) => Ok(None),
+            (SimulationCase::Made(chip), Some(drawn)) => chip.element(drawn).map(Some),
+            (SimulationCase::Made(_), None) => Err(not_held()),
         };
         Ok(ReadElement {
+            widths,
             made: self.cases.iter().map(made).collect::<Result<_>>()?,
             drawn,
         })
@@ -201,7 +219,7 @@ impl<'a> ElementSimulator<'a> {
             let middle = arriving(element, colour.wavelength_um, MIDDLE)?;
             for (at, case) in colour.cases.iter().zip(&self.cases) {
                 if let Some(tables) = &at.tables
-                    && let Some(both) = tables.among_neighbours(read.drawn.pillars(), &middle)?
+                    && let Some(both) = tables.among_neighbours(read.widths, &middle)?
                 {
                     let both = both.each_ref().map(|a| -> &dyn Aperture { a });
                     let found = site_shares(&both, phase, at.full);
@@ -219,7 +237,8 @@ impl<'a> ElementSimulator<'a> {
                 let table = match (&at.tables, case) {
                     (Some(tables), _) => &tables.normal,
                     (None, SimulationCase::Made(chip)) => {
-                        made = by_drawn_width(chip, rule, &read.drawn, colour.wavelength_um, progress)?;
+                        let drawn = read.drawn.as_ref().ok_or_else(not_held)?;
+                        made = by_drawn_width(chip, rule, drawn, colour.wavelength_um, progress)?;
                         &made
                     }
                     (None, SimulationCase::Cell(_)) => unreachable!("every cell has its tables"),
@@ -250,7 +269,19 @@ impl<'a> ElementSimulator<'a> {
         let angles = &self.design.verify.field_angles;
         // The phase before mapping and rounding, once for all colours and angles.
         let radius_um = self.design.lens.radius_um();
-        let designed = PhaseMap::new(self.lattice, radius_um, |ix, iy| phase.turns(ix, iy));
+        let turns = |ix, iy| phase.turns(ix, iy);
+        let (held, computed);
+        let designed: &dyn Aperture = if self.part_bytes.is_none() {
+            held = PhaseMap::new(self.lattice, radius_um, turns);
+            &held
+        } else {
+            computed = PhaseSites {
+                lattice: self.lattice,
+                radius_um,
+                turns,
+            };
+            &computed
+        };
         let mut tasks = Vec::new();
         for colour in &self.colours {
             for field in angles {
@@ -270,7 +301,7 @@ impl<'a> ElementSimulator<'a> {
                 if progress.stopped() {
                     return Err(Error::Interrupted);
                 }
-                let pair = self.pair(&task, element, &designed, read.drawn.pillars(), scratch);
+                let pair = self.pair(&task, element, designed, read.widths, scratch);
                 progress.advance(1);
                 pair
             })
@@ -297,8 +328,8 @@ impl<'a> ElementSimulator<'a> {
         &self,
         task: &Task<'_>,
         element: &Element,
-        designed: &PhaseMap,
-        widths: &WidthMap,
+        designed: &dyn Aperture,
+        widths: &dyn WidthRows,
         scratch: &mut Scratch,
     ) -> Result<PsfPair> {
         let (lens, spec) = (&self.design.lens, &self.design.verify);
@@ -315,6 +346,10 @@ impl<'a> ElementSimulator<'a> {
             lens.focal_length_um,
         );
         let fold = Fold::plan(self.lattice, lens.radius_um(), wavelength_um, window, self.accuracy)?;
+        let fold = match self.part_bytes {
+            Some(bytes) => fold.within(bytes),
+            None => fold,
+        };
         let designed = Psf::formed(&fold, designed, wave, &CURVE_LP_MM, scratch)?;
         let perfect = self.perfect(chief, wavelength_um);
         let mut extracted = Vec::new();
@@ -382,6 +417,15 @@ fn by_drawn_width(
         table[usize::from(*w)] = t;
     }
     Ok(table)
+}
+
+/// Where the chief ray of an element lands from one of its field angles, from the element's axis (um).
+///
+/// # Errors
+/// If it does not reach the sensor.
+pub(super) fn landing(element: &Element, wavelength_um: f64, field: FieldAngle, distance_um: f64) -> Result<[f64; 2]> {
+    let wave = arriving(element, wavelength_um, field)?;
+    Ok(landing_um(&element.wedge, &wave, distance_um)?)
 }
 
 /// The wave that arrives at an element from one of its field angles.

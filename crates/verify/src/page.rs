@@ -286,7 +286,7 @@ fn written(page: &mut Page, design: &Design, found: &Verification) {
     );
     let mut histogram = Vec::new();
     for element in &found.distinct {
-        for (w, c) in element.widths.histogram().into_iter().enumerate().skip(1) {
+        for (w, c) in element.histogram.iter().enumerate().skip(1) {
             histogram.resize(histogram.len().max(w + 1), 0);
             histogram[w] += c * element.copies as u64;
         }

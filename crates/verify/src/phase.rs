@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use metalith_cell::ForwardPolynomial;
-use metalith_core::WidthMap;
+use metalith_core::WidthRows;
 use metalith_design::array::WidthRule;
 use metalith_design::phase::ElementPhase;
 
@@ -39,12 +39,18 @@ pub struct PillarResponse<'a> {
 
 impl PhaseErrors {
     /// Compare the pillars of an element with its phase.
-    pub fn of(widths: &WidthMap, phase: &ElementPhase<'_>, rule: &WidthRule, response: &PillarResponse<'_>) -> Self {
-        let pitch_nm = f64::from(widths.lattice.pitch_nm());
+    pub fn of(
+        widths: &dyn WidthRows,
+        phase: &ElementPhase<'_>,
+        rule: &WidthRule,
+        response: &PillarResponse<'_>,
+    ) -> Self {
+        let pitch_nm = f64::from(widths.lattice().pitch_nm());
         let forward = ForwardPolynomial::published();
         let by_width = |nm: f64| TAU * forward.turns(nm / pitch_nm, response.wavelength_um);
-        let widest = widths.width_nm.iter().copied().max().unwrap_or(0);
-        let written = (0..=widest).map(|w| by_width(f64::from(w))).collect::<Vec<_>>();
+        let written = (0..=widths.widest_nm())
+            .map(|w| by_width(f64::from(w)))
+            .collect::<Vec<_>>();
         let turns_of = |t: &Complex64| (t.norm() > 0.0).then(|| t.arg() / TAU);
         let turns: Vec<Option<f64>> = response.table.iter().map(turns_of).collect();
         let off = |pillar: Pillar| Some(turns[(response.class)(pillar.site, pillar.width_nm)]? - pillar.design_turns);
@@ -115,15 +121,15 @@ impl Sums {
 /// Fold each row on whatever thread; the caller adds the rows in order, so that sums do not depend on
 /// the number of threads.
 fn per_row<T: Send>(
-    widths: &WidthMap,
+    widths: &dyn WidthRows,
     phase: &ElementPhase<'_>,
     fold: impl Fn(&mut dyn Iterator<Item = Pillar>) -> T + Sync,
 ) -> Vec<T> {
-    let n = widths.lattice.sites();
+    let n = widths.lattice().sites();
     (0..n)
         .into_par_iter()
-        .map(|iy| {
-            let row = widths.width_nm.row(iy);
+        .map_init(Vec::new, |room, iy| {
+            let row = widths.row(iy, 0..n, room);
             let mut pillars = row
                 .iter()
                 .enumerate()

@@ -84,7 +84,7 @@ pub fn single_psfs(
         for ((site, widths), psf) in elements.iter().zip(psfs) {
             // Strehl is against the sites as drawn, whatever they transmit.
             let table = vec![Complex64::ONE; usize::from(widest_nm(&elements)) + 1];
-            let matched = Matched::of(&Pillars::new(widths, &table)?, focus, wavelength_um, full);
+            let matched = Matched::of(&Pillars::new(*widths, &table)?, focus, wavelength_um, full);
             all.push(SinglePsf {
                 element: site.name.clone(),
                 wavelength_um,
@@ -120,7 +120,7 @@ fn by_cell(
             }
             let (window, radius_um) = (light.window(widths.lattice), widths.circle_um());
             let fold = Fold::plan(widths.lattice, radius_um, wavelength_um, window, light.accuracy)?;
-            let psf = tables.psf(widths, &wave, &wave, &fold, &CONTRAST_LP_MM, scratch)?;
+            let psf = tables.psf(*widths, &wave, &wave, &fold, &CONTRAST_LP_MM, scratch)?;
             progress.advance(1);
             Ok(psf)
         })

@@ -14,7 +14,7 @@ use metalith_camera::{Camera, ChannelSampling, Sampling};
 use metalith_core::{Error, Lattice, Progress, Result, Wedge};
 use metalith_design::{CellIncidence, Design, Element};
 use metalith_made::{MadeView, SimulationCase};
-use metalith_wave::propagation::landing_um;
+use metalith_wave::propagation;
 use metalith_wave::psf::{BandPart, BandSample, CURVE_LP_MM, band_otf, pixel_mtf, polychromatic};
 use metalith_wave::{Accuracy, Fold, Matched, PhaseFunction, PlaneWave, Psf, Scratch, Window};
 
@@ -121,6 +121,23 @@ pub(super) fn camera_of(design: &Design) -> Result<Option<(Camera, Sampling)>> {
     Ok(sampling.map(|sampling| (camera, sampling)))
 }
 
+/// The wavelengths that white light is simulated at (um); none if there is no camera to be had.
+///
+/// # Errors
+/// As [`camera_of`].
+pub(super) fn wavelengths_um(design: &Design) -> Result<Vec<f64>> {
+    let sampling = camera_of(design)?.map(|(_, sampling)| sampling);
+    Ok(sampling.map_or_else(Vec::new, |s| s.wavelengths_nm.iter().map(|nm| nm * 1e-3).collect()))
+}
+
+/// Where the light of one wavelength lands from a point that an element looks at (um).
+///
+/// # Errors
+/// As [`Point::landing_um`].
+pub(super) fn landing_um(element: &Element, wavelength_um: f64, distance_um: f64) -> Result<[f64; 2]> {
+    Point::of(element, distance_um).landing_um(wavelength_um)
+}
+
 /// The visible and the wavelengths that the design names, where its materials are known (nm).
 fn range_nm(design: &Design) -> Result<[f64; 2]> {
     let spec = design.table_spec()?;
@@ -145,6 +162,8 @@ pub(super) struct WhiteSimulator<'a> {
     design: &'a Design,
     lattice: Lattice,
     judge: SimulationCase<'a>,
+    /// Spectra that a thread may hold at a time, if not all (bytes): see [`Fold::within`].
+    part_bytes: Option<usize>,
     camera: Camera,
     sampling: Sampling,
     colours: Vec<Colour>,
@@ -158,7 +177,12 @@ impl<'a> WhiteSimulator<'a> {
     ///
     /// # Errors
     /// As [`camera_of`]; also if a cell cannot be solved.
-    pub fn new(design: &'a Design, lattice: Lattice, judge: SimulationCase<'a>) -> Result<Option<Self>> {
+    pub fn new(
+        design: &'a Design,
+        lattice: Lattice,
+        judge: SimulationCase<'a>,
+        part_bytes: Option<usize>,
+    ) -> Result<Option<Self>> {
         let Some((camera, sampling)) = camera_of(design)? else {
             return Ok(None);
         };
@@ -192,6 +216,7 @@ impl<'a> WhiteSimulator<'a> {
             design,
             lattice,
             judge,
+            part_bytes,
             camera,
             sampling,
             lp_mm,
@@ -298,7 +323,11 @@ impl<'a> WhiteSimulator<'a> {
             (None, Some(tables)) => {
                 let radius_um = lens.radius_um();
                 let fold = Fold::plan(self.lattice, radius_um, colour.wavelength_um, window, Accuracy::Fast)?;
-                tables.psf(read.drawn.pillars(), &wave, &wave, &fold, &self.lp_mm, scratch)?
+                let fold = match self.part_bytes {
+                    Some(bytes) => fold.within(bytes),
+                    None => fold,
+                };
+                tables.psf(read.widths, &wave, &wave, &fold, &self.lp_mm, scratch)?
             }
             (None, None) => unreachable!("a case is a cell or a made chip"),
         };
@@ -439,7 +468,8 @@ impl Point {
     /// # Errors
     /// If it does not reach the sensor.
     pub fn landing_um(&self, wavelength_um: f64) -> Result<[f64; 2]> {
-        Ok(landing_um(&self.wedge, &self.wave(wavelength_um), self.distance_um)?)
+        let wave = self.wave(wavelength_um);
+        Ok(propagation::landing_um(&self.wedge, &wave, self.distance_um)?)
     }
 }
 

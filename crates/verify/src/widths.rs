@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use metalith_core::WidthRows;
+use metalith_core::{EighthMap, WidthRows};
 
 /// How the pillars of one element differ from the intended ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -37,15 +37,40 @@ impl WidthCheck {
         check
     }
 
+    /// Compare pillars that all eight symmetries leave as they are: each set of copies once.
+    ///
+    /// # Panics
+    /// If the two are on different lattices.
+    pub fn compare_eighth(intended: &impl WidthRows, found: &EighthMap) -> Self {
+        let lattice = intended.lattice();
+        assert_eq!(lattice, found.lattice(), "an element is read back on its own lattice");
+        let mut check = Self::default();
+        let (n, mut room, mut other_room) = (lattice.sites(), Vec::new(), Vec::new());
+        for iy in n / 2..n {
+            let meant = intended.row(iy, n / 2..iy + 1, &mut room);
+            let got = found.to_diagonal(iy, &mut other_room);
+            for (ix, (&meant, &got)) in (n / 2..).zip(meant.iter().zip(got)) {
+                check.sites(meant, got, found.copies(ix, iy) as u64);
+            }
+        }
+        check
+    }
+
     #[inline]
     fn site(&mut self, meant: u16, got: u16) {
-        self.pillars += u64::from(got != 0);
+        self.sites(meant, got, 1);
+    }
+
+    /// So many sites that are alike.
+    #[inline]
+    fn sites(&mut self, meant: u16, got: u16, sites: u64) {
+        self.pillars += sites * u64::from(got != 0);
         if meant != got {
             match (meant, got) {
-                (_, 0) => self.missing += 1,
-                (0, _) => self.extra += 1,
+                (_, 0) => self.missing += sites,
+                (0, _) => self.extra += sites,
                 _ => {
-                    self.wrong += 1;
+                    self.wrong += sites;
                     self.largest_nm = self.largest_nm.max(meant.abs_diff(got));
                 }
             }
@@ -84,5 +109,22 @@ mod tests {
         assert_eq!(check, expected);
         assert_eq!(check.faults(), 4);
         assert_eq!(WidthCheck::compare(&intended, &intended).faults(), 0);
+    }
+
+    /// An eighth against the whole, on even and odd lattices, with every kind of difference.
+    #[test]
+    fn an_eighth_is_compared_as_the_whole() {
+        for n in [1, 2, 7, 40, 71] {
+            let lattice = Lattice::new(350, n).unwrap();
+            let (mut intended, mut found) = (EighthMap::empty(lattice), EighthMap::empty(lattice));
+            for (iy, ix) in (0..n * n).map(|k| (k / n, k % n)) {
+                let radius2 = lattice.half_radius2(ix, iy) as u16;
+                *intended.at(ix, iy) = if radius2 % 7 == 1 { 0 } else { 100 + radius2 % 50 };
+                *found.at(ix, iy) = if radius2 % 5 == 1 { 0 } else { 100 + radius2 % 48 };
+            }
+            let whole = WidthCheck::compare(&intended.whole(), &found.whole());
+            assert_eq!(WidthCheck::compare_eighth(&intended, &found), whole);
+            assert!(n < 20 || (whole.wrong > 0 && whole.missing > 0 && whole.extra > 0));
+        }
     }
 }

@@ -1,23 +1,15 @@
 //! Where the elements of a layout from anywhere are, and on which lattice they stand.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 use super::sites::Scale;
+use super::tiles::{MOST_TILES, TileMap};
 use crate::{
     Error, ExtractionError, LayerNumber, Layout, LayoutCell, Point, Rect, Result, Selection, Shape, Transform, Visitor,
 };
 use metalith_core::ElementSite;
 use metalith_core::{Lattice, Progress};
 
-/// Tiles of the map of occupied places (nm): two elements with an empty tile between them are two. Wider
-/// than any pitch, so that sparse places of a lens hold together.
-const TILE_NM: i64 = 1 << 13;
-/// Tiles of the map: 5 x 5 lenses of 1 mm occupy 300,000.
-const MOST_TILES: usize = 1 << 21;
-/// Bits of the place of a tile along an axis by which it is looked up first: 128 x 128 tiles are 1 mm.
-const LATELY: u32 = 7;
-/// Centres remembered a tile, to tell pitch and phase from.
-const SAMPLES: usize = 24;
 /// Wider squares are pads or marks (nm).
 const WIDEST_NM: i64 = 4000;
 /// Fewer squares together are no element.
@@ -27,33 +19,14 @@ const MOST_ELEMENTS: usize = 4096;
 /// Lattice sites for each square found: a lens fills 0.79 of its lattice.
 const SITES_PER_PILLAR: u64 = 64;
 
-/// Squares in one tile; centres from the tile's corner, doubled (half nm). Small, because every square comes here.
-#[derive(Clone, Debug)]
-struct Tile {
-    squares: u64,
-    low: (u16, u16),
-    high: (u16, u16),
-    /// Number of its samples.
-    sampled: u8,
-}
-
-impl Tile {
-    const EMPTY: Self = Self {
-        squares: 0,
-        low: (u16::MAX, u16::MAX),
-        high: (0, 0),
-        sampled: 0,
-    };
-}
-
+/// Occupied places of a layout.
 struct Map {
     scale: Scale,
-    numbers: HashMap<(i64, i64), u32>,
-    tiles: Vec<((i64, i64), Tile)>,
-    /// Some centres in each tile, as in the tile.
-    samples: Vec<[(u16, u16); SAMPLES]>,
-    /// Tiles met lately, by the low bits of their place: most squares are looked up here, without a hash.
-    lately: Vec<u32>,
+    tiles: TileMap,
+    /// Of the current cell in its own coordinates, if it is placed more than once: each square is looked at once.
+    own: TileMap,
+    /// Placements of the current cell whose squares are in `own`.
+    placements: Vec<Transform>,
     /// Tile that each placement of the current cell met last.
     guesses: Vec<u32>,
     /// There are more tiles than are held.
@@ -70,10 +43,9 @@ pub fn discover(
 ) -> Result<Vec<ElementSite>> {
     let mut map = Map {
         scale,
-        numbers: HashMap::new(),
-        tiles: Vec::new(),
-        samples: Vec::new(),
-        lately: vec![0; 1 << (2 * LATELY)],
+        tiles: TileMap::new(),
+        own: TileMap::new(),
+        placements: Vec::new(),
         guesses: Vec::new(),
         scattered: false,
     };
@@ -86,12 +58,13 @@ pub fn discover(
         cause,
     };
     layout.visit(&selection, &mut map, progress)?;
+    map.place_own();
     if map.scattered {
         return Err(fail(ExtractionError::Scattered { most: MOST_TILES }));
     }
     let layers = || layers.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
     let mut sites = Vec::new();
-    for cluster in map.clusters() {
+    for cluster in map.tiles.clusters() {
         if let Some(site) = map.element(&cluster).map_err(fail)? {
             sites.push(site);
         }
@@ -113,96 +86,70 @@ pub fn discover(
     Ok(sites)
 }
 
+/// A square as it is looked for, in half nanometres.
+struct Square {
+    centre: Point,
+    /// Whether its edges are on the grid of whole nanometres if its centre is on that of half ones.
+    even: bool,
+}
+
 impl Map {
-    fn add(&mut self, r: &Rect, placement: usize) {
+    /// A rectangle as a square that may be a pillar.
+    #[inline]
+    fn square(&self, r: &Rect) -> Option<Square> {
         if !self.scale.reaches(r) || r.width() != r.height() {
-            return;
+            return None;
         }
-        let (Some(width), Some(x), Some(y)) = (
-            self.scale.whole_nm(r.width()),
-            self.scale.whole_nm(r.x0 + r.x1),
-            self.scale.whole_nm(r.y0 + r.y1),
-        ) else {
-            return;
-        };
-        if width > WIDEST_NM {
-            return;
-        }
-        let key = (x.div_euclid(2 * TILE_NM), y.div_euclid(2 * TILE_NM));
-        let guess = &mut self.guesses[placement];
-        if self.tiles.get(*guess as usize).is_none_or(|(k, _)| *k != key) {
-            let low = |v: i64| (v & ((1 << LATELY) - 1)) as usize;
-            let lately = &mut self.lately[low(key.1) << LATELY | low(key.0)];
-            if self.tiles.get(*lately as usize).is_none_or(|(k, _)| *k != key) {
-                let next = self.tiles.len() as u32;
-                *lately = *self.numbers.entry(key).or_insert(next);
-                if *lately == next {
-                    self.tiles.push((key, Tile::EMPTY));
-                    self.samples.push([(0, 0); SAMPLES]);
-                }
-            }
-            *guess = *lately;
-        }
-        let from_corner = |v: i64| v.rem_euclid(2 * TILE_NM) as u16;
-        let (x, y) = (from_corner(x), from_corner(y));
-        let tile = &mut self.tiles[*guess as usize].1;
-        tile.squares += 1;
-        tile.low = (tile.low.0.min(x), tile.low.1.min(y));
-        tile.high = (tile.high.0.max(x), tile.high.1.max(y));
-        if usize::from(tile.sampled) < SAMPLES && width % 2 == 0 {
-            self.samples[*guess as usize][usize::from(tile.sampled)] = (x, y);
-            tile.sampled += 1;
-        }
+        let width = self.scale.whole_nm(r.width())?;
+        let centre = Point::new(self.scale.whole_nm(r.x0 + r.x1)?, self.scale.whole_nm(r.y0 + r.y1)?);
+        (width <= WIDEST_NM).then_some(Square {
+            centre,
+            even: width % 2 == 0,
+        })
     }
 
-    /// Tiles that touch, corners included.
-    fn clusters(&self) -> Vec<Vec<usize>> {
-        let mut seen = vec![false; self.tiles.len()];
-        let mut clusters = Vec::new();
-        for start in 0..self.tiles.len() {
-            if std::mem::replace(&mut seen[start], true) {
+    /// Whether the squares of a cell with these placements are gathered in its own coordinates.
+    fn gathers(&self, placements: &[Transform]) -> bool {
+        placements.len() > 1
+            && self.scale.den == 1
+            && placements
+                .iter()
+                .all(|t| matches!(t, Transform::Square { dx, dy, .. } if self.scale.reaches(&Rect::around(&[Point::new(*dx, *dy)]))))
+    }
+
+    /// Put the tiles of the last cell where it is placed.
+    fn place_own(&mut self) {
+        if self.own.is_empty() {
+            return;
+        }
+        for placement in &self.placements {
+            let Transform::Square { orientation, dx, dy } = *placement else {
                 continue;
+            };
+            let twice = 2 * self.scale.num;
+            let placement = Transform::Square {
+                orientation,
+                dx: twice * dx,
+                dy: twice * dy,
+            };
+            self.scattered |= !self.tiles.place(&self.own, &placement);
+            if self.scattered {
+                break;
             }
-            let mut cluster = vec![start];
-            let mut next = 0;
-            while next < cluster.len() {
-                let (x, y) = self.tiles[cluster[next]].0;
-                next += 1;
-                for (dx, dy) in [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)] {
-                    if let Some(&k) = self.numbers.get(&(x + dx, y + dy))
-                        && !std::mem::replace(&mut seen[k as usize], true)
-                    {
-                        cluster.push(k as usize);
-                    }
-                }
-            }
-            clusters.push(cluster);
         }
-        clusters
-    }
-
-    /// A place in a tile, doubled (half nm).
-    fn place(&self, tile: usize, (x, y): (u16, u16)) -> (i64, i64) {
-        let (column, row) = self.tiles[tile].0;
-        (2 * TILE_NM * column + i64::from(x), 2 * TILE_NM * row + i64::from(y))
-    }
-
-    /// Centres remembered of a tile, doubled (half nm).
-    fn samples(&self, tile: usize) -> impl Iterator<Item = (i64, i64)> + '_ {
-        let sampled = usize::from(self.tiles[tile].1.sampled);
-        self.samples[tile][..sampled].iter().map(move |&s| self.place(tile, s))
+        self.own.clear();
     }
 
     /// The lattice of one cluster; none if it is too small to be an element.
     fn element(&self, cluster: &[usize]) -> Result<Option<ElementSite>, ExtractionError> {
-        let squares: u64 = cluster.iter().map(|&k| self.tiles[k].1.squares).sum();
+        let squares: u64 = cluster.iter().map(|&k| self.tiles.squares(k)).sum();
         if squares < FEWEST {
             return Ok(None);
         }
         let mut steps: BTreeMap<i64, u64> = BTreeMap::new();
         for &k in cluster {
-            for axis in [|s: (i64, i64)| s.0, |s: (i64, i64)| s.1] {
-                let mut places: Vec<i64> = self.samples(k).map(axis).collect();
+            for axis in [|s: Point| s.x, |s: Point| s.y] {
+                let mut places: Vec<i64> = self.tiles.samples(k).map(axis).collect();
                 places.sort_unstable();
                 places.dedup();
                 for pair in places.windows(2) {
@@ -213,16 +160,11 @@ impl Map {
         let Some(step) = most_common(steps) else {
             return Ok(None);
         };
-        let bounds = cluster
-            .iter()
-            .flat_map(|&k| [self.tiles[k].1.low, self.tiles[k].1.high].map(|place| self.place(k, place)))
-            .fold(Rect::EMPTY, |mut sum, (x, y)| {
-                sum.include(Point::new(x, y));
-                sum
-            });
-        let axis = |of: fn((i64, i64)) -> i64, from: i64, to: i64| {
+        let mut bounds = Rect::EMPTY;
+        cluster.iter().for_each(|&k| bounds.unite(&self.tiles.bounds(k)));
+        let axis = |of: fn(Point) -> i64, from: i64, to: i64| {
             let mut phases: BTreeMap<i64, u64> = BTreeMap::new();
-            for s in cluster.iter().flat_map(|&k| self.samples(k)) {
+            for s in cluster.iter().flat_map(|&k| self.tiles.samples(k)) {
                 *phases.entry(of(s).rem_euclid(step)).or_default() += 1;
             }
             let phase = most_common(phases).unwrap_or(0);
@@ -231,8 +173,8 @@ impl Map {
             let last = to - (to - phase).rem_euclid(step);
             (first, (last - first).max(0) / step + 1)
         };
-        let (x, columns) = axis(|s| s.0, bounds.x0, bounds.x1);
-        let (y, rows) = axis(|s| s.1, bounds.y0, bounds.y1);
+        let (x, columns) = axis(|s| s.x, bounds.x0, bounds.x1);
+        let (y, rows) = axis(|s| s.y, bounds.y0, bounds.y1);
         let sites = columns.max(rows);
         if (sites as u64).saturating_pow(2) > squares.saturating_mul(SITES_PER_PILLAR) + (1 << 16) {
             return Err(ExtractionError::Sparse {
@@ -273,22 +215,37 @@ fn most_common(counts: BTreeMap<i64, u64>) -> Option<i64> {
 
 impl Visitor for Map {
     fn cell(&mut self, _cell: &LayoutCell, placements: &[Transform]) -> metalith_core::Result<()> {
+        self.place_own();
+        self.placements.clear();
+        if self.gathers(placements) {
+            self.placements.extend_from_slice(placements);
+        }
         self.guesses.clear();
-        self.guesses.resize(placements.len(), 0);
+        self.guesses.resize(placements.len().max(1), 0);
         Ok(())
     }
 
     #[inline]
     fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> metalith_core::Result<()> {
         let Some(rect) = &shape.rect else { return Ok(()) };
+        // A tile too many, and no more is looked for.
+        self.scattered |= self.tiles.len().max(self.own.len()) > MOST_TILES;
+        if self.scattered {
+            return Ok(());
+        }
+        // What comes with placements of its own is turned by other than quarter turns.
+        if !self.placements.is_empty() && placements[0].is_square() {
+            if let Some(square) = self.square(rect) {
+                self.own.add(square.centre, square.even, &mut self.guesses[0]);
+            }
+            return Ok(());
+        }
         for (k, placement) in placements.iter().enumerate() {
-            // A tile too many, and no more is looked for.
-            self.scattered |= self.tiles.len() > MOST_TILES;
-            if self.scattered {
+            if self.tiles.len() > MOST_TILES {
                 break;
             }
-            if let Some(placed) = placement.apply_rect(rect) {
-                self.add(&placed, k);
+            if let Some(square) = placement.apply_rect(rect).and_then(|r| self.square(&r)) {
+                self.tiles.add(square.centre, square.even, &mut self.guesses[k]);
             }
         }
         Ok(())

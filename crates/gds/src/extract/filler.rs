@@ -26,6 +26,8 @@ pub struct Filler {
     first: Transform,
     pillars: u64,
     held: u64,
+    /// Sites that may be held.
+    most: u64,
     /// More is to be held than may be.
     refused: bool,
 }
@@ -52,8 +54,16 @@ impl Filler {
             first: Transform::IDENTITY,
             pillars: 0,
             held: 0,
+            most: MOST_SITES,
             refused: false,
         }
+    }
+
+    /// The same, of which this many sites may be held.
+    #[must_use]
+    pub fn holding(mut self, most: u64) -> Self {
+        self.most = most;
+        self
     }
 
     /// Pillars that were put, over all elements.
@@ -76,7 +86,7 @@ impl Filler {
                 .iter()
                 .map(|e| (e.site.lattice.sites() as u64).pow(2))
                 .sum(),
-            most: MOST_SITES,
+            most: self.most,
         })
     }
 
@@ -103,7 +113,7 @@ impl Filler {
         let widths = &mut self.elements[element as usize].widths;
         let HeldWidths::Empty(lattice) = *widths else { return };
         let held = self.held + EighthMap::sites(lattice);
-        if held <= MOST_SITES {
+        if held <= self.most {
             self.held = held;
             *widths = HeldWidths::Eighth(EighthMap::empty(lattice));
         }
@@ -255,7 +265,7 @@ impl Filler {
         let widths = &mut self.elements[element as usize].widths;
         let sites = (widths.lattice().sites() as u64).pow(2);
         let held = self.held - widths.sites() + sites;
-        self.refused |= held > MOST_SITES;
+        self.refused |= held > self.most;
         if !self.refused {
             self.held = held;
             *widths = HeldWidths::Whole(widths.whole());

@@ -64,6 +64,13 @@ impl WidthRows for HeldWidths {
         }
     }
 
+    fn held(&self) -> Option<&WidthMap> {
+        match self {
+            Self::Whole(map) => Some(map),
+            Self::Empty(_) | Self::Eighth(_) => None,
+        }
+    }
+
     fn row<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16] {
         match self {
             Self::Empty(_) => {

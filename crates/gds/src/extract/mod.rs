@@ -12,6 +12,7 @@ mod pillars;
 mod plan;
 mod sites;
 mod survey;
+mod tiles;
 
 pub use oddity::{Oddities, Oddity, Why};
 pub use plan::{Elements, ExtractedElement, Extraction, ExtractionPlan};
@@ -29,15 +30,19 @@ pub use filler::Filler;
 pub use held::HeldWidths;
 pub use sites::Scale;
 
-/// Sites of all elements together: 5 x 5 lenses of 1 mm have 204 million.
+/// Sites of all elements together where they are held in full, or where the layout says how large they are: 5 x 5 lenses
+/// of 1 mm have 204 million.
 const MOST_SITES: u64 = 1 << 28;
+/// Sites that are held of elements that a design gives (4.3 GB): a steered lens of 10 mm has 816 million, an eighth of one of
+/// 30 mm 919 million.
+const MOST_GIVEN_SITES: u64 = 1 << 31;
 
 /// Whether the lattices of these elements can be held, known before the layout at `path` is read.
 ///
 /// # Errors
 /// [`ExtractionError::Sites`] if they have too many sites together.
 pub fn fits(path: &Path, elements: &[ElementSite]) -> Result<()> {
-    fits_as(path, elements, &vec![Holding::Whole; elements.len()])
+    fits_within(path, elements, &vec![Holding::Whole; elements.len()], MOST_SITES)
 }
 
 /// How an element is held.
@@ -49,17 +54,26 @@ pub enum Holding {
     Eighth,
 }
 
-/// As [`fits`], with how each element is held.
-///
-/// # Errors
-/// As [`fits`].
-pub fn fits_as(path: &Path, elements: &[ElementSite], holdings: &[Holding]) -> Result<()> {
+/// Sites that are held of these elements of a design.
+pub fn held_sites(elements: &[ElementSite], holdings: &[Holding]) -> u64 {
     let held = |(e, holding): (&ElementSite, &Holding)| match holding {
         Holding::Whole => (e.lattice.sites() as u64).pow(2),
         Holding::Eighth => EighthMap::sites(e.lattice),
     };
-    let sites = elements.iter().zip(holdings).map(held).sum();
-    if sites <= MOST_SITES {
+    elements.iter().zip(holdings).map(held).sum()
+}
+
+/// As [`fits`], of elements that a design gives, with how each is held by [`extract_folded`].
+///
+/// # Errors
+/// As [`fits`].
+pub fn fits_folded(path: &Path, elements: &[ElementSite], holdings: &[Holding]) -> Result<()> {
+    fits_within(path, elements, holdings, MOST_GIVEN_SITES)
+}
+
+fn fits_within(path: &Path, elements: &[ElementSite], holdings: &[Holding], most: u64) -> Result<()> {
+    let sites = held_sites(elements, holdings);
+    if sites <= most {
         return Ok(());
     }
     Err(Error::Extraction {
@@ -67,7 +81,7 @@ pub fn fits_as(path: &Path, elements: &[ElementSite], holdings: &[Holding]) -> R
         cause: ExtractionError::Sites {
             elements: elements.len(),
             sites,
-            most: MOST_SITES,
+            most,
         },
     })
 }
@@ -98,7 +112,7 @@ impl PillarReader for GdsPillars {
 pub fn extract(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) -> Result<Extraction> {
     let found = sites_of(layout, plan, progress)?;
     fits(layout.path(), &found)?;
-    let folded = extract_from(layout, plan, found, progress)?;
+    let folded = extract_from(layout, plan, found, MOST_SITES, progress)?;
     let whole = |e: ExtractedElement<HeldWidths>| ExtractedElement {
         site: e.site,
         widths: e.widths.into_map(),
@@ -122,7 +136,11 @@ pub fn extract_folded(
     progress: &dyn Progress,
 ) -> Result<Extraction<HeldWidths>> {
     let found = sites_of(layout, plan, progress)?;
-    extract_from(layout, plan, found, progress)
+    let most = match plan.elements {
+        Elements::Given(_) => MOST_GIVEN_SITES,
+        Elements::Discover => MOST_SITES,
+    };
+    extract_from(layout, plan, found, most, progress)
 }
 
 /// The elements of a layout: as given, or as found.
@@ -144,11 +162,12 @@ fn extract_from(
     layout: &Layout,
     plan: &ExtractionPlan,
     sites: Vec<ElementSite>,
+    most: u64,
     progress: &dyn Progress,
 ) -> Result<Extraction<HeldWidths>> {
     let selection = plan.selection();
     let top = layout.roots(&selection)?[0];
-    let mut pillars = PillarCollector::new(plan, sites, Scale::of(layout)?);
+    let mut pillars = PillarCollector::new(plan, sites, Scale::of(layout)?, most);
     layout.visit(&selection, &mut pillars, progress)?;
     let name = layout.cells()[top].name.clone();
     pillars.finish(name).map_err(|cause| Error::Extraction {

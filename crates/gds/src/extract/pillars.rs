@@ -22,12 +22,13 @@ pub(super) struct PillarCollector {
 }
 
 impl PillarCollector {
-    pub fn new(plan: &ExtractionPlan, sites: Vec<ElementSite>, scale: Scale) -> Self {
+    /// Holds `most` sites.
+    pub fn new(plan: &ExtractionPlan, sites: Vec<ElementSite>, scale: Scale, most: u64) -> Self {
         Self {
             layer: plan.pillar_layer,
             listed: plan.listed,
             scale,
-            filler: Filler::new(sites, scale),
+            filler: Filler::new(sites, scale).holding(most),
             oddities: Oddities::default(),
             surveyor: Surveyor::default(),
         }

@@ -121,10 +121,10 @@ fn what_breaks_the_symmetry_is_read_as_it_stands() {
 /// A lens of more sites than are held is read as an eighth, and refused with a remedy if it cannot be.
 #[test]
 fn a_lens_too_large_to_be_held_is_held_folded() {
-    // 28,571 sites an axis, as of 10 mm: only what is touched of the eighth is memory.
-    let sites = 28_572;
+    // As of 16.4 mm: only what is touched of the eighth is memory.
+    let sites = 46_858;
     let plan = ExtractionPlan::given(PILLARS, vec![site(sites)]);
-    let octant: &[_] = &[(1, 3, 120), (3, 28_571, 130)];
+    let octant: &[_] = &[(1, 3, 120), (3, 46_857, 130)];
     let found = extract_folded(&file(&[(octant, &ALL)], true), &plan, &Silent).unwrap();
     assert_eq!(found.pillars, 16);
     assert_eq!(found.elements[0].widths.width(sites / 2 + 1, sites - 1), 130);

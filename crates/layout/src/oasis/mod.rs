@@ -313,7 +313,7 @@ impl Elements<'_, '_> {
     /// Write the cells of an element. Returns number and box of each.
     fn pillars(&mut self, names: &[String], pillars: &mut ElementPillars<'_>) -> Result<Vec<(u64, [i64; 4])>> {
         let encoding = match self.encoding {
-            OasisEncoding::Compact => PillarEncoding::Lists,
+            OasisEncoding::Compact => pillars.lists(),
             OasisEncoding::Plain => PillarEncoding::Rectangles,
             OasisEncoding::Smallest => self.smallest(pillars),
         };
@@ -340,10 +340,10 @@ impl Elements<'_, '_> {
     fn smallest(&self, pillars: &mut ElementPillars<'_>) -> PillarEncoding {
         // Any numbers will do to see how small it gets.
         pillars.width_cells = (0..=u64::from(u16::MAX)).collect();
-        let candidates = [PillarEncoding::Lists, PillarEncoding::References];
+        let candidates = [pillars.lists(), PillarEncoding::References];
         match candidates.map(|encoding| pillars.bytes_of_sample(encoding)) {
             [Some(lists), Some(references)] if references < SURE * lists => PillarEncoding::References,
-            _ => PillarEncoding::Lists,
+            _ => pillars.lists(),
         }
     }
 

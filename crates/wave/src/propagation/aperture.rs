@@ -1,6 +1,6 @@
 //! The transmission of an element, row by row.
 
-use metalith_core::{Lattice, WidthMap};
+use metalith_core::{Lattice, WidthRows};
 use num_complex::{Complex32, Complex64};
 
 use crate::error::{Result, WaveError};
@@ -29,9 +29,9 @@ pub trait Aperture: Sync {
 }
 
 /// Pillars as they stand in a layout, through a table of what each width transmits.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Pillars<'a> {
-    widths: &'a WidthMap,
+    widths: &'a dyn WidthRows,
     table: Vec<Complex32>,
     radius_um: f64,
 }
@@ -42,8 +42,8 @@ impl<'a> Pillars<'a> {
     ///
     /// # Errors
     /// If a width is beyond the table.
-    pub fn new(widths: &'a WidthMap, table: &[Complex64]) -> Result<Self> {
-        let largest = widths.width_nm.iter().fold(0, |m, &w| m.max(usize::from(w)));
+    pub fn new(widths: &'a dyn WidthRows, table: &[Complex64]) -> Result<Self> {
+        let largest = usize::from(widths.widest_nm());
         if largest >= table.len() {
             return Err(WaveError::Width {
                 width_nm: largest,
@@ -60,7 +60,7 @@ impl<'a> Pillars<'a> {
 
 impl Aperture for Pillars<'_> {
     fn lattice(&self) -> Lattice {
-        self.widths.lattice
+        self.widths.lattice()
     }
 
     fn radius_um(&self) -> f64 {
@@ -68,7 +68,11 @@ impl Aperture for Pillars<'_> {
     }
 
     fn fill_row(&self, iy: usize, row: &mut [Complex32]) {
-        for (t, &w) in row.iter_mut().zip(self.widths.width_nm.row(iy)) {
+        let mut room = Vec::new();
+        for (t, &w) in row
+            .iter_mut()
+            .zip(self.widths.row(iy, 0..self.widths.lattice().sites(), &mut room))
+        {
             *t = self.table[usize::from(w)];
         }
     }
@@ -145,6 +149,7 @@ fn single(t: Complex64) -> Complex32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use metalith_core::WidthMap;
 
     #[test]
     fn circle_counts_its_sites_exactly() {

@@ -52,8 +52,8 @@ const FAST_MARGIN: f64 = 1.5;
 const FAST_STRAY: f64 = 2.5e-3;
 /// In fast mode, with a gain that allows it: period in units of lens radius and half the window.
 const FAST_PERIOD: f64 = 1.19;
-/// More bins an axis than any element of this program needs; beyond it memory is the fault that shows.
-const MOST_BINS: usize = 1 << 16;
+/// More bins an axis than any element of this program needs: a lens of 30 mm has 94,000.
+const MOST_BINS: usize = 1 << 17;
 
 /// The frequency bins that count: `bins` an axis in a period, of which a disc (in landing points) is kept.
 pub(super) struct FrequencyBand {

@@ -37,7 +37,7 @@ pub use distances::{Distances, DistancesPlan, DistancesScratch, FillRow};
 pub use fold::{Fold, Otf};
 pub use hankel::Hankel;
 pub use landing::{Landing, LandingGrid};
-pub use phase::{PhaseFunction, PhaseMap};
+pub use phase::{PhaseFunction, PhaseMap, PhaseSites};
 pub use propagator::{Field, Propagator, Scratch};
 pub use steepness::Steepness;
 pub use wave::{PlaneWave, incident, landing_um, leaving};

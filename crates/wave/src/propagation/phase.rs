@@ -69,12 +69,43 @@ impl PhaseMap {
     /// passes light may be farther from the centre than `radius_um`.
     pub fn new(lattice: Lattice, radius_um: f64, turns: impl Fn(usize, usize) -> Option<f64>) -> Self {
         let n = lattice.sites();
-        let reduced = |turns: f64| (turns - turns.round()) as f32;
         Self {
             lattice,
             radius_um,
-            turns: Array2::from_shape_fn([n; 2], |(iy, ix)| turns(ix, iy).map_or(f32::NAN, reduced)),
+            turns: Array2::from_shape_fn([n; 2], |(iy, ix)| reduced(turns(ix, iy))),
         }
+    }
+}
+
+/// Within half a turn of zero; NaN where there is none.
+fn reduced(turns: Option<f64>) -> f32 {
+    turns.map_or(f32::NAN, |turns| (turns - turns.round()) as f32)
+}
+
+/// As [`PhaseMap`] to the last bit, the phase computed each time that a row is asked for: nothing of the size of the
+/// element is held.
+#[derive(Clone, Copy, Debug)]
+pub struct PhaseSites<F> {
+    /// Where the samples are.
+    pub lattice: Lattice,
+    /// No site that passes light is farther from the centre (um).
+    pub radius_um: f64,
+    /// The phase at column `ix` and row `iy` (turns), not reduced; nothing passes where there is none.
+    pub turns: F,
+}
+
+impl<F: Fn(usize, usize) -> Option<f64> + Sync> Aperture for PhaseSites<F> {
+    fn lattice(&self) -> Lattice {
+        self.lattice
+    }
+
+    fn radius_um(&self) -> f64 {
+        self.radius_um
+    }
+
+    fn fill_row(&self, iy: usize, row: &mut [Complex32]) {
+        let turns: Vec<f32> = (0..row.len()).map(|ix| reduced((self.turns)(ix, iy))).collect();
+        cis_where(&turns, row);
     }
 }
 
@@ -91,5 +122,29 @@ impl Aperture for PhaseMap {
         let turns = self.turns.row(iy);
         let turns = turns.to_slice().expect("rows are contiguous");
         cis_where(turns, row);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_phase_that_is_computed_is_the_one_that_is_held() {
+        let lattice = Lattice::new(350, 41).unwrap();
+        let turns = |ix: usize, iy: usize| (ix + iy > 9).then(|| 0.37 * (ix * ix) as f64 - 1.9 * iy as f64);
+        let held = PhaseMap::new(lattice, 11.0, turns);
+        let computed = PhaseSites {
+            lattice,
+            radius_um: 11.0,
+            turns,
+        };
+        let (mut a, mut b) = ([Complex32::ONE; 41], [Complex32::ONE; 41]);
+        for iy in 0..41 {
+            held.fill_row(iy, &mut a);
+            computed.fill_row(iy, &mut b);
+            assert_eq!(a, b);
+        }
+        assert_eq!(a[0].norm_sqr() > 0.5, turns(0, 40).is_some());
     }
 }

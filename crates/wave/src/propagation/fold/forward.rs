@@ -1,5 +1,7 @@
 //! From the lattice to the window.
 
+use std::ops::Range;
+
 use ndarray::ArrayViewMut2;
 use num_complex::Complex32;
 
@@ -8,9 +10,15 @@ use crate::kernels::{accumulate, gather, multiply, process, product_sum};
 use crate::propagation::{Aperture, PlaneWave, Scratch};
 
 impl Fold {
-    /// Folds and transforms along x; leaves the kept columns in tiles of `LANES` columns by all rows. Gives the power
-    /// that the aperture passes of a wave of unit amplitude (um^2).
-    pub(super) fn rows_forward(&self, aperture: &dyn Aperture, wave: &PlaneWave, scratch: &mut Scratch) -> f64 {
+    /// Folds and transforms along x; leaves the kept columns of these blocks in tiles of `LANES` columns by all rows. Gives
+    /// the power that the aperture passes of a wave of unit amplitude (um^2).
+    pub(super) fn rows_forward(
+        &self,
+        aperture: &dyn Aperture,
+        wave: &PlaneWave,
+        blocks: Range<usize>,
+        scratch: &mut Scratch,
+    ) -> f64 {
         let (n, m, residues) = (self.lattice.sites(), self.band.bins, self.residues());
         self.fill_wave(wave, scratch);
         let Scratch {
@@ -24,8 +32,17 @@ impl Fold {
         } = scratch;
         row.resize(n, Complex32::ZERO);
         columns.resize(m.max(columns.len()), Complex32::ZERO);
-        spectrum.resize(self.blocks() * LANES, Complex32::ZERO);
-        tiles.resize(self.blocks() * residues * LANES, Complex32::ZERO);
+        let first = blocks.start * LANES;
+        let kept = (blocks.end * LANES).min(self.band.count[0]) - first;
+        spectrum.clear();
+        spectrum.resize(blocks.len() * LANES, Complex32::ZERO);
+        let held = blocks.len() * residues * LANES;
+        if tiles.capacity() < held {
+            // What grows by itself may take twice the memory that was counted with.
+            tiles.clear();
+            tiles.reserve_exact(held);
+        }
+        tiles.resize(held, Complex32::ZERO);
         let folded = &mut columns[..m];
         let mut power = 0.0;
         for r in 0..residues {
@@ -38,7 +55,7 @@ impl Fold {
                 }
             }
             process(&*self.forward, folded, fft);
-            gather(&mut spectrum[..self.band.count[0]], folded, self.band.first[0]);
+            gather(&mut spectrum[..kept], folded, self.band.first[0] + first as i64);
             for (block, lanes) in spectrum.chunks_exact(LANES).enumerate() {
                 let at = (block * residues + r) * LANES;
                 tiles[at..at + LANES].copy_from_slice(lanes);
@@ -47,8 +64,14 @@ impl Fold {
         power * self.lattice.pitch_um().powi(2)
     }
 
-    /// Transforms along y, sends each frequency to the sensor, shows it to `observe`, and forms the window's rows of each column.
-    pub(super) fn columns_forward(&self, scratch: &mut Scratch, observe: &mut dyn FnMut(&[Complex32])) {
+    /// Transforms these blocks along y, sends each frequency to the sensor, shows it to `observe`, and forms the window's
+    /// rows of each column.
+    pub(super) fn columns_forward(
+        &self,
+        blocks: Range<usize>,
+        scratch: &mut Scratch,
+        observe: &mut dyn FnMut(&[Complex32]),
+    ) {
         let (m, residues, samples) = (self.band.bins, self.residues(), self.window.samples);
         let [kx, ky] = self.band.count;
         let Scratch {
@@ -68,7 +91,7 @@ impl Fold {
         transfer.resize(ky, Complex32::ZERO);
         middle.resize(samples * kx, Complex32::ZERO);
         row.resize(samples.max(row.len()), Complex32::ZERO);
-        for (block, tile) in tiles.chunks_exact(residues * LANES).enumerate() {
+        for (block, tile) in blocks.zip(tiles.chunks_exact(residues * LANES)) {
             let lanes = LANES.min(kx - block * LANES);
             for (lane, column) in columns.chunks_exact_mut(m).enumerate() {
                 for (value, line) in column.iter_mut().zip(tile.chunks_exact(LANES)) {

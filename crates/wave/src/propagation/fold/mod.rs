@@ -42,6 +42,9 @@ pub struct Fold {
     forward: Arc<dyn Fft<f32>>,
     inverse: Arc<dyn Fft<f32>>,
     zoom: [Zoom; 2],
+    /// Blocks of columns whose spectra are held at a time; the rows of the aperture are asked for and transformed once for
+    /// each such part.
+    blocks_at_once: usize,
 }
 
 impl Fold {
@@ -95,6 +98,7 @@ impl Fold {
         let cycles = window.step_um / band.fade.period_um;
         let zoom = [0, 1].map(|a| Zoom::new(&mut planner, band.count[a], band.first[a], window.samples, cycles));
         Self {
+            blocks_at_once: band.count[0].div_ceil(LANES),
             lattice,
             wavelength_um,
             window,
@@ -109,6 +113,28 @@ impl Fold {
     /// Period and fade that were chosen.
     pub fn fade(&self) -> &Fade {
         &self.band.fade
+    }
+
+    /// The same plan, holding spectra of columns of at most so many bytes at a time, but at least of a few columns. The
+    /// field is the same to the last bit; the rows of the aperture are transformed once for each part.
+    #[must_use]
+    pub fn within(mut self, bytes: usize) -> Self {
+        self.blocks_at_once = (bytes / self.block_bytes()).clamp(1, self.blocks());
+        self
+    }
+
+    /// Number of parts that a field is formed in, one after the other.
+    pub fn parts(&self) -> usize {
+        self.blocks().div_ceil(self.blocks_at_once)
+    }
+
+    /// Bytes of the spectra of all columns: what a field takes that is formed in one part, but for less than a tenth.
+    pub fn spectra_bytes(&self) -> usize {
+        self.blocks() * self.block_bytes()
+    }
+
+    fn block_bytes(&self) -> usize {
+        LANES * self.residues() * size_of::<Complex32>()
     }
 
     /// As [`Propagator::field`], into memory of the caller's. Shape `[samples, samples]`.
@@ -151,8 +177,12 @@ impl Fold {
                 wanted: [samples; 2],
             });
         }
-        let power_um2 = self.rows_forward(aperture, wave, scratch);
-        self.columns_forward(scratch, observe);
+        let mut power_um2 = 0.0;
+        for first in (0..self.blocks()).step_by(self.blocks_at_once) {
+            let part = first..(first + self.blocks_at_once).min(self.blocks());
+            power_um2 = self.rows_forward(aperture, wave, part.clone(), scratch);
+            self.columns_forward(part, scratch, observe);
+        }
         self.window_rows(scratch, &mut values);
         Ok(power_um2)
     }

@@ -200,6 +200,33 @@ mod tests {
     }
 
     #[test]
+    fn a_field_in_parts_is_the_whole_to_the_last_bit() {
+        let wave = PlaneWave::normal(WAVELENGTH_UM);
+        let formed = |fold: Fold| {
+            fold.with_otf(&lens(0.8), &wave, &LP_MM, &mut Scratch::default())
+                .unwrap()
+        };
+        let whole = fold(48);
+        let bytes = whole.spectra_bytes();
+        assert_eq!(whole.parts(), 1);
+        let whole = formed(whole);
+        for (part, parts) in [(bytes, 1), (bytes / 2, 3), (0, 0)] {
+            let fold = fold(48).within(part);
+            assert!(
+                if parts > 0 {
+                    fold.parts() <= parts
+                } else {
+                    fold.parts() > 5
+                },
+                "{}",
+                fold.parts()
+            );
+            let (field, otf) = formed(fold);
+            assert!(field.values == whole.0.values && otf == whole.1);
+        }
+    }
+
+    #[test]
     fn a_veil_outside_of_the_window_takes_contrast() {
         /// Of the power that passes: light that a window of 210 um does not hold either, and interpolation of bins.
         const WIDE_WINDOW: f64 = 3e-3;

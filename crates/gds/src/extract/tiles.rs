@@ -1,0 +1,282 @@
+//! Occupied places of a layout or a cell, tile by tile.
+
+use std::collections::HashMap;
+
+use crate::{Point, Rect, Transform};
+
+/// Side of a tile (nm): two elements with an empty tile between them are two. Wider than any pitch, so that sparse places
+/// of a lens hold together.
+const TILE_NM: i64 = 1 << 13;
+/// The same in half nanometres, the unit of all places here.
+const TILE: i64 = 2 * TILE_NM;
+/// Tiles of a map at most: 5 x 5 lenses of 1 mm occupy 300,000, one of 10 mm 1.2 million.
+pub(super) const MOST_TILES: usize = 1 << 21;
+/// Bits of the place of a tile along an axis by which it is looked up first: 128 x 128 tiles are 1 mm.
+const LATELY: u32 = 7;
+/// Centres remembered a tile, to tell pitch and phase from.
+const SAMPLES: usize = 24;
+/// Parts of a tile along an axis that are known to be occupied or not: 1 um. Tiles of a cell that is placed between tiles
+/// occupy tiles to this accuracy.
+const PARTS: i64 = 8;
+
+/// Squares in one tile; places from the tile's corner. Small, because every square comes here.
+#[derive(Clone, Debug)]
+struct Tile {
+    squares: u64,
+    /// Around all centres; beyond the tile if those of a placed cell are counted here together.
+    low: (i32, i32),
+    high: (i32, i32),
+    /// Which parts are occupied, row by row; not known of what was placed.
+    parts: u64,
+    /// Number of its samples.
+    sampled: u8,
+}
+
+impl Tile {
+    const EMPTY: Self = Self {
+        squares: 0,
+        low: (i32::MAX, i32::MAX),
+        high: (i32::MIN, i32::MIN),
+        parts: 0,
+        sampled: 0,
+    };
+
+    #[inline]
+    fn include(&mut self, x: i32, y: i32) {
+        self.low = (self.low.0.min(x), self.low.1.min(y));
+        self.high = (self.high.0.max(x), self.high.1.max(y));
+    }
+}
+
+/// Column and row of the tile that holds a place.
+#[inline]
+fn key_of(place: Point) -> (i64, i64) {
+    (place.x.div_euclid(TILE), place.y.div_euclid(TILE))
+}
+
+/// Centres of squares by tile.
+pub(super) struct TileMap {
+    numbers: HashMap<(i64, i64), u32>,
+    tiles: Vec<((i64, i64), Tile)>,
+    /// Some centres in each tile, as in the tile.
+    samples: Vec<[(u16, u16); SAMPLES]>,
+    /// Tiles met lately, by the low bits of their place: most squares are looked up here, without a hash.
+    lately: Vec<u32>,
+}
+
+impl TileMap {
+    pub fn new() -> Self {
+        Self {
+            numbers: HashMap::new(),
+            tiles: Vec::new(),
+            samples: Vec::new(),
+            lately: vec![0; 1 << (2 * LATELY)],
+        }
+    }
+
+    pub fn clear(&mut self) {
+        self.numbers.clear();
+        self.tiles.clear();
+        self.samples.clear();
+    }
+
+    /// Number of tiles.
+    pub fn len(&self) -> usize {
+        self.tiles.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.tiles.is_empty()
+    }
+
+    /// Squares in a tile.
+    pub fn squares(&self, tile: usize) -> u64 {
+        self.tiles[tile].1.squares
+    }
+
+    /// Around the centres in a tile (half nm).
+    pub fn bounds(&self, tile: usize) -> Rect {
+        let ((column, row), tile) = &self.tiles[tile];
+        let place = |(x, y): (i32, i32)| (TILE * column + i64::from(x), TILE * row + i64::from(y));
+        let ((x0, y0), (x1, y1)) = (place(tile.low), place(tile.high));
+        if tile.low.0 > tile.high.0 {
+            return Rect::EMPTY;
+        }
+        Rect { x0, y0, x1, y1 }
+    }
+
+    /// Centres remembered of a tile (half nm).
+    pub fn samples(&self, tile: usize) -> impl Iterator<Item = Point> + '_ {
+        let ((column, row), Tile { sampled, .. }) = &self.tiles[tile];
+        self.samples[tile][..usize::from(*sampled)]
+            .iter()
+            .map(move |&(x, y)| Point::new(TILE * column + i64::from(x), TILE * row + i64::from(y)))
+    }
+
+    /// The tile that holds a place; `guess` is the one to try first, and is set to it.
+    #[inline]
+    fn at(&mut self, place: Point, guess: &mut u32) -> usize {
+        let key = key_of(place);
+        if self.tiles.get(*guess as usize).is_none_or(|(k, _)| *k != key) {
+            let low = |v: i64| (v & ((1 << LATELY) - 1)) as usize;
+            let lately = &mut self.lately[low(key.1) << LATELY | low(key.0)];
+            if self.tiles.get(*lately as usize).is_none_or(|(k, _)| *k != key) {
+                let next = self.tiles.len() as u32;
+                *lately = *self.numbers.entry(key).or_insert(next);
+                if *lately == next {
+                    self.tiles.push((key, Tile::EMPTY));
+                    self.samples.push([(0, 0); SAMPLES]);
+                }
+            }
+            *guess = *lately;
+        }
+        *guess as usize
+    }
+
+    #[inline]
+    fn sample(&mut self, tile: usize, x: i64, y: i64) {
+        let sampled = &mut self.tiles[tile].1.sampled;
+        if usize::from(*sampled) < SAMPLES {
+            self.samples[tile][usize::from(*sampled)] = (x as u16, y as u16);
+            *sampled += 1;
+        }
+    }
+
+    /// Count a square by its centre; it serves as a sample of the lattice if it is an `even` number of nm wide.
+    #[inline]
+    pub fn add(&mut self, centre: Point, even: bool, guess: &mut u32) {
+        let number = self.at(centre, guess);
+        let (x, y) = (centre.x.rem_euclid(TILE), centre.y.rem_euclid(TILE));
+        let tile = &mut self.tiles[number].1;
+        tile.squares += 1;
+        tile.include(x as i32, y as i32);
+        tile.parts |= 1 << (y * PARTS / TILE * PARTS + x * PARTS / TILE);
+        if even {
+            self.sample(number, x, y);
+        }
+    }
+
+    /// Add the tiles of a cell where a placement, which moves by half nanometres, puts them; whether there is room.
+    pub fn place(&mut self, cell: &Self, placement: &Transform) -> bool {
+        let mut guess = 0;
+        for (number, ((column, row), tile)) in cell.tiles.iter().enumerate() {
+            let Some(bounds) = placement.apply_rect(&cell.bounds(number)) else {
+                continue;
+            };
+            let corners = [Point::new(bounds.x0, bounds.y0), Point::new(bounds.x1, bounds.y1)];
+            let mut counted = 0;
+            // What lies in one tile needs no parts.
+            if key_of(corners[0]) == key_of(corners[1]) {
+                counted = self.at(corners[0], &mut guess);
+            } else {
+                let own = cell.bounds(number);
+                let middle = |k: i64, from: i64, low: i64, high: i64| {
+                    (TILE * from + (2 * k + 1) * TILE / (2 * PARTS)).clamp(low, high)
+                };
+                for part in (0..PARTS * PARTS).filter(|part| tile.parts >> part & 1 == 1) {
+                    let x = middle(part % PARTS, *column, own.x0, own.x1);
+                    let y = middle(part / PARTS, *row, own.y0, own.y1);
+                    counted = self.at(placement.apply(Point::new(x, y)), &mut guess);
+                }
+            }
+            for sample in cell.samples(number) {
+                let sample = placement.apply(sample);
+                let tile = self.at(sample, &mut guess);
+                self.sample(tile, sample.x.rem_euclid(TILE), sample.y.rem_euclid(TILE));
+            }
+            let ((column, row), sum) = &mut self.tiles[counted];
+            sum.squares += tile.squares;
+            for corner in corners {
+                sum.include((corner.x - TILE * *column) as i32, (corner.y - TILE * *row) as i32);
+            }
+            if self.len() > MOST_TILES {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Tiles that touch, corners included.
+    pub fn clusters(&self) -> Vec<Vec<usize>> {
+        let mut seen = vec![false; self.tiles.len()];
+        let mut clusters = Vec::new();
+        for start in 0..self.tiles.len() {
+            if std::mem::replace(&mut seen[start], true) {
+                continue;
+            }
+            let mut cluster = vec![start];
+            let mut next = 0;
+            while next < cluster.len() {
+                let (x, y) = self.tiles[cluster[next]].0;
+                next += 1;
+                for (dx, dy) in [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)] {
+                    if let Some(&k) = self.numbers.get(&(x + dx, y + dy))
+                        && !std::mem::replace(&mut seen[k as usize], true)
+                    {
+                        cluster.push(k as usize);
+                    }
+                }
+            }
+            clusters.push(cluster);
+        }
+        clusters
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Squares and bounds of each cluster.
+    fn found(map: &TileMap) -> Vec<(u64, Rect)> {
+        let sum = |cluster: &Vec<usize>| {
+            let mut bounds = Rect::EMPTY;
+            cluster.iter().for_each(|&k| bounds.unite(&map.bounds(k)));
+            (cluster.iter().map(|&k| map.squares(k)).sum(), bounds)
+        };
+        let mut all: Vec<_> = map.clusters().iter().map(sum).collect();
+        all.sort_unstable();
+        all
+    }
+
+    /// A disc of 60 um and a patch beside it, placed in all orientations and between tiles.
+    #[test]
+    fn tiles_of_a_placed_cell_are_those_of_its_squares() {
+        let lattice = |n: i64, at: i64| {
+            (0..n * n)
+                .map(move |k| Point::new(at + 700 * (k % n), 700 * (k / n)))
+                .filter(move |p| (p.x - at - 350 * n).pow(2) + (p.y - 350 * n).pow(2) < (350 * n).pow(2))
+        };
+        let squares: Vec<Point> = lattice(170, -333).chain(lattice(9, 200_001)).collect();
+        let mut cell = TileMap::new();
+        squares.iter().for_each(|&p| cell.add(p, true, &mut 0));
+        let (mut placed, mut direct) = (TileMap::new(), TileMap::new());
+        for orientation in 0..8 {
+            let placement = Transform::Square {
+                orientation,
+                dx: 1_000_000 * i64::from(orientation) + 12_345,
+                dy: 77_777 * i64::from(orientation),
+            };
+            assert!(placed.place(&cell, &placement));
+            squares
+                .iter()
+                .for_each(|&p| direct.add(placement.apply(p), true, &mut 0));
+        }
+        assert_eq!(found(&placed), found(&direct));
+        assert_eq!(found(&placed).len(), 16);
+        // Samples are where squares are.
+        let all: std::collections::HashSet<Point> = (0..8)
+            .flat_map(|orientation| {
+                let placement = Transform::Square {
+                    orientation,
+                    dx: 1_000_000 * i64::from(orientation) + 12_345,
+                    dy: 77_777 * i64::from(orientation),
+                };
+                squares.iter().map(move |&p| placement.apply(p)).collect::<Vec<_>>()
+            })
+            .collect();
+        for tile in 0..placed.len() {
+            assert!(placed.samples(tile).all(|p| all.contains(&p)));
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! Layouts that are too large for a simulation of the usual kind: simulated in parts, or compared pillar by pillar alone.
+
+use std::path::Path;
+
+use metalith_cell::Fidelity;
+use metalith_core::{Progress, Result, WidthRows};
+use metalith_design::Design;
+use metalith_design::array::{PillarArray, PlacedElement};
+use metalith_gds::extract::{HeldWidths, extract_folded};
+use metalith_gds::{Layout, ReadLimits};
+use metalith_wave::Accuracy;
+
+use super::{SimulationCases, Verification, WidthCheck, check, compare, facts, judge, plan};
+
+/// Compare the pillars of an element as they are held: of one that is held as an eighth, and meant to have all eight
+/// symmetries, each set of copies once.
+fn compare_held(array: &PillarArray, placed: &PlacedElement, found: &HeldWidths) -> WidthCheck {
+    match found {
+        HeldWidths::Eighth(map) if array.classes[placed.class].group.members().len() == 8 => {
+            WidthCheck::compare_eighth(array.rows(placed).as_ref(), map)
+        }
+        _ => WidthCheck::compare(array.all_rows(placed).as_ref(), found),
+    }
+}
+
+/// As [`verify`](super::verify), for elements of any size: a thread holds spectra of at most `part_bytes` at a time, and
+/// elements that the file folds by all eight symmetries take an eighth of the memory of others. The figures are the same to
+/// the last bit. Cells of lattices of equal pillars judge, in `cases`; a chip as made, and pillars among unlike
+/// neighbours, are for elements that are held in full.
+///
+/// # Errors
+/// As [`verify`](super::verify).
+pub fn verify_in_parts(
+    design: &Design,
+    array: &PillarArray,
+    path: &Path,
+    cases: &SimulationCases<'_>,
+    accuracy: Accuracy,
+    part_bytes: usize,
+    progress: &dyn Progress,
+) -> Result<Verification> {
+    let layout = Layout::open_with(path, ReadLimits::default(), progress)?;
+    let extraction = extract_folded(&layout, &plan(design, array), progress)?;
+    let elements = compare(array, &extraction, |placed, found| compare_held(array, placed, found));
+    let widths: Vec<&dyn WidthRows> = extraction.elements.iter().map(|e| &e.widths as _).collect();
+    let found = super::Found {
+        layout: facts(&layout, &extraction, layout.path()),
+        foreign: extraction.oddities.clone(),
+        elements,
+        widths,
+    };
+    judge(design, array, found, cases, accuracy, Some(part_bytes), progress)
+}
+
+/// Read the layout at `path` back and compare every pillar with the design, without simulating any: the limits of the
+/// design on what only a simulation tells do not hold. Elements that the file folds by all eight symmetries take an
+/// eighth of the memory of others.
+///
+/// # Errors
+/// If the layout cannot be read, an element is too large to be held, or the user stopped it.
+pub fn verify_pillars(
+    design: &Design,
+    array: &PillarArray,
+    path: &Path,
+    fidelity: Fidelity,
+    why: String,
+    progress: &dyn Progress,
+) -> Result<Verification> {
+    let layout = Layout::open_with(path, ReadLimits::default(), progress)?;
+    let extraction = extract_folded(&layout, &plan(design, array), progress)?;
+    let mut verification = Verification {
+        design: design.name.clone(),
+        design_digest: design.digest(),
+        fidelity,
+        model: None,
+        compensated: array.compensated,
+        accuracy: "none",
+        camera: None,
+        layout: facts(&layout, &extraction, layout.path()),
+        elements: compare(array, &extraction, |placed, found| compare_held(array, placed, found)),
+        foreign: extraction.oddities,
+        distinct: Vec::new(),
+        not_simulated: Some(why),
+        checks: Vec::new(),
+    };
+    verification.checks = check::all(&design.verify.limits, &verification);
+    Ok(verification)
+}
