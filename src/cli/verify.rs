@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use metalith::camera::Camera;
 use metalith::design::CellIncidence;
-use metalith::report::sig;
+use metalith::picture::thumbnail;
+use metalith::report::{Figure, sig};
 use metalith::{
     Accuracy, CalibratedModel, Design, Error, Fidelity, MadeChip, PillarArray, Result, SimulationCases, Verification,
     cell_models, verify, verify::verify_pillars, write_report,
@@ -62,6 +64,11 @@ pub struct Judging {
     /// pillar by pillar, and not simulated.
     #[arg(long, value_name = "MB", default_value_t = 8000.0)]
     memory_mb: f64,
+
+    /// Show on the page which picture this camera will take of a test chart: a camera file. Its kernels cost minutes of CPU
+    /// time the first time, then they are kept.
+    #[arg(long, value_name = "CAMERA")]
+    picture: Option<PathBuf>,
 
     /// Print `report.json` to standard output.
     #[arg(long)]
@@ -129,7 +136,7 @@ impl Judging {
             terminal.say(&format!("note: every pillar is compared, nothing is simulated: {why}"));
             let fidelity = self.fidelity.map_or(Fidelity::Rigorous, Fidelity::from);
             let found = verify_pillars(design, array, layout, fidelity, why, terminal)?;
-            return self.report(design, array, &found, folder, terminal);
+            return self.report(design, array, &found, None, folder, terminal);
         }
         let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
         let made = match &model {
@@ -146,8 +153,13 @@ impl Judging {
             None => SimulationCases::of_cells(&models)?,
         };
         let accuracy = if self.fast { Accuracy::Fast } else { Accuracy::Accurate };
+        let camera = self.picture.as_deref().map(Camera::read).transpose()?;
         let found = verify(design, array, layout, &cases, accuracy, terminal)?;
-        self.report(design, array, &found, folder, terminal)
+        let picture = match camera {
+            Some(camera) => Some(thumbnail(design, layout, &camera, model.as_ref(), terminal)?),
+            None => None,
+        };
+        self.report(design, array, &found, picture, folder, terminal)
     }
 
     fn report(
@@ -155,10 +167,11 @@ impl Judging {
         design: &Design,
         array: &PillarArray,
         found: &Verification,
+        picture: Option<Figure>,
         folder: &Path,
         terminal: &Terminal,
     ) -> Result<Outcome> {
-        write_report(design, array, found, folder)?;
+        write_report(design, array, found, picture, folder)?;
         terminal.clear();
         if self.json {
             print_json(found);
