@@ -102,10 +102,14 @@ fn page(pages: &PicturePages<'_>) -> Page {
         ("PSNR", format!("{} dB", fixed(whole.psnr_db, 1))),
         ("SSIM", fixed(whole.ssim, 3)),
         (
-            "Linear light: PSNR, forecast for natural scenes",
-            first.forecast_db.first().map_or_else(
-                || format!("{} dB", fixed(whole.psnr_linear_db, 1)),
-                |f| format!("{} dB, {} dB", fixed(whole.psnr_linear_db, 1), fixed(*f, 1)),
+            "PSNR of linear light, forecast for natural scenes",
+            format!(
+                "{} dB, {}",
+                fixed(whole.psnr_linear_db, 1),
+                first
+                    .forecast_db
+                    .first()
+                    .map_or_else(|| "not made".into(), |f| format!("{} dB", fixed(*f, 1)))
             ),
         ),
         (
