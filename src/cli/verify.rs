@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use metalith::camera::Camera;
 use metalith::design::CellIncidence;
-use metalith::report::sig;
+use metalith::picture::thumbnail;
+use metalith::report::{Figure, sig};
 use metalith::{
     Accuracy, CalibratedModel, Design, Error, Fidelity, MadeChip, PillarArray, Result, SimulationCases, Verification,
     cell_models, verify,
@@ -66,6 +68,11 @@ pub struct Judging {
     /// cell that judges alone; what takes more even so is compared with its design pillar by pillar, and not simulated.
     #[arg(long, value_name = "MB", default_value_t = 8000.0)]
     memory_mb: f64,
+
+    /// Show on the page which picture this camera will take of a test chart: a camera file. Its kernels cost minutes of CPU
+    /// time the first time, then they are kept.
+    #[arg(long, value_name = "CAMERA")]
+    picture: Option<PathBuf>,
 
     /// Print `report.json` to standard output.
     #[arg(long)]
@@ -141,18 +148,25 @@ impl Judging {
         }
         let design = &design;
         let judge = self.fidelity(design);
+        let camera = self.picture.as_deref().map(Camera::read).transpose()?;
         match self.simulation(design, layout)? {
             Simulation::Whole => {}
+            _ if camera.is_some() => {
+                return Err(Error::invalid(
+                    "a picture of a layout whose elements are too large to be held in full",
+                    "leave out --picture, or allow more memory with --memory-mb",
+                ));
+            }
             Simulation::InParts { part_bytes, .. } => {
                 let models = cell_models(design, &[judge])?;
                 let cases = SimulationCases::of_cells(&models)?;
                 let accuracy = self.accuracy();
                 let found = verify_in_parts(design, array, layout, &cases, accuracy, part_bytes, terminal)?;
-                return self.report(design, array, &found, folder, terminal);
+                return self.report(design, array, &found, None, folder, terminal);
             }
             Simulation::Not(why) => {
                 let found = verify_pillars(design, array, layout, judge, why, terminal)?;
-                return self.report(design, array, &found, folder, terminal);
+                return self.report(design, array, &found, None, folder, terminal);
             }
         }
         let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
@@ -171,7 +185,11 @@ impl Judging {
             None => SimulationCases::of_cells(&models)?,
         };
         let found = verify(design, array, layout, &cases, self.accuracy(), terminal)?;
-        self.report(design, array, &found, folder, terminal)
+        let picture = match camera {
+            Some(camera) => Some(thumbnail(design, layout, &camera, model.as_ref(), terminal)?),
+            None => None,
+        };
+        self.report(design, array, &found, picture, folder, terminal)
     }
 
     /// The cell of the pillars as drawn that judges a layout of this design.
@@ -184,10 +202,11 @@ impl Judging {
         design: &Design,
         array: &PillarArray,
         found: &Verification,
+        picture: Option<Figure>,
         folder: &Path,
         terminal: &Terminal,
     ) -> Result<Outcome> {
-        write_report(design, array, found, folder)?;
+        write_report(design, array, found, picture, folder)?;
         terminal.clear();
         if self.json {
             print_json(found);

@@ -138,7 +138,7 @@ fn verification(
         None => SimulationCases::of_cells(&models)?,
     };
     let found = verify_layout(design, array, pillars, &cases, options.accuracy, progress)?;
-    write_report(design, array, &found, &files.at("verification"))?;
+    write_report(design, array, &found, None, &files.at("verification"))?;
     let failed: Vec<_> = found
         .checks
         .iter()

@@ -113,6 +113,25 @@ pub fn expose(camera: &Camera, gain: &[f64], light: &[Array2<f32>], seed: u64) -
 }
 
 impl Frame {
+    /// Whether it can be of a sensor of so many rows and columns behind so many channels.
+    ///
+    /// # Errors
+    /// If it is of another camera.
+    pub fn is_of(&self, rows_columns: [usize; 2], channels: usize) -> Result<()> {
+        let [rows, columns] = rows_columns;
+        let [own_rows, own_columns] = self.planes.first().map_or([0; 2], |p| [p.nrows(), p.ncols()]);
+        if self.gain.len() == channels && self.planes.iter().all(|p| p.dim() == (rows, columns)) {
+            return Ok(());
+        }
+        Err(Error::invalid(
+            format!(
+                "the frame is of another camera: it has {own_columns} x {own_rows} pixels and {} channels, the camera {columns} x {rows} and {channels}",
+                self.gain.len()
+            ),
+            "give the camera that it was recorded with",
+        ))
+    }
+
     /// Light of each channel, and how much each pixel is to be trusted: one over the variance of its light, zero where it
     /// does not count the channel or is at full scale. To the noise comes what the operator of a restoration errs by, as
     /// a share of the light, by channel, and of no less than the mean light of the frame: light in dark places comes from
@@ -146,7 +165,7 @@ impl Frame {
 const NEAR: usize = 16;
 
 /// Sums over squares about each pixel, as far as they are in the plane.
-fn box_sums(plane: &Array2<f64>, near: usize) -> Array2<f64> {
+pub(crate) fn box_sums(plane: &Array2<f64>, near: usize) -> Array2<f64> {
     let along = |line: ndarray::ArrayView1<'_, f64>| -> Vec<f64> {
         let mut running = vec![0.0];
         line.iter().for_each(|v| running.push(running[running.len() - 1] + v));
@@ -205,6 +224,11 @@ mod tests {
         assert!((mean(1, 1) - 0.2).abs() < 1e-3 && (mean(0, 1) - 0.5).abs() < 1.2e-3);
         assert_eq!(expose(&camera, &[1.0, 1.0, 1.0], &light, 3).planes, frame.planes);
         let (light, trust) = frame.light(&camera, &[0.0; 3]);
+        assert!(frame.is_of([40, 40], 3).is_ok());
+        for (size, channels) in [([40, 41], 3), ([40, 40], 1)] {
+            let error = frame.is_of(size, channels).unwrap_err().to_string();
+            assert!(error.contains("another camera"), "{error}");
+        }
         assert!(light[0][[1, 1]] > 0.1 && trust[0][[1, 1]] > 0.0 && trust[0][[0, 0]] == 0.0 && trust[2][[0, 0]] == 0.0);
     }
 }

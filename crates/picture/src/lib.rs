@@ -24,6 +24,7 @@ pub mod scene;
 mod score;
 pub mod spectra;
 mod studio;
+mod thumbnail;
 mod veil;
 
 pub use assumed::{Assumed, AssumedScore, worth_of_assumptions};
@@ -40,4 +41,5 @@ pub use report::{Assumption, ChannelBudget, HomographyResidual, PictureReport, R
 pub use resolution::{ContrastCurve, contrast_curves};
 pub use score::{Zone, ZoneScore, scores};
 pub use studio::Studio;
+pub use thumbnail::thumbnail;
 pub use veil::{LightShares, Veil};

@@ -36,12 +36,17 @@ pub fn write_pages(pages: &PicturePages<'_>, folder: &Path) -> Result<()> {
     page(pages).write(&folder.join("picture.html"))
 }
 
-/// The three pictures of the head of the page.
-pub fn head(pages: &PicturePages<'_>) -> PhotoRow {
+/// Scene and picture in linear sRGB, and the frame between them.
+pub fn pictures_side_by_side(
+    scene: &Array3<f64>,
+    frame: &Frame,
+    restored: &Array3<f64>,
+    channel_names: &[String],
+) -> PhotoRow {
     let mut row = PhotoRow::new("Scene, frame, picture", 250.0);
-    row.photo("scene", &pages.scene.mapv(srgb::encoded));
-    row.photo("frame as recorded", &shown(pages.frame, pages.channel_names));
-    row.photo("picture restored", &pages.restored.mapv(srgb::encoded));
+    row.photo("scene", &scene.mapv(srgb::encoded));
+    row.photo("frame as recorded", &shown(frame, channel_names));
+    row.photo("picture restored", &restored.mapv(srgb::encoded));
     row
 }
 
@@ -86,7 +91,8 @@ fn page(pages: &PicturePages<'_>) -> Page {
             report.scene, report.camera, report.layout
         ),
     );
-    page.figure(head(pages).caption(
+    let head = pictures_side_by_side(pages.scene, pages.frame, pages.restored, pages.channel_names);
+    page.figure(head.caption(
         "The frame is what the sensor records, neighbours' light and veil included; its mosaic is shown as colours. The picture is restored from this frame alone.",
     ));
     let first = &report.restorations[0];
@@ -96,10 +102,14 @@ fn page(pages: &PicturePages<'_>) -> Page {
         ("PSNR", format!("{} dB", fixed(whole.psnr_db, 1))),
         ("SSIM", fixed(whole.ssim, 3)),
         (
-            "Linear light: PSNR, forecast for natural scenes",
-            first.forecast_db.first().map_or_else(
-                || format!("{} dB", fixed(whole.psnr_linear_db, 1)),
-                |f| format!("{} dB, {} dB", fixed(whole.psnr_linear_db, 1), fixed(*f, 1)),
+            "PSNR of linear light, forecast for natural scenes",
+            format!(
+                "{} dB, {}",
+                fixed(whole.psnr_linear_db, 1),
+                first
+                    .forecast_db
+                    .first()
+                    .map_or_else(|| "not made".into(), |f| format!("{} dB", fixed(*f, 1)))
             ),
         ),
         (

@@ -15,10 +15,10 @@ use crate::assumed::Assumed;
 use crate::exposure::{Frame, expose, gains, sensitivity};
 use crate::kernels::{BankSpec, KernelBank};
 use crate::operator::{Detail, FrameOperator, SceneInputs, ScenePoints};
-use crate::restore::{Recorded, RestorationMethod, restore_joint, restore_separate};
+use crate::restore::{Recorded, RestorationMethod, SceneStatistics, restore_joint, restore_separate};
 use crate::scene::SceneImage;
 use crate::spectra::{SceneSpectrum, rgb_basis};
-use crate::veil::Veil;
+use crate::veil::{LightShares, Veil};
 use crate::{
     ChannelColours, ChipInLight, ElementView, SceneSpace, SceneView, cache, element_views, read_pillars, sampling_of,
 };
@@ -57,6 +57,9 @@ const NODES: usize = 17;
 const SMALL_UM: f64 = 150.0;
 /// Pixels an axis of a kernel.
 const WINDOW: usize = 64;
+/// Least share of the light that travels to the sensor in the windows of the kernels: with less there is no image.
+/// `prototype_3x3` has 40 %.
+const LEAST_IN_WINDOWS: f64 = 0.02;
 
 impl BankSpec {
     /// For the elements of a design before a camera.
@@ -178,6 +181,7 @@ impl Studio {
                 (bank, veil)
             }
         };
+        check_windows(&veil, bank.bases, &channels, &bank.spec)?;
         let studio = Self {
             design: design.clone(),
             camera: camera.clone(),
@@ -242,7 +246,10 @@ impl Studio {
             true => SceneInputs::Spectra(primaries),
             false => SceneInputs::Channels(primaries),
         };
-        self.operator(Detail::restoration(ScenePoints::OneASquare, inputs))
+        self.operator(Detail {
+            statistics: self.colours.has_colours().then(|| SceneStatistics::colours().mixing()),
+            ..Detail::restoration(ScenePoints::OneASquare, inputs)
+        })
     }
 
     /// Which spectra of the bank are the primaries of a restoration: red, green and blue.
@@ -281,13 +288,7 @@ impl Studio {
         joint: bool,
         progress: &dyn Progress,
     ) -> Result<Array3<f64>> {
-        let size = operator.frame();
-        if frame.gain.len() != self.gain.len() || frame.planes.iter().any(|p| p.dim() != (size[0], size[1])) {
-            return Err(Error::invalid(
-                "the frame is of another camera: its size or its channels differ",
-                "give the camera that it was recorded with",
-            ));
-        }
+        frame.is_of(operator.frame(), self.gain.len())?;
         let (light, trust) = frame.light(&self.camera, error);
         let recorded = Recorded {
             operator,
@@ -306,10 +307,38 @@ impl Studio {
         })
     }
 
+    /// A frame as a picture without any restoration, linear sRGB `[row, column, colour]`: pixels where they look, over those
+    /// of a white scene.
+    pub fn unrestored(&self, operator: &FrameOperator<'_>, frame: &Frame) -> Array3<f64> {
+        let (light, trust) = frame.light(&self.camera, &vec![0.0; self.gain.len()]);
+        self.colours.rgb(&operator.unrestored(&light, &trust))
+    }
+
     /// What a perfect camera with these channels would give of a scene: the truth that pictures are held to.
     pub fn truth(&self, scene: &SceneImage) -> Array3<f64> {
         self.colours.rgb(&ChannelColours::ideal(&self.channels, scene))
     }
+}
+
+/// Kernels must hold a part of the light that can be called an image.
+fn check_windows(veil: &Veil, bases: usize, channels: &[ChannelSampling], spec: &BankSpec) -> Result<()> {
+    for (channel, shares) in channels.iter().zip(veil.budget.chunks(bases)) {
+        let all = LightShares::sum(shares);
+        let travelling = all.in_kernels + all.veil + all.beyond;
+        if all.in_kernels < LEAST_IN_WINDOWS * travelling {
+            return Err(Error::invalid(
+                format!(
+                    "windows of {} pixels of {} um are too small for the images of a point: they hold {:.2} % of the light of channel `{}` that travels to the sensor",
+                    spec.window,
+                    spec.pixel_um,
+                    100.0 * all.in_kernels / travelling.max(f64::MIN_POSITIVE),
+                    channel.name
+                ),
+                "give a sensor with larger pixels, or a layout that images at the distance of the sensor",
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// A camera must see the chip, and the array the scene.
@@ -360,4 +389,37 @@ fn check_view(elements: &[ElementView], spec: &BankSpec, camera: &Camera, view: 
         ));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_without_an_image_are_refused() {
+        let camera = Camera::three_bands(5.86);
+        let channels = camera.sampling([400.0, 700.0], 12.5).unwrap().channels;
+        let spec = BankSpec {
+            pixel_um: 5.86,
+            window: WINDOW,
+            nodes: 3,
+            reach_um: 10.0,
+            accurate: false,
+        };
+        let with = |in_kernels: f64| {
+            let mut veil = Veil::none(&camera.sensor, channels.len(), 2);
+            for shares in &mut veil.budget {
+                *shares = LightShares {
+                    arrives: 1.0,
+                    in_kernels,
+                    veil: 0.5,
+                    ..LightShares::default()
+                };
+            }
+            check_windows(&veil, 2, &channels, &spec)
+        };
+        assert!(with(0.3).is_ok());
+        let error = with(0.005).unwrap_err().to_string();
+        assert!(error.contains("too small"), "{error}");
+    }
 }

@@ -6,6 +6,7 @@ use metalith_design::array::PillarArray;
 use metalith_design::{Design, cell_models};
 use metalith_layout::write_pillars;
 use metalith_made::SimulationCase;
+use metalith_picture::restore::SceneStatistics;
 use metalith_picture::scene::SceneImage;
 use metalith_picture::{
     BankSpec, ChipInLight, Detail, FrameOperator, KernelBank, SceneInputs, ScenePoints, SceneSpace, Veil,
@@ -318,6 +319,10 @@ fn the_adjoint_is_that_of_the_operator() {
     for detail in [
         Detail::simulation(3),
         Detail::restoration(ScenePoints::OneASquare, SceneInputs::Spectra(0..3)),
+        Detail {
+            statistics: Some(SceneStatistics::colours().mixing()),
+            ..Detail::restoration(ScenePoints::OneASquare, SceneInputs::Spectra(0..3))
+        },
         Detail::restoration(ScenePoints::OneAPixel, SceneInputs::Channels(0..3)),
     ] {
         let operator = FrameOperator::new(

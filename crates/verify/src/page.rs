@@ -12,7 +12,7 @@ use metalith_design::array::PillarArray;
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{CellIncidence, Design};
 use metalith_report::{
-    Axis, Cell, Chart, Column, ImageGrid, Page, PillarZoom, Plan, Table, Verdict, count, exact, sig, write_json,
+    Axis, Cell, Chart, Column, Figure, ImageGrid, Page, PillarZoom, Plan, Table, Verdict, count, exact, sig, write_json,
 };
 use metalith_wave::psf::HALF_NYQUIST_LP_MM;
 
@@ -21,16 +21,23 @@ const PSF_DECADES: f64 = 4.0;
 /// Edge of the part of a PSF that is shown (um): some ten sensor pixels.
 const PSF_SHOWN_UM: f64 = 60.0;
 
-/// Write `report.html` and `report.json` into a folder.
+/// Write `report.html` and `report.json` into a folder; the page shows the picture that a camera of the chip will take, if
+/// there is one.
 ///
 /// # Errors
 /// If they cannot be written.
-pub fn write_report(design: &Design, array: &PillarArray, found: &Verification, folder: &Path) -> Result<()> {
+pub fn write_report(
+    design: &Design,
+    array: &PillarArray,
+    found: &Verification,
+    picture: Option<Figure>,
+    folder: &Path,
+) -> Result<()> {
     write_json(&folder.join("report.json"), "verification", found)?;
-    page(design, array, found).write(&folder.join("report.html"))
+    page(design, array, found, picture).write(&folder.join("report.html"))
 }
 
-fn page(design: &Design, array: &PillarArray, found: &Verification) -> Page {
+fn page(design: &Design, array: &PillarArray, found: &Verification, picture: Option<Figure>) -> Page {
     let mut page = Page::new(
         &design.title,
         format!("{}, computed from the bytes of {}", design.name, found.layout.file),
@@ -56,6 +63,9 @@ fn page(design: &Design, array: &PillarArray, found: &Verification) -> Page {
         ("a whole channel from one direction", white_contrast(found)),
         ("File", format!("{} MB", sig(found.layout.bytes as f64 * 1e-6, 3))),
     ]);
+    if let Some(picture) = picture {
+        page.figure(picture);
+    }
     limits(&mut page, found);
     assumptions::write(&mut page, design, found);
     designed(&mut page, design, array);

@@ -1,5 +1,7 @@
 //! The kernels of all elements over their fields.
 
+use std::borrow::Cow;
+
 use metalith_design::array::Symmetry;
 use serde::{Deserialize, Serialize};
 
@@ -80,11 +82,23 @@ pub struct TurnedKernel<'a> {
 }
 
 impl TurnedKernel<'_> {
-    /// The value at row `i` and column `j`.
-    pub fn at(&self, i: usize, j: usize) -> f32 {
+    /// Its values, row by row, as it is turned.
+    pub fn turned(&self) -> Cow<'_, [f32]> {
+        if self.back == Symmetry::IDENTITY {
+            return Cow::Borrowed(self.values);
+        }
         let last = self.side as i64 - 1;
-        let (x, y) = self.back.point(2 * j as i64 - last, 2 * i as i64 - last);
-        self.values[((y + last) / 2) as usize * self.side + ((x + last) / 2) as usize]
+        let kept = |x: i64, y: i64| {
+            let (x, y) = self.back.point(2 * x - last, 2 * y - last);
+            (y + last) / 2 * self.side as i64 + (x + last) / 2
+        };
+        // Along a row kept values are equally far apart.
+        let step = kept(1, 0) - kept(0, 0);
+        let row = |y: usize| {
+            let first = kept(0, y as i64);
+            (0..self.side as i64).map(move |x| self.values[(first + x * step) as usize])
+        };
+        (0..self.side).flat_map(row).collect()
     }
 
     /// Energy in all pixels of the window.

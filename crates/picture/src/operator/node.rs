@@ -8,6 +8,7 @@ use metalith_wave::kernels::fft_size;
 use ndarray::Array2;
 use num_complex::Complex32;
 
+use super::mixed::MixedKernels;
 use super::source::KernelSource;
 use super::warp::{CellPoint, Warp, hat};
 use super::{FftScratch, SquareFft};
@@ -37,7 +38,8 @@ struct NodePlan {
     node: [usize; 2],
     first: [usize; 2],
     shape: [usize; 2],
-    spectra: Vec<Complex32>,
+    /// By phase and light, see [`MixedKernels`].
+    kernels: MixedKernels,
 }
 
 /// The sub-image of an element: the pixels of one phase of its cells, in one channel.
@@ -121,7 +123,7 @@ impl<'a> ElementOperator<'a> {
                     node,
                     first: low,
                     shape: [high[0] - low[0], high[1] - low[1]],
-                    spectra: Vec::new(),
+                    kernels: MixedKernels::default(),
                 });
             }
         }
@@ -130,14 +132,16 @@ impl<'a> ElementOperator<'a> {
         let mut warps = Vec::new();
         if self.source.points.offsets().len() == 1 {
             let mut scratch = FftScratch::default();
+            let inputs = self.source.inputs(channel).len();
             for node in &mut nodes {
+                let mut spectra = Vec::new();
                 for phase in 0..self.source.phases(channel).len() {
-                    for input in 0..self.source.inputs(channel).len() {
+                    for input in 0..inputs {
                         let at = KernelAt { input, point: 0, phase };
-                        node.spectra
-                            .extend(self.spectrum(node.node, channel, at, &fft, &mut scratch));
+                        spectra.extend(self.spectrum(node.node, channel, at, &fft, &mut scratch));
                     }
                 }
+                node.kernels = MixedKernels::new(spectra, inputs, fft.size(), self.source.statistics.as_ref());
             }
             warps.push(middle);
         }
@@ -187,20 +191,68 @@ impl<'a> ElementOperator<'a> {
         points.iter().map(warp).collect()
     }
 
-    /// The kept spectrum of a node for one of its phases and inputs, or one that is made now.
+    /// What is cut out of the sampled light for a node: weights of its inputs, at one of their points.
+    fn lights(&self, node: &NodePlan, inputs: usize, points: usize) -> Vec<Light> {
+        if !node.kernels.is_empty() {
+            let all = node.kernels.mixtures().iter();
+            return all
+                .map(|w| Light {
+                    weights: w.clone(),
+                    point: 0,
+                })
+                .collect();
+        }
+        let alone = |input: usize| (0..inputs).map(|i| f32::from(u8::from(i == input))).collect();
+        (0..inputs * points)
+            .map(|k| Light {
+                weights: alone(k / points),
+                point: k % points,
+            })
+            .collect()
+    }
+
+    /// The kept spectrum of a node for one of its lights and phases, or one that is made now.
     fn kernel<'b>(
         &self,
         channel: usize,
-        plan: &'b ChannelPlan,
+        plan: &ChannelPlan,
         node: &'b NodePlan,
-        at: KernelAt,
+        (light, points): (usize, usize),
+        phase: usize,
         scratch: &mut FftScratch,
     ) -> Cow<'b, [Complex32]> {
-        if node.spectra.is_empty() {
-            return Cow::Owned(self.spectrum(node.node, channel, at, &plan.fft, scratch));
+        if !node.kernels.is_empty() {
+            return Cow::Borrowed(node.kernels.spectrum(phase, light));
         }
-        let (inputs, entries) = (self.source.inputs(channel).len(), plan.fft.entries());
-        Cow::Borrowed(&node.spectra[(at.phase * inputs + at.input) * entries..][..entries])
+        let at = KernelAt {
+            input: light / points,
+            point: light % points,
+            phase,
+        };
+        Cow::Owned(self.spectrum(node.node, channel, at, &plan.fft, scratch))
+    }
+
+    /// Add the light of pixels to the places of the scene that they look at, as if nothing were blurred: a plane for each
+    /// channel.
+    pub fn lay_on_scene(&self, frames: &[Array2<f32>], planes: &mut [Array2<f32>]) {
+        let cell = self.source.points.cell() as i64;
+        for (channel, plan) in self.channels.iter().enumerate() {
+            let Some(warp) = plan.warps.first() else { continue };
+            let frame = &frames[channel];
+            let pixel = |y: usize, x: usize, phase: &[usize; 2]| {
+                let row = inside((warp.origin[0] + y as i64) * cell + phase[0] as i64, frame.nrows())?;
+                let column = inside((warp.origin[1] + x as i64) * cell + phase[1] as i64, frame.ncols())?;
+                Some(frame[[row, column]])
+            };
+            let phases = self.source.phases(channel);
+            let light: Vec<f32> = (0..warp.shape[0] * warp.shape[1])
+                .map(|i| {
+                    let of = |phase| pixel(i / warp.shape[1], i % warp.shape[1], phase);
+                    phases.iter().filter_map(of).sum()
+                })
+                .collect();
+            warp.scatter(&light, &mut planes[channel]);
+        }
     }
 
     pub fn apply(&self, scene: &[Array2<f32>], scratch: &mut FftScratch) -> Vec<SubImage> {
@@ -229,19 +281,23 @@ impl<'a> ElementOperator<'a> {
             for node in &plan.nodes {
                 sums.iter_mut().for_each(|s| s.fill(Complex32::ZERO));
                 let mut lit = false;
-                for (k, light) in sampled.iter().enumerate() {
-                    let (input, point) = (k / warps.len(), k % warps.len());
+                for (k, light) in self.lights(node, inputs.len(), warps.len()).iter().enumerate() {
                     if k == 0 || warps.len() > 1 {
-                        node.hats(&warps[point], &mut hats);
+                        node.hats(&warps[light.point], &mut hats);
                     }
-                    if !node.cut(light, shape[1], &hats, &mut square, size) {
+                    square.fill(0.0);
+                    let mut any = false;
+                    for (own, weight) in sampled.chunks_exact(warps.len()).zip(&light.weights) {
+                        any |= node.cut(&own[light.point], *weight, shape[1], &hats, &mut square, size);
+                    }
+                    if !any {
                         continue;
                     }
                     lit = true;
                     plan.fft.forward(&mut square, node.shape[0], &mut spectrum, scratch);
                     for (phase, sum) in sums.iter_mut().enumerate() {
-                        let at = KernelAt { input, point, phase };
-                        multiply_add(sum, &spectrum, &self.kernel(channel, plan, node, at, scratch));
+                        let kernel = self.kernel(channel, plan, node, (k, warps.len()), phase, scratch);
+                        multiply_add(sum, &spectrum, &kernel);
                     }
                 }
                 if !lit {
@@ -301,23 +357,18 @@ impl<'a> ElementOperator<'a> {
                 if !any {
                     continue;
                 }
-                for (k, light) in gathered.iter_mut().enumerate() {
-                    let (input, point) = (k / warps.len(), k % warps.len());
+                for (k, light) in self.lights(node, own.len(), warps.len()).iter().enumerate() {
                     product.fill(Complex32::ZERO);
                     for (phase, spectrum) in spectra.iter().enumerate() {
-                        let at = KernelAt { input, point, phase };
-                        multiply_conj_add(&mut product, spectrum, &self.kernel(channel, plan, node, at, scratch));
+                        let kernel = self.kernel(channel, plan, node, (k, warps.len()), phase, scratch);
+                        multiply_conj_add(&mut product, spectrum, &kernel);
                     }
                     plan.fft.inverse(&mut product, &mut square, scratch);
                     if k == 0 || warps.len() > 1 {
-                        node.hats(&warps[point], &mut hats);
+                        node.hats(&warps[light.point], &mut hats);
                     }
-                    for (y, hats) in hats.chunks_exact(node.shape[1]).enumerate() {
-                        let to = &mut light[(node.first[0] + y) * columns + node.first[1]..][..node.shape[1]];
-                        let from = &square[y * size..][..node.shape[1]];
-                        to.iter_mut()
-                            .zip(from.iter().zip(hats))
-                            .for_each(|(t, (f, h))| *t += f * h);
+                    for (to, weight) in gathered.chunks_exact_mut(warps.len()).zip(&light.weights) {
+                        node.add(&square, size, *weight, &hats, &mut to[light.point], columns);
                     }
                 }
             }
@@ -327,6 +378,13 @@ impl<'a> ElementOperator<'a> {
         }
         planes
     }
+}
+
+/// Light that one kernel of a node acts on.
+struct Light {
+    /// Of each input.
+    weights: Vec<f32>,
+    point: usize,
 }
 
 /// Which of the kernels of a node.
@@ -351,19 +409,36 @@ impl NodePlan {
         }
     }
 
-    /// The light under the hat, in the corner of a square. Whether there is any.
-    fn cut(&self, light: &[f32], columns: usize, hats: &[f32], square: &mut [f32], size: usize) -> bool {
-        square.fill(0.0);
+    /// Add light under the hat, times a weight, to the corner of a square. Whether there is any.
+    fn cut(&self, light: &[f32], weight: f32, columns: usize, hats: &[f32], square: &mut [f32], size: usize) -> bool {
+        if weight == 0.0 {
+            return false;
+        }
         let mut lit = false;
         for (y, hats) in hats.chunks_exact(self.shape[1]).enumerate() {
             let from = &light[(self.first[0] + y) * columns + self.first[1]..][..self.shape[1]];
             let to = &mut square[y * size..][..self.shape[1]];
             for (to, (v, h)) in to.iter_mut().zip(from.iter().zip(hats)) {
-                *to = v * h;
-                lit |= *to != 0.0;
+                let value = weight * v * h;
+                *to += value;
+                lit |= value != 0.0;
             }
         }
         lit
+    }
+
+    /// The adjoint of [`NodePlan::cut`].
+    fn add(&self, square: &[f32], size: usize, weight: f32, hats: &[f32], light: &mut [f32], columns: usize) {
+        if weight == 0.0 {
+            return;
+        }
+        for (y, hats) in hats.chunks_exact(self.shape[1]).enumerate() {
+            let to = &mut light[(self.first[0] + y) * columns + self.first[1]..][..self.shape[1]];
+            let from = &square[y * size..][..self.shape[1]];
+            to.iter_mut()
+                .zip(from.iter().zip(hats))
+                .for_each(|(t, (f, h))| *t += weight * f * h);
+        }
     }
 }
 

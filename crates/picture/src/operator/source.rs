@@ -7,6 +7,7 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 use metalith_camera::{ColourFilter, Sensor};
+use nalgebra::DMatrix;
 
 use super::{Detail, SceneInputs, ScenePoints};
 use crate::assumed::Assumed;
@@ -20,6 +21,8 @@ pub struct KernelSource<'a> {
     pub points: ScenePoints,
     pub inputs: SceneInputs,
     pub assumed: Assumed,
+    /// How inputs vary with one another, if kernels are to be mixed.
+    pub statistics: Option<DMatrix<f64>>,
     /// That of the bank, with the nodes that are used.
     pub spec: BankSpec,
     node_step: usize,
@@ -73,6 +76,7 @@ impl<'a> KernelSource<'a> {
             points: detail.points,
             inputs: detail.inputs.clone(),
             assumed: detail.assumed,
+            statistics: detail.statistics.clone(),
             spec: BankSpec {
                 nodes: steps / detail.node_step + 1,
                 ..bank.spec
@@ -119,17 +123,19 @@ impl<'a> KernelSource<'a> {
         let [down, across] = [0, 1].map(|axis| self.taps((point >> (1 - axis)) & 1, phase[axis]));
         let (kept, node) = (2 * self.spec.window, node.map(|n| n * self.node_step));
         let mut out = vec![0.0f32; side * side];
-        let mut lines = vec![0.0f32; kept * side];
         for basis in bases {
             let (kernel, level) = self.kernel(element, node, channel, basis);
-            for (i, line) in lines.chunks_exact_mut(side).enumerate() {
-                for (m, to) in line.iter_mut().enumerate() {
-                    *to = across.sum(m, kept, |j| kernel.at(i, j));
-                }
-            }
-            for (m, row) in out.chunks_exact_mut(side).enumerate() {
-                for (x, to) in row.iter_mut().enumerate() {
-                    *to += level * down.sum(m, kept, |i| lines[i * side + x]);
+            let kernel = kernel.turned();
+            // Sums along the rows that are asked for, each once.
+            let mut lines: Vec<Option<Vec<f32>>> = vec![None; kept];
+            for (m, to) in out.chunks_exact_mut(side).enumerate() {
+                for (i, weight) in down.weights_of(m, kept) {
+                    let line = lines[i].get_or_insert_with(|| {
+                        let row = &kernel[i * kept..][..kept];
+                        (0..side).map(|x| across.sum(x, row)).collect()
+                    });
+                    let weight = level * weight;
+                    to.iter_mut().zip(line.iter()).for_each(|(t, v)| *t += weight * v);
                 }
             }
         }
@@ -190,12 +196,18 @@ struct Taps {
 }
 
 impl Taps {
-    fn sum(&self, cell: usize, values: usize, at: impl Fn(usize) -> f32) -> f32 {
+    /// Which of so many values count for a cell, and by which weight.
+    fn weights_of(&self, cell: usize, values: usize) -> impl Iterator<Item = (usize, f32)> {
         let first = self.first + (cell * self.stride) as i64;
         let from = (-first).max(0) as usize;
         let to = (values as i64 - first).clamp(0, self.weights.len() as i64) as usize;
-        let inside = (from.min(to)..to).map(|k| self.weights[k] * at((first + k as i64) as usize));
-        inside.sum()
+        let inside = &self.weights[from.min(to)..to];
+        let first = (first + from.min(to) as i64) as usize;
+        inside.iter().enumerate().map(move |(k, w)| (first + k, *w))
+    }
+
+    fn sum(&self, cell: usize, values: &[f32]) -> f32 {
+        self.weights_of(cell, values.len()).map(|(i, w)| w * values[i]).sum()
     }
 }
 

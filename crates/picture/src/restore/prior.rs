@@ -1,6 +1,7 @@
 //! What is known of a picture before it is taken: how scenes vary from place to place and from colour to colour.
 
 use metalith_wave::kernels::fft_size;
+use nalgebra::DMatrix;
 use ndarray::Array2;
 use num_complex::Complex32;
 use rand::SeedableRng;
@@ -55,6 +56,12 @@ impl SceneStatistics {
             mix: (0..planes).map(unit).collect(),
             power: POWER / 3.0,
         }
+    }
+
+    /// Planes of the picture (rows) from independent planes (columns).
+    pub fn mixing(&self) -> DMatrix<f64> {
+        let n = self.mix.len();
+        DMatrix::from_fn(n, n, |i, k| f64::from(self.mix[i][k]))
     }
 
     /// Planes of the picture from independent planes.

@@ -1,0 +1,51 @@
+//! A picture for the page of another report.
+
+use std::path::Path;
+
+use metalith_camera::Camera;
+use metalith_core::{Progress, Result};
+use metalith_design::Design;
+use metalith_made::CalibratedModel;
+use metalith_report::{Figure, fixed};
+
+use crate::page::pictures_side_by_side;
+use crate::rehearsal::Rehearsal;
+use crate::restore::RestorationMethod;
+use crate::scene::{BuiltIn, chart};
+use crate::score::scores;
+use crate::studio::Studio;
+
+/// Pixels an axis of the scene.
+const PIXELS: usize = 512;
+/// Angle from its left to its right edge.
+const FIELD_DEG: f64 = 80.0;
+/// Of the noise.
+const SEED: u64 = 1;
+
+/// Scene, frame and picture of a Siemens star in the camera of a layout, by Tikhonov and all elements.
+///
+/// # Errors
+/// As [`Studio::open`] and [`Studio::restore`].
+pub fn thumbnail(
+    design: &Design,
+    layout: &Path,
+    camera: &Camera,
+    model: Option<&CalibratedModel>,
+    progress: &dyn Progress,
+) -> Result<Figure> {
+    let scene = chart(BuiltIn::Star, PIXELS, FIELD_DEG, f64::INFINITY);
+    let studio = Studio::open(design, layout, camera, model, &scene, progress)?;
+    let frame = studio.record(&studio.simulation(), &scene, SEED)?;
+    let operator = studio.restoration();
+    let error = Rehearsal::new(&studio, &operator).operator_error;
+    let picture = studio.restore(&operator, &error, &frame, RestorationMethod::Tikhonov, true, progress)?;
+    let truth = studio.truth(&scene);
+    let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();
+    let whole = scores(&picture, &truth)?[0];
+    Ok(pictures_side_by_side(&truth, &frame, &picture, &names).caption(format!(
+        "What `{}` takes of a Siemens star over {FIELD_DEG} degrees, far away, and what is restored from this frame: PSNR {} dB, SSIM {}. `metalith picture` says more.",
+        camera.name,
+        fixed(whole.psnr_db, 1),
+        fixed(whole.ssim, 2)
+    )))
+}

@@ -1,0 +1,133 @@
+//! Photographs through a chip and its camera: a table of scores by method and zone, and the forecast beside them.
+//!
+//! ```text
+//! cargo run --release --example photographs -- DESIGN LAYOUT CAMERA FOLDER FIELD_DEG tikhonov,hqs [separate]
+//! ```
+//!
+//! Takes every PNG and JPEG of a folder, which must be of one size. PSNR is that of the mean squared error over the
+//! photographs, SSIM the mean. The row `frame` is the frame itself, its pixels laid where they look and divided by those of a
+//! white scene. The forecast was made from kernels, noise and the spectrum of scenes, without these photographs.
+
+use std::path::{Path, PathBuf};
+
+use metalith::camera::Camera;
+use metalith::picture::restore::RestorationMethod;
+use metalith::picture::scene::{SceneFile, read_scene};
+use metalith::picture::{Rehearsal, Studio, Zone, ZoneScore, scores};
+use metalith::{Design, Error, Result, Silent};
+
+/// Scores of all photographs by one way.
+struct Row {
+    way: String,
+    found: Vec<Vec<ZoneScore>>,
+}
+
+fn main() -> Result<()> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [design, layout, camera, folder, field, methods, more @ ..] = &arguments[..] else {
+        let usage = "DESIGN LAYOUT CAMERA FOLDER FIELD_DEG METHOD,METHOD [separate]";
+        return Err(Error::invalid("too few arguments", usage));
+    };
+    let field_deg = field
+        .parse()
+        .map_err(|_| Error::invalid("the field is no number", "give degrees"))?;
+    let methods: Vec<RestorationMethod> = methods.split(',').map(str::parse).collect::<Result<_>>()?;
+    let separate = more.iter().any(|a| a == "separate");
+    let design = Design::read(design.as_ref())?;
+    let camera = Camera::read(camera.as_ref())?;
+    let photographs = images(folder.as_ref())?;
+    let read = |path: &PathBuf| {
+        read_scene(&SceneFile {
+            path: path.clone(),
+            wavelengths_nm: None,
+            field_deg,
+            distance_um: f64::INFINITY,
+        })
+    };
+    let studio = Studio::open(
+        &design,
+        layout.as_ref(),
+        &camera,
+        None,
+        &read(&photographs[0])?,
+        &Silent,
+    )?;
+    let (simulation, operator) = (studio.simulation(), studio.restoration());
+    let rehearsal = Rehearsal::new(&studio, &operator);
+    let forecast = rehearsal.forecast(&studio, &operator, &Silent)?;
+    let mut rows: Vec<Row> = Vec::new();
+    let mut keep = |way: String, found: Vec<ZoneScore>| match rows.iter_mut().find(|r| r.way == way) {
+        Some(row) => row.found.push(found),
+        None => rows.push(Row {
+            way,
+            found: vec![found],
+        }),
+    };
+    for path in &photographs {
+        let scene = read(path)?;
+        let frame = studio.record(&simulation, &scene, 1)?;
+        let truth = studio.truth(&scene);
+        keep("frame".into(), scores(&studio.unrestored(&operator, &frame), &truth)?);
+        for method in &methods {
+            for joint in [true, false] {
+                if joint || separate {
+                    let error = &rehearsal.operator_error;
+                    let picture = studio.restore(&operator, error, &frame, *method, joint, &Silent)?;
+                    let found = scores(&picture, &truth)?;
+                    let words = if joint { "joint" } else { "each alone" };
+                    eprintln!("{}: {}, {words}: {:.2} dB", scene.name, method.name(), found[0].psnr_db);
+                    keep(format!("{}, {words}", method.name()), found);
+                }
+            }
+        }
+    }
+    let zones: Vec<&str> = Zone::ALL.iter().map(|z| z.name()).collect();
+    println!(
+        "{}: {} photographs; zones: {}\n",
+        design.name,
+        photographs.len(),
+        zones.join(", ")
+    );
+    println!("| way | PSNR (dB) | SSIM | PSNR of linear light (dB) |\n| --- | --- | --- | --- |");
+    for row in &rows {
+        println!(
+            "| {} | {} | {} | {} |",
+            row.way,
+            row.cell(2, |s| 10f64.powf(-0.1 * s.psnr_db), |v| -10.0 * v.log10()),
+            row.cell(3, |s| s.ssim, |v| v),
+            row.cell(2, |s| 10f64.powf(-0.1 * s.psnr_linear_db), |v| -10.0 * v.log10()),
+        );
+    }
+    let forecast: Vec<String> = forecast.iter().map(|db| format!("{db:.2}")).collect();
+    println!("| forecast, tikhonov, joint | | | {} |", forecast.join(", "));
+    Ok(())
+}
+
+impl Row {
+    /// A mean over the photographs in each zone.
+    fn cell(&self, digits: usize, of: impl Fn(&ZoneScore) -> f64, back: impl Fn(f64) -> f64) -> String {
+        let zone = |z: usize| {
+            let sum: f64 = self.found.iter().map(|scores| of(&scores[z])).sum();
+            format!("{:.digits$}", back(sum / self.found.len() as f64))
+        };
+        (0..Zone::ALL.len()).map(zone).collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// Pictures of a folder by name.
+fn images(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder).map_err(Error::io("read", folder))?;
+    let known = |path: &PathBuf| {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        extension.is_some_and(|e| ["png", "jpg", "jpeg"].contains(&e.as_str()))
+    };
+    let mut images: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(known).collect();
+    images.sort();
+    match images.is_empty() {
+        true => Err(Error::invalid(
+            format!("{} holds no PNG or JPEG", folder.display()),
+            "give a folder of photographs",
+        )),
+        false => Ok(images),
+    }
+}
