@@ -30,6 +30,15 @@ impl Fidelity {
     /// Those that a design alone has, from the least to the most true.
     pub const ALL: [Self; 4] = [Self::Published, Self::Fitted, Self::Rigorous, Self::Neighbours];
 
+    /// The cell that answers where the width of a pillar is all that is known: neighbours are then taken for equals.
+    #[must_use]
+    pub fn of_width_alone(self) -> Self {
+        match self {
+            Self::Neighbours => Self::Rigorous,
+            other => other,
+        }
+    }
+
     /// The name used in options, files and reports.
     pub fn name(self) -> &'static str {
         match self {

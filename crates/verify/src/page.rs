@@ -321,7 +321,7 @@ fn simulated(page: &mut Page, found: &Verification, element: &DistinctElement) {
         found.elements.len(),
         sig(element.phase.rounding.rms_rad, 3),
         sig(element.phase.rounding.largest_rad, 3),
-        found.fidelity,
+        found.fidelity.of_width_alone(),
         sig(element.phase.mapping.rms_rad, 3),
         sig(element.phase.mapping.largest_rad, 3),
         steepness(element),

@@ -23,7 +23,7 @@ pub(super) fn write(page: &mut Page, found: &Verification, element: &DistinctEle
     page.paragraph(format!(
         "A point of the scene in the direction in which the element looks at {} nm, by the `{}` cell.",
         exact(element.element.wedge.wavelength_um * 1e3),
-        found.fidelity,
+        found.fidelity.of_width_alone(),
     ));
     let alone: Vec<(String, &PsfResult)> = element
         .spots
@@ -49,7 +49,7 @@ pub(super) fn channels(
     ));
     page.table(table(channels));
     let mut images = ImageGrid::new("PSF of each channel", channels.len())
-        .values("share of the light that arrives", "1/um²")
+        .values("share of arriving light", "1/um²")
         .log(DECADES)
         .side((760.0 / channels.len().max(1) as f64).min(230.0));
     let samples = channels.iter().map(|w| w.image.nrows()).min().unwrap_or(1);
