@@ -55,23 +55,29 @@ impl NeighbourTable {
         cache: Option<&Path>,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let numbers = [spec.wavelength_um, spec.sines[0], spec.sines[1]];
-        if mappings.is_empty() || !numbers.iter().all(|v| v.is_finite()) {
-            return Err(Error::invalid(
-                format!("a table of neighbours for {spec:?} and {} mappings", mappings.len()),
-                "give finite numbers and a mapping",
-            ));
-        }
-        let samples = mappings.iter().flat_map(|m| m.samples_nm());
-        let basis = NeighbourBasis::new(samples.map(|w| f64::from(*w)));
+        check(spec, mappings)?;
         let kept = kept(spec, stack, mappings, cache);
-        if let Some(table) = kept.read(|content| decode(content, basis), progress) {
+        if let Some(table) = kept.read(|content| decode(content, basis(mappings)), progress) {
             return Ok(table);
         }
-        let Fitted { responses, left_out } = solve(spec, stack, mappings, basis, progress)?;
-        let table = Self { responses, left_out };
+        let table = Self::solved(spec, stack, mappings, progress)?;
         kept.write(&encode(&table), progress);
         Ok(table)
+    }
+
+    /// The same, solved now whatever is kept.
+    ///
+    /// # Errors
+    /// As [`NeighbourTable::obtain`].
+    pub fn solved(
+        spec: &NeighbourTableSpec,
+        stack: &CellStack,
+        mappings: &[Mapping],
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        check(spec, mappings)?;
+        let Fitted { responses, left_out } = solve(spec, stack, mappings, basis(mappings), progress)?;
+        Ok(Self { responses, left_out })
     }
 
     /// Whether the table of a light comes with the program, as it does for the designs that do.
@@ -106,6 +112,22 @@ impl NeighbourTable {
     pub fn left_out(&self) -> f64 {
         self.left_out
     }
+}
+
+fn check(spec: &NeighbourTableSpec, mappings: &[Mapping]) -> Result<()> {
+    let numbers = [spec.wavelength_um, spec.sines[0], spec.sines[1]];
+    if mappings.is_empty() || !numbers.iter().all(|v| v.is_finite()) {
+        return Err(Error::invalid(
+            format!("a table of neighbours for {spec:?} and {} mappings", mappings.len()),
+            "give finite numbers and a mapping",
+        ));
+    }
+    Ok(())
+}
+
+fn basis(mappings: &[Mapping]) -> NeighbourBasis {
+    let samples = mappings.iter().flat_map(|m| m.samples_nm());
+    NeighbourBasis::new(samples.map(|w| f64::from(*w)))
 }
 
 fn kept(spec: &NeighbourTableSpec, stack: &CellStack, mappings: &[Mapping], cache: Option<&Path>) -> KeptTable {

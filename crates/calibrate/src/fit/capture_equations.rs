@@ -91,7 +91,8 @@ impl CaptureEquations {
     }
 }
 
-fn dot(a: &[f32], b: &[f32]) -> f64 {
+/// The inner product of two columns.
+pub fn dot(a: &[f32], b: &[f32]) -> f64 {
     // Short partial sums in single precision, their total in double.
     a.chunks(64)
         .zip(b.chunks(64))

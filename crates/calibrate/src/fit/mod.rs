@@ -15,6 +15,7 @@ mod registration;
 
 mod widths;
 
+pub use capture_equations::dot;
 pub use cross_validation::{Gain, HeldOutErrors, beam_groups, gain, half_widths, held_out, mean_error};
 pub use data::{CaptureSetup, Data};
 pub use model_error::change_energy;

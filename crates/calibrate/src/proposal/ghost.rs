@@ -4,7 +4,7 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::effects::{DeclaredEffect, DeclaredParameter};
-use crate::fit::{Fit, FitProblem};
+use crate::fit::{Fit, FitProblem, dot};
 use metalith_made::DeclaredQuantity;
 
 /// Part of a frame's edge that displacements go to: light from farther is not in the frame.
@@ -168,8 +168,4 @@ fn take_out(column: &mut [f32], basis: &[Vec<f32>]) {
         let part = dot(own, column) as f32;
         column.iter_mut().zip(own).for_each(|(v, o)| *v -= part * o);
     }
-}
-
-fn dot(a: &[f32], b: &[f32]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
 }
