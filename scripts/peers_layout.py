@@ -88,7 +88,8 @@ def gdstk_objects(path):
     return cpu() - start
 
 
-def klayout_flat(path):
+def klayout_filled():
+    """Its database with a box for each pillar, and when that was begun."""
     import klayout.db as db
     x, y, w = lens()
     start = cpu()
@@ -97,6 +98,11 @@ def klayout_flat(path):
     insert, box = layout.create_cell("TOP").shapes(layout.layer(1, 0)).insert, db.Box
     for a, b, h in zip(x.tolist(), y.tolist(), (w // 2).tolist()):
         insert(box(a - h, b - h, a + h, b + h))
+    return layout, start
+
+
+def klayout_flat(path):
+    layout, start = klayout_filled()
     layout.write(path)
     return cpu() - start
 
@@ -124,13 +130,7 @@ def klayout_oasis_writer(path):
 
 def klayout_write_oasis(path):
     import klayout.db as db
-    x, y, w = lens()
-    start = cpu()
-    layout = db.Layout()
-    layout.dbu = 0.001
-    insert, box = layout.create_cell("TOP").shapes(layout.layer(1, 0)).insert, db.Box
-    for a, b, h in zip(x.tolist(), y.tolist(), (w // 2).tolist()):
-        insert(box(a - h, b - h, a + h, b + h))
+    layout, start = klayout_filled()
     filled = cpu()
     options = db.SaveLayoutOptions()
     options.format, options.oasis_compression_level, options.oasis_write_cblocks = "OASIS", 10, True

@@ -71,9 +71,8 @@ fn finish(
     progress: &dyn Progress,
 ) -> Result<Calibration> {
     let (mut diagnosis, evidence) = session.diagnose(simulations, progress)?;
-    let left = matches!(diagnosis.verdict, SetVerdict::Partly | SetVerdict::Unexplained);
     let proposed = match &evidence {
-        Some(evidence) if left => propose(session, evidence),
+        Some(evidence) if diagnosis.verdict.leaves_a_residual() => propose(session, evidence),
         _ => Vec::new(),
     };
     if proposed.is_empty() {

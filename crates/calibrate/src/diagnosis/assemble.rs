@@ -55,8 +55,7 @@ impl Diagnosis {
         };
         let unexplained_share = unexplained_share(&error, finding);
         let verdict = verdict(&error, finding, unexplained_share);
-        let left = matches!(verdict, SetVerdict::Partly | SetVerdict::Unexplained);
-        let patterns = if left {
+        let patterns = if verdict.leaves_a_residual() {
             free_patterns(simulator, evidence)
         } else {
             Vec::new()

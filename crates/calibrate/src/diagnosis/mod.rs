@@ -28,6 +28,13 @@ pub enum SetVerdict {
     DataUnfit,
 }
 
+impl SetVerdict {
+    /// Whether there is something that no effect which was found explains.
+    pub fn leaves_a_residual(self) -> bool {
+        matches!(self, Self::Partly | Self::Unexplained)
+    }
+}
+
 /// An effect that was found.
 #[derive(Clone, Debug, Serialize)]
 pub struct FoundEffect {
