@@ -3,22 +3,11 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use metalith::cell::{CellStack, Material};
+use metalith::cell::CellStack;
 use metalith::rcwa::{Incidence, Orders, Side, solve};
 
 fn stack() -> CellStack {
-    let material = |name: &str| Material::named(name).expect("a known name");
-    CellStack {
-        pitch_nm: 350.0,
-        height_nm: 700.0,
-        film: material("sin_luke_2015"),
-        substrate: material("fused_silica_malitson_1965"),
-        ambient: material("air"),
-        taper: 0.0,
-        corner_radius_nm: 0.0,
-        mask_height_nm: 0.0,
-        mask: material("alumina_zhukovsky_2015"),
-    }
+    CellStack::paper(350.0, 700.0).expect("known materials")
 }
 
 fn cells(c: &mut Criterion) {

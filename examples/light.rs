@@ -7,7 +7,6 @@
 use std::path::Path;
 
 use metalith::cell::{RigorousCell, cache_folder};
-use metalith::cell_study::LED_UM;
 use metalith::extract::ElementSite;
 use metalith::gds::ReadLimits;
 use metalith::phase::{ElementPhase, LensPhase};
@@ -26,12 +25,14 @@ fn main() -> Result<()> {
         centre_nm: [placed.element.centre_nm.0, placed.element.centre_nm.1],
         lattice: array.lattice,
     });
-    let plan = ExtractionPlan::given(design.layout.layers.pillars.number(), sites.collect());
+    let plan =
+        ExtractionPlan::given(design.layout.layers.pillars.number(), sites.collect()).of_shape(design.cell.shape);
     let layout = Layout::open_with(Path::new(layout), ReadLimits::default(), &Silent)?;
     let extraction = extract(&layout, &plan, &Silent)?;
-    let lens = LensPhase::new(array.lattice, design.lens.diameter_nm, &design.lens.phase);
+    let lens = LensPhase::of(&design);
     let (cell, _) = RigorousCell::obtain(&design.table_spec()?, cache_folder().as_deref(), &Silent)?;
-    let tables = LED_UM
+    let wavelengths_um = design.compared_um();
+    let tables = wavelengths_um
         .iter()
         .map(|&l| {
             Ok((
@@ -41,9 +42,9 @@ fn main() -> Result<()> {
         })
         .collect::<Result<Vec<_>>>()?;
 
-    let mut sums = [[0.0; 2]; LED_UM.len()];
+    let mut sums = vec![[0.0; 2]; wavelengths_um.len()];
     for (placed, found) in array.placed.iter().zip(&extraction.elements) {
-        let phase = ElementPhase::new(&lens, &placed.element.wedge);
+        let phase = ElementPhase::of(&lens, &placed.element);
         // Sums of exp(-2 pi i m u) over the pillars of each width, for m = 0 and 1.
         let mut by_width = vec![[Complex64::ZERO; 2]; design.cell.pitch_nm as usize + 1];
         let mut pillars = 0.0;
@@ -63,7 +64,7 @@ fn main() -> Result<()> {
         }
     }
     println!("wavelength   first order   zero order");
-    for (wavelength, [zero, first]) in LED_UM.iter().zip(&sums) {
+    for (wavelength, [zero, first]) in wavelengths_um.iter().zip(&sums) {
         println!("{:>7.0} nm {first:>13.3} {zero:>12.3}", wavelength * 1e3);
     }
     Ok(())

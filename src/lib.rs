@@ -98,7 +98,9 @@ pub use metalith_verify as verify;
 pub use metalith_wave as wave;
 
 pub use metalith_cell::{CellModel, Fidelity};
-pub use metalith_core::{Error, Fault, Faults, Lattice, Progress, Result, Silent, Wedge, WholeFile, WidthMap, text};
+pub use metalith_core::{
+    Error, Fault, Faults, Lattice, PillarShape, Progress, Result, Silent, Wedge, WholeFile, WidthMap, text,
+};
 pub use metalith_design::{Design, Hierarchy, PillarArray, cell_models};
 pub use metalith_gds::Layout;
 pub use metalith_gds::extract::{Extraction, ExtractionPlan, extract};

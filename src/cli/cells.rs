@@ -86,7 +86,11 @@ pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
         fixed(study.span_turns, 2),
         fixed(study.design_round_trip.rms_rad, 3)
     );
-    print_line!("first / zero order            455 nm        530 nm        590 nm        660 nm     band");
+    let wavelengths = study
+        .compared_um
+        .iter()
+        .map(|um| format!("{:>14}", format!("{:.0} nm", um * 1e3)));
+    print_line!("first / zero order      {}     band", wavelengths.collect::<String>());
     for mapping in &study.mappings {
         let led: Vec<_> = mapping
             .led

@@ -159,6 +159,7 @@ impl PsfArgs {
     fn stack(&self, found: &Extraction) -> Result<CellStack> {
         let here = Path::new("");
         Ok(CellStack {
+            shape: found.shape,
             film: Material::resolve(&self.pillar_material, here)?,
             substrate: Material::resolve(&self.substrate_material, here)?,
             ..CellStack::paper(f64::from(Self::pitch_nm(found)), self.height_nm)?
@@ -273,11 +274,12 @@ fn mostly_pillars(args: &PsfArgs, found: &Extraction) -> Result<()> {
     }
     Err(Error::invalid(
         format!(
-            "{}: only {} of {} shapes on layer {} are square pillars on a lattice",
+            "{}: only {} of {} shapes on layer {} are {} on a lattice",
             args.layout.display(),
             count(found.pillars),
             count(found.pillars + others),
-            args.layer
+            args.layer,
+            found.shape.plural()
         ),
         "name the layer of the pillars with --layer, or look at what else is there with --extract-only --json",
     ))

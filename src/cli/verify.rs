@@ -176,8 +176,13 @@ impl Judging {
         };
         // A made chip judges, and cells of the pillars as drawn stand beside it.
         let judge = if made.is_some() { Fidelity::Rigorous } else { judge };
-        let beside = [Fidelity::Rigorous, Fidelity::Fitted, Fidelity::Published];
-        let beside = beside.into_iter().filter(|f| *f != judge);
+        // Polynomials in width and wavelength are of the paper's cell: of another they would only confuse.
+        let beside: &[Fidelity] = if design.cell.is_of_the_paper() {
+            &[Fidelity::Rigorous, Fidelity::Fitted, Fidelity::Published]
+        } else {
+            &[Fidelity::Rigorous]
+        };
+        let beside = beside.iter().copied().filter(|f| *f != judge);
         let wanted = std::iter::once(judge).chain(beside).collect::<Vec<_>>();
         let models = cell_models(design, &wanted)?;
         let cases = match &made {

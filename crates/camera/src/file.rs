@@ -48,16 +48,26 @@ impl Camera {
         Document::read(path, &text, Draft::read)?.with_files(path)
     }
 
-    /// The camera that is assumed where none is named: three channels of flat response, 400 to 500, 500 to 600 and
-    /// 600 to 700 nm, in light of equal energy, with the noise of Tseng et al. (2021).
+    /// The camera that is assumed of a design for this band (nm) where none is named: three flat bands if it holds the
+    /// visible, else one over the whole of it.
+    pub fn assumed(pixel_um: f64, band_nm: [f64; 2]) -> Self {
+        let three = Self::three_bands(pixel_um);
+        if band_nm[0] <= VISIBLE_NM[0] && band_nm[1] >= VISIBLE_NM[1] {
+            return three;
+        }
+        Self {
+            name: "one flat band".into(),
+            channels: vec![flat_channel("band", band_nm)],
+            ..three
+        }
+    }
+
+    /// Three channels of flat response, 400 to 500, 500 to 600 and 600 to 700 nm, in light of equal energy, with the noise
+    /// of Tseng et al. (2021).
     pub fn three_bands(pixel_um: f64) -> Self {
-        let band = |name: &str, low: f64| Channel {
-            name: name.to_owned(),
-            response: Response::Band {
-                band_nm: [low, low + 100.0],
-                efficiency: 1.0,
-            },
-        };
+        let [short, long] = VISIBLE_NM;
+        let third = (long - short) / 3.0;
+        let band = |name: &str, k: f64| flat_channel(name, [short + k * third, short + (k + 1.0) * third]);
         let noise = metalith_wave::camera::Noise::default();
         Self {
             name: "three flat bands".into(),
@@ -75,7 +85,7 @@ impl Camera {
                     read: noise.read,
                 },
             },
-            channels: vec![band("blue", 400.0), band("green", 500.0), band("red", 600.0)],
+            channels: vec![band("blue", 0.0), band("green", 1.0), band("red", 2.0)],
             illuminant: Illuminant::EqualEnergy,
             exposure: Exposure {
                 time_s: 0.01,
@@ -97,6 +107,20 @@ impl Camera {
                 hint: "let the efficiency of each channel and the illuminant overlap in wavelength".into(),
             }),
         }
+    }
+}
+
+/// Band of colour sensors (nm).
+const VISIBLE_NM: [f64; 2] = [400.0, 700.0];
+
+/// A channel that counts all light of a band (nm).
+fn flat_channel(name: &str, band_nm: [f64; 2]) -> Channel {
+    Channel {
+        name: name.to_owned(),
+        response: Response::Band {
+            band_nm,
+            efficiency: 1.0,
+        },
     }
 }
 

@@ -7,4 +7,4 @@ mod study;
 
 pub use page::write_cell_report;
 pub use steered::{SteeredLight, SteeredStudy, study_steered};
-pub use study::{CellStudy, InverseTrial, LED_UM, MappingStudy, StudyOptions};
+pub use study::{CellStudy, InverseTrial, MappingStudy, StudyOptions};

@@ -4,8 +4,7 @@ use std::path::Path;
 
 use ndarray::Array2;
 
-use super::steered::SteeredStudy;
-use super::study::{CellStudy, LED_UM, MappingStudy};
+use super::study::{CellStudy, MappingStudy};
 use metalith_cell::{Basis, MappingError};
 use metalith_core::{Result, WholeFile};
 use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, Table, count, fixed, sig, write_json};
@@ -34,20 +33,24 @@ pub fn write_cell_report(study: &CellStudy, folder: &Path) -> Result<()> {
         )?;
     }
     if !study.steered.is_empty() {
-        WholeFile::write(
-            &folder.join("mapping_steered.toml"),
-            steered_toml(&study.steered).as_bytes(),
-        )?;
+        WholeFile::write(&folder.join("mapping_steered.toml"), steered_toml(study).as_bytes())?;
     }
     Ok(())
 }
 
+/// The wavelengths that mappings are compared at (nm).
+fn wavelengths(study: &CellStudy) -> String {
+    let each: Vec<String> = study.compared_um.iter().map(|l| format!("{:.0}", l * 1e3)).collect();
+    each.join(", ")
+}
+
 /// The mappings as a design file takes them.
-fn steered_toml(steered: &[SteeredStudy]) -> String {
-    let mut text = String::from(
-        "# Most light in the first order, mean of 455, 530, 590 and 660 nm, among unlike neighbours:\n# metalith cells --steered\n",
+fn steered_toml(study: &CellStudy) -> String {
+    let mut text = format!(
+        "# Most light in the first order, mean of {} nm, among unlike neighbours:\n# metalith cells --steered\n",
+        wavelengths(study)
     );
-    for study in steered {
+    for study in &study.steered {
         let coefficients: Vec<String> = study.coefficients.iter().map(|c| format!("{c}")).collect();
         let (first, second) = study.steps;
         text += &format!(
@@ -59,7 +62,7 @@ fn steered_toml(steered: &[SteeredStudy]) -> String {
     text
 }
 
-fn steered(page: &mut Page, steered: &[SteeredStudy]) {
+fn steered(page: &mut Page, study: &CellStudy) {
     page.section("Mappings of steered elements");
     page.paragraph(
         "Where the phase is steep, unlike pillars stand side by side. For the elements that are so many steps from the \
@@ -72,15 +75,15 @@ fn steered(page: &mut Page, steered: &[SteeredStudy]) {
         Column::text("Steps"),
         Column::number("Gain, mean of the wavelengths", ""),
     ];
-    for l in LED_UM {
+    for l in &study.compared_um {
         columns.push(Column::text(format!("Supercells at {:.0} nm", l * 1e3)));
     }
-    for l in LED_UM {
+    for l in &study.compared_um {
         columns.push(Column::text(format!("Pairs at {:.0} nm", l * 1e3)));
     }
     let mut table = Table::new(columns);
     let pair = |[before, after]: [f64; 2]| Cell::from(format!("{} to {}", fixed(before, 3), fixed(after, 3)));
-    for study in steered {
+    for study in &study.steered {
         let mut row = vec![
             Cell::from(format!("{}, {}", study.steps.0, study.steps.1)),
             Cell::from(fixed(study.gain(), 3)),
@@ -114,7 +117,7 @@ fn page(study: &CellStudy) -> Page {
     maps(&mut page, study);
     mappings(&mut page, study);
     if !study.steered.is_empty() {
-        steered(&mut page, &study.steered);
+        steered(&mut page, study);
     }
     inverse(&mut page, study);
     forward(&mut page, study);
@@ -183,17 +186,19 @@ fn dips(study: &CellStudy) -> Vec<(f64, f64, String)> {
 
 fn mappings(page: &mut Page, study: &CellStudy) {
     page.section("Where a mapping sends the light");
-    page.paragraph(
+    page.paragraph(format!(
         "A lens is nearly everywhere a ramp on which all phases occur alike. The first order of that ramp \
          makes the image, the zero order is haze. Powers are of the incident light, by rigorous theory. \
          `fitted` is the inverse polynomial of degree three, `exact` the width whose phase is nearest, \
-         `most light` the mapping of any form with the most first order from 440 to 680 nm.",
-    );
+         `most light` the mapping of any form with the most first order from {:.0} to {:.0} nm.",
+        study.best_band_um.0 * 1e3,
+        study.best_band_um.1 * 1e3,
+    ));
     let mut columns = vec![Column::text("Mapping"), Column::number("Phase error, rms", "rad")];
-    for l in LED_UM {
+    for l in &study.compared_um {
         columns.push(Column::number(format!("First at {:.0} nm", l * 1e3), ""));
     }
-    for l in LED_UM {
+    for l in &study.compared_um {
         columns.push(Column::number(format!("Zero at {:.0} nm", l * 1e3), ""));
     }
     columns.push(Column::number("First, mean of the band", ""));
@@ -253,7 +258,7 @@ fn avoidance(page: &mut Page, study: &CellStudy) {
         page.note(format!(
             "Staying away from widths that are bad at {} nm costs {} rad of phase error (rms {} instead of {}) \
              and changes the first order, on the mean of the band, from {} to {}.",
-            LED_UM.map(|l| format!("{:.0}", l * 1e3)).join(", "),
+            wavelengths(study),
             fixed(wary.phase.rms_rad - exact.phase.rms_rad, 3),
             fixed(wary.phase.rms_rad, 3),
             fixed(exact.phase.rms_rad, 3),

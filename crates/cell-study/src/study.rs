@@ -15,11 +15,8 @@ use metalith_design::array::WidthRule;
 
 use crate::SteeredStudy;
 
-/// Wavelengths that mappings are compared at (um): LEDs of a colour camera.
-pub const LED_UM: [f64; 4] = [0.455, 0.530, 0.590, 0.660];
-
-/// Band that the best mapping sends light to the first order in (um), and its step.
-const BEST_BAND_UM: (f64, f64, f64) = (0.440, 0.680, 0.008);
+/// Steps of the band that the best mapping sends light to the first order in.
+const BEST_STEPS: f64 = 30.0;
 
 /// Degree of the inverse polynomial that stands for `fitted`.
 const FITTED_DEGREE: usize = 3;
@@ -50,7 +47,7 @@ pub struct MappingStudy {
     pub name: &'static str,
     /// Against rigorous phase at the wavelength of the mapping.
     pub phase: MappingError,
-    /// At the wavelengths of [`LED_UM`].
+    /// At the wavelengths of [`CellStudy::compared_um`].
     pub led: Vec<RampOrders>,
     /// Over the band.
     pub band: Vec<RampOrders>,
@@ -88,6 +85,9 @@ pub struct CellStudy {
     pub points: usize,
     /// Wavelength of the mapping (um).
     pub mapping_um: f64,
+    /// Wavelengths that mappings are compared at, and the band of the best (um).
+    pub compared_um: Vec<f64>,
+    pub best_band_um: (f64, f64),
     /// Turns between the narrowest and the widest pillar at that wavelength.
     pub span_turns: f64,
     pub options: StudyOptions,
@@ -154,6 +154,8 @@ impl CellStudy {
             tolerance: spec.tolerance,
             points: cell.table().points(),
             mapping_um,
+            compared_um: design.compared_um().to_vec(),
+            best_band_um: design.mapping_band_um()?,
             span_turns: fine.turns[fine.turns.len() - 1] - fine.turns[0],
             options,
             design_round_trip: round_trip(&design.mapping.polynomial, &fine, pitch_nm),
@@ -193,7 +195,8 @@ fn mappings(
         MappingTable::sampled(|u| rule.width_nm(u))
     };
     let curve = PhaseCurve::new(cell, design.mapping.wavelength_um, writable)?;
-    let best_curves = steps((BEST_BAND_UM.0, BEST_BAND_UM.1), BEST_BAND_UM.2)
+    let best_band = design.mapping_band_um()?;
+    let best_curves = steps(best_band, (best_band.1 - best_band.0) / BEST_STEPS)
         .into_iter()
         .map(|l| PhaseCurve::new(cell, l, writable))
         .collect::<Result<Vec<_>>>()?;
@@ -205,7 +208,10 @@ fn mappings(
         polynomial("design", &design.mapping.polynomial);
     }
     let published = InversePolynomial::published();
-    polynomial("published", &published);
+    // The widths of the paper say nothing of another cell.
+    if design.cell.fits(&published) {
+        polynomial("published", &published);
+    }
     let fitted = inverse
         .iter()
         .find(|trial| trial.basis == Basis::AllPowers && trial.degree == FITTED_DEGREE);
@@ -229,7 +235,7 @@ fn mappings(
         found.insert(0, ("design", table.clone(), None));
     }
     let exact = MappingTable::nearest(&curve, &[])?;
-    let led_bad = bad_cells(cell, &LED_UM, writable, options.threshold)?;
+    let led_bad = bad_cells(cell, design.compared_um(), writable, options.threshold)?;
     let avoid: BTreeSet<u16> = led_bad.iter().map(|b| b.width_nm).collect();
     let avoid: Vec<u16> = avoid.into_iter().collect();
     let exchanged = exact.exchanged(&best_curves);
@@ -256,7 +262,7 @@ fn mappings(
             Ok(MappingStudy {
                 name,
                 phase: table.phase_error(&curve),
-                led: orders(&LED_UM)?,
+                led: orders(design.compared_um())?,
                 band: orders(&band)?,
                 coefficients,
                 table,

@@ -1,4 +1,4 @@
-//! The cell: a square pillar on its lattice site, and how light passes it.
+//! The cell: a pillar on its lattice site, and how light passes it.
 
 mod cache;
 mod column;
@@ -29,5 +29,5 @@ pub use pointwise::{BAND_ORDERS, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, ta
 pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};
 pub use published::PublishedCell;
 pub use rigorous::RigorousCell;
-pub use stack::CellStack;
+pub use stack::{CellStack, UniformLayer};
 pub use table::{CellTable, Origin, TableSpec};

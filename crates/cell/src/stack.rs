@@ -5,7 +5,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use metalith_core::{Error, Result};
+use metalith_core::{Error, PillarShape, Result};
 use metalith_rcwa::{Incidence, Layer, LayerStack, Material, Orders, Outline, Side, solve, transmit};
 
 /// A pillar on its substrate, as etched: everything that decides its transmission but its width.
@@ -15,9 +15,15 @@ pub struct CellStack {
     pub pitch_nm: f64,
     /// Height of the pillar (nm).
     pub height_nm: f64,
+    /// Cross-section of the pillar; its width is the edge of a square, the diameter of a circle.
+    #[serde(skip_serializing_if = "PillarShape::is_square")]
+    pub shape: PillarShape,
     /// What the pillar is etched from.
     pub film: Material,
     pub substrate: Material,
+    /// Unstructured layers between substrate and pillar, from the substrate upwards: a spacer, what the etch left of the film.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub under: Vec<UniformLayer>,
     /// Around and above the pillar.
     pub ambient: Material,
     /// Angle of the walls from upright (rad). The width is that of the top; positive is wider at the foot.
@@ -28,6 +34,14 @@ pub struct CellStack {
     pub mask_height_nm: f64,
     /// What the mask is of.
     pub mask: Material,
+}
+
+/// A layer without structure.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct UniformLayer {
+    pub material: Material,
+    /// Thickness (nm).
+    pub height_nm: f64,
 }
 
 /// Slices that stand for a leaning wall, each as wide as the pillar is in its middle. At one degree
@@ -43,8 +57,10 @@ impl CellStack {
         Ok(Self {
             pitch_nm,
             height_nm,
+            shape: PillarShape::Square,
             film: Material::named("sin_luke_2015")?,
             substrate: Material::named("fused_silica_malitson_1965")?,
+            under: Vec::new(),
             ambient: Material::named("air")?,
             taper: 0.0,
             corner_radius_nm: 0.0,
@@ -66,23 +82,21 @@ impl CellStack {
             let width_nm = width_nm.max(0.0);
             Layer {
                 height_nm,
-                outline: if width_nm > 0.0 {
-                    Outline::rounded(width_nm, self.corner_radius_nm)
-                } else {
-                    Outline::empty()
-                },
+                outline: self.outline(width_nm),
                 inside,
                 outside: ambient,
             }
         };
         let slices = if self.taper == 0.0 { 1 } else { TAPER_SLICES };
         let slope = 2.0 * self.taper.tan();
-        let mut layers: Vec<_> = (0..slices)
-            .map(|slice| {
-                let depth_nm = self.height_nm * (1.0 - (slice as f64 + 0.5) / slices as f64);
-                layer(self.height_nm / slices as f64, width_nm + slope * depth_nm, film)
-            })
-            .collect();
+        let mut layers = Vec::new();
+        for under in self.under.iter().filter(|u| u.height_nm > 0.0) {
+            layers.push(Layer::uniform(under.height_nm, under.material.index(wavelength_um)?));
+        }
+        layers.extend((0..slices).map(|slice| {
+            let depth_nm = self.height_nm * (1.0 - (slice as f64 + 0.5) / slices as f64);
+            layer(self.height_nm / slices as f64, width_nm + slope * depth_nm, film)
+        }));
         if self.mask_height_nm > 0.0 {
             layers.push(layer(self.mask_height_nm, width_nm, self.mask.index(wavelength_um)?));
         }
@@ -92,6 +106,15 @@ impl CellStack {
             layers,
             above: ambient,
         })
+    }
+
+    /// Cross-section of the pillar where it is so wide (nm).
+    fn outline(&self, width_nm: f64) -> Outline {
+        match self.shape {
+            _ if width_nm <= 0.0 => Outline::empty(),
+            PillarShape::Square => Outline::rounded(width_nm, self.corner_radius_nm),
+            PillarShape::Circle => Outline::circle(width_nm),
+        }
     }
 
     /// Zero-order transmission along the normal, from the substrate: the field where the stack ends (the
@@ -174,13 +197,18 @@ impl CellStack {
         Ok((below.re / above.re).sqrt())
     }
 
+    /// The materials that light passes.
+    pub fn materials(&self) -> impl Iterator<Item = &Material> {
+        let masks = (self.mask_height_nm > 0.0).then_some(&self.mask);
+        [&self.film, &self.substrate, &self.ambient]
+            .into_iter()
+            .chain(self.under.iter().map(|u| &u.material))
+            .chain(masks)
+    }
+
     /// Wavelengths at which every material is known (um).
     pub fn range_um(&self) -> (f64, f64) {
-        let materials = [&self.film, &self.substrate, &self.ambient];
-        let masks = (self.mask_height_nm > 0.0).then_some(&self.mask);
-        materials
-            .into_iter()
-            .chain(masks)
+        self.materials()
             .map(Material::range_um)
             .fold((0.0, f64::INFINITY), |(low, high), (a, b)| (low.max(a), high.min(b)))
     }
@@ -200,6 +228,12 @@ impl CellStack {
             ));
         }
         let sound = |v: f64| v.is_finite() && v >= 0.0;
+        if let Some(under) = self.under.iter().find(|u| !sound(u.height_nm)) {
+            return Err(Error::invalid(
+                format!("{} nm of {} under the pillars", under.height_nm, under.material),
+                "give a thickness of zero or more",
+            ));
+        }
         if !sound(self.corner_radius_nm) || !sound(self.mask_height_nm) {
             return Err(Error::invalid(
                 format!(

@@ -1,5 +1,6 @@
 //! What every room of the project stands on: errors, progress, whole files, documents with spans, the lattice.
 
+mod circle;
 mod cross;
 #[cfg(feature = "documents")]
 pub mod document;
@@ -14,10 +15,13 @@ mod pillars;
 mod plane;
 mod progress;
 mod rows;
+mod shape;
 pub mod srgb;
 pub mod text;
 mod wedge;
+mod zernike;
 
+pub use circle::circle_corners;
 pub use cross::cross_corners;
 #[cfg(feature = "documents")]
 pub use document::{Fault, Faults};
@@ -30,4 +34,6 @@ pub use pillars::{ElementSite, PillarReader};
 pub use plane::part;
 pub use progress::{Progress, Silent};
 pub use rows::WidthRows;
+pub use shape::PillarShape;
 pub use wedge::Wedge;
+pub use zernike::Zernike;

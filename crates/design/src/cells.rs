@@ -3,16 +3,20 @@
 use std::path::Path;
 
 use metalith_cell::{
-    CellModel, CellStack, Fidelity, FittedCell, PointwiseCell, PublishedCell, TableSpec, cache_folder,
+    CellModel, CellStack, Fidelity, FittedCell, PointwiseCell, PublishedCell, TableSpec, UniformLayer, cache_folder,
 };
 use metalith_core::{Error, Result};
 use metalith_grating::{Mapping, NeighbourCell};
 use metalith_rcwa::Material;
 
+use crate::spec::UnderSpec;
 use crate::{Design, WidthRule};
 
-/// The band that every design's table spans (um).
+/// The band of designs whose wavelengths are all visible (um): that of colour sensors.
 const VISIBLE_UM: (f64, f64) = (0.4, 0.7);
+
+/// Share by which the band of other designs is wider than the wavelengths that they name, to either side.
+const BEYOND: f64 = 0.03;
 
 impl Design {
     /// The folder that paths in the design count from.
@@ -25,36 +29,83 @@ impl Design {
     /// # Errors
     /// If a material is not known or its table cannot be read.
     pub fn cell_stack(&self) -> Result<CellStack> {
-        let folder = self.folder();
+        let material = |name: &str| Material::resolve(name, self.folder());
+        let layer = |under: &UnderSpec| -> Result<UniformLayer> {
+            Ok(UniformLayer {
+                material: material(&under.material)?,
+                height_nm: under.height_nm,
+            })
+        };
+        let cell = &self.cell;
         Ok(CellStack {
-            pitch_nm: f64::from(self.cell.pitch_nm),
-            height_nm: self.cell.pillar_height_nm,
-            film: Material::resolve(&self.cell.pillar_material, folder)?,
-            substrate: Material::resolve(&self.cell.substrate_material, folder)?,
-            ambient: Material::constant(self.cell.ambient_index, 0.0)?,
-            taper: 0.0,
-            corner_radius_nm: 0.0,
-            mask_height_nm: 0.0,
-            mask: Material::named("alumina_zhukovsky_2015")?,
+            shape: cell.shape,
+            film: material(&cell.pillar_material)?,
+            substrate: material(&cell.substrate_material)?,
+            under: cell.under.iter().map(layer).collect::<Result<_>>()?,
+            ambient: match &cell.ambient_material {
+                Some(name) => material(name)?,
+                None => Material::constant(cell.ambient_index, 0.0)?,
+            },
+            ..CellStack::paper(f64::from(cell.pitch_nm), cell.pillar_height_nm)?
         })
     }
 
-    /// The table of the cell that the design needs, over the visible and all wavelengths that it names.
+    /// The table of the cell that the design needs, over its band.
     ///
     /// # Errors
     /// If a material is not known.
     pub fn table_spec(&self) -> Result<TableSpec> {
         Ok(TableSpec::new(
             self.cell_stack()?,
-            self.band_um(),
+            self.band_um()?,
             self.cell.width_range_nm,
         ))
     }
 
-    /// The visible and all wavelengths that the design names (um).
-    fn band_um(&self) -> (f64, f64) {
+    /// Wavelengths that the design is judged over (um), all that it names among them. Where it does not say its band: the
+    /// visible, if all that it names are; else those and a little more; as far as its materials are known.
+    ///
+    /// # Errors
+    /// If a material is not known.
+    pub fn band_um(&self) -> Result<(f64, f64)> {
         let named = self.verify.wavelengths_um.iter().chain([&self.mapping.wavelength_um]);
-        named.fold(VISIBLE_UM, |(short, long), &l| (short.min(l), long.max(l)))
+        let around = |band: (f64, f64)| {
+            named
+                .clone()
+                .fold(band, |(short, long), &l| (short.min(l), long.max(l)))
+        };
+        let own = around((f64::INFINITY, 0.0));
+        let is_visible = own.0 >= VISIBLE_UM.0 && own.1 <= VISIBLE_UM.1;
+        let known = self.cell_stack()?.range_um();
+        Ok(match self.cell.band_um {
+            Some(band) => around(band),
+            None if is_visible => (VISIBLE_UM.0.max(known.0), VISIBLE_UM.1.min(known.1)),
+            None => (
+                (own.0 * (1.0 - BEYOND)).max(known.0),
+                (own.1 * (1.0 + BEYOND)).min(known.1),
+            ),
+        })
+    }
+}
+
+impl Design {
+    /// Band that mappings should send light to the first order in (um): that of the design where it says no other.
+    ///
+    /// # Errors
+    /// As [`Design::band_um`].
+    pub fn mapping_band_um(&self) -> Result<(f64, f64)> {
+        match self.mapping.comparison.band_um {
+            Some(band) => Ok(band),
+            None => self.band_um(),
+        }
+    }
+
+    /// Single wavelengths that mappings are compared at (um): those that the design is verified at where it says no other.
+    pub fn compared_um(&self) -> &[f64] {
+        match self.mapping.comparison.wavelengths_um.as_slice() {
+            [] => &self.verify.wavelengths_um,
+            own => own,
+        }
     }
 }
 
@@ -85,7 +136,7 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
                     let stack = design.cell_stack()?;
                     Ok(Box::new(FittedCell::of_stack(
                         &stack,
-                        design.band_um(),
+                        design.band_um()?,
                         design.cell.width_range_nm,
                     )?))
                 }

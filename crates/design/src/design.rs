@@ -68,7 +68,7 @@ impl Design {
         let cell = CellSpec::read(&root.section("cell"));
         let lens = LensSpec::read(&root.section("lens"), &root.section("phase"), &cell);
         let array_section = root.section("array");
-        let array = ArraySpec::read(&array_section, &lens);
+        let array = ArraySpec::read(&array_section, &lens, &root.sections("element"));
         let mapping = MappingSpec::read(&root.section("mapping"), &cell, &array);
         let layout = LayoutSpec::read(root, &lens, &array);
         let verify = VerifySpec::read(&root.section("verify"));
@@ -90,13 +90,21 @@ impl Design {
 
     /// Read the files that the design names, after all its own mistakes are known to be none.
     fn with_files(mut self) -> Result<Self> {
-        self.lens.phase.load(self.lens.radius_um())?;
+        let radius_um = self.lens.radius_um();
+        self.lens.phase.load(radius_um)?;
+        for term in &mut self.lens.terms {
+            term.load(radius_um)?;
+        }
         self.mapping.load(&self.cell)?;
+        let band_um = self.band_um()?;
+        self.optimise.within(band_um);
         // Unknown materials and wavelengths that they are not known at are mistakes of the design, whoever asks first.
         let stack = self.cell_stack()?;
         for um in self.verify.wavelengths_um.iter().chain([&self.mapping.wavelength_um]) {
             stack.full_transmission(*um)?;
-            stack.film.index(*um)?;
+            for material in stack.materials() {
+                material.index(*um)?;
+            }
         }
         Ok(self)
     }

@@ -1,6 +1,7 @@
 //! One shape as rules about distances see it.
 
 use super::polygon::{distance, inside, overlap, ring_of, twice_area};
+use metalith_core::{PillarShape, circle_corners};
 use metalith_gds::{Point, Rect, simplified};
 
 /// Steps of work of one pair of sides of polygons: four distances of a point from a side.
@@ -10,13 +11,27 @@ const SIDES: u64 = 8;
 #[derive(Clone, Copy)]
 pub(super) enum Body<'a> {
     Rect(Rect),
+    /// A circle in a square.
+    Disc(Rect),
     Ring(&'a [Point]),
+}
+
+/// Largest distance between a circle and the polygon that stands for it (database units).
+const CHORD_ERROR: f64 = 0.5;
+
+/// The polygon of a circle in a square, closed.
+pub(super) fn disc_ring(r: &Rect) -> Vec<Point> {
+    let diameter = u32::try_from(r.width()).unwrap_or(u32::MAX);
+    let (x, y) = (r.x0 + r.width() / 2, r.y0 + r.height() / 2);
+    let corners = circle_corners(diameter, CHORD_ERROR);
+    let ring = corners.iter().chain(corners.first());
+    ring.map(|&(dx, dy)| Point::new(x + dx, y + dy)).collect()
 }
 
 impl Body<'_> {
     pub fn bounds(&self) -> Rect {
         match self {
-            Self::Rect(r) => *r,
+            Self::Rect(r) | Self::Disc(r) => *r,
             Self::Ring(p) => Rect::around(p),
         }
     }
@@ -33,6 +48,7 @@ impl Body<'_> {
     pub fn ring(&self) -> Vec<Point> {
         match self {
             Self::Rect(r) => ring_of(r).to_vec(),
+            Self::Disc(r) => disc_ring(r),
             Self::Ring(p) => p.to_vec(),
         }
     }
@@ -44,6 +60,12 @@ impl Body<'_> {
                 let (dx, dy) = between(a, b);
                 (dx as f64).hypot(dy as f64)
             }
+            (Self::Disc(a), Self::Disc(b)) => {
+                let apart = |a0: i64, a1: i64, b0: i64, b1: i64| (a0 + a1 - b0 - b1) as f64 / 2.0;
+                let between = [apart(a.x0, a.x1, b.x0, b.x1), apart(a.y0, a.y1, b.y0, b.y1)];
+                let widths = [a.width() as f64, b.width() as f64];
+                PillarShape::Circle.gap(widths, between).max(0.0)
+            }
             _ => distance(&self.ring(), &other.ring()),
         }
     }
@@ -54,6 +76,10 @@ impl Body<'_> {
         let within = p.x > r.x0 && p.x < r.x1 && p.y > r.y0 && p.y < r.y1;
         match self {
             Self::Rect(_) => within,
+            Self::Disc(r) => {
+                let from_middle = |v: i64, low: i64, high: i64| (2 * v - low - high) as f64;
+                from_middle(p.x, r.x0, r.x1).hypot(from_middle(p.y, r.y0, r.y1)) < r.width() as f64
+            }
             Self::Ring(ring) => within && inside(ring, p),
         }
     }
@@ -62,6 +88,7 @@ impl Body<'_> {
     pub fn sides(&self) -> u64 {
         match self {
             Self::Rect(_) => 4,
+            Self::Disc(r) => disc_ring(r).len() as u64 - 1,
             Self::Ring(p) => p.len() as u64 - 1,
         }
     }
@@ -79,7 +106,7 @@ impl Body<'_> {
     /// Whether they are the same area drawn twice.
     pub fn equals(&self, other: &Self) -> bool {
         match (self, other) {
-            (Self::Rect(a), Self::Rect(b)) => a == b,
+            (Self::Rect(a), Self::Rect(b)) | (Self::Disc(a), Self::Disc(b)) => a == b,
             (Self::Ring(a), Self::Ring(b)) => same_ring(a, b),
             _ => false,
         }

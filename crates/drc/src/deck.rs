@@ -12,7 +12,7 @@ use metalith_core::document::{Document, Limits, Section, load};
 use metalith_gds::LayerNumber;
 
 /// The decks that ship with the program, by the names of their files; the first is the standard one.
-const SHIPPED: [(&str, &str); 5] = [
+const SHIPPED: [(&str, &str); 6] = [
     ("sin_pillars.toml", include_str!("../../../rules/sin_pillars.toml")),
     ("sin_apertures.toml", include_str!("../../../rules/sin_apertures.toml")),
     ("dose_matrix.toml", include_str!("../../../rules/dose_matrix.toml")),
@@ -21,6 +21,7 @@ const SHIPPED: [(&str, &str); 5] = [
         include_str!("../../../rules/test_structures.toml"),
     ),
     ("test_openings.toml", include_str!("../../../rules/test_openings.toml")),
+    ("circles.toml", include_str!("../../../rules/circles.toml")),
 ];
 
 /// Version of the format of rule files that this program reads.

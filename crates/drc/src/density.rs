@@ -49,7 +49,7 @@ impl Windows {
         let beside = (n as i64 - sites as i64).max(-1).div_euclid(2 * sites as i64);
         let first = (n as i64 - sites as i64) / 2 - beside * sites as i64;
         let count = if n < sites { 0 } else { (2 * beside + 1) as usize };
-        // Area of the pillars of each window (nm^2); none where a site is empty.
+        // Squared widths of the pillars of each window (nm^2); none where a site is empty.
         let mut areas: Vec<Option<u64>> = vec![Some(0); count * count];
         let mut room = Vec::new();
         for k in 0..count * sites {
@@ -65,7 +65,7 @@ impl Windows {
                 *area = area.filter(|_| full).map(|area| area + more);
             }
         }
-        let share = |area: u64| area as f64 / (sites as f64 * pitch * 1e3).powi(2);
+        let share = |area: u64| area as f64 * flat.shape.area_share() / (sites as f64 * pitch * 1e3).powi(2);
         let fill = areas.into_iter().map(|area| area.map(share)).collect();
         Self {
             sites,

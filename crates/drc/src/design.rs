@@ -99,9 +99,9 @@ impl Against {
 
 fn phase_step(flat: &FlatLayout<'_>, design: &Design, most: f64, found: &mut Findings) -> RuleOutcome {
     let lattice = design.lattice();
-    let lens = LensPhase::new(lattice, design.lens.diameter_nm, &design.lens.phase);
+    let lens = LensPhase::of(design);
     for element in design.elements() {
-        let phase = ElementPhase::new(&lens, &element.wedge);
+        let phase = ElementPhase::of(&lens, &element);
         let (steps, steep) = steps(flat.work, lattice, &phase)?;
         let share = steep as f64 / steps.max(1) as f64;
         found

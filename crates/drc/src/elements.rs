@@ -3,8 +3,8 @@
 use super::deck::Deck;
 use super::input::CheckInput;
 use super::work::Allowance;
-use metalith_core::{Error, Progress, Result};
-use metalith_gds::extract::{ElementSite, Scale, discover};
+use metalith_core::{Error, PillarShape, Progress, Result};
+use metalith_gds::extract::{Discovered, ElementSite, Scale, discover};
 use metalith_gds::{LayerNumber, Layout, Selection};
 
 /// The layer that pillars are known by, and further layers whose shapes count as if they were on it.
@@ -21,23 +21,27 @@ pub(super) fn sites(
     allowance: &Allowance,
     selection: &Selection,
     progress: &dyn Progress,
-) -> Result<(Vec<ElementSite>, String)> {
+) -> Result<(Discovered, String)> {
     if let Some(design) = input.design {
         let site = |e: &metalith_design::Element| ElementSite {
             name: e.label(),
             centre_nm: [e.centre_nm.0, e.centre_nm.1],
             lattice: design.lattice(),
         };
-        return Ok((design.elements().iter().map(site).collect(), String::new()));
+        let designed = Discovered {
+            sites: design.elements().iter().map(site).collect(),
+            shape: design.cell.shape,
+        };
+        return Ok((designed, String::new()));
     }
     // The pillars may be in a companion, where the apertures are what is checked.
     let mut why = String::new();
     for file in std::iter::once(&layout).chain(&input.with) {
         match discover(file, selection, &deck.pillars, Scale::of(file)?, progress).map_err(Error::from) {
-            Ok(sites) => {
-                let total: u64 = sites.iter().map(|s| (s.lattice.sites() as u64).pow(2)).sum();
+            Ok(found) => {
+                let total: u64 = found.sites.iter().map(|s| (s.lattice.sites() as u64).pow(2)).sum();
                 if total <= allowance.sites {
-                    return Ok((sites, String::new()));
+                    return Ok((found, String::new()));
                 }
                 why = format!("elements with {total} lattice sites; {} are held", allowance.sites);
             }
@@ -45,5 +49,9 @@ pub(super) fn sites(
             Err(other) => return Err(other),
         }
     }
-    Ok((Vec::new(), why))
+    let nothing = Discovered {
+        sites: Vec::new(),
+        shape: PillarShape::Square,
+    };
+    Ok((nothing, why))
 }

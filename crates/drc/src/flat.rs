@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::body::Body;
 use super::work::Work;
-use metalith_core::WidthRows;
+use metalith_core::{PillarShape, WidthRows};
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
 use metalith_gds::extract::{ExtractedElement, HeldWidths};
@@ -71,6 +71,8 @@ pub(super) struct FlatLayout<'a> {
     pub array: Option<&'a PillarArray>,
     pub unit_nm: f64,
     pub pillars: LayerNumber,
+    /// What pillars are.
+    pub shape: PillarShape,
     /// Elements with the pillars on their lattices.
     pub elements: Vec<ExtractedElement<HeldWidths>>,
     /// Why there are none, if there are none.
@@ -96,7 +98,15 @@ impl FlatLayout<'_> {
         nm / self.unit_nm
     }
 
-    /// The rectangle of the pillar at a site, in database units.
+    /// The pillar in a box (database units).
+    pub fn body_in(&self, around: Rect) -> Body<'static> {
+        match self.shape {
+            PillarShape::Square => Body::Rect(around),
+            PillarShape::Circle => Body::Disc(around),
+        }
+    }
+
+    /// The box around the pillar at a site, in database units.
     pub fn pillar(&self, element: usize, row: usize, column: usize) -> Rect {
         let e = &self.elements[element];
         let half = f64::from(e.widths.width(column, row)) / 2.0;

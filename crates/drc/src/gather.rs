@@ -1,8 +1,9 @@
 //! One visit of the layout: outlines to the rules that look at them, geometry into the flat.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 
+use super::body::disc_ring;
 use super::deck::Deck;
 use super::drawn::DrawnOutline;
 use super::elements::{pillar_layers, sites};
@@ -13,10 +14,11 @@ use super::polygon::twice_area;
 use super::rule::DeckRule;
 use super::work::{Allowance, Stop, Work};
 use metalith_core::text::printable_bytes;
-use metalith_core::{Error, Progress, Result};
-use metalith_gds::extract::{Filler, Scale, Why};
+use metalith_core::{Error, PillarShape, Progress, Result};
+use metalith_gds::extract::{Discovered, Filler, Scale, Why};
 use metalith_gds::{
-    LayerNumber, Layout, LayoutCell, Point, Rect, Selection, Shape, Text, Transform, Visitor, rectangle_of, simplified,
+    LayerNumber, Layout, LayoutCell, Point, Rect, Selection, Shape, Text, Transform, Visitor, circle_of, pillar_of,
+    rectangle_of, simplified,
 };
 
 /// Widest square that is decided by table (database units).
@@ -41,7 +43,7 @@ pub(super) fn gather<'a>(
         lenient: true,
         ..Selection::default()
     };
-    let (sites, no_elements) = sites(layout, deck, input, allowance, &selection, progress)?;
+    let (Discovered { sites, shape }, no_elements) = sites(layout, deck, input, allowance, &selection, progress)?;
     let unit_nm = layout.unit_nm();
     let (pillars, doses) = pillar_layers(deck);
     let rules: Vec<(&DeckRule, &mut Findings)> = deck
@@ -52,6 +54,9 @@ pub(super) fn gather<'a>(
         .collect();
     let mut visit = Gather {
         pillars,
+        shape,
+        sound: HashSet::new(),
+        relative: Vec::new(),
         doses,
         unit_nm,
         passes: pass_table(pillars, unit_nm, &rules),
@@ -93,6 +98,7 @@ pub(super) fn gather<'a>(
         array: None,
         unit_nm,
         pillars,
+        shape,
         elements,
         no_elements,
         loose: visit.loose,
@@ -122,6 +128,11 @@ fn pass_table(pillars: LayerNumber, unit_nm: f64, rules: &[(&DeckRule, &mut Find
 
 struct Gather<'r, 'p> {
     pillars: LayerNumber,
+    /// What pillars are.
+    shape: PillarShape,
+    /// Outlines of pillars that are no squares, from the middle of the box around them, that no rule finds anything in.
+    sound: HashSet<Box<[Point]>>,
+    relative: Vec<Point>,
     /// Further layers whose shapes count as if they were on that one.
     doses: &'r [LayerNumber],
     unit_nm: f64,
@@ -169,6 +180,27 @@ impl Gather<'_, '_> {
         Ok(())
     }
 
+    /// As [`Gather::show`], of an outline that is the same wherever it stands: it is looked at once.
+    ///
+    /// # Errors
+    /// If that is too much work.
+    fn show_once(&mut self, shape: &Shape<'_>, around: &Rect, placements: &[Transform]) -> Result<()> {
+        let (x, y) = (around.x0 + around.width() / 2, around.y0 + around.height() / 2);
+        self.relative.clear();
+        self.relative
+            .extend(shape.points.iter().map(|p| Point::new(p.x - x, p.y - y)));
+        if self.sound.contains(self.relative.as_slice()) {
+            return Ok(());
+        }
+        let total = |rules: &[(&DeckRule, &mut Findings)]| rules.iter().map(|(_, found)| found.total).sum::<u64>();
+        let before = total(&self.rules);
+        self.show(shape, placements)?;
+        if total(&self.rules) == before && self.sound.len() < TABLE {
+            self.sound.insert(self.relative.as_slice().into());
+        }
+        Ok(())
+    }
+
     #[inline]
     fn pillar(&mut self, r: &Rect, placement: usize) {
         let standing = self.filler.put(r, placement, |width| width % 2 == 0);
@@ -180,7 +212,11 @@ impl Gather<'_, '_> {
             Err(Why::OffLattice) => self.off_lattice.push(*r),
             Err(_) => {}
         }
-        self.keep_rect(self.pillars, r);
+        if self.shape.is_square() {
+            self.keep_rect(self.pillars, r);
+        } else {
+            self.keep(self.pillars, &disc_ring(r));
+        }
     }
 
     fn keep_rect(&mut self, layer: LayerNumber, r: &Rect) {
@@ -239,14 +275,18 @@ impl Visitor for Gather<'_, '_> {
             ..*shape
         };
         let square = placements.iter().all(Transform::is_square);
-        if let (Some(rect), true) = (&shape.rect, square)
+        if let (Some(rect), true) = (shape.pillar(self.shape), square)
             && shape.layer == self.pillars
         {
             self.pillar_shapes += placements.len() as u64;
-            let table = &self.passes[usize::from(turns_right(shape.points))];
-            let known = rect.width() == rect.height() && table.get(rect.width() as usize).is_some_and(|&p| p);
-            if !known {
-                self.show(shape, placements)?;
+            if self.shape.is_square() {
+                let table = &self.passes[usize::from(turns_right(shape.points))];
+                let known = rect.width() == rect.height() && table.get(rect.width() as usize).is_some_and(|&p| p);
+                if !known {
+                    self.show(shape, placements)?;
+                }
+            } else {
+                self.show_once(shape, rect, placements)?;
             }
             if self.filler.put_orbits(rect, placements, |width| width % 2 == 0) {
                 return Ok(());
@@ -301,11 +341,12 @@ impl Gather<'_, '_> {
                 let here = Shape {
                     points: &placed,
                     rect: rectangle_of(&placed),
+                    circle: circle_of(&placed),
                     ..*shape
                 };
                 self.show(&here, &[Transform::IDENTITY])?;
             }
-            match rectangle_of(&simplified(&placed)) {
+            match pillar_of(&placed, self.shape) {
                 Some(r) if shape.layer == self.pillars => self.pillar(&r, k),
                 _ => self.keep(shape.layer, &placed),
             }

@@ -6,11 +6,12 @@ use super::findings::Findings;
 use super::rule::Rule;
 use super::tolerance::ROUNDING_DEG;
 use metalith_core::document::{Limits, Section};
-use metalith_gds::LayerNumber;
+use metalith_gds::{LayerNumber, circle_of};
 
 #[derive(Clone, Copy, PartialEq)]
 enum OutlineCheck {
     Square,
+    Circle,
     Manhattan,
     /// Sharpest angle (degrees).
     Angle(f64),
@@ -36,6 +37,7 @@ struct OutlineRule {
 pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Option<Box<dyn Rule>> {
     let form = match check {
         "square" => OutlineCheck::Square,
+        "circle" => OutlineCheck::Circle,
         "manhattan" => OutlineCheck::Manhattan,
         "acute_angle" => OutlineCheck::Angle(s.float("min_deg", Limits::new(1.0..=179.0, "degrees"))),
         "self_crossing" => OutlineCheck::NoCrossing,
@@ -91,6 +93,7 @@ impl OutlineRule {
                     None => Some("not a square".into()),
                 }
             }
+            OutlineCheck::Circle => circle_of(points).is_none().then(|| "not a circle".into()),
             OutlineCheck::Manhattan => (!outline.is_manhattan()).then(|| "a side that is not along an axis".into()),
             OutlineCheck::Angle(min) => {
                 let sharpest = outline.sharpest_deg();
@@ -134,6 +137,7 @@ impl Rule for OutlineRule {
     fn words(&self) -> String {
         match self.form {
             OutlineCheck::Square => "pillars are squares".into(),
+            OutlineCheck::Circle => "pillars are circles".into(),
             OutlineCheck::Manhattan => "sides are along the axes".into(),
             OutlineCheck::Angle(min) => format!("no angle sharper than {min} degrees"),
             OutlineCheck::NoCrossing => "no outline crosses itself".into(),
@@ -155,6 +159,7 @@ impl Rule for OutlineRule {
         match self.form {
             OutlineCheck::Winding(counter_clockwise) => clockwise != counter_clockwise,
             OutlineCheck::Vertices(most) => most >= 5,
+            OutlineCheck::Circle => false,
             _ => true,
         }
     }

@@ -61,7 +61,7 @@ pub(super) fn near<'s>(
             let sites = (rows.end - rows.start).max(0) as u64 * (columns.end - columns.start).max(0) as u64;
             flat.work.spend(1 + sites)?;
             for pillar in pillars_in(flat, element, rows, columns, grown) {
-                let pillar = Body::Rect(pillar);
+                let pillar = flat.body_in(pillar);
                 flat.work.spend(body(k).effort(&pillar))?;
                 f(body(k), pillar);
             }

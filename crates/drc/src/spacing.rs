@@ -136,14 +136,10 @@ fn on_lattices(flat: &FlatLayout<'_>, nm: f64, height_nm: Option<f64>, found: &m
                         continue;
                     };
                     let Some(&other) = lines[up].get(c) else { continue };
-                    let along = pitch - (f64::from(own) + f64::from(other)) / 2.0;
-                    let gap = if up == 1 && right != 0 {
-                        along * std::f64::consts::SQRT_2
-                    } else {
-                        along
-                    };
+                    let apart = [pitch * right as f64, pitch * up as f64];
+                    let gap = flat.shape.gap([own, other].map(f64::from), apart);
                     if other != 0 && gap < nm - ROUNDING_NM {
-                        let body = |row, column| Body::Rect(flat.pillar(k, row, column));
+                        let body = |row, column| flat.body_in(flat.pillar(k, row, column));
                         let (a, b) = (body(row, column), body(row + up, c));
                         report_gap(flat, &a, &b, gap / flat.unit_nm, height_nm, found);
                     }

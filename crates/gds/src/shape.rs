@@ -1,6 +1,7 @@
 //! What stands on a layer.
 
-use metalith_core::LayerNumber;
+use super::circle::circle_of;
+use metalith_core::{LayerNumber, PillarShape};
 
 /// A place in database units.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -99,8 +100,30 @@ pub struct Shape<'a> {
     pub points: &'a [Point],
     /// The same as an upright rectangle, if it is one, with area and with five points.
     pub rect: Option<Rect>,
+    /// The square around the circle that it stands for, if it does: see [`crate::circle_of`].
+    pub circle: Option<Rect>,
     /// Place of the element in the file.
     pub offset: u64,
+}
+
+impl Shape<'_> {
+    /// The square around it, if it may be a pillar of this shape as it stands.
+    #[inline]
+    pub fn pillar(&self, shape: PillarShape) -> Option<&Rect> {
+        match shape {
+            PillarShape::Square => self.rect.as_ref(),
+            PillarShape::Circle => self.circle.as_ref(),
+        }
+    }
+}
+
+/// The square around an outline in any place, if it may be a pillar of this shape: a rectangle may have more vertices than it
+/// needs.
+pub fn pillar_of(points: &[Point], shape: PillarShape) -> Option<Rect> {
+    match shape {
+        PillarShape::Square => rectangle_of(&simplified(points)),
+        PillarShape::Circle => circle_of(points),
+    }
 }
 
 /// A label: no area, no exposure.

@@ -2,6 +2,7 @@
 
 use super::cell::LayoutCell;
 use super::cells::CellInput;
+use super::circle::circle_of;
 use super::element::{ElementContent, ElementKind};
 use super::layout::Layout;
 use super::names::Recent;
@@ -139,16 +140,18 @@ struct InlineShape {
     layer: LayerNumber,
     points: Vec<Point>,
     rect: Option<Rect>,
+    circle: Option<Rect>,
 }
 
 impl InlineShape {
     fn new(kind: ShapeKind, layer: LayerNumber, points: Vec<Point>) -> Self {
-        let rect = rectangle_of(&points);
+        let (rect, circle) = (rectangle_of(&points), circle_of(&points));
         Self {
             kind,
             layer,
             points,
             rect,
+            circle,
         }
     }
 }
@@ -243,6 +246,7 @@ impl<V: Visitor> Spread<'_, V> {
                 layer: kept.layer,
                 points: &kept.points,
                 rect: kept.rect,
+                circle: kept.circle,
                 offset,
             };
             // Rounding happens once, at the end of the chain: only exact transforms are applied here.
@@ -251,6 +255,7 @@ impl<V: Visitor> Spread<'_, V> {
                 self.moved.extend(kept.points.iter().map(|&p| own.apply(p)));
                 shape.points = &self.moved;
                 shape.rect = kept.rect.and_then(|r| own.apply_rect(&r));
+                shape.circle = kept.circle.and_then(|r| own.apply_rect(&r));
                 self.visitor.shape(&shape, self.placements)?;
             } else {
                 self.visitor.shape(&shape, &self.chains)?;
@@ -271,6 +276,7 @@ impl<V: Visitor> Sink for Spread<'_, V> {
             layer,
             points,
             rect: rectangle_of(points),
+            circle: None,
             offset,
         };
         Ok(self.visitor.shape(&shape, self.placements)?)
@@ -318,6 +324,7 @@ impl<V: Visitor> Sink for Spread<'_, V> {
                         kind,
                         layer: element.layer,
                         rect: rectangle_of(&points),
+                        circle: circle_of(&points),
                         points: &points,
                         offset: element.offset,
                     };
@@ -353,7 +360,7 @@ impl<V: Visitor> Sink for Spread<'_, V> {
             _ => {
                 let (mut points, mut moved) = (std::mem::take(&mut self.path), std::mem::take(&mut self.moved));
                 if let Some(kind) = outline_of(element, &mut points) {
-                    let rect = rectangle_of(&points);
+                    let (rect, circle) = (rectangle_of(&points), circle_of(&points));
                     moved.clone_from(&points);
                     copies.each(|by| {
                         for (to, from) in moved.iter_mut().zip(&points) {
@@ -363,6 +370,7 @@ impl<V: Visitor> Sink for Spread<'_, V> {
                             kind,
                             layer: element.layer,
                             rect: rect.map(|r| r.moved(by)),
+                            circle: circle.map(|r| r.moved(by)),
                             points: &moved,
                             offset: element.offset,
                         };

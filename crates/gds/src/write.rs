@@ -39,6 +39,40 @@ impl SquareRecord {
     }
 }
 
+/// A polygon on one layer: a BOUNDARY without optional record.
+#[derive(Clone, Debug)]
+pub struct PolygonRecord {
+    head: Vec<u8>,
+    /// Closed, about the place that it is written at.
+    corners: Vec<[i32; 2]>,
+}
+
+impl PolygonRecord {
+    /// The template for a polygon of these corners (database units), the first not repeated, on a layer.
+    ///
+    /// # Panics
+    /// If there are more than 8190 corners: the format has no longer record.
+    pub fn on(layer: LayerNumber, corners: &[[i32; 2]]) -> Self {
+        assert!(corners.len() <= 8190, "a polygon of {} corners", corners.len());
+        let closed: Vec<[i32; 2]> = corners.iter().chain(corners.first()).copied().collect();
+        let mut head = SquareRecord::on(layer).0[..16].to_vec();
+        head.extend(((4 + 8 * closed.len()) as u16).to_be_bytes());
+        head.extend([0x10, 3]);
+        Self { head, corners: closed }
+    }
+
+    /// Append the polygon about a place in database units.
+    #[inline]
+    pub fn append(&self, out: &mut Vec<u8>, x: i32, y: i32) {
+        out.extend_from_slice(&self.head);
+        for [dx, dy] in &self.corners {
+            out.extend((x + dx).to_be_bytes());
+            out.extend((y + dy).to_be_bytes());
+        }
+        out.extend([0, 4, 0x11, 0]);
+    }
+}
+
 /// A plain reference (SREF) to one cell: not mirrored, magnified or turned.
 #[derive(Clone, Debug)]
 pub struct ReferenceRecord {
@@ -111,6 +145,20 @@ mod tests {
                 layer,
                 datatype,
                 xy: corners.map(|(x, y)| GdsPoint::new(x, y)).to_vec(),
+                ..Default::default()
+            };
+            prop_assert_eq!(ours, by_gds21(boundary.into()));
+        }
+
+        #[test]
+        fn polygons_are_those_of_gds21(x in -2_000_000_000..2_000_000_000, y in -2_000_000_000..2_000_000_000, corners in prop::collection::vec([-30_000i32..30_000, -30_000i32..30_000], 3..60)) {
+            let mut ours = Vec::new();
+            PolygonRecord::on(LayerNumber::new(1, 2), &corners).append(&mut ours, x, y);
+            let place = |[dx, dy]: &[i32; 2]| GdsPoint::new(x + dx, y + dy);
+            let boundary = GdsBoundary {
+                layer: 1,
+                datatype: 2,
+                xy: corners.iter().chain(&corners[..1]).map(place).collect(),
                 ..Default::default()
             };
             prop_assert_eq!(ours, by_gds21(boundary.into()));

@@ -20,6 +20,15 @@ pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
             "a positive resist needs `method = \"lift_off\"`, a negative one `method = \"direct_etch\"`",
         ));
     }
+    if !design.cell.shape.is_square() {
+        return Err(Error::invalid(
+            format!(
+                "the pillars of the design are {}: dose matrix, test structures and areas of a hand-off are of squares as yet",
+                design.cell.shape.plural()
+            ),
+            "hand off what `metalith layout` and `metalith check` leave, with the report of `metalith run`",
+        ));
+    }
     let film = design.cell.pillar_material.as_str();
     if !process.transfer.films.iter().any(|f| f == film) {
         return Err(Error::invalid(

@@ -100,8 +100,8 @@ pub(super) fn small_lens(design: &Design, diameter_um: f64, wavelength_nm: f64) 
 /// The design with one element, not steered, hyperbolic for a wavelength.
 pub(super) fn hyperbolic(design: &Design, wavelength_nm: f64) -> Design {
     let mut single = design.clone();
-    single.array.count = (1, 1);
-    single.array.steering_deg = 0.0;
+    single.array = design.array.alone();
+    single.lens.terms.clear();
     single.lens.phase = RadialPhase::Hyperbola {
         wavelength_um: wavelength_nm * 1e-3,
         focal_length_um: design.lens.focal_length_um,

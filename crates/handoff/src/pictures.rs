@@ -40,9 +40,8 @@ pub(super) fn chip(design: &Design) -> Figure {
         }
     }
     // From the origin to half way between the elements.
-    let spacing = design.array.spacing_nm as f64 * 1e-3;
     let reach = if design.array.count.0 > 1 {
-        spacing / 2.0
+        0.5e-3 * design.array.spacing_nm as f64
     } else {
         0.3e-3 * w.min(h) as f64
     };

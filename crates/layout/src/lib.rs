@@ -7,6 +7,7 @@
 mod aperture;
 mod convert;
 mod fixed;
+mod form;
 mod format;
 mod frame;
 mod mark;
@@ -19,6 +20,7 @@ use std::path::{Path, PathBuf};
 use gds21::GdsElement;
 
 use fixed::FixedShapes;
+use form::PillarForm;
 use frame::LibraryFrame;
 use metalith_core::{Error, Progress, Result, WholeFile};
 use metalith_design::array::PillarArray;
@@ -61,7 +63,7 @@ pub fn write_pillars(
     let layers = &design.layout.layers;
     let fixed = FixedShapes::of_pillars(design).gds();
     progress.begin("writing pillars", array.pillars());
-    let mut writer = PillarWriter::create(path, &frame, &layers.pillars, progress)?;
+    let mut writer = PillarWriter::create(path, &frame, &layers.pillars, PillarForm::of(design), progress)?;
     let mut remarks = Vec::new();
     match hierarchy {
         Hierarchy::Folded => {

@@ -1,6 +1,6 @@
 //! Millions of pillars into a file, block by block.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::ops::Range;
 use std::path::Path;
@@ -8,12 +8,13 @@ use std::path::Path;
 use gds21::{GdsElement, GdsStrans, GdsStructRef};
 use rayon::prelude::*;
 
+use super::form::PillarForm;
 use super::frame::LibraryFrame;
 use super::{coordinate, point, polygon};
 use metalith_core::{Error, Progress, Result, WholeFile, WidthRows};
 use metalith_design::LayoutLayer;
-use metalith_design::array::{PillarArray, PlacedElement, Symmetry};
-use metalith_gds::write::{ReferenceRecord, SquareRecord};
+use metalith_design::array::{Class, PillarArray, PlacedElement, Symmetry};
+use metalith_gds::write::{PolygonRecord, ReferenceRecord, SquareRecord};
 
 /// Sites of the rows that are encoded as one block, about: a megabyte.
 const SITES: usize = 12_000;
@@ -26,6 +27,7 @@ pub(super) struct PillarWriter<'a> {
     path: &'a Path,
     frame: &'a LibraryFrame,
     layer: &'a LayoutLayer,
+    form: PillarForm,
     progress: &'a dyn Progress,
     bytes: u64,
     /// References of the top cell, in the order of the elements.
@@ -41,11 +43,61 @@ struct PlacedPillar {
     width: u16,
 }
 
+/// What is written for a pillar.
+enum Template {
+    Square(SquareRecord),
+    /// By width.
+    Polygons(BTreeMap<u16, PolygonRecord>),
+    /// By width, to cells of one outline.
+    References(BTreeMap<u16, ReferenceRecord>),
+}
+
+impl Template {
+    /// The outline itself for each pillar.
+    fn outlines(array: &PillarArray, layer: &LayoutLayer, form: PillarForm) -> Self {
+        if form.is_square() {
+            return Self::Square(SquareRecord::on(layer.number()));
+        }
+        let record = |width: u16| {
+            let corners: Vec<[i32; 2]> = form
+                .corners(width)
+                .iter()
+                .map(|&(x, y)| [coordinate(x), coordinate(y)])
+                .collect();
+            (width, PolygonRecord::on(layer.number(), &corners))
+        };
+        Self::Polygons(widths_of(array).into_iter().map(record).collect())
+    }
+
+    #[inline]
+    fn append(&self, out: &mut Vec<u8>, pillar: &PlacedPillar) {
+        let PlacedPillar { x, y, width } = *pillar;
+        match self {
+            Self::Square(square) => square.append(out, x, y, width),
+            Self::Polygons(polygons) => polygons[&width].append(out, x, y),
+            Self::References(cells) => cells[&width].append(out, x, y),
+        }
+    }
+}
+
+/// Widths of the pillars of an array (nm).
+fn widths_of(array: &PillarArray) -> BTreeSet<u16> {
+    let of_class = |class: &Class| {
+        let counts = class.widths.histogram();
+        (1..counts.len())
+            .filter(|&w| counts[w] > 0)
+            .map(|w| w as u16)
+            .collect::<Vec<_>>()
+    };
+    array.classes.iter().flat_map(of_class).collect()
+}
+
 impl<'a> PillarWriter<'a> {
     pub fn create(
         path: &'a Path,
         frame: &'a LibraryFrame,
         layer: &'a LayoutLayer,
+        form: PillarForm,
         progress: &'a dyn Progress,
     ) -> Result<Self> {
         let mut writer = Self {
@@ -53,6 +105,7 @@ impl<'a> PillarWriter<'a> {
             path,
             frame,
             layer,
+            form,
             progress,
             bytes: 0,
             placed: Vec::new(),
@@ -65,7 +118,12 @@ impl<'a> PillarWriter<'a> {
     /// Write each class once, folded by its symmetries, and refer to it for each element.
     /// Says which classes have no symmetry to fold by.
     pub fn folded(&mut self, array: &PillarArray) -> Result<Vec<String>> {
-        let square = SquareRecord::on(self.layer.number());
+        // Squares are as short as references to them; other outlines are written once each.
+        let template = if self.form.is_square() {
+            Template::Square(SquareRecord::on(self.layer.number()))
+        } else {
+            Template::References(self.width_cells(array)?)
+        };
         let n = array.lattice.sites();
         let mut remarks = Vec::new();
         for (k, class) in array.classes.iter().enumerate() {
@@ -76,7 +134,7 @@ impl<'a> PillarWriter<'a> {
                 let (begin, end) = self.frame.cell(&name, Vec::new())?;
                 self.put(&begin)?;
                 let runs = |iy| class.group.runs(part, n, iy);
-                self.rows(&class.widths, runs, |out, s| square.append(out, s.x, s.y, s.width))?;
+                self.rows(&class.widths, runs, |out, s| template.append(out, &s))?;
                 self.put(&end)?;
                 references.extend(part.copies.iter().map(|s| reference(&name, *s, (0, 0))));
             }
@@ -90,28 +148,23 @@ impl<'a> PillarWriter<'a> {
         Ok(remarks)
     }
 
-    /// Write a cell for each width and one reference a pillar, each element a cell of its own.
-    pub fn referenced(&mut self, array: &PillarArray) -> Result<()> {
+    /// Write a cell for each width that there is.
+    fn width_cells(&mut self, array: &PillarArray) -> Result<BTreeMap<u16, ReferenceRecord>> {
         let mut cells = BTreeMap::new();
-        for class in &array.classes {
-            for (width, _) in class
-                .widths
-                .histogram()
-                .iter()
-                .enumerate()
-                .skip(1)
-                .filter(|(_, count)| **count > 0)
-            {
-                cells.insert(width as u16, ReferenceRecord::to(&width_name(width)));
-            }
-        }
-        for &width in cells.keys() {
-            let h = i64::from(width) / 2;
-            let square = polygon(self.layer, &[(-h, -h), (h, -h), (h, h), (-h, h)]);
-            let (begin, end) = self.frame.cell(&width_name(width.into()), vec![square])?;
+        for width in widths_of(array) {
+            let name = width_name(width.into());
+            let outline = polygon(self.layer, &self.form.corners(width));
+            let (begin, end) = self.frame.cell(&name, vec![outline])?;
             self.put(&begin)?;
             self.put(&end)?;
+            cells.insert(width, ReferenceRecord::to(&name));
         }
+        Ok(cells)
+    }
+
+    /// Write a cell for each width and one reference a pillar, each element a cell of its own.
+    pub fn referenced(&mut self, array: &PillarArray) -> Result<()> {
+        let template = Template::References(self.width_cells(array)?);
         for (k, placed) in array.placed.iter().enumerate() {
             let name = format!("E{k}");
             let widths = array.rows(placed);
@@ -120,7 +173,7 @@ impl<'a> PillarWriter<'a> {
             self.rows(
                 widths.as_ref(),
                 |_| [all_of(array), 0..0],
-                |out, s| cells[&s.width].append(out, s.x, s.y),
+                |out, s| template.append(out, &s),
             )?;
             self.put(&end)?;
             self.placed
@@ -136,7 +189,7 @@ impl<'a> PillarWriter<'a> {
         let (begin, end) = self.frame.cell(top, fixed)?;
         self.put(&begin)?;
         if let Some(array) = flat {
-            let square = SquareRecord::on(self.layer.number());
+            let template = Template::outlines(array, self.layer, self.form);
             for placed in &array.placed {
                 let widths = array.rows(placed);
                 let (cx, cy) = placed.element.centre_nm;
@@ -144,7 +197,10 @@ impl<'a> PillarWriter<'a> {
                 self.rows(
                     widths.as_ref(),
                     |_| [all_of(array), 0..0],
-                    |out, s| square.append(out, cx + s.x, cy + s.y, s.width),
+                    |out, s| {
+                        let (x, y) = (cx + s.x, cy + s.y);
+                        template.append(out, &PlacedPillar { x, y, ..s });
+                    },
                 )?;
             }
         }

@@ -53,7 +53,8 @@ impl Judged {
 pub fn lens_alone(design: &Design, table: &Path) -> Result<Design> {
     let mut alone = design.clone();
     alone.lens.phase = RadialPhase::read_table(table, Interpolation::Nearest, design.lens.radius_um())?;
-    alone.array.count = (1, 1);
+    alone.array = design.array.alone();
+    alone.lens.terms.clear();
     Ok(alone)
 }
 

@@ -113,7 +113,8 @@ pub mod tests {
     use super::*;
 
     use metalith_cell::InversePolynomial;
-    use metalith_design::{CellSpec, MappingSpec};
+    use metalith_core::PillarShape;
+    use metalith_design::{CellSpec, MappingComparison, MappingSpec};
 
     /// The rule of the shipped designs but for the coefficients.
     pub fn rule(coefficients: &[f64]) -> WidthRule {
@@ -125,6 +126,10 @@ pub mod tests {
             pillar_material: "sin_luke_2015".into(),
             substrate_material: "fused_silica_malitson_1965".into(),
             ambient_index: 1.0,
+            shape: PillarShape::Square,
+            ambient_material: None,
+            under: Vec::new(),
+            band_um: None,
         };
         let polynomial = InversePolynomial {
             coefficients: coefficients.to_vec(),
@@ -136,6 +141,7 @@ pub mod tests {
             table_file: None,
             table: None,
             steered: Vec::new(),
+            comparison: MappingComparison::default(),
         };
         WidthRule::new(&cell, &mapping)
     }

@@ -72,7 +72,7 @@ pub fn read_pillars(design: &Design, layout: &std::path::Path, progress: &dyn Pr
     };
     let sites: Vec<ElementSite> = design.elements().into_iter().map(site).collect();
     metalith_gds::extract::fits(layout, &sites)?;
-    let plan = ExtractionPlan::given(design.layout.layers.pillars.number(), sites);
+    let plan = ExtractionPlan::given(design.layout.layers.pillars.number(), sites).of_shape(design.cell.shape);
     let layout = Layout::open_with(layout, ReadLimits::default(), progress)?;
     Ok(extract(&layout, &plan, progress)?)
 }
@@ -82,11 +82,7 @@ pub fn read_pillars(design: &Design, layout: &std::path::Path, progress: &dyn Pr
 /// # Errors
 /// If a channel counts no light at which the design's materials are known.
 pub fn sampling_of(design: &Design, camera: &Camera) -> Result<Sampling> {
-    let spec = design.table_spec()?;
-    let materials = [spec.stack.film.range_um(), spec.stack.substrate.range_um()];
-    let (low, high) = materials
-        .iter()
-        .fold(spec.band_um, |(low, high), (a, b)| (low.max(*a), high.min(*b)));
+    let (low, high) = design.band_um()?;
     camera.sampling([low * 1e3, high * 1e3], STEP_NM)
 }
 

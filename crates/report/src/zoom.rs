@@ -4,7 +4,7 @@ use svg::node::element::{Group, Path, SVG};
 
 use super::axis::Axis;
 use super::figure::{Figure, Frame, scale_bar};
-use metalith_core::WidthMap;
+use metalith_core::{PillarShape, WidthMap};
 
 /// More pillars an axis than this would be dust.
 const MOST: f64 = 80.0;
@@ -13,8 +13,9 @@ const MOST: f64 = 80.0;
 #[derive(Clone, Debug)]
 pub struct PillarZoom {
     title: String,
-    squares: String,
-    pillars: u64,
+    /// Left, top and width of each in the drawing (nm).
+    pillars: Vec<[i64; 3]>,
+    shape: PillarShape,
     centre_um: (f64, f64),
     span_um: f64,
     side: f64,
@@ -29,8 +30,7 @@ impl PillarZoom {
         let half = (span_um + lattice.pitch_um()) / 2.0;
         let near =
             |centre: f64| (0..lattice.sites()).filter(move |&i| (lattice.coordinate_um(i) - centre).abs() <= half);
-        let mut squares = String::new();
-        let mut pillars = 0;
+        let mut pillars = Vec::new();
         let origin = (nm(centre_um.0), nm(centre_um.1));
         for iy in near(centre_um.1) {
             for ix in near(centre_um.0) {
@@ -38,21 +38,38 @@ impl PillarZoom {
                 if width == 0 {
                     continue;
                 }
-                pillars += 1;
                 // The drawing counts nanometres from its middle, y downwards.
                 let x = lattice.coordinate_nm(ix) - origin.0 - width / 2;
                 let y = origin.1 - lattice.coordinate_nm(iy) - width / 2;
-                squares.push_str(&format!("M{x} {y}h{width}v{width}h-{width}z"));
+                pillars.push([x, y, width]);
             }
         }
         Self {
             title: title.into(),
-            squares,
             pillars,
+            shape: PillarShape::Square,
             centre_um,
             span_um,
             side: 380.0,
         }
+    }
+
+    /// Draw pillars of this shape; squares else.
+    pub fn shape(mut self, shape: PillarShape) -> Self {
+        self.shape = shape;
+        self
+    }
+
+    /// The outlines of all pillars as one path.
+    fn outlines(&self) -> String {
+        let outline = |[x, y, width]: &[i64; 3]| match self.shape {
+            PillarShape::Square => format!("M{x} {y}h{width}v{width}h-{width}z"),
+            PillarShape::Circle => {
+                let (radius, middle) = (*width as f64 / 2.0, *y as f64 + *width as f64 / 2.0);
+                format!("M{x} {middle}a{radius} {radius} 0 1 0 {width} 0a{radius} {radius} 0 1 0 -{width} 0z")
+            }
+        };
+        self.pillars.iter().map(outline).collect()
     }
 
     /// Width of the square in the drawing; 380 else.
@@ -92,12 +109,12 @@ impl From<PillarZoom> for Figure {
             .set("width", zoom.side)
             .set("height", zoom.side)
             .set("viewBox", (-span_nm / 2, -span_nm / 2, span_nm, span_nm))
-            .add(Path::new().set("class", "pillar").set("d", zoom.squares));
+            .add(Path::new().set("class", "pillar").set("d", zoom.outlines()));
         let um_per_unit = zoom.span_um / zoom.side;
         let bar = scale_bar(frame.left, frame.bottom + 46.0, zoom.side / 4.0, um_per_unit, "ink");
         let words = format!(
             "{} pillars to scale; {}, {}.",
-            super::count(zoom.pillars),
+            super::count(zoom.pillars.len() as u64),
             x.words(),
             y.words()
         );

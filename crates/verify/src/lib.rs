@@ -213,7 +213,7 @@ fn judge(
     progress: &dyn Progress,
 ) -> Result<Verification> {
     let elements = found.elements;
-    let lens = LensPhase::new(array.lattice, design.lens.diameter_nm, &design.lens.phase);
+    let lens = LensPhase::of(design);
     let responses = MappingResponse::new(design, cases.judge)?;
     let mut simulator = optics::ElementSimulator::new(design, array.lattice, cases, accuracy, part_bytes)?;
     let chosen = distinct(&elements, cases.judge.depends_on_place());
@@ -231,7 +231,7 @@ fn judge(
     for (k, copies) in chosen {
         let element = elements[k].element;
         let widths = found.widths[k];
-        let phase = ElementPhase::new(&lens, &element.wedge);
+        let phase = ElementPhase::of(&lens, &element);
         let rule = WidthRule::of_element(design, element.index);
         let read = simulator.read(&element, widths)?;
         simulated.push(DistinctElement {
@@ -275,7 +275,7 @@ fn judge(
 
 /// What pillars transmit at the wavelength of the mapping, in the case that judges.
 enum MappingResponse<'a> {
-    ByWidth(f64, Vec<Complex64>),
+    ByWidth(Vec<Complex64>),
     Made(f64, &'a MadeChip),
 }
 
@@ -283,7 +283,7 @@ impl<'a> MappingResponse<'a> {
     fn new(design: &Design, judge: SimulationCase<'a>) -> Result<Self> {
         let um = design.mapping.wavelength_um;
         Ok(match judge {
-            SimulationCase::Cell(cell) => Self::ByWidth(um, cell.transmissions(um, design.cell.pitch_nm as u16)?),
+            SimulationCase::Cell(cell) => Self::ByWidth(cell.transmissions(um, design.cell.pitch_nm as u16)?),
             SimulationCase::Made(chip) => Self::Made(um, chip),
         })
     }
@@ -297,12 +297,8 @@ impl<'a> MappingResponse<'a> {
         progress: &dyn Progress,
     ) -> Result<PhaseErrors> {
         let widths = read.widths;
-        let errors = |wavelength_um: &f64, table: &[Complex64], class: &(dyn Fn(usize, u16) -> usize + Sync)| {
-            let response = PillarResponse {
-                wavelength_um: *wavelength_um,
-                table,
-                class,
-            };
+        let errors = |table: &[Complex64], class: &(dyn Fn(usize, u16) -> usize + Sync)| {
+            let response = PillarResponse { table, class };
             PhaseErrors::of(widths, phase, rule, &response)
         };
         match (self, &read.made[0]) {
@@ -311,9 +307,9 @@ impl<'a> MappingResponse<'a> {
                 let single = |t: &Complex32| Complex64::new(f64::from(t.re), f64::from(t.im));
                 let table: Vec<_> = view.tables[0].t.iter().map(single).collect();
                 let classes = made.classes();
-                Ok(errors(um, &table, &|site, _| usize::from(classes[site])))
+                Ok(errors(&table, &|site, _| usize::from(classes[site])))
             }
-            (Self::ByWidth(um, table), _) => Ok(errors(um, table, &|_, width_nm| usize::from(width_nm))),
+            (Self::ByWidth(table), _) => Ok(errors(table, &|_, width_nm| usize::from(width_nm))),
             (Self::Made(..), None) => unreachable!("a made chip has made elements"),
         }
     }
@@ -336,7 +332,7 @@ fn plan(design: &Design, array: &PillarArray) -> ExtractionPlan {
         lattice: array.lattice,
     };
     let sites = array.placed.iter().map(site).collect();
-    ExtractionPlan::given(design.layout.layers.pillars.number(), sites)
+    ExtractionPlan::given(design.layout.layers.pillars.number(), sites).of_shape(design.cell.shape)
 }
 
 fn compare<W>(

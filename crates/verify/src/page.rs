@@ -21,6 +21,9 @@ const PSF_DECADES: f64 = 4.0;
 /// Edge of the part of a PSF that is shown (um): some ten sensor pixels.
 const PSF_SHOWN_UM: f64 = 60.0;
 
+/// Pillars that the picture of the middle shows along an axis.
+const ZOOMED_PITCHES: f64 = 34.0;
+
 /// Write `report.html` and `report.json` into a folder; the page shows the picture that a camera of the chip will take, if
 /// there is one.
 ///
@@ -139,31 +142,45 @@ fn limits(page: &mut Page, found: &Verification) {
 
 fn designed(page: &mut Page, design: &Design, array: &PillarArray) {
     page.section("What was designed");
+    let elements = match design.array.spacing_words() {
+        Some(apart) => format!(
+            "{} x {} elements of {} um, f = {} um, {apart} apart, steered by {}° a step",
+            design.array.count.0,
+            design.array.count.1,
+            exact(f64::from(design.lens.diameter_nm) * 1e-3),
+            exact(design.lens.focal_length_um),
+            design.array.steering_deg,
+        ),
+        None => format!(
+            "{} elements of {} um, f = {} um, placed and steered one by one,",
+            array.placed.len(),
+            exact(f64::from(design.lens.diameter_nm) * 1e-3),
+            exact(design.lens.focal_length_um),
+        ),
+    };
+    let plural = design.cell.shape.plural();
     page.paragraph(format!(
-        "{} x {} elements of {} um, f = {} um, {} um apart, steered by {}° a step at {} nm; pillars on a lattice of {} nm.",
-        design.array.count.0,
-        design.array.count.1,
-        exact(f64::from(design.lens.diameter_nm) * 1e-3),
-        exact(design.lens.focal_length_um),
-        exact(design.array.spacing_nm as f64 * 1e-3),
-        design.array.steering_deg,
+        "{elements} at {} nm; pillars, {plural}, on a lattice of {} nm.",
         exact(design.array.wedge_wavelength_um * 1e3),
         design.cell.pitch_nm,
     ));
-    let centre = array
-        .placed
-        .iter()
-        .find(|p| p.element.index == (0, 0))
-        .expect("the count of elements is odd");
+    let centre = array.central();
     let rows = array.rows(centre);
     let zoomed = middle(rows.as_ref());
+    let span_um = ZOOMED_PITCHES * array.lattice.pitch_um();
     page.row([
         chip(design).caption("The chip from above: openings, pillars, marks and outline as they are written."),
-        PillarZoom::new("Pillars in the middle of the centre element", &zoomed, (0.0, 0.0), 12.0)
-            .caption("Pillars as they are written, to scale."),
+        PillarZoom::new(
+            "Pillars in the middle of the centre element",
+            &zoomed,
+            (0.0, 0.0),
+            span_um,
+        )
+        .shape(design.cell.shape)
+        .caption("Pillars as they are written, to scale."),
     ]);
-    let lens = LensPhase::new(array.lattice, design.lens.diameter_nm, &design.lens.phase);
-    let phase = ElementPhase::new(&lens, &centre.element.wedge);
+    let lens = LensPhase::of(design);
+    let phase = ElementPhase::of(&lens, &centre.element);
     let n = array.lattice.sites();
     let along = |value: &dyn Fn(usize) -> Option<f64>| {
         let radius = |ix| array.lattice.coordinate_um(ix);

@@ -6,7 +6,6 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use metalith_cell::ForwardPolynomial;
 use metalith_core::WidthRows;
 use metalith_design::array::WidthRule;
 use metalith_design::phase::ElementPhase;
@@ -21,7 +20,7 @@ pub struct PhaseError {
 /// What a written element does to the phase that was asked of it, at the wavelength of the mapping.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PhaseErrors {
-    /// Width as written against the unrounded width, by the published polynomial.
+    /// Width as written against the unrounded width, by [`WidthRule::turns_of_width`].
     pub rounding: PhaseError,
     /// Phase of the pillar as the cell has it against the design phase, less the mean.
     pub mapping: PhaseError,
@@ -29,8 +28,6 @@ pub struct PhaseErrors {
 
 /// What pillars transmit at the wavelength of the mapping.
 pub struct PillarResponse<'a> {
-    /// Wavelength of the mapping (um).
-    pub wavelength_um: f64,
     /// Transmission of each class of pillars, zero where the aperture is shut.
     pub table: &'a [Complex64],
     /// Class of a pillar, by its site counted row by row and its width (nm).
@@ -45,9 +42,7 @@ impl PhaseErrors {
         rule: &WidthRule,
         response: &PillarResponse<'_>,
     ) -> Self {
-        let pitch_nm = f64::from(widths.lattice().pitch_nm());
-        let forward = ForwardPolynomial::published();
-        let by_width = |nm: f64| TAU * forward.turns(nm / pitch_nm, response.wavelength_um);
+        let by_width = |nm: f64| TAU * rule.turns_of_width(nm);
         let written = (0..=widths.widest_nm())
             .map(|w| by_width(f64::from(w)))
             .collect::<Vec<_>>();

@@ -232,7 +232,7 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
         "a layout without a design, computed from its bytes",
     );
     page.facts(&[
-        ("Pillars", count(found.pillars)),
+        ("Pillars", format!("{} {}", count(found.pillars), found.shape.plural())),
         ("Elements", found.elements.len().to_string()),
         ("of them distinct", elements.len().to_string()),
         ("Other shapes on the pillar layer", count(found.oddities.total())),
@@ -291,7 +291,9 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
     }
     page.section("Pillars");
     let zooms = elements.iter().take(4).map(|(site, widths)| {
-        PillarZoom::new(format!("Middle of {}", site.name), widths, (0.0, 0.0), 10.0).caption("As read, to scale.")
+        PillarZoom::new(format!("Middle of {}", site.name), widths, (0.0, 0.0), 10.0)
+            .shape(found.shape)
+            .caption("As read, to scale.")
     });
     page.row(zooms);
     write_json(

@@ -22,6 +22,9 @@ use metalith_wave::{Accuracy, Fold, Matched, PhaseFunction, PlaneWave, Psf, Scra
 /// this weighs is reported for each channel.
 pub(super) const STEP_NM: f64 = 12.5;
 
+/// Steps that the visible has.
+const MOST_STEPS: f64 = 24.0;
+
 /// The camera and the light that figures are for.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CameraStatement {
@@ -110,14 +113,15 @@ impl WhiteChannel {
 /// # Errors
 /// If the camera file cannot be used, or one of its channels counts no light at which the design's materials are known.
 pub(super) fn camera_of(design: &Design) -> Result<Option<(Camera, Sampling)>> {
-    let range_nm = range_nm(design)?;
+    let (short, long) = design.band_um()?;
+    let range_nm = [short * 1e3, long * 1e3];
     if let Some(file) = &design.verify.camera {
         let camera = Camera::read(file)?;
-        let sampling = camera.sampling(range_nm, STEP_NM)?;
+        let sampling = camera.sampling(range_nm, step_nm(range_nm))?;
         return Ok(Some((camera, sampling)));
     }
-    let camera = Camera::three_bands(design.verify.pixel_um);
-    let sampling = camera.sampling(range_nm, STEP_NM).ok();
+    let camera = Camera::assumed(design.verify.pixel_um, range_nm);
+    let sampling = camera.sampling(range_nm, step_nm(range_nm)).ok();
     Ok(sampling.map(|sampling| (camera, sampling)))
 }
 
@@ -138,14 +142,9 @@ pub(super) fn landing_um(element: &Element, wavelength_um: f64, distance_um: f64
     Point::of(element, distance_um).landing_um(wavelength_um)
 }
 
-/// The visible and the wavelengths that the design names, where its materials are known (nm).
-fn range_nm(design: &Design) -> Result<[f64; 2]> {
-    let spec = design.table_spec()?;
-    let materials = [spec.stack.film.range_um(), spec.stack.substrate.range_um()];
-    let (low, high) = materials
-        .iter()
-        .fold(spec.band_um, |(low, high), (a, b)| (low.max(*a), high.min(*b)));
-    Ok([low * 1e3, high * 1e3])
+/// Distance of the wavelengths (nm): a band that is much wider than the visible has as many as that.
+fn step_nm([short, long]: [f64; 2]) -> f64 {
+    STEP_NM.max((long - short) / MOST_STEPS)
 }
 
 /// One wavelength, with what all elements share.

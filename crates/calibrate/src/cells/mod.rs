@@ -351,6 +351,8 @@ mod tests {
         let stack = CellStack {
             pitch_nm: 350.0,
             height_nm: 700.0,
+            shape: metalith_core::PillarShape::Square,
+            under: Vec::new(),
             film: constant(2.02),
             substrate: constant(1.46),
             ambient: constant(1.0),

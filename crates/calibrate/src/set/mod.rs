@@ -47,15 +47,9 @@ impl MeasuredSet {
     /// If a material is not known.
     pub fn stated_cell(&self) -> Result<CellStack> {
         Ok(CellStack {
-            pitch_nm: f64::from(self.stack.pitch_nm),
-            height_nm: self.stack.pillar_height_nm,
             film: self.stack.film.clone(),
-            substrate: Material::named("fused_silica_malitson_1965")?,
             ambient: Material::constant(self.stack.ambient_index, 0.0)?,
-            taper: 0.0,
-            corner_radius_nm: 0.0,
-            mask_height_nm: 0.0,
-            mask: Material::named("alumina_zhukovsky_2015")?,
+            ..CellStack::paper(f64::from(self.stack.pitch_nm), self.stack.pillar_height_nm)?
         })
     }
 

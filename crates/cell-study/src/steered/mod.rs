@@ -3,7 +3,7 @@
 //! Where the phase is steep, neighbours differ from one to the next, and the mapping that brings most light into the first
 //! order of equal neighbours is not the best one. Here the pillars of a sample of sites, drawn by a polynomial, transmit by
 //! the sum over pairs ([`NeighbourTable`]); the coefficients are those with most light in the first order, mean of
-//! [`LED_UM`](crate::LED_UM). What is found is judged by supercells of rows of the element's own pillars.
+//! the wavelengths that the design compares mappings at. What is found is judged by supercells of rows of the element's own pillars.
 
 mod judge;
 mod sample;
@@ -21,7 +21,6 @@ use metalith_design::Design;
 use metalith_design::phase::LensPhase;
 use metalith_grating::{Mapping, NeighbourTable, NeighbourTableSpec};
 
-use crate::LED_UM;
 use judge::judge;
 use sample::SiteSample;
 
@@ -41,7 +40,7 @@ pub struct SteeredStudy {
     /// Steps from the centre element along the two axes, the larger first.
     pub steps: (u32, u32),
     pub coefficients: Vec<f64>,
-    /// At each of [`LED_UM`](crate::LED_UM).
+    /// At each of the wavelengths that the design compares mappings at.
     pub light: Vec<SteeredLight>,
 }
 
@@ -100,7 +99,8 @@ fn study(
     // Any width that may be written, whatever mapping is found.
     let writable: Vec<u16> = design.cell.widths_nm().collect();
     let mapping = Mapping::new(|u| writable[(u * writable.len() as f64) as usize]);
-    let tables = LED_UM
+    let tables = design
+        .compared_um()
         .iter()
         .map(|&um| {
             let spec = NeighbourTableSpec {
@@ -136,7 +136,7 @@ fn study(
         .expect("there are starts");
     let pairs = [shares(common), shares(&best)];
     let mut light = Vec::new();
-    for (k, um) in LED_UM.into_iter().enumerate() {
+    for (k, &um) in design.compared_um().iter().enumerate() {
         let judged = [common, &best].map(|polynomial| {
             let width_nm = |u| width_nm(design, polynomial, u);
             judge(stack, lens, wedge, (um, sines(um)), &width_nm, progress)

@@ -4,9 +4,10 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-use metalith_core::{EighthMap, Lattice, Wedge, WidthMap, WidthRows};
+use metalith_core::{EighthMap, Lattice, WidthMap, WidthRows};
 
 use super::{Symmetry, SymmetryGroup, WidthRule};
+use crate::Element;
 use crate::phase::{ElementPhase, LensPhase};
 
 /// The pillars of one element as a function of the site: no memory but that of the lens's phase, which all elements
@@ -15,33 +16,40 @@ use crate::phase::{ElementPhase, LensPhase};
 pub struct ComputedWidths {
     lens: Arc<LensPhase>,
     rule: Arc<WidthRule>,
-    wedge: Wedge,
+    element: Element,
 }
 
 impl ComputedWidths {
-    pub(super) fn new(lens: Arc<LensPhase>, rule: Arc<WidthRule>, wedge: Wedge) -> Self {
-        Self { lens, rule, wedge }
+    pub(super) fn new(lens: Arc<LensPhase>, rule: Arc<WidthRule>, element: Element) -> Self {
+        Self { lens, rule, element }
     }
 
-    /// The element of the same lens with another wedge.
-    pub(super) fn steered(&self, wedge: Wedge) -> Self {
-        Self { wedge, ..self.clone() }
+    /// Another element of the same lens and mapping.
+    pub(super) fn steered(&self, element: Element) -> Self {
+        Self {
+            element,
+            ..self.clone()
+        }
     }
 
     fn phase(&self) -> ElementPhase<'_> {
-        ElementPhase::new(&self.lens, &self.wedge)
+        ElementPhase::of(&self.lens, &self.element)
     }
 
     fn directions(&self) -> [f64; 2] {
-        [self.wedge.sin_x, self.wedge.sin_y]
+        [self.element.wedge.sin_x, self.element.wedge.sin_y]
     }
 
     /// Whether a symmetry turns this element into another of the same lens and mapping. The phase is a function of the exact radius
     /// and of the sum of two products with the wedge, so a symmetry that turns one wedge into the other turns one
-    /// element into the other to the last bit.
+    /// element into the other to the last bit. Of phases over the plane nothing is known: each such element is its own copy
+    /// alone.
     pub fn maps(&self, symmetry: Symmetry, to: &Self) -> bool {
+        if self.lens.has_terms() {
+            return symmetry == Symmetry::IDENTITY && self.element == to.element;
+        }
         self.rule == to.rule
-            && self.wedge.wavelength_um == to.wedge.wavelength_um
+            && self.element.wedge.wavelength_um == to.element.wedge.wavelength_um
             && symmetry.vector(self.directions()) == to.directions()
     }
 

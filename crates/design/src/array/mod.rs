@@ -70,7 +70,7 @@ impl PillarArray {
     /// As [`PillarArray::build`].
     pub fn build_within(design: &Design, most_held: u64, progress: &dyn Progress) -> Result<Self> {
         let lattice = design.lattice();
-        let lens = Arc::new(LensPhase::new(lattice, design.lens.diameter_nm, &design.lens.phase));
+        let lens = Arc::new(LensPhase::of(design));
         let held = (lattice.sites() as u64).pow(2) <= most_held;
         let elements = design.elements();
         progress.begin("widths of the elements", elements.len() as u64);
@@ -88,14 +88,29 @@ impl PillarArray {
             array.place(
                 element,
                 if held {
-                    ClassWidths::Held(rule.widths(&ElementPhase::new(&lens, &element.wedge)))
+                    ClassWidths::Held(rule.widths(&ElementPhase::of(&lens, &element)))
                 } else {
-                    ClassWidths::Computed(ComputedWidths::new(lens.clone(), rule, element.wedge))
+                    ClassWidths::Computed(ComputedWidths::new(lens.clone(), rule, element))
                 },
             );
             progress.advance(1);
         }
         Ok(array)
+    }
+
+    /// The element in the middle of the chip, or nearest to it.
+    ///
+    /// # Panics
+    /// If there is no element: a design has at least one.
+    pub fn central(&self) -> &PlacedElement {
+        let distance = |p: &&PlacedElement| {
+            let (x, y) = p.element.centre_nm;
+            x * x + y * y
+        };
+        self.placed
+            .iter()
+            .min_by_key(distance)
+            .expect("a design has at least one element")
     }
 
     /// Number of pillars of all elements.
@@ -121,7 +136,7 @@ impl PillarArray {
             ClassWidths::Held(map) => Cow::Owned(ClassWidths::Held(placed.symmetry.apply(map))),
             // No symmetry turns it.
             ClassWidths::Eighth(_) => Cow::Borrowed(widths),
-            ClassWidths::Computed(class) => Cow::Owned(ClassWidths::Computed(class.steered(placed.element.wedge))),
+            ClassWidths::Computed(class) => Cow::Owned(ClassWidths::Computed(class.steered(placed.element))),
         }
     }
 

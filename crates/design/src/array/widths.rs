@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::phase::ElementPhase;
 use crate::{CellSpec, Design, MappingSpec};
-use metalith_cell::{InversePolynomial, MappingTable};
+use metalith_cell::{ForwardPolynomial, InversePolynomial, MappingTable};
 use metalith_core::WidthMap;
 
 /// Rounds the duty cycle that a mapping asks for to a width that may be written.
@@ -15,7 +15,12 @@ pub struct WidthRule {
     pitch_nm: f64,
     step_nm: f64,
     range_nm: (f64, f64),
+    /// Published phase over width of the paper's cell, and the wavelength of the mapping (um).
+    forward: Option<(ForwardPolynomial, f64)>,
 }
+
+/// The largest phase below a turn that tables of mappings tell from one.
+const LAST_TURN: f64 = 0.9999;
 
 impl WidthRule {
     /// The rule of the element of a design that is so many steps from the centre.
@@ -48,6 +53,9 @@ impl WidthRule {
             pitch_nm: f64::from(cell.pitch_nm),
             step_nm: f64::from(cell.width_step_nm),
             range_nm: (f64::from(cell.width_range_nm.0), f64::from(cell.width_range_nm.1)),
+            forward: cell
+                .is_of_the_paper()
+                .then(|| (ForwardPolynomial::published(), mapping.wavelength_um)),
         }
     }
 
@@ -57,6 +65,16 @@ impl WidthRule {
             Some(table) => f64::from(table.width_nm(u)),
             None => self.pitch_nm * self.polynomial.duty(u),
         }
+    }
+
+    /// Phase (turns) that stands for a width (nm) where what counts is the difference of two: by the published polynomial for
+    /// the cell of the paper, else by the mean slope of the mapping.
+    pub fn turns_of_width(&self, nm: f64) -> f64 {
+        if let Some(forward) = &self.forward {
+            return forward.0.turns(nm / self.pitch_nm, forward.1);
+        }
+        let span_nm = self.unrounded_nm(LAST_TURN) - self.unrounded_nm(0.0);
+        nm / span_nm.abs().max(self.step_nm)
     }
 
     /// Width to write (nm) for a phase of `u` turns, `0 <= u < 1`.

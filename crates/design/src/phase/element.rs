@@ -1,6 +1,7 @@
 //! The phase of every site of an element.
 
-use super::RadialPhase;
+use super::{PhaseTerm, RadialPhase};
+use crate::{Design, Element};
 use metalith_core::{Lattice, Wedge};
 
 /// Radii that are tabulated at most: 64 MB. A lens of 1 mm has a million.
@@ -21,6 +22,8 @@ pub struct LensPhase {
     /// Entries are this power of two apart in squared half pitches: a shift, since this is done for each pillar.
     stride_log2: u32,
     offset: i64,
+    /// Phases over the plane that elements have besides.
+    terms: Vec<PhaseTerm>,
 }
 
 /// Phase (turns) of a squared radius.
@@ -31,6 +34,14 @@ enum TurnsOfRadius {
 }
 
 impl LensPhase {
+    /// The phase of the lens of a design.
+    pub fn of(design: &Design) -> Self {
+        Self {
+            terms: design.lens.terms.clone(),
+            ..Self::new(design.lattice(), design.lens.diameter_nm, &design.lens.phase)
+        }
+    }
+
     /// Tabulate `radial` for a lens of this diameter on this lattice.
     pub fn new(lattice: Lattice, diameter_nm: u32, radial: &RadialPhase) -> Self {
         Self::with_entries(lattice, diameter_nm, radial, MOST_ENTRIES)
@@ -62,6 +73,7 @@ impl LensPhase {
             turns,
             stride_log2,
             offset,
+            terms: Vec::new(),
         }
     }
 
@@ -70,7 +82,12 @@ impl LensPhase {
         self.lattice
     }
 
-    /// Phase at a site (turns), not reduced; none outside the lens.
+    /// Whether elements have phases over the plane besides.
+    pub fn has_terms(&self) -> bool {
+        !self.terms.is_empty()
+    }
+
+    /// Phase over the radius at a site (turns), not reduced; none outside the lens.
     pub fn turns(&self, ix: usize, iy: usize) -> Option<f64> {
         let r2 = self.lattice.half_radius2(ix, iy);
         (r2 <= self.limit).then(|| match &self.turns {
@@ -92,19 +109,30 @@ fn radius2_um2(lattice: Lattice, r2: i64) -> f64 {
 }
 
 /// The phase of one element: that of the lens and its wedge.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct ElementPhase<'a> {
     lens: &'a LensPhase,
+    /// Phases over the plane that it has.
+    terms: Vec<&'a PhaseTerm>,
     /// Turns a half pitch along x and y.
     step: (f64, f64),
 }
 
 impl<'a> ElementPhase<'a> {
-    /// The lens with a wedge on it.
+    /// The phase of an element.
+    pub fn of(lens: &'a LensPhase, element: &Element) -> Self {
+        Self {
+            terms: lens.terms.iter().filter(|t| t.is_of(element.index)).collect(),
+            ..Self::new(lens, &element.wedge)
+        }
+    }
+
+    /// The lens with a wedge on it and nothing else.
     pub fn new(lens: &'a LensPhase, wedge: &Wedge) -> Self {
         let half_pitch_turns = lens.lattice.pitch_um() / 2.0 / wedge.wavelength_um;
         Self {
             lens,
+            terms: Vec::new(),
             step: (half_pitch_turns * wedge.sin_x, half_pitch_turns * wedge.sin_y),
         }
     }
@@ -116,7 +144,7 @@ impl<'a> ElementPhase<'a> {
 
     /// Whether no wedge is on the lens: its phase is the same at sites of one radius.
     pub fn is_radial(&self) -> bool {
-        self.step == (0.0, 0.0)
+        self.step == (0.0, 0.0) && self.terms.is_empty()
     }
 
     /// Phase at a site (turns), not reduced; none outside the lens.
@@ -127,7 +155,17 @@ impl<'a> ElementPhase<'a> {
             self.lens.lattice.half_index(iy) as f64,
         );
         // The two parts of the wedge are added first: exchanging x and y then gives the same sum.
-        Some(radial + (x * self.step.0 + y * self.step.1))
+        let steered = radial + (x * self.step.0 + y * self.step.1);
+        if self.terms.is_empty() {
+            return Some(steered);
+        }
+        let lattice = self.lens.lattice;
+        let (x_um, y_um) = (lattice.coordinate_um(ix), lattice.coordinate_um(iy));
+        Some(
+            self.terms
+                .iter()
+                .fold(steered, |sum, term| sum + term.turns(x_um, y_um)),
+        )
     }
 
     /// Phase at a site modulo one turn, in [0, 1); none outside the lens.

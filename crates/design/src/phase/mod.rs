@@ -4,6 +4,8 @@
 mod element;
 mod radial;
 mod table;
+mod term;
 
 pub use element::{ElementPhase, LensPhase};
 pub use radial::{Interpolation, RadialPhase};
+pub use term::{MapTable, PhaseTerm, TermForm, ZernikeOrder};

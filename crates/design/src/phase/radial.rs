@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::table;
+use metalith_core::document::Section;
 use metalith_core::{Error, Result};
 
 /// How a table is read between its radii.
@@ -29,6 +30,8 @@ pub enum RadialPhase {
         /// The radius R that r is divided by (um).
         normalisation_um: f64,
     },
+    /// None: what is added over the plane is all.
+    Flat,
     /// Phase (rad) over radius (um), ascending.
     Table {
         #[serde(skip)]
@@ -37,6 +40,16 @@ pub enum RadialPhase {
         radius_um: Vec<f64>,
         phase_rad: Vec<f64>,
     },
+}
+
+impl Interpolation {
+    pub(crate) fn read(s: &Section<'_, '_>) -> Self {
+        s.choice(
+            "interpolation",
+            &[("linear", Self::Linear), ("nearest", Self::Nearest)],
+            Some(Self::Linear),
+        )
+    }
 }
 
 impl RadialPhase {
@@ -111,6 +124,7 @@ impl RadialPhase {
                 let x = radius2_um2 / (normalisation_um * normalisation_um);
                 coefficients_rad.iter().rev().fold(0.0, |sum, a| (sum + a) * x) / std::f64::consts::TAU
             }
+            Self::Flat => 0.0,
             Self::Table {
                 interpolation,
                 radius_um,

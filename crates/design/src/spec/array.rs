@@ -7,23 +7,39 @@ use super::lens::WAVELENGTH;
 use metalith_core::Wedge;
 use metalith_core::document::{Limits, Section};
 
-/// A grid of elements, each the same lens with a wedge of its own.
+/// Elements of one lens, each with a wedge of its own: on a grid, or wherever each is said to be.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ArraySpec {
-    /// Number of elements along x and y, odd, so that one is in the centre.
+    /// Number of elements of the grid along x and y.
     pub count: (u32, u32),
-    /// Distance of neighbouring elements (nm).
+    /// Distance of neighbouring elements of the grid along x (nm).
     pub spacing_nm: i64,
-    /// Steering of an element by each step from the centre (degrees).
+    /// The same along y, where it is another.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spacing_y_nm: Option<i64>,
+    /// Steering of an element by each step from the middle (degrees).
     pub steering_deg: f64,
     /// Wavelength lambda_w at which a wedge steers by its angle (um).
     pub wedge_wavelength_um: f64,
+    /// Elements that are placed one by one, in place of the grid.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub placed: Vec<PlacedSpec>,
+}
+
+/// An element that is placed by itself.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PlacedSpec {
+    /// Centre on the chip (nm).
+    pub centre_nm: (i64, i64),
+    /// Steering along x and y (degrees).
+    pub steering_deg: (f64, f64),
 }
 
 /// One element of the array.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Element {
-    /// Steps from the centre element along x and y: (m, n) of the paper.
+    /// Steps from the middle of the grid along x and y: (m, n) of the paper. Of an even number the two beside the middle are
+    /// -1 and 1. Elements that are placed one by one are counted from (1, 0) on.
     pub index: (i32, i32),
     /// Centre on the chip (nm).
     pub centre_nm: (i64, i64),
@@ -44,18 +60,35 @@ impl Element {
 }
 
 impl ArraySpec {
-    pub(crate) fn read(s: &Section<'_, '_>, lens: &LensSpec) -> Self {
+    pub(crate) fn read(s: &Section<'_, '_>, lens: &LensSpec, placed: &[Section<'_, '_>]) -> Self {
+        let wedge_wavelength_um = s.optional_float("wedge_wavelength_nm", WAVELENGTH).unwrap_or(550.0) * 1e-3;
+        let spec = if placed.is_empty() {
+            Self::read_grid(s, lens, wedge_wavelength_um)
+        } else {
+            Self::read_placed(s, lens, placed, wedge_wavelength_um)
+        };
+        s.finish();
+        spec
+    }
+
+    fn read_grid(s: &Section<'_, '_>, lens: &LensSpec, wedge_wavelength_um: f64) -> Self {
         let count = s.array::<2>("elements", Limits::new(1.0..=99.0, "elements along x and y"));
-        if count.iter().any(|c| c.fract() != 0.0 || c % 2.0 != 1.0) {
+        if count.iter().any(|c| c.fract() != 0.0) {
             s.fault(
                 "elements",
-                format!("{} by {} elements have none in the centre", count[0], count[1]),
-                "use odd whole numbers",
+                format!("{} by {} elements", count[0], count[1]),
+                "use whole numbers",
             );
         }
-        let spacing_um = s.float("spacing_um", Limits::new(1.0..=100_000.0, "um"));
-        let spacing_nm = (spacing_um * 1e3).round() as i64;
-        if count.iter().any(|&c| c > 1.0) && spacing_nm < i64::from(lens.diameter_nm) && s.has("spacing_um") {
+        let range = Limits::new(1.0..=100_000.0, "um");
+        let spacing_um = if s.is_list("spacing_um") {
+            s.array::<2>("spacing_um", range)
+        } else {
+            [s.float("spacing_um", range); 2]
+        };
+        let spacing_nm = spacing_um.map(|um| whole_nm(s, "spacing_um", um));
+        let overlap = (0..2).any(|axis| count[axis] > 1.0 && spacing_nm[axis] < i64::from(lens.diameter_nm));
+        if overlap && s.has("spacing_um") {
             s.fault_given(
                 &["lens.diameter_um", "array.elements"],
                 "spacing_um",
@@ -66,22 +99,20 @@ impl ArraySpec {
                 ),
             );
         }
-        if (spacing_um * 1e3 - spacing_nm as f64).abs() > 1e-6 {
-            s.fault(
-                "spacing_um",
-                format!("{spacing_um} um is not whole nanometres"),
-                "round it to 0.001 um",
-            );
-        }
         let spec = Self {
             count: (count[0] as u32, count[1] as u32),
-            spacing_nm,
+            spacing_nm: spacing_nm[0],
+            spacing_y_nm: (spacing_nm[1] != spacing_nm[0]).then_some(spacing_nm[1]),
             steering_deg: s
                 .optional_float("steering_deg", Limits::new(0.0..=89.0, "degrees"))
                 .unwrap_or(0.0),
-            wedge_wavelength_um: s.optional_float("wedge_wavelength_nm", WAVELENGTH).unwrap_or(550.0) * 1e-3,
+            wedge_wavelength_um,
+            placed: Vec::new(),
         };
-        let outermost = f64::from(spec.count.0.max(spec.count.1) / 2) * spec.steering_deg;
+        let outermost = steps_from_middle(spec.count.0.max(spec.count.1))
+            .next_back()
+            .unwrap_or(0.0)
+            * spec.steering_deg;
         if outermost >= 90.0 {
             s.fault_given(
                 &["array.elements"],
@@ -90,25 +121,170 @@ impl ArraySpec {
                 "keep it below 90",
             );
         }
-        s.finish();
         spec
     }
 
-    /// The elements, row by row from the lowest.
+    /// `[[element]]`: each by itself.
+    fn read_placed(s: &Section<'_, '_>, lens: &LensSpec, placed: &[Section<'_, '_>], wedge_wavelength_um: f64) -> Self {
+        for key in ["elements", "spacing_um", "steering_deg"] {
+            if s.has(key) {
+                s.fault(
+                    key,
+                    "a grid beside elements that are placed one by one",
+                    format!("leave `{key}` out, or the sections `[[element]]`"),
+                );
+            }
+        }
+        let angle = Limits::new(-89.0..=89.0, "degrees");
+        let mut centres: Vec<(i64, i64)> = Vec::new();
+        for s in placed {
+            let [x, y] =
+                ["x_um", "y_um"].map(|key| whole_nm(s, key, s.float(key, Limits::new(-150_000.0..=150_000.0, "um"))));
+            let near = |&(a, b): &(i64, i64)| ((x - a) as f64).hypot((y - b) as f64) < f64::from(lens.diameter_nm);
+            if let Some(other) = centres.iter().position(near) {
+                s.fault_given(
+                    &["lens.diameter_um"],
+                    "x_um",
+                    format!("this lens overlaps that of element ({}, 0)", other + 1),
+                    "place them a lens diameter apart",
+                );
+            }
+            centres.push((x, y));
+        }
+        let steered = placed.iter().map(|s| {
+            let [x, y] =
+                ["steering_x_deg", "steering_y_deg"].map(|key| s.optional_float(key, angle.clone()).unwrap_or(0.0));
+            s.finish();
+            (x, y)
+        });
+        let each = centres
+            .iter()
+            .zip(steered)
+            .map(|(&centre_nm, steering_deg)| PlacedSpec {
+                centre_nm,
+                steering_deg,
+            });
+        Self {
+            count: (0, 0),
+            spacing_nm: 0,
+            spacing_y_nm: None,
+            steering_deg: 0.0,
+            wedge_wavelength_um,
+            placed: each.collect(),
+        }
+    }
+
+    /// The elements: of a grid row by row from the lowest, else as they are listed.
     pub fn elements(&self) -> Vec<Element> {
-        let (mx, my) = (self.count.0 as i32 / 2, self.count.1 as i32 / 2);
-        let wedge_sine = |step: i32| (f64::from(step) * self.steering_deg).to_radians().sin();
-        (-my..=my)
-            .flat_map(|n| (-mx..=mx).map(move |m| (m, n)))
-            .map(|(m, n)| Element {
-                index: (m, n),
-                centre_nm: (i64::from(m) * self.spacing_nm, i64::from(n) * self.spacing_nm),
-                wedge: Wedge {
-                    wavelength_um: self.wedge_wavelength_um,
-                    sin_x: wedge_sine(m),
-                    sin_y: wedge_sine(n),
-                },
-            })
-            .collect()
+        let element = |index, centre_nm, (x_deg, y_deg): (f64, f64)| Element {
+            index,
+            centre_nm,
+            wedge: Wedge {
+                wavelength_um: self.wedge_wavelength_um,
+                sin_x: x_deg.to_radians().sin(),
+                sin_y: y_deg.to_radians().sin(),
+            },
+        };
+        if !self.placed.is_empty() {
+            let each = self.placed.iter().zip(1..);
+            return each
+                .map(|(p, k)| element((k, 0), p.centre_nm, p.steering_deg))
+                .collect();
+        }
+        let spacing_y_nm = self.spacing_y_nm.unwrap_or(self.spacing_nm);
+        let place = |half_steps: i64, spacing_nm: i64| half_steps * spacing_nm / 2;
+        let mut elements = Vec::new();
+        for (n, y) in indices(self.count.1) {
+            for (m, x) in indices(self.count.0) {
+                let steering = |half_steps: i64| 0.5 * half_steps as f64 * self.steering_deg;
+                let centre = (place(x, self.spacing_nm), place(y, spacing_y_nm));
+                elements.push(element((m, n), centre, (steering(x), steering(y))));
+            }
+        }
+        elements
+    }
+
+    /// One element in the middle of the chip, not steered.
+    #[must_use]
+    pub fn alone(&self) -> Self {
+        Self {
+            count: (1, 1),
+            steering_deg: 0.0,
+            placed: Vec::new(),
+            ..self.clone()
+        }
+    }
+
+    /// Distance of neighbouring elements along x and y in words; nothing where they are placed one by one.
+    pub fn spacing_words(&self) -> Option<String> {
+        let um = |nm: i64| nm as f64 * 1e-3;
+        self.placed.is_empty().then(|| match self.spacing_y_nm {
+            None => format!("{} um", um(self.spacing_nm)),
+            Some(y) => format!("{} by {} um", um(self.spacing_nm), um(y)),
+        })
+    }
+}
+
+/// Index of each of so many elements of an axis, and its place in half steps from the middle.
+fn indices(count: u32) -> impl Iterator<Item = (i32, i64)> {
+    (0..i64::from(count)).map(move |k| {
+        let half_steps = 2 * k - (i64::from(count) - 1);
+        let index = if half_steps % 2 == 0 {
+            half_steps / 2
+        } else {
+            (half_steps + half_steps.signum()) / 2
+        };
+        (index as i32, half_steps)
+    })
+}
+
+/// Distances of elements from the middle of an axis of so many (steps), rising.
+fn steps_from_middle(count: u32) -> impl DoubleEndedIterator<Item = f64> {
+    let distances: Vec<f64> = indices(count).map(|(_, half)| 0.5 * half.max(0) as f64).collect();
+    distances.into_iter()
+}
+
+/// A length of a text (um) as whole nanometres.
+fn whole_nm(s: &Section<'_, '_>, key: &str, um: f64) -> i64 {
+    let nm = (um * 1e3).round() as i64;
+    if (um * 1e3 - nm as f64).abs() > 1e-6 {
+        s.fault(key, format!("{um} um is not whole nanometres"), "round it to 0.001 um");
+    }
+    nm
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid(count: (u32, u32)) -> ArraySpec {
+        ArraySpec {
+            count,
+            spacing_nm: 1000,
+            spacing_y_nm: Some(3000),
+            steering_deg: 10.0,
+            wedge_wavelength_um: 0.55,
+            placed: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn grids_of_any_number_are_about_the_middle() {
+        let columns: Vec<_> = grid((4, 1))
+            .elements()
+            .iter()
+            .map(|e| (e.index.0, e.centre_nm.0))
+            .collect();
+        assert_eq!(columns, [(-2, -1500), (-1, -500), (1, 500), (2, 1500)]);
+        let rows: Vec<_> = grid((1, 3))
+            .elements()
+            .iter()
+            .map(|e| (e.index.1, e.centre_nm.1))
+            .collect();
+        assert_eq!(rows, [(-1, -3000), (0, 0), (1, 3000)]);
+        let last = grid((2, 3)).elements()[5];
+        assert_eq!((last.index, last.centre_nm), ((1, 1), (500, 3000)));
+        assert_eq!(last.wedge.sin_x, 5f64.to_radians().sin());
+        assert_eq!(last.wedge.sin_y, 10f64.to_radians().sin());
     }
 }

@@ -3,7 +3,7 @@
 use chrono::NaiveDateTime;
 use serde::Serialize;
 
-use super::{ArraySpec, LensSpec};
+use super::{ArraySpec, Element, LensSpec};
 use metalith_core::LayerNumber;
 use metalith_core::document::{Limits, Section};
 
@@ -88,6 +88,9 @@ pub struct MarkSpec {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LayoutSpec {
     pub hierarchy: Hierarchy,
+    /// Largest distance between a round pillar and its polygon (nm), if the design says it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub circle_chord_error_nm: Option<f64>,
     /// The date in the headers of the file. One fixed date, so that equal designs give equal bytes.
     pub timestamp: NaiveTimestamp,
     pub layers: Layers,
@@ -106,6 +109,7 @@ impl LayoutSpec {
     pub fn read(root: &Section<'_, '_>, lens: &LensSpec, array: &ArraySpec) -> Self {
         let layout = root.optional_section("layout");
         let (mut hierarchy, mut timestamp) = (Hierarchy::Folded, FIXED_TIMESTAMP.to_owned());
+        let mut circle_chord_error_nm = None;
         if let Some(s) = &layout {
             let choices = [
                 ("folded", Hierarchy::Folded),
@@ -123,6 +127,7 @@ impl LayoutSpec {
                 }
                 timestamp = text;
             }
+            circle_chord_error_nm = s.optional_float("circle_chord_error_nm", Limits::new(0.1..=1000.0, "nm"));
             s.finish();
         }
         let layers = Layers::read(&root.section("layers"));
@@ -132,6 +137,7 @@ impl LayoutSpec {
         Self {
             hierarchy,
             timestamp,
+            circle_chord_error_nm,
             layers,
             apertures,
             chip,
@@ -245,8 +251,12 @@ impl ChipSpec {
             nanometres(s, "size_um", size_um[0]),
             nanometres(s, "size_um", size_um[1]),
         );
-        let needed = |count: u32| i64::from(count - 1) * array.spacing_nm + i64::from(lens.diameter_nm);
-        let (x, y) = (needed(array.count.0.max(1)), needed(array.count.1.max(1)));
+        let elements = array.elements();
+        let needed = |centre: fn(&Element) -> i64| {
+            let farthest = elements.iter().map(|e| centre(e).abs()).max().unwrap_or(0);
+            2 * farthest + i64::from(lens.diameter_nm)
+        };
+        let (x, y) = (needed(|e| e.centre_nm.0), needed(|e| e.centre_nm.1));
         if s.has("size_um") && (size_nm.0 < x || size_nm.1 < y) {
             s.fault_given(
                 &["lens.diameter_um", "array.elements", "array.spacing_um"],

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::CellSpec;
-use crate::phase::{Interpolation, RadialPhase};
+use super::{CellSpec, term};
+use crate::phase::{Interpolation, PhaseTerm, RadialPhase};
 use metalith_core::Lattice;
 use metalith_core::document::{Limits, Section};
 
@@ -16,6 +16,9 @@ pub struct LensSpec {
     pub focal_length_um: f64,
     /// Phase over the radius, before wedge and modulo.
     pub phase: RadialPhase,
+    /// Phases over the plane that are added to it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub terms: Vec<PhaseTerm>,
 }
 
 impl LensSpec {
@@ -39,11 +42,19 @@ impl LensSpec {
         }
         let focal_length_um = lens.float("focal_length_um", Limits::new(1.0..=100_000.0, "um"));
         lens.finish();
-        let phase = read_phase(phase, focal_length_um, f64::from(diameter_nm) * 0.5e-3);
+        let radius_um = f64::from(diameter_nm) * 0.5e-3;
+        let terms = phase.sections("term");
+        let terms = terms
+            .iter()
+            .map(|s| term::read(s, focal_length_um, radius_um))
+            .collect();
+        let radial = read_radial(phase, focal_length_um, radius_um);
+        phase.finish();
         Self {
             diameter_nm,
             focal_length_um,
-            phase,
+            phase: radial,
+            terms,
         }
     }
 
@@ -53,19 +64,22 @@ impl LensSpec {
     }
 }
 
-fn read_phase(s: &Section<'_, '_>, focal_length_um: f64, radius_um: f64) -> RadialPhase {
+/// The phase over the radius that a section says.
+pub(super) fn read_radial(s: &Section<'_, '_>, focal_length_um: f64, radius_um: f64) -> RadialPhase {
     #[derive(Clone, Copy)]
     enum PhaseSource {
         Hyperbola,
         EvenPowers,
         Table,
+        Flat,
     }
     let sources = [
         ("hyperbola", PhaseSource::Hyperbola),
         ("even_powers", PhaseSource::EvenPowers),
         ("table", PhaseSource::Table),
+        ("flat", PhaseSource::Flat),
     ];
-    let phase = match s.choice("source", &sources, None) {
+    match s.choice("source", &sources, None) {
         PhaseSource::Hyperbola => RadialPhase::Hyperbola {
             wavelength_um: s.float("wavelength_nm", WAVELENGTH) * 1e-3,
             focal_length_um: s
@@ -88,21 +102,13 @@ fn read_phase(s: &Section<'_, '_>, focal_length_um: f64, radius_um: f64) -> Radi
                     .unwrap_or(radius_um),
             }
         }
-        PhaseSource::Table => RadialPhase::table(
-            s.file("file"),
-            s.choice(
-                "interpolation",
-                &[("linear", Interpolation::Linear), ("nearest", Interpolation::Nearest)],
-                Some(Interpolation::Linear),
-            ),
-        ),
-    };
-    s.finish();
-    phase
+        PhaseSource::Table => RadialPhase::table(s.file("file"), Interpolation::read(s)),
+        PhaseSource::Flat => RadialPhase::Flat,
+    }
 }
 
 /// A hundred million turns: beyond it the fraction of a turn has fewer digits in double precision than a layout needs.
-const COEFFICIENT: Limits = Limits {
+pub(super) const COEFFICIENT: Limits = Limits {
     range: -6e8..=6e8,
     unit: "rad",
 };

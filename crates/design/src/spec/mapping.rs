@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use super::cell::read_band;
 use super::lens::WAVELENGTH;
-use super::{ArraySpec, CellSpec};
+use super::{ArraySpec, CellSpec, Element};
 use metalith_cell::{Basis, InversePolynomial, MappingTable};
 use metalith_core::Result;
 use metalith_core::document::{Limits, Section};
@@ -28,6 +29,18 @@ pub struct MappingSpec {
     /// Mappings of steered elements, where they have their own.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub steered: Vec<SteeredMapping>,
+    /// What mappings are compared over. Decides nothing of the layout.
+    #[serde(skip)]
+    pub comparison: MappingComparison,
+}
+
+/// Wavelengths that a study compares mappings at, where the design says them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MappingComparison {
+    /// Band that a mapping should send light to the first order in (um).
+    pub band_um: Option<(f64, f64)>,
+    /// Single wavelengths that are shown (um).
+    pub wavelengths_um: Vec<f64>,
 }
 
 /// The mapping of the elements that are steered by so many steps, to whichever side: their phase is steep, and what a pillar
@@ -68,7 +81,10 @@ impl MappingSpec {
             basis,
             coefficients,
         };
-        check_widths(s, cell, &polynomial);
+        // A table is held to the widths of the cell when it is read.
+        if !s.has("table") {
+            check_widths(s, cell, &polynomial);
+        }
         let table_file = s.has("table").then(|| s.file("table"));
         if table_file.is_some() && s.has("coefficients") {
             s.fault(
@@ -90,6 +106,14 @@ impl MappingSpec {
                 "give one `[[mapping.steered]]` for each pair of steps",
             );
         }
+        let comparison = MappingComparison {
+            band_um: read_band(s),
+            wavelengths_um: if s.has("compared_nm") {
+                s.floats("compared_nm", WAVELENGTH).iter().map(|nm| nm * 1e-3).collect()
+            } else {
+                Vec::new()
+            },
+        };
         s.finish();
         Self {
             wavelength_um,
@@ -97,6 +121,7 @@ impl MappingSpec {
             table_file,
             table: None,
             steered,
+            comparison,
         }
     }
 
@@ -120,10 +145,12 @@ impl SteeredMapping {
     fn read(s: &Section<'_, '_>, cell: &CellSpec, array: &ArraySpec, common: &InversePolynomial) -> Self {
         let steps = s.array::<2>("steps", Limits::new(0.0..=49.0, "steps from the centre element"));
         let [first, second] = steps.map(|v| v as u32);
-        let outermost = (
-            array.count.0.max(array.count.1) / 2,
-            array.count.0.min(array.count.1) / 2,
-        );
+        let steps_of = |e: &Element| (e.index.0.unsigned_abs(), e.index.1.unsigned_abs());
+        let outermost = array
+            .elements()
+            .iter()
+            .map(steps_of)
+            .fold((0, 0), |most, (m, n)| (most.0.max(m.max(n)), most.1.max(m.min(n))));
         let is_whole = steps.iter().all(|v| v.fract() == 0.0);
         if !is_whole || first == 0 || second > first || first > outermost.0 || second > outermost.1 {
             s.fault_given(
@@ -164,9 +191,7 @@ fn check_widths(s: &Section<'_, '_>, cell: &CellSpec, polynomial: &InversePolyno
     let (low, high) = polynomial.range();
     let pitch = f64::from(cell.pitch_nm);
     let (narrow, wide) = cell.width_range_nm;
-    let half_step = f64::from(cell.width_step_nm) / 2.0;
-    let fits = low * pitch >= f64::from(narrow) - half_step && high * pitch <= f64::from(wide) + half_step;
-    if !fits {
+    if !cell.fits(polynomial) {
         s.fault_given(
             &[
                 "cell.pitch_nm",

@@ -6,12 +6,13 @@ mod layout;
 mod lens;
 mod mapping;
 mod optimise;
+mod term;
 mod verify;
 
-pub use array::{ArraySpec, Element};
-pub use cell::CellSpec;
+pub use array::{ArraySpec, Element, PlacedSpec};
+pub use cell::{CellSpec, UnderSpec};
 pub use layout::{ApertureSpec, ChipSpec, Hierarchy, Layers, LayoutLayer, LayoutSpec, MarkSpec};
 pub use lens::LensSpec;
-pub use mapping::MappingSpec;
+pub use mapping::{MappingComparison, MappingSpec};
 pub use optimise::{MeritSpec, OptimiseSpec, RobustSpec, SolverSpec, StartSpec, ViewSpec};
 pub use verify::{CellIncidence, FieldAngle, LimitSpec, VerifySpec};

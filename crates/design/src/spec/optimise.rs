@@ -13,9 +13,12 @@ pub struct OptimiseSpec {
     /// The cell that phases are optimised with.
     pub fidelity: Fidelity,
     pub solver: SolverSpec,
-    /// First and last wavelength (um), and their distance.
+    /// First and last wavelength (um): those of the design's band where the section does not say them. And their distance.
     pub band_um: (f64, f64),
     pub step_um: f64,
+    /// Whether the section says its band, and the distance.
+    #[serde(skip)]
+    said: [bool; 2],
     /// Largest wrapped phase step from ring to ring (turns); 0.5 is no limit.
     pub step_limit_turns: f64,
     pub start: StartSpec,
@@ -133,6 +136,7 @@ impl OptimiseSpec {
             ),
             solver,
             band_um: (short, long),
+            said: ["band_nm", "step_nm"].map(|key| s.has(key)),
             step_um: s
                 .optional_float("step_nm", Limits::new(0.1..=50.0, "nm"))
                 .unwrap_or(1.0)
@@ -168,7 +172,23 @@ impl OptimiseSpec {
         s.finish();
         spec
     }
+
+    /// Take the band of the design where the section does not say its own, at as many wavelengths as the visible has.
+    pub(crate) fn within(&mut self, band_um: (f64, f64)) {
+        let [band, step] = self.said;
+        if !band {
+            self.band_um = band_um;
+        }
+        if !step {
+            // Whole picometres: 1 nm in the visible, to the last bit.
+            let pm = ((self.band_um.1 - self.band_um.0) * 1e6 / STEPS).round();
+            self.step_um = pm / 1e3 * 1e-3;
+        }
+    }
 }
+
+/// Steps of a band: one of 1 nm in the visible.
+const STEPS: f64 = 300.0;
 
 impl Default for OptimiseSpec {
     fn default() -> Self {
@@ -176,6 +196,7 @@ impl Default for OptimiseSpec {
             fidelity: Fidelity::Rigorous,
             solver: SolverSpec::EXCHANGE,
             band_um: (0.4, 0.7),
+            said: [false; 2],
             step_um: 1e-3,
             step_limit_turns: 0.2,
             start: StartSpec::All,

@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, HashMap};
 
 use super::super::work::Allowance;
-use metalith_core::Progress;
-use metalith_core::{Error, Result};
+use metalith_core::{Error, PillarShape, Progress, Result};
 use metalith_gds::extract::{ElementSite, ExtractedElement, Filler, HeldWidths, Scale, Why};
 use metalith_gds::{
-    LayerNumber, Layout, LayoutCell, Point, Rect, Selection, Shape, Text, Transform, Visitor, rectangle_of, simplified,
+    LayerNumber, Layout, LayoutCell, Point, Rect, Selection, Shape, Text, Transform, Visitor, pillar_of, rectangle_of,
+    simplified,
 };
 
 /// Vertices that may be placed for each that may be held: most corners of rectangles are not.
@@ -22,6 +22,14 @@ pub(super) struct Outlines {
     pub rects: Vec<[i32; 4]>,
     /// Rings from their smallest corner, counter-clockwise, not closed.
     pub rings: Vec<Ring>,
+}
+
+/// What is a pillar, and where.
+#[derive(Clone, Copy)]
+pub(super) struct WantedPillars<'a> {
+    pub layer: LayerNumber,
+    pub shape: PillarShape,
+    pub sites: &'a [ElementSite],
 }
 
 /// One layout.
@@ -81,16 +89,17 @@ impl Content {
     pub fn read(
         layout: &Layout,
         factor: i64,
-        sites: &[ElementSite],
-        pillars: LayerNumber,
+        wanted: WantedPillars<'_>,
         strings: &mut Strings,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let allowance = Allowance::of([layout]);
+        let pillars = wanted.layer;
         let mut reader = ContentReader {
             pillars,
+            shape: wanted.shape,
             factor,
-            filler: Filler::new(sites.to_vec(), Scale::of(layout)?),
+            filler: Filler::new(wanted.sites.to_vec(), Scale::of(layout)?),
             outlines: BTreeMap::new(),
             held: 0,
             most: allowance.rects,
@@ -123,6 +132,7 @@ impl Content {
 
 struct ContentReader<'s> {
     pillars: LayerNumber,
+    shape: PillarShape,
     factor: i64,
     filler: Filler,
     outlines: BTreeMap<LayerNumber, Outlines>,
@@ -137,17 +147,18 @@ struct ContentReader<'s> {
 }
 
 impl ContentReader<'_> {
-    /// A rectangle of the pillar layer. Of two squares on one site the wider counts, in whatever order
-    /// they come; odd widths are off the site by half a unit and are kept as they stand.
+    /// The box around a shape of the pillar layer that may be a pillar. Of two on one site the wider counts, in whatever
+    /// order they come; odd widths are off the site by half a unit and are kept as they stand.
     #[inline]
-    fn pillar(&mut self, r: &Rect, placement: usize) -> Result<()> {
+    fn pillar(&mut self, r: &Rect, placement: usize, corners: impl FnOnce() -> Vec<Point>) -> Result<()> {
         match self.filler.put(r, placement, |width| width % 2 == 0) {
             Ok(true) => Ok(()),
             Err(Why::DuplicateSite) => {
                 let rest = self.filler.keep_wider(r, placement);
                 self.rect(self.pillars, &rest)
             }
-            _ => self.rect(self.pillars, r),
+            _ if self.shape.is_square() => self.rect(self.pillars, r),
+            _ => self.ring(self.pillars, &simplified(&corners())),
         }
     }
 
@@ -193,12 +204,20 @@ impl ContentReader<'_> {
     }
 
     fn outline(&mut self, layer: LayerNumber, placed: &[Point], placement: usize) -> Result<()> {
+        if layer == self.pillars
+            && let Some(r) = pillar_of(placed, self.shape)
+        {
+            return self.pillar(&r, placement, || placed.to_vec());
+        }
         let corners = simplified(placed);
         match rectangle_of(&corners) {
-            Some(r) if layer == self.pillars => return self.pillar(&r, placement),
-            Some(r) => return self.rect(layer, &r),
-            None => {}
+            Some(r) => self.rect(layer, &r),
+            None => self.ring(layer, &corners),
         }
+    }
+
+    /// A closed outline that is kept as it is, without corners that are none.
+    fn ring(&mut self, layer: LayerNumber, corners: &[Point]) -> Result<()> {
         let mut ring: Vec<Point> = corners
             .iter()
             .map(|p| Point::new(p.x.saturating_mul(self.factor), p.y.saturating_mul(self.factor)))
@@ -234,7 +253,7 @@ impl Visitor for ContentReader<'_> {
     #[inline]
     fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> Result<()> {
         let square = placements.iter().all(Transform::is_square);
-        match &shape.rect {
+        match shape.pillar(self.shape) {
             Some(rect) if square && shape.layer == self.pillars => {
                 self.pillar_shapes += placements.len() as u64;
                 if self.filler.put_orbits(rect, placements, |width| width % 2 == 0) {
@@ -242,7 +261,8 @@ impl Visitor for ContentReader<'_> {
                 }
                 for (k, placement) in placements.iter().enumerate() {
                     let placed = placement.apply_rect(rect).unwrap_or(*rect);
-                    self.pillar(&placed, k)?;
+                    let corners = || shape.points.iter().map(|&p| placement.apply(p)).collect();
+                    self.pillar(&placed, k, corners)?;
                 }
             }
             _ => {

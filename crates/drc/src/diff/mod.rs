@@ -18,7 +18,7 @@ pub use report::{Change, ElementDiff, LayerDiff, LayoutDiff, TextAt, TreeDiff, t
 use std::io::Read;
 
 use super::work::Allowance;
-use content::{Content, Strings};
+use content::{Content, Strings, WantedPillars};
 use metalith_core::{Error, Progress, Result};
 use metalith_gds::extract::{Scale, discover};
 use metalith_gds::{LayerNumber, Layout, Selection};
@@ -52,10 +52,13 @@ pub fn diff(a: &Layout, b: &Layout, plan: &DiffPlan, progress: &dyn Progress) ->
     let ((num_a, den_a), (num_b, den_b)) = (a.unit_ratio_nm()?, b.unit_ratio_nm()?);
     let den = den_a / gcd(den_a, den_b) * den_b;
     let factors = [num_a * (den / den_a), num_b * (den / den_b)];
-    let mut sites = Vec::new();
+    let (mut sites, mut shape) = (Vec::new(), None);
     for layout in [a, b] {
         match discover(layout, &everything, &[plan.pillar_layer], Scale::of(layout)?, progress).map_err(Error::from) {
-            Ok(found) => sites::unite(&mut sites, found),
+            Ok(found) => {
+                shape.get_or_insert(found.shape);
+                sites::unite(&mut sites, found.sites);
+            }
             // Without elements, all shapes are compared as outlines.
             Err(Error::Invalid { .. }) => {}
             Err(other) => return Err(other),
@@ -73,8 +76,12 @@ pub fn diff(a: &Layout, b: &Layout, plan: &DiffPlan, progress: &dyn Progress) ->
         site.name = format!("element {}", k + 1);
     }
     let mut strings = Strings::default();
-    let mut content =
-        |layout: &Layout, factor| Content::read(layout, factor, &sites, plan.pillar_layer, &mut strings, progress);
+    let wanted = WantedPillars {
+        layer: plan.pillar_layer,
+        shape: shape.unwrap_or_default(),
+        sites: &sites,
+    };
+    let mut content = |layout: &Layout, factor| Content::read(layout, factor, wanted, &mut strings, progress);
     let (mut first, mut second) = (content(a, factors[0])?, content(b, factors[1])?);
     let strings = strings.sorted([&mut first, &mut second]);
     let mut report = compare::compare(first, second, &strings, 1.0 / den as f64, plan);

@@ -7,11 +7,10 @@ use super::tiles::{MOST_TILES, TileMap};
 use crate::{
     Error, ExtractionError, LayerNumber, Layout, LayoutCell, Point, Rect, Result, Selection, Shape, Transform, Visitor,
 };
-use metalith_core::ElementSite;
-use metalith_core::{Lattice, Progress};
+use metalith_core::{ElementSite, Lattice, PillarShape, Progress};
 
-/// Wider squares are pads or marks (nm).
-const WIDEST_NM: i64 = 4000;
+/// Wider shapes are pads or marks (nm).
+const WIDEST_NM: i64 = 6000;
 /// Fewer squares together are no element.
 const FEWEST: u64 = 16;
 /// Elements found at most.
@@ -31,6 +30,16 @@ struct Map {
     guesses: Vec<u32>,
     /// There are more tiles than are held.
     scattered: bool,
+    /// Squares and circles.
+    shapes: [u64; 2],
+}
+
+/// The elements of a layout from anywhere.
+#[derive(Clone, Debug)]
+pub struct Discovered {
+    pub sites: Vec<ElementSite>,
+    /// What most of its pillars are.
+    pub shape: PillarShape,
 }
 
 /// Find the elements of a layout whose pillars are on these layers.
@@ -40,7 +49,7 @@ pub fn discover(
     layers: &[LayerNumber],
     scale: Scale,
     progress: &dyn Progress,
-) -> Result<Vec<ElementSite>> {
+) -> Result<Discovered> {
     let mut map = Map {
         scale,
         tiles: TileMap::new(),
@@ -48,6 +57,7 @@ pub fn discover(
         placements: Vec::new(),
         guesses: Vec::new(),
         scattered: false,
+        shapes: [0; 2],
     };
     let selection = Selection {
         layers: Some(layers.to_vec()),
@@ -83,7 +93,15 @@ pub fn discover(
     for (k, site) in sites.iter_mut().enumerate() {
         site.name = format!("element {}", k + 1);
     }
-    Ok(sites)
+    let [squares, circles] = map.shapes;
+    Ok(Discovered {
+        sites,
+        shape: if circles > squares {
+            PillarShape::Circle
+        } else {
+            PillarShape::Square
+        },
+    })
 }
 
 /// A square as it is looked for, in half nanometres.
@@ -94,7 +112,7 @@ struct Square {
 }
 
 impl Map {
-    /// A rectangle as a square that may be a pillar.
+    /// The box around a shape as a square that may be a pillar.
     #[inline]
     fn square(&self, r: &Rect) -> Option<Square> {
         if !self.scale.reaches(r) || r.width() != r.height() {
@@ -227,7 +245,10 @@ impl Visitor for Map {
 
     #[inline]
     fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> metalith_core::Result<()> {
-        let Some(rect) = &shape.rect else { return Ok(()) };
+        let Some(rect) = shape.rect.as_ref().or(shape.circle.as_ref()) else {
+            return Ok(());
+        };
+        self.shapes[usize::from(shape.rect.is_none())] += placements.len() as u64;
         // A tile too many, and no more is looked for.
         self.scattered |= self.tiles.len().max(self.own.len()) > MOST_TILES;
         if self.scattered {

@@ -22,10 +22,10 @@ use std::path::Path;
 
 use crate::{Error, ExtractionError, Layout, Result};
 pub use metalith_core::ElementSite;
-use metalith_core::{EighthMap, LayerNumber, PillarReader, Progress, WidthMap};
+use metalith_core::{EighthMap, LayerNumber, PillarReader, PillarShape, Progress, WidthMap};
 use pillars::PillarCollector;
 
-pub use discover::discover;
+pub use discover::{Discovered, discover};
 pub use filler::Filler;
 pub use held::HeldWidths;
 pub use sites::Scale;
@@ -111,7 +111,7 @@ impl PillarReader for GdsPillars {
 /// out of all proportion, or if the file cannot be read.
 pub fn extract(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) -> Result<Extraction> {
     let found = sites_of(layout, plan, progress)?;
-    fits(layout.path(), &found)?;
+    fits(layout.path(), &found.sites)?;
     let folded = extract_from(layout, plan, found, MOST_SITES, progress)?;
     let whole = |e: ExtractedElement<HeldWidths>| ExtractedElement {
         site: e.site,
@@ -119,6 +119,7 @@ pub fn extract(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) 
     };
     Ok(Extraction {
         top: folded.top,
+        shape: folded.shape,
         elements: folded.elements.into_iter().map(whole).collect(),
         pillars: folded.pillars,
         oddities: folded.oddities,
@@ -143,11 +144,14 @@ pub fn extract_folded(
     extract_from(layout, plan, found, most, progress)
 }
 
-/// The elements of a layout: as given, or as found.
-fn sites_of(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) -> Result<Vec<ElementSite>> {
+/// The elements of a layout, as given or as found, and the shape of their pillars.
+fn sites_of(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) -> Result<Discovered> {
     layout.roots(&plan.selection())?;
-    Ok(match &plan.elements {
-        Elements::Given(sites) => sites.clone(),
+    let mut found = match &plan.elements {
+        Elements::Given(sites) => Discovered {
+            sites: sites.clone(),
+            shape: PillarShape::default(),
+        },
         Elements::Discover => discover(
             layout,
             &plan.selection(),
@@ -155,19 +159,21 @@ fn sites_of(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) -> 
             Scale::of(layout)?,
             progress,
         )?,
-    })
+    };
+    found.shape = plan.shape.unwrap_or(found.shape);
+    Ok(found)
 }
 
 fn extract_from(
     layout: &Layout,
     plan: &ExtractionPlan,
-    sites: Vec<ElementSite>,
+    found: Discovered,
     most: u64,
     progress: &dyn Progress,
 ) -> Result<Extraction<HeldWidths>> {
     let selection = plan.selection();
     let top = layout.roots(&selection)?[0];
-    let mut pillars = PillarCollector::new(plan, sites, Scale::of(layout)?, most);
+    let mut pillars = PillarCollector::new(plan, found.shape, found.sites, Scale::of(layout)?, most);
     layout.visit(&selection, &mut pillars, progress)?;
     let name = layout.cells()[top].name.clone();
     pillars.finish(name).map_err(|cause| Error::Extraction {

@@ -11,7 +11,7 @@ pub enum Why {
     OffLattice,
     /// An upright rectangle with unequal sides.
     NotSquare,
-    /// Not an upright rectangle, or not a whole number of nanometres wide.
+    /// Neither an upright rectangle nor a circle, or not a whole number of nanometres wide.
     OddShape,
     /// A second square on a site that has one.
     DuplicateSite,
@@ -19,17 +19,20 @@ pub enum Why {
     OutsideElements,
     /// Wider than the pitch: it overlaps its neighbours' sites.
     TooWide,
+    /// A circle among squares, or a square among circles.
+    OtherShape,
 }
 
 impl Why {
     /// All reasons, in the order of [`Oddities::by_why`].
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::OffLattice,
         Self::NotSquare,
         Self::OddShape,
         Self::DuplicateSite,
         Self::OutsideElements,
         Self::TooWide,
+        Self::OtherShape,
     ];
 
     /// In words.
@@ -37,10 +40,11 @@ impl Why {
         match self {
             Self::OffLattice => "off the lattice",
             Self::NotSquare => "not square",
-            Self::OddShape => "not an upright rectangle",
+            Self::OddShape => "no outline of a pillar",
             Self::DuplicateSite => "second pillar on its site",
             Self::OutsideElements => "outside every element",
             Self::TooWide => "wider than the pitch",
+            Self::OtherShape => "of another shape than the pillars",
         }
     }
 }
@@ -62,7 +66,7 @@ pub struct Oddity {
 pub struct Oddities {
     pub listed: Vec<Oddity>,
     /// Number for each of [`Why::ALL`].
-    pub by_why: [u64; 6],
+    pub by_why: [u64; 7],
 }
 
 impl Oddities {

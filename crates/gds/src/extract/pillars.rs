@@ -6,14 +6,13 @@ use super::oddity::{Oddities, Oddity, Why};
 use super::plan::{Extraction, ExtractionPlan};
 use super::sites::Scale;
 use super::survey::Surveyor;
-use crate::{
-    ExtractionError, LayerNumber, LayoutCell, Point, Rect, Shape, Text, Transform, Visitor, rectangle_of, simplified,
-};
-use metalith_core::ElementSite;
+use crate::{ExtractionError, LayerNumber, LayoutCell, Point, Rect, Shape, Text, Transform, Visitor, pillar_of};
+use metalith_core::{ElementSite, PillarShape};
 
 /// Fills width maps from the shapes of a layout, and lists what is no pillar.
 pub(super) struct PillarCollector {
     layer: LayerNumber,
+    shape: PillarShape,
     listed: usize,
     scale: Scale,
     filler: Filler,
@@ -23,9 +22,10 @@ pub(super) struct PillarCollector {
 
 impl PillarCollector {
     /// Holds `most` sites.
-    pub fn new(plan: &ExtractionPlan, sites: Vec<ElementSite>, scale: Scale, most: u64) -> Self {
+    pub fn new(plan: &ExtractionPlan, shape: PillarShape, sites: Vec<ElementSite>, scale: Scale, most: u64) -> Self {
         Self {
             layer: plan.pillar_layer,
+            shape,
             listed: plan.listed,
             scale,
             filler: Filler::new(sites, scale).holding(most),
@@ -37,6 +37,7 @@ impl PillarCollector {
     pub fn finish(self, top: String) -> Result<Extraction<HeldWidths>, ExtractionError> {
         Ok(Extraction {
             top,
+            shape: self.shape,
             pillars: self.filler.pillars(),
             elements: self.filler.finish()?,
             oddities: self.oddities,
@@ -44,9 +45,9 @@ impl PillarCollector {
         })
     }
 
-    /// An upright rectangle of the layout.
+    /// The square around a shape that may be a pillar.
     #[inline]
-    fn rectangle(&mut self, r: &Rect, placement: usize, offset: u64) {
+    fn candidate(&mut self, r: &Rect, placement: usize, offset: u64) {
         if let Err(why) = self.filler.put(r, placement, |_| true) {
             self.odd(why, r, offset);
         }
@@ -64,14 +65,20 @@ impl PillarCollector {
         self.oddities.add(oddity, self.listed);
     }
 
-    /// An outline that is no rectangle as it stands: it may be one with more vertices than it needs, or
-    /// become one where it is placed.
+    /// An outline that is no pillar as it stands: it may be a rectangle with more vertices than it needs, or become one where
+    /// it is placed.
     #[cold]
     fn polygon(&mut self, shape: &Shape<'_>, placements: &[Transform]) {
         for (k, placement) in placements.iter().enumerate() {
             let placed: Vec<Point> = shape.points.iter().map(|&p| placement.apply(p)).collect();
-            match rectangle_of(&simplified(&placed)) {
-                Some(r) => self.rectangle(&r, k, shape.offset),
+            let other = || {
+                PillarShape::CHOICES
+                    .iter()
+                    .any(|(_, s)| pillar_of(&placed, *s).is_some())
+            };
+            match pillar_of(&placed, self.shape) {
+                Some(r) => self.candidate(&r, k, shape.offset),
+                None if other() => self.odd(Why::OtherShape, &Rect::around(&placed), shape.offset),
                 None => self.odd(Why::OddShape, &Rect::around(&placed), shape.offset),
             }
         }
@@ -91,14 +98,14 @@ impl Visitor for PillarCollector {
         if shape.layer != self.layer {
             return Ok(());
         }
-        match &shape.rect {
+        match shape.pillar(self.shape) {
             Some(rect) if placements.iter().all(Transform::is_square) => {
                 if self.filler.put_orbits(rect, placements, |_| true) {
                     return Ok(());
                 }
                 for (k, placement) in placements.iter().enumerate() {
                     let placed = placement.apply_rect(rect).unwrap_or(*rect);
-                    self.rectangle(&placed, k, shape.offset);
+                    self.candidate(&placed, k, shape.offset);
                 }
             }
             _ => self.polygon(shape, placements),

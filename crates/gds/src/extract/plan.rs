@@ -3,7 +3,7 @@
 use super::oddity::Oddities;
 use super::survey::Survey;
 use crate::{LayerNumber, Selection};
-use metalith_core::{ElementSite, WidthMap};
+use metalith_core::{ElementSite, PillarShape, WidthMap};
 
 /// Where the elements are.
 #[derive(Clone, Debug)]
@@ -20,6 +20,8 @@ pub enum Elements {
 pub struct ExtractionPlan {
     /// Layer that the pillars are on.
     pub pillar_layer: LayerNumber,
+    /// What the pillars are; where it is left out, what most shapes of the elements that are found are.
+    pub shape: Option<PillarShape>,
     pub elements: Elements,
     /// Cell to start from; the top cell if there is one only.
     pub top: Option<String>,
@@ -28,13 +30,23 @@ pub struct ExtractionPlan {
 }
 
 impl ExtractionPlan {
-    /// The elements of a design.
+    /// The elements of a design, square pillars.
     pub fn given(pillar_layer: LayerNumber, elements: Vec<ElementSite>) -> Self {
         Self {
             pillar_layer,
+            shape: Some(PillarShape::Square),
             elements: Elements::Given(elements),
             top: None,
             listed: 1000,
+        }
+    }
+
+    /// The same for pillars of this shape.
+    #[must_use]
+    pub fn of_shape(self, shape: PillarShape) -> Self {
+        Self {
+            shape: Some(shape),
+            ..self
         }
     }
 
@@ -49,6 +61,7 @@ impl ExtractionPlan {
     /// A layout from anywhere.
     pub fn discover(pillar_layer: LayerNumber) -> Self {
         Self {
+            shape: None,
             elements: Elements::Discover,
             ..Self::given(pillar_layer, Vec::new())
         }
@@ -68,9 +81,11 @@ pub struct Extraction<W = WidthMap> {
     /// Name of the cell that was read.
     pub top: String,
     pub elements: Vec<ExtractedElement<W>>,
-    /// Squares on a lattice, over all elements.
+    /// What the pillars are.
+    pub shape: PillarShape,
+    /// Pillars on a lattice, over all elements.
     pub pillars: u64,
-    /// Everything on the pillar layer that is not a square on the lattice of an element.
+    /// Everything on the pillar layer that is not a pillar on the lattice of an element.
     pub oddities: Oddities,
     /// All layers and texts.
     pub survey: Survey,

@@ -6,7 +6,7 @@ mod trees;
 
 use std::path::PathBuf;
 
-use metalith_core::{Lattice, Silent, WidthMap};
+use metalith_core::{Lattice, PillarShape, Silent, WidthMap};
 use metalith_gds::extract::{ElementSite, ExtractionPlan, Why, extract};
 use metalith_gds::{
     Error, LayerNumber, Layout, LayoutError, Limit, Point, ReadLimits, Rect, Selection, Shape, Transform, Visitor,
@@ -132,6 +132,40 @@ fn files_of_other_tools_hold_the_same_lens() {
     }
 }
 
+/// The polygon of a circle about a place, closed.
+fn circle_of_points(x: i32, y: i32, diameter: u32) -> Vec<(i32, i32)> {
+    let corners = metalith_core::circle_corners(diameter, 0.5);
+    let closed = corners.iter().chain(corners.first());
+    closed.map(|&(dx, dy)| (x + dx as i32, y + dy as i32)).collect()
+}
+
+/// Circles of two diameters on a lattice, and one square among them.
+#[test]
+fn circles_are_pillars_where_most_are() {
+    let mut gds = Gds::library();
+    gds.cell("TOP");
+    for k in 0..36 {
+        let (x, y) = (175 + 350 * (k % 6) - 1050, 175 + 350 * (k / 6) - 1050);
+        if k == 7 {
+            gds.square(1, x, y, 200);
+        } else {
+            gds.polygon(1, &circle_of_points(x, y, if k % 2 == 0 { 200 } else { 120 }));
+        }
+    }
+    gds.end_cell();
+    let file = layout(gds.end());
+    let read = extract(&file, &ExtractionPlan::discover(PILLARS), &Silent).unwrap();
+    assert_eq!(read.shape, PillarShape::Circle);
+    assert_eq!((read.elements.len(), read.pillars), (1, 35));
+    let widths = &read.elements[0].widths.width_nm;
+    assert_eq!((widths[[0, 0]], widths[[0, 1]], widths[[1, 1]]), (200, 120, 0));
+    assert_eq!(read.oddities.listed[0].why, Why::OtherShape);
+    // Taken for squares, they are none.
+    let squares = ExtractionPlan::discover(PILLARS).of_shape(PillarShape::Square);
+    let read = extract(&file, &squares, &Silent).unwrap();
+    assert_eq!((read.pillars, read.oddities.total()), (1, 35));
+}
+
 /// One of each oddity, and each for the right reason, at the right place.
 #[test]
 fn everything_that_is_not_a_pillar_is_listed() {
@@ -143,6 +177,8 @@ fn everything_that_is_not_a_pillar_is_listed() {
     gds.polygon(1, &[(0, 600), (100, 600), (50, 700), (0, 600)]); // odd
     gds.square(1, 9000, 0, 100); // outside
     gds.square(1, -175, -175, 360); // too wide
+    let circle = circle_of_points(-525, 175, 100);
+    gds.polygon(1, &circle); // a circle among squares
     gds.square(2, 0, 0, 100); // on another layer
     // A square with two vertices more than it needs is one.
     gds.polygon(
@@ -164,7 +200,7 @@ fn everything_that_is_not_a_pillar_is_listed() {
         lattice: Lattice::new(350, 4).unwrap(),
     };
     let read = extract(&layout(gds.end()), &ExtractionPlan::given(PILLARS, vec![site]), &Silent).unwrap();
-    assert_eq!(read.oddities.by_why, [1; 6]);
+    assert_eq!(read.oddities.by_why, [1; 7]);
     let whys: Vec<_> = read.oddities.listed.iter().map(|o| o.why).collect();
     assert_eq!(
         whys,
@@ -174,7 +210,8 @@ fn everything_that_is_not_a_pillar_is_listed() {
             Why::NotSquare,
             Why::OddShape,
             Why::OutsideElements,
-            Why::TooWide
+            Why::TooWide,
+            Why::OtherShape
         ]
     );
     assert_eq!(read.oddities.listed[1].centre_nm, [526.0, 175.0]);

@@ -7,6 +7,7 @@ use metalith_design::array::{DomainPart, SymmetryGroup};
 use metalith_oasis::{CellBounds, CompressedBlock, Placing, RecordBuffer, Repetition};
 use rayon::prelude::*;
 
+use super::super::form::PillarForm;
 use super::rings;
 
 /// Bytes of records that are compressed together: smaller blocks cost size, larger ones memory.
@@ -25,8 +26,8 @@ const SAMPLE: usize = 6;
 pub(super) enum PillarEncoding {
     /// Lists of places in strips.
     Lists(StripsOf),
-    /// A rectangle for each.
-    Rectangles,
+    /// The outline of each.
+    Outlines,
     /// A reference for each, to cells of one width.
     References,
 }
@@ -57,7 +58,7 @@ impl PillarEncoding {
     fn bytes_of_pillar(self) -> u64 {
         match self {
             Self::Lists(_) => 2,
-            Self::Rectangles | Self::References => 6,
+            Self::Outlines | Self::References => 6,
         }
     }
 
@@ -78,6 +79,7 @@ pub(super) struct ElementPillars<'a> {
     /// Columns of each part in each row.
     runs: Vec<Vec<[Range<usize>; 2]>>,
     layer: LayerNumber,
+    form: PillarForm,
     /// Number of the cell of each width, for references.
     pub width_cells: Vec<u64>,
     /// Of compression, 1 to 9.
@@ -128,6 +130,7 @@ impl<'a> ElementPillars<'a> {
         group: &'a SymmetryGroup,
         parts: &'a [DomainPart],
         layer: LayerNumber,
+        form: PillarForm,
         level: u32,
     ) -> Self {
         let n = widths.lattice().sites();
@@ -138,6 +141,7 @@ impl<'a> ElementPillars<'a> {
             parts,
             runs: parts.iter().map(runs).collect(),
             layer,
+            form,
             width_cells: Vec::new(),
             level,
         }
@@ -329,9 +333,14 @@ impl<'a> ElementPillars<'a> {
             places.iter_mut().for_each(|p| *p = [p[0] - first[0], p[1] - first[1]]);
             let grid = i64::from(lattice.pitch_nm());
             let list = Repetition::List { grid, places };
-            let corner = at(first[0], first[1]).map(|c| c - side / 2);
-            out.records
-                .rectangle(self.layer(), corner, [side; 2], (count > 1).then_some(&list));
+            let (centre, copies) = (at(first[0], first[1]), (count > 1).then_some(&list));
+            if self.form.is_square() {
+                let corner = centre.map(|c| c - side / 2);
+                out.records.rectangle(self.layer(), corner, [side; 2], copies);
+            } else {
+                let cell = self.width_cells[width];
+                out.records.placement(cell, centre, &Placing::PLAIN, copies);
+            }
             out.written(count);
             if let Repetition::List { mut places, .. } = list {
                 places.clear();
@@ -343,6 +352,8 @@ impl<'a> ElementPillars<'a> {
     /// Pillars of a sector, one record each, ring by ring.
     fn sector(&self, encoding: PillarEncoding, sector: usize, rings: i64, out: &mut [Packer]) {
         let lattice = self.widths.lattice();
+        // Outlines that are no squares, by width: made once a sector.
+        let mut corners: Vec<Vec<[i64; 2]>> = Vec::new();
         rings::walk(lattice.sites(), sector, rings, |ix, iy| {
             if let Some(part) = self.group.part_of(self.parts, lattice.sites(), ix, iy)
                 && let width = self.widths.width(ix, iy)
@@ -354,9 +365,19 @@ impl<'a> ElementPillars<'a> {
                 if encoding == PillarEncoding::References {
                     let cell = self.width_cells[usize::from(width)];
                     out.records.placement(cell, centre, &Placing::PLAIN, None);
-                } else {
+                } else if self.form.is_square() {
                     out.records
                         .rectangle(self.layer(), centre.map(|c| c - side / 2), [side; 2], None);
+                } else {
+                    if corners.len() <= usize::from(width) {
+                        corners.resize(usize::from(width) + 1, Vec::new());
+                    }
+                    let own = &mut corners[usize::from(width)];
+                    if own.is_empty() {
+                        own.extend(self.form.corners(width).iter().map(|&(x, y)| [x, y]));
+                    }
+                    let placed: Vec<[i64; 2]> = own.iter().map(|[x, y]| [centre[0] + x, centre[1] + y]).collect();
+                    out.records.polygon(self.layer(), &placed, None);
                 }
                 out.include(centre, side);
                 out.written(1);

@@ -12,6 +12,7 @@ use metalith_design::{Design, Hierarchy, LayoutLayer};
 use metalith_oasis::{CompressedBlock, OasisWriter, Placing, RecordBuffer};
 
 use super::fixed::FixedShapes;
+use super::form::PillarForm;
 use super::{OasisEncoding, Written, no_copies, no_symmetry, top_cell};
 use encode::{ElementPillars, NOTHING, PillarEncoding, bounds_of, unite};
 
@@ -49,6 +50,7 @@ pub fn write_pillars_oasis(
     let mut elements = Elements {
         file: &mut file,
         layer: pillars,
+        form: PillarForm::of(design),
         encoding,
         width_cells: vec![None; usize::from(u16::MAX) + 1],
         progress,
@@ -230,6 +232,7 @@ fn numbers(layer: &LayoutLayer) -> [u32; 2] {
 struct Elements<'f, 'p> {
     file: &'f mut OasisFile<'p>,
     layer: &'f LayoutLayer,
+    form: PillarForm,
     encoding: OasisEncoding,
     /// Cells of one width that were referred to.
     width_cells: Vec<Option<u64>>,
@@ -287,7 +290,7 @@ impl Elements<'_, '_> {
         group: &'e SymmetryGroup,
         parts: &'e [DomainPart],
     ) -> ElementPillars<'e> {
-        ElementPillars::new(widths, group, parts, self.layer.number(), self.level())
+        ElementPillars::new(widths, group, parts, self.layer.number(), self.form, self.level())
     }
 
     /// A lens of parts.
@@ -314,7 +317,7 @@ impl Elements<'_, '_> {
     fn pillars(&mut self, names: &[String], pillars: &mut ElementPillars<'_>) -> Result<Vec<(u64, [i64; 4])>> {
         let encoding = match self.encoding {
             OasisEncoding::Compact => pillars.lists(),
-            OasisEncoding::Plain => PillarEncoding::Rectangles,
+            OasisEncoding::Plain => PillarEncoding::Outlines,
             OasisEncoding::Smallest => self.smallest(pillars),
         };
         pillars.width_cells = self.numbers_of_widths(pillars.widths, encoding);
@@ -349,7 +352,12 @@ impl Elements<'_, '_> {
 
     /// Numbers of the cells of all widths, by width, if the encoding refers to them.
     fn numbers_of_widths(&mut self, widths: &dyn WidthRows, encoding: PillarEncoding) -> Vec<u64> {
-        if encoding != PillarEncoding::References {
+        let refers = match encoding {
+            PillarEncoding::References => true,
+            PillarEncoding::Lists(_) => !self.form.is_square(),
+            PillarEncoding::Outlines => false,
+        };
+        if !refers {
             return Vec::new();
         }
         let counts = widths.histogram();
@@ -367,7 +375,13 @@ impl Elements<'_, '_> {
             if number.is_some() {
                 let half = width as i64 / 2;
                 let mut records = RecordBuffer::absolute();
-                records.rectangle(numbers(self.layer), [-half; 2], [width as i64; 2], None);
+                if self.form.is_square() {
+                    records.rectangle(numbers(self.layer), [-half; 2], [width as i64; 2], None);
+                } else {
+                    let corners = self.form.corners(width as u16);
+                    let corners: Vec<[i64; 2]> = corners.iter().map(|&(x, y)| [x, y]).collect();
+                    records.polygon(numbers(self.layer), &corners, None);
+                }
                 let name = super::pillars::width_name(width);
                 self.file.cell(&name, &records, [-half, -half, half, half])?;
             }

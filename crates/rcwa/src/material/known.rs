@@ -1,5 +1,6 @@
 //! Materials that can be named: published fits, each with its source and its range.
 
+use super::films;
 use super::form::Dispersion;
 
 /// A named material: name, source, formula.
@@ -10,7 +11,7 @@ pub(super) struct Known {
 }
 
 /// What can be named in a design. Each is the published fit, in its published range.
-pub(super) const KNOWN: [Known; 6] = [
+pub(super) const KNOWN: &[Known] = &[
     Known {
         name: "sin_luke_2015",
         source: "silicon nitride, LPCVD film: Luke et al., Opt. Lett. 40, 4823 (2015)",
@@ -61,8 +62,73 @@ pub(super) const KNOWN: [Known; 6] = [
         },
     },
     Known {
+        name: "sin_poor_vogt_2015",
+        source: "silicon nitride, n = 1.91 at 633 nm: film 1 of Vogt, thesis, Leibniz Universitaet Hannover (2015)",
+        form: || samples(films::SIN_POOR),
+    },
+    Known {
+        name: "sin_rich_vogt_2015",
+        source: "silicon nitride, n = 2.13 at 633 nm: film 3 of Vogt, thesis, Leibniz Universitaet Hannover (2015)",
+        form: || samples(films::SIN_RICH),
+    },
+    Known {
+        name: "a_si_pierce_1972",
+        source: "amorphous silicon, evaporated film: Pierce and Spicer, Phys. Rev. B 5, 3017 (1972), as sampled in Palik's \
+                 Handbook of Optical Constants of Solids (1985)",
+        form: || samples(films::A_SI),
+    },
+    Known {
+        name: "c_si_salzberg_1957",
+        source: "crystalline silicon: Salzberg and Villa, J. Opt. Soc. Am. 47, 244 (1957), formula by Tatian, Appl. Opt. 23, \
+                 4477 (1984)",
+        form: || Dispersion::Sellmeier {
+            terms: vec![
+                (10.668_429_3, 0.301_516_485),
+                (0.003_043_474_8, 1.134_751_15),
+                (1.541_334_08, 1104.0),
+            ],
+            range_um: (1.357, 11.04),
+        },
+    },
+    Known {
+        name: "tio2_siefke_2016",
+        source: "titanium dioxide, ALD film: Siefke et al., Adv. Opt. Mater. 4, 1780 (2016)",
+        form: || samples(films::TIO2_ALD),
+    },
+    Known {
+        name: "tio2_rutile_devore_1951",
+        source: "rutile, ordinary ray: Devore, J. Opt. Soc. Am. 41, 416 (1951)",
+        // n^2 = 5.913 + 0.2441 / (L^2 - 0.0803), as a constant and one resonance.
+        form: || Dispersion::Sellmeier {
+            terms: vec![
+                (5.913 - 1.0 - 0.2441 / 0.0803, 0.0),
+                (0.2441 / 0.0803, 0.0803_f64.sqrt()),
+            ],
+            range_um: (0.43, 1.53),
+        },
+    },
+    Known {
+        name: "gan_barker_1973",
+        source: "gallium nitride, ordinary ray: Barker and Ilegems, Phys. Rev. B 7, 743 (1973)",
+        form: || Dispersion::Sellmeier {
+            terms: vec![(2.60, 0.0), (1.75, 0.256), (4.1, 17.86)],
+            range_um: (0.35, 10.0),
+        },
+    },
+    Known {
+        name: "nb2o5_lemarchand_2013",
+        source: "niobium pentoxide, sputtered film: Lemarchand (2013), measured as in Gao et al., Opt. Express 20, 15734 (2012)",
+        form: || samples(films::NB2O5),
+    },
+    Known {
         name: "air",
         source: "n = 1",
         form: || Dispersion::Constant { n: 1.0, k: 0.0 },
     },
 ];
+
+fn samples(known: &[[f64; 3]]) -> Dispersion {
+    Dispersion::Table {
+        samples: known.to_vec(),
+    }
+}

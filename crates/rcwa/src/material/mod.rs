@@ -1,5 +1,6 @@
 //! Refractive indices: published dispersion formulas with their ranges, constants, tables.
 
+mod films;
 mod form;
 mod known;
 mod table;
@@ -198,6 +199,14 @@ mod tests {
             ("sin_philipp_1973", 0.5876, 2.0167),
             ("alumina_malitson_dodge_1972", 0.5876, 1.7682),
             ("alumina_zhukovsky_2015", 0.500_005, 1.633_752),
+            ("a_si_pierce_1972", 1.550, 3.48),
+            ("c_si_salzberg_1957", 10.6, 3.4175),
+            ("tio2_siefke_2016", 0.533_748, 2.448_51),
+            ("tio2_rutile_devore_1951", 0.5893, 2.613),
+            ("gan_barker_1973", 0.6, 2.394_8),
+            ("nb2o5_lemarchand_2013", 0.55, 2.360_3),
+            ("sin_poor_vogt_2015", 0.64, 1.904),
+            ("sin_rich_vogt_2015", 0.64, 2.131),
         ] {
             let got = index(name, wavelength_um);
             assert!((got - want).abs() < PRINTED, "{name}: {got}");

@@ -1,0 +1,175 @@
+//! Phases from a table over the plane.
+
+use std::f64::consts::TAU;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use super::super::Interpolation;
+use metalith_core::{Error, Result, npy};
+
+/// Entries of a table along an axis at most: sites of the largest lens that is held.
+const MOST: u64 = 1 << 15;
+
+/// Phase (rad) on a square grid about the middle; between its places straight lines or the nearest entry.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MapTable {
+    #[serde(skip)]
+    file: PathBuf,
+    /// Distance of its places (um).
+    pitch_um: f64,
+    interpolation: Interpolation,
+    /// Known up to whole turns: what is between two places is that of the sum of their waves.
+    wrapped: bool,
+    /// SHA-256 of the values, in hexadecimal.
+    digest: String,
+    /// Columns, and values in turns, rows along x, the lowest y first.
+    #[serde(skip)]
+    values: Arc<(usize, Vec<f64>)>,
+}
+
+impl MapTable {
+    /// A table that is still to be loaded.
+    pub fn new(file: PathBuf, pitch_um: f64, interpolation: Interpolation, wrapped: bool) -> Self {
+        Self {
+            file,
+            pitch_um,
+            interpolation,
+            wrapped,
+            digest: String::new(),
+            values: Arc::default(),
+        }
+    }
+
+    /// Load the table for places up to these distances along x and y (um).
+    ///
+    /// # Errors
+    /// If the file is no NPY array of shape `[ny, nx]`, holds what is no number, or ends before.
+    pub(super) fn load(&mut self, reach_um: [f64; 2]) -> Result<()> {
+        let fault = |what: String, hint: &str| Error::Table {
+            path: self.file.clone(),
+            line: None,
+            what,
+            hint: hint.into(),
+        };
+        let array = read(&self.file)?;
+        let [rows, columns] = [array.shape[0], array.shape[1]].map(|n| n as usize);
+        if let Some(at) = array.values.iter().position(|v| !v.is_finite()) {
+            return Err(fault(
+                format!("entry [{}, {}] is {}", at / columns, at % columns, array.values[at]),
+                "every phase must be a finite number, in rad",
+            ));
+        }
+        // Half a place beyond the last is still nearest to it.
+        let extent = [columns, rows].map(|n| n as f64 * self.pitch_um / 2.0);
+        if extent[0] < reach_um[0] || extent[1] < reach_um[1] {
+            return Err(fault(
+                format!(
+                    "{columns} by {rows} places of {} um reach to {} and {} um, the lens to {} and {} um",
+                    self.pitch_um, extent[0], extent[1], reach_um[0], reach_um[1]
+                ),
+                "extend the table, give its pitch in um, or make the lens smaller",
+            ));
+        }
+        let mut digest = Sha256::new();
+        digest.update((columns as u64).to_le_bytes());
+        array.values.iter().for_each(|v| digest.update(v.to_le_bytes()));
+        self.digest = digest.finalize().iter().map(|b| format!("{b:02x}")).collect();
+        self.values = Arc::new((columns, array.values.iter().map(|rad| rad / TAU).collect()));
+        Ok(())
+    }
+
+    /// Phase at a place from the middle of the table (um), in turns; beyond the table, that of its edge.
+    pub(super) fn turns(&self, x_um: f64, y_um: f64) -> f64 {
+        let (columns, values) = &*self.values;
+        if values.is_empty() {
+            return 0.0;
+        }
+        let rows = values.len() / columns;
+        let place = |um: f64, n: usize| (um / self.pitch_um + 0.5 * (n - 1) as f64).clamp(0.0, (n - 1) as f64);
+        let (x, y) = (place(x_um, *columns), place(y_um, rows));
+        let at = |ix: usize, iy: usize| values[iy.min(rows - 1) * columns + ix.min(columns - 1)];
+        if self.interpolation == Interpolation::Nearest {
+            return at(x.round() as usize, y.round() as usize);
+        }
+        let (ix, iy) = (x.floor() as usize, y.floor() as usize);
+        let (u, v) = (x - ix as f64, y - iy as f64);
+        let corners = [
+            (at(ix, iy), (1.0 - u) * (1.0 - v)),
+            (at(ix + 1, iy), u * (1.0 - v)),
+            (at(ix, iy + 1), (1.0 - u) * v),
+            (at(ix + 1, iy + 1), u * v),
+        ];
+        if !self.wrapped {
+            return corners.iter().map(|(turns, weight)| turns * weight).sum();
+        }
+        let wave = |part: fn(f64) -> f64| {
+            corners
+                .iter()
+                .map(|(turns, weight)| part(turns * TAU) * weight)
+                .sum::<f64>()
+        };
+        let (re, im) = (wave(f64::cos), wave(f64::sin));
+        im.atan2(re) / TAU
+    }
+}
+
+/// An array of two axes.
+fn read(path: &Path) -> Result<npy::Array> {
+    let array = npy::read(path, |shape| {
+        shape.len() == 2 && shape.iter().all(|n| (2..=MOST).contains(n))
+    });
+    array.map_err(|error| match error {
+        npy::NpyError::Io(error) => Error::io("read", path)(error),
+        other => Error::Table {
+            path: path.to_owned(),
+            line: None,
+            what: other.to_string(),
+            hint: format!("save phases in rad as an array [ny, nx] of 2 to {MOST} each, float64 or float32 in C order"),
+        },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table(interpolation: Interpolation, wrapped: bool) -> MapTable {
+        MapTable {
+            values: Arc::new((3, vec![0.0, 0.1, 0.2, 0.45, 0.55, 0.65])),
+            ..MapTable::new(PathBuf::new(), 2.0, interpolation, wrapped)
+        }
+    }
+
+    #[test]
+    fn rows_rise_with_y_and_columns_with_x() {
+        const ROUNDING: f64 = 1e-12;
+        let linear = table(Interpolation::Linear, false);
+        let nearest = table(Interpolation::Nearest, false);
+        for (x, y, want) in [
+            (-2.0, -1.0, 0.0),
+            (2.0, 1.0, 0.65),
+            (0.0, 0.0, 0.325),
+            (1.0, -1.0, 0.15),
+            (9.0, 9.0, 0.65),
+        ] {
+            assert!((linear.turns(x, y) - want).abs() < ROUNDING, "{x} {y}");
+        }
+        assert!((nearest.turns(0.9, -0.9) - 0.1).abs() < ROUNDING);
+    }
+
+    #[test]
+    fn wrapped_phases_are_joined_the_short_way() {
+        const ROUNDING: f64 = 1e-9;
+        let ends = MapTable {
+            values: Arc::new((2, vec![0.95, 0.05, 0.95, 0.05])),
+            ..MapTable::new(PathBuf::new(), 2.0, Interpolation::Linear, true)
+        };
+        let between = ends.turns(0.0, 0.0);
+        assert!((between - between.round()).abs() < ROUNDING, "{between}");
+        let plain = MapTable { wrapped: false, ..ends };
+        assert!((plain.turns(0.0, 0.0) - 0.5).abs() < ROUNDING);
+    }
+}

@@ -1,0 +1,179 @@
+//! Phases over the plane of an element that are added to the radial phase of the lens.
+
+mod map;
+mod optic_studio;
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::RadialPhase;
+use metalith_core::{Result, Zernike};
+
+pub use map::MapTable;
+
+/// A phase over the plane of an element, and the elements that have it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PhaseTerm {
+    pub form: TermForm,
+    /// What the phase is multiplied by.
+    pub scale: f64,
+    /// Middle of the phase, from that of the element (um).
+    pub centre_um: [f64; 2],
+    /// Indices of the elements that have it; all where none is named.
+    pub elements: Vec<(i32, i32)>,
+}
+
+/// Where a phase comes from.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TermForm {
+    /// A phase over the radius.
+    Radial(RadialPhase),
+    /// A table over the plane.
+    Map(MapTable),
+    /// Sum of Zernike polynomials.
+    Zernike {
+        order: ZernikeOrder,
+        /// Of the first polynomials of that order (turns).
+        coefficients: Vec<f64>,
+        /// Radius of the disc that they are orthogonal over (um).
+        radius_um: f64,
+    },
+    /// Sum of `a x^i y^j`, with lengths in parts of a radius: "Binary 1" in optical design programs.
+    Polynomial {
+        /// Powers of x and y, and the coefficient (rad).
+        terms: Vec<(u32, u32, f64)>,
+        /// What lengths are divided by (um).
+        radius_um: f64,
+    },
+    /// A surface of a lens file of OpticStudio, still to be read.
+    OpticStudio {
+        #[serde(skip)]
+        file: PathBuf,
+        surface: Option<u32>,
+    },
+}
+
+/// The order in which Zernike polynomials are counted, and how they are normalised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ZernikeOrder {
+    /// Noll's order, an rms of one over the disc.
+    Standard,
+    /// The order of the University of Arizona, a largest value of one.
+    Fringe,
+}
+
+impl PhaseTerm {
+    /// Read the file that it names, if it does, for a lens of this radius (um).
+    ///
+    /// # Errors
+    /// If the file is not what it should be, or does not cover the lens.
+    pub fn load(&mut self, lens_radius_um: f64) -> Result<()> {
+        let reach_um = lens_radius_um + self.centre_um[0].hypot(self.centre_um[1]);
+        match &mut self.form {
+            TermForm::Radial(radial) => radial.load(reach_um),
+            TermForm::Map(map) => {
+                let [x, y] = self.centre_um.map(f64::abs);
+                map.load([lens_radius_um + x, lens_radius_um + y])
+            }
+            TermForm::OpticStudio { file, surface } => {
+                self.form = optic_studio::read(file, *surface)?;
+                Ok(())
+            }
+            TermForm::Zernike { .. } | TermForm::Polynomial { .. } => Ok(()),
+        }
+    }
+
+    /// Whether an element has it.
+    pub fn is_of(&self, element: (i32, i32)) -> bool {
+        self.elements.is_empty() || self.elements.contains(&element)
+    }
+
+    /// Phase at a place from the middle of the element (um), in turns, not reduced.
+    pub fn turns(&self, x_um: f64, y_um: f64) -> f64 {
+        let (x, y) = (x_um - self.centre_um[0], y_um - self.centre_um[1]);
+        self.scale
+            * match &self.form {
+                TermForm::Radial(radial) => radial.turns(x * x + y * y),
+                TermForm::Map(map) => map.turns(x, y),
+                TermForm::Zernike {
+                    order,
+                    coefficients,
+                    radius_um,
+                } => {
+                    let (x, y) = (x / radius_um, y / radius_um);
+                    let each = coefficients.iter().zip(1..).filter(|(c, _)| **c != 0.0);
+                    each.map(|(c, j)| c * order.value(j, x, y)).sum()
+                }
+                TermForm::Polynomial { terms, radius_um } => {
+                    let (x, y) = (x / radius_um, y / radius_um);
+                    let sum: f64 = terms
+                        .iter()
+                        .map(|&(i, j, a)| a * x.powi(i as i32) * y.powi(j as i32))
+                        .sum();
+                    sum / std::f64::consts::TAU
+                }
+                TermForm::OpticStudio { .. } => 0.0,
+            }
+    }
+}
+
+impl ZernikeOrder {
+    fn value(self, j: u32, x: f64, y: f64) -> f64 {
+        match self {
+            Self::Standard => Zernike::noll(j).norm() * Zernike::noll(j).value(x, y),
+            Self::Fringe => Zernike::fringe(j).value(x, y),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rounding of phases of a few turns.
+    const ROUNDING: f64 = 1e-12;
+
+    fn term(form: TermForm) -> PhaseTerm {
+        PhaseTerm {
+            form,
+            scale: 1.0,
+            centre_um: [0.0; 2],
+            elements: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn zernike_terms_have_the_sizes_that_their_orders_say() {
+        let of = |order, coefficients: &[f64]| {
+            term(TermForm::Zernike {
+                order,
+                coefficients: coefficients.to_vec(),
+                radius_um: 50.0,
+            })
+        };
+        // Defocus at the rim: sqrt 3 of an rms of one, or one.
+        let standard = of(ZernikeOrder::Standard, &[0.0, 0.0, 0.0, 0.5]);
+        let fringe = of(ZernikeOrder::Fringe, &[0.0, 0.0, 0.0, 0.5]);
+        assert!((standard.turns(30.0, 40.0) - 0.5 * 3f64.sqrt()).abs() < ROUNDING);
+        assert!((fringe.turns(30.0, 40.0) - 0.5).abs() < ROUNDING);
+        // Tilt along x.
+        assert!((of(ZernikeOrder::Fringe, &[0.0, 2.0]).turns(25.0, 7.0) - 1.0).abs() < ROUNDING);
+    }
+
+    #[test]
+    fn polynomials_scales_and_centres() {
+        let polynomial = PhaseTerm {
+            scale: -2.0,
+            centre_um: [1.0, 0.0],
+            ..term(TermForm::Polynomial {
+                terms: vec![(2, 1, 3.0), (0, 0, 1.0)],
+                radius_um: 10.0,
+            })
+        };
+        let want = -2.0 * (3.0 * 0.4 * 0.4 * 0.5 + 1.0) / std::f64::consts::TAU;
+        assert!((polynomial.turns(5.0, 5.0) - want).abs() < ROUNDING);
+    }
+}

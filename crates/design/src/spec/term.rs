@@ -1,0 +1,123 @@
+//! `[[phase.term]]`: phases over the plane of an element, added to that over the radius.
+
+use super::lens::{COEFFICIENT, read_radial};
+use crate::phase::{Interpolation, MapTable, PhaseTerm, TermForm, ZernikeOrder};
+use metalith_core::document::{Limits, Section};
+
+/// Most polynomials of a sum.
+const MOST_TERMS: usize = 231;
+
+/// Highest power of a coordinate.
+const HIGHEST_POWER: f64 = 30.0;
+
+#[derive(Clone, Copy)]
+enum TermSource {
+    Radial,
+    Map,
+    Zernike,
+    Polynomial,
+    OpticStudio,
+}
+
+pub(super) fn read(s: &Section<'_, '_>, focal_length_um: f64, radius_um: f64) -> PhaseTerm {
+    let sources = [
+        ("hyperbola", TermSource::Radial),
+        ("even_powers", TermSource::Radial),
+        ("table", TermSource::Radial),
+        ("map", TermSource::Map),
+        ("zernike", TermSource::Zernike),
+        ("polynomial", TermSource::Polynomial),
+        ("optic_studio", TermSource::OpticStudio),
+    ];
+    let normalisation = |s: &Section<'_, '_>| {
+        s.optional_float("normalisation_radius_um", Limits::new(1e-3..=1e6, "um"))
+            .unwrap_or(radius_um)
+    };
+    let form = match s.choice("source", &sources, None) {
+        TermSource::Radial => TermForm::Radial(read_radial(s, focal_length_um, radius_um)),
+        TermSource::Map => TermForm::Map(MapTable::new(
+            s.file("file"),
+            s.float("pitch_um", Limits::new(1e-3..=1e5, "um")),
+            Interpolation::read(s),
+            s.choice("wrapped", &[("no", false), ("yes", true)], Some(true)),
+        )),
+        TermSource::Zernike => TermForm::Zernike {
+            order: s.choice(
+                "order",
+                &[("standard", ZernikeOrder::Standard), ("fringe", ZernikeOrder::Fringe)],
+                None,
+            ),
+            coefficients: some(s, "coefficients_waves", Limits::new(-1e8..=1e8, "waves")),
+            radius_um: normalisation(s),
+        },
+        TermSource::Polynomial => TermForm::Polynomial {
+            terms: polynomial(s),
+            radius_um: normalisation(s),
+        },
+        TermSource::OpticStudio => TermForm::OpticStudio {
+            file: s.file("file"),
+            surface: s
+                .optional_integer("surface", 0..=10_000, "")
+                .map(|number| number as u32),
+        },
+    };
+    let term = PhaseTerm {
+        form,
+        scale: s.optional_float("scale", Limits::new(-1e6..=1e6, "")).unwrap_or(1.0),
+        centre_um: s
+            .optional_array::<2>("centre_um", Limits::new(-1e5..=1e5, "um"))
+            .unwrap_or([0.0; 2]),
+        elements: elements(s),
+    };
+    s.finish();
+    term
+}
+
+/// A list that is not empty and not too long.
+fn some(s: &Section<'_, '_>, key: &str, limits: Limits) -> Vec<f64> {
+    let values = s.floats(key, limits);
+    if s.has(key) && (values.is_empty() || values.len() > MOST_TERMS) {
+        s.fault(
+            key,
+            format!("{} coefficients", values.len()),
+            format!("give 1 to {MOST_TERMS} of them"),
+        );
+    }
+    values
+}
+
+fn polynomial(s: &Section<'_, '_>) -> Vec<(u32, u32, f64)> {
+    let power = Limits::new(0.0..=HIGHEST_POWER, "");
+    let coefficients = some(s, "coefficients_rad", COEFFICIENT);
+    let [x, y] = ["powers_x", "powers_y"].map(|key| {
+        let powers = s.floats(key, power.clone());
+        if s.has(key) && (powers.len() != coefficients.len() || powers.iter().any(|p| p.fract() != 0.0)) {
+            s.fault_given(
+                &["coefficients_rad"],
+                key,
+                format!("{} powers for {} coefficients", powers.len(), coefficients.len()),
+                "give one whole power for each coefficient",
+            );
+        }
+        powers
+    });
+    let each = x.iter().zip(&y).zip(&coefficients);
+    each.map(|((i, j), a)| (*i as u32, *j as u32, *a)).collect()
+}
+
+/// Indices of the elements that the term is of.
+fn elements(s: &Section<'_, '_>) -> Vec<(i32, i32)> {
+    if !s.has("elements_m") && !s.has("elements_n") {
+        return Vec::new();
+    }
+    let index = Limits::new(-99.0..=99.0, "");
+    let [m, n] = ["elements_m", "elements_n"].map(|key| s.floats(key, index.clone()));
+    if m.len() != n.len() || m.iter().chain(&n).any(|k| k.fract() != 0.0) {
+        s.fault(
+            "elements_m",
+            format!("{} indices along x and {} along y", m.len(), n.len()),
+            "give m and n of each element, as the report of `metalith layout` names them",
+        );
+    }
+    m.iter().zip(&n).map(|(m, n)| (*m as i32, *n as i32)).collect()
+}

@@ -1,0 +1,127 @@
+//! Designs beyond the grid of radial lenses: phases over the plane, elements placed one by one, other bands and materials.
+
+use std::path::{Path, PathBuf};
+
+use metalith_core::Silent;
+use metalith_design::phase::{ElementPhase, LensPhase};
+use metalith_design::{Design, PillarArray};
+
+fn path(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../designs/{name}.toml"))
+}
+
+fn text(name: &str) -> String {
+    std::fs::read_to_string(path(name)).unwrap()
+}
+
+fn changed(name: &str, from: &str, to: &str) -> metalith_core::Result<Design> {
+    let text = text(name);
+    assert!(text.contains(from), "{from}");
+    Design::parse(&path(name), &text.replacen(from, to, 1))
+}
+
+#[test]
+fn a_hologram_is_on_the_element_that_it_is_of() {
+    let design = Design::read(&path("hologram")).unwrap();
+    let array = PillarArray::build(&design, &Silent).unwrap();
+    let centres: Vec<_> = array.placed.iter().map(|p| p.element.centre_nm).collect();
+    assert_eq!(centres, [(-60_000, 0), (60_000, 20_000)]);
+    assert_eq!(array.classes.len(), 2);
+    // The lens has all symmetries of the square, the hologram none.
+    let members: Vec<_> = array.classes.iter().map(|c| c.group.members().len()).collect();
+    assert_eq!(members, [8, 1]);
+    let lens = LensPhase::of(&design);
+    let [plain, hologram] = [0, 1].map(|k| ElementPhase::of(&lens, &array.placed[k].element));
+    let turns = |phase: &ElementPhase<'_>, ix, iy| phase.turns(ix, iy).unwrap();
+    let apart = turns(&hologram, 90, 60) - turns(&plain, 90, 60);
+    // The table is of float32, within half a turn.
+    assert!(apart != 0.0 && apart.abs() <= 0.5 + 1e-6, "{apart}");
+}
+
+#[test]
+fn two_by_four_elements_are_about_the_middle() {
+    let design = Design::read(&path("array_2x4")).unwrap();
+    let array = PillarArray::build(&design, &Silent).unwrap();
+    assert_eq!(array.placed.len(), 8);
+    // Mirror images of two: those of the inner and of the outer rows.
+    assert_eq!(array.classes.len(), 2);
+    let sum = design
+        .elements()
+        .iter()
+        .fold((0, 0), |s, e| (s.0 + e.centre_nm.0, s.1 + e.centre_nm.1));
+    assert_eq!(sum, (0, 0));
+}
+
+#[test]
+fn the_band_is_that_of_the_design() {
+    let infrared = Design::read(&path("asi_940")).unwrap();
+    let (short, long) = infrared.band_um().unwrap();
+    assert!(
+        short > 0.9 && short < 0.94 && long > 0.94 && long < 1.0,
+        "{short} {long}"
+    );
+    let visible = Design::read(&path("mini_3x3")).unwrap();
+    assert_eq!(visible.band_um().unwrap(), (0.4, 0.7));
+    let own = changed("asi_940", "[cell]\n", "[cell]\nband_nm = [900, 1000]\n").unwrap();
+    assert_eq!(own.band_um().unwrap(), (0.9, 1.0));
+    assert_eq!(
+        own.digest(),
+        infrared.digest(),
+        "the band decides nothing of the layout"
+    );
+}
+
+#[test]
+fn mistakes_are_said() {
+    for (name, from, to, wanted) in [
+        ("asi_940", "shape = \"circle\"", "shape = \"hexagon\"", "shape"),
+        (
+            "asi_940",
+            "[cell]\n",
+            "[cell]\nband_nm = [1000, 900]\n",
+            "a band from 1000 to 900",
+        ),
+        (
+            "asi_940",
+            "[cell]\n",
+            "[cell]\nspacer_nm = 50\n",
+            "a spacer of no material",
+        ),
+        (
+            "array_2x4",
+            "spacing_um = [150, 120]",
+            "spacing_um = [150, 50]",
+            "neighbouring lenses overlap",
+        ),
+        (
+            "array_2x4",
+            "elements = [2, 4]",
+            "elements = [2, 4.5]",
+            "2 by 4.5 elements",
+        ),
+        ("hologram", "x_um = 60", "x_um = -20", "overlaps that of element (1, 0)"),
+        (
+            "hologram",
+            "[array]\n",
+            "[array]\nelements = [1, 1]\n",
+            "a grid beside elements",
+        ),
+        ("hologram", "pitch_um = 0.35", "pitch_um = 0.2", "the lens to 30"),
+        ("hologram", "source = \"map\"", "source = \"maps\"", "source"),
+        (
+            "array_2x4",
+            "[array]",
+            "[[phase.term]]\nsource = \"polynomial\"\npowers_x = [1]\npowers_y = [0, 1]\ncoefficients_rad = [1.0]\n\n[array]",
+            "2 powers for 1 coefficients",
+        ),
+        (
+            "array_2x4",
+            "[array]",
+            "[[phase.term]]\nsource = \"zernike\"\norder = \"noll\"\ncoefficients_waves = [1.0]\n\n[array]",
+            "order",
+        ),
+    ] {
+        let error = changed(name, from, to).unwrap_err().to_string();
+        assert!(error.contains(wanted), "{to}: {error}");
+    }
+}
