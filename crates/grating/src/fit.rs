@@ -1,12 +1,13 @@
 //! A response of pairs fitted to the sites of supercells, by least squares.
 
+use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use metalith_cell::{NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourBasis, NeighbourResponse};
 use metalith_core::{Error, Result};
 use metalith_rcwa::SiteLattice;
 
-use crate::linear::eliminate;
+use crate::linear;
 use crate::table::images;
 
 /// Added to the mean square of each term, as a part of it: sites are a few for each weight, and widths of neighbours are
@@ -98,15 +99,13 @@ impl Sums {
 
     /// Weights for s and p.
     fn solve(mut self) -> Result<[Vec<Complex64>; 2]> {
-        for i in 0..NEIGHBOUR_TERMS {
-            let (above, own) = self.matrix.split_at_mut(i);
-            for (j, row) in above.iter().enumerate() {
-                own[0][j] = row[i];
-            }
+        let size = NEIGHBOUR_TERMS;
+        let mut matrix = DMatrix::from_fn(size, size, |i, j| self.matrix[i.min(j)][i.max(j)]);
+        for i in 0..size {
             // A term that never occurs has no weight.
-            own[0][i] += RIDGE * own[0][i].max(self.count * f64::EPSILON);
+            matrix[(i, i)] += RIDGE * matrix[(i, i)].max(self.count * f64::EPSILON);
         }
-        eliminate(&mut self.matrix, &mut self.right, 0.0).ok_or_else(|| {
+        linear::solve(matrix, &mut self.right, f64::MIN_POSITIVE).ok_or_else(|| {
             Error::invalid(
                 "supercells that do not tell their pillars apart",
                 "give a mapping that draws several widths",

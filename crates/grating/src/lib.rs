@@ -61,7 +61,7 @@ pub use neighbour_pillars::NeighbourPillars;
 pub use neighbour_table::{NeighbourTable, NeighbourTableSpec};
 pub use node::{FIRST_KEPT, GratingVector, KEPT, OrderAmplitudes};
 pub use orientation::Orientation;
-pub use rows::{RealRow, SolvedRow};
+pub use rows::{ElementRow, RealRow, SolvedRow};
 pub use sites::site_transmissions;
 pub use slopes::SlopeMap;
 pub use surface::Surface;

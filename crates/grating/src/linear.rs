@@ -1,51 +1,28 @@
 //! Dense linear equations.
 
+use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-/// Gauss's elimination with partial pivots; the solution takes the place of the right-hand sides. Nothing where a pivot is
-/// below `least_pivot`.
-pub(crate) fn eliminate<const N: usize>(
-    matrix: &mut [Vec<f64>],
+/// Solves with partial pivoting; the solution takes the place of the right-hand sides. Nothing where a pivot is below
+/// `least_pivot`.
+pub(crate) fn solve<const N: usize>(
+    matrix: DMatrix<f64>,
     right: &mut [[Complex64; N]],
     least_pivot: f64,
 ) -> Option<()> {
-    let size = matrix.len();
-    for column in 0..size {
-        let pivot = (column..size)
-            .max_by(|&a, &b| matrix[a][column].abs().total_cmp(&matrix[b][column].abs()))
-            .expect("rows are left");
-        if matrix[pivot][column].abs() < least_pivot {
-            return None;
-        }
-        matrix.swap(column, pivot);
-        right.swap(column, pivot);
-        let (above, below) = matrix.split_at_mut(column + 1);
-        let (right_above, right_below) = right.split_at_mut(column + 1);
-        let (own, right_own) = (&above[column], &right_above[column]);
-        for (row, right) in below.iter_mut().zip(right_below) {
-            let factor = row[column] / own[column];
-            if factor == 0.0 {
-                continue;
-            }
-            for (value, own) in row[column..].iter_mut().zip(&own[column..]) {
-                *value -= factor * own;
-            }
-            for (value, own) in right.iter_mut().zip(right_own) {
-                *value -= own * factor;
-            }
-        }
+    let lu = matrix.lu();
+    let pivots = lu.u().diagonal();
+    if !pivots.iter().all(|pivot| pivot.abs() >= least_pivot) {
+        return None;
     }
-    for row in (0..size).rev() {
-        let (left, solved) = right.split_at_mut(row + 1);
-        let own = &mut left[row];
-        for (solved, factor) in solved.iter().zip(&matrix[row][row + 1..]) {
-            for (value, solved) in own.iter_mut().zip(solved) {
-                *value -= solved * factor;
-            }
-        }
-        for value in own {
-            *value /= matrix[row][row];
-        }
+    // Real and imaginary parts are columns of their own.
+    let columns = DMatrix::from_fn(right.len(), 2 * N, |row, column| {
+        let value = right[row][column / 2];
+        if column % 2 == 0 { value.re } else { value.im }
+    });
+    let solved = lu.solve(&columns)?;
+    for (row, right) in right.iter_mut().enumerate() {
+        *right = std::array::from_fn(|k| Complex64::new(solved[(row, 2 * k)], solved[(row, 2 * k + 1)]));
     }
     Some(())
 }

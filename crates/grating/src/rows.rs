@@ -9,6 +9,10 @@ use metalith_rcwa::SiteLattice;
 
 use crate::{CoarseCell, site_transmissions};
 
+/// Pillars of a row along x, where a mirror plane halves the unknowns, and of others.
+const PILLARS: usize = 20;
+const PILLARS_ACROSS: usize = 12;
+
 /// Consecutive pillars of an element, in a direction across which its widths hardly change.
 ///
 /// The row is closed to a ring, and repeated across: along y for a row along x, and along (1, -1) for one along (1, 1). Its supercell has as many sites as the row.
@@ -32,6 +36,49 @@ pub struct SolvedRow {
     /// What each site transmits, `[polarisation][site]`.
     transmitted: [Vec<Complex64>; 2],
     full: f64,
+}
+
+/// A row of an element, with the phase that is asked of each of its pillars.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ElementRow {
+    /// Where it begins, from the middle of the element (um).
+    pub radius_um: f64,
+    /// Phase of each pillar (turns).
+    pub turns: Vec<f64>,
+    pub row: RealRow,
+}
+
+impl ElementRow {
+    /// Rows that stand for an element: one for each radius (um) and direction, 20 pillars long along x and 12 in others.
+    /// `turns` gives the phases of consecutive sites from a radius on in a direction, nothing where the element ends before:
+    /// such rows are left out. `width_nm` draws a phase.
+    pub fn of_element(
+        radii_um: &[f64],
+        directions: &[[i32; 2]],
+        turns: impl Fn(f64, [i32; 2], usize) -> Option<Vec<f64>>,
+        width_nm: impl Fn(f64) -> f64,
+    ) -> Vec<Self> {
+        let places = radii_um.iter().flat_map(|r| directions.iter().map(|d| (*r, *d)));
+        places
+            .filter_map(|(radius_um, direction)| {
+                let pillars = if direction[1] == 0 { PILLARS } else { PILLARS_ACROSS };
+                let turns = turns(radius_um, direction, pillars)?;
+                let widths_nm = turns.iter().map(|u| width_nm(*u)).collect();
+                Some(Self {
+                    radius_um,
+                    turns,
+                    row: RealRow { direction, widths_nm },
+                })
+            })
+            .collect()
+    }
+
+    /// Share of the light in the first order of all rows together, mean of s and p, from the amplitude of each.
+    pub fn share(amplitudes: &[[Complex64; 2]]) -> f64 {
+        let count = amplitudes.len().max(1) as f64;
+        let share = |pol: usize| (amplitudes.iter().map(|a| a[pol]).sum::<Complex64>() / count).norm_sqr();
+        (share(0) + share(1)) / 2.0
+    }
 }
 
 impl SolvedRow {
@@ -71,6 +118,9 @@ impl SolvedRow {
 }
 
 impl RealRow {
+    /// Directions that differ for an element that is steered along x or a diagonal.
+    pub const DIRECTIONS: [[i32; 2]; 5] = [[1, 0], [-1, 0], [0, 1], [1, 1], [1, -1]];
+
     /// Light that a model puts elsewhere than the supercell does, as [`SolvedRow::misfit`].
     ///
     /// `sines` is the direction of arrival in air. `model` gives the transmission of every site of the lattice from

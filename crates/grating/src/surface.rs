@@ -1,10 +1,11 @@
 //! Smooth surfaces through scattered values over the plane of grating vectors.
 
+use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use metalith_core::{Error, Result};
 
-use crate::linear::eliminate;
+use crate::linear::solve;
 
 /// The cubic spline in two dimensions: sum of |K - K_i|^3 weights and a plane through places K_i, by solving the dense
 /// equations (Duchon 1977; Wendland, Scattered Data Approximation, 2004, chapter 8).
@@ -30,20 +31,20 @@ impl<const N: usize> Surface<N> {
     pub fn through(places: &[[f64; 2]], values: &[[Complex64; N]], smoothing: f64) -> Result<Self> {
         let n = places.len();
         let size = n + PLANE;
-        let mut matrix = vec![vec![0.0; size]; size];
+        let mut matrix = DMatrix::zeros(size, size);
         for (i, a) in places.iter().enumerate() {
             for (j, b) in places.iter().enumerate() {
-                matrix[i][j] = cube(a, b);
+                matrix[(i, j)] = cube(a, b);
             }
-            matrix[i][i] += smoothing;
+            matrix[(i, i)] += smoothing;
             for (k, value) in plane(a).into_iter().enumerate() {
-                matrix[i][n + k] = value;
-                matrix[n + k][i] = value;
+                matrix[(i, n + k)] = value;
+                matrix[(n + k, i)] = value;
             }
         }
         let mut weights = values.to_vec();
         weights.resize(size, [Complex64::ZERO; N]);
-        eliminate(&mut matrix, &mut weights, LEAST_PIVOT).ok_or_else(|| {
+        solve(matrix, &mut weights, LEAST_PIVOT).ok_or_else(|| {
             Error::invalid(
                 "grating vectors that coincide or lie on one line",
                 "give at least three that span the plane",

@@ -33,10 +33,17 @@ const OF_EQUAL: f64 = 0.5;
 /// what is left over.
 const WORSE: f64 = 0.005;
 
-/// Share of the first order, rms over the rows of the truth along the normal, mean over offsets and of s and p, of
-/// which equal neighbours miss this many times as much at least.
-const FIRST: f64 = 0.04;
-const GAIN: f64 = 2.5;
+/// Share of the first order of blazed rows of the truth, mean over where their phase starts and over s and p, rms over
+/// gratings and wavelengths: along the normal and from where the element looks. Measured: 0.027 and, of the one grating that is
+/// always compared, 0.088, which is too little light. Along the normal equal neighbours miss this many times as much at least.
+const FIRST: [f64; 2] = [0.035, 0.1];
+const GAIN: f64 = 4.0;
+
+/// Of single rows: the share of the first order, that of the zero order, and the phase (rad) less its mean. Resonances of
+/// a row that repeats exactly are not in a sum over pairs. Measured: 0.050 along the normal and 0.115, 0.015, 0.047.
+const FIRST_OF_A_ROW: [f64; 2] = [0.06, 0.13];
+const ZERO: f64 = 0.02;
+const PHASE: f64 = 0.055;
 
 #[test]
 #[ignore = "second tier: five tables and rows of real pillars take some CPU minutes"]
@@ -76,48 +83,130 @@ fn real_rows_are_met_better_than_by_equal_neighbours() {
     }
 }
 
-#[test]
-#[ignore = "second tier: three tables take a CPU minute"]
-fn blazed_rows_of_the_truth_are_met_better_than_by_equal_neighbours() {
-    let prototype = Prototype::new();
-    let rows = truth_rows::read();
-    let mut groups: BTreeMap<(u32, usize, i32), Vec<&Row>> = BTreeMap::new();
-    for row in rows.iter().filter(|row| !row.looks) {
-        groups
-            .entry((row.wavelength_nm, row.cells, row.turns))
-            .or_default()
-            .push(row);
-    }
-    let (mut squares, mut count) = ([0.0; 2], 0.0);
-    for nm in [455, 530, 660] {
-        let table = prototype.neighbours(f64::from(nm) * 1e-3, [0.0; 2]);
-        for ((_, cells, turns), rows) in groups.range((nm, 0, 0)..(nm + 1, 0, 0)) {
-            let lattice = SiteLattice::row(*cells).unwrap();
-            let mean = |of: &dyn Fn(&Row) -> f64| rows.iter().map(|r| of(r)).sum::<f64>() / rows.len() as f64;
-            let first = mean(&|row| {
-                let blaze = Blaze {
-                    turns: [*turns, 0],
-                    sites: *cells,
-                    offset_turns: f64::from(*turns) * row.offset / *cells as f64,
-                };
-                let widths = blaze.widths_nm(&lattice, |u| prototype.mapping.width_nm(u));
-                let sites = &table.sites(&lattice, &widths, 1.0)[row.polarisation];
-                let back = |x: usize| Complex64::cis(-TAU * f64::from(*turns) * x as f64 / *cells as f64);
-                let sum: Complex64 = sites.iter().enumerate().map(|(x, t)| t * back(x)).sum();
-                (sum / *cells as f64).norm_sqr()
-            });
-            let (truth, equal) = (mean(&|r| r.share_first), mean(&|r| r.local_normal));
-            println!("{nm} nm, {cells} / {turns}: {first:.3} for {truth:.3}, equal neighbours {equal:.3}");
-            squares[0] += (first - truth).powi(2);
-            squares[1] += (equal - truth).powi(2);
-            count += 1.0;
+/// A row of the truth by the sum over pairs.
+struct Found<'r> {
+    truth: &'r Row,
+    first: Complex64,
+    zero: f64,
+}
+
+/// Differences of several rows from the truth.
+struct Off {
+    /// Share of the first order: of the mean over the rows, of the same by equal neighbours along the normal, and root mean
+    /// square over the rows.
+    mean: f64,
+    mean_equal: f64,
+    first: f64,
+    /// Root mean square, of the share of the zero order and of the phase of the first (rad), less its mean.
+    zero: f64,
+    phase: f64,
+}
+
+impl Off {
+    fn of(rows: &[Found]) -> Self {
+        let n = rows.len() as f64;
+        let mean = |of: &dyn Fn(&Found) -> f64| rows.iter().map(of).sum::<f64>() / n;
+        let rms = |of: &dyn Fn(&Found) -> f64| mean(&|r| of(r).powi(2)).sqrt();
+        let first = |r: &Found| r.first.norm_sqr() - r.truth.share_first;
+        let tilt: Complex64 = rows
+            .iter()
+            .map(|r| (r.first / r.truth.first) / (r.first / r.truth.first).norm())
+            .sum();
+        Self {
+            mean: mean(&first),
+            mean_equal: mean(&|r| r.truth.local_normal - r.truth.share_first),
+            first: rms(&first),
+            zero: rms(&|r| r.zero - r.truth.share_zero),
+            phase: rms(&|r| (r.first / r.truth.first / tilt).arg()),
         }
     }
-    let [first, equal] = squares.map(|s: f64| (s / count).sqrt());
-    println!("all: {first:.4}, equal neighbours {equal:.4}");
-    assert!(count > 10.0);
-    assert!(first < FIRST, "{first}");
-    assert!(equal > GAIN * first, "{equal} {first}");
+}
+
+/// Rows of one grating in one light, by a table that was not fitted to any of them.
+fn by_pairs<'r>(rows: &[&'r Row], table: &NeighbourTable, prototype: &Prototype) -> Vec<Found<'r>> {
+    let found = |row: &&'r Row| {
+        let lattice = SiteLattice::row(row.cells).unwrap();
+        let blaze = Blaze {
+            turns: [row.turns, 0],
+            sites: row.cells,
+            offset_turns: f64::from(row.turns) * row.offset / row.cells as f64,
+        };
+        let widths = blaze.widths_nm(&lattice, |u| prototype.mapping.width_nm(u));
+        let sites = &table.sites(&lattice, &widths, 1.0)[row.polarisation];
+        // The truth's phases are without that of the wedge at the middle of pillar 0.
+        let order = |m: f64| {
+            let back = |x: usize| Complex64::cis(-TAU * m * blaze.phase(x, 0));
+            sites.iter().enumerate().map(|(x, t)| t * back(x)).sum::<Complex64>() / row.cells as f64
+        };
+        Found {
+            truth: row,
+            first: order(1.0),
+            zero: order(0.0).norm_sqr(),
+        }
+    };
+    rows.iter().map(found).collect()
+}
+
+/// Rows in light from where the element looks need a table for each grating and wavelength, a minute of CPU each. One is
+/// made here; this variable, set to anything, asks for all.
+const ALL: &str = "METALITH_ALL_ROWS";
+const CHEAP: (u32, usize, i32) = (530, 6, 1);
+
+#[test]
+#[ignore = "second tier: four tables take some CPU minutes"]
+fn blazed_rows_of_the_truth_are_met_better_than_by_equal_neighbours() {
+    let prototype = Prototype::new();
+    let all = std::env::var_os(ALL).is_some();
+    let rows = truth_rows::read();
+    let mut groups: BTreeMap<(bool, u32, usize, i32), Vec<&Row>> = BTreeMap::new();
+    for row in &rows {
+        let grating = (row.wavelength_nm, row.cells, row.turns);
+        if !row.looks || all || grating == CHEAP {
+            let (nm, cells, turns) = grating;
+            groups.entry((row.looks, nm, cells, turns)).or_default().push(row);
+        }
+    }
+    let mut tables: BTreeMap<u32, NeighbourTable> = BTreeMap::new();
+    let mut parts: [Vec<Off>; 2] = Default::default();
+    println!(
+        "| light | nm | pillars, turns | truth | mean | equal neighbours | rows, rms | zero order | phase (rad) |"
+    );
+    for ((looks, nm, cells, turns), rows) in &groups {
+        let um = f64::from(*nm) * 1e-3;
+        let off = if *looks {
+            let sine = f64::from(*turns) / *cells as f64 * um * 1e3 / f64::from(prototype.design.cell.pitch_nm);
+            Off::of(&by_pairs(rows, &prototype.neighbours(um, [-sine, 0.0]), &prototype))
+        } else {
+            let table = tables.entry(*nm).or_insert_with(|| prototype.neighbours(um, [0.0; 2]));
+            Off::of(&by_pairs(rows, table, &prototype))
+        };
+        let truth = rows.iter().map(|r| r.share_first).sum::<f64>() / rows.len() as f64;
+        println!(
+            "| {} | {nm} | {cells}, {turns} | {truth:.3} | {:+.3} | {:+.3} | {:.3} | {:.3} | {:.3} |",
+            if *looks { "looks" } else { "normal" },
+            off.mean,
+            off.mean_equal,
+            off.first,
+            off.zero,
+            off.phase
+        );
+        parts[usize::from(*looks)].push(off);
+    }
+    let most = FIRST.into_iter().zip(FIRST_OF_A_ROW);
+    for ((name, part), (most, of_a_row)) in ["normal", "looks"].into_iter().zip(&parts).zip(most) {
+        let rms = |of: fn(&Off) -> f64| (part.iter().map(|o| of(o).powi(2)).sum::<f64>() / part.len() as f64).sqrt();
+        let (mean, equal) = (rms(|o| o.mean), rms(|o| o.mean_equal));
+        let (first, zero, phase) = (rms(|o| o.first), rms(|o| o.zero), rms(|o| o.phase));
+        println!(
+            "{name}: mean {mean:.4}, equal neighbours {equal:.4}, rows {first:.4}, zero {zero:.4}, phase {phase:.4}"
+        );
+        assert!(mean < most, "{name}: {mean}");
+        assert!(first < of_a_row, "{name}: {first}");
+        assert!(zero < ZERO, "{name}: {zero}");
+        assert!(phase < PHASE, "{name}: {phase}");
+    }
+    let squares = |of: fn(&Off) -> f64| parts[0].iter().map(|o| of(o).powi(2)).sum::<f64>();
+    assert!(squares(|o| o.mean_equal) > GAIN * GAIN * squares(|o| o.mean));
 }
 
 /// Mathematical libraries of machines differ in their last digits, which a fit over thousands of sites adds up.

@@ -5,19 +5,14 @@ use metalith_cell::{CellModel, PointwiseCell};
 use metalith_core::{Silent, Wedge};
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, WidthRule};
-use metalith_grating::{CoarseCell, Mapping, NeighbourTable, NeighbourTableSpec, RealRow};
+use metalith_grating::{CoarseCell, ElementRow, Mapping, NeighbourTable, NeighbourTableSpec, RealRow};
 use num_complex::Complex64;
-
-/// Pillars of a row along x, where a mirror plane halves the unknowns, and of others.
-const PILLARS: usize = 20;
-const PILLARS_ACROSS: usize = 12;
 
 /// Where rows begin, from the middle of the element (um).
 pub const RADII_UM: [f64; 4] = [60.0, 180.0, 300.0, 440.0];
 
-/// Directions away from the middle: of a centre element, whose axes are all alike, and of one that is steered along x.
+/// Directions away from the middle of a centre element, whose axes are all alike.
 const CENTRE: [[i32; 2]; 2] = [[1, 0], [1, 1]];
-const STEERED: [[i32; 2]; 5] = [[1, 0], [-1, 0], [0, 1], [1, 1], [1, -1]];
 
 /// Share of the light that models put elsewhere than the supercell of a row, mean of s and p.
 pub struct RowMisfit {
@@ -95,51 +90,40 @@ impl Prototype {
 
         let rule = WidthRule::new(&self.design.cell, &self.design.mapping);
         let mut rows = Vec::new();
-        let mut first = [[Complex64::ZERO; 2]; 3];
-        for radius_um in RADII_UM {
-            let directions: &[_] = if along_normal { &CENTRE } else { &STEERED };
-            for &direction in directions {
-                let turns = self.turns(&wedge, radius_um, direction);
-                let row = RealRow {
-                    direction,
-                    widths_nm: turns.iter().map(|u| f64::from(rule.width_nm(*u))).collect(),
-                };
-                let row = row.solve(&coarse, sines).unwrap();
-                let single = |t: &[Vec<Complex64>; 2]| -> [Vec<Complex64>; 2] {
-                    t.clone()
-                        .map(|t| row.widths_nm.iter().map(|w| t[*w as usize]).collect())
-                };
-                let (as_lit, neighbours) = (single(&as_lit), table.sites(&row.lattice, &row.widths_nm, full));
-                for (sum, found) in first.iter_mut().zip([&as_lit, &neighbours, row.transmitted()]) {
-                    let amplitude = row.first_order(found, &turns);
-                    sum.iter_mut().zip(amplitude).for_each(|(sum, a)| *sum += a);
-                }
-                rows.push(RowMisfit {
-                    radius_um,
-                    direction,
-                    normal: row.misfit(&single(&normal)),
-                    as_lit: row.misfit(&as_lit),
-                    neighbours: row.misfit(&neighbours),
-                });
-            }
-        }
-        let count = rows.len() as f64;
-        Misfits {
-            left_out: table.left_out(),
-            first: first.map(|amplitude| amplitude.iter().map(|a| (a / count).norm_sqr()).sum::<f64>() / 2.0),
-            rows,
-        }
-    }
-
-    /// Phases of a row (turns).
-    fn turns(&self, wedge: &Wedge, radius_um: f64, direction: [i32; 2]) -> Vec<f64> {
+        let mut first: [Vec<[Complex64; 2]>; 3] = Default::default();
+        let directions: &[_] = if along_normal { &CENTRE } else { &RealRow::DIRECTIONS };
         let lens = LensPhase::new(
             self.design.lattice(),
             self.design.lens.diameter_nm,
             &self.design.lens.phase,
         );
-        let pillars = if direction[1] == 0 { PILLARS } else { PILLARS_ACROSS };
-        let row = ElementPhase::new(&lens, wedge).row(radius_um, direction, pillars);
-        row.expect("a row within the lens")
+        let phase = ElementPhase::new(&lens, &wedge);
+        let turns = |radius: f64, direction: [i32; 2], pillars: usize| phase.row(radius, direction, pillars);
+        let all = ElementRow::of_element(&RADII_UM, directions, turns, |u| f64::from(rule.width_nm(u)));
+        assert_eq!(all.len(), RADII_UM.len() * directions.len(), "rows within the lens");
+        for ElementRow { radius_um, turns, row } in all {
+            let direction = row.direction;
+            let row = row.solve(&coarse, sines).unwrap();
+            let single = |t: &[Vec<Complex64>; 2]| -> [Vec<Complex64>; 2] {
+                t.clone()
+                    .map(|t| row.widths_nm.iter().map(|w| t[*w as usize]).collect())
+            };
+            let (as_lit, neighbours) = (single(&as_lit), table.sites(&row.lattice, &row.widths_nm, full));
+            for (amplitudes, found) in first.iter_mut().zip([&as_lit, &neighbours, row.transmitted()]) {
+                amplitudes.push(row.first_order(found, &turns));
+            }
+            rows.push(RowMisfit {
+                radius_um,
+                direction,
+                normal: row.misfit(&single(&normal)),
+                as_lit: row.misfit(&as_lit),
+                neighbours: row.misfit(&neighbours),
+            });
+        }
+        Misfits {
+            left_out: table.left_out(),
+            first: first.map(|amplitudes| ElementRow::share(&amplitudes)),
+            rows,
+        }
     }
 }
