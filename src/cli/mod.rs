@@ -20,6 +20,7 @@ mod picture;
 mod psf;
 mod run;
 mod standard_input;
+mod study;
 mod terminal;
 mod verify;
 
@@ -85,6 +86,7 @@ enum Command {
     Diff(diff::DiffArgs),
     Convert(convert::ConvertArgs),
     Calibrate(calibrate::CalibrateArgs),
+    Study(study::StudyArgs),
     Completions(completions::CompletionsArgs),
     #[command(hide = true)]
     Manual(completions::ManualArgs),
@@ -137,6 +139,7 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::Diff(args) => diff::run(args, terminal),
         Command::Convert(args) => convert::run(args, terminal),
         Command::Calibrate(args) => calibrate::run(args, terminal),
+        Command::Study(args) => study::run(args, terminal),
         Command::Completions(args) => completions::run(args, terminal),
         Command::Manual(args) => completions::manual(args, terminal),
     }
