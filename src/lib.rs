@@ -75,6 +75,14 @@
 //! # }
 //! ```
 
+// The program says `metalith::` of the library, as any other program would.
+#[cfg(feature = "cli")]
+extern crate self as metalith;
+
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod cli;
+
 pub use metalith_calibrate as calibrate;
 pub use metalith_camera as camera;
 pub use metalith_cell as cell;

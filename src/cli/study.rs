@@ -163,7 +163,7 @@ fn run_shards(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
 
 /// Each shard by a process of its own, so many at a time.
 fn by_processes(args: &RunArgs, missing: &[u64], jobs: usize, terminal: &Terminal) -> Result<()> {
-    let program = std::env::current_exe().map_err(Error::io("find", "the program".as_ref()))?;
+    let program = super::program()?;
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
     let threads = (cores / jobs).max(1).to_string();
     terminal.begin("running shards", missing.len() as u64);

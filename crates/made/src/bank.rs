@@ -21,8 +21,17 @@ const MAGIC: [u8; 8] = *b"MLBANK\0\x01";
 /// Longest file that is read.
 const LONGEST: u64 = 1 << 32;
 
-/// Distance of the widths of a bank (nm).
+/// Distance of the widths of a bank (nm) where transmission is smooth.
 const WIDTH_STEP_NM: f64 = 1.0;
+
+/// Parts that a step is divided into where it is not: guided-mode resonances are a fraction of a nanometre wide.
+const FINE_PARTS: usize = 8;
+
+/// Where a width is farther than this from the cubic through its four neighbours, transmission is not smooth.
+const ROUGH: f64 = 0.01;
+
+/// Steps on either side of such a width that are divided too: a resonance moves with the pillar.
+const BESIDE: usize = 2;
 
 /// Widths that are solved beyond both ends, so that a cubic has its four points.
 const BEYOND: usize = 2;
@@ -122,8 +131,34 @@ pub struct CellBank {
     range: BankRange,
     widths: Axis,
     axes: [Axis; QUANTITIES],
-    /// By colour, stack and width; the last of each row is a site without pillar.
+    colours: Vec<Colour>,
+}
+
+/// One wavelength of a bank.
+#[derive(Debug, PartialEq)]
+struct Colour {
+    /// Widths that are solved (nm), rising.
+    widths_nm: Vec<f64>,
+    /// By stack and width; the last of each row is a site without pillar.
     t: Vec<Complex64>,
+}
+
+impl Colour {
+    /// Weights of four widths for any between them; none outside.
+    fn weights(&self, width_nm: f64) -> Option<[(usize, f64); 4]> {
+        let (first, last) = (self.widths_nm.first()?, self.widths_nm.last()?);
+        if !(*first..=*last).contains(&width_nm) {
+            return None;
+        }
+        let above = self.widths_nm.partition_point(|w| *w <= width_nm);
+        let from = above.clamp(2, self.widths_nm.len() - 2) - 2;
+        let at = |k: usize| self.widths_nm[from + k];
+        // Lagrange's polynomial through four points at any distances.
+        Some(std::array::from_fn(|k| {
+            let others = (0..4).filter(|j| *j != k);
+            (from + k, others.map(|j| (width_nm - at(j)) / (at(k) - at(j))).product())
+        }))
+    }
 }
 
 impl CellBank {
@@ -133,21 +168,32 @@ impl CellBank {
     /// If it would be too large, a cell cannot be solved, or the user stopped it.
     pub fn solve(stated: &CellStack, range: BankRange, progress: &dyn Progress) -> Result<Self> {
         let mut bank = Self::empty(stated, range)?;
-        let rows = bank.range.colours.len() * bank.stacks();
-        progress.begin("solving the tables of cells", rows as u64);
-        let solved = (0..rows)
+        let (colours, stacks) = (bank.range.colours.len(), bank.stacks());
+        let coarse: Vec<f64> = (0..bank.widths.nodes).map(|k| bank.widths.node(k)).collect();
+        progress.begin("solving the tables of cells", (colours * (stacks + 1)) as u64);
+        for colour in 0..colours {
+            let rows = bank.solve_rows(colour, &coarse, progress)?;
+            let added = between(&coarse, &rows);
+            let fine = bank.solve_rows(colour, &added, &Unwatched(progress))?;
+            bank.colours.push(merged(&coarse, &rows, &added, &fine));
+            progress.advance(1);
+        }
+        Ok(bank)
+    }
+
+    /// One row for each stack: these widths, then a site without pillar.
+    fn solve_rows(&self, colour: usize, widths_nm: &[f64], progress: &dyn Progress) -> Result<Vec<Vec<Complex64>>> {
+        (0..self.stacks())
             .into_par_iter()
-            .map(|row| {
+            .map(|stack| {
                 if progress.stopped() {
                     return Err(Error::Interrupted);
                 }
-                let solved = bank.solve_row(row / bank.stacks(), row % bank.stacks());
+                let row = self.solve_row(colour, stack, widths_nm);
                 progress.advance(1);
-                solved
+                row
             })
-            .collect::<Result<Vec<_>>>()?;
-        bank.t = solved.concat();
-        Ok(bank)
+            .collect()
     }
 
     /// Read the bank that was kept for these inputs.
@@ -168,11 +214,14 @@ impl CellBank {
             .chunks_exact(8)
             .map(|b| f64::from_le_bytes(b.try_into().expect("eight bytes")))
             .collect();
-        let rows = bank.range.colours.len() * bank.stacks();
-        if numbers.len() != 2 * rows * (bank.widths.nodes + 1) || numbers.iter().any(|v| !v.is_finite()) {
-            return Err(unusable("numbers are missing".into()));
+        if numbers.iter().any(|v| !v.is_finite()) {
+            return Err(unusable("it holds what is no number".into()));
         }
-        bank.t = numbers.chunks_exact(2).map(|z| Complex64::new(z[0], z[1])).collect();
+        let mut rest = numbers.as_slice();
+        for _ in 0..bank.range.colours.len() {
+            let colour = take(&mut rest, bank.stacks()).ok_or_else(|| unusable("numbers are missing".into()))?;
+            bank.colours.push(colour);
+        }
         Ok(bank)
     }
 
@@ -181,8 +230,14 @@ impl CellBank {
     /// # Errors
     /// If the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let numbers = self.t.iter().flat_map(|z| [z.re.to_le_bytes(), z.im.to_le_bytes()]);
-        kept::write(path, MAGIC, &self.inputs(), &numbers.flatten().collect::<Vec<u8>>())
+        let mut numbers: Vec<f64> = Vec::new();
+        for colour in &self.colours {
+            numbers.push(colour.widths_nm.len() as f64);
+            numbers.extend(&colour.widths_nm);
+            numbers.extend(colour.t.iter().flat_map(|z| [z.re, z.im]));
+        }
+        let bytes: Vec<u8> = numbers.iter().flat_map(|v| v.to_le_bytes()).collect();
+        kept::write(path, MAGIC, &self.inputs(), &bytes)
     }
 
     /// Number of stacks that are solved at every wavelength.
@@ -211,7 +266,7 @@ impl CellBank {
             },
             range,
             axes,
-            t: Vec::new(),
+            colours: Vec::new(),
         };
         if bank.stacks() > MOST_STACKS {
             return Err(Error::invalid(
@@ -219,7 +274,9 @@ impl CellBank {
                     "tables of {} pillars would have to be solved, for every width and wavelength",
                     bank.stacks()
                 ),
-                format!("vary fewer of height, index, taper, corners and mask at once, or less: at most {MOST_STACKS} are solved"),
+                format!(
+                    "vary fewer of height, index, taper, corners and mask at once, or less: at most {MOST_STACKS} are solved"
+                ),
             ));
         }
         Ok(bank)
@@ -234,7 +291,7 @@ impl CellBank {
         }))
     }
 
-    fn solve_row(&self, colour: usize, stack: usize) -> Result<Vec<Complex64>> {
+    fn solve_row(&self, colour: usize, stack: usize, widths_nm: &[f64]) -> Result<Vec<Complex64>> {
         let (um, orders) = self.range.colours[colour];
         let orders = Orders::new(orders)?;
         let etched = perturbed(&self.stated, &self.change(stack));
@@ -242,7 +299,7 @@ impl CellBank {
             let width = possible_width_nm(&etched, width);
             off_cutoff(width, |w| etched.transmission(w, um, orders))
         };
-        let widths = (0..self.widths.nodes).map(|k| at(self.widths.node(k)));
+        let widths = widths_nm.iter().map(|w| at(*w));
         widths.chain([etched.transmission(0.0, um, orders)]).collect()
     }
 
@@ -268,22 +325,28 @@ impl CellBank {
         let mut stacks = vec![(0, 1.0)];
         let mut stride = 1;
         for (axis, value) in self.axes.iter().zip(quantities(change)) {
-            let nodes = axis.weights(value).ok_or_else(|| outside(format!("pillar like {change:?}")))?;
-            let pairs = stacks.iter().flat_map(|(s, w)| nodes.iter().map(move |(k, v)| (s + k * stride, w * v)));
+            let nodes = axis
+                .weights(value)
+                .ok_or_else(|| outside(format!("pillar like {change:?}")))?;
+            let pairs = stacks
+                .iter()
+                .flat_map(|(s, w)| nodes.iter().map(move |(k, v)| (s + k * stride, w * v)));
             stacks = pairs.collect();
             stride *= axis.nodes;
         }
         // One row for this pillar; widths are then taken from it.
-        let length = self.widths.nodes + 1;
+        let colour = &self.colours[colour];
+        let length = colour.widths_nm.len() + 1;
         let mut row = vec![Complex64::ZERO; length];
         for (stack, weight) in stacks {
-            let from = (colour * self.stacks() + stack) * length;
-            for (sum, t) in row.iter_mut().zip(&self.t[from..from + length]) {
+            for (sum, t) in row.iter_mut().zip(&colour.t[stack * length..]) {
                 *sum += t * weight;
             }
         }
         let at = |width: &f64| {
-            let weights = self.widths.weights(*width).ok_or_else(|| outside(format!("width of {width} nm")))?;
+            let weights = colour
+                .weights(*width)
+                .ok_or_else(|| outside(format!("width of {width} nm")))?;
             Ok(weights.into_iter().map(|(k, w)| row[k] * w).sum())
         };
         Ok(SolvedWidths {
@@ -299,6 +362,68 @@ impl CellBank {
     }
 }
 
+/// Widths between these where any of the rows is not smooth.
+fn between(widths_nm: &[f64], rows: &[Vec<Complex64>]) -> Vec<f64> {
+    let last = widths_nm.len() - 1;
+    let mut divided = vec![false; last];
+    for row in rows {
+        for k in 2..last - 1 {
+            let [a, b, c, d, e] = [k - 2, k - 1, k, k + 1, k + 2].map(|k| row[k]);
+            if ((b + d) * (2.0 / 3.0) - (a + e) / 6.0 - c).norm() > ROUGH {
+                divided[k.saturating_sub(1 + BESIDE)..(k + 1 + BESIDE).min(last)].fill(true);
+            }
+        }
+    }
+    let parts = |k: usize| {
+        let (low, high) = (widths_nm[k], widths_nm[k + 1]);
+        (1..FINE_PARTS).map(move |p| low + (high - low) * p as f64 / FINE_PARTS as f64)
+    };
+    (0..last).filter(|k| divided[*k]).flat_map(parts).collect()
+}
+
+/// Two sets of widths of one wavelength as one.
+fn merged(coarse: &[f64], rows: &[Vec<Complex64>], added: &[f64], fine: &[Vec<Complex64>]) -> Colour {
+    let mut order: Vec<(f64, bool, usize)> = coarse.iter().enumerate().map(|(k, w)| (*w, false, k)).collect();
+    order.extend(added.iter().enumerate().map(|(k, w)| (*w, true, k)));
+    order.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let whole = rows.iter().zip(fine).flat_map(|(row, fine)| {
+        let widths = order
+            .iter()
+            .map(move |(_, is_fine, k)| if *is_fine { fine[*k] } else { row[*k] });
+        widths.chain([row[coarse.len()]])
+    });
+    Colour {
+        t: whole.collect(),
+        widths_nm: order.iter().map(|o| o.0).collect(),
+    }
+}
+
+/// One wavelength from the front of the numbers of a file.
+fn take(rest: &mut &[f64], stacks: usize) -> Option<Colour> {
+    let (count, after) = rest.split_first()?;
+    let count = *count as usize;
+    let (widths, after) = after.split_at_checked(count)?;
+    let (t, after) = after.split_at_checked(2 * stacks.checked_mul(count + 1)?)?;
+    *rest = after;
+    (count >= 4).then(|| Colour {
+        widths_nm: widths.to_vec(),
+        t: t.chunks_exact(2).map(|z| Complex64::new(z[0], z[1])).collect(),
+    })
+}
+
+/// Hears that the user wants to stop, and counts nothing.
+struct Unwatched<'a>(&'a dyn Progress);
+
+impl Progress for Unwatched<'_> {
+    fn begin(&self, _what: &str, _steps: u64) {}
+
+    fn advance(&self, _steps: u64) {}
+
+    fn stopped(&self) -> bool {
+        self.0.stopped()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -306,7 +431,7 @@ mod tests {
     use metalith_cell::BAND_ORDERS;
     use metalith_core::Silent;
 
-    /// Rms error over widths and pillars: what a cubic leaves beside resonances.
+    /// Rms error over widths and pillars: what cubics leave of the resonances, of transmissions of modulus one.
     const RMS: f64 = 0.01;
 
     fn bank() -> CellBank {
@@ -328,7 +453,7 @@ mod tests {
         let path = folder.path().join("cells.bank");
         bank.write(&path).unwrap();
         let back = CellBank::read(&path, bank.stated(), bank.range.clone()).unwrap();
-        assert_eq!(back.t, bank.t);
+        assert_eq!(back.colours, bank.colours);
         let change = change_of([1.3, 0.0, 0.0, 0.0, 0.0]);
         let widths: Vec<f64> = (0..24).map(|k| 150.4 + 2.0 * f64::from(k)).collect();
         let table = bank.transmissions(&change, BAND_ORDERS, &widths, 0.53).unwrap();

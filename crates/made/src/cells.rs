@@ -6,9 +6,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use super::CellChange;
 use super::bank::CellBank;
 use super::stack::{off_cutoff, perturbed, possible_width_nm};
-use super::CellChange;
 use metalith_cell::{BAND_ORDERS, CellStack, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, dark};
 use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::Orders;

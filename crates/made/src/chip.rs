@@ -8,8 +8,8 @@ use serde::Serialize;
 use super::cells::{RealisedCells, SolvedWidths};
 use super::stack::perturbed;
 use super::{
-    ArrivingLight, CalibratedModel, CellBank, CameraChange, ClassTable, DrawnElement, MadeElement, NotApplied, Perturbation,
-    cell_direction, mixed, realised_nm,
+    ArrivingLight, CalibratedModel, CameraChange, CellBank, ClassTable, DrawnElement, MadeElement, NotApplied,
+    Perturbation, cell_direction, mixed, realised_nm,
 };
 use metalith_cell::{CellStack, POLARISATION_SHARE};
 use metalith_core::{Error, Progress, Result};

@@ -132,11 +132,17 @@ impl Bench {
         let chip = MadeChip::of_bank(&self.bank, &model)?;
         let cases = SimulationCases::judged_by(&chip);
         let accuracy = self.tolerance.accuracy;
-        let found = self.layout.judge(&self.design, &self.array, &cases, accuracy, progress)?;
+        let found = self
+            .layout
+            .judge(&self.design, &self.array, &cases, accuracy, progress)?;
         let figures = figures(&found);
         let limits = self.limits(&found);
         let of_design = found.checks.iter().map(|c| finite(c.reached));
-        let own = self.tolerance.limits.iter().map(|l| figures.get(&l.figure).copied().flatten());
+        let own = self
+            .tolerance
+            .limits
+            .iter()
+            .map(|l| figures.get(&l.figure).copied().flatten());
         let reached: Vec<Option<f64>> = of_design.chain(own).collect();
         let record = DrawRecord {
             draw: k,
@@ -151,7 +157,9 @@ impl Bench {
     /// All limits: of the design, then of the study.
     pub fn limits(&self, found: &Verification) -> Vec<LimitStatement> {
         let of_design = found.checks.iter().map(LimitStatement::of_check);
-        of_design.chain(self.tolerance.limits.iter().map(LimitStatement::of_figure)).collect()
+        of_design
+            .chain(self.tolerance.limits.iter().map(LimitStatement::of_figure))
+            .collect()
     }
 }
 

@@ -45,14 +45,23 @@ impl Drawer {
     /// For a tolerance that was read; `base` is what its model says.
     pub fn new(tolerance: &Tolerance, base: Perturbation) -> Self {
         let effects = effects();
-        let at = |name: &str| effects.iter().position(|e| e.name() == name).expect("names were checked");
+        let at = |name: &str| {
+            effects
+                .iter()
+                .position(|e| e.name() == name)
+                .expect("names were checked")
+        };
         let mut quantities = Vec::new();
         let mut add = |name: &str, source: &dyn Fn() -> Source| {
             let effect: &dyn Effect = effects[at(name)].as_ref();
             let count = effect.parameters().len();
             for k in 1..=count {
                 quantities.push(Quantity {
-                    name: if count == 1 { name.to_owned() } else { format!("{name}_{k}") },
+                    name: if count == 1 {
+                        name.to_owned()
+                    } else {
+                        format!("{name}_{k}")
+                    },
                     unit: effect.unit().to_owned(),
                     effect: at(name),
                     source: source(),
@@ -75,7 +84,10 @@ impl Drawer {
 
     /// Name and unit of each quantity; grids first.
     pub fn names(&self) -> Vec<(String, String)> {
-        self.quantities.iter().map(|q| (q.name.clone(), q.unit.clone())).collect()
+        self.quantities
+            .iter()
+            .map(|q| (q.name.clone(), q.unit.clone()))
+            .collect()
     }
 
     /// Whether a quantity is drawn, and not one of a grid.
@@ -156,7 +168,11 @@ impl Drawer {
     pub fn perturbation(&self, drawn: &Drawn) -> Perturbation {
         let mut to = self.base.clone();
         for (e, effect) in self.effects.iter().enumerate() {
-            let own = self.quantities.iter().zip(&drawn.amounts).filter(|(q, _)| q.effect == e);
+            let own = self
+                .quantities
+                .iter()
+                .zip(&drawn.amounts)
+                .filter(|(q, _)| q.effect == e);
             let parameters: Vec<f64> = own.map(|(_, amount)| effect.parameter(*amount)).collect();
             if !parameters.is_empty() {
                 effect.apply(&parameters, &mut to);
@@ -184,7 +200,11 @@ mod tests {
             model: None,
             draws: 1000,
             accuracy: Accuracy::Fast,
-            varied: vec![normal("cd_bias", sd), normal("tilt", 1.0), normal("corner_rounding", 10.0)],
+            varied: vec![
+                normal("cd_bias", sd),
+                normal("tilt", 1.0),
+                normal("corner_rounding", 10.0),
+            ],
             grids: vec![Grid {
                 effect: "gap".into(),
                 values: vec![-5.0, 0.0, 5.0],

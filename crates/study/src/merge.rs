@@ -51,7 +51,10 @@ pub fn merge(plan: &Plan, show: usize, progress: &dyn Progress) -> Result<StudyR
     let random: Vec<bool> = (0..count).map(|q| drawer.is_random(q)).collect();
     let table = Table::new(names, &middles, random, &draws);
     let limits = plan.limits.iter().enumerate();
-    let responses: Vec<Response> = limits.clone().filter_map(|(k, l)| table.response(k, l, &draws)).collect();
+    let responses: Vec<Response> = limits
+        .clone()
+        .filter_map(|(k, l)| table.response(k, l, &draws))
+        .collect();
     let mut yields: Vec<Yield> = limits
         .map(|(k, l)| {
             let held = draws.iter().filter(|d| l.holds(d.reached[k])).count();
@@ -108,7 +111,10 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for entry in entries {
         let path = entry.map_err(Error::io("read", folder))?.path();
-        let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let name = path
+            .file_name()
+            .map(|n| n.to_string_lossy().into_owned())
+            .unwrap_or_default();
         // Hidden ones are being written, or were left by a run that was killed.
         if name.ends_with(".jsonl") && !name.starts_with('.') {
             files.push(path);
@@ -127,7 +133,12 @@ fn whole(plan: &Plan, folder: &Path, files: &[PathBuf]) -> Result<Vec<DrawRecord
         for draw in read(plan, path)? {
             let Some(place) = found.get_mut(draw.draw as usize) else {
                 return Err(Error::invalid(
-                    format!("{} holds draw {}, and the study has {}", path.display(), draw.draw, plan.draws),
+                    format!(
+                        "{} holds draw {}, and the study has {}",
+                        path.display(),
+                        draw.draw,
+                        plan.draws
+                    ),
                     "remove the file",
                 ));
             };
@@ -151,7 +162,13 @@ fn whole(plan: &Plan, folder: &Path, files: &[PathBuf]) -> Result<Vec<DrawRecord
     let missing: Vec<u64> = (0..plan.draws).filter(|k| found[*k as usize].is_none()).collect();
     if !missing.is_empty() {
         return Err(Error::invalid(
-            format!("{} of {} draws are missing in {}: {}", missing.len(), plan.draws, folder.display(), ranges(&missing)),
+            format!(
+                "{} of {} draws are missing in {}: {}",
+                missing.len(),
+                plan.draws,
+                folder.display(),
+                ranges(&missing)
+            ),
             "make them with `metalith study run FOLDER --missing`",
         ));
     }
@@ -214,7 +231,11 @@ impl StudyResult {
             "" => name.clone(),
             unit => format!("{name}_{}", unit.replace(' ', "_")),
         }));
-        let figures: Vec<&String> = self.draws.first().map(|d| d.figures.keys().collect()).unwrap_or_default();
+        let figures: Vec<&String> = self
+            .draws
+            .first()
+            .map(|d| d.figures.keys().collect())
+            .unwrap_or_default();
         head.extend(figures.iter().map(|k| (*k).clone()));
         head.extend(self.plan.limits.iter().map(|l| format!("limit_{}", l.key)));
         head.push("passed".into());

@@ -28,18 +28,33 @@ pub fn write_page(result: &StudyResult, folder: &Path) -> Result<()> {
 
 fn page(result: &StudyResult) -> Page {
     let plan = &result.plan;
-    let name = plan.tolerance.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    let mut page = Page::new(format!("Study of {name}"), "A chip made many times with the tolerances of its process");
+    let name = plan
+        .tolerance
+        .file_name()
+        .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    let mut page = Page::new(
+        format!("Study of {name}"),
+        "A chip made many times with the tolerances of its process",
+    );
     let all = result.yields.last().expect("the yield over all limits is always there");
     page.facts(&[
         ("Draws", count(plan.draws)),
         ("Shards", count(plan.shards())),
         ("Yield over all limits", share(all)),
-        ("Varied", plan.quantities.iter().map(|q| q.0.as_str()).collect::<Vec<_>>().join(", ")),
+        (
+            "Varied",
+            plan.quantities
+                .iter()
+                .map(|q| q.0.as_str())
+                .collect::<Vec<_>>()
+                .join(", "),
+        ),
         ("Key", plan.key[..16].to_owned()),
     ]);
     page.section("Yield");
-    page.paragraph("Draws that hold each limit, counted. Intervals are Wilson's, 95 %, for the finite number of draws.");
+    page.paragraph(
+        "Draws that hold each limit, counted. Intervals are Wilson's, 95 %, for the finite number of draws.",
+    );
     page.table(yields(result));
     if !result.responses.is_empty() {
         page.section("What contributes");
@@ -54,7 +69,11 @@ fn page(result: &StudyResult) -> Page {
             for (quantity, share) in plan.quantities.iter().zip(&r.shares) {
                 bars.bar(quantity.0.clone(), *share, None, String::new(), false);
             }
-            bars.caption(format!("Pairs of quantities: {}; not explained: {}.", sig(r.pairs, 2), sig(r.rest, 2)))
+            bars.caption(format!(
+                "Pairs of quantities: {}; not explained: {}.",
+                sig(r.pairs, 2),
+                sig(r.rest, 2)
+            ))
         }));
         page.section("How tight for a yield of 90 %");
         page.paragraph(
@@ -79,7 +98,9 @@ fn page(result: &StudyResult) -> Page {
         page.paragraph("By the least margin over the limits, in units of what that margin varies by.");
         page.table(worst(result));
         for (k, found) in &result.shown {
-            let Some(element) = found.distinct.first() else { continue };
+            let Some(element) = found.distinct.first() else {
+                continue;
+            };
             let mut grid = ImageGrid::new(format!("Draw {k}, element {}", element.element.label()), 3);
             let mut step_um = 1.0;
             for spot in &element.spots {
@@ -96,7 +117,12 @@ fn page(result: &StudyResult) -> Page {
 
 fn share(y: &Yield) -> String {
     let [low, high] = y.interval;
-    format!("{} % ({} to {} %)", sig(y.share * 100.0, 3), sig(low * 100.0, 3), sig(high * 100.0, 3))
+    format!(
+        "{} % ({} to {} %)",
+        sig(y.share * 100.0, 3),
+        sig(low * 100.0, 3),
+        sig(high * 100.0, 3)
+    )
 }
 
 fn yields(result: &StudyResult) -> Table {
@@ -108,9 +134,18 @@ fn yields(result: &StudyResult) -> Table {
     ]);
     for (k, y) in result.yields.iter().enumerate() {
         let limit = result.plan.limits.get(k).map_or_else(String::new, |l| {
-            format!("{} {}", if l.at_least { "at least" } else { "at most" }, sig(l.limit, 4))
+            format!(
+                "{} {}",
+                if l.at_least { "at least" } else { "at most" },
+                sig(l.limit, 4)
+            )
         });
-        table.row([Cell::from(y.key.as_str()), Cell::from(limit), Cell::from(count(y.held)), Cell::from(share(y))]);
+        table.row([
+            Cell::from(y.key.as_str()),
+            Cell::from(limit),
+            Cell::from(count(y.held)),
+            Cell::from(share(y)),
+        ]);
     }
     table
 }
@@ -138,7 +173,11 @@ fn tightenings(result: &StudyResult) -> Table {
             Some(f) => sig(f, 2),
             None => "not by this alone".to_owned(),
         };
-        table.row([Cell::from(t.quantity.as_str()), Cell::from(factor), Cell::sig(t.best_yield * 100.0, 3)]);
+        table.row([
+            Cell::from(t.quantity.as_str()),
+            Cell::from(factor),
+            Cell::sig(t.best_yield * 100.0, 3),
+        ]);
     }
     table
 }
@@ -164,13 +203,21 @@ fn over_one(result: &StudyResult, q: usize) -> Figure {
         (middle, share, 0.5 * (high - low).max(0.0))
     });
     let x = Axis::linear(name.clone(), unit.clone());
-    let mut chart = Chart::new(format!("Yield over {name}"), x, Axis::linear("yield", "").range(0.0, 1.0));
+    let mut chart = Chart::new(
+        format!("Yield over {name}"),
+        x,
+        Axis::linear("yield", "").range(0.0, 1.0),
+    );
     chart.points_with_errors("all limits", points.collect::<Vec<_>>());
     chart.caption("Bins of equal numbers of draws; bars are half the width of Wilson's 95 % interval.")
 }
 
 fn worst(result: &StudyResult) -> Table {
-    let names = result.plan.quantities.iter().map(|(n, u)| Column::number(n.clone(), u.clone()));
+    let names = result
+        .plan
+        .quantities
+        .iter()
+        .map(|(n, u)| Column::number(n.clone(), u.clone()));
     let limits = result.plan.limits.iter().map(|l| Column::number(l.key.clone(), ""));
     let mut table = Table::new(std::iter::once(Column::text("Draw")).chain(names).chain(limits));
     for k in result.worst.iter().take(10) {

@@ -99,7 +99,10 @@ impl Plan {
         };
         let mut plan: Self = serde_json::from_slice(&bytes).map_err(|e| fault(e.to_string()))?;
         if plan.schema != SCHEMA || plan.draws_per_shard == 0 {
-            return Err(fault(format!("a manifest of schema {}, {SCHEMA} is known", plan.schema)));
+            return Err(fault(format!(
+                "a manifest of schema {}, {SCHEMA} is known",
+                plan.schema
+            )));
         }
         plan.folder = folder.to_owned();
         Ok(plan)
@@ -171,7 +174,10 @@ pub fn plan(tolerance_path: &Path, folder: &Path, settings: PlanSettings, progre
             return Ok(known);
         }
         return Err(Error::invalid(
-            format!("{} holds another study, or one whose files have changed since", folder.display()),
+            format!(
+                "{} holds another study, or one whose files have changed since",
+                folder.display()
+            ),
             "name another folder with --out, or remove this one",
         ));
     }
@@ -242,4 +248,22 @@ pub(crate) fn hex(key: &[u8; 32]) -> String {
 
 fn absolute(path: &Path) -> Result<PathBuf> {
     std::path::absolute(path).map_err(Error::io("find", path))
+}
+
+/// A plan of nothing, for tests of what is done with plans.
+#[cfg(test)]
+pub(crate) fn test_plan(folder: &Path, layout: Layout, draws: u64, draws_per_shard: u64) -> Plan {
+    Plan {
+        schema: SCHEMA,
+        key: hex(&[0; 32]),
+        tolerance: "tolerance.toml".into(),
+        layout,
+        quantities: Vec::new(),
+        limits: Vec::new(),
+        draws,
+        draws_per_shard,
+        seconds_per_draw: 1.0,
+        stacks: 1,
+        folder: folder.to_owned(),
+    }
 }

@@ -57,7 +57,11 @@ impl LimitStatement {
 
     /// How far what was reached is on the right side.
     pub fn margin(&self, reached: f64) -> f64 {
-        if self.at_least { reached - self.limit } else { self.limit - reached }
+        if self.at_least {
+            reached - self.limit
+        } else {
+            self.limit - reached
+        }
     }
 }
 
@@ -83,7 +87,11 @@ pub(crate) fn figures(found: &Verification) -> BTreeMap<String, Option<f64>> {
             };
             let mtf = spot.judged().mtf();
             worst(format!("strehl_{at}"), spot.judged().metrics.strehl, false);
-            worst(format!("energy_1_pixel_{at}"), spot.judged().metrics.energy_1_pixel, false);
+            worst(
+                format!("energy_1_pixel_{at}"),
+                spot.judged().metrics.energy_1_pixel,
+                false,
+            );
             worst(format!("mtf_half_nyquist_{at}"), mtf[0], false);
             worst(format!("mtf_nyquist_{at}"), mtf[1], false);
             worst(format!("centroid_shift_um_{at}"), spot.centroid_shift_um(), true);
@@ -96,7 +104,11 @@ pub(crate) fn figures(found: &Verification) -> BTreeMap<String, Option<f64>> {
                     worst(key, contrast.mtf[0].min(contrast.mtf[1]), false);
                 }
             }
-            worst(format!("white_energy_2_pixels_{}", white.channel), white.energy_2_pixels, false);
+            worst(
+                format!("white_energy_2_pixels_{}", white.channel),
+                white.energy_2_pixels,
+                false,
+            );
         }
     }
     figures.into_iter().map(|(k, v)| (k, finite(v))).collect()

@@ -72,7 +72,11 @@ impl Term {
 
 impl Quadratic {
     fn value(&self, x: &[f64]) -> f64 {
-        self.terms.iter().zip(&self.coefficients).map(|(t, c)| c * t.value(x)).sum()
+        self.terms
+            .iter()
+            .zip(&self.coefficients)
+            .map(|(t, c)| c * t.value(x))
+            .sum()
     }
 
     /// Least squares; none if the matrix has no solution.
@@ -91,7 +95,10 @@ impl Quadratic {
         }
         // Two values of a grid have no square apart from the constant: the least solution is taken.
         const SINGULAR: f64 = 1e-10;
-        let solved = normal.svd(true, true).solve(&right, SINGULAR * rows.len() as f64).ok()?;
+        let solved = normal
+            .svd(true, true)
+            .solve(&right, SINGULAR * rows.len() as f64)
+            .ok()?;
         Some(Self {
             terms: terms.to_vec(),
             coefficients: solved.iter().copied().collect(),
@@ -117,7 +124,8 @@ impl Table {
         let spreads: Vec<f64> = (0..names.len()).map(spread).collect();
         let scaled = |r: &DrawRecord| {
             let each = r.amounts.iter().zip(middles).zip(&spreads);
-            each.map(|((a, m), s)| if *s > 0.0 { (a - m) / s } else { 0.0 }).collect()
+            each.map(|((a, m), s)| if *s > 0.0 { (a - m) / s } else { 0.0 })
+                .collect()
         };
         Self {
             x: records.iter().map(scaled).collect(),
@@ -146,7 +154,10 @@ impl Table {
         let mut missed = 0.0;
         for (fitted, left_out) in [(0, 1), (1, 0)] {
             let fit = Quadratic::fit(&terms, &halves[fitted])?;
-            missed += halves[left_out].iter().map(|(x, y)| (fit.value(x) - y).powi(2)).sum::<f64>();
+            missed += halves[left_out]
+                .iter()
+                .map(|(x, y)| (fit.value(x) - y).powi(2))
+                .sum::<f64>();
         }
         let part = |of: &dyn Fn(Term) -> bool| {
             let own = self.x.iter().map(|x| {
@@ -278,7 +289,9 @@ mod tests {
         assert!((found.shares[0] - va / (va + vb)).abs() < LATTICE, "{:?}", found.shares);
         assert!(found.predicted > 0.999 && found.rest < 1e-6 && found.pairs < 1e-6);
         let tight = table.tightenings(0.9, &[limit], &[found], &records);
-        let [all, a, b] = tight.as_slice() else { panic!("{tight:?}") };
+        let [all, a, b] = tight.as_slice() else {
+            panic!("{tight:?}")
+        };
         assert_eq!(all.quantity, "all");
         // The margin holds for |a| below 1.41, seven tenths of the range: 0.9 of the draws for 0.78 of the range.
         assert!((a.factor.unwrap() - 0.78).abs() < 0.05, "{a:?}");

@@ -128,7 +128,9 @@ fn finished(plan: &Plan, shard: Shard) -> Result<bool> {
     let path = plan.shard_path(shard.number);
     let Some(file) = open(&path)? else { return Ok(false) };
     let mut first = String::new();
-    BufReader::new(file).read_line(&mut first).map_err(Error::io("read", &path))?;
+    BufReader::new(file)
+        .read_line(&mut first)
+        .map_err(Error::io("read", &path))?;
     match refusal(plan, shard, &first) {
         None => Ok(true),
         Some(why) => Err(refused(&path, &why)),

@@ -120,3 +120,44 @@ fn job(slurm: &Slurm, study: &Path, folder: &Path, list: &Path, tasks: usize) ->
 fn quoted(path: &Path) -> String {
     format!("'{}'", path.display().to_string().replace('\'', "'\\''"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::Layout;
+    use crate::plan::test_plan;
+
+    #[test]
+    fn arrays_stay_below_the_size_and_make_the_shards_of_their_lists() {
+        let folder = tempfile::tempdir().unwrap();
+        let plan = test_plan(
+            &folder.path().join("it's"),
+            Layout::Written("layout.gds".into()),
+            5000,
+            1,
+        );
+        let file = folder.path().join("slurm.toml");
+        std::fs::write(&file, "partition = \"cpu\"\ncpus_per_task = 4\nmax_array_size = 1001\n").unwrap();
+        let slurm = Slurm::read(&file).unwrap();
+        let missing: Vec<u64> = (0..5000).filter(|k| k % 2 == 1).collect();
+        let all = submissions(&plan, &slurm, &missing).unwrap();
+        assert_eq!(
+            all.iter().map(|s| s.shards.len()).collect::<Vec<_>>(),
+            [1001, 1001, 498]
+        );
+        let script = std::fs::read_to_string(&all[2].script).unwrap();
+        for line in [
+            "#SBATCH --array=0-497",
+            "#SBATCH --partition=cpu",
+            "#SBATCH --cpus-per-task=4",
+            "it'\\''s' --shard \"$shard\" --threads 4",
+        ] {
+            assert!(script.contains(line), "{line} is not in {script}");
+        }
+        let list = std::fs::read_to_string(all[1].script.with_extension("txt")).unwrap();
+        assert_eq!(list.lines().next(), Some("2003"));
+        std::fs::write(&file, "cpus_per_task = 0\npartitio = \"cpu\"\n").unwrap();
+        let error = Slurm::read(&file).unwrap_err().to_string();
+        assert!(error.contains("cpus_per_task") && error.contains("partitio"), "{error}");
+    }
+}

@@ -99,10 +99,22 @@ impl Tolerance {
             }
             used.push(name.to_owned());
         };
-        let varied: Vec<Varied> = root.sections("vary").iter().map(|s| vary(s, &known, &mut once)).collect();
-        let grids: Vec<Grid> = root.sections("grid").iter().map(|s| grid(s, &known, &mut once)).collect();
+        let varied: Vec<Varied> = root
+            .sections("vary")
+            .iter()
+            .map(|s| vary(s, &known, &mut once))
+            .collect();
+        let grids: Vec<Grid> = root
+            .sections("grid")
+            .iter()
+            .map(|s| grid(s, &known, &mut once))
+            .collect();
         if varied.is_empty() && grids.is_empty() {
-            root.fault("vary", "nothing varies", "add one [[vary]] with `effect` and `distribution` for each quantity");
+            root.fault(
+                "vary",
+                "nothing varies",
+                "add one [[vary]] with `effect` and `distribution` for each quantity",
+            );
         }
         let file = |key: &str| root.has(key).then(|| root.file(key));
         Self {
@@ -157,7 +169,12 @@ fn vary(s: &Section<'_, '_>, known: &[Box<dyn Effect>], once: &mut dyn FnMut(&Se
     } else {
         let (low, high) = (s.float("low", AMOUNT), s.float("high", AMOUNT));
         if low >= high {
-            s.fault_given(&["vary.low", "vary.high"], "high", "the highest amount is not above the lowest", "give `low` below `high`");
+            s.fault_given(
+                &["vary.low", "vary.high"],
+                "high",
+                "the highest amount is not above the lowest",
+                "give `low` below `high`",
+            );
         }
         physical(s, "low", effect, low);
         physical(s, "high", effect, high);
@@ -183,7 +200,11 @@ fn grid(s: &Section<'_, '_>, known: &[Box<dyn Effect>], once: &mut dyn FnMut(&Se
         );
     }
     if values.is_empty() {
-        s.fault("values", "a grid without values", "give the amounts, such as `values = [-5, 0, 5]`");
+        s.fault(
+            "values",
+            "a grid without values",
+            "give the amounts, such as `values = [-5, 0, 5]`",
+        );
         values.push(0.0);
     }
     for value in &values {
@@ -197,12 +218,19 @@ fn grid(s: &Section<'_, '_>, known: &[Box<dyn Effect>], once: &mut dyn FnMut(&Se
 
 fn limit(s: &Section<'_, '_>) -> FigureLimit {
     let figure = s.text("figure");
-    let (least, most) = (s.optional_float("at_least", AMOUNT), s.optional_float("at_most", AMOUNT));
+    let (least, most) = (
+        s.optional_float("at_least", AMOUNT),
+        s.optional_float("at_most", AMOUNT),
+    );
     let (sense, limit) = match (least, most) {
         (Some(limit), None) => (Sense::AtLeast, limit),
         (None, Some(limit)) => (Sense::AtMost, limit),
         _ => {
-            s.fault("figure", "a limit has one side", "give `at_least` or `at_most`, not both");
+            s.fault(
+                "figure",
+                "a limit has one side",
+                "give `at_least` or `at_most`, not both",
+            );
             (Sense::AtLeast, 0.0)
         }
     };
@@ -258,7 +286,12 @@ at_least = 0.6
             .replace("[-5, 0, 5]", "[-500]")
             .replace("at_least", "at_leas");
         let error = read(&bad).unwrap_err().to_string();
-        for part in ["did you mean", "not above the lowest", "`gap` cannot be -500 um", "one side"] {
+        for part in [
+            "did you mean",
+            "not above the lowest",
+            "`gap` cannot be -500 um",
+            "one side",
+        ] {
             assert!(error.contains(part), "{part} is not in {error}");
         }
     }
@@ -275,7 +308,12 @@ at_least = 0.6
             let mut perturbation = metalith_made::Perturbation::default();
             let numbers: Vec<f64> = effect.parameters().iter().map(|p| p.typical).collect();
             effect.apply(&numbers, &mut perturbation);
-            assert_ne!(perturbation, metalith_made::Perturbation::default(), "{}", effect.name());
+            assert_ne!(
+                perturbation,
+                metalith_made::Perturbation::default(),
+                "{}",
+                effect.name()
+            );
             assert_eq!(perturbation.not_applied(), [], "{}", effect.name());
         }
     }
