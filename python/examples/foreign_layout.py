@@ -33,7 +33,14 @@ def lens() -> npt.NDArray[np.uint16]:
     away = (turns[..., None] - phase + 0.5) % 1.0 - 0.5
     widths = trial[np.argmin(np.abs(away), axis=-1)]
     widths[r2 > at_um[-1] ** 2] = 0
-    return widths.astype(np.uint16)
+    out: npt.NDArray[np.uint16] = widths.astype(np.uint16)
+    return out
+
+
+def drawn(of: npt.NDArray[np.uint16]) -> npt.NDArray[np.uint16]:
+    """The part of a map that has pillars: a layout does not say how far its lattice goes on."""
+    rows, columns = np.nonzero(of)
+    return of[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
 
 
 widths = lens()
@@ -54,7 +61,7 @@ layout = ml.read_layout(folder / "foreign.gds")
 print(layout)
 assert layout.other_shapes == 0
 assert layout.pillars == np.count_nonzero(widths)
-assert np.array_equal(layout.widths[0], widths)
+assert np.array_equal(drawn(layout.widths[0]), drawn(widths))
 
 # %% [markdown]
 # Design rules: those of the program ask for marks and an outline, which this layout does not have.
@@ -78,5 +85,5 @@ for psf in ml.psf(layout, [530, 550, 570], distance_um=FOCUS_UM, fast=True):
 array = ml.write_layout(folder / "again.oas", [widths, widths], pitch_nm=PITCH_NM, centres_nm=[(0, 0), (60_000, 0)])
 again = ml.read_layout(folder / "again.oas")
 assert again.pillars == 2 * layout.pillars
-assert all(np.array_equal(w, widths) for w in again.widths)
+assert all(np.array_equal(drawn(w), drawn(widths)) for w in again.widths)
 print(array, (folder / "again.oas").stat().st_size, "bytes")

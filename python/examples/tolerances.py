@@ -35,15 +35,21 @@ at_least = 0.6
 
 # %%
 def main() -> None:
-    from dask.distributed import Client, LocalCluster
+    # Dask has no types.
+    from typing import Any
+
+    import dask.distributed
+
+    dask_distributed: Any = dask.distributed
 
     folder = Path(tempfile.mkdtemp())
     (folder / "tolerance.toml").write_text(TOLERANCE)
     study = ml.Study(folder / "tolerance.toml", draws_per_shard=4)
     plan = study.plan()
     print(plan["draws"], "draws, shards", study.missing())
-    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
-        study.run(client=client)
+    with dask_distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        with dask_distributed.Client(cluster) as client:
+            study.run(client=client)
     assert study.missing() == []
     result = study.result()
     print(result.yields[-1])

@@ -155,7 +155,8 @@ def psf(
     """PSFs of the distinct lenses of an array, of the elements of a layout that was read, or of one map of widths.
 
     ``field_deg`` counts from where an element looks. ``fidelity`` is ``rigorous`` (a lattice of equal pillars, along the
-    normal), ``neighbours`` (each pillar among its own neighbours; solved once in minutes, then kept), ``fitted`` or
+    normal), ``neighbours`` (each pillar among its own neighbours;
+    solved in minutes for each direction of light, then kept), ``fitted`` or
     ``published``. ``fast`` allows errors of 1e-3 instead of 1e-5 of the peak. An array of a design knows its sensor and
     its pillars; else ``distance_um`` and, for a map of widths, ``pitch_nm`` are needed."""
     wavelengths = [float(nm) for nm in np.atleast_1d(np.asarray(wavelengths_nm, dtype=float))]
