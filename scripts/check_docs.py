@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-FOLDERS = "benches|crates|designs|docs|examples|golden|processes|rules|scripts|src|tests"
+FOLDERS = "benches|crates|designs|docs|examples|golden|processes|python|rules|scripts|src|tests"
 LINK = re.compile(r"\]\(([^)#\s]*)(#[^)\s]*)?\)")
 PATH = re.compile(rf"`((?:{FOLDERS})/[\w./-]*)")
 

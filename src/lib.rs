@@ -75,6 +75,14 @@
 //! # }
 //! ```
 
+// The program says `metalith::` of the library, as any other program would.
+#[cfg(feature = "cli")]
+extern crate self as metalith;
+
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod cli;
+
 pub use metalith_calibrate as calibrate;
 pub use metalith_camera as camera;
 pub use metalith_cell as cell;
@@ -94,6 +102,7 @@ pub use metalith_optimise as optimise;
 pub use metalith_picture as picture;
 pub use metalith_rcwa as rcwa;
 pub use metalith_report as report;
+pub use metalith_study as study;
 pub use metalith_verify as verify;
 pub use metalith_wave as wave;
 

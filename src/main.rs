@@ -1,7 +1,5 @@
 //! The `metalith` program. See `metalith --help`.
 
-mod cli;
-
 fn main() -> std::process::ExitCode {
-    cli::run()
+    std::process::ExitCode::from(metalith::cli::run_with(std::env::args_os()))
 }

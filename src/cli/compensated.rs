@@ -13,7 +13,7 @@ use super::Terminal;
 pub struct CompensatedFor {
     /// The layout was made by `metalith layout --compensate MODEL`: its pillars are compared with those of the
     /// compensated design.
-    #[arg(long = "compensated", value_name = "MODEL", requires = "design")]
+    #[arg(id = "compensated", long, value_name = "MODEL", requires = "design")]
     pub model: Option<PathBuf>,
 }
 

@@ -20,11 +20,14 @@ mod picture;
 mod psf;
 mod run;
 mod standard_input;
+mod study;
 mod terminal;
 mod verify;
 
+use std::ffi::OsString;
 use std::fmt;
-use std::process::ExitCode;
+use std::path::PathBuf;
+use std::sync::OnceLock;
 
 use clap::{Parser, Subcommand};
 use miette::{Diagnostic, GraphicalReportHandler, SourceCode};
@@ -85,21 +88,51 @@ enum Command {
     Diff(diff::DiffArgs),
     Convert(convert::ConvertArgs),
     Calibrate(calibrate::CalibrateArgs),
+    Study(study::StudyArgs),
     Completions(completions::CompletionsArgs),
     #[command(hide = true)]
     Manual(completions::ManualArgs),
 }
 
-/// Run the program with the arguments of the process.
-pub fn run() -> ExitCode {
-    let arguments = Arguments::parse();
+/// How the program is started again, if it was started by another name than that of its file.
+static STARTED_AS: OnceLock<PathBuf> = OnceLock::new();
+
+/// The program as a process of its own can be started.
+///
+/// # Errors
+/// If the system does not say.
+fn program() -> metalith::Result<PathBuf> {
+    match STARTED_AS.get() {
+        Some(path) => Ok(path.clone()),
+        None => std::env::current_exe().map_err(Error::io("find", "the program".as_ref())),
+    }
+}
+
+/// Run the program with the arguments of a process, the first of which is its name; the answer is its exit code. Some hosts
+/// of the library, such as an interpreter, are not the program themselves: then the first argument is a file that is.
+pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let given: Vec<OsString> = arguments.into_iter().collect();
+    let arguments = match Arguments::try_parse_from(&given) {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            // Help is no error, and goes to standard output.
+            let _ = error.print();
+            return u8::try_from(error.exit_code()).unwrap_or(2);
+        }
+    };
+    if let Some(first) = given.first().map(PathBuf::from)
+        && std::env::current_exe().is_ok_and(|own| own.file_stem() != first.file_stem())
+        && first.is_file()
+    {
+        let _ = STARTED_AS.set(first);
+    }
     if let Some(threads) = arguments.threads {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads.into())
             .build_global();
         if let Err(error) = pool {
             eprintln!("error: {threads} threads cannot be started: {error}\n  help: use fewer with --threads");
-            return ExitCode::from(2);
+            return 2;
         }
     }
     let terminal = Terminal::new(arguments.quiet);
@@ -107,15 +140,15 @@ pub fn run() -> ExitCode {
     terminal.clear();
     if let Some(reason) = output::failure() {
         eprintln!("error: cannot write to standard output: {reason}");
-        return ExitCode::from(3);
+        return 3;
     }
     match outcome {
-        Ok(Outcome::Fine) => ExitCode::SUCCESS,
-        Ok(Outcome::OutsideLimits) => ExitCode::from(1),
-        Ok(Outcome::NotDone) => ExitCode::from(3),
+        Ok(Outcome::Fine) => 0,
+        Ok(Outcome::OutsideLimits) => 1,
+        Ok(Outcome::NotDone) => 3,
         Err(error) => {
             report(&error);
-            ExitCode::from(error.exit_code())
+            error.exit_code()
         }
     }
 }
@@ -137,6 +170,7 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::Diff(args) => diff::run(args, terminal),
         Command::Convert(args) => convert::run(args, terminal),
         Command::Calibrate(args) => calibrate::run(args, terminal),
+        Command::Study(args) => study::run(args, terminal),
         Command::Completions(args) => completions::run(args, terminal),
         Command::Manual(args) => completions::manual(args, terminal),
     }

@@ -259,6 +259,8 @@ fn the_program_applies_what_it_once_left_out_and_names_what_it_cannot() {
     };
     let nothing = judged("nothing", &|_| ());
     assert_eq!(nothing["model"]["not_applied"].as_array().unwrap().len(), 0);
+    // A model that judges is no model that the layout was compensated for.
+    assert!(nothing["compensated"].is_null());
     let offset = judged("offset", &|p| p.geometry.aperture_offset_um = [15.0, 0.0]);
     let near = judged("near", &|p| p.path.source_per_m = 50.0);
     // Either perturbation costs more than a twentieth of the peak; a command that ignored it would cost nothing.

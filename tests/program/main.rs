@@ -11,3 +11,4 @@ mod optimise;
 mod picture;
 mod predict;
 mod run;
+mod study;

@@ -44,7 +44,7 @@ pub use bench::{Bench, Sampling};
 pub use diagnosis::{
     Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePattern, GroupValue, LeftOut, Proposal, Ranked, SetVerdict,
 };
-pub use effects::{DeclaredEffect, DeclaredParameter, Effect, Parameter, Stage, all as all_effects};
+pub use effects::{DeclaredEffect, DeclaredParameter, Effect, Parameter, Stage, all as all_effects, of_any_chip};
 pub use fidelity::Rung;
 pub use proposal::propose;
 pub use run::{Calibration, calibrate};

@@ -16,9 +16,18 @@ const CHORD_ERROR_NM: f64 = 0.5;
 
 impl PillarForm {
     pub fn of(design: &Design) -> Self {
+        let plain = Self::plain(design.cell.shape);
         Self {
-            shape: design.cell.shape,
-            chord_error_nm: design.layout.circle_chord_error_nm.unwrap_or(CHORD_ERROR_NM),
+            chord_error_nm: design.layout.circle_chord_error_nm.unwrap_or(plain.chord_error_nm),
+            ..plain
+        }
+    }
+
+    /// Pillars of this shape, where nothing else is said.
+    pub fn plain(shape: PillarShape) -> Self {
+        Self {
+            shape,
+            chord_error_nm: CHORD_ERROR_NM,
         }
     }
 

@@ -24,7 +24,12 @@ impl LibraryFrame {
             .timestamp
             .parse::<NaiveDateTime>()
             .expect("checked when the design was read");
-        let mut library = GdsLibrary::new(top_cell(design));
+        Self::named(top_cell(design), date)
+    }
+
+    /// An empty library of this name and date.
+    pub fn named(name: String, date: NaiveDateTime) -> Result<Self> {
+        let mut library = GdsLibrary::new(name);
         library.units = GdsUnits::new(1e-3, 1e-9);
         library.dates = GdsDateTimes {
             modified: date,

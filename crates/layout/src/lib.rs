@@ -10,6 +10,7 @@ mod fixed;
 mod form;
 mod format;
 mod frame;
+mod free;
 mod mark;
 mod oasis;
 mod pillars;
@@ -29,6 +30,7 @@ use pillars::PillarWriter;
 
 pub use convert::convert;
 pub use format::{LayoutFormat, OasisEncoding};
+pub use free::{FreeLayout, write_free};
 pub use oasis::{write_apertures_oasis, write_pillars_oasis};
 pub use properties::write_layer_properties;
 
@@ -60,10 +62,36 @@ pub fn write_pillars(
     progress: &dyn Progress,
 ) -> Result<Written> {
     let frame = LibraryFrame::new(design)?;
-    let layers = &design.layout.layers;
+    let layer = &design.layout.layers.pillars;
     let fixed = FixedShapes::of_pillars(design).gds();
+    write_array(
+        &frame,
+        &top_cell(design),
+        layer,
+        PillarForm::of(design),
+        fixed,
+        array,
+        hierarchy,
+        path,
+        progress,
+    )
+}
+
+/// Write an array within a library, beside what is fixed in the top cell.
+#[allow(clippy::too_many_arguments)]
+fn write_array(
+    frame: &LibraryFrame,
+    top: &str,
+    layer: &LayoutLayer,
+    form: PillarForm,
+    fixed: Vec<GdsElement>,
+    array: &PillarArray,
+    hierarchy: Hierarchy,
+    path: &Path,
+    progress: &dyn Progress,
+) -> Result<Written> {
     progress.begin("writing pillars", array.pillars());
-    let mut writer = PillarWriter::create(path, &frame, &layers.pillars, PillarForm::of(design), progress)?;
+    let mut writer = PillarWriter::create(path, frame, layer, form, progress)?;
     let mut remarks = Vec::new();
     match hierarchy {
         Hierarchy::Folded => {
@@ -75,11 +103,11 @@ pub fn write_pillars(
         Hierarchy::Flat => {}
     }
     let flat = (hierarchy == Hierarchy::Flat).then_some(array);
-    let bytes = writer.finish(&top_cell(design), fixed, flat)?;
+    let bytes = writer.finish(top, fixed, flat)?;
     Ok(Written {
         path: path.to_owned(),
         bytes,
-        top_cell: top_cell(design),
+        top_cell: top.to_owned(),
         remarks,
         beside: Vec::new(),
     })

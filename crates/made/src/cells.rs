@@ -1,12 +1,14 @@
 //! Transmission of pillars of any realised width, solved where they are needed.
 
 use std::collections::{BTreeSet, HashMap};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::stack::{off_cutoff, possible_width_nm};
+use super::CellChange;
+use super::bank::CellBank;
+use super::stack::{off_cutoff, perturbed, possible_width_nm};
 use metalith_cell::{BAND_ORDERS, CellStack, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, dark};
 use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::Orders;
@@ -47,6 +49,8 @@ pub struct RealisedCells {
     /// under a bias common to all are solved exactly at their width.
     offset_nm: f64,
     known: Mutex<HashMap<(WaveKey, Solve), Polarised>>,
+    /// Where transmissions are taken from instead of being solved.
+    bank: Option<(Arc<CellBank>, CellChange)>,
 }
 
 /// What sites of some widths transmit: one table for light along the normal; else one for each polarisation that is
@@ -92,6 +96,16 @@ impl RealisedCells {
             stack,
             offset_nm: bias_nm - bias_nm.floor(),
             known: Mutex::default(),
+            bank: None,
+        }
+    }
+
+    /// Cells of a changed pillar, all taken from a bank: light off the normal has no answer, nor has what is outside
+    /// of the bank.
+    pub fn of_bank(bank: &Arc<CellBank>, change: &CellChange) -> Self {
+        Self {
+            bank: Some((Arc::clone(bank), *change)),
+            ..Self::new(perturbed(bank.stated(), change), 0.0)
         }
     }
 
@@ -144,6 +158,15 @@ impl RealisedCells {
         sines: [f64; 2],
         progress: &dyn Progress,
     ) -> Result<SolvedWidths> {
+        if let Some((bank, change)) = &self.bank {
+            if sines != [0.0; 2] {
+                return Err(Error::invalid(
+                    "tables of cells are for light along the normal",
+                    "leave out `incidence = \"as_lit\"`",
+                ));
+            }
+            return bank.transmissions(change, orders, widths_nm, wavelength_um);
+        }
         let [um, x, y] = [wavelength_um, sines[0], sines[1]].map(f64::to_bits);
         let place = [um, x, y, orders as u64];
         let places: Vec<Among> = widths_nm.iter().map(|w| among(*w, self.offset_nm)).collect();

@@ -1,13 +1,15 @@
 //! The chip as made: a stated cell and a perturbation, for any layout and light.
 
+use std::sync::Arc;
+
 use num_complex::Complex64;
 use serde::Serialize;
 
 use super::cells::{RealisedCells, SolvedWidths};
 use super::stack::perturbed;
 use super::{
-    ArrivingLight, CalibratedModel, CameraChange, ClassTable, DrawnElement, MadeElement, NotApplied, Perturbation,
-    cell_direction, mixed, realised_nm,
+    ArrivingLight, CalibratedModel, CameraChange, CellBank, ClassTable, DrawnElement, MadeElement, NotApplied,
+    Perturbation, cell_direction, mixed, realised_nm,
 };
 use metalith_cell::{CellStack, POLARISATION_SHARE};
 use metalith_core::{Error, Progress, Result};
@@ -56,6 +58,18 @@ impl MadeChip {
         Ok(Self {
             cells: RealisedCells::new(perturbed(stated, &perturbation.cell), perturbation.geometry.cd_bias_nm),
             model: model.clone(),
+        })
+    }
+
+    /// The same with all cells from a bank of the stated pillar: nothing is solved.
+    ///
+    /// # Errors
+    /// As [`MadeChip::new`].
+    pub fn of_bank(bank: &Arc<CellBank>, model: &CalibratedModel) -> Result<Self> {
+        let made = Self::new(bank.stated(), model)?;
+        Ok(Self {
+            cells: RealisedCells::of_bank(bank, &model.perturbation.cell),
+            ..made
         })
     }
 

@@ -20,6 +20,7 @@
 //!
 //! [`MadeElement::aperture`] gives a [`metalith_wave::Aperture`], so that every propagator runs from it.
 
+mod bank;
 mod camera;
 mod case;
 mod cells;
@@ -36,6 +37,7 @@ mod pupil;
 mod stack;
 pub mod zernike;
 
+pub use bank::{BankRange, CellBank};
 pub use camera::veiled;
 pub use case::SimulationCase;
 pub use cells::{NODE_STEP_NM, RealisedCells, SolvedWidths, lagrange};

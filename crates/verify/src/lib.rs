@@ -179,17 +179,79 @@ pub fn verify_layout(
     accuracy: Accuracy,
     progress: &dyn Progress,
 ) -> Result<Verification> {
-    fits(design, layout.path())?;
-    let extraction = extract(layout, &plan(design, array), progress)?;
-    let found = Found {
-        layout: facts(layout, &extraction, layout.path()),
-        elements: compare(array, &extraction, |placed, found| {
-            WidthCheck::compare(array.rows(placed).as_ref(), found)
-        }),
-        widths: extraction.elements.iter().map(|e| &e.widths as _).collect(),
-        foreign: extraction.oddities.clone(),
-    };
-    judge(design, array, found, cases, accuracy, None, progress)
+    ReadLayout::of(design, array, layout, progress)?.judge(design, array, cases, accuracy, progress)
+}
+
+/// A layout that was read back and compared with its design, to be judged as often as one likes.
+pub struct ReadLayout {
+    facts: LayoutFacts,
+    elements: Vec<ElementCheck>,
+    extraction: Extraction,
+}
+
+impl ReadLayout {
+    /// Read an open layout back and compare it with its design.
+    ///
+    /// # Errors
+    /// If it is too large to be held, cannot be read, or the user stopped it.
+    pub fn of(design: &Design, array: &PillarArray, layout: &Layout, progress: &dyn Progress) -> Result<Self> {
+        fits(design, layout.path())?;
+        let extraction = extract(layout, &plan(design, array), progress)?;
+        Ok(Self {
+            facts: facts(layout, &extraction, layout.path()),
+            elements: compare(array, &extraction, |placed, found| {
+                WidthCheck::compare(array.rows(placed).as_ref(), found)
+            }),
+            extraction,
+        })
+    }
+
+    /// The pillars that were read.
+    pub fn extraction(&self) -> &Extraction {
+        &self.extraction
+    }
+
+    /// Simulate it and hold it to the limits of its design.
+    ///
+    /// # Errors
+    /// If a cell has no answer at a wavelength, or the user stopped it.
+    pub fn judge(
+        &self,
+        design: &Design,
+        array: &PillarArray,
+        cases: &SimulationCases<'_>,
+        accuracy: Accuracy,
+        progress: &dyn Progress,
+    ) -> Result<Verification> {
+        let found = Found {
+            layout: self.facts.clone(),
+            elements: self.elements.clone(),
+            widths: self.extraction.elements.iter().map(|e| &e.widths as _).collect(),
+            foreign: self.extraction.oddities.clone(),
+        };
+        judge(design, array, found, cases, accuracy, None, progress)
+    }
+}
+
+/// The files that a camera is read from, the camera file first.
+///
+/// # Errors
+/// If it cannot be used.
+pub fn camera_files(camera: &Path) -> Result<Vec<std::path::PathBuf>> {
+    Ok(metalith_camera::Camera::read(camera)?.files)
+}
+
+/// Wavelengths at which a design is judged (um): those that single PSFs and the mapping are for, and those of the band
+/// of white light.
+///
+/// # Errors
+/// If the camera of the design cannot be used.
+pub fn wavelengths_um(design: &Design) -> Result<(Vec<f64>, Vec<f64>)> {
+    let mut single = design.verify.wavelengths_um.clone();
+    single.push(design.mapping.wavelength_um);
+    single.sort_by(f64::total_cmp);
+    single.dedup();
+    Ok((single, white::wavelengths_um(design)?))
 }
 
 /// What was read of a layout.

@@ -101,6 +101,11 @@ pub trait Effect: Send + Sync {
     /// Set its parameters.
     fn apply(&self, parameters: &[f64], to: &mut Perturbation);
 
+    /// The parameter of an amount of the effect in its [`Effect::unit`], counted from a perfect chip.
+    fn parameter(&self, amount: f64) -> f64 {
+        amount
+    }
+
     /// The value that is reported for one of its parameters.
     fn value(&self, parameter: f64, _set: &MeasuredSet) -> f64 {
         parameter
@@ -143,9 +148,23 @@ pub fn separate_by(a: &dyn Effect, b: &str) -> Option<&'static str> {
         .map(|c| c.1)
 }
 
-/// All effects that are tried on a set.
-pub fn all(set: &MeasuredSet) -> Vec<Box<dyn Effect>> {
-    let mut effects: Vec<Box<dyn Effect>> = vec![
+/// Effects that any chip and bench may have, whatever was measured: all but those of the lamps and of the distances
+/// between the elements of a set.
+pub fn of_any_chip() -> Vec<Box<dyn Effect>> {
+    let mut effects = single();
+    effects.extend(aberrations());
+    effects
+}
+
+fn aberrations() -> impl Iterator<Item = Box<dyn Effect>> {
+    aberration::ABERRATIONS
+        .into_iter()
+        .map(|e| Box::new(e) as Box<dyn Effect>)
+}
+
+/// Those that have one file each.
+fn single() -> Vec<Box<dyn Effect>> {
+    vec![
         Box::new(cd_bias::CdBias),
         Box::new(cd_bias_density::CdBiasDensity),
         Box::new(film_height::FilmHeight),
@@ -163,9 +182,14 @@ pub fn all(set: &MeasuredSet) -> Vec<Box<dyn Effect>> {
         Box::new(zero_order::ZeroOrder),
         Box::new(stray_light::StrayLight),
         Box::new(aperture_offset::ApertureOffset),
-    ];
+    ]
+}
+
+/// All effects that are tried on a set.
+pub fn all(set: &MeasuredSet) -> Vec<Box<dyn Effect>> {
+    let mut effects = single();
     effects.extend(sensor_tilt::SensorTilt::of(set).map(|e| Box::new(e) as Box<dyn Effect>));
-    effects.extend(aberration::ABERRATIONS.map(|e| Box::new(e) as Box<dyn Effect>));
+    effects.extend(aberrations());
     for (led, lamp) in set.leds.iter().enumerate() {
         effects.push(Box::new(led_centre::LedCentre {
             led,

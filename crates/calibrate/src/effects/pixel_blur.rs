@@ -28,6 +28,10 @@ impl Effect for PixelBlur {
         to.camera.pixel_blur_um = parameters[0].max(0.0).sqrt();
     }
 
+    fn parameter(&self, amount: f64) -> f64 {
+        amount * amount.abs()
+    }
+
     fn value(&self, parameter: f64, _set: &MeasuredSet) -> f64 {
         parameter.max(0.0).sqrt()
     }

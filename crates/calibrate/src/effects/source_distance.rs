@@ -28,6 +28,10 @@ impl Effect for SourceDistance {
         to.path.source_per_m = parameters[0].max(0.0);
     }
 
+    fn parameter(&self, amount: f64) -> f64 {
+        1e6 / amount
+    }
+
     fn value(&self, parameter: f64, _set: &MeasuredSet) -> f64 {
         // 1e6 um to the metre; collimated light comes from infinitely far.
         1e6 / parameter.max(1e-6)

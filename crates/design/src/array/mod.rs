@@ -15,15 +15,25 @@ pub use widths::WidthRule;
 
 use crate::phase::{ElementPhase, LensPhase};
 use crate::{Design, Element};
-use metalith_core::Progress;
 use metalith_core::{EighthMap, Lattice, WidthMap, WidthRows};
 use metalith_core::{Error, Result};
+use metalith_core::{Progress, Wedge};
 
 /// Sites of an element that is held (128 MB): one of 2.8 mm. The pillars of a larger one are made as they are asked for.
 const MOST_HELD: u64 = 1 << 26;
 
 /// Widths of an eighth of an element that is held to be read whole (268 MB): one of 11 mm.
 const MOST_EIGHTH: u64 = 1 << 27;
+
+/// Places of elements without a design (nm): layouts have 32 bits for them.
+const FARTHEST_NM: i64 = 1_000_000_000;
+
+/// The wedge of an element that looks straight ahead, at all wavelengths.
+const UNSTEERED: Wedge = Wedge {
+    wavelength_um: 1.0,
+    sin_x: 0.0,
+    sin_y: 0.0,
+};
 
 /// Elements that are the same pillars up to a symmetry of the square.
 #[derive(Clone, Debug)]
@@ -62,6 +72,56 @@ impl PillarArray {
     /// [`Error::Interrupted`] if the user stopped it.
     pub fn build(design: &Design, progress: &dyn Progress) -> Result<Self> {
         Self::build_within(design, MOST_HELD, progress)
+    }
+
+    /// The array of pillars that were not made from a design: maps of widths with the places of their centres (nm). Copies
+    /// and symmetries are found as those of a design are; nothing is steered.
+    ///
+    /// # Errors
+    /// If there is none, they are not of one lattice, a place is farther than 1 m from the middle, or the user stopped it.
+    pub fn of_maps(maps: Vec<(WidthMap, (i64, i64))>, progress: &dyn Progress) -> Result<Self> {
+        let Some(lattice) = maps.first().map(|(map, _)| map.lattice) else {
+            return Err(Error::invalid(
+                "an array without elements",
+                "give at least one map of widths",
+            ));
+        };
+        progress.begin("comparing elements", maps.len() as u64);
+        let mut array = Self {
+            lattice,
+            classes: Vec::new(),
+            placed: Vec::new(),
+            compensated: false,
+        };
+        for (k, (map, centre_nm)) in maps.into_iter().enumerate() {
+            if progress.stopped() {
+                return Err(Error::Interrupted);
+            }
+            if map.lattice != lattice {
+                let sites = [map.lattice.sites(), lattice.sites()];
+                return Err(Error::invalid(
+                    format!(
+                        "map {k} has {} sites along an axis, the first has {}",
+                        sites[0], sites[1]
+                    ),
+                    "give maps of one size and pitch: pad smaller ones with zeros",
+                ));
+            }
+            if centre_nm.0.abs().max(centre_nm.1.abs()) > FARTHEST_NM {
+                return Err(Error::invalid(
+                    format!("element {k} at ({}, {}) nm", centre_nm.0, centre_nm.1),
+                    "place elements within 1 m of the middle",
+                ));
+            }
+            let element = Element {
+                index: (k as i32, 0),
+                centre_nm,
+                wedge: UNSTEERED,
+            };
+            array.place(element, ClassWidths::Held(map));
+            progress.advance(1);
+        }
+        Ok(array)
     }
 
     /// As [`PillarArray::build`]; elements of more than `most_held` sites are not held but made row by row.

@@ -1,0 +1,246 @@
+//! The numbers of one draw, from the plan's key and its own number.
+
+use metalith_calibrate::Effect;
+use metalith_core::{Error, Result};
+use metalith_made::Perturbation;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution as _, Normal, Uniform};
+
+use crate::tolerance::{Distribution, TAIL_SD, Tolerance, effects};
+
+/// Amounts that are drawn at the most until one is physical.
+const MOST_TRIES: usize = 10_000;
+
+/// The amounts of one draw, in the order of [`Drawer::names`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drawn {
+    /// In the unit of each quantity.
+    pub amounts: Vec<f64>,
+}
+
+/// One number that varies.
+struct Quantity {
+    /// Name of its effect, with the number of its parameter where there are several.
+    name: String,
+    unit: String,
+    effect: usize,
+    source: Source,
+}
+
+enum Source {
+    Random(Distribution),
+    Grid(Vec<f64>),
+}
+
+/// Makes the draws of a tolerance.
+pub(crate) struct Drawer {
+    effects: Vec<Box<dyn Effect>>,
+    quantities: Vec<Quantity>,
+    base: Perturbation,
+    draws: u64,
+}
+
+impl Drawer {
+    /// For a tolerance that was read; `base` is what its model says.
+    pub fn new(tolerance: &Tolerance, base: Perturbation) -> Self {
+        let effects = effects();
+        let at = |name: &str| {
+            effects
+                .iter()
+                .position(|e| e.name() == name)
+                .expect("names were checked")
+        };
+        let mut quantities = Vec::new();
+        let mut add = |name: &str, source: &dyn Fn() -> Source| {
+            let effect: &dyn Effect = effects[at(name)].as_ref();
+            let count = effect.parameters().len();
+            for k in 1..=count {
+                quantities.push(Quantity {
+                    name: if count == 1 {
+                        name.to_owned()
+                    } else {
+                        format!("{name}_{k}")
+                    },
+                    unit: effect.unit().to_owned(),
+                    effect: at(name),
+                    source: source(),
+                });
+            }
+        };
+        for grid in &tolerance.grids {
+            add(&grid.effect, &|| Source::Grid(grid.values.clone()));
+        }
+        for varied in &tolerance.varied {
+            add(&varied.effect, &|| Source::Random(varied.distribution));
+        }
+        Self {
+            quantities,
+            effects,
+            base,
+            draws: tolerance.draws,
+        }
+    }
+
+    /// Name and unit of each quantity; grids first.
+    pub fn names(&self) -> Vec<(String, String)> {
+        self.quantities
+            .iter()
+            .map(|q| (q.name.clone(), q.unit.clone()))
+            .collect()
+    }
+
+    /// Whether a quantity is drawn, and not one of a grid.
+    pub fn is_random(&self, quantity: usize) -> bool {
+        matches!(self.quantities[quantity].source, Source::Random(_))
+    }
+
+    /// All draws at all points of the grid.
+    pub fn count(&self) -> u64 {
+        self.draws * self.points()
+    }
+
+    fn points(&self) -> u64 {
+        let sizes = self.quantities.iter().map(|q| match &q.source {
+            Source::Grid(values) => values.len() as u64,
+            Source::Random(_) => 1,
+        });
+        sizes.product()
+    }
+
+    /// Draw `k`: the point of the grid `k / draws`, and random amounts from ChaCha8 with the key and stream `k`.
+    ///
+    /// # Errors
+    /// If a distribution has next to nothing within the physical range of its effect.
+    pub fn draw(&self, key: [u8; 32], k: u64) -> Result<Drawn> {
+        let mut rng = ChaCha8Rng::from_seed(key);
+        rng.set_stream(k);
+        let mut point = k / self.draws;
+        let mut amounts = Vec::with_capacity(self.quantities.len());
+        for quantity in &self.quantities {
+            amounts.push(match &quantity.source {
+                Source::Grid(values) => {
+                    let value = values[(point % values.len() as u64) as usize];
+                    point /= values.len() as u64;
+                    value
+                }
+                Source::Random(distribution) => self.amount(quantity, distribution, &mut rng)?,
+            });
+        }
+        Ok(Drawn { amounts })
+    }
+
+    fn amount(&self, quantity: &Quantity, distribution: &Distribution, rng: &mut ChaCha8Rng) -> Result<f64> {
+        let effect = &self.effects[quantity.effect];
+        let (low, high) = effect.parameters()[0].range;
+        for _ in 0..MOST_TRIES {
+            let (amount, inside) = match *distribution {
+                Distribution::Normal { mean, sd } => {
+                    let normal = Normal::new(mean, sd).expect("the deviation is positive");
+                    let amount = normal.sample(rng);
+                    (amount, (amount - mean).abs() <= TAIL_SD * sd)
+                }
+                Distribution::Uniform { low, high } => {
+                    let uniform = Uniform::new(low, high).expect("the range is not empty");
+                    (uniform.sample(rng), true)
+                }
+            };
+            if inside && (low..=high).contains(&effect.parameter(amount)) {
+                return Ok(amount);
+            }
+        }
+        Err(Error::invalid(
+            format!("`{}` is hardly ever within what a chip can have", quantity.name),
+            "give a distribution that overlaps with the physical range of the effect",
+        ))
+    }
+
+    /// The middle of a quantity: what it is where nothing varies.
+    pub fn middle(&self, quantity: usize) -> f64 {
+        match &self.quantities[quantity].source {
+            Source::Random(Distribution::Normal { mean, .. }) => *mean,
+            Source::Random(Distribution::Uniform { low, high }) => 0.5 * (low + high),
+            Source::Grid(values) => values.iter().sum::<f64>() / values.len() as f64,
+        }
+    }
+
+    /// What these amounts make of a chip.
+    pub fn perturbation(&self, drawn: &Drawn) -> Perturbation {
+        let mut to = self.base.clone();
+        for (e, effect) in self.effects.iter().enumerate() {
+            let own = self
+                .quantities
+                .iter()
+                .zip(&drawn.amounts)
+                .filter(|(q, _)| q.effect == e);
+            let parameters: Vec<f64> = own.map(|(_, amount)| effect.parameter(*amount)).collect();
+            if !parameters.is_empty() {
+                effect.apply(&parameters, &mut to);
+            }
+        }
+        to
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tolerance::{Grid, Varied};
+    use metalith_wave::Accuracy;
+
+    fn drawer(sd: f64) -> Drawer {
+        let normal = |effect: &str, sd| Varied {
+            effect: effect.into(),
+            distribution: Distribution::Normal { mean: 0.0, sd },
+        };
+        let tolerance = Tolerance {
+            path: "t.toml".into(),
+            design: "d.toml".into(),
+            layout: None,
+            model: None,
+            draws: 1000,
+            accuracy: Accuracy::Fast,
+            varied: vec![
+                normal("cd_bias", sd),
+                normal("tilt", 1.0),
+                normal("corner_rounding", 10.0),
+            ],
+            grids: vec![Grid {
+                effect: "gap".into(),
+                values: vec![-5.0, 0.0, 5.0],
+            }],
+            limits: Vec::new(),
+        };
+        Drawer::new(&tolerance, Perturbation::default())
+    }
+
+    #[test]
+    fn a_draw_follows_from_its_number_and_is_of_its_distribution() {
+        let drawer = drawer(2.0);
+        let names: Vec<String> = drawer.names().into_iter().map(|n| n.0).collect();
+        assert_eq!(names, ["gap", "cd_bias", "tilt_1", "tilt_2", "corner_rounding"]);
+        assert_eq!(drawer.count(), 3000);
+        let draw = |k| drawer.draw([7; 32], k).unwrap().amounts;
+        assert_eq!(draw(17), draw(17));
+        assert_ne!(draw(17)[1], draw(18)[1]);
+        assert_eq!([draw(0)[0], draw(1000)[0], draw(2999)[0]], [-5.0, 0.0, 5.0]);
+        let bias: Vec<f64> = (0..3000).map(|k| draw(k)[1]).collect();
+        let mean = bias.iter().sum::<f64>() / 3000.0;
+        let sd = (bias.iter().map(|b| (b - mean).powi(2)).sum::<f64>() / 3000.0).sqrt();
+        // Four standard errors of 3000 draws; tails beyond three deviations are left out, which takes 1.3 % off.
+        assert!(mean.abs() < 4.0 * 2.0 / 3000_f64.sqrt(), "{mean}");
+        assert!((sd - 2.0 * 0.987).abs() < 4.0 * 2.0 / 6000_f64.sqrt(), "{sd}");
+        assert!((0..3000).all(|k| draw(k)[4] >= 0.0));
+    }
+
+    #[test]
+    fn amounts_become_a_perturbation_in_the_unit_of_their_effect() {
+        let amounts = vec![5.0, -3.0, 1.0, 2.0, 20.0];
+        let p = drawer(2.0).perturbation(&Drawn { amounts });
+        assert_eq!(p.path.gap_um, 5.0);
+        assert_eq!(p.geometry.cd_bias_nm, -3.0);
+        assert_eq!(p.path.tilt_mrad, [1.0, 2.0]);
+        // The square is what is fitted; its root comes back to rounding.
+        assert!((p.cell.corner_rounding_nm - 20.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,45 @@
+//! Studies: a chip made many times with the tolerances of a process and a bench, cut into shards.
+//!
+//! ```text
+//! tolerance.toml         ->  Tolerance
+//! design, layout, cells  ->  Plan: a folder with manifest, layout and tables of cells
+//! plan, number of shard  ->  a file of draws, whole or not at all
+//! all shards             ->  StudyResult: draws, yields, shares of variance, page
+//! ```
+//!
+//! Draw `k` follows from the plan and `k` alone: neither the size of a shard, nor the order in which shards run, nor the
+//! machine or the number of threads change it.
+//!
+//! | file | holds |
+//! | --- | --- |
+//! | `tolerance` | the file of a study, and its quantities as effects of the calibration |
+//! | `draw` | the numbers of one draw |
+//! | `bench` | what draws are judged with: design, layout as read back, tables of cells |
+//! | `record` | what is kept of one draw |
+//! | `plan`, `shard` | the folder of a study |
+//! | `merge`, `yields`, `response` | all draws, and what they say |
+//! | `page` | what a person reads |
+//! | `slurm` | job arrays |
+
+mod bench;
+mod draw;
+mod merge;
+mod page;
+mod plan;
+mod record;
+mod response;
+mod shard;
+mod slurm;
+mod tolerance;
+mod yields;
+
+pub use draw::Drawn;
+pub use merge::{StudyResult, merge};
+pub use page::write_page;
+pub use plan::{Layout, Plan, PlanSettings, Shard, plan};
+pub use record::{DrawRecord, LimitStatement};
+pub use response::{Response, Tightening};
+pub use shard::{Run, Status, run_shard, status};
+pub use slurm::{Slurm, Submission, submissions};
+pub use tolerance::{Distribution, FigureLimit, Grid, Tolerance, Varied};
+pub use yields::{Yield, wilson};

@@ -1,0 +1,320 @@
+//! The file of a study, read with a place for every mistake.
+
+use std::path::{Path, PathBuf};
+
+use metalith_calibrate::{Effect, Stage, of_any_chip};
+use metalith_core::Result;
+use metalith_core::document::{Document, Limits, Section, load};
+use metalith_verify::Sense;
+use metalith_wave::Accuracy;
+
+/// Version of the format that is read.
+const SCHEMA: i64 = 1;
+
+/// Most draws of a study.
+const MOST_DRAWS: i64 = 10_000_000;
+
+/// Any amount, in any unit.
+const AMOUNT: Limits = Limits::new(-1e6..=1e6, "");
+
+/// Normal distributions end here: a process with a tail beyond is not described by one (standard deviations).
+pub(crate) const TAIL_SD: f64 = 3.0;
+
+/// What varies, what is looked at, and how often.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tolerance {
+    /// The file it was read from.
+    pub path: PathBuf,
+    pub design: PathBuf,
+    /// The pillar layout; written from the design if left out.
+    pub layout: Option<PathBuf>,
+    /// The calibrated model that varied quantities depart from.
+    pub model: Option<PathBuf>,
+    /// Draws at each point of the grid.
+    pub draws: u64,
+    pub accuracy: Accuracy,
+    pub varied: Vec<Varied>,
+    pub grids: Vec<Grid>,
+    /// Limits on figures, beside those of the design.
+    pub limits: Vec<FigureLimit>,
+}
+
+/// An effect of the calibration with a distribution.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Varied {
+    /// Name of the effect.
+    pub effect: String,
+    /// Of each of its parameters, independently, in the unit of the effect.
+    pub distribution: Distribution,
+}
+
+/// Where amounts come from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Distribution {
+    /// Mean and standard deviation, without what is beyond three of them or not physical.
+    Normal { mean: f64, sd: f64 },
+    /// Every amount between two alike.
+    Uniform { low: f64, high: f64 },
+}
+
+/// An effect at each of some amounts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid {
+    pub effect: String,
+    pub values: Vec<f64>,
+}
+
+/// A limit on a figure of a draw.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FigureLimit {
+    /// Key of the figure, such as `strehl_530nm_0deg`.
+    pub figure: String,
+    pub sense: Sense,
+    pub limit: f64,
+}
+
+/// The effects that a study can vary: those that PSFs of a wavelength and a point show.
+pub(crate) fn effects() -> Vec<Box<dyn Effect>> {
+    let seen = |e: &Box<dyn Effect>| e.stage() != Stage::Source && e.name() != "source_size";
+    of_any_chip().into_iter().filter(seen).collect()
+}
+
+impl Tolerance {
+    /// Read the file at `path`.
+    ///
+    /// # Errors
+    /// Every mistake of the file at once, each with line, column and remedy.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = load(path)?;
+        Document::read(path, &text, |root| Self::sections(path, root))
+    }
+
+    fn sections(path: &Path, root: &Section<'_, '_>) -> Self {
+        root.integer("schema", SCHEMA..=SCHEMA, "");
+        let known = effects();
+        let mut used: Vec<String> = Vec::new();
+        let mut once = |section: &Section<'_, '_>, name: &str| {
+            if used.iter().any(|u| u == name) {
+                section.fault("effect", format!("`{name}` varies twice"), "keep one of the two");
+            }
+            used.push(name.to_owned());
+        };
+        let varied: Vec<Varied> = root
+            .sections("vary")
+            .iter()
+            .map(|s| vary(s, &known, &mut once))
+            .collect();
+        let grids: Vec<Grid> = root
+            .sections("grid")
+            .iter()
+            .map(|s| grid(s, &known, &mut once))
+            .collect();
+        if varied.is_empty() && grids.is_empty() {
+            root.fault(
+                "vary",
+                "nothing varies",
+                "add one [[vary]] with `effect` and `distribution` for each quantity",
+            );
+        }
+        let file = |key: &str| root.has(key).then(|| root.file(key));
+        Self {
+            path: path.to_owned(),
+            design: root.file("design"),
+            layout: file("layout"),
+            model: file("model"),
+            draws: root.integer("draws", 1..=MOST_DRAWS, "draws") as u64,
+            accuracy: root.choice(
+                "accuracy",
+                &[("fast", Accuracy::Fast), ("accurate", Accuracy::Accurate)],
+                Some(Accuracy::Fast),
+            ),
+            limits: root.sections("limit").iter().map(limit).collect(),
+            varied,
+            grids,
+        }
+    }
+}
+
+/// The effect that a section names.
+fn effect<'e>(s: &Section<'_, '_>, known: &'e [Box<dyn Effect>]) -> &'e dyn Effect {
+    let names: Vec<String> = known.iter().map(|e| e.name()).collect();
+    let choices: Vec<(&str, usize)> = names.iter().enumerate().map(|(k, n)| (n.as_str(), k)).collect();
+    known[s.choice("effect", &choices, None)].as_ref()
+}
+
+/// Amounts must be what an effect can be.
+fn physical(s: &Section<'_, '_>, key: &str, effect: &dyn Effect, amount: f64) {
+    let range = effect.parameters()[0].range;
+    let parameter = effect.parameter(amount);
+    if !(range.0..=range.1).contains(&parameter) {
+        s.fault(
+            key,
+            format!("`{}` cannot be {amount} {}", effect.name(), effect.unit()),
+            "give an amount that a chip can have; the table of effects in docs/guide/study.md has the ranges",
+        );
+    }
+}
+
+fn vary(s: &Section<'_, '_>, known: &[Box<dyn Effect>], once: &mut dyn FnMut(&Section<'_, '_>, &str)) -> Varied {
+    let effect = effect(s, known);
+    if s.sound(&["vary.effect"]) {
+        once(s, &effect.name());
+    }
+    let normal = s.choice("distribution", &[("normal", true), ("uniform", false)], None);
+    let distribution = if normal {
+        let mean = s.optional_float("mean", AMOUNT).unwrap_or(0.0);
+        let sd = s.float("sd", Limits::new(1e-9..=1e6, ""));
+        physical(s, "mean", effect, mean);
+        Distribution::Normal { mean, sd }
+    } else {
+        let (low, high) = (s.float("low", AMOUNT), s.float("high", AMOUNT));
+        if low >= high {
+            s.fault_given(
+                &["vary.low", "vary.high"],
+                "high",
+                "the highest amount is not above the lowest",
+                "give `low` below `high`",
+            );
+        }
+        physical(s, "low", effect, low);
+        physical(s, "high", effect, high);
+        Distribution::Uniform { low, high }
+    };
+    Varied {
+        effect: effect.name(),
+        distribution,
+    }
+}
+
+fn grid(s: &Section<'_, '_>, known: &[Box<dyn Effect>], once: &mut dyn FnMut(&Section<'_, '_>, &str)) -> Grid {
+    let effect = effect(s, known);
+    if s.sound(&["grid.effect"]) {
+        once(s, &effect.name());
+    }
+    let mut values = s.floats("values", AMOUNT);
+    if effect.parameters().len() > 1 {
+        s.fault(
+            "effect",
+            format!("`{}` has {} parameters", effect.name(), effect.parameters().len()),
+            "give it a distribution with [[vary]]; a grid is over effects of one parameter",
+        );
+    }
+    if values.is_empty() {
+        s.fault(
+            "values",
+            "a grid without values",
+            "give the amounts, such as `values = [-5, 0, 5]`",
+        );
+        values.push(0.0);
+    }
+    for value in &values {
+        physical(s, "values", effect, *value);
+    }
+    Grid {
+        effect: effect.name(),
+        values,
+    }
+}
+
+fn limit(s: &Section<'_, '_>) -> FigureLimit {
+    let figure = s.text("figure");
+    let (least, most) = (
+        s.optional_float("at_least", AMOUNT),
+        s.optional_float("at_most", AMOUNT),
+    );
+    let (sense, limit) = match (least, most) {
+        (Some(limit), None) => (Sense::AtLeast, limit),
+        (None, Some(limit)) => (Sense::AtMost, limit),
+        _ => {
+            s.fault(
+                "figure",
+                "a limit has one side",
+                "give `at_least` or `at_most`, not both",
+            );
+            (Sense::AtLeast, 0.0)
+        }
+    };
+    FigureLimit { figure, sense, limit }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GOOD: &str = r#"
+schema = 1
+design = "d.toml"
+draws = 10
+[[vary]]
+effect = "cd_bias"
+distribution = "normal"
+sd = 3.0
+[[vary]]
+effect = "tilt"
+distribution = "uniform"
+low = -2.0
+high = 2.0
+[[grid]]
+effect = "gap"
+values = [-5, 0, 5]
+[[limit]]
+figure = "strehl_530nm_0deg"
+at_least = 0.6
+"#;
+
+    fn read(text: &str) -> Result<Tolerance> {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("d.toml"), "").unwrap();
+        let path = folder.path().join("tolerance.toml");
+        std::fs::write(&path, text).unwrap();
+        Tolerance::read(&path)
+    }
+
+    #[test]
+    fn a_file_is_read() {
+        let read = read(GOOD).unwrap();
+        assert_eq!(read.varied[0].distribution, Distribution::Normal { mean: 0.0, sd: 3.0 });
+        assert_eq!(read.grids[0].values, [-5.0, 0.0, 5.0]);
+        assert_eq!(read.limits[0].sense, Sense::AtLeast);
+    }
+
+    #[test]
+    fn all_mistakes_are_told_at_once() {
+        let bad = GOOD
+            .replace("\"cd_bias\"", "\"cd_bia\"")
+            .replace("high = 2.0", "high = -3.0")
+            .replace("[-5, 0, 5]", "[-500]")
+            .replace("at_least", "at_leas");
+        let error = read(&bad).unwrap_err().to_string();
+        for part in [
+            "did you mean",
+            "not above the lowest",
+            "`gap` cannot be -500 um",
+            "one side",
+        ] {
+            assert!(error.contains(part), "{part} is not in {error}");
+        }
+    }
+
+    #[test]
+    fn what_psfs_of_one_wavelength_do_not_show_cannot_vary() {
+        let names: Vec<String> = effects().iter().map(|e| e.name()).collect();
+        assert!(names.contains(&"film_height".to_owned()), "{names:?}");
+        for lamp in ["led_width", "source_size"] {
+            assert!(!names.contains(&lamp.to_owned()), "{names:?}");
+        }
+        // No other effect may set what such PSFs do not show.
+        for effect in effects() {
+            let mut perturbation = metalith_made::Perturbation::default();
+            let numbers: Vec<f64> = effect.parameters().iter().map(|p| p.typical).collect();
+            effect.apply(&numbers, &mut perturbation);
+            assert_ne!(
+                perturbation,
+                metalith_made::Perturbation::default(),
+                "{}",
+                effect.name()
+            );
+            assert_eq!(perturbation.not_applied(), [], "{}", effect.name());
+        }
+    }
+}

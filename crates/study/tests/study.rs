@@ -1,0 +1,156 @@
+//! A study from its file to its result: the answer depends on nothing but the plan.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use metalith_core::Silent;
+use metalith_study::{Plan, PlanSettings, Run, merge, plan, run_shard, status, write_page};
+
+/// A design that is solved in some seconds: one small lens, one wavelength and white light.
+fn tolerance(folder: &Path, draws: u64) -> PathBuf {
+    let design = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/mini_3x3.toml")).unwrap();
+    let small = [
+        ("diameter_um = 60", "diameter_um = 20"),
+        ("focal_length_um = 144", "focal_length_um = 48"),
+        ("elements = [3, 3]", "elements = [1, 1]"),
+        ("wavelengths_nm = [455, 530, 660]", "wavelengths_nm = [660]"),
+        ("field_x_deg = [0, 15]", "field_x_deg = [0]"),
+        ("field_y_deg = [0, 0]", "field_y_deg = [0]"),
+        ("window_samples = 128", "window_samples = 32"),
+        ("width_step_nm = 2 ", "width_step_nm = 8 "),
+    ];
+    let design = small.iter().fold(design, |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replace(from, to)
+    });
+    fs::write(folder.join("design.toml"), design).unwrap();
+    let text = format!(
+        r#"
+schema = 1
+design = "design.toml"
+draws = {draws}
+[[vary]]
+effect = "cd_bias"
+distribution = "normal"
+sd = 3.0
+[[vary]]
+effect = "gap"
+distribution = "uniform"
+low = -4.0
+high = 4.0
+[[limit]]
+figure = "strehl_660nm_0deg"
+at_least = 0.01
+"#
+    );
+    let path = folder.join("tolerance.toml");
+    fs::write(&path, text).unwrap();
+    path
+}
+
+fn in_shards(tolerance: &Path, folder: &Path, draws_per_shard: u64) -> Plan {
+    let settings = PlanSettings {
+        draws_per_shard: Some(draws_per_shard),
+    };
+    plan(tolerance, folder, settings, &Silent).unwrap()
+}
+
+#[test]
+fn the_draws_depend_neither_on_the_cut_nor_on_the_order_nor_on_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = tolerance(folder.path(), 7);
+    let one = in_shards(&path, &folder.path().join("one"), 7);
+    let many = in_shards(&path, &folder.path().join("many"), 3);
+    assert_eq!((one.shards(), many.shards()), (1, 3));
+    assert_eq!(one.key, many.key);
+    let single = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    single.install(|| run_shard(&one, 0, &Silent)).unwrap();
+    let run = Run::open(&many, &Silent).unwrap();
+    for shard in [2, 0, 1] {
+        run.shard(shard, &Silent).unwrap();
+    }
+    let (a, b) = (merge(&one, 0, &Silent).unwrap(), merge(&many, 1, &Silent).unwrap());
+    assert_eq!(a.draws, b.draws);
+    assert_eq!(a.yields, b.yields);
+    assert_ne!(a.draws[0].figures, a.draws[1].figures);
+    write_page(&b, folder.path()).unwrap();
+    let page = fs::read_to_string(folder.path().join("report.html")).unwrap();
+    assert!(page.contains("Worst draws"));
+    b.write(&folder.path().join("result.csv")).unwrap();
+    let csv = fs::read_to_string(folder.path().join("result.csv")).unwrap();
+    assert!(csv.starts_with("draw,cd_bias_nm,gap_um,"), "{csv}");
+    assert_eq!(csv.lines().count(), 8);
+    assert!(b.write(&folder.path().join("result.xls")).is_err());
+}
+
+#[test]
+fn shards_are_whole_are_of_one_plan_and_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = tolerance(folder.path(), 4);
+    let study = folder.path().join("study");
+    let made = in_shards(&path, &study, 2);
+    assert_eq!(
+        in_shards(&path, &study, 4),
+        made,
+        "a study that is planned keeps its cut"
+    );
+    let missing = merge(&made, 0, &Silent).err().unwrap().to_string();
+    assert!(
+        missing.contains("4 of 4 draws are missing") && missing.contains("0-3"),
+        "{missing}"
+    );
+    run_shard(&made, 0, &Silent).unwrap();
+    // A shard that is there is left as it is, without reading anything else.
+    let bank = study.join("cells.bank");
+    let kept = fs::read(&bank).unwrap();
+    fs::remove_file(&bank).unwrap();
+    run_shard(&made, 0, &Silent).unwrap();
+    let refused = run_shard(&made, 1, &Silent).err().unwrap().to_string();
+    assert!(refused.contains("cells.bank"), "a shard makes no tables: {refused}");
+    fs::write(&bank, &kept[..kept.len() - 1]).unwrap();
+    let refused = run_shard(&made, 1, &Silent).err().unwrap().to_string();
+    assert!(refused.contains("no tables of its own"), "{refused}");
+    fs::write(&bank, &kept).unwrap();
+    run_shard(&made, 1, &Silent).unwrap();
+    assert_eq!(status(&made).unwrap().finished, 2);
+    // The same draws twice.
+    let twice = made.shard_path(7);
+    fs::copy(made.shard_path(0), &twice).unwrap();
+    let double = merge(&made, 0, &Silent).err().unwrap().to_string();
+    assert!(double.contains("twice") && double.contains("000007.jsonl"), "{double}");
+    fs::remove_file(&twice).unwrap();
+    // A part of another plan.
+    let own = fs::read_to_string(made.shard_path(1)).unwrap();
+    fs::write(made.shard_path(1), own.replace(&made.key, &"0".repeat(64))).unwrap();
+    let foreign = run_shard(&made, 1, &Silent).err().unwrap().to_string();
+    assert!(foreign.contains("another plan"), "{foreign}");
+    assert!(merge(&made, 0, &Silent).is_err());
+    assert_eq!(status(&made).unwrap().unusable.len(), 1);
+    fs::write(made.shard_path(1), own).unwrap();
+    merge(&made, 0, &Silent).unwrap();
+    // A design that has changed since.
+    let design = folder.path().join("design.toml");
+    let text = fs::read_to_string(&design).unwrap();
+    fs::write(&design, text.replace("window_samples = 32", "window_samples = 34")).unwrap();
+    let changed = Run::open(&made, &Silent).err().unwrap().to_string();
+    assert!(changed.contains("has changed"), "{changed}");
+    assert!(plan(&path, &study, PlanSettings::default(), &Silent).is_err());
+}
+
+#[test]
+fn a_limit_on_no_figure_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = tolerance(folder.path(), 1);
+    let text = fs::read_to_string(&path)
+        .unwrap()
+        .replace("strehl_660nm_0deg", "strehl_670nm_0deg");
+    fs::write(&path, text).unwrap();
+    let error = plan(&path, &folder.path().join("s"), PlanSettings::default(), &Silent)
+        .err()
+        .unwrap()
+        .to_string();
+    assert!(
+        error.contains("strehl_670nm_0deg") && error.contains("strehl_660nm_0deg"),
+        "{error}"
+    );
+}

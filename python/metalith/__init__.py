@@ -1,0 +1,39 @@
+"""From the phase of a metalens array to the layout a cleanroom writes, and back from that file to the image it makes.
+
+Lengths carry their unit in their names; angles are degrees; arrays have their rows along +y and their columns along +x.
+Everything that cannot be done raises :class:`MetalithError` with the words and the remedy that the program prints.
+Long calls release the interpreter's lock, stop at Ctrl-C, and take ``progress``, a callable of what is done, the steps
+that are done, and all of them.
+"""
+
+from __future__ import annotations
+
+from ._layouts import Array, Design, Layout, read_layout, write_layout
+from ._light import Psf, PsfSet, cell, index, propagate, psf
+from ._native import MetalithError, __version__
+from ._checks import CheckReport, Marker, Verification, calibrate, check, verify
+from ._studies import Study, StudyResult
+
+__all__ = [
+    "Array",
+    "CheckReport",
+    "Design",
+    "Layout",
+    "Marker",
+    "MetalithError",
+    "Psf",
+    "PsfSet",
+    "Study",
+    "StudyResult",
+    "Verification",
+    "__version__",
+    "calibrate",
+    "cell",
+    "check",
+    "index",
+    "propagate",
+    "psf",
+    "read_layout",
+    "verify",
+    "write_layout",
+]

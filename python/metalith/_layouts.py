@@ -1,0 +1,235 @@
+"""Designs, arrays and layouts."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _native
+from ._types import PathLike, Progress, Widths
+
+
+class Design:
+    """What is built, how it is written, and what must hold of it: a design file."""
+
+    def __init__(self, native: _native.Design) -> None:
+        self._native = native
+
+    @classmethod
+    def read(cls, path: PathLike) -> Design:
+        """Read a design file; all its mistakes are reported at once."""
+        return cls(_native.Design.read(path))
+
+    @classmethod
+    def parse(cls, text: str, path: PathLike = "design.toml") -> Design:
+        """The design of a text, such as one that was made in Python. Files that it names count from the folder of
+        ``path``, which need not be there."""
+        return cls(_native.Design.parse(text, path))
+
+    @property
+    def name(self) -> str:
+        """Name of the design, which its files have."""
+        return self._native.name
+
+    @property
+    def title(self) -> str:
+        """One line for people."""
+        return self._native.title
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of all that decides the layout, in hexadecimal."""
+        return self._native.digest
+
+    @property
+    def pitch_nm(self) -> int:
+        """Distance of the pillars (nm)."""
+        return self._native.pitch_nm
+
+    @property
+    def pillar_height_nm(self) -> float:
+        """Height of the pillars (nm)."""
+        return self._native.pillar_height_nm
+
+    @property
+    def diameter_um(self) -> float:
+        """Diameter of a lens (um)."""
+        return self._native.diameter_um
+
+    @property
+    def focal_length_um(self) -> float:
+        """From the pillar tops to the sensor (um)."""
+        return self._native.focal_length_um
+
+    @property
+    def wavelengths_nm(self) -> list[float]:
+        """Wavelengths that the design is judged at (nm)."""
+        return self._native.wavelengths_nm
+
+    @property
+    def elements(self) -> list[tuple[tuple[int, int], tuple[float, float]]]:
+        """Index and centre (um) of each element."""
+        return [(index, (centre[0], centre[1])) for index, centre in self._native.elements]
+
+    def array(self, progress: Progress | None = None) -> Array:
+        """The pillars of all elements."""
+        return Array(self._native.array(progress), self)
+
+    def __repr__(self) -> str:
+        return f"Design({self.name!r}, {len(self.elements)} elements of {self.diameter_um:g} um)"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            ("elements", str(len(self.elements))),
+            ("diameter", f"{self.diameter_um:g} um"),
+            ("focal length", f"{self.focal_length_um:g} um"),
+            ("pitch", f"{self.pitch_nm} nm"),
+            ("pillar height", f"{self.pillar_height_nm:g} nm"),
+            ("wavelengths", ", ".join(f"{nm:g}" for nm in self.wavelengths_nm) + " nm"),
+        ]
+        body = "".join(f"<tr><th>{html.escape(k)}</th><td>{html.escape(v)}</td></tr>" for k, v in rows)
+        title = html.escape(f"{self.name}: {self.title}")
+        return f"<table><caption>{title}</caption>{body}</table>{self._thumbnail()}"
+
+    def _thumbnail(self) -> str:
+        """The elements from above, to scale."""
+        centres = [centre for _, centre in self.elements]
+        radius = 0.5 * self.diameter_um
+        reach = max(max(abs(x), abs(y)) for x, y in centres) + 1.1 * radius
+        circles = "".join(f'<circle cx="{x:g}" cy="{-y:g}" r="{radius:g}"/>' for x, y in centres)
+        box = f"{-reach:g} {-reach:g} {2 * reach:g} {2 * reach:g}"
+        return f'<svg width="120" height="120" viewBox="{box}" fill="#4a7ab5">{circles}</svg>'
+
+
+class Array:
+    """The pillars of all elements of a chip."""
+
+    def __init__(self, native: _native.Array, design: Design | None = None) -> None:
+        self._native = native
+        self.design = design
+        """The design that it was made from; None for pillars that were given as arrays."""
+
+    @property
+    def pillars(self) -> int:
+        """Number of pillars."""
+        return self._native.pillars
+
+    @property
+    def pitch_nm(self) -> int:
+        """Distance of the pillars (nm)."""
+        return self._native.pitch_nm
+
+    @property
+    def centres_nm(self) -> list[tuple[int, int]]:
+        """Centre of each element (nm)."""
+        return [(c[0], c[1]) for _, c, _ in self._native.elements]
+
+    def __len__(self) -> int:
+        return len(self._native.elements)
+
+    def widths(self, element: int) -> Widths:
+        """Widths of the pillars of one element (nm): uint16, shape ``[sites, sites]``, zero where there is none."""
+        return self._native.widths(element)
+
+    def write(
+        self,
+        path: PathLike,
+        *,
+        hierarchy: str | None = None,
+        layer: tuple[int, int] = (1, 0),
+        progress: Progress | None = None,
+    ) -> int:
+        """Write the pillar layout, GDSII or OASIS by the ending ``.gds`` or ``.oas``; returns its length in bytes.
+
+        ``hierarchy`` is ``folded``, ``sref`` or ``flat``, the same geometry; that of the design if left out. ``layer``
+        is for arrays without a design."""
+        return self._native.write(path, hierarchy, layer, progress)
+
+    def __repr__(self) -> str:
+        return f"Array({len(self)} elements, {self.pillars:,} pillars)"
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The pillars that a layout file holds."""
+
+    widths: list[Widths] = field(repr=False)
+    """Of each element (nm): uint16, shape ``[sites, sites]``, zero where there is no pillar."""
+    names: list[str] = field(repr=False)
+    """Name of each element."""
+    centres_nm: list[tuple[int, int]] = field(repr=False)
+    """Centre of each element (nm)."""
+    pitch_nm: int
+    """Distance of the pillars (nm)."""
+    pillars: int
+    """Number of pillars."""
+    other_shapes: int
+    """Shapes on the layer that are no pillar on a lattice."""
+    top: str
+    """Name of the cell that was read."""
+
+
+def read_layout(
+    path: PathLike,
+    *,
+    layer: tuple[int, int] = (1, 0),
+    top: str | None = None,
+    design: Design | None = None,
+    progress: Progress | None = None,
+) -> Layout:
+    """Read the pillars of a GDSII or OASIS file, written by any program: at the elements of ``design``, or wherever
+    squares stand on a lattice on ``layer`` (layer and datatype)."""
+    native = design._native if design is not None else None
+    names, centres, pitches, widths, pillars, others, found = _native.read_layout(path, layer, top, native, progress)
+    return Layout(
+        widths=widths,
+        names=names,
+        centres_nm=[(c[0], c[1]) for c in centres],
+        pitch_nm=pitches[0] if pitches else 0,
+        pillars=pillars,
+        other_shapes=others,
+        top=found,
+    )
+
+
+def write_layout(
+    path: PathLike,
+    widths: Sequence[npt.ArrayLike] | Widths,
+    *,
+    pitch_nm: int,
+    centres_nm: Sequence[tuple[int, int]] | None = None,
+    layer: tuple[int, int] = (1, 0),
+    hierarchy: str = "folded",
+    progress: Progress | None = None,
+) -> Array:
+    """Write maps of widths as a layout.
+
+    ``widths`` is one map or several, each a square array of whole, even nanometres, zero where there is no pillar, all of
+    one size. ``centres_nm`` are their places; one map alone stands at the origin. Maps that are copies of one another, or
+    symmetric, are stored once. Returns the array that was written."""
+    if isinstance(widths, np.ndarray) and widths.ndim == 2:
+        widths = [widths]
+    maps = [_whole(np.asarray(w)) for w in widths]
+    if centres_nm is None and len(maps) == 1:
+        centres_nm = [(0, 0)]
+    centres = [(int(x), int(y)) for x, y in centres_nm or []]
+    array = Array(_native.array_of_widths(maps, pitch_nm, centres, progress))
+    array.write(path, hierarchy=hierarchy, layer=layer, progress=progress)
+    return array
+
+
+def _whole(widths: npt.NDArray[np.generic]) -> Widths:
+    """Widths as uint16, if that changes none."""
+    if widths.dtype == np.uint16:
+        return np.ascontiguousarray(widths, dtype=np.uint16)
+    with np.errstate(invalid="ignore"):
+        whole = widths.astype(np.uint16)
+    if not np.array_equal(whole, widths):
+        raise _native.MetalithError(
+            "widths that are not whole nanometres from 0 to 65535\n  help: round them to even nanometres first"
+        )
+    return whole

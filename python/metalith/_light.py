@@ -1,0 +1,253 @@
+"""Light: PSFs, cells, materials, and the propagation of any aperture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _native
+from ._layouts import Array, Layout
+from ._types import Complex64, Complex128, Float64, Progress, Widths
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+SILICON_NITRIDE = "sin_luke_2015"
+FUSED_SILICA = "fused_silica_malitson_1965"
+
+
+@dataclass(frozen=True)
+class Psf:
+    """The PSF of one element in one light."""
+
+    element: str
+    wavelength_nm: float
+    field_deg: tuple[float, float]
+    """Angles of the light from where the element looks, in the x-z and y-z plane (degrees)."""
+    incidence_sin: tuple[float, float]
+    """Direction sines of the light."""
+    x_um: Float64 = field(repr=False)
+    """Places of the columns from the axis of the element (um)."""
+    y_um: Float64 = field(repr=False)
+    """Places of the rows (um)."""
+    values: Float64 = field(repr=False)
+    """Intensity over that of the light that arrives, shape ``[samples, samples]``."""
+    strehl: float
+    peak_um: tuple[float, float] = field(repr=False)
+    centroid_um: tuple[float, float] = field(repr=False)
+    energy_1_pixel: float = field(repr=False)
+    """Share of the light in a square of one pixel about the peak, of what a perfect aperture passes."""
+    energy_2_pixels: float = field(repr=False)
+    energy_passed: float = field(repr=False)
+    """Share of all light that passes, of the same."""
+    mtf_half_nyquist: tuple[float, float] = field(repr=False)
+    """MTF at 42.7 line pairs a millimetre along x and y, without the pixel."""
+    mtf_nyquist: tuple[float, float] = field(repr=False)
+    """MTF at 85.3 line pairs a millimetre along x and y, without the pixel."""
+
+
+class PsfSet(Sequence[Psf]):
+    """PSFs of elements, wavelengths and fields, in this order."""
+
+    def __init__(self, psfs: list[Psf]) -> None:
+        self._psfs = psfs
+
+    @overload
+    def __getitem__(self, k: int) -> Psf: ...
+    @overload
+    def __getitem__(self, k: slice) -> PsfSet: ...
+    def __getitem__(self, k: int | slice) -> Psf | PsfSet:
+        return PsfSet(self._psfs[k]) if isinstance(k, slice) else self._psfs[k]
+
+    def __len__(self) -> int:
+        return len(self._psfs)
+
+    def __iter__(self) -> Iterator[Psf]:
+        return iter(self._psfs)
+
+    def table(self) -> list[dict[str, Any]]:
+        """The figures of each PSF, for ``pandas.DataFrame`` or a loop."""
+        rows = []
+        for p in self._psfs:
+            row = {k: v for k, v in vars(p).items() if k not in ("x_um", "y_um", "values")}
+            rows.append(row)
+        return rows
+
+    def to_xarray(self) -> Any:
+        """An ``xarray.DataArray`` with dimensions element, wavelength_nm, field, y and x. Windows of steered elements
+        lie elsewhere for each PSF: x and y count from the middle of the window, ``centre_x_um`` and ``centre_y_um`` are
+        coordinates."""
+        import xarray
+
+        elements = list(dict.fromkeys(p.element for p in self._psfs))
+        wavelengths = list(dict.fromkeys(p.wavelength_nm for p in self._psfs))
+        fields = list(dict.fromkeys(p.field_deg for p in self._psfs))
+        samples = len(self._psfs[0].x_um)
+        shape = (len(elements), len(wavelengths), len(fields))
+        values = np.full((*shape, samples, samples), np.nan)
+        centres = np.full((*shape, 2), np.nan)
+        for p in self._psfs:
+            at = (elements.index(p.element), wavelengths.index(p.wavelength_nm), fields.index(p.field_deg))
+            values[at] = p.values
+            centres[at] = (p.x_um[samples // 2], p.y_um[samples // 2])
+        first = self._psfs[0]
+        dims = ("element", "wavelength_nm", "field")
+        return xarray.DataArray(
+            values,
+            dims=(*dims, "y", "x"),
+            coords={
+                "element": elements,
+                "wavelength_nm": wavelengths,
+                "field_x_deg": ("field", [f[0] for f in fields]),
+                "field_y_deg": ("field", [f[1] for f in fields]),
+                "x": first.x_um - first.x_um[samples // 2],
+                "y": first.y_um - first.y_um[samples // 2],
+                "centre_x_um": (dims, centres[..., 0]),
+                "centre_y_um": (dims, centres[..., 1]),
+            },
+            name="psf",
+            attrs={"long_name": "intensity over that of the light that arrives"},
+        )
+
+    def plot(self, columns: int = 4) -> Any:
+        """A matplotlib figure of all PSFs on one logarithmic scale of four decades."""
+        from matplotlib import pyplot
+        from matplotlib.colors import LogNorm
+
+        rows = -(-len(self) // columns)
+        figure, axes = pyplot.subplots(rows, columns, squeeze=False, figsize=(3 * columns, 3 * rows))
+        most = max(float(p.values.max()) for p in self)
+        for axis in axes.flat[len(self) :]:
+            axis.set_axis_off()
+        for axis, p in zip(axes.flat, self):
+            extent = (p.x_um[0], p.x_um[-1], p.y_um[0], p.y_um[-1])
+            axis.imshow(p.values, origin="lower", extent=extent, norm=LogNorm(1e-4 * most, most))
+            axis.set_title(f"{p.element}, {p.wavelength_nm:g} nm, {p.field_deg[0]:g} deg", fontsize=8)
+            axis.set_xlabel("x [um]")
+            axis.set_ylabel("y [um]")
+        figure.tight_layout()
+        return figure
+
+    def __repr__(self) -> str:
+        return f"PsfSet({len(self)} PSFs)"
+
+
+def psf(
+    of: Array | Layout | Widths,
+    wavelengths_nm: npt.ArrayLike,
+    field_deg: Sequence[tuple[float, float]] = ((0.0, 0.0),),
+    *,
+    elements: Sequence[int] | None = None,
+    fidelity: str = "rigorous",
+    fast: bool = False,
+    samples: int | None = None,
+    distance_um: float | None = None,
+    pitch_nm: int | None = None,
+    pillar_height_nm: float = 700.0,
+    pillar: str = SILICON_NITRIDE,
+    substrate: str = FUSED_SILICA,
+    progress: Progress | None = None,
+) -> PsfSet:
+    """PSFs of the distinct lenses of an array, of the elements of a layout that was read, or of one map of widths.
+
+    ``field_deg`` counts from where an element looks. ``fidelity`` is ``rigorous`` (a lattice of equal pillars, along the
+    normal), ``neighbours`` (each pillar among its own neighbours;
+    solved in minutes for each direction of light, then kept), ``fitted`` or
+    ``published``. ``fast`` allows errors of 1e-3 instead of 1e-5 of the peak. An array of a design knows its sensor and
+    its pillars; else ``distance_um`` and, for a map of widths, ``pitch_nm`` are needed."""
+    wavelengths = [float(nm) for nm in np.atleast_1d(np.asarray(wavelengths_nm, dtype=float))]
+    fields = [(float(x), float(y)) for x, y in field_deg]
+    if isinstance(of, Array) and of.design is not None:
+        chosen = list(elements) if elements is not None else None
+        found = _native.psf_of_array(
+            of._native, wavelengths, fields, fidelity, fast, samples, chosen, progress
+        )
+        return PsfSet([Psf(**p) for p in found])
+    maps, pitch = _maps(of, pitch_nm)
+    if elements is not None:
+        maps = [maps[k] for k in elements]
+    if distance_um is None:
+        raise _native.MetalithError(
+            "a layout says nothing of the sensor\n  help: give `distance_um`, from the pillar tops to the sensor"
+        )
+    found = _native.psf_of_widths(
+        maps,
+        pitch,
+        wavelengths,
+        fields,
+        distance_um,
+        fidelity,
+        fast,
+        samples or 128,
+        pillar_height_nm,
+        pillar,
+        substrate,
+        progress,
+    )
+    return PsfSet([Psf(**p) for p in found])
+
+
+def _maps(of: Array | Layout | Widths, pitch_nm: int | None) -> tuple[list[Widths], int]:
+    if isinstance(of, Layout):
+        return of.widths, of.pitch_nm
+    if isinstance(of, Array):
+        return [of.widths(k) for k in range(len(of))], of.pitch_nm
+    if pitch_nm is None:
+        raise _native.MetalithError("a map of widths has no pitch\n  help: give `pitch_nm`")
+    return [of], pitch_nm
+
+
+def cell(
+    width_nm: npt.ArrayLike,
+    wavelength_nm: npt.ArrayLike,
+    *,
+    pitch_nm: float = 350.0,
+    pillar_height_nm: float = 700.0,
+    pillar: str = SILICON_NITRIDE,
+    substrate: str = FUSED_SILICA,
+    orders: int = 13,
+    progress: Progress | None = None,
+) -> Complex128:
+    """Complex zero-order transmission of square pillars on a lattice of equal ones, by rigorous coupled-wave analysis,
+    for light along the normal from the substrate: complex128 of the shape of ``width_nm`` followed by that of
+    ``wavelength_nm``. It is a ratio of fields, from the foot of the pillars to their tops; ``orders`` along an axis, odd."""
+    widths, wavelengths = np.asarray(width_nm, dtype=float), np.asarray(wavelength_nm, dtype=float)
+    found = _native.cell(
+        widths.ravel(), wavelengths.ravel(), pitch_nm, pillar_height_nm, pillar, substrate, orders, progress
+    )
+    return found.reshape(widths.shape + wavelengths.shape)
+
+
+def index(material: str, wavelength_nm: npt.ArrayLike) -> Complex128:
+    """Complex refractive index of a material that a design can name, or of a CSV file; absorption is positive."""
+    wavelengths = np.asarray(wavelength_nm, dtype=float)
+    return _native.index(material, wavelengths.ravel()).reshape(wavelengths.shape)
+
+
+def propagate(
+    aperture: npt.ArrayLike,
+    *,
+    pitch_nm: int,
+    wavelength_nm: float,
+    distance_um: float,
+    at_um: tuple[float, float] = (0.0, 0.0),
+    samples: int = 128,
+    step_um: float | None = None,
+    incidence_deg: tuple[float, float] = (0.0, 0.0),
+    fast: bool = False,
+    direct: bool = False,
+    progress: Progress | None = None,
+) -> tuple[Complex64, Float64, Float64]:
+    """The field of a plane wave behind any complex aperture: field (complex64, ``[samples, samples]``), x and y (um).
+
+    ``aperture`` is square, its samples ``pitch_nm`` apart about the axis, each a point of weight pitch squared. The window
+    is about ``at_um``, its samples ``step_um`` apart (the pitch if left out). ``direct`` takes the Rayleigh-Sommerfeld sum
+    over all samples instead of folded transforms: slow, and what they are tested against."""
+    values = np.ascontiguousarray(aperture, dtype=np.complex128)
+    return _native.propagate(
+        values, pitch_nm, wavelength_nm, distance_um, at_um, samples, step_um, incidence_deg, fast, direct, progress
+    )

@@ -1,0 +1,160 @@
+"""Types of the native module. It is not called by hand: ``metalith`` is written on it."""
+
+import os
+from typing import Any, final
+
+import numpy as np
+import numpy.typing as npt
+
+from ._types import Complex64, Complex128, Float64, PathLike, Progress, Widths
+
+__version__: str
+
+class MetalithError(Exception): ...
+
+@final
+class Design:
+    @staticmethod
+    def read(path: PathLike) -> Design: ...
+    @staticmethod
+    def parse(text: str, path: PathLike) -> Design: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def title(self) -> str: ...
+    @property
+    def digest(self) -> str: ...
+    @property
+    def path(self) -> os.PathLike[str]: ...
+    @property
+    def pitch_nm(self) -> int: ...
+    @property
+    def pillar_height_nm(self) -> float: ...
+    @property
+    def diameter_um(self) -> float: ...
+    @property
+    def focal_length_um(self) -> float: ...
+    @property
+    def wavelengths_nm(self) -> list[float]: ...
+    @property
+    def elements(self) -> list[tuple[tuple[int, int], tuple[float, float]]]: ...
+    def array(self, progress: Progress | None = None) -> Array: ...
+
+@final
+class Array:
+    @property
+    def pillars(self) -> int: ...
+    @property
+    def pitch_nm(self) -> int: ...
+    @property
+    def sites(self) -> int: ...
+    @property
+    def elements(self) -> list[tuple[str, tuple[int, int], int]]: ...
+    def widths(self, element: int) -> Widths: ...
+    def write(
+        self,
+        path: PathLike,
+        hierarchy: str | None = None,
+        layer: tuple[int, int] = (1, 0),
+        progress: Progress | None = None,
+    ) -> int: ...
+
+def main(arguments: list[str]) -> int: ...
+def read_layout(
+    path: PathLike,
+    layer: tuple[int, int] = (1, 0),
+    top: str | None = None,
+    design: Design | None = None,
+    progress: Progress | None = None,
+) -> tuple[list[str], list[tuple[int, int]], list[int], list[Widths], int, int, str]: ...
+def array_of_widths(
+    widths: list[Widths],
+    pitch_nm: int,
+    centres_nm: list[tuple[int, int]],
+    progress: Progress | None = None,
+) -> Array: ...
+def psf_of_array(
+    array: Array,
+    wavelengths_nm: list[float],
+    fields_deg: list[tuple[float, float]],
+    fidelity: str,
+    fast: bool,
+    samples: int | None,
+    elements: list[int] | None = None,
+    progress: Progress | None = None,
+) -> list[dict[str, Any]]: ...
+def psf_of_widths(
+    widths: list[Widths],
+    pitch_nm: int,
+    wavelengths_nm: list[float],
+    fields_deg: list[tuple[float, float]],
+    distance_um: float,
+    fidelity: str,
+    fast: bool,
+    samples: int,
+    height_nm: float,
+    pillar: str,
+    substrate: str,
+    progress: Progress | None = None,
+) -> list[dict[str, Any]]: ...
+def propagate(
+    aperture: Complex128,
+    pitch_nm: int,
+    wavelength_nm: float,
+    distance_um: float,
+    at_um: tuple[float, float],
+    samples: int,
+    step_um: float | None,
+    incidence_deg: tuple[float, float],
+    fast: bool,
+    direct: bool,
+    progress: Progress | None = None,
+) -> tuple[Complex64, Float64, Float64]: ...
+def cell(
+    widths_nm: Float64,
+    wavelengths_nm: Float64,
+    pitch_nm: float,
+    height_nm: float,
+    pillar: str,
+    substrate: str,
+    orders: int,
+    progress: Progress | None = None,
+) -> Complex128: ...
+def index(material: str, wavelengths_nm: Float64) -> Complex128: ...
+def check(
+    layout: PathLike,
+    rules: PathLike | None = None,
+    design: Design | None = None,
+    with_layouts: list[PathLike] = ...,
+    waivers: PathLike | None = None,
+    markers: int = 100,
+    progress: Progress | None = None,
+) -> tuple[str, bool]: ...
+def verify(
+    design: Design,
+    layout: PathLike,
+    fast: bool = False,
+    model: PathLike | None = None,
+    out: PathLike | None = None,
+    progress: Progress | None = None,
+) -> tuple[str, bool]: ...
+def calibrate(
+    set: PathLike,
+    out: PathLike,
+    effects: list[str] = ...,
+    progress: Progress | None = None,
+) -> str: ...
+def study_plan(
+    tolerance: PathLike,
+    folder: PathLike,
+    draws_per_shard: int | None = None,
+    progress: Progress | None = None,
+) -> str: ...
+def study_status(folder: PathLike) -> str: ...
+def study_run(folder: PathLike, shard: int, progress: Progress | None = None) -> None: ...
+def study_merge(
+    folder: PathLike,
+    out: PathLike | None = None,
+    psfs: int = 0,
+    progress: Progress | None = None,
+) -> str: ...

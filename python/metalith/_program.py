@@ -1,0 +1,16 @@
+"""The program ``metalith``, as the wheel installs it."""
+
+from __future__ import annotations
+
+import sys
+
+from . import _native
+
+
+def main() -> int:
+    """Run the program with the arguments of this process; the answer is its exit code."""
+    return _native.main(sys.argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,312 @@
+//! Designs, arrays and layouts.
+
+use std::path::PathBuf;
+
+use metalith::extract::{ElementSite, ExtractedElement};
+use metalith::gds::{LayerNumber, ReadLimits};
+use metalith::layout::{FreeLayout, LayoutFormat, OasisEncoding, write_free, write_pillars_as};
+use metalith::{Error, ExtractionPlan, Hierarchy, Lattice, Layout, PillarArray, PillarShape, Wedge, WidthMap, extract};
+use numpy::ndarray::Array2;
+use numpy::{PyArray2, PyReadonlyArray2};
+use pyo3::prelude::*;
+
+use crate::work::{error, work};
+
+/// A design: what is built, how it is written, and what must hold of it.
+#[pyclass(frozen, module = "metalith._native")]
+pub struct Design {
+    pub design: metalith::Design,
+}
+
+#[pymethods]
+impl Design {
+    /// Read a design file, and the files that it names.
+    #[staticmethod]
+    fn read(path: PathBuf) -> PyResult<Self> {
+        let design = metalith::Design::read(&path).map_err(error)?;
+        Ok(Self { design })
+    }
+
+    /// The design of a text; files that it names count from the folder of `path`.
+    #[staticmethod]
+    fn parse(text: &str, path: PathBuf) -> PyResult<Self> {
+        let design = metalith::Design::parse(&path, text).map_err(error)?;
+        Ok(Self { design })
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.design.name
+    }
+
+    #[getter]
+    fn title(&self) -> &str {
+        &self.design.title
+    }
+
+    #[getter]
+    fn digest(&self) -> String {
+        self.design.digest()
+    }
+
+    #[getter]
+    fn path(&self) -> PathBuf {
+        self.design.path.clone()
+    }
+
+    #[getter]
+    fn pitch_nm(&self) -> u32 {
+        self.design.cell.pitch_nm
+    }
+
+    #[getter]
+    fn pillar_height_nm(&self) -> f64 {
+        self.design.cell.pillar_height_nm
+    }
+
+    #[getter]
+    fn diameter_um(&self) -> f64 {
+        f64::from(self.design.lens.diameter_nm) * 1e-3
+    }
+
+    #[getter]
+    fn focal_length_um(&self) -> f64 {
+        self.design.lens.focal_length_um
+    }
+
+    #[getter]
+    fn wavelengths_nm(&self) -> Vec<f64> {
+        self.design.verify.wavelengths_um.iter().map(|um| um * 1e3).collect()
+    }
+
+    /// Index and centre (um) of each element.
+    #[getter]
+    fn elements(&self) -> Vec<((i32, i32), [f64; 2])> {
+        let elements = self.design.elements();
+        elements.iter().map(|e| (e.index, e.centre_um())).collect()
+    }
+
+    /// The pillars of all elements.
+    #[pyo3(signature = (progress=None))]
+    fn array(&self, py: Python<'_>, progress: Option<Py<PyAny>>) -> PyResult<Array> {
+        let design = &self.design;
+        let array = work(py, progress, |p| PillarArray::build(design, p))?;
+        Ok(Array {
+            array,
+            design: Some(design.clone()),
+        })
+    }
+}
+
+/// The pillars of all elements of a chip.
+#[pyclass(frozen, module = "metalith._native")]
+pub struct Array {
+    pub array: PillarArray,
+    /// None for pillars that were given as arrays.
+    pub design: Option<metalith::Design>,
+}
+
+#[pymethods]
+impl Array {
+    /// Number of pillars.
+    #[getter]
+    fn pillars(&self) -> u64 {
+        self.array.pillars()
+    }
+
+    #[getter]
+    fn pitch_nm(&self) -> u32 {
+        self.array.lattice.pitch_nm()
+    }
+
+    /// Sites along an axis of one element.
+    #[getter]
+    fn sites(&self) -> usize {
+        self.array.lattice.sites()
+    }
+
+    /// Label, centre (nm) and number of the distinct lens of each element.
+    #[getter]
+    fn elements(&self) -> Vec<(String, [i64; 2], usize)> {
+        let placed = self.array.placed.iter();
+        placed
+            .map(|p| {
+                (
+                    p.element.label(),
+                    [p.element.centre_nm.0, p.element.centre_nm.1],
+                    p.class,
+                )
+            })
+            .collect()
+    }
+
+    /// Widths of one element (nm): uint16, rows along +y, columns along +x, zero where there is no pillar.
+    fn widths<'py>(&self, py: Python<'py>, element: usize) -> PyResult<Bound<'py, PyArray2<u16>>> {
+        let placed = self.array.placed.get(element).ok_or_else(|| {
+            error(Error::invalid(
+                format!("there is no element {element}"),
+                format!("this array has elements 0 to {}", self.array.placed.len() - 1),
+            ))
+        })?;
+        let widths = py.detach(|| self.array.widths(placed).into_owned());
+        Ok(PyArray2::from_owned_array(py, widths.width_nm))
+    }
+
+    /// Write the pillar layout, as GDSII or OASIS by the ending of the name. Returns the number of bytes.
+    #[pyo3(signature = (path, hierarchy=None, layer=(1, 0), progress=None))]
+    fn write(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        hierarchy: Option<&str>,
+        layer: (u16, u16),
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<u64> {
+        let hierarchy = match hierarchy {
+            None => self.design.as_ref().map_or(Hierarchy::Folded, |d| d.layout.hierarchy),
+            Some("folded") => Hierarchy::Folded,
+            Some("sref") => Hierarchy::Sref,
+            Some("flat") => Hierarchy::Flat,
+            Some(other) => {
+                return Err(error(Error::invalid(
+                    format!("there is no hierarchy `{other}`"),
+                    "use folded, sref or flat",
+                )));
+            }
+        };
+        let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        let format = match ending.as_deref() {
+            Some("gds") => LayoutFormat::Gds,
+            Some("oas") => LayoutFormat::Oasis(OasisEncoding::default()),
+            _ => {
+                return Err(error(Error::invalid(
+                    format!("{}: this ending is not known", path.display()),
+                    "name a file that ends in .gds or .oas",
+                )));
+            }
+        };
+        let written = work(py, progress, |p| match &self.design {
+            Some(design) => write_pillars_as(design, &self.array, hierarchy, format, &path, p),
+            None => {
+                let free = FreeLayout {
+                    top: "TOP",
+                    layer: LayerNumber::new(layer.0, layer.1),
+                    shape: PillarShape::Square,
+                };
+                write_free(&free, &self.array, hierarchy, format, &path, p)
+            }
+        })?;
+        Ok(written.bytes)
+    }
+}
+
+/// An array of pillars that are given as widths, one map for each element.
+#[pyfunction]
+#[pyo3(signature = (widths, pitch_nm, centres_nm, progress=None))]
+pub fn array_of_widths(
+    py: Python<'_>,
+    widths: Vec<PyReadonlyArray2<'_, u16>>,
+    pitch_nm: u32,
+    centres_nm: Vec<(i64, i64)>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Array> {
+    if widths.len() != centres_nm.len() || widths.is_empty() {
+        return Err(error(Error::invalid(
+            format!("{} maps of widths, {} centres", widths.len(), centres_nm.len()),
+            "give one centre for each map, and at least one",
+        )));
+    }
+    let maps: Vec<WidthMap> = widths
+        .iter()
+        .map(|w| width_map(w.as_array().to_owned(), pitch_nm))
+        .collect::<metalith::Result<_>>()
+        .map_err(error)?;
+    drop(widths);
+    let array = work(py, progress, |p| {
+        let placed = maps.into_iter().zip(centres_nm).collect();
+        PillarArray::of_maps(placed, p)
+    })?;
+    Ok(Array { array, design: None })
+}
+
+/// A map of widths as the library has it.
+pub fn width_map(width_nm: Array2<u16>, pitch_nm: u32) -> metalith::Result<WidthMap> {
+    let (rows, columns) = width_nm.dim();
+    if rows != columns {
+        return Err(Error::invalid(
+            format!("a map of {rows} x {columns} widths"),
+            "give a square map: pad it with zeros, which are sites without pillars",
+        ));
+    }
+    let lattice = Lattice::new(pitch_nm, rows)?;
+    if let Some(wrong) = width_nm.iter().find(|w| **w % 2 != 0 || u32::from(**w) > pitch_nm) {
+        return Err(Error::invalid(
+            format!("a pillar {wrong} nm wide"),
+            format!("widths are even, so that edges are whole nanometres, and at most the pitch of {pitch_nm} nm"),
+        ));
+    }
+    Ok(WidthMap { lattice, width_nm })
+}
+
+/// What a layout holds: names, centres (nm), pitches (nm) and widths (nm) of its elements, number of pillars, number of
+/// other shapes on the layer, top cell.
+type ReadLayout<'py> = (
+    Vec<String>,
+    Vec<[i64; 2]>,
+    Vec<u32>,
+    Vec<Bound<'py, PyArray2<u16>>>,
+    u64,
+    u64,
+    String,
+);
+
+/// Read the pillars of a layout: at the elements of a design, or wherever there are squares on a lattice.
+#[pyfunction]
+#[pyo3(signature = (path, layer=(1, 0), top=None, design=None, progress=None))]
+pub fn read_layout<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    layer: (u16, u16),
+    top: Option<String>,
+    design: Option<&Design>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<ReadLayout<'py>> {
+    let layer = LayerNumber::new(layer.0, layer.1);
+    let design = design.map(|d| &d.design);
+    let found = work(py, progress, |p| {
+        let layout = Layout::open_with(&path, ReadLimits::default(), p)?;
+        let plan = match design {
+            None => ExtractionPlan::discover(layer),
+            Some(design) => {
+                let site = |e: metalith::design::Element| ElementSite {
+                    name: e.label(),
+                    centre_nm: [e.centre_nm.0, e.centre_nm.1],
+                    lattice: design.lattice(),
+                };
+                let sites = design.elements().into_iter().map(site).collect();
+                ExtractionPlan::given(design.layout.layers.pillars.number(), sites)
+            }
+        };
+        Ok(extract(&layout, &ExtractionPlan { top, ..plan }, p)?)
+    })?;
+    let pillars = found.pillars;
+    let others = found.oddities.total();
+    let mut out: ReadLayout<'py> = (vec![], vec![], vec![], vec![], pillars, others, found.top);
+    for ExtractedElement { site, widths } in found.elements {
+        out.0.push(site.name);
+        out.1.push(site.centre_nm);
+        out.2.push(site.lattice.pitch_nm());
+        // The memory that it was read into becomes the array's: nothing is copied.
+        out.3.push(PyArray2::from_owned_array(py, widths.width_nm));
+    }
+    Ok(out)
+}
+
+/// The direction of an element that steers nothing.
+pub fn no_wedge() -> Wedge {
+    Wedge {
+        wavelength_um: 0.55,
+        sin_x: 0.0,
+        sin_y: 0.0,
+    }
+}

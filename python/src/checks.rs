@@ -1,0 +1,111 @@
+//! Whether a layout is what it should be: rules, verification, calibration. Answers are those of the program, as JSON.
+
+use std::path::PathBuf;
+
+use metalith::calibrate::Settings;
+use metalith::cell::cache_folder;
+use metalith::drc::{self, CheckInput, Date, Deck, Waivers};
+use metalith::extract::GdsPillars;
+use metalith::gds::ReadLimits;
+use metalith::{Accuracy, CalibratedModel, Layout, MadeChip, PillarArray, SimulationCases, cell_models};
+use pyo3::prelude::*;
+
+use crate::arrays::Design;
+use crate::work::work;
+
+fn json(value: &impl serde::Serialize) -> String {
+    serde_json::to_string(value).expect("plain data serialises")
+}
+
+/// Design rules: the report as JSON, and whether it is clean.
+#[pyfunction]
+#[pyo3(signature = (layout, rules=None, design=None, with_layouts=vec![], waivers=None, markers=100, progress=None))]
+#[allow(clippy::too_many_arguments)]
+pub fn check(
+    py: Python<'_>,
+    layout: PathBuf,
+    rules: Option<PathBuf>,
+    design: Option<&Design>,
+    with_layouts: Vec<PathBuf>,
+    waivers: Option<PathBuf>,
+    markers: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(String, bool)> {
+    let design = design.map(|d| &d.design);
+    work(py, progress, |p| {
+        let deck = rules.as_deref().map_or_else(|| Ok(Deck::standard()), Deck::read)?;
+        let waivers = waivers.as_deref().map(Waivers::read).transpose()?;
+        let open = |path: &PathBuf| Layout::open_with(path, ReadLimits::default(), p);
+        let file = open(&layout)?;
+        let with = with_layouts.iter().map(open).collect::<Result<Vec<_>, _>>()?;
+        let input = CheckInput {
+            with: with.iter().collect(),
+            design,
+            array: None,
+            waivers: waivers.as_ref(),
+            today: Date::today(),
+            markers,
+        };
+        let report = drc::check(&file, &deck, &input, p)?;
+        Ok((json(&report), report.exit_code() == 0))
+    })
+}
+
+/// A layout read back, compared with its design, simulated and judged: the numbers of `report.json`, as JSON, and
+/// whether all limits hold. With a folder the page is written too.
+#[pyfunction]
+#[pyo3(signature = (design, layout, fast=false, model=None, out=None, progress=None))]
+pub fn verify(
+    py: Python<'_>,
+    design: &Design,
+    layout: PathBuf,
+    fast: bool,
+    model: Option<PathBuf>,
+    out: Option<PathBuf>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(String, bool)> {
+    let design = &design.design;
+    work(py, progress, |p| {
+        let array = PillarArray::build(design, p)?;
+        let model = model.as_deref().map(CalibratedModel::read).transpose()?;
+        let made = match &model {
+            Some(model) => Some(MadeChip::new(&design.cell_stack()?, model)?),
+            None => None,
+        };
+        let cells = match &made {
+            None => cell_models(design, &[design.verify.fidelity])?,
+            Some(_) => Vec::new(),
+        };
+        let cases = match &made {
+            Some(chip) => SimulationCases::judged_by(chip),
+            None => SimulationCases::of_cells(&cells)?,
+        };
+        let accuracy = if fast { Accuracy::Fast } else { Accuracy::Accurate };
+        let found = metalith::verify(design, &array, &layout, &cases, accuracy, p)?;
+        if let Some(folder) = out {
+            metalith::write_report(design, &array, &found, None, &folder)?;
+        }
+        Ok((json(&found), found.passed()))
+    })
+}
+
+/// The diagnosis of a measured set, as JSON; report and model are written into a folder.
+#[pyfunction]
+#[pyo3(signature = (set, out, effects=vec![], progress=None))]
+pub fn calibrate(
+    py: Python<'_>,
+    set: PathBuf,
+    out: PathBuf,
+    effects: Vec<String>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<String> {
+    work(py, progress, |p| {
+        let settings = Settings {
+            cache: cache_folder(),
+            only: effects,
+            ..Settings::default()
+        };
+        let done = metalith::calibrate::calibrate(&[set], &[out], &settings, &GdsPillars, p)?;
+        Ok(json(&done[0].diagnosis))
+    })
+}

@@ -1,0 +1,52 @@
+//! metalith from Python: the native half of the package. What it is for people stands in `metalith/*.py`, which is
+//! written against these functions; their types are in `metalith/_native.pyi`.
+//!
+//! Every call that takes longer than a moment runs on a thread of its own without the interpreter's lock, while the
+//! caller's thread looks for Ctrl-C and reports progress: see [`work`].
+
+mod arrays;
+mod checks;
+mod light;
+mod studies;
+mod work;
+
+use pyo3::create_exception;
+use pyo3::exceptions::PyException;
+use pyo3::prelude::*;
+
+create_exception!(
+    metalith,
+    MetalithError,
+    PyException,
+    "Something that metalith cannot do, with the words and the remedy that the program would print."
+);
+
+/// The program, with the arguments of a process; returns its exit code.
+#[pyfunction]
+fn main(py: Python<'_>, arguments: Vec<std::ffi::OsString>) -> u8 {
+    py.detach(|| metalith::cli::run_with(arguments))
+}
+
+#[pymodule]
+fn _native(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add("MetalithError", m.py().get_type::<MetalithError>())?;
+    m.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    m.add_class::<arrays::Design>()?;
+    m.add_class::<arrays::Array>()?;
+    m.add_function(wrap_pyfunction!(main, m)?)?;
+    m.add_function(wrap_pyfunction!(arrays::read_layout, m)?)?;
+    m.add_function(wrap_pyfunction!(arrays::array_of_widths, m)?)?;
+    m.add_function(wrap_pyfunction!(light::psf_of_array, m)?)?;
+    m.add_function(wrap_pyfunction!(light::psf_of_widths, m)?)?;
+    m.add_function(wrap_pyfunction!(light::propagate, m)?)?;
+    m.add_function(wrap_pyfunction!(light::cell, m)?)?;
+    m.add_function(wrap_pyfunction!(light::index, m)?)?;
+    m.add_function(wrap_pyfunction!(checks::check, m)?)?;
+    m.add_function(wrap_pyfunction!(checks::verify, m)?)?;
+    m.add_function(wrap_pyfunction!(checks::calibrate, m)?)?;
+    m.add_function(wrap_pyfunction!(studies::study_plan, m)?)?;
+    m.add_function(wrap_pyfunction!(studies::study_status, m)?)?;
+    m.add_function(wrap_pyfunction!(studies::study_run, m)?)?;
+    m.add_function(wrap_pyfunction!(studies::study_merge, m)?)?;
+    Ok(())
+}

@@ -1,0 +1,435 @@
+//! Light: PSFs, cells, materials, and the propagation of any aperture.
+
+use std::path::Path;
+
+use metalith::cell::{CellStack, FittedCell, PointwiseCell, PublishedCell, cache_folder};
+use metalith::extract::{ElementSite, ExtractedElement, Extraction};
+use metalith::grating::{Mapping, NeighbourCell};
+use metalith::rcwa::{Material, Orders};
+use metalith::verify::{Lighting, SimulationCase, SinglePsf, single_psfs};
+use metalith::wave::propagation::{incident, landing_um};
+use metalith::wave::{Aperture, Direct, Fold, PlaneWave, Propagator, Scratch, Window};
+use metalith::{Accuracy, CellModel, Error, Fidelity, Lattice, Progress, Result, Wedge, WidthMap, cell_models};
+use ndarray::Array2;
+use num_complex::{Complex32, Complex64};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rayon::prelude::*;
+
+use crate::arrays::{Array, no_wedge, width_map};
+use crate::work::{error, work};
+
+/// The cell that a word names.
+fn fidelity(word: &str) -> Result<Fidelity> {
+    match word {
+        "rigorous" => Ok(Fidelity::Rigorous),
+        "neighbours" => Ok(Fidelity::Neighbours),
+        "fitted" => Ok(Fidelity::Fitted),
+        "published" => Ok(Fidelity::Published),
+        _ => Err(Error::invalid(
+            format!("there is no fidelity `{word}`"),
+            "use rigorous, neighbours, fitted or published",
+        )),
+    }
+}
+
+/// An element to simulate.
+struct Lit {
+    name: String,
+    widths: WidthMap,
+    wedge: Wedge,
+}
+
+/// In what light elements are looked at.
+struct Looked {
+    wavelengths_nm: Vec<f64>,
+    fields_deg: Vec<(f64, f64)>,
+    distance_um: f64,
+    samples: usize,
+    pixel_um: f64,
+    fast: bool,
+}
+
+/// One PSF with where it is from.
+struct Found {
+    field_deg: (f64, f64),
+    incidence_sin: [f64; 2],
+    psf: SinglePsf,
+}
+
+/// Elements one by one: each looks elsewhere, and its light lands elsewhere.
+fn simulate(elements: Vec<Lit>, cell: &dyn CellModel, light: &Looked, progress: &dyn Progress) -> Result<Vec<Found>> {
+    let mut all = Vec::new();
+    for lit in elements {
+        let pillars = lit.widths.pillars();
+        let site = ElementSite {
+            name: lit.name,
+            centre_nm: [0; 2],
+            lattice: lit.widths.lattice,
+        };
+        let extraction = Extraction {
+            top: String::new(),
+            elements: vec![ExtractedElement {
+                site,
+                widths: lit.widths,
+            }],
+            pillars,
+            oddities: Default::default(),
+            survey: Default::default(),
+        };
+        for nm in &light.wavelengths_nm {
+            for field_deg in &light.fields_deg {
+                let um = nm * 1e-3;
+                let field_rad = [field_deg.0, field_deg.1].map(f64::to_radians);
+                let wave = incident(&lit.wedge, um, field_rad)?;
+                let lighting = Lighting {
+                    wavelengths_um: vec![um],
+                    incidence_sin: [wave.sin_x, wave.sin_y],
+                    cells_as_lit: false,
+                    distance_um: light.distance_um,
+                    at_um: landing_um(&lit.wedge, &wave, light.distance_um)?,
+                    samples: light.samples,
+                    pixel_um: light.pixel_um,
+                    aperture_radius_um: None,
+                    accuracy: if light.fast { Accuracy::Fast } else { Accuracy::Accurate },
+                };
+                let psfs = single_psfs(&extraction, SimulationCase::Cell(cell), &lighting, progress)?;
+                all.extend(psfs.into_iter().map(|psf| Found {
+                    field_deg: *field_deg,
+                    incidence_sin: lighting.incidence_sin,
+                    psf,
+                }));
+            }
+        }
+    }
+    Ok(all)
+}
+
+/// PSFs for Python: a dictionary for each.
+fn told<'py>(py: Python<'py>, found: Vec<Found>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+    let one = |f: Found| {
+        let dict = PyDict::new(py);
+        let (m, window) = (f.psf.metrics, f.psf.psf.window);
+        dict.set_item("element", f.psf.element)?;
+        dict.set_item("wavelength_nm", f.psf.wavelength_um * 1e3)?;
+        dict.set_item("field_deg", f.field_deg)?;
+        dict.set_item("incidence_sin", (f.incidence_sin[0], f.incidence_sin[1]))?;
+        let along = |axis: usize| (0..window.samples).map(move |i| window.coordinate_um(axis, i));
+        dict.set_item("x_um", PyArray1::from_iter(py, along(0)))?;
+        dict.set_item("y_um", PyArray1::from_iter(py, along(1)))?;
+        dict.set_item("values", PyArray2::from_owned_array(py, f.psf.psf.values))?;
+        dict.set_item("strehl", m.strehl)?;
+        dict.set_item("peak_um", (m.peak_um[0], m.peak_um[1]))?;
+        dict.set_item("centroid_um", (m.centroid_um[0], m.centroid_um[1]))?;
+        dict.set_item("energy_1_pixel", m.energy_1_pixel)?;
+        dict.set_item("energy_2_pixels", m.energy_2_pixels)?;
+        dict.set_item("energy_passed", m.energy_passed)?;
+        dict.set_item("mtf_half_nyquist", (m.mtf_half_nyquist[0], m.mtf_half_nyquist[1]))?;
+        dict.set_item("mtf_nyquist", (m.mtf_nyquist[0], m.mtf_nyquist[1]))?;
+        Ok(dict)
+    };
+    found.into_iter().map(one).collect()
+}
+
+/// PSFs of the distinct lenses of an array of a design, or of the elements that are named.
+#[pyfunction]
+#[pyo3(signature = (array, wavelengths_nm, fields_deg, fidelity, fast, samples, elements=None, progress=None))]
+#[allow(clippy::too_many_arguments)]
+pub fn psf_of_array<'py>(
+    py: Python<'py>,
+    array: &Array,
+    wavelengths_nm: Vec<f64>,
+    fields_deg: Vec<(f64, f64)>,
+    fidelity: &str,
+    fast: bool,
+    samples: Option<usize>,
+    elements: Option<Vec<usize>>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Vec<Bound<'py, PyDict>>> {
+    let design = array.design.as_ref().ok_or_else(|| {
+        error(Error::invalid(
+            "an array of widths says nothing of the sensor",
+            "give `distance_um` and what pillars are made of",
+        ))
+    })?;
+    let wanted = self::fidelity(fidelity).map_err(error)?;
+    let placed = &array.array.placed;
+    let chosen = elements.unwrap_or_else(|| {
+        let first = |class| {
+            placed
+                .iter()
+                .position(|p| p.class == class)
+                .expect("every class is placed")
+        };
+        (0..array.array.classes.len()).map(first).collect()
+    });
+    if let Some(wrong) = chosen.iter().find(|k| **k >= placed.len()) {
+        return Err(error(Error::invalid(
+            format!("there is no element {wrong}"),
+            format!("this array has elements 0 to {}", placed.len() - 1),
+        )));
+    }
+    let found = work(py, progress, |p| {
+        let mut design = design.clone();
+        // Tables span the wavelengths that a design names.
+        design
+            .verify
+            .wavelengths_um
+            .extend(wavelengths_nm.iter().map(|nm| nm * 1e-3));
+        let cells = cell_models(&design, &[wanted])?;
+        let lit = chosen.iter().map(|k| Lit {
+            name: placed[*k].element.label(),
+            widths: array.array.widths(&placed[*k]).into_owned(),
+            wedge: placed[*k].element.wedge,
+        });
+        let light = Looked {
+            wavelengths_nm,
+            fields_deg,
+            distance_um: design.lens.focal_length_um,
+            samples: samples.unwrap_or(design.verify.window_samples),
+            pixel_um: design.verify.pixel_um,
+            fast,
+        };
+        simulate(lit.collect(), cells[0].as_ref(), &light, p)
+    })?;
+    told(py, found)
+}
+
+/// What pillars are made of, where no design says.
+fn stack(pitch_nm: f64, height_nm: f64, pillar: &str, substrate: &str) -> Result<CellStack> {
+    let here = Path::new("");
+    Ok(CellStack {
+        film: Material::resolve(pillar, here)?,
+        substrate: Material::resolve(substrate, here)?,
+        ..CellStack::paper(pitch_nm, height_nm)?
+    })
+}
+
+/// PSFs of maps of widths, without a design.
+#[pyfunction]
+#[pyo3(signature = (widths, pitch_nm, wavelengths_nm, fields_deg, distance_um, fidelity, fast, samples, height_nm, pillar,
+    substrate, progress=None))]
+#[allow(clippy::too_many_arguments)]
+pub fn psf_of_widths<'py>(
+    py: Python<'py>,
+    widths: Vec<PyReadonlyArray2<'py, u16>>,
+    pitch_nm: u32,
+    wavelengths_nm: Vec<f64>,
+    fields_deg: Vec<(f64, f64)>,
+    distance_um: f64,
+    fidelity: &str,
+    fast: bool,
+    samples: usize,
+    height_nm: f64,
+    pillar: &str,
+    substrate: &str,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Vec<Bound<'py, PyDict>>> {
+    let wanted = self::fidelity(fidelity).map_err(error)?;
+    let maps = widths.iter().map(|w| width_map(w.as_array().to_owned(), pitch_nm));
+    let maps = maps.collect::<Result<Vec<_>>>().map_err(error)?;
+    drop(widths);
+    let stack = stack(f64::from(pitch_nm), height_nm, pillar, substrate).map_err(error)?;
+    let found = work(py, progress, |p| {
+        let drawn = drawn(&maps);
+        let cell: Box<dyn CellModel> = match wanted {
+            Fidelity::Published => Box::new(PublishedCell::new(pitch_nm)),
+            Fidelity::Neighbours => {
+                let mapping = Mapping::of_widths(maps.iter().map(WidthMap::histogram))?;
+                Box::new(NeighbourCell::new(stack, vec![mapping], cache_folder()))
+            }
+            Fidelity::Fitted => {
+                let um = wavelengths_nm.iter().map(|nm| nm * 1e-3);
+                let band = um.fold((0.4, 0.7), |(a, b): (f64, f64), um| (a.min(um), b.max(um)));
+                let range = (*drawn.first().unwrap_or(&100), *drawn.last().unwrap_or(&300));
+                Box::new(FittedCell::of_stack(&stack, band, range)?)
+            }
+            _ => Box::new(PointwiseCell::new(stack, drawn)),
+        };
+        let lit = maps.into_iter().enumerate().map(|(k, widths)| Lit {
+            name: format!("element {k}"),
+            widths,
+            wedge: no_wedge(),
+        });
+        let light = Looked {
+            wavelengths_nm,
+            fields_deg,
+            distance_um,
+            samples,
+            pixel_um: 5.86,
+            fast,
+        };
+        simulate(lit.collect(), cell.as_ref(), &light, p)
+    })?;
+    told(py, found)
+}
+
+/// The widths that are drawn (nm), rising.
+fn drawn(maps: &[WidthMap]) -> Vec<u16> {
+    let mut widths: Vec<u16> = Vec::new();
+    for map in maps {
+        let histogram = map.histogram();
+        let there = histogram.iter().enumerate().skip(1).filter(|(_, n)| **n > 0);
+        widths.extend(there.map(|(w, _)| w as u16));
+    }
+    widths.sort_unstable();
+    widths.dedup();
+    widths
+}
+
+/// A complex transmission on a lattice.
+struct Given {
+    lattice: Lattice,
+    values: Array2<Complex32>,
+    radius_um: f64,
+}
+
+impl Aperture for Given {
+    fn lattice(&self) -> Lattice {
+        self.lattice
+    }
+
+    fn radius_um(&self) -> f64 {
+        self.radius_um
+    }
+
+    fn fill_row(&self, iy: usize, row: &mut [Complex32]) {
+        for (to, from) in row.iter_mut().zip(self.values.row(iy)) {
+            *to = *from;
+        }
+    }
+}
+
+impl Given {
+    fn new(values: Array2<Complex32>, pitch_nm: u32) -> Result<Self> {
+        let (rows, columns) = values.dim();
+        if rows != columns {
+            return Err(Error::invalid(
+                format!("an aperture of {rows} x {columns} samples"),
+                "give a square one: pad it with zeros",
+            ));
+        }
+        if values.iter().any(|v| !v.re.is_finite() || !v.im.is_finite()) {
+            return Err(Error::invalid(
+                "an aperture with values that are no numbers",
+                "give finite values",
+            ));
+        }
+        let lattice = Lattice::new(pitch_nm, rows)?;
+        let open = values.indexed_iter().filter(|(_, v)| **v != Complex32::ZERO);
+        let half2 = open
+            .map(|((iy, ix), _)| lattice.half_radius2(ix, iy))
+            .max()
+            .unwrap_or(0);
+        Ok(Self {
+            lattice,
+            values,
+            radius_um: (half2 as f64).sqrt() * 0.5 * lattice.pitch_um(),
+        })
+    }
+}
+
+/// The field behind a complex aperture, on a window: `direct` by the Rayleigh-Sommerfeld sum over all sites, else folded.
+#[pyfunction]
+#[pyo3(signature = (aperture, pitch_nm, wavelength_nm, distance_um, at_um, samples, step_um, incidence_deg, fast, direct,
+    progress=None))]
+#[allow(clippy::too_many_arguments)]
+pub fn propagate<'py>(
+    py: Python<'py>,
+    aperture: PyReadonlyArray2<'py, Complex64>,
+    pitch_nm: u32,
+    wavelength_nm: f64,
+    distance_um: f64,
+    at_um: [f64; 2],
+    samples: usize,
+    step_um: Option<f64>,
+    incidence_deg: [f64; 2],
+    fast: bool,
+    direct: bool,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(
+    Bound<'py, PyArray2<Complex32>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+)> {
+    let single = aperture.as_array().mapv(|v| Complex32::new(v.re as f32, v.im as f32));
+    drop(aperture);
+    let given = Given::new(single, pitch_nm).map_err(error)?;
+    let um = wavelength_nm * 1e-3;
+    let window = Window::about(at_um, step_um.unwrap_or(given.lattice.pitch_um()), samples, distance_um);
+    let [sin_x, sin_y] = incidence_deg.map(|deg| deg.to_radians().sin());
+    let wave = PlaneWave {
+        wavelength_um: um,
+        sin_x,
+        sin_y,
+    };
+    let field = work(py, progress, |_| {
+        let accuracy = if fast { Accuracy::Fast } else { Accuracy::Accurate };
+        let mut scratch = Scratch::default();
+        if direct {
+            let sum = Direct::plan(given.lattice, um, window)?;
+            return Ok(sum.field(&given, &wave, &mut scratch)?);
+        }
+        let fold = Fold::plan(given.lattice, given.radius_um, um, window, accuracy)?;
+        Ok(fold.field(&given, &wave, &mut scratch)?)
+    })?;
+    let along = |axis: usize| (0..window.samples).map(move |i| window.coordinate_um(axis, i));
+    Ok((
+        PyArray2::from_owned_array(py, field.values),
+        PyArray1::from_iter(py, along(0)),
+        PyArray1::from_iter(py, along(1)),
+    ))
+}
+
+/// Zero-order transmission of pillars along the normal, shape `[widths, wavelengths]`.
+#[pyfunction]
+#[pyo3(signature = (widths_nm, wavelengths_nm, pitch_nm, height_nm, pillar, substrate, orders, progress=None))]
+#[allow(clippy::too_many_arguments)]
+pub fn cell<'py>(
+    py: Python<'py>,
+    widths_nm: PyReadonlyArray1<'py, f64>,
+    wavelengths_nm: PyReadonlyArray1<'py, f64>,
+    pitch_nm: f64,
+    height_nm: f64,
+    pillar: &str,
+    substrate: &str,
+    orders: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyArray2<Complex64>>> {
+    let (widths, wavelengths) = (widths_nm.as_array().to_vec(), wavelengths_nm.as_array().to_vec());
+    drop((widths_nm, wavelengths_nm));
+    let stack = stack(pitch_nm, height_nm, pillar, substrate).map_err(error)?;
+    let orders = Orders::new(orders).map_err(|e| error(e.into()))?;
+    let (rows, columns) = (widths.len(), wavelengths.len());
+    let t = work(py, progress, |p| {
+        p.begin("solving cells", (rows * columns) as u64);
+        let one = |k: usize| {
+            if p.stopped() {
+                return Err(Error::Interrupted);
+            }
+            let t = stack.transmission(widths[k / columns], wavelengths[k % columns] * 1e-3, orders);
+            p.advance(1);
+            t
+        };
+        (0..rows * columns).into_par_iter().map(one).collect::<Result<Vec<_>>>()
+    })?;
+    let t = Array2::from_shape_vec((rows, columns), t).expect("one for each");
+    Ok(PyArray2::from_owned_array(py, t))
+}
+
+/// Complex index of a material, absorption positive.
+#[pyfunction]
+pub fn index<'py>(
+    py: Python<'py>,
+    material: &str,
+    wavelengths_nm: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Bound<'py, PyArray1<Complex64>>> {
+    let material = Material::resolve(material, Path::new("")).map_err(|e| error(e.into()))?;
+    let wavelengths = wavelengths_nm.as_array();
+    let found = wavelengths.iter().map(|nm| material.index(nm * 1e-3));
+    let found = found
+        .collect::<std::result::Result<Vec<_>, _>>()
+        .map_err(|e| error(e.into()))?;
+    Ok(PyArray1::from_vec(py, found))
+}

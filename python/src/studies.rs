@@ -1,0 +1,56 @@
+//! Studies: plan, shards and merge. Answers are JSON.
+
+use std::path::PathBuf;
+
+use metalith::study::{self, Plan, PlanSettings};
+use pyo3::prelude::*;
+
+use crate::work::{error, work};
+
+/// Plan a study into a folder, or read the plan that is there; its manifest, with the number of shards.
+#[pyfunction]
+#[pyo3(signature = (tolerance, folder, draws_per_shard=None, progress=None))]
+pub fn study_plan(
+    py: Python<'_>,
+    tolerance: PathBuf,
+    folder: PathBuf,
+    draws_per_shard: Option<u64>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<String> {
+    let settings = PlanSettings { draws_per_shard };
+    let plan = work(py, progress, |p| study::plan(&tolerance, &folder, settings, p))?;
+    Ok(serde_json::json!({ "plan": plan, "shards": plan.shards() }).to_string())
+}
+
+/// Which shards are there.
+#[pyfunction]
+pub fn study_status(py: Python<'_>, folder: PathBuf) -> PyResult<String> {
+    let status = py.detach(|| study::status(&Plan::open(&folder)?)).map_err(error)?;
+    Ok(serde_json::json!(status).to_string())
+}
+
+/// Make one shard, if it is not there.
+#[pyfunction]
+#[pyo3(signature = (folder, shard, progress=None))]
+pub fn study_run(py: Python<'_>, folder: PathBuf, shard: u64, progress: Option<Py<PyAny>>) -> PyResult<()> {
+    work(py, progress, |p| study::run_shard(&Plan::open(&folder)?, shard, p))
+}
+
+/// All draws and what they say; with a folder, the page is written there.
+#[pyfunction]
+#[pyo3(signature = (folder, out=None, psfs=0, progress=None))]
+pub fn study_merge(
+    py: Python<'_>,
+    folder: PathBuf,
+    out: Option<PathBuf>,
+    psfs: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<String> {
+    work(py, progress, |p| {
+        let result = study::merge(&Plan::open(&folder)?, psfs, p)?;
+        if let Some(out) = out {
+            study::write_page(&result, &out)?;
+        }
+        Ok(serde_json::json!({ "study": result, "draws": result.draws }).to_string())
+    })
+}

@@ -1,0 +1,20 @@
+#!/usr/bin/env bash
+# The Python package as a user gets it: installed into a fresh environment, its types checked, its tests and examples run.
+# Usage: scripts/python.sh [FOLDER]; FOLDER holds the environment, target/ci/python if left out.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+folder=${1:-target/ci/python}
+mkdir -p "$folder"
+folder=$(realpath "$folder")
+rm -rf "$folder/venv"
+python3 -m venv "$folder/venv"
+pip() { "$folder/venv/bin/pip" --disable-pip-version-check --quiet "$@"; }
+
+pip install ./python
+pip install -r scripts/requirements-python.txt
+"$folder/venv/bin/mypy" --strict --cache-dir "$folder/mypy" python/examples
+"$folder/venv/bin/python" -m pytest -q -p no:cacheprovider python/tests
+for example in python/examples/*.py; do
+    echo "== $example"
+    "$folder/venv/bin/python" "$example"
+done

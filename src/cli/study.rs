@@ -1,0 +1,282 @@
+//! `metalith study`: a chip made many times, in shards for any number of machines.
+
+use std::path::PathBuf;
+use std::process::{Child, Command};
+
+use clap::{Args, Subcommand};
+use metalith::study::{Plan, PlanSettings, Run, Slurm, merge, plan, run_shard, status, submissions, write_page};
+use metalith::{Error, Progress, Result};
+
+use super::{Outcome, Terminal, print_json, print_line};
+
+/// Make a chip many times with the tolerances of its process and bench: which share of the chips holds the limits, and
+/// what decides it.
+#[derive(Args)]
+#[command(
+    after_help = "Example:\n  metalith study plan tolerance.toml --out out/study\n  metalith study run out/study --missing\n  metalith study merge out/study --out out/study/result.csv"
+)]
+pub struct StudyArgs {
+    #[command(subcommand)]
+    step: Step,
+}
+
+#[derive(Subcommand)]
+enum Step {
+    /// Cut a study into shards: the layout, the tables of cells, the first draw to know its time, and a manifest.
+    Plan(PlanArgs),
+    /// Make one shard, or all that are missing. One that is there is left as it is.
+    Run(RunArgs),
+    /// Say which shards are there.
+    Status(StatusArgs),
+    /// Give what is missing to Slurm, as job arrays.
+    Submit(SubmitArgs),
+    /// Put all shards together: a table of the draws, and a page.
+    Merge(MergeArgs),
+}
+
+#[derive(Args)]
+struct PlanArgs {
+    /// What varies, what is looked at, and how often.
+    tolerance: PathBuf,
+
+    /// Folder of the study, created if need be.
+    #[arg(long, short, value_name = "FOLDER")]
+    out: PathBuf,
+
+    /// Draws of a shard; as many as take ten minutes if left out. The answer does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    draws_per_shard: Option<u64>,
+}
+
+#[derive(Args)]
+struct RunArgs {
+    /// Folder of the study.
+    study: PathBuf,
+
+    /// Number of the shard.
+    #[arg(long, value_name = "N", required_unless_present = "missing")]
+    shard: Option<u64>,
+
+    /// All shards that are not there.
+    #[arg(long, conflicts_with = "shard")]
+    missing: bool,
+
+    /// Processes to share them; one after the other with all threads if left out.
+    #[arg(long, value_name = "N", requires = "missing", value_parser = clap::value_parser!(u16).range(1..=512))]
+    jobs: Option<u16>,
+}
+
+#[derive(Args)]
+struct StatusArgs {
+    /// Folder of the study.
+    study: PathBuf,
+
+    /// Print it as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Args)]
+struct SubmitArgs {
+    /// Folder of the study.
+    study: PathBuf,
+
+    /// What jobs of the cluster need: partition, time, memory, size of arrays.
+    #[arg(long, value_name = "FILE")]
+    slurm: PathBuf,
+
+    /// Write the job scripts, and submit nothing.
+    #[arg(long)]
+    dry_run: bool,
+}
+
+#[derive(Args)]
+struct MergeArgs {
+    /// Folder of the study.
+    study: PathBuf,
+
+    /// Table of the draws: .csv, .json or .jsonl; `result.csv` in the folder of the study if left out. The page is
+    /// written beside it.
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+
+    /// Worst draws that are simulated again, to show their PSFs.
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    psfs: usize,
+}
+
+pub fn run(args: &StudyArgs, terminal: &Terminal) -> Result<Outcome> {
+    terminal.stop_on_interrupt();
+    match &args.step {
+        Step::Plan(args) => plan_study(args, terminal),
+        Step::Run(args) => run_shards(args, terminal),
+        Step::Status(args) => tell_status(args),
+        Step::Submit(args) => submit(args),
+        Step::Merge(args) => merge_shards(args, terminal),
+    }
+}
+
+fn plan_study(args: &PlanArgs, terminal: &Terminal) -> Result<Outcome> {
+    let settings = PlanSettings {
+        draws_per_shard: args.draws_per_shard,
+    };
+    let plan = plan(&args.tolerance, &args.out, settings, terminal)?;
+    terminal.clear();
+    print_line!(
+        "{} draws of {:.2} s in {} shards of {}: {}",
+        plan.draws,
+        plan.seconds_per_draw,
+        plan.shards(),
+        plan.draws_per_shard,
+        args.out.display()
+    );
+    Ok(Outcome::Fine)
+}
+
+fn run_shards(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
+    let plan = Plan::open(&args.study)?;
+    if let Some(number) = args.shard {
+        run_shard(&plan, number, terminal)?;
+        terminal.clear();
+        return Ok(Outcome::Fine);
+    }
+    let found = status(&plan)?;
+    if let Some((path, why)) = found.unusable.first() {
+        return Err(Error::invalid(
+            format!("{} cannot be used: {why}", path.display()),
+            "remove it first",
+        ));
+    }
+    match args.jobs {
+        Some(jobs) if jobs > 1 => by_processes(args, &found.missing, jobs.into(), terminal)?,
+        _ if found.missing.is_empty() => {}
+        _ => {
+            let run = Run::open(&plan, terminal)?;
+            for number in found.missing {
+                run.shard(number, terminal)?;
+            }
+        }
+    }
+    terminal.clear();
+    tell(&plan)
+}
+
+/// Each shard by a process of its own, so many at a time.
+fn by_processes(args: &RunArgs, missing: &[u64], jobs: usize, terminal: &Terminal) -> Result<()> {
+    let program = super::program()?;
+    let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
+    let threads = (cores / jobs).max(1).to_string();
+    terminal.begin("running shards", missing.len() as u64);
+    let mut running: Vec<(u64, Child)> = Vec::new();
+    let mut failed = Vec::new();
+    let mut waiting = missing.iter();
+    loop {
+        while running.len() < jobs && !terminal.stopped() {
+            let Some(number) = waiting.next() else { break };
+            let child = Command::new(&program)
+                .args(["study", "run"])
+                .arg(&args.study)
+                .args(["--shard", &number.to_string(), "--threads", &threads, "--quiet"])
+                .spawn()
+                .map_err(Error::io("start", &program))?;
+            running.push((*number, child));
+        }
+        if running.is_empty() {
+            break;
+        }
+        let (number, mut child) = running.remove(0);
+        let done = child.wait().map_err(Error::io("wait for", &program))?;
+        terminal.advance(1);
+        if !done.success() {
+            failed.push(number);
+        }
+    }
+    if terminal.stopped() {
+        return Err(Error::Interrupted);
+    }
+    if failed.is_empty() {
+        return Ok(());
+    }
+    Err(Error::invalid(
+        format!("{} shards were not made, the first is {}", failed.len(), failed[0]),
+        "their messages stand above; run again with --missing",
+    ))
+}
+
+/// One line on how far a study is.
+fn tell(plan: &Plan) -> Result<Outcome> {
+    let found = status(plan)?;
+    print_line!("{} of {} shards are there", found.finished, found.shards);
+    Ok(Outcome::Fine)
+}
+
+fn tell_status(args: &StatusArgs) -> Result<Outcome> {
+    let plan = Plan::open(&args.study)?;
+    let found = status(&plan)?;
+    if args.json {
+        print_json(&found);
+    } else {
+        print_line!("{} of {} shards are there", found.finished, found.shards);
+        for (path, why) in &found.unusable {
+            print_line!("{}: {why}", path.display());
+        }
+    }
+    Ok(Outcome::Fine)
+}
+
+fn submit(args: &SubmitArgs) -> Result<Outcome> {
+    let plan = Plan::open(&args.study)?;
+    let slurm = Slurm::read(&args.slurm)?;
+    let missing = status(&plan)?.missing;
+    if missing.is_empty() {
+        print_line!("nothing is missing");
+        return Ok(Outcome::Fine);
+    }
+    for submission in submissions(&plan, &slurm, &missing)? {
+        let shards = submission.shards.len();
+        if args.dry_run {
+            print_line!("{} shards: sbatch {}", shards, submission.script.display());
+            continue;
+        }
+        let answer = Command::new("sbatch")
+            .arg(&submission.script)
+            .output()
+            .map_err(Error::io("start sbatch for", &submission.script))?;
+        if !answer.status.success() {
+            return Err(Error::invalid(
+                format!(
+                    "sbatch refused {}: {}",
+                    submission.script.display(),
+                    String::from_utf8_lossy(&answer.stderr).trim()
+                ),
+                "correct the file that --slurm names; --dry-run writes the scripts alone",
+            ));
+        }
+        print_line!("{} shards: {}", shards, String::from_utf8_lossy(&answer.stdout).trim());
+    }
+    Ok(Outcome::Fine)
+}
+
+fn merge_shards(args: &MergeArgs, terminal: &Terminal) -> Result<Outcome> {
+    let plan = Plan::open(&args.study)?;
+    let result = merge(&plan, args.psfs, terminal)?;
+    let out = args.out.clone().unwrap_or_else(|| args.study.join("result.csv"));
+    result.write(&out)?;
+    let folder = out.parent().map_or_else(PathBuf::new, std::path::Path::to_owned);
+    write_page(&result, &folder)?;
+    terminal.clear();
+    for y in &result.yields {
+        print_line!(
+            "{}: {} of {} draws, {:.1} % ({:.1} to {:.1} %)",
+            y.key,
+            y.held,
+            y.of,
+            100.0 * y.share,
+            100.0 * y.interval[0],
+            100.0 * y.interval[1]
+        );
+    }
+    print_line!("{}", out.display());
+    print_line!("{}", folder.join("report.html").display());
+    Ok(Outcome::Fine)
+}
