@@ -17,7 +17,7 @@ fn tolerance(folder: &Path, draws: u64) -> PathBuf {
         ("field_x_deg = [0, 15]", "field_x_deg = [0]"),
         ("field_y_deg = [0, 0]", "field_y_deg = [0]"),
         ("window_samples = 128", "window_samples = 32"),
-        ("width_step_nm = 2 ", "width_step_nm = 8 "),
+        ("width_step_nm = 2 ", "width_step_nm = 10 "),
     ];
     let design = small.iter().fold(design, |text, (from, to)| {
         assert!(text.contains(from), "{from}");
@@ -56,6 +56,7 @@ fn in_shards(tolerance: &Path, folder: &Path, draws_per_shard: u64) -> Plan {
 }
 
 #[test]
+#[ignore = "second tier: CPU time, run by .ci/run"]
 fn the_draws_depend_neither_on_the_cut_nor_on_the_order_nor_on_threads() {
     let folder = tempfile::tempdir().unwrap();
     let path = tolerance(folder.path(), 7);
@@ -84,6 +85,7 @@ fn the_draws_depend_neither_on_the_cut_nor_on_the_order_nor_on_threads() {
 }
 
 #[test]
+#[ignore = "second tier: CPU time, run by .ci/run"]
 fn shards_are_whole_are_of_one_plan_and_are_counted() {
     let folder = tempfile::tempdir().unwrap();
     let path = tolerance(folder.path(), 4);
@@ -138,6 +140,7 @@ fn shards_are_whole_are_of_one_plan_and_are_counted() {
 }
 
 #[test]
+#[ignore = "second tier: CPU time, run by .ci/run"]
 fn a_limit_on_no_figure_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let path = tolerance(folder.path(), 1);
