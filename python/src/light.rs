@@ -9,7 +9,9 @@ use metalith::rcwa::{Material, Orders};
 use metalith::verify::{Lighting, SimulationCase, SinglePsf, single_psfs};
 use metalith::wave::propagation::{incident, landing_um};
 use metalith::wave::{Aperture, Direct, Fold, PlaneWave, Propagator, Scratch, Window};
-use metalith::{Accuracy, CellModel, Error, Fidelity, Lattice, Progress, Result, Wedge, WidthMap, cell_models};
+use metalith::{
+    Accuracy, CellModel, Error, Fidelity, Lattice, PillarShape, Progress, Result, Wedge, WidthMap, cell_models,
+};
 use ndarray::Array2;
 use num_complex::{Complex32, Complex64};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
@@ -70,6 +72,7 @@ fn simulate(elements: Vec<Lit>, cell: &dyn CellModel, light: &Looked, progress: 
         };
         let extraction = Extraction {
             top: String::new(),
+            shape: PillarShape::Square,
             elements: vec![ExtractedElement {
                 site,
                 widths: lit.widths,

@@ -47,7 +47,19 @@ pub fn write_free(
         purpose: "pillars".into(),
     };
     let form = PillarForm::plain(free.shape);
-    let write = |path: &Path| write_array(&frame, free.top, &layer, form, Vec::new(), array, hierarchy, path, progress);
+    let write = |path: &Path| {
+        write_array(
+            &frame,
+            free.top,
+            &layer,
+            form,
+            Vec::new(),
+            array,
+            hierarchy,
+            path,
+            progress,
+        )
+    };
     if format == LayoutFormat::Gds {
         return write(path);
     }
