@@ -333,6 +333,13 @@ impl Given {
     }
 }
 
+/// A field, and the places of its columns and rows (um).
+type FieldOnGrid<'py> = (
+    Bound<'py, PyArray2<Complex32>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+);
+
 /// The field behind a complex aperture, on a window: `direct` by the Rayleigh-Sommerfeld sum over all sites, else folded.
 #[pyfunction]
 #[pyo3(signature = (aperture, pitch_nm, wavelength_nm, distance_um, at_um, samples, step_um, incidence_deg, fast, direct,
@@ -351,11 +358,7 @@ pub fn propagate<'py>(
     fast: bool,
     direct: bool,
     progress: Option<Py<PyAny>>,
-) -> PyResult<(
-    Bound<'py, PyArray2<Complex32>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-)> {
+) -> PyResult<FieldOnGrid<'py>> {
     let single = aperture.as_array().mapv(|v| Complex32::new(v.re as f32, v.im as f32));
     drop(aperture);
     let given = Given::new(single, pitch_nm).map_err(error)?;

@@ -75,8 +75,8 @@ pub struct FigureLimit {
 
 /// The effects that a study can vary: those that PSFs of a wavelength and a point show.
 pub(crate) fn effects() -> Vec<Box<dyn Effect>> {
-    let seen = |e: &Box<dyn Effect>| e.stage() != Stage::Source && e.name() != "source_size";
-    of_any_chip().into_iter().filter(seen).collect()
+    let seen = |e: &dyn Effect| e.stage() != Stage::Source && e.name() != "source_size";
+    of_any_chip().into_iter().filter(|e| seen(e.as_ref())).collect()
 }
 
 impl Tolerance {

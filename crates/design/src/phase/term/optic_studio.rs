@@ -68,10 +68,8 @@ pub(super) fn read(path: &Path, wanted: Option<u32>) -> Result<TermForm> {
                             _ => None,
                         }
                     }
-                    "PARM" if surface.kind.is_some() => {
-                        if number("the number of the parameter")? == 0.0 {
-                            surface.order = Some(number("a value")?);
-                        }
+                    "PARM" if surface.kind.is_some() && number("the number of the parameter")? == 0.0 => {
+                        surface.order = Some(number("a value")?);
                     }
                     "XDAT" if surface.kind.is_some() => {
                         let at = number("the number of the entry")?;
