@@ -108,6 +108,8 @@ impl Body<'_> {
         match (self, other) {
             (Self::Rect(a), Self::Rect(b)) | (Self::Disc(a), Self::Disc(b)) => a == b,
             (Self::Ring(a), Self::Ring(b)) => same_ring(a, b),
+            // A second circle on a site is held as its polygon.
+            (Self::Disc(r), Self::Ring(ring)) | (Self::Ring(ring), Self::Disc(r)) => same_ring(&disc_ring(r), ring),
             _ => false,
         }
     }
@@ -124,7 +126,7 @@ fn same_ring(a: &[Point], b: &[Point]) -> bool {
         ring.rotate_left(start);
         ring
     };
-    a.len() == b.len() && Rect::around(a) == Rect::around(b) && normal(a) == normal(b)
+    Rect::around(a) == Rect::around(b) && normal(a) == normal(b)
 }
 
 /// Distances of two rectangles along x and y, zero where they overlap.

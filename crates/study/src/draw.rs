@@ -12,7 +12,7 @@ use crate::tolerance::{Distribution, TAIL_SD, Tolerance, effects};
 /// Amounts that are drawn at the most until one is physical.
 const MOST_TRIES: usize = 10_000;
 
-/// The amounts of one draw, in the order of [`Drawer::names`].
+/// The amounts of one draw, in the order of `Drawer::names`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawn {
     /// In the unit of each quantity.

@@ -1,6 +1,7 @@
 //! Design rules: for each rule of the standard decks a layout that breaks it once and only it; what does not
 //! run is not clean; waivers; the forms of the report.
 
+mod circles;
 mod decks;
 mod design;
 mod forms;

@@ -1,0 +1,73 @@
+//! The deck for round pillars: a clean chip, and for each rule of theirs one that breaks it.
+
+use metalith_core::circle_corners;
+use metalith_testing::gds::Gds;
+
+use crate::{broken, deck_from, input, layout};
+
+/// Sites an axis, their distance and the common diameter (nm).
+const SITES: i32 = 12;
+const PITCH: i32 = 350;
+const DIAMETER: u32 = 200;
+
+fn circle(gds: &mut Gds, (x, y): (i32, i32), diameter: u32) {
+    let corners = circle_corners(diameter, 0.5);
+    let closed = corners.iter().chain(corners.first());
+    let points: Vec<(i32, i32)> = closed.map(|&(dx, dy)| (x + dx as i32, y + dy as i32)).collect();
+    gds.polygon(1, &points);
+}
+
+fn place(column: i32, row: i32) -> (i32, i32) {
+    let at = |k: i32| PITCH * k - PITCH * (SITES - 1) / 2;
+    (at(column), at(row))
+}
+
+/// Rules that a lattice of circles breaks whose diameters are as `diameter` says, with `more` on it.
+fn found(diameter: impl Fn(i32, i32) -> Option<u32>, more: impl Fn(&mut Gds)) -> (Vec<(String, u64)>, u64) {
+    let mut gds = Gds::library();
+    gds.cell("TOP");
+    for (column, row) in (0..SITES * SITES).map(|k| (k % SITES, k / SITES)) {
+        if let Some(diameter) = diameter(column, row) {
+            circle(&mut gds, place(column, row), diameter);
+        }
+    }
+    more(&mut gds);
+    gds.end_cell();
+    let file = layout(gds.end());
+    let report = metalith_drc::check(
+        &file,
+        &deck_from("rules/circles.toml", &[]),
+        &input(),
+        &metalith_core::Silent,
+    )
+    .unwrap();
+    let broken = broken(&report).into_iter().map(|(id, count)| (id.to_owned(), count));
+    (broken.collect(), report.pillars_on_lattices)
+}
+
+#[test]
+fn each_rule_of_circles_finds_what_it_is_for() {
+    let all = |_: i32, _: i32| Some(DIAMETER);
+    assert_eq!(found(all, |_| {}), (vec![], 144));
+
+    let but_one = |column: i32, row: i32| ((column, row) != (5, 5)).then_some(DIAMETER);
+    let (x, y) = place(5, 5);
+    let square = found(but_one, |gds| {
+        gds.square(1, x, y, DIAMETER as i32);
+    });
+    assert_eq!(square, (vec![("pillar.circle".into(), 1)], 143));
+
+    // 350 - 312 nm along the axis; squares of this width would be as near along the diagonal as along the axes.
+    let near = found(
+        |c, r| Some(if r == 5 && (c == 5 || c == 6) { 312 } else { DIAMETER }),
+        |_| {},
+    );
+    assert_eq!(near, (vec![("gap.min".into(), 1)], 144));
+    let diagonal = found(|c, r| Some(if c == r && (c == 5 || c == 6) { 340 } else { 80 }), |_| {});
+    assert_eq!(diagonal, (vec![], 144));
+
+    let twice = found(all, |gds| circle(gds, (x, y), DIAMETER));
+    assert_eq!(twice, (vec![("gap.duplicate".into(), 1)], 144));
+    let wider = found(all, |gds| circle(gds, (x, y), DIAMETER + 20));
+    assert_eq!(wider, (vec![("gap.overlap".into(), 1)], 144));
+}
