@@ -31,7 +31,7 @@ pub struct NewArgs {
     /// The file to write; the design has its name. An existing file is never replaced.
     design: PathBuf,
 
-    /// Elements along an axis; odd.
+    /// Elements along an axis.
     #[arg(long, value_name = "N", default_value_t = 3)]
     elements: u32,
 

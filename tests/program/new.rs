@@ -57,9 +57,9 @@ fn a_new_design_replaces_nothing_and_says_what_cannot_be() {
     fs::write(folder.path().join("mine.toml"), "mine").unwrap();
     new(&["mine.toml"]).stderr(contains("mine.toml exists"));
     assert_eq!(fs::read_to_string(folder.path().join("mine.toml")).unwrap(), "mine");
-    new(&["even.toml", "--elements", "2"]).stderr(contains("elements"));
+    new(&["none.toml", "--elements", "0"]).stderr(contains("elements"));
     new(&["nan.toml", "--diameter-um", "nan"]);
-    assert!(!folder.path().join("even.toml").exists() && !folder.path().join("nan.toml").exists());
+    assert!(!folder.path().join("none.toml").exists() && !folder.path().join("nan.toml").exists());
 }
 
 /// A design that is piped in makes the layout of the same design in a file.
