@@ -7,10 +7,9 @@
 use std::path::Path;
 
 use metalith::cell::{RigorousCell, cache_folder};
-use metalith::extract::ElementSite;
-use metalith::gds::ReadLimits;
+use metalith::layout::read_pillars;
 use metalith::phase::{ElementPhase, LensPhase};
-use metalith::{CellModel, Design, ExtractionPlan, Layout, PillarArray, Result, Silent, extract};
+use metalith::{CellModel, Design, PillarArray, Result, Silent};
 use num_complex::Complex64;
 
 fn main() -> Result<()> {
@@ -20,15 +19,7 @@ fn main() -> Result<()> {
     };
     let design = Design::read(Path::new(design))?;
     let array = PillarArray::build(&design, &Silent)?;
-    let sites = array.placed.iter().map(|placed| ElementSite {
-        name: placed.element.label(),
-        centre_nm: [placed.element.centre_nm.0, placed.element.centre_nm.1],
-        lattice: array.lattice,
-    });
-    let plan =
-        ExtractionPlan::given(design.layout.layers.pillars.number(), sites.collect()).of_shape(design.cell.shape);
-    let layout = Layout::open_with(Path::new(layout), ReadLimits::default(), &Silent)?;
-    let extraction = extract(&layout, &plan, &Silent)?;
+    let extraction = read_pillars(&design, Path::new(layout), &Silent)?;
     let lens = LensPhase::of(&design);
     let (cell, _) = RigorousCell::obtain(&design.table_spec()?, cache_folder().as_deref(), &Silent)?;
     let wavelengths_um = design.compared_um();

@@ -46,15 +46,15 @@ def drawn(of: npt.NDArray[np.uint16]) -> npt.NDArray[np.uint16]:
 widths = lens()
 
 # %%
-import gdstk
+from gdstk import Library, rectangle
 
-library: Any = gdstk.Library()
-cell: Any = library.new_cell("LENS")
+stream: Any = Library()
+cell: Any = stream.new_cell("LENS")
 for iy, ix in np.argwhere(widths):
     x, y = (np.array([ix, iy]) - 0.5 * (SITES - 1)) * PITCH_NM * 1e-3
     h = 0.5e-3 * float(widths[iy, ix])
-    cell.add(gdstk.rectangle((x - h, y - h), (x + h, y + h), layer=1))
-library.write_gds(folder / "foreign.gds")
+    cell.add(rectangle((x - h, y - h), (x + h, y + h), layer=1))
+stream.write_gds(folder / "foreign.gds")
 
 # %%
 layout = ml.read_layout(folder / "foreign.gds")

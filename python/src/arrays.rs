@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use metalith::extract::{ElementSite, ExtractedElement};
+use metalith::extract::{ExtractedElement};
 use metalith::gds::{LayerNumber, ReadLimits};
-use metalith::layout::{FreeLayout, LayoutFormat, OasisEncoding, write_free, write_pillars_as};
+use metalith::layout::{FreeLayout, LayoutFormat, OasisEncoding, extraction_plan, write_free, write_pillars_as};
 use metalith::{Error, ExtractionPlan, Hierarchy, Lattice, Layout, PillarArray, PillarShape, Wedge, WidthMap, extract};
 use numpy::ndarray::Array2;
 use numpy::{PyArray2, PyReadonlyArray2};
@@ -277,15 +277,7 @@ pub fn read_layout<'py>(
         let layout = Layout::open_with(&path, ReadLimits::default(), p)?;
         let plan = match design {
             None => ExtractionPlan::discover(layer),
-            Some(design) => {
-                let site = |e: metalith::design::Element| ElementSite {
-                    name: e.label(),
-                    centre_nm: [e.centre_nm.0, e.centre_nm.1],
-                    lattice: design.lattice(),
-                };
-                let sites = design.elements().into_iter().map(site).collect();
-                ExtractionPlan::given(design.layout.layers.pillars.number(), sites)
-            }
+            Some(design) => extraction_plan(design),
         };
         Ok(extract(&layout, &ExtractionPlan { top, ..plan }, p)?)
     })?;

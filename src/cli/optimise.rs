@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::cell::{RigorousCell, cache_folder};
+use metalith::layout::read_pillars;
 use metalith::optimise::{
     Checkpoint, Deconvolution, Judged, OptimiseReport, OptimiseTask, Optimised, OverWavelength, cells_off_height,
     lens_alone, mean_and_deviation, views, wavelengths, write_phase_table,
 };
 use metalith::report::sig;
-use metalith::verify::read_back;
 use metalith::{CellModel, Design, Fidelity, Hierarchy, PillarArray, Result, cell_models, write_pillars};
 
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
@@ -186,7 +186,7 @@ fn findings(
     let array = PillarArray::build(&alone, terminal)?;
     let layout = folder.join("lens.gds");
     write_pillars(&alone, &array, Hierarchy::Folded, &layout, terminal)?;
-    let read = read_back(&alone, &array, &layout, terminal)?;
+    let read = read_pillars(&alone, &layout, terminal)?;
     after.push(task.judge_layout(&read.elements[0].widths, cells.rigorous())?);
     let limits = [0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5];
     let over_limit = task.merit_over_limit(&cells.all(), &found.turns, &limits, terminal)?;

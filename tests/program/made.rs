@@ -64,7 +64,7 @@ impl Files {
         small_set(folder);
         let mut set = MeasuredSet::read(folder, &GdsPillars, &Silent).unwrap();
         // The same chip on a bench: pillars of this layout, openings as the design has them.
-        let found = metalith::verify::read_back(&design, &array, &layout, &Silent).unwrap();
+        let found = metalith::layout::read_pillars(&design, &layout, &Silent).unwrap();
         for element in &mut set.elements {
             let index = (element.index[0] as i32, element.index[1] as i32);
             let at = array.placed.iter().position(|p| p.element.index == index);

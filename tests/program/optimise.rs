@@ -5,8 +5,8 @@ use std::path::Path;
 
 use assert_cmd::Command;
 use metalith::cell::PublishedCell;
+use metalith::layout::read_pillars;
 use metalith::optimise::{Checkpoint, OptimiseTask, lens_alone};
-use metalith::verify::read_back;
 use metalith::{Design, Hierarchy, PillarArray, Silent, write_pillars};
 
 const EXCHANGE: &str = "[optimise]\ncell = \"published\"\nstep_nm = 5\nchains = 3\nhot_sweeps = 12\nseed = 4\n";
@@ -57,7 +57,7 @@ fn the_phase_of_the_command_becomes_a_layout_that_keeps_the_limit() {
     let alone = lens_alone(&design, &phases[0]).unwrap();
     let array = PillarArray::build(&alone, &Silent).unwrap();
     write_pillars(&alone, &array, Hierarchy::Folded, &layout, &Silent).unwrap();
-    let read = read_back(&alone, &array, &layout, &Silent).unwrap();
+    let read = read_pillars(&alone, &layout, &Silent).unwrap();
     let found = task.judge_layout(&read.elements[0].widths, &cell).unwrap();
     // The limit of the design, and the rounding of phases to the text of their table.
     const STEP_TURNS: f64 = 0.2 + 1e-6;

@@ -9,8 +9,9 @@ use super::line::Line;
 use metalith_core::{Error, Progress, Result, WidthMap};
 use metalith_design::array::PillarArray;
 use metalith_design::{CellIncidence, Design, Element};
+use metalith_layout::read_pillars;
 use metalith_made::{DrawnElement, MadeChip, MadeElement};
-use metalith_verify::{PsfResult, read_back};
+use metalith_verify::PsfResult;
 use metalith_wave::propagation::{incident, landing_um};
 use metalith_wave::psf::{CURVE_LP_MM, Matched, Psf};
 use metalith_wave::{Accuracy, PhaseFunction, Scratch, Window};
@@ -45,7 +46,7 @@ pub fn compensation_cases(
     progress: &dyn Progress,
 ) -> Result<Vec<CompensationCase>> {
     let line = &compensated.line;
-    let found = read_back(design, intended, layout, progress)?;
+    let found = read_pillars(design, layout, progress)?;
     let work = intended.classes.len() * line.colours.len();
     progress.begin("simulating elements", work as u64);
     let mut cases = Vec::new();

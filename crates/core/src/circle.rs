@@ -5,6 +5,9 @@ use std::f64::consts::{FRAC_PI_4, PI};
 /// Fewest and most steps of an eighth of the circle.
 const STEPS: [f64; 2] = [2.0, 512.0];
 
+/// Largest distance between a circle and its polygon where nothing else is said: half a unit of the grid.
+pub const CHORD_ERROR: f64 = 0.5;
+
 /// Corners of the polygon in a circle about the origin, on the grid of whole units, counter-clockwise from the x axis.
 ///
 /// All corners are on the circle to within their rounding, chords are at most `chord_error` and that rounding from it. The

@@ -21,7 +21,7 @@ pub mod text;
 mod wedge;
 mod zernike;
 
-pub use circle::circle_corners;
+pub use circle::{CHORD_ERROR, circle_corners};
 pub use cross::cross_corners;
 #[cfg(feature = "documents")]
 pub use document::{Fault, Faults};

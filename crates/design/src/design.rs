@@ -6,7 +6,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use metalith_core::document::{Document, Section, load};
-use metalith_core::{Lattice, Result};
+use metalith_core::{ElementSite, Lattice, Result};
 
 use crate::spec::{
     ArraySpec, CellSpec, Element, FieldAngle, LayoutSpec, LensSpec, MappingSpec, OptimiseSpec, VerifySpec,
@@ -122,6 +122,16 @@ impl Design {
     /// The elements of the array, row by row from the lowest.
     pub fn elements(&self) -> Vec<Element> {
         self.array.elements()
+    }
+
+    /// Where they are in a layout, in the same order.
+    pub fn sites(&self) -> Vec<ElementSite> {
+        let site = |element: Element| ElementSite {
+            name: element.label(),
+            centre_nm: [element.centre_nm.0, element.centre_nm.1],
+            lattice: self.lattice(),
+        };
+        self.elements().into_iter().map(site).collect()
     }
 
     /// SHA-256 of all that decides the layout (not of what is verified): two designs with the same

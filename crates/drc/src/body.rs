@@ -1,7 +1,7 @@
 //! One shape as rules about distances see it.
 
 use super::polygon::{distance, inside, overlap, ring_of, twice_area};
-use metalith_core::{PillarShape, circle_corners};
+use metalith_core::{CHORD_ERROR, PillarShape, circle_corners};
 use metalith_gds::{Point, Rect, simplified};
 
 /// Steps of work of one pair of sides of polygons: four distances of a point from a side.
@@ -15,9 +15,6 @@ pub(super) enum Body<'a> {
     Disc(Rect),
     Ring(&'a [Point]),
 }
-
-/// Largest distance between a circle and the polygon that stands for it (database units).
-const CHORD_ERROR: f64 = 0.5;
 
 /// The polygon of a circle in a square, closed.
 pub(super) fn disc_ring(r: &Rect) -> Vec<Point> {

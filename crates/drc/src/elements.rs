@@ -4,7 +4,7 @@ use super::deck::Deck;
 use super::input::CheckInput;
 use super::work::Allowance;
 use metalith_core::{Error, PillarShape, Progress, Result};
-use metalith_gds::extract::{Discovered, ElementSite, Scale, discover};
+use metalith_gds::extract::{Discovered, Scale, discover};
 use metalith_gds::{LayerNumber, Layout, Selection};
 
 /// The layer that pillars are known by, and further layers whose shapes count as if they were on it.
@@ -23,13 +23,8 @@ pub(super) fn sites(
     progress: &dyn Progress,
 ) -> Result<(Discovered, String)> {
     if let Some(design) = input.design {
-        let site = |e: &metalith_design::Element| ElementSite {
-            name: e.label(),
-            centre_nm: [e.centre_nm.0, e.centre_nm.1],
-            lattice: design.lattice(),
-        };
         let designed = Discovered {
-            sites: design.elements().iter().map(site).collect(),
+            sites: design.sites(),
             shape: design.cell.shape,
         };
         return Ok((designed, String::new()));

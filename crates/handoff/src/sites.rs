@@ -45,13 +45,8 @@ pub(super) fn sites(
     let mut sites = Vec::new();
     let widths = targets(design);
     // The element in the middle, and the one furthest from it.
-    let distance = |p: &&metalith_design::array::PlacedElement| {
-        let (x, y) = p.element.centre_nm;
-        x * x + y * y
-    };
-    let nearest = array.placed.iter().min_by_key(distance);
-    let furthest = array.placed.iter().max_by_key(distance);
-    let mut chosen: Vec<_> = nearest.into_iter().chain(furthest).collect();
+    let furthest = array.placed.iter().max_by_key(|p| p.element.distance_nm2());
+    let mut chosen: Vec<_> = std::iter::once(array.central()).chain(furthest).collect();
     chosen.dedup_by_key(|p| p.element.index);
     for placed in chosen {
         let map = array.widths(placed);

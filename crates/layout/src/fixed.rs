@@ -6,7 +6,7 @@ use metalith_design::{Design, LayoutLayer};
 use super::{mark, point};
 
 /// Polygons and texts of a top cell.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct FixedShapes<'a> {
     /// Corners (nm), the first not repeated.
     pub polygons: Vec<(&'a LayoutLayer, Vec<(i64, i64)>)>,
@@ -17,10 +17,7 @@ impl<'a> FixedShapes<'a> {
     /// Marks of the first step, outline of the chip and label.
     pub fn of_pillars(design: &'a Design) -> Self {
         let layers = &design.layout.layers;
-        let mut fixed = Self {
-            polygons: Vec::new(),
-            texts: Vec::new(),
-        };
+        let mut fixed = Self::default();
         fixed.add(&layers.pillar_marks, mark::crosses(&design.layout.marks));
         fixed.add(&layers.outline, [mark::outline(&design.layout.chip).to_vec()]);
         fixed.label(design);
@@ -30,10 +27,7 @@ impl<'a> FixedShapes<'a> {
     /// Openings, marks of the second step and label.
     pub fn of_apertures(design: &'a Design) -> Self {
         let layers = &design.layout.layers;
-        let mut fixed = Self {
-            polygons: Vec::new(),
-            texts: Vec::new(),
-        };
+        let mut fixed = Self::default();
         fixed.add(&layers.apertures, super::aperture::openings(design));
         fixed.add(&layers.aperture_marks, mark::crosses(&design.layout.marks));
         fixed.label(design);

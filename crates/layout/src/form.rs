@@ -1,6 +1,6 @@
 //! The outline of one pillar of each width, as it is written.
 
-use metalith_core::{PillarShape, circle_corners};
+use metalith_core::{CHORD_ERROR, PillarShape, circle_corners};
 use metalith_design::Design;
 
 /// How the pillars of a design are drawn.
@@ -10,9 +10,6 @@ pub(super) struct PillarForm {
     /// Of circles (nm).
     chord_error_nm: f64,
 }
-
-/// Largest distance between a circle and its polygon (nm) where the design does not say it: half a unit of the file.
-const CHORD_ERROR_NM: f64 = 0.5;
 
 impl PillarForm {
     pub fn of(design: &Design) -> Self {
@@ -27,7 +24,7 @@ impl PillarForm {
     pub fn plain(shape: PillarShape) -> Self {
         Self {
             shape,
-            chord_error_nm: CHORD_ERROR_NM,
+            chord_error_nm: CHORD_ERROR,
         }
     }
 

@@ -3,7 +3,7 @@
 use chrono::NaiveDateTime;
 use gds21::{GdsDateTimes, GdsElement, GdsLibrary, GdsStruct, GdsUnits};
 
-use super::{encoding, top_cell};
+use super::encoding;
 use metalith_core::Result;
 use metalith_design::Design;
 
@@ -17,18 +17,8 @@ pub(super) struct LibraryFrame {
 }
 
 impl LibraryFrame {
-    /// The empty library of a design: database unit 1 nm, user unit 1 um, one date for everything.
-    pub fn new(design: &Design) -> Result<Self> {
-        let date = design
-            .layout
-            .timestamp
-            .parse::<NaiveDateTime>()
-            .expect("checked when the design was read");
-        Self::named(top_cell(design), date)
-    }
-
-    /// An empty library of this name and date.
-    pub fn named(name: String, date: NaiveDateTime) -> Result<Self> {
+    /// An empty library of this name: database unit 1 nm, user unit 1 um, one date for everything.
+    pub fn new(name: String, date: NaiveDateTime) -> Result<Self> {
         let mut library = GdsLibrary::new(name);
         library.units = GdsUnits::new(1e-3, 1e-9);
         library.dates = GdsDateTimes {
@@ -62,6 +52,12 @@ impl LibraryFrame {
         let (begin, end) = cell.split_at(cell.len() - END);
         Ok((begin.to_vec(), end.to_vec()))
     }
+}
+
+/// The date that the files of a design bear: its own, so that its bytes depend on nothing else.
+pub(super) fn date(design: &Design) -> NaiveDateTime {
+    let date = design.layout.timestamp.parse();
+    date.expect("checked when the design was read")
 }
 
 fn encode(library: &GdsLibrary) -> Result<Vec<u8>> {

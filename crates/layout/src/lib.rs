@@ -1,4 +1,4 @@
-//! From pillars to the bytes that a cleanroom writes: GDSII or OASIS, streamed.
+//! From pillars to the bytes that a cleanroom writes, GDSII or OASIS, streamed, and back to the pillars of a design.
 //!
 //! In GDSII gds21 builds and encodes the library, the cells, references, marks and labels; the pillars, of which
 //! there are millions, are records of our own between the bytes that it made. In OASIS all is written by
@@ -15,9 +15,11 @@ mod mark;
 mod oasis;
 mod pillars;
 mod properties;
+mod read;
 
 use std::path::{Path, PathBuf};
 
+use chrono::NaiveDateTime;
 use gds21::GdsElement;
 
 use fixed::FixedShapes;
@@ -31,8 +33,8 @@ use pillars::PillarWriter;
 pub use convert::convert;
 pub use format::{LayoutFormat, OasisEncoding};
 pub use free::{FreeLayout, write_free};
-pub use oasis::{write_apertures_oasis, write_pillars_oasis};
 pub use properties::write_layer_properties;
+pub use read::{extraction_plan, read_pillars};
 
 /// A file that was written.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -47,7 +49,7 @@ pub struct Written {
     pub beside: Vec<PathBuf>,
 }
 
-/// Write the pillar layout of a design: pillars, marks of the first step, chip outline and label.
+/// Write the pillar layout of a design as GDSII: pillars, marks of the first step, chip outline and label.
 ///
 /// The same design gives the same bytes on any number of threads; memory does not grow with the number
 /// of pillars.
@@ -61,59 +63,11 @@ pub fn write_pillars(
     path: &Path,
     progress: &dyn Progress,
 ) -> Result<Written> {
-    let frame = LibraryFrame::new(design)?;
-    let layer = &design.layout.layers.pillars;
-    let fixed = FixedShapes::of_pillars(design).gds();
-    write_array(
-        &frame,
-        &top_cell(design),
-        layer,
-        PillarForm::of(design),
-        fixed,
-        array,
-        hierarchy,
-        path,
-        progress,
-    )
+    write_pillars_as(design, array, hierarchy, LayoutFormat::Gds, path, progress)
 }
 
-/// Write an array within a library, beside what is fixed in the top cell.
-#[allow(clippy::too_many_arguments)]
-fn write_array(
-    frame: &LibraryFrame,
-    top: &str,
-    layer: &LayoutLayer,
-    form: PillarForm,
-    fixed: Vec<GdsElement>,
-    array: &PillarArray,
-    hierarchy: Hierarchy,
-    path: &Path,
-    progress: &dyn Progress,
-) -> Result<Written> {
-    progress.begin("writing pillars", array.pillars());
-    let mut writer = PillarWriter::create(path, frame, layer, form, progress)?;
-    let mut remarks = Vec::new();
-    match hierarchy {
-        Hierarchy::Folded => {
-            let folded = writer.folded(array)?;
-            remarks.extend(no_copies(array));
-            remarks.extend(folded);
-        }
-        Hierarchy::Sref => writer.referenced(array)?,
-        Hierarchy::Flat => {}
-    }
-    let flat = (hierarchy == Hierarchy::Flat).then_some(array);
-    let bytes = writer.finish(top, fixed, flat)?;
-    Ok(Written {
-        path: path.to_owned(),
-        bytes,
-        top_cell: top.to_owned(),
-        remarks,
-        beside: Vec::new(),
-    })
-}
-
-/// Write the pillar layout of a design in a format.
+/// Write the pillar layout of a design in a format. In the plain encoding of OASIS each further layer has a file of its
+/// own beside it, with its numbers in the name.
 ///
 /// # Errors
 /// As [`write_pillars`].
@@ -125,20 +79,87 @@ pub fn write_pillars_as(
     path: &Path,
     progress: &dyn Progress,
 ) -> Result<Written> {
-    match format {
-        LayoutFormat::Gds => write_pillars(design, array, hierarchy, path, progress),
-        LayoutFormat::Oasis(encoding) => write_pillars_oasis(design, array, hierarchy, encoding, path, progress),
-    }
+    PillarLayout::of(design).write(array, hierarchy, format, path, progress)
 }
 
-/// Write the aperture layout of a design in a format.
+/// Write the aperture layout of a design in a format: one flat cell of openings, marks of the second step and label; in
+/// the plain encoding of OASIS a file for each layer.
 ///
 /// # Errors
 /// As [`write_apertures`].
 pub fn write_apertures_as(design: &Design, format: LayoutFormat, path: &Path) -> Result<Written> {
     match format {
         LayoutFormat::Gds => write_apertures(design, path),
-        LayoutFormat::Oasis(encoding) => write_apertures_oasis(design, encoding, path),
+        LayoutFormat::Oasis(encoding) => oasis::write_apertures(design, encoding, path),
+    }
+}
+
+/// What an array of pillars is written as, in any format.
+struct PillarLayout<'a> {
+    /// Name of the top cell.
+    top: String,
+    /// Of all cells, where the format has a date.
+    date: NaiveDateTime,
+    layer: &'a LayoutLayer,
+    form: PillarForm,
+    /// What the top cell has beside the pillars.
+    fixed: FixedShapes<'a>,
+}
+
+impl<'a> PillarLayout<'a> {
+    fn of(design: &'a Design) -> Self {
+        Self {
+            top: top_cell(design),
+            date: frame::date(design),
+            layer: &design.layout.layers.pillars,
+            form: PillarForm::of(design),
+            fixed: FixedShapes::of_pillars(design),
+        }
+    }
+
+    fn write(
+        &self,
+        array: &PillarArray,
+        hierarchy: Hierarchy,
+        format: LayoutFormat,
+        path: &Path,
+        progress: &dyn Progress,
+    ) -> Result<Written> {
+        progress.begin("writing pillars", array.pillars());
+        match format {
+            LayoutFormat::Gds => self.write_gds(array, hierarchy, path, progress),
+            LayoutFormat::Oasis(encoding) => oasis::write_pillars(self, array, hierarchy, encoding, path, progress),
+        }
+    }
+
+    fn write_gds(
+        &self,
+        array: &PillarArray,
+        hierarchy: Hierarchy,
+        path: &Path,
+        progress: &dyn Progress,
+    ) -> Result<Written> {
+        let frame = LibraryFrame::new(self.top.clone(), self.date)?;
+        let mut writer = PillarWriter::create(path, &frame, self.layer, self.form, progress)?;
+        let mut remarks = Vec::new();
+        match hierarchy {
+            Hierarchy::Folded => {
+                let folded = writer.folded(array)?;
+                remarks.extend(no_copies(array));
+                remarks.extend(folded);
+            }
+            Hierarchy::Sref => writer.referenced(array)?,
+            Hierarchy::Flat => {}
+        }
+        let flat = (hierarchy == Hierarchy::Flat).then_some(array);
+        let bytes = writer.finish(&self.top, self.fixed.gds(), flat)?;
+        Ok(Written {
+            path: path.to_owned(),
+            bytes,
+            top_cell: self.top.clone(),
+            remarks,
+            beside: Vec::new(),
+        })
     }
 }
 
@@ -159,12 +180,12 @@ fn no_symmetry(array: &PillarArray, class: usize) -> Option<String> {
     })
 }
 
-/// Write the aperture layout of a design: one flat cell of openings, marks of the second step and label.
+/// Write the aperture layout of a design as GDSII: one flat cell of openings, marks of the second step and label.
 ///
 /// # Errors
 /// If the file cannot be written; the old file is then as it was.
 pub fn write_apertures(design: &Design, path: &Path) -> Result<Written> {
-    let frame = LibraryFrame::new(design)?;
+    let frame = LibraryFrame::new(top_cell(design), frame::date(design))?;
     let (begin, end) = frame.cell(&top_cell(design), FixedShapes::of_apertures(design).gds())?;
     let bytes = [frame.head(), &begin, &end, frame.tail()].concat();
     WholeFile::write(path, &bytes)?;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use metalith_core::{ElementSite, PillarShape, Silent};
+use metalith_core::{PillarShape, Silent};
 use metalith_design::{Design, Hierarchy, PillarArray};
 use metalith_gds::Layout;
 use metalith_gds::extract::{ExtractionPlan, Why, extract};
@@ -19,13 +19,7 @@ fn circles() -> Design {
 }
 
 fn plan(design: &Design, shape: PillarShape) -> ExtractionPlan {
-    let site = |e: &metalith_design::Element| ElementSite {
-        name: e.label(),
-        centre_nm: [e.centre_nm.0, e.centre_nm.1],
-        lattice: design.lattice(),
-    };
-    let sites = design.elements().iter().map(site).collect();
-    ExtractionPlan::given(design.layout.layers.pillars.number(), sites).of_shape(shape)
+    ExtractionPlan::given(design.layout.layers.pillars.number(), design.sites()).of_shape(shape)
 }
 
 fn holds(path: &Path, design: &Design, array: &PillarArray) {

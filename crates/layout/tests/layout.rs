@@ -8,9 +8,7 @@ use metalith_core::{Silent, WholeFile, WidthRows};
 use metalith_design::array::ClassWidths;
 use metalith_design::{Design, Hierarchy, PillarArray};
 use metalith_gds::{LayerNumber, Layout, Point, Selection, Shape, Transform, Visitor};
-use metalith_layout::{
-    LayoutFormat, OasisEncoding, convert, write_apertures, write_pillars, write_pillars_as, write_pillars_oasis,
-};
+use metalith_layout::{LayoutFormat, OasisEncoding, convert, write_apertures, write_pillars, write_pillars_as};
 use metalith_oasis::{CellReference, NameTable, OasisItem, OasisLimits, OasisReader, OasisShape};
 use metalith_testing::{design, golden};
 use serde_json::json;
@@ -201,8 +199,10 @@ fn oasis_has_every_pillar_on_any_number_of_threads() {
             let on = |threads| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 let path = folder.path().join("pillars.oas");
-                pool.install(|| write_pillars_oasis(&mini, &array, hierarchy, encoding, &path, &Silent))
-                    .unwrap();
+                pool.install(|| {
+                    write_pillars_as(&mini, &array, hierarchy, LayoutFormat::Oasis(encoding), &path, &Silent)
+                })
+                .unwrap();
                 fs::read(path).unwrap()
             };
             let one = on(1);
@@ -212,7 +212,15 @@ fn oasis_has_every_pillar_on_any_number_of_threads() {
     }
     // Plain files have one layer each, and no repetition.
     let path = folder.path().join("plain.oas");
-    let written = write_pillars_oasis(&mini, &array, Hierarchy::Folded, OasisEncoding::Plain, &path, &Silent).unwrap();
+    let written = write_pillars_as(
+        &mini,
+        &array,
+        Hierarchy::Folded,
+        LayoutFormat::Oasis(OasisEncoding::Plain),
+        &path,
+        &Silent,
+    )
+    .unwrap();
     assert_eq!(written.beside.len(), 2, "marks and outline: {:?}", written.beside);
     for path in written.beside.iter().chain([&path]) {
         let bytes = fs::read(path).unwrap();

@@ -4,8 +4,7 @@ use metalith_camera::{Camera, Sampling};
 use metalith_core::{Error, Progress, Result, WidthMap};
 use metalith_design::Design;
 use metalith_design::array::{Symmetry, SymmetryGroup};
-use metalith_gds::extract::{ElementSite, Extraction, ExtractionPlan, extract};
-use metalith_gds::{Layout, ReadLimits};
+use metalith_gds::extract::Extraction;
 use metalith_made::{
     ArrivingLight, CameraChange, ClassTable, DrawnElement, MadeElement, MadeView, PathChange, Perturbation,
     SimulationCase,
@@ -58,23 +57,6 @@ pub fn element_views(design: &Design, camera: &Camera) -> Vec<ElementView> {
         slope: camera.sensor.tilt_rad.map(f64::tan),
     };
     design.elements().into_iter().map(view).collect()
-}
-
-/// The pillars of a layout at the elements of a design, in the order of [`Design::elements`].
-///
-/// # Errors
-/// If the layout cannot be read, or the user stopped it.
-pub fn read_pillars(design: &Design, layout: &std::path::Path, progress: &dyn Progress) -> Result<Extraction> {
-    let site = |element: metalith_design::Element| ElementSite {
-        name: element.label(),
-        centre_nm: [element.centre_nm.0, element.centre_nm.1],
-        lattice: design.lattice(),
-    };
-    let sites: Vec<ElementSite> = design.elements().into_iter().map(site).collect();
-    metalith_gds::extract::fits(layout, &sites)?;
-    let plan = ExtractionPlan::given(design.layout.layers.pillars.number(), sites).of_shape(design.cell.shape);
-    let layout = Layout::open_with(layout, ReadLimits::default(), progress)?;
-    Ok(extract(&layout, &plan, progress)?)
 }
 
 /// Wavelengths at which a camera is simulated behind a design.

@@ -28,7 +28,7 @@ mod thumbnail;
 mod veil;
 
 pub use assumed::{Assumed, AssumedScore, worth_of_assumptions};
-pub use chip::{ChipInLight, element_views, read_pillars, sampling_of};
+pub use chip::{ChipInLight, element_views, sampling_of};
 pub use colour::ChannelColours;
 pub use dataset::{DatasetManifest, DatasetPair, write_dataset};
 pub use exposure::{Frame, channel_at, expose, gains, sensitivity};

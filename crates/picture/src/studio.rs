@@ -6,6 +6,7 @@ use metalith_camera::{Camera, ChannelSampling};
 use metalith_cell::{Fidelity, cache_folder};
 use metalith_core::{Error, Progress, Result};
 use metalith_design::{Design, cell_models};
+use metalith_layout::read_pillars;
 use metalith_made::{CalibratedModel, MadeChip, SimulationCase};
 use ndarray::{Array2, Array3};
 use serde::Serialize;
@@ -19,9 +20,7 @@ use crate::restore::{Recorded, RestorationMethod, SceneStatistics, restore_joint
 use crate::scene::SceneImage;
 use crate::spectra::{SceneSpectrum, rgb_basis};
 use crate::veil::{LightShares, Veil};
-use crate::{
-    ChannelColours, ChipInLight, ElementView, SceneSpace, SceneView, cache, element_views, read_pillars, sampling_of,
-};
+use crate::{ChannelColours, ChipInLight, ElementView, SceneSpace, SceneView, cache, element_views, sampling_of};
 
 /// What pictures are taken with.
 #[derive(Clone)]

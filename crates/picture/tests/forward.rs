@@ -4,13 +4,12 @@ use metalith_camera::{Camera, Channel, Illuminant, Response, Sensor};
 use metalith_core::Silent;
 use metalith_design::array::PillarArray;
 use metalith_design::{Design, cell_models};
-use metalith_layout::write_pillars;
+use metalith_layout::{read_pillars, write_pillars};
 use metalith_made::SimulationCase;
 use metalith_picture::restore::SceneStatistics;
 use metalith_picture::scene::SceneImage;
 use metalith_picture::{
-    BankSpec, ChipInLight, Detail, FrameOperator, KernelBank, SceneInputs, ScenePoints, SceneSpace, Veil,
-    element_views, read_pillars,
+    BankSpec, ChipInLight, Detail, FrameOperator, KernelBank, SceneInputs, ScenePoints, SceneSpace, Veil, element_views,
 };
 use metalith_wave::{Accuracy, Scratch, Window};
 use ndarray::{Array2, Array3};

@@ -6,11 +6,12 @@ use metalith_cell::Fidelity;
 use metalith_core::{Progress, Result, WidthRows};
 use metalith_design::Design;
 use metalith_design::array::{PillarArray, PlacedElement};
-use metalith_gds::extract::{HeldWidths, extract_folded};
+use metalith_gds::extract::{Extraction, HeldWidths, extract_folded};
 use metalith_gds::{Layout, ReadLimits};
+use metalith_layout::extraction_plan;
 use metalith_wave::Accuracy;
 
-use super::{SimulationCases, Verification, WidthCheck, check, compare, facts, judge, plan};
+use super::{ElementCheck, LayoutFacts, SimulationCases, Verification, WidthCheck, check, compare, facts, judge};
 
 /// Compare the pillars of an element as they are held: of one that is held as an eighth, and meant to have all eight
 /// symmetries, each set of copies once.
@@ -39,17 +40,28 @@ pub fn verify_in_parts(
     part_bytes: usize,
     progress: &dyn Progress,
 ) -> Result<Verification> {
-    let layout = Layout::open_with(path, ReadLimits::default(), progress)?;
-    let extraction = extract_folded(&layout, &plan(design, array), progress)?;
-    let elements = compare(array, &extraction, |placed, found| compare_held(array, placed, found));
+    let (facts, elements, extraction) = read_folded(design, array, path, progress)?;
     let widths: Vec<&dyn WidthRows> = extraction.elements.iter().map(|e| &e.widths as _).collect();
     let found = super::Found {
-        layout: facts(&layout, &extraction, layout.path()),
+        layout: facts,
         foreign: extraction.oddities.clone(),
         elements,
         widths,
     };
     judge(design, array, found, cases, accuracy, Some(part_bytes), progress)
+}
+
+/// A layout read back with its elements folded, and compared with its design.
+fn read_folded(
+    design: &Design,
+    array: &PillarArray,
+    path: &Path,
+    progress: &dyn Progress,
+) -> Result<(LayoutFacts, Vec<ElementCheck>, Extraction<HeldWidths>)> {
+    let layout = Layout::open_with(path, ReadLimits::default(), progress)?;
+    let extraction = extract_folded(&layout, &extraction_plan(design), progress)?;
+    let elements = compare(array, &extraction, |placed, found| compare_held(array, placed, found));
+    Ok((facts(&layout, &extraction, layout.path()), elements, extraction))
 }
 
 /// Read the layout at `path` back and compare every pillar with the design, without simulating any: the limits of the
@@ -66,8 +78,7 @@ pub fn verify_pillars(
     why: String,
     progress: &dyn Progress,
 ) -> Result<Verification> {
-    let layout = Layout::open_with(path, ReadLimits::default(), progress)?;
-    let extraction = extract_folded(&layout, &plan(design, array), progress)?;
+    let (facts, elements, extraction) = read_folded(design, array, path, progress)?;
     let mut verification = Verification {
         design: design.name.clone(),
         design_digest: design.digest(),
@@ -76,8 +87,8 @@ pub fn verify_pillars(
         compensated: array.compensated,
         accuracy: "none",
         camera: None,
-        layout: facts(&layout, &extraction, layout.path()),
-        elements: compare(array, &extraction, |placed, found| compare_held(array, placed, found)),
+        layout: facts,
+        elements,
         foreign: extraction.oddities,
         distinct: Vec::new(),
         not_simulated: Some(why),

@@ -27,8 +27,9 @@ use metalith_core::{Progress, Result, WidthRows};
 use metalith_design::array::{PillarArray, PlacedElement, WidthRule};
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, Element};
-use metalith_gds::extract::{ElementSite, ExtractedElement, Extraction, ExtractionPlan, Oddities, Survey, extract};
+use metalith_gds::extract::{ExtractedElement, Extraction, Oddities, Survey, extract};
 use metalith_gds::{self, Layout};
+use metalith_layout::extraction_plan;
 use metalith_made::{MadeChip, ModelStatement};
 use metalith_wave::propagation::Steepness;
 use metalith_wave::{Accuracy, PlaneWave};
@@ -134,20 +135,9 @@ impl Verification {
 /// If the elements have more lattice sites together than are held at a time, or the camera of the design cannot be
 /// used.
 pub fn fits(design: &Design, path: &Path) -> Result<()> {
-    metalith_gds::extract::fits(path, &sites(design))?;
+    metalith_gds::extract::fits(path, &design.sites())?;
     white::camera_of(design)?;
     Ok(())
-}
-
-/// The elements of a design on their lattices.
-fn sites(design: &Design) -> Vec<ElementSite> {
-    let lattice = design.lattice();
-    let site = |element: Element| ElementSite {
-        name: element.label(),
-        centre_nm: [element.centre_nm.0, element.centre_nm.1],
-        lattice,
-    };
-    design.elements().into_iter().map(site).collect()
 }
 
 /// Read the layout at `path` back and hold it to its design.
@@ -196,7 +186,7 @@ impl ReadLayout {
     /// If it is too large to be held, cannot be read, or the user stopped it.
     pub fn of(design: &Design, array: &PillarArray, layout: &Layout, progress: &dyn Progress) -> Result<Self> {
         fits(design, layout.path())?;
-        let extraction = extract(layout, &plan(design, array), progress)?;
+        let extraction = extract(layout, &extraction_plan(design), progress)?;
         Ok(Self {
             facts: facts(layout, &extraction, layout.path()),
             elements: compare(array, &extraction, |placed, found| {
@@ -375,26 +365,6 @@ impl<'a> MappingResponse<'a> {
             (Self::Made(..), None) => unreachable!("a made chip has made elements"),
         }
     }
-}
-
-/// The pillars of a layout at the elements of a design.
-///
-/// # Errors
-/// If the layout cannot be read, or the user stopped it.
-pub fn read_back(design: &Design, array: &PillarArray, path: &Path, progress: &dyn Progress) -> Result<Extraction> {
-    let layout = Layout::open_with(path, metalith_gds::ReadLimits::default(), progress)?;
-    Ok(extract(&layout, &plan(design, array), progress)?)
-}
-
-/// Where the elements of a design are.
-fn plan(design: &Design, array: &PillarArray) -> ExtractionPlan {
-    let site = |placed: &PlacedElement| ElementSite {
-        name: placed.element.label(),
-        centre_nm: [placed.element.centre_nm.0, placed.element.centre_nm.1],
-        lattice: array.lattice,
-    };
-    let sites = array.placed.iter().map(site).collect();
-    ExtractionPlan::given(design.layout.layers.pillars.number(), sites).of_shape(design.cell.shape)
 }
 
 fn compare<W>(

@@ -7,7 +7,7 @@ use metalith_design::{Design, Element};
 use metalith_gds::extract::{Holding, fits_folded, held_sites};
 use metalith_wave::{Accuracy, Fold, Window};
 
-use super::{optics, sites, white};
+use super::{optics, white};
 
 /// Bytes of each site of every element: its width as read.
 const READ_BYTES: f64 = 2.0;
@@ -52,7 +52,7 @@ impl Simulation {
         if whole_mb <= memory_mb && super::fits(design, path).is_ok() {
             return Ok(Self::Whole);
         }
-        let (elements, holdings) = (sites(design), holdings(design));
+        let (elements, holdings) = (design.sites(), holdings(design));
         fits_folded(path, &elements, &holdings)?;
         if by_site {
             return Ok(Self::Not(format!(

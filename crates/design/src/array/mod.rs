@@ -163,14 +163,8 @@ impl PillarArray {
     /// # Panics
     /// If there is no element: a design has at least one.
     pub fn central(&self) -> &PlacedElement {
-        let distance = |p: &&PlacedElement| {
-            let (x, y) = p.element.centre_nm;
-            x * x + y * y
-        };
-        self.placed
-            .iter()
-            .min_by_key(distance)
-            .expect("a design has at least one element")
+        let nearest = self.placed.iter().min_by_key(|p| p.element.distance_nm2());
+        nearest.expect("a design has at least one element")
     }
 
     /// Number of pillars of all elements.

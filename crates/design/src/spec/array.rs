@@ -57,6 +57,12 @@ impl Element {
     pub fn centre_um(&self) -> [f64; 2] {
         [self.centre_nm.0 as f64 * 1e-3, self.centre_nm.1 as f64 * 1e-3]
     }
+
+    /// Square of the distance from the middle of the chip (nm²), to tell the nearest element and the furthest.
+    pub fn distance_nm2(&self) -> i64 {
+        let (x, y) = self.centre_nm;
+        x * x + y * y
+    }
 }
 
 impl ArraySpec {

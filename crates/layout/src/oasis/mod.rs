@@ -13,7 +13,7 @@ use metalith_oasis::{CompressedBlock, OasisWriter, Placing, RecordBuffer};
 
 use super::fixed::FixedShapes;
 use super::form::PillarForm;
-use super::{OasisEncoding, Written, no_copies, no_symmetry, top_cell};
+use super::{OasisEncoding, PillarLayout, Written, no_copies, no_symmetry, top_cell};
 use encode::{ElementPillars, NOTHING, PillarEncoding, bounds_of, unite};
 
 /// Steps of the grid in a micrometre: 1 nm.
@@ -25,32 +25,30 @@ const SURE: f64 = 0.97;
 /// Compression of cells with few records.
 const LEVEL: u32 = 6;
 
-/// Write the pillar layout of a design as OASIS: pillars, marks of the first step, chip outline and label. In the
-/// plain encoding each further layer has a file of its own beside it, with its numbers in the name.
+/// Write an array of pillars and what is fixed beside it. In the plain encoding each further layer has a file of its
+/// own beside it, with its numbers in the name.
 ///
 /// Folded layouts have a cell for each part that symmetry leaves unique, all others a cell for each element, which is
-/// placed without turn or mirror. The same design gives the same bytes on any number of threads; memory does not grow
+/// placed without turn or mirror. The same array gives the same bytes on any number of threads; memory does not grow
 /// with the number of pillars.
 ///
 /// # Errors
 /// If the file cannot be written, or the user stopped it; the old file is then as it was.
-pub fn write_pillars_oasis(
-    design: &Design,
+pub(super) fn write_pillars(
+    layout: &PillarLayout<'_>,
     array: &PillarArray,
     hierarchy: Hierarchy,
     encoding: OasisEncoding,
     path: &Path,
     progress: &dyn Progress,
 ) -> Result<Written> {
-    let fixed = FixedShapes::of_pillars(design);
-    let pillars = &design.layout.layers.pillars;
-    progress.begin("writing pillars", array.pillars());
-    let mut file = OasisFile::create(design, path)?;
+    let (fixed, pillars) = (&layout.fixed, layout.layer);
+    let mut file = OasisFile::create(&layout.top, path)?;
     let mut remarks = Vec::new();
     let mut elements = Elements {
         file: &mut file,
         layer: pillars,
-        form: PillarForm::of(design),
+        form: layout.form,
         encoding,
         width_cells: vec![None; usize::from(u16::MAX) + 1],
         progress,
@@ -64,12 +62,12 @@ pub fn write_pillars_oasis(
     };
     elements.width_cells()?;
     if encoding == OasisEncoding::Plain {
-        file.top(&fixed, &placed, |layer| layer.number() == pillars.number())?;
+        file.top(fixed, &placed, |layer| layer.number() == pillars.number())?;
         let mut written = file.finish(remarks)?;
-        written.beside = layers_apart(design, &fixed, pillars, path)?;
+        written.beside = layers_apart(&layout.top, fixed, pillars, path)?;
         return Ok(written);
     }
-    file.top(&fixed, &placed, |_| true)?;
+    file.top(fixed, &placed, |_| true)?;
     file.finish(remarks)
 }
 
@@ -77,21 +75,22 @@ pub fn write_pillars_oasis(
 ///
 /// # Errors
 /// If the file cannot be written; the old file is then as it was.
-pub fn write_apertures_oasis(design: &Design, encoding: OasisEncoding, path: &Path) -> Result<Written> {
+pub(super) fn write_apertures(design: &Design, encoding: OasisEncoding, path: &Path) -> Result<Written> {
     let fixed = FixedShapes::of_apertures(design);
     let openings = &design.layout.layers.apertures;
-    let mut file = OasisFile::create(design, path)?;
+    let top = top_cell(design);
+    let mut file = OasisFile::create(&top, path)?;
     let plain = encoding == OasisEncoding::Plain;
     file.top(&fixed, &[], |layer| !plain || layer.number() == openings.number())?;
     let mut written = file.finish(Vec::new())?;
     if plain {
-        written.beside = layers_apart(design, &fixed, openings, path)?;
+        written.beside = layers_apart(&top, &fixed, openings, path)?;
     }
     Ok(written)
 }
 
 /// A file for each layer of polygons but one; texts for people are left out.
-fn layers_apart(design: &Design, fixed: &FixedShapes<'_>, but: &LayoutLayer, path: &Path) -> Result<Vec<PathBuf>> {
+fn layers_apart(top: &str, fixed: &FixedShapes<'_>, but: &LayoutLayer, path: &Path) -> Result<Vec<PathBuf>> {
     let mut numbers: Vec<_> = fixed.polygons.iter().map(|(layer, _)| layer.number()).collect();
     numbers.sort_unstable();
     numbers.dedup();
@@ -101,7 +100,7 @@ fn layers_apart(design: &Design, fixed: &FixedShapes<'_>, but: &LayoutLayer, pat
     for number in numbers {
         let name = format!("{stem}_{}_{}.oas", number.layer, number.datatype);
         let path = path.with_file_name(name);
-        let mut file = OasisFile::create(design, &path)?;
+        let mut file = OasisFile::create(top, &path)?;
         file.top(fixed, &[], |layer| layer.number() == number)?;
         paths.push(file.finish(Vec::new())?.path);
     }
@@ -152,11 +151,14 @@ struct OasisFile<'a> {
 }
 
 impl<'a> OasisFile<'a> {
-    fn create(design: &Design, path: &'a Path) -> Result<Self> {
-        let top = top_cell(design);
+    fn create(top: &str, path: &'a Path) -> Result<Self> {
         let out = BufWriter::new(WholeFile::create(path)?);
-        let writer = OasisWriter::new(out, GRID_PER_UM, &[&top], true).map_err(Error::io("write", path))?;
-        Ok(Self { writer, path, top })
+        let writer = OasisWriter::new(out, GRID_PER_UM, &[top], true).map_err(Error::io("write", path))?;
+        Ok(Self {
+            writer,
+            path,
+            top: top.to_owned(),
+        })
     }
 
     fn begin(&mut self, name: &str) -> Result<u64> {

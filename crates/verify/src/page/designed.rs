@@ -1,0 +1,124 @@
+//! What was designed: the chip, the pillars in the middle, phase and width along a radius.
+
+use metalith_core::{Lattice, WidthMap, WidthRows};
+use metalith_design::Design;
+use metalith_design::array::PillarArray;
+use metalith_design::phase::{ElementPhase, LensPhase};
+use metalith_report::{Axis, Chart, Page, PillarZoom, Plan, exact};
+
+/// Pillars that the picture of the middle shows along an axis.
+const ZOOMED_PITCHES: f64 = 34.0;
+/// Sites along a radius that can be told apart in a figure.
+const RADIUS_POINTS: usize = 600;
+
+/// The section of the design.
+pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
+    page.section("What was designed");
+    let elements = match design.array.spacing_words() {
+        Some(apart) => format!(
+            "{} x {} elements of {} um, f = {} um, {apart} apart, steered by {}° a step",
+            design.array.count.0,
+            design.array.count.1,
+            exact(f64::from(design.lens.diameter_nm) * 1e-3),
+            exact(design.lens.focal_length_um),
+            design.array.steering_deg,
+        ),
+        None => format!(
+            "{} elements of {} um, f = {} um, placed and steered one by one,",
+            array.placed.len(),
+            exact(f64::from(design.lens.diameter_nm) * 1e-3),
+            exact(design.lens.focal_length_um),
+        ),
+    };
+    let plural = design.cell.shape.plural();
+    page.paragraph(format!(
+        "{elements} at {} nm; pillars, {plural}, on a lattice of {} nm.",
+        exact(design.array.wedge_wavelength_um * 1e3),
+        design.cell.pitch_nm,
+    ));
+    let centre = array.central();
+    let rows = array.rows(centre);
+    let zoomed = middle(rows.as_ref());
+    let span_um = ZOOMED_PITCHES * array.lattice.pitch_um();
+    page.row([
+        chip(design).caption("The chip from above: openings, pillars, marks and outline as they are written."),
+        PillarZoom::new(
+            "Pillars in the middle of the centre element",
+            &zoomed,
+            (0.0, 0.0),
+            span_um,
+        )
+        .shape(design.cell.shape)
+        .caption("Pillars as they are written, to scale."),
+    ]);
+    let lens = LensPhase::of(design);
+    let phase = ElementPhase::of(&lens, &centre.element);
+    let n = array.lattice.sites();
+    let along = |value: &dyn Fn(usize) -> Option<f64>| {
+        let radius = |ix| array.lattice.coordinate_um(ix);
+        (n / 2..n)
+            .filter_map(|ix| Some((radius(ix), value(ix)?)))
+            .collect::<Vec<_>>()
+    };
+    let mut turns = Chart::new(
+        "Phase along a radius",
+        Axis::linear("radius", "um"),
+        Axis::linear("phase", "turns"),
+    )
+    .size(420.0, 260.0);
+    turns.line("unwrapped", along(&|ix| phase.turns(ix, n / 2)));
+    let mut widths = Chart::new(
+        "Width along a radius",
+        Axis::linear("radius", "um"),
+        Axis::linear("width", "nm"),
+    )
+    .size(420.0, 260.0);
+    let last = along(&|ix| phase.turns(ix, n / 2)).len();
+    let shown = along(&|ix| Some(f64::from(rows.width(ix, n / 2))).filter(|w| *w > 0.0));
+    widths.points("as written", shown.into_iter().take(last.min(RADIUS_POINTS)));
+    page.row([
+        turns.caption("Centre element, before the modulo."),
+        widths.caption(format!(
+            "Centre element, the first {} sites from the middle.",
+            last.min(RADIUS_POINTS)
+        )),
+    ]);
+}
+
+/// The sites about the middle of an element that figures show.
+fn middle(rows: &impl WidthRows) -> WidthMap {
+    let lattice = rows.lattice();
+    let n = lattice.sites();
+    let beside = n.saturating_sub(2 * RADIUS_POINTS) / 2;
+    let shown = Lattice::new(lattice.pitch_nm(), n - 2 * beside).expect("a part of a lattice is one");
+    let mut map = WidthMap::empty(shown);
+    for ((iy, ix), width) in map.width_nm.indexed_iter_mut() {
+        *width = rows.width(ix + beside, iy + beside);
+    }
+    map
+}
+
+fn chip(design: &Design) -> Plan {
+    let layout = &design.layout;
+    let mut plan = Plan::new("The chip").width(460.0);
+    let um = |nm: i64| nm as f64 * 1e-3;
+    let outline = plan.outlines("chip outline");
+    let openings = plan.layer("apertures");
+    let pillars = plan.layer("pillars");
+    let marks = plan.solid("marks");
+    let (x, y) = (um(layout.chip.size_nm.0) / 2.0, um(layout.chip.size_nm.1) / 2.0);
+    plan.rectangle(outline, (-x, -y), (x, y));
+    for element in design.elements() {
+        let (cx, cy) = (um(element.centre_nm.0), um(element.centre_nm.1));
+        let radius = design.lens.radius_um();
+        plan.circle(openings, cx, cy, radius + um(layout.apertures.margin_nm));
+        plan.circle(pillars, cx, cy, radius);
+        plan.label(cx, cy, element.label());
+    }
+    for set in &layout.marks {
+        for &(cx, cy) in &set.centres_nm {
+            plan.cross(marks, (um(cx), um(cy)), um(set.length_nm), um(set.width_nm));
+        }
+    }
+    plan
+}

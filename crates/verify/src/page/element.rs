@@ -1,0 +1,157 @@
+//! What the written file does: one distinct element, its PSFs, contrast and orders.
+
+use ndarray::Array2;
+
+use crate::{DistinctElement, PsfResult, Verification, white_page};
+use metalith_cell::Fidelity;
+use metalith_core::part;
+use metalith_report::{Axis, Cell, Chart, Column, ImageGrid, Page, Table, exact, sig};
+
+/// Decades of a PSF that are shown: below lies what a camera's noise hides.
+const PSF_DECADES: f64 = 4.0;
+/// Edge of the part of a PSF that is shown (um): some ten sensor pixels.
+const PSF_SHOWN_UM: f64 = 60.0;
+
+/// The section of one distinct element.
+pub(super) fn write(page: &mut Page, found: &Verification, element: &DistinctElement) {
+    page.section(format!("Element {}", element.element.label()));
+    page.paragraph(format!(
+        "Stands for {} of {} elements. Phase errors at the wavelength of the mapping: rounding {} rad rms, {} at most; mapping, by the `{}` cell, {} rad rms, {} at most. {}",
+        element.copies,
+        found.elements.len(),
+        sig(element.phase.rounding.rms_rad, 3),
+        sig(element.phase.rounding.largest_rad, 3),
+        found.fidelity.of_width_alone(),
+        sig(element.phase.mapping.rms_rad, 3),
+        sig(element.phase.mapping.largest_rad, 3),
+        steepness(element),
+    ));
+    page.table(spot_table(element));
+    let shown: Vec<_> = element
+        .spots
+        .iter()
+        .filter_map(|spot| Some((spot, spot.images()?)))
+        .collect();
+    // Designed above extracted, a column for each wavelength.
+    let mut images = ImageGrid::new("PSF designed above extracted", shown.len())
+        .values("|E|² / |E inc|²", "")
+        .log(PSF_DECADES)
+        .side((760.0 / shown.len().max(1) as f64).min(230.0));
+    for (spot, seen) in &shown {
+        images = images.pixel_um(seen.step_um);
+        images.image(format!("designed, {}", spot.place()), cut(&seen.designed, seen.step_um));
+    }
+    for (spot, seen) in &shown {
+        images.image(
+            format!("extracted, {}", spot.place()),
+            cut(&seen.extracted, seen.step_um),
+        );
+    }
+    let mut chart = Chart::new(
+        "MTF with the sensor's pixel",
+        Axis::linear("spatial frequency", "1/mm"),
+        Axis::linear("MTF", "").range(0.0, 1.0),
+    );
+    for (spot, _) in &shown {
+        let colour = format!("{} nm", exact(spot.wavelength_um * 1e3));
+        chart.line(format!("designed, {colour}"), spot.designed.mtf_curve.iter().copied());
+        chart.line(format!("extracted, {colour}"), spot.judged().mtf_curve.iter().copied());
+    }
+    page.figure(images.caption(format!(
+        "The middle {PSF_SHOWN_UM} um about the chief ray, {PSF_DECADES} decades; extracted by the `{}` cell.",
+        found.fidelity
+    )));
+    page.figure(chart.caption("In the middle of the field, mean of x and y."));
+    let mut orders = Table::new([
+        Column::number("Wavelength", "nm"),
+        Column::text("Cell"),
+        Column::number("First order", "%"),
+        Column::number("Zero order", "%"),
+        Column::number("Second order", "%"),
+        Column::number("All transmitted in the zero order of the lattice", "%"),
+    ]);
+    for entry in &element.orders {
+        orders.row([
+            Cell::exact(entry.wavelength_um * 1e3),
+            Cell::from(entry.fidelity.name()),
+            Cell::fixed(entry.first * 100.0, 1),
+            Cell::fixed(entry.zero * 100.0, 1),
+            Cell::fixed(entry.second * 100.0, 1),
+            Cell::fixed(entry.transmitted * 100.0, 1),
+        ]);
+    }
+    let whose = if found.fidelity == Fidelity::Neighbours {
+        "the mapping's own account, for `neighbours` by that of the element's pillars"
+    } else {
+        "the mapping's own account"
+    };
+    page.table(orders.caption(format!(
+        "Where light goes by {whose}: the first order is the image, the zero order passes the element as if it had no phase.",
+    )));
+    white_page::write(page, found, element);
+}
+
+fn steepness(element: &DistinctElement) -> String {
+    let steep = &element.steepness;
+    match steep.from_pitches {
+        None => format!(
+            "The design phase nowhere steps by more than pi a pitch ({} rad at most).",
+            sig(steep.largest_step_rad, 3)
+        ),
+        Some(from) => format!(
+            "The design phase steps by more than pi a pitch at {} % of the pillars, the first of them {} pitches from the middle.",
+            sig(steep.steep_sites as f64 / steep.sites.max(1) as f64 * 100.0, 3),
+            sig(from, 4),
+        ),
+    }
+}
+
+fn spot_table(element: &DistinctElement) -> Table {
+    let mut table = Table::new([
+        Column::text("Wavelength, field angle"),
+        Column::text("Of"),
+        Column::number("Strehl", ""),
+        Column::number("Energy in 1 pixel", "%"),
+        Column::number("in 2", "%"),
+        Column::number("MTF 42.7/mm", ""),
+        Column::number("85.3/mm", ""),
+        Column::number("Centroid x", "um"),
+        Column::number("y", "um"),
+        Column::number("PSF difference", ""),
+    ]);
+    for spot in &element.spots {
+        let mut row = |of: String, spot_of: &PsfResult, difference: Cell| {
+            let (m, [half, nyquist]) = (&spot_of.metrics, spot_of.mtf());
+            table.row([
+                Cell::from(spot.place()),
+                Cell::from(of),
+                Cell::sig(m.strehl, 3),
+                Cell::fixed(m.energy_1_pixel * 100.0, 2),
+                Cell::fixed(m.energy_2_pixels * 100.0, 2),
+                Cell::fixed(half, 3),
+                Cell::fixed(nyquist, 3),
+                Cell::fixed(m.centroid_um[0] - spot.chief_ray_um[0], 2),
+                Cell::fixed(m.centroid_um[1] - spot.chief_ray_um[1], 2),
+                difference,
+            ]);
+        };
+        row("design phase".into(), &spot.designed, Cell::none());
+        for (k, (fidelity, extracted)) in spot.extracted.iter().enumerate() {
+            let difference = if k == 0 {
+                Cell::sig(spot.psf_difference, 3)
+            } else {
+                Cell::none()
+            };
+            row(format!("layout, {fidelity}"), extracted, difference);
+        }
+    }
+    table.caption("The unrounded design phase beside the pillars read back, by each cell. Energies are of the light that arrives at the element; the centroid counts from the chief ray.")
+}
+
+/// The middle of a PSF.
+fn cut(values: &Array2<f32>, step_um: f64) -> Array2<f64> {
+    let n = values.nrows();
+    let keep = ((PSF_SHOWN_UM / step_um) as usize).clamp(1, n);
+    let from = (n - keep) / 2;
+    part(values.view(), from..from + keep, from..from + keep).mapv(f64::from)
+}

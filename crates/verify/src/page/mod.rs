@@ -1,0 +1,170 @@
+//! The report of a run: what was designed, what was written, and what the written file does.
+
+mod designed;
+mod element;
+mod written;
+
+use std::path::Path;
+
+use super::{PsfResult, Sense, Verification, assumptions};
+use metalith_cell::Fidelity;
+use metalith_core::Result;
+use metalith_design::array::PillarArray;
+use metalith_design::{CellIncidence, Design};
+use metalith_report::{Cell, Column, Figure, Page, Table, Verdict, count, exact, sig, write_json};
+use metalith_wave::psf::HALF_NYQUIST_LP_MM;
+
+/// Write `report.html` and `report.json` into a folder; the page shows the picture that a camera of the chip will take, if
+/// there is one.
+///
+/// # Errors
+/// If they cannot be written.
+pub fn write_report(
+    design: &Design,
+    array: &PillarArray,
+    found: &Verification,
+    picture: Option<Figure>,
+    folder: &Path,
+) -> Result<()> {
+    write_json(&folder.join("report.json"), "verification", found)?;
+    page(design, array, found, picture).write(&folder.join("report.html"))
+}
+
+fn page(design: &Design, array: &PillarArray, found: &Verification, picture: Option<Figure>) -> Page {
+    let mut page = Page::new(
+        &design.title,
+        format!("{}, computed from the bytes of {}", design.name, found.layout.file),
+    );
+    if let Some(why) = &found.not_simulated {
+        page.paragraph(format!("Every pillar was compared; nothing was simulated: {why}."));
+    }
+    let failed = found.checks.iter().filter(|c| !c.passed()).count();
+    let words = match failed {
+        0 => format!(
+            "What was written is what was designed: all {} limits hold.",
+            found.checks.len()
+        ),
+        _ => format!("{failed} of {} limits do not hold.", found.checks.len()),
+    };
+    page.verdict(Verdict::of(failed == 0), words);
+    page.facts(&[
+        ("Pillars", count(found.layout.pillars)),
+        ("Elements", found.elements.len().to_string()),
+        ("of them distinct", found.distinct.len().to_string()),
+        ("Strehl ratio, least to greatest", strehl(found)),
+        ("MTF at 42.7 lp/mm, one wavelength", contrast(found)),
+        ("a whole channel from one direction", white_contrast(found)),
+        ("File", format!("{} MB", sig(found.layout.bytes as f64 * 1e-6, 3))),
+    ]);
+    if let Some(picture) = picture {
+        page.figure(picture);
+    }
+    limits(&mut page, found);
+    assumptions::write(&mut page, design, found);
+    designed::write(&mut page, design, array);
+    written::write(&mut page, design, found);
+    // From the middle outwards: the plainest element first.
+    let mut elements = found.distinct.iter().collect::<Vec<_>>();
+    elements.sort_by_key(|e| e.element.index.0.abs() + e.element.index.1.abs());
+    for element in elements {
+        element::write(&mut page, found, element);
+    }
+    method(&mut page, design, found);
+    page
+}
+
+/// Range of the Strehl ratios of the case that judges.
+fn strehl(found: &Verification) -> String {
+    range(found, |psf| psf.metrics.strehl)
+}
+
+/// Range of its contrast at half the frequency of the sensor, pixel included.
+fn contrast(found: &Verification) -> String {
+    range(found, |psf| psf.mtf()[0])
+}
+
+/// The same in the light of each channel of the camera, along both axes.
+fn white_contrast(found: &Verification) -> String {
+    let channels = found.distinct.iter().flat_map(|d| &d.white);
+    let contrasts = channels.flat_map(|channel| &channel.contrast);
+    between(contrasts.filter(|c| c.lp_mm == HALF_NYQUIST_LP_MM).flat_map(|c| c.mtf))
+}
+
+fn range(found: &Verification, of: impl Fn(&PsfResult) -> f64) -> String {
+    between(found.distinct.iter().flat_map(|d| &d.spots).map(|s| of(s.judged())))
+}
+
+/// Least and greatest in words.
+fn between(values: impl Iterator<Item = f64>) -> String {
+    let ends = values.fold(None, |ends: Option<(f64, f64)>, v| {
+        Some(ends.map_or((v, v), |(a, b)| (a.min(v), b.max(v))))
+    });
+    ends.map_or_else(
+        || "none".into(),
+        |(least, most)| format!("{} to {}", sig(least, 2), sig(most, 2)),
+    )
+}
+
+fn limits(page: &mut Page, found: &Verification) {
+    page.section("Limits");
+    let mut table = Table::new([
+        Column::text("What, and where it is worst"),
+        Column::number("Reached", ""),
+        Column::number("Limit", ""),
+        Column::verdict(),
+    ]);
+    for check in &found.checks {
+        let sign = match check.sense {
+            Sense::AtMost => "≤",
+            Sense::AtLeast => "≥",
+        };
+        table.row([
+            Cell::from(check.what.as_str()),
+            Cell::sig(check.reached, 4),
+            Cell::from(format!("{sign} {}", exact(check.limit))),
+            Cell::from(Verdict::of(check.passed())),
+        ]);
+    }
+    page.table(table.caption(
+        "From `[verify.limits]` of the design file; limits that it does not set have their default, or none.",
+    ));
+}
+
+fn method(page: &mut Page, design: &Design, found: &Verification) {
+    page.section("How it was computed");
+    if let Some(model) = &found.model {
+        page.paragraph(format!(
+            "Pillars, apertures, light and sensor are those of the calibrated model of {}: {}.",
+            model.set, model.finding
+        ));
+        for quantity in &model.not_applied {
+            page.note(quantity.to_string());
+        }
+    }
+    let relabelled = found
+        .distinct
+        .iter()
+        .flat_map(|d| &d.spots)
+        .map(|s| s.relabelled)
+        .max()
+        .unwrap_or(0);
+    page.paragraph(format!(
+        "Design `{}`, digest `{}`. Everything about the layout is computed from the file that was read back. Fields: the lattice of point samples, each of weight pitch², folded ({} mode), frequencies weighed by where their rays land; at most {} frequency bins had to be relabelled towards the mean ray. PSF: |E|² over that of the incident wave. Strehl: against the same aperture passing all its power in the zero order with the perfect phase for the place where the chief ray lands. MTF: the transform of the PSF over all light that the element passes, of which what lands outside of the window is a veil. Field angles count from where an element looks at each wavelength.",
+        found.design, found.design_digest, found.accuracy, count(relabelled),
+    ));
+    page.paragraph(format!(
+        "The cell that judges is `{}`, lit {}; wavelengths {} nm; windows of {} x {} samples of one pitch about the chief ray; sensor pixels of {} um.",
+        found.fidelity,
+        match design.verify.incidence {
+            CellIncidence::Normal if found.fidelity == Fidelity::Neighbours => {
+                "from the middle of each element's field"
+            }
+            CellIncidence::Normal => "along the normal at all field angles",
+            CellIncidence::AsLit => "at the angle that light arrives at, both polarisations",
+        },
+        design.verify.wavelengths_um.iter().map(|w| exact(w * 1e3)).collect::<Vec<_>>().join(", "),
+        design.verify.window_samples,
+        design.verify.window_samples,
+        design.verify.pixel_um,
+    ));
+}

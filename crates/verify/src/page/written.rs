@@ -1,0 +1,82 @@
+//! What was written: every site compared, the layers of the file, the widths as read back.
+
+use crate::Verification;
+use metalith_design::Design;
+use metalith_report::{Axis, Cell, Chart, Column, Page, Table, count, sig};
+
+/// Odd shapes that are listed in the page; all are in `report.json` up to its own limit.
+const MOST_ODDITIES: usize = 20;
+
+/// The section of the file.
+pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
+    page.section("What was written");
+    let mut table = Table::new([
+        Column::text("Element (m, n)"),
+        Column::number("Pillars", ""),
+        Column::number("Wrong width", ""),
+        Column::number("Missing", ""),
+        Column::number("Extra", ""),
+        Column::text("Simulated as"),
+    ]);
+    for check in &found.elements {
+        let copy = check.copy_of.and_then(|k| found.distinct.get(k));
+        table.row([
+            Cell::from(check.element.label()),
+            Cell::from(count(check.widths.pillars)),
+            Cell::from(count(check.widths.wrong)),
+            Cell::from(count(check.widths.missing)),
+            Cell::from(count(check.widths.extra)),
+            Cell::from(copy.map_or_else(|| "itself".into(), |d| d.element.label())),
+        ]);
+    }
+    page.table(table.caption("Every site of every element, compared with the width that the design asks for."));
+    let mut layers = Table::new([
+        Column::text("Layer"),
+        Column::number("Shapes", ""),
+        Column::number("Texts", ""),
+        Column::text("Purpose"),
+    ]);
+    for layer in &found.layout.survey.layers {
+        let known = design.layout.layers.all();
+        let purpose = known.iter().find(|(_, l)| l.number() == layer.layer);
+        layers.row([
+            Cell::code(format!("{}/{}", layer.layer.layer, layer.layer.datatype)),
+            Cell::from(count(layer.shapes)),
+            Cell::from(count(layer.texts)),
+            Cell::from(purpose.map_or("not a layer of the design", |(_, l)| l.purpose.as_str())),
+        ]);
+    }
+    page.table(layers.caption(format!(
+        "Layers of {}, all references followed: {} cells, {} deep, top cell `{}`.",
+        found.layout.file, found.layout.cells, found.layout.depth, found.layout.top_cell
+    )));
+    for oddity in found.foreign.listed.iter().take(MOST_ODDITIES) {
+        page.note(format!(
+            "{} at ({}, {}) um, {} x {} nm",
+            oddity.why.words(),
+            sig(oddity.centre_nm[0] * 1e-3, 9),
+            sig(oddity.centre_nm[1] * 1e-3, 9),
+            sig(oddity.size_nm[0], 6),
+            sig(oddity.size_nm[1], 6)
+        ));
+    }
+    let mut widths = Chart::new(
+        "Widths of all pillars",
+        Axis::linear("width", "nm"),
+        Axis::linear("pillars", ""),
+    );
+    let mut histogram = Vec::new();
+    for element in &found.distinct {
+        for (w, c) in element.histogram.iter().enumerate().skip(1) {
+            histogram.resize(histogram.len().max(w + 1), 0);
+            histogram[w] += c * element.copies as u64;
+        }
+    }
+    let step = f64::from(design.cell.width_step_nm) / 2.0;
+    let bars = histogram.iter().enumerate().filter(|(_, c)| **c > 0);
+    widths.bars(
+        "pillars",
+        bars.map(|(w, &c)| (w as f64 - step, w as f64 + step, c as f64)),
+    );
+    page.figure(widths.caption("Number of pillars of each width, as read back."));
+}
