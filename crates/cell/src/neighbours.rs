@@ -80,6 +80,17 @@ impl NeighbourBasis {
         terms
     }
 
+    /// Degree of each term: that in its own width, and of pairs that in the neighbour's added.
+    pub fn degrees() -> [usize; NEIGHBOUR_TERMS] {
+        std::array::from_fn(|i| match i.checked_sub(OWN_TERMS) {
+            None => i,
+            Some(pair) => {
+                let within = pair % PAIR_TERMS;
+                within / NEIGHBOUR_DEGREE + within % NEIGHBOUR_DEGREE + 1
+            }
+        })
+    }
+
     fn own(&self, width_nm: f64) -> [f64; OWN_TERMS] {
         self.chebyshev(width_nm)
     }

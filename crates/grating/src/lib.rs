@@ -36,7 +36,6 @@
 mod aperture;
 mod blaze;
 mod cell;
-mod ensemble;
 mod fit;
 mod linear;
 mod mapping;
@@ -51,6 +50,7 @@ mod sites;
 mod slopes;
 mod surface;
 mod table;
+mod training;
 
 pub use aperture::{GratingPillars, LocalCell};
 pub use blaze::{Blaze, BlazeOrder, BlazeOrders};

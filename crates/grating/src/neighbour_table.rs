@@ -11,18 +11,13 @@ use metalith_cell::{CellStack, NEIGHBOUR_TERMS, NeighbourBasis, NeighbourRespons
 use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::SiteLattice;
 
-use crate::ensemble::{ensemble, equal_pillars};
 use crate::fit::{Fitted, fit, neighbours_nm, samples};
 use crate::shipped;
+use crate::training::{self, TrainingCell};
 use crate::{COARSE, CoarseCell, Mapping, site_transmissions};
 
-/// Supercells along the normal, where each of their sites counts for eight by symmetry, and for other directions. With
-/// half as many, what is left over grows by a tenth; of light from the diagonal too little then goes to the first order,
-/// 0.654 where rows of real pillars have 0.679 and these have 0.665.
-const SUPERCELLS: [usize; 2] = [120, 400];
-
 /// Raised whenever the supercells or the fit change: kept tables are then of no use.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 const MAGIC: [u8; 8] = *b"MLNEIG\0\x01";
 
@@ -141,8 +136,8 @@ fn solve(
     basis: NeighbourBasis,
     progress: &dyn Progress,
 ) -> Result<Fitted> {
-    let mut cells = ensemble(mappings, SUPERCELLS[usize::from(spec.sines != [0.0; 2])])?;
-    cells.extend(equal_pillars(mappings)?);
+    let step = spec.wavelength_um * 1e3 / stack.pitch_nm;
+    let cells = training::cells(mappings, spec.sines.map(|sine| -sine / step))?;
     progress.begin(
         &format!("solving unlike neighbours at {:.0} nm", spec.wavelength_um * 1e3),
         cells.len() as u64,
@@ -157,10 +152,11 @@ fn solve(
             if progress.stopped() {
                 return Err(Error::Interrupted);
             }
-            let response = coarse.solve(cell.lattice, &cell.widths_nm, spec.sines)?;
-            let t = site_transmissions(&cell.lattice, &response, coarse.wavelength_over_pitch(), 1.0);
+            let TrainingCell { lattice, widths_nm, .. } = cell;
+            let response = coarse.solve(*lattice, widths_nm, spec.sines)?;
+            let t = site_transmissions(lattice, &response, coarse.wavelength_over_pitch(), 1.0);
             progress.advance(1);
-            Ok(samples(number, &cell.lattice, &cell.widths_nm, &t))
+            Ok(samples(number, cell, &t))
         })
         .collect::<Result<Vec<_>>>()?;
     fit(basis, spec.sines, &sites.concat())
@@ -174,7 +170,6 @@ fn inputs(spec: &NeighbourTableSpec, stack: &CellStack, mappings: &[Mapping]) ->
         version: u32,
         terms: usize,
         coarse: usize,
-        supercells: [usize; 2],
         spec: &'a NeighbourTableSpec,
         stack: &'a CellStack,
         widths_nm: Vec<&'a [u16]>,
@@ -184,7 +179,6 @@ fn inputs(spec: &NeighbourTableSpec, stack: &CellStack, mappings: &[Mapping]) ->
         version: VERSION,
         terms: NEIGHBOUR_TERMS,
         coarse: COARSE,
-        supercells: SUPERCELLS,
         spec,
         stack,
         widths_nm: mappings.iter().map(Mapping::samples_nm).collect(),

@@ -34,14 +34,14 @@ const OF_EQUAL: f64 = 0.5;
 const WORSE: f64 = 0.005;
 
 /// Share of the first order of blazed rows of the truth, mean over where their phase starts and over s and p, rms over
-/// gratings and wavelengths: along the normal and from where the element looks. Measured: 0.027 and, of the one grating that is
-/// always compared, 0.088, which is too little light. Along the normal equal neighbours miss this many times as much at least.
-const FIRST: [f64; 2] = [0.035, 0.1];
-const GAIN: f64 = 4.0;
+/// gratings and wavelengths: along the normal and from where the element looks. Measured: 0.015 and, of the one grating that is
+/// always compared, 0.036. Along the normal equal neighbours miss this many times as much at least.
+const FIRST: [f64; 2] = [0.02, 0.045];
+const GAIN: f64 = 6.0;
 
 /// Of single rows: the share of the first order, that of the zero order, and the phase (rad) less its mean. Resonances of
-/// a row that repeats exactly are not in a sum over pairs. Measured: 0.050 along the normal and 0.115, 0.015, 0.047.
-const FIRST_OF_A_ROW: [f64; 2] = [0.06, 0.13];
+/// a row that repeats exactly are not in a sum over pairs. Measured: 0.039 along the normal and 0.058, 0.015, 0.049.
+const FIRST_OF_A_ROW: f64 = 0.065;
 const ZERO: f64 = 0.02;
 const PHASE: f64 = 0.055;
 
@@ -192,8 +192,7 @@ fn blazed_rows_of_the_truth_are_met_better_than_by_equal_neighbours() {
         );
         parts[usize::from(*looks)].push(off);
     }
-    let most = FIRST.into_iter().zip(FIRST_OF_A_ROW);
-    for ((name, part), (most, of_a_row)) in ["normal", "looks"].into_iter().zip(&parts).zip(most) {
+    for ((name, part), most) in ["normal", "looks"].into_iter().zip(&parts).zip(FIRST) {
         let rms = |of: fn(&Off) -> f64| (part.iter().map(|o| of(o).powi(2)).sum::<f64>() / part.len() as f64).sqrt();
         let (mean, equal) = (rms(|o| o.mean), rms(|o| o.mean_equal));
         let (first, zero, phase) = (rms(|o| o.first), rms(|o| o.zero), rms(|o| o.phase));
@@ -201,7 +200,7 @@ fn blazed_rows_of_the_truth_are_met_better_than_by_equal_neighbours() {
             "{name}: mean {mean:.4}, equal neighbours {equal:.4}, rows {first:.4}, zero {zero:.4}, phase {phase:.4}"
         );
         assert!(mean < most, "{name}: {mean}");
-        assert!(first < of_a_row, "{name}: {first}");
+        assert!(first < FIRST_OF_A_ROW, "{name}: {first}");
         assert!(zero < ZERO, "{name}: {zero}");
         assert!(phase < PHASE, "{name}: {phase}");
     }
