@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use metalith::extract::{ExtractedElement};
+use metalith::extract::ExtractedElement;
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::layout::{FreeLayout, LayoutFormat, OasisEncoding, extraction_plan, write_free, write_pillars_as};
 use metalith::{Error, ExtractionPlan, Hierarchy, Lattice, Layout, PillarArray, PillarShape, Wedge, WidthMap, extract};

@@ -6,10 +6,12 @@ use clap::Args;
 use metalith::camera::Camera;
 use metalith::{CalibratedModel, Design, Result};
 
+use super::standard_input;
+
 /// The chip, the camera that it is in, and the field of its scenes.
 #[derive(Args)]
 pub struct CameraArgs {
-    /// The design that the layout is of: elements, wedges, cell.
+    /// The design that the layout is of: elements, wedges, cell; `-` for standard input.
     #[arg(long)]
     pub design: PathBuf,
 
@@ -44,7 +46,7 @@ impl CameraArgs {
     /// If one cannot be read.
     pub fn read(&self) -> Result<CameraFiles> {
         Ok(CameraFiles {
-            design: Design::read(&self.design)?,
+            design: standard_input::design(&self.design)?,
             camera: Camera::read(&self.camera)?,
             model: self.model.as_deref().map(CalibratedModel::read).transpose()?,
         })

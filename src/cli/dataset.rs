@@ -8,6 +8,7 @@ use metalith::picture::{Studio, write_dataset};
 use metalith::{Error, Result};
 
 use super::camera_args::{CameraArgs, CameraFiles};
+use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_line};
 
 /// Record the frame of every image of a folder, for learning: frames, what an ideal camera gives, and a manifest.
@@ -22,7 +23,7 @@ pub struct DatasetArgs {
     /// Folder of PNG, JPEG or NPY images.
     images: PathBuf,
 
-    /// The pillar layout.
+    /// The pillar layout; `-` for standard input.
     #[arg(long)]
     layout: PathBuf,
 
@@ -46,14 +47,8 @@ pub fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
             distance_um: f64::INFINITY,
         })
     };
-    let studio = Studio::open(
-        &design,
-        &args.layout,
-        &camera,
-        model.as_ref(),
-        &read(&images[0])?,
-        terminal,
-    )?;
+    let layout = InputFile::of(&args.layout)?;
+    let studio = Studio::open(&design, &layout, &camera, model.as_ref(), &read(&images[0])?, terminal)?;
     let operator = studio.simulation();
     let manifest = write_dataset(&studio, &operator, &images, &read, args.with.seed, &args.out, terminal)?;
     terminal.clear();

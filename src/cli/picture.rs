@@ -13,6 +13,7 @@ use metalith::{Error, Fidelity, Result};
 
 use super::camera_args::{CameraArgs, CameraFiles};
 use super::paths::apart;
+use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_json, print_line};
 
 /// Simulate the frame that the camera of a layout records of a scene, and restore the picture from it.
@@ -23,10 +24,10 @@ use super::{Outcome, Terminal, print_json, print_line};
     scenes chart, star and edge. Kernels are kept on the disk and used again."
 )]
 pub struct PictureArgs {
-    /// The pillar layout.
+    /// The pillar layout; `-` for standard input.
     layout: PathBuf,
 
-    /// The scene: an image file, or `chart`, `star`, `edge`.
+    /// The scene: an image file, `-` for standard input, or `chart`, `star`, `edge`.
     scene: String,
 
     #[command(flatten)]
@@ -88,10 +89,11 @@ impl PictureArgs {
                 "give a positive --distance-mm",
             ));
         }
+        let file = InputFile::of(self.scene.as_ref())?;
         let scene = match self.scene.parse::<BuiltIn>() {
             Ok(kind) => chart(kind, self.pixels.into(), self.with.field_deg, distance_um),
             Err(_) => read_scene(&SceneFile {
-                path: PathBuf::from(&self.scene),
+                path: file.to_owned(),
                 wavelengths_nm: self.wavelengths_nm.clone(),
                 field_deg: self.with.field_deg,
                 distance_um,
@@ -112,7 +114,8 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     let (page, numbers) = (args.out.join("picture.html"), args.out.join("picture.json"));
     let inputs = [&args.layout, &args.with.design, &args.with.camera].map(PathBuf::as_path);
     apart(inputs.into_iter().chain([args.scene.as_ref()]), &[&page, &numbers])?;
-    let studio = Studio::open(&design, &args.layout, &camera, model.as_ref(), &scene, terminal)?;
+    let layout = InputFile::of(&args.layout)?;
+    let studio = Studio::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
     let simulation = studio.simulation_of(&scene);
     let frame = studio.record(&simulation, &scene, args.with.seed)?;
     let truth = studio.truth(&scene);
@@ -148,7 +151,7 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     if let Some(Assume::Paper) = args.assume {
         drop(operator);
-        let narrow = studio.open_without_dispersion(&design, &args.layout, model.as_ref(), &scene, terminal)?;
+        let narrow = studio.open_without_dispersion(&design, &layout, model.as_ref(), &scene, terminal)?;
         report.worth = worth_of_assumptions(&studio, &narrow, &scene, args.with.seed, terminal)?;
     }
     let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use metalith::{Design, Error, Result};
 use tempfile::TempDir;
@@ -16,6 +17,18 @@ const LONGEST_DESIGN: u64 = 16 << 20;
 
 fn is_standard_input(path: &Path) -> bool {
     path.as_os_str() == "-"
+}
+
+/// Standard input, which ends where it has been read once.
+fn take() -> Result<io::StdinLock<'static>> {
+    static TAKEN: AtomicBool = AtomicBool::new(false);
+    if TAKEN.swap(true, Ordering::Relaxed) {
+        return Err(Error::invalid(
+            "standard input is given for two files",
+            "give one of them as `-`, and the others by their names",
+        ));
+    }
+    Ok(io::stdin().lock())
 }
 
 /// A file that is read: that of its path, or for `-` a copy of standard input, which is removed with this. Layouts are read
@@ -37,9 +50,10 @@ impl InputFile {
                 _copy: None,
             });
         }
+        let mut input = take()?;
         let folder = TempDir::new().map_err(Error::io("create a folder in", &std::env::temp_dir()))?;
         let path = folder.path().join(NAME);
-        let copied = File::create(&path).and_then(|mut copy| io::copy(&mut io::stdin().lock(), &mut copy));
+        let copied = File::create(&path).and_then(|mut copy| io::copy(&mut input, &mut copy));
         copied.map_err(Error::io("copy standard input to", &path))?;
         Ok(Self {
             path,
@@ -66,7 +80,7 @@ pub fn design(path: &Path) -> Result<Design> {
     }
     let name = Path::new(NAME);
     let mut text = String::new();
-    let read = io::stdin().lock().take(LONGEST_DESIGN + 1).read_to_string(&mut text);
+    let read = take()?.take(LONGEST_DESIGN + 1).read_to_string(&mut text);
     read.map_err(Error::io("read", name))?;
     if text.len() as u64 > LONGEST_DESIGN {
         return Err(Error::invalid(

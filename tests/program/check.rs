@@ -61,6 +61,8 @@ fn a_dash_is_standard_input_or_output() {
         "{piped}"
     );
     printed(&["diff", "-", "broken.gds"], 0);
+    // It ends where it has been read once.
+    printed(&["diff", "-", "-"], 2);
     printed(&["check", "broken.gds", "--junit", "broken.xml"], 1);
     let file = std::fs::read_to_string(folder.path().join("broken.xml")).unwrap();
     let junit = printed(&["check", "broken.gds", "--junit", "-"], 1);
