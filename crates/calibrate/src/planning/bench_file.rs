@@ -76,7 +76,17 @@ impl BenchFile {
 fn sections(root: &Section<'_, '_>) -> BenchFile {
     root.integer("schema", SCHEMA..=SCHEMA, "");
     let divergence_rad = read::source(&root.section("source"));
-    let (camera, _) = read::camera(&root.section("camera"));
+    let s = root.section("camera");
+    for key in ["dark_frame", "flat_frame"] {
+        if s.has(key) {
+            s.fault(
+                key,
+                "a frame of the sensor is no part of a plan",
+                "add it to measurement.toml once it has been taken",
+            );
+        }
+    }
+    let (camera, _) = read::camera(&s);
     let leds: PerLed<Led> = read::leds(root, camera.bayer, None).into();
     let s = root.section("captures");
     let ending = s.choice(
@@ -101,10 +111,12 @@ fn sections(root: &Section<'_, '_>) -> BenchFile {
     }
     let floats = |key: &str, limits: Limits| if s.has(key) { s.floats(key, limits) } else { Vec::new() };
     let distances_um = floats("distance_um", Limits::new(1.0..=100_000.0, "um"));
-    let mut frames: Vec<u32> = floats("frames", Limits::new(1.0..=1e6, "frames"))
-        .iter()
-        .map(|f| f.round() as u32)
-        .collect();
+    let whole = |v: &f64| v.fract() == 0.0;
+    let numbers = floats("frames", Limits::new(1.0..=1e6, "frames"));
+    if !numbers.iter().all(whole) {
+        s.fault("frames", "a part of a frame", "give whole numbers");
+    }
+    let mut frames: Vec<u32> = numbers.iter().map(|f| *f as u32).collect();
     if frames.is_empty() {
         frames.extend(FRAMES);
     }

@@ -4,12 +4,13 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use metalith_cell::Material;
-use metalith_core::{Error, Result, WholeFile};
+use metalith_core::{Error, PillarShape, Result, WholeFile};
 use metalith_design::Design;
 
 use super::bench_file::BenchFile;
 use crate::set::MeasuredSet;
 use crate::set::read::SPECTRUM_SIGMAS;
+use crate::set::{Bayer, Channel};
 
 /// Step of the tables of materials (nm).
 const TABLE_STEP_NM: f64 = 2.0;
@@ -84,9 +85,8 @@ fn text(
     line("[stack]", none());
     line("pitch_nm", format!("{}", cell.pitch_nm));
     line("pillar_height_nm", format!("{}", cell.height_nm));
-    if !cell.shape.is_square() {
-        let word = metalith_core::PillarShape::CHOICES.iter().find(|c| c.1 == cell.shape);
-        line("shape", quoted(word.map_or("square", |c| c.0)));
+    if let Some(shape) = word(&PillarShape::CHOICES, Some(cell.shape)) {
+        line("shape", quoted(shape));
     }
     line("pillar_index", quoted("film_nk.csv"));
     line("substrate", quoted(substrate));
@@ -121,10 +121,19 @@ fn text(
     ] {
         line(key, format!("{value}"));
     }
+    if camera.relay_blur_um > 0.0 {
+        line("relay_blur_um", format!("{}", camera.relay_blur_um));
+    }
+    if let Some(bayer) = word(&Bayer::CHOICES, camera.bayer) {
+        line("bayer", quoted(bayer));
+    }
     for led in &set.leds {
         line("[[led]]", none());
         line("centre_nm", format!("{}", led.centre_nm));
         line("fwhm_nm", format!("{}", led.fwhm_nm));
+        if let Some(channel) = word(&Channel::CHOICES, led.channel) {
+            line("channel", quoted(channel));
+        }
     }
     for e in &set.elements {
         line("[[element]]", none());
@@ -153,6 +162,12 @@ fn text(
         line("edge_offset_nm", format!("{}", set.sem_offset_sigma_nm));
     }
     out
+}
+
+/// The word that a choice is written by.
+fn word<T: PartialEq>(choices: &[(&'static str, T)], chosen: Option<T>) -> Option<&'static str> {
+    let chosen = chosen?;
+    choices.iter().find(|c| c.1 == chosen).map(|c| c.0)
 }
 
 /// Without what the way to other units and back has added.

@@ -39,6 +39,9 @@ pub struct Information {
     pub shared: usize,
 }
 
+/// The effects that are tried on a set.
+pub type EffectsOf<'a> = dyn Fn(&MeasuredSet) -> Result<Vec<Box<dyn Effect>>> + 'a;
+
 /// Cells for a set, for simulators that follow one another.
 pub fn cells_of(set: &MeasuredSet, sampling: Sampling, cache: Option<std::path::PathBuf>) -> CellSource {
     let bench = Bench::new(set, sampling);
@@ -60,7 +63,7 @@ pub fn information(
     candidates: &Candidates,
     bench: &BenchFile,
     sampling: Sampling,
-    effects: &dyn Fn(&MeasuredSet) -> Result<Vec<Box<dyn Effect>>>,
+    effects: &EffectsOf<'_>,
     mut cells: CellSource,
     progress: &dyn Progress,
 ) -> Result<(Information, CellSource)> {
@@ -110,7 +113,21 @@ pub fn exposed(set: &MeasuredSet, surrogate: &Surrogate, peak: f64) -> MeasuredS
         let brightest = light.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
         // To three digits, as a person would note it.
         capture.scale_dn = three_digits(room / f64::from(brightest));
+        let filter = camera.bayer.zip(set.leds[capture.led].channel);
         capture.dn = light.mapv(|v| (camera.black_level_dn + capture.scale_dn * f64::from(v).max(0.0)) as f32);
+        capture.noise = filter.map(|(bayer, channel)| {
+            let variance = |v: f32| {
+                let shot = (f64::from(v) - camera.black_level_dn) / camera.gain_e_per_dn;
+                (shot + camera.read_noise_dn.powi(2)) / f64::from(capture.frames)
+            };
+            Array2::from_shape_fn(capture.dn.dim(), |at| {
+                if bayer.has(at, channel) {
+                    variance(capture.dn[at]) as f32
+                } else {
+                    f32::INFINITY
+                }
+            })
+        });
     }
     out
 }

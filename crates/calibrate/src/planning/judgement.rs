@@ -13,6 +13,9 @@ use crate::simulator::Simulator;
 use crate::simulator_model::separating_measurement;
 use crate::surrogate::Surrogate;
 
+/// Margin that is enough: the choice stops at one, and its sums round.
+const ENOUGH: f64 = 1.0 - 1e-6;
+
 /// An effect as the planned session would see it.
 #[derive(Clone, Debug, Serialize)]
 pub struct PlannedEffect {
@@ -67,7 +70,7 @@ pub fn amount(effect: &dyn Effect, parameter: f64, set: &MeasuredSet) -> f64 {
     } else {
         value
     };
-    counted.copysign(counted * parameter.signum())
+    parameter.signum() * counted
 }
 
 /// Every effect at its wanted size in a session that shows what `exposed` says; `margins` are of the requirements that ask
@@ -110,7 +113,7 @@ pub fn effects(
             gain: margin * NEEDED,
             needed: NEEDED,
             half_interval,
-            detected: *margin >= 1.0 - 1e-6 && half < r.size,
+            detected: *margin >= ENOUGH && half < r.size,
             reachable: *reachable,
         });
         progress.advance(1);
@@ -140,7 +143,7 @@ pub fn confusions(
         let Some(other) = r.beside.first().map(|&s| of(s)) else {
             continue;
         };
-        if *margin >= 1.0 - 1e-6 {
+        if *margin >= ENOUGH {
             continue;
         }
         let (own, pair) = (of(r.slot), [of(r.slot).min(other), of(r.slot).max(other)]);
