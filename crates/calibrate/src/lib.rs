@@ -52,7 +52,7 @@ pub use planning::{BenchFile, CapturePlan, Confusion, PlanRequest, PlannedCaptur
 pub use proposal::propose;
 pub use run::{Calibration, calibrate};
 pub use session::{Screening, Session, Settings, Simulations};
-pub use set::{Capture, Led, MeasuredElement, MeasuredSet, RelayCamera, SemSite, Stack};
+pub use set::{Bayer, Capture, Channel, Led, MeasuredElement, MeasuredSet, RelayCamera, SemSite, Stack};
 pub use set::{CaptureIndex, ElementIndex, LedIndex, PerCapture, PerElement, PerLed};
 pub use validate::synthetic::{Synthesizer, SyntheticImages, UnlistedEffect};
 pub use validate::{DetectionLimit, Validation, ValidationPlan, ValidationTrial, validate, write_validation};
