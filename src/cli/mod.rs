@@ -17,6 +17,7 @@ mod output;
 mod paths;
 mod photographs;
 mod picture;
+mod plan;
 mod psf;
 mod run;
 mod standard_input;
@@ -87,6 +88,7 @@ enum Command {
     Check(check::CheckArgs),
     Diff(diff::DiffArgs),
     Convert(convert::ConvertArgs),
+    Plan(plan::PlanArgs),
     Calibrate(calibrate::CalibrateArgs),
     Study(study::StudyArgs),
     Completions(completions::CompletionsArgs),
@@ -169,6 +171,7 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::Check(args) => check::run(args, terminal),
         Command::Diff(args) => diff::run(args, terminal),
         Command::Convert(args) => convert::run(args, terminal),
+        Command::Plan(args) => plan::run(args, terminal),
         Command::Calibrate(args) => calibrate::run(args, terminal),
         Command::Study(args) => study::run(args, terminal),
         Command::Completions(args) => completions::run(args, terminal),

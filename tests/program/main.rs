@@ -9,6 +9,7 @@ mod new;
 mod oasis;
 mod optimise;
 mod picture;
+mod plan;
 mod predict;
 mod run;
 mod study;

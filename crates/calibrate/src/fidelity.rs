@@ -26,7 +26,8 @@ pub struct Rung {
     pub residuals: PerCapture<Array2<f32>>,
 }
 
-/// The error of each fidelity. `problem` is that of the rigorous cell.
+/// The error of each fidelity: of the published and the fitted polynomials where the cell is that of the paper, and of
+/// the rigorous cell. `problem` is that of the rigorous cell.
 ///
 /// # Errors
 /// If a cell cannot be fitted or simulated, or the user stopped it.
@@ -36,15 +37,30 @@ pub fn compare_fidelities(
     problem: &FitProblem<'_>,
     progress: &dyn Progress,
 ) -> Result<Vec<Rung>> {
+    let mut rungs = Vec::new();
+    if set.stack.is_of_the_paper() {
+        rungs = polynomials(set, sampling, problem, progress)?;
+    }
+    rungs.push(rung("rigorous", problem));
+    Ok(rungs)
+}
+
+/// The error of the cells that are polynomials: published, and fitted to the stack.
+fn polynomials(
+    set: &MeasuredSet,
+    sampling: Sampling,
+    problem: &FitProblem<'_>,
+    progress: &dyn Progress,
+) -> Result<Vec<Rung>> {
     let bench = Bench::new(set, sampling);
-    let published = CellSource::Model(Box::new(PublishedCell::new(set.stack.pitch_nm)));
+    let published = CellSource::Model(Box::new(PublishedCell::new(set.stack.cell.pitch_nm as u32)));
     let ends = bench
         .wavelengths_nm()
         .iter()
         .fold((f64::MAX, 0.0f64), |(a, b), &l| (a.min(l), b.max(l)));
     let (low, high) = bench.widths_nm();
     let fitted = FittedCell::of_stack(
-        &set.stated_cell()?,
+        &set.stack.cell,
         (ends.0 * 1e-3, ends.1 * 1e-3),
         (low as u16, high as u16),
     )?;
@@ -60,7 +76,6 @@ pub fn compare_fidelities(
         };
         rungs.push(rung(name, &of_model));
     }
-    rungs.push(rung("rigorous", problem));
     Ok(rungs)
 }
 

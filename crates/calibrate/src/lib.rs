@@ -15,6 +15,7 @@
 //! | `search` | which effects explain a residual | `fit` |
 //! | `proposal` | effects for what is left | `search`, `session` |
 //! | `session`, `diagnosis`, `page`, `run` | a set from its files to its answer | all above |
+//! | `planning` | which captures to take of a design before it is measured | all above |
 //! | `validate` | the calibration judged on synthetic sets | all above |
 
 mod bench;
@@ -29,6 +30,7 @@ mod linear_model;
 mod names;
 mod optics;
 mod page;
+mod planning;
 mod proposal;
 mod run;
 mod search;
@@ -46,10 +48,11 @@ pub use diagnosis::{
 };
 pub use effects::{DeclaredEffect, DeclaredParameter, Effect, Parameter, Stage, all as all_effects, of_any_chip};
 pub use fidelity::Rung;
+pub use planning::{BenchFile, CapturePlan, Confusion, PlanRequest, PlannedCapture, PlannedEffect, SemOffer, plan};
 pub use proposal::propose;
 pub use run::{Calibration, calibrate};
 pub use session::{Screening, Session, Settings, Simulations};
-pub use set::{Capture, Led, MeasuredElement, MeasuredSet, RelayCamera, SemSite, Stack};
+pub use set::{Bayer, Capture, Channel, Led, MeasuredElement, MeasuredSet, RelayCamera, SemSite, Stack};
 pub use set::{CaptureIndex, ElementIndex, LedIndex, PerCapture, PerElement, PerLed};
 pub use validate::synthetic::{Synthesizer, SyntheticImages, UnlistedEffect};
 pub use validate::{DetectionLimit, Validation, ValidationPlan, ValidationTrial, validate, write_validation};

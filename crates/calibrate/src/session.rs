@@ -92,7 +92,7 @@ impl<'a> Session<'a> {
         let bench = Bench::new(set, settings.sampling);
         let (low, high) = bench.widths_nm();
         let cells = RigorousCells::new(
-            set.stated_cell()?,
+            set.stack.cell.clone(),
             bench.wavelengths_nm(),
             (low - WIDTH_ROOM_NM, high + WIDTH_ROOM_NM),
             settings.cache.clone(),

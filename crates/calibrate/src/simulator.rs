@@ -62,6 +62,17 @@ impl<'a> Simulator<'a> {
             .collect()
     }
 
+    /// The name of a number: that of its effect, with its axis or number where this has several.
+    pub fn slot_name(&self, slot: usize) -> String {
+        let slot = &self.slots[slot];
+        let effect = &self.effects[slot.effect];
+        match (effect.parameters().len(), slot.index) {
+            (1, _) => effect.name(),
+            (2, index) => format!("{} {}", effect.name(), ["x", "y"][index]),
+            (_, index) => format!("{} {}", effect.name(), index + 1),
+        }
+    }
+
     /// What the numbers mean together.
     pub fn perturbation(&self, theta: &[f64]) -> Perturbation {
         let mut perturbation = Perturbation::default();

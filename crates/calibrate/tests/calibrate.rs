@@ -213,6 +213,78 @@ fn a_tilt_of_the_sensor_is_found() {
     assert!((apart_um / 6.0 - 1.0).abs() < 0.05, "{}", pattern.sentence());
 }
 
+/// A session as a colour sensor behind a relay takes it: two exposures of each capture, the longer one saturated, one of the
+/// two as a stack; only the pixels of a channel count.
+#[test]
+fn a_bench_with_exposures_filters_and_a_relay_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = small_set(folder.path());
+    let text = fs::read_to_string(&path).unwrap();
+    let mut text = text
+        .replace(
+            "pixel_um = 0.5",
+            "sensor_pixel_um = 5.0\nmagnification = 10.0\nrelay_blur_um = 0.3\nbayer = \"rggb\"",
+        )
+        .replace("fwhm_nm = 6.0", "fwhm_nm = 6.0\nchannel = \"green\"");
+    let (long, short) = (folder.path().join("e0_500_z0.npy"), folder.path().join("short.npy"));
+    let frame =
+        |peak: f32| Array2::from_shape_fn((PIXELS, PIXELS), |(y, x)| if (y, x) == (20, 21) { peak } else { 140.0 });
+    write_npy(&long, &frame(4095.0));
+    write_npy(&short, &frame(540.0).mapv(|v| 40.0 + 0.1 * (v - 40.0)));
+    text = text.replacen("file = \"e0_500_z0.npy\"\n", "", 1).replacen(
+        "scale_dn = 1.0\nframes = 64\n",
+        "[[capture.exposure]]\nfile = \"e0_500_z0.npy\"\nscale_dn = 1.0\nframes = 64\n\
+         [[capture.exposure]]\nfile = \"short.npy\"\nscale_dn = 0.1\nframes = 16\n",
+        1,
+    );
+    fs::write(&path, text).unwrap();
+    let set = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
+    assert_eq!((set.camera.pixel_um, set.camera.relay_blur_um), (0.5, 0.3));
+    let first = &set.captures.raw[0];
+    assert_eq!((first.scale_dn, first.frames), (1.0, 64));
+    // Single precision.
+    assert!((first.dn[[20, 21]] - 540.0).abs() < 0.01, "{}", first.dn[[20, 21]]);
+    let noise = first.noise.as_ref().unwrap();
+    assert!(noise[[20, 21]].is_finite() && noise[[20, 22]].is_infinite());
+    assert!(
+        noise[[20, 21]] > noise[[0, 1]],
+        "the peak is known by the short exposure alone"
+    );
+    let session = Session::new(&set, settings()).unwrap();
+    for c in session.data.captures() {
+        assert_eq!(session.data.pixels(c), PIXELS * PIXELS / 2);
+        assert_eq!(set.seeing_pixels(c), PIXELS * PIXELS / 2);
+    }
+}
+
+/// The half of each lens beyond a boundary stands off its place.
+#[test]
+#[ignore = "second tier: CPU time, run by .ci/run"]
+fn a_displaced_part_of_every_lens_is_found() {
+    const BY_NM: f64 = 90.0;
+    // The lab says 7 um, it is at 8.
+    let mut like = LIKE.clone();
+    like.field_boundary_um = Some([7.0, -9.0]);
+    let synthesizer = Synthesizer::new(&like, &settings()).unwrap();
+    let images = synthesizer
+        .with_effect("stitching_x", &[BY_NM, 0.0, 1.0], &Silent)
+        .unwrap();
+    let set = synthesizer.draw(&images, 28);
+    let session = Session::new(&set, with_effects(&["stitching_x", "coma", "gap", "tilt"])).unwrap();
+    let d = session
+        .diagnose(&session.simulate(&Silent).unwrap(), &Silent)
+        .unwrap()
+        .0;
+    assert_eq!(names(&d), ["stitching_x"], "{} {:?}", d.sentence(), d.error);
+    let found: Vec<f64> = serde_json::from_value(d.effects[0].value.clone()).unwrap();
+    // Displacement and place trade for one another.
+    assert!(
+        (found[0] / BY_NM - 1.0).abs() < 0.1 && (found[2] - 8.0).abs() < 1.0,
+        "{}",
+        d.sentence()
+    );
+}
+
 /// An effect that is in no list, declared by an expression: found, with its value, and written into the model.
 #[test]
 fn a_declared_effect_is_found_and_kept_in_the_model() {

@@ -10,6 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use super::declared::{CompiledTerm, DeclaredQuantity, RowPlaces, compiled};
 use super::expression::Input;
 use super::pupil::PupilTerms;
+use super::stitching::displace;
 use super::{ArrivingLight, GeometryChange, NODE_STEP_NM, density, zernike};
 use metalith_core::{Error, Lattice, Result, WidthMap};
 use metalith_wave::Aperture;
@@ -357,9 +358,16 @@ impl Aperture for MadeAperture<'_> {
 
     fn fill_row(&self, iy: usize, row: &mut [Complex32]) {
         let n = self.element.lattice.sites();
-        let classes = &self.element.class[iy * n..][..n];
-        for (to, &class) in row.iter_mut().zip(classes) {
-            *to = self.table[usize::from(class)];
+        let pattern = |iy: usize, row: &mut [Complex32]| {
+            let classes = &self.element.class[iy * n..][..n];
+            for (to, &class) in row.iter_mut().zip(classes) {
+                *to = self.table[usize::from(class)];
+            }
+        };
+        pattern(iy, row);
+        let stitching = &self.element.geometry.stitching;
+        if !stitching.is_empty() {
+            displace(stitching, self.element.lattice, iy, row, pattern);
         }
         if !self.element.path_um.is_empty() {
             for (to, path) in row.iter_mut().zip(&self.element.path_um[iy * n..]) {

@@ -12,7 +12,7 @@
 //!
 //! | part | applied to |
 //! | --- | --- |
-//! | `geometry` | width of each site (bias, bias by the density around it, declared terms), open sites (aperture offset), transmission of each class (missing pillars, light that sees no pillar, free amplitude), path, phase and amplitude of each site (wavefront, declared terms) |
+//! | `geometry` | width of each site (bias, bias by the density around it, declared terms), open sites (aperture offset), places of pillars beyond a boundary (stitching), transmission of each class (missing pillars, light that sees no pillar, free amplitude), path, phase and amplitude of each site (wavefront, declared terms) |
 //! | `cell` | the stack that every realised width is solved with |
 //! | `path` | the wave that arrives (tilt, curvature) and the distance of the sensor (gap, tilt of the sensor, declared terms) |
 //! | `camera` | the PSF: declared kernels, Gaussian blur, veil over its window |
@@ -35,6 +35,7 @@ mod not_applied;
 mod perturbation;
 mod pupil;
 mod stack;
+mod stitching;
 pub mod zernike;
 
 pub use bank::{BankRange, CellBank};
@@ -50,3 +51,4 @@ pub use model::CalibratedModel;
 pub use not_applied::NotApplied;
 pub use perturbation::{CameraChange, CellChange, GeometryChange, LightChange, PathChange, Perturbation, legendre};
 pub use stack::{off_cutoff, perturbed, possible_width_nm};
+pub use stitching::Stitching;

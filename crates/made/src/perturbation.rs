@@ -4,6 +4,7 @@ use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
 use super::declared::{CompiledTerm, DeclaredQuantity, DeclaredTerm, compiled};
+use super::stitching::{self, Stitching};
 use super::zernike;
 
 /// How chip and bench differ from what was drawn and stated. The default differs in nothing.
@@ -42,6 +43,9 @@ pub struct GeometryChange {
     pub transmission_phase_rad: Vec<f64>,
     /// Widths that stand at -1 and +1 of those polynomials (nm).
     pub transmission_range_nm: [f64; 2],
+    /// Boundaries of write fields beyond which pillars are displaced.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub stitching: Vec<Stitching>,
     /// Terms declared by expressions: widths, and what sites do to light.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub declared: Vec<DeclaredTerm>,
@@ -212,9 +216,10 @@ struct Bound {
 
 impl Perturbation {
     /// Whether what is made of an element depends on where on the chip it stands, or on which way it is turned by
-    /// declared terms, of which it may.
+    /// boundaries of write fields and declared terms, of which it may.
     pub fn depends_on_place(&self) -> bool {
-        self.path.sensor_tilt_mrad != [0.0; 2] || self.declared().next().is_some()
+        let tilted = self.path.sensor_tilt_mrad != [0.0; 2];
+        tilted || !self.geometry.stitching.is_empty() || self.declared().next().is_some()
     }
 
     /// Add a term to the part that it acts on.
@@ -301,6 +306,16 @@ impl Perturbation {
         if terms.iter().any(|t| t.len() > MOST_TERMS) {
             faults.push(format!(
                 "`geometry.wavefront_nm`, `transmission` and `transmission_phase_rad` have at most {MOST_TERMS} terms"
+            ));
+        }
+        let reach = |s: &Stitching| s.by_nm.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+        let sound = |s: &Stitching| {
+            s.axis < 2 && s.at_um.abs() <= 1e4 && s.by_nm.iter().all(|v| v.is_finite()) && reach(s) <= 1e4
+        };
+        if g.stitching.len() > stitching::MOST || !g.stitching.iter().all(sound) {
+            faults.push(format!(
+                "`geometry.stitching` has at most {} boundaries, each with an axis of 0 or 1, within 10 mm of the middle, and a displacement of at most 10 um",
+                stitching::MOST
             ));
         }
         for term in self.declared() {

@@ -66,7 +66,7 @@ struct FocusSeries {
 impl<'a> Bench<'a> {
     /// Plan the simulation of a set.
     pub fn new(set: &'a MeasuredSet, sampling: Sampling) -> Self {
-        let (low, high) = set.stack.film.range_um();
+        let (low, high) = set.stack.cell.range_um();
         let quadratures: PerLed<_> = set
             .leds
             .iter()
@@ -170,7 +170,7 @@ impl<'a> Bench<'a> {
                 let optic = Optic {
                     pixel_um: camera.pixel_um,
                     disc_um: self.disc_um(group, z, perturbation),
-                    blur_um: perturbation.camera.pixel_blur_um,
+                    blur_um: perturbation.camera.pixel_blur_um.hypot(camera.relay_blur_um),
                 };
                 let stray = perturbation.camera.stray_light;
                 let (step, n) = (group.plan.step_um(), group.plan.window());

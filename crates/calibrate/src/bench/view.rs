@@ -80,13 +80,14 @@ mod tests {
         // One wavelength and a point source: only chip, path and camera remain.
         set.leds.iter_mut().for_each(|led| led.fwhm_nm = 1e-6);
         set.divergence_rad = 0.0;
+        set.field_boundary_um = Some([5.0, -4.0]);
         let sampling = Sampling {
             spectrum: 3.0,
             ..Sampling::default()
         };
         let mut bench = Bench::new(&set, sampling);
         bench.follows = false;
-        let published = || PublishedCell::new(set.stack.pitch_nm);
+        let published = || PublishedCell::new(set.stack.cell.pitch_nm as u32);
         let simulator = Simulator::new(bench, CellSource::Model(Box::new(published())), effects::all(&set));
         let pixel = set.camera.pixel_um;
         for effect in &simulator.effects {

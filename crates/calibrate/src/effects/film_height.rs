@@ -29,7 +29,7 @@ impl Effect for FilmHeight {
     }
 
     fn value(&self, parameter: f64, set: &MeasuredSet) -> f64 {
-        set.stack.pillar_height_nm + parameter
+        set.stack.cell.height_nm + parameter
     }
 
     fn confusions(&self) -> &'static [(&'static str, &'static str)] {

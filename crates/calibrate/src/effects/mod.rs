@@ -21,6 +21,7 @@ mod sensor_tilt;
 mod sidewall_taper;
 mod source_distance;
 mod source_size;
+mod stitching;
 mod stray_light;
 mod tilt;
 mod zero_order;
@@ -190,6 +191,7 @@ pub fn all(set: &MeasuredSet) -> Vec<Box<dyn Effect>> {
     let mut effects = single();
     effects.extend(sensor_tilt::SensorTilt::of(set).map(|e| Box::new(e) as Box<dyn Effect>));
     effects.extend(aberrations());
+    effects.extend(stitching::StitchedFields::of(set).map(|e| Box::new(e) as Box<dyn Effect>));
     for (led, lamp) in set.leds.iter().enumerate() {
         effects.push(Box::new(led_centre::LedCentre {
             led,

@@ -3,7 +3,7 @@
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::set::{CaptureIndex, ElementIndex, LedIndex, MeasuredSet, PerCapture, PerLed, SATURATED};
+use crate::set::{CaptureIndex, ElementIndex, LedIndex, MeasuredSet, PerCapture, PerLed, saturated};
 
 /// How a capture was lit and where it was taken: captures are grouped by this.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,8 +48,8 @@ pub struct Data {
 }
 
 impl Data {
-    /// Frames of a set, whitened by Poisson and read noise over their frames. Saturated pixels do not count, nor do their
-    /// neighbours, which the charge of a full pixel spills into.
+    /// Frames of a set, whitened by Poisson and read noise over their frames, or by the noise that comes with them. Saturated
+    /// pixels do not count, nor do their neighbours, which the charge of a full pixel spills into.
     pub fn new(set: &MeasuredSet) -> Self {
         let camera = &set.camera;
         let black = camera.black_level_dn as f32;
@@ -58,6 +58,9 @@ impl Data {
             .captures
             .iter()
             .map(|c| {
+                if let Some(noise) = &c.noise {
+                    return noise.mapv(|variance| variance.sqrt().recip());
+                }
                 let full = saturated(&c.dn, camera.saturation_dn);
                 Array2::from_shape_fn(c.dn.dim(), |at| {
                     let v = c.dn[at];
@@ -122,20 +125,4 @@ impl Data {
     pub fn pixels(&self, capture: CaptureIndex) -> usize {
         self.weight[capture].iter().filter(|w| **w > 0.0).count()
     }
-}
-
-/// Pixels that are saturated or beside one that is, diagonally too.
-fn saturated(dn: &Array2<f32>, saturation_dn: f64) -> Array2<bool> {
-    let mut out = Array2::from_elem(dn.dim(), false);
-    let (rows, cols) = dn.dim();
-    for ((y, x), v) in dn.indexed_iter() {
-        if f64::from(*v) >= SATURATED * saturation_dn {
-            for ny in y.saturating_sub(1)..(y + 2).min(rows) {
-                for nx in x.saturating_sub(1)..(x + 2).min(cols) {
-                    out[(ny, nx)] = true;
-                }
-            }
-        }
-    }
-    out
 }

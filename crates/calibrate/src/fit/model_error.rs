@@ -75,7 +75,7 @@ pub fn change_energy(problem: &FitProblem<'_>, fit: &Fit) -> f64 {
 }
 
 /// The inner products of all columns but the shared nuisances and the residual, with the nuisances projected out.
-fn projected(form: &DMatrix<f64>, shared: usize) -> DMatrix<f64> {
+pub fn projected(form: &DMatrix<f64>, shared: usize) -> DMatrix<f64> {
     let n = form.nrows() - 1 - shared;
     let nuisances = form.view((0, 0), (shared, shared)).into_owned();
     let cross = form.view((0, shared), (shared, n)).into_owned();

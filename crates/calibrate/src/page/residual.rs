@@ -75,19 +75,8 @@ pub(super) fn confusable(page: &mut Page, session: &Session<'_>, simulations: &S
         ..session.problem(simulations)
     };
     let c = cosines(&problem, &evidence.finding.before);
-    let names: Vec<String> = session
-        .simulator
-        .slots
-        .iter()
-        .map(|s| {
-            let e = &session.simulator.effects[s.effect];
-            if e.parameters().len() > 1 {
-                format!("{} {}", e.name(), ["x", "y"][s.index])
-            } else {
-                e.name()
-            }
-        })
-        .collect();
+    let slots = 0..session.simulator.slots.len();
+    let names: Vec<String> = slots.map(|s| session.simulator.slot_name(s)).collect();
     let mut table = Table::new([
         Column::text("Effect"),
         Column::text("and"),

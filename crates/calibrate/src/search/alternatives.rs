@@ -7,7 +7,7 @@ use super::stepwise::{LEAST_GAIN, physical};
 use crate::fit::{Fit, Gain, HeldOutErrors, gain, half_widths, held_out, mean_error};
 
 /// Difference in the chi-square of the SEM widths that decides between two explanations: three sigma.
-const SEM_DECIDES: f64 = 9.0;
+pub const SEM_DECIDES: f64 = 9.0;
 
 /// Errors on captures left out that differ by more than this are not equal, however wide the interval.
 const ALIKE_WITHIN: f64 = 0.02;

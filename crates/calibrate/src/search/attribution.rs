@@ -22,7 +22,7 @@ const MORE_IS_LEFT: f64 = 1.01;
 
 /// No confidence interval is narrower than this share of a typical size on each side: two correct forward models
 /// differ by this much.
-const MODEL_SHARE: f64 = 0.03;
+pub const MODEL_SHARE: f64 = 0.03;
 
 /// The outcome of a search.
 pub struct Finding {

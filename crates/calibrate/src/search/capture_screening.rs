@@ -2,10 +2,11 @@
 
 use crate::fit::{FitProblem, Nuisances};
 use crate::set::{CaptureIndex, MeasuredSet};
+use ndarray::Array2;
 
 /// Share of pixels that are saturated or beside such past which a capture is left out; fewer are masked. What surrounds a
-/// lost peak still tells of distance, path and width, but a window this full was exposed for something else.
-const MOST_SATURATED: f64 = 0.05;
+/// lost peak still tells of distance, path and width; a window that is fuller was exposed for something else.
+const MOST_SATURATED: f64 = 0.5;
 
 /// Share of the expected light below which a shutter was closed or a lamp off.
 const LEAST_LIGHT: f64 = 0.1;
@@ -27,11 +28,16 @@ pub fn unusable_captures(set: &MeasuredSet, problem: &FitProblem<'_>, nuisances:
     let registration = set.camera.registration_sigma_px;
     let beyond = window_offsets(nuisances, set.camera.pixel_um);
     for ((c, capture), beyond) in set.captures.iter_enumerated().zip(beyond) {
-        let pixels = capture.dn.len();
+        let pixels = set.seeing_pixels(c);
         let lost = pixels - problem.data.pixels(c);
         let model = problem.image(&problem.surrogate.about, c).pixels([0.0; 2]);
-        let expected = f64::from(model.iter().sum::<f32>()) * capture.scale_dn;
-        let seen = f64::from(problem.data.signal[c].iter().sum::<f32>());
+        // Over the pixels that count: a lost peak is no lost light.
+        let counted = |light: &Array2<f32>| {
+            let pairs = light.iter().zip(&problem.data.weight[c]);
+            f64::from(pairs.filter(|(_, w)| **w > 0.0).map(|(v, _)| *v).sum::<f32>())
+        };
+        let expected = counted(&model) * capture.scale_dn;
+        let seen = counted(&problem.data.signal[c]);
         let reason = if lost as f64 > MOST_SATURATED * pixels as f64 {
             format!("{lost} of its {pixels} pixels are saturated or beside one that is")
         } else if seen < LEAST_LIGHT * expected {

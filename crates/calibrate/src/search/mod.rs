@@ -12,7 +12,8 @@ mod signatures;
 mod state;
 mod stepwise;
 
-pub use attribution::Finding;
+pub use alternatives::SEM_DECIDES;
+pub use attribution::{Finding, MODEL_SHARE};
 pub use capture_screening::{UnusableCapture, unusable_captures};
 pub use defect_noise::DefectNoise;
 pub use evidence::{Evidence, attribute_set};

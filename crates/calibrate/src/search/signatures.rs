@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::fit::{Fit, FitProblem, minimise};
+use crate::fit::{Fit, FitProblem, minimise, projected};
 
 /// Effects by the share of the residual that their signature explains, highest first; nuisances and what is
 /// chosen are projected out.
@@ -61,11 +61,8 @@ fn form_of_all(problem: &FitProblem<'_>, now: &Fit) -> DMatrix<f64> {
 /// Cosines between the signatures of all parameters, nuisances projected out, weighted by the noise of this set.
 pub fn cosines(problem: &FitProblem<'_>, at: &Fit) -> DMatrix<f64> {
     let form = form_of_all(problem, at);
-    let (shared, n) = (problem.shared(), problem.model.slots().len());
-    let a = form.view((0, 0), (shared, shared)).into_owned();
-    let cross = form.view((0, shared), (shared, n)).into_owned();
-    let inverse = a.try_inverse().unwrap_or_else(|| DMatrix::zeros(shared, shared));
-    let g = form.view((shared, shared), (n, n)) - cross.transpose() * inverse * &cross;
+    let n = problem.model.slots().len();
+    let g = projected(&form, problem.shared());
     DMatrix::from_fn(n, n, |i, j| {
         let size = (g[(i, i)] * g[(j, j)]).sqrt();
         if size > 0.0 { g[(i, j)] / size } else { 0.0 }

@@ -2,18 +2,20 @@
 
 mod frame;
 mod index;
-mod read;
+pub(crate) mod read;
 mod sem;
 
 use std::path::PathBuf;
 
 use ndarray::Array2;
 
+pub(crate) use frame::saturated;
+pub use frame::{Bayer, Channel};
 pub use index::{CaptureIndex, ElementIndex, LedIndex, PerCapture, PerElement, PerLed};
-pub use sem::SemSite;
+pub use sem::{COLUMNS as SEM_COLUMNS, SemSite};
 
-use metalith_cell::{CellStack, Material};
-use metalith_core::{Result, WidthMap};
+use metalith_cell::CellStack;
+use metalith_core::WidthMap;
 
 /// A mean of frames this near to saturation contains clipped frames.
 pub const SATURATED: f64 = 0.97;
@@ -34,6 +36,8 @@ pub struct MeasuredSet {
     pub leds: PerLed<Led>,
     pub elements: PerElement<MeasuredElement>,
     pub captures: PerCapture<Capture>,
+    /// Where a boundary of write fields runs across x and across y, from the middle of every lens (um), if the lab says so.
+    pub field_boundary_um: Option<[f64; 2]>,
     /// Widths seen from above; empty where none were taken.
     pub sem: Vec<SemSite>,
     /// Standard deviation of the offset common to all widths of the SEM (nm).
@@ -41,18 +45,6 @@ pub struct MeasuredSet {
 }
 
 impl MeasuredSet {
-    /// The cell as stated.
-    ///
-    /// # Errors
-    /// If a material is not known.
-    pub fn stated_cell(&self) -> Result<CellStack> {
-        Ok(CellStack {
-            film: self.stack.film.clone(),
-            ambient: Material::constant(self.stack.ambient_index, 0.0)?,
-            ..CellStack::paper(f64::from(self.stack.pitch_nm), self.stack.pillar_height_nm)?
-        })
-    }
-
     /// The element and the lattice site of a width by SEM; none if it is on no lattice.
     pub fn site_of(&self, site: &SemSite) -> Option<(ElementIndex, usize)> {
         let (index, element) = self.elements.iter_enumerated().find(|(_, e)| e.index == site.element)?;
@@ -64,9 +56,19 @@ impl MeasuredSet {
         is_inside.then(|| (index, iy as usize * lattice.sites() + ix as usize))
     }
 
+    /// Pixels of a capture that its colour can be seen by: those of its filter, where the sensor has filters.
+    pub fn seeing_pixels(&self, capture: CaptureIndex) -> usize {
+        let (camera, channel) = (&self.camera, self.leds[self.captures[capture].led].channel);
+        let all = camera.rows * camera.cols;
+        camera.bayer.zip(channel).map_or(all, |(bayer, channel)| {
+            let pixels = (0..camera.rows).flat_map(|y| (0..camera.cols).map(move |x| (y, x)));
+            pixels.filter(|at| bayer.has(*at, channel)).count()
+        })
+    }
+
     /// Whether two sessions have one plan: all is equal but light levels, noise and frames.
     pub fn same_plan(&self, other: &Self) -> bool {
-        let camera = |c: &RelayCamera| (c.pixel_um, c.rows, c.cols);
+        let camera = |c: &RelayCamera| (c.pixel_um, c.rows, c.cols, c.relay_blur_um);
         let captures = |set: &Self| -> Vec<_> {
             let of = |c: &Capture| (c.element, c.led, c.aoi_rad, c.distance_um, c.window_centre_um);
             set.captures.iter().map(of).collect()
@@ -89,13 +91,21 @@ impl MeasuredSet {
 /// The cell and the lens as the lab believes them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stack {
-    pub pitch_nm: u32,
-    pub pillar_height_nm: f64,
-    /// Index of the film that the pillars are etched from.
-    pub film: Material,
-    pub ambient_index: f64,
+    pub cell: CellStack,
     pub lens_diameter_um: f64,
     pub focal_length_um: f64,
+}
+
+impl Stack {
+    /// Whether it is the cell of the published polynomials, whatever its film was measured to be.
+    pub fn is_of_the_paper(&self) -> bool {
+        let paper = CellStack::paper(350.0, 700.0).map(|paper| CellStack {
+            film: self.cell.film.clone(),
+            ambient: self.cell.ambient.clone(),
+            ..paper
+        });
+        paper.is_ok_and(|paper| paper == self.cell) && self.cell.ambient.index(1.0).is_ok_and(|n| n.re == 1.0)
+    }
 }
 
 /// The camera behind its relay, in units of the sensor plane.
@@ -112,6 +122,10 @@ pub struct RelayCamera {
     pub registration_sigma_px: f64,
     /// Relative standard deviation of the DN scale of each LED.
     pub flux_sigma: f64,
+    /// Standard deviation of the relay's own Gaussian blur (um).
+    pub relay_blur_um: f64,
+    /// Filters over the pixels; none for a sensor that sees all colours alike.
+    pub bayer: Option<Bayer>,
 }
 
 /// A Gaussian spectrum.
@@ -119,6 +133,8 @@ pub struct RelayCamera {
 pub struct Led {
     pub centre_nm: f64,
     pub fwhm_nm: f64,
+    /// Filter whose pixels record it, where the sensor has filters.
+    pub channel: Option<Channel>,
 }
 
 impl Led {
@@ -161,4 +177,6 @@ pub struct Capture {
     pub frames: u32,
     /// Raw DN. Shape `[rows, cols]`, row index along +y, column index along +x.
     pub dn: Array2<f32>,
+    /// Variance of each pixel (DN^2), infinite where it tells nothing; none where `frames`, gain and read noise say it.
+    pub noise: Option<Array2<f32>>,
 }

@@ -17,9 +17,13 @@ pub struct SemSite {
     pub sigma_nm: f64,
 }
 
-const COLUMNS: &str = "element_m,element_n,x_um,y_um,designed_nm,measured_nm,sigma_nm";
+/// Head of the table of widths.
+pub const COLUMNS: &str = "element_m,element_n,x_um,y_um,designed_nm,measured_nm,sigma_nm";
 
-/// Read the widths of a set.
+/// Place of the measured width among the columns.
+const MEASURED: usize = 5;
+
+/// Read the widths of a set. Lines whose measured width is empty have not been measured yet, and are left out.
 ///
 /// # Errors
 /// If the file cannot be read or a line is not what its columns say.
@@ -34,6 +38,11 @@ pub fn read(path: &Path) -> Result<Vec<SemSite>> {
     rows(&text, COLUMNS)
         .map_err(|(at, what)| fault(at, what))?
         .into_iter()
+        .filter(|(_, line)| {
+            line.split(',')
+                .nth(MEASURED)
+                .is_none_or(|field| !field.trim().is_empty())
+        })
         .map(|(at, line)| {
             let wrong = || fault(at, format!("`{line}` is no width of a pillar"));
             let [m, n, x, y, designed, measured, sigma] = numbers(line).ok_or_else(wrong)?;

@@ -65,11 +65,36 @@ impl Surrogate {
         smooth: Option<(&PerCapture<LedIndex>, usize)>,
         progress: &dyn Progress,
     ) -> Result<Self> {
+        Self::simulated(model, about, [&TWO_SIDED, &ONE_SIDED], smooth, progress)
+    }
+
+    /// As [`Surrogate::simulate`] with the fewest values of each parameter: enough for derivatives and for effects of about
+    /// their typical size.
+    ///
+    /// # Errors
+    /// As [`ForwardModel::images`].
+    pub fn beside(
+        model: &dyn ForwardModel,
+        about: &[f64],
+        smooth: Option<(&PerCapture<LedIndex>, usize)>,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        Self::simulated(model, about, [&BESIDE, &BESIDE_ONE_SIDED], smooth, progress)
+    }
+
+    /// With these multiples of the typical size: of parameters with two sides, and of those that can only be positive.
+    fn simulated(
+        model: &dyn ForwardModel,
+        about: &[f64],
+        [two_sided, one_sided]: [&[f64]; 2],
+        smooth: Option<(&PerCapture<LedIndex>, usize)>,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         let mut points = vec![ParameterPoint::new(about.to_vec())];
         let mut nodes: Vec<Vec<f64>> = Vec::new();
         for (s, slot) in model.slots().iter().enumerate() {
-            let one_sided = slot.parameter.one_sided() && about[s] == 0.0;
-            let multiples: &[f64] = if one_sided { &ONE_SIDED } else { &TWO_SIDED };
+            let only_positive = slot.parameter.one_sided() && about[s] == 0.0;
+            let multiples = if only_positive { one_sided } else { two_sided };
             nodes.push(add_nodes(model, about, s, multiples, &mut points));
         }
         if smooth.is_some() {

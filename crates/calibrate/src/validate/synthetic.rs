@@ -69,7 +69,7 @@ impl<'a> Synthesizer<'a> {
         bench.follows = false;
         let (low, high) = bench.widths_nm();
         let cells = RigorousCells::new(
-            like.stated_cell()?,
+            like.stack.cell.clone(),
             bench.wavelengths_nm(),
             (low - WIDTH_ROOM_NM, high + WIDTH_ROOM_NM),
             settings.cache.clone(),
@@ -199,11 +199,15 @@ impl<'a> Synthesizer<'a> {
                 light.scaled_add(share as f32, &grid.pixels([shift[0] - at[0], shift[1] - at[1]]));
             }
             let factor = capture.scale_dn * flux[capture.led];
-            capture.dn = light.mapv(|v| {
-                let signal = (f64::from(v) * factor).max(0.0);
-                let variance = signal / camera.gain_e_per_dn + camera.read_noise_dn.powi(2);
-                let noise = (variance / f64::from(capture.frames)).sqrt() * normal(&mut rng);
-                (black + signal + noise) as f32
+            let (frames, own) = (f64::from(capture.frames), &capture.noise);
+            capture.dn = Array2::from_shape_fn(light.dim(), |at| {
+                let signal = (f64::from(light[at]) * factor).max(0.0);
+                let variance = match own {
+                    Some(own) if own[at].is_finite() => f64::from(own[at]),
+                    Some(_) => 0.0,
+                    None => (signal / camera.gain_e_per_dn + camera.read_noise_dn.powi(2)) / frames,
+                };
+                (black + signal + variance.sqrt() * normal(&mut rng)) as f32
             });
         }
         let offset = like.sem_offset_sigma_nm * normal(&mut rng);

@@ -1,6 +1,10 @@
 //! The measurements of a set: captures, and widths by SEM.
 
-use crate::set::frame::SensorFrames;
+use std::path::PathBuf;
+
+use ndarray::Array2;
+
+use crate::set::frame::{Exposure, SensorFrames};
 use crate::set::{
     Capture, ElementIndex, Led, LedIndex, MeasuredElement, PerElement, PerLed, RelayCamera, SemSite, frame, sem,
 };
@@ -15,7 +19,6 @@ pub(super) fn captures(
 ) -> Vec<Capture> {
     let mut captures = Vec::new();
     for s in root.sections("capture") {
-        let path = s.file("file");
         let index = s
             .array::<2>("element", Limits::new(-1000.0..=1000.0, ""))
             .map(|v| v as i64);
@@ -28,7 +31,7 @@ pub(super) fn captures(
             );
             ElementIndex::from(0)
         });
-        let led_nm = s.float("led_nm", Limits::new(200.0..=3000.0, "nm"));
+        let led_nm = s.float("led_nm", Limits::new(200.0..=20_000.0, "nm"));
         let known = leds.iter_enumerated().find(|(_, l)| l.centre_nm == led_nm);
         let led = known.map(|(l, _)| l).unwrap_or_else(|| {
             s.fault(
@@ -41,26 +44,10 @@ pub(super) fn captures(
         let aoi_deg: [f64; 2] = s.array("aoi_deg", Limits::new(-80.0..=80.0, "degrees"));
         let distance_um = s.float("distance_um", Limits::new(1.0..=100_000.0, "um"));
         let window_centre_um = s.array("window_centre_um", Limits::new(-10_000.0..=10_000.0, "um"));
-        let scale_dn = s.float("scale_dn", Limits::new(f64::MIN_POSITIVE..=1e12, "DN"));
-        let frames = s.integer("frames", 1..=1_000_000, "frames") as u32;
+        let filter = camera.bayer.zip(leds.get(led).and_then(|l| l.channel));
+        let (path, exposures) = exposures(&s, camera);
         s.finish();
-        let dn = match frame::read(&path, camera.rows, camera.cols) {
-            Ok(mut dn) => {
-                sensor.take_out(&mut dn, camera);
-                dn
-            }
-            Err(what) => {
-                // A file that is not there has been named as such already.
-                if path.is_file() {
-                    s.fault(
-                        "file",
-                        what,
-                        "save it as NPY [rows, cols] or as grey PNG, or leave the capture out",
-                    );
-                }
-                ndarray::Array2::zeros((camera.rows, camera.cols))
-            }
-        };
+        let joined = frame::joined(exposures, sensor, camera, filter);
         captures.push(Capture {
             name: path
                 .file_stem()
@@ -70,15 +57,64 @@ pub(super) fn captures(
             aoi_rad: aoi_deg.map(f64::to_radians),
             distance_um,
             window_centre_um,
-            scale_dn,
-            frames,
-            dn,
+            scale_dn: joined.scale_dn,
+            frames: joined.frames,
+            dn: joined.dn,
+            noise: joined.noise,
         });
     }
     if captures.is_empty() {
         root.fault("capture", "no capture", "add one [[capture]] for each frame");
     }
     captures
+}
+
+/// The exposures of a capture, at least one, and the file of the first: those of its `[[capture.exposure]]`, or its own.
+fn exposures(s: &Section<'_, '_>, camera: &RelayCamera) -> (PathBuf, Vec<Exposure>) {
+    if !s.has("exposure") {
+        let (path, only) = exposure(s, camera);
+        return (path, vec![only]);
+    }
+    let mut name = None;
+    let mut all = Vec::new();
+    for own in s.sections("exposure") {
+        let (path, exposure) = exposure(&own, camera);
+        own.finish();
+        name.get_or_insert(path);
+        all.push(exposure);
+    }
+    if all.is_empty() {
+        s.fault(
+            "exposure",
+            "no exposure",
+            "add one [[capture.exposure]] for each, or give `file`",
+        );
+        all.push(Exposure {
+            dn: Array2::zeros((camera.rows, camera.cols)),
+            scale_dn: 1.0,
+            frames: 1,
+        });
+    }
+    (name.unwrap_or_default(), all)
+}
+
+fn exposure(s: &Section<'_, '_>, camera: &RelayCamera) -> (PathBuf, Exposure) {
+    let path = s.file("file");
+    let scale_dn = s.float("scale_dn", Limits::new(f64::MIN_POSITIVE..=1e12, "DN"));
+    let frames = s.integer("frames", 1..=1_000_000, "frames") as u32;
+    let dn = frame::read(&path, camera.rows, camera.cols, camera.saturation_dn).unwrap_or_else(|what| {
+        // A file that is not there has been named as such already.
+        if path.is_file() {
+            s.fault(
+                "file",
+                what,
+                "save it as NPY [rows, cols], as grey PNG or as grey TIFF, or leave the capture out",
+            );
+        }
+        Array2::zeros((camera.rows, camera.cols))
+    });
+    let exposure = Exposure { dn, scale_dn, frames };
+    (path, exposure)
 }
 
 pub(super) fn widths(root: &Section<'_, '_>, elements: &PerElement<MeasuredElement>) -> (Vec<SemSite>, f64) {

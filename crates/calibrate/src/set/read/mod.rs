@@ -5,20 +5,20 @@ mod elements;
 
 use std::path::Path;
 
-use super::frame::{self, SensorFrames};
+use super::frame::{self, Bayer, Channel, SensorFrames};
 use super::{Led, MeasuredSet, PerElement, PerLed, RelayCamera, Stack};
 use captures::{captures, widths};
 use elements::elements;
-use metalith_cell::Material;
+use metalith_cell::{CellStack, Material, UniformLayer};
 use metalith_core::document::{Document, Limits, Section, load};
-use metalith_core::{ElementSite, LayerNumber, PillarReader, Progress, Result};
+use metalith_core::{ElementSite, LayerNumber, PillarReader, PillarShape, Progress, Result};
 
 /// Version of the format that is read.
 const SCHEMA: i64 = 1;
 
 /// Half-width of the spectrum that the film's table must cover, in standard deviations: what lies outside
 /// is 1e-3 of the light.
-pub(super) const SPECTRUM_SIGMAS: f64 = 3.2;
+pub(crate) const SPECTRUM_SIGMAS: f64 = 3.2;
 
 impl MeasuredSet {
     /// Read the set in `folder`, or the `measurement.toml` given; `layouts` reads the layout that it names.
@@ -52,10 +52,10 @@ fn sections(path: &Path, root: &Section<'_, '_>, layouts: &dyn PillarReader, pro
     layer("apertures");
     layers.finish();
 
-    let (stack, film_is_known) = stack(&root.section("stack"));
+    let (stack, is_known) = stack(&root.section("stack"), path.parent().unwrap_or(Path::new("")));
     let divergence_rad = source(&root.section("source"));
     let (camera, frames) = camera(&root.section("camera"));
-    let leds: PerLed<_> = leds(root, film_is_known.then_some(&stack.film)).into();
+    let leds: PerLed<_> = leds(root, camera.bayer, is_known.then_some(&stack.cell)).into();
     let layout = root.file("layout");
     let elements: PerElement<_> = {
         let read = |sites: &[ElementSite]| layouts.pillars(&layout, pillar_layer, sites, progress);
@@ -63,6 +63,7 @@ fn sections(path: &Path, root: &Section<'_, '_>, layouts: &dyn PillarReader, pro
     };
     let captures = captures(root, &camera, &frames, &leds, &elements);
     let (sem, sem_offset_sigma_nm) = widths(root, &elements);
+    let field_boundary_um = field_boundary(root);
     MeasuredSet {
         path: path.to_owned(),
         title,
@@ -73,14 +74,35 @@ fn sections(path: &Path, root: &Section<'_, '_>, layouts: &dyn PillarReader, pro
         leds,
         elements,
         captures: captures.into(),
+        field_boundary_um,
         sem,
         sem_offset_sigma_nm,
     }
 }
 
-/// The cell as stated, and whether the film's table could be read; a vacuum takes its place else.
-fn stack(s: &Section<'_, '_>) -> (Stack, bool) {
-    let pitch_nm = s.integer("pitch_nm", 50..=5000, "nm") as u32;
+/// Edge of a pixel in the plane of the chip's image (um): as given, or that of the sensor over the magnification of the
+/// relay.
+fn pixel_um(s: &Section<'_, '_>) -> f64 {
+    let positive = |key, high, unit| s.float(key, Limits::new(f64::MIN_POSITIVE..=high, unit));
+    if !s.has("magnification") {
+        return positive("pixel_um", 100.0, "um");
+    }
+    if s.has("pixel_um") {
+        s.fault(
+            "pixel_um",
+            "a pixel size beside a magnification",
+            "give `sensor_pixel_um` and `magnification`, or `pixel_um` alone",
+        );
+    }
+    positive("sensor_pixel_um", 1000.0, "um") / positive("magnification", 1000.0, "")
+}
+
+/// Tallest pillar and thickest layer (nm).
+const TALLEST_NM: f64 = 50_000.0;
+
+/// The cell as stated, and whether its materials are known; a vacuum takes their place else.
+fn stack(s: &Section<'_, '_>, folder: &Path) -> (Stack, bool) {
+    let pitch_nm = s.integer("pitch_nm", 50..=20_000, "nm") as u32;
     if !pitch_nm.is_multiple_of(2) {
         s.fault(
             "pitch_nm",
@@ -88,38 +110,73 @@ fn stack(s: &Section<'_, '_>) -> (Stack, bool) {
             "use an even number",
         );
     }
-    let pillar_height_nm = s.float("pillar_height_nm", Limits::new(10.0..=10_000.0, "nm"));
-    s.choice("substrate", &[("fused_silica_malitson_1965", ())], None);
+    let height_nm = s.float("pillar_height_nm", Limits::new(10.0..=TALLEST_NM, "nm"));
     s.choice("incidence", &[("substrate", ())], None);
-    let ambient_index = s.float("ambient_index", Limits::new(1.0..=1.0, ""));
+    let vacuum = || Material::constant(1.0, 0.0).expect("index one is physical");
+    let found = |key: &str, material: metalith_core::Result<Material>| {
+        let fault = |e: metalith_core::Error| s.fault(key, e.to_string(), "name a known material, or mend its table");
+        material.map_err(fault).ok()
+    };
+    let film_path = s.file("pillar_index");
+    let film = if film_path.is_file() {
+        found("pillar_index", Material::read_csv(&film_path).map_err(Into::into))
+    } else {
+        None
+    };
+    let substrate = found("substrate", resolved(&s.text("substrate"), folder));
+    let ambient_index = s.float("ambient_index", Limits::new(1.0..=3.0, ""));
+    let spacer = s.optional_text("spacer_material");
+    let spacer = spacer.map(|name| found("spacer_material", resolved(&name, folder)).unwrap_or_else(vacuum));
+    let layer = |key: &str, material: Option<Material>| {
+        let height = s
+            .optional_float(key, Limits::new(0.0..=TALLEST_NM, "nm"))
+            .unwrap_or(0.0);
+        if height > 0.0 && material.is_none() {
+            s.fault(key, "a layer of no known material", "say its material");
+        }
+        let layer = material.map(|material| UniformLayer {
+            material,
+            height_nm: height,
+        });
+        layer.filter(|_| height > 0.0)
+    };
+    let under = [layer("spacer_nm", spacer), layer("residual_nm", film.clone())];
+    let shape = s.choice("shape", &PillarShape::CHOICES, Some(PillarShape::Square));
     let lens_diameter_um = s.float("lens_diameter_um", Limits::new(5.0..=2000.0, "um"));
     let focal_length_um = s.float("focal_length_um", Limits::new(1.0..=100_000.0, "um"));
-    let film_path = s.file("pillar_index");
-    let film = film_path
-        .is_file()
-        .then(|| Material::read_csv(&film_path))
-        .and_then(|film| match film {
-            Ok(film) => Some(film),
-            Err(e) => {
-                s.fault("pillar_index", e.to_string(), "mend the table of the film");
-                None
-            }
-        });
     s.finish();
-    let film_is_known = film.is_some();
-    let vacuum = || Material::constant(1.0, 0.0).expect("index one is physical");
-    let stack = Stack {
-        pitch_nm: pitch_nm + pitch_nm % 2,
-        pillar_height_nm,
+    let is_known = film.is_some() && substrate.is_some();
+    let even = f64::from(pitch_nm + pitch_nm % 2);
+    let cell = CellStack {
+        shape,
         film: film.unwrap_or_else(vacuum),
-        ambient_index,
+        substrate: substrate.unwrap_or_else(vacuum),
+        under: under.into_iter().flatten().collect(),
+        ambient: Material::constant(ambient_index, 0.0).unwrap_or_else(|_| vacuum()),
+        ..CellStack::paper(even, height_nm).expect("the program knows its own materials")
+    };
+    let stack = Stack {
+        cell,
         lens_diameter_um,
         focal_length_um,
     };
-    (stack, film_is_known)
+    (stack, is_known)
 }
 
-fn source(s: &Section<'_, '_>) -> f64 {
+/// A material by its name or the path of its table.
+fn resolved(text: &str, folder: &Path) -> Result<Material> {
+    Ok(Material::resolve(text, folder)?)
+}
+
+/// Where write fields meet in every lens, if that is stated.
+pub(crate) fn field_boundary(root: &Section<'_, '_>) -> Option<[f64; 2]> {
+    let s = root.optional_section("writer")?;
+    let place = s.array("field_boundary_um", Limits::new(-1000.0..=1000.0, "um"));
+    s.finish();
+    Some(place)
+}
+
+pub(crate) fn source(s: &Section<'_, '_>) -> f64 {
     s.choice("kind", &[("collimated", ())], None);
     s.choice("divergence_axes", &[("uniform disc", ())], None);
     let mrad = s.float("divergence_mrad", Limits::new(0.0..=50.0, "mrad"));
@@ -127,10 +184,10 @@ fn source(s: &Section<'_, '_>) -> f64 {
     mrad * 1e-3
 }
 
-fn camera(s: &Section<'_, '_>) -> (RelayCamera, SensorFrames) {
+pub(crate) fn camera(s: &Section<'_, '_>) -> (RelayCamera, SensorFrames) {
     let positive = |key, high, unit| s.float(key, Limits::new(f64::MIN_POSITIVE..=high, unit));
     let camera = RelayCamera {
-        pixel_um: positive("pixel_um", 100.0, "um"),
+        pixel_um: pixel_um(s),
         rows: s.integer("rows", 16..=1024, "pixels") as usize,
         cols: s.integer("cols", 16..=1024, "pixels") as usize,
         black_level_dn: s.float("black_level_dn", Limits::new(0.0..=1e6, "DN")),
@@ -139,13 +196,17 @@ fn camera(s: &Section<'_, '_>) -> (RelayCamera, SensorFrames) {
         saturation_dn: positive("saturation_dn", 1e9, "DN"),
         registration_sigma_px: positive("registration_sigma_px", 8.0, "pixels"),
         flux_sigma: positive("flux_sigma", 1.0, ""),
+        relay_blur_um: s
+            .optional_float("relay_blur_um", Limits::new(0.0..=100.0, "um"))
+            .unwrap_or(0.0),
+        bayer: s.has("bayer").then(|| s.choice("bayer", &Bayer::CHOICES, None)),
     };
     let sensor_frame = |key| {
         s.has(key)
             .then(|| s.file(key))
             .filter(|path| path.is_file())
             .and_then(|path| {
-                let read = frame::read(&path, camera.rows, camera.cols);
+                let read = frame::read(&path, camera.rows, camera.cols, f64::INFINITY);
                 read.map_err(|what| s.fault(key, what, "give a frame as large as the captures"))
                     .ok()
             })
@@ -158,12 +219,13 @@ fn camera(s: &Section<'_, '_>) -> (RelayCamera, SensorFrames) {
     (camera, frames)
 }
 
-fn leds(root: &Section<'_, '_>, film: Option<&Material>) -> Vec<Led> {
+pub(crate) fn leds(root: &Section<'_, '_>, bayer: Option<Bayer>, cell: Option<&CellStack>) -> Vec<Led> {
     let mut leds: Vec<Led> = Vec::new();
     for s in root.sections("led") {
         let led = Led {
-            centre_nm: s.float("centre_nm", Limits::new(200.0..=3000.0, "nm")),
+            centre_nm: s.float("centre_nm", Limits::new(200.0..=20_000.0, "nm")),
             fwhm_nm: s.float("fwhm_nm", Limits::new(0.5..=200.0, "nm")),
+            channel: bayer.map(|_| s.choice("channel", &Channel::CHOICES, None)),
         };
         s.finish();
         if leds.iter().any(|l| l.centre_nm == led.centre_nm) {
@@ -173,20 +235,30 @@ fn leds(root: &Section<'_, '_>, film: Option<&Material>) -> Vec<Led> {
                 "leave one out; captures name their LED by it",
             );
         }
-        if let Some(film) = film {
-            let (low, high) = film.range_um();
-            let (low, high) = (low * 1e3, high * 1e3);
+        if let Some(cell) = cell {
+            let (film, all) = (cell.film.range_um(), cell.range_um());
             let half = SPECTRUM_SIGMAS * led.sigma_nm();
-            if led.centre_nm - half < low || led.centre_nm + half > high {
-                s.fault(
-                    "centre_nm",
-                    format!(
-                        "its spectrum from {:.0} to {:.0} nm is outside the film's table, {low:.0} to {high:.0} nm",
-                        led.centre_nm - half,
-                        led.centre_nm + half
-                    ),
+            let (from, to) = (led.centre_nm - half, led.centre_nm + half);
+            for (what, hint, (low, high)) in [
+                (
+                    "the film's table",
                     "measure the film over the whole spectrum, or correct centre and width of the LED",
-                );
+                    film,
+                ),
+                (
+                    "what is known of the other materials",
+                    "give a table of the material that reaches farther",
+                    all,
+                ),
+            ] {
+                let (low, high) = (low * 1e3, high * 1e3);
+                if from < low || to > high {
+                    let what = format!(
+                        "its spectrum from {from:.0} to {to:.0} nm is outside {what}, {low:.0} to {high:.0} nm"
+                    );
+                    s.fault("centre_nm", what, hint);
+                    break;
+                }
             }
         }
         leds.push(led);

@@ -1,0 +1,188 @@
+//! What a bench can do and what is asked of it: `BENCH.toml`, with every fault found in one go.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use metalith_core::Result;
+use metalith_core::document::{Document, Limits, Section, load};
+
+use crate::set::read;
+use crate::set::{Led, PerLed, RelayCamera};
+
+/// Version of the format that is read.
+const SCHEMA: i64 = 1;
+
+/// What a bench can do.
+#[derive(Clone, Debug)]
+pub struct BenchFile {
+    /// Full angle of the uniform disc that the source is (rad).
+    pub divergence_rad: f64,
+    pub camera: RelayCamera,
+    pub leds: PerLed<Led>,
+    /// Ending of the frames that the camera saves, without the dot.
+    pub ending: String,
+    /// Elements that may be looked at, by their place in the array; those of the design that differ most if empty.
+    pub elements: Vec<[i64; 2]>,
+    /// Angles of incidence in air along x and y (deg), from where an element looks.
+    pub fields_deg: Vec<[f64; 2]>,
+    /// Distances from the pillar tops (um); three about the focus if empty.
+    pub distances_um: Vec<f64>,
+    /// Frames that a capture may be the mean of, fewest first.
+    pub frames: Vec<u32>,
+    /// The brightest pixel of a capture is exposed to this share of saturation.
+    pub peak: f64,
+    /// Captures that a session may have.
+    pub most_captures: usize,
+    /// Where a boundary of write fields runs through every lens (um), if it is known.
+    pub field_boundary_um: Option<[f64; 2]>,
+    /// Widths by SEM that could be taken.
+    pub sem: Option<SemOffer>,
+    /// Sizes that are to be found, by the name of the effect, in its unit.
+    pub wanted: BTreeMap<String, f64>,
+}
+
+/// What a scanning electron microscope could add.
+#[derive(Clone, Copy, Debug)]
+pub struct SemOffer {
+    /// Pillars that are measured.
+    pub sites: usize,
+    /// Standard deviation of one width (nm).
+    pub sigma_nm: f64,
+    /// Standard deviation of the offset that all widths share (nm).
+    pub offset_sigma_nm: f64,
+}
+
+/// Part of saturation that captures are exposed to where the bench says nothing: 30 % of room for what is brighter than
+/// planned.
+const PEAK: f64 = 0.7;
+
+/// Frames of a capture where the bench says nothing.
+const FRAMES: [u32; 2] = [16, 64];
+
+/// Captures of a session where the bench says nothing.
+const MOST_CAPTURES: i64 = 48;
+
+impl BenchFile {
+    /// Read the file.
+    ///
+    /// # Errors
+    /// Every fault at once, each at the line that has it.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = load(path)?;
+        Document::read(path, &text, sections)
+    }
+}
+
+fn sections(root: &Section<'_, '_>) -> BenchFile {
+    root.integer("schema", SCHEMA..=SCHEMA, "");
+    let divergence_rad = read::source(&root.section("source"));
+    let s = root.section("camera");
+    for key in ["dark_frame", "flat_frame"] {
+        if s.has(key) {
+            s.fault(
+                key,
+                "a frame of the sensor is no part of a plan",
+                "add it to measurement.toml once it has been taken",
+            );
+        }
+    }
+    let (camera, _) = read::camera(&s);
+    let leds: PerLed<Led> = read::leds(root, camera.bayer, None).into();
+    let s = root.section("captures");
+    let ending = s.choice(
+        "format",
+        &[("npy", "npy"), ("png", "png"), ("tiff", "tiff")],
+        Some("npy"),
+    );
+    let pairs = |key: &str, limits: fn() -> Limits| -> Vec<[f64; 2]> {
+        if !s.has(key) {
+            return Vec::new();
+        }
+        let all = s.floats(key, limits());
+        if all.len() % 2 == 1 {
+            s.fault(key, "an odd number of numbers", "give pairs, x and y: x1, y1, x2, y2");
+        }
+        all.chunks_exact(2).map(|p| [p[0], p[1]]).collect()
+    };
+    let elements = pairs("elements", || Limits::new(-1000.0..=1000.0, ""));
+    let mut fields_deg = pairs("field_deg", || Limits::new(-80.0..=80.0, "degrees"));
+    if fields_deg.is_empty() {
+        fields_deg.push([0.0; 2]);
+    }
+    let floats = |key: &str, limits: Limits| if s.has(key) { s.floats(key, limits) } else { Vec::new() };
+    let distances_um = floats("distance_um", Limits::new(1.0..=100_000.0, "um"));
+    let whole = |v: &f64| v.fract() == 0.0;
+    let numbers = floats("frames", Limits::new(1.0..=1e6, "frames"));
+    if !numbers.iter().all(whole) {
+        s.fault("frames", "a part of a frame", "give whole numbers");
+    }
+    let mut frames: Vec<u32> = numbers.iter().map(|f| *f as u32).collect();
+    if frames.is_empty() {
+        frames.extend(FRAMES);
+    }
+    frames.sort_unstable();
+    frames.dedup();
+    let peak = s.optional_float("peak", Limits::new(0.05..=0.9, "")).unwrap_or(PEAK);
+    let most = s
+        .optional_integer("most", 1..=1000, "captures")
+        .unwrap_or(MOST_CAPTURES);
+    s.finish();
+    BenchFile {
+        divergence_rad,
+        camera,
+        leds,
+        ending: ending.to_owned(),
+        elements: elements.into_iter().map(|e| e.map(|v| v as i64)).collect(),
+        fields_deg,
+        distances_um,
+        frames,
+        peak,
+        most_captures: most as usize,
+        field_boundary_um: read::field_boundary(root),
+        sem: root.optional_section("sem").map(|s| sem(&s)),
+        wanted: root
+            .optional_section("wanted")
+            .map_or_else(BTreeMap::new, |s| wanted(&s)),
+    }
+}
+
+fn sem(s: &Section<'_, '_>) -> SemOffer {
+    let offer = SemOffer {
+        sites: s.integer("sites", 2..=10_000, "pillars") as usize,
+        sigma_nm: s.float("sigma_nm", Limits::new(0.01..=100.0, "nm")),
+        offset_sigma_nm: s.float("edge_offset_nm", Limits::new(f64::MIN_POSITIVE..=100.0, "nm")),
+    };
+    s.finish();
+    offer
+}
+
+fn wanted(s: &Section<'_, '_>) -> BTreeMap<String, f64> {
+    let sizes = s.keys().into_iter().map(|name| {
+        let size = s.float(&name, Limits::new(1e-9..=1e9, ""));
+        (name, size)
+    });
+    let sizes = sizes.collect();
+    s.finish();
+    sizes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_fault_of_a_bench_is_named_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("bench.toml");
+        std::fs::write(
+            &path,
+            "schema = 1\n[source]\nkind = \"collimated\"\ndivergence_mrad = 99.0\ndivergence_axes = \"uniform disc\"\n\
+             [[led]]\ncentre_nm = 530\nfwhm_nm = 30\n[captures]\nfield_deg = [1.0, 2.0, 3.0]\nformat = \"bmp\"\n",
+        )
+        .unwrap();
+        let error = BenchFile::read(&path).unwrap_err().to_string();
+        for part in ["divergence_mrad", "odd number", "format", "camera"] {
+            assert!(error.contains(part), "{part} is not in:\n{error}");
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! What each candidate capture tells of each parameter: its normal equations by the simulator and the noise of the bench.
+
+use metalith_core::{Progress, Result};
+use nalgebra::DMatrix;
+use ndarray::Array2;
+
+use super::bench_file::BenchFile;
+use super::candidates::{Candidates, sem_sites};
+use crate::bench::{Bench, Sampling};
+use crate::cells::{CellSource, RigorousCells};
+use crate::effects::Effect;
+use crate::fit::{Data, FitProblem, Nuisances};
+use crate::set::{Capture, MeasuredSet, PerCapture};
+use crate::simulator::{Simulator, WIDTH_ROOM_NM};
+use crate::surrogate::Surrogate;
+
+/// Captures that are simulated at once: each holds an image for two sizes of every parameter.
+const TOGETHER: usize = 12;
+
+/// A capture, exposed as it would be, and what it tells.
+pub struct Told {
+    /// With its scale set to the exposure, and what it would show.
+    pub capture: Capture,
+    /// Inner products of flux of each LED, black level, every parameter, and the residual, as
+    /// [`crate::fit::NormalEquations`] has them.
+    pub form: DMatrix<f64>,
+    /// Pixels that count.
+    pub pixels: f64,
+}
+
+/// What all candidates tell.
+pub struct Information {
+    pub told: Vec<Told>,
+    /// What is known of flux and black level beforehand.
+    pub prior: DMatrix<f64>,
+    /// What the widths by SEM tell, where the bench offers them.
+    pub widths: Option<DMatrix<f64>>,
+    /// Number of shared nuisances, which stand first.
+    pub shared: usize,
+}
+
+/// The effects that are tried on a set.
+pub type EffectsOf<'a> = dyn Fn(&MeasuredSet) -> Result<Vec<Box<dyn Effect>>> + 'a;
+
+/// Cells for a set, for simulators that follow one another.
+pub fn cells_of(set: &MeasuredSet, sampling: Sampling, cache: Option<std::path::PathBuf>) -> CellSource {
+    let bench = Bench::new(set, sampling);
+    let (low, high) = bench.widths_nm();
+    let widths = (low - WIDTH_ROOM_NM, high + WIDTH_ROOM_NM);
+    CellSource::Rigorous(Box::new(RigorousCells::new(
+        set.stack.cell.clone(),
+        bench.wavelengths_nm(),
+        widths,
+        cache,
+    )))
+}
+
+/// Simulate every candidate, and weigh what it tells with its noise; the cells come back for later use.
+///
+/// # Errors
+/// If a cell cannot be solved, or the user stopped it.
+pub fn information(
+    candidates: &Candidates,
+    bench: &BenchFile,
+    sampling: Sampling,
+    effects: &EffectsOf<'_>,
+    mut cells: CellSource,
+    progress: &dyn Progress,
+) -> Result<(Information, CellSource)> {
+    let mut out = Information {
+        told: Vec::new(),
+        prior: DMatrix::zeros(0, 0),
+        widths: None,
+        shared: bench.leds.len() + 1,
+    };
+    for batch in candidates.captures.chunks(TOGETHER) {
+        let mut set = candidates.set.clone();
+        set.captures = PerCapture::from(batch.to_vec());
+        if let Some(offer) = bench.sem.filter(|_| out.told.is_empty()) {
+            set.sem = sem_sites(&set, offer);
+        }
+        let simulator = Simulator::new(Bench::new(&set, sampling), cells, effects(&set)?);
+        let nothing = vec![0.0; simulator.slots.len()];
+        let surrogate = Surrogate::beside(&simulator, &nothing, None, progress)?;
+        let exposed = exposed(&set, &surrogate, bench.peak);
+        let data = Data::new(&exposed);
+        let problem = FitProblem::new(&simulator, surrogate, &data);
+        let slots: Vec<usize> = (0..nothing.len()).collect();
+        let fit = problem.at(&slots, nothing, Nuisances::stated(&data));
+        if out.told.is_empty() {
+            out.prior = fit.nuisances.prior(&data, fit.equations.size());
+            out.widths = bench.sem.map(|_| fit.equations.widths.clone());
+        }
+        for ((c, capture), form) in exposed.captures.iter_enumerated().zip(&fit.equations.captures) {
+            out.told.push(Told {
+                capture: capture.clone(),
+                form: form.clone(),
+                pixels: data.pixels(c) as f64,
+            });
+        }
+        cells = simulator.cells;
+    }
+    Ok((out, cells))
+}
+
+/// The set with each capture exposed so that its brightest pixel reaches a share of saturation, and showing what it would.
+pub fn exposed(set: &MeasuredSet, surrogate: &Surrogate, peak: f64) -> MeasuredSet {
+    let camera = set.camera;
+    let room = (peak * camera.saturation_dn - camera.black_level_dn).max(1.0);
+    let mut out = set.clone();
+    for (capture, grid) in out.captures.iter_mut().zip(surrogate.base.iter()) {
+        let light: Array2<f32> = grid.pixels([0.0; 2]);
+        let brightest = light.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+        // To three digits, as a person would note it.
+        capture.scale_dn = three_digits(room / f64::from(brightest));
+        let filter = camera.bayer.zip(set.leds[capture.led].channel);
+        capture.dn = light.mapv(|v| (camera.black_level_dn + capture.scale_dn * f64::from(v).max(0.0)) as f32);
+        capture.noise = filter.map(|(bayer, channel)| {
+            let variance = |v: f32| {
+                let shot = (f64::from(v) - camera.black_level_dn) / camera.gain_e_per_dn;
+                (shot + camera.read_noise_dn.powi(2)) / f64::from(capture.frames)
+            };
+            Array2::from_shape_fn(capture.dn.dim(), |at| {
+                if bayer.has(at, channel) {
+                    variance(capture.dn[at]) as f32
+                } else {
+                    f32::INFINITY
+                }
+            })
+        });
+    }
+    out
+}
+
+fn three_digits(v: f64) -> f64 {
+    let unit = 10f64.powi(v.log10().floor() as i32 - 2);
+    // By way of its text: no digits that nobody asked for.
+    let rounded = (v / unit).round() * unit;
+    format!("{rounded:.6e}").parse().unwrap_or(rounded)
+}

@@ -1,0 +1,273 @@
+//! Before measuring: which captures tell which effects apart, and the session that takes them.
+//!
+//! ```text
+//! design, layout, bench -> candidates -> what each tells -> the fewest that do -> set folder, check list
+//! ```
+//!
+//! | file | holds |
+//! | --- | --- |
+//! | `bench_file` | what the bench can do and what is asked of it |
+//! | `candidates` | every capture that it could take |
+//! | `information` | normal equations of each, by the simulator and the noise |
+//! | `choice` | the fewest captures |
+//! | `judgement` | what they find, and what they cannot tell apart |
+//! | `files`, `page` | the set folder, and the check list |
+
+mod bench_file;
+mod candidates;
+mod choice;
+mod files;
+mod information;
+mod judgement;
+mod page;
+
+use std::path::{Path, PathBuf};
+
+use metalith_core::{PillarReader, Progress, Result};
+use metalith_design::Design;
+use serde::Serialize;
+
+pub use bench_file::{BenchFile, SemOffer};
+pub use judgement::{Confusion, PlannedEffect};
+
+use crate::bench::{Bench, Sampling};
+use crate::effects::{self, Effect};
+use crate::session::check_effects;
+use crate::set::{LedIndex, MeasuredSet, PerCapture};
+use crate::simulator::Simulator;
+use crate::surrogate::Surrogate;
+use candidates::{Candidates, sem_sites};
+use choice::{Choice, Picked, Place, Requirement};
+use information::{Information, cells_of, exposed};
+
+/// Spectra of a plan: steps in wavelength are coarser than those of a calibration, since nothing is fitted.
+const SAMPLING: Sampling = Sampling {
+    spectrum: 0.3,
+    step_nm: 6.0,
+    step_um: 0.5,
+    margin: 22,
+};
+
+/// A session that was planned, with what it is expected to find.
+#[derive(Clone, Debug, Serialize)]
+pub struct CapturePlan {
+    /// Folder of the set.
+    pub folder: PathBuf,
+    /// The check list.
+    pub page: PathBuf,
+    /// Captures that the bench could take, and those among them that are to be taken.
+    pub candidates: usize,
+    pub captures: Vec<PlannedCapture>,
+    pub effects: Vec<PlannedEffect>,
+    /// Pairs that the captures cannot tell apart.
+    pub confusions: Vec<Confusion>,
+}
+
+/// A capture to take.
+#[derive(Clone, Debug, Serialize)]
+pub struct PlannedCapture {
+    pub file: String,
+    pub element: [i64; 2],
+    pub led_nm: f64,
+    pub aoi_deg: [f64; 2],
+    pub distance_um: f64,
+    pub window_centre_um: [f64; 2],
+    pub frames: u32,
+    pub scale_dn: f64,
+    /// Of the brightest pixel (DN), black level included.
+    pub brightest_dn: f64,
+}
+
+/// What is planned, and where it goes.
+pub struct PlanRequest<'a> {
+    pub design: &'a Design,
+    pub bench: &'a BenchFile,
+    /// The layout that is or will be written.
+    pub layout: &'a Path,
+    /// Its path as the set names it.
+    pub layout_in_set: String,
+    /// Folder of the set.
+    pub folder: &'a Path,
+    /// Plan for these effects alone; for all if empty.
+    pub only: Vec<String>,
+    /// Where tables of cells are kept from one run to the next.
+    pub cache: Option<PathBuf>,
+}
+
+impl CapturePlan {
+    /// Whether every effect that this bench can see at all is found at its wanted size.
+    pub fn finds_all(&self) -> bool {
+        self.effects.iter().all(|e| e.detected)
+    }
+
+    /// One line for a person.
+    pub fn sentence(&self) -> String {
+        let missed: Vec<&str> = self
+            .effects
+            .iter()
+            .filter(|e| !e.detected)
+            .map(|e| e.name.as_str())
+            .collect();
+        let found = format!(
+            "{} of {} captures find {} of {} effects at their wanted size",
+            self.captures.len(),
+            self.candidates,
+            self.effects.len() - missed.len(),
+            self.effects.len()
+        );
+        if missed.is_empty() {
+            return found;
+        }
+        format!("{found}; not found: {}", missed.join(", "))
+    }
+}
+
+/// Plan a session, and write its folder: `measurement.toml`, the tables that it names, `plan.html` and `plan.json`.
+///
+/// # Errors
+/// If a name is not known, the layout cannot be read, a cell cannot be solved, a file cannot be written, or the user stopped
+/// it.
+pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn Progress) -> Result<CapturePlan> {
+    let (design, bench) = (request.design, request.bench);
+    let candidates = candidates::candidates(design, bench, request.layout, reader, progress)?;
+    let effects = |set: &MeasuredSet| wanted_effects(set, request);
+    let cells = cells_of(&candidates.set, SAMPLING, request.cache.clone());
+    let known = effects(&candidates.set)?;
+    let asked: Vec<String> = bench.wanted.keys().cloned().collect();
+    check_effects(&effects::all(&candidates.set), &asked)?;
+    let (information, cells) = information::information(&candidates, bench, SAMPLING, &effects, cells, progress)?;
+    let choice = Choice {
+        places: information.told.iter().map(|t| place(&t.capture)).collect(),
+        requirements: requirements(&known, bench),
+        frames: bench.frames.clone(),
+        information: &information,
+    };
+    let mut reachable = choice.reachable();
+    only_of_what_is_found(&choice, &mut reachable);
+    let picked = choice.captures(&reachable, bench.most_captures);
+    let set = chosen_set(&candidates, bench, &information, &picked);
+
+    let simulator = Simulator::new(Bench::new(&set, SAMPLING), cells, known);
+    let led = set.captures.iter().map(|c| c.led).collect::<PerCapture<LedIndex>>();
+    let nothing = vec![0.0; simulator.slots.len()];
+    let surrogate = Surrogate::beside(&simulator, &nothing, Some((&led, set.leds.len())), progress)?;
+    let shown = exposed(&set, &surrogate, bench.peak);
+    let margins = choice.margins(&picked);
+    let detections: Vec<(Requirement, f64, bool)> = choice
+        .requirements
+        .iter()
+        .zip(margins)
+        .zip(&reachable)
+        .filter(|((r, _), _)| r.beside.is_empty())
+        .map(|((r, margin), reachable)| (r.clone(), margin, *reachable))
+        .collect();
+    let plan = CapturePlan {
+        folder: request.folder.to_owned(),
+        page: request.folder.join("plan.html"),
+        candidates: candidates.captures.len(),
+        captures: shown.captures.iter().map(|c| planned(c, &shown, bench)).collect(),
+        effects: judgement::effects(&simulator, &surrogate, &shown, &detections, progress)?,
+        confusions: judgement::confusions(&simulator, &shown, &choice, &picked, &reachable),
+    };
+    files::write_set(request.folder, design, bench, &shown, &request.layout_in_set)?;
+    page::write_page(&plan, &shown, candidates.unseen)?;
+    metalith_report::write_json(&request.folder.join("plan.json"), "plan", &plan)?;
+    Ok(plan)
+}
+
+fn wanted_effects(set: &MeasuredSet, request: &PlanRequest<'_>) -> Result<Vec<Box<dyn Effect>>> {
+    let mut effects = effects::all(set);
+    check_effects(&effects, &request.only)?;
+    if !request.only.is_empty() {
+        effects.retain(|e| request.only.contains(&e.name()));
+    }
+    Ok(effects)
+}
+
+fn place(capture: &crate::set::Capture) -> Place {
+    Place {
+        element: capture.element.into(),
+        led: capture.led.into(),
+        aoi_rad: capture.aoi_rad,
+        distance_um: capture.distance_um,
+    }
+}
+
+/// Each parameter of each effect is to be detected, and to be told from each other effect. Parameters that change nothing
+/// by themselves are not asked for.
+fn requirements(effects: &[Box<dyn Effect>], bench: &BenchFile) -> Vec<Requirement> {
+    let mut slots: Vec<Vec<usize>> = Vec::new();
+    let mut own: Vec<(usize, usize, f64)> = Vec::new();
+    let mut next = 0;
+    for (e, effect) in effects.iter().enumerate() {
+        let parameters = effect.parameters();
+        let asked = bench.wanted.get(&effect.name());
+        for (k, p) in parameters.iter().enumerate() {
+            if k == 0 || !effect.dormant() {
+                let size = asked.map_or(p.typical, |amount| effect.parameter(*amount));
+                own.push((e, next + k, size));
+            }
+        }
+        slots.push((next..next + parameters.len()).collect());
+        next += parameters.len();
+    }
+    let detected = own.iter().map(|&(_, slot, size)| Requirement {
+        slot,
+        size,
+        beside: Vec::new(),
+    });
+    let apart = own.iter().flat_map(|&(e, slot, size)| {
+        let others = slots.iter().enumerate().filter(move |(other, _)| *other != e);
+        others.map(move |(_, beside)| Requirement {
+            slot,
+            size,
+            beside: beside.clone(),
+        })
+    });
+    detected.chain(apart).collect()
+}
+
+/// An effect that cannot be found is not to be told from others.
+fn only_of_what_is_found(choice: &Choice<'_>, reachable: &mut [bool]) {
+    let lost: Vec<usize> = choice
+        .requirements
+        .iter()
+        .zip(reachable.iter())
+        .filter(|(r, reached)| r.beside.is_empty() && !**reached)
+        .map(|(r, _)| r.slot)
+        .collect();
+    for (r, reached) in choice.requirements.iter().zip(reachable) {
+        *reached &= !lost.contains(&r.slot);
+    }
+}
+
+/// The session of the captures that were chosen, and the widths by SEM that are offered.
+fn chosen_set(candidates: &Candidates, bench: &BenchFile, information: &Information, picked: &[Picked]) -> MeasuredSet {
+    let mut set = candidates.set.clone();
+    set.captures = picked
+        .iter()
+        .map(|p| {
+            let mut capture = information.told[p.candidate].capture.clone();
+            capture.frames = p.frames;
+            capture
+        })
+        .collect();
+    if let Some(offer) = bench.sem {
+        set.sem = sem_sites(&set, offer);
+    }
+    set
+}
+
+fn planned(capture: &crate::set::Capture, set: &MeasuredSet, bench: &BenchFile) -> PlannedCapture {
+    PlannedCapture {
+        file: files::frame_file(&capture.name, bench),
+        element: set.elements[capture.element].index,
+        led_nm: set.leds[capture.led].centre_nm,
+        aoi_deg: capture.aoi_rad.map(|a| (a.to_degrees() * 1e4).round() / 1e4),
+        distance_um: capture.distance_um,
+        window_centre_um: capture.window_centre_um,
+        frames: capture.frames,
+        scale_dn: capture.scale_dn,
+        brightest_dn: f64::from(capture.dn.iter().copied().fold(0.0, f32::max)),
+    }
+}

@@ -1,0 +1,168 @@
+//! Exposures of one capture as one frame, with the noise of each pixel.
+
+use ndarray::Array2;
+
+use super::bayer::{Bayer, Channel};
+use super::{SensorFrames, saturated};
+use crate::set::RelayCamera;
+
+/// A mean frame of one exposure.
+pub struct Exposure {
+    /// As recorded, black level included (DN).
+    pub dn: Array2<f32>,
+    /// DN for |E|^2 / |E_inc|^2 = 1.
+    pub scale_dn: f64,
+    /// Frames that it is the mean of.
+    pub frames: u32,
+}
+
+/// A capture as it is used.
+pub struct Joined {
+    /// DN of the longest exposure, black level included.
+    pub dn: Array2<f32>,
+    /// Variance of each pixel (DN^2), infinite where it tells nothing; none where frames, gain and read noise say it.
+    pub noise: Option<Array2<f32>>,
+    /// That of the longest exposure.
+    pub scale_dn: f64,
+    pub frames: u32,
+}
+
+/// Join exposures of one scene: the mean of what they say of the light, each weighted by one over its variance; an
+/// exposure in which a pixel is saturated, or beside one that is, says nothing of it. Variances follow from a first mean of
+/// all exposures, not from each by itself, which would favour those that came out too dark. With `filter`, pixels under
+/// other filters are masked.
+///
+/// # Panics
+/// If there is no exposure.
+pub fn joined(
+    mut exposures: Vec<Exposure>,
+    sensor: &SensorFrames,
+    camera: &RelayCamera,
+    filter: Option<(Bayer, Channel)>,
+) -> Joined {
+    exposures.iter_mut().for_each(|e| sensor.take_out(&mut e.dn, camera));
+    let longest = exposures.iter().max_by(|a, b| a.scale_dn.total_cmp(&b.scale_dn));
+    let (scale_dn, frames) = longest.map(|e| (e.scale_dn, e.frames)).expect("at least one exposure");
+    let response = sensor.responses(camera);
+    if let ([only], None, None) = (exposures.as_slice(), &response, filter) {
+        return Joined {
+            dn: only.dn.clone(),
+            noise: None,
+            scale_dn,
+            frames,
+        };
+    }
+    let black = camera.black_level_dn;
+    let masks: Vec<Array2<bool>> = exposures
+        .iter()
+        .map(|e| saturated(&e.dn, camera.saturation_dn))
+        .collect();
+    let mut dn = exposures[0].dn.clone();
+    let mut noise = Array2::from_elem(dn.dim(), f32::INFINITY);
+    for (at, to) in dn.indexed_iter_mut() {
+        let usable = || {
+            exposures
+                .iter()
+                .zip(&masks)
+                .filter(|(_, full)| !full[at])
+                .map(|(e, _)| e)
+        };
+        let signal = |e: &Exposure| f64::from(e.dn[at]) - black;
+        let (light, weight) = usable().fold((0.0, 0.0), |(light, weight), e| {
+            let frames = f64::from(e.frames);
+            (light + frames * signal(e), weight + frames * e.scale_dn)
+        });
+        if weight == 0.0 {
+            // All that is known is that there is much of it.
+            *to = (black
+                + scale_dn / exposures.iter().map(|e| e.scale_dn).fold(f64::MAX, f64::min) * camera.saturation_dn)
+                as f32;
+            continue;
+        }
+        let (first, response) = (light / weight, response.as_ref().map_or(1.0, |r| f64::from(r[at])));
+        let (mut sum, mut certainty) = (0.0, 0.0);
+        for e in usable() {
+            let shot = (first * e.scale_dn).max(0.0) / (camera.gain_e_per_dn * response);
+            let read = (camera.read_noise_dn / response).powi(2);
+            let own = e.scale_dn * e.scale_dn * f64::from(e.frames) / (shot + read);
+            sum += own * signal(e) / e.scale_dn;
+            certainty += own;
+        }
+        *to = (black + scale_dn * sum / certainty) as f32;
+        noise[at] = (scale_dn * scale_dn / certainty) as f32;
+    }
+    if let Some((bayer, channel)) = filter {
+        dn = bayer.filled(&dn, channel);
+        for (at, v) in noise.indexed_iter_mut() {
+            if !bayer.has(at, channel) {
+                *v = f32::INFINITY;
+            }
+        }
+    }
+    Joined {
+        dn,
+        noise: Some(noise),
+        scale_dn,
+        frames,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sensor::tests::camera;
+    use super::*;
+
+    fn exposure(scale_dn: f64, frames: u32, values: [f32; 6]) -> Exposure {
+        Exposure {
+            dn: Array2::from_shape_vec((2, 3), values.to_vec()).unwrap(),
+            scale_dn,
+            frames,
+        }
+    }
+
+    /// Two exposures of unlike length: what is saturated in the long one comes from the short one, the rest from both,
+    /// with the variance of a mean that is weighted by certainty.
+    #[test]
+    fn exposures_are_joined_with_their_noise() {
+        // Single precision.
+        const ROUNDING: f64 = 1e-5;
+        let mut camera = camera();
+        (camera.saturation_dn, camera.gain_e_per_dn, camera.read_noise_dn) = (1000.0, 2.0, 3.0);
+        let long = exposure(100.0, 4, [1000.0, 440.0, 340.0, 240.0, 140.0, 40.0]);
+        let short = exposure(10.0, 16, [540.0, 80.0, 70.0, 60.0, 50.0, 40.0]);
+        let joined = joined(vec![short, long], &SensorFrames::default(), &camera, None);
+        assert_eq!((joined.scale_dn, joined.frames), (100.0, 4));
+        let noise = joined.noise.unwrap();
+        // Pixels beside the saturated one are the short exposure's alone: 40 DN over black in 16 frames, times ten.
+        assert!((f64::from(joined.dn[(0, 0)]) - 5040.0).abs() < 5040.0 * ROUNDING);
+        assert!((f64::from(joined.dn[(0, 1)]) - 440.0).abs() < 440.0 * ROUNDING);
+        let alone = (40.0 / 2.0 + 9.0) / 16.0 * 100.0;
+        assert!(
+            (f64::from(noise[(0, 1)]) / alone - 1.0).abs() < ROUNDING,
+            "{}",
+            noise[(0, 1)]
+        );
+        // The far pixel has both: 300 DN in 4 frames, 30 DN in 16.
+        let (a, b) = ((300.0 / 2.0 + 9.0) / 4.0, (30.0 / 2.0 + 9.0) / 16.0 * 100.0);
+        let both = 1.0 / (1.0 / a + 1.0 / b);
+        assert!(
+            (f64::from(noise[(0, 2)]) / both - 1.0).abs() < ROUNDING,
+            "{}",
+            noise[(0, 2)]
+        );
+        assert!((f64::from(joined.dn[(0, 2)]) - 340.0).abs() < 340.0 * ROUNDING);
+    }
+
+    #[test]
+    fn pixels_under_other_filters_are_masked() {
+        let filter = Some((Bayer::CHOICES[0].1, Channel::Green));
+        let frame = exposure(1.0, 1, [900.0, 50.0, 900.0, 60.0, 900.0, 70.0]);
+        let joined = joined(vec![frame], &SensorFrames::default(), &camera(), filter);
+        let noise = joined.noise.unwrap();
+        let counts: Vec<bool> = noise.iter().map(|v| v.is_finite()).collect();
+        assert_eq!(counts, [false, true, false, true, false, true]);
+        // Between two greens.
+        assert_eq!(joined.dn[(0, 0)], 55.0);
+        assert_eq!(joined.dn[(0, 1)], 50.0);
+    }
+}

@@ -1,0 +1,160 @@
+//! Camera frames from NPY, PNG and TIFF files, what the sensor itself adds to them, and several exposures as one.
+
+mod bayer;
+mod join;
+mod png;
+mod sensor;
+mod tiff;
+
+pub use bayer::{Bayer, Channel};
+pub use join::{Exposure, joined};
+pub use sensor::SensorFrames;
+
+use std::path::Path;
+
+use metalith_core::npy;
+use ndarray::Array2;
+
+use super::SATURATED;
+
+/// Most pixels of a stack of frames (1 GB in single precision).
+const MOST_PIXELS: u64 = 1 << 28;
+
+/// Read frames of exactly `rows` x `cols` finite numbers, whose values are DN: NPY, grey PNG, or grey TIFF. NPY of three axes
+/// and TIFF of several pages are stacks: what comes back is their mean, and pixels that are saturated in any frame
+/// have `saturation_dn`, which a mean would hide. The first row of the file is row 0. What is wrong comes back in words.
+pub fn read(path: &Path, rows: usize, cols: usize, saturation_dn: f64) -> Result<Array2<f32>, String> {
+    let is = |endings: &[&str]| {
+        let ending = path.extension().and_then(|e| e.to_str());
+        ending.is_some_and(|e| endings.iter().any(|known| e.eq_ignore_ascii_case(known)))
+    };
+    let frames = if is(&["png"]) {
+        vec![png::read(path, rows, cols)?]
+    } else if is(&["tif", "tiff"]) {
+        tiff::read(path, rows, cols)?
+    } else {
+        from_npy(path, rows, cols)?
+    };
+    mean(&frames, rows, cols, saturation_dn)
+}
+
+fn from_npy(path: &Path, rows: usize, cols: usize) -> Result<Vec<Vec<f32>>, String> {
+    let one = [rows as u64, cols as u64];
+    let takes = |shape: &[u64]| {
+        shape == one
+            || (shape.len() == 3 && shape[1..] == one && shape[0] > 0 && shape[0] <= MOST_PIXELS / (one[0] * one[1]))
+    };
+    let array = npy::read(path, takes).map_err(|error| match error {
+        npy::NpyError::Shape { .. } => format!("{error}, the camera says [{rows}, {cols}]"),
+        other => other.to_string(),
+    })?;
+    let frames = array.values.chunks_exact(rows * cols);
+    Ok(frames.map(|f| f.iter().map(|&v| v as f32).collect()).collect())
+}
+
+fn mean(frames: &[Vec<f32>], rows: usize, cols: usize, saturation_dn: f64) -> Result<Array2<f32>, String> {
+    let wrong = frames.iter().flatten().filter(|v| !v.is_finite()).count();
+    if wrong > 0 {
+        let all = frames.len() * rows * cols;
+        return Err(format!("{wrong} of its {all} pixels are not finite numbers"));
+    }
+    let full = (SATURATED * saturation_dn) as f32;
+    let values = (0..rows * cols).map(|at| match frames {
+        [one] => one[at],
+        many if many.iter().any(|f| f[at] >= full) => saturation_dn as f32,
+        many => (many.iter().map(|f| f64::from(f[at])).sum::<f64>() / many.len() as f64) as f32,
+    });
+    Array2::from_shape_vec((rows, cols), values.collect()).map_err(|e| e.to_string())
+}
+
+/// What a file of another size says.
+fn other_size(found: (usize, usize), rows: usize, cols: usize) -> String {
+    format!(
+        "it is {} x {} pixels, the camera says [{rows}, {cols}]",
+        found.0, found.1
+    )
+}
+
+/// Pixels that are saturated or beside one that is, diagonally too.
+pub fn saturated(dn: &Array2<f32>, saturation_dn: f64) -> Array2<bool> {
+    let mut out = Array2::from_elem(dn.dim(), false);
+    let (rows, cols) = dn.dim();
+    for ((y, x), v) in dn.indexed_iter() {
+        if f64::from(*v) >= SATURATED * saturation_dn {
+            for ny in y.saturating_sub(1)..(y + 2).min(rows) {
+                for nx in x.saturating_sub(1)..(x + 2).min(cols) {
+                    out[(ny, nx)] = true;
+                }
+            }
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::File;
+
+    use npyz::WriterBuilder;
+
+    use super::*;
+
+    const FULL: f64 = 60_000.0;
+
+    #[test]
+    fn grey_png_files_hold_dn() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let write = |depth: ::png::BitDepth, data: &[u8]| {
+            let mut encoder = ::png::Encoder::new(File::create(&path).unwrap(), 3, 2);
+            encoder.set_color(::png::ColorType::Grayscale);
+            encoder.set_depth(depth);
+            encoder.write_header().unwrap().write_image_data(data).unwrap();
+        };
+        write(::png::BitDepth::Eight, &[1, 2, 3, 4, 5, 255]);
+        assert_eq!(
+            read(&path, 2, 3, FULL).unwrap(),
+            ndarray::arr2(&[[1.0, 2.0, 3.0], [4.0, 5.0, 255.0]])
+        );
+        write(::png::BitDepth::Sixteen, &[0, 1, 1, 0, 0, 3, 0, 4, 0, 5, 255, 255]);
+        assert_eq!(
+            read(&path, 2, 3, FULL).unwrap(),
+            ndarray::arr2(&[[1.0, 256.0, 3.0], [4.0, 5.0, 65535.0]])
+        );
+        assert!(read(&path, 3, 3, FULL).unwrap_err().contains("2 x 3"));
+        write(::png::BitDepth::One, &[0, 0]);
+        assert!(read(&path, 2, 3, FULL).unwrap_err().contains("not grey of 8 or 16"));
+    }
+
+    /// A stack of TIFF pages and one of NPY frames are their mean; a pixel that is saturated once is saturated.
+    #[test]
+    fn stacks_are_means_and_keep_what_is_saturated() {
+        use ::tiff::encoder::{TiffEncoder, colortype};
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.tif");
+        let pages: [[u16; 6]; 2] = [[1, 2, 3, 4, 5, 600], [3, 4, 5, 6, 7, 0]];
+        {
+            let mut encoder = TiffEncoder::new(File::create(&path).unwrap()).unwrap();
+            for page in &pages {
+                encoder.write_image::<colortype::Gray16>(3, 2, page).unwrap();
+            }
+        }
+        let want = ndarray::arr2(&[[2.0, 3.0, 4.0], [5.0, 6.0, 600.0]]);
+        assert_eq!(read(&path, 2, 3, 600.0).unwrap(), want);
+        assert!(read(&path, 3, 2, 600.0).unwrap_err().contains("2 x 3"));
+        let npy = folder.path().join("a.npy");
+        let mut bytes = Vec::new();
+        let mut writer = npyz::WriteOptions::new()
+            .default_dtype()
+            .shape(&[2, 2, 3])
+            .writer(&mut bytes)
+            .begin_nd()
+            .unwrap();
+        writer.extend(pages.concat()).unwrap();
+        writer.finish().unwrap();
+        std::fs::write(&npy, bytes).unwrap();
+        assert_eq!(read(&npy, 2, 3, 600.0).unwrap(), want);
+        std::fs::write(&path, b"II*\0nothing").unwrap();
+        assert!(read(&path, 2, 3, 600.0).unwrap_err().contains("no TIFF"));
+    }
+}

@@ -1,0 +1,177 @@
+//! Planned sessions: what is planned for is found in what comes back, read as it was written. They simulate whole sessions,
+//! so they are of the second tier.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use metalith_calibrate::{
+    BenchFile, CapturePlan, MeasuredSet, PlanRequest, Sampling, Session, Settings, Synthesizer, plan,
+};
+use metalith_core::Silent;
+use metalith_design::{Design, PillarArray};
+use metalith_gds::extract::GdsPillars;
+use metalith_layout::write_pillars;
+use metalith_testing::session::write_npy;
+use ndarray::Array2;
+
+/// Edge of a frame (pixels).
+const PIXELS: usize = 48;
+
+/// A bench with two narrow LEDs, so that few wavelengths are simulated.
+const BENCH: &str = r#"schema = 1
+
+[source]
+kind = "collimated"
+divergence_mrad = 2.35
+divergence_axes = "uniform disc"
+
+[camera]
+pixel_um = 0.5
+rows = 48
+cols = 48
+black_level_dn = 40.0
+gain_e_per_dn = 5.0
+read_noise_dn = 2.0
+saturation_dn = 4095
+registration_sigma_px = 0.5
+flux_sigma = 0.01
+
+[[led]]
+centre_nm = 500
+fwhm_nm = 6.0
+
+[[led]]
+centre_nm = 560
+fwhm_nm = 6.0
+
+[captures]
+elements = [0, 0, 1, 0]
+distance_um = [139.0, 144.0, 149.0]
+frames = [16, 64]
+
+[sem]
+sites = 24
+sigma_nm = 1.5
+edge_offset_nm = 1.0
+
+[wanted]
+gap = 2.0
+cd_bias = 6.0
+"#;
+
+/// Plan a session for a design.
+fn planned(folder: &Path, design: &Design, bench: &str, only: &[&str]) -> CapturePlan {
+    let array = PillarArray::build(design, &Silent).unwrap();
+    let layout = folder.join("layout.gds");
+    write_pillars(design, &array, design.layout.hierarchy, &layout, &Silent).unwrap();
+    let file = folder.join("bench.toml");
+    fs::write(&file, bench).unwrap();
+    let request = PlanRequest {
+        design,
+        bench: &BenchFile::read(&file).unwrap(),
+        layout: &layout,
+        layout_in_set: "layout.gds".into(),
+        folder,
+        only: only.iter().map(|n| (*n).into()).collect(),
+        cache: None,
+    };
+    plan(&request, &GdsPillars, &Silent).unwrap()
+}
+
+fn mini() -> Design {
+    Design::read(&metalith_testing::root().join("designs/mini_3x3.toml")).unwrap()
+}
+
+/// Fill the folder with frames; dark ones where none are given.
+fn fill(folder: &Path, plan: &CapturePlan, set: Option<&MeasuredSet>) {
+    for (k, capture) in plan.captures.iter().enumerate() {
+        let dark = Array2::from_elem((PIXELS, PIXELS), 40.0);
+        let frame = set.map_or(dark, |set| set.captures.raw[k].dn.clone());
+        write_npy(&folder.join(&capture.file), &frame);
+    }
+}
+
+fn read(folder: &Path) -> MeasuredSet {
+    MeasuredSet::read(folder, &GdsPillars, &Silent).unwrap()
+}
+
+fn settings(cache: PathBuf, only: &[&str]) -> Settings {
+    Settings {
+        sampling: Sampling {
+            spectrum: 0.34,
+            ..Sampling::default()
+        },
+        cache: Some(cache),
+        only: only.iter().map(|n| (*n).into()).collect(),
+        compare_fidelities: false,
+        ..Settings::default()
+    }
+}
+
+#[test]
+#[ignore = "second tier: CPU time, run by .ci/run"]
+fn what_is_planned_for_is_found_in_what_comes_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let tried = ["cd_bias", "gap", "pixel_blur"];
+    let plan = planned(folder.path(), &mini(), BENCH, &tried);
+    assert!(plan.finds_all(), "{}", plan.sentence());
+    assert!(
+        plan.captures.len() >= 4 && plan.captures.len() < plan.candidates / 2,
+        "{}",
+        plan.sentence()
+    );
+    assert_eq!(plan.confusions.len(), 0, "{:?}", plan.confusions);
+    let page = fs::read_to_string(&plan.page).unwrap();
+    assert!(plan.captures.iter().all(|c| page.contains(&c.file)));
+    // The brightest pixel is where the bench asked for it: three digits of the exposure.
+    for c in &plan.captures {
+        assert!(
+            (c.brightest_dn / (0.7 * 4095.0) - 1.0).abs() < 0.01,
+            "{}",
+            c.brightest_dn
+        );
+    }
+
+    fill(folder.path(), &plan, None);
+    let like = read(folder.path());
+    assert!(like.sem.is_empty(), "no width has been measured yet");
+    let settings = settings(folder.path().join("cells"), &tried);
+    let synthesizer = Synthesizer::new(&like, &settings).unwrap();
+    for (name, size) in [("cd_bias", 6.0), ("gap", 2.0)] {
+        let images = synthesizer.with_effect(name, &[size], &Silent).unwrap();
+        fill(folder.path(), &plan, Some(&synthesizer.draw(&images, 41)));
+        let came_back = read(folder.path());
+        let session = Session::new(&came_back, settings.clone()).unwrap();
+        let found = session
+            .diagnose(&session.simulate(&Silent).unwrap(), &Silent)
+            .unwrap()
+            .0;
+        let names: Vec<&str> = found.effects.iter().map(|e| e.name.as_str()).collect();
+        assert_eq!(names, [name], "{}", found.sentence());
+        assert_eq!(found.effects[0].holds(size), Some(true), "{}", found.sentence());
+    }
+}
+
+/// One distance in focus cannot tell a gap from a source that is near; three distances do.
+#[test]
+#[ignore = "second tier: CPU time, run by .ci/run"]
+fn what_captures_cannot_split_is_named_with_what_can() {
+    let folder = tempfile::tempdir().unwrap();
+    let bench = BENCH
+        .replace("[139.0, 144.0, 149.0]", "[144.0]")
+        .replace("elements = [0, 0, 1, 0]", "elements = [0, 0]")
+        .replace("gap = 2.0", "gap = 0.06");
+    let plan = planned(
+        folder.path(),
+        &mini(),
+        &bench,
+        &["gap", "source_distance", "cd_bias", "corner_rounding"],
+    );
+    let pair = plan.confusions.iter().find(|c| {
+        let both = [c.effect.as_str(), c.looks_like.as_str()];
+        both.contains(&"gap") && both.contains(&"source_distance")
+    });
+    let pair = pair.unwrap_or_else(|| panic!("{:#?} {:#?}", plan.confusions, plan.effects));
+    assert!(pair.gain < pair.needed && !pair.captures_could);
+    assert!(pair.separate_by.is_some() && !pair.sem_decides);
+}

@@ -1,0 +1,105 @@
+//! `metalith plan`: from a design and a bench to the captures that tell effects apart.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use metalith::calibrate::{BenchFile, CapturePlan, PlanRequest, plan};
+use metalith::cell::cache_folder;
+use metalith::extract::GdsPillars;
+use metalith::{Error, PillarArray, Result, write_pillars};
+
+use super::{Outcome, Terminal, print_json, print_line, standard_input};
+
+/// Plan a bench session: the fewest captures that find every effect at a wanted size and tell it from the others.
+#[derive(Args)]
+#[command(
+    after_help = "Example:\n  metalith plan designs/mini_3x3.toml --bench bench.toml --out out/session-1\n\nWrites measurement.toml, plan.html (a check list to print) and plan.json; frames go to captures/. Exit code 1 if an effect is not found at its wanted size."
+)]
+pub struct PlanArgs {
+    /// The design file.
+    design: PathBuf,
+
+    /// What the bench can do, and what it is to find.
+    #[arg(long, short, value_name = "BENCH")]
+    bench: PathBuf,
+
+    /// The layout that was written; without it, the design's pillars are written into the folder.
+    #[arg(long, value_name = "FILE")]
+    layout: Option<PathBuf>,
+
+    /// Folder of the session, created if need be; `out/NAME_session` of the design if left out.
+    #[arg(long, short, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+
+    /// Plan for these effects alone, separated by commas; for all of them if left out.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    effects: Vec<String>,
+
+    /// Print the plan as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Name of the layout in the folder of the session.
+const LAYOUT: &str = "layout.gds";
+
+pub fn run(args: &PlanArgs, terminal: &Terminal) -> Result<Outcome> {
+    terminal.stop_on_interrupt();
+    let design = standard_input::design(&args.design)?;
+    let bench = BenchFile::read(&args.bench)?;
+    let folder = match &args.out {
+        Some(out) => out.clone(),
+        None => Path::new("out").join(format!("{}_session", design.name)),
+    };
+    // A session that was begun is not overwritten: its exposures and frames would no longer be those of its plan.
+    let begun = folder.join("captures");
+    if std::fs::read_dir(&begun).is_ok_and(|mut files| files.next().is_some()) {
+        return Err(Error::invalid(
+            format!("there are frames in {}", begun.display()),
+            "give another folder with --out, or move them away",
+        ));
+    }
+    let (layout, layout_in_set) = match &args.layout {
+        Some(file) => {
+            let whole = std::fs::canonicalize(file).map_err(Error::io("find", file))?;
+            let name = whole.display().to_string();
+            (whole, name)
+        }
+        None => {
+            let file = folder.join(LAYOUT);
+            let array = PillarArray::build(&design, terminal)?;
+            write_pillars(&design, &array, design.layout.hierarchy, &file, terminal)?;
+            (file, LAYOUT.to_owned())
+        }
+    };
+    let request = PlanRequest {
+        design: &design,
+        bench: &bench,
+        layout: &layout,
+        layout_in_set,
+        folder: &folder,
+        only: args.effects.clone(),
+        cache: cache_folder(),
+    };
+    let planned = plan(&request, &GdsPillars, terminal)?;
+    terminal.clear();
+    if args.json {
+        print_json(&planned);
+    } else {
+        describe(&planned);
+    }
+    Ok(if planned.finds_all() {
+        Outcome::Fine
+    } else {
+        Outcome::OutsideLimits
+    })
+}
+
+fn describe(planned: &CapturePlan) {
+    print_line!("{}", planned.sentence());
+    for c in &planned.confusions {
+        print_line!("not told apart: {} and {}; {}", c.effect, c.looks_like, c.remedy());
+    }
+    print_line!("{}", planned.folder.join("measurement.toml").display());
+    print_line!("{}", planned.page.display());
+}

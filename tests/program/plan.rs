@@ -1,0 +1,56 @@
+//! `metalith plan`: what is refused before anything is simulated.
+
+use assert_cmd::Command;
+use predicates::prelude::PredicateBooleanExt;
+
+fn plan(bench: &str, more: &[&str]) -> assert_cmd::assert::Assert {
+    let mut command = Command::cargo_bin("metalith").unwrap();
+    command
+        .args(["plan", "designs/mini_3x3.toml", "--bench", bench])
+        .args(more);
+    command.assert()
+}
+
+#[test]
+fn faults_of_the_bench_are_named_and_frames_are_not_overwritten() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let bench = path("bench.toml");
+    std::fs::write(&bench, "schema = 1\n[captures]\npeak = 3.0\n").unwrap();
+    let told = plan(&bench, &["--out", &path("out")]).code(2);
+    told.stderr(predicates::str::contains("peak").and(predicates::str::contains("camera")));
+    std::fs::write(&bench, SOUND).unwrap();
+    plan(&bench, &["--out", &path("out"), "--effects", "cd_bais"])
+        .code(2)
+        .stderr(predicates::str::contains("did you mean `cd_bias`?"));
+    std::fs::create_dir_all(folder.path().join("begun/captures")).unwrap();
+    std::fs::write(folder.path().join("begun/captures/a.npy"), b"").unwrap();
+    plan(&bench, &["--out", &path("begun")])
+        .code(2)
+        .stderr(predicates::str::contains("there are frames in"));
+}
+
+const SOUND: &str = r#"schema = 1
+
+[source]
+kind = "collimated"
+divergence_mrad = 2.35
+divergence_axes = "uniform disc"
+
+[camera]
+pixel_um = 0.5
+rows = 48
+cols = 48
+black_level_dn = 40.0
+gain_e_per_dn = 5.0
+read_noise_dn = 2.0
+saturation_dn = 4095
+registration_sigma_px = 0.5
+flux_sigma = 0.01
+
+[[led]]
+centre_nm = 500
+fwhm_nm = 6.0
+
+[captures]
+"#;
