@@ -1,14 +1,16 @@
-//! Complex transmission of cells of circles, for `scripts/shape_peers.py`: `cargo run --release --example shapes -- 17 25`.
+//! Jones matrices of cells of circles and of rotated rectangles, for `scripts/shape_peers.py`:
+//! `cargo run --release --example shapes -- 17 25`.
 //!
-//! One line of JSON for each number of orders: all cases of [`CASES`] at all their diameters, along the normal.
+//! One line of JSON for each number of orders: all cases of [`CIRCLES`] at five diameters, all of [`RECTANGLES`] at five
+//! angles, along the normal.
 
-use metalith::cell::{CellStack, Material};
+use metalith::cell::{CellStack, Material, RotatedRectangle};
 use metalith::rcwa::Orders;
 use metalith::{PillarShape, Result};
+use num_complex::Complex64;
 
-/// Film, pitch, height (nm), wavelength (um) and the smallest diameter and its step (nm); five diameters each. From fused
-/// silica to air.
-const CASES: [(&str, f64, f64, f64, f64, f64); 6] = [
+/// Film, pitch, height (nm), wavelength (um) and the smallest diameter and its step (nm). From fused silica to air.
+const CIRCLES: [(&str, f64, f64, f64, f64, f64); 6] = [
     ("sin_luke_2015", 350.0, 700.0, 0.455, 110.0, 45.0),
     ("sin_luke_2015", 350.0, 700.0, 0.530, 110.0, 45.0),
     ("sin_luke_2015", 350.0, 700.0, 0.660, 110.0, 45.0),
@@ -17,35 +19,72 @@ const CASES: [(&str, f64, f64, f64, f64, f64); 6] = [
     ("a_si_pierce_1972", 750.0, 900.0, 1.550, 200.0, 70.0),
 ];
 
+/// Film, pitch, height (nm), wavelength (um), width and length (nm).
+const RECTANGLES: [(&str, f64, f64, f64, f64, f64); 6] = [
+    ("sin_luke_2015", 350.0, 700.0, 0.530, 110.0, 260.0),
+    ("sin_luke_2015", 400.0, 800.0, 0.660, 140.0, 320.0),
+    ("tio2_siefke_2016", 355.0, 600.0, 0.532, 100.0, 250.0),
+    ("tio2_siefke_2016", 320.0, 600.0, 0.532, 90.0, 200.0),
+    ("a_si_pierce_1972", 450.0, 550.0, 0.940, 120.0, 260.0),
+    ("a_si_pierce_1972", 750.0, 900.0, 1.550, 200.0, 440.0),
+];
+
+/// Angles of the rectangles (degrees).
+const ANGLES: [f64; 5] = [10.0, 30.0, 45.0, 70.0, 110.0];
+
+fn stack(film: &str, pitch: f64, height: f64) -> Result<CellStack> {
+    Ok(CellStack {
+        film: Material::named(film)?,
+        ..CellStack::paper(pitch, height)?
+    })
+}
+
+/// What a point is, and its Jones matrix: xx, xy, yx, yy.
+fn point(stack: &CellStack, wavelength: f64, shape: &str, jones: [[Complex64; 2]; 2]) -> Result<String> {
+    let film = stack.film.index(wavelength)?;
+    let entries = jones.iter().flatten().map(|t| format!("[{:.8}, {:.8}]", t.re, t.im));
+    Ok(format!(
+        "{{\"pitch\": {}, \"height\": {}, \"wavelength\": {}, {shape}, \"film\": [{}, {}], \"below\": {}, \"jones\": [{}]}}",
+        stack.pitch_nm,
+        stack.height_nm,
+        wavelength * 1e3,
+        film.re,
+        film.im,
+        stack.substrate.index(wavelength)?.re,
+        entries.collect::<Vec<_>>().join(", ")
+    ))
+}
+
 fn main() -> Result<()> {
     for argument in std::env::args().skip(1) {
         let along_axis: usize = argument.parse().expect("a number of orders");
         let orders = Orders::new(along_axis)?;
-        let mut values = Vec::new();
-        for (film, pitch, height, wavelength, first, step) in CASES {
+        let mut points = Vec::new();
+        for (film, pitch, height, wavelength, first, step) in CIRCLES {
             let stack = CellStack {
                 shape: PillarShape::Circle,
-                film: Material::named(film)?,
-                ..CellStack::paper(pitch, height)?
+                ..stack(film, pitch, height)?
             };
-            for k in 0..5 {
-                let diameter = first + step * f64::from(k);
+            for diameter in (0..5).map(|k| first + step * f64::from(k)) {
                 let t = stack.transmission(diameter, wavelength, orders)?;
-                let index = stack.film.index(wavelength)?;
-                let below = stack.substrate.index(wavelength)?;
-                values.push(format!(
-                    "{{\"pitch\": {pitch}, \"height\": {height}, \"wavelength\": {}, \"diameter\": {diameter}, \"film\": [{}, {}], \
-                     \"below\": {}, \"t\": [{:.8}, {:.8}]}}",
-                    wavelength * 1e3,
-                    index.re,
-                    index.im,
-                    below.re,
-                    t.re,
-                    t.im
-                ));
+                let jones = [[t, Complex64::ZERO], [Complex64::ZERO, t]];
+                points.push(point(&stack, wavelength, &format!("\"diameter\": {diameter}"), jones)?);
             }
         }
-        println!("{{\"orders\": {along_axis}, \"points\": [{}]}}", values.join(", "));
+        for (film, pitch, height, wavelength, width_nm, length_nm) in RECTANGLES {
+            let stack = stack(film, pitch, height)?;
+            for degrees in ANGLES {
+                let pillar = RotatedRectangle {
+                    width_nm,
+                    length_nm,
+                    rotation: degrees.to_radians(),
+                };
+                let jones = stack.jones(&pillar, wavelength, [0.0; 2], orders)?;
+                let shape = format!("\"size\": [{width_nm}, {length_nm}], \"degrees\": {degrees}");
+                points.push(point(&stack, wavelength, &shape, jones)?);
+            }
+        }
+        println!("{{\"orders\": {along_axis}, \"points\": [{}]}}", points.join(", "));
     }
     Ok(())
 }

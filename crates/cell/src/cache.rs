@@ -36,7 +36,7 @@ pub(super) fn inputs(spec: &TableSpec) -> Vec<u8> {
         solver: u32,
         spec: &'a TableSpec,
     }
-    let solver = kept::SOLVER;
+    let solver = kept::solver_of(spec.stack.shape);
     serde_json::to_vec(&Inputs { solver, spec }).expect("plain data serialises")
 }
 

@@ -9,10 +9,21 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-use metalith_core::{Error, Progress, Result, WholeFile, file::read_at_most};
+use metalith_core::{Error, PillarShape, Progress, Result, WholeFile, file::read_at_most};
 
 /// Raised whenever the solver or the sampling changes what it answers: kept results are then of no use.
 pub const SOLVER: u32 = 1;
+
+/// How often the solver has changed what it answers for circles alone.
+const SOLVER_OF_CIRCLES: u32 = 1;
+
+/// [`SOLVER`] for pillars of a shape: raised where the answers for that shape alone have changed.
+pub fn solver_of(shape: PillarShape) -> u32 {
+    match shape {
+        PillarShape::Square => SOLVER,
+        PillarShape::Circle => SOLVER + SOLVER_OF_CIRCLES,
+    }
+}
 
 /// Length of the checksum.
 const CHECKSUM: usize = 32;

@@ -75,14 +75,18 @@ impl CellStack {
     /// # Errors
     /// If the foot is wider than the pitch, or the wavelength is outside the range of a material.
     pub fn layers(&self, width_nm: f64, wavelength_um: f64) -> Result<LayerStack> {
+        self.layers_of(wavelength_um, |wider_nm| self.outline((width_nm + wider_nm).max(0.0)))
+    }
+
+    /// Layers of a pillar with these cross-sections, each by how much wider than the top it is (nm).
+    pub(super) fn layers_of(&self, wavelength_um: f64, outline: impl Fn(f64) -> Outline) -> Result<LayerStack> {
         self.check()?;
         let ambient = self.ambient.index(wavelength_um)?;
         let film = self.film.index(wavelength_um)?;
-        let layer = |height_nm: f64, width_nm: f64, inside: Complex64| -> Layer {
-            let width_nm = width_nm.max(0.0);
+        let layer = |height_nm: f64, wider_nm: f64, inside: Complex64| -> Layer {
             Layer {
                 height_nm,
-                outline: self.outline(width_nm),
+                outline: outline(wider_nm),
                 inside,
                 outside: ambient,
             }
@@ -95,10 +99,10 @@ impl CellStack {
         }
         layers.extend((0..slices).map(|slice| {
             let depth_nm = self.height_nm * (1.0 - (slice as f64 + 0.5) / slices as f64);
-            layer(self.height_nm / slices as f64, width_nm + slope * depth_nm, film)
+            layer(self.height_nm / slices as f64, slope * depth_nm, film)
         }));
         if self.mask_height_nm > 0.0 {
-            layers.push(layer(self.mask_height_nm, width_nm, self.mask.index(wavelength_um)?));
+            layers.push(layer(self.mask_height_nm, 0.0, self.mask.index(wavelength_um)?));
         }
         Ok(LayerStack {
             pitch_nm: self.pitch_nm,

@@ -357,7 +357,12 @@ impl CellBank {
 
     /// What the numbers follow from.
     fn inputs(&self) -> Vec<u8> {
-        let known = format!("{} {:?} {:?}", kept::SOLVER, self.stated, self.range);
+        let known = format!(
+            "{} {:?} {:?}",
+            kept::solver_of(self.stated.shape),
+            self.stated,
+            self.range
+        );
         known.into_bytes()
     }
 }

@@ -157,7 +157,11 @@ impl Checkpoint {
 /// Of all that decides an optimisation.
 fn digest(design: &Design) -> String {
     let decisive = (&design.cell, &design.lens, &design.mapping, &design.optimise);
-    let bytes = serde_json::to_vec(&decisive).expect("plain data serialises");
+    let mut bytes = serde_json::to_vec(&decisive).expect("plain data serialises");
+    // The solver of squares is named in the inputs of the file.
+    if !design.cell.shape.is_square() {
+        bytes.extend(kept::solver_of(design.cell.shape).to_le_bytes());
+    }
     Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect()
 }
 

@@ -42,6 +42,9 @@ pub enum Error {
         outlines: usize,
         sites: usize,
     },
+    /// Sites are counted from one.
+    #[error("a rotated rectangle on site {site} of a supercell")]
+    RotatedSite { site: usize },
     #[error("diffraction orders up to {highest} for each cell of a supercell")]
     SupercellOrders { highest: usize },
     #[error("{sites} sites with orders up to {highest} for each are {unknowns} unknowns")]
@@ -147,6 +150,9 @@ impl Error {
             }
             Self::OutlineCount { .. } => {
                 "give each layer one outline for each site, an empty one where nothing stands".into()
+            }
+            Self::RotatedSite { .. } => {
+                "solve it in a cell of its own: supercells know pillars that both axes mirror".into()
             }
             Self::SupercellOrders { .. } => format!("use at most {}", Orders::MOST / 2),
             Self::SupercellTooLarge { most, .. } => {

@@ -2,9 +2,11 @@
 
 mod basis;
 mod error;
+mod jones;
 mod layer;
 mod material;
 mod outline;
+mod permittivity;
 mod propagate;
 mod response;
 mod scalar;
@@ -16,10 +18,12 @@ use std::f64::consts::TAU;
 use faer::Mat;
 use num_complex::Complex64;
 
-use basis::{FieldBasis, Space};
-use layer::{CrossSection, Modes};
+use basis::{Family, FieldBasis, Space};
+pub use jones::circular;
+use layer::Modes;
 pub use material::Material;
 pub use outline::Outline;
+use permittivity::CrossSection;
 use propagate::{Ends, propagate_wave};
 pub use response::{Convergence, DiffractionOrder, Response, converge};
 pub use stack::{Layer, LayerStack, Orders};
@@ -122,7 +126,8 @@ const MOST_UNKNOWNS: usize = 6000;
 /// Everything known of how the stack answers a plane wave.
 ///
 /// At normal incidence, and where the plane of incidence is along an axis, only fields of the symmetry
-/// of the incident one are solved for: matrices a quarter or half as wide.
+/// of the incident one are solved for: matrices a quarter or half as wide. Of rotated rectangles half a turn is the symmetry,
+/// along the normal.
 ///
 /// # Errors
 /// If a number of the stack or the incidence is not physical, the incident wave does not propagate in
@@ -151,24 +156,32 @@ fn solve_with(stack: &LayerStack, incidence: &Incidence, orders: Orders, symmetr
 fn solve_once(stack: &LayerStack, incidence: &Incidence, orders: Orders, symmetric: bool) -> Result<Response> {
     let mut problem = Problem::new(stack, incidence, orders)?;
     let [kx, ky] = incidence.sines;
-    if !symmetric && kx == 0.0 && ky == 0.0 {
-        problem.k[0] = ALONG_AXIS;
-    }
+    let along_normal = kx == 0.0 && ky == 0.0;
     let unit = [[Complex64::ONE, Complex64::ZERO], [Complex64::ZERO, Complex64::ONE]];
-    let parts = match (symmetric && kx == 0.0, symmetric && ky == 0.0) {
-        (false, false) => vec![problem.part(Space::Full, Space::Full, &unit)?],
+    let mirrored = symmetric && problem.stack.is_mirrored();
+    let parts = match (mirrored && kx == 0.0, mirrored && ky == 0.0) {
+        (false, false) if symmetric && along_normal && !problem.stack.has_upright() => {
+            vec![problem.part(Family::Alike, &unit)?]
+        }
+        (false, false) => {
+            if along_normal {
+                problem.k[0] = ALONG_AXIS;
+            }
+            vec![problem.part(Family::Product(Space::Full, Space::Full), &unit)?]
+        }
         (split_x, split_y) => {
             let space = |split: bool, even: bool| match (split, even) {
                 (false, _) => Space::Full,
                 (true, true) => Space::Even,
                 (true, false) => Space::Odd,
             };
+            let family = |even: bool| Family::Product(space(split_x, even), space(split_y, even));
             // A wave polarised along x has Ex even about both axes; along y, Ey is, and Ex is odd.
-            let along_x = problem.part(space(split_x, true), space(split_y, true), &unit[..1])?;
+            let along_x = problem.part(family(true), &unit[..1])?;
             let along_y = if split_x && split_y && problem.stack.is_square() {
                 along_x.turned()
             } else {
-                problem.part(space(split_x, false), space(split_y, false), &unit[1..])?
+                problem.part(family(false), &unit[1..])?
             };
             vec![along_x, along_y]
         }
@@ -187,7 +200,10 @@ pub fn transmit(stack: &LayerStack, wavelength_um: f64, side: Side, orders: Orde
     }
     off_cutoff(wavelength_um, |wavelength_um| {
         let problem = Problem::new(stack, &Incidence::normal(wavelength_um, side), orders)?;
-        let part = problem.part(Space::Even, Space::Even, &[[Complex64::ONE, Complex64::ZERO]])?;
+        let part = problem.part(
+            Family::Product(Space::Even, Space::Even),
+            &[[Complex64::ONE, Complex64::ZERO]],
+        )?;
         response::finite(part.amplitude(&part.ends.transmitted, 0, 0, 0)[0])
     })
 }
@@ -244,8 +260,8 @@ impl Problem {
         })
     }
 
-    fn part(&self, x: Space, y: Space, incident: &[[Complex64; 2]]) -> Result<Part> {
-        let basis = FieldBasis::new(self.orders.highest(), x, y, self.k, self.step);
+    fn part(&self, family: Family, incident: &[[Complex64; 2]]) -> Result<Part> {
+        let basis = FieldBasis::new(self.orders.highest(), family, self.k, self.step);
         if basis.rows.len() > MOST_UNKNOWNS {
             return Err(Error::TooLarge {
                 along_axis: self.orders.along_axis(),

@@ -14,6 +14,9 @@ use super::{Incidence, LayerStack, Orders, Part, Problem, solve};
 pub struct Response {
     /// Zero order at the far side: `transmission[out][in]`, 0 for s and 1 for p; field ratios.
     pub transmission: [[Complex64; 2]; 2],
+    /// The same by transverse fields along the axes: `jones[out][in]`, 0 for x and 1 for y; ratios of the parts of the field
+    /// that lie in the plane of the lattice, whatever the angle. [`circular`](crate::circular) has it in circular polarisation.
+    pub jones: [[Complex64; 2]; 2],
     /// Zero order that returns, alike. A reflected p has its transverse part where the incident has it.
     pub reflection: [[Complex64; 2]; 2],
     /// All orders that propagate on either side.
@@ -57,6 +60,7 @@ impl Response {
         let [transmission, reflection] = fields.zero_order()?;
         Ok(Self {
             transmission,
+            jones: fields.jones()?,
             reflection,
             orders,
         })
@@ -81,10 +85,20 @@ impl<'a> Fields<'a> {
         }
     }
 
-    /// Transverse amplitudes [transmitted, reflected] of an order, for a unit transverse field along s
-    /// (0) or p (1).
-    fn amplitudes(&self, polarisation: usize, m: i32, n: i32) -> [[Complex64; 2]; 2] {
-        let wanted = self.polarisation[polarisation];
+    /// Transmission of the zero order along x and y.
+    fn jones(&self) -> Result<[[Complex64; 2]; 2]> {
+        let mut jones = [[Complex64::ZERO; 2]; 2];
+        for (input, unit) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
+            let [transmitted, _] = self.amplitudes(unit, 0, 0);
+            for output in [0, 1] {
+                jones[output][input] = finite(transmitted[output])?;
+            }
+        }
+        Ok(jones)
+    }
+
+    /// Transverse amplitudes [transmitted, reflected] of an order, for this transverse field that arrives.
+    fn amplitudes(&self, wanted: [f64; 2], m: i32, n: i32) -> [[Complex64; 2]; 2] {
         let mut sum = [[Complex64::ZERO; 2]; 2];
         for part in self.parts {
             for (column, incident) in part.incident.iter().enumerate() {
@@ -122,7 +136,7 @@ impl<'a> Fields<'a> {
                 self.problem.k,
                 self.polarisation[polarisation].map(Complex64::from),
             );
-            let both = self.amplitudes(polarisation, m, n);
+            let both = self.amplitudes(self.polarisation[polarisation], m, n);
             for side in [0, 1] {
                 power[side][polarisation] = finite(Complex64::from(flux(media[side], k, both[side]) / incident))?.re;
             }
@@ -147,7 +161,7 @@ impl<'a> Fields<'a> {
         {
             let leaving = cosine(index);
             for input in [0, 1] {
-                let field = self.amplitudes(input, 0, 0)[side];
+                let field = self.amplitudes(self.polarisation[input], 0, 0)[side];
                 for output in [0, 1] {
                     let unit = self.polarisation[output];
                     let mut ratio = field[0] * unit[0] + field[1] * unit[1];

@@ -89,6 +89,18 @@ impl LayerStack {
         self.layers.iter().all(|l| l.outline.is_square())
     }
 
+    /// Whether both axes mirror it.
+    pub(super) fn is_mirrored(&self) -> bool {
+        self.layers.iter().all(|l| l.outline.is_mirrored())
+    }
+
+    /// Whether any pillar has sides along the axes.
+    pub(super) fn has_upright(&self) -> bool {
+        self.layers
+            .iter()
+            .any(|l| l.outline.is_upright() && !l.outline.is_empty())
+    }
+
     /// Refuses what cannot be, before anything is computed from it.
     pub(super) fn check(&self) -> Result<()> {
         let pitch = self.pitch_nm;

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use metalith_cell::kept::SOLVER;
+use metalith_cell::kept::solver_of;
 use metalith_core::file::read_at_most;
 use metalith_core::{Error, Progress, Result, WholeFile};
 use metalith_design::Design;
@@ -225,7 +225,8 @@ pub(crate) fn key(tolerance: &Tolerance, design: &Design, layout: &Path) -> Resu
         hash.update(what);
         hash.update(bytes);
     };
-    add("version", format!("{} {SOLVER}", env!("CARGO_PKG_VERSION")).as_bytes());
+    let solver = solver_of(design.cell.shape);
+    add("version", format!("{} {solver}", env!("CARGO_PKG_VERSION")).as_bytes());
     // A design names further files: its digest covers what they say.
     add("design", design.digest().as_bytes());
     let mut files = vec![tolerance.path.clone(), tolerance.design.clone(), layout.to_owned()];

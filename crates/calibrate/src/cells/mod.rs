@@ -18,6 +18,7 @@ use sha2::{Digest, Sha256};
 pub use table::PillarTable;
 
 use self::carry::{Carried, carried_over};
+use metalith_cell::kept;
 use metalith_cell::{CellModel, CellStack};
 use metalith_core::{Error, Progress, Result, WholeFile};
 use metalith_made::{CellChange, off_cutoff, perturbed, possible_width_nm};
@@ -282,6 +283,10 @@ impl RigorousCells {
         let mut hash = Sha256::new();
         hash.update(env!("CARGO_PKG_VERSION"));
         hash.update(serde_json::to_vec(&self.stack).expect("plain data serialises"));
+        // The solver of squares is named in the file.
+        if !self.stack.shape.is_square() {
+            hash.update(kept::solver_of(self.stack.shape).to_le_bytes());
+        }
         let numbers = self
             .wavelengths_nm
             .iter()

@@ -109,6 +109,9 @@ impl Supercell {
             }
         }
         (0..self.lattice.len()).try_for_each(|site| {
+            if self.layers.iter().any(|layer| !layer.outlines[site].is_mirrored()) {
+                return Err(Error::RotatedSite { site: site + 1 });
+            }
             let layers = self.layers.iter().map(|layer| Layer {
                 height_nm: layer.height_nm,
                 outline: layer.outlines[site].clone(),

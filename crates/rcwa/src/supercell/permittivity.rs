@@ -14,7 +14,7 @@ use super::SiteLayer;
 use super::sites::{Lines, SiteLattice};
 use super::waves::{Waves, entry};
 use crate::basis::Space;
-use crate::layer::{Permittivity, invert};
+use crate::permittivity::{Permittivity, invert};
 
 /// Edges nearer than this are one (pitches): a strip so thin has no weight beside the rounding of the rest.
 const SAME_EDGE: f64 = 1e-12;
@@ -36,6 +36,7 @@ pub(super) fn permittivity(
 ) -> Permittivity<Complex64> {
     Permittivity {
         transverse: [0, 1].map(|axis| along(layer, pitch_nm, lattice, waves, axis)),
+        cross: None,
         z: laurent(layer, pitch_nm, lattice, waves),
     }
 }

@@ -1,9 +1,12 @@
 //! Plane waves of the lattice, and the symmetric combinations of them that a mirror plane leaves.
 
+mod family;
+
 use faer::Mat;
 use num_complex::Complex64;
 
 use super::scalar::Scalar;
+pub(super) use family::Family;
 
 /// Functions of one axis.
 ///
@@ -125,67 +128,49 @@ impl Rows {
 }
 
 /// The transverse field of a lattice in one symmetry.
-///
-/// Ex is in the space `x` times `y`, Ey in their derived spaces, Ez in `x` derived times `y`.
 #[derive(Clone)]
 pub(super) struct FieldBasis {
     pub highest: usize,
-    pub x: Space,
-    pub y: Space,
+    /// What Ex, Ey and Ez are made of.
+    pub families: [Family; 3],
     pub rows: Rows,
 }
 
 impl FieldBasis {
-    /// `k` is the wave vector of the zero order over k0, `step` the wavelength over the pitch. The k of
-    /// an axis in an even or odd space is zero.
-    pub fn new(highest: usize, x: Space, y: Space, k: [f64; 2], step: f64) -> Self {
-        let spaces = [(x, y), (x.derived(), y.derived()), (x.derived(), y)];
-        let place = |(sx, sy): (Space, Space), m: i32, n: i32| -> Option<usize> {
-            Some(sx.position(m, highest)? * sy.len(highest) + sy.position(n, highest)?)
-        };
-        let rows_of = |(sx, sy): (Space, Space)| sx.len(highest) * sy.len(highest);
-        let rows_x = rows_of(spaces[0]);
-        let mut rows = Vec::with_capacity(rows_x + rows_of(spaces[1]));
+    /// `family` is that of Ex, `k` the wave vector of the zero order over k0, `step` the wavelength over the pitch. The k of
+    /// an axis in an even or odd space is zero, and both are in a family that half a turn tells.
+    pub fn new(highest: usize, family: Family, k: [f64; 2], step: f64) -> Self {
+        let families = family.of_components();
+        let orders = families.map(|f| f.orders(highest));
+        let place = |family: Family, order: [i32; 2]| family.position(order, highest);
+        let rows_x = orders[0].len();
+        let mut rows = Vec::with_capacity(rows_x + orders[1].len());
         for component in [0, 1] {
-            let (sx, sy) = spaces[component];
-            for m in sx.orders(highest) {
-                for n in sy.orders(highest) {
-                    let partner = place(spaces[1 - component], m, n);
-                    rows.push(FieldRow {
-                        component,
-                        k: [k[0] + f64::from(m) * step, k[1] + f64::from(n) * step],
-                        partner: partner.map(|p| if component == 0 { rows_x + p } else { p }),
-                        z: place(spaces[2], m, n),
-                    });
-                }
+            for &order in &orders[component] {
+                let partner = place(families[1 - component], order);
+                rows.push(FieldRow {
+                    component,
+                    k: [0, 1].map(|axis| k[axis] + f64::from(order[axis]) * step),
+                    partner: partner.map(|p| if component == 0 { rows_x + p } else { p }),
+                    z: place(families[2], order),
+                });
             }
         }
         Self {
             highest,
-            x,
-            y,
+            families,
             rows: Rows {
                 list: rows,
                 of_x: rows_x,
-                of_z: rows_of(spaces[2]),
+                of_z: orders[2].len(),
             },
-        }
-    }
-
-    /// Spaces of a component along x and y.
-    fn spaces(&self, component: usize) -> (Space, Space) {
-        match component {
-            0 => (self.x, self.y),
-            _ => (self.x.derived(), self.y.derived()),
         }
     }
 
     /// Row and factor of the plane wave of order (m, n) in a component.
     pub fn plane_wave(&self, component: usize, m: i32, n: i32) -> Option<(usize, f64)> {
-        let (sx, sy) = self.spaces(component);
-        let (i, a) = sx.plane_wave(m, self.highest)?;
-        let (j, b) = sy.plane_wave(n, self.highest)?;
-        Some((component * self.rows.of_x + i * sy.len(self.highest) + j, a * b))
+        let (place, factor) = self.families[component].plane_wave([m, n], self.highest)?;
+        Some((component * self.rows.of_x + place, factor))
     }
 
     /// The plane-wave amplitudes of order (m, n) of the field in column `column` of `field`.

@@ -1,0 +1,235 @@
+//! Fourier coefficients of a pillar, and of the direction of its normal over it.
+//!
+//! The normal n enters by the matrix P = n n^T = (1 + [[c, s], [s, -c]]) / 2, where c and s are cosine and sine of twice its
+//! angle. They are given at the rim, and continued over the pillar by functions that are as smooth as may be there; outside
+//! of it they are not needed (see `normal`).
+
+use std::f64::consts::{PI, TAU};
+
+use crate::outline::SlantedForm;
+
+/// Fourier coefficients of a function of the cell for orders of -highest..=highest along both axes; those of opposite order
+/// are equal, as the function is alike after half a turn.
+pub(super) struct Coefficients {
+    highest: i32,
+    values: Vec<f64>,
+}
+
+impl Coefficients {
+    fn new(highest: usize) -> Self {
+        let side = 2 * highest + 1;
+        Self {
+            highest: highest as i32,
+            values: vec![0.0; side * side],
+        }
+    }
+
+    fn place(&self, m: i32, n: i32) -> usize {
+        ((m + self.highest) * (2 * self.highest + 1) + n + self.highest) as usize
+    }
+
+    pub fn at(&self, m: i32, n: i32) -> f64 {
+        self.values[self.place(m, n)]
+    }
+}
+
+/// Coefficients of a pillar and of the normal over it.
+pub(super) struct Moments {
+    /// Of the function that is one in the pillar and zero outside.
+    pub pillar: Coefficients,
+    /// Of c in the pillar, zero outside.
+    pub cosine: Coefficients,
+    /// Of s alike.
+    pub sine: Coefficients,
+}
+
+impl Moments {
+    /// For orders up to `highest`.
+    pub fn of(form: &SlantedForm, pitch_nm: f64, highest: usize) -> Self {
+        match *form {
+            SlantedForm::Circle { diameter_nm } => Self::of_circle(diameter_nm / pitch_nm, highest),
+            SlantedForm::Rectangle { halves_nm, rotation } => {
+                Self::of_rectangle(halves_nm.map(|half| half / pitch_nm), rotation, highest)
+            }
+        }
+    }
+
+    /// Of a circle whose diameter is this share of the pitch. The normal is the radius; c and s are continued by harmonic
+    /// functions, r^2 cos 2a and r^2 sin 2a over the radius squared. With g = k R for the wave vector k and the radius R the
+    /// integrals over the disc are those of Bessel functions, 2 pi R^2 J1(g) / g and, with twice the angle of k,
+    /// -2 pi R^2 J3(g) / g.
+    fn of_circle(duty: f64, highest: usize) -> Self {
+        let [mut pillar, mut cosine, mut sine] = [(); 3].map(|()| Coefficients::new(highest));
+        let area = PI * duty * duty / 4.0;
+        let last = highest as i32;
+        for m in 0..=last {
+            for n in 0..=m {
+                let square = f64::from(m * m + n * n);
+                let g = PI * duty * square.sqrt();
+                let (disc, twice) = if square == 0.0 {
+                    (area, 0.0)
+                } else {
+                    (2.0 * area * libm::j1(g) / g, -2.0 * area * libm::jn(3, g) / g / square)
+                };
+                let (c, s) = (twice * f64::from(m * m - n * n), twice * f64::from(2 * m * n));
+                for (p, q, turn) in [(m, n, 1.0), (n, m, -1.0)] {
+                    for (x, y, mirror) in [(p, q, 1.0), (-p, q, -1.0), (p, -q, -1.0), (-p, -q, 1.0)] {
+                        let place = pillar.place(x, y);
+                        pillar.values[place] = disc;
+                        cosine.values[place] = turn * c;
+                        sine.values[place] = mirror * s;
+                    }
+                }
+            }
+        }
+        Self { pillar, cosine, sine }
+    }
+
+    /// A rectangle with these half-widths over the pitch, turned. Its normals are turned by that angle or a quarter more, so
+    /// that c and s are cosine and sine of twice the angle times one function, 1 on the first pair of sides and -1 on the
+    /// second (see [`Interior`]).
+    fn of_rectangle(halves: [f64; 2], rotation: f64, highest: usize) -> Self {
+        let [mut pillar, mut cosine, mut sine] = [(); 3].map(|()| Coefficients::new(highest));
+        let ((sin, cos), (sin2, cos2)) = (rotation.sin_cos(), (2.0 * rotation).sin_cos());
+        let interior = Interior::of(halves);
+        let last = highest as i32;
+        for m in 0..=last {
+            for n in -last..=last {
+                let k = [m, n].map(|order| TAU * f64::from(order));
+                let k = [k[0] * cos + k[1] * sin, k[1] * cos - k[0] * sin];
+                let area = slab(k[0], halves[0]) * slab(k[1], halves[1]);
+                let v = interior.transform(k);
+                for place in [pillar.place(m, n), pillar.place(-m, -n)] {
+                    pillar.values[place] = area;
+                    cosine.values[place] = v * cos2;
+                    sine.values[place] = v * sin2;
+                }
+            }
+        }
+        Self { pillar, cosine, sine }
+    }
+}
+
+/// Integral of cos(k x) over |x| < half.
+fn slab(k: f64, half: f64) -> f64 {
+    let x = k * half;
+    2.0 * half * if x == 0.0 { 1.0 } else { x.sin() / x }
+}
+
+/// How fast the direction of the normal turns from one side of a rectangle to the next: (b^q - a^q) / (b^q + a^q) at distances
+/// a and b from the nearest sides of the first pair and the second. Of 1.5 to 4 (and of a harmonic function) this one needs
+/// the fewest orders: a slower turn is right at too few places of the sides, a faster one needs more orders itself.
+const TURN: f64 = 2.5;
+
+/// Points along half an edge by which the function is integrated; the step shrinks to nothing at the middle and at the sides, so
+/// that the rule of rectangles is as good as one of high order (see the tests).
+const POINTS: usize = 48;
+
+/// The function of [`Moments::of_rectangle`] over a quarter of the rectangle; all four are alike.
+struct Interior {
+    /// Places along each half edge, over the pitch.
+    places: [Vec<f64>; 2],
+    /// Values times weights, the second place running fastest.
+    values: Vec<f64>,
+}
+
+impl Interior {
+    fn of(halves: [f64; 2]) -> Self {
+        let nodes: Vec<[f64; 2]> = (0..POINTS)
+            .map(|i| {
+                let t = (i as f64 + 0.5) / POINTS as f64;
+                let (sin, cos) = (TAU * t).sin_cos();
+                [t - sin / TAU, (1.0 - cos) / POINTS as f64]
+            })
+            .collect();
+        let mut values = Vec::with_capacity(POINTS * POINTS);
+        for [x, weight_x] in &nodes {
+            for [y, weight_y] in &nodes {
+                let [a, b] = [(1.0 - x) * halves[0], (1.0 - y) * halves[1]].map(|distance| distance.powf(TURN));
+                // Each quarter has as much of a wave that half a turn leaves alike.
+                let weight = 4.0 * halves[0] * weight_x * halves[1] * weight_y;
+                values.push(weight * (b - a) / (b + a));
+            }
+        }
+        Self {
+            places: halves.map(|half| nodes.iter().map(|[t, _]| t * half).collect()),
+            values,
+        }
+    }
+
+    /// Transform at a wave vector along the sides of the rectangle.
+    fn transform(&self, k: [f64; 2]) -> f64 {
+        let [x, y] = [0, 1]
+            .map(|axis: usize| -> Vec<f64> { self.places[axis].iter().map(|place| (k[axis] * place).cos()).collect() });
+        let rows = self.values.chunks_exact(POINTS).zip(&x);
+        rows.map(|(row, x)| x * row.iter().zip(&y).map(|(v, y)| v * y).sum::<f64>())
+            .sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sums of a few products of numbers of size one.
+    const ROUNDING: f64 = 1e-13;
+
+    /// The disc and its normal by sums over a fine polar grid.
+    #[test]
+    fn a_circle_has_the_moments_of_its_disc() {
+        // The rule of rectangles along the radius, 400 points; angles are exact.
+        const SUMMED: f64 = 1e-5;
+        let duty = 0.6;
+        let moments = Moments::of_circle(duty, 4);
+        for (m, n) in [(0, 0), (1, 0), (2, 3), (-4, 1)] {
+            let mut sums = [0.0; 3];
+            for i in 0..400 {
+                let r = (f64::from(i) + 0.5) / 400.0;
+                for j in 0..200 {
+                    let angle = TAU * f64::from(j) / 200.0;
+                    let (sin, cos) = angle.sin_cos();
+                    let wave = (TAU * 0.5 * duty * r * (f64::from(m) * cos + f64::from(n) * sin)).cos();
+                    let area = 0.25 * duty * duty * r / 400.0 * TAU / 200.0;
+                    let turn = r * r;
+                    for (sum, value) in
+                        sums.iter_mut()
+                            .zip([1.0, turn * (2.0 * angle).cos(), turn * (2.0 * angle).sin()])
+                    {
+                        *sum += wave * area * value;
+                    }
+                }
+            }
+            let found = [&moments.pillar, &moments.cosine, &moments.sine].map(|c| c.at(m, n));
+            for (a, b) in found.iter().zip(sums) {
+                assert!((a - b).abs() < SUMMED, "{m} {n}: {found:?} {sums:?}");
+            }
+        }
+    }
+
+    /// Half a square has its normal along one axis, half along the other: there is no mean. At the wave vector of one side the
+    /// integral is that of twice as many points.
+    #[test]
+    fn the_interior_of_a_rectangle_is_integrated() {
+        // Coefficients count against the area of the rectangle, 0.15 here.
+        const INTEGRATED: f64 = 1e-5;
+        let square = Interior::of([0.3, 0.3]);
+        assert!(square.transform([0.0, 0.0]).abs() < ROUNDING);
+        assert!((square.transform([8.0, 3.0]) + square.transform([3.0, 8.0])).abs() < ROUNDING);
+        let halves = [0.15, 0.25];
+        let rectangle = Interior::of(halves);
+        for k in [[0.0, 0.0], [20.0, 0.0], [9.0, 60.0], [100.0, 100.0]] {
+            let fine = 1000;
+            let mut sum = 0.0;
+            for i in 0..fine {
+                for j in 0..fine {
+                    let [x, y] = [i, j].map(|i| (f64::from(i) + 0.5) / f64::from(fine));
+                    let [a, b] = [(1.0 - x) * halves[0], (1.0 - y) * halves[1]].map(|distance| distance.powf(TURN));
+                    sum += (b - a) / (b + a) * (k[0] * x * halves[0]).cos() * (k[1] * y * halves[1]).cos();
+                }
+            }
+            sum *= 4.0 * halves[0] * halves[1] / f64::from(fine * fine);
+            let found = rectangle.transform(k);
+            assert!((found - sum).abs() < INTEGRATED, "{k:?}: {found} {sum}");
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! Pillars with sides in any direction.
+//!
+//! Across a side the normal component of D and the tangential one of E are continuous. With the normal n at the sides and
+//! P = n n^T, continued over the pillar (see `moments`), F = (1 - P) E + P D / e_out is continuous, so that products with it
+//! follow the Laurent rule: E = C F and D = S F, with C = 1 - P + P e_out / e and S = e (1 - P) + P e_out, which makes
+//! D = [S] [C]^-1 E (E. Popov and M. Neviere, J. Opt. Soc. Am. A 18, 2886 (2001)). As e_out is the permittivity
+//! outside, where F is E itself whatever P is there, C = 1 + (e_out / e_in - 1) P and S = e_out + (e_in - e_out) (1 - P) in the
+//! pillar, and P outside of it drops out.
+//!
+//! The product is not symmetric when the series end, and so keeps neither power nor reciprocity. Half the sum with its
+//! transpose keeps both, and is as near.
+
+use std::ops::Range;
+
+use faer::Mat;
+use faer::linalg::solvers::Solve;
+use num_complex::Complex64;
+
+use super::moments::{Coefficients, Moments};
+use super::{CrossSection, Permittivity};
+use crate::basis::FieldBasis;
+use crate::outline::SlantedForm;
+use crate::scalar::Scalar;
+
+/// The permittivity matrices of the pillar of a section.
+pub(super) fn permittivity<T: Scalar>(
+    section: &CrossSection<'_>,
+    basis: &FieldBasis,
+    form: &SlantedForm,
+) -> Permittivity<T> {
+    let moments = Moments::of(form, section.pitch_nm, 2 * basis.highest);
+    let (inside, outside) = (section.inside, section.outside);
+    let split = basis.rows.of_x;
+    let size = basis.rows.len();
+    // uniform + (plain + direction P) in the pillar.
+    let tensor = |uniform: Complex64, plain: Complex64, direction: Complex64| -> Mat<T> {
+        let (mean, part) = (plain + 0.5 * direction, 0.5 * direction);
+        let mut matrix = Mat::<T>::zeros(size, size);
+        let mut fill = |target: usize, source: usize, sum: &[(Complex64, &Coefficients)], uniform: Complex64| {
+            let block = multiplication::<T>(basis, [target, source], sum, uniform);
+            matrix
+                .submatrix_mut(target * split, source * split, block.nrows(), block.ncols())
+                .copy_from(&block);
+        };
+        fill(0, 0, &[(mean, &moments.pillar), (part, &moments.cosine)], uniform);
+        fill(1, 1, &[(mean, &moments.pillar), (-part, &moments.cosine)], uniform);
+        fill(0, 1, &[(part, &moments.sine)], Complex64::ZERO);
+        fill(1, 0, &[(part, &moments.sine)], Complex64::ZERO);
+        matrix
+    };
+    let stretched = tensor(Complex64::ONE, Complex64::ZERO, outside / inside - 1.0);
+    let mut transverse = tensor(outside, inside - outside, outside - inside);
+    // Both are symmetric: C^-1 S is the transpose of S C^-1.
+    stretched.partial_piv_lu().solve_in_place(&mut transverse);
+    let block = |rows: Range<usize>, columns: Range<usize>| -> Mat<T> {
+        Mat::from_fn(rows.len(), columns.len(), |i, j| {
+            let (i, j) = (rows.start + i, columns.start + j);
+            (transverse[(i, j)] + transverse[(j, i)]) * T::real(0.5)
+        })
+    };
+    let (x, y) = (0..split, split..size);
+    Permittivity {
+        transverse: [block(x.clone(), x.clone()), block(y.clone(), y.clone())],
+        cross: Some([block(x.clone(), y.clone()), block(y, x)]),
+        z: multiplication(basis, [2, 2], &[(inside - outside, &moments.pillar)], outside),
+    }
+}
+
+/// Multiplication of component `source` by a sum of functions of the cell and a constant, as component `target`.
+fn multiplication<T: Scalar>(
+    basis: &FieldBasis,
+    [target, source]: [usize; 2],
+    sum: &[(Complex64, &Coefficients)],
+    constant: Complex64,
+) -> Mat<T> {
+    // Coefficients of the sum by the difference of two orders.
+    let reach = 2 * basis.highest as i32;
+    let side = 2 * reach + 1;
+    let place = |[m, n]: [i32; 2]| m * side + n;
+    let middle = place([reach, reach]);
+    let mut table: Vec<T> = Vec::with_capacity((side * side) as usize);
+    for m in -reach..=reach {
+        for n in -reach..=reach {
+            table.push(T::of(
+                sum.iter().map(|(factor, function)| factor * function.at(m, n)).sum(),
+            ));
+        }
+    }
+    table[middle as usize] += T::of(constant);
+
+    let families = [target, source].map(|c| basis.families[c]);
+    let [to, from] = families.map(|family| family.orders(basis.highest));
+    let [scale_to, scale_from] = [0, 1].map(|end| -> Vec<f64> {
+        let images = families[end].images();
+        let same = |[m, n]: [i32; 2]| images.iter().filter(|([p, q], _)| [p * m, q * n] == [m, n]).count();
+        [&to, &from][end]
+            .iter()
+            .map(|&order| (same(order) as f64).sqrt().recip())
+            .collect()
+    });
+    let images = families[1].images();
+    let mut matrix = Mat::<T>::zeros(to.len(), from.len());
+    for (j, [m, n]) in from.iter().enumerate() {
+        let column = matrix.col_as_slice_mut(j);
+        for ([p, q], sign) in &images {
+            let start = middle - place([p * m, q * n]);
+            for ((entry, order), scale) in column.iter_mut().zip(&to).zip(&scale_to) {
+                *entry += table[(start + place(*order)) as usize] * T::real(sign * scale * scale_from[j]);
+            }
+        }
+    }
+    matrix
+}
