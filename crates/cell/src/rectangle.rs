@@ -78,9 +78,13 @@ mod tests {
 
     use super::*;
 
-    /// What the lattice, which does not turn with the pillar, may add to the geometric phase (rad). It is less than this for
-    /// the pillar of the test; others, that reach nearer to their neighbours, have some hundredths.
-    const GEOMETRIC: f64 = 0.01;
+    /// What the lattice, which does not turn with the pillar, may add to the geometric phase (rad): 0.0126 for the pillar of the
+    /// test with 13 orders, 0.0137 with 17; others, that reach nearer to their neighbours, have some hundredths.
+    const GEOMETRIC: f64 = 0.015;
+
+    /// A quarter of a turn leaves the lattice alike: what it does to the phase is exact, but for what tells x from y in the
+    /// solver, 1e-9, felt more at resonances.
+    const QUARTER: f64 = 1e-6;
 
     fn titania() -> CellStack {
         CellStack {
@@ -112,6 +116,9 @@ mod tests {
             assert!(t.norm_sqr() / 1.46 > CONVERTED, "{degrees}: {t}");
             let apart = (t / upright * Complex64::cis(-2.0 * degrees.to_radians())).arg();
             assert!(apart.abs() < GEOMETRIC, "{degrees} degrees: {apart} rad");
+            if degrees % 90.0 == 0.0 {
+                assert!(apart.abs() < QUARTER, "{degrees} degrees: {apart} rad");
+            }
         }
     }
 
