@@ -127,7 +127,7 @@ impl Studio {
         unexposed.name = String::new();
         unexposed.exposure = Camera::three_bands(1.0).exposure;
         let inputs = Inputs {
-            solver: metalith_cell::kept::SOLVER,
+            solver: metalith_cell::kept::solver_of(design.cell.shape),
             layout: &layout_digest,
             design: &design.digest(),
             lens_um: [design.lens.radius_um(), design.lens.focal_length_um],
