@@ -1,6 +1,7 @@
 //! `metalith plan`: what is refused before anything is simulated.
 
 use assert_cmd::Command;
+use metalith_testing::session;
 use predicates::prelude::PredicateBooleanExt;
 
 fn plan(bench: &str, more: &[&str]) -> assert_cmd::assert::Assert {
@@ -19,7 +20,7 @@ fn faults_of_the_bench_are_named_and_frames_are_not_overwritten() {
     std::fs::write(&bench, "schema = 1\n[captures]\npeak = 3.0\n").unwrap();
     let told = plan(&bench, &["--out", &path("out")]).code(2);
     told.stderr(predicates::str::contains("peak").and(predicates::str::contains("camera")));
-    std::fs::write(&bench, SOUND).unwrap();
+    std::fs::write(&bench, format!("schema = 1\n{}\n[captures]\n", session::bench())).unwrap();
     plan(&bench, &["--out", &path("out"), "--effects", "cd_bais"])
         .code(2)
         .stderr(predicates::str::contains("did you mean `cd_bias`?"));
@@ -29,28 +30,3 @@ fn faults_of_the_bench_are_named_and_frames_are_not_overwritten() {
         .code(2)
         .stderr(predicates::str::contains("there are frames in"));
 }
-
-const SOUND: &str = r#"schema = 1
-
-[source]
-kind = "collimated"
-divergence_mrad = 2.35
-divergence_axes = "uniform disc"
-
-[camera]
-pixel_um = 0.5
-rows = 48
-cols = 48
-black_level_dn = 40.0
-gain_e_per_dn = 5.0
-read_noise_dn = 2.0
-saturation_dn = 4095
-registration_sigma_px = 0.5
-flux_sigma = 0.01
-
-[[led]]
-centre_nm = 500
-fwhm_nm = 6.0
-
-[captures]
-"#;

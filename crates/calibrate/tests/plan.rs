@@ -11,39 +11,16 @@ use metalith_core::Silent;
 use metalith_design::{Design, PillarArray};
 use metalith_gds::extract::GdsPillars;
 use metalith_layout::write_pillars;
-use metalith_testing::session::write_npy;
+use metalith_testing::session::{self, PIXELS, write_npy};
 use ndarray::Array2;
 
-/// Edge of a frame (pixels).
-const PIXELS: usize = 48;
+/// The bench of the small session, with what may be taken and what is wanted.
+fn small_bench() -> String {
+    let bench = session::bench();
+    format!(
+        r#"schema = 1
 
-/// A bench with two narrow LEDs, so that few wavelengths are simulated.
-const BENCH: &str = r#"schema = 1
-
-[source]
-kind = "collimated"
-divergence_mrad = 2.35
-divergence_axes = "uniform disc"
-
-[camera]
-pixel_um = 0.5
-rows = 48
-cols = 48
-black_level_dn = 40.0
-gain_e_per_dn = 5.0
-read_noise_dn = 2.0
-saturation_dn = 4095
-registration_sigma_px = 0.5
-flux_sigma = 0.01
-
-[[led]]
-centre_nm = 500
-fwhm_nm = 6.0
-
-[[led]]
-centre_nm = 560
-fwhm_nm = 6.0
-
+{bench}
 [captures]
 elements = [0, 0, 1, 0]
 distance_um = [139.0, 144.0, 149.0]
@@ -57,7 +34,9 @@ edge_offset_nm = 1.0
 [wanted]
 gap = 2.0
 cd_bias = 6.0
-"#;
+"#
+    )
+}
 
 /// Plan a session for a design.
 fn planned(folder: &Path, design: &Design, bench: &str, only: &[&str]) -> CapturePlan {
@@ -113,7 +92,7 @@ fn settings(cache: PathBuf, only: &[&str]) -> Settings {
 fn what_is_planned_for_is_found_in_what_comes_back() {
     let folder = tempfile::tempdir().unwrap();
     let tried = ["cd_bias", "gap", "pixel_blur"];
-    let plan = planned(folder.path(), &mini(), BENCH, &tried);
+    let plan = planned(folder.path(), &mini(), &small_bench(), &tried);
     assert!(plan.finds_all(), "{}", plan.sentence());
     assert!(
         plan.captures.len() >= 4 && plan.captures.len() < plan.candidates / 2,
@@ -157,7 +136,7 @@ fn what_is_planned_for_is_found_in_what_comes_back() {
 #[ignore = "second tier: CPU time, run by .ci/run"]
 fn what_captures_cannot_split_is_named_with_what_can() {
     let folder = tempfile::tempdir().unwrap();
-    let bench = BENCH
+    let bench = small_bench()
         .replace("[139.0, 144.0, 149.0]", "[144.0]")
         .replace("elements = [0, 0, 1, 0]", "elements = [0, 0]")
         .replace("gap = 2.0", "gap = 0.06");

@@ -30,33 +30,10 @@ pub fn write_npy(path: &Path, values: &Array2<f32>) {
     fs::write(path, bytes).unwrap();
 }
 
-/// Write a session with lenses of 60 um, its frames still dark; its `measurement.toml`.
-pub fn small_set(folder: &Path) -> PathBuf {
-    let root = crate::root();
-    let design = Design::read(&root.join("designs/mini_3x3.toml")).unwrap();
-    let array = PillarArray::build(&design, &Silent).unwrap();
-    write_pillars(&design, &array, Hierarchy::Sref, &folder.join("layout.gds"), &Silent).unwrap();
-    fs::copy(root.join("golden/measured/film_nk.csv"), folder.join("film_nk.csv")).unwrap();
-    let mut text = format!(
-        r#"schema = 1
-title = "small chip"
-layout = "layout.gds"
-
-[layout_layers]
-pillars = [1, 0]
-apertures = [2, 0]
-
-[stack]
-pitch_nm = 350
-pillar_height_nm = 700
-pillar_index = "film_nk.csv"
-substrate = "fused_silica_malitson_1965"
-ambient_index = 1.0
-incidence = "substrate"
-lens_diameter_um = 60.0
-focal_length_um = 144.0
-
-[source]
+/// Source, camera and two narrow LEDs of a small session, as sets and benches name them.
+pub fn bench() -> String {
+    format!(
+        r#"[source]
 kind = "collimated"
 divergence_mrad = 2.35
 divergence_axes = "uniform disc"
@@ -80,6 +57,37 @@ fwhm_nm = 6.0
 centre_nm = 560
 fwhm_nm = 6.0
 "#
+    )
+}
+
+/// Write a session with lenses of 60 um, its frames still dark; its `measurement.toml`.
+pub fn small_set(folder: &Path) -> PathBuf {
+    let root = crate::root();
+    let design = Design::read(&root.join("designs/mini_3x3.toml")).unwrap();
+    let array = PillarArray::build(&design, &Silent).unwrap();
+    write_pillars(&design, &array, Hierarchy::Sref, &folder.join("layout.gds"), &Silent).unwrap();
+    fs::copy(root.join("golden/measured/film_nk.csv"), folder.join("film_nk.csv")).unwrap();
+    let bench = bench();
+    let mut text = format!(
+        r#"schema = 1
+title = "small chip"
+layout = "layout.gds"
+
+[layout_layers]
+pillars = [1, 0]
+apertures = [2, 0]
+
+[stack]
+pitch_nm = 350
+pillar_height_nm = 700
+pillar_index = "film_nk.csv"
+substrate = "fused_silica_malitson_1965"
+ambient_index = 1.0
+incidence = "substrate"
+lens_diameter_um = 60.0
+focal_length_um = 144.0
+
+{bench}"#
     );
     for (index, _) in BEAMS {
         text.push_str(&format!(
