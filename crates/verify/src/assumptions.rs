@@ -5,6 +5,7 @@ use metalith_core::PillarShape;
 use metalith_design::{CellIncidence, Design, Element};
 use metalith_report::{Cell, Column, Page, Table, fixed, sig};
 
+use super::page::span;
 use super::{OrderEfficiencies, PsfResult, Verification};
 
 /// Share by which a cell in an infinite lattice of equal pillars overstates the first order of a blazed row at 455,
@@ -73,16 +74,15 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
                 PillarShape::Circle => "0.004 rms in t, 0.01 beside resonances".into(),
                 PillarShape::Square => "not known for this cell; more where the index is higher".into(),
             },
-            "squares of silicon nitride against 27 orders, widths of 100 to 295 nm at 455, 530 and 660 nm; circles of three materials against 29 orders and another code",
+            "squares of silicon nitride against 27 orders, widths of 100 to 295 nm at 455, 530 and 660 nm; circles of three materials against 33 orders",
         );
     }
     let (least, most) = outside(found);
     row(
         "PSFs and energies are of a window about the chief ray; MTF counts all light that passes",
         format!(
-            "{} to {} % of the light is outside of the window",
-            fixed(least * 100.0, 0),
-            fixed(most * 100.0, 0)
+            "{} % of the light is outside of the window",
+            span(fixed(least * 100.0, 0), fixed(most * 100.0, 0))
         ),
         "power of all pillars against the energy of the window",
     );

@@ -14,21 +14,18 @@ const RADIUS_POINTS: usize = 600;
 /// The section of the design.
 pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
     page.section("What was designed");
-    let elements = match design.array.spacing_words() {
-        Some(apart) => format!(
-            "{} x {} elements of {} um, f = {} um, {apart} apart, steered by {}° a step",
-            design.array.count.0,
-            design.array.count.1,
-            exact(f64::from(design.lens.diameter_nm) * 1e-3),
-            exact(design.lens.focal_length_um),
-            design.array.steering_deg,
+    let lens = format!(
+        "{} um, f = {} um",
+        exact(f64::from(design.lens.diameter_nm) * 1e-3),
+        exact(design.lens.focal_length_um),
+    );
+    let elements = match (array.placed.len(), design.array.spacing_words()) {
+        (1, _) => format!("One element of {lens}"),
+        (_, Some(apart)) => format!(
+            "{} x {} elements of {lens}, {apart} apart, steered by {}° a step",
+            design.array.count.0, design.array.count.1, design.array.steering_deg,
         ),
-        None => format!(
-            "{} elements of {} um, f = {} um, placed and steered one by one,",
-            array.placed.len(),
-            exact(f64::from(design.lens.diameter_nm) * 1e-3),
-            exact(design.lens.focal_length_um),
-        ),
+        (count, None) => format!("{count} elements of {lens}, placed and steered one by one,"),
     };
     let plural = design.cell.shape.plural();
     page.paragraph(format!(

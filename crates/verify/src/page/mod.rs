@@ -94,15 +94,21 @@ fn range(found: &Verification, of: impl Fn(&PsfResult) -> f64) -> String {
     between(found.distinct.iter().flat_map(|d| &d.spots).map(|s| of(s.judged())))
 }
 
-/// Least and greatest in words.
+/// Least and greatest in words; one number where they read the same.
 fn between(values: impl Iterator<Item = f64>) -> String {
     let ends = values.fold(None, |ends: Option<(f64, f64)>, v| {
         Some(ends.map_or((v, v), |(a, b)| (a.min(v), b.max(v))))
     });
-    ends.map_or_else(
-        || "none".into(),
-        |(least, most)| format!("{} to {}", sig(least, 2), sig(most, 2)),
-    )
+    ends.map_or_else(|| "none".into(), |(least, most)| span(sig(least, 2), sig(most, 2)))
+}
+
+/// From one number to another, or the one that both are.
+pub(crate) fn span(least: String, most: String) -> String {
+    if least == most {
+        least
+    } else {
+        format!("{least} to {most}")
+    }
 }
 
 fn limits(page: &mut Page, found: &Verification) {
