@@ -126,12 +126,16 @@ impl Design {
 
     /// Where they are in a layout, in the same order.
     pub fn sites(&self) -> Vec<ElementSite> {
-        let site = |element: Element| ElementSite {
+        self.elements().iter().map(|e| self.site_of(e)).collect()
+    }
+
+    /// Where one of them is in a layout.
+    pub fn site_of(&self, element: &Element) -> ElementSite {
+        ElementSite {
             name: element.label(),
             centre_nm: [element.centre_nm.0, element.centre_nm.1],
             lattice: self.lattice(),
-        };
-        self.elements().into_iter().map(site).collect()
+        }
     }
 
     /// SHA-256 of all that decides the layout (not of what is verified): two designs with the same

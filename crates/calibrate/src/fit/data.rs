@@ -67,8 +67,7 @@ impl Data {
                     if full[at] {
                         return 0.0;
                     }
-                    let photons = f64::from(v - black).max(0.0) / camera.gain_e_per_dn;
-                    let variance = (photons + camera.read_noise_dn.powi(2)) / f64::from(c.frames);
+                    let variance = camera.variance_dn2(f64::from(v - black), 1.0, c.frames);
                     variance.sqrt().recip() as f32
                 })
             })

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use metalith_core::{ElementSite, Error, Lattice, PillarReader, Progress, Result, Wedge, WidthMap};
-use metalith_design::Design;
+use metalith_design::{Design, Element};
 use ndarray::Array2;
 
 use super::bench_file::{BenchFile, SemOffer};
@@ -40,15 +40,7 @@ pub fn candidates(
     progress: &dyn Progress,
 ) -> Result<Candidates> {
     let chosen = chosen_elements(design, bench)?;
-    let lattice = design.lattice();
-    let sites: Vec<ElementSite> = chosen
-        .iter()
-        .map(|e| ElementSite {
-            name: format!("({}, {})", e.0[0], e.0[1]),
-            centre_nm: e.1,
-            lattice,
-        })
-        .collect();
+    let sites: Vec<ElementSite> = chosen.iter().map(|e| design.site_of(e)).collect();
     let layer = design.layout.layers.pillars.number();
     let maps = reader.pillars(layout, layer, &sites, progress)?;
     if let Some(empty) = maps.iter().zip(&sites).find(|(map, _)| map.pillars() == 0) {
@@ -68,22 +60,12 @@ pub fn candidates(
     Ok(Candidates { set, captures, unseen })
 }
 
-/// Index, centre (nm) and wedge of an element.
-type Chosen = ([i64; 2], [i64; 2], Wedge);
-
 /// The elements that the bench names; else the central one, the one farthest along x, and the farthest of all.
-fn chosen_elements(design: &Design, bench: &BenchFile) -> Result<Vec<Chosen>> {
-    let all: Vec<Chosen> = design
-        .elements()
-        .iter()
-        .map(|e| {
-            let index = [i64::from(e.index.0), i64::from(e.index.1)];
-            (index, [e.centre_nm.0, e.centre_nm.1], e.wedge)
-        })
-        .collect();
+fn chosen_elements(design: &Design, bench: &BenchFile) -> Result<Vec<Element>> {
+    let all = design.elements();
     if !bench.elements.is_empty() {
         let of = |index: &[i64; 2]| {
-            all.iter().find(|e| e.0 == *index).copied().ok_or_else(|| {
+            all.iter().find(|e| index_of(e) == *index).copied().ok_or_else(|| {
                 Error::invalid(
                     format!("the design has no element {index:?}"),
                     "correct `elements` of the bench",
@@ -92,35 +74,38 @@ fn chosen_elements(design: &Design, bench: &BenchFile) -> Result<Vec<Chosen>> {
         };
         return bench.elements.iter().map(of).collect();
     }
-    let far = |e: &Chosen| e.1[0].abs() + e.1[1].abs();
-    let along_x = |e: &Chosen| e.1[0] - e.1[1].abs();
     let picked = [
-        all.iter().min_by_key(|e| far(e)),
-        all.iter().max_by_key(|e| along_x(e)),
-        all.iter().max_by_key(|e| e.1[0] + e.1[1]),
+        all.iter().min_by_key(|e| e.centre_nm.0.abs() + e.centre_nm.1.abs()),
+        all.iter().max_by_key(|e| e.centre_nm.0 - e.centre_nm.1.abs()),
+        all.iter().max_by_key(|e| e.centre_nm.0 + e.centre_nm.1),
     ];
-    let mut out: Vec<Chosen> = Vec::new();
+    let mut out: Vec<Element> = Vec::new();
     for e in picked.into_iter().flatten() {
-        if !out.iter().any(|o| o.0 == e.0) {
+        if !out.contains(e) {
             out.push(*e);
         }
     }
     Ok(out)
 }
 
+/// Index of an element as sets have it.
+fn index_of(element: &Element) -> [i64; 2] {
+    [element.index.0.into(), element.index.1.into()]
+}
+
 fn session(
     design: &Design,
     bench: &BenchFile,
     layout: &Path,
-    chosen: &[Chosen],
+    chosen: &[Element],
     maps: Vec<WidthMap>,
 ) -> Result<MeasuredSet> {
     let elements: PerElement<MeasuredElement> = chosen
         .iter()
         .zip(maps)
-        .map(|((index, centre_nm, _), pillars)| MeasuredElement {
-            index: *index,
-            centre_um: centre_nm.map(|c| c as f64 * 1e-3),
+        .map(|(element, pillars)| MeasuredElement {
+            index: index_of(element),
+            centre_um: element.centre_um(),
             aperture_diameter_um: 2.0 * design.aperture_radius_um(),
             pillars,
         })
@@ -145,7 +130,7 @@ fn session(
     })
 }
 
-fn captures(design: &Design, bench: &BenchFile, set: &MeasuredSet, chosen: &[Chosen]) -> (Vec<Capture>, usize) {
+fn captures(design: &Design, bench: &BenchFile, set: &MeasuredSet, chosen: &[Element]) -> (Vec<Capture>, usize) {
     let f_um = design.lens.focal_length_um;
     let distances = if bench.distances_um.is_empty() {
         vec![f_um * (1.0 - DEFOCUS), f_um, f_um * (1.0 + DEFOCUS)]
@@ -156,14 +141,15 @@ fn captures(design: &Design, bench: &BenchFile, set: &MeasuredSet, chosen: &[Cho
     let most = bench.frames.last().copied().unwrap_or(1);
     let dark = Array2::zeros((bench.camera.rows, bench.camera.cols));
     let (mut out, mut unseen) = (Vec::new(), 0);
-    for (e, (index, _, wedge)) in chosen.iter().enumerate() {
+    for (e, element) in chosen.iter().enumerate() {
+        let (index, wedge) = (index_of(element), element.wedge);
         let turn = [wedge.sin_x, wedge.sin_y];
         for (led, lamp) in set.leds.iter().enumerate() {
             for (a, field) in bench.fields_deg.iter().enumerate() {
                 // Where the element looks, and the field from there, to a hundredth of a degree as a person would set it.
                 let axis = turn.map(|s| -s.asin().to_degrees());
                 let aoi_deg = [0, 1].map(|k| ((axis[k] + field[k]) * 100.0).round() / 100.0);
-                let Some(centre) = landing_um(*wedge, aoi_deg, lamp.centre_nm * 1e-3, f_um) else {
+                let Some(centre) = landing_um(wedge, aoi_deg, lamp.centre_nm * 1e-3, f_um) else {
                     unseen += distances.len();
                     continue;
                 };

@@ -116,13 +116,10 @@ pub fn exposed(set: &MeasuredSet, surrogate: &Surrogate, peak: f64) -> MeasuredS
         let filter = camera.bayer.zip(set.leds[capture.led].channel);
         capture.dn = light.mapv(|v| (camera.black_level_dn + capture.scale_dn * f64::from(v).max(0.0)) as f32);
         capture.noise = filter.map(|(bayer, channel)| {
-            let variance = |v: f32| {
-                let shot = (f64::from(v) - camera.black_level_dn) / camera.gain_e_per_dn;
-                (shot + camera.read_noise_dn.powi(2)) / f64::from(capture.frames)
-            };
+            let signal = |v: f32| f64::from(v) - camera.black_level_dn;
             Array2::from_shape_fn(capture.dn.dim(), |at| {
                 if bayer.has(at, channel) {
-                    variance(capture.dn[at]) as f32
+                    camera.variance_dn2(signal(capture.dn[at]), 1.0, capture.frames) as f32
                 } else {
                     f32::INFINITY
                 }

@@ -128,6 +128,15 @@ pub struct RelayCamera {
     pub bayer: Option<Bayer>,
 }
 
+impl RelayCamera {
+    /// Variance of a pixel (DN^2) in the mean of so many frames: shot noise of this signal above the black level (DN), and read
+    /// noise. `response` is what a flat frame divided the pixel by, one without.
+    pub fn variance_dn2(&self, signal_dn: f64, response: f64, frames: u32) -> f64 {
+        let shot = signal_dn.max(0.0) / (self.gain_e_per_dn * response);
+        (shot + (self.read_noise_dn / response).powi(2)) / f64::from(frames)
+    }
+}
+
 /// A Gaussian spectrum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Led {

@@ -199,13 +199,13 @@ impl<'a> Synthesizer<'a> {
                 light.scaled_add(share as f32, &grid.pixels([shift[0] - at[0], shift[1] - at[1]]));
             }
             let factor = capture.scale_dn * flux[capture.led];
-            let (frames, own) = (f64::from(capture.frames), &capture.noise);
+            let (frames, own) = (capture.frames, &capture.noise);
             capture.dn = Array2::from_shape_fn(light.dim(), |at| {
                 let signal = (f64::from(light[at]) * factor).max(0.0);
                 let variance = match own {
                     Some(own) if own[at].is_finite() => f64::from(own[at]),
                     Some(_) => 0.0,
-                    None => (signal / camera.gain_e_per_dn + camera.read_noise_dn.powi(2)) / frames,
+                    None => camera.variance_dn2(signal, 1.0, frames),
                 };
                 (black + signal + variance.sqrt() * normal(&mut rng)) as f32
             });

@@ -82,9 +82,7 @@ pub fn joined(
         let (first, response) = (light / weight, response.as_ref().map_or(1.0, |r| f64::from(r[at])));
         let (mut sum, mut certainty) = (0.0, 0.0);
         for e in usable() {
-            let shot = (first * e.scale_dn).max(0.0) / (camera.gain_e_per_dn * response);
-            let read = (camera.read_noise_dn / response).powi(2);
-            let own = e.scale_dn * e.scale_dn * f64::from(e.frames) / (shot + read);
+            let own = e.scale_dn * e.scale_dn / camera.variance_dn2(first * e.scale_dn, response, e.frames);
             sum += own * signal(e) / e.scale_dn;
             certainty += own;
         }
