@@ -100,6 +100,7 @@ pub use metalith_layout as layout;
 pub use metalith_made as made;
 pub use metalith_optimise as optimise;
 pub use metalith_picture as picture;
+pub use metalith_prior as prior;
 pub use metalith_rcwa as rcwa;
 pub use metalith_report as report;
 pub use metalith_study as study;

@@ -11,6 +11,7 @@ from __future__ import annotations
 from ._layouts import Array, Design, Layout, read_layout, write_layout
 from ._light import Psf, PsfSet, cell, index, propagate, psf
 from ._native import MetalithError, __version__
+from ._pictures import Frame, Studio, denoise
 from ._checks import CheckReport, Marker, Verification, calibrate, check, verify
 from ._studies import Study, StudyResult
 
@@ -18,11 +19,13 @@ __all__ = [
     "Array",
     "CheckReport",
     "Design",
+    "Frame",
     "Layout",
     "Marker",
     "MetalithError",
     "Psf",
     "PsfSet",
+    "Studio",
     "Study",
     "StudyResult",
     "Verification",
@@ -30,6 +33,7 @@ __all__ = [
     "calibrate",
     "cell",
     "check",
+    "denoise",
     "index",
     "propagate",
     "psf",

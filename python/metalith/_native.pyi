@@ -158,3 +158,36 @@ def study_merge(
     psfs: int = 0,
     progress: Progress | None = None,
 ) -> str: ...
+
+@final
+class Frame:
+    @property
+    def planes(self) -> list[npt.NDArray[np.float32]]: ...
+    @property
+    def saturated(self) -> int: ...
+
+@final
+class Studio:
+    @staticmethod
+    def open(
+        design: Design,
+        layout: PathLike,
+        camera: PathLike,
+        rows: int,
+        columns: int,
+        field_deg: float,
+        distance_mm: float | None = None,
+        model: PathLike | None = None,
+        prior: PathLike | None = None,
+        progress: Progress | None = None,
+    ) -> Studio: ...
+    def record(self, scene: Float64, seed: int = 1, progress: Progress | None = None) -> Frame: ...
+    def truth(self, scene: Float64) -> Float64: ...
+    def restore(
+        self, frame: Frame, method: str = "tikhonov", joint: bool = True, progress: Progress | None = None
+    ) -> Float64: ...
+    def samples(self, frame: Frame, count: int, progress: Progress | None = None) -> list[Float64]: ...
+
+def denoise(
+    values: npt.NDArray[np.float32], deviation: npt.NDArray[np.float32], weights: PathLike | None = None
+) -> npt.NDArray[np.float32]: ...

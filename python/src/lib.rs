@@ -7,6 +7,7 @@
 mod arrays;
 mod checks;
 mod light;
+mod pictures;
 mod studies;
 mod work;
 
@@ -41,6 +42,9 @@ fn _native(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(light::propagate, m)?)?;
     m.add_function(wrap_pyfunction!(light::cell, m)?)?;
     m.add_function(wrap_pyfunction!(light::index, m)?)?;
+    m.add_class::<pictures::Studio>()?;
+    m.add_class::<pictures::Frame>()?;
+    m.add_function(wrap_pyfunction!(pictures::denoise, m)?)?;
     m.add_function(wrap_pyfunction!(checks::check, m)?)?;
     m.add_function(wrap_pyfunction!(checks::verify, m)?)?;
     m.add_function(wrap_pyfunction!(checks::calibrate, m)?)?;

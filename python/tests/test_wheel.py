@@ -115,6 +115,18 @@ def test_rules_are_a_table(array: ml.Array, tmp_path: Path) -> None:
     assert any("20" in row["words"] for row in report.table()), report.table()
 
 
+def test_noise_goes_by_the_learnt_prior() -> None:
+    row = np.linspace(0.2, 0.8, 48)
+    clean = np.repeat(np.repeat(row[None, :, None], 40, axis=0), 3, axis=2)
+    noisy = clean + 0.1 * np.random.default_rng(1).standard_normal(clean.shape)
+    found = ml.denoise(noisy, 0.1)
+    assert found.shape == clean.shape
+    # A ramp has nothing that could be taken for noise: a third of it is left at most.
+    assert np.sqrt(np.mean((found - clean) ** 2)) < 0.1 / 3
+    with pytest.raises(ml.MetalithError, match="shape"):
+        ml.denoise(noisy[:, :, :2], 0.1)
+
+
 def test_ctrl_c_stops_a_long_call_soon() -> None:
     code = (
         "import signal, metalith as ml, numpy as np\n"

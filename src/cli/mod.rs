@@ -8,6 +8,7 @@ mod compensated;
 mod completions;
 mod convert;
 mod dataset;
+mod denoise;
 mod diff;
 mod handoff;
 mod layout;
@@ -23,6 +24,7 @@ mod run;
 mod standard_input;
 mod study;
 mod terminal;
+mod train;
 mod verify;
 
 use std::ffi::OsString;
@@ -81,6 +83,8 @@ enum Command {
     Photographs(photographs::PhotographsArgs),
     Picture(picture::PictureArgs),
     Dataset(dataset::DatasetArgs),
+    Train(train::TrainArgs),
+    Denoise(denoise::DenoiseArgs),
     Verify(verify::VerifyArgs),
     Psf(psf::PsfArgs),
     Handoff(handoff::HandoffArgs),
@@ -163,6 +167,8 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::Optimise(args) => optimise::run(args, terminal),
         Command::Photographs(args) => photographs::run(args, terminal),
         Command::Dataset(args) => dataset::run(args, terminal),
+        Command::Train(args) => train::run(args, terminal),
+        Command::Denoise(args) => denoise::run(args, terminal),
         Command::Picture(args) => picture::run(args, terminal),
         Command::Handoff(args) => handoff::run(args, terminal),
         Command::Verify(args) => verify::run(args, terminal),

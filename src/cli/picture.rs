@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metalith::picture::restore::RestorationMethod;
+use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
 use metalith::picture::scene::{BuiltIn, SceneFile, SceneImage, chart, read_depth, read_scene};
 use metalith::picture::{
-    Frame, PicturePages, PictureReport, Rehearsal, RestorationReport, Studio, contrast_curves, scores,
+    Doubt, Frame, PicturePages, PictureReport, Rehearsal, RestorationReport, Studio, contrast_curves, scores,
     worth_of_assumptions, write_pages,
 };
 use metalith::{Error, Fidelity, Result};
@@ -49,7 +49,7 @@ pub struct PictureArgs {
     #[arg(long, default_value_t = 800, value_parser = clap::value_parser!(u16).range(64..=4096))]
     pixels: u16,
 
-    /// Ways to restore: tikhonov, tv, richardson-lucy, hqs; the picture of the page is that of the first.
+    /// Ways to restore: tikhonov, tv, richardson-lucy, hqs, prior (learnt from photographs); the picture of the page is that of the first.
     #[arg(long, value_delimiter = ',', default_value = "tikhonov")]
     method: Vec<String>,
 
@@ -60,6 +60,14 @@ pub struct PictureArgs {
     /// Restore by each element alone too.
     #[arg(long)]
     separate: bool,
+
+    /// File of weights for the learnt prior that `metalith train` wrote; those of the program if left out.
+    #[arg(long, value_name = "FILE")]
+    prior: Option<PathBuf>,
+
+    /// Draw so many pictures that the frame may be of, by the learnt prior, for their mean and a map of doubt.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=64))]
+    samples: Option<u8>,
 
     /// Say too what the assumptions of others are worth: `paper`, those of the array that the prototype follows.
     #[arg(long, value_name = "WHOSE")]
@@ -115,7 +123,11 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     let inputs = [&args.layout, &args.with.design, &args.with.camera].map(PathBuf::as_path);
     apart(inputs.into_iter().chain([args.scene.as_ref()]), &[&page, &numbers])?;
     let layout = InputFile::of(&args.layout)?;
-    let studio = Studio::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
+    let prior = args.prior.as_deref().map(LearnedDenoiser::read).transpose()?;
+    let mut studio = Studio::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
+    if let Some(prior) = prior {
+        studio.prior = prior;
+    }
     let simulation = studio.simulation_of(&scene);
     let frame = studio.record(&simulation, &scene, args.with.seed)?;
     let truth = studio.truth(&scene);
@@ -149,6 +161,17 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     if let Ok(kind) = args.scene.parse::<BuiltIn>() {
         report.contrast = contrast_curves(&studio, kind, &truth, &frame, &pictures[0]);
     }
+    let doubt = match args.samples {
+        Some(n) => Some(Doubt::of(&studio.samples(
+            &operator,
+            error,
+            &frame,
+            0..n.into(),
+            terminal,
+        )?)),
+        None => None,
+    };
+    report.doubt = doubt.as_ref().map(|d| d.report(&truth)).transpose()?;
     if let Some(Assume::Paper) = args.assume {
         drop(operator);
         let narrow = studio.open_without_dispersion(&design, &layout, model.as_ref(), &scene, terminal)?;
@@ -161,6 +184,7 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         frame: &frame,
         restored: &pictures[0],
         channel_names: &names,
+        doubt: doubt.as_ref(),
     };
     write_pages(&pages, &args.out)?;
     terminal.clear();
@@ -180,6 +204,15 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
             },
             whole.psnr_db,
             whole.ssim
+        );
+    }
+    if let Some(doubt) = &report.doubt {
+        print_line!(
+            "mean of {} samples: PSNR {:.2} dB, SSIM {:.3}; rank correlation of doubt and error {:.2}",
+            doubt.samples,
+            doubt.scores[0].psnr_db,
+            doubt.scores[0].ssim,
+            doubt.rank_correlation
         );
     }
     print_line!("page: {}", page.display());
@@ -212,6 +245,7 @@ fn report(
         homographies: studio.homographies(),
         assumptions: studio.assumptions(fidelity),
         contrast: Vec::new(),
+        doubt: None,
         worth: Vec::new(),
     }
 }

@@ -19,9 +19,29 @@ pub fn encoded(light: f64) -> f64 {
     }
 }
 
+/// How fast the value rises with light from 0 to 1.
+pub fn slope(light: f64) -> f64 {
+    if light <= 0.003_130_8 {
+        12.92
+    } else {
+        1.055 / 2.4 * light.powf(1.0 / 2.4 - 1.0)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_slope_is_that_of_differences() {
+        /// A central difference over a thousandth of the light.
+        const QUOTIENT: f64 = 1e-5;
+        for light in [0.001, 0.01, 0.2, 0.9] {
+            let step = 1e-3 * light;
+            let quotient = (encoded(light + step) - encoded(light - step)) / (2.0 * step);
+            assert!((quotient / slope(light) - 1.0).abs() < QUOTIENT, "{light}");
+        }
+    }
 
     #[test]
     fn one_undoes_the_other() {

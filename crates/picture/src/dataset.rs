@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 
 use metalith_core::file::read_at_most;
 use metalith_core::{Error, Progress, Result, WholeFile, srgb};
-use ndarray::{Array2, Array3};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::operator::FrameOperator;
+use crate::png16;
 use crate::scene::SceneImage;
 use crate::studio::Studio;
 
@@ -90,8 +90,11 @@ pub fn write_dataset(
         if !folder.join(&frame).exists() || !folder.join(&truth).exists() {
             let scene = read(image)?;
             let recorded = studio.record(operator, &scene, own_seed)?;
-            WholeFile::write(&folder.join(&frame), &frame_png(&recorded.planes))?;
-            WholeFile::write(&folder.join(&truth), &truth_png(&studio.truth(&scene)))?;
+            WholeFile::write(&folder.join(&frame), &png16::grey(&recorded.planes))?;
+            WholeFile::write(
+                &folder.join(&truth),
+                &png16::colour(&studio.truth(&scene).mapv(srgb::encoded)),
+            )?;
         }
         let digest = |file: &str| {
             let bytes = read_at_most(&folder.join(file), LONGEST, "a picture of the set")?;
@@ -121,34 +124,6 @@ pub fn write_dataset(
     Ok(manifest)
 }
 
-fn sixteen(value: f64) -> [u8; 2] {
-    ((value.clamp(0.0, 1.0) * 65535.0).round() as u16).to_be_bytes()
-}
-
-fn frame_png(planes: &[Array2<f32>]) -> Vec<u8> {
-    let (rows, columns) = planes[0].dim();
-    let data: Vec<u8> = planes.iter().flatten().flat_map(|v| sixteen(f64::from(*v))).collect();
-    encode(rows * planes.len(), columns, png::ColorType::Grayscale, &data)
-}
-
-fn truth_png(rgb: &Array3<f64>) -> Vec<u8> {
-    let (rows, columns, _) = rgb.dim();
-    let data: Vec<u8> = rgb.iter().flat_map(|v| sixteen(srgb::encoded(*v))).collect();
-    encode(rows, columns, png::ColorType::Rgb, &data)
-}
-
-fn encode(rows: usize, columns: usize, colour: png::ColorType, data: &[u8]) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, columns as u32, rows as u32);
-    encoder.set_color(colour);
-    encoder.set_depth(png::BitDepth::Sixteen);
-    // Writing to memory fails only for a wrong size, which is ours to keep.
-    let mut writer = encoder.write_header().expect("a header fits in memory");
-    writer.write_image_data(data).expect("as many bytes as pixels");
-    writer.finish().expect("an end fits in memory");
-    bytes
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -157,18 +132,5 @@ mod tests {
     fn shards_are_named_by_their_range() {
         assert_eq!(shard(0), "000000-000999");
         assert_eq!(shard(1999), "001000-001999");
-    }
-
-    #[test]
-    fn frames_keep_sixteen_bits() {
-        let plane = Array2::from_shape_fn((4, 6), |(y, x)| (y * 6 + x) as f32 / 24.0);
-        let bytes = frame_png(&[plane.clone(), plane.clone()]);
-        let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
-        let mut data = vec![0; reader.output_buffer_size().unwrap()];
-        reader.next_frame(&mut data).unwrap();
-        assert_eq!((reader.info().width, reader.info().height), (6, 8));
-        let value = f64::from(u16::from_be_bytes([data[2 * 29], data[2 * 29 + 1]])) / 65535.0;
-        // Half a step of sixteen bits, and single precision.
-        assert!((value - 5.0 / 24.0).abs() < 1e-5);
     }
 }

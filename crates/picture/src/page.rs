@@ -8,6 +8,7 @@ use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, PhotoRow, Table,
 use ndarray::{Array2, Array3, Axis as Along};
 
 use crate::assumed::AssumedScore;
+use crate::doubt::{Doubt, DoubtReport, root_mean_square};
 use crate::exposure::Frame;
 use crate::report::{Assumption, PictureReport};
 use crate::resolution::ContrastCurve;
@@ -22,6 +23,8 @@ pub struct PicturePages<'a> {
     /// The first method's picture, linear sRGB.
     pub restored: &'a Array3<f64>,
     pub channel_names: &'a [String],
+    /// What samples say, if any were drawn.
+    pub doubt: Option<&'a Doubt>,
 }
 
 /// Edge of a zoom (pixels of the scene).
@@ -125,6 +128,9 @@ fn page(pages: &PicturePages<'_>) -> Page {
     ]);
     zooms(&mut page, pages);
     errors(&mut page, pages);
+    if let (Some(found), Some(numbers)) = (pages.doubt, &report.doubt) {
+        doubt(&mut page, found, numbers);
+    }
     contrast(&mut page, &report.contrast);
     scores(&mut page, report);
     budget(&mut page, report);
@@ -162,26 +168,36 @@ fn zooms(page: &mut Page, pages: &PicturePages<'_>) {
 }
 
 fn errors(page: &mut Page, pages: &PicturePages<'_>) {
-    let (rows, columns, _) = pages.scene.dim();
-    // The first row of a map is at the bottom, that of a picture at the top.
-    let error = Array2::from_shape_fn((rows, columns), |(y, x)| {
-        let at = [rows - 1 - y, x];
-        let sum = (0..3).map(|c| {
-            let d = srgb::encoded(pages.restored[[at[0], at[1], c]]) - srgb::encoded(pages.scene[[at[0], at[1], c]]);
-            d * d
-        });
-        (sum.sum::<f64>() / 3.0).sqrt()
-    });
-    let axis = |name: &str, n: usize| (Axis::linear(name, ""), 0.0, n as f64);
-    let map = HeatMap::new(
-        "Error of the picture",
-        error,
-        axis("column", columns),
-        axis("row from below", rows),
-    )
-    .values("error", "");
+    let error = root_mean_square(&pages.restored.mapv(srgb::encoded), &pages.scene.mapv(srgb::encoded));
     page.section("Errors");
+    let map = map("Error of the picture", &error, "error");
     page.figure(map.caption("Root mean square over the colours, of sRGB values from 0 to 1."));
+}
+
+/// A map of a picture's pixels.
+fn map(title: &str, values: &Array2<f64>, what: &str) -> HeatMap {
+    let (rows, columns) = values.dim();
+    // The first row of a map is at the bottom, that of a picture at the top.
+    let upwards = Array2::from_shape_fn((rows, columns), |(y, x)| values[[rows - 1 - y, x]]);
+    let axis = |name: &str, n: usize| (Axis::linear(name, ""), 0.0, n as f64);
+    HeatMap::new(title, upwards, axis("column", columns), axis("row from below", rows)).values(what, "")
+}
+
+/// What samples say: where they differ, detail is invented.
+fn doubt(page: &mut Page, doubt: &Doubt, report: &DoubtReport) {
+    page.section("How sure the picture is");
+    let mut row = PhotoRow::new("Mean of samples", 250.0);
+    row.photo("mean", &doubt.mean.mapv(srgb::encoded));
+    page.figure(row.caption(format!(
+        "{} pictures that the frame may be of were drawn by the learnt prior; their mean has {} dB.",
+        doubt.samples,
+        fixed(report.scores[0].psnr_db, 2)
+    )));
+    let map = map("Doubt", &doubt.spread, "deviation");
+    page.figure(map.caption(format!(
+        "Deviation of the samples from their mean, of sRGB values: where it is large, detail is invented. The order of the pixels by doubt and that by true error have a rank correlation of {}.",
+        fixed(report.rank_correlation, 2)
+    )));
 }
 
 fn scores(page: &mut Page, report: &PictureReport) {

@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use crate::assumed::AssumedScore;
+use crate::doubt::DoubtReport;
 use crate::resolution::ContrastCurve;
 use crate::restore::RestorationMethod;
 use crate::score::ZoneScore;
@@ -30,6 +31,9 @@ pub struct PictureReport {
     /// Contrast of fine detail, for scenes that say it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub contrast: Vec<ContrastCurve>,
+    /// What samples say, if any were drawn.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub doubt: Option<DoubtReport>,
     /// What the assumptions of others are worth, if asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub worth: Vec<AssumedScore>,

@@ -16,7 +16,9 @@ use crate::assumed::Assumed;
 use crate::exposure::{Frame, expose, gains, sensitivity};
 use crate::kernels::{BankSpec, KernelBank};
 use crate::operator::{Detail, FrameOperator, SceneInputs, ScenePoints};
-use crate::restore::{Recorded, RestorationMethod, SceneStatistics, restore_joint, restore_separate};
+use crate::restore::{
+    LearnedDenoiser, Recorded, RestorationMethod, SceneStatistics, restore_joint, restore_samples, restore_separate,
+};
 use crate::scene::SceneImage;
 use crate::spectra::{SceneSpectrum, rgb_basis};
 use crate::veil::{LightShares, Veil};
@@ -45,6 +47,8 @@ pub struct Studio {
     pub from_cache: [bool; 2],
     /// What is assumed instead of what is known; nothing, unless asked for.
     pub assumed: Assumed,
+    /// What is known of pictures from photographs; as it comes with the program, unless another is put here.
+    pub prior: LearnedDenoiser,
 }
 
 /// Field of an element that kernels are made for: the angle from its axis, behind it (degrees). Light that leaves more
@@ -196,6 +200,7 @@ impl Studio {
             gain: Vec::new(),
             from_cache,
             assumed: Assumed::default(),
+            prior: LearnedDenoiser::shipped()?,
         };
         studio.exposed()
     }
@@ -287,23 +292,57 @@ impl Studio {
         joint: bool,
         progress: &dyn Progress,
     ) -> Result<Array3<f64>> {
-        frame.is_of(operator.frame(), self.gain.len())?;
-        let (light, trust) = frame.light(&self.camera, error);
+        let [light, trust] = self.known(operator, error, frame)?;
         let recorded = Recorded {
             operator,
             light: &light,
             trust: &trust,
+            prior: &self.prior,
         };
         let planes = match joint {
             true => restore_joint(&recorded, method, progress)?,
             false => restore_separate(&recorded, method, progress)?,
         };
-        Ok(match operator.sees_colours() {
+        Ok(self.picture(operator, &planes))
+    }
+
+    /// Pictures that a frame may be of, one for each seed, linear sRGB `[row, column, colour]`.
+    ///
+    /// # Errors
+    /// If the frame is of another camera, or the user stopped it.
+    pub fn samples(
+        &self,
+        operator: &FrameOperator<'_>,
+        error: &[f64],
+        frame: &Frame,
+        seeds: std::ops::Range<u64>,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Array3<f64>>> {
+        let [light, trust] = self.known(operator, error, frame)?;
+        let recorded = Recorded {
+            operator,
+            light: &light,
+            trust: &trust,
+            prior: &self.prior,
+        };
+        let drawn = restore_samples(&recorded, seeds, progress)?;
+        Ok(drawn.iter().map(|planes| self.picture(operator, planes)).collect())
+    }
+
+    /// What a frame says: its light, and how far each pixel is to be trusted.
+    fn known(&self, operator: &FrameOperator<'_>, error: &[f64], frame: &Frame) -> Result<[Vec<Array2<f32>>; 2]> {
+        frame.is_of(operator.frame(), self.gain.len())?;
+        Ok(frame.light(&self.camera, error).into())
+    }
+
+    /// Planes of a restoration in linear sRGB `[row, column, colour]`.
+    fn picture(&self, operator: &FrameOperator<'_>, planes: &[Array2<f32>]) -> Array3<f64> {
+        match operator.sees_colours() {
             true => Array3::from_shape_fn((self.view.rows, self.view.columns, 3), |(y, x, c)| {
                 f64::from(planes[c][[y, x]])
             }),
-            false => self.colours.rgb(&planes),
-        })
+            false => self.colours.rgb(planes),
+        }
     }
 
     /// A frame as a picture without any restoration, linear sRGB `[row, column, colour]`: pixels where they look, over those

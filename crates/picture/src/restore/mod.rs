@@ -1,4 +1,4 @@
-//! From a frame back to a picture, classically: in linear light, with kernels that are known.
+//! From a frame back to a picture, in linear light, with kernels that are known.
 //!
 //! | method | file |
 //! | --- | --- |
@@ -7,16 +7,19 @@
 //! | total variation, by the alternating direction method of multipliers | `total_variation` |
 //! | Richardson and Lucy | `lucy` |
 //! | half-quadratic splitting with any denoiser | `splitting` |
+//! | denoisers for it: least total variation, and the learnt prior | `slope`, `learned` |
 //! | each element alone, blended | `separate` |
 //!
 //! What is beyond the sensor is not known: pixels that do not exist have no weight, and none is made up. The linear
 //! systems of all of them are one, in `normal`, and `precondition` makes them easier.
 
+mod learned;
 mod lucy;
 mod normal;
 mod precondition;
 mod prior;
 mod separate;
+mod slope;
 mod splitting;
 mod tikhonov;
 mod total_variation;
@@ -28,8 +31,10 @@ use ndarray::Array2;
 
 use crate::operator::FrameOperator;
 
+pub use learned::LearnedDenoiser;
 pub use prior::SceneStatistics;
-pub use splitting::{Denoiser, SlopeDenoiser};
+pub use slope::SlopeDenoiser;
+pub use splitting::{Denoiser, Schedule};
 
 /// How a picture is restored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,15 +43,18 @@ pub enum RestorationMethod {
     TotalVariation,
     RichardsonLucy,
     HalfQuadratic,
+    /// Half-quadratic splitting with the learnt prior.
+    LearnedPrior,
 }
 
 impl RestorationMethod {
     /// All of them.
-    pub const ALL: [Self; 4] = [
+    pub const ALL: [Self; 5] = [
         Self::Tikhonov,
         Self::TotalVariation,
         Self::RichardsonLucy,
         Self::HalfQuadratic,
+        Self::LearnedPrior,
     ];
 
     /// Name in options and reports.
@@ -56,6 +64,7 @@ impl RestorationMethod {
             Self::TotalVariation => "tv",
             Self::RichardsonLucy => "richardson-lucy",
             Self::HalfQuadratic => "hqs",
+            Self::LearnedPrior => "prior",
         }
     }
 }
@@ -67,7 +76,7 @@ impl FromStr for RestorationMethod {
         Self::ALL.into_iter().find(|m| m.name() == text).ok_or_else(|| {
             Error::invalid(
                 format!("`{text}` is no way to restore a picture"),
-                "use tikhonov, tv, richardson-lucy or hqs",
+                "use tikhonov, tv, richardson-lucy, hqs or prior",
             )
         })
     }
@@ -80,6 +89,8 @@ pub struct Recorded<'a> {
     pub light: &'a [Array2<f32>],
     /// One over the variance of the light of each pixel; zero where nothing is known.
     pub trust: &'a [Array2<f32>],
+    /// What is known of pictures from photographs.
+    pub prior: &'a LearnedDenoiser,
 }
 
 /// Restore by all elements at once: one scene that explains the whole frame. Planes as those that go into the operator, white
@@ -108,6 +119,21 @@ pub fn restore_separate(
     separate::restore(recorded, method, progress)
 }
 
+/// Pictures that a frame may be of, one for each seed, by the learnt prior and all elements at once.
+///
+/// # Errors
+/// If the user stopped it.
+pub fn restore_samples(
+    recorded: &Recorded<'_>,
+    seeds: std::ops::Range<u64>,
+    progress: &dyn Progress,
+) -> Result<Vec<Vec<Array2<f32>>>> {
+    let all: Vec<usize> = (0..recorded.operator.elements()).collect();
+    let system = normal::NormalSystem::new(recorded, &all, true);
+    let drawn = splitting::samples(&system, recorded.prior, seeds, progress)?;
+    Ok(drawn.iter().map(|planes| system.statistics().picture(planes)).collect())
+}
+
 fn restore_by(
     recorded: &Recorded<'_>,
     method: RestorationMethod,
@@ -122,7 +148,8 @@ fn restore_by(
             let independent = match method {
                 RestorationMethod::Tikhonov => tikhonov::restore(&system, progress),
                 RestorationMethod::TotalVariation => total_variation::restore(&system, progress),
-                _ => splitting::restore(&system, &SlopeDenoiser::default(), progress),
+                RestorationMethod::LearnedPrior => splitting::restore(&system, recorded.prior, progress),
+                _ => splitting::restore(&system, &SlopeDenoiser::new(system.statistics()), progress),
             };
             Ok(system.statistics().picture(&independent?))
         }

@@ -41,8 +41,6 @@ pub struct NormalSystem<'a> {
     pub data: Planes,
     /// What one unit of the data term is, in units of the inverse variance of the picture.
     pub scale: f64,
-    /// How much light counts, mean over the picture; one where most does.
-    pub mean_share: f64,
     preconditioner: Preconditioner,
 }
 
@@ -53,7 +51,7 @@ pub struct Terms {
     pub slopes: f64,
     /// Of squared sums of the slopes that meet at a pixel.
     pub bends: f64,
-    /// Of the picture itself.
+    /// Of the picture itself, whose planes are mixed from those of the system.
     pub identity: f64,
 }
 
@@ -94,7 +92,6 @@ impl<'a> NormalSystem<'a> {
                 .statistics
                 .adjoint(&operator.adjoint_elements(&products, elements, veil)),
             scale: f64::from(most),
-            mean_share: share.iter().map(|s| f64::from(*s)).sum::<f64>() / share.len().max(1) as f64,
             preconditioner: Preconditioner::new(&share),
             term,
         }
@@ -119,9 +116,9 @@ impl<'a> NormalSystem<'a> {
     /// The left side of the system.
     pub fn apply(&self, x: &[Array2<f32>], terms: Terms) -> Planes {
         let mut out = self.term.apply(x);
-        for (to, x) in out.iter_mut().zip(x) {
+        for ((to, x), size) in out.iter_mut().zip(x).zip(self.statistics().sizes()) {
             add_prior(to, x, terms);
-            to.scaled_add(terms.identity as f32, x);
+            to.scaled_add((size * terms.identity) as f32, x);
         }
         out
     }
@@ -140,8 +137,13 @@ impl<'a> NormalSystem<'a> {
     ) -> Result<Planes> {
         let mut residual: Planes = self.apply(&x, terms);
         residual.iter_mut().zip(right).for_each(|(r, b)| *r = b - &*r);
-        let filter = self.preconditioner.filter(terms);
-        let mut z = self.preconditioner.apply(&residual, &filter);
+        let of_plane = |size: f64| Terms {
+            identity: size * terms.identity,
+            ..terms
+        };
+        let sizes = self.statistics().sizes();
+        let filters: Vec<Vec<f32>> = sizes.iter().map(|s| self.preconditioner.filter(of_plane(*s))).collect();
+        let mut z = self.preconditioner.apply(&residual, &filters);
         let mut direction = z.clone();
         let mut old = dot(&residual, &z);
         for _ in 0..iterations {
@@ -160,7 +162,7 @@ impl<'a> NormalSystem<'a> {
                 residual[c].scaled_add(-step, &image[c]);
             }
             let before = z;
-            z = self.preconditioner.apply(&residual, &filter);
+            z = self.preconditioner.apply(&residual, &filters);
             let new = dot(&residual, &z);
             // Polak and Ribiere: the preconditioner is not exactly the same for both signs of rounding.
             let turn = ((new - dot(&residual, &before)) / old).max(0.0) as f32;

@@ -57,9 +57,13 @@ impl Preconditioner {
     }
 
     /// The inverse of the prior between two roots of the light of each place. The two are in one unit where a place
-    /// counts most.
-    pub fn apply(&self, right: &[Array2<f32>], filter: &[f32]) -> Planes {
-        right.par_iter().map(|r| self.apply_to(r, filter)).collect()
+    /// counts most; each plane has a filter of its own.
+    pub fn apply(&self, right: &[Array2<f32>], filters: &[Vec<f32>]) -> Planes {
+        right
+            .par_iter()
+            .zip(filters)
+            .map(|(r, filter)| self.apply_to(r, filter))
+            .collect()
     }
 
     fn apply_to(&self, right: &Array2<f32>, filter: &[f32]) -> Array2<f32> {

@@ -76,6 +76,22 @@ impl SceneStatistics {
         (0..self.mix.len()).map(column).collect()
     }
 
+    /// Sums of the squares of what each independent plane is to the planes of a picture: columns of the mixing, which are at
+    /// right angles.
+    pub fn sizes(&self) -> Vec<f64> {
+        let column = |k: usize| self.mix.iter().map(|row| f64::from(row[k]).powi(2)).sum();
+        (0..self.mix.len()).map(column).collect()
+    }
+
+    /// Independent planes of a picture: the inverse of [`SceneStatistics::picture`].
+    pub fn independent(&self, picture: &[Array2<f32>]) -> Planes {
+        let mut planes = self.adjoint(picture);
+        for (plane, size) in planes.iter_mut().zip(self.sizes()) {
+            *plane /= size as f32;
+        }
+        planes
+    }
+
     /// The prior of independent planes, in units of `scale`: one over their spectrum.
     pub fn terms(&self, scale: f64) -> Terms {
         let strength = 1.0 / (self.power * scale);

@@ -36,6 +36,7 @@ pub fn restore(recorded: &Recorded<'_>, method: RestorationMethod, progress: &dy
             operator,
             light: &light,
             trust: recorded.trust,
+            prior: recorded.prior,
         };
         let seen = operator.apply_elements(&ones, &[element], false);
         let weighted: Planes = seen.iter().zip(recorded.trust).map(|(s, t)| s * t).collect();

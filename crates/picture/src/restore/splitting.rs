@@ -5,105 +5,136 @@
 use metalith_core::{Progress, Result};
 use ndarray::Array2;
 
-use super::normal::{NormalSystem, Planes, Terms, slopes, slopes_adjoint};
+use super::learned::LearnedDenoiser;
+use super::normal::{NormalSystem, Planes, Terms};
 use super::tikhonov;
-use super::total_variation::shrunk;
 
-/// What takes noise out of a picture: a plane in linear light, white being one.
+/// What takes noise out of a picture.
 pub trait Denoiser: Sync {
-    /// The plane without noise of this standard deviation.
-    fn denoise(&self, plane: &Array2<f32>, deviation: f64) -> Array2<f32>;
+    /// Planes of a picture in linear light, white being one, without noise of this standard deviation, which is the same
+    /// everywhere. `near` is the picture as it was known before, if it was.
+    fn denoise(&self, picture: &[Array2<f32>], near: Option<&[Array2<f32>]>, deviation: f64) -> Planes;
+
+    /// Deviations of the noise that is left in the picture, round by round.
+    fn schedule(&self) -> Schedule;
 }
 
-/// The picture of least total variation near another one, by gradients of its dual (Chambolle, J. Math. Imaging Vis. 20,
-/// 89 (2004)).
+/// Rounds before samples are drawn.
+const DRAWN_AFTER: usize = 3;
+
+/// Rounds of a splitting.
 #[derive(Clone, Copy, Debug)]
-pub struct SlopeDenoiser {
-    /// Strength, in standard deviations of the noise.
-    pub strength: f64,
+pub struct Schedule {
+    /// Deviation of the noise in the first round and after the last, in linear light; between them it falls evenly in its
+    /// logarithm.
+    pub deviations: [f64; 2],
     pub rounds: usize,
+    /// Steps of conjugate gradients in each.
+    pub steps: usize,
+    /// How much the denoised picture weighs: over one by the variance of the noise.
+    pub trust: f64,
 }
 
-impl Default for SlopeDenoiser {
-    fn default() -> Self {
-        Self {
-            strength: 1.0,
-            rounds: 20,
-        }
+impl Schedule {
+    fn deviation(&self, round: usize) -> f64 {
+        let [first, last] = self.deviations;
+        first * (last / first).powf(round as f64 / self.rounds as f64)
     }
 }
 
-impl Denoiser for SlopeDenoiser {
-    fn denoise(&self, plane: &Array2<f32>, deviation: f64) -> Array2<f32> {
-        let strength = (self.strength * deviation) as f32;
-        if strength <= 0.0 {
-            return plane.clone();
-        }
-        let mut dual = [Array2::<f32>::zeros(plane.dim()), Array2::zeros(plane.dim())];
-        for _ in 0..self.rounds {
-            let now = plane - &slopes_adjoint(&dual);
-            let step = slopes(&now);
-            for a in 0..2 {
-                dual[a].scaled_add(0.125, &step[a]);
-            }
-            // Onto vectors no longer than the strength: what shrinking takes off.
-            let off = shrunk(&dual, strength);
-            for a in 0..2 {
-                dual[a] -= &off[a];
-            }
-        }
-        plane - &slopes_adjoint(&dual)
-    }
+/// Where a splitting stands.
+#[derive(Clone)]
+struct Standing {
+    /// Planes of the system.
+    x: Planes,
+    /// The picture as the denoiser last gave it.
+    near: Option<Planes>,
+    rounds: usize,
 }
 
-/// Rounds, and steps of conjugate gradients in each.
-const ROUNDS: usize = 6;
-const STEPS: usize = 2;
-/// Weight of the denoised picture in the first round, of the largest weight of the data, and how it grows.
-const FIRST: f64 = 0.1;
-const GROWS: f64 = 1.6;
-/// Deviation of the noise that is left in the first picture.
-const FIRST_DEVIATION: f64 = 0.03;
+impl Standing {
+    fn begin(system: &NormalSystem<'_>, progress: &dyn Progress) -> Result<Self> {
+        let x = tikhonov::restore(system, progress)?;
+        Ok(Self {
+            x,
+            near: None,
+            rounds: 0,
+        })
+    }
 
-/// By rounds of both steps.
-pub fn restore(system: &NormalSystem<'_>, denoiser: &dyn Denoiser, progress: &dyn Progress) -> Result<Planes> {
-    use rayon::prelude::*;
-    let mut x = tikhonov::restore(system, progress)?;
-    progress.begin("restoring by splitting", (ROUNDS * STEPS) as u64);
-    let mut weight = FIRST * system.mean_share;
-    let mut deviation = FIRST_DEVIATION;
-    for _ in 0..ROUNDS {
-        let clean: Planes = x.par_iter().map(|p| denoiser.denoise(p, deviation)).collect();
-        let mut right = system.data.clone();
-        for (r, z) in right.iter_mut().zip(&clean) {
-            r.scaled_add(weight as f32, z);
-        }
+    /// One round; `z` makes a clean picture of one with noise of a deviation.
+    fn round(
+        &mut self,
+        system: &NormalSystem<'_>,
+        schedule: &Schedule,
+        progress: &dyn Progress,
+        z: impl FnOnce(&[Array2<f32>], Option<&[Array2<f32>]>, f64) -> Planes,
+    ) -> Result<()> {
+        let statistics = system.statistics();
+        let deviation = schedule.deviation(self.rounds);
+        let near = z(&statistics.picture(&self.x), self.near.as_deref(), deviation);
         let terms = Terms {
             slopes: 0.0,
             bends: 0.0,
-            identity: weight,
+            identity: schedule.trust / (deviation * deviation * system.scale),
         };
-        x = system.solve(clean, &right, terms, STEPS, progress)?;
-        weight *= GROWS;
-        deviation /= GROWS.sqrt();
+        let mut right = system.data.clone();
+        for (r, z) in right.iter_mut().zip(statistics.adjoint(&near)) {
+            r.scaled_add(terms.identity as f32, &z);
+        }
+        self.x = system.solve(statistics.independent(&near), &right, terms, schedule.steps, progress)?;
+        self.near = Some(near);
+        self.rounds += 1;
+        Ok(())
     }
-    Ok(x.par_iter().map(|p| denoiser.denoise(p, deviation)).collect())
+
+    /// All rounds that are left, and a last look of the denoiser.
+    fn finish(mut self, system: &NormalSystem<'_>, denoiser: &dyn Denoiser, progress: &dyn Progress) -> Result<Planes> {
+        let schedule = denoiser.schedule();
+        while self.rounds < schedule.rounds {
+            self.round(system, &schedule, progress, |p, near, d| denoiser.denoise(p, near, d))?;
+        }
+        let statistics = system.statistics();
+        let picture = statistics.picture(&self.x);
+        let last = denoiser.denoise(&picture, self.near.as_deref(), schedule.deviation(self.rounds));
+        Ok(statistics.independent(&last))
+    }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// By rounds of both steps.
+pub fn restore(system: &NormalSystem<'_>, denoiser: &dyn Denoiser, progress: &dyn Progress) -> Result<Planes> {
+    let schedule = denoiser.schedule();
+    let standing = Standing::begin(system, progress)?;
+    progress.begin("restoring by splitting", (schedule.rounds * schedule.steps) as u64);
+    standing.finish(system, denoiser, progress)
+}
 
-    #[test]
-    fn noise_goes_and_edges_stay() {
-        let clean = Array2::from_shape_fn((40, 40), |(_, x)| if x < 20 { 0.2f32 } else { 0.8 });
-        let noisy = Array2::from_shape_fn((40, 40), |(y, x)| {
-            clean[[y, x]] + if (x + y * 3) % 2 == 0 { 0.05 } else { -0.05 }
-        });
-        let got = SlopeDenoiser::default().denoise(&noisy, 0.05);
-        let error = |a: &Array2<f32>| (a - &clean).mapv(|v| v * v).mean().unwrap().sqrt();
-        assert!(error(&got) < 0.4 * error(&noisy), "{} {}", error(&got), error(&noisy));
-        assert!(got[[20, 22]] - got[[20, 17]] > 0.5);
-        assert_eq!(SlopeDenoiser::default().denoise(&noisy, 0.0), noisy);
+/// Pictures that the frame may be of, one for each seed: after some rounds of the splitting one clean picture is drawn in
+/// place of the expected one, and the rest of the rounds holds it to the frame.
+pub fn samples(
+    system: &NormalSystem<'_>,
+    denoiser: &LearnedDenoiser,
+    seeds: std::ops::Range<u64>,
+    progress: &dyn Progress,
+) -> Result<Vec<Planes>> {
+    let schedule = denoiser.schedule();
+    let mut standing = Standing::begin(system, progress)?;
+    let left = schedule.rounds - DRAWN_AFTER;
+    let count = (seeds.end - seeds.start) as usize;
+    progress.begin(
+        "drawing samples",
+        ((DRAWN_AFTER + count * left) * schedule.steps) as u64,
+    );
+    for _ in 0..DRAWN_AFTER {
+        standing.round(system, &schedule, progress, |p, near, d| denoiser.denoise(p, near, d))?;
     }
+    seeds
+        .map(|seed| {
+            let mut own = standing.clone();
+            own.round(system, &schedule, progress, |p, near, d| {
+                denoiser.draw(p, near, d, seed)
+            })?;
+            own.finish(system, denoiser, progress)
+        })
+        .collect()
 }

@@ -42,7 +42,7 @@ pub fn read_scene(file: &SceneFile) -> Result<SceneImage> {
         .file_stem()
         .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     let bytes = read_at_most(path, LONGEST, "a picture of a scene")?;
-    let is_npy = bytes.starts_with(b"\x93NUMPY");
+    let is_npy = is_npy(&bytes);
     match (&file.wavelengths_nm, is_npy) {
         (Some(_), false) => Err(fault(path, "wavelengths are given, but this is no NPY file")),
         (Some(nm), true) => {
@@ -74,17 +74,39 @@ pub fn read_scene(file: &SceneFile) -> Result<SceneImage> {
             })
         }
         (None, _) => {
-            let rgb = if is_npy {
-                grey_or_colour(path, array(path, &bytes)?)?
-            } else if bytes.starts_with(b"\x89PNG") {
-                png(path, &bytes)?
-            } else if bytes.starts_with(&[0xff, 0xd8]) {
-                jpeg(path, &bytes)?
-            } else {
-                return Err(fault(path, "it is neither PNG, JPEG nor NPY"));
+            let rgb = match is_npy {
+                true => grey_or_colour(path, array(path, &bytes)?)?,
+                false => values(path, &bytes)?.mapv(srgb::linear),
             };
             Ok(SceneImage::of_rgb(&name, &rgb, file.field_deg, file.distance_um))
         }
+    }
+}
+
+/// Read a picture, `[row, column, colour]` in sRGB values from 0 to 1: the same files as [`read_scene`], but for cubes.
+///
+/// # Errors
+/// If the file cannot be read or holds something else.
+pub fn read_picture(path: &Path) -> Result<Array3<f64>> {
+    let bytes = read_at_most(path, LONGEST, "a picture")?;
+    if is_npy(&bytes) {
+        return Ok(grey_or_colour(path, array(path, &bytes)?)?.mapv(srgb::encoded));
+    }
+    values(path, &bytes)
+}
+
+fn is_npy(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"\x93NUMPY")
+}
+
+/// Values of an image file as they are stored, full scale being one.
+fn values(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
+    if bytes.starts_with(b"\x89PNG") {
+        Ok(png_values(path, bytes)?.0)
+    } else if bytes.starts_with(&[0xff, 0xd8]) {
+        jpeg(path, bytes)
+    } else {
+        Err(fault(path, "it is neither PNG, JPEG nor NPY"))
     }
 }
 
@@ -133,10 +155,6 @@ fn grey_or_colour(path: &Path, array: Array3<f64>) -> Result<Array3<f64>> {
     }
 }
 
-fn png(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
-    Ok(png_values(path, bytes)?.0.mapv(srgb::linear))
-}
-
 /// Red, green and blue of an opaque PNG as they are stored, full scale being one; and whether values have 16 bits.
 pub(super) fn png_values(path: &Path, bytes: &[u8]) -> Result<(Array3<f64>, bool)> {
     let wrong = |e: png::DecodingError| fault(path, e.to_string());
@@ -182,7 +200,7 @@ fn jpeg(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
         return Err(fault(path, "its colours are not those of a picture"));
     }
     Ok(Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| {
-        srgb::linear(f64::from(data[(y * columns + x) * 3 + c]) / 255.0)
+        f64::from(data[(y * columns + x) * 3 + c]) / 255.0
     }))
 }
 

@@ -1,0 +1,29 @@
+//! What pictures look like, learnt from photographs by a small network.
+//!
+//! ```text
+//! photographs -> pieces with noise -> gradients -> weights           (`train`)
+//! noisy picture, map of its noise    -> expected picture             (`NetworkDenoiser::denoise`)
+//! the same, and a seed               -> one of the pictures it may be of  (`NetworkDenoiser::sample`)
+//! ```
+//!
+//! The network has 0.8 million weights. Its convolutions and their gradients are made here, in registers: what they are
+//! needed for is small enough, they are three times as fast as those of the general packages that were measured (see
+//! docs/method/prior.md), and the order of their sums is known.
+
+mod adam;
+mod checkpoint;
+mod convolution;
+mod denoiser;
+mod examples;
+mod features;
+mod network;
+mod sample;
+mod training;
+mod weights;
+
+pub use denoiser::NetworkDenoiser;
+pub use examples::{Photographs, with_noise};
+pub use network::COLOURS;
+pub use sample::SAMPLING_STEPS;
+pub use training::{JUDGED, TrainingReport, TrainingSpec, train};
+pub use weights::shipped_digest;

@@ -1,0 +1,196 @@
+//! Pictures: the frame that a camera records, and what can be restored from it.
+
+use std::path::PathBuf;
+use std::sync::OnceLock;
+
+use metalith::camera::Camera;
+use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
+use metalith::picture::scene::SceneImage;
+use metalith::picture::{self, Rehearsal};
+use metalith::prior::NetworkDenoiser;
+use metalith::{CalibratedModel, Error, Result};
+use ndarray::Array3;
+use numpy::{PyArray2, PyArray3, PyReadonlyArray3};
+use pyo3::prelude::*;
+
+use crate::arrays::Design;
+use crate::work::{error, work};
+
+/// Distance of a scene of which none is said (um).
+const FAR: f64 = f64::INFINITY;
+
+/// A layout behind a camera, and the field of its scenes.
+#[pyclass(frozen)]
+pub struct Studio {
+    studio: picture::Studio,
+    /// What the operator of the restoration errs by; found when it is first needed.
+    operator_error: OnceLock<Vec<f64>>,
+}
+
+/// A frame that was recorded.
+#[pyclass(frozen)]
+pub struct Frame {
+    frame: picture::Frame,
+}
+
+#[pymethods]
+impl Frame {
+    /// Planes of full scale: one with a colour filter array, else one for each channel.
+    #[getter]
+    fn planes<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyArray2<f32>>> {
+        self.frame.planes.iter().map(|p| PyArray2::from_array(py, p)).collect()
+    }
+
+    /// Pixels at full scale.
+    #[getter]
+    fn saturated(&self) -> usize {
+        self.frame.saturated
+    }
+}
+
+#[pymethods]
+impl Studio {
+    /// Kernels and veil of a layout, made or taken from the disk.
+    #[staticmethod]
+    #[pyo3(signature = (design, layout, camera, rows, columns, field_deg, distance_mm=None, model=None, prior=None, progress=None))]
+    #[allow(clippy::too_many_arguments)]
+    fn open(
+        py: Python<'_>,
+        design: &Design,
+        layout: PathBuf,
+        camera: PathBuf,
+        rows: usize,
+        columns: usize,
+        field_deg: f64,
+        distance_mm: Option<f64>,
+        model: Option<PathBuf>,
+        prior: Option<PathBuf>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Self> {
+        let design = &design.design;
+        let studio = work(py, progress, |p| {
+            let camera = Camera::read(&camera)?;
+            let model = model.as_deref().map(CalibratedModel::read).transpose()?;
+            let prior = prior.as_deref().map(LearnedDenoiser::read).transpose()?;
+            let black = Array3::zeros((rows, columns, 3));
+            let scene = SceneImage::of_rgb("scene", &black, field_deg, distance_mm.map_or(FAR, |mm| mm * 1e3));
+            let mut studio = picture::Studio::open(design, &layout, &camera, model.as_ref(), &scene, p)?;
+            if let Some(prior) = prior {
+                studio.prior = prior;
+            }
+            Ok(studio)
+        })?;
+        Ok(Self {
+            studio,
+            operator_error: OnceLock::new(),
+        })
+    }
+
+    /// The frame of a scene `[row, column, colour]` in linear sRGB.
+    #[pyo3(signature = (scene, seed=1, progress=None))]
+    fn record(
+        &self,
+        py: Python<'_>,
+        scene: PyReadonlyArray3<'_, f64>,
+        seed: u64,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Frame> {
+        let rgb = scene.as_array().to_owned();
+        let frame = work(py, progress, |_| {
+            let scene = self.scene(&rgb)?;
+            self.studio.record(&self.studio.simulation(), &scene, seed)
+        })?;
+        Ok(Frame { frame })
+    }
+
+    /// What an ideal camera of the same channels gives of a scene, linear sRGB.
+    fn truth<'py>(&self, py: Python<'py>, scene: PyReadonlyArray3<'py, f64>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let scene = self.scene(&scene.as_array().to_owned()).map_err(error)?;
+        Ok(PyArray3::from_owned_array(py, self.studio.truth(&scene)))
+    }
+
+    /// The picture restored from a frame, linear sRGB.
+    #[pyo3(signature = (frame, method="tikhonov", joint=true, progress=None))]
+    fn restore<'py>(
+        &self,
+        py: Python<'py>,
+        frame: &Frame,
+        method: &str,
+        joint: bool,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let method: RestorationMethod = method.parse().map_err(error)?;
+        let found = work(py, progress, |p| {
+            let operator = self.studio.restoration();
+            let expected = self.operator_error(&operator);
+            self.studio.restore(&operator, expected, &frame.frame, method, joint, p)
+        })?;
+        Ok(PyArray3::from_owned_array(py, found))
+    }
+
+    /// Pictures that a frame may be of, linear sRGB, one for each seed from zero.
+    #[pyo3(signature = (frame, count, progress=None))]
+    fn samples<'py>(
+        &self,
+        py: Python<'py>,
+        frame: &Frame,
+        count: u64,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Vec<Bound<'py, PyArray3<f64>>>> {
+        let drawn = work(py, progress, |p| {
+            let operator = self.studio.restoration();
+            let expected = self.operator_error(&operator);
+            self.studio.samples(&operator, expected, &frame.frame, 0..count, p)
+        })?;
+        Ok(drawn.into_iter().map(|d| PyArray3::from_owned_array(py, d)).collect())
+    }
+}
+
+impl Studio {
+    fn scene(&self, rgb: &Array3<f64>) -> Result<SceneImage> {
+        let view = self.studio.view;
+        if rgb.dim() != (view.rows, view.columns, 3) {
+            return Err(Error::invalid(
+                format!("a scene of shape {:?}", rgb.dim()),
+                format!("give one of shape ({}, {}, 3)", view.rows, view.columns),
+            ));
+        }
+        Ok(SceneImage::of_rgb("scene", rgb, view.field_deg, view.distance_um))
+    }
+
+    fn operator_error(&self, operator: &picture::FrameOperator<'_>) -> &[f64] {
+        self.operator_error
+            .get_or_init(|| Rehearsal::new(&self.studio, operator).operator_error)
+    }
+}
+
+/// A picture `[row, column, colour]` in sRGB values without its normal noise, whose deviation is given for each value.
+#[pyfunction]
+#[pyo3(signature = (values, deviation, weights=None))]
+pub fn denoise<'py>(
+    py: Python<'py>,
+    values: PyReadonlyArray3<'py, f32>,
+    deviation: PyReadonlyArray3<'py, f32>,
+    weights: Option<PathBuf>,
+) -> PyResult<Bound<'py, PyArray3<f32>>> {
+    let (values, deviation) = (values.as_array().to_owned(), deviation.as_array().to_owned());
+    let clean = work(py, None, |_| {
+        let denoiser = match &weights {
+            Some(path) => NetworkDenoiser::read(path)?,
+            None => NetworkDenoiser::shipped()?,
+        };
+        let (rows, columns, colours) = values.dim();
+        if colours != 3 || rows == 0 || columns == 0 || deviation.dim() != values.dim() {
+            return Err(Error::invalid(
+                format!(
+                    "values of shape {:?}, deviations of shape {:?}",
+                    values.dim(),
+                    deviation.dim()
+                ),
+                "give both with shape (rows, columns, 3)",
+            ));
+        }
+        Ok(denoiser.denoise(&values, &deviation))
+    })?;
+    Ok(PyArray3::from_owned_array(py, clean))
+}

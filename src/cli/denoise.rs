@@ -1,0 +1,113 @@
+//! `metalith denoise`: the learnt prior by itself.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use metalith::picture::scene::read_picture;
+use metalith::picture::write_picture;
+use metalith::prior::{NetworkDenoiser, with_noise};
+use metalith::wave::restore::{psnr_db, ssim_colour};
+use metalith::{Error, Result};
+use ndarray::Array3;
+use serde::Serialize;
+
+use super::paths::apart;
+use super::{Outcome, Terminal, print_json, print_line};
+
+/// Take noise out of a picture by the network that restorations use.
+///
+/// With `--add` the noise is added first, and the result is held against the picture.
+#[derive(Args)]
+#[command(after_help = "Example:\n  metalith denoise photograph.png --noise 25 --add --out clean.png")]
+pub struct DenoiseArgs {
+    /// The picture: PNG, JPEG or NPY.
+    picture: PathBuf,
+
+    /// Standard deviation of the noise, of 255.
+    #[arg(long, value_name = "LEVELS", value_parser = noise)]
+    noise: f32,
+
+    /// Add normal noise of this deviation first, drawn from `--seed`.
+    #[arg(long)]
+    add: bool,
+
+    /// Of the noise that is added.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+
+    /// File of weights that `metalith train` wrote; those of the program if left out.
+    #[arg(long, value_name = "FILE")]
+    weights: Option<PathBuf>,
+
+    /// PNG of 16 bits for the picture without noise.
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+
+    /// Print the scores as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// How near the pictures are to the one without noise.
+#[derive(Serialize)]
+struct Scores {
+    noisy_psnr_db: f64,
+    psnr_db: f64,
+    ssim: f64,
+}
+
+fn noise(text: &str) -> std::result::Result<f32, String> {
+    match text.parse() {
+        Ok(value) if (0.0..=255.0).contains(&value) => Ok(value),
+        _ => Err("give a number from 0 to 255".into()),
+    }
+}
+
+pub fn run(args: &DenoiseArgs, terminal: &Terminal) -> Result<Outcome> {
+    if args.out.is_none() && !args.add {
+        return Err(Error::invalid(
+            "nothing would come of this",
+            "name a file with --out, or hold the result against the picture with --add",
+        ));
+    }
+    if let Some(out) = &args.out {
+        apart([args.picture.as_path()], &[out])?;
+    }
+    let given = read_picture(&args.picture)?;
+    let denoiser = match &args.weights {
+        Some(path) => NetworkDenoiser::read(path)?,
+        None => NetworkDenoiser::shipped()?,
+    };
+    let deviation = args.noise / 255.0;
+    let single = given.mapv(|v| v as f32);
+    let noisy = match args.add {
+        true => with_noise(&single, deviation, args.seed),
+        false => single,
+    };
+    let clean = denoiser.denoise_even(&noisy, deviation);
+    let values = |p: &Array3<f32>| p.mapv(|v| f64::from(v.clamp(0.0, 1.0)));
+    if let Some(out) = &args.out {
+        write_picture(out, &values(&clean))?;
+    }
+    terminal.clear();
+    if args.add {
+        // Noisy pictures are scored as they are; what a picture can hold is between black and white.
+        let noisy = noisy.mapv(f64::from);
+        let found = Scores {
+            noisy_psnr_db: psnr_db(noisy.view(), given.view())?,
+            psnr_db: psnr_db(values(&clean).view(), given.view())?,
+            ssim: ssim_colour(values(&clean).view(), given.view())?,
+        };
+        if args.json {
+            print_json(&found);
+        } else {
+            print_line!(
+                "PSNR {:.2} dB (noisy {:.2}), SSIM {:.4}",
+                found.psnr_db,
+                found.noisy_psnr_db,
+                found.ssim
+            );
+        }
+    }
+    Ok(Outcome::Fine)
+}
