@@ -69,7 +69,7 @@ const ADDED: f32 = 0.1;
 impl TrainingSpec {
     fn check(&self) -> Result<()> {
         let fault = |what: &str, hint: &str| Err(Error::invalid(what, hint));
-        if self.piece % 8 != 0 || !(32..=512).contains(&self.piece) {
+        if !self.piece.is_multiple_of(8) || !(32..=512).contains(&self.piece) {
             return fault(
                 "pieces of this size cannot be learnt from",
                 "give a multiple of 8 from 32 to 512",
@@ -127,10 +127,10 @@ pub fn train(
         at.adam.step(&mut at.weights, &gradient, at.step, spec.rate(at.step));
         at.loss = 0.99 * at.loss + 0.01 * if at.step == 1 { 100.0 * loss } else { loss };
         progress.advance(1);
-        if at.step % LOOK == 0 {
+        if at.step.is_multiple_of(LOOK) {
             judged = held_out(photographs, &at.weights);
         }
-        if at.step % KEEP == 0 {
+        if at.step.is_multiple_of(KEEP) {
             at.write(state, &origin)?;
         }
         progress.note(&format!("loss {:.5}, held out {judged:.2} dB", at.loss));
@@ -229,7 +229,11 @@ mod tests {
     fn picture(seed: usize, side: usize) -> Array3<f32> {
         Array3::from_shape_fn((side, side, 3), |(y, x, c)| {
             let wave = (0.1 * (x * (seed + 1)) as f32 + 0.05 * (y * (c + 1)) as f32).sin();
-            let edge = if (x / 16 + y / 24 + seed) % 2 == 0 { 0.15 } else { -0.15 };
+            let edge = if (x / 16 + y / 24 + seed).is_multiple_of(2) {
+                0.15
+            } else {
+                -0.15
+            };
             0.5 + 0.2 * wave + edge
         })
     }

@@ -84,7 +84,11 @@ mod tests {
             clean[[y, x]] + if (x + y * 3) % 2 == 0 { 0.05 } else { -0.05 }
         });
         let denoiser = SlopeDenoiser::new(&SceneStatistics::grey(1));
-        let denoised = |deviation: f64| denoiser.denoise(&[noisy.clone()], None, deviation).remove(0);
+        let denoised = |deviation: f64| {
+            denoiser
+                .denoise(std::slice::from_ref(&noisy), None, deviation)
+                .remove(0)
+        };
         let got = denoised(0.05);
         let error = |a: &Array2<f32>| (a - &clean).mapv(|v| v * v).mean().unwrap().sqrt();
         assert!(error(&got) < 0.4 * error(&noisy), "{} {}", error(&got), error(&noisy));
