@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use metalith::Result;
 use metalith::picture::scene::{SceneFile, read_scene};
 use metalith::picture::{Studio, write_dataset};
-use metalith::{Error, Result};
 
 use super::camera_args::{CameraArgs, CameraFiles};
 use super::standard_input::InputFile;
-use super::{Outcome, Terminal, print_line};
+use super::{Outcome, Terminal, images, print_line};
 
 /// Record the frame of every image of a folder, for learning: frames, what an ideal camera gives, and a manifest.
 ///
@@ -38,7 +38,7 @@ pub struct DatasetArgs {
 pub fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let CameraFiles { design, camera, model } = args.with.read()?;
-    let images = images(&args.images)?;
+    let images = images::of_folder(&args.images)?;
     let read = |path: &Path| {
         read_scene(&SceneFile {
             path: path.to_owned(),
@@ -54,22 +54,4 @@ pub fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.clear();
     print_line!("{} pairs in {}", manifest.pairs.len(), args.out.display());
     Ok(Outcome::Fine)
-}
-
-/// Images of a folder by name.
-fn images(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder).map_err(Error::io("read", folder))?;
-    let known = |path: &PathBuf| {
-        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        extension.is_some_and(|e| ["png", "jpg", "jpeg", "npy"].contains(&e.as_str()))
-    };
-    let mut images: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(known).collect();
-    images.sort();
-    if images.is_empty() {
-        return Err(Error::invalid(
-            format!("{} holds no image", folder.display()),
-            "give a folder of PNG, JPEG or NPY files",
-        ));
-    }
-    Ok(images)
 }

@@ -4,12 +4,14 @@ mod calibrate;
 mod camera_args;
 mod cells;
 mod check;
+mod compare;
 mod compensated;
 mod completions;
 mod convert;
 mod dataset;
 mod diff;
 mod handoff;
+mod images;
 mod layout;
 mod new;
 mod optimise;
@@ -81,6 +83,7 @@ enum Command {
     Photographs(photographs::PhotographsArgs),
     Picture(picture::PictureArgs),
     Dataset(dataset::DatasetArgs),
+    Compare(compare::CompareArgs),
     Verify(verify::VerifyArgs),
     Psf(psf::PsfArgs),
     Handoff(handoff::HandoffArgs),
@@ -163,6 +166,7 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::Optimise(args) => optimise::run(args, terminal),
         Command::Photographs(args) => photographs::run(args, terminal),
         Command::Dataset(args) => dataset::run(args, terminal),
+        Command::Compare(args) => compare::run(args, terminal),
         Command::Picture(args) => picture::run(args, terminal),
         Command::Handoff(args) => handoff::run(args, terminal),
         Command::Verify(args) => verify::run(args, terminal),

@@ -34,7 +34,7 @@ pub use dataset::{DatasetManifest, DatasetPair, write_dataset};
 pub use exposure::{Frame, channel_at, expose, gains, sensitivity};
 pub use geometry::{ElementView, SceneSpace, SceneView};
 pub use kernels::{BankSpec, KernelBank};
-pub use operator::{Detail, FrameOperator, SceneInputs, ScenePoints};
+pub use operator::{Detail, FftScratch, FrameOperator, SceneInputs, ScenePoints, SquareFft};
 pub use page::{PicturePages, shown, write_pages};
 pub use rehearsal::Rehearsal;
 pub use report::{Assumption, ChannelBudget, HomographyResidual, PictureReport, RestorationReport};
