@@ -103,6 +103,7 @@ pub use metalith_picture as picture;
 pub use metalith_prior as prior;
 pub use metalith_rcwa as rcwa;
 pub use metalith_report as report;
+pub use metalith_rivals as rivals;
 pub use metalith_study as study;
 pub use metalith_verify as verify;
 pub use metalith_wave as wave;

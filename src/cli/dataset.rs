@@ -8,9 +8,8 @@ use metalith::picture::scene::{SceneFile, read_scene};
 use metalith::picture::{Studio, write_dataset};
 
 use super::camera_args::{CameraArgs, CameraFiles};
-use super::paths::images;
 use super::standard_input::InputFile;
-use super::{Outcome, Terminal, print_line};
+use super::{Outcome, Terminal, images, print_line};
 
 /// Record the frame of every image of a folder, for learning: frames, what an ideal camera gives, and a manifest.
 ///
@@ -39,7 +38,7 @@ pub struct DatasetArgs {
 pub fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let CameraFiles { design, camera, model } = args.with.read()?;
-    let images = images(&args.images)?;
+    let images = images::of_folder(&args.images)?;
     let read = |path: &Path| {
         read_scene(&SceneFile {
             path: path.to_owned(),

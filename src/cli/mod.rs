@@ -4,6 +4,7 @@ mod calibrate;
 mod camera_args;
 mod cells;
 mod check;
+mod compare;
 mod compensated;
 mod completions;
 mod convert;
@@ -11,6 +12,7 @@ mod dataset;
 mod denoise;
 mod diff;
 mod handoff;
+mod images;
 mod layout;
 mod new;
 mod optimise;
@@ -85,6 +87,7 @@ enum Command {
     Dataset(dataset::DatasetArgs),
     Train(train::TrainArgs),
     Denoise(denoise::DenoiseArgs),
+    Compare(compare::CompareArgs),
     Verify(verify::VerifyArgs),
     Psf(psf::PsfArgs),
     Handoff(handoff::HandoffArgs),
@@ -169,6 +172,7 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::Dataset(args) => dataset::run(args, terminal),
         Command::Train(args) => train::run(args, terminal),
         Command::Denoise(args) => denoise::run(args, terminal),
+        Command::Compare(args) => compare::run(args, terminal),
         Command::Picture(args) => picture::run(args, terminal),
         Command::Handoff(args) => handoff::run(args, terminal),
         Command::Verify(args) => verify::run(args, terminal),

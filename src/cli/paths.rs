@@ -1,4 +1,4 @@
-//! Files that are read and written: images of a folder, and that no input is written over.
+//! What is read and what is written are different files.
 
 use std::path::{Path, PathBuf};
 
@@ -25,27 +25,6 @@ pub fn apart<'p>(inputs: impl IntoIterator<Item = &'p Path>, outputs: &[&Path]) 
         ));
     }
     Ok(())
-}
-
-/// Images of a folder by name.
-///
-/// # Errors
-/// If the folder cannot be read or holds none.
-pub fn images(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder).map_err(Error::io("read", folder))?;
-    let known = |path: &PathBuf| {
-        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        extension.is_some_and(|e| ["png", "jpg", "jpeg", "npy"].contains(&e.as_str()))
-    };
-    let mut images: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(known).collect();
-    images.sort();
-    if images.is_empty() {
-        return Err(Error::invalid(
-            format!("{} holds no image", folder.display()),
-            "give a folder of PNG, JPEG or NPY files",
-        ));
-    }
-    Ok(images)
 }
 
 /// What tells a file from others, whatever its path says.

@@ -7,8 +7,8 @@ use metalith::Result;
 use metalith::picture::scene::read_picture;
 use metalith::prior::{Photographs, TrainingSpec, train};
 
-use super::paths::{apart, images};
-use super::{Outcome, Terminal, print_json, print_line};
+use super::paths::apart;
+use super::{Outcome, Terminal, images, print_json, print_line};
 
 /// Teach the network that takes noise out of pictures from the photographs of a folder.
 ///
@@ -54,7 +54,7 @@ pub fn run(args: &TrainArgs, terminal: &Terminal) -> Result<Outcome> {
         piece: args.piece,
         seed: args.seed,
     };
-    let files = images(&args.folder)?;
+    let files = images::of_folder(&args.folder)?;
     let mut state = args.out.clone().into_os_string();
     state.push(".state");
     let state = PathBuf::from(state);

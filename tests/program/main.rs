@@ -3,6 +3,7 @@
 mod broken_designs;
 mod cells;
 mod check;
+mod compare;
 mod handoff;
 mod made;
 mod new;

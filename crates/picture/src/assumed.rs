@@ -29,6 +29,18 @@ pub struct Assumed {
     pub patch_pixels: Option<u32>,
 }
 
+impl Assumed {
+    /// All of it: the setting of the paper.
+    pub fn paper() -> Self {
+        Self {
+            fixed_kernels: true,
+            butterworth: true,
+            no_veil: true,
+            patch_pixels: Some(PATCH),
+        }
+    }
+}
+
 /// Angle at which the filter has lost half of the power: half of 45 degrees.
 const CUTOFF_DEG: f64 = 22.5;
 const ORDER: i32 = 4;
@@ -107,12 +119,7 @@ pub fn worth_of_assumptions(
         patch_pixels: Some(PATCH),
         ..none
     };
-    let all = Assumed {
-        fixed_kernels: true,
-        butterworth: true,
-        no_veil: true,
-        patch_pixels: Some(PATCH),
-    };
+    let all = Assumed::paper();
     let cases = [
         ("none: all of the physics", studio, none),
         ("one kernel for each element and colour", studio, fixed),

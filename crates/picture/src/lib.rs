@@ -37,7 +37,7 @@ pub use doubt::{Doubt, DoubtReport};
 pub use exposure::{Frame, channel_at, expose, gains, sensitivity};
 pub use geometry::{ElementView, SceneSpace, SceneView};
 pub use kernels::{BankSpec, KernelBank};
-pub use operator::{Detail, FrameOperator, SceneInputs, ScenePoints};
+pub use operator::{Detail, FftScratch, FrameOperator, SceneInputs, ScenePoints, SquareFft};
 pub use page::{PicturePages, shown, write_pages};
 pub use png16::write_picture;
 pub use rehearsal::Rehearsal;

@@ -1,0 +1,259 @@
+//! A camera with a mask in place of a lens, whose frame is a product: rows of the mask act on columns of the scene, columns
+//! on rows (Asif et al., IEEE Trans. Comput. Imaging 3, 384 (2017)).
+//!
+//! The mask is open where both of two sequences of maximum length are. Its shadow is that of diffraction along the normal,
+//! wavelength by wavelength, and moves with the direction of arrival. What a restoration knows is one shadow for each channel,
+//! of a grey surface.
+
+mod mask;
+mod solve;
+
+use faer::Mat;
+use metalith_camera::Camera;
+use metalith_core::{Error, Progress, Result};
+use metalith_picture::restore::SceneStatistics;
+use metalith_picture::scene::SceneImage;
+use metalith_picture::{Frame, SceneView};
+use ndarray::{Array2, Array3, Axis, Slice};
+use rayon::prelude::*;
+
+use crate::contender::{Contender, Way};
+use crate::lensless::LenslessBench;
+pub use mask::MaskSpec;
+use mask::Shadow;
+use solve::{Factor, TwoFactors};
+
+/// Distance of the wavelengths that shadows are simulated at (nm).
+const STEP_NM: f64 = 25.0;
+/// Strengths of the prior that are tried on a random scene: powers of ten from the first to the last, relative to the
+/// largest singular value, in steps.
+const STRENGTHS: ([f64; 2], usize) = ([-9.0, -1.0], 17);
+/// Of the random scene and of its noise.
+const SEED: u64 = 1;
+
+/// A mask before a sensor, ready for scenes of one size and field.
+pub struct FlatCam {
+    bench: LenslessBench,
+    /// By wavelength: along rows and along columns of the frame, `[pixel, place of the scene]`.
+    shadows: Vec<[Mat<f32>; 2]>,
+    /// By channel, for each place of its pixels in the square of two by two.
+    systems: Vec<Vec<([usize; 2], TwoFactors)>>,
+    /// By channel.
+    strength: Vec<f64>,
+}
+
+impl FlatCam {
+    /// For a mask before the sensor of a camera. The strength of the prior is chosen on a random scene, not on those that
+    /// will be taken.
+    ///
+    /// # Errors
+    /// If the camera tells no colours apart, the scene is near, a decomposition fails, or the user stopped it.
+    pub fn new(mask: &MaskSpec, camera: &Camera, view: SceneView, progress: &dyn Progress) -> Result<Self> {
+        let bench = LenslessBench::new(camera, view, STEP_NM)?;
+        let [rows, columns] = bench.frame();
+        let pixel = camera.sensor.pixel_um;
+        let places = |n: usize, place: fn(&SceneView, f64) -> f64| -> Vec<f64> {
+            (0..n).map(|i| place(&view, i as f64)).collect()
+        };
+        let tangents_y = places(view.rows, |v, i| v.tangents(i, 0.0)[1]);
+        let tangents_x = places(view.columns, |v, i| v.tangents(0.0, i)[0]);
+        progress.begin("shadows of the mask", bench.sampling.wavelengths_nm.len() as u64);
+        let both = |shadow: &Shadow| {
+            [
+                shadow.on_pixels(rows, pixel, &tangents_y, view.pixel()),
+                shadow.on_pixels(columns, pixel, &tangents_x, view.pixel()),
+            ]
+        };
+        let patterns: Vec<Shadow> = bench
+            .sampling
+            .wavelengths_nm
+            .par_iter()
+            .map(|nm| {
+                let reach =
+                    rows.max(columns) as f64 * pixel + 2.0 * mask.distance_um * tangents_x[0].hypot(tangents_y[0]);
+                let shadow = mask.shadow(nm * 1e-3, reach);
+                progress.advance(1);
+                shadow
+            })
+            .collect();
+        let shadows: Vec<[Mat<f32>; 2]> = patterns
+            .par_iter()
+            .map(|s| both(s).map(|m| Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] as f32)))
+            .collect();
+        progress.begin("singular values of the mask", bench.channels() as u64);
+        let systems = (0..bench.channels())
+            .into_par_iter()
+            .map(|channel| {
+                let known = both(&Shadow::mean(&patterns, &bench.grey_weights(channel)));
+                let found = bench
+                    .places(channel)
+                    .into_iter()
+                    .map(|[r, c]| {
+                        let own = |m: &Mat<f64>, first: usize| Factor::new(m, first);
+                        Ok(([r, c], TwoFactors::new(own(&known[0], r)?, own(&known[1], c)?)))
+                    })
+                    .collect::<Result<Vec<_>>>();
+                progress.advance(1);
+                found
+            })
+            .collect::<Result<Vec<_>>>()?;
+        if progress.stopped() {
+            return Err(Error::Interrupted);
+        }
+        let mut camera = Self {
+            bench,
+            shadows,
+            systems,
+            strength: Vec::new(),
+        };
+        let white = camera.light(&camera.bench.white());
+        camera.bench = camera.bench.exposed(&white)?;
+        camera.strength = camera.chosen_strengths();
+        Ok(camera)
+    }
+
+    /// Light of each channel in each pixel; that of a white scene through an open mask would be about one.
+    fn light(&self, scene: &SceneImage) -> Vec<Array2<f32>> {
+        let [rows, columns] = self.bench.frame();
+        let scale = ((scene.view.rows * scene.view.columns) as f32).recip();
+        let sent: Vec<Array2<f32>> = scene.planes.iter().map(|p| self.bench.sent(p)).collect();
+        let channels = self.bench.channels();
+        let weights: Vec<Vec<Vec<f64>>> = (0..channels)
+            .map(|c| scene.basis.iter().map(|b| self.bench.weights(c, b)).collect())
+            .collect();
+        let nothing = || vec![Array2::<f32>::zeros((rows, columns)); channels];
+        self.shadows
+            .par_iter()
+            .enumerate()
+            .map(|(i, [down, across])| {
+                let mut frames = nothing();
+                for (frame, own) in frames.iter_mut().zip(&weights) {
+                    let mut light = Mat::<f32>::zeros(scene.view.rows, scene.view.columns);
+                    for (plane, w) in sent.iter().zip(own) {
+                        let w = w[i] as f32 * scale;
+                        for ((y, x), v) in plane.indexed_iter() {
+                            light[(y, x)] += w * v;
+                        }
+                    }
+                    if own.iter().any(|w| w[i] != 0.0) {
+                        let seen = down * &light * across.transpose();
+                        *frame = Array2::from_shape_fn((rows, columns), |at| seen[at]);
+                    }
+                }
+                frames
+            })
+            // In the order of the wavelengths, whoever was first.
+            .collect::<Vec<_>>()
+            .into_iter()
+            .fold(nothing(), |mut sum, frames| {
+                sum.iter_mut().zip(&frames).for_each(|(s, f)| *s += f);
+                sum
+            })
+    }
+
+    /// By channel, the strength that restores a random scene best.
+    fn chosen_strengths(&self) -> Vec<f64> {
+        let scene = self
+            .bench
+            .scene_of(SceneStatistics::colours().random_scene(&self.bench.view, SEED));
+        let frame = self.bench.record(&self.light(&scene), SEED);
+        let truth = self.bench.ideal(&scene);
+        let (light, _) = frame.light(&self.bench.camera, &vec![0.0; self.bench.channels()]);
+        let ([first, last], steps) = STRENGTHS;
+        let tried: Vec<f64> = (0..steps)
+            .map(|k| 10f64.powf(first + (last - first) * k as f64 / (steps - 1) as f64))
+            .collect();
+        (0..self.bench.channels())
+            .into_par_iter()
+            .map(|c| {
+                let error = |strength: &f64| -> f64 {
+                    let picture = self.bench.unsent(&[self.solved(c, &light[c], *strength)]).remove(0);
+                    let off = picture.iter().zip(&truth[c]);
+                    off.map(|(a, b)| f64::from(a - b).powi(2)).sum()
+                };
+                let errors = tried.iter().map(error);
+                let best = errors.zip(&tried).min_by(|a, b| a.0.total_cmp(&b.0));
+                best.map_or(tried[0], |(_, strength)| *strength)
+            })
+            .collect()
+    }
+
+    /// Sent light of a channel, the mean over the places of its pixels.
+    fn solved(&self, channel: usize, light: &Array2<f32>, strength: f64) -> Array2<f32> {
+        let view = &self.bench.view;
+        let places = &self.systems[channel];
+        let mut sum = Array2::<f32>::zeros((view.rows, view.columns));
+        for ([row, column], system) in places {
+            let mut own = light.view();
+            own.slice_axis_inplace(Axis(0), Slice::new(*row as isize, None, 2));
+            own.slice_axis_inplace(Axis(1), Slice::new(*column as isize, None, 2));
+            sum += &system.solve(&own, strength);
+        }
+        let scale = (view.rows * view.columns) as f32 / places.len() as f32;
+        sum.mapv(|v| v * scale)
+    }
+}
+
+impl Contender for FlatCam {
+    fn ways(&self) -> Vec<Way> {
+        vec![Way {
+            method: "tikhonov".into(),
+            joint: None,
+        }]
+    }
+
+    fn channel_names(&self) -> Vec<String> {
+        self.bench.channel_names()
+    }
+
+    fn record(&self, scene: &SceneImage, seed: u64) -> Result<Frame> {
+        self.bench.sees(scene)?;
+        Ok(self.bench.record(&self.light(scene), seed))
+    }
+
+    fn truth(&self, scene: &SceneImage) -> Array3<f64> {
+        self.bench.truth(scene)
+    }
+
+    fn unrestored(&self, _frame: &Frame) -> Option<Array3<f64>> {
+        None
+    }
+
+    fn restore(&self, frame: &Frame, _way: usize, progress: &dyn Progress) -> Result<Array3<f64>> {
+        frame.is_of(self.bench.frame(), self.bench.channels())?;
+        progress.begin("restoring", self.bench.channels() as u64);
+        let (light, _) = frame.light(&self.bench.camera, &vec![0.0; self.bench.channels()]);
+        let sent: Vec<Array2<f32>> = light
+            .par_iter()
+            .enumerate()
+            .map(|(c, l)| {
+                let own = self.solved(c, l, self.strength[c]);
+                progress.advance(1);
+                own
+            })
+            .collect();
+        Ok(self.bench.picture(&sent))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lensless::tests::small;
+    use metalith_core::Silent;
+    use metalith_picture::scores;
+
+    #[test]
+    fn a_picture_comes_out_of_the_shadows_of_a_mask() {
+        /// A flat picture of the right brightness has 14 dB.
+        const LEAST_DB: f64 = 20.0;
+        let (camera, scene) = small(48, 300, 260);
+        let mask = MaskSpec::standard();
+        let flat = FlatCam::new(&mask, &camera, scene.view, &Silent).unwrap();
+        let frame = flat.record(&scene, 1).unwrap();
+        let picture = flat.restore(&frame, 0, &Silent).unwrap();
+        let found = scores(&picture, &flat.truth(&scene)).unwrap()[0];
+        assert!(found.psnr_linear_db > LEAST_DB, "{found:?}");
+        assert!(flat.record(&small(40, 300, 260).1, 1).is_err());
+    }
+}

@@ -1,0 +1,84 @@
+//! `metalith compare`: one table from photographs; bad input is one clear error each.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+use predicates::str::contains;
+
+fn compare(arguments: &[&str], out: &str) -> Command {
+    let mut command = Command::cargo_bin("metalith").unwrap();
+    command
+        .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")))
+        .arg("compare")
+        .args(arguments)
+        .args(["--out", out]);
+    command
+}
+
+/// A grey PNG of 8 bits.
+fn photograph(path: &Path, side: u32) -> String {
+    let mut encoder = png::Encoder::new(fs::File::create(path).unwrap(), side, side);
+    encoder.set_color(png::ColorType::Grayscale);
+    let bytes: Vec<u8> = (0..side * side)
+        .map(|i| if (i % side + i / side) % 20 < 10 { 200 } else { 40 })
+        .collect();
+    encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
+    path.display().to_string()
+}
+
+#[test]
+fn what_cannot_be_compared_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let one = photograph(&folder.path().join("one.png"), 32);
+    let other = photograph(&folder.path().join("other.png"), 40);
+    let out = folder.path().join("out").display().to_string();
+    let camera = ["--camera", "cameras/gt1930.toml"];
+    let flatcam = ["--rivals", "flatcam"];
+    let cases: [(&[&str], &str); 8] = [
+        (&[&one], "no camera to compare"),
+        (&[&one, &other, flatcam[0], flatcam[1]], "of one size"),
+        (&[&one, "--rivals", "pinhole"], "possible values"),
+        (&[&one, "--design", "a=b:c:d:e:f"], "no field in degrees"),
+        (&[&one, "--design", "designs/tio2_532.toml"], "no layout of"),
+        (
+            &[&one, "--design", "designs/mini_3x3.toml:none.gds", "--method", "magic"],
+            "no way to restore",
+        ),
+        (&[&one, flatcam[0], flatcam[1], "--mask-distance-um", "0"], "from 1 to"),
+        (&[&one, "--rivals", "diffusercam", "--diffuser-opening", "9"], "opening"),
+    ];
+    for (arguments, words) in cases {
+        compare(&[arguments, &camera].concat(), &out)
+            .assert()
+            .code(2)
+            .stderr(contains(words));
+        assert!(!Path::new(&out).exists(), "nothing is left of {arguments:?}");
+    }
+}
+
+#[test]
+fn a_table_comes_out_of_photographs() {
+    let folder = tempfile::tempdir().unwrap();
+    photograph(&folder.path().join("stripes.png"), 48);
+    let photographs = folder.path().display().to_string();
+    let out = folder.path().join("out").display().to_string();
+    let arguments = [
+        &photographs,
+        "--camera",
+        "cameras/gt1930.toml",
+        "--rivals",
+        "flatcam",
+        "--field-deg",
+        "60",
+    ];
+    compare(&arguments, &out)
+        .assert()
+        .success()
+        .stdout(contains("| FlatCam, ours | tikhonov |").and(contains("1 photographs of 48 x 48 pixels")));
+    let page = fs::read_to_string(Path::new(&out).join("compare.html")).unwrap();
+    assert!(page.contains("Cameras side by side"));
+    let numbers = fs::read_to_string(Path::new(&out).join("compare.json")).unwrap();
+    assert!(numbers.contains("psnr_linear_db"));
+}
