@@ -31,7 +31,7 @@ pub struct Checkpoint {
     pub adam: Option<AdamState>,
     /// Of the cells: an input of the kept file.
     #[serde(skip)]
-    solver: u32,
+    pub solver: u32,
 }
 
 /// One exchange.
