@@ -97,7 +97,9 @@ impl OutlineRule {
                 }
             }
             OutlineCheck::Circle => circle_of(points).is_none().then(|| "not a circle".into()),
-            OutlineCheck::Rectangle => tilted_rectangle_of(points).is_none().then(|| "not a rectangle".into()),
+            OutlineCheck::Rectangle => tilted_rectangle_of(points, outline.unit_nm)
+                .is_none()
+                .then(|| "not a rectangle".into()),
             OutlineCheck::Manhattan => (!outline.is_manhattan()).then(|| "a side that is not along an axis".into()),
             OutlineCheck::Angle(min) => {
                 let sharpest = outline.sharpest_deg();

@@ -130,7 +130,7 @@ impl Rule for WidthBound {
         let mut sides = [bounds.width(), bounds.height()].map(|v| v as f64 * outline.unit_nm);
         // Corners of a rotated rectangle are on the grid: its edges are whole nanometres but for that.
         if outline.rectangle().is_none()
-            && let Some(tilted) = tilted_rectangle_of(outline.points).filter(|t| !t.is_square())
+            && let Some(tilted) = tilted_rectangle_of(outline.points, outline.unit_nm).filter(|t| !t.is_square())
         {
             sides = tilted.edges.map(|e| (e * outline.unit_nm).round());
         }

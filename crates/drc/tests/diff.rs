@@ -88,7 +88,12 @@ fn rotated_rectangles_are_compared_by_rotation_and_to_the_nanometre() {
     let plain = file("plain.gds", bytes(&|site, _| number(site)));
     let rotated = file("rotated.gds", bytes(&|site, _| number(site) + u16::from(site == 42)));
     let found = compare(&plain, &rotated);
-    assert_eq!((found.elements[0].pillars, found.elements[0].rotated), ([100, 100], 1), "{}", text(&found));
+    assert_eq!(
+        (found.elements[0].pillars, found.elements[0].rotated),
+        ([100, 100], 1),
+        "{}",
+        text(&found)
+    );
     assert!(text(&found).contains("1 rotated"));
     let moved = file(
         "moved.gds",

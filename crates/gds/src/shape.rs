@@ -137,7 +137,7 @@ pub fn pillar_of(points: &[Point], shape: PillarShape, unit_nm: f64) -> Option<D
         PillarShape::Square => rectangle_of(&simplified(points)).map(of_width),
         PillarShape::Circle => circle_of(points).map(of_width),
         PillarShape::Rectangle(pillars) => {
-            let tilted = tilted_rectangle_of(points)?;
+            let tilted = tilted_rectangle_of(points, unit_nm)?;
             Some(DrawnPillar {
                 around: tilted.around,
                 number: Some(tilted.number(pillars, unit_nm)?),

@@ -86,7 +86,14 @@ fn golden_digests_of_the_full_size_designs() {
 /// Circles, rotated rectangles, phases over the plane, other arrays.
 #[test]
 fn golden_digests_of_the_other_designs() {
-    let names = ["asi_940", "tio2_532", "geometric_phase_532", "silicon_10600", "hologram", "array_2x4"];
+    let names = [
+        "asi_940",
+        "tio2_532",
+        "geometric_phase_532",
+        "silicon_10600",
+        "hologram",
+        "array_2x4",
+    ];
     golden_records("other_designs.json", &names);
 }
 

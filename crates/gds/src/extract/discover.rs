@@ -289,7 +289,7 @@ impl Visitor for Map {
             }
             return Ok(());
         }
-        let rectangle = Sizes::rectangle(shape);
+        let rectangle = Sizes::rectangle(shape, self.scale);
         if let Some(rectangle) = &rectangle {
             self.sizes.add(rectangle, placements.len() as u64, self.scale);
         }

@@ -27,12 +27,12 @@ pub(super) struct Sizes {
 
 impl Sizes {
     /// The rectangle that a shape is, as drawn, if it is one and no square.
-    pub fn rectangle(shape: &Shape<'_>) -> Option<TiltedRectangle> {
+    pub fn rectangle(shape: &Shape<'_>, scale: Scale) -> Option<TiltedRectangle> {
         let unequal = shape.rect.is_none_or(|r| r.width() != r.height());
         if !unequal || shape.circle.is_some() || shape.points.len() != 5 {
             return None;
         }
-        tilted_rectangle_of(shape.points).filter(|r| !r.is_square())
+        tilted_rectangle_of(shape.points, scale.nm(1.0)).filter(|r| !r.is_square())
     }
 
     /// So many copies of a rectangle.
