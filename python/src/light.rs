@@ -94,6 +94,7 @@ fn simulate(elements: Vec<Lit>, cell: &dyn CellModel, light: &Looked, progress: 
                     at_um: landing_um(&lit.wedge, &wave, light.distance_um)?,
                     samples: light.samples,
                     pixel_um: light.pixel_um,
+                    analyser: false,
                     aperture_radius_um: None,
                     accuracy: if light.fast { Accuracy::Fast } else { Accuracy::Accurate },
                 };

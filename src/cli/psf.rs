@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use metalith::camera::Camera;
-use metalith::cell::{CellStack, FittedCell, PointwiseCell, PublishedCell, cache_folder};
+use metalith::cell::{CellStack, FittedCell, Handedness, PointwiseCell, PublishedCell, RotatedCell, cache_folder};
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::grating::{Mapping, NeighbourCell};
 use metalith::rcwa::Material;
@@ -117,6 +117,14 @@ pub struct PsfArgs {
     #[arg(long, default_value_t = 550.0, requires = "camera")]
     wedge_wavelength_nm: f64,
 
+    /// Circular polarisation of the light that arrives, where the pillars are rotated rectangles.
+    #[arg(long, value_enum, default_value_t = CircularArg::Left)]
+    arriving: CircularArg,
+
+    /// Leave out the light that rotated rectangles do not convert, as a circular analyser before the sensor does.
+    #[arg(long)]
+    analyser: bool,
+
     /// Only read the pillars; simulate nothing.
     #[arg(long)]
     extract_only: bool,
@@ -128,6 +136,23 @@ pub struct PsfArgs {
     /// Print all numbers as JSON.
     #[arg(long)]
     json: bool,
+}
+
+/// Circular polarisations.
+#[derive(Clone, Copy, ValueEnum)]
+enum CircularArg {
+    /// (x + i y) / sqrt 2 for a wave along +z.
+    Left,
+    Right,
+}
+
+impl From<CircularArg> for Handedness {
+    fn from(arg: CircularArg) -> Self {
+        match arg {
+            CircularArg::Left => Self::Left,
+            CircularArg::Right => Self::Right,
+        }
+    }
 }
 
 /// `1/0` as layer 1, datatype 0.
@@ -194,6 +219,21 @@ impl PsfArgs {
             (None, FidelityArg::Rigorous) => "rigorous coupled-wave analysis of a lattice of equal pillars".into(),
         };
         all.push(("cell", cell));
+        if let Some(pillars) = found.shape.rectangles() {
+            let arriving = Handedness::from(self.arriving);
+            let rotations = format!(
+                "{} x {} nm, read to {} degrees; light arrives {arriving} circularly polarised, {}",
+                pillars.width_nm,
+                pillars.length_nm,
+                pillars.step_deg(),
+                if self.analyser {
+                    "an analyser keeps what is not converted from the sensor"
+                } else {
+                    "what is not converted is in the figures"
+                },
+            );
+            all.push(("rotated rectangles", rotations));
+        }
         if !published {
             let stack = format!(
                 "{} nm of {} on {}, lit from there",
@@ -209,6 +249,15 @@ impl PsfArgs {
     /// What solves it for the pillars as drawn.
     fn cell(&self, found: &Extraction) -> Result<Box<dyn CellModel>> {
         let stack = self.stack(found)?;
+        if let Some(pillars) = found.shape.rectangles() {
+            if !matches!(self.fidelity, FidelityArg::Rigorous) {
+                return Err(Error::invalid(
+                    "rotated rectangles by another cell than the rigorous one",
+                    "add --fidelity rigorous: no other is made for rectangles",
+                ));
+            }
+            return Ok(Box::new(RotatedCell::new(stack, pillars, self.arriving.into())));
+        }
         if matches!(self.fidelity, FidelityArg::Published) {
             return Ok(Box::new(PublishedCell::new(stack.pitch_nm as u32)));
         }
@@ -260,6 +309,7 @@ impl PsfArgs {
             at_um: [self.at_x_um, self.at_y_um],
             samples: self.samples,
             pixel_um: 5.86,
+            analyser: self.analyser,
             aperture_radius_um: self.aperture_um.map(|d| 0.5 * d),
             accuracy: if self.fast { Accuracy::Fast } else { Accuracy::Accurate },
         }

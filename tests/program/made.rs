@@ -119,6 +119,7 @@ impl Files {
             ..read
         };
         let light = Lighting {
+            analyser: false,
             wavelengths_um: vec![UM],
             incidence_sin: [0.0; 2],
             cells_as_lit: self.design.verify.incidence == CellIncidence::AsLit,

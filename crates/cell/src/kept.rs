@@ -20,7 +20,7 @@ const SOLVER_OF_CIRCLES: u32 = 1;
 /// [`SOLVER`] for pillars of a shape: raised where the answers for that shape alone have changed.
 pub fn solver_of(shape: PillarShape) -> u32 {
     match shape {
-        PillarShape::Square => SOLVER,
+        PillarShape::Square | PillarShape::Rectangle(_) => SOLVER,
         PillarShape::Circle => SOLVER + SOLVER_OF_CIRCLES,
     }
 }

@@ -13,6 +13,7 @@ mod polynomial;
 mod published;
 mod rectangle;
 mod rigorous;
+mod rotated;
 mod stack;
 mod table;
 
@@ -29,7 +30,8 @@ pub use pointwise::PointwiseCell;
 pub use pointwise::{BAND_ORDERS, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, tabulate};
 pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};
 pub use published::PublishedCell;
-pub use rectangle::RotatedRectangle;
+pub use rectangle::{Handedness, RotatedRectangle};
 pub use rigorous::RigorousCell;
+pub use rotated::{ROTATED_ORDERS, RotatedCell};
 pub use stack::{CellStack, UniformLayer};
 pub use table::{CellTable, Origin, TableSpec};

@@ -127,6 +127,23 @@ pub trait CellModel: Sync {
         self.transmissions(wavelength_um, max_width_nm)
     }
 
+    /// Of a cell that changes polarisation, and whose transmissions are of the light that it changes: the light that leaves
+    /// as it arrived, as [`CellModel::transmissions`]. It does not interfere with the other. Nothing of cells that change none.
+    ///
+    /// # Errors
+    /// As [`CellModel::transmissions`].
+    fn unconverted(&self, _wavelength_um: f64, _max_width_nm: u16) -> Result<Option<Vec<Complex64>>> {
+        Ok(None)
+    }
+
+    /// As [`CellModel::unconverted`], for one of many wavelengths that a band is averaged over.
+    ///
+    /// # Errors
+    /// As [`CellModel::transmissions`].
+    fn unconverted_in_band(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Option<Vec<Complex64>>> {
+        self.unconverted(wavelength_um, max_width_nm)
+    }
+
     /// The same as [`CellModel::transmissions`] for light that arrives obliquely, by polarisation. `sines` are those of
     /// the direction in air along x and y.
     ///

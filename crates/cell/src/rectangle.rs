@@ -1,11 +1,46 @@
 //! Rectangular pillars, rotated: cells that tell polarisations apart.
 
+use std::fmt;
+
 use num_complex::Complex64;
+use serde::Serialize;
 
 use metalith_core::{Error, Result};
 use metalith_rcwa::{Incidence, LayerStack, Orders, Outline, Side, solve};
 
 use super::CellStack;
+
+/// Which way circularly polarised light turns, seen against it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Handedness {
+    /// (x + i y) / sqrt 2, with exp(-i w t) and a wave along +z.
+    #[default]
+    Left,
+    Right,
+}
+
+impl Handedness {
+    /// Name and value of each, as design files and options have them.
+    pub const CHOICES: [(&'static str, Self); 2] = [("left", Self::Left), ("right", Self::Right)];
+
+    /// What a pillar that is rotated by an angle (rad) adds to the phase of light that arrives so and leaves the other way (rad).
+    pub fn geometric_phase(self, rotation: f64) -> f64 {
+        match self {
+            Self::Left => 2.0 * rotation,
+            Self::Right => -2.0 * rotation,
+        }
+    }
+}
+
+impl fmt::Display for Handedness {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Left => "left",
+            Self::Right => "right",
+        })
+    }
+}
 
 /// The cross-section of a rectangular pillar at its top.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,7 +108,7 @@ impl CellStack {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use metalith_rcwa::{Material, circular};
 
     use super::*;
@@ -86,7 +121,7 @@ mod tests {
     /// solver, 1e-9, felt more at resonances.
     const QUARTER: f64 = 1e-6;
 
-    fn titania() -> CellStack {
+    pub fn titania() -> CellStack {
         CellStack {
             film: Material::named("tio2_siefke_2016").unwrap(),
             ..CellStack::paper(355.0, 600.0).unwrap()

@@ -73,8 +73,15 @@ impl CellStack {
     /// zero leaves the bare substrate.
     ///
     /// # Errors
-    /// If the foot is wider than the pitch, or the wavelength is outside the range of a material.
+    /// If the foot is wider than the pitch, the wavelength is outside the range of a material, or the pillars are rectangles,
+    /// which differ by their rotation: see [`CellStack::rectangle_layers`].
     pub fn layers(&self, width_nm: f64, wavelength_um: f64) -> Result<LayerStack> {
+        if self.shape.rectangles().is_some() {
+            return Err(Error::invalid(
+                "rectangular pillars, where those of a width are asked for",
+                "use squares or circles here: rotated rectangles are known to layout, check, diff, verify, run and psf",
+            ));
+        }
         self.layers_of(wavelength_um, |wider_nm| self.outline((width_nm + wider_nm).max(0.0)))
     }
 
@@ -118,6 +125,7 @@ impl CellStack {
             _ if width_nm <= 0.0 => Outline::empty(),
             PillarShape::Square => Outline::rounded(width_nm, self.corner_radius_nm),
             PillarShape::Circle => Outline::circle(width_nm),
+            PillarShape::Rectangle(_) => Outline::empty(),
         }
     }
 

@@ -4,7 +4,11 @@ use std::fmt;
 
 use serde::Serialize;
 
-/// The form of all pillars of a layout. One number says how large a pillar is: its width.
+use crate::circle::circle_corners;
+use crate::rectangle::Rectangles;
+
+/// The form of all pillars of a layout. One number tells a pillar from others of its form: its width, or of rectangles, which are
+/// all of one size, the number of its rotation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PillarShape {
@@ -13,10 +17,12 @@ pub enum PillarShape {
     Square,
     /// A circle; its width is its diameter.
     Circle,
+    /// A rectangle; its number is that of its rotation: see [`Rectangles`].
+    Rectangle(Rectangles),
 }
 
 impl PillarShape {
-    /// Name and value of each, as design files and options have them.
+    /// Name and value of each that differs by its width alone, as design files and options have them.
     pub const CHOICES: [(&'static str, Self); 2] = [("square", Self::Square), ("circle", Self::Circle)];
 
     /// Whether it is the square: what designs had before there were others, and what is then left out of keys and digests.
@@ -29,10 +35,63 @@ impl PillarShape {
         match self {
             Self::Square => 1.0,
             Self::Circle => std::f64::consts::FRAC_PI_4,
+            Self::Rectangle(_) => 1.0,
         }
     }
 
-    /// Distance of two pillars of these widths whose centres are (dx, dy) apart, all in one unit; negative where they overlap.
+    /// Area of the square of its width, or of the rectangle (nm^2): times [`PillarShape::area_share`] that of the pillar.
+    pub fn square_nm2(self, number: u16) -> u64 {
+        match self {
+            Self::Square | Self::Circle => u64::from(number) * u64::from(number),
+            Self::Rectangle(pillars) => u64::from(pillars.width_nm) * u64::from(pillars.length_nm),
+        }
+    }
+
+    /// The rectangles, if it is one.
+    pub fn rectangles(self) -> Option<Rectangles> {
+        match self {
+            Self::Rectangle(pillars) => Some(pillars),
+            Self::Square | Self::Circle => None,
+        }
+    }
+
+    /// Corners of a pillar about its middle (nm), counter-clockwise, the first not repeated; a circle's chords are at most
+    /// `chord_error_nm` from it.
+    pub fn corners(self, number: u16, chord_error_nm: f64) -> Vec<(i64, i64)> {
+        let h = i64::from(number) / 2;
+        match self {
+            Self::Square => vec![(-h, -h), (h, -h), (h, h), (-h, h)],
+            Self::Circle => circle_corners(number.into(), chord_error_nm),
+            Self::Rectangle(pillars) => pillars.corners(number).to_vec(),
+        }
+    }
+
+    /// How far a pillar reaches from its middle along x and y (nm), if its width is even.
+    pub fn reach(self, number: u16) -> (i64, i64) {
+        match self {
+            Self::Square | Self::Circle => (i64::from(number) / 2, i64::from(number) / 2),
+            Self::Rectangle(pillars) => pillars.reach(number),
+        }
+    }
+
+    /// Width (nm) that no pillar up to a number has more than, in any direction of rectangles.
+    pub fn widest_nm(self, number: u16) -> f64 {
+        match self {
+            Self::Square | Self::Circle => f64::from(number),
+            Self::Rectangle(pillars) => f64::from(pillars.width_nm).hypot(f64::from(pillars.length_nm)),
+        }
+    }
+
+    /// What is said of a pillar with this number.
+    pub fn words(self, number: u16) -> String {
+        match self {
+            Self::Square | Self::Circle => format!("{number} nm wide"),
+            Self::Rectangle(pillars) => format!("rotated by {} degrees", short_deg(pillars.rotation(number))),
+        }
+    }
+
+    /// Distance of two pillars of these widths or numbers whose centres are (dx, dy) apart, all in one unit, of rectangles nm;
+    /// negative where they overlap.
     pub fn gap(self, widths: [f64; 2], [dx, dy]: [f64; 2]) -> f64 {
         let reach = 0.5 * (widths[0] + widths[1]);
         match self {
@@ -41,6 +100,7 @@ impl PillarShape {
                 let (x, y) = (dx.abs() - reach, dy.abs() - reach);
                 if x > 0.0 && y > 0.0 { x.hypot(y) } else { x.max(y) }
             }
+            Self::Rectangle(pillars) => pillars.gap(widths.map(|number| number as u16), [dx, dy]),
         }
     }
 
@@ -49,6 +109,7 @@ impl PillarShape {
         match self {
             Self::Square => "squares",
             Self::Circle => "circles",
+            Self::Rectangle(_) => "rectangles",
         }
     }
 }
@@ -58,8 +119,14 @@ impl fmt::Display for PillarShape {
         f.write_str(match self {
             Self::Square => "square",
             Self::Circle => "circle",
+            Self::Rectangle(_) => "rectangle",
         })
     }
+}
+
+/// An angle in degrees, without the digits that steps of it do not have.
+fn short_deg(rad: f64) -> f64 {
+    (rad.to_degrees() * 1e6).round() / 1e6
 }
 
 #[cfg(test)]

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use metalith_cell::{
-    CellModel, CellStack, Fidelity, FittedCell, PointwiseCell, PublishedCell, TableSpec, UniformLayer, cache_folder,
+    CellModel, CellStack, Fidelity, FittedCell, PointwiseCell, PublishedCell, RotatedCell, TableSpec, UniformLayer,
+    cache_folder,
 };
 use metalith_core::{Error, Result};
 use metalith_grating::{Mapping, NeighbourCell};
@@ -117,6 +118,18 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
     wanted
         .iter()
         .map(|fidelity| -> Result<Box<dyn CellModel>> {
+            if let Some(pillars) = design.cell.shape.rectangles() {
+                return match fidelity {
+                    Fidelity::Rigorous => {
+                        let arriving = design.cell.arriving.unwrap_or_default();
+                        Ok(Box::new(RotatedCell::new(design.cell_stack()?, pillars, arriving)))
+                    }
+                    other => Err(Error::invalid(
+                        format!("rectangular pillars by the `{other}` cell"),
+                        "ask for `rigorous`, in [verify] of the design or with --fidelity: no other is made for rectangles",
+                    )),
+                };
+            }
             match fidelity {
                 Fidelity::Published => Ok(Box::new(PublishedCell::new(design.cell.pitch_nm))),
                 Fidelity::Rigorous => {

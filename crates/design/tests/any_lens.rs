@@ -99,6 +99,42 @@ fn mistakes_are_said() {
             "elements = [2, 4.5]",
             "2 by 4.5 elements",
         ),
+        (
+            "geometric_phase_532",
+            "pillar_length_nm = 250",
+            "pillar_length_nm = 100",
+            "100 nm is not longer than the width of 100 nm",
+        ),
+        (
+            "geometric_phase_532",
+            "pillar_length_nm = 250",
+            "pillar_length_nm = 350",
+            "a diagonal of 364 nm reaches beyond its cell",
+        ),
+        (
+            "geometric_phase_532",
+            "rotation_step_deg = 1",
+            "rotation_step_deg = 7",
+            "no whole number of steps of 7 degrees",
+        ),
+        (
+            "geometric_phase_532",
+            "rotation_step_deg = 1",
+            "rotation_step_deg = 0.5",
+            "do not tell rotations of 0.5 degrees",
+        ),
+        (
+            "geometric_phase_532",
+            "[mapping]  ",
+            "[mapping]\ncoefficients = [0.3, 0.5]\n#",
+            "rectangles have no mapping",
+        ),
+        (
+            "geometric_phase_532",
+            "pillar_height_nm = 600",
+            "pillar_height_nm = 600\nwidth_min_nm = 100",
+            "width_min_nm",
+        ),
         ("hologram", "x_um = 60", "x_um = -20", "overlaps that of element (1, 0)"),
         (
             "hologram",

@@ -1,5 +1,6 @@
 //! Openings in the metal against the lenses under them.
 
+use super::body::Body;
 use super::context::Context;
 use super::findings::Findings;
 use super::flat::{FlatLayout, Loose};
@@ -63,7 +64,10 @@ fn rim(flat: &FlatLayout<'_>, element: usize) -> Vec<Point> {
     at_ends
         .into_iter()
         .flat_map(|(row, column)| {
-            let [a, b, c, d, _] = ring_of(&flat.pillar(element, row, column));
+            let [a, b, c, d, _] = match flat.body(element, row, column) {
+                Body::Tilted(ring) => ring,
+                other => ring_of(&other.bounds()),
+            };
             [a, b, c, d]
         })
         .collect()

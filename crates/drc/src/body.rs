@@ -13,6 +13,8 @@ pub(super) enum Body<'a> {
     Rect(Rect),
     /// A circle in a square.
     Disc(Rect),
+    /// A rotated rectangle, closed.
+    Tilted([Point; 5]),
     Ring(&'a [Point]),
 }
 
@@ -29,6 +31,7 @@ impl Body<'_> {
     pub fn bounds(&self) -> Rect {
         match self {
             Self::Rect(r) | Self::Disc(r) => *r,
+            Self::Tilted(p) => Rect::around(p),
             Self::Ring(p) => Rect::around(p),
         }
     }
@@ -46,6 +49,7 @@ impl Body<'_> {
         match self {
             Self::Rect(r) => ring_of(r).to_vec(),
             Self::Disc(r) => disc_ring(r),
+            Self::Tilted(p) => p.to_vec(),
             Self::Ring(p) => p.to_vec(),
         }
     }
@@ -77,6 +81,7 @@ impl Body<'_> {
                 let from_middle = |v: i64, low: i64, high: i64| (2 * v - low - high) as f64;
                 from_middle(p.x, r.x0, r.x1).hypot(from_middle(p.y, r.y0, r.y1)) < r.width() as f64
             }
+            Self::Tilted(ring) => within && inside(ring, p),
             Self::Ring(ring) => within && inside(ring, p),
         }
     }
@@ -84,7 +89,7 @@ impl Body<'_> {
     /// Corners, the first not counted twice.
     pub fn sides(&self) -> u64 {
         match self {
-            Self::Rect(_) => 4,
+            Self::Rect(_) | Self::Tilted(_) => 4,
             Self::Disc(r) => disc_ring(r).len() as u64 - 1,
             Self::Ring(p) => p.len() as u64 - 1,
         }
@@ -105,6 +110,9 @@ impl Body<'_> {
         match (self, other) {
             (Self::Rect(a), Self::Rect(b)) | (Self::Disc(a), Self::Disc(b)) => a == b,
             (Self::Ring(a), Self::Ring(b)) => same_ring(a, b),
+            (Self::Tilted(a), Self::Tilted(b)) => same_ring(a, b),
+            (Self::Tilted(a), Self::Ring(b)) | (Self::Ring(b), Self::Tilted(a)) => same_ring(a, b),
+            (Self::Tilted(a), Self::Rect(b)) | (Self::Rect(b), Self::Tilted(a)) => same_ring(a, &ring_of(b)),
             // A second circle on a site is held as its polygon.
             (Self::Disc(r), Self::Ring(ring)) | (Self::Ring(ring), Self::Disc(r)) => same_ring(&disc_ring(r), ring),
             _ => false,

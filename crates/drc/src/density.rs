@@ -61,7 +61,7 @@ impl Windows {
             let windows = &mut areas[k / sites * count..][..count];
             for (area, part) in windows.iter_mut().zip(row.chunks(sites)) {
                 let full = part.iter().all(|&w| w != 0);
-                let more: u64 = part.iter().map(|&w| u64::from(w) * u64::from(w)).sum();
+                let more: u64 = part.iter().map(|&w| flat.shape.square_nm2(w)).sum();
                 *area = area.filter(|_| full).map(|area| area + more);
             }
         }

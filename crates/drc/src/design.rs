@@ -86,8 +86,9 @@ impl Against {
                 for (column, (&w, &wanted)) in there.iter().zip(wanted).enumerate() {
                     // Missing and additional pillars are a matter of count.
                     if w != wanted && w != 0 && wanted != 0 {
-                        found.rect(&flat.pillar(k, row, column), || {
-                            format!("{w} nm wide, {wanted} nm designed")
+                        found.rect(&flat.pillar(k, row, column), || match flat.shape.rectangles() {
+                            None => format!("{w} nm wide, {wanted} nm designed"),
+                            Some(_) => format!("{}, designed {}", flat.shape.words(w), flat.shape.words(wanted)),
                         });
                     }
                 }

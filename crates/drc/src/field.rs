@@ -83,17 +83,17 @@ impl FieldRule {
             let columns = self.lines(flat, k, 0);
             let rows = self.lines(flat, k, 1);
             let (n, mut room) = (e.site.lattice.sites(), Vec::new());
-            let cut = |w: u16, distance: f64| w != 0 && distance < f64::from(w) / 2.0 - ROUNDING_NM;
+            let cut = |w: u16, axis: usize, distance: f64| w != 0 && distance < flat.half_nm(w)[axis] - ROUNDING_NM;
             let words = || "cut by a field boundary".to_owned();
             for &(column, distance) in &columns {
-                for row in (0..n).filter(|&row| cut(e.widths.width(column, row), distance)) {
+                for row in (0..n).filter(|&row| cut(e.widths.width(column, row), 0, distance)) {
                     found.rect(&flat.pillar(k, row, column), words);
                 }
             }
             for &(row, distance) in &rows {
                 let line = e.widths.row(row, 0..n, &mut room).iter();
-                for (column, &w) in line.enumerate().filter(|(_, w)| cut(**w, distance)) {
-                    if !columns.iter().any(|&(c, d)| c == column && cut(w, d)) {
+                for (column, &w) in line.enumerate().filter(|(_, w)| cut(**w, 1, distance)) {
+                    if !columns.iter().any(|&(c, d)| c == column && cut(w, 0, d)) {
                         found.rect(&flat.pillar(k, row, column), words);
                     }
                 }

@@ -98,26 +98,46 @@ impl FlatLayout<'_> {
         nm / self.unit_nm
     }
 
-    /// The pillar in a box (database units).
-    pub fn body_in(&self, around: Rect) -> Body<'static> {
+    /// The pillar at a site, in database units.
+    pub fn body(&self, element: usize, row: usize, column: usize) -> Body<'static> {
+        let around = self.pillar(element, row, column);
         match self.shape {
             PillarShape::Square => Body::Rect(around),
             PillarShape::Circle => Body::Disc(around),
+            PillarShape::Rectangle(pillars) => {
+                let (e, unit) = (&self.elements[element], |nm: i64| self.units(nm as f64).round() as i64);
+                let x = e.site.centre_nm[0] + e.site.lattice.coordinate_nm(column);
+                let y = e.site.centre_nm[1] + e.site.lattice.coordinate_nm(row);
+                let corner = |(dx, dy): (i64, i64)| Point::new(unit(x + dx), unit(y + dy));
+                let [a, b, c, d] = pillars.corners(e.widths.width(column, row)).map(corner);
+                Body::Tilted([a, b, c, d, a])
+            }
+        }
+    }
+
+    /// Half of what the pillar with a width or number takes along x and y (nm).
+    pub fn half_nm(&self, number: u16) -> [f64; 2] {
+        match self.shape {
+            PillarShape::Square | PillarShape::Circle => [f64::from(number) / 2.0; 2],
+            PillarShape::Rectangle(pillars) => {
+                let (x, y) = pillars.reach(number);
+                [x as f64, y as f64]
+            }
         }
     }
 
     /// The box around the pillar at a site, in database units.
     pub fn pillar(&self, element: usize, row: usize, column: usize) -> Rect {
         let e = &self.elements[element];
-        let half = f64::from(e.widths.width(column, row)) / 2.0;
+        let [half_x, half_y] = self.half_nm(e.widths.width(column, row));
         let x = (e.site.centre_nm[0] + e.site.lattice.coordinate_nm(column)) as f64;
         let y = (e.site.centre_nm[1] + e.site.lattice.coordinate_nm(row)) as f64;
         let unit = |nm: f64| self.units(nm).round() as i64;
         Rect {
-            x0: unit(x - half),
-            y0: unit(y - half),
-            x1: unit(x + half),
-            y1: unit(y + half),
+            x0: unit(x - half_x),
+            y0: unit(y - half_y),
+            x1: unit(x + half_x),
+            y1: unit(y + half_y),
         }
     }
 

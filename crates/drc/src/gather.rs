@@ -17,8 +17,8 @@ use metalith_core::text::printable_bytes;
 use metalith_core::{Error, PillarShape, Progress, Result};
 use metalith_gds::extract::{Discovered, Filler, Scale, Why};
 use metalith_gds::{
-    LayerNumber, Layout, LayoutCell, Point, Rect, Selection, Shape, Text, Transform, Visitor, circle_of, pillar_of,
-    rectangle_of, simplified,
+    DrawnPillar, LayerNumber, Layout, LayoutCell, Point, Rect, Selection, Shape, Text, Transform, Visitor, circle_of,
+    pillar_of, rectangle_of, simplified,
 };
 
 /// Widest square that is decided by table (database units).
@@ -201,6 +201,19 @@ impl Gather<'_, '_> {
         Ok(())
     }
 
+    /// A pillar that is known by its corners: where it has no site it is kept as it is drawn.
+    fn drawn_pillar(&mut self, pillar: &DrawnPillar, placement: usize, placed: &[Point]) {
+        if pillar.number.is_none() {
+            return self.pillar(&pillar.around, placement);
+        }
+        match self.filler.put_drawn(pillar, placement, |_| true) {
+            Ok(_) => return,
+            Err(Why::OffLattice) => self.off_lattice.push(pillar.around),
+            Err(_) => {}
+        }
+        self.keep(self.pillars, placed);
+    }
+
     #[inline]
     fn pillar(&mut self, r: &Rect, placement: usize) {
         let standing = self.filler.put(r, placement, |width| width % 2 == 0);
@@ -328,7 +341,11 @@ impl Gather<'_, '_> {
     fn other(&mut self, shape: &Shape<'_>, placements: &[Transform], square: bool) -> Result<()> {
         *self.counts.entry(shape.layer).or_default() += placements.len() as u64;
         if square {
-            self.show(shape, placements)?;
+            if shape.layer == self.pillars && self.shape.rectangles().is_some() {
+                self.show_once(shape, &Rect::around(shape.points), placements)?;
+            } else {
+                self.show(shape, placements)?;
+            }
             if self.incomplete.is_some() {
                 return Ok(());
             }
@@ -346,8 +363,8 @@ impl Gather<'_, '_> {
                 };
                 self.show(&here, &[Transform::IDENTITY])?;
             }
-            match pillar_of(&placed, self.shape) {
-                Some(r) if shape.layer == self.pillars => self.pillar(&r, k),
+            match pillar_of(&placed, self.shape, self.unit_nm) {
+                Some(pillar) if shape.layer == self.pillars => self.drawn_pillar(&pillar, k, &placed),
                 _ => self.keep(shape.layer, &placed),
             }
         }

@@ -1,5 +1,6 @@
 //! Grids: the lattice of the element, the grid of the database, and the steps of the beam.
 
+use super::body::Body;
 use super::context::Context;
 use super::findings::Findings;
 use super::flat::FlatLayout;
@@ -108,7 +109,12 @@ impl GridRule {
         for (k, e) in flat.elements.iter().enumerate() {
             e.widths.each_pillar(|row, column, _| {
                 let r = flat.pillar(k, row, column);
-                if self.off(Point::new(r.x0, r.y0), flat.unit_nm) || self.off(Point::new(r.x1, r.y1), flat.unit_nm) {
+                let tilted = match flat.body(k, row, column) {
+                    Body::Tilted(ring) => ring.iter().any(|p| self.off(*p, flat.unit_nm)),
+                    _ => false,
+                };
+                let ends = [Point::new(r.x0, r.y0), Point::new(r.x1, r.y1)];
+                if tilted || ends.iter().any(|p| self.off(*p, flat.unit_nm)) {
                     found.rect(&r, || format!("a corner off the grid of {} nm", self.step_nm));
                 }
             });
@@ -136,6 +142,10 @@ impl Rule for ExposureGrid {
     fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
         if flat.elements.is_empty() {
             return Err(NotRun::Skipped(flat.no_elements.clone()));
+        }
+        if flat.shape.rectangles().is_some() {
+            let why = "rotated rectangles have no edges along the steps of the beam".to_owned();
+            return Err(NotRun::Skipped(why));
         }
         let (mut squares, mut sum) = (0u64, 0.0);
         let mut count = |width_nm: f64, pillars: u64| {

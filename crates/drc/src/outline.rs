@@ -6,12 +6,14 @@ use super::findings::Findings;
 use super::rule::Rule;
 use super::tolerance::ROUNDING_DEG;
 use metalith_core::document::{Limits, Section};
-use metalith_gds::{LayerNumber, circle_of};
+use metalith_gds::{LayerNumber, circle_of, tilted_rectangle_of};
 
 #[derive(Clone, Copy, PartialEq)]
 enum OutlineCheck {
     Square,
     Circle,
+    /// At any angle.
+    Rectangle,
     Manhattan,
     /// Sharpest angle (degrees).
     Angle(f64),
@@ -38,6 +40,7 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Optio
     let form = match check {
         "square" => OutlineCheck::Square,
         "circle" => OutlineCheck::Circle,
+        "rectangle" => OutlineCheck::Rectangle,
         "manhattan" => OutlineCheck::Manhattan,
         "acute_angle" => OutlineCheck::Angle(s.float("min_deg", Limits::new(1.0..=179.0, "degrees"))),
         "self_crossing" => OutlineCheck::NoCrossing,
@@ -94,6 +97,9 @@ impl OutlineRule {
                 }
             }
             OutlineCheck::Circle => circle_of(points).is_none().then(|| "not a circle".into()),
+            OutlineCheck::Rectangle => tilted_rectangle_of(points, outline.unit_nm)
+                .is_none()
+                .then(|| "not a rectangle".into()),
             OutlineCheck::Manhattan => (!outline.is_manhattan()).then(|| "a side that is not along an axis".into()),
             OutlineCheck::Angle(min) => {
                 let sharpest = outline.sharpest_deg();
@@ -138,6 +144,7 @@ impl Rule for OutlineRule {
         match self.form {
             OutlineCheck::Square => "pillars are squares".into(),
             OutlineCheck::Circle => "pillars are circles".into(),
+            OutlineCheck::Rectangle => "pillars are rectangles, at any angle".into(),
             OutlineCheck::Manhattan => "sides are along the axes".into(),
             OutlineCheck::Angle(min) => format!("no angle sharper than {min} degrees"),
             OutlineCheck::NoCrossing => "no outline crosses itself".into(),

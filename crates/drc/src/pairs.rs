@@ -61,7 +61,6 @@ pub(super) fn near<'s>(
             let sites = (rows.end - rows.start).max(0) as u64 * (columns.end - columns.start).max(0) as u64;
             flat.work.spend(1 + sites)?;
             for pillar in pillars_in(flat, element, rows, columns, grown) {
-                let pillar = flat.body_in(pillar);
                 flat.work.spend(body(k).effort(&pillar))?;
                 f(body(k), pillar);
             }
@@ -94,11 +93,14 @@ fn pillars_in<'s>(
     rows: Range<i64>,
     columns: Range<i64>,
     r: Rect,
-) -> impl Iterator<Item = Rect> + 's {
+) -> impl Iterator<Item = Body<'static>> + 's {
     rows.flat_map(move |row| columns.clone().map(move |column| (row as usize, column as usize)))
         .filter(move |&(row, column)| flat.elements[element].widths.width(column, row) != 0)
-        .map(move |(row, column)| flat.pillar(element, row, column))
-        .filter(move |p| p.x0 <= r.x1 && r.x0 <= p.x1 && p.y0 <= r.y1 && r.y0 <= p.y1)
+        .map(move |(row, column)| flat.body(element, row, column))
+        .filter(move |body| {
+            let p = body.bounds();
+            p.x0 <= r.x1 && r.x0 <= p.x1 && p.y0 <= r.y1 && r.y0 <= p.y1
+        })
 }
 
 /// Pairs of boxes at most `reach` apart along x and along y. Boxes are taken from the lowest; those that

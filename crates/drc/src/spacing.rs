@@ -116,7 +116,9 @@ fn on_lattices(flat: &FlatLayout<'_>, nm: f64, height_nm: Option<f64>, found: &m
                 e.site.name
             ));
         }
-        let widest = e.widths.histogram().len().saturating_sub(1) as f64;
+        let widest = flat
+            .shape
+            .widest_nm(e.widths.histogram().len().saturating_sub(1) as u16);
         if pitch - widest >= nm {
             continue;
         }
@@ -139,8 +141,7 @@ fn on_lattices(flat: &FlatLayout<'_>, nm: f64, height_nm: Option<f64>, found: &m
                     let apart = [pitch * right as f64, pitch * up as f64];
                     let gap = flat.shape.gap([own, other].map(f64::from), apart);
                     if other != 0 && gap < nm - ROUNDING_NM {
-                        let body = |row, column| flat.body_in(flat.pillar(k, row, column));
-                        let (a, b) = (body(row, column), body(row + up, c));
+                        let (a, b) = (flat.body(k, row, column), flat.body(k, row + up, c));
                         report_gap(flat, &a, &b, gap / flat.unit_nm, height_nm, found);
                     }
                 }

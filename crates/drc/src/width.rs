@@ -6,7 +6,7 @@ use super::findings::Findings;
 use super::rule::Rule;
 use super::tolerance::{EQUAL_NM, ROUNDING};
 use metalith_core::document::{Limits, Section};
-use metalith_gds::LayerNumber;
+use metalith_gds::{LayerNumber, tilted_rectangle_of};
 
 /// Limit on the smaller and the larger side of a pillar (nm).
 enum WidthLimit {
@@ -127,10 +127,14 @@ impl Rule for WidthBound {
 
     fn outline(&self, outline: &DrawnOutline<'_>, found: &mut Findings) {
         let bounds = outline.bounds();
-        let (a, b) = (
-            bounds.width() as f64 * outline.unit_nm,
-            bounds.height() as f64 * outline.unit_nm,
-        );
+        let mut sides = [bounds.width(), bounds.height()].map(|v| v as f64 * outline.unit_nm);
+        // Corners of a rotated rectangle are on the grid: its edges are whole nanometres but for that.
+        if outline.rectangle().is_none()
+            && let Some(tilted) = tilted_rectangle_of(outline.points, outline.unit_nm).filter(|t| !t.is_square())
+        {
+            sides = tilted.edges.map(|e| (e * outline.unit_nm).round());
+        }
+        let [a, b] = sides;
         // Without area there is no width; that has a rule of its own.
         if outline.twice_area() == 0 {
             return;

@@ -1,6 +1,7 @@
 //! What stands on a layer.
 
 use super::circle::circle_of;
+use super::rectangle::tilted_rectangle_of;
 use metalith_core::{LayerNumber, PillarShape};
 
 /// A place in database units.
@@ -107,22 +108,41 @@ pub struct Shape<'a> {
 }
 
 impl Shape<'_> {
-    /// The square around it, if it may be a pillar of this shape as it stands.
+    /// The square around it, if it may be a pillar of this shape as it stands, by its box alone; rectangles are told by their
+    /// corners, where they are placed: see [`pillar_of`].
     #[inline]
     pub fn pillar(&self, shape: PillarShape) -> Option<&Rect> {
         match shape {
             PillarShape::Square => self.rect.as_ref(),
             PillarShape::Circle => self.circle.as_ref(),
+            PillarShape::Rectangle(_) => None,
         }
     }
 }
 
-/// The square around an outline in any place, if it may be a pillar of this shape: a rectangle may have more vertices than it
-/// needs.
-pub fn pillar_of(points: &[Point], shape: PillarShape) -> Option<Rect> {
+/// An outline that may be a pillar.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DrawnPillar {
+    /// The box around it.
+    pub around: Rect,
+    /// What tells it from others, where its width does not.
+    pub number: Option<u16>,
+}
+
+/// What an outline in any place is, if it may be a pillar of this shape; a database unit is so long (nm). It may have more
+/// vertices than it needs.
+pub fn pillar_of(points: &[Point], shape: PillarShape, unit_nm: f64) -> Option<DrawnPillar> {
+    let of_width = |around| DrawnPillar { around, number: None };
     match shape {
-        PillarShape::Square => rectangle_of(&simplified(points)),
-        PillarShape::Circle => circle_of(points),
+        PillarShape::Square => rectangle_of(&simplified(points)).map(of_width),
+        PillarShape::Circle => circle_of(points).map(of_width),
+        PillarShape::Rectangle(pillars) => {
+            let tilted = tilted_rectangle_of(points, unit_nm)?;
+            Some(DrawnPillar {
+                around: tilted.around,
+                number: Some(tilted.number(pillars, unit_nm)?),
+            })
+        }
     }
 }
 

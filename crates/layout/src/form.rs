@@ -1,6 +1,6 @@
-//! The outline of one pillar of each width, as it is written.
+//! The outline of one pillar of each width or rotation, as it is written.
 
-use metalith_core::{CHORD_ERROR, PillarShape, circle_corners};
+use metalith_core::{CHORD_ERROR, PillarShape};
 use metalith_design::Design;
 
 /// How the pillars of a design are drawn.
@@ -33,12 +33,19 @@ impl PillarForm {
         self.shape.is_square()
     }
 
-    /// Corners of a pillar of an even width (nm) about its middle, counter-clockwise, the first not repeated.
-    pub fn corners(&self, width_nm: u16) -> Vec<(i64, i64)> {
-        let h = i64::from(width_nm) / 2;
-        match self.shape {
-            PillarShape::Square => vec![(-h, -h), (h, -h), (h, h), (-h, h)],
-            PillarShape::Circle => circle_corners(width_nm.into(), self.chord_error_nm),
-        }
+    /// Corners of a pillar of an even width (nm) or a number about its middle, counter-clockwise, the first not repeated.
+    pub fn corners(&self, number: u16) -> Vec<(i64, i64)> {
+        self.shape.corners(number, self.chord_error_nm)
+    }
+
+    /// How far it reaches from its middle along x and y (nm).
+    pub fn reach(&self, number: u16) -> (i64, i64) {
+        self.shape.reach(number)
+    }
+
+    /// Name of the cell of one of these pillars: by its width, or by its rotation in steps.
+    pub fn cell_name(&self, number: u16) -> String {
+        let kind = if self.shape.rectangles().is_some() { "R" } else { "W" };
+        format!("{kind}{number}")
     }
 }

@@ -34,6 +34,12 @@ pub fn write_free(
     path: &Path,
     progress: &dyn Progress,
 ) -> Result<Written> {
+    if free.shape.rectangles().is_some() && array.shape != free.shape {
+        return Err(Error::invalid(
+            "rotated rectangles without a design",
+            "write squares or circles, or give a design with `shape = \"rectangle\"`",
+        ));
+    }
     let number = |n: u16| {
         let hint = format!("layers and datatypes go to {}", i16::MAX);
         i16::try_from(n).map_err(|_| Error::invalid(format!("there is no layer {}", free.layer), hint))

@@ -36,7 +36,7 @@ pub(super) struct PillarWriter<'a> {
     buffers: [Vec<u8>; BLOCKS],
 }
 
-/// One pillar of a lens: its centre from the lens's (nm), its width (nm).
+/// One pillar of a lens: its centre from the lens's (nm), its width (nm) or number.
 struct PlacedPillar {
     x: i32,
     y: i32,
@@ -152,7 +152,7 @@ impl<'a> PillarWriter<'a> {
     fn width_cells(&mut self, array: &PillarArray) -> Result<BTreeMap<u16, ReferenceRecord>> {
         let mut cells = BTreeMap::new();
         for width in widths_of(array) {
-            let name = width_name(width.into());
+            let name = self.form.cell_name(width);
             let outline = polygon(self.layer, &self.form.corners(width));
             let (begin, end) = self.frame.cell(&name, vec![outline])?;
             self.put(&begin)?;
@@ -280,10 +280,6 @@ fn blocks(n: usize, runs: impl Fn(usize) -> [Range<usize>; 2]) -> Vec<Range<usiz
 
 fn lens_name(class: usize) -> String {
     format!("LENS{class}")
-}
-
-pub(super) fn width_name(width: usize) -> String {
-    format!("W{width}")
 }
 
 /// A reference with one of the symmetries of the square; a plain one has no STRANS record.

@@ -42,43 +42,59 @@ fn golden_bytes_of_the_mini_design() {
     golden("mini_3x3/apertures.gds.gz", &fs::read(apertures).unwrap());
 }
 
+/// What a folded layout of a design is, in number: its digest and how many pillars have each width, or of rectangles each
+/// number of a rotation.
+fn record(name: &str, folder: &Path) -> serde_json::Value {
+    let design = Design::read(&design(name)).unwrap();
+    let array = PillarArray::build(&design, &Silent).unwrap();
+    let path = folder.join(name);
+    let written = write_pillars(&design, &array, Hierarchy::Folded, &path, &Silent).unwrap();
+    let mut sha = Sha256::new();
+    std::io::copy(&mut fs::File::open(&path).unwrap(), &mut sha).unwrap();
+    fs::remove_file(path).unwrap();
+    let mut widths: BTreeMap<usize, u64> = BTreeMap::new();
+    for placed in &array.placed {
+        let counts = array.classes[placed.class].widths.histogram();
+        for (width, count) in counts.into_iter().enumerate().skip(1).filter(|(_, c)| *c > 0) {
+            *widths.entry(width).or_default() += count;
+        }
+    }
+    json!({
+        "design_digest": design.digest(),
+        "pillars": array.pillars(),
+        "elements": array.placed.len(),
+        "distinct_elements": array.classes.len(),
+        "bytes": written.bytes,
+        "sha256": format!("{:x}", sha.finalize()),
+        "widths_nm": widths,
+    })
+}
+
+fn golden_records(file: &str, names: &[&str]) {
+    let folder = tempfile::tempdir().unwrap();
+    let all: BTreeMap<&str, _> = names.iter().map(|name| (*name, record(name, folder.path()))).collect();
+    golden(file, format!("{:#}\n", json!(all)).as_bytes());
+}
+
 /// The main job at full size: 57.7 and 160.3 million pillars.
 #[test]
 #[ignore = "second tier: full size, run by .ci/run"]
 fn golden_digests_of_the_full_size_designs() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut all = BTreeMap::new();
-    for name in ["prototype_3x3", "wide_5x5"] {
-        let full = Design::read(&design(name)).unwrap();
-        let array = PillarArray::build(&full, &Silent).unwrap();
-        let path = folder.path().join(name);
-        let written = write_pillars(&full, &array, Hierarchy::Folded, &path, &Silent).unwrap();
-        let mut sha = Sha256::new();
-        std::io::copy(&mut fs::File::open(&path).unwrap(), &mut sha).unwrap();
-        let mut histogram = vec![0; 301];
-        for placed in &array.placed {
-            let counts = array.classes[placed.class].widths.histogram();
-            histogram.iter_mut().zip(counts).for_each(|(sum, c)| *sum += c);
-        }
-        let widths = (1..)
-            .zip(&histogram[1..])
-            .filter(|(_, c)| **c > 0)
-            .collect::<BTreeMap<u16, _>>();
-        all.insert(
-            name,
-            json!({
-                "design_digest": full.digest(),
-                "pillars": array.pillars(),
-                "elements": array.placed.len(),
-                "distinct_elements": array.classes.len(),
-                "bytes": written.bytes,
-                "sha256": format!("{:x}", sha.finalize()),
-                "widths_nm": widths,
-            }),
-        );
-        fs::remove_file(path).unwrap();
-    }
-    golden("full_size.json", format!("{:#}\n", json!(all)).as_bytes());
+    golden_records("full_size.json", &["prototype_3x3", "wide_5x5"]);
+}
+
+/// Circles, rotated rectangles, phases over the plane, other arrays.
+#[test]
+fn golden_digests_of_the_other_designs() {
+    let names = [
+        "asi_940",
+        "tio2_532",
+        "geometric_phase_532",
+        "silicon_10600",
+        "hologram",
+        "array_2x4",
+    ];
+    golden_records("other_designs.json", &names);
 }
 
 /// Elements that are made row by row, as large ones are, give the bytes of those that are held: a lens of 1 mm, and

@@ -29,6 +29,9 @@ pub struct Checkpoint {
     pub chains: Vec<Chain>,
     /// Adam, if that was begun.
     pub adam: Option<AdamState>,
+    /// Of the cells: an input of the kept file.
+    #[serde(skip)]
+    pub solver: u32,
 }
 
 /// One exchange.
@@ -98,6 +101,7 @@ impl Checkpoint {
     pub fn begin(design: &Design) -> Self {
         Self {
             digest: digest(design),
+            solver: kept::solver_of(design.cell.shape),
             ..Self::default()
         }
     }
@@ -121,13 +125,17 @@ impl Checkpoint {
         let read = serde_json::from_slice::<Self>(&content).ok();
         Ok(read
             .filter(|kept| kept.digest == fresh.digest && kept.is_of(rings))
+            .map(|kept| Self {
+                solver: fresh.solver,
+                ..kept
+            })
             .unwrap_or(fresh))
     }
 
     /// What it was made from.
     fn inputs(&self) -> Vec<u8> {
         let mut bytes = OPTIMISER.to_le_bytes().to_vec();
-        bytes.extend(kept::SOLVER.to_le_bytes());
+        bytes.extend(self.solver.to_le_bytes());
         bytes.extend(self.digest.as_bytes());
         bytes
     }
@@ -157,11 +165,7 @@ impl Checkpoint {
 /// Of all that decides an optimisation.
 fn digest(design: &Design) -> String {
     let decisive = (&design.cell, &design.lens, &design.mapping, &design.optimise);
-    let mut bytes = serde_json::to_vec(&decisive).expect("plain data serialises");
-    // The solver of squares is named in the inputs of the file.
-    if !design.cell.shape.is_square() {
-        bytes.extend(kept::solver_of(design.cell.shape).to_le_bytes());
-    }
+    let bytes = serde_json::to_vec(&decisive).expect("plain data serialises");
     Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect()
 }
 

@@ -127,6 +127,7 @@ pub mod tests {
             substrate_material: "fused_silica_malitson_1965".into(),
             ambient_index: 1.0,
             shape: PillarShape::Square,
+            arriving: None,
             ambient_material: None,
             under: Vec::new(),
             band_um: None,

@@ -9,12 +9,12 @@ use metalith_core::{PillarShape, WidthMap};
 /// More pillars an axis than this would be dust.
 const MOST: f64 = 80.0;
 
-/// A cut-out of an element, each pillar at its true place and width.
+/// A cut-out of an element, each pillar at its true place, in its true size.
 #[derive(Clone, Debug)]
 pub struct PillarZoom {
     title: String,
-    /// Left, top and width of each in the drawing (nm).
-    pillars: Vec<[i64; 3]>,
+    /// Middle of each in the drawing (nm), and its width (nm) or number.
+    pillars: Vec<([i64; 2], u16)>,
     shape: PillarShape,
     centre_um: (f64, f64),
     span_um: f64,
@@ -34,14 +34,16 @@ impl PillarZoom {
         let origin = (nm(centre_um.0), nm(centre_um.1));
         for iy in near(centre_um.1) {
             for ix in near(centre_um.0) {
-                let width = i64::from(map.width_nm[[iy, ix]]);
+                let width = map.width_nm[[iy, ix]];
                 if width == 0 {
                     continue;
                 }
                 // The drawing counts nanometres from its middle, y downwards.
-                let x = lattice.coordinate_nm(ix) - origin.0 - width / 2;
-                let y = origin.1 - lattice.coordinate_nm(iy) - width / 2;
-                pillars.push([x, y, width]);
+                let (x, y) = (
+                    lattice.coordinate_nm(ix) - origin.0,
+                    origin.1 - lattice.coordinate_nm(iy),
+                );
+                pillars.push(([x, y], width));
             }
         }
         Self {
@@ -62,11 +64,19 @@ impl PillarZoom {
 
     /// The outlines of all pillars as one path.
     fn outlines(&self) -> String {
-        let outline = |[x, y, width]: &[i64; 3]| match self.shape {
-            PillarShape::Square => format!("M{x} {y}h{width}v{width}h-{width}z"),
-            PillarShape::Circle => {
-                let (radius, middle) = (*width as f64 / 2.0, *y as f64 + *width as f64 / 2.0);
-                format!("M{x} {middle}a{radius} {radius} 0 1 0 {width} 0a{radius} {radius} 0 1 0 -{width} 0z")
+        let outline = |([cx, cy], number): &([i64; 2], u16)| {
+            let width = i64::from(*number);
+            let (x, y) = (cx - width / 2, cy - width / 2);
+            match self.shape {
+                PillarShape::Square => format!("M{x} {y}h{width}v{width}h-{width}z"),
+                PillarShape::Circle => {
+                    let (radius, middle) = (width as f64 / 2.0, y as f64 + width as f64 / 2.0);
+                    format!("M{x} {middle}a{radius} {radius} 0 1 0 {width} 0a{radius} {radius} 0 1 0 -{width} 0z")
+                }
+                PillarShape::Rectangle(pillars) => {
+                    let [a, b, c, d] = pillars.corners(*number).map(|(x, y)| format!("{} {}", cx + x, cy - y));
+                    format!("M{a}L{b}L{c}L{d}z")
+                }
             }
         };
         self.pillars.iter().map(outline).collect()

@@ -1,7 +1,7 @@
 //! What a simulation assumes, and how much each assumption weighs for the design at hand.
 
-use metalith_cell::{Fidelity, ORDERS};
-use metalith_core::PillarShape;
+use metalith_cell::{Fidelity, ORDERS, ROTATED_ORDERS};
+use metalith_core::{PillarShape, Rectangles};
 use metalith_design::{CellIncidence, Design, Element};
 use metalith_report::{Cell, Column, Page, Table, fixed, sig};
 
@@ -41,6 +41,8 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
             "Each pillar passes light as in an infinite lattice of equal pillars",
             if design.cell.is_of_the_paper() {
                 neighbours(design)
+            } else if design.cell.shape.rectangles().is_some() {
+                "not known; at the rim neighbours differ most".into()
             } else {
                 "not known for this cell; --fidelity neighbours tells".into()
             },
@@ -63,16 +65,24 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
         row(
             "Cells are lit along the normal",
             "not computed in this run".into(),
-            "--as-lit solves them at the angle at which light arrives, both polarisations",
+            if design.cell.shape.rectangles().is_some() {
+                "rectangles are solved along the normal alone"
+            } else {
+                "--as-lit solves them at the angle at which light arrives, both polarisations"
+            },
         );
     }
-    if found.fidelity == Fidelity::Rigorous {
+    if let Some(pillars) = design.cell.shape.rectangles() {
+        polarised(&mut row, design, found, pillars);
+    } else if found.fidelity == Fidelity::Rigorous {
         row(
             &format!("Cells are solved with {ORDERS} diffraction orders an axis"),
             match design.cell.shape {
                 _ if design.cell.is_of_the_paper() => "0.004 rms in |t|, 0.03 beside resonances".into(),
                 PillarShape::Circle => "0.004 rms in t, 0.01 beside resonances".into(),
-                PillarShape::Square => "not known for this cell; more where the index is higher".into(),
+                PillarShape::Square | PillarShape::Rectangle(_) => {
+                    "not known for this cell; more where the index is higher".into()
+                }
             },
             "squares of silicon nitride against 27 orders, widths of 100 to 295 nm at 455, 530 and 660 nm; circles of three materials against 33 orders",
         );
@@ -100,6 +110,52 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
         "direct sums in double precision; polarisation of the field behind the lens is left out",
     );
     page.table(table);
+}
+
+/// What is assumed of the polarisation of light, and what steps and grid do to the phase of rotated rectangles.
+fn polarised(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &Verification, pillars: Rectangles) {
+    let arriving = design.cell.arriving.unwrap_or_default();
+    let shares: Vec<String> = found
+        .distinct
+        .iter()
+        .flat_map(|d| &d.orders)
+        .filter_map(|o| Some(fixed(o.unconverted? * 100.0, 1)))
+        .collect();
+    row(
+        &format!(
+            "Light arrives {arriving} circularly polarised; pillars convert it to the other with twice their rotation as phase"
+        ),
+        if design.verify.analyser {
+            "a circular analyser keeps what is not converted from the sensor".into()
+        } else {
+            format!(
+                "{} % is not converted: a background, in all figures of the layout",
+                shares.join(", ")
+            )
+        },
+        "Jones matrices of both; light of the other handedness diverges, of unpolarised light that is half",
+    );
+    let turned = (1..=pillars.steps)
+        .map(|number| pillars.turned_by_grid(number).abs())
+        .fold(0.0, f64::max);
+    row(
+        "Rotations are rounded to steps, and corners to the grid of 1 nm",
+        format!(
+            "steps of {}° are {} rad of phase at most; the grid turns pillars by up to {}°, {} rad, which is not simulated",
+            sig(pillars.step_deg(), 3),
+            sig(pillars.step_deg().to_radians(), 2),
+            sig(turned.to_degrees(), 2),
+            sig(2.0 * turned, 2),
+        ),
+        "axis of each outline as it is drawn, against its rotation",
+    );
+    row(
+        &format!(
+            "Cells are solved with {ROTATED_ORDERS} diffraction orders an axis, at seven rotations, the others by a Fourier series"
+        ),
+        "not known for this cell; 0.006 rms in t with 17 orders for rectangles of three materials".into(),
+        "the series meets the solver between its rotations to 0.0005; geometric phases of lattices that are all rotated alike differ from twice the rotation by what the lattice adds",
+    );
 }
 
 /// Share of the light in the first order by equal neighbours over that by the neighbours that there are.

@@ -57,6 +57,9 @@ impl<'a> SimulationCases<'a> {
 pub(super) struct TransmissionTables {
     /// Along the normal.
     pub normal: Vec<Complex64>,
+    /// Along the normal, what leaves in the polarisation in which it arrived, of a cell that changes it, unless an analyser keeps
+    /// it from the sensor.
+    pub unconverted: Option<Vec<Complex64>>,
     /// By direction, for s and p; empty where the design asks for normal incidence, or the cell knows no angles.
     oblique: HashMap<[u64; 2], ObliqueTables>,
     /// By direction, for s and p, of a cell that knows unlike neighbours.
@@ -73,6 +76,7 @@ impl TransmissionTables {
     pub fn new(cell: &dyn CellModel, wavelength_um: f64, widest_nm: u16) -> Result<Self> {
         Ok(Self {
             normal: cell.transmissions(wavelength_um, widest_nm)?,
+            unconverted: cell.unconverted(wavelength_um, widest_nm)?,
             oblique: HashMap::new(),
             neighbours: HashMap::new(),
             in_band: false,
@@ -86,10 +90,18 @@ impl TransmissionTables {
     pub fn in_band(cell: &dyn CellModel, wavelength_um: f64, widest_nm: u16) -> Result<Self> {
         Ok(Self {
             normal: cell.transmissions_in_band(wavelength_um, widest_nm)?,
+            unconverted: cell.unconverted_in_band(wavelength_um, widest_nm)?,
             oblique: HashMap::new(),
             neighbours: HashMap::new(),
             in_band: true,
         })
+    }
+
+    /// The same with an analyser before the sensor, or without one.
+    #[must_use]
+    pub fn behind_analyser(mut self, analyser: bool) -> Self {
+        self.unconverted = self.unconverted.filter(|_| !analyser);
+        self
     }
 
     /// Solve it for more directions, those that are alike by symmetry once.
@@ -157,8 +169,9 @@ impl TransmissionTables {
         Ok(Some([of(0)?, of(1)?]))
     }
 
-    /// The PSF of pillars for a wave on a window: the mean over polarisations where cells are solved at an angle. `lit` is
-    /// the wave that they are solved for where they are.
+    /// The PSF of pillars for a wave on a window: the mean over polarisations where cells are solved at an angle, the sum of
+    /// converted and unconverted light where cells change polarisation. `lit` is the wave that they are solved for where they
+    /// are.
     ///
     /// # Errors
     /// As [`Psf::formed`].
@@ -182,7 +195,10 @@ impl TransmissionTables {
                 tables.passed().map(of).collect::<Result<_>>()?,
                 POLARISATION_SHARE,
             )),
-            None => of(&self.normal),
+            None => match &self.unconverted {
+                None => of(&self.normal),
+                Some(unconverted) => Ok(Psf::sum(vec![of(&self.normal)?, of(unconverted)?], 1.0)),
+            },
         }
     }
 }

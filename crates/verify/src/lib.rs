@@ -335,7 +335,7 @@ impl<'a> MappingResponse<'a> {
     fn new(design: &Design, judge: SimulationCase<'a>) -> Result<Self> {
         let um = design.mapping.wavelength_um;
         Ok(match judge {
-            SimulationCase::Cell(cell) => Self::ByWidth(cell.transmissions(um, design.cell.pitch_nm as u16)?),
+            SimulationCase::Cell(cell) => Self::ByWidth(cell.transmissions(um, design.cell.most())?),
             SimulationCase::Made(chip) => Self::Made(um, chip),
         })
     }

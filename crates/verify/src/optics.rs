@@ -77,7 +77,8 @@ impl<'a> ElementSimulator<'a> {
                     tables: match case {
                         SimulationCase::Made(_) => None,
                         SimulationCase::Cell(cell) => {
-                            Some(TransmissionTables::new(*cell, wavelength_um, widest_nm(design))?)
+                            let tables = TransmissionTables::new(*cell, wavelength_um, widest_nm(design))?;
+                            Some(tables.behind_analyser(design.verify.analyser))
                         }
                     },
                 })
@@ -230,6 +231,7 @@ impl<'a> ElementSimulator<'a> {
                         zero: found.orders[0],
                         second: found.orders[2],
                         transmitted: found.transmitted,
+                        unconverted: None,
                     });
                     continue;
                 }
@@ -243,13 +245,11 @@ impl<'a> ElementSimulator<'a> {
                     }
                     (None, SimulationCase::Cell(_)) => unreachable!("every cell has its tables"),
                 };
-                all.push(OrderEfficiencies::of(
-                    rule,
-                    colour.wavelength_um,
-                    at.fidelity,
-                    at.full,
-                    table,
-                ));
+                let orders = OrderEfficiencies::of(rule, colour.wavelength_um, at.fidelity, at.full, table);
+                all.push(match &at.tables {
+                    Some(tables) => orders.beside(tables.unconverted.as_deref(), rule, at.full),
+                    None => orders,
+                });
             }
         }
         Ok(all)
@@ -434,9 +434,9 @@ fn arriving(element: &Element, wavelength_um: f64, field: FieldAngle) -> Result<
     Ok(incident(&element.wedge, wavelength_um, field_rad)?)
 }
 
-/// Widths that tables go to: no pillar is wider than the pitch.
+/// Widths that tables go to.
 fn widest_nm(design: &Design) -> u16 {
-    design.cell.pitch_nm as u16
+    design.cell.most()
 }
 
 /// The same with sites of another modulus.

@@ -128,6 +128,10 @@ pub struct OrderEfficiencies {
     pub second: f64,
     /// Share in all orders of the mapping: the rest is reflected, absorbed or diffracted by the lattice itself.
     pub transmitted: f64,
+    /// Of pillars that change polarisation, the share that leaves in that in which it arrived and reaches the sensor: it passes the
+    /// element as if there were no phase. The shares above are of the light that is converted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unconverted: Option<f64>,
 }
 
 impl OrderEfficiencies {
@@ -150,6 +154,19 @@ impl OrderEfficiencies {
             first: shares[1],
             second: shares[2],
             transmitted: t.iter().map(Complex64::norm_sqr).sum::<f64>() / (full * full * t.len() as f64),
+            unconverted: None,
+        }
+    }
+
+    /// The same with the light that pillars leave in the polarisation in which it arrives, by its table.
+    pub(super) fn beside(self, unconverted: Option<&[Complex64]>, rule: &WidthRule, full: f64) -> Self {
+        let share = |table: &[Complex64]| {
+            let power = (0..ORDER_SAMPLES).map(|i| table[usize::from(rule.width_nm(order_phase(i)))].norm_sqr());
+            power.sum::<f64>() / (full * full * ORDER_SAMPLES as f64)
+        };
+        Self {
+            unconverted: unconverted.map(share),
+            ..self
         }
     }
 }

@@ -39,6 +39,8 @@ pub struct Lighting {
     pub samples: usize,
     /// Edge of a sensor pixel (um).
     pub pixel_um: f64,
+    /// Whether light that leaves in the polarisation in which it arrived is kept from the sensor, where pillars change it.
+    pub analyser: bool,
     /// Radius of the openings in the metal (um); that of the circle around the pillars if none is given. It counts
     /// where a model has them off their place.
     pub aperture_radius_um: Option<f64>,
@@ -106,7 +108,7 @@ fn by_cell(
     progress: &dyn Progress,
 ) -> Result<Vec<Psf>> {
     let widest = widest_nm(elements);
-    let mut tables = TransmissionTables::new(cell, wavelength_um, widest)?;
+    let mut tables = TransmissionTables::new(cell, wavelength_um, widest)?.behind_analyser(light.analyser);
     let wave = light.wave(wavelength_um);
     if light.cells_as_lit {
         tables.add_directions(cell, &[wave], widest, &Silent)?;

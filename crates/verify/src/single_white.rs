@@ -51,7 +51,7 @@ pub fn single_white(
     let tables = sampling.wavelengths_nm.iter().map(|nm| match case {
         SimulationCase::Made(_) => Ok(None),
         SimulationCase::Cell(cell) => {
-            let mut tables = TransmissionTables::in_band(cell, nm * 1e-3, widest)?;
+            let mut tables = TransmissionTables::in_band(cell, nm * 1e-3, widest)?.behind_analyser(light.analyser);
             if light.cells_as_lit {
                 tables.add_directions(cell, &[point().wave(nm * 1e-3)], widest, &metalith_core::Silent)?;
             }

@@ -185,12 +185,15 @@ impl<'a> WhiteSimulator<'a> {
         let Some((camera, sampling)) = camera_of(design)? else {
             return Ok(None);
         };
-        let widest_nm = design.cell.pitch_nm as u16;
+        let widest_nm = design.cell.most();
         let colour = |nm: &f64| {
             let wavelength_um = nm * 1e-3;
             let tables = match judge {
                 SimulationCase::Made(_) => None,
-                SimulationCase::Cell(cell) => Some(TransmissionTables::in_band(cell, wavelength_um, widest_nm)?),
+                SimulationCase::Cell(cell) => {
+                    let tables = TransmissionTables::in_band(cell, wavelength_um, widest_nm)?;
+                    Some(tables.behind_analyser(design.verify.analyser))
+                }
             };
             Ok(Colour {
                 wavelength_um,
@@ -244,7 +247,7 @@ impl<'a> WhiteSimulator<'a> {
                 .map(|e| Point::of(e, distance_um).wave(colour.wavelength_um))
                 .collect();
             if let Some(tables) = &mut colour.tables {
-                tables.add_directions(cell, &waves, self.design.cell.pitch_nm as u16, progress)?;
+                tables.add_directions(cell, &waves, self.design.cell.most(), progress)?;
             }
         }
         Ok(())

@@ -15,7 +15,7 @@ pub struct WidthCheck {
     pub missing: u64,
     /// Sites with a pillar that should have none.
     pub extra: u64,
-    /// Largest difference of widths where both have a pillar (nm).
+    /// Largest difference of widths where both have a pillar (nm); of rectangles of their numbers.
     pub largest_nm: u16,
 }
 

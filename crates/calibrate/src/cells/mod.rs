@@ -205,8 +205,10 @@ impl RigorousCells {
             .as_ref()
             .map(|f| f.join(format!("{}.cells", self.digest(&key))));
         let (wavelengths, count) = (self.wavelengths_nm.len(), self.count());
+        let solver = kept::solver_of(self.stack.shape);
         let load = |path: &std::path::Path| {
-            PillarTable::from_bytes(&fs::read(path).ok()?, wavelengths, count, self.first_nm(), STEP_NM)
+            let bytes = fs::read(path).ok()?;
+            PillarTable::from_bytes(&bytes, solver, wavelengths, count, self.first_nm(), STEP_NM)
         };
         let table = match path.as_deref().and_then(load) {
             Some(table) => table,
@@ -214,7 +216,7 @@ impl RigorousCells {
                 let table = make()?;
                 if let Some(path) = &path {
                     // A cache that cannot be written costs time, not correctness.
-                    let _ = WholeFile::write(path, &table.bytes());
+                    let _ = WholeFile::write(path, &table.bytes(solver));
                 }
                 table
             }
@@ -283,10 +285,6 @@ impl RigorousCells {
         let mut hash = Sha256::new();
         hash.update(env!("CARGO_PKG_VERSION"));
         hash.update(serde_json::to_vec(&self.stack).expect("plain data serialises"));
-        // The solver of squares is named in the file.
-        if !self.stack.shape.is_square() {
-            hash.update(kept::solver_of(self.stack.shape).to_le_bytes());
-        }
         let numbers = self
             .wavelengths_nm
             .iter()

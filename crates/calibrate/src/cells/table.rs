@@ -29,10 +29,10 @@ impl PillarTable {
         row[i - 1..i + 3].iter().zip(weights).map(|(t, w)| t * w).sum()
     }
 
-    /// The bytes of the cached file: the inputs, the version of the solver, and a checksum.
-    pub fn bytes(&self) -> Vec<u8> {
+    /// The bytes of the cached file: the inputs, the version of the solver that made it, and a checksum.
+    pub fn bytes(&self, solver: u32) -> Vec<u8> {
         let count = self.t.first().map_or(0, Vec::len);
-        let inputs = inputs(self.t.len(), count, self.first_nm, self.step_nm);
+        let inputs = inputs(solver, self.t.len(), count, self.first_nm, self.step_nm);
         let rows = self.t.iter().zip(&self.bare);
         let numbers = rows.flat_map(|(row, bare)| row.iter().chain([bare]));
         let content: Vec<u8> = numbers
@@ -43,8 +43,16 @@ impl PillarTable {
     }
 
     /// From the cached bytes, if they hold this number of widths and wavelengths; else `None`.
-    pub fn from_bytes(bytes: &[u8], wavelengths: usize, count: usize, first_nm: f64, step_nm: f64) -> Option<Self> {
-        let content = kept::open(bytes, MAGIC, &inputs(wavelengths, count, first_nm, step_nm)).ok()?;
+    pub fn from_bytes(
+        bytes: &[u8],
+        solver: u32,
+        wavelengths: usize,
+        count: usize,
+        first_nm: f64,
+        step_nm: f64,
+    ) -> Option<Self> {
+        let inputs = inputs(solver, wavelengths, count, first_nm, step_nm);
+        let content = kept::open(bytes, MAGIC, &inputs).ok()?;
         if content.len() != wavelengths * (count + 1) * 16 {
             return None;
         }
@@ -71,8 +79,8 @@ impl PillarTable {
 }
 
 /// Inputs of a cached table; the cell itself is in the name of its file.
-fn inputs(wavelengths: usize, count: usize, first_nm: f64, step_nm: f64) -> Vec<u8> {
-    let mut bytes = kept::SOLVER.to_le_bytes().to_vec();
+fn inputs(solver: u32, wavelengths: usize, count: usize, first_nm: f64, step_nm: f64) -> Vec<u8> {
+    let mut bytes = solver.to_le_bytes().to_vec();
     for number in [wavelengths as u64, count as u64, first_nm.to_bits(), step_nm.to_bits()] {
         bytes.extend(number.to_le_bytes());
     }
@@ -96,21 +104,22 @@ mod tests {
     #[test]
     fn a_kept_table_comes_back() {
         let table = table();
-        let back = PillarTable::from_bytes(&table.bytes(), 3, 400, 100.0, 2.0).unwrap();
+        let back = PillarTable::from_bytes(&table.bytes(kept::SOLVER), kept::SOLVER, 3, 400, 100.0, 2.0).unwrap();
         assert_eq!((back.t, back.bare), (table.t, table.bare));
     }
 
     /// A page of zeros, which is finite numbers all the same, and a table of other widths.
     #[test]
     fn a_damaged_table_is_made_again() {
-        let bytes = table().bytes();
+        let bytes = table().bytes(kept::SOLVER);
         for page in (0..bytes.len()).step_by(4096) {
             let mut damaged = bytes.clone();
             damaged[page..(page + 4096).min(bytes.len())].fill(0);
-            assert!(PillarTable::from_bytes(&damaged, 3, 400, 100.0, 2.0).is_none());
+            assert!(PillarTable::from_bytes(&damaged, kept::SOLVER, 3, 400, 100.0, 2.0).is_none());
         }
-        assert!(PillarTable::from_bytes(&bytes, 3, 400, 102.0, 2.0).is_none());
-        assert!(PillarTable::from_bytes(&bytes, 2, 400, 100.0, 2.0).is_none());
-        assert!(PillarTable::from_bytes(&bytes[..bytes.len() - 1], 3, 400, 100.0, 2.0).is_none());
+        assert!(PillarTable::from_bytes(&bytes, kept::SOLVER, 3, 400, 102.0, 2.0).is_none());
+        assert!(PillarTable::from_bytes(&bytes, kept::SOLVER, 2, 400, 100.0, 2.0).is_none());
+        assert!(PillarTable::from_bytes(&bytes, kept::SOLVER + 1, 3, 400, 100.0, 2.0).is_none());
+        assert!(PillarTable::from_bytes(&bytes[..bytes.len() - 1], kept::SOLVER, 3, 400, 100.0, 2.0).is_none());
     }
 }

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-use metalith_core::{EighthMap, Lattice, WidthMap, WidthRows};
+use metalith_core::{EighthMap, Lattice, PillarShape, WidthMap, WidthRows};
 
 use super::{Symmetry, SymmetryGroup, WidthRule};
 use crate::Element;
@@ -55,7 +55,8 @@ impl ComputedWidths {
 
     /// The symmetries that leave the element as it is.
     pub fn group(&self) -> SymmetryGroup {
-        SymmetryGroup::of_those(|s| self.maps(s, self))
+        let shape = self.rule.shape();
+        SymmetryGroup::of_those(|s| s.keeps(shape) && self.maps(s, self))
     }
 
     fn fill<'r>(
@@ -110,10 +111,10 @@ impl ClassWidths {
         }
     }
 
-    /// The symmetries that leave the pillars as they are.
-    pub(super) fn group(&self) -> SymmetryGroup {
+    /// The symmetries that leave the pillars, of this shape, as they are.
+    pub(super) fn group(&self, shape: PillarShape) -> SymmetryGroup {
         match self {
-            Self::Held(map) => SymmetryGroup::of(map),
+            Self::Held(map) => SymmetryGroup::of_shape(map, shape),
             Self::Computed(computed) => computed.group(),
             Self::Eighth(_) => SymmetryGroup::of_those(|_| true),
         }

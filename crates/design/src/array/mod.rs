@@ -15,7 +15,7 @@ pub use widths::WidthRule;
 
 use crate::phase::{ElementPhase, LensPhase};
 use crate::{Design, Element};
-use metalith_core::{EighthMap, Lattice, WidthMap, WidthRows};
+use metalith_core::{EighthMap, Lattice, PillarShape, WidthMap, WidthRows};
 use metalith_core::{Error, Result};
 use metalith_core::{Progress, Wedge};
 
@@ -59,6 +59,8 @@ pub struct PlacedElement {
 #[derive(Clone, Debug)]
 pub struct PillarArray {
     pub lattice: Lattice,
+    /// What the pillars are.
+    pub shape: PillarShape,
     pub classes: Vec<Class>,
     pub placed: Vec<PlacedElement>,
     /// Whether widths were moved on purpose, for what a process makes of them, from those that the mapping gives.
@@ -74,7 +76,7 @@ impl PillarArray {
         Self::build_within(design, MOST_HELD, progress)
     }
 
-    /// The array of pillars that were not made from a design: maps of widths with the places of their centres (nm). Copies
+    /// The array of square or round pillars that were not made from a design: maps of widths with the places of their centres (nm). Copies
     /// and symmetries are found as those of a design are; nothing is steered.
     ///
     /// # Errors
@@ -89,6 +91,7 @@ impl PillarArray {
         progress.begin("comparing elements", maps.len() as u64);
         let mut array = Self {
             lattice,
+            shape: PillarShape::default(),
             classes: Vec::new(),
             placed: Vec::new(),
             compensated: false,
@@ -136,6 +139,7 @@ impl PillarArray {
         progress.begin("widths of the elements", elements.len() as u64);
         let mut array = Self {
             lattice,
+            shape: design.cell.shape,
             classes: Vec::new(),
             placed: Vec::new(),
             compensated: false,
@@ -209,11 +213,12 @@ impl PillarArray {
 
     fn place(&mut self, element: Element, widths: ClassWidths) {
         let copy = self.classes.iter().enumerate().find_map(|(class, known)| {
-            let symmetry = Symmetry::ALL.into_iter().find(|s| widths.is_copy(*s, &known.widths))?;
+            let mut kept = Symmetry::ALL.into_iter().filter(|s| s.keeps(self.shape));
+            let symmetry = kept.find(|s| widths.is_copy(*s, &known.widths))?;
             Some((class, symmetry))
         });
         let (class, symmetry) = copy.unwrap_or_else(|| {
-            let group = widths.group();
+            let group = widths.group(self.shape);
             self.classes.push(Class { widths, group });
             (self.classes.len() - 1, Symmetry::IDENTITY)
         });

@@ -1,6 +1,6 @@
 //! The eight symmetries of the square, and those of them that leave a lens as it is.
 
-use metalith_core::WidthMap;
+use metalith_core::{PillarShape, WidthMap};
 use ndarray::{Array2, ArrayView2, Axis};
 
 /// One of the eight symmetries of the square, as GDSII writes it: mirrored about the x axis first
@@ -79,6 +79,12 @@ impl Symmetry {
         seen
     }
 
+    /// Whether it leaves every pillar of a shape as it is, about its own middle: a rotated rectangle is turned by it, but for half
+    /// a turn.
+    pub fn keeps(self, shape: PillarShape) -> bool {
+        shape.rectangles().is_none() || (!self.mirrored && self.quarter_turns.is_multiple_of(2))
+    }
+
     /// Where a vector that is no whole number of anything goes.
     pub fn vector(self, [x, y]: [f64; 2]) -> [f64; 2] {
         let ((ax, ay), (bx, by)) = (self.point(1, 0), self.point(0, 1));
@@ -136,6 +142,11 @@ impl SymmetryGroup {
     /// The group of a lens: each symmetry is tried on every site, or follows from two that hold.
     pub fn of(widths: &WidthMap) -> Self {
         Self::of_those(|s| s.maps(widths, widths))
+    }
+
+    /// As [`SymmetryGroup::of`], of those that leave each pillar of this shape as it is.
+    pub fn of_shape(widths: &WidthMap, shape: PillarShape) -> Self {
+        Self::of_those(|s| s.keeps(shape) && s.maps(widths, widths))
     }
 
     /// The group of what these symmetries, and those that follow from them, leave as it is.

@@ -4,8 +4,8 @@ use rayon::prelude::*;
 
 use crate::phase::ElementPhase;
 use crate::{CellSpec, Design, MappingSpec};
-use metalith_cell::{ForwardPolynomial, InversePolynomial, MappingTable};
-use metalith_core::WidthMap;
+use metalith_cell::{ForwardPolynomial, Handedness, InversePolynomial, MappingTable};
+use metalith_core::{PillarShape, Rectangles, WidthMap};
 
 /// Rounds the duty cycle that a mapping asks for to a width that may be written.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,6 +17,8 @@ pub struct WidthRule {
     range_nm: (f64, f64),
     /// Published phase over width of the paper's cell, and the wavelength of the mapping (um).
     forward: Option<(ForwardPolynomial, f64)>,
+    /// Of rectangles, for light that arrives so: everything else does not count.
+    rotation: Option<(Rectangles, Handedness)>,
 }
 
 /// The largest phase below a turn that tables of mappings tell from one.
@@ -56,11 +58,31 @@ impl WidthRule {
             forward: cell
                 .is_of_the_paper()
                 .then(|| (ForwardPolynomial::published(), mapping.wavelength_um)),
+            rotation: cell
+                .shape
+                .rectangles()
+                .map(|pillars| (pillars, cell.arriving.unwrap_or_default())),
         }
     }
 
-    /// Width before rounding (nm) for a phase of `u` turns, `0 <= u < 1`.
+    /// What the pillars are, as far as symmetry is asked: rectangles, or what a mirror leaves as it is.
+    pub(super) fn shape(&self) -> PillarShape {
+        self.rotation
+            .map_or(PillarShape::Square, |(pillars, _)| PillarShape::Rectangle(pillars))
+    }
+
+    /// Width before rounding (nm) for a phase of `u` turns, `0 <= u < 1`; of rectangles the number of the rotation, from half to
+    /// half beyond the last.
     pub fn unrounded_nm(&self, u: f64) -> f64 {
+        if let Some((pillars, arriving)) = &self.rotation {
+            // Half a turn of rotation is a turn of phase.
+            let steps = f64::from(pillars.steps);
+            let number = match arriving {
+                Handedness::Left => u * steps,
+                Handedness::Right => (1.0 - u) * steps,
+            };
+            return if number < 0.5 { number + steps } else { number };
+        }
         match &self.table {
             Some(table) => f64::from(table.width_nm(u)),
             None => self.pitch_nm * self.polynomial.duty(u),
@@ -70,6 +92,13 @@ impl WidthRule {
     /// Phase (turns) that stands for a width (nm) where what counts is the difference of two: by the published polynomial for
     /// the cell of the paper, else by the mean slope of the mapping.
     pub fn turns_of_width(&self, nm: f64) -> f64 {
+        if let Some((pillars, arriving)) = &self.rotation {
+            let turns = nm / f64::from(pillars.steps);
+            return match arriving {
+                Handedness::Left => turns,
+                Handedness::Right => -turns,
+            };
+        }
         if let Some(forward) = &self.forward {
             return forward.0.turns(nm / self.pitch_nm, forward.1);
         }
@@ -77,7 +106,7 @@ impl WidthRule {
         nm / span_nm.abs().max(self.step_nm)
     }
 
-    /// Width to write (nm) for a phase of `u` turns, `0 <= u < 1`.
+    /// Width to write (nm) for a phase of `u` turns, `0 <= u < 1`; of rectangles the number of the rotation.
     pub fn width_nm(&self, u: f64) -> u16 {
         let width = (self.unrounded_nm(u) / self.step_nm).round() * self.step_nm;
         width.clamp(self.range_nm.0, self.range_nm.1) as u16

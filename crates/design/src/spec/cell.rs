@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use super::lens::WAVELENGTH;
-use metalith_cell::InversePolynomial;
-use metalith_core::PillarShape;
+use metalith_cell::{Handedness, InversePolynomial};
 use metalith_core::document::{Limits, Section};
+use metalith_core::{PillarShape, Rectangles};
 
 /// The unit cell: a pillar on a square lattice.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -15,11 +15,15 @@ pub struct CellSpec {
     /// Cross-section of the pillars.
     #[serde(skip_serializing_if = "PillarShape::is_square")]
     pub shape: PillarShape,
+    /// Circular polarisation of the light that arrives, where the pillars are rectangles: its phase is twice their rotation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub arriving: Option<Handedness>,
     /// Height of the pillars (nm).
     pub pillar_height_nm: f64,
-    /// Narrowest and widest pillar that may be written (nm), both multiples of the step.
+    /// Narrowest and widest pillar that may be written (nm), both multiples of the step; of rectangles the first and the last
+    /// number of a rotation.
     pub width_range_nm: (u16, u16),
-    /// Widths are multiples of this (nm), even, so that edges of centred squares are whole nanometres.
+    /// Widths are multiples of this (nm), even, so that edges of centred squares are whole nanometres; 1 of rectangles.
     pub width_step_nm: u16,
     /// Name of the pillar's material, or path of a CSV table of n and k.
     pub pillar_material: String,
@@ -67,40 +71,28 @@ impl CellSpec {
                 "use an even number: half a pitch must be whole nanometres",
             );
         }
-        let step = s.optional_integer("width_step_nm", 2..=100, "nm").unwrap_or(2) as u16;
-        if !step.is_multiple_of(2) {
-            s.fault(
-                "width_step_nm",
-                format!("a width step of {step} nm is odd"),
-                "use an even number, so that all edges are on the 1 nm grid",
-            );
-        }
         // A pitch with a fault bounds nothing.
         let widest = if s.sound(&["cell.pitch_nm"]) {
             pitch_nm
         } else {
             WIDEST_PITCH_NM
         };
-        let low = s.integer("width_min_nm", 10..=i64::from(widest), "nm") as u16;
-        let high = s.integer("width_max_nm", 10..=i64::from(widest), "nm") as u16;
-        for (key, width) in [("width_min_nm", low), ("width_max_nm", high)] {
-            if step > 0 && width % step != 0 {
-                s.fault_given(
-                    &["cell.width_step_nm"],
-                    key,
-                    format!("{width} nm is not a multiple of the width step"),
-                    format!("use a multiple of {step} nm"),
-                );
+        let kinds = [Kind::Square, Kind::Circle, Kind::Rectangle];
+        let kinds = ["square", "circle", "rectangle"]
+            .into_iter()
+            .zip(kinds)
+            .collect::<Vec<_>>();
+        let (shape, width_range_nm, width_step_nm) = match s.choice("shape", &kinds, Some(Kind::Square)) {
+            Kind::Square => with_widths(s, PillarShape::Square, widest),
+            Kind::Circle => with_widths(s, PillarShape::Circle, widest),
+            Kind::Rectangle => {
+                let pillars = read_rectangles(s, widest);
+                (PillarShape::Rectangle(pillars), (1, pillars.steps), 1)
             }
-        }
-        if low > high {
-            s.fault_given(
-                &["cell.width_min_nm"],
-                "width_max_nm",
-                "the widest pillar is narrower than the narrowest",
-                "exchange the two",
-            );
-        }
+        };
+        let arriving = shape
+            .rectangles()
+            .map(|_| s.choice("arriving", &Handedness::CHOICES, Some(Handedness::default())));
         // Widths and places are whole nanometres; the key is there so that a design says so.
         s.optional_integer("database_unit_nm", 1..=1, "nm, the only unit that is written");
         let pillar_material = s
@@ -108,10 +100,11 @@ impl CellSpec {
             .unwrap_or_else(|| DEFAULT_FILM.into());
         let cell = Self {
             pitch_nm: pitch_nm & !1,
-            shape: s.choice("shape", &PillarShape::CHOICES, Some(PillarShape::Square)),
+            shape,
+            arriving,
             pillar_height_nm: s.float("pillar_height_nm", Limits::new(10.0..=TALLEST_NM, "nm")),
-            width_range_nm: (low, high),
-            width_step_nm: step,
+            width_range_nm,
+            width_step_nm,
             under: read_under(s, &pillar_material),
             band_um: read_band(s),
             pillar_material,
@@ -149,9 +142,123 @@ impl CellSpec {
         low * pitch >= f64::from(narrow) - half_step && high * pitch <= f64::from(wide) + half_step
     }
 
-    /// All widths that may be written (nm), narrowest first.
+    /// The largest width (nm) or number that a pillar can have: no width is beyond the pitch.
+    pub fn most(&self) -> u16 {
+        match self.shape {
+            PillarShape::Square | PillarShape::Circle => self.pitch_nm as u16,
+            PillarShape::Rectangle(pillars) => pillars.steps,
+        }
+    }
+
+    /// All widths that may be written (nm), narrowest first; of rectangles all numbers.
     pub fn widths_nm(&self) -> impl Iterator<Item = u16> + use<> {
         (self.width_range_nm.0..=self.width_range_nm.1).step_by(usize::from(self.width_step_nm))
+    }
+}
+
+/// The shapes as the key has them.
+#[derive(Clone, Copy)]
+enum Kind {
+    Square,
+    Circle,
+    Rectangle,
+}
+
+/// A shape with its narrowest and widest pillar and the step between widths (nm).
+fn with_widths(s: &Section<'_, '_>, shape: PillarShape, widest: u32) -> (PillarShape, (u16, u16), u16) {
+    let step = s.optional_integer("width_step_nm", 2..=100, "nm").unwrap_or(2) as u16;
+    if !step.is_multiple_of(2) {
+        s.fault(
+            "width_step_nm",
+            format!("a width step of {step} nm is odd"),
+            "use an even number, so that all edges are on the 1 nm grid",
+        );
+    }
+    let low = s.integer("width_min_nm", 10..=i64::from(widest), "nm") as u16;
+    let high = s.integer("width_max_nm", 10..=i64::from(widest), "nm") as u16;
+    for (key, width) in [("width_min_nm", low), ("width_max_nm", high)] {
+        if step > 0 && width % step != 0 {
+            s.fault_given(
+                &["cell.width_step_nm"],
+                key,
+                format!("{width} nm is not a multiple of the width step"),
+                format!("use a multiple of {step} nm"),
+            );
+        }
+    }
+    if low > high {
+        s.fault_given(
+            &["cell.width_min_nm"],
+            "width_max_nm",
+            "the widest pillar is narrower than the narrowest",
+            "exchange the two",
+        );
+    }
+    (shape, (low, high), step)
+}
+
+/// Most rotations in half a turn.
+const MOST_STEPS: f64 = 1800.0;
+
+/// Rounding of half a turn over a step.
+const WHOLE: f64 = 1e-6;
+
+/// Rectangles: one size, and the step of their rotation.
+fn read_rectangles(s: &Section<'_, '_>, widest: u32) -> Rectangles {
+    let width_nm = s.integer("pillar_width_nm", 10..=i64::from(widest), "nm") as u16;
+    let length_nm = s.integer("pillar_length_nm", 10..=i64::from(widest), "nm") as u16;
+    for (key, edge) in [("pillar_width_nm", width_nm), ("pillar_length_nm", length_nm)] {
+        if !edge.is_multiple_of(2) {
+            s.fault(
+                key,
+                format!("an edge of {edge} nm is odd"),
+                "use an even number, so that the corners of an upright pillar are on the 1 nm grid",
+            );
+        }
+    }
+    if width_nm >= length_nm {
+        s.fault_given(
+            &["cell.pillar_width_nm"],
+            "pillar_length_nm",
+            format!("{length_nm} nm is not longer than the width of {width_nm} nm"),
+            "give the shorter edge as the width: a square has no geometric phase",
+        );
+    }
+    let diagonal_nm = f64::from(width_nm).hypot(f64::from(length_nm));
+    if diagonal_nm > f64::from(widest) {
+        s.fault_given(
+            &["cell.pitch_nm", "cell.pillar_width_nm"],
+            "pillar_length_nm",
+            format!("a pillar with a diagonal of {diagonal_nm:.0} nm reaches beyond its cell where it is rotated"),
+            format!("use shorter edges or a wider pitch: the diagonal is to be at most {widest} nm"),
+        );
+    }
+    let step_deg = s
+        .optional_float("rotation_step_deg", Limits::new(180.0 / MOST_STEPS..=15.0, "degrees"))
+        .unwrap_or(1.0);
+    let steps = (180.0 / step_deg).round().clamp(1.0, MOST_STEPS);
+    if (steps * step_deg - 180.0).abs() > WHOLE || steps % 2.0 != 0.0 {
+        s.fault(
+            "rotation_step_deg",
+            format!("a quarter turn is no whole number of steps of {step_deg} degrees"),
+            "use a step such as 1, 0.5 or 2 degrees",
+        );
+    }
+    // Corners are half the diagonal of the grid off at most, to either side at the two ends of an edge.
+    let told_nm = 2.0 * std::f64::consts::SQRT_2;
+    let finest_deg = (told_nm / f64::from(length_nm.max(1))).to_degrees();
+    if step_deg < finest_deg {
+        s.fault_given(
+            &["cell.pillar_length_nm", "cell.pillar_width_nm"],
+            "rotation_step_deg",
+            format!("corners on the grid of 1 nm do not tell rotations of {step_deg} degrees of a pillar {length_nm} nm long"),
+            format!("use a step of {:.1} degrees or more that divides 90", (finest_deg * 10.0).ceil() / 10.0),
+        );
+    }
+    Rectangles {
+        width_nm: width_nm & !1,
+        length_nm: length_nm & !1,
+        steps: steps as u16,
     }
 }
 

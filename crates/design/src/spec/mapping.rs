@@ -81,8 +81,21 @@ impl MappingSpec {
             basis,
             coefficients,
         };
+        let rotated = cell.shape.rectangles().is_some();
+        if rotated {
+            for key in ["coefficients", "table", "basis", "steered"]
+                .into_iter()
+                .filter(|key| s.has(key))
+            {
+                s.fault(
+                    key,
+                    "rectangles have no mapping: the phase is twice their rotation",
+                    format!("leave `{key}` out, or use squares or circles"),
+                );
+            }
+        }
         // A table is held to the widths of the cell when it is read.
-        if !s.has("table") {
+        if !s.has("table") && !rotated {
             check_widths(s, cell, &polynomial);
         }
         let table_file = s.has("table").then(|| s.file("table"));

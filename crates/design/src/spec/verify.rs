@@ -24,6 +24,9 @@ pub struct VerifySpec {
     pub window_samples: usize,
     /// Edge of a sensor pixel (um).
     pub pixel_um: f64,
+    /// Whether a circular analyser before the sensor lets pass what pillars convert alone; counts where they change polarisation.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub analyser: bool,
     /// Camera file that the figures of white light are for; three flat bands where none is named.
     pub camera: Option<PathBuf>,
     pub limits: LimitSpec,
@@ -126,6 +129,7 @@ impl VerifySpec {
             pixel_um: s
                 .optional_float("pixel_um", Limits::new(0.1..=100.0, "um"))
                 .unwrap_or(5.86),
+            analyser: s.choice("analyser", &[("none", false), ("circular", true)], Some(false)),
             camera: s.has("camera").then(|| s.file("camera")),
             limits: LimitSpec::read(s.optional_section("limits").as_ref()),
         };

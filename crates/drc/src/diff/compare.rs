@@ -4,8 +4,8 @@ use super::DiffPlan;
 use super::area::{MOST_SIDES, Sides};
 use super::content::{Content, Outlines, Ring, TextCopy};
 use super::report::{Change, ChangeMap, ElementDiff, LayerDiff, LayoutDiff, TextAt, TreeDiff};
-use metalith_core::WidthRows;
 use metalith_core::text::printable_bytes;
+use metalith_core::{PillarShape, WidthRows};
 use metalith_gds::extract::{ExtractedElement, HeldWidths};
 use metalith_gds::{LayerNumber, Point, Rect};
 
@@ -24,7 +24,7 @@ pub(super) fn compare(a: Content, b: Content, strings: &[Box<[u8]>], unit_nm: f6
         .elements
         .iter()
         .zip(&b.elements)
-        .map(|(a, b)| element(a, b, &mut changes))
+        .map(|(own, other)| element(own, other, a.shape, &mut changes))
         .collect();
     let mut numbers: Vec<LayerNumber> = a.counts.keys().chain(b.counts.keys()).copied().collect();
     numbers.sort_unstable();
@@ -142,7 +142,13 @@ fn map_over(a: &Content, b: &Content, unit_nm: f64) -> ChangeMap {
     }
 }
 
-fn element(a: &ExtractedElement<HeldWidths>, b: &ExtractedElement<HeldWidths>, changes: &mut Changes) -> ElementDiff {
+fn element(
+    a: &ExtractedElement<HeldWidths>,
+    b: &ExtractedElement<HeldWidths>,
+    shape: PillarShape,
+    changes: &mut Changes,
+) -> ElementDiff {
+    let rotated = shape.rectangles().is_some();
     let lattice = a.site.lattice;
     let mut diff = ElementDiff {
         name: a.site.name.clone(),
@@ -154,6 +160,7 @@ fn element(a: &ExtractedElement<HeldWidths>, b: &ExtractedElement<HeldWidths>, c
         removed: 0,
         widened: 0,
         narrowed: 0,
+        rotated: 0,
         largest_change_nm: 0,
         rms_change_nm: 0.0,
     };
@@ -168,19 +175,21 @@ fn element(a: &ExtractedElement<HeldWidths>, b: &ExtractedElement<HeldWidths>, c
         let (count, what) = match (from, to) {
             (0, _) => (&mut diff.added, "added"),
             (_, 0) => (&mut diff.removed, "removed"),
+            _ if rotated => (&mut diff.rotated, "rotated"),
             _ if to > from => (&mut diff.widened, "widened"),
             _ => (&mut diff.narrowed, "narrowed"),
         };
         *count += 1;
-        if from != 0 && to != 0 {
+        if from != 0 && to != 0 && !rotated {
             let change = from.abs_diff(to);
             diff.largest_change_nm = diff.largest_change_nm.max(change);
             squares += u64::from(change) * u64::from(change);
         }
         let x = (a.site.centre_nm[0] + lattice.coordinate_nm(column)) as f64;
         let y = (a.site.centre_nm[1] + lattice.coordinate_nm(row)) as f64;
-        let half = f64::from(from.max(to)) / 2.0;
-        changes.add(what, layer, [x - half, y - half, x + half, y + half], Some([from, to]));
+        let half = shape.widest_nm(from.max(to)) / 2.0;
+        let widths = (!rotated).then_some([from, to]);
+        changes.add(what, layer, [x - half, y - half, x + half, y + half], widths);
     };
     for row in 0..n {
         let from = a.widths.row(row, 0..n, &mut room);

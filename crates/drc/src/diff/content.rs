@@ -6,8 +6,8 @@ use super::super::work::Allowance;
 use metalith_core::{Error, PillarShape, Progress, Result};
 use metalith_gds::extract::{ElementSite, ExtractedElement, Filler, HeldWidths, Scale, Why};
 use metalith_gds::{
-    LayerNumber, Layout, LayoutCell, Point, Rect, Selection, Shape, Text, Transform, Visitor, pillar_of, rectangle_of,
-    simplified,
+    DrawnPillar, LayerNumber, Layout, LayoutCell, Point, Rect, Selection, Shape, Text, Transform, Visitor, pillar_of,
+    rectangle_of, simplified,
 };
 
 /// Vertices that may be placed for each that may be held: most corners of rectangles are not.
@@ -34,6 +34,8 @@ pub(super) struct WantedPillars<'a> {
 
 /// One layout.
 pub(super) struct Content {
+    /// What is a pillar.
+    pub shape: PillarShape,
     pub elements: Vec<ExtractedElement<HeldWidths>>,
     pub outlines: BTreeMap<LayerNumber, Outlines>,
     pub counts: BTreeMap<LayerNumber, u64>,
@@ -99,6 +101,7 @@ impl Content {
             pillars,
             shape: wanted.shape,
             factor,
+            unit_nm: layout.unit_nm(),
             filler: Filler::new(wanted.sites.to_vec(), Scale::of(layout)?),
             outlines: BTreeMap::new(),
             held: 0,
@@ -122,6 +125,7 @@ impl Content {
             Error::invalid(what, cause.remedy())
         })?;
         Ok(Self {
+            shape: wanted.shape,
             elements,
             outlines: reader.outlines,
             counts: reader.counts,
@@ -134,6 +138,7 @@ struct ContentReader<'s> {
     pillars: LayerNumber,
     shape: PillarShape,
     factor: i64,
+    unit_nm: f64,
     filler: Filler,
     outlines: BTreeMap<LayerNumber, Outlines>,
     /// Rectangles, texts and vertices of other outlines, and how many may be held.
@@ -160,6 +165,36 @@ impl ContentReader<'_> {
             _ if self.shape.is_square() => self.rect(self.pillars, r),
             _ => self.ring(self.pillars, &simplified(&corners())),
         }
+    }
+
+    /// A rotated rectangle. Only one whose corners are those of its rotation, to the unit, is known by that alone; of two on one
+    /// site the one of the larger number is.
+    fn rotated(&mut self, pillar: &DrawnPillar, number: u16, placed: &[Point], placement: usize) -> Result<()> {
+        let exact = self.corners(pillar, number);
+        let corners = simplified(placed);
+        let same = corners.len() == 5 && corners.iter().all(|p| exact.contains(p));
+        if !same {
+            return self.ring(self.pillars, &corners);
+        }
+        match self.filler.put_drawn(pillar, placement, |_| true) {
+            Ok(_) => Ok(()),
+            Err(Why::DuplicateSite) => {
+                let other = self.filler.keep_larger_number(pillar, placement);
+                let corners = self.corners(pillar, other);
+                self.ring(self.pillars, &corners)
+            }
+            Err(_) => self.ring(self.pillars, &corners),
+        }
+    }
+
+    /// The corners of the pillar with a number that stands where this one does (database units), closed.
+    fn corners(&self, pillar: &DrawnPillar, number: u16) -> Vec<Point> {
+        let r = &pillar.around;
+        let (x, y) = ((r.x0 + r.x1) / 2, (r.y0 + r.y1) / 2);
+        let unit = |nm: i64| (nm as f64 / self.unit_nm).round() as i64;
+        let drawn = self.shape.corners(number, 0.0);
+        let closed = drawn.iter().chain(drawn.first());
+        closed.map(|&(dx, dy)| Point::new(x + unit(dx), y + unit(dy))).collect()
     }
 
     fn room(&mut self, count: usize) -> Result<()> {
@@ -205,9 +240,12 @@ impl ContentReader<'_> {
 
     fn outline(&mut self, layer: LayerNumber, placed: &[Point], placement: usize) -> Result<()> {
         if layer == self.pillars
-            && let Some(r) = pillar_of(placed, self.shape)
+            && let Some(pillar) = pillar_of(placed, self.shape, self.unit_nm)
         {
-            return self.pillar(&r, placement, || placed.to_vec());
+            return match pillar.number {
+                None => self.pillar(&pillar.around, placement, || placed.to_vec()),
+                Some(number) => self.rotated(&pillar, number, placed, placement),
+            };
         }
         let corners = simplified(placed);
         match rectangle_of(&corners) {

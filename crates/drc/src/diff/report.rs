@@ -21,16 +21,23 @@ pub struct ElementDiff {
     pub removed: u64,
     pub widened: u64,
     pub narrowed: u64,
+    /// Of rectangles, sites whose pillar is rotated otherwise; their edges are alike.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub rotated: u64,
     /// Largest change of width where both have a pillar (nm).
     pub largest_change_nm: u16,
     /// Root of the mean squared change over all sites where both have a pillar (nm).
     pub rms_change_nm: f64,
 }
 
+fn is_zero(count: &u64) -> bool {
+    *count == 0
+}
+
 impl ElementDiff {
     /// Sites that differ.
     pub fn changed(&self) -> u64 {
-        self.added + self.removed + self.widened + self.narrowed
+        self.added + self.removed + self.widened + self.narrowed + self.rotated
     }
 }
 
@@ -58,7 +65,7 @@ pub struct TextAt {
 /// One place that differs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
-    /// `added`, `removed`, `widened`, `narrowed` for pillars; `only in a`, `only in b` for other outlines.
+    /// `added`, `removed`, `widened`, `narrowed`, `rotated` for pillars; `only in a`, `only in b` for other outlines.
     pub what: &'static str,
     pub layer: LayerNumber,
     /// Left, bottom, right, top (nm).
@@ -143,7 +150,7 @@ pub fn text(diff: &LayoutDiff) -> String {
         }
         let _ = writeln!(
             out,
-            "{} at ({:.1}, {:.1}) um: {} added, {} removed, {} widened, {} narrowed of {}; largest change {} nm, rms {:.4} nm",
+            "{} at ({:.1}, {:.1}) um: {} added, {} removed, {} widened, {} narrowed{} of {}; largest change {} nm, rms {:.4} nm",
             e.name,
             e.centre_nm[0] as f64 * 1e-3,
             e.centre_nm[1] as f64 * 1e-3,
@@ -151,6 +158,11 @@ pub fn text(diff: &LayoutDiff) -> String {
             e.removed,
             e.widened,
             e.narrowed,
+            if e.rotated > 0 {
+                format!(", {} rotated", e.rotated)
+            } else {
+                String::new()
+            },
             e.pillars[0],
             e.largest_change_nm,
             e.rms_change_nm

@@ -8,6 +8,7 @@ mod forms;
 mod openings;
 mod pillars;
 mod proportion;
+mod rectangles;
 
 use metalith_core::Silent;
 use metalith_drc::{CheckInput, Date, Deck, DrcReport};

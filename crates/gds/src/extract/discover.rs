@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 
 use super::sites::Scale;
+use super::sizes::Sizes;
 use super::tiles::{MOST_TILES, TileMap};
 use crate::{
     Error, ExtractionError, LayerNumber, Layout, LayoutCell, Point, Rect, Result, Selection, Shape, Transform, Visitor,
+    pillar_of,
 };
 use metalith_core::{ElementSite, Lattice, PillarShape, Progress};
 
@@ -32,6 +34,10 @@ struct Map {
     scattered: bool,
     /// Squares and circles.
     shapes: [u64; 2],
+    /// What else may be pillars.
+    sizes: Sizes,
+    /// What is looked for: squares and circles, or these.
+    wanted: PillarShape,
 }
 
 /// The elements of a layout from anywhere.
@@ -50,15 +56,7 @@ pub fn discover(
     scale: Scale,
     progress: &dyn Progress,
 ) -> Result<Discovered> {
-    let mut map = Map {
-        scale,
-        tiles: TileMap::new(),
-        own: TileMap::new(),
-        placements: Vec::new(),
-        guesses: Vec::new(),
-        scattered: false,
-        shapes: [0; 2],
-    };
+    let mut map = Map::new(scale, PillarShape::Square);
     let selection = Selection {
         layers: Some(layers.to_vec()),
         ..from.clone()
@@ -68,6 +66,12 @@ pub fn discover(
         cause,
     };
     layout.visit(&selection, &mut map, progress)?;
+    if map.sizes.rectangles > map.shapes.iter().sum()
+        && let Some(pillars) = map.sizes.pillars(WIDEST_NM)
+    {
+        map = Map::new(scale, PillarShape::Rectangle(pillars));
+        layout.visit(&selection, &mut map, progress)?;
+    }
     map.place_own();
     if map.scattered {
         return Err(fail(ExtractionError::Scattered { most: MOST_TILES }));
@@ -99,7 +103,7 @@ pub fn discover(
         shape: if circles > squares {
             PillarShape::Circle
         } else {
-            PillarShape::Square
+            map.wanted
         },
     })
 }
@@ -112,6 +116,39 @@ struct Square {
 }
 
 impl Map {
+    fn new(scale: Scale, wanted: PillarShape) -> Self {
+        Self {
+            scale,
+            tiles: TileMap::new(),
+            own: TileMap::new(),
+            placements: Vec::new(),
+            guesses: Vec::new(),
+            scattered: false,
+            shapes: [0; 2],
+            sizes: Sizes::default(),
+            wanted,
+        }
+    }
+
+    /// Add the rectangles that are looked for where they stand.
+    fn rectangle(&mut self, shape: &Shape<'_>, placements: &[Transform]) {
+        for (k, placement) in placements.iter().enumerate() {
+            let placed: Vec<Point> = shape.points.iter().map(|&p| placement.apply(p)).collect();
+            let Some(pillar) = pillar_of(&placed, self.wanted, self.scale.nm(1.0)) else {
+                continue;
+            };
+            let r = pillar.around;
+            if let (true, Some(x), Some(y)) = (
+                self.scale.reaches(&r),
+                self.scale.whole_nm(r.x0 + r.x1),
+                self.scale.whole_nm(r.y0 + r.y1),
+            ) {
+                let even = r.width() % 2 == 0 && r.height() % 2 == 0;
+                self.tiles.add(Point::new(x, y), even, &mut self.guesses[k]);
+            }
+        }
+    }
+
     /// The box around a shape as a square that may be a pillar.
     #[inline]
     fn square(&self, r: &Rect) -> Option<Square> {
@@ -245,10 +282,23 @@ impl Visitor for Map {
 
     #[inline]
     fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> metalith_core::Result<()> {
+        if self.wanted.rectangles().is_some() {
+            self.scattered |= self.tiles.len() > MOST_TILES;
+            if !self.scattered {
+                self.rectangle(shape, placements);
+            }
+            return Ok(());
+        }
+        let rectangle = Sizes::rectangle(shape, self.scale);
+        if let Some(rectangle) = &rectangle {
+            self.sizes.add(rectangle, placements.len() as u64, self.scale);
+        }
         let Some(rect) = shape.rect.as_ref().or(shape.circle.as_ref()) else {
             return Ok(());
         };
-        self.shapes[usize::from(shape.rect.is_none())] += placements.len() as u64;
+        if rectangle.is_none() {
+            self.shapes[usize::from(shape.rect.is_none())] += placements.len() as u64;
+        }
         // A tile too many, and no more is looked for.
         self.scattered |= self.tiles.len().max(self.own.len()) > MOST_TILES;
         if self.scattered {

@@ -7,7 +7,7 @@ use super::held::HeldWidths;
 use super::oddity::Why;
 use super::plan::ExtractedElement;
 use super::sites::{Scale, Sites, Standing};
-use crate::{ExtractionError, Rect, Transform};
+use crate::{DrawnPillar, ExtractionError, Rect, Transform};
 use metalith_core::{EighthMap, ElementSite, WidthRows};
 
 /// Puts squares on the sites of elements.
@@ -214,16 +214,59 @@ impl Filler {
             return Err(Why::NotSquare);
         }
         let width_nm = self.scale.whole_nm(r.width()).ok_or(Why::OddShape)?;
-        let (element, row, column) = match self.sites.stand(r, guess) {
-            Standing::Site(element, row, column) => (element, row, column),
-            Standing::Between(element) if width_nm > self.sites.pitch_nm(element) => return Err(Why::TooWide),
-            Standing::Between(_) => return Err(Why::OffLattice),
-            Standing::Outside => return Err(Why::OutsideElements),
-        };
-        if width_nm > self.sites.pitch_nm(element) || width_nm > i64::from(u16::MAX) {
+        let (element, row, column) = self.site(r, width_nm, guess)?;
+        if width_nm > i64::from(u16::MAX) {
             return Err(Why::TooWide);
         }
         Ok((element, row, column, width_nm as u16))
+    }
+
+    /// Element, row and column of a pillar that reaches so far (nm), by the box around it.
+    #[inline]
+    fn site(&self, r: &Rect, width_nm: i64, guess: &mut u32) -> Result<(u32, usize, usize), Why> {
+        match self.sites.stand(r, guess) {
+            Standing::Site(element, ..) | Standing::Between(element) if width_nm > self.sites.pitch_nm(element) => {
+                Err(Why::TooWide)
+            }
+            Standing::Site(element, row, column) => Ok((element, row, column)),
+            Standing::Between(_) => Err(Why::OffLattice),
+            Standing::Outside => Err(Why::OutsideElements),
+        }
+    }
+
+    /// As [`Filler::put`] of a pillar that may be told by its corners: `takes` is asked of those that their width tells.
+    pub fn put_drawn(
+        &mut self,
+        pillar: &DrawnPillar,
+        placement: usize,
+        takes: impl Fn(i64) -> bool,
+    ) -> Result<bool, Why> {
+        let Some(number) = pillar.number else {
+            return self.put(&pillar.around, placement, takes);
+        };
+        let r = &pillar.around;
+        if !self.scale.reaches(r) {
+            return Err(Why::OutsideElements);
+        }
+        let widest_nm = self.scale.nm(r.width().max(r.height()) as f64).ceil() as i64;
+        let mut guess = self.guesses[placement];
+        let site = self.site(r, widest_nm, &mut guess);
+        self.guesses[placement] = guess;
+        let (element, row, column) = site?;
+        self.fill(element, row, column, number)
+    }
+
+    /// Put a pillar on a free site.
+    #[inline]
+    fn fill(&mut self, element: u32, row: usize, column: usize, number: u16) -> Result<bool, Why> {
+        if self.elements[element as usize].widths.width(column, row) != 0 {
+            return Err(Why::DuplicateSite);
+        }
+        if let Some(place) = self.place(element, row, column) {
+            *place = number;
+            self.pillars += 1;
+        }
+        Ok(true)
     }
 
     /// Put an upright rectangle of the layout on its site if `takes` its width in database units, and say
@@ -237,14 +280,7 @@ impl Filler {
         if !takes(r.width()) {
             return Ok(false);
         }
-        if self.elements[element as usize].widths.width(column, row) != 0 {
-            return Err(Why::DuplicateSite);
-        }
-        if let Some(place) = self.place(element, row, column) {
-            *place = width_nm;
-            self.pillars += 1;
-        }
-        Ok(true)
+        self.fill(element, row, column, width_nm)
     }
 
     /// The width at one site alone; none if its element cannot be held.
@@ -270,6 +306,24 @@ impl Filler {
             self.held = held;
             *widths = HeldWidths::Whole(widths.whole());
         }
+    }
+
+    /// Of a pillar that is told by its corners and the one that is on its site already, leave the one of the larger number
+    /// there; the number of the other.
+    pub fn keep_larger_number(&mut self, pillar: &DrawnPillar, placement: usize) -> u16 {
+        let number = pillar.number.unwrap_or(0);
+        let Standing::Site(element, row, column) = self.sites.stand(&pillar.around, &mut self.guesses[placement])
+        else {
+            return number;
+        };
+        let there = self.elements[element as usize].widths.width(column, row);
+        if number <= there {
+            return number;
+        }
+        if let Some(place) = self.place(element, row, column) {
+            *place = number;
+        }
+        there
     }
 
     /// Of a square and the one that is on its site already, leave the wider there; the other, as a

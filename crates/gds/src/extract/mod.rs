@@ -11,6 +11,7 @@ mod oddity;
 mod pillars;
 mod plan;
 mod sites;
+mod sizes;
 mod survey;
 mod tiles;
 

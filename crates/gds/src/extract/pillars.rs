@@ -65,19 +65,23 @@ impl PillarCollector {
         self.oddities.add(oddity, self.listed);
     }
 
-    /// An outline that is no pillar as it stands: it may be a rectangle with more vertices than it needs, or become one where
-    /// it is placed.
-    #[cold]
+    /// An outline that is no pillar by its box alone: it may be a rectangle with more vertices than it needs, become one where it
+    /// is placed, or be told by its corners.
     fn polygon(&mut self, shape: &Shape<'_>, placements: &[Transform]) {
+        let unit_nm = self.scale.nm(1.0);
         for (k, placement) in placements.iter().enumerate() {
             let placed: Vec<Point> = shape.points.iter().map(|&p| placement.apply(p)).collect();
             let other = || {
                 PillarShape::CHOICES
                     .iter()
-                    .any(|(_, s)| pillar_of(&placed, *s).is_some())
+                    .any(|(_, s)| pillar_of(&placed, *s, unit_nm).is_some())
             };
-            match pillar_of(&placed, self.shape) {
-                Some(r) => self.candidate(&r, k, shape.offset),
+            match pillar_of(&placed, self.shape, unit_nm) {
+                Some(pillar) => {
+                    if let Err(why) = self.filler.put_drawn(&pillar, k, |_| true) {
+                        self.odd(why, &pillar.around, shape.offset);
+                    }
+                }
                 None if other() => self.odd(Why::OtherShape, &Rect::around(&placed), shape.offset),
                 None => self.odd(Why::OddShape, &Rect::around(&placed), shape.offset),
             }

@@ -326,7 +326,7 @@ impl<'a> ElementPillars<'a> {
                 ]
             });
             for [x, y] in corners {
-                out.include(at(x, y), side);
+                out.include(at(x, y), self.form.reach(width as u16));
             }
             let count = places.len() as u64;
             places.remove(0);
@@ -379,7 +379,7 @@ impl<'a> ElementPillars<'a> {
                     let placed: Vec<[i64; 2]> = own.iter().map(|[x, y]| [centre[0] + x, centre[1] + y]).collect();
                     out.records.polygon(self.layer(), &placed, None);
                 }
-                out.include(centre, side);
+                out.include(centre, self.form.reach(width));
                 out.written(1);
             }
         });
@@ -410,10 +410,9 @@ impl Packer {
     }
 
     #[inline]
-    fn include(&mut self, centre: [i64; 2], width: i64) {
-        let half = width / 2;
-        let [x, y] = centre;
-        self.encoded.bounds = unite(self.encoded.bounds, [x - half, y - half, x + half, y + half]);
+    fn include(&mut self, centre: [i64; 2], reach: (i64, i64)) {
+        let ([x, y], (rx, ry)) = (centre, reach);
+        self.encoded.bounds = unite(self.encoded.bounds, [x - rx, y - ry, x + rx, y + ry]);
     }
 
     /// A pillar of a strip.

@@ -366,7 +366,7 @@ impl Elements<'_, '_> {
         let mut numbers = vec![0; counts.len()];
         for (width, _) in counts.iter().enumerate().skip(1).filter(|(_, count)| **count > 0) {
             numbers[width] = *self.width_cells[width]
-                .get_or_insert_with(|| self.file.writer.cell_number(&super::pillars::width_name(width)));
+                .get_or_insert_with(|| self.file.writer.cell_number(&self.form.cell_name(width as u16)));
         }
         numbers
     }
@@ -384,8 +384,9 @@ impl Elements<'_, '_> {
                     let corners: Vec<[i64; 2]> = corners.iter().map(|&(x, y)| [x, y]).collect();
                     records.polygon(numbers(self.layer), &corners, None);
                 }
-                let name = super::pillars::width_name(width);
-                self.file.cell(&name, &records, [-half, -half, half, half])?;
+                let name = self.form.cell_name(width as u16);
+                let (x, y) = self.form.reach(width as u16);
+                self.file.cell(&name, &records, [-x, -y, x, y])?;
             }
         }
         Ok(())

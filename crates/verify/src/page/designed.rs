@@ -27,9 +27,17 @@ pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
         ),
         (count, None) => format!("{count} elements of {lens}, placed and steered one by one,"),
     };
-    let plural = design.cell.shape.plural();
+    let pillars = match design.cell.shape.rectangles() {
+        None => design.cell.shape.plural().to_owned(),
+        Some(pillars) => format!(
+            "rectangles of {} x {} nm rotated in steps of {}° by half of the phase",
+            pillars.width_nm,
+            pillars.length_nm,
+            exact(pillars.step_deg())
+        ),
+    };
     page.paragraph(format!(
-        "{elements} at {} nm; pillars, {plural}, on a lattice of {} nm.",
+        "{elements} at {} nm; pillars, {pillars}, on a lattice of {} nm.",
         exact(design.array.wedge_wavelength_um * 1e3),
         design.cell.pitch_nm,
     ));
@@ -64,14 +72,15 @@ pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
     )
     .size(420.0, 260.0);
     turns.line("unwrapped", along(&|ix| phase.turns(ix, n / 2)));
-    let mut widths = Chart::new(
-        "Width along a radius",
-        Axis::linear("radius", "um"),
-        Axis::linear("width", "nm"),
-    )
-    .size(420.0, 260.0);
+    let (title, axis) = numbers(design);
+    let mut widths =
+        Chart::new(format!("{title} along a radius"), Axis::linear("radius", "um"), axis).size(420.0, 260.0);
     let last = along(&|ix| phase.turns(ix, n / 2)).len();
-    let shown = along(&|ix| Some(f64::from(rows.width(ix, n / 2))).filter(|w| *w > 0.0));
+    let shown = along(&|ix| {
+        Some(rows.width(ix, n / 2))
+            .filter(|w| *w > 0)
+            .map(|w| shown_number(design, w))
+    });
     widths.points("as written", shown.into_iter().take(last.min(RADIUS_POINTS)));
     page.row([
         turns.caption("Centre element, before the modulo."),
@@ -80,6 +89,22 @@ pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
             last.min(RADIUS_POINTS)
         )),
     ]);
+}
+
+/// What the widths or numbers of pillars are in figures, and their axis.
+pub(super) fn numbers(design: &Design) -> (&'static str, Axis) {
+    match design.cell.shape.rectangles() {
+        None => ("Width", Axis::linear("width", "nm")),
+        Some(_) => ("Rotation", Axis::linear("rotation", "°")),
+    }
+}
+
+/// The width of a pillar (nm), or its rotation (degrees).
+pub(super) fn shown_number(design: &Design, number: u16) -> f64 {
+    match design.cell.shape.rectangles() {
+        None => f64::from(number),
+        Some(pillars) => pillars.rotation(number).to_degrees(),
+    }
 }
 
 /// The sites about the middle of an element that figures show.

@@ -62,31 +62,49 @@ pub(super) fn write(page: &mut Page, found: &Verification, element: &DistinctEle
         found.fidelity
     )));
     page.figure(chart.caption("In the middle of the field, mean of x and y."));
-    let mut orders = Table::new([
+    let converts = element.orders.iter().any(|o| o.unconverted.is_some());
+    let mut columns = vec![
         Column::number("Wavelength", "nm"),
         Column::text("Cell"),
         Column::number("First order", "%"),
         Column::number("Zero order", "%"),
         Column::number("Second order", "%"),
         Column::number("All transmitted in the zero order of the lattice", "%"),
-    ]);
+    ];
+    if converts {
+        columns.push(Column::number("Not converted, beside it", "%"));
+    }
+    let mut orders = Table::new(columns);
     for entry in &element.orders {
-        orders.row([
+        let mut cells = vec![
             Cell::exact(entry.wavelength_um * 1e3),
             Cell::from(entry.fidelity.name()),
             Cell::fixed(entry.first * 100.0, 1),
             Cell::fixed(entry.zero * 100.0, 1),
             Cell::fixed(entry.second * 100.0, 1),
             Cell::fixed(entry.transmitted * 100.0, 1),
-        ]);
+        ];
+        if converts {
+            cells.push(
+                entry
+                    .unconverted
+                    .map_or_else(Cell::none, |share| Cell::fixed(share * 100.0, 1)),
+            );
+        }
+        orders.row(cells);
     }
     let whose = if found.fidelity == Fidelity::Neighbours {
         "the mapping's own account, for `neighbours` by that of the element's pillars"
     } else {
         "the mapping's own account"
     };
+    let beside = if converts {
+        " Light that is not converted passes as if there were no phase too; it is in the PSFs, beside the orders of what is converted."
+    } else {
+        ""
+    };
     page.table(orders.caption(format!(
-        "Where light goes by {whose}: the first order is the image, the zero order passes the element as if it had no phase.",
+        "Where light goes by {whose}: the first order is the image, the zero order passes the element as if it had no phase.{beside}",
     )));
     white_page::write(page, found, element);
 }

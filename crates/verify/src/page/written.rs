@@ -1,5 +1,6 @@
 //! What was written: every site compared, the layers of the file, the widths as read back.
 
+use super::designed::{numbers, shown_number};
 use crate::Verification;
 use metalith_design::Design;
 use metalith_report::{Axis, Cell, Chart, Column, Page, Table, count, sig};
@@ -10,10 +11,11 @@ const MOST_ODDITIES: usize = 20;
 /// The section of the file.
 pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
     page.section("What was written");
+    let rotated = design.cell.shape.rectangles().is_some();
     let mut table = Table::new([
         Column::text("Element (m, n)"),
         Column::number("Pillars", ""),
-        Column::number("Wrong width", ""),
+        Column::number(if rotated { "Wrong rotation" } else { "Wrong width" }, ""),
         Column::number("Missing", ""),
         Column::number("Extra", ""),
         Column::text("Simulated as"),
@@ -29,7 +31,10 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
             Cell::from(copy.map_or_else(|| "itself".into(), |d| d.element.label())),
         ]);
     }
-    page.table(table.caption("Every site of every element, compared with the width that the design asks for."));
+    page.table(table.caption(format!(
+        "Every site of every element, compared with the {} that the design asks for.",
+        if rotated { "rotation" } else { "width" }
+    )));
     let mut layers = Table::new([
         Column::text("Layer"),
         Column::number("Shapes", ""),
@@ -60,11 +65,8 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
             sig(oddity.size_nm[1], 6)
         ));
     }
-    let mut widths = Chart::new(
-        "Widths of all pillars",
-        Axis::linear("width", "nm"),
-        Axis::linear("pillars", ""),
-    );
+    let (title, axis) = numbers(design);
+    let mut widths = Chart::new(format!("{title}s of all pillars"), axis, Axis::linear("pillars", ""));
     let mut histogram = Vec::new();
     for element in &found.distinct {
         for (w, c) in element.histogram.iter().enumerate().skip(1) {
@@ -72,11 +74,15 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
             histogram[w] += c * element.copies as u64;
         }
     }
-    let step = f64::from(design.cell.width_step_nm) / 2.0;
+    let step = match design.cell.shape.rectangles() {
+        None => f64::from(design.cell.width_step_nm),
+        Some(pillars) => pillars.step_deg(),
+    };
+    let at = |w: usize, steps: f64| shown_number(design, w as u16) + steps * step;
     let bars = histogram.iter().enumerate().filter(|(_, c)| **c > 0);
-    widths.bars(
-        "pillars",
-        bars.map(|(w, &c)| (w as f64 - step, w as f64 + step, c as f64)),
-    );
-    page.figure(widths.caption("Number of pillars of each width, as read back."));
+    widths.bars("pillars", bars.map(|(w, &c)| (at(w, -0.5), at(w, 0.5), c as f64)));
+    page.figure(widths.caption(format!(
+        "Number of pillars of each {}, as read back.",
+        if rotated { "rotation" } else { "width" }
+    )));
 }

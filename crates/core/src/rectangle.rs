@@ -1,0 +1,207 @@
+//! Rectangular pillars of one size, which differ by their rotation.
+
+use std::f64::consts::PI;
+
+use serde::Serialize;
+
+/// Rectangular pillars of one size on a layout. What tells one from another is its number, from 1 to `steps`: its rotation in
+/// steps of half a turn over `steps`. Half a turn leaves a rectangle as it is, so the last number stands for no rotation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+pub struct Rectangles {
+    /// The shorter edge (nm), along the direction of the rotation.
+    pub width_nm: u16,
+    /// The longer edge (nm), across it.
+    pub length_nm: u16,
+    /// Rotations in half a turn.
+    pub steps: u16,
+}
+
+impl Rectangles {
+    /// Rotation of a pillar, from x towards y (rad), from 0 up to pi.
+    pub fn rotation(self, number: u16) -> f64 {
+        let steps = self.steps.max(1);
+        PI * f64::from(number % steps) / f64::from(steps)
+    }
+
+    /// The number of the rotation nearest to an angle (rad).
+    pub fn number(self, rotation: f64) -> u16 {
+        let steps = self.steps.max(1);
+        let nearest = (rotation / PI * f64::from(steps)).round() as i64;
+        match nearest.rem_euclid(i64::from(steps)) as u16 {
+            0 => steps,
+            number => number,
+        }
+    }
+
+    /// Angle between neighbouring rotations (degrees).
+    pub fn step_deg(self) -> f64 {
+        180.0 / f64::from(self.steps.max(1))
+    }
+
+    /// Corners of a pillar about its middle, each on the nearest place of the grid of whole nanometres, counter-clockwise.
+    pub fn corners(self, number: u16) -> [(i64, i64); 4] {
+        let (sin, cos) = self.rotation(number).sin_cos();
+        let (w, l) = (f64::from(self.width_nm) / 2.0, f64::from(self.length_nm) / 2.0);
+        let corner = |x: f64, y: f64| {
+            let on_grid = |v: f64| v.round() as i64;
+            (on_grid(cos * x - sin * y), on_grid(sin * x + cos * y))
+        };
+        let (a, b) = (corner(-w, -l), corner(w, -l));
+        [a, b, (-a.0, -a.1), (-b.0, -b.1)]
+    }
+
+    /// How far the corners of a pillar reach from its middle along x and y (nm).
+    pub fn reach(self, number: u16) -> (i64, i64) {
+        let [a, b, ..] = self.corners(number);
+        (a.0.abs().max(b.0.abs()), a.1.abs().max(b.1.abs()))
+    }
+
+    /// By how much the rounding of its corners to the grid turns a pillar (rad): its axis as drawn less [`Rectangles::rotation`].
+    pub fn turned_by_grid(self, number: u16) -> f64 {
+        let [a, b, c, _] = self.corners(number).map(|(x, y)| (x as f64, y as f64));
+        let (along, across) = ((b.0 - a.0, b.1 - a.1), (c.0 - b.0, c.1 - b.1));
+        // The axis of the second moments of a parallelogram; that of the longer edge is a quarter turn on.
+        let sum = |f: fn((f64, f64)) -> f64| f(along) + f(across);
+        let axis = 0.5 * (2.0 * sum(|e| e.0 * e.1)).atan2(sum(|e| e.0 * e.0 - e.1 * e.1)) - PI / 2.0;
+        let apart = axis - self.rotation(number);
+        apart - PI * (apart / PI).round()
+    }
+
+    /// Distance of two pillars of these numbers whose centres are (dx, dy) apart (nm), as drawn; negative where they overlap.
+    pub fn gap(self, numbers: [u16; 2], [dx, dy]: [f64; 2]) -> f64 {
+        let a = self.corners(numbers[0]).map(|(x, y)| [x as f64, y as f64]);
+        let b = self.corners(numbers[1]).map(|(x, y)| [x as f64 + dx, y as f64 + dy]);
+        let separation = along_normals(&a, &b).max(along_normals(&b, &a));
+        if separation <= 0.0 {
+            return separation;
+        }
+        let nearest = |of: &[[f64; 2]; 4], to: &[[f64; 2]; 4]| {
+            let from_sides = |p: &[f64; 2]| {
+                (0..4)
+                    .map(|k| from_side(*p, to[k], to[(k + 1) % 4]))
+                    .fold(f64::INFINITY, f64::min)
+            };
+            of.iter().map(from_sides).fold(f64::INFINITY, f64::min)
+        };
+        nearest(&a, &b).min(nearest(&b, &a))
+    }
+
+    /// The number of the pillar whose outline is this one about its middle (nm), in any order of its corners, if each is within
+    /// `slack_nm` of one of the pillar's.
+    pub fn recognised(self, corners: &[[f64; 2]; 4], slack_nm: f64) -> Option<u16> {
+        let edge = |k: usize| {
+            let (a, b) = (corners[k], corners[(k + 1) % 4]);
+            [b[0] - a[0], b[1] - a[1]]
+        };
+        let (first, second) = (edge(0), edge(1));
+        // The longer edge is the truer one: its direction is a quarter turn from the rotation.
+        let along = if first[0].hypot(first[1]) > second[0].hypot(second[1]) {
+            first
+        } else {
+            second
+        };
+        let number = self.number(along[1].atan2(along[0]) - PI / 2.0);
+        let drawn = self.corners(number).map(|(x, y)| [x as f64, y as f64]);
+        let near = |p: &[f64; 2]| drawn.iter().any(|q| (p[0] - q[0]).hypot(p[1] - q[1]) <= slack_nm);
+        let distinct = |k: usize| edge(k)[0].hypot(edge(k)[1]) > 2.0 * slack_nm;
+        ((0..4).all(distinct) && corners.iter().all(near)).then_some(number)
+    }
+}
+
+/// Largest distance by which a side of `a` has all of `b` beyond it; negative if none has.
+fn along_normals(a: &[[f64; 2]; 4], b: &[[f64; 2]; 4]) -> f64 {
+    let beyond = |k: usize| {
+        let (from, to) = (a[k], a[(k + 1) % 4]);
+        let (ex, ey) = (to[0] - from[0], to[1] - from[1]);
+        let length = ex.hypot(ey).max(f64::MIN_POSITIVE);
+        // Counter-clockwise: what is outside is to the right.
+        let distance = |p: &[f64; 2]| ((p[0] - from[0]) * ey - (p[1] - from[1]) * ex) / length;
+        b.iter().map(distance).fold(f64::INFINITY, f64::min)
+    };
+    (0..4).map(beyond).fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Distance of a point from a side.
+fn from_side(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
+    let (ex, ey) = (b[0] - a[0], b[1] - a[1]);
+    let (px, py) = (p[0] - a[0], p[1] - a[1]);
+    let share = ((px * ex + py * ey) / (ex * ex + ey * ey).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    (px - share * ex).hypot(py - share * ey)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PILLARS: Rectangles = Rectangles {
+        width_nm: 100,
+        length_nm: 250,
+        steps: 180,
+    };
+
+    /// Rounding of a few operations on lengths of hundreds.
+    const ROUNDING: f64 = 1e-9;
+
+    #[test]
+    fn numbers_stand_for_rotations_and_half_a_turn_for_none() {
+        assert_eq!(PILLARS.rotation(180), 0.0);
+        for number in 1..=180 {
+            assert_eq!(PILLARS.number(PILLARS.rotation(number)), number);
+            assert_eq!(PILLARS.number(PILLARS.rotation(number) - 3.0 * PI), number);
+        }
+        assert_eq!(PILLARS.corners(180), [(-50, -125), (50, -125), (50, 125), (-50, 125)]);
+        assert_eq!(PILLARS.corners(90), [(125, -50), (125, 50), (-125, 50), (-125, -50)]);
+        assert_eq!(PILLARS.reach(90), (125, 50));
+    }
+
+    #[test]
+    fn corners_are_on_the_rectangle_and_are_recognised_in_any_order() {
+        // Half the diagonal of a step of the grid.
+        const ROUNDED: f64 = 0.7072;
+        // What that may turn half of the longer edge by, with two corners that give way to opposite sides.
+        const TURNED: f64 = ROUNDED / 125.0;
+        for number in 1..=180 {
+            let drawn = PILLARS.corners(number);
+            let (sin, cos) = PILLARS.rotation(number).sin_cos();
+            for ((x, y), (u, v)) in drawn
+                .iter()
+                .zip([(-50.0, -125.0), (50.0, -125.0), (50.0, 125.0), (-50.0, 125.0)])
+            {
+                let off = (*x as f64 - (cos * u - sin * v)).hypot(*y as f64 - (sin * u + cos * v));
+                assert!(off <= ROUNDED, "{number}: {off}");
+            }
+            assert!(PILLARS.turned_by_grid(number).abs() < TURNED, "{number}");
+            let mut corners = drawn.map(|(x, y)| [x as f64, y as f64]);
+            for _ in 0..4 {
+                corners.rotate_left(1);
+                assert_eq!(PILLARS.recognised(&corners, 0.1), Some(number));
+                let mut back = corners;
+                back.reverse();
+                assert_eq!(PILLARS.recognised(&back, 0.1), Some(number));
+            }
+            corners[0][0] += 3.0;
+            assert_eq!(PILLARS.recognised(&corners, 1.5), None);
+        }
+        let thinner = Rectangles {
+            width_nm: 90,
+            ..PILLARS
+        };
+        let corners = thinner.corners(30).map(|(x, y)| [x as f64, y as f64]);
+        assert_eq!(PILLARS.recognised(&corners, 1.5), None);
+        assert_eq!(PILLARS.recognised(&[[0.0; 2]; 4], 200.0), None);
+    }
+
+    #[test]
+    fn gaps_along_sides_between_corners_and_where_pillars_overlap() {
+        for (numbers, apart, want) in [
+            ([180, 180], [355.0, 0.0], 255.0),
+            ([180, 180], [0.0, 355.0], 105.0),
+            ([90, 180], [355.0, 0.0], 180.0),
+            ([180, 180], [130.0, 290.0], 50.0),
+            ([180, 180], [40.0, 200.0], -50.0),
+        ] {
+            let gap = PILLARS.gap(numbers, apart);
+            assert!((gap - want).abs() < ROUNDING, "{numbers:?} {apart:?}: {gap}");
+        }
+    }
+}

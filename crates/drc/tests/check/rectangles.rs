@@ -1,0 +1,102 @@
+//! The deck for rotated rectangles: a clean chip, and for each rule of theirs one that breaks it.
+
+use metalith_core::Rectangles;
+use metalith_testing::gds::Gds;
+
+use crate::{broken, deck_from, input, layout};
+
+/// Sites an axis and their distance (nm).
+const SITES: i32 = 12;
+const PITCH: i32 = 354;
+const PILLARS: Rectangles = Rectangles {
+    width_nm: 100,
+    length_nm: 250,
+    steps: 180,
+};
+
+fn pillar(gds: &mut Gds, (x, y): (i32, i32), number: u16) {
+    let corners = PILLARS.corners(number);
+    let closed = corners.iter().chain(corners.first());
+    let points: Vec<(i32, i32)> = closed.map(|&(dx, dy)| (x + dx as i32, y + dy as i32)).collect();
+    gds.polygon(1, &points);
+}
+
+fn place(column: i32, row: i32) -> (i32, i32) {
+    let at = |k: i32| PITCH * k - PITCH * (SITES - 1) / 2;
+    (at(column), at(row))
+}
+
+/// Rules that a lattice of rectangles breaks whose rotations are as `number` says, with `more` on it; `rules` are added.
+fn found(
+    rules: &[(&str, &str)],
+    number: impl Fn(i32, i32) -> Option<u16>,
+    more: impl Fn(&mut Gds),
+) -> (Vec<(String, u64)>, u64) {
+    let mut gds = Gds::library();
+    gds.cell("TOP");
+    for (column, row) in (0..SITES * SITES).map(|k| (k % SITES, k / SITES)) {
+        if let Some(number) = number(column, row) {
+            pillar(&mut gds, place(column, row), number);
+        }
+    }
+    more(&mut gds);
+    gds.end_cell();
+    let file = layout(gds.end());
+    let deck = deck_from("rules/rectangles.toml", rules);
+    let report = metalith_drc::check(&file, &deck, &input(), &metalith_core::Silent).unwrap();
+    let broken = broken(&report).into_iter().map(|(id, count)| (id.to_owned(), count));
+    (broken.collect(), report.pillars_on_lattices)
+}
+
+/// Rotations from 13 to 167 degrees: none is upright.
+fn all(column: i32, row: i32) -> Option<u16> {
+    Some(13 + ((column * 17 + row * 31) % 155) as u16)
+}
+
+#[test]
+fn each_rule_of_rectangles_finds_what_it_is_for() {
+    assert_eq!(found(&[], all, |_| {}), (vec![], 144));
+
+    let but_one = |column: i32, row: i32| {
+        if (column, row) == (5, 5) {
+            None
+        } else {
+            all(column, row)
+        }
+    };
+    let (x, y) = place(5, 5);
+    let trapezoid = found(&[], but_one, |gds| {
+        let points = [(-100, -50), (100, -50), (60, 50), (-60, 50), (-100, -50)];
+        gds.polygon(1, &points.map(|(dx, dy)| (x + dx, y + dy)));
+    });
+    assert_eq!(trapezoid, (vec![("pillar.rectangle".into(), 1)], 143));
+
+    // Two with their long edges in one line are 354 - 250 nm apart; two that are rotated by 45 degrees 150 nm.
+    let wide_gap = [("nm = 40", "nm = 104.5")];
+    let upright = |column: i32, row: i32| column == 5 && (row == 5 || row == 6);
+    let near = found(&wide_gap, |c, r| Some(if upright(c, r) { 180 } else { 45 }), |_| {});
+    assert_eq!(near, (vec![("gap.min".into(), 1)], 144));
+
+    let twice = found(&[], all, |gds| pillar(gds, (x, y), all(5, 5).unwrap()));
+    assert_eq!(twice, (vec![("gap.duplicate".into(), 1)], 144));
+    let other = found(&[], all, |gds| pillar(gds, (x, y), 30 + all(5, 5).unwrap()));
+    assert_eq!(other, (vec![("gap.overlap".into(), 1)], 144));
+}
+
+/// Corners on the grid are up to 0.7 nm off: edges are judged to the nearest nanometre.
+#[test]
+fn edges_of_rotated_rectangles_have_their_widths() {
+    let rule = |nm: f64, check: &str| {
+        format!("[[rule]]\nid = \"width\"\ncheck = \"{check}\"\nnm = {nm}\n\n[[rule]]\nid = \"gap.min\"")
+    };
+    for (check, nm, holds) in [
+        ("width_min", 100.0, true),
+        ("width_min", 101.0, false),
+        ("width_max", 250.0, true),
+        ("width_max", 249.0, false),
+    ] {
+        let added = rule(nm, check);
+        let (broken, _) = found(&[("[[rule]]\nid = \"gap.min\"", &added)], all, |_| {});
+        assert_eq!(broken.is_empty(), holds, "{check} {nm}: {broken:?}");
+    }
+}

@@ -1,0 +1,133 @@
+//! Outlines that stand for rectangles at any angle.
+
+use super::shape::{Point, Rect, simplified};
+use metalith_core::Rectangles;
+
+/// By how much a corner may be off the rectangle, in database units or in nanometres, whichever is more: corners are rounded to
+/// one of these grids, twice where a cell is placed at an angle.
+const ROUNDED: f64 = 1.5;
+
+/// The same in database units, of which one is so long (nm).
+fn slack(unit_nm: f64) -> f64 {
+    ROUNDED * (1.0 / unit_nm).max(1.0)
+}
+
+/// A rectangle at any angle, as its corners on the grid show it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TiltedRectangle {
+    /// The box around it.
+    pub around: Rect,
+    /// Corners, counter-clockwise or not, from the middle of that box (database units).
+    corners: [[f64; 2]; 4],
+    /// The shorter and the longer edge (database units).
+    pub edges: [f64; 2],
+    /// By how much corners may be off (database units).
+    slack: f64,
+}
+
+/// The rectangle that a closed outline is to within the rounding of its corners, if it has area; the upright ones too. A
+/// database unit is so long (nm).
+pub fn tilted_rectangle_of(points: &[Point], unit_nm: f64) -> Option<TiltedRectangle> {
+    let simple;
+    let points = if points.len() == 5 {
+        points
+    } else {
+        simple = simplified(points);
+        &simple
+    };
+    let &[a, b, c, d, e] = points else { return None };
+    if a != e {
+        return None;
+    }
+    let around = Rect::around(points);
+    let middle = [
+        (around.x0 + around.x1) as f64 / 2.0,
+        (around.y0 + around.y1) as f64 / 2.0,
+    ];
+    let corners = [a, b, c, d].map(|p| [p.x as f64 - middle[0], p.y as f64 - middle[1]]);
+    let [first, second] = [0, 1].map(|k| [corners[k + 1][0] - corners[k][0], corners[k + 1][1] - corners[k][1]]);
+    let [long, other] = [first, second].map(|e| e[0].hypot(e[1]));
+    // A parallelogram has its corners opposite one another about its middle; one with right angles equal diagonals.
+    let opposite = |k: usize| (corners[k][0] + corners[k + 2][0]).hypot(corners[k][1] + corners[k + 2][1]) / 2.0;
+    let reach = |k: usize| corners[k][0].hypot(corners[k][1]);
+    let slack = slack(unit_nm);
+    let is_rectangle = opposite(0).max(opposite(1)) <= slack && (reach(0) - reach(1)).abs() <= slack;
+    let edges = [long.min(other), long.max(other)];
+    (is_rectangle && edges[0] > 2.0 * slack).then_some(TiltedRectangle {
+        around,
+        corners,
+        edges,
+        slack,
+    })
+}
+
+impl TiltedRectangle {
+    /// Whether it is a square to within the rounding of its corners.
+    pub fn is_square(&self) -> bool {
+        self.edges[1] - self.edges[0] <= 2.0 * self.slack
+    }
+
+    /// The number of the pillar that it is, if it is one of these; a database unit is so long (nm).
+    pub fn number(&self, pillars: Rectangles, unit_nm: f64) -> Option<u16> {
+        let corners = self.corners.map(|c| c.map(|v| v * unit_nm));
+        pillars.recognised(&corners, self.slack * unit_nm)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PILLARS: Rectangles = Rectangles {
+        width_nm: 90,
+        length_nm: 240,
+        steps: 180,
+    };
+
+    fn closed(corners: impl IntoIterator<Item = (i64, i64)>) -> Vec<Point> {
+        let mut points: Vec<Point> = corners.into_iter().map(|(x, y)| Point::new(x + 177, y - 31)).collect();
+        points.push(points[0]);
+        points
+    }
+
+    #[test]
+    fn rectangles_at_any_angle_are_recognised_and_others_are_not() {
+        for number in 1..=180 {
+            let corners = PILLARS.corners(number);
+            for outline in [closed(corners), closed(corners.into_iter().rev())] {
+                let found = tilted_rectangle_of(&outline, 1.0).unwrap();
+                assert_eq!(found.number(PILLARS, 1.0), Some(number));
+                let (x, y) = PILLARS.reach(number);
+                let around = Rect {
+                    x0: 177 - x,
+                    y0: -31 - y,
+                    x1: 177 + x,
+                    y1: -31 + y,
+                };
+                assert_eq!(found.around, around);
+                // A file in half nanometres.
+                let fine: Vec<Point> = outline.iter().map(|p| Point::new(2 * p.x, 2 * p.y)).collect();
+                assert_eq!(
+                    tilted_rectangle_of(&fine, 0.5).unwrap().number(PILLARS, 0.5),
+                    Some(number)
+                );
+            }
+        }
+        let corners = PILLARS.corners(37);
+        // A vertex on a side changes nothing; a trapezoid, a rhombus, a triangle and a line are no rectangles.
+        let more = [corners[0], corners[1], corners[2], corners[3], corners[0]];
+        let mut more = closed(more);
+        more.insert(1, more[0]);
+        assert_eq!(tilted_rectangle_of(&more, 1.0).unwrap().number(PILLARS, 1.0), Some(37));
+        let trapezoid = [(-100, 0), (100, 0), (50, 80), (-50, 80)];
+        let rhombus = [(-100, 0), (0, -60), (100, 0), (0, 60)];
+        let triangle = [(-100, 0), (100, 0), (0, 80)];
+        let line = [(-100, 0), (100, 0), (100, 1), (-100, 1)];
+        assert_eq!(tilted_rectangle_of(&closed(trapezoid), 1.0), None);
+        assert_eq!(tilted_rectangle_of(&closed(rhombus), 1.0), None);
+        assert_eq!(tilted_rectangle_of(&closed(triangle), 1.0), None);
+        assert_eq!(tilted_rectangle_of(&closed(line), 1.0), None);
+        let square = tilted_rectangle_of(&closed([(-50, -50), (50, -50), (50, 50), (-50, 50)]), 1.0).unwrap();
+        assert!(square.is_square() && square.number(PILLARS, 1.0).is_none());
+    }
+}
