@@ -60,22 +60,15 @@ fn rotated_rectangles_are_compared_by_rotation_and_to_the_nanometre() {
         length_nm: 250,
         steps: 180,
     };
-    let bytes = |change: &dyn Fn(usize, &mut Vec<(i32, i32)>) -> u16| {
+    // The rotations of a lattice, and the pillar of which a corner is a nanometre off.
+    let bytes = |number: &dyn Fn(usize) -> u16, bent: Option<usize>| {
         let mut gds = Gds::library();
         gds.cell("TOP");
         for site in 0..100_usize {
             let (x, y) = (354 * (site % 10) as i32 - 1593, 354 * (site / 10) as i32 - 1593);
-            let mut moved = Vec::new();
-            let number = change(site, &mut moved);
-            let mut corners: Vec<(i32, i32)> = pillars
-                .corners(number)
-                .iter()
-                .map(|&(dx, dy)| (x + dx as i32, y + dy as i32))
-                .collect();
-            moved.iter().for_each(|(dx, dy)| {
-                corners[1].0 += dx;
-                corners[1].1 += dy;
-            });
+            let corners = pillars.corners(number(site));
+            let mut corners = corners.map(|(dx, dy)| (x + dx as i32, y + dy as i32)).to_vec();
+            corners[1].0 += i32::from(bent == Some(site));
             corners.push(corners[0]);
             gds.polygon(1, &corners);
         }
@@ -85,8 +78,8 @@ fn rotated_rectangles_are_compared_by_rotation_and_to_the_nanometre() {
     let number = |site: usize| 20 + (site * 37 % 120) as u16;
     let folder = tempfile::tempdir().unwrap();
     let file = |name, bytes| write(folder.path(), name, bytes);
-    let plain = file("plain.gds", bytes(&|site, _| number(site)));
-    let rotated = file("rotated.gds", bytes(&|site, _| number(site) + u16::from(site == 42)));
+    let plain = file("plain.gds", bytes(&number, None));
+    let rotated = file("rotated.gds", bytes(&|site| number(site) + u16::from(site == 42), None));
     let found = compare(&plain, &rotated);
     assert_eq!(
         (found.elements[0].pillars, found.elements[0].rotated),
@@ -95,13 +88,7 @@ fn rotated_rectangles_are_compared_by_rotation_and_to_the_nanometre() {
         text(&found)
     );
     assert!(text(&found).contains("1 rotated"));
-    let moved = file(
-        "moved.gds",
-        bytes(&|site, moved| {
-            moved.extend((site == 42).then_some((1, 0)));
-            number(site)
-        }),
-    );
+    let moved = file("moved.gds", bytes(&number, Some(42)));
     let found = compare(&plain, &moved);
     assert_eq!(found.elements[0].pillars, [100, 99], "{}", text(&found));
     assert!(!found.same_geometry);
