@@ -3,10 +3,10 @@
 
     python3 scripts/compare_denoisers.py target/release/metalith PHOTOGRAPH... [--noise 25] [--weights FILE]
 
-Each photograph in colour (grey ones are left out) gets normal noise of the given deviation (of 255, seed 1; the program
+Each photograph in colour (files of one channel are left out) gets normal noise of the given deviation (of 255, seed 1; the program
 draws its own, numpy that of the others) and is denoised by `metalith denoise`, by total variation, by wavelets and by non-local means, each of the three
 told the true deviation, with the settings of their documentation. PSNR in dB, against the photograph, values cut to what
-a picture holds. Needs numpy, Pillow and scikit-image; CPU seconds are those of the children and of this process.
+a picture holds. Needs numpy, Pillow, scikit-image and PyWavelets; CPU seconds are those of the children and of this process.
 """
 
 import argparse

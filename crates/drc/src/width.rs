@@ -96,6 +96,17 @@ impl WidthBound {
     }
 }
 
+impl WidthBound {
+    /// The same for sides that are known to `off`.
+    fn wrong_within(&self, small: f64, large: f64, off: f64) -> Option<String> {
+        match &self.want {
+            WidthLimit::Max(_) => self.wrong(small, large - off),
+            WidthLimit::Library { .. } if off > 0.0 => self.wrong(small.round(), large),
+            _ => self.wrong(small + off, large),
+        }
+    }
+}
+
 impl Rule for WidthBound {
     fn words(&self) -> String {
         match &self.want {
@@ -128,18 +139,21 @@ impl Rule for WidthBound {
     fn outline(&self, outline: &DrawnOutline<'_>, found: &mut Findings) {
         let bounds = outline.bounds();
         let mut sides = [bounds.width(), bounds.height()].map(|v| v as f64 * outline.unit_nm);
-        // Corners of a rotated rectangle are on the grid: its edges are whole nanometres but for that.
+        // Corners of a rotated rectangle are on the grid, hence its edges known but for that: it is judged by
+        // the best that they can be.
+        let mut off = 0.0;
         if outline.rectangle().is_none()
             && let Some(tilted) = tilted_rectangle_of(outline.points, outline.unit_nm).filter(|t| !t.is_square())
         {
-            sides = tilted.edges.map(|e| (e * outline.unit_nm).round());
+            sides = tilted.edges.map(|e| e * outline.unit_nm);
+            off = tilted.edges_off() * outline.unit_nm;
         }
         let [a, b] = sides;
         // Without area there is no width; that has a rule of its own.
         if outline.twice_area() == 0 {
             return;
         }
-        if let Some(words) = self.wrong(a.min(b), a.max(b)) {
+        if let Some(words) = self.wrong_within(a.min(b), a.max(b), off) {
             found.copies(outline.points, outline.placements, || words.clone());
         }
     }

@@ -62,6 +62,11 @@ pub fn tilted_rectangle_of(points: &[Point], unit_nm: f64) -> Option<TiltedRecta
 }
 
 impl TiltedRectangle {
+    /// How far its edges may be off (database units): corners on the grid move an edge by less than one and a half of it.
+    pub fn edges_off(&self) -> f64 {
+        self.slack
+    }
+
     /// Whether it is a square to within the rounding of its corners.
     pub fn is_square(&self) -> bool {
         self.edges[1] - self.edges[0] <= 2.0 * self.slack

@@ -34,7 +34,7 @@ pub struct TrainingSpec {
 impl Default for TrainingSpec {
     fn default() -> Self {
         Self {
-            steps: 12_000,
+            steps: 8000,
             batch: 8,
             piece: 96,
             seed: 1,

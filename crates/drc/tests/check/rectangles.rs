@@ -83,7 +83,7 @@ fn each_rule_of_rectangles_finds_what_it_is_for() {
     assert_eq!(other, (vec![("gap.overlap".into(), 1)], 144));
 }
 
-/// Corners on the grid are up to 0.7 nm off: edges are judged to the nearest nanometre.
+/// Corners on the grid are up to 0.7 nm off, edges 1.4 nm: they are judged by the best that they can be.
 #[test]
 fn edges_of_rotated_rectangles_have_their_widths() {
     let rule = |nm: f64, check: &str| {

@@ -19,7 +19,10 @@ const PENALTY: f64 = 5.0;
 /// The penalty of what the sensor would have seen beyond its border, over the weight of what it has seen.
 const CROP: f64 = 1.0;
 /// The penalty of light beyond the scene and below zero, over that of slopes.
-const BORDER: f64 = 1.0;
+const BORDER: f64 = 100.0;
+/// Least penalty of slopes, over the weight of what is seen. Noise alone would ask for a hundredth of it; then what the kernel
+/// errs by is taken for detail (13.8 dB of linear light for the picture of the test, 19.9 with this).
+const LEAST_SLOPES: f64 = 0.03;
 
 /// A channel of a camera whose kernel is the same everywhere.
 pub struct Deconvolution {
@@ -71,7 +74,7 @@ impl Deconvolution {
         let n = self.grid.size;
         let [rows, columns] = self.grid.data;
         let [scene_rows, scene_columns] = self.grid.scene();
-        let slope_weight = (PENALTY * variance / EXPECTED_SLOPE.powi(2)) as f32;
+        let slope_weight = (PENALTY * variance / EXPECTED_SLOPE.powi(2)).max(LEAST_SLOPES) as f32;
         let threshold = (std::f64::consts::SQRT_2 * EXPECTED_SLOPE / PENALTY) as f32;
         let (crop, border) = (CROP as f32, BORDER as f32 * slope_weight);
         let zero = || Array2::<f32>::zeros((n, n));
