@@ -8,7 +8,7 @@ TITLE is how the title of a figure begins, WIDTH its width in the picture in pix
     metalith run designs/mini_3x3.toml --out out/mini
     picture.py out/mini/report.html docs/report.png "The chip=280" "Pillars in the middle=280" "PSF designed=540"
     metalith picture out/prototype_3x3/prototype_3x3_pillars.gds astronaut.png --camera cameras/gt1930.toml \\
-        --design designs/prototype_3x3.toml --field-deg 80 --no-forecast --out out/picture
+        --design designs/prototype_3x3.toml --field-deg 80 --no-forecast --method prior --out out/picture
     picture.py out/picture/picture.html docs/photograph.png "Scene, frame, picture=760"
     picture.py out/calibrate/control/report.html docs/ladder.png "Residual under three=760"
     picture.py out/calibrate/control/validation.html docs/proof.png "Confusion matrix=800"

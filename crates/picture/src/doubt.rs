@@ -24,6 +24,8 @@ pub struct DoubtReport {
     pub scores: Vec<ZoneScore>,
     /// Mean deviation of the samples (sRGB values).
     pub spread: f64,
+    /// Mean error of their mean, in the same unit: more than the spread, as samples know nothing of what all of them miss.
+    pub error: f64,
     /// How well the order of the pixels by their doubt is that by their error (Spearman's rank correlation).
     pub rank_correlation: f64,
 }
@@ -59,6 +61,7 @@ impl Doubt {
             samples: self.samples,
             scores: scores(&self.mean, truth)?,
             spread: self.spread.mean().unwrap_or(0.0),
+            error: error.mean().unwrap_or(0.0),
             rank_correlation: rank_correlation(&self.spread, &error),
         })
     }

@@ -195,8 +195,10 @@ fn doubt(page: &mut Page, doubt: &Doubt, report: &DoubtReport) {
     )));
     let map = map("Doubt", &doubt.spread, "deviation");
     page.figure(map.caption(format!(
-        "Deviation of the samples from their mean, of sRGB values: where it is large, detail is invented. The order of the pixels by doubt and that by true error have a rank correlation of {}.",
-        fixed(report.rank_correlation, 2)
+        "Deviation of the samples from their mean, of sRGB values: where it is large, detail is invented. The order of the pixels by doubt and that by true error have a rank correlation of {}. It says where, not how much: samples deviate by {} on average, their mean errs by {}.",
+        fixed(report.rank_correlation, 2),
+        fixed(report.spread, 3),
+        fixed(report.error, 3)
     )));
 }
 
