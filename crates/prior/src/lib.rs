@@ -26,4 +26,3 @@ pub use examples::{Photographs, with_noise};
 pub use network::COLOURS;
 pub use sample::SAMPLING_STEPS;
 pub use training::{JUDGED, TrainingReport, TrainingSpec, train};
-pub use weights::shipped_digest;

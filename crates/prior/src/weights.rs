@@ -25,12 +25,6 @@ pub(crate) fn read_weights(path: &Path) -> Result<Vec<f32>> {
     parse(&read_at_most(path, LONGEST, "a file of weights")?, path)
 }
 
-/// SHA-256 of the shipped weights: what decides a restoration by them.
-pub fn shipped_digest() -> String {
-    use sha2::{Digest, Sha256};
-    Sha256::digest(SHIPPED).iter().map(|b| format!("{b:02x}")).collect()
-}
-
 fn shape(layer: &Layer) -> Vec<usize> {
     let side = if layer.shape.taps == 9 { 3 } else { 1 };
     vec![layer.shape.outputs, layer.shape.inputs, side, side]
