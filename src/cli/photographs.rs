@@ -1,17 +1,15 @@
 //! `metalith photographs`: real images through the lens of a design, for several phases of it.
 
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::cell::{RigorousCell, cache_folder};
 use metalith::optimise::{Deconvolution, OptimiseTask, Start, StepLimit, blurs_of_colours, turns_of, views};
 use metalith::phase::{Interpolation, RadialPhase};
+use metalith::picture::scene::read_picture;
 use metalith::wave::Photograph;
 use metalith::wave::restore::Restoration;
 use metalith::{CellModel, Error, Fidelity, Result, cell_models};
-use ndarray::Array3;
 use rayon::prelude::*;
 
 use super::verify::FidelityArg;
@@ -31,7 +29,7 @@ pub struct PhotographsArgs {
     /// The design file: lens, cell, mapping, views.
     design: PathBuf,
 
-    /// PNG images, 8 bits a colour.
+    /// PNG, JPEG or NPY images.
     #[arg(required = true)]
     images: Vec<PathBuf>,
 
@@ -51,7 +49,7 @@ pub fn run(args: &PhotographsArgs, terminal: &Terminal) -> Result<Outcome> {
     let images = args
         .images
         .iter()
-        .map(|path| read_png(path))
+        .map(|path| read_picture(path))
         .collect::<Result<Vec<_>>>()?;
     let phases = phases(args, &task)?;
     let fidelity = Fidelity::from(args.fidelity);
@@ -147,39 +145,4 @@ fn phases(args: &PhotographsArgs, task: &OptimiseTask) -> Result<Vec<(String, Ve
         *turns = chosen.iter().map(|&c| task.mapping.choices()[c].turns).collect();
     }
     Ok(phases)
-}
-
-/// An image as `[row, column, colour]` from 0 to 1; grey ones get three equal colours.
-fn read_png(path: &Path) -> Result<Array3<f64>> {
-    /// Longest side that is read.
-    const LARGEST: u32 = 4096;
-    let fault = |what: String| Error::Table {
-        path: path.to_owned(),
-        line: None,
-        what,
-        hint: "give a PNG of 8 bits a colour, 32 to 4096 pixels a side".into(),
-    };
-    let file = File::open(path).map_err(|e| fault(e.to_string()))?;
-    let mut decoder = png::Decoder::new(BufReader::new(file));
-    decoder.set_transformations(png::Transformations::normalize_to_color8());
-    let mut reader = decoder.read_info().map_err(|e| fault(e.to_string()))?;
-    let (width, height) = (reader.info().width, reader.info().height);
-    if width.min(height) < 32 || width.max(height) > LARGEST {
-        return Err(fault(format!("an image of {width} by {height} pixels")));
-    }
-    let mut bytes = vec![
-        0;
-        reader
-            .output_buffer_size()
-            .ok_or_else(|| fault("the image is too large".into()))?
-    ];
-    let info = reader.next_frame(&mut bytes).map_err(|e| fault(e.to_string()))?;
-    let samples = info.color_type.samples();
-    Ok(Array3::from_shape_fn(
-        (height as usize, width as usize, 3),
-        |(y, x, c)| {
-            let colour = if samples < 3 { 0 } else { c };
-            f64::from(bytes[y * info.line_size + x * samples + colour]) / 255.0
-        },
-    ))
 }

@@ -76,7 +76,7 @@ fn a_table_comes_out_of_photographs() {
     compare(&arguments, &out)
         .assert()
         .success()
-        .stdout(contains("| FlatCam, ours | tikhonov |").and(contains("1 photographs of 48 x 48 pixels")));
+        .stdout(contains("| FlatCam, ours | tikhonov |").and(contains("1 photograph of 48 x 48 pixels")));
     let page = fs::read_to_string(Path::new(&out).join("compare.html")).unwrap();
     assert!(page.contains("Cameras side by side"));
     let numbers = fs::read_to_string(Path::new(&out).join("compare.json")).unwrap();

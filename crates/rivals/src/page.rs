@@ -18,10 +18,9 @@ pub fn write_comparison(comparison: &Comparison, folder: &Path) -> Result<()> {
 }
 
 fn page(comparison: &Comparison) -> Page {
-    let several = comparison.photographs.len();
     let mut page = Page::new(
         "Cameras side by side",
-        format!("{several} photographs, sensor and light of {}", comparison.camera),
+        format!("{}, sensor and light of {}", comparison.counted(), comparison.camera),
     );
     let mut best = PhotoRow::new("Scene, and the picture of each camera", 220.0);
     if let Some(first) = comparison.cameras.first() {

@@ -16,14 +16,22 @@ impl WayScores {
 }
 
 impl Comparison {
+    /// How many photographs were taken, in words.
+    pub(crate) fn counted(&self) -> String {
+        match self.photographs.len() {
+            1 => "1 photograph".into(),
+            n => format!("{n} photographs"),
+        }
+    }
+
     /// The table in Markdown: a row for each camera and way; zones are separated by slashes.
     pub fn markdown(&self) -> String {
         let zones = Zone::ALL.map(Zone::name).join(" / ");
         let mut text = String::new();
         let mut line = |words: String| writeln!(text, "{words}").expect("strings take everything");
         line(format!(
-            "{} photographs of {} x {} pixels, sensor and light `{}`, noise of seed {}. Zones: {zones}.\n",
-            self.photographs.len(),
+            "{} of {} x {} pixels, sensor and light `{}`, noise of seed {}. Zones: {zones}.\n",
+            self.counted(),
             self.size[1],
             self.size[0],
             self.camera,
