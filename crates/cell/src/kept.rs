@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
+use metalith_core::text::hex;
 use metalith_core::{Error, PillarShape, Progress, Result, WholeFile, file::read_at_most};
 
 /// Raised whenever the solver or the sampling changes what it answers: kept results are then of no use.
@@ -181,11 +182,7 @@ impl KeptTable {
 
 /// Sixteen hexadecimal digits that name a file by the inputs of its content.
 pub fn name_of(inputs: &[u8]) -> String {
-    Sha256::digest(inputs)
-        .iter()
-        .take(8)
-        .map(|b| format!("{b:02x}"))
-        .collect()
+    hex(&Sha256::digest(inputs)[..8])
 }
 
 #[cfg(test)]

@@ -69,6 +69,11 @@ pub fn printable_bytes(bytes: &[u8]) -> String {
     out
 }
 
+/// Bytes as hexadecimal digits, such as those of a digest.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
 /// As [`printable`], and cut at 80 characters: for quoting in a message what may be of any length.
 pub fn quoted(text: &str) -> String {
     const LONGEST: usize = 80;

@@ -6,6 +6,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use metalith_core::document::{Document, Section, load};
+use metalith_core::text::hex;
 use metalith_core::{ElementSite, Lattice, Result};
 
 use crate::spec::{
@@ -159,7 +160,7 @@ impl Design {
             &self.layout,
         );
         let bytes = serde_json::to_vec(&decisive).expect("plain data serialises");
-        Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect()
+        hex(&Sha256::digest(&bytes))
     }
 }
 

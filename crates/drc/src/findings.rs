@@ -1,5 +1,6 @@
 //! Findings of a rule: markers up to a limit, counts without one.
 
+use metalith_core::text::hex;
 use std::collections::HashMap;
 
 use serde::Serialize;
@@ -155,5 +156,5 @@ fn hash(rule: &str, ring: &[Point], unit_nm: f64) -> String {
 }
 
 fn digest(text: &str) -> String {
-    Sha256::digest(text)[..8].iter().map(|b| format!("{b:02x}")).collect()
+    hex(&Sha256::digest(text)[..8])
 }

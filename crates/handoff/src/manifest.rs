@@ -10,7 +10,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use sha2::{Digest, Sha256};
 
 use metalith_core::file::read_at_most;
-use metalith_core::text::{printable, quoted};
+use metalith_core::text::{hex, printable, quoted};
 use metalith_core::{Error, Result};
 use metalith_core::{Progress, WholeFile};
 
@@ -255,10 +255,6 @@ pub(super) fn files_below(folder: &Path) -> Result<Below> {
     found.other.sort();
     found.empty.sort();
     Ok(found)
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
 /// Names that the manifest of a folder lists.

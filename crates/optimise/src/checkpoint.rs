@@ -8,6 +8,7 @@ use sha2::{Digest, Sha256};
 use super::adam::Adam;
 use super::rings::Rings;
 use metalith_cell::kept;
+use metalith_core::text::hex;
 use metalith_core::{Error, Result};
 use metalith_design::Design;
 
@@ -166,7 +167,7 @@ impl Checkpoint {
 fn digest(design: &Design) -> String {
     let decisive = (&design.cell, &design.lens, &design.mapping, &design.optimise);
     let bytes = serde_json::to_vec(&decisive).expect("plain data serialises");
-    Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect()
+    hex(&Sha256::digest(&bytes))
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@
 use std::path::{Path, PathBuf};
 
 use metalith_core::file::read_at_most;
+use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result, WholeFile, srgb};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -46,10 +47,6 @@ pub struct DatasetPair {
     /// 16-bit PNG in sRGB: what an ideal camera of the same channels gives.
     pub truth: String,
     pub truth_sha256: String,
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
 /// Folder of the shard that image number `i` is in.

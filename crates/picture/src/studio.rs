@@ -4,6 +4,7 @@ use std::path::Path;
 
 use metalith_camera::{Camera, ChannelSampling};
 use metalith_cell::{Fidelity, cache_folder};
+use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::{Design, cell_models};
 use metalith_layout::read_pillars;
@@ -97,7 +98,7 @@ fn digest(path: &Path) -> Result<String> {
     let mut file = std::fs::File::open(path).map_err(Error::io("read", path))?;
     let mut hasher = Sha256::new();
     std::io::copy(&mut file, &mut hasher).map_err(Error::io("read", path))?;
-    Ok(hasher.finalize().iter().map(|b| format!("{b:02x}")).collect())
+    Ok(hex(&hasher.finalize()))
 }
 
 impl Studio {
@@ -292,13 +293,8 @@ impl Studio {
         joint: bool,
         progress: &dyn Progress,
     ) -> Result<Array3<f64>> {
-        let [light, trust] = self.known(operator, error, frame)?;
-        let recorded = Recorded {
-            operator,
-            light: &light,
-            trust: &trust,
-            prior: &self.prior,
-        };
+        let known = self.known(operator, error, frame)?;
+        let recorded = self.recorded(operator, &known);
         let planes = match joint {
             true => restore_joint(&recorded, method, progress)?,
             false => restore_separate(&recorded, method, progress)?,
@@ -318,15 +314,23 @@ impl Studio {
         seeds: std::ops::Range<u64>,
         progress: &dyn Progress,
     ) -> Result<Vec<Array3<f64>>> {
-        let [light, trust] = self.known(operator, error, frame)?;
-        let recorded = Recorded {
-            operator,
-            light: &light,
-            trust: &trust,
-            prior: &self.prior,
-        };
+        let known = self.known(operator, error, frame)?;
+        let recorded = self.recorded(operator, &known);
         let drawn = restore_samples(&recorded, seeds, progress)?;
         Ok(drawn.iter().map(|planes| self.picture(operator, planes)).collect())
+    }
+
+    fn recorded<'a>(
+        &'a self,
+        operator: &'a FrameOperator<'a>,
+        [light, trust]: &'a [Vec<Array2<f32>>; 2],
+    ) -> Recorded<'a> {
+        Recorded {
+            operator,
+            light,
+            trust,
+            prior: &self.prior,
+        }
     }
 
     /// What a frame says: its light, and how far each pixel is to be trusted.

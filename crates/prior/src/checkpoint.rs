@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use metalith_core::file::read_at_most;
+use metalith_core::text::hex;
 use metalith_core::{Error, Result, WholeFile};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use sha2::{Digest, Sha256};
@@ -115,7 +116,7 @@ fn digest(parts: &[&[u8]], origin: &str, step: u64) -> String {
     parts.iter().for_each(|p| hasher.update(p));
     hasher.update(origin);
     hasher.update(step.to_le_bytes());
-    hasher.finalize().iter().map(|b| format!("{b:02x}")).collect()
+    hex(&hasher.finalize())
 }
 
 #[cfg(test)]

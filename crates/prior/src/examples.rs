@@ -1,5 +1,6 @@
 //! What the network learns from: pieces of photographs, and noise on them.
 
+use metalith_core::text::hex;
 use metalith_core::{Error, Result};
 use ndarray::Array3;
 use rand::{Rng, SeedableRng};
@@ -79,7 +80,7 @@ impl Photographs {
             hasher.update([rows as u64, columns as u64].map(u64::to_le_bytes).concat());
             picture.iter().for_each(|v| hasher.update(v.to_le_bytes()));
         }
-        hasher.finalize().iter().map(|b| format!("{b:02x}")).collect()
+        hex(&hasher.finalize())
     }
 
     /// Example number `k` of a seed: the same whatever was drawn before.

@@ -1,11 +1,13 @@
 //! What cameras without a lens have in common: a sensor, light of a flat scene on its pixels, exposure, colours.
 
 use metalith_camera::{Camera, ColourFilter, Sampling};
-use metalith_core::{Error, Result};
+use metalith_core::{Error, Progress, Result};
 use metalith_picture::scene::SceneImage;
 use metalith_picture::spectra::{SceneSpectrum, rgb_basis};
 use metalith_picture::{ChannelColours, Frame, SceneView, channel_at, expose, gains, sensitivity};
 use ndarray::{Array2, Array3, Zip};
+
+use crate::contender::{Contender, Way};
 
 /// A sensor in the light of scenes of one size and field, whatever stands before it.
 pub struct LenslessBench {
@@ -16,6 +18,56 @@ pub struct LenslessBench {
     /// What light at sines far from the normal brings less, at each pixel of the scene.
     falloff: Array2<f32>,
     gain: Vec<f64>,
+}
+
+/// A camera without a lens: what stands before its sensor, and how a picture is made of its frame.
+pub trait Lensless {
+    /// The sensor.
+    fn bench(&self) -> &LenslessBench;
+
+    /// Name of its method of restoration.
+    fn method(&self) -> &'static str;
+
+    /// Light of each channel in each pixel.
+    fn light(&self, scene: &SceneImage) -> Vec<Array2<f32>>;
+
+    /// Sent light of each channel from a frame.
+    ///
+    /// # Errors
+    /// If the user stopped it.
+    fn sent(&self, frame: &Frame, progress: &dyn Progress) -> Result<Vec<Array2<f32>>>;
+}
+
+impl<T: Lensless> Contender for T {
+    fn ways(&self) -> Vec<Way> {
+        vec![Way {
+            method: self.method().into(),
+            joint: None,
+        }]
+    }
+
+    fn channel_names(&self) -> Vec<String> {
+        self.bench().channel_names()
+    }
+
+    fn record(&self, scene: &SceneImage, seed: u64) -> Result<Frame> {
+        self.bench().sees(scene)?;
+        Ok(self.bench().record(&self.light(scene), seed))
+    }
+
+    fn truth(&self, scene: &SceneImage) -> Array3<f64> {
+        self.bench().truth(scene)
+    }
+
+    fn unrestored(&self, _frame: &Frame) -> Option<Array3<f64>> {
+        None
+    }
+
+    fn restore(&self, frame: &Frame, _way: usize, progress: &dyn Progress) -> Result<Array3<f64>> {
+        let bench = self.bench();
+        frame.is_of(bench.frame(), bench.channels())?;
+        Ok(bench.picture(&self.sent(frame, progress)?))
+    }
 }
 
 /// Wavelengths that visible light is simulated over (nm).

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use metalith_cell::BAND_ORDERS;
+use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::array::PillarArray;
 use metalith_design::{CellIncidence, Design};
@@ -12,7 +13,7 @@ use metalith_made::{BankRange, CalibratedModel, CellBank, CellChange, MadeChip, 
 use metalith_verify::{ReadLayout, SimulationCases, Verification, wavelengths_um};
 
 use crate::draw::Drawer;
-use crate::plan::{CELLS, Plan, hex, key};
+use crate::plan::{CELLS, Plan, key};
 use crate::record::{DrawRecord, LimitStatement, figures, finite};
 use crate::tolerance::Tolerance;
 

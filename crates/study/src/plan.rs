@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use metalith_cell::kept::solver_of;
 use metalith_core::file::read_at_most;
+use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result, WholeFile};
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
@@ -241,10 +242,6 @@ pub(crate) fn key(tolerance: &Tolerance, design: &Design, layout: &Path) -> Resu
         add("file", &one.finalize());
     }
     Ok(hash.finalize().into())
-}
-
-pub(crate) fn hex(key: &[u8; 32]) -> String {
-    key.iter().map(|b| format!("{b:02x}")).collect()
 }
 
 fn absolute(path: &Path) -> Result<PathBuf> {

@@ -20,6 +20,7 @@ pub use table::PillarTable;
 use self::carry::{Carried, carried_over};
 use metalith_cell::kept;
 use metalith_cell::{CellModel, CellStack};
+use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result, WholeFile};
 use metalith_made::{CellChange, off_cutoff, perturbed, possible_width_nm};
 use metalith_rcwa::{Incidence, Orders, Outline, Side, solve};
@@ -299,7 +300,7 @@ impl RigorousCells {
             hash.update(index.re.to_le_bytes());
             hash.update(index.im.to_le_bytes());
         }
-        hash.finalize().iter().take(16).map(|b| format!("{b:02x}")).collect()
+        hex(&hash.finalize()[..16])
     }
 }
 

@@ -3,7 +3,8 @@
 use metalith_core::circle_corners;
 use metalith_testing::gds::Gds;
 
-use crate::{broken, deck_from, input, layout};
+use crate::deck_from;
+use crate::on_lattice::{broken_on_lattice, site};
 
 /// Sites an axis, their distance and the common diameter (nm).
 const SITES: i32 = 12;
@@ -18,31 +19,21 @@ fn circle(gds: &mut Gds, (x, y): (i32, i32), diameter: u32) {
 }
 
 fn place(column: i32, row: i32) -> (i32, i32) {
-    let at = |k: i32| PITCH * k - PITCH * (SITES - 1) / 2;
-    (at(column), at(row))
+    site(PITCH, SITES, column, row)
 }
 
 /// Rules that a lattice of circles breaks whose diameters are as `diameter` says, with `more` on it.
 fn found(diameter: impl Fn(i32, i32) -> Option<u32>, more: impl Fn(&mut Gds)) -> (Vec<(String, u64)>, u64) {
-    let mut gds = Gds::library();
-    gds.cell("TOP");
-    for (column, row) in (0..SITES * SITES).map(|k| (k % SITES, k / SITES)) {
-        if let Some(diameter) = diameter(column, row) {
-            circle(&mut gds, place(column, row), diameter);
-        }
-    }
-    more(&mut gds);
-    gds.end_cell();
-    let file = layout(gds.end());
-    let report = metalith_drc::check(
-        &file,
+    broken_on_lattice(
         &deck_from("rules/circles.toml", &[]),
-        &input(),
-        &metalith_core::Silent,
+        SITES,
+        |gds, column, row| {
+            if let Some(diameter) = diameter(column, row) {
+                circle(gds, place(column, row), diameter);
+            }
+        },
+        more,
     )
-    .unwrap();
-    let broken = broken(&report).into_iter().map(|(id, count)| (id.to_owned(), count));
-    (broken.collect(), report.pillars_on_lattices)
 }
 
 #[test]

@@ -3,7 +3,8 @@
 use metalith_core::Rectangles;
 use metalith_testing::gds::Gds;
 
-use crate::{broken, deck_from, input, layout};
+use crate::deck_from;
+use crate::on_lattice::{broken_on_lattice, site};
 
 /// Sites an axis and their distance (nm).
 const SITES: i32 = 12;
@@ -22,8 +23,7 @@ fn pillar(gds: &mut Gds, (x, y): (i32, i32), number: u16) {
 }
 
 fn place(column: i32, row: i32) -> (i32, i32) {
-    let at = |k: i32| PITCH * k - PITCH * (SITES - 1) / 2;
-    (at(column), at(row))
+    site(PITCH, SITES, column, row)
 }
 
 /// Rules that a lattice of rectangles breaks whose rotations are as `number` says, with `more` on it; `rules` are added.
@@ -32,20 +32,16 @@ fn found(
     number: impl Fn(i32, i32) -> Option<u16>,
     more: impl Fn(&mut Gds),
 ) -> (Vec<(String, u64)>, u64) {
-    let mut gds = Gds::library();
-    gds.cell("TOP");
-    for (column, row) in (0..SITES * SITES).map(|k| (k % SITES, k / SITES)) {
-        if let Some(number) = number(column, row) {
-            pillar(&mut gds, place(column, row), number);
-        }
-    }
-    more(&mut gds);
-    gds.end_cell();
-    let file = layout(gds.end());
-    let deck = deck_from("rules/rectangles.toml", rules);
-    let report = metalith_drc::check(&file, &deck, &input(), &metalith_core::Silent).unwrap();
-    let broken = broken(&report).into_iter().map(|(id, count)| (id.to_owned(), count));
-    (broken.collect(), report.pillars_on_lattices)
+    broken_on_lattice(
+        &deck_from("rules/rectangles.toml", rules),
+        SITES,
+        |gds, column, row| {
+            if let Some(number) = number(column, row) {
+                pillar(gds, place(column, row), number);
+            }
+        },
+        more,
+    )
 }
 
 /// Rotations from 13 to 167 degrees: none is upright.

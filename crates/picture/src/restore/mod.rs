@@ -32,7 +32,7 @@ use ndarray::Array2;
 use crate::operator::FrameOperator;
 
 pub use learned::LearnedDenoiser;
-pub use prior::SceneStatistics;
+pub use prior::{SceneStatistics, squared_frequencies};
 pub use slope::SlopeDenoiser;
 pub use splitting::{Denoiser, Schedule};
 

@@ -141,7 +141,7 @@ fn weighted(weights: impl Iterator<Item = f32>, planes: &[Array2<f32>]) -> Array
 }
 
 /// What differences of neighbours count of each frequency of a periodic line, squared.
-pub(super) fn squared_frequencies(size: usize) -> Vec<f64> {
+pub fn squared_frequencies(size: usize) -> Vec<f64> {
     let of = |k: usize| 2.0 - 2.0 * (std::f64::consts::TAU * k as f64 / size as f64).cos();
     (0..size).map(of).collect()
 }

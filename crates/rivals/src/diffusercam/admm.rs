@@ -4,6 +4,7 @@
 
 use metalith_core::{Error, Progress, Result, part};
 use metalith_picture::SquareFft;
+use metalith_picture::restore::squared_frequencies;
 use ndarray::{Array2, Zip};
 use num_complex::Complex32;
 
@@ -38,9 +39,7 @@ impl Deconvolution {
     pub fn new(grid: CoarseGrid) -> Self {
         let fft = SquareFft::new(grid.size);
         let n = grid.size;
-        let squared: Vec<f32> = (0..n)
-            .map(|k| (2.0 - 2.0 * (std::f64::consts::TAU * k as f64 / n as f64).cos()) as f32)
-            .collect();
+        let squared: Vec<f32> = squared_frequencies(n).into_iter().map(|s| s as f32).collect();
         Self {
             kernel: transformed(&fft, &grid.kernel),
             slopes: (0..fft.entries()).map(|i| squared[i / n] + squared[i % n]).collect(),

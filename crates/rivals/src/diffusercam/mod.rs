@@ -14,11 +14,10 @@ use metalith_picture::restore::SceneStatistics;
 use metalith_picture::scene::SceneImage;
 use metalith_picture::spectra::rgb_basis;
 use metalith_picture::{Frame, SceneView};
-use ndarray::{Array2, Array3};
+use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::contender::{Contender, Way};
-use crate::lensless::LenslessBench;
+use crate::lensless::{Lensless, LenslessBench};
 use admm::Deconvolution;
 use grid::{CoarseGrid, FineGrid, on_scene};
 use surface::RoughSurface;
@@ -146,16 +145,6 @@ impl DiffuserCam {
         Ok(camera)
     }
 
-    /// Light of each channel in each pixel; it would be one for a white scene without borders.
-    fn light(&self, scene: &SceneImage) -> Vec<Array2<f32>> {
-        let sent: Vec<Array2<f32>> = scene
-            .planes
-            .par_iter()
-            .map(|p| self.fine.sampled(&self.bench.sent(p), &scene.view))
-            .collect();
-        self.fine.frames(&sent)
-    }
-
     /// Root mean square difference of what the restoration knows and the simulation on a random scene, over the light.
     fn operator_error(&self) -> Vec<f64> {
         let planes = SceneStatistics::colours().random_scene(&self.bench.view, SEED);
@@ -176,37 +165,29 @@ impl DiffuserCam {
     }
 }
 
-impl Contender for DiffuserCam {
-    fn ways(&self) -> Vec<Way> {
-        vec![Way {
-            method: "tv".into(),
-            joint: None,
-        }]
+impl Lensless for DiffuserCam {
+    fn bench(&self) -> &LenslessBench {
+        &self.bench
     }
 
-    fn channel_names(&self) -> Vec<String> {
-        self.bench.channel_names()
+    fn method(&self) -> &'static str {
+        "tv"
     }
 
-    fn record(&self, scene: &SceneImage, seed: u64) -> Result<Frame> {
-        self.bench.sees(scene)?;
-        Ok(self.bench.record(&self.light(scene), seed))
+    fn light(&self, scene: &SceneImage) -> Vec<Array2<f32>> {
+        let sent: Vec<Array2<f32>> = scene
+            .planes
+            .par_iter()
+            .map(|p| self.fine.sampled(&self.bench.sent(p), &scene.view))
+            .collect();
+        self.fine.frames(&sent)
     }
 
-    fn truth(&self, scene: &SceneImage) -> Array3<f64> {
-        self.bench.truth(scene)
-    }
-
-    fn unrestored(&self, _frame: &Frame) -> Option<Array3<f64>> {
-        None
-    }
-
-    fn restore(&self, frame: &Frame, _way: usize, progress: &dyn Progress) -> Result<Array3<f64>> {
-        frame.is_of(self.bench.frame(), self.bench.channels())?;
+    fn sent(&self, frame: &Frame, progress: &dyn Progress) -> Result<Vec<Array2<f32>>> {
         let (light, trust) = frame.light(&self.bench.camera, &self.error);
         progress.begin("restoring by total variation", (admm::ROUNDS * light.len()) as u64);
         let step = 2.0 * self.bench.camera.sensor.pixel_um / self.spec.distance_um;
-        let sent = light
+        light
             .par_iter()
             .zip(&trust)
             .zip(&self.solvers)
@@ -215,14 +196,14 @@ impl Contender for DiffuserCam {
                 let found = solver.solve(&solver.grid().data(light), variance, progress)?;
                 Ok(on_scene(&found, step, &self.bench.view))
             })
-            .collect::<Result<Vec<_>>>()?;
-        Ok(self.bench.picture(&sent))
+            .collect()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contender::Contender;
     use crate::lensless::tests::small;
     use metalith_core::Silent;
     use metalith_picture::scores;

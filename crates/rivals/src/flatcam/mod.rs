@@ -14,11 +14,10 @@ use metalith_core::{Error, Progress, Result};
 use metalith_picture::restore::SceneStatistics;
 use metalith_picture::scene::SceneImage;
 use metalith_picture::{Frame, SceneView};
-use ndarray::{Array2, Array3, Axis, Slice};
+use ndarray::{Array2, Axis, Slice};
 use rayon::prelude::*;
 
-use crate::contender::{Contender, Way};
-use crate::lensless::LenslessBench;
+use crate::lensless::{Lensless, LenslessBench};
 pub use mask::MaskSpec;
 use mask::Shadow;
 use solve::{Factor, TwoFactors};
@@ -112,45 +111,6 @@ impl FlatCam {
         Ok(camera)
     }
 
-    /// Light of each channel in each pixel; that of a white scene through an open mask would be about one.
-    fn light(&self, scene: &SceneImage) -> Vec<Array2<f32>> {
-        let [rows, columns] = self.bench.frame();
-        let scale = ((scene.view.rows * scene.view.columns) as f32).recip();
-        let sent: Vec<Array2<f32>> = scene.planes.iter().map(|p| self.bench.sent(p)).collect();
-        let channels = self.bench.channels();
-        let weights: Vec<Vec<Vec<f64>>> = (0..channels)
-            .map(|c| scene.basis.iter().map(|b| self.bench.weights(c, b)).collect())
-            .collect();
-        let nothing = || vec![Array2::<f32>::zeros((rows, columns)); channels];
-        self.shadows
-            .par_iter()
-            .enumerate()
-            .map(|(i, [down, across])| {
-                let mut frames = nothing();
-                for (frame, own) in frames.iter_mut().zip(&weights) {
-                    let mut light = Mat::<f32>::zeros(scene.view.rows, scene.view.columns);
-                    for (plane, w) in sent.iter().zip(own) {
-                        let w = w[i] as f32 * scale;
-                        for ((y, x), v) in plane.indexed_iter() {
-                            light[(y, x)] += w * v;
-                        }
-                    }
-                    if own.iter().any(|w| w[i] != 0.0) {
-                        let seen = down * &light * across.transpose();
-                        *frame = Array2::from_shape_fn((rows, columns), |at| seen[at]);
-                    }
-                }
-                frames
-            })
-            // In the order of the wavelengths, whoever was first.
-            .collect::<Vec<_>>()
-            .into_iter()
-            .fold(nothing(), |mut sum, frames| {
-                sum.iter_mut().zip(&frames).for_each(|(s, f)| *s += f);
-                sum
-            })
-    }
-
     /// By channel, the strength that restores a random scene best.
     fn chosen_strengths(&self) -> Vec<f64> {
         let scene = self
@@ -194,36 +154,57 @@ impl FlatCam {
     }
 }
 
-impl Contender for FlatCam {
-    fn ways(&self) -> Vec<Way> {
-        vec![Way {
-            method: "tikhonov".into(),
-            joint: None,
-        }]
+impl Lensless for FlatCam {
+    fn bench(&self) -> &LenslessBench {
+        &self.bench
     }
 
-    fn channel_names(&self) -> Vec<String> {
-        self.bench.channel_names()
+    fn method(&self) -> &'static str {
+        "tikhonov"
     }
 
-    fn record(&self, scene: &SceneImage, seed: u64) -> Result<Frame> {
-        self.bench.sees(scene)?;
-        Ok(self.bench.record(&self.light(scene), seed))
+    fn light(&self, scene: &SceneImage) -> Vec<Array2<f32>> {
+        let [rows, columns] = self.bench.frame();
+        let scale = ((scene.view.rows * scene.view.columns) as f32).recip();
+        let sent: Vec<Array2<f32>> = scene.planes.iter().map(|p| self.bench.sent(p)).collect();
+        let channels = self.bench.channels();
+        let weights: Vec<Vec<Vec<f64>>> = (0..channels)
+            .map(|c| scene.basis.iter().map(|b| self.bench.weights(c, b)).collect())
+            .collect();
+        let nothing = || vec![Array2::<f32>::zeros((rows, columns)); channels];
+        self.shadows
+            .par_iter()
+            .enumerate()
+            .map(|(i, [down, across])| {
+                let mut frames = nothing();
+                for (frame, own) in frames.iter_mut().zip(&weights) {
+                    let mut light = Mat::<f32>::zeros(scene.view.rows, scene.view.columns);
+                    for (plane, w) in sent.iter().zip(own) {
+                        let w = w[i] as f32 * scale;
+                        for ((y, x), v) in plane.indexed_iter() {
+                            light[(y, x)] += w * v;
+                        }
+                    }
+                    if own.iter().any(|w| w[i] != 0.0) {
+                        let seen = down * &light * across.transpose();
+                        *frame = Array2::from_shape_fn((rows, columns), |at| seen[at]);
+                    }
+                }
+                frames
+            })
+            // In the order of the wavelengths, whoever was first.
+            .collect::<Vec<_>>()
+            .into_iter()
+            .fold(nothing(), |mut sum, frames| {
+                sum.iter_mut().zip(&frames).for_each(|(s, f)| *s += f);
+                sum
+            })
     }
 
-    fn truth(&self, scene: &SceneImage) -> Array3<f64> {
-        self.bench.truth(scene)
-    }
-
-    fn unrestored(&self, _frame: &Frame) -> Option<Array3<f64>> {
-        None
-    }
-
-    fn restore(&self, frame: &Frame, _way: usize, progress: &dyn Progress) -> Result<Array3<f64>> {
-        frame.is_of(self.bench.frame(), self.bench.channels())?;
+    fn sent(&self, frame: &Frame, progress: &dyn Progress) -> Result<Vec<Array2<f32>>> {
         progress.begin("restoring", self.bench.channels() as u64);
         let (light, _) = frame.light(&self.bench.camera, &vec![0.0; self.bench.channels()]);
-        let sent: Vec<Array2<f32>> = light
+        let sent = light
             .par_iter()
             .enumerate()
             .map(|(c, l)| {
@@ -232,13 +213,14 @@ impl Contender for FlatCam {
                 own
             })
             .collect();
-        Ok(self.bench.picture(&sent))
+        Ok(sent)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contender::Contender;
     use crate::lensless::tests::small;
     use metalith_core::Silent;
     use metalith_picture::scores;

@@ -8,6 +8,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use super::super::Interpolation;
+use metalith_core::text::hex;
 use metalith_core::{Error, Result, npy};
 
 /// Entries of a table along an axis at most: sites of the largest lens that is held.
@@ -76,7 +77,7 @@ impl MapTable {
         let mut digest = Sha256::new();
         digest.update((columns as u64).to_le_bytes());
         array.values.iter().for_each(|v| digest.update(v.to_le_bytes()));
-        self.digest = digest.finalize().iter().map(|b| format!("{b:02x}")).collect();
+        self.digest = hex(&digest.finalize());
         self.values = Arc::new((columns, array.values.iter().map(|rad| rad / TAU).collect()));
         Ok(())
     }
