@@ -6,7 +6,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use metalith_core::document::{Document, Section, load};
-use metalith_core::text::hex;
+use metalith_core::text::{hex, quoted};
 use metalith_core::{ElementSite, Lattice, Result};
 
 use crate::spec::{
@@ -61,7 +61,7 @@ impl Design {
         if root.has("name") && (name.is_empty() || name.len() > MAX_NAME || !name.chars().all(legal)) {
             root.fault(
                 "name",
-                format!("\"{name}\" cannot name files and cells"),
+                format!("\"{}\" cannot name files and cells", quoted(&name)),
                 format!("use 1 to {MAX_NAME} of the characters A-Z a-z 0-9 _ -"),
             );
         }

@@ -7,6 +7,7 @@ use super::rule::{Needs, Rule, RuleOutcome};
 use metalith_core::WidthRows;
 use metalith_core::document::{Limits, Section};
 use metalith_gds::LayerNumber;
+use metalith_report::exact;
 
 enum BudgetRule {
     FileSize(f64),
@@ -71,7 +72,7 @@ impl Rule for BudgetRule {
         };
         found.facts.push((unit.to_owned(), value));
         if value > most {
-            found.plain(unit, || format!("{value:.3} {unit}, at most {most}"));
+            found.plain(unit, || format!("{} {unit}, at most {}", exact(value), exact(most)));
         }
         Ok(())
     }

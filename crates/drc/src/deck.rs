@@ -9,6 +9,7 @@ use super::rule::{DeckRule, Rule, Severity};
 use super::{aperture, budget, density, design, field, lattice, layers, marks, outline, spacing, tree, width};
 use metalith_core::Result;
 use metalith_core::document::{Document, Limits, Section, load};
+use metalith_core::text::quoted;
 use metalith_gds::LayerNumber;
 
 /// The decks that ship with the program, by the names of their files; the first is the standard one.
@@ -116,7 +117,7 @@ fn read(root: &Section<'_, '_>) -> DeckContents {
         parse_layer(text).unwrap_or_else(|| {
             section.fault(
                 key,
-                format!("\"{text}\" is not a layer"),
+                format!("\"{}\" is not a layer", quoted(&text)),
                 "write layer and datatype as \"1/0\"",
             );
             LayerNumber::default()

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use metalith_core::text::{is_printable, printable};
+use metalith_report::exact;
 use serde_json::json;
 
 use super::report::{DrcReport, RuleReport};
@@ -21,6 +22,7 @@ pub fn text(report: &DrcReport) -> String {
         report.pillars_on_lattices,
         report.deck
     );
+    let mut reason = "";
     for r in &report.rules {
         let state = match &r.status {
             Status::Run if r.violations == 0 => "ok".to_owned(),
@@ -31,10 +33,11 @@ pub fn text(report: &DrcReport) -> String {
         };
         let _ = writeln!(out, "{:28} {:>18}  {}", r.id, state, r.words);
         if let Status::Skipped(why) | Status::Failed(why) = &r.status {
-            let _ = writeln!(out, "{:28} {why}", "");
+            let said = std::mem::replace(&mut reason, why) == why;
+            let _ = writeln!(out, "{:28} {}", "", if said { "for the same reason" } else { why });
         }
         for (name, value) in &r.facts {
-            let _ = writeln!(out, "{:28} {name}: {value:.6}", "");
+            let _ = writeln!(out, "{:28} {name}: {}", "", exact(*value));
         }
         for m in r.markers.iter().filter(|m| !m.waived).take(SHOWN) {
             let place = m.outline_nm.first().map_or_else(String::new, |p| {

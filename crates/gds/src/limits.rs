@@ -42,7 +42,7 @@ impl ReadLimits {
 pub(super) const TEXT_BYTES: u64 = 64;
 
 impl Default for ReadLimits {
-    /// Twelve times the largest array asked for (5 x 5, 160 million pillars) in under a gigabyte.
+    /// Room for one lens of 40 mm, 10 billion pillars, if its file is in proportion.
     fn default() -> Self {
         Self {
             cells: 1 << 20,
@@ -52,7 +52,7 @@ impl Default for ReadLimits {
             vertices: 1 << 20,
             depth: 256,
             placements: 1 << 22,
-            flat_shapes: 2_000_000_000,
+            flat_shapes: 16_000_000_000,
             short_file_shapes: 1 << 24,
             shapes_per_byte: 64,
             flat_text_bytes: 1 << 26,

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use metalith_core::text::quoted;
 use metalith_core::{Error, Result, document};
 
 /// The width of one pillar by scanning electron microscope.
@@ -44,7 +45,7 @@ pub fn read(path: &Path) -> Result<Vec<SemSite>> {
                 .is_none_or(|field| !field.trim().is_empty())
         })
         .map(|(at, line)| {
-            let wrong = || fault(at, format!("`{line}` is no width of a pillar"));
+            let wrong = || fault(at, format!("`{}` is no width of a pillar", quoted(line)));
             let [m, n, x, y, designed, measured, sigma] = numbers(line).ok_or_else(wrong)?;
             if sigma <= 0.0 || measured <= 0.0 || m.fract() != 0.0 || n.fract() != 0.0 {
                 return Err(wrong());
@@ -70,7 +71,7 @@ fn rows<'t>(text: &'t str, columns: &str) -> Result<Vec<(usize, &'t str)>, (usiz
     match lines.next() {
         None => Err((1, "the file is empty".into())),
         Some((at, head)) if head.split(',').map(str::trim).ne(columns.split(',')) => {
-            Err((at, format!("the columns are `{head}`")))
+            Err((at, format!("the columns are `{}`", quoted(head))))
         }
         Some(_) => Ok(lines.collect()),
     }

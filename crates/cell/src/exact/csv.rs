@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use super::MappingTable;
+use metalith_core::text::quoted;
 use metalith_core::{Error, Result};
 
 /// Longest mapping that is read (bytes), and the rounding of its phases in print.
@@ -57,7 +58,7 @@ impl MappingTable {
             .iter()
             .enumerate()
             .map(|(i, &(line, row))| {
-                let not_a_part = || fault(Some(line), format!("\"{row}\" is not a phase and a width"));
+                let not_a_part = || fault(Some(line), format!("\"{}\" is not a phase and a width", quoted(row)));
                 let (turns, width) = row.split_once(',').ok_or_else(not_a_part)?;
                 let turns: f64 = turns.trim().parse().map_err(|_| not_a_part())?;
                 let width: u16 = width.trim().parse().map_err(|_| not_a_part())?;

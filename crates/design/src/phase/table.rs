@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use super::Interpolation;
+use metalith_core::text::quoted;
 use metalith_core::{Error, Result, document, npy};
 
 /// Most rows of a table: a ring for each site of the largest lens that can be designed.
@@ -55,7 +56,7 @@ fn read_csv(path: &Path) -> Result<Vec<(f64, f64)>> {
         .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
     let (at, head) = lines.next().ok_or_else(|| fault(1, "the file is empty".into()))?;
     if head.split(',').map(str::trim).ne(["r_um", "phase_rad"]) {
-        return Err(fault(at, format!("the columns are `{head}`")));
+        return Err(fault(at, format!("the columns are `{}`", quoted(head))));
     }
     lines
         .take(MOST_ROWS + 1)
@@ -63,7 +64,7 @@ fn read_csv(path: &Path) -> Result<Vec<(f64, f64)>> {
             let mut fields = line.split(',').map(|f| f.trim().parse::<f64>());
             match (fields.next(), fields.next(), fields.next()) {
                 (Some(Ok(r)), Some(Ok(phase)), None) => Ok((r, phase)),
-                _ => Err(fault(at, format!("`{line}` is not two numbers"))),
+                _ => Err(fault(at, format!("`{}` is not two numbers", quoted(line)))),
             }
         })
         .collect()

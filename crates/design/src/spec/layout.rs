@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::{ArraySpec, Element, LensSpec};
 use metalith_core::LayerNumber;
 use metalith_core::document::{Limits, Section};
+use metalith_core::text::quoted;
 
 /// How the geometry is nested in the file. All three hold the same geometry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -121,7 +122,7 @@ impl LayoutSpec {
                 if text.parse::<NaiveDateTime>().is_err() {
                     s.fault(
                         "timestamp",
-                        format!("\"{text}\" is not a date and time"),
+                        format!("\"{}\" is not a date and time", quoted(&text)),
                         "write it as \"2026-01-31T12:00:00\"",
                     );
                 }

@@ -259,13 +259,18 @@ impl Filler {
     /// Put a pillar on a free site.
     #[inline]
     fn fill(&mut self, element: u32, row: usize, column: usize, number: u16) -> Result<bool, Why> {
-        if self.elements[element as usize].widths.width(column, row) != 0 {
+        // Nearly all pillars are of elements that are held whole already.
+        let place = match &mut self.elements[element as usize].widths {
+            HeldWidths::Whole(map) => Some(&mut map.width_nm[[row, column]]),
+            other if other.width(column, row) != 0 => return Err(Why::DuplicateSite),
+            _ => self.place(element, row, column),
+        };
+        let Some(place) = place else { return Ok(true) };
+        if *place != 0 {
             return Err(Why::DuplicateSite);
         }
-        if let Some(place) = self.place(element, row, column) {
-            *place = number;
-            self.pillars += 1;
-        }
+        *place = number;
+        self.pillars += 1;
         Ok(true)
     }
 

@@ -152,6 +152,11 @@ impl<'a> ElementPillars<'a> {
         PillarEncoding::Lists(StripsOf::of(self.group))
     }
 
+    /// Whether the element is more than a mirror image of itself.
+    pub fn has_many_symmetries(&self) -> bool {
+        self.group.members().len() > 2
+    }
+
     /// Whether there is no pillar.
     pub fn is_empty(&self) -> bool {
         self.parts.is_empty()
@@ -228,11 +233,7 @@ impl<'a> ElementPillars<'a> {
 
     /// Bytes of a pillar, from some pieces; none if no pillar is in them.
     pub fn bytes_of_sample(&self, encoding: PillarEncoding) -> Option<f64> {
-        let every = if self.group.members().len() > 2 {
-            SAMPLE / 2
-        } else {
-            SAMPLE
-        };
+        let every = if self.has_many_symmetries() { SAMPLE / 2 } else { SAMPLE };
         let pieces: Vec<usize> = (every / 3..encoding.pieces(self.widths.lattice().sites()))
             .step_by(every)
             .collect();
