@@ -6,7 +6,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use metalith_core::document::{Document, Section, load};
-use metalith_core::{ElementSite, Lattice, Result};
+use metalith_core::{ElementSite, Error, Lattice, Result};
 
 use crate::spec::{
     ArraySpec, CellSpec, Element, FieldAngle, LayoutSpec, LensSpec, MappingSpec, OptimiseSpec, VerifySpec,
@@ -66,9 +66,10 @@ impl Design {
         }
         let title = root.optional_text("title").unwrap_or_else(|| name.clone());
         let cell = CellSpec::read(&root.section("cell"));
-        let lens = LensSpec::read(&root.section("lens"), &root.section("phase"), &cell);
+        let phase = root.section("phase");
+        let lens = LensSpec::read(&root.section("lens"), &phase, &cell);
         let array_section = root.section("array");
-        let array = ArraySpec::read(&array_section, &lens, &root.sections("element"));
+        let array = ArraySpec::read(&array_section, &lens, &phase, &cell, &root.sections("element"));
         let mapping = MappingSpec::read(&root.section("mapping"), &cell, &array);
         let layout = LayoutSpec::read(root, &lens, &array);
         let verify = VerifySpec::read(&root.section("verify"));
@@ -90,10 +91,9 @@ impl Design {
 
     /// Read the files that the design names, after all its own mistakes are known to be none.
     fn with_files(mut self) -> Result<Self> {
-        let radius_um = self.lens.radius_um();
-        self.lens.phase.load(radius_um)?;
-        for term in &mut self.lens.terms {
-            term.load(radius_um)?;
+        self.lens.load()?;
+        for own in self.array.placed.iter_mut().filter_map(|p| p.lens.as_mut()) {
+            own.load()?;
         }
         self.mapping.load(&self.cell)?;
         let band_um = self.band_um()?;
@@ -109,14 +109,46 @@ impl Design {
         Ok(self)
     }
 
-    /// The lattice that the pillars of each element stand on.
+    /// The lattice that the pillars of each element stand on: it covers the largest.
     pub fn lattice(&self) -> Lattice {
-        Lattice::covering(self.lens.diameter_nm, self.cell.pitch_nm).expect("checked when the design was read")
+        let largest_nm = self.array.largest_nm(&self.lens);
+        Lattice::covering(largest_nm, self.cell.pitch_nm).expect("checked when the design was read")
     }
 
-    /// Radius of the openings in the metal around the lenses (um).
+    /// The lens of an element: its own, or that all share.
+    pub fn lens_of(&self, element: &Element) -> &LensSpec {
+        self.array.lens_of(&self.lens, element.index)
+    }
+
+    /// Nothing, if all elements are of one lens.
+    ///
+    /// # Errors
+    /// If some are of their own; `who` knows one lens alone.
+    pub fn one_lens(&self, who: &str) -> Result<()> {
+        if !self.array.has_own_lenses() {
+            return Ok(());
+        }
+        Err(Error::invalid(
+            format!(
+                "{who} knows one lens for all elements, and elements of the design have their own, or rotated ones"
+            ),
+            "make a design of the elements that share a lens: without `diameter_um`, `focal_length_um`, `rotation_deg` and \
+             [element.phase]",
+        ))
+    }
+
+    /// Radius of the openings in the metal around the lenses that have none of their own (um).
     pub fn aperture_radius_um(&self) -> f64 {
-        self.lens.radius_um() + self.layout.apertures.margin_nm as f64 * 1e-3
+        self.around_um(&self.lens)
+    }
+
+    /// Radius of the opening in the metal around an element (um).
+    pub fn aperture_radius_of_um(&self, element: &Element) -> f64 {
+        self.around_um(self.lens_of(element))
+    }
+
+    fn around_um(&self, lens: &LensSpec) -> f64 {
+        lens.radius_um() + self.layout.apertures.margin_nm as f64 * 1e-3
     }
 
     /// The elements of the array, row by row from the lowest.

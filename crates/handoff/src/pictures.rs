@@ -26,9 +26,9 @@ pub(super) fn chip(design: &Design) -> Figure {
     let (w, h) = design.layout.chip.size_nm;
     let (a, b) = corners(RectNm::new(-w / 2, -h / 2, w / 2, h / 2));
     plan.rectangle(outline, a, b);
-    let radius = design.lens.radius_um();
     let margin = design.layout.apertures.margin_nm as f64 * 1e-3;
     for element in design.elements() {
+        let radius = design.lens_of(&element).radius_um();
         let (x, y) = (element.centre_nm.0 as f64 * 1e-3, element.centre_nm.1 as f64 * 1e-3);
         plan.circle(openings, x, y, radius + margin);
         plan.circle(lenses, x, y, radius);

@@ -63,7 +63,8 @@ pub(super) fn sites(
     for placed in chosen {
         let map = array.widths(placed);
         let (cx, cy) = placed.element.centre_nm;
-        for best in best_sites(&map, array.shape, design.lens.radius_um(), &widths, zones) {
+        let radius_um = design.lens_of(&placed.element).radius_um();
+        for best in best_sites(&map, array.shape, radius_um, &widths, zones) {
             let (around_nm, around_deg) = neighbours(array.shape, &best);
             let (x, y) = (map.lattice.coordinate_nm(best.ix), map.lattice.coordinate_nm(best.iy));
             sites.push(MetrologySite {

@@ -194,11 +194,14 @@ fn files_of(path: &Path, design: &Design) -> Result<Vec<Named>> {
     if let Some(table) = &design.mapping.table_file {
         files.push((table.clone(), "", "phase to width, the mapping of the design"));
     }
-    if let RadialPhase::Table { file, .. } = &design.lens.phase {
-        files.push((file.clone(), "", "phase of the lens over its radius"));
-    }
-    for file in design.lens.terms.iter().filter_map(|term| term.file.as_ref()) {
-        files.push((file.clone(), "", "a phase over the plane of the lens"));
+    let own = design.array.placed.iter().filter_map(|placed| placed.lens.as_ref());
+    for lens in std::iter::once(&design.lens).chain(own) {
+        if let RadialPhase::Table { file, .. } = &lens.phase {
+            files.push((file.clone(), "", "phase of the lens over its radius"));
+        }
+        for file in lens.terms.iter().filter_map(|term| term.file.as_ref()) {
+            files.push((file.clone(), "", "a phase over the plane of the lens"));
+        }
     }
     if let Some(camera) = &design.verify.camera {
         for file in Camera::read(camera)?.files {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use metalith_core::Result;
-use metalith_design::{Design, Element};
+use metalith_design::{Design, Element, LensSpec};
 use metalith_gds::extract::{Holding, fits_folded, held_sites};
 use metalith_wave::{Accuracy, Fold, Window};
 
@@ -100,8 +100,8 @@ fn holdings(design: &Design) -> Vec<Holding> {
 
 /// The most that the spectra of a field of the design take (bytes).
 fn largest_spectra_bytes(design: &Design, accuracy: Accuracy) -> Result<usize> {
-    let (lens, lattice) = (&design.lens, design.lattice());
-    let bytes = |wavelength_um, landing, accuracy| -> Result<usize> {
+    let lattice = design.lattice();
+    let bytes = |lens: &LensSpec, wavelength_um, landing, accuracy| -> Result<usize> {
         let window = Window::about(
             landing,
             lattice.pitch_um(),
@@ -114,16 +114,17 @@ fn largest_spectra_bytes(design: &Design, accuracy: Accuracy) -> Result<usize> {
     let white = white::wavelengths_um(design)?;
     let mut most = 0;
     for element in design.elements() {
+        let lens = design.lens_of(&element);
         for &wavelength_um in &design.verify.wavelengths_um {
             for field in &design.verify.field_angles {
                 let landing = optics::landing(&element, wavelength_um, *field, lens.focal_length_um)?;
-                most = most.max(bytes(wavelength_um, landing, accuracy)?);
+                most = most.max(bytes(lens, wavelength_um, landing, accuracy)?);
             }
         }
         // The shorter the wavelength, the more frequencies.
         if let Some(shortest) = white.iter().copied().reduce(f64::min) {
             let landing = white::landing_um(&element, shortest, lens.focal_length_um)?;
-            most = most.max(bytes(shortest, landing, Accuracy::Fast)?);
+            most = most.max(bytes(lens, shortest, landing, Accuracy::Fast)?);
         }
     }
     Ok(most)

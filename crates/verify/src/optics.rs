@@ -160,15 +160,16 @@ impl<'a> ElementSimulator<'a> {
 
     /// The lens with the perfect phase for the place where a chief ray lands, all sites of modulus one: what Strehl ratios
     /// are against.
-    fn perfect(&self, chief_um: [f64; 2], wavelength_um: f64) -> Matched {
+    fn perfect(&self, element: &Element, chief_um: [f64; 2], wavelength_um: f64) -> Matched {
+        let lens = self.design.lens_of(element);
         let open = PhaseFunction {
             lattice: self.lattice,
-            radius_um: self.design.lens.radius_um(),
+            radius_um: lens.radius_um(),
             amplitude: 1.0,
             phase_rad: |_, _| 0.0,
         };
         let [x, y] = chief_um;
-        Matched::of(&open, [x, y, self.design.lens.focal_length_um], wavelength_um, 1.0)
+        Matched::of(&open, [x, y, lens.focal_length_um], wavelength_um, 1.0)
     }
 
     /// Number of wavelengths and angles of one element.
@@ -186,7 +187,7 @@ impl<'a> ElementSimulator<'a> {
     /// As [`MadeElement::new`]; also if a chip is to be made of pillars that are not held as a map.
     pub fn read<'w>(&self, element: &Element, widths: &'w dyn WidthRows) -> Result<ReadElement<'w>> {
         let drawn = widths.held().map(|map| {
-            let drawn = DrawnElement::new(map, self.design.aperture_radius_um());
+            let drawn = DrawnElement::new(map, self.design.aperture_radius_of_um(element));
             drawn.placed(element.centre_um())
         });
         let made = |case: &SimulationCase<'_>| match (case, &drawn) {
@@ -268,7 +269,7 @@ impl<'a> ElementSimulator<'a> {
     ) -> Result<Vec<PsfPair>> {
         let angles = &self.design.verify.field_angles;
         // The phase before mapping and rounding, once for all colours and angles.
-        let radius_um = self.design.lens.radius_um();
+        let radius_um = self.design.lens_of(element).radius_um();
         let turns = |ix, iy| phase.turns(ix, iy);
         let (held, computed);
         let designed: &dyn Aperture = if self.part_bytes.is_none() {
@@ -332,7 +333,7 @@ impl<'a> ElementSimulator<'a> {
         widths: &dyn WidthRows,
         scratch: &mut Scratch,
     ) -> Result<PsfPair> {
-        let (lens, spec) = (&self.design.lens, &self.design.verify);
+        let (lens, spec) = (self.design.lens_of(element), &self.design.verify);
         let Task {
             colour, field, wave, ..
         } = task;
@@ -351,7 +352,7 @@ impl<'a> ElementSimulator<'a> {
             None => fold,
         };
         let designed = Psf::formed(&fold, designed, wave, &CURVE_LP_MM, scratch)?;
-        let perfect = self.perfect(chief, wavelength_um);
+        let perfect = self.perfect(element, chief, wavelength_um);
         let mut extracted = Vec::new();
         let mut judged = None;
         for (at, view) in colour.cases.iter().zip(&task.views) {

@@ -1,7 +1,11 @@
 //! The phase of every site of an element.
 
+use std::cell::OnceCell;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use super::{PhaseTerm, RadialPhase};
-use crate::{Design, Element};
+use crate::{Design, Element, LensSpec};
 use metalith_core::{Lattice, Wedge};
 
 /// Radii that are tabulated at most: 64 MB. A lens of 1 mm has a million.
@@ -24,6 +28,41 @@ pub struct LensPhase {
     offset: i64,
     /// Phases over the plane that elements have besides.
     terms: Vec<PhaseTerm>,
+    /// Elements, by their indices, whose lens is another or rotated.
+    own: BTreeMap<(i32, i32), OwnPhase>,
+}
+
+/// What an element has in place of the lens that all share.
+#[derive(Clone, Debug)]
+struct OwnPhase {
+    lens: Arc<LensPhase>,
+    rotation: Rotation,
+}
+
+/// Cosine and sine of a rotation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Rotation(f64, f64);
+
+impl Rotation {
+    const NONE: Self = Self(1.0, 0.0);
+
+    /// By so many degrees, from x towards y; exact where it is quarter turns.
+    fn of_deg(deg: f64) -> Self {
+        let quarters = (deg / 90.0).round();
+        let (sin, cos) = (deg - 90.0 * quarters).to_radians().sin_cos();
+        match quarters.rem_euclid(4.0) as u8 {
+            0 => Self(cos, sin),
+            1 => Self(-sin, cos),
+            2 => Self(-cos, -sin),
+            _ => Self(sin, -cos),
+        }
+    }
+
+    /// Where the place of a rotated element was before.
+    fn before(self, x: f64, y: f64) -> (f64, f64) {
+        let Self(cos, sin) = self;
+        (cos * x + sin * y, cos * y - sin * x)
+    }
 }
 
 /// Phase (turns) of a squared radius.
@@ -34,12 +73,32 @@ enum TurnsOfRadius {
 }
 
 impl LensPhase {
-    /// The phase of the lens of a design.
+    /// The phase of the lens of a design, and of the lenses that elements have of their own.
     pub fn of(design: &Design) -> Self {
-        Self {
-            terms: design.lens.terms.clone(),
-            ..Self::new(design.lattice(), design.lens.diameter_nm, &design.lens.phase)
+        let of_lens = |lens: &LensSpec| Self {
+            terms: lens.terms.clone(),
+            ..Self::new(design.lattice(), lens.diameter_nm, &lens.phase)
+        };
+        let mut shared = of_lens(&design.lens);
+        // Elements that are rotated alone share one table.
+        let rotated = OnceCell::new();
+        let mut own = BTreeMap::new();
+        for element in design.elements() {
+            let Some(placed) = design.array.placed(element.index) else {
+                continue;
+            };
+            if placed.lens.is_none() && placed.rotation_deg == 0.0 {
+                continue;
+            }
+            let lens = match &placed.lens {
+                Some(lens) => Arc::new(of_lens(lens)),
+                None => rotated.get_or_init(|| Arc::new(shared.clone())).clone(),
+            };
+            let rotation = Rotation::of_deg(placed.rotation_deg);
+            own.insert(element.index, OwnPhase { lens, rotation });
         }
+        shared.own = own;
+        shared
     }
 
     /// Tabulate `radial` for a lens of this diameter on this lattice.
@@ -74,17 +133,13 @@ impl LensPhase {
             stride_log2,
             offset,
             terms: Vec::new(),
+            own: BTreeMap::new(),
         }
     }
 
     /// The lattice that it is tabulated on.
     pub fn lattice(&self) -> Lattice {
         self.lattice
-    }
-
-    /// Whether elements have phases over the plane besides.
-    pub fn has_terms(&self) -> bool {
-        !self.terms.is_empty()
     }
 
     /// Phase over the radius at a site (turns), not reduced; none outside the lens.
@@ -108,12 +163,14 @@ fn radius2_um2(lattice: Lattice, r2: i64) -> f64 {
     r2 as f64 * half_pitch_um * half_pitch_um
 }
 
-/// The phase of one element: that of the lens and its wedge.
+/// The phase of one element: that of its lens, and its wedge.
 #[derive(Clone, Debug)]
 pub struct ElementPhase<'a> {
     lens: &'a LensPhase,
     /// Phases over the plane that it has.
     terms: Vec<&'a PhaseTerm>,
+    /// What phases over the plane are rotated by.
+    rotation: Rotation,
     /// Turns a half pitch along x and y.
     step: (f64, f64),
 }
@@ -121,8 +178,13 @@ pub struct ElementPhase<'a> {
 impl<'a> ElementPhase<'a> {
     /// The phase of an element.
     pub fn of(lens: &'a LensPhase, element: &Element) -> Self {
+        let (lens, rotation) = match lens.own.get(&element.index) {
+            Some(own) => (own.lens.as_ref(), own.rotation),
+            None => (lens, Rotation::NONE),
+        };
         Self {
             terms: lens.terms.iter().filter(|t| t.is_of(element.index)).collect(),
+            rotation,
             ..Self::new(lens, &element.wedge)
         }
     }
@@ -133,6 +195,7 @@ impl<'a> ElementPhase<'a> {
         Self {
             lens,
             terms: Vec::new(),
+            rotation: Rotation::NONE,
             step: (half_pitch_turns * wedge.sin_x, half_pitch_turns * wedge.sin_y),
         }
     }
@@ -145,6 +208,22 @@ impl<'a> ElementPhase<'a> {
     /// Whether no wedge is on the lens: its phase is the same at sites of one radius.
     pub fn is_radial(&self) -> bool {
         self.step == (0.0, 0.0) && self.terms.is_empty()
+    }
+
+    /// Whether nothing is on the lens but a wedge: a symmetry that turns the wedge into that of another element of the lens
+    /// turns the element into that.
+    pub fn is_steered_alone(&self) -> bool {
+        self.terms.is_empty()
+    }
+
+    /// Whether another element is of the same lens.
+    pub fn is_of_lens(&self, other: &ElementPhase<'_>) -> bool {
+        std::ptr::eq(self.lens, other.lens)
+    }
+
+    /// Whether a site is inside the lens.
+    pub fn holds(&self, ix: usize, iy: usize) -> bool {
+        self.lens.holds(ix, iy)
     }
 
     /// Phase at a site (turns), not reduced; none outside the lens.
@@ -160,7 +239,9 @@ impl<'a> ElementPhase<'a> {
             return Some(steered);
         }
         let lattice = self.lens.lattice;
-        let (x_um, y_um) = (lattice.coordinate_um(ix), lattice.coordinate_um(iy));
+        let (x_um, y_um) = self
+            .rotation
+            .before(lattice.coordinate_um(ix), lattice.coordinate_um(iy));
         Some(
             self.terms
                 .iter()

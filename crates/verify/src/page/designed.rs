@@ -4,7 +4,7 @@ use metalith_core::{Lattice, WidthMap, WidthRows};
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
 use metalith_design::phase::{ElementPhase, LensPhase};
-use metalith_report::{Axis, Chart, Page, PillarZoom, Plan, exact};
+use metalith_report::{Axis, Cell, Chart, Column, Page, PillarZoom, Plan, Table, exact};
 
 /// Pillars that the picture of the middle shows along an axis.
 const ZOOMED_PITCHES: f64 = 34.0;
@@ -25,6 +25,11 @@ pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
             "{} x {} elements of {lens}, {apart} apart, steered by {}° a step",
             design.array.count.0, design.array.count.1, design.array.steering_deg,
         ),
+        (count, None) if design.array.has_own_lenses() => {
+            format!(
+                "{count} elements, each with a lens of its own where the table says so, placed and steered one by one,"
+            )
+        }
         (count, None) => format!("{count} elements of {lens}, placed and steered one by one,"),
     };
     let pillars = match design.cell.shape.rectangles() {
@@ -56,6 +61,9 @@ pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
         .shape(design.cell.shape)
         .caption("Pillars as they are written, to scale."),
     ]);
+    if design.array.has_own_lenses() {
+        page.table(own_lenses(design));
+    }
     let lens = LensPhase::of(design);
     let phase = ElementPhase::of(&lens, &centre.element);
     let n = array.lattice.sites();
@@ -132,7 +140,7 @@ fn chip(design: &Design) -> Plan {
     plan.rectangle(outline, (-x, -y), (x, y));
     for element in design.elements() {
         let (cx, cy) = (um(element.centre_nm.0), um(element.centre_nm.1));
-        let radius = design.lens.radius_um();
+        let radius = design.lens_of(&element).radius_um();
         plan.circle(openings, cx, cy, radius + um(layout.apertures.margin_nm));
         plan.circle(pillars, cx, cy, radius);
         plan.label(cx, cy, element.label());
@@ -143,4 +151,33 @@ fn chip(design: &Design) -> Plan {
         }
     }
     plan
+}
+
+/// What each element is that was placed by itself.
+fn own_lenses(design: &Design) -> Table {
+    let mut table = Table::new([
+        Column::text("Element"),
+        Column::number("x", "um"),
+        Column::number("y", "um"),
+        Column::number("Diameter", "um"),
+        Column::number("Focal length", "um"),
+        Column::number("Rotation", "degrees"),
+        Column::text("Phase"),
+    ])
+    .caption("The elements and their lenses");
+    for element in design.elements() {
+        let (lens, [x, y]) = (design.lens_of(&element), element.centre_um());
+        let placed = design.array.placed(element.index);
+        let own = placed.is_some_and(|p| p.lens.as_ref().is_some_and(|l| l.phase != design.lens.phase));
+        table.row([
+            element.label().into(),
+            Cell::fixed(x, 3),
+            Cell::fixed(y, 3),
+            exact(f64::from(lens.diameter_nm) * 1e-3).into(),
+            exact(lens.focal_length_um).into(),
+            exact(placed.map_or(0.0, |p| p.rotation_deg)).into(),
+            if own { "its own" } else { "that of [phase]" }.into(),
+        ]);
+    }
+    table
 }
