@@ -9,7 +9,7 @@ use metalith_core::document::{Document, Section, load};
 use metalith_core::{ElementSite, Error, Lattice, Result};
 
 use crate::spec::{
-    ArraySpec, CellSpec, Element, FieldAngle, LayoutSpec, LensSpec, MappingSpec, OptimiseSpec, VerifySpec,
+    ArraySpec, CellSpec, Element, FieldAngle, LayoutSpec, LensOutline, LensSpec, MappingSpec, OptimiseSpec, VerifySpec,
 };
 
 /// Version of the format of design files that this program reads.
@@ -120,21 +120,34 @@ impl Design {
         self.array.lens_of(&self.lens, element.index)
     }
 
-    /// Nothing, if all elements are of one lens.
+    /// Nothing, if all elements are of one round lens.
     ///
     /// # Errors
-    /// If some are of their own; `who` knows one lens alone.
+    /// If they are not; `who` knows one round lens alone.
     pub fn one_lens(&self, who: &str) -> Result<()> {
-        if !self.array.has_own_lenses() {
-            return Ok(());
+        if self.array.has_own_lenses() {
+            return Err(Error::invalid(
+                format!(
+                    "{who} knows one lens for all elements, and elements of the design have their own, or rotated ones"
+                ),
+                "make a design of the elements that share a lens: without `diameter_um`, `aperture`, `focal_length_um`, \
+                 `rotation_deg` and [element.phase]",
+            ));
         }
-        Err(Error::invalid(
-            format!(
-                "{who} knows one lens for all elements, and elements of the design have their own, or rotated ones"
-            ),
-            "make a design of the elements that share a lens: without `diameter_um`, `focal_length_um`, `rotation_deg` and \
-             [element.phase]",
-        ))
+        if self.lens.outline.is_some() {
+            return Err(Error::invalid(
+                format!("{who} knows round lenses alone, and the aperture of the design is a polygon"),
+                "leave `aperture` of [lens] out: simulate the round lens about it",
+            ));
+        }
+        Ok(())
+    }
+
+    /// The outline of an element as it stands on the chip, from its middle; none where it is a circle.
+    pub fn outline_of(&self, element: &Element) -> Option<LensOutline> {
+        let rotation_deg = self.array.placed(element.index).map_or(0.0, |p| p.rotation_deg);
+        let outline = self.lens_of(element).outline.as_ref()?;
+        Some(outline.rotated(rotation_deg))
     }
 
     /// Radius of the openings in the metal around the lenses that have none of their own (um).

@@ -89,6 +89,7 @@ fn even(n: i64) -> i64 {
 pub(super) fn small_lens(design: &Design, diameter_um: f64, wavelength_nm: f64) -> Result<Class> {
     let mut small = hyperbolic(design, wavelength_nm);
     let share = diameter_um / (2.0 * design.lens.radius_um());
+    small.lens.outline = None;
     small.lens.diameter_nm = (diameter_um * 1e3).round() as u32;
     small.lens.focal_length_um = design.lens.focal_length_um * share;
     small.lens.phase = RadialPhase::Hyperbola {

@@ -30,8 +30,18 @@ pub(super) fn chip(design: &Design) -> Figure {
     for element in design.elements() {
         let radius = design.lens_of(&element).radius_um();
         let (x, y) = (element.centre_nm.0 as f64 * 1e-3, element.centre_nm.1 as f64 * 1e-3);
-        plan.circle(openings, x, y, radius + margin);
-        plan.circle(lenses, x, y, radius);
+        let shifted = |&(dx, dy): &(i64, i64)| (x + dx as f64 * 1e-3, y + dy as f64 * 1e-3);
+        match design.outline_of(&element) {
+            Some(outline) => {
+                let opening = outline.grown(design.layout.apertures.margin_nm);
+                plan.polygon(openings, opening.iter().map(shifted));
+                plan.polygon(lenses, outline.corners_nm().iter().map(shifted));
+            }
+            None => {
+                plan.circle(openings, x, y, radius + margin);
+                plan.circle(lenses, x, y, radius);
+            }
+        }
         plan.label(x, y - radius - margin - 0.022e-3 * h as f64, element.label());
     }
     for set in &design.layout.marks {

@@ -1,18 +1,21 @@
-//! Circular openings in the metal, as polygons.
+//! Openings in the metal, as polygons.
 
 use std::f64::consts::TAU;
 
 use metalith_design::{Design, Element};
 
-/// One polygon round each lens. It encloses the circle and is nowhere further from it than the chord
-/// error (and half a nanometre of rounding).
+/// One polygon round each lens: its outline with all sides moved outwards by the margin, or one that encloses the circle and is
+/// nowhere further from it than the chord error (and half a nanometre of rounding).
 pub(super) fn openings(design: &Design) -> Vec<Vec<(i64, i64)>> {
     design
         .elements()
         .iter()
         .map(|element| {
             let (cx, cy) = element.centre_nm;
-            let corners = circle(design, element);
+            let corners = match design.outline_of(element) {
+                Some(outline) => outline.grown(design.layout.apertures.margin_nm),
+                None => circle(design, element),
+            };
             corners.iter().map(|&(x, y)| (cx + x, cy + y)).collect()
         })
         .collect()

@@ -294,7 +294,7 @@ fn judge(
             orders: simulator.orders(&element, &phase, &rule, &read, progress)?,
             spots: simulator.simulate(&element, &phase, &read, progress)?,
             white: match &white {
-                Some(white) => white.simulate(&element, &read, progress)?,
+                Some(white) => white.simulate(&element, &phase, &read, progress)?,
                 None => Vec::new(),
             },
             histogram: widths.histogram(),

@@ -89,11 +89,15 @@ fn whole_mb(design: &Design) -> f64 {
     BASE_MB + 1e-6 * sites * (READ_BYTES * elements + DESIGNED_BYTES * distinct + SIMULATED_BYTES)
 }
 
-/// How elements are held that are read folded: of those that are not steered, an eighth.
+/// How elements are held that are read folded: of those that are round lenses and nothing else, an eighth.
 fn holdings(design: &Design) -> Vec<Holding> {
-    let held = |element: &Element| match (element.wedge.sin_x, element.wedge.sin_y) {
-        (0.0, 0.0) => Holding::Eighth,
-        _ => Holding::Whole,
+    let held = |element: &Element| {
+        let lens = design.lens_of(element);
+        let round = lens.outline.is_none() && !lens.terms.iter().any(|term| term.is_of(element.index));
+        match (element.wedge.sin_x, element.wedge.sin_y) {
+            (0.0, 0.0) if round => Holding::Eighth,
+            _ => Holding::Whole,
+        }
     };
     design.elements().iter().map(held).collect()
 }

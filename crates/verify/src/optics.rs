@@ -160,16 +160,10 @@ impl<'a> ElementSimulator<'a> {
 
     /// The lens with the perfect phase for the place where a chief ray lands, all sites of modulus one: what Strehl ratios
     /// are against.
-    fn perfect(&self, element: &Element, chief_um: [f64; 2], wavelength_um: f64) -> Matched {
-        let lens = self.design.lens_of(element);
-        let open = PhaseFunction {
-            lattice: self.lattice,
-            radius_um: lens.radius_um(),
-            amplitude: 1.0,
-            phase_rad: |_, _| 0.0,
-        };
+    fn perfect(&self, element: &Element, phase: &ElementPhase<'_>, chief_um: [f64; 2], wavelength_um: f64) -> Matched {
         let [x, y] = chief_um;
-        Matched::of(&open, [x, y, lens.focal_length_um], wavelength_um, 1.0)
+        let focus = [x, y, self.design.lens_of(element).focal_length_um];
+        open_matched(self.design, element, phase, focus, wavelength_um)
     }
 
     /// Number of wavelengths and angles of one element.
@@ -302,7 +296,7 @@ impl<'a> ElementSimulator<'a> {
                 if progress.stopped() {
                     return Err(Error::Interrupted);
                 }
-                let pair = self.pair(&task, element, designed, read.widths, scratch);
+                let pair = self.pair(&task, (element, phase), designed, read.widths, scratch);
                 progress.advance(1);
                 pair
             })
@@ -328,7 +322,7 @@ impl<'a> ElementSimulator<'a> {
     fn pair(
         &self,
         task: &Task<'_>,
-        element: &Element,
+        (element, phase): (&Element, &ElementPhase<'_>),
         designed: &dyn Aperture,
         widths: &dyn WidthRows,
         scratch: &mut Scratch,
@@ -352,7 +346,7 @@ impl<'a> ElementSimulator<'a> {
             None => fold,
         };
         let designed = Psf::formed(&fold, designed, wave, &CURVE_LP_MM, scratch)?;
-        let perfect = self.perfect(element, chief, wavelength_um);
+        let perfect = self.perfect(element, phase, chief, wavelength_um);
         let mut extracted = Vec::new();
         let mut judged = None;
         for (at, view) in colour.cases.iter().zip(&task.views) {
@@ -433,6 +427,34 @@ pub(super) fn landing(element: &Element, wavelength_um: f64, field: FieldAngle, 
 fn arriving(element: &Element, wavelength_um: f64, field: FieldAngle) -> Result<PlaneWave> {
     let field_rad = [field.x_deg, field.y_deg].map(f64::to_radians);
     Ok(incident(&element.wedge, wavelength_um, field_rad)?)
+}
+
+/// The sites of an element, all of modulus one, with the perfect phase for a focus (um).
+pub(super) fn open_matched(
+    design: &Design,
+    element: &Element,
+    phase: &ElementPhase<'_>,
+    focus_um: [f64; 3],
+    wavelength_um: f64,
+) -> Matched {
+    let (lattice, lens) = (phase.lattice(), design.lens_of(element));
+    let radius_um = lens.radius_um();
+    if lens.outline.is_some() {
+        let turns = |ix, iy| phase.holds(ix, iy).then_some(0.0);
+        let open = PhaseSites {
+            lattice,
+            radius_um,
+            turns,
+        };
+        return Matched::of(&open, focus_um, wavelength_um, 1.0);
+    }
+    let open = PhaseFunction {
+        lattice,
+        radius_um,
+        amplitude: 1.0,
+        phase_rad: |_, _| 0.0,
+    };
+    Matched::of(&open, focus_um, wavelength_um, 1.0)
 }
 
 /// Widths that tables go to.

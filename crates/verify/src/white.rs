@@ -9,14 +9,15 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::case::TransmissionTables;
-use super::optics::ReadElement;
+use super::optics::{ReadElement, open_matched};
 use metalith_camera::{Camera, ChannelSampling, Sampling};
 use metalith_core::{Error, Lattice, Progress, Result, Wedge};
+use metalith_design::phase::ElementPhase;
 use metalith_design::{CellIncidence, Design, Element};
 use metalith_made::{MadeView, SimulationCase};
 use metalith_wave::propagation;
 use metalith_wave::psf::{BandPart, BandSample, CURVE_LP_MM, band_otf, pixel_mtf, polychromatic};
-use metalith_wave::{Accuracy, Fold, Matched, PhaseFunction, PlaneWave, Psf, Scratch, Window};
+use metalith_wave::{Accuracy, Fold, PlaneWave, Psf, Scratch, Window};
 
 /// Largest distance of the wavelengths that are simulated (nm): eight intervals over a channel of 100 nm. How much
 /// this weighs is reported for each channel.
@@ -260,6 +261,7 @@ impl<'a> WhiteSimulator<'a> {
     pub fn simulate(
         &self,
         element: &Element,
+        phase: &ElementPhase<'_>,
         read: &ReadElement<'_>,
         progress: &dyn Progress,
     ) -> Result<Vec<WhiteChannel>> {
@@ -272,7 +274,7 @@ impl<'a> WhiteSimulator<'a> {
             _ => Ok(None),
         };
         let views = self.colours.iter().map(view).collect::<Result<Vec<_>>>()?;
-        let area_um2 = self.area_um2(element);
+        let area_um2 = self.area_um2(element, phase);
         let samples = self
             .colours
             .par_iter()
@@ -328,16 +330,9 @@ impl<'a> WhiteSimulator<'a> {
     }
 
     /// What the sites of an element pass if all pass everything (um^2).
-    fn area_um2(&self, element: &Element) -> f64 {
-        let lens = self.design.lens_of(element);
-        let open = PhaseFunction {
-            lattice: self.lattice,
-            radius_um: lens.radius_um(),
-            amplitude: 1.0,
-            phase_rad: |_, _| 0.0,
-        };
-        let focus = [0.0, 0.0, lens.focal_length_um];
-        Matched::of(&open, focus, self.design.mapping.wavelength_um, 1.0).power_um2
+    fn area_um2(&self, element: &Element, phase: &ElementPhase<'_>) -> f64 {
+        let focus = [0.0, 0.0, self.design.lens_of(element).focal_length_um];
+        open_matched(self.design, element, phase, focus, self.design.mapping.wavelength_um).power_um2
     }
 
     fn point(&self, element: &Element) -> Point {

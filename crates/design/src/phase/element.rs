@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::{PhaseTerm, RadialPhase};
-use crate::{Design, Element, LensSpec};
+use crate::{Design, Element, LensOutline, LensSpec};
 use metalith_core::{Lattice, Wedge};
 
 /// Radii that are tabulated at most: 64 MB. A lens of 1 mm has a million.
@@ -26,6 +26,8 @@ pub struct LensPhase {
     /// Entries are this power of two apart in squared half pitches: a shift, since this is done for each pillar.
     stride_log2: u32,
     offset: i64,
+    /// Where pillars stand within that, if the lens is not round.
+    outline: Option<LensOutline>,
     /// Phases over the plane that elements have besides.
     terms: Vec<PhaseTerm>,
     /// Elements, by their indices, whose lens is another or rotated.
@@ -41,13 +43,13 @@ struct OwnPhase {
 
 /// Cosine and sine of a rotation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Rotation(f64, f64);
+pub(crate) struct Rotation(f64, f64);
 
 impl Rotation {
     const NONE: Self = Self(1.0, 0.0);
 
     /// By so many degrees, from x towards y; exact where it is quarter turns.
-    fn of_deg(deg: f64) -> Self {
+    pub fn of_deg(deg: f64) -> Self {
         let quarters = (deg / 90.0).round();
         let (sin, cos) = (deg - 90.0 * quarters).to_radians().sin_cos();
         match quarters.rem_euclid(4.0) as u8 {
@@ -56,6 +58,12 @@ impl Rotation {
             2 => Self(-cos, -sin),
             _ => Self(sin, -cos),
         }
+    }
+
+    /// Where a place goes.
+    pub fn after(self, x: f64, y: f64) -> (f64, f64) {
+        let Self(cos, sin) = self;
+        (cos * x - sin * y, cos * y + sin * x)
     }
 
     /// Where the place of a rotated element was before.
@@ -76,11 +84,12 @@ impl LensPhase {
     /// The phase of the lens of a design, and of the lenses that elements have of their own.
     pub fn of(design: &Design) -> Self {
         let of_lens = |lens: &LensSpec| Self {
+            outline: lens.outline.clone(),
             terms: lens.terms.clone(),
             ..Self::new(design.lattice(), lens.diameter_nm, &lens.phase)
         };
         let mut shared = of_lens(&design.lens);
-        // Elements that are rotated alone share one table.
+        // Elements of a round lens that are rotated alone share one table.
         let rotated = OnceCell::new();
         let mut own = BTreeMap::new();
         for element in design.elements() {
@@ -91,7 +100,14 @@ impl LensPhase {
                 continue;
             }
             let lens = match &placed.lens {
-                Some(lens) => Arc::new(of_lens(lens)),
+                Some(_) => Arc::new(Self {
+                    outline: design.outline_of(&element),
+                    ..of_lens(design.lens_of(&element))
+                }),
+                None if shared.outline.is_some() => Arc::new(Self {
+                    outline: design.outline_of(&element),
+                    ..shared.clone()
+                }),
                 None => rotated.get_or_init(|| Arc::new(shared.clone())).clone(),
             };
             let rotation = Rotation::of_deg(placed.rotation_deg);
@@ -132,6 +148,7 @@ impl LensPhase {
             turns,
             stride_log2,
             offset,
+            outline: None,
             terms: Vec::new(),
             own: BTreeMap::new(),
         }
@@ -145,7 +162,7 @@ impl LensPhase {
     /// Phase over the radius at a site (turns), not reduced; none outside the lens.
     pub fn turns(&self, ix: usize, iy: usize) -> Option<f64> {
         let r2 = self.lattice.half_radius2(ix, iy);
-        (r2 <= self.limit).then(|| match &self.turns {
+        self.holds(ix, iy).then(|| match &self.turns {
             TurnsOfRadius::Tabulated(turns) => turns[((r2 - self.offset) >> self.stride_log2) as usize],
             TurnsOfRadius::Computed(radial) => radial.turns(radius2_um2(self.lattice, r2)),
         })
@@ -153,7 +170,9 @@ impl LensPhase {
 
     /// Whether a site is inside the lens.
     pub fn holds(&self, ix: usize, iy: usize) -> bool {
+        let place = |i| self.lattice.coordinate_nm(i);
         self.lattice.half_radius2(ix, iy) <= self.limit
+            && self.outline.as_ref().is_none_or(|o| o.holds(place(ix), place(iy)))
     }
 }
 
@@ -205,15 +224,15 @@ impl<'a> ElementPhase<'a> {
         self.lens.lattice
     }
 
-    /// Whether no wedge is on the lens: its phase is the same at sites of one radius.
+    /// Whether no wedge is on a round lens: its phase is the same at sites of one radius.
     pub fn is_radial(&self) -> bool {
-        self.step == (0.0, 0.0) && self.terms.is_empty()
+        self.step == (0.0, 0.0) && self.is_steered_alone()
     }
 
-    /// Whether nothing is on the lens but a wedge: a symmetry that turns the wedge into that of another element of the lens
+    /// Whether nothing is on a round lens but a wedge: a symmetry that turns the wedge into that of another element of the lens
     /// turns the element into that.
     pub fn is_steered_alone(&self) -> bool {
-        self.terms.is_empty()
+        self.terms.is_empty() && self.lens.outline.is_none()
     }
 
     /// Whether another element is of the same lens.

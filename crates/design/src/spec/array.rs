@@ -243,6 +243,12 @@ impl ArraySpec {
         self.placed.iter().any(|p| p.lens.is_some() || p.rotation_deg != 0.0)
     }
 
+    /// The lenses of all elements; where all share one, that.
+    pub fn lenses<'a>(&'a self, shared: &'a LensSpec) -> impl Iterator<Item = &'a LensSpec> {
+        let own = self.placed.iter().map(move |p| p.lens.as_ref().unwrap_or(shared));
+        own.chain(self.placed.is_empty().then_some(shared))
+    }
+
     /// Diameter of the largest lens (nm).
     pub fn largest_nm(&self, shared: &LensSpec) -> u32 {
         let each = self

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::outline::{self, DIAMETER, LensOutline};
 use super::{CellSpec, term};
 use crate::phase::{Interpolation, PhaseTerm, RadialPhase};
 use metalith_core::document::{Limits, Section};
@@ -12,6 +13,9 @@ use metalith_core::{Lattice, Result};
 pub struct LensSpec {
     /// Pillars stand where their centre is within this diameter (nm).
     pub diameter_nm: u32,
+    /// And within this outline, if it is no circle; the diameter is that of the circle about it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outline: Option<LensOutline>,
     /// Distance from the pillar tops to the sensor (um).
     pub focal_length_um: f64,
     /// Phase over the radius, before wedge and modulo.
@@ -23,11 +27,12 @@ pub struct LensSpec {
 
 impl LensSpec {
     pub fn read(lens: &Section<'_, '_>, phase: &Section<'_, '_>, cell: &CellSpec) -> Self {
-        let diameter_nm = read_diameter(lens, cell);
+        let (diameter_nm, outline) = outline::read(lens, cell);
         let focal_length_um = lens.float("focal_length_um", FOCAL_LENGTH);
         lens.finish();
         let mut it = Self {
             diameter_nm,
+            outline,
             focal_length_um,
             phase: RadialPhase::Flat,
             terms: Vec::new(),
@@ -46,14 +51,17 @@ impl LensSpec {
         cell: &CellSpec,
     ) -> Option<Self> {
         let phase = s.optional_section("phase");
-        if phase.is_none() && !s.has("diameter_um") && !s.has("focal_length_um") {
+        let sized = s.has("diameter_um") || s.has("aperture");
+        if phase.is_none() && !sized && !s.has("focal_length_um") {
             return None;
         }
+        let (diameter_nm, outline) = match sized {
+            true => outline::read(s, cell),
+            false => (shared.diameter_nm, shared.outline.clone()),
+        };
         let mut own = Self {
-            diameter_nm: match s.has("diameter_um") {
-                true => read_diameter(s, cell),
-                false => shared.diameter_nm,
-            },
+            diameter_nm,
+            outline,
             focal_length_um: s
                 .optional_float("focal_length_um", FOCAL_LENGTH)
                 .unwrap_or(shared.focal_length_um),
@@ -102,8 +110,8 @@ const FOCAL_LENGTH: Limits = Limits {
 };
 
 /// The diameter that a section says (nm).
-fn read_diameter(s: &Section<'_, '_>, cell: &CellSpec) -> u32 {
-    let diameter_um = s.float("diameter_um", Limits::new(5.0..=100_000.0, "um"));
+pub(super) fn read_diameter(s: &Section<'_, '_>, cell: &CellSpec) -> u32 {
+    let diameter_um = s.float("diameter_um", DIAMETER);
     let diameter_nm = (diameter_um * 1e3).round() as u32;
     if (diameter_um * 1e3 - f64::from(diameter_nm)).abs() > 1e-6 {
         s.fault(

@@ -1,9 +1,9 @@
 //! What was designed: the chip, the pillars in the middle, phase and width along a radius.
 
 use metalith_core::{Lattice, WidthMap, WidthRows};
-use metalith_design::Design;
 use metalith_design::array::PillarArray;
 use metalith_design::phase::{ElementPhase, LensPhase};
+use metalith_design::{Design, LensSpec};
 use metalith_report::{Axis, Cell, Chart, Column, Page, PillarZoom, Plan, Table, exact};
 
 /// Pillars that the picture of the middle shows along an axis.
@@ -14,8 +14,12 @@ const RADIUS_POINTS: usize = 600;
 /// The section of the design.
 pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
     page.section("What was designed");
+    let across = match design.lens.outline {
+        Some(_) => format!(" ({})", aperture(&design.lens)),
+        None => String::new(),
+    };
     let lens = format!(
-        "{} um, f = {} um",
+        "{} um{across}, f = {} um",
         exact(f64::from(design.lens.diameter_nm) * 1e-3),
         exact(design.lens.focal_length_um),
     );
@@ -141,8 +145,17 @@ fn chip(design: &Design) -> Plan {
     for element in design.elements() {
         let (cx, cy) = (um(element.centre_nm.0), um(element.centre_nm.1));
         let radius = design.lens_of(&element).radius_um();
-        plan.circle(openings, cx, cy, radius + um(layout.apertures.margin_nm));
-        plan.circle(pillars, cx, cy, radius);
+        let shifted = |(x, y): &(i64, i64)| (cx + um(*x), cy + um(*y));
+        match design.outline_of(&element) {
+            Some(outline) => {
+                plan.polygon(openings, outline.grown(layout.apertures.margin_nm).iter().map(shifted));
+                plan.polygon(pillars, outline.corners_nm().iter().map(shifted));
+            }
+            None => {
+                plan.circle(openings, cx, cy, radius + um(layout.apertures.margin_nm));
+                plan.circle(pillars, cx, cy, radius);
+            }
+        }
         plan.label(cx, cy, element.label());
     }
     for set in &layout.marks {
@@ -153,6 +166,14 @@ fn chip(design: &Design) -> Plan {
     plan
 }
 
+/// The aperture of a lens in words.
+fn aperture(lens: &LensSpec) -> String {
+    match &lens.outline {
+        Some(outline) => format!("a polygon of {} corners", outline.corners_nm().len()),
+        None => "a circle".into(),
+    }
+}
+
 /// What each element is that was placed by itself.
 fn own_lenses(design: &Design) -> Table {
     let mut table = Table::new([
@@ -160,6 +181,7 @@ fn own_lenses(design: &Design) -> Table {
         Column::number("x", "um"),
         Column::number("y", "um"),
         Column::number("Diameter", "um"),
+        Column::text("Aperture"),
         Column::number("Focal length", "um"),
         Column::number("Rotation", "degrees"),
         Column::text("Phase"),
@@ -174,6 +196,7 @@ fn own_lenses(design: &Design) -> Table {
             Cell::fixed(x, 3),
             Cell::fixed(y, 3),
             exact(f64::from(lens.diameter_nm) * 1e-3).into(),
+            aperture(lens).into(),
             exact(lens.focal_length_um).into(),
             exact(placed.map_or(0.0, |p| p.rotation_deg)).into(),
             if own { "its own" } else { "that of [phase]" }.into(),
