@@ -63,13 +63,14 @@ pub struct CompensationSummary {
 /// Compensate the pillars of a design for what a model says of the line.
 ///
 /// # Errors
-/// If a cell cannot be solved, or the user stopped it.
+/// If elements have lenses of their own, a cell cannot be solved, or the user stopped it.
 pub fn compensate(
     design: &Design,
     array: &PillarArray,
     model: &CalibratedModel,
     progress: &dyn Progress,
 ) -> Result<Compensated> {
+    design.one_lens("the compensation")?;
     let mut line = Line::new(design, model)?;
     let copies = |class: usize| array.placed.iter().filter(|p| p.class == class).count() as u64;
     let mut drawn = array.clone();

@@ -7,10 +7,10 @@ use sha2::{Digest, Sha256};
 
 use metalith_core::document::{Document, Section, load};
 use metalith_core::text::{hex, quoted};
-use metalith_core::{ElementSite, Lattice, Result};
+use metalith_core::{ElementSite, Error, Lattice, Result};
 
 use crate::spec::{
-    ArraySpec, CellSpec, Element, FieldAngle, LayoutSpec, LensSpec, MappingSpec, OptimiseSpec, VerifySpec,
+    ArraySpec, CellSpec, Element, FieldAngle, LayoutSpec, LensOutline, LensSpec, MappingSpec, OptimiseSpec, VerifySpec,
 };
 
 /// Version of the format of design files that this program reads.
@@ -67,9 +67,10 @@ impl Design {
         }
         let title = root.optional_text("title").unwrap_or_else(|| name.clone());
         let cell = CellSpec::read(&root.section("cell"));
-        let lens = LensSpec::read(&root.section("lens"), &root.section("phase"), &cell);
+        let phase = root.section("phase");
+        let lens = LensSpec::read(&root.section("lens"), &phase, &cell);
         let array_section = root.section("array");
-        let array = ArraySpec::read(&array_section, &lens, &root.sections("element"));
+        let array = ArraySpec::read(&array_section, &lens, &phase, &cell, &root.sections("element"));
         let mapping = MappingSpec::read(&root.section("mapping"), &cell, &array);
         let layout = LayoutSpec::read(root, &lens, &array);
         let verify = VerifySpec::read(&root.section("verify"));
@@ -91,10 +92,9 @@ impl Design {
 
     /// Read the files that the design names, after all its own mistakes are known to be none.
     fn with_files(mut self) -> Result<Self> {
-        let radius_um = self.lens.radius_um();
-        self.lens.phase.load(radius_um)?;
-        for term in &mut self.lens.terms {
-            term.load(radius_um)?;
+        self.lens.load()?;
+        for own in self.array.placed.iter_mut().filter_map(|p| p.lens.as_mut()) {
+            own.load()?;
         }
         self.mapping.load(&self.cell)?;
         let band_um = self.band_um()?;
@@ -110,14 +110,59 @@ impl Design {
         Ok(self)
     }
 
-    /// The lattice that the pillars of each element stand on.
+    /// The lattice that the pillars of each element stand on: it covers the largest.
     pub fn lattice(&self) -> Lattice {
-        Lattice::covering(self.lens.diameter_nm, self.cell.pitch_nm).expect("checked when the design was read")
+        let largest_nm = self.array.largest_nm(&self.lens);
+        Lattice::covering(largest_nm, self.cell.pitch_nm).expect("checked when the design was read")
     }
 
-    /// Radius of the openings in the metal around the lenses (um).
+    /// The lens of an element: its own, or that all share.
+    pub fn lens_of(&self, element: &Element) -> &LensSpec {
+        self.array.lens_of(&self.lens, element.index)
+    }
+
+    /// Nothing, if all elements are of one round lens.
+    ///
+    /// # Errors
+    /// If they are not; `who` knows one round lens alone.
+    pub fn one_lens(&self, who: &str) -> Result<()> {
+        if self.array.has_own_lenses() {
+            return Err(Error::invalid(
+                format!(
+                    "{who} knows one lens for all elements, and elements of the design have their own, or rotated ones"
+                ),
+                "make a design of the elements that share a lens: without `diameter_um`, `aperture`, `focal_length_um`, \
+                 `rotation_deg` and [element.phase]",
+            ));
+        }
+        if self.lens.outline.is_some() {
+            return Err(Error::invalid(
+                format!("{who} knows round lenses alone, and the aperture of the design is a polygon"),
+                "leave `aperture` of [lens] out: simulate the round lens about it",
+            ));
+        }
+        Ok(())
+    }
+
+    /// The outline of an element as it stands on the chip, from its middle; none where it is a circle.
+    pub fn outline_of(&self, element: &Element) -> Option<LensOutline> {
+        let rotation_deg = self.array.placed(element.index).map_or(0.0, |p| p.rotation_deg);
+        let outline = self.lens_of(element).outline.as_ref()?;
+        Some(outline.rotated(rotation_deg))
+    }
+
+    /// Radius of the openings in the metal around the lenses that have none of their own (um).
     pub fn aperture_radius_um(&self) -> f64 {
-        self.lens.radius_um() + self.layout.apertures.margin_nm as f64 * 1e-3
+        self.around_um(&self.lens)
+    }
+
+    /// Radius of the opening in the metal around an element (um).
+    pub fn aperture_radius_of_um(&self, element: &Element) -> f64 {
+        self.around_um(self.lens_of(element))
+    }
+
+    fn around_um(&self, lens: &LensSpec) -> f64 {
+        lens.radius_um() + self.layout.apertures.margin_nm as f64 * 1e-3
     }
 
     /// The elements of the array, row by row from the lowest.

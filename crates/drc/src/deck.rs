@@ -13,7 +13,7 @@ use metalith_core::text::quoted;
 use metalith_gds::LayerNumber;
 
 /// The decks that ship with the program, by the names of their files; the first is the standard one.
-const SHIPPED: [(&str, &str); 6] = [
+const SHIPPED: [(&str, &str); 16] = [
     ("sin_pillars.toml", include_str!("../../../rules/sin_pillars.toml")),
     ("sin_apertures.toml", include_str!("../../../rules/sin_apertures.toml")),
     ("dose_matrix.toml", include_str!("../../../rules/dose_matrix.toml")),
@@ -23,6 +23,25 @@ const SHIPPED: [(&str, &str); 6] = [
     ),
     ("test_openings.toml", include_str!("../../../rules/test_openings.toml")),
     ("circles.toml", include_str!("../../../rules/circles.toml")),
+    ("rectangles.toml", include_str!("../../../rules/rectangles.toml")),
+    ("openings.toml", include_str!("../../../rules/openings.toml")),
+    ("asi_pillars.toml", include_str!("../../../rules/asi_pillars.toml")),
+    ("tio2_circles.toml", include_str!("../../../rules/tio2_circles.toml")),
+    (
+        "tio2_rectangles.toml",
+        include_str!("../../../rules/tio2_rectangles.toml"),
+    ),
+    ("csi_pillars.toml", include_str!("../../../rules/csi_pillars.toml")),
+    ("dose_circles.toml", include_str!("../../../rules/dose_circles.toml")),
+    (
+        "dose_rectangles.toml",
+        include_str!("../../../rules/dose_rectangles.toml"),
+    ),
+    ("test_circles.toml", include_str!("../../../rules/test_circles.toml")),
+    (
+        "test_rectangles.toml",
+        include_str!("../../../rules/test_rectangles.toml"),
+    ),
 ];
 
 /// Version of the format of rule files that this program reads.

@@ -147,7 +147,13 @@ impl Rule for FieldRule {
             return self.cut_loose(flat, found);
         }
         for (k, e) in flat.elements.iter().enumerate() {
-            let lines = self.lines(flat, k, 0).len() + self.lines(flat, k, 1).len();
+            // Small lenses stand in the middle of the lattice of the largest.
+            let n = e.site.lattice.sites();
+            let columns = self.lines(flat, k, 0).into_iter();
+            let columns = columns.filter(|&(column, _)| (0..n).any(|row| e.widths.width(column, row) != 0));
+            let rows = self.lines(flat, k, 1).into_iter();
+            let rows = rows.filter(|&(row, _)| (0..n).any(|column| e.widths.width(column, row) != 0));
+            let lines = columns.count() + rows.count();
             if lines > 0 {
                 let half = (e.site.lattice.coordinate_nm(0).abs() + i64::from(e.site.lattice.pitch_nm()) / 2) as f64;
                 let unit = |nm: f64| flat.units(nm).round() as i64;

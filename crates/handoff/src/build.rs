@@ -123,7 +123,8 @@ fn verification(
         None => options.fidelity.unwrap_or(design.verify.fidelity),
     };
     let mut wanted = vec![judge];
-    if judge != Fidelity::Published {
+    // Polynomials in width and wavelength are of the paper's cell.
+    if judge != Fidelity::Published && design.cell.is_of_the_paper() {
         wanted.push(Fidelity::Published);
     }
     let models = cell_models(design, &wanted)?;

@@ -7,6 +7,7 @@ use super::dose::{Beam, DoseRow, Exposure, WriteTime, doses};
 use super::exposure::{exposures, snapping};
 use super::layouts::Layouts;
 use super::listing::Listing;
+use super::pad::measured;
 use super::process::Process;
 use super::sites::{Cross, MetrologySite, crosses, sites};
 use super::{job, tables};
@@ -18,7 +19,7 @@ use metalith_design::Design;
 pub(super) struct Documents {
     /// Exposure of each file of the first step, with its time at each current.
     pub exposures: Vec<(String, Exposure, Vec<WriteTime>)>,
-    /// Root mean square change of the widths when snapped to the shots of each beam (nm).
+    /// Root mean square change of the pillars when snapped to the shots of each beam (nm): see [`snapping`].
     pub snapping: Vec<(Beam, f64)>,
     pub doses: Vec<DoseRow>,
     pub sites: Vec<MetrologySite>,
@@ -43,13 +44,19 @@ pub(super) fn write(
         sites: sites(design, process, &layouts.array, &layouts.structures),
         crosses: crosses(design),
     };
-    dose_tables(files, process, layouts, &documents)?;
+    dose_tables(files, design, process, layouts, &documents)?;
     measuring_tables(files, design, process, layouts, &documents)?;
     jobs(files, design, process, &documents)?;
     Ok(documents)
 }
 
-fn dose_tables(files: &mut Listing, process: &Process, layouts: &Layouts, documents: &Documents) -> Result<()> {
+fn dose_tables(
+    files: &mut Listing,
+    design: &Design,
+    process: &Process,
+    layouts: &Layouts,
+    documents: &Documents,
+) -> Result<()> {
     tables::write_doses(
         &files.add(
             "dose/dose_table.csv",
@@ -58,6 +65,7 @@ fn dose_tables(files: &mut Listing, process: &Process, layouts: &Layouts, docume
         &documents.doses,
         &layouts.blocks,
         process.dose_matrix.layer,
+        design.cell.shape,
     )?;
     let times: Vec<_> = documents
         .exposures
@@ -80,11 +88,16 @@ fn measuring_tables(
     tables::write_structures(
         &files.add("tests/structures.csv", "what each test structure is for and where"),
         &layouts.structures,
+        design.cell.shape,
     )?;
     tables::write_sites(
-        &files.add("metrology/cd_table.csv", "where to measure widths, columns to fill in"),
+        &files.add(
+            "metrology/cd_table.csv",
+            format!("where to measure {}, columns to fill in", measured(design.cell.shape)),
+        ),
         &documents.sites,
         process,
+        design.cell.shape,
     )?;
     let layers = &design.layout.layers;
     let both = format!(

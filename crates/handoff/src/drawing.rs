@@ -1,4 +1,4 @@
-//! Cells of rectangles, references and labels in whole nanometres, written through gds21.
+//! Cells of polygons, references and labels in whole nanometres, written through gds21.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use metalith_core::{Error, Result, Silent, WholeFile, WidthRows};
 use metalith_design::LayoutLayer;
 use metalith_design::array::{Class, Symmetry};
 use metalith_gds::Layout;
-use metalith_layout::{LayoutFormat, convert};
+use metalith_layout::{LayoutFormat, PillarForm, convert};
 
 /// Layer and datatype.
 pub(super) type LayerPair = (i16, i16);
@@ -75,19 +75,20 @@ impl Sheet {
     }
 
     pub fn rectangle(&mut self, layer: LayerPair, r: RectNm) {
-        let corners = [(r.x0, r.y0), (r.x1, r.y0), (r.x1, r.y1), (r.x0, r.y1), (r.x0, r.y0)];
+        let corners = [(r.x0, r.y0), (r.x1, r.y0), (r.x1, r.y1), (r.x0, r.y1)];
+        self.polygon(layer, (0, 0), &corners);
+    }
+
+    /// A polygon with these corners about a place, the first not repeated.
+    pub fn polygon(&mut self, layer: LayerPair, (x, y): (i64, i64), corners: &[(i64, i64)]) {
+        let closed = corners.iter().chain(corners.first());
         let boundary = GdsBoundary {
             layer: layer.0,
             datatype: layer.1,
-            xy: corners.iter().map(|&(x, y)| point(x, y)).collect(),
+            xy: closed.map(|&(dx, dy)| point(x + dx, y + dy)).collect(),
             ..Default::default()
         };
         self.elements.push(boundary.into());
-    }
-
-    /// A square of even width about a place.
-    pub fn square(&mut self, layer: LayerPair, (x, y): (i64, i64), width: i64) {
-        self.rectangle(layer, RectNm::at(x - width / 2, y - width / 2, width, width));
     }
 
     pub fn text(&mut self, layer: LayerPair, (x, y): (i64, i64), words: impl Into<String>) {
@@ -212,15 +213,23 @@ impl Drawing {
         });
     }
 
-    /// Add a cell of one square, for arrays of it.
-    pub fn add_pillar(&mut self, name: &str, layer: LayerPair, width: i64) {
+    /// Add a cell of one pillar with these corners, for arrays of it.
+    pub fn add_pillar(&mut self, name: &str, layer: LayerPair, corners: &[(i64, i64)]) {
         let mut sheet = Sheet::new(name);
-        sheet.square(layer, (0, 0), width);
+        sheet.polygon(layer, (0, 0), corners);
         self.add(sheet);
     }
 
-    /// Add the pillars of a lens as a cell of this name, folded by its symmetries.
-    pub fn add_lens(&mut self, name: &str, layer: LayerPair, class: &Class) {
+    /// Add the pillars of a lens as a cell of this name, folded by its symmetries. Squares are drawn where they are; other
+    /// outlines, which have more corners, once each in a cell of their own.
+    pub fn add_lens(&mut self, name: &str, layer: LayerPair, class: &Class, form: PillarForm) {
+        let own = |number: u16| format!("{name}_{}", form.cell_name(number));
+        if !form.is_square() {
+            let counts = class.widths.histogram();
+            for number in (1..counts.len()).filter(|&w| counts[w] > 0).map(|w| w as u16) {
+                self.add_pillar(&own(number), layer, &form.corners(number));
+            }
+        }
         let lattice = class.widths.lattice();
         let (n, mut room) = (lattice.sites(), Vec::new());
         let mut whole = Sheet::new(name);
@@ -233,7 +242,11 @@ impl Drawing {
                     .filter(|(_, w)| **w != 0)
                 {
                     let at = (lattice.coordinate_nm(ix), lattice.coordinate_nm(iy));
-                    sheet.square(layer, at, i64::from(width));
+                    if form.is_square() {
+                        sheet.polygon(layer, at, &form.corners(width));
+                    } else {
+                        sheet.place(&own(width), at, Symmetry::IDENTITY);
+                    }
                 }
             }
             for symmetry in &part.copies {

@@ -4,7 +4,7 @@ use super::census::Census;
 use super::dose::{Beam, Exposure, WriteTime};
 use super::fields;
 use super::process::Process;
-use metalith_core::{Result, WidthRows};
+use metalith_core::{PillarShape, Result, WidthRows};
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
 
@@ -49,7 +49,8 @@ pub(super) fn exposures(
     Ok(exposures)
 }
 
-/// How much the widths of the array change on the shots of each beam, root mean square over all pillars.
+/// How much the pillars of the array change on the shots of each beam, root mean square over all pillars (nm): their widths, or of
+/// rotated rectangles, which have no edges along the shots, the places of their corners.
 pub(super) fn snapping(array: &PillarArray, process: &Process) -> Result<Vec<(Beam, f64)>> {
     let mut counts: Vec<u64> = Vec::new();
     let histograms: Vec<_> = array.classes.iter().map(|c| c.widths.histogram()).collect();
@@ -65,9 +66,25 @@ pub(super) fn snapping(array: &PillarArray, process: &Process) -> Result<Vec<(Be
         .iter()
         .map(|&current| {
             let beam = Beam::choose(&process.writer, current, process.resist.dose_uc_cm2)?;
-            let square = |(w, &n): (usize, &u64)| n as f64 * (beam.snapped_nm(w as f64) - w as f64).powi(2);
-            let sum: f64 = counts.iter().enumerate().skip(1).map(square).sum();
+            let of_pillar = |(w, &n): (usize, &u64)| n as f64 * snapped_square(array.shape, w as u16, &beam);
+            let sum: f64 = counts.iter().enumerate().skip(1).map(of_pillar).sum();
             Ok((beam, (sum / pillars.max(1) as f64).sqrt()))
         })
         .collect()
+}
+
+/// Square of what the shots change of a pillar (nm^2): of its width, or, mean over them, of the places of its corners.
+fn snapped_square(shape: PillarShape, number: u16, beam: &Beam) -> f64 {
+    let off = |nm: f64| beam.snapped_nm(nm) - nm;
+    match shape {
+        PillarShape::Square | PillarShape::Circle => off(f64::from(number)).powi(2),
+        PillarShape::Rectangle(pillars) => {
+            let corners = pillars.corners(number);
+            let sum: f64 = corners
+                .iter()
+                .map(|&(x, y)| off(x as f64).powi(2) + off(y as f64).powi(2))
+                .sum();
+            sum / corners.len() as f64
+        }
+    }
 }

@@ -46,8 +46,8 @@ impl WriteFields {
 pub(super) fn of_design(design: &Design, process: &Process) -> u64 {
     let (w, h) = design.layout.chip.size_nm;
     let mut fields = WriteFields::new((-w / 2, -h / 2), process.writer.field_used_um);
-    let radius = i64::from(design.lens.diameter_nm) / 2;
     for element in design.elements() {
+        let radius = i64::from(design.lens_of(&element).diameter_nm) / 2;
         let (cx, cy) = element.centre_nm;
         let around = RectNm::new(cx - radius, cy - radius, cx + radius, cy + radius);
         fields.touch(around, |f| {

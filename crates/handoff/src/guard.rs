@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::manifest::{self, files_below};
 use super::process::Process;
-use metalith_core::{Error, Result};
+use metalith_core::{Error, PillarShape, Result};
 use metalith_design::Design;
 
 /// Whether the process can make the design at all.
@@ -20,15 +20,6 @@ pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
             "a positive resist needs `method = \"lift_off\"`, a negative one `method = \"direct_etch\"`",
         ));
     }
-    if !design.cell.shape.is_square() {
-        return Err(Error::invalid(
-            format!(
-                "the pillars of the design are {}: dose matrix, test structures and areas of a hand-off are of squares as yet",
-                design.cell.shape.plural()
-            ),
-            "hand off what `metalith layout` and `metalith check` leave, with the report of `metalith run`",
-        ));
-    }
     let film = design.cell.pillar_material.as_str();
     if !process.transfer.films.iter().any(|f| f == film) {
         return Err(Error::invalid(
@@ -38,6 +29,16 @@ pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
                 process.transfer.etch
             ),
             "use a process file for this film, or, if its etch is right for it, add the film to `films` in [transfer]",
+        ));
+    }
+    if process.checks.of_shape(design.cell.shape).is_none() {
+        let shapes = design.cell.shape.plural();
+        return Err(Error::invalid(
+            format!("the pillars of the design are {shapes}, and the process has no decks of rules for them"),
+            match design.cell.shape {
+                PillarShape::Square => "add `pillar_rules`, `dose_rules` and `test_rules` to [checks]".to_owned(),
+                _ => format!("add a section [checks.{shapes}] with `pillar_rules`, `dose_rules` and `test_rules`"),
+            },
         ));
     }
     let taken = design.layout.layers.all();

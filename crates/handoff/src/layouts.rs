@@ -159,7 +159,7 @@ const BESIDE_REFERENCE: i64 = 50_000;
 
 /// The design with one hyperbolic lens on a chip of its own, at full size.
 fn reference_design(design: &Design, process: &Process) -> Design {
-    let mut reference = matrix::hyperbolic(design, process.tests.reference_wavelength_nm);
+    let mut reference = matrix::hyperbolic(design, process.reference_wavelength_nm(design));
     reference.name = "reference_lens".into();
     reference.title = "Hyperbolic reference lens".into();
     reference.layout.marks.clear();

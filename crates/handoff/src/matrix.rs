@@ -4,11 +4,13 @@ use std::path::Path;
 
 use super::dose::doses;
 use super::drawing::{Drawing, LayerPair, RectNm, Sheet, nm, number};
+use super::pad::dose_pads;
 use super::process::Process;
 use metalith_core::{Result, Silent};
 use metalith_design::Design;
 use metalith_design::array::{Class, PillarArray, Symmetry};
 use metalith_design::phase::RadialPhase;
+use metalith_layout::PillarForm;
 
 /// Space between the parts of a block (nm).
 const APART: i64 = 20_000;
@@ -29,10 +31,10 @@ pub(super) struct DoseBlock {
     pub bounds: RectNm,
 }
 
-/// The blocks of a dose matrix, base dose in the middle of the file, each in the middle of a field of its own: a
-/// dose is not to be judged across a seam.
-pub(super) fn blocks(process: &Process) -> Vec<DoseBlock> {
-    let size = Sizes::of(process);
+/// The blocks of a dose matrix with so many pads each, base dose in the middle of the file, each in the middle of a field of
+/// its own: a dose is not to be judged across a seam.
+pub(super) fn blocks(process: &Process, pads: usize) -> Vec<DoseBlock> {
+    let size = Sizes::of(process, pads);
     let field = nm(process.writer.field_used_um);
     let fields = |length: i64| (length + size.gap).div_euclid(field) * field + field;
     let step = (fields(size.width), fields(size.height));
@@ -61,10 +63,10 @@ struct Sizes {
 }
 
 impl Sizes {
-    fn of(process: &Process) -> Self {
+    fn of(process: &Process, pads: usize) -> Self {
         let spec = &process.dose_matrix;
         let (lens, pad, gap) = (nm(spec.lens_diameter_um), nm(spec.pad_um), nm(spec.gap_um));
-        let pads = spec.pad_widths_nm.len() as i64;
+        let pads = pads as i64;
         let beside = lens + 2 * (APART + NUMERAL);
         Self {
             lens,
@@ -87,6 +89,7 @@ fn even(n: i64) -> i64 {
 pub(super) fn small_lens(design: &Design, diameter_um: f64, wavelength_nm: f64) -> Result<Class> {
     let mut small = hyperbolic(design, wavelength_nm);
     let share = diameter_um / (2.0 * design.lens.radius_um());
+    small.lens.outline = None;
     small.lens.diameter_nm = (diameter_um * 1e3).round() as u32;
     small.lens.focal_length_um = design.lens.focal_length_um * share;
     small.lens.phase = RadialPhase::Hyperbola {
@@ -115,26 +118,25 @@ pub(super) fn hyperbolic(design: &Design, wavelength_nm: f64) -> Design {
 /// If the file cannot be written.
 pub(super) fn write(path: &Path, design: &Design, process: &Process) -> Result<Vec<DoseBlock>> {
     let spec = &process.dose_matrix;
-    let lens = small_lens(design, spec.lens_diameter_um, process.tests.reference_wavelength_nm)?;
+    let lens = small_lens(design, spec.lens_diameter_um, process.reference_wavelength_nm(design))?;
+    let pads = dose_pads(design, process);
     let pitch = i64::from(design.cell.pitch_nm);
     let (label, marks) = (
         number(&design.layout.layers.label),
         number(&design.layout.layers.pillar_marks),
     );
-    let blocks = blocks(process);
+    let blocks = blocks(process, pads.len());
     let mut drawing = Drawing::new("DOSE_MATRIX", &design.layout.timestamp);
     let mut top = Sheet::new("DOSE_MATRIX");
     for (block, dose) in blocks.iter().zip(doses(process)) {
         let layer: LayerPair = (spec.layer, block.number as i16);
         let lens_name = format!("D{}_LENS", block.number);
-        drawing.add_lens(&lens_name, layer, &lens);
+        drawing.add_lens(&lens_name, layer, &lens, PillarForm::of(design));
         top.place(&lens_name, block.lens, Symmetry::IDENTITY);
-        let count = spec.pad_widths_nm.len() as i64;
-        let span = (nm(spec.pad_um) + APART) * (count - 1);
-        for (k, &width_nm) in spec.pad_widths_nm.iter().enumerate() {
-            let width = legal_width(design, width_nm);
-            let cell = format!("D{}_W{width}", block.number);
-            drawing.add_pillar(&cell, layer, width);
+        let span = (nm(spec.pad_um) + APART) * (pads.len() as i64 - 1);
+        for (k, pad) in pads.iter().enumerate() {
+            let cell = format!("D{}_{}", block.number, pad.cell_name());
+            drawing.add_pillar(&cell, layer, &pad.corners());
             let x = block.pads.0 - span / 2 + k as i64 * (nm(spec.pad_um) + APART);
             top_pad(&mut top, &cell, (x, block.pads.1), nm(spec.pad_um), pitch);
         }
@@ -159,17 +161,4 @@ pub(super) fn top_pad(sheet: &mut Sheet, pillar: &str, (x, y): (i64, i64), side:
     let n = (side / pitch).max(1);
     let first = -(n - 1) * pitch / 2;
     sheet.array(pillar, (x + first, y + first), (n as i16, n as i16), pitch);
-}
-
-/// The width that the design may write nearest to one that is asked for (nm).
-pub(super) fn legal_width(design: &Design, width_nm: f64) -> i64 {
-    let nearest = design
-        .cell
-        .widths_nm()
-        .min_by(|a, b| {
-            let off = |w: &u16| (f64::from(*w) - width_nm).abs();
-            off(a).total_cmp(&off(b))
-        })
-        .unwrap_or(design.cell.width_range_nm.0);
-    i64::from(nearest)
 }

@@ -2,6 +2,7 @@
 
 use super::drawing::RectNm;
 use super::matrix::DoseBlock;
+use super::pad::PadPillar;
 use super::process::{Method, Process, Tone};
 use super::structures::Structure;
 use metalith_design::Design;
@@ -25,12 +26,22 @@ pub(super) fn chip(design: &Design) -> Figure {
     let (w, h) = design.layout.chip.size_nm;
     let (a, b) = corners(RectNm::new(-w / 2, -h / 2, w / 2, h / 2));
     plan.rectangle(outline, a, b);
-    let radius = design.lens.radius_um();
     let margin = design.layout.apertures.margin_nm as f64 * 1e-3;
     for element in design.elements() {
+        let radius = design.lens_of(&element).radius_um();
         let (x, y) = (element.centre_nm.0 as f64 * 1e-3, element.centre_nm.1 as f64 * 1e-3);
-        plan.circle(openings, x, y, radius + margin);
-        plan.circle(lenses, x, y, radius);
+        let shifted = |&(dx, dy): &(i64, i64)| (x + dx as f64 * 1e-3, y + dy as f64 * 1e-3);
+        match design.outline_of(&element) {
+            Some(outline) => {
+                let opening = outline.grown(design.layout.apertures.margin_nm);
+                plan.polygon(openings, opening.iter().map(shifted));
+                plan.polygon(lenses, outline.corners_nm().iter().map(shifted));
+            }
+            None => {
+                plan.circle(openings, x, y, radius + margin);
+                plan.circle(lenses, x, y, radius);
+            }
+        }
         plan.label(x, y - radius - margin - 0.022e-3 * h as f64, element.label());
     }
     for set in &design.layout.marks {
@@ -74,6 +85,9 @@ fn arrow(plan: &mut Plan, layer: PlanLayer, reach: f64, upright: bool) {
     plan.polygon(layer, points.map(|(x, y)| if upright { (y, x) } else { (x, y) }));
 }
 
+/// Height of pillars that distances in the cross-section are chosen for (um).
+const DRAWN_HEIGHT_UM: f64 = 0.7;
+
 /// What happens to the film where the first step exposes, and to the metal where the second does.
 pub(super) fn tone(design: &Design, process: &Process) -> Figure {
     let mut plan = Plan::new("Tone of both steps, in cross-section").width(900.0);
@@ -89,8 +103,14 @@ pub(super) fn tone(design: &Design, process: &Process) -> Figure {
         process.resist.thickness_nm * 1e-3,
         process.transfer.mask_thickness_nm * 1e-3,
     );
-    let (low, high) = design.cell.width_range_nm;
+    // What a cut shows: from the narrowest to the widest pillar, of rectangles from edge to edge.
+    let (low, high) = match design.cell.shape.rectangles() {
+        Some(pillars) => (pillars.width_nm, pillars.length_nm),
+        None => design.cell.width_range_nm,
+    };
     let widths = [low, (low + high) / 2, high].map(|w| f64::from(w) * 1e-3);
+    // Thickness of the substrate and room for words grow with the pillars.
+    let scale = height / DRAWN_HEIGHT_UM;
     let pillars: Vec<(f64, f64)> = widths
         .iter()
         .enumerate()
@@ -117,18 +137,18 @@ pub(super) fn tone(design: &Design, process: &Process) -> Figure {
     };
     let top = height + resist_um;
     for k in 0..4 {
-        plan.rectangle(glass, (k as f64 * panel, -0.25), (k as f64 * panel + end, 0.0));
+        plan.rectangle(glass, (k as f64 * panel, -0.25 * scale), (k as f64 * panel + end, 0.0));
     }
     plan.rectangle(film, (0.0, 0.0), (end, height));
     plan.rectangle(resist, (0.0, height), (end, top));
     for &(a, b) in &pillars {
-        plan.rectangle(exposed, (a, height), (b, top + 0.12));
+        plan.rectangle(exposed, (a, height), (b, top + 0.12 * scale));
     }
     let at = panel;
     plan.rectangle(film, (at, 0.0), (at + end, height));
     if process.transfer.method == Method::LiftOff {
         for &(a, b) in open {
-            plan.rectangle(mask, (at + a, height), (at + b, height + mask_um.max(0.02)));
+            plan.rectangle(mask, (at + a, height), (at + b, height + mask_um.max(0.02 * scale)));
         }
     } else {
         for &(a, b) in closed {
@@ -151,16 +171,16 @@ pub(super) fn tone(design: &Design, process: &Process) -> Figure {
         (at + middle - widths[1] / 2.0, 0.0),
         (at + middle + widths[1] / 2.0, height),
     );
-    plan.rectangle(exposed, (at + inside.0, 0.0), (at + inside.1, metal_um + 0.12));
+    plan.rectangle(exposed, (at + inside.0, 0.0), (at + inside.1, metal_um + 0.12 * scale));
     let second = if process.transfer.method == Method::LiftOff {
         "2 mask lifted off"
     } else {
         "2 developed"
     };
     for (k, words) in ["1 exposed", second, "3 etched", "4 metal opened"].iter().enumerate() {
-        plan.label(k as f64 * panel + middle, top + 0.28, *words);
+        plan.label(k as f64 * panel + middle, top + 0.28 * scale, *words);
     }
-    plan.reach(0.0, top + 0.4);
+    plan.reach(0.0, top + 0.4 * scale);
     plan.caption(format!(
         "Heights to scale. Step 1, {} resist: {}. Step 2: {}. Middle pillar of the last panel stands for a whole lens.",
         match process.resist.tone {
@@ -184,8 +204,13 @@ fn complement(intervals: &[(f64, f64)], end: f64) -> Vec<(f64, f64)> {
     gaps
 }
 
-/// The nine blocks with their doses.
-pub(super) fn dose_matrix(process: &Process, blocks: &[DoseBlock], doses: &[super::dose::DoseRow]) -> Figure {
+/// The nine blocks with their doses, each with these pads.
+pub(super) fn dose_matrix(
+    process: &Process,
+    pads: &[PadPillar],
+    blocks: &[DoseBlock],
+    doses: &[super::dose::DoseRow],
+) -> Figure {
     let spec = &process.dose_matrix;
     let mut plan = Plan::new("Dose matrix").width(560.0);
     let bounds = plan.outlines("block");
@@ -208,8 +233,8 @@ pub(super) fn dose_matrix(process: &Process, blocks: &[DoseBlock], doses: &[supe
         let (x, y) = at(block.lens);
         plan.circle(lens, x, y, spec.lens_diameter_um / 2.0);
         let (px, py) = at(block.pads);
-        let count = spec.pad_widths_nm.len() as f64;
-        for k in 0..spec.pad_widths_nm.len() {
+        let count = pads.len() as f64;
+        for k in 0..pads.len() {
             let left = px + (k as f64 - (count - 1.0) / 2.0) * (spec.pad_um + 20.0) - spec.pad_um / 2.0;
             plan.rectangle(
                 pad,
@@ -224,17 +249,16 @@ pub(super) fn dose_matrix(process: &Process, blocks: &[DoseBlock], doses: &[supe
         );
     }
     plan.caption(format!(
-        "DoseBlock n is on layer {}, datatype n, and has its number beside its lens. Each stands in the middle of a field of \
-         {} um, if a field is about the origin. Pads from the left: {} nm.",
+        "Block n is on layer {}, datatype n, and has its number beside its lens. Each stands in the middle of a field of \
+         {} um, if a field is about the origin. Pads from the left: pillars of {}.",
         spec.layer,
         process.writer.field_used_um,
-        spec.pad_widths_nm
-            .iter()
-            .map(f64::to_string)
-            .collect::<Vec<_>>()
-            .join(", ")
+        pads.iter().map(PadPillar::words).collect::<Vec<_>>().join(", ")
     ))
 }
+
+/// Characters of a name that there is room for in a structure with a width: not those of lines.
+const LONGEST_LABEL: usize = 7;
 
 /// Where each test structure is.
 pub(super) fn tests(structures: &[Structure], frame: RectNm, border: (i64, i64)) -> Figure {
@@ -265,7 +289,7 @@ pub(super) fn tests(structures: &[Structure], frame: RectNm, border: (i64, i64))
         };
         let (p, q) = corners(s.bounds);
         plan.rectangle(layers[k], p, q);
-        if s.id.len() <= 6 && s.width_nm.is_some() || s.width_nm.is_none() && s.id != "CLEAVE" {
+        if s.id.len() <= LONGEST_LABEL && s.drawn.is_some() || s.drawn.is_none() && s.id != "CLEAVE" {
             plan.label((p.0 + q.0) / 2.0, (p.1 + q.1) / 2.0, s.id.clone());
         }
     }

@@ -47,7 +47,7 @@ pub(super) struct Subject<'a> {
 
 /// The layouts of a hand-off with the rules of each.
 pub(super) fn subjects<'a>(sources: &'a Sources, layouts: &'a Layouts, opened: &'a OfEach<Layout>) -> [Subject<'a>; 7] {
-    let decks = &sources.process.checks;
+    let (decks, first) = (&sources.process.checks, sources.first_step());
     let design = Some((&sources.design, &layouts.array));
     let reference = Some((&layouts.reference, &layouts.reference_array));
     let subject = |name, layout, rules: &std::path::Path| Subject {
@@ -61,17 +61,17 @@ pub(super) fn subjects<'a>(sources: &'a Sources, layouts: &'a Layouts, opened: &
     [
         Subject {
             design,
-            ..subject("pillars", &opened.pillars, &decks.pillar_rules)
+            ..subject("pillars", &opened.pillars, &first.pillar_rules)
         },
         Subject {
             design,
             with: Some(&opened.pillars),
             ..subject("apertures", &opened.apertures, &decks.aperture_rules)
         },
-        subject("dose_matrix", &opened.dose_matrix, &decks.dose_rules),
+        subject("dose_matrix", &opened.dose_matrix, &first.dose_rules),
         Subject {
             structures: Cow::Borrowed(&layouts.structures),
-            ..subject("tests_pillars", &opened.tests, &decks.test_rules)
+            ..subject("tests_pillars", &opened.tests, &first.test_rules)
         },
         Subject {
             with: Some(&opened.tests),
@@ -80,7 +80,7 @@ pub(super) fn subjects<'a>(sources: &'a Sources, layouts: &'a Layouts, opened: &
         Subject {
             design: reference,
             structures: Cow::Owned(vec![middle_of_reference()]),
-            ..subject("reference_pillars", &opened.reference, &decks.pillar_rules)
+            ..subject("reference_pillars", &opened.reference, &first.pillar_rules)
         },
         Subject {
             design: reference,

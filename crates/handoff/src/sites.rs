@@ -1,8 +1,9 @@
 //! Places on the chip at which widths are to be measured, and crosses to align by.
 
-use metalith_core::part;
+use metalith_core::{PillarShape, WidthMap, part};
 use serde::Serialize;
 
+use super::pad::{DrawnSize, legal_width, whole_mdeg};
 use super::process::Process;
 use super::structures::Structure;
 use metalith_design::Design;
@@ -13,6 +14,11 @@ use metalith_design::array::PillarArray;
 const NEIGHBOURS: usize = 1;
 /// Widths between the narrowest and the widest that are looked for on the lenses.
 const WIDTHS: usize = 5;
+/// Rotations of rectangles that are looked for (degrees): along the axes, where an SEM measures best, and between them.
+const ROTATIONS_DEG: [f64; 4] = [0.0, 45.0, 90.0, 135.0];
+
+/// Least and greatest of something, where pillars differ by it.
+type Range<T> = Option<(T, T)>;
 
 /// One place to measure a width at.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -29,9 +35,15 @@ pub struct MetrologySite {
     /// From the middle of the element (um).
     pub element_x_um: Option<f64>,
     pub element_y_um: Option<f64>,
-    pub width_nm: u16,
-    /// Narrowest and widest of the pillar and its neighbours (nm).
-    pub around_nm: (u16, u16),
+    #[serde(flatten)]
+    pub drawn: DrawnSize,
+    /// Narrowest and widest of the pillar and its neighbours (nm), where they differ by their width.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub around_nm: Range<u16>,
+    /// Least and greatest rotation of the pillar and its neighbours (degrees), where they differ by it; counted on beyond half a
+    /// turn and below none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub around_deg: Range<f64>,
 }
 
 /// Places on the first and the last element of the array, and one on each structure that has a width.
@@ -51,7 +63,9 @@ pub(super) fn sites(
     for placed in chosen {
         let map = array.widths(placed);
         let (cx, cy) = placed.element.centre_nm;
-        for best in best_sites(&map, design.lens.radius_um(), &widths, zones) {
+        let radius_um = design.lens_of(&placed.element).radius_um();
+        for best in best_sites(&map, array.shape, radius_um, &widths, zones) {
+            let (around_nm, around_deg) = neighbours(array.shape, &best);
             let (x, y) = (map.lattice.coordinate_nm(best.ix), map.lattice.coordinate_nm(best.iy));
             sites.push(MetrologySite {
                 id: format!("L{:02}", sites.len() + 1),
@@ -61,13 +75,14 @@ pub(super) fn sites(
                 y_um: (cy + y) as f64 * 1e-3,
                 element_x_um: Some(x as f64 * 1e-3),
                 element_y_um: Some(y as f64 * 1e-3),
-                width_nm: best.width_nm,
-                around_nm: best.around_nm,
+                drawn: DrawnSize::of(array.shape, best.number),
+                around_nm,
+                around_deg,
             });
         }
     }
     for structure in structures {
-        let Some(width) = structure.width_nm else { continue };
+        let Some(drawn) = structure.drawn else { continue };
         let (x, y) = structure.bounds.centre();
         sites.push(MetrologySite {
             id: format!("T{:02}", sites.len() + 1),
@@ -77,72 +92,105 @@ pub(super) fn sites(
             y_um: y as f64 * 1e-3,
             element_x_um: None,
             element_y_um: None,
-            width_nm: width as u16,
-            around_nm: (width as u16, width as u16),
+            drawn,
+            around_nm: drawn.rotation_deg.is_none().then_some((drawn.width_nm, drawn.width_nm)),
+            around_deg: drawn.rotation_deg.map(|deg| (deg, deg)),
         });
     }
     sites
 }
 
-/// Widths to look for: equal steps inside the range, not its ends, where few pillars are (nm).
+/// What to look for: widths in equal steps inside the range, not its ends, where few pillars are (nm); of rectangles the numbers
+/// of a few rotations.
 fn targets(design: &Design) -> Vec<u16> {
+    if let Some(pillars) = design.cell.shape.rectangles() {
+        return ROTATIONS_DEG.map(|deg| pillars.number(deg.to_radians())).to_vec();
+    }
     let (low, high) = design.cell.width_range_nm;
     let step = f64::from(high - low) / (WIDTHS + 1) as f64;
     (1..=WIDTHS)
-        .map(|k| super::matrix::legal_width(design, f64::from(low) + step * k as f64) as u16)
+        .map(|k| legal_width(design, f64::from(low) + step * k as f64))
         .collect()
 }
 
 struct BestSite {
     ix: usize,
     iy: usize,
-    width_nm: u16,
-    around_nm: (u16, u16),
+    /// Width (nm), or number of the rotation.
+    number: u16,
+    /// Least and greatest of the pillar and its neighbours, from its own: widths (nm), or steps of rotation.
+    around: (i32, i32),
 }
 
-/// For each width and each ring of the lens the site whose neighbours differ least from it; among equals
+/// The neighbours of a site in nm, or in degrees.
+fn neighbours(shape: PillarShape, site: &BestSite) -> (Range<u16>, Range<f64>) {
+    let (low, high) = site.around;
+    match shape {
+        PillarShape::Square | PillarShape::Circle => {
+            let width = |from_own: i32| (i32::from(site.number) + from_own) as u16;
+            (Some((width(low), width(high))), None)
+        }
+        PillarShape::Rectangle(pillars) => {
+            let own = pillars.rotation(site.number).to_degrees();
+            let deg = |from_own: i32| whole_mdeg(own + f64::from(from_own) * pillars.step_deg());
+            (None, Some((deg(low), deg(high))))
+        }
+    }
+}
+
+/// How far a width or number is from another; of rotations, of which the last is next to the first, the short way round.
+fn from_own(shape: PillarShape, own: u16, other: u16) -> i32 {
+    let apart = i32::from(other) - i32::from(own);
+    match shape.rectangles() {
+        None => apart,
+        Some(pillars) => {
+            let (steps, half) = (i32::from(pillars.steps), i32::from(pillars.steps / 2));
+            (apart + half).rem_euclid(steps) - half
+        }
+    }
+}
+
+/// For each width or rotation and each ring of the lens the site whose neighbours differ least from it; among equals
 /// the one nearest the x axis, where a stage finds it by moving along one axis.
-fn best_sites(map: &metalith_core::WidthMap, radius_um: f64, widths: &[u16], zones: usize) -> Vec<BestSite> {
+fn best_sites(map: &WidthMap, shape: PillarShape, radius_um: f64, targets: &[u16], zones: usize) -> Vec<BestSite> {
     let n = map.lattice.sites();
-    let mut best: Vec<Option<(u64, BestSite)>> = (0..widths.len() * zones).map(|_| None).collect();
+    let mut best: Vec<Option<(u64, BestSite)>> = (0..targets.len() * zones).map(|_| None).collect();
     for iy in NEIGHBOURS..n.saturating_sub(NEIGHBOURS) {
         for ix in NEIGHBOURS..n.saturating_sub(NEIGHBOURS) {
-            let width_nm = map.width_nm[[iy, ix]];
-            let Some(target) = widths.iter().position(|&w| w == width_nm) else {
+            let number = map.width_nm[[iy, ix]];
+            let Some(target) = targets.iter().position(|&w| w == number) else {
                 continue;
             };
-            let Some(around_nm) = around(map, ix, iy) else { continue };
+            let Some(around) = around(map, shape, ix, iy) else {
+                continue;
+            };
             let r_um = map.lattice.coordinate_um(ix).hypot(map.lattice.coordinate_um(iy));
             let zone = ((r_um / radius_um * zones as f64) as usize).min(zones - 1);
-            let difference = u64::from((width_nm - around_nm.0).max(around_nm.1 - width_nm));
+            let difference = u64::from(around.0.unsigned_abs().max(around.1.unsigned_abs()));
             let aside = map.lattice.half_index(iy).unsigned_abs();
             let score = (difference << 32) | aside;
             let held = &mut best[target * zones + zone];
             if held.as_ref().is_none_or(|(known, _)| score < *known) {
-                *held = Some((
-                    score,
-                    BestSite {
-                        ix,
-                        iy,
-                        width_nm,
-                        around_nm,
-                    },
-                ));
+                let site = BestSite { ix, iy, number, around };
+                *held = Some((score, site));
             }
         }
     }
     best.into_iter().flatten().map(|(_, site)| site).collect()
 }
 
-/// Narrowest and widest pillar in the square about a site; none where one is missing.
-fn around(map: &metalith_core::WidthMap, ix: usize, iy: usize) -> Option<(u16, u16)> {
+/// Least and greatest pillar in the square about a site, from its own; none where one is missing.
+fn around(map: &WidthMap, shape: PillarShape, ix: usize, iy: usize) -> Option<(i32, i32)> {
     let part = part(
         map.width_nm.view(),
         iy - NEIGHBOURS..iy + NEIGHBOURS + 1,
         ix - NEIGHBOURS..ix + NEIGHBOURS + 1,
     );
-    let low = *part.iter().min()?;
-    (low > 0).then(|| (low, *part.iter().max().expect("nine pillars")))
+    let own = map.width_nm[[iy, ix]];
+    part.iter().try_fold((0, 0), |(low, high), &other| {
+        let apart = from_own(shape, own, other);
+        (other > 0).then_some((low.min(apart), high.max(apart)))
+    })
 }
 
 /// One cross.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::listing::Listing;
 use super::options::HandoffOptions;
-use super::process::Process;
+use super::process::{Process, ShapeRules};
 use metalith_camera::Camera;
 use metalith_compensate::compensated_name;
 use metalith_core::file::read_at_most;
@@ -50,12 +50,12 @@ impl Sources {
         let process = options
             .process
             .as_deref()
-            .map_or_else(|| Ok(Process::standard()), Process::read)?;
+            .map_or_else(|| Ok(Process::of_film(&design.cell.pillar_material)), Process::read)?;
         // The process and its decks may be those of the program, which are no files.
         let (path, text) = process.source();
         kept.push(InputCopy::new("process_", path, "the process values", text.as_bytes()));
         let mut decks: Vec<(PathBuf, Deck)> = Vec::new();
-        for rules in process.checks.decks() {
+        for rules in process.checks.decks(design.cell.shape) {
             if decks.iter().any(|(known, _)| known == rules) {
                 continue;
             }
@@ -98,6 +98,12 @@ impl Sources {
             waivers,
             kept,
         })
+    }
+
+    /// The decks of the first step for the pillars of the design.
+    pub fn first_step(&self) -> &ShapeRules {
+        let rules = self.process.checks.of_shape(self.design.cell.shape);
+        rules.expect("a process that has none is refused before")
     }
 
     /// A deck that the process names.
@@ -188,8 +194,14 @@ fn files_of(path: &Path, design: &Design) -> Result<Vec<Named>> {
     if let Some(table) = &design.mapping.table_file {
         files.push((table.clone(), "", "phase to width, the mapping of the design"));
     }
-    if let RadialPhase::Table { file, .. } = &design.lens.phase {
-        files.push((file.clone(), "", "phase of the lens over its radius"));
+    let own = design.array.placed.iter().filter_map(|placed| placed.lens.as_ref());
+    for lens in std::iter::once(&design.lens).chain(own) {
+        if let RadialPhase::Table { file, .. } = &lens.phase {
+            files.push((file.clone(), "", "phase of the lens over its radius"));
+        }
+        for file in lens.terms.iter().filter_map(|term| term.file.as_ref()) {
+            files.push((file.clone(), "", "a phase over the plane of the lens"));
+        }
     }
     if let Some(camera) = &design.verify.camera {
         for file in Camera::read(camera)?.files {
@@ -197,13 +209,23 @@ fn files_of(path: &Path, design: &Design) -> Result<Vec<Named>> {
         }
     }
     let folder = path.parent().unwrap_or(Path::new(""));
-    for text in [&design.cell.pillar_material, &design.cell.substrate_material] {
-        // Judging a hand-off and choosing its etch needs to know both, at any fidelity.
+    let cell = &design.cell;
+    let others = cell
+        .ambient_material
+        .iter()
+        .chain(cell.under.iter().map(|layer| &layer.material));
+    for text in [&cell.pillar_material, &cell.substrate_material]
+        .into_iter()
+        .chain(others)
+    {
+        // Judging a hand-off and choosing its etch needs to know them, at any fidelity.
         Material::resolve(text, folder)?;
         if Material::named(text).is_err() {
             files.push((folder.join(text), "", "index of a material of the cell"));
         }
     }
-    files.dedup();
+    // A file that is named twice is kept once.
+    let mut known = BTreeSet::new();
+    files.retain(|(path, ..)| known.insert(path.clone()));
     Ok(files)
 }

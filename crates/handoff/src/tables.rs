@@ -4,10 +4,11 @@ use std::path::Path;
 
 use super::dose::{DoseRow, WriteTime};
 use super::matrix::DoseBlock;
+use super::pad::DrawnSize;
 use super::process::Process;
 use super::sites::{Cross, MetrologySite};
 use super::structures::Structure;
-use metalith_core::{Result, WholeFile};
+use metalith_core::{PillarShape, Result, WholeFile};
 
 /// Rows of text under a head.
 struct Csv(String);
@@ -48,8 +49,20 @@ fn um(x: f64) -> String {
     format!("{x:.3}")
 }
 
-pub(super) fn write_doses(path: &Path, doses: &[DoseRow], blocks: &[DoseBlock], layer: i16) -> Result<()> {
-    let mut csv = Csv::new(&[
+/// The doses, with a column to fill in for each size that tells a pad: of rectangles two.
+pub(super) fn write_doses(
+    path: &Path,
+    doses: &[DoseRow],
+    blocks: &[DoseBlock],
+    layer: i16,
+    shape: PillarShape,
+) -> Result<()> {
+    let measured: &[&str] = match shape {
+        PillarShape::Square => &["measured_pad_width_nm"],
+        PillarShape::Circle => &["measured_pad_diameter_nm"],
+        PillarShape::Rectangle(_) => &["measured_pad_width_nm", "measured_pad_length_nm"],
+    };
+    let mut head = vec![
         "number",
         "layer",
         "datatype",
@@ -60,11 +73,12 @@ pub(super) fn write_doses(path: &Path, doses: &[DoseRow], blocks: &[DoseBlock], 
         "lens_y_um",
         "pads_x_um",
         "pads_y_um",
-        "measured_pad_width_nm",
-        "remarks",
-    ]);
+    ];
+    head.extend(measured);
+    head.push("remarks");
+    let mut csv = Csv::new(&head);
     for (dose, block) in doses.iter().zip(blocks) {
-        csv.row(&[
+        let mut cells = vec![
             dose.number.to_string(),
             layer.to_string(),
             dose.number.to_string(),
@@ -75,9 +89,9 @@ pub(super) fn write_doses(path: &Path, doses: &[DoseRow], blocks: &[DoseBlock], 
             um(block.lens.1 as f64 * 1e-3),
             um(block.pads.0 as f64 * 1e-3),
             um(block.pads.1 as f64 * 1e-3),
-            String::new(),
-            String::new(),
-        ]);
+        ];
+        cells.resize(head.len(), String::new());
+        csv.row(&cells);
     }
     csv.write(path)
 }
@@ -112,28 +126,33 @@ pub(super) fn write_times(path: &Path, files: &[(String, Vec<WriteTime>)]) -> Re
     csv.write(path)
 }
 
-pub(super) fn write_sites(path: &Path, sites: &[MetrologySite], process: &Process) -> Result<()> {
-    let mut csv = Csv::new(&[
-        "id",
-        "file",
-        "place",
-        "x_um",
-        "y_um",
-        "element_x_um",
-        "element_y_um",
-        "drawn_nm",
-        "neighbours_min_nm",
-        "neighbours_max_nm",
-        "expected_low_nm",
-        "expected_high_nm",
-        "measured_x_nm",
-        "measured_y_nm",
-        "remarks",
-    ]);
+/// Places to measure at. Squares and circles are measured along x and y, rectangles along their edges.
+pub(super) fn write_sites(path: &Path, sites: &[MetrologySite], process: &Process, shape: PillarShape) -> Result<()> {
+    let mut head = vec!["id", "file", "place", "x_um", "y_um", "element_x_um", "element_y_um"];
+    head.extend(drawn_columns(shape));
+    head.extend::<&[&str]>(match shape {
+        PillarShape::Square | PillarShape::Circle => &[
+            "neighbours_min_nm",
+            "neighbours_max_nm",
+            "expected_low_nm",
+            "expected_high_nm",
+            "measured_x_nm",
+            "measured_y_nm",
+        ],
+        PillarShape::Rectangle(_) => &[
+            "neighbours_min_deg",
+            "neighbours_max_deg",
+            "expected_within_nm",
+            "measured_width_nm",
+            "measured_length_nm",
+            "measured_rotation_deg",
+        ],
+    });
+    head.push("remarks");
+    let mut csv = Csv::new(&head);
     let within = 2.0 * process.metrology.width_tolerance_nm;
     for site in sites {
-        let width = f64::from(site.width_nm);
-        csv.row(&[
+        let mut cells = vec![
             site.id.clone(),
             site.file.to_owned(),
             site.place.clone(),
@@ -141,17 +160,39 @@ pub(super) fn write_sites(path: &Path, sites: &[MetrologySite], process: &Proces
             um(site.y_um),
             site.element_x_um.map_or_else(String::new, um),
             site.element_y_um.map_or_else(String::new, um),
-            site.width_nm.to_string(),
-            site.around_nm.0.to_string(),
-            site.around_nm.1.to_string(),
-            format!("{:.1}", width - within),
-            format!("{:.1}", width + within),
-            String::new(),
-            String::new(),
-            String::new(),
-        ]);
+        ];
+        cells.extend(drawn_cells(shape, Some(&site.drawn)));
+        if shape.rectangles().is_some() {
+            let deg = |pick: fn((f64, f64)) -> f64| site.around_deg.map_or_else(String::new, |a| pick(a).to_string());
+            cells.extend([deg(|a| a.0), deg(|a| a.1), format!("{within:.1}")]);
+        } else {
+            let nm = |pick: fn((u16, u16)) -> u16| site.around_nm.map_or_else(String::new, |a| pick(a).to_string());
+            let width = f64::from(site.drawn.width_nm);
+            let expected = [width - within, width + within].map(|nm| format!("{nm:.1}"));
+            cells.extend([nm(|a| a.0), nm(|a| a.1)].into_iter().chain(expected));
+        }
+        cells.resize(head.len(), String::new());
+        csv.row(&cells);
     }
     csv.write(path)
+}
+
+/// Columns of what is drawn where something is measured.
+fn drawn_columns(shape: PillarShape) -> &'static [&'static str] {
+    match shape {
+        PillarShape::Square | PillarShape::Circle => &["drawn_nm"],
+        PillarShape::Rectangle(_) => &["drawn_width_nm", "drawn_length_nm", "drawn_rotation_deg"],
+    }
+}
+
+fn drawn_cells(shape: PillarShape, drawn: Option<&DrawnSize>) -> Vec<String> {
+    let width = drawn.map_or_else(String::new, |d| d.width_nm.to_string());
+    if shape.rectangles().is_none() {
+        return vec![width];
+    }
+    let length = drawn.and_then(|d| d.length_nm).map(|nm| nm.to_string());
+    let rotation = drawn.and_then(|d| d.rotation_deg).map(|deg| deg.to_string());
+    vec![width, length.unwrap_or_default(), rotation.unwrap_or_default()]
 }
 
 pub(super) fn write_crosses(path: &Path, crosses: &[Cross], steps: &str) -> Result<()> {
@@ -182,14 +223,18 @@ pub(super) fn write_crosses(path: &Path, crosses: &[Cross], steps: &str) -> Resu
     csv.write(path)
 }
 
-pub(super) fn write_structures(path: &Path, structures: &[Structure]) -> Result<()> {
-    let mut csv = Csv::new(&["id", "x0_um", "y0_um", "x1_um", "y1_um", "drawn_nm", "purpose"]);
+pub(super) fn write_structures(path: &Path, structures: &[Structure], shape: PillarShape) -> Result<()> {
+    let mut head = vec!["id", "x0_um", "y0_um", "x1_um", "y1_um"];
+    head.extend(drawn_columns(shape));
+    head.push("purpose");
+    let mut csv = Csv::new(&head);
     for s in structures {
         let b = s.bounds;
-        let corners = [b.x0, b.y0, b.x1, b.y1].map(|v| um(v as f64 * 1e-3));
-        let [x0, y0, x1, y1] = corners;
-        let width = s.width_nm.map_or_else(String::new, |w| w.to_string());
-        csv.row(&[s.id.clone(), x0, y0, x1, y1, width, s.purpose.clone()]);
+        let mut cells = vec![s.id.clone()];
+        cells.extend([b.x0, b.y0, b.x1, b.y1].map(|v| um(v as f64 * 1e-3)));
+        cells.extend(drawn_cells(shape, s.drawn.as_ref()));
+        cells.push(s.purpose.clone());
+        csv.row(&cells);
     }
     csv.write(path)
 }

@@ -1,27 +1,30 @@
-//! Circular openings in the metal, as polygons.
+//! Openings in the metal, as polygons.
 
 use std::f64::consts::TAU;
 
-use metalith_design::Design;
+use metalith_design::{Design, Element};
 
-/// One polygon round each lens. It encloses the circle and is nowhere further from it than the chord
-/// error (and half a nanometre of rounding).
+/// One polygon round each lens: its outline with all sides moved outwards by the margin, or one that encloses the circle and is
+/// nowhere further from it than the chord error (and half a nanometre of rounding).
 pub(super) fn openings(design: &Design) -> Vec<Vec<(i64, i64)>> {
-    let corners = circle(design);
     design
         .elements()
         .iter()
         .map(|element| {
             let (cx, cy) = element.centre_nm;
+            let corners = match design.outline_of(element) {
+                Some(outline) => outline.grown(design.layout.apertures.margin_nm),
+                None => circle(design, element),
+            };
             corners.iter().map(|&(x, y)| (cx + x, cy + y)).collect()
         })
         .collect()
 }
 
 /// Corners round the origin, counter-clockwise, no two neighbours the same.
-fn circle(design: &Design) -> Vec<(i64, i64)> {
+fn circle(design: &Design, element: &Element) -> Vec<(i64, i64)> {
     let spec = &design.layout.apertures;
-    let radius = f64::from(design.lens.diameter_nm) / 2.0 + spec.margin_nm as f64;
+    let radius = f64::from(design.lens_of(element).diameter_nm) / 2.0 + spec.margin_nm as f64;
     let count = spec.vertices(radius);
     let step = TAU / count as f64;
     // Between two corners the polygon touches the circle.

@@ -3,15 +3,16 @@
 use metalith_core::{CHORD_ERROR, PillarShape};
 use metalith_design::Design;
 
-/// How the pillars of a design are drawn.
+/// How pillars are drawn: their shape, and how near to a circle polygons are.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct PillarForm {
+pub struct PillarForm {
     shape: PillarShape,
     /// Of circles (nm).
     chord_error_nm: f64,
 }
 
 impl PillarForm {
+    /// The pillars of a design.
     pub fn of(design: &Design) -> Self {
         let plain = Self::plain(design.cell.shape);
         Self {
@@ -26,6 +27,17 @@ impl PillarForm {
             shape,
             chord_error_nm: CHORD_ERROR,
         }
+    }
+
+    /// The same chords for pillars of another shape.
+    #[must_use]
+    pub fn with_shape(self, shape: PillarShape) -> Self {
+        Self { shape, ..self }
+    }
+
+    /// What the pillars are.
+    pub fn shape(&self) -> PillarShape {
+        self.shape
     }
 
     /// Whether a pillar is an upright square, which both formats have a short record for.

@@ -23,7 +23,6 @@ use chrono::NaiveDateTime;
 use gds21::GdsElement;
 
 use fixed::FixedShapes;
-use form::PillarForm;
 use frame::LibraryFrame;
 use metalith_core::{Error, Progress, Result, WholeFile};
 use metalith_design::array::PillarArray;
@@ -31,6 +30,7 @@ use metalith_design::{Design, Hierarchy, LayoutLayer};
 use pillars::PillarWriter;
 
 pub use convert::convert;
+pub use form::PillarForm;
 pub use format::{LayoutFormat, OasisEncoding};
 pub use free::{FreeLayout, write_free};
 pub use properties::write_layer_properties;

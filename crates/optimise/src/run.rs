@@ -52,8 +52,9 @@ impl OptimiseTask {
     /// The task that a design sets.
     ///
     /// # Errors
-    /// If its lens has no rings.
+    /// If its lens has no rings, or elements have lenses of their own.
     pub fn of(design: &Design) -> Result<Self> {
+        design.one_lens("the optimiser")?;
         let rings = Rings::new(design.lattice(), design.lens.diameter_nm)?;
         let own_turns = turns_of(&rings, &design.lens.phase);
         let lens = Lens {

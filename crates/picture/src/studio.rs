@@ -105,8 +105,8 @@ impl Studio {
     /// For a layout of a design behind a camera file, as drawn or as a calibrated model says, and scenes of a field.
     ///
     /// # Errors
-    /// If the layout cannot be read, the camera does not see the chip, a scene is wider than the array sees, or the user
-    /// stopped it.
+    /// If elements have lenses of their own, the layout cannot be read, the camera does not see the chip, a scene is wider than
+    /// the array sees, or the user stopped it.
     pub fn open(
         design: &Design,
         layout: &Path,
@@ -115,6 +115,7 @@ impl Studio {
         scene: &SceneImage,
         progress: &dyn Progress,
     ) -> Result<Self> {
+        design.one_lens("the simulation of pictures")?;
         let elements = element_views(design, camera);
         let channels = sampling_of(design, camera)?.channels;
         let mut basis = scene.basis.clone();

@@ -183,7 +183,11 @@ fn neighbours(design: &Design) -> String {
     let turns = |e: &Element| e.wedge.sin_x.hypot(e.wedge.sin_y) / e.wedge.wavelength_um * design.lattice().pitch_um();
     let steepest = design.elements().iter().map(turns).fold(0.0, f64::max);
     // The lens adds its own slope, at its rim as much as sin(atan(R / f)) / wavelength.
-    let rim = (design.lens.radius_um() / design.lens.focal_length_um).atan().sin();
+    let slope = |e: &Element| {
+        let lens = design.lens_of(e);
+        (lens.radius_um() / lens.focal_length_um).atan().sin()
+    };
+    let rim = design.elements().iter().map(slope).fold(0.0, f64::max);
     let rim = rim / design.mapping.wavelength_um * design.lattice().pitch_um();
     let worst = |turns: f64| {
         let all = overstated(turns);
@@ -218,8 +222,9 @@ fn outside(found: &Verification) -> (f64, f64) {
 }
 
 fn dispersion(design: &Design) -> String {
-    let of =
-        |e: &Element| design.lens.focal_length_um * e.wedge.sin_x.hypot(e.wedge.sin_y) / (e.wedge.wavelength_um * 1e3);
+    let of = |e: &Element| {
+        design.lens_of(e).focal_length_um * e.wedge.sin_x.hypot(e.wedge.sin_y) / (e.wedge.wavelength_um * 1e3)
+    };
     let most = design.elements().iter().map(of).fold(0.0, f64::max);
     if most == 0.0 {
         return "none: no element has a wedge".into();

@@ -268,7 +268,7 @@ fn judge(
     let lens = LensPhase::of(design);
     let responses = MappingResponse::new(design, cases.judge)?;
     let mut simulator = optics::ElementSimulator::new(design, array.lattice, cases, accuracy, part_bytes)?;
-    let chosen = distinct(&elements, cases.judge.depends_on_place());
+    let chosen = distinct(design, &elements, cases.judge.depends_on_place());
     let shown = chosen.iter().map(|(k, _)| elements[*k].element).collect::<Vec<_>>();
     simulator.add_directions(&shown, progress)?;
     let mut white = white::WhiteSimulator::new(design, array.lattice, cases.judge, part_bytes)?;
@@ -294,7 +294,7 @@ fn judge(
             orders: simulator.orders(&element, &phase, &rule, &read, progress)?,
             spots: simulator.simulate(&element, &phase, &read, progress)?,
             white: match &white {
-                Some(white) => white.simulate(&element, &read, progress)?,
+                Some(white) => white.simulate(&element, &phase, &read, progress)?,
                 None => Vec::new(),
             },
             histogram: widths.histogram(),
@@ -396,24 +396,31 @@ fn compare<W>(
 }
 
 /// Which elements are simulated, and for how many each stands: one of each kind, and the first of those
-/// that are not as intended; each by itself where light depends on `place`.
-fn distinct(elements: &[ElementCheck], place: bool) -> Vec<(usize, usize)> {
-    let mut chosen: Vec<(usize, usize, Option<usize>)> = Vec::new();
+/// that are not as intended; each by itself where light depends on `place`. Elements of other focal lengths are of other kinds.
+fn distinct(design: &Design, elements: &[ElementCheck], place: bool) -> Vec<(usize, usize)> {
+    let mut chosen: Vec<(usize, usize)> = Vec::new();
+    // Class and focal length of each that was chosen; none of those that are not as intended.
+    let mut kinds: Vec<Option<(usize, f64)>> = Vec::new();
     let mut faulty = 0;
     for (k, check) in elements.iter().enumerate() {
-        match check.copy_of {
-            Some(class) => match chosen.iter_mut().find(|c| !place && c.2 == Some(class)) {
-                Some(known) => known.1 += 1,
-                None => chosen.push((k, 1, Some(class))),
-            },
-            None if faulty < MOST_FAULTY => {
-                faulty += 1;
-                chosen.push((k, 1, None));
-            }
-            None => {}
+        let focal_length_um = design.lens_of(&check.element).focal_length_um;
+        let kind = check.copy_of.map(|class| (class, focal_length_um));
+        let known = kinds
+            .iter()
+            .position(|known| !place && kind.is_some() && *known == kind);
+        if let Some(known) = known {
+            chosen[known].1 += 1;
+            continue;
+        }
+        if kind.is_none() {
+            faulty += 1;
+        }
+        if kind.is_some() || faulty <= MOST_FAULTY {
+            chosen.push((k, 1));
+            kinds.push(kind);
         }
     }
-    chosen.into_iter().map(|(k, copies, _)| (k, copies)).collect()
+    chosen
 }
 
 fn facts<W>(layout: &Layout, extraction: &Extraction<W>, path: &Path) -> LayoutFacts {

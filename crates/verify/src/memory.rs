@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use metalith_core::Result;
-use metalith_design::{Design, Element};
+use metalith_design::{Design, Element, LensSpec};
 use metalith_gds::extract::{Holding, fits_folded, held_sites};
 use metalith_wave::{Accuracy, Fold, Window};
 
@@ -89,19 +89,23 @@ fn whole_mb(design: &Design) -> f64 {
     BASE_MB + 1e-6 * sites * (READ_BYTES * elements + DESIGNED_BYTES * distinct + SIMULATED_BYTES)
 }
 
-/// How elements are held that are read folded: of those that are not steered, an eighth.
+/// How elements are held that are read folded: of those that are round lenses and nothing else, an eighth.
 fn holdings(design: &Design) -> Vec<Holding> {
-    let held = |element: &Element| match (element.wedge.sin_x, element.wedge.sin_y) {
-        (0.0, 0.0) => Holding::Eighth,
-        _ => Holding::Whole,
+    let held = |element: &Element| {
+        let lens = design.lens_of(element);
+        let round = lens.outline.is_none() && !lens.terms.iter().any(|term| term.is_of(element.index));
+        match (element.wedge.sin_x, element.wedge.sin_y) {
+            (0.0, 0.0) if round => Holding::Eighth,
+            _ => Holding::Whole,
+        }
     };
     design.elements().iter().map(held).collect()
 }
 
 /// The most that the spectra of a field of the design take (bytes).
 fn largest_spectra_bytes(design: &Design, accuracy: Accuracy) -> Result<usize> {
-    let (lens, lattice) = (&design.lens, design.lattice());
-    let bytes = |wavelength_um, landing, accuracy| -> Result<usize> {
+    let lattice = design.lattice();
+    let bytes = |lens: &LensSpec, wavelength_um, landing, accuracy| -> Result<usize> {
         let window = Window::about(
             landing,
             lattice.pitch_um(),
@@ -114,16 +118,17 @@ fn largest_spectra_bytes(design: &Design, accuracy: Accuracy) -> Result<usize> {
     let white = white::wavelengths_um(design)?;
     let mut most = 0;
     for element in design.elements() {
+        let lens = design.lens_of(&element);
         for &wavelength_um in &design.verify.wavelengths_um {
             for field in &design.verify.field_angles {
                 let landing = optics::landing(&element, wavelength_um, *field, lens.focal_length_um)?;
-                most = most.max(bytes(wavelength_um, landing, accuracy)?);
+                most = most.max(bytes(lens, wavelength_um, landing, accuracy)?);
             }
         }
         // The shorter the wavelength, the more frequencies.
         if let Some(shortest) = white.iter().copied().reduce(f64::min) {
             let landing = white::landing_um(&element, shortest, lens.focal_length_um)?;
-            most = most.max(bytes(shortest, landing, Accuracy::Fast)?);
+            most = most.max(bytes(lens, shortest, landing, Accuracy::Fast)?);
         }
     }
     Ok(most)

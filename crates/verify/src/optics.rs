@@ -160,15 +160,10 @@ impl<'a> ElementSimulator<'a> {
 
     /// The lens with the perfect phase for the place where a chief ray lands, all sites of modulus one: what Strehl ratios
     /// are against.
-    fn perfect(&self, chief_um: [f64; 2], wavelength_um: f64) -> Matched {
-        let open = PhaseFunction {
-            lattice: self.lattice,
-            radius_um: self.design.lens.radius_um(),
-            amplitude: 1.0,
-            phase_rad: |_, _| 0.0,
-        };
+    fn perfect(&self, element: &Element, phase: &ElementPhase<'_>, chief_um: [f64; 2], wavelength_um: f64) -> Matched {
         let [x, y] = chief_um;
-        Matched::of(&open, [x, y, self.design.lens.focal_length_um], wavelength_um, 1.0)
+        let focus = [x, y, self.design.lens_of(element).focal_length_um];
+        open_matched(self.design, element, phase, focus, wavelength_um)
     }
 
     /// Number of wavelengths and angles of one element.
@@ -186,7 +181,7 @@ impl<'a> ElementSimulator<'a> {
     /// As [`MadeElement::new`]; also if a chip is to be made of pillars that are not held as a map.
     pub fn read<'w>(&self, element: &Element, widths: &'w dyn WidthRows) -> Result<ReadElement<'w>> {
         let drawn = widths.held().map(|map| {
-            let drawn = DrawnElement::new(map, self.design.aperture_radius_um());
+            let drawn = DrawnElement::new(map, self.design.aperture_radius_of_um(element));
             drawn.placed(element.centre_um())
         });
         let made = |case: &SimulationCase<'_>| match (case, &drawn) {
@@ -268,7 +263,7 @@ impl<'a> ElementSimulator<'a> {
     ) -> Result<Vec<PsfPair>> {
         let angles = &self.design.verify.field_angles;
         // The phase before mapping and rounding, once for all colours and angles.
-        let radius_um = self.design.lens.radius_um();
+        let radius_um = self.design.lens_of(element).radius_um();
         let turns = |ix, iy| phase.turns(ix, iy);
         let (held, computed);
         let designed: &dyn Aperture = if self.part_bytes.is_none() {
@@ -301,7 +296,7 @@ impl<'a> ElementSimulator<'a> {
                 if progress.stopped() {
                     return Err(Error::Interrupted);
                 }
-                let pair = self.pair(&task, element, designed, read.widths, scratch);
+                let pair = self.pair(&task, (element, phase), designed, read.widths, scratch);
                 progress.advance(1);
                 pair
             })
@@ -327,12 +322,12 @@ impl<'a> ElementSimulator<'a> {
     fn pair(
         &self,
         task: &Task<'_>,
-        element: &Element,
+        (element, phase): (&Element, &ElementPhase<'_>),
         designed: &dyn Aperture,
         widths: &dyn WidthRows,
         scratch: &mut Scratch,
     ) -> Result<PsfPair> {
-        let (lens, spec) = (&self.design.lens, &self.design.verify);
+        let (lens, spec) = (self.design.lens_of(element), &self.design.verify);
         let Task {
             colour, field, wave, ..
         } = task;
@@ -351,7 +346,7 @@ impl<'a> ElementSimulator<'a> {
             None => fold,
         };
         let designed = Psf::formed(&fold, designed, wave, &CURVE_LP_MM, scratch)?;
-        let perfect = self.perfect(chief, wavelength_um);
+        let perfect = self.perfect(element, phase, chief, wavelength_um);
         let mut extracted = Vec::new();
         let mut judged = None;
         for (at, view) in colour.cases.iter().zip(&task.views) {
@@ -432,6 +427,34 @@ pub(super) fn landing(element: &Element, wavelength_um: f64, field: FieldAngle, 
 fn arriving(element: &Element, wavelength_um: f64, field: FieldAngle) -> Result<PlaneWave> {
     let field_rad = [field.x_deg, field.y_deg].map(f64::to_radians);
     Ok(incident(&element.wedge, wavelength_um, field_rad)?)
+}
+
+/// The sites of an element, all of modulus one, with the perfect phase for a focus (um).
+pub(super) fn open_matched(
+    design: &Design,
+    element: &Element,
+    phase: &ElementPhase<'_>,
+    focus_um: [f64; 3],
+    wavelength_um: f64,
+) -> Matched {
+    let (lattice, lens) = (phase.lattice(), design.lens_of(element));
+    let radius_um = lens.radius_um();
+    if lens.outline.is_some() {
+        let turns = |ix, iy| phase.holds(ix, iy).then_some(0.0);
+        let open = PhaseSites {
+            lattice,
+            radius_um,
+            turns,
+        };
+        return Matched::of(&open, focus_um, wavelength_um, 1.0);
+    }
+    let open = PhaseFunction {
+        lattice,
+        radius_um,
+        amplitude: 1.0,
+        phase_rad: |_, _| 0.0,
+    };
+    Matched::of(&open, focus_um, wavelength_um, 1.0)
 }
 
 /// Widths that tables go to.

@@ -9,14 +9,15 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::case::TransmissionTables;
-use super::optics::ReadElement;
+use super::optics::{ReadElement, open_matched};
 use metalith_camera::{Camera, ChannelSampling, Sampling};
 use metalith_core::{Error, Lattice, Progress, Result, Wedge};
+use metalith_design::phase::ElementPhase;
 use metalith_design::{CellIncidence, Design, Element};
 use metalith_made::{MadeView, SimulationCase};
 use metalith_wave::propagation;
 use metalith_wave::psf::{BandPart, BandSample, CURVE_LP_MM, band_otf, pixel_mtf, polychromatic};
-use metalith_wave::{Accuracy, Fold, Matched, PhaseFunction, PlaneWave, Psf, Scratch, Window};
+use metalith_wave::{Accuracy, Fold, PlaneWave, Psf, Scratch, Window};
 
 /// Largest distance of the wavelengths that are simulated (nm): eight intervals over a channel of 100 nm. How much
 /// this weighs is reported for each channel.
@@ -167,8 +168,6 @@ pub(super) struct WhiteSimulator<'a> {
     sampling: Sampling,
     colours: Vec<Colour>,
     lp_mm: Vec<f64>,
-    /// Area of the sites of the lens (um^2).
-    area_um2: f64,
 }
 
 impl<'a> WhiteSimulator<'a> {
@@ -201,20 +200,12 @@ impl<'a> WhiteSimulator<'a> {
                 tables,
             })
         };
-        let open = PhaseFunction {
-            lattice,
-            radius_um: design.lens.radius_um(),
-            amplitude: 1.0,
-            phase_rad: |_, _| 0.0,
-        };
-        let focus = [0.0, 0.0, design.lens.focal_length_um];
         let mut lp_mm = CURVE_LP_MM.to_vec();
         lp_mm.push(design.verify.limits.white_mtf_lp_mm);
         lp_mm.sort_by(f64::total_cmp);
         lp_mm.dedup();
         Ok(Some(Self {
             colours: sampling.wavelengths_nm.iter().map(colour).collect::<Result<_>>()?,
-            area_um2: Matched::of(&open, focus, design.mapping.wavelength_um, 1.0).power_um2,
             design,
             lattice,
             judge,
@@ -240,11 +231,11 @@ impl<'a> WhiteSimulator<'a> {
             "solving cells as they are lit by white light",
             (elements.len() * self.colours.len()) as u64,
         );
-        let distance_um = self.design.lens.focal_length_um;
+        let design = self.design;
         for colour in &mut self.colours {
             let waves: Vec<_> = elements
                 .iter()
-                .map(|e| Point::of(e, distance_um).wave(colour.wavelength_um))
+                .map(|e| Point::of(e, design.lens_of(e).focal_length_um).wave(colour.wavelength_um))
                 .collect();
             if let Some(tables) = &mut colour.tables {
                 tables.add_directions(cell, &waves, self.design.cell.most(), progress)?;
@@ -270,6 +261,7 @@ impl<'a> WhiteSimulator<'a> {
     pub fn simulate(
         &self,
         element: &Element,
+        phase: &ElementPhase<'_>,
         read: &ReadElement<'_>,
         progress: &dyn Progress,
     ) -> Result<Vec<WhiteChannel>> {
@@ -282,6 +274,7 @@ impl<'a> WhiteSimulator<'a> {
             _ => Ok(None),
         };
         let views = self.colours.iter().map(view).collect::<Result<Vec<_>>>()?;
+        let area_um2 = self.area_um2(element, phase);
         let samples = self
             .colours
             .par_iter()
@@ -290,7 +283,7 @@ impl<'a> WhiteSimulator<'a> {
                 if progress.stopped() {
                     return Err(Error::Interrupted);
                 }
-                let sample = self.sample(element, colour, view.as_ref(), read, scratch);
+                let sample = self.sample(element, (colour, area_um2), view.as_ref(), read, scratch);
                 progress.advance(1);
                 sample
             })
@@ -309,12 +302,12 @@ impl<'a> WhiteSimulator<'a> {
     fn sample(
         &self,
         element: &Element,
-        colour: &Colour,
+        (colour, area_um2): (&Colour, f64),
         view: Option<&MadeView<'_>>,
         read: &ReadElement<'_>,
         scratch: &mut Scratch,
     ) -> Result<BandSample> {
-        let (lens, spec) = (&self.design.lens, &self.design.verify);
+        let (lens, spec) = (self.design.lens_of(element), &self.design.verify);
         let point = self.point(element);
         let wave = point.wave(colour.wavelength_um);
         let landing = point.landing_um(colour.wavelength_um)?;
@@ -333,11 +326,17 @@ impl<'a> WhiteSimulator<'a> {
             }
             (None, None) => unreachable!("a case is a cell or a made chip"),
         };
-        Ok(per_light(landing, psf, colour.full * colour.full * self.area_um2))
+        Ok(per_light(landing, psf, colour.full * colour.full * area_um2))
+    }
+
+    /// What the sites of an element pass if all pass everything (um^2).
+    fn area_um2(&self, element: &Element, phase: &ElementPhase<'_>) -> f64 {
+        let focus = [0.0, 0.0, self.design.lens_of(element).focal_length_um];
+        open_matched(self.design, element, phase, focus, self.design.mapping.wavelength_um).power_um2
     }
 
     fn point(&self, element: &Element) -> Point {
-        Point::of(element, self.design.lens.focal_length_um)
+        Point::of(element, self.design.lens_of(element).focal_length_um)
     }
 }
 

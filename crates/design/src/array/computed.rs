@@ -45,10 +45,13 @@ impl ComputedWidths {
     /// element into the other to the last bit. Of phases over the plane nothing is known: each such element is its own copy
     /// alone.
     pub fn maps(&self, symmetry: Symmetry, to: &Self) -> bool {
-        if self.lens.has_terms() {
+        let (own, other) = (self.phase(), to.phase());
+        if !own.is_steered_alone() || !other.is_steered_alone() {
             return symmetry == Symmetry::IDENTITY && self.element == to.element;
         }
-        self.rule == to.rule
+        Arc::ptr_eq(&self.lens, &to.lens)
+            && own.is_of_lens(&other)
+            && self.rule == to.rule
             && self.element.wedge.wavelength_um == to.element.wedge.wavelength_um
             && symmetry.vector(self.directions()) == to.directions()
     }
@@ -88,7 +91,8 @@ impl WidthRows for ComputedWidths {
     }
 
     fn occupied<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16] {
-        self.fill(iy, columns, room, |ix, iy| u16::from(self.lens.holds(ix, iy)))
+        let phase = self.phase();
+        self.fill(iy, columns, room, |ix, iy| u16::from(phase.holds(ix, iy)))
     }
 }
 

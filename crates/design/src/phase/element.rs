@@ -1,7 +1,11 @@
 //! The phase of every site of an element.
 
+use std::cell::OnceCell;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use super::{PhaseTerm, RadialPhase};
-use crate::{Design, Element};
+use crate::{Design, Element, LensOutline, LensSpec};
 use metalith_core::{Lattice, Wedge};
 
 /// Radii that are tabulated at most: 64 MB. A lens of 1 mm has a million.
@@ -22,8 +26,51 @@ pub struct LensPhase {
     /// Entries are this power of two apart in squared half pitches: a shift, since this is done for each pillar.
     stride_log2: u32,
     offset: i64,
+    /// Where pillars stand within that, if the lens is not round.
+    outline: Option<LensOutline>,
     /// Phases over the plane that elements have besides.
     terms: Vec<PhaseTerm>,
+    /// Elements, by their indices, whose lens is another or rotated.
+    own: BTreeMap<(i32, i32), OwnPhase>,
+}
+
+/// What an element has in place of the lens that all share.
+#[derive(Clone, Debug)]
+struct OwnPhase {
+    lens: Arc<LensPhase>,
+    rotation: Rotation,
+}
+
+/// Cosine and sine of a rotation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Rotation(f64, f64);
+
+impl Rotation {
+    const NONE: Self = Self(1.0, 0.0);
+
+    /// By so many degrees, from x towards y; exact where it is quarter turns.
+    pub fn of_deg(deg: f64) -> Self {
+        let quarters = (deg / 90.0).round();
+        let (sin, cos) = (deg - 90.0 * quarters).to_radians().sin_cos();
+        match quarters.rem_euclid(4.0) as u8 {
+            0 => Self(cos, sin),
+            1 => Self(-sin, cos),
+            2 => Self(-cos, -sin),
+            _ => Self(sin, -cos),
+        }
+    }
+
+    /// Where a place goes.
+    pub fn after(self, x: f64, y: f64) -> (f64, f64) {
+        let Self(cos, sin) = self;
+        (cos * x - sin * y, cos * y + sin * x)
+    }
+
+    /// Where the place of a rotated element was before.
+    fn before(self, x: f64, y: f64) -> (f64, f64) {
+        let Self(cos, sin) = self;
+        (cos * x + sin * y, cos * y - sin * x)
+    }
 }
 
 /// Phase (turns) of a squared radius.
@@ -34,12 +81,40 @@ enum TurnsOfRadius {
 }
 
 impl LensPhase {
-    /// The phase of the lens of a design.
+    /// The phase of the lens of a design, and of the lenses that elements have of their own.
     pub fn of(design: &Design) -> Self {
-        Self {
-            terms: design.lens.terms.clone(),
-            ..Self::new(design.lattice(), design.lens.diameter_nm, &design.lens.phase)
+        let of_lens = |lens: &LensSpec| Self {
+            outline: lens.outline.clone(),
+            terms: lens.terms.clone(),
+            ..Self::new(design.lattice(), lens.diameter_nm, &lens.phase)
+        };
+        let mut shared = of_lens(&design.lens);
+        // Elements of a round lens that are rotated alone share one table.
+        let rotated = OnceCell::new();
+        let mut own = BTreeMap::new();
+        for element in design.elements() {
+            let Some(placed) = design.array.placed(element.index) else {
+                continue;
+            };
+            if placed.lens.is_none() && placed.rotation_deg == 0.0 {
+                continue;
+            }
+            let lens = match &placed.lens {
+                Some(_) => Arc::new(Self {
+                    outline: design.outline_of(&element),
+                    ..of_lens(design.lens_of(&element))
+                }),
+                None if shared.outline.is_some() => Arc::new(Self {
+                    outline: design.outline_of(&element),
+                    ..shared.clone()
+                }),
+                None => rotated.get_or_init(|| Arc::new(shared.clone())).clone(),
+            };
+            let rotation = Rotation::of_deg(placed.rotation_deg);
+            own.insert(element.index, OwnPhase { lens, rotation });
         }
+        shared.own = own;
+        shared
     }
 
     /// Tabulate `radial` for a lens of this diameter on this lattice.
@@ -73,7 +148,9 @@ impl LensPhase {
             turns,
             stride_log2,
             offset,
+            outline: None,
             terms: Vec::new(),
+            own: BTreeMap::new(),
         }
     }
 
@@ -82,15 +159,10 @@ impl LensPhase {
         self.lattice
     }
 
-    /// Whether elements have phases over the plane besides.
-    pub fn has_terms(&self) -> bool {
-        !self.terms.is_empty()
-    }
-
     /// Phase over the radius at a site (turns), not reduced; none outside the lens.
     pub fn turns(&self, ix: usize, iy: usize) -> Option<f64> {
         let r2 = self.lattice.half_radius2(ix, iy);
-        (r2 <= self.limit).then(|| match &self.turns {
+        self.holds(ix, iy).then(|| match &self.turns {
             TurnsOfRadius::Tabulated(turns) => turns[((r2 - self.offset) >> self.stride_log2) as usize],
             TurnsOfRadius::Computed(radial) => radial.turns(radius2_um2(self.lattice, r2)),
         })
@@ -98,7 +170,9 @@ impl LensPhase {
 
     /// Whether a site is inside the lens.
     pub fn holds(&self, ix: usize, iy: usize) -> bool {
+        let place = |i| self.lattice.coordinate_nm(i);
         self.lattice.half_radius2(ix, iy) <= self.limit
+            && self.outline.as_ref().is_none_or(|o| o.holds(place(ix), place(iy)))
     }
 }
 
@@ -108,12 +182,14 @@ fn radius2_um2(lattice: Lattice, r2: i64) -> f64 {
     r2 as f64 * half_pitch_um * half_pitch_um
 }
 
-/// The phase of one element: that of the lens and its wedge.
+/// The phase of one element: that of its lens, and its wedge.
 #[derive(Clone, Debug)]
 pub struct ElementPhase<'a> {
     lens: &'a LensPhase,
     /// Phases over the plane that it has.
     terms: Vec<&'a PhaseTerm>,
+    /// What phases over the plane are rotated by.
+    rotation: Rotation,
     /// Turns a half pitch along x and y.
     step: (f64, f64),
 }
@@ -121,8 +197,13 @@ pub struct ElementPhase<'a> {
 impl<'a> ElementPhase<'a> {
     /// The phase of an element.
     pub fn of(lens: &'a LensPhase, element: &Element) -> Self {
+        let (lens, rotation) = match lens.own.get(&element.index) {
+            Some(own) => (own.lens.as_ref(), own.rotation),
+            None => (lens, Rotation::NONE),
+        };
         Self {
             terms: lens.terms.iter().filter(|t| t.is_of(element.index)).collect(),
+            rotation,
             ..Self::new(lens, &element.wedge)
         }
     }
@@ -133,6 +214,7 @@ impl<'a> ElementPhase<'a> {
         Self {
             lens,
             terms: Vec::new(),
+            rotation: Rotation::NONE,
             step: (half_pitch_turns * wedge.sin_x, half_pitch_turns * wedge.sin_y),
         }
     }
@@ -142,9 +224,25 @@ impl<'a> ElementPhase<'a> {
         self.lens.lattice
     }
 
-    /// Whether no wedge is on the lens: its phase is the same at sites of one radius.
+    /// Whether no wedge is on a round lens: its phase is the same at sites of one radius.
     pub fn is_radial(&self) -> bool {
-        self.step == (0.0, 0.0) && self.terms.is_empty()
+        self.step == (0.0, 0.0) && self.is_steered_alone()
+    }
+
+    /// Whether nothing is on a round lens but a wedge: a symmetry that turns the wedge into that of another element of the lens
+    /// turns the element into that.
+    pub fn is_steered_alone(&self) -> bool {
+        self.terms.is_empty() && self.lens.outline.is_none()
+    }
+
+    /// Whether another element is of the same lens.
+    pub fn is_of_lens(&self, other: &ElementPhase<'_>) -> bool {
+        std::ptr::eq(self.lens, other.lens)
+    }
+
+    /// Whether a site is inside the lens.
+    pub fn holds(&self, ix: usize, iy: usize) -> bool {
+        self.lens.holds(ix, iy)
     }
 
     /// Phase at a site (turns), not reduced; none outside the lens.
@@ -160,7 +258,9 @@ impl<'a> ElementPhase<'a> {
             return Some(steered);
         }
         let lattice = self.lens.lattice;
-        let (x_um, y_um) = (lattice.coordinate_um(ix), lattice.coordinate_um(iy));
+        let (x_um, y_um) = self
+            .rotation
+            .before(lattice.coordinate_um(ix), lattice.coordinate_um(iy));
         Some(
             self.terms
                 .iter()

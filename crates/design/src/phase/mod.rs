@@ -6,6 +6,7 @@ mod radial;
 mod table;
 mod term;
 
+pub(crate) use element::Rotation;
 pub use element::{ElementPhase, LensPhase};
 pub use radial::{Interpolation, RadialPhase};
 pub use term::{MapTable, PhaseTerm, TermForm, ZernikeOrder};

@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-use super::LensSpec;
 use super::lens::WAVELENGTH;
-use metalith_core::Wedge;
+use super::{CellSpec, LensSpec};
 use metalith_core::document::{Limits, Section};
+use metalith_core::{Lattice, Wedge};
 
 /// Elements of one lens, each with a wedge of its own: on a grid, or wherever each is said to be.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -33,6 +33,18 @@ pub struct PlacedSpec {
     pub centre_nm: (i64, i64),
     /// Steering along x and y (degrees).
     pub steering_deg: (f64, f64),
+    /// What the phase of its lens is rotated by about its middle, from x towards y (degrees); the steering is not.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub rotation_deg: f64,
+    /// Its own lens, in place of that all share.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lens: Option<LensSpec>,
+}
+
+/// What serde asks for keys that are left out where nothing is rotated.
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_zero(deg: &f64) -> bool {
+    *deg == 0.0
 }
 
 /// One element of the array.
@@ -66,12 +78,22 @@ impl Element {
 }
 
 impl ArraySpec {
-    pub(crate) fn read(s: &Section<'_, '_>, lens: &LensSpec, placed: &[Section<'_, '_>]) -> Self {
+    /// The array; `phase` is the section of the phase that all elements share.
+    pub(crate) fn read(
+        s: &Section<'_, '_>,
+        lens: &LensSpec,
+        phase: &Section<'_, '_>,
+        cell: &CellSpec,
+        placed: &[Section<'_, '_>],
+    ) -> Self {
         let wedge_wavelength_um = s.optional_float("wedge_wavelength_nm", WAVELENGTH).unwrap_or(550.0) * 1e-3;
         let spec = if placed.is_empty() {
             Self::read_grid(s, lens, wedge_wavelength_um)
         } else {
-            Self::read_placed(s, lens, placed, wedge_wavelength_um)
+            Self {
+                wedge_wavelength_um,
+                ..Self::read_placed(s, lens, phase, cell, placed)
+            }
         };
         s.finish();
         spec
@@ -131,7 +153,13 @@ impl ArraySpec {
     }
 
     /// `[[element]]`: each by itself.
-    fn read_placed(s: &Section<'_, '_>, lens: &LensSpec, placed: &[Section<'_, '_>], wedge_wavelength_um: f64) -> Self {
+    fn read_placed(
+        s: &Section<'_, '_>,
+        lens: &LensSpec,
+        phase: &Section<'_, '_>,
+        cell: &CellSpec,
+        sections: &[Section<'_, '_>],
+    ) -> Self {
         for key in ["elements", "spacing_um", "steering_deg"] {
             if s.has(key) {
                 s.fault(
@@ -142,42 +170,92 @@ impl ArraySpec {
             }
         }
         let angle = Limits::new(-89.0..=89.0, "degrees");
-        let mut centres: Vec<(i64, i64)> = Vec::new();
-        for s in placed {
-            let [x, y] =
-                ["x_um", "y_um"].map(|key| whole_nm(s, key, s.float(key, Limits::new(-150_000.0..=150_000.0, "um"))));
-            let near = |&(a, b): &(i64, i64)| ((x - a) as f64).hypot((y - b) as f64) < f64::from(lens.diameter_nm);
-            if let Some(other) = centres.iter().position(near) {
-                s.fault_given(
-                    &["lens.diameter_um"],
-                    "x_um",
-                    format!("this lens overlaps that of element ({}, 0)", other + 1),
-                    "place them a lens diameter apart",
-                );
-            }
-            centres.push((x, y));
-        }
-        let steered = placed.iter().map(|s| {
-            let [x, y] =
-                ["steering_x_deg", "steering_y_deg"].map(|key| s.optional_float(key, angle.clone()).unwrap_or(0.0));
-            s.finish();
-            (x, y)
-        });
-        let each = centres
+        let placed: Vec<_> = sections
             .iter()
-            .zip(steered)
-            .map(|(&centre_nm, steering_deg)| PlacedSpec {
-                centre_nm,
-                steering_deg,
-            });
-        Self {
+            .zip(1..)
+            .map(|(s, k)| {
+                let place = Limits::new(-150_000.0..=150_000.0, "um");
+                let [x, y] = ["x_um", "y_um"].map(|key| whole_nm(s, key, s.float(key, place.clone())));
+                let [steer_x, steer_y] =
+                    ["steering_x_deg", "steering_y_deg"].map(|key| s.optional_float(key, angle.clone()).unwrap_or(0.0));
+                let spec = PlacedSpec {
+                    centre_nm: (x, y),
+                    steering_deg: (steer_x, steer_y),
+                    rotation_deg: s
+                        .optional_float("rotation_deg", Limits::new(-360.0..=360.0, "degrees"))
+                        .unwrap_or(0.0),
+                    lens: LensSpec::read_own(s, lens, phase, (k, 0), cell),
+                };
+                s.finish();
+                spec
+            })
+            .collect();
+        let spec = Self {
             count: (0, 0),
             spacing_nm: 0,
             spacing_y_nm: None,
             steering_deg: 0.0,
-            wedge_wavelength_um,
-            placed: each.collect(),
+            wedge_wavelength_um: 0.0,
+            placed,
+        };
+        spec.apart(lens, cell, sections);
+        spec
+    }
+
+    /// Elements stand on lattices of one size: their squares must not overlap, or pillars could be of either.
+    fn apart(&self, lens: &LensSpec, cell: &CellSpec, sections: &[Section<'_, '_>]) {
+        let Ok(lattice) = Lattice::covering(self.largest_nm(lens), cell.pitch_nm) else {
+            return;
+        };
+        let side_nm = lattice.sites() as i64 * i64::from(lattice.pitch_nm());
+        for (k, s) in sections.iter().enumerate() {
+            let (x, y) = self.placed[k].centre_nm;
+            let near = |p: &PlacedSpec| (x - p.centre_nm.0).abs().max((y - p.centre_nm.1).abs()) < side_nm;
+            if let Some(other) = self.placed[..k].iter().position(near) {
+                s.fault_given(
+                    &["lens.diameter_um", "cell.pitch_nm"],
+                    "x_um",
+                    format!(
+                        "this lens overlaps that of element ({}, 0), or the square about it does",
+                        other + 1
+                    ),
+                    format!(
+                        "place them at least {} um apart along x or along y: the largest lens with its lattice",
+                        side_nm as f64 * 1e-3
+                    ),
+                );
+            }
         }
+    }
+
+    /// The lens of the element of an index: its own, or that all share.
+    pub fn lens_of<'a>(&'a self, shared: &'a LensSpec, index: (i32, i32)) -> &'a LensSpec {
+        self.placed(index).and_then(|p| p.lens.as_ref()).unwrap_or(shared)
+    }
+
+    /// What an element is, if it was placed by itself.
+    pub fn placed(&self, index: (i32, i32)) -> Option<&PlacedSpec> {
+        self.placed.get(usize::try_from(index.0).ok()?.checked_sub(1)?)
+    }
+
+    /// Whether an element has a lens of its own, or one that is rotated.
+    pub fn has_own_lenses(&self) -> bool {
+        self.placed.iter().any(|p| p.lens.is_some() || p.rotation_deg != 0.0)
+    }
+
+    /// The lenses of all elements; where all share one, that.
+    pub fn lenses<'a>(&'a self, shared: &'a LensSpec) -> impl Iterator<Item = &'a LensSpec> {
+        let own = self.placed.iter().map(move |p| p.lens.as_ref().unwrap_or(shared));
+        own.chain(self.placed.is_empty().then_some(shared))
+    }
+
+    /// Diameter of the largest lens (nm).
+    pub fn largest_nm(&self, shared: &LensSpec) -> u32 {
+        let each = self
+            .placed
+            .iter()
+            .map(|p| p.lens.as_ref().unwrap_or(shared).diameter_nm);
+        each.max().unwrap_or(shared.diameter_nm)
     }
 
     /// The elements: of a grid row by row from the lowest, else as they are listed.

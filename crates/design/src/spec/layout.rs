@@ -132,7 +132,7 @@ impl LayoutSpec {
             s.finish();
         }
         let layers = Layers::read(&root.section("layers"));
-        let apertures = ApertureSpec::read(&root.section("apertures"), lens);
+        let apertures = ApertureSpec::read(&root.section("apertures"), lens, array);
         let chip = ChipSpec::read(&root.section("chip"), lens, array);
         let marks = root.sections("mark").iter().map(|s| MarkSpec::read(s, &chip)).collect();
         Self {
@@ -205,13 +205,15 @@ impl Layers {
 }
 
 impl ApertureSpec {
-    fn read(s: &Section<'_, '_>, lens: &LensSpec) -> Self {
+    fn read(s: &Section<'_, '_>, lens: &LensSpec, array: &ArraySpec) -> Self {
         let spec = Self {
             margin_nm: nanometres(s, "margin_um", s.float("margin_um", Limits::new(0.2..=1000.0, "um"))),
             chord_error_nm: s.float("chord_error_nm", Limits::new(0.5..=10_000.0, "nm")),
             max_vertices: s.optional_integer("max_vertices", 16..=8191, "vertices").unwrap_or(200) as usize,
         };
-        let radius_nm = f64::from(lens.diameter_nm) / 2.0 + spec.margin_nm as f64;
+        let round = array.lenses(lens).filter(|lens| lens.outline.is_none());
+        let largest_nm = round.map(|lens| lens.diameter_nm).max().unwrap_or(0);
+        let radius_nm = f64::from(largest_nm) / 2.0 + spec.margin_nm as f64;
         if spec.vertices(radius_nm) + 1 > spec.max_vertices {
             s.fault_given(
                 &["lens.diameter_um", "apertures.margin_um", "apertures.max_vertices"],
@@ -226,6 +228,25 @@ impl ApertureSpec {
                     spec.error_nm(radius_nm)
                 ),
             );
+        }
+        for outline in array.lenses(lens).filter_map(|lens| lens.outline.as_ref()) {
+            if !outline.grows(spec.margin_nm) {
+                s.fault_given(
+                    &["lens.aperture_um", "lens.corners_x_um"],
+                    "margin_um",
+                    "the opening about an aperture meets itself: a notch of the aperture is narrower than two margins",
+                    "use a smaller margin or a wider notch",
+                );
+            }
+            let corners = outline.corners_nm().len() + 1;
+            if corners > spec.max_vertices {
+                s.fault_given(
+                    &["apertures.max_vertices"],
+                    "max_vertices",
+                    format!("an aperture has {corners} vertices, the closing one counted"),
+                    "allow as many, or use fewer corners",
+                );
+            }
         }
         s.finish();
         spec
@@ -254,8 +275,8 @@ impl ChipSpec {
         );
         let elements = array.elements();
         let needed = |centre: fn(&Element) -> i64| {
-            let farthest = elements.iter().map(|e| centre(e).abs()).max().unwrap_or(0);
-            2 * farthest + i64::from(lens.diameter_nm)
+            let reach = |e: &Element| 2 * centre(e).abs() + i64::from(array.lens_of(lens, e.index).diameter_nm);
+            elements.iter().map(reach).max().unwrap_or(0)
         };
         let (x, y) = (needed(|e| e.centre_nm.0), needed(|e| e.centre_nm.1));
         if s.has("size_um") && (size_nm.0 < x || size_nm.1 < y) {

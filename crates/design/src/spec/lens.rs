@@ -1,17 +1,21 @@
-//! `[lens]` and `[phase]`: the lens that all elements share.
+//! `[lens]` and `[phase]`: the lens that all elements share, or that one of them has in its place.
 
 use serde::Serialize;
 
+use super::outline::{self, DIAMETER, LensOutline};
 use super::{CellSpec, term};
 use crate::phase::{Interpolation, PhaseTerm, RadialPhase};
-use metalith_core::Lattice;
 use metalith_core::document::{Limits, Section};
+use metalith_core::{Lattice, Result};
 
-/// The lens that all elements of the array share.
+/// The lens that all elements of the array share, or that an element has of its own.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LensSpec {
     /// Pillars stand where their centre is within this diameter (nm).
     pub diameter_nm: u32,
+    /// And within this outline, if it is no circle; the diameter is that of the circle about it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outline: Option<LensOutline>,
     /// Distance from the pillar tops to the sensor (um).
     pub focal_length_um: f64,
     /// Phase over the radius, before wedge and modulo.
@@ -23,45 +27,108 @@ pub struct LensSpec {
 
 impl LensSpec {
     pub fn read(lens: &Section<'_, '_>, phase: &Section<'_, '_>, cell: &CellSpec) -> Self {
-        let diameter_um = lens.float("diameter_um", Limits::new(5.0..=100_000.0, "um"));
-        let diameter_nm = (diameter_um * 1e3).round() as u32;
-        if (diameter_um * 1e3 - f64::from(diameter_nm)).abs() > 1e-6 {
-            lens.fault(
-                "diameter_um",
-                format!("{diameter_um} um is not whole nanometres"),
-                "round it to 0.001 um",
-            );
-        }
-        if Lattice::covering(diameter_nm, cell.pitch_nm).is_err() {
-            lens.fault_given(
-                &["cell.pitch_nm"],
-                "diameter_um",
-                "the lens has no sites on this lattice",
-                "make it larger than the pitch",
-            );
-        }
-        let focal_length_um = lens.float("focal_length_um", Limits::new(1.0..=100_000.0, "um"));
+        let (diameter_nm, outline) = outline::read(lens, cell);
+        let focal_length_um = lens.float("focal_length_um", FOCAL_LENGTH);
         lens.finish();
-        let radius_um = f64::from(diameter_nm) * 0.5e-3;
-        let terms = phase.sections("term");
-        let terms = terms
-            .iter()
-            .map(|s| term::read(s, focal_length_um, radius_um))
-            .collect();
-        let radial = read_radial(phase, focal_length_um, radius_um);
-        phase.finish();
-        Self {
+        let mut it = Self {
             diameter_nm,
+            outline,
             focal_length_um,
-            phase: radial,
-            terms,
+            phase: RadialPhase::Flat,
+            terms: Vec::new(),
+        };
+        it.read_phase(phase);
+        it
+    }
+
+    /// The lens of an element that is placed by itself, if it says anything of it; the rest is as in the lens that all share,
+    /// whose phase `shared_phase` says.
+    pub(super) fn read_own(
+        s: &Section<'_, '_>,
+        shared: &Self,
+        shared_phase: &Section<'_, '_>,
+        index: (i32, i32),
+        cell: &CellSpec,
+    ) -> Option<Self> {
+        let phase = s.optional_section("phase");
+        let sized = s.has("diameter_um") || s.has("aperture");
+        if phase.is_none() && !sized && !s.has("focal_length_um") {
+            return None;
         }
+        let (diameter_nm, outline) = match sized {
+            true => outline::read(s, cell),
+            false => (shared.diameter_nm, shared.outline.clone()),
+        };
+        let mut own = Self {
+            diameter_nm,
+            outline,
+            focal_length_um: s
+                .optional_float("focal_length_um", FOCAL_LENGTH)
+                .unwrap_or(shared.focal_length_um),
+            ..shared.clone()
+        };
+        if let Some(phase) = phase {
+            own.read_phase(&phase);
+        } else {
+            // A hyperbola that names no focal length has that of the element; its radius of normalisation is no other.
+            own.phase = read_radial(shared_phase, own.focal_length_um, shared.radius_um());
+            own.terms.retain(|term| term.is_of(index));
+        }
+        Some(own)
+    }
+
+    /// The phase that a section says, of a lens with this diameter and focal length.
+    fn read_phase(&mut self, s: &Section<'_, '_>) {
+        let (focal_length_um, radius_um) = (self.focal_length_um, self.radius_um());
+        let terms = s.sections("term");
+        let terms = terms.iter().map(|term| term::read(term, focal_length_um, radius_um));
+        self.terms = terms.collect();
+        self.phase = read_radial(s, focal_length_um, radius_um);
+        s.finish();
+    }
+
+    /// Read the files that its phase names.
+    ///
+    /// # Errors
+    /// [`metalith_core::Error::Table`] for one that cannot be used.
+    pub(crate) fn load(&mut self) -> Result<()> {
+        let radius_um = self.radius_um();
+        self.phase.load(radius_um)?;
+        self.terms.iter_mut().try_for_each(|term| term.load(radius_um))
     }
 
     /// Half the diameter (um).
     pub fn radius_um(&self) -> f64 {
         f64::from(self.diameter_nm) * 0.5e-3
     }
+}
+
+/// Focal lengths of lenses, and distances of sensors.
+const FOCAL_LENGTH: Limits = Limits {
+    range: 1.0..=100_000.0,
+    unit: "um",
+};
+
+/// The diameter that a section says (nm).
+pub(super) fn read_diameter(s: &Section<'_, '_>, cell: &CellSpec) -> u32 {
+    let diameter_um = s.float("diameter_um", DIAMETER);
+    let diameter_nm = (diameter_um * 1e3).round() as u32;
+    if (diameter_um * 1e3 - f64::from(diameter_nm)).abs() > 1e-6 {
+        s.fault(
+            "diameter_um",
+            format!("{diameter_um} um is not whole nanometres"),
+            "round it to 0.001 um",
+        );
+    }
+    if Lattice::covering(diameter_nm, cell.pitch_nm).is_err() {
+        s.fault_given(
+            &["cell.pitch_nm"],
+            "diameter_um",
+            "the lens has no sites on this lattice",
+            "make it larger than the pitch",
+        );
+    }
+    diameter_nm
 }
 
 /// The phase over the radius that a section says.

@@ -6,6 +6,7 @@ mod layout;
 mod lens;
 mod mapping;
 mod optimise;
+mod outline;
 mod term;
 mod verify;
 
@@ -15,4 +16,5 @@ pub use layout::{ApertureSpec, ChipSpec, Hierarchy, Layers, LayoutLayer, LayoutS
 pub use lens::LensSpec;
 pub use mapping::{MappingComparison, MappingSpec};
 pub use optimise::{MeritSpec, OptimiseSpec, RobustSpec, SolverSpec, StartSpec, ViewSpec};
+pub use outline::LensOutline;
 pub use verify::{CellIncidence, FieldAngle, LimitSpec, VerifySpec};

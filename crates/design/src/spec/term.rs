@@ -1,7 +1,7 @@
 //! `[[phase.term]]`: phases over the plane of an element, added to that over the radius.
 
 use super::lens::{COEFFICIENT, read_radial};
-use crate::phase::{Interpolation, MapTable, PhaseTerm, TermForm, ZernikeOrder};
+use crate::phase::{Interpolation, MapTable, PhaseTerm, RadialPhase, TermForm, ZernikeOrder};
 use metalith_core::document::{Limits, Section};
 
 /// Most polynomials of a sum.
@@ -61,8 +61,14 @@ pub(super) fn read(s: &Section<'_, '_>, focal_length_um: f64, radius_um: f64) ->
                 .map(|number| number as u32),
         },
     };
+    let file = match &form {
+        TermForm::Radial(RadialPhase::Table { file, .. }) | TermForm::OpticStudio { file, .. } => Some(file.clone()),
+        TermForm::Map(map) => Some(map.file().to_owned()),
+        _ => None,
+    };
     let term = PhaseTerm {
         form,
+        file,
         scale: s.optional_float("scale", Limits::new(-1e6..=1e6, "")).unwrap_or(1.0),
         centre_um: s
             .optional_array::<2>("centre_um", Limits::new(-1e5..=1e5, "um"))

@@ -178,12 +178,30 @@ pub(super) fn stack(page: &mut Page, c: &Contents<'_>) {
         p.transfer.mask_thickness_nm.to_string().into(),
         "on the pillars until it is stripped".into(),
     ]);
+    let (film, becomes) = match design.cell.pillar_material == design.cell.substrate_material {
+        true => ("pillars", "etched into the substrate"),
+        false => ("film", "becomes the pillars"),
+    };
     table.row([
-        "film".into(),
+        film.into(),
         design.cell.pillar_material.as_str().into(),
         design.cell.pillar_height_nm.to_string().into(),
-        format!("becomes the pillars; {}", p.transfer.etch).into(),
+        format!("{becomes}; {}", p.transfer.etch).into(),
     ]);
+    // From above: what the etch left of the film first.
+    for layer in design.cell.under.iter().rev() {
+        let residual = layer.material == design.cell.pillar_material;
+        let (name, note) = match residual {
+            true => ("residual film", "the etch stops before its end"),
+            false => ("spacer", "under the film; not etched"),
+        };
+        table.row([
+            name.into(),
+            layer.material.as_str().into(),
+            layer.height_nm.to_string().into(),
+            note.into(),
+        ]);
+    }
     table.row([
         "substrate".into(),
         design.cell.substrate_material.as_str().into(),

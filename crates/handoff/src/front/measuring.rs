@@ -2,7 +2,9 @@
 
 use super::SHOWN;
 use crate::contents::Contents;
+use crate::pad::measured;
 use crate::pictures;
+use metalith_core::PillarShape;
 use metalith_report::{Cell, Column, Page, Table};
 
 pub(super) fn tests(page: &mut Page, c: &Contents<'_>) {
@@ -28,19 +30,28 @@ pub(super) fn tests(page: &mut Page, c: &Contents<'_>) {
     });
     page.paragraph(format!(
         "The hyperbolic reference lens for {} nm, {} um across like the elements, is a file of its own: place it beside the array.",
-        c.process.tests.reference_wavelength_nm,
+        c.process.reference_wavelength_nm(c.design),
         f64::from(c.design.lens.diameter_nm) * 1e-3
     ));
 }
 
 pub(super) fn metrology(page: &mut Page, c: &Contents<'_>) {
-    page.section("Where to measure widths");
+    let shape = c.design.cell.shape;
+    page.section(format!("Where to measure {}", measured(shape)));
+    let (alike, expected) = match shape {
+        PillarShape::Square => ("nearly the same width", "drawn width"),
+        PillarShape::Circle => (
+            "nearly the same diameter",
+            "drawn diameter, along x and along y: where they differ the beam is astigmatic,",
+        ),
+        PillarShape::Rectangle(_) => ("nearly the same rotation", "drawn width and length"),
+    };
     page.paragraph(format!(
-        "Sites on the lenses are those whose neighbours have nearly the same width, so that a miscount by one pillar changes the result little. \
-         Expected: drawn width within two standard deviations of {} nm. `metrology/cd_table.csv` has columns to fill in.",
+        "Sites on the lenses are those whose neighbours have {alike}, so that a miscount by one pillar changes the result little. \
+         Expected: {expected} within two standard deviations of {} nm. `metrology/cd_table.csv` has columns to fill in.",
         c.process.metrology.width_tolerance_nm
     ));
-    let mut table = Table::new([
+    let mut columns = vec![
         Column::text("Site"),
         Column::text("Place"),
         Column::number("x", "um"),
@@ -48,22 +59,38 @@ pub(super) fn metrology(page: &mut Page, c: &Contents<'_>) {
         Column::number("in the element x", "um"),
         Column::number("y", "um"),
         Column::number("Drawn", "nm"),
-        Column::text("Neighbours"),
-    ]);
+    ];
+    if shape.rectangles().is_some() {
+        columns.extend([Column::number("by", "nm"), Column::number("Rotation", "degrees")]);
+    }
+    columns.push(Column::text("Neighbours"));
+    let mut table = Table::new(columns);
     for s in c.documents.sites.iter().filter(|s| s.file == "pillars") {
-        table.row([
+        let mut cells = vec![
             Cell::code(&s.id),
             s.place.as_str().into(),
             Cell::fixed(s.x_um, 3),
             Cell::fixed(s.y_um, 3),
             s.element_x_um.map(|x| Cell::fixed(x, 3)).unwrap_or(Cell::none()),
             s.element_y_um.map(|y| Cell::fixed(y, 3)).unwrap_or(Cell::none()),
-            u64::from(s.width_nm).into(),
-            format!("{} to {} nm", s.around_nm.0, s.around_nm.1).into(),
-        ]);
+            u64::from(s.drawn.width_nm).into(),
+        ];
+        cells.extend(s.drawn.length_nm.map(|nm| Cell::from(u64::from(nm))));
+        cells.extend(s.drawn.rotation_deg.map(|deg| Cell::fixed(deg, 1)));
+        let nm = s.around_nm.map(|(low, high)| format!("{low} to {high} nm"));
+        let deg = s.around_deg.map(|(low, high)| format!("{low} to {high} degrees"));
+        cells.push(nm.or(deg).unwrap_or_default().into());
+        table.row(cells);
     }
     page.table(table);
     page.section("Alignment");
+    if c.documents.crosses.is_empty() {
+        page.note(
+            "The design has no crosses: nothing tells the writer of step 2 where step 1 lies. Add sets of [[mark]] to the design, \
+             or use marks of the lab that the substrate has.",
+        );
+        return;
+    }
     let mut table = Table::new([
         Column::text("Set"),
         Column::text("Name at the writer"),

@@ -2,7 +2,9 @@
 
 use crate::contents::Contents;
 use crate::dose::{DOSE_FORMULA, FORMULA, duration};
+use crate::pad::{dose_pads, measured};
 use crate::{job, pictures};
+use metalith_core::PillarShape;
 use metalith_report::{Cell, Column, Page, Table, fixed};
 
 pub(super) fn doses(page: &mut Page, c: &Contents<'_>) {
@@ -10,10 +12,19 @@ pub(super) fn doses(page: &mut Page, c: &Contents<'_>) {
     let range = c.process.resist.dose_range_uc_cm2;
     page.paragraph(format!(
         "Labs differ: {} is written with {} to {} uC/cm2 at {} kV. Write the matrix first, choose the dose whose pads have \
-         the widths drawn, and change the base dose.",
-        c.process.resist.name, range[0], range[1], c.process.writer.acceleration_kv
+         the {} drawn, and change the base dose.",
+        c.process.resist.name,
+        range[0],
+        range[1],
+        c.process.writer.acceleration_kv,
+        measured(c.design.cell.shape)
     ));
-    page.figure(pictures::dose_matrix(c.process, &c.blocks, &c.documents.doses));
+    page.figure(pictures::dose_matrix(
+        c.process,
+        &dose_pads(c.design, c.process),
+        &c.blocks,
+        &c.documents.doses,
+    ));
     let mut table = Table::new([
         Column::number("Dose", ""),
         Column::number("Factor", ""),
@@ -36,11 +47,17 @@ pub(super) fn doses(page: &mut Page, c: &Contents<'_>) {
 pub(super) fn write_time(page: &mut Page, c: &Contents<'_>) {
     page.section("Write time");
     let w = &c.process.writer;
+    let shape = c.design.cell.shape;
+    let (snapped, changed) = match shape {
+        PillarShape::Square => ("a width that is no multiple of it", "rms change of width"),
+        PillarShape::Circle => ("a diameter that is no multiple of it", "rms change of diameter"),
+        PillarShape::Rectangle(_) => ("a corner that is on no multiple of it", "rms shift of corners"),
+    };
     page.code(format!("{FORMULA}\n{DOSE_FORMULA}"));
     page.paragraph(format!(
         "{}, {}: fields of {} um, grid {} nm, at most {} MHz. Overheads: {} us a shape, {} s a field, {} s a job. The shot \
-         step is the finest that the clock can follow; widths that are no multiple of it are snapped.",
-        w.name, w.mode, w.field_used_um, w.grid_nm, w.clock_max_mhz, w.shape_overhead_us, w.field_overhead_s, w.job_overhead_s
+         step is the finest that the clock can follow; {} is snapped.",
+        w.name, w.mode, w.field_used_um, w.grid_nm, w.clock_max_mhz, w.shape_overhead_us, w.field_overhead_s, w.job_overhead_s, snapped
     ));
     let mut table = Table::new([
         Column::text("File"),
@@ -74,10 +91,10 @@ pub(super) fn write_time(page: &mut Page, c: &Contents<'_>) {
         Column::number("Current", "nA"),
         Column::number("Shot step", "nm"),
         Column::number("Clock", "MHz"),
-        Column::number("rms change of width", "nm"),
+        Column::number(changed, "nm"),
         Column::text("Pitch"),
     ])
-    .caption("What the shots of each beam do to the widths of the array");
+    .caption("What the shots of each beam do to the pillars of the array");
     for (beam, rms) in &c.documents.snapping {
         let rest = pitch % beam.shot_step_nm;
         let pitch = if rest == 0.0 {

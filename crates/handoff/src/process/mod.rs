@@ -6,15 +6,30 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use metalith_core::Result;
 use metalith_core::document::load;
+use metalith_core::{PillarShape, Result};
+use metalith_design::Design;
 use metalith_drc::Deck;
 
-/// The process that ships with the program, and the name of its file.
-const STANDARD: (&str, &str) = (
-    "processes/jbx6300_zep520a.toml",
-    include_str!("../../../../processes/jbx6300_zep520a.toml"),
-);
+/// The processes that ship with the program, by the names of their files; the first is the standard one.
+const SHIPPED: [(&str, &str); 4] = [
+    (
+        "processes/jbx6300_zep520a.toml",
+        include_str!("../../../../processes/jbx6300_zep520a.toml"),
+    ),
+    (
+        "processes/jbx6300_asi.toml",
+        include_str!("../../../../processes/jbx6300_asi.toml"),
+    ),
+    (
+        "processes/jbx6300_tio2.toml",
+        include_str!("../../../../processes/jbx6300_tio2.toml"),
+    ),
+    (
+        "processes/jbx6300_csi.toml",
+        include_str!("../../../../processes/jbx6300_csi.toml"),
+    ),
+];
 
 /// Doses of a matrix: three by three blocks.
 pub(super) const DOSES: usize = 9;
@@ -39,7 +54,7 @@ pub struct Process {
     path: PathBuf,
     #[serde(skip)]
     text: String,
-    /// Whether it is the program's own, and so are its decks.
+    /// Whether it is one of the program's own, and so are its decks.
     #[serde(skip)]
     standard: bool,
 }
@@ -159,7 +174,9 @@ pub struct TestSpec {
     pub overlay_vernier_step_nm: f64,
     pub etch_pad_um: f64,
     pub film_witness_um: f64,
-    pub reference_wavelength_nm: f64,
+    /// Of the reference lens; that of the mapping of the design where it is left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reference_wavelength_nm: Option<f64>,
 }
 
 /// Where widths are to be measured, and how well they should fit.
@@ -173,16 +190,25 @@ pub struct MetrologySpec {
 /// The decks of rules that layouts for this process must keep: their files, or those of the program.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CheckSpec {
+    /// For designs of squares, of circles and of rectangles.
     #[serde(skip)]
-    pub pillar_rules: PathBuf,
+    pub squares: Option<ShapeRules>,
+    #[serde(skip)]
+    pub circles: Option<ShapeRules>,
+    #[serde(skip)]
+    pub rectangles: Option<ShapeRules>,
     #[serde(skip)]
     pub aperture_rules: PathBuf,
     #[serde(skip)]
-    pub dose_rules: PathBuf,
-    #[serde(skip)]
-    pub test_rules: PathBuf,
-    #[serde(skip)]
     pub test_opening_rules: PathBuf,
+}
+
+/// The decks of the first step for one shape of pillars.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShapeRules {
+    pub pillar_rules: PathBuf,
+    pub dose_rules: PathBuf,
+    pub test_rules: PathBuf,
 }
 
 /// Values of the draft job that the staff must confirm.
@@ -195,15 +221,23 @@ pub struct JobSpec {
 }
 
 impl CheckSpec {
-    /// The decks of rules, each once.
-    pub(super) fn decks(&self) -> [&Path; 5] {
-        [
-            &self.pillar_rules,
-            &self.aperture_rules,
-            &self.dose_rules,
-            &self.test_rules,
-            &self.test_opening_rules,
-        ]
+    /// The decks of the first step for pillars of a shape, if the process has them.
+    pub fn of_shape(&self, shape: PillarShape) -> Option<&ShapeRules> {
+        match shape {
+            PillarShape::Square => self.squares.as_ref(),
+            PillarShape::Circle => self.circles.as_ref(),
+            PillarShape::Rectangle(_) => self.rectangles.as_ref(),
+        }
+    }
+
+    /// The decks of rules for pillars of a shape, those of the first step first.
+    pub(super) fn decks(&self, shape: PillarShape) -> Vec<&Path> {
+        let of_shape = self.of_shape(shape).into_iter();
+        of_shape
+            .flat_map(|rules| [&rules.pillar_rules, &rules.dose_rules, &rules.test_rules])
+            .chain([&self.aperture_rules, &self.test_opening_rules])
+            .map(PathBuf::as_path)
+            .collect()
     }
 }
 
@@ -221,8 +255,26 @@ impl Process {
     /// # Panics
     /// Never: it is tested.
     pub fn standard() -> Self {
-        let (name, text) = STANDARD;
-        read::process(Path::new(name), text.to_owned(), true).expect("the process of the program is sound")
+        Self::shipped(0)
+    }
+
+    /// The process that ships with the program and etches a film, as designs name it, if there is one; else the standard one.
+    pub fn of_film(film: &str) -> Self {
+        let all = (0..SHIPPED.len()).map(Self::shipped);
+        let mut fitting = all.filter(|process| process.transfer.films.iter().any(|known| known == film));
+        fitting.next().unwrap_or_else(Self::standard)
+    }
+
+    fn shipped(k: usize) -> Self {
+        let (name, text) = SHIPPED[k];
+        read::process(Path::new(name), text.to_owned(), true).expect("the processes of the program are sound")
+    }
+
+    /// Wavelength of the hyperbolic reference lens and of the small lenses of the dose matrix (nm).
+    pub fn reference_wavelength_nm(&self, design: &Design) -> f64 {
+        self.tests
+            .reference_wavelength_nm
+            .unwrap_or(design.mapping.wavelength_um * 1e3)
     }
 
     pub(super) fn parse(path: &Path, text: String) -> Result<Self> {
@@ -267,23 +319,36 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_shipped_process_is_read_and_exposes_pillars() {
-        let process = Process::standard();
-        for rules in process.checks.decks() {
-            // The same deck, built in and from its file.
-            let name = |deck: Deck| deck.name;
-            let file = Path::new(env!("CARGO_MANIFEST_DIR"))
-                .join("../../rules")
-                .join(rules.file_name().unwrap());
-            assert_eq!(name(process.deck(rules).unwrap()), name(Deck::read(&file).unwrap()));
+    fn the_shipped_processes_are_read_and_expose_pillars() {
+        let rectangles = PillarShape::Rectangle(metalith_core::Rectangles {
+            width_nm: 100,
+            length_nm: 250,
+            steps: 180,
+        });
+        for k in 0..SHIPPED.len() {
+            let process = Process::shipped(k);
+            for shape in [PillarShape::Square, PillarShape::Circle, rectangles] {
+                for rules in process.checks.decks(shape) {
+                    // The same deck, built in and from its file.
+                    let name = |deck: Deck| deck.name;
+                    let file = Path::new(env!("CARGO_MANIFEST_DIR"))
+                        .join("../../rules")
+                        .join(rules.file_name().unwrap());
+                    assert_eq!(name(process.deck(rules).unwrap()), name(Deck::read(&file).unwrap()));
+                }
+            }
+            assert!(process.exposes_pillars());
+            for film in &process.transfer.films {
+                assert_eq!(Process::of_film(film), process);
+            }
         }
-        assert_eq!(process.resist.dose_uc_cm2, 280.0);
-        assert!(process.exposes_pillars());
+        assert_eq!(Process::of_film("no film that is known"), Process::standard());
+        assert_eq!(Process::standard().resist.dose_uc_cm2, 280.0);
     }
 
     #[test]
     fn all_mistakes_are_reported_at_once_with_their_places() {
-        let text = STANDARD
+        let text = SHIPPED[0]
             .1
             .replace("tone = \"positive\"", "tone = \"possitive\"")
             .replace("field_used_um = 499.8", "field_used_um = 600")

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{
     ApertureStep, CheckSpec, DOSES, DoseMatrixSpec, JobSpec, Method, MetrologySpec, PatternTransfer, Process,
-    Proximity, Resist, TestSpec, Tone, Writer,
+    Proximity, Resist, ShapeRules, TestSpec, Tone, Writer,
 };
 use metalith_core::Result;
 use metalith_core::document::{Document, Limits, Section};
@@ -163,7 +163,7 @@ fn dose_matrix(s: &Section<'_, '_>) -> DoseMatrixSpec {
         layer: s.integer("layer", 0..=255, "") as i16,
         lens_diameter_um: within(s, "lens_diameter_um", 5.0, 200.0, "um"),
         pad_um: within(s, "pad_um", 5.0, 1000.0, "um"),
-        pad_widths_nm: some(s, "pad_widths_nm", 10.0, 2000.0, "nm"),
+        pad_widths_nm: some(s, "pad_widths_nm", 10.0, 20_000.0, "nm"),
         gap_um: within(s, "gap_um", 0.0, 10_000.0, "um"),
     }
 }
@@ -174,7 +174,7 @@ fn tests(s: &Section<'_, '_>) -> TestSpec {
         pad_um: within(s, "pad_um", 100.0, 1000.0, pad_unit),
         pad_width_step_nm: within(s, "pad_width_step_nm", 2.0, 1000.0, "nm"),
         sparse_pitches: s.integer("sparse_pitches", 2..=100, "pitches"),
-        cd_widths_nm: some(s, "cd_widths_nm", 10.0, 5000.0, "nm"),
+        cd_widths_nm: some(s, "cd_widths_nm", 10.0, 20_000.0, "nm"),
         cd_length_um: within(s, "cd_length_um", 5.0, 1000.0, "um"),
         vernier_pitch_um: within(s, "vernier_pitch_um", 0.5, 100.0, "um"),
         vernier_step_nm: within(s, "vernier_step_nm", 1.0, 1000.0, "nm"),
@@ -182,7 +182,7 @@ fn tests(s: &Section<'_, '_>) -> TestSpec {
         overlay_vernier_step_nm: within(s, "overlay_vernier_step_nm", 1.0, 5000.0, "nm"),
         etch_pad_um: within(s, "etch_pad_um", 10.0, 2000.0, "um"),
         film_witness_um: within(s, "film_witness_um", 50.0, 5000.0, "um"),
-        reference_wavelength_nm: within(s, "reference_wavelength_nm", 150.0, 20_000.0, "nm"),
+        reference_wavelength_nm: s.optional_float("reference_wavelength_nm", Limits::new(150.0..=20_000.0, "nm")),
     }
 }
 
@@ -193,20 +193,38 @@ fn metrology(s: &Section<'_, '_>) -> MetrologySpec {
     }
 }
 
+/// The decks: those for squares in the section itself, those for other shapes in sections of their own.
 fn checks(s: &Section<'_, '_>, standard: bool) -> CheckSpec {
-    let file = |key: &str| {
+    let file = |s: &Section<'_, '_>, key: &str| {
         if standard {
             PathBuf::from(s.text(key))
         } else {
             s.file(key)
         }
     };
+    let rules = |s: &Section<'_, '_>| ShapeRules {
+        pillar_rules: file(s, "pillar_rules"),
+        dose_rules: file(s, "dose_rules"),
+        test_rules: file(s, "test_rules"),
+    };
+    let of_shape = |key: &str| {
+        let section = s.optional_section(key)?;
+        let rules = rules(&section);
+        section.finish();
+        Some(rules)
+    };
+    let (circles, rectangles) = (of_shape("circles"), of_shape("rectangles"));
+    // Who has decks for another shape alone makes no squares.
+    let some = ["pillar_rules", "dose_rules", "test_rules"]
+        .iter()
+        .any(|key| s.has(key));
+    let squares = (some || (circles.is_none() && rectangles.is_none())).then(|| rules(s));
     CheckSpec {
-        pillar_rules: file("pillar_rules"),
-        aperture_rules: file("aperture_rules"),
-        dose_rules: file("dose_rules"),
-        test_rules: file("test_rules"),
-        test_opening_rules: file("test_opening_rules"),
+        squares,
+        circles,
+        rectangles,
+        aperture_rules: file(s, "aperture_rules"),
+        test_opening_rules: file(s, "test_opening_rules"),
     }
 }
 

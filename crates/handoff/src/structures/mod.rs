@@ -6,6 +6,7 @@ mod rows;
 mod verniers;
 
 use super::drawing::{Drawing, LayerPair, RectNm, Sheet, nm, number};
+use super::pad::{DrawnSize, PadPillar};
 use super::process::Process;
 use metalith_core::Result;
 use metalith_design::Design;
@@ -28,8 +29,9 @@ pub(super) struct Structure {
     /// On the chip of the test structures, whose lower left corner is the origin (nm).
     #[serde(rename = "bounds_nm")]
     pub bounds: RectNm,
-    /// Width drawn, where one is to be measured (nm).
-    pub width_nm: Option<i64>,
+    /// What is drawn, where it is to be measured.
+    #[serde(flatten)]
+    pub drawn: Option<DrawnSize>,
     /// Rules that it breaks by intention, each with the reason.
     pub on_purpose: &'static [(&'static str, &'static str)],
 }
@@ -41,15 +43,10 @@ pub(super) struct Structures {
     pub frame: RectNm,
     /// Where borders of fields are crossed on purpose (nm).
     pub field_border: (i64, i64),
-    pillars: Vec<PillarCell>,
+    /// Pillars that have a cell of their own.
+    pillars: Vec<PadPillar>,
     top: Sheet,
     step2: Sheet,
-}
-
-/// A cell of one pillar.
-struct PillarCell {
-    name: String,
-    width: i64,
 }
 
 struct StructureLayers {
@@ -97,7 +94,7 @@ impl Structures {
             y = row.y1 + APART;
         }
         y = clear_of_borders(y, nm(process.tests.etch_pad_um), field);
-        let row = it.large(process, &layers, y);
+        let row = it.large(design, process, &layers, y);
         right = right.max(row.x1);
         let top = it.field_verniers(process, &layers, right + APART).max(row.y1);
         right = it.field_border.0 + 2 * APART;
@@ -113,14 +110,14 @@ impl Structures {
         id: String,
         purpose: impl Into<String>,
         bounds: RectNm,
-        width_nm: Option<i64>,
+        drawn: Option<DrawnSize>,
     ) {
         self.top.text(layers.label, (bounds.x0, bounds.y1), id.clone());
         self.list.push(Structure {
             id,
             purpose: purpose.into(),
             bounds,
-            width_nm,
+            drawn,
             on_purpose: &[],
         });
     }
@@ -132,13 +129,11 @@ impl Structures {
         }
     }
 
-    fn pillar(&mut self, width: i64) -> String {
-        let name = format!("W{width}");
-        if !self.pillars.iter().any(|c| c.width == width) {
-            self.pillars.push(PillarCell {
-                name: name.clone(),
-                width,
-            });
+    /// The cell of a pillar.
+    fn pillar(&mut self, pillar: PadPillar) -> String {
+        let name = pillar.cell_name();
+        if !self.pillars.iter().any(|known| known.cell_name() == name) {
+            self.pillars.push(pillar);
         }
         name
     }
@@ -150,8 +145,9 @@ impl Structures {
     pub fn write(self, design: &Design, pillars: &Path, step2: &Path) -> Result<Vec<Structure>> {
         let timestamp = &design.layout.timestamp;
         let mut drawing = Drawing::new("TESTS", timestamp);
-        for cell in &self.pillars {
-            drawing.add_pillar(&cell.name, number(&design.layout.layers.pillars), cell.width);
+        for pillar in &self.pillars {
+            let layer = number(&design.layout.layers.pillars);
+            drawing.add_pillar(&pillar.cell_name(), layer, &pillar.corners());
         }
         drawing.add(self.top);
         drawing.write(pillars)?;
@@ -169,7 +165,7 @@ pub(super) fn middle_of_reference() -> Structure {
         id: "REFERENCE".into(),
         purpose: "hyperbolic lens to compare the elements with".into(),
         bounds: RectNm::new(-LEVEL_REACH, -LEVEL_REACH, LEVEL_REACH, LEVEL_REACH),
-        width_nm: None,
+        drawn: None,
         on_purpose: &[("fill", LEVEL), ("fill_gradient", LEVEL)],
     }
 }

@@ -2,8 +2,10 @@
 
 use super::{APART, BESIDE, NUMERAL, StructureLayers, Structures, clear_of_borders};
 use crate::drawing::{RectNm, Sheet, nm};
-use crate::matrix::{legal_width, top_pad};
+use crate::matrix::top_pad;
+use crate::pad::{DrawnSize, line_width, test_pads};
 use crate::process::Process;
+use metalith_core::PillarShape;
 use metalith_design::Design;
 
 /// Lines of a dense CD group; odd, so that the middle one is as dense as lines get.
@@ -23,15 +25,20 @@ impl Structures {
         let side = nm(process.tests.pad_um);
         let pitch = i64::from(design.cell.pitch_nm) * sparse;
         let cleave = sparse == 1;
+        let sizes = match design.cell.shape {
+            PillarShape::Square => "width",
+            PillarShape::Circle => "diameter",
+            PillarShape::Rectangle(_) => "width, length",
+        };
         // Room at the left for the dashes of the cleave line.
         let mut x = APART + side + APART;
         let mut row = RectNm::at(x, y, side, side);
-        for width in pad_widths(design, process) {
-            let pillar = self.pillar(width);
+        for pillar in test_pads(design, process) {
+            let cell = self.pillar(pillar);
             x = clear_of_borders(x, side, nm(process.writer.field_used_um));
             let pad = RectNm::at(x, y, side, side);
-            top_pad(&mut self.top, &pillar, pad.centre(), side, pitch);
-            let words = width.to_string();
+            top_pad(&mut self.top, &cell, pad.centre(), side, pitch);
+            let words = pillar.digits();
             let numeral = pad.centre().0 - Sheet::numerals_width(NUMERAL, &words) / 2;
             self.top
                 .numerals(layers.marks, (numeral, pad.y1 + BESIDE), NUMERAL, &words);
@@ -39,10 +46,13 @@ impl Structures {
             let bounds = RectNm::new(pad.x0, pad.y0, pad.x1, pad.y1 + BESIDE + NUMERAL);
             self.record(
                 layers,
-                format!("{}{width}", if cleave { "D" } else { "S" }),
-                format!("uniform pillars of {width} nm, {kind}, pitch {pitch} nm: transmission, width, height"),
+                format!("{}{words}", if cleave { "D" } else { "S" }),
+                format!(
+                    "uniform pillars of {}, {kind}, pitch {pitch} nm: transmission, {sizes}, height",
+                    pillar.words()
+                ),
                 bounds,
-                Some(width),
+                Some(pillar.drawn()),
             );
             row = row.united(&bounds);
             x = pad.x1 + APART;
@@ -83,7 +93,7 @@ impl Structures {
         let mut x = APART;
         let mut row = RectNm::at(x, y, 0, length);
         for &asked in &process.tests.cd_widths_nm {
-            let width = legal_width(design, asked);
+            let width = line_width(design, asked);
             let across = if upright {
                 2 * width * (LINES + 1) + 10_000
             } else {
@@ -119,26 +129,11 @@ impl Structures {
                 format!("CD_{axis}_{width}"),
                 format!("{turned} lines {width} nm wide, {LINES} at equal space and one single: width along {axis}"),
                 bounds,
-                Some(width),
+                Some(DrawnSize::width(width as u16)),
             );
             row = row.united(&bounds);
             x = bounds.x1 + APART;
         }
         row
     }
-}
-
-/// Widths of the uniform pads (nm), from the narrowest to the widest that the design may write.
-fn pad_widths(design: &Design, process: &Process) -> Vec<i64> {
-    let (low, high) = design.cell.width_range_nm;
-    let step = process
-        .tests
-        .pad_width_step_nm
-        .max(f64::from(design.cell.width_step_nm));
-    let count = (f64::from(high - low) / step).floor() as i64;
-    let mut widths: Vec<i64> = (0..=count)
-        .map(|k| legal_width(design, f64::from(low) + k as f64 * step))
-        .collect();
-    widths.dedup();
-    widths
 }

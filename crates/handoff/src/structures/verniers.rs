@@ -3,43 +3,34 @@
 use super::{APART, BESIDE, StructureLayers, Structures};
 use crate::drawing::{RectNm, nm};
 use crate::process::Process;
+use metalith_design::Design;
 
 /// Bars of a vernier on each side of its middle.
 const BARS: i64 = 10;
 
 impl Structures {
     /// Etch depth, film witness, and the verniers between both steps.
-    pub(super) fn large(&mut self, process: &Process, layers: &StructureLayers, y: i64) -> RectNm {
+    pub(super) fn large(&mut self, design: &Design, process: &Process, layers: &StructureLayers, y: i64) -> RectNm {
         let (etch, witness) = (nm(process.tests.etch_pad_um), nm(process.tests.film_witness_um));
         let pad = RectNm::at(APART, y, etch, etch);
         self.top.rectangle(layers.pillars, pad);
         self.record(
             layers,
             "ETCH".into(),
-            "solid square beside bare glass: height of its step is the depth of the etch",
+            "solid square beside bare substrate: height of its step is the depth of the etch",
             pad,
             None,
         );
-        let film = RectNm::at(pad.x1 + APART, y, witness, witness);
-        self.top.rectangle(layers.pillars, film);
-        self.step2.rectangle(layers.openings, film.grown(BESIDE));
-        self.record(
-            layers,
-            "FILM".into(),
-            "solid film that is left whole: thickness and index by ellipsometry after all steps",
-            film,
-            None,
-        );
-        self.breaks(&[(
-            "field_cut",
-            "solid, and its thickness is the same on both sides of a seam",
-        )]);
-        let mut row = pad.united(&film);
+        let mut row = pad;
+        // Pillars that are etched into the substrate have no film.
+        if design.cell.pillar_material != design.cell.substrate_material {
+            row = row.united(&self.film_witness(layers, (pad.x1 + APART, y), witness));
+        }
+        let mut x = row.x1 + APART;
         let (pitch, step) = (
             nm(process.tests.overlay_vernier_pitch_um),
             process.tests.overlay_vernier_step_nm as i64,
         );
-        let mut x = film.x1 + APART;
         for upright in [true, false] {
             let axis = if upright { "x" } else { "y" };
             let span = 2 * BARS * (pitch + step) + pitch;
@@ -69,6 +60,25 @@ impl Structures {
             x = bounds.x1 + APART;
         }
         row
+    }
+
+    /// A square of film with an opening over it.
+    fn film_witness(&mut self, layers: &StructureLayers, (x, y): (i64, i64), witness: i64) -> RectNm {
+        let film = RectNm::at(x, y, witness, witness);
+        self.top.rectangle(layers.pillars, film);
+        self.step2.rectangle(layers.openings, film.grown(BESIDE));
+        self.record(
+            layers,
+            "FILM".into(),
+            "solid film that is left whole: thickness and index by ellipsometry after all steps",
+            film,
+            None,
+        );
+        self.breaks(&[(
+            "field_cut",
+            "solid, and its thickness is the same on both sides of a seam",
+        )]);
+        film
     }
 
     /// Verniers over borders of fields, and lines that run across them. Returns the top of the highest.

@@ -3,6 +3,7 @@
 mod formats;
 mod job;
 mod publish;
+mod shapes;
 mod trust;
 
 use std::collections::BTreeMap;
@@ -70,7 +71,12 @@ fn copy_of_shared(to: &Path) -> PathBuf {
 }
 
 fn rows(file: &str) -> Vec<BTreeMap<String, String>> {
-    let text = fs::read_to_string(shared().join(file)).unwrap();
+    rows_in(shared(), file)
+}
+
+/// Rows of a table of a hand-off, by the names of its columns.
+fn rows_in(folder: &Path, file: &str) -> Vec<BTreeMap<String, String>> {
+    let text = fs::read_to_string(folder.join(file)).unwrap();
     let mut lines = text.split("\r\n").filter(|l| !l.is_empty());
     let head: Vec<_> = lines.next().unwrap().split(',').map(str::to_owned).collect();
     lines

@@ -1,10 +1,10 @@
 //! What was designed: the chip, the pillars in the middle, phase and width along a radius.
 
 use metalith_core::{Lattice, WidthMap, WidthRows};
-use metalith_design::Design;
 use metalith_design::array::PillarArray;
 use metalith_design::phase::{ElementPhase, LensPhase};
-use metalith_report::{Axis, Chart, Page, PillarZoom, Plan, exact};
+use metalith_design::{Design, LensSpec};
+use metalith_report::{Axis, Cell, Chart, Column, Page, PillarZoom, Plan, Table, exact};
 
 /// Pillars that the picture of the middle shows along an axis.
 const ZOOMED_PITCHES: f64 = 34.0;
@@ -14,8 +14,12 @@ const RADIUS_POINTS: usize = 600;
 /// The section of the design.
 pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
     page.section("What was designed");
+    let across = match design.lens.outline {
+        Some(_) => format!(" ({})", aperture(&design.lens)),
+        None => String::new(),
+    };
     let lens = format!(
-        "{} um, f = {} um",
+        "{} um{across}, f = {} um",
         exact(f64::from(design.lens.diameter_nm) * 1e-3),
         exact(design.lens.focal_length_um),
     );
@@ -25,6 +29,11 @@ pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
             "{} x {} elements of {lens}, {apart} apart, steered by {}° a step",
             design.array.count.0, design.array.count.1, design.array.steering_deg,
         ),
+        (count, None) if design.array.has_own_lenses() => {
+            format!(
+                "{count} elements, each with a lens of its own where the table says so, placed and steered one by one,"
+            )
+        }
         (count, None) => format!("{count} elements of {lens}, placed and steered one by one,"),
     };
     let pillars = match design.cell.shape.rectangles() {
@@ -56,6 +65,9 @@ pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
         .shape(design.cell.shape)
         .caption("Pillars as they are written, to scale."),
     ]);
+    if design.array.has_own_lenses() {
+        page.table(own_lenses(design));
+    }
     let lens = LensPhase::of(design);
     let phase = ElementPhase::of(&lens, &centre.element);
     let n = array.lattice.sites();
@@ -132,9 +144,18 @@ fn chip(design: &Design) -> Plan {
     plan.rectangle(outline, (-x, -y), (x, y));
     for element in design.elements() {
         let (cx, cy) = (um(element.centre_nm.0), um(element.centre_nm.1));
-        let radius = design.lens.radius_um();
-        plan.circle(openings, cx, cy, radius + um(layout.apertures.margin_nm));
-        plan.circle(pillars, cx, cy, radius);
+        let radius = design.lens_of(&element).radius_um();
+        let shifted = |(x, y): &(i64, i64)| (cx + um(*x), cy + um(*y));
+        match design.outline_of(&element) {
+            Some(outline) => {
+                plan.polygon(openings, outline.grown(layout.apertures.margin_nm).iter().map(shifted));
+                plan.polygon(pillars, outline.corners_nm().iter().map(shifted));
+            }
+            None => {
+                plan.circle(openings, cx, cy, radius + um(layout.apertures.margin_nm));
+                plan.circle(pillars, cx, cy, radius);
+            }
+        }
         plan.label(cx, cy, element.label());
     }
     for set in &layout.marks {
@@ -143,4 +164,43 @@ fn chip(design: &Design) -> Plan {
         }
     }
     plan
+}
+
+/// The aperture of a lens in words.
+fn aperture(lens: &LensSpec) -> String {
+    match &lens.outline {
+        Some(outline) => format!("a polygon of {} corners", outline.corners_nm().len()),
+        None => "a circle".into(),
+    }
+}
+
+/// What each element is that was placed by itself.
+fn own_lenses(design: &Design) -> Table {
+    let mut table = Table::new([
+        Column::text("Element"),
+        Column::number("x", "um"),
+        Column::number("y", "um"),
+        Column::number("Diameter", "um"),
+        Column::text("Aperture"),
+        Column::number("Focal length", "um"),
+        Column::number("Rotation", "degrees"),
+        Column::text("Phase"),
+    ])
+    .caption("The elements and their lenses");
+    for element in design.elements() {
+        let (lens, [x, y]) = (design.lens_of(&element), element.centre_um());
+        let placed = design.array.placed(element.index);
+        let own = placed.is_some_and(|p| p.lens.as_ref().is_some_and(|l| l.phase != design.lens.phase));
+        table.row([
+            element.label().into(),
+            Cell::fixed(x, 3),
+            Cell::fixed(y, 3),
+            exact(f64::from(lens.diameter_nm) * 1e-3).into(),
+            aperture(lens).into(),
+            exact(lens.focal_length_um).into(),
+            exact(placed.map_or(0.0, |p| p.rotation_deg)).into(),
+            if own { "its own" } else { "that of [phase]" }.into(),
+        ]);
+    }
+    table
 }

@@ -44,6 +44,11 @@ impl MapTable {
         }
     }
 
+    /// The file that it is read from.
+    pub fn file(&self) -> &Path {
+        &self.file
+    }
+
     /// Load the table for places up to these distances along x and y (um).
     ///
     /// # Errors

@@ -22,6 +22,9 @@ pub struct PhaseTerm {
     pub centre_um: [f64; 2],
     /// Indices of the elements that have it; all where none is named.
     pub elements: Vec<(i32, i32)>,
+    /// The file that its numbers come from, if they come from one.
+    #[serde(skip)]
+    pub file: Option<PathBuf>,
 }
 
 /// Where a phase comes from.
@@ -142,6 +145,7 @@ mod tests {
             scale: 1.0,
             centre_um: [0.0; 2],
             elements: Vec::new(),
+            file: None,
         }
     }
 

@@ -1,0 +1,213 @@
+//! Pillars of uniform pads: outline, words, and what is measured of them.
+
+use metalith_core::{PillarShape, Rectangles};
+use metalith_design::Design;
+use metalith_layout::PillarForm;
+use serde::Serialize;
+
+use super::process::Process;
+
+/// Rotations of the pads of a dose matrix of rectangles (degrees): edges along both axes and between them.
+const DOSE_ROTATIONS_DEG: [f64; 3] = [0.0, 45.0, 90.0];
+
+/// Rotations of the pads of test structures of rectangles (degrees): half a turn of a rectangle is none.
+const TEST_ROTATIONS_DEG: [f64; 6] = [0.0, 30.0, 60.0, 90.0, 120.0, 150.0];
+
+/// Sizes of upright rectangles beside the nominal one, in steps of both edges.
+const SIZES: [i64; 4] = [-2, -1, 1, 2];
+
+/// Shortest edge of a rectangle of a pad (nm).
+const SHORTEST: i64 = 20;
+
+/// What is drawn where something is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct DrawnSize {
+    /// Width, diameter, or shorter edge of a rectangle (nm).
+    pub width_nm: u16,
+    /// Longer edge of a rectangle (nm).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub length_nm: Option<u16>,
+    /// Direction of the shorter edge of a rectangle, from x towards y (degrees).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rotation_deg: Option<f64>,
+}
+
+impl DrawnSize {
+    /// A width alone.
+    pub(super) fn width(width_nm: u16) -> Self {
+        Self {
+            width_nm,
+            length_nm: None,
+            rotation_deg: None,
+        }
+    }
+
+    /// A pillar of this shape with this width (nm) or number.
+    pub(super) fn of(shape: PillarShape, number: u16) -> Self {
+        match shape {
+            PillarShape::Square | PillarShape::Circle => Self::width(number),
+            PillarShape::Rectangle(pillars) => Self {
+                width_nm: pillars.width_nm,
+                length_nm: Some(pillars.length_nm),
+                rotation_deg: Some(whole_mdeg(pillars.rotation(number).to_degrees())),
+            },
+        }
+    }
+}
+
+/// An angle (degrees) without the rounding of its computation.
+pub(super) fn whole_mdeg(deg: f64) -> f64 {
+    (deg * 1e3).round() / 1e3
+}
+
+/// What is measured of the pillars of a design, in words.
+pub(super) fn measured(shape: PillarShape) -> &'static str {
+    match shape {
+        PillarShape::Square => "widths",
+        PillarShape::Circle => "diameters",
+        PillarShape::Rectangle(_) => "widths, lengths and rotations",
+    }
+}
+
+/// The pillar that a pad is made of.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PadPillar {
+    form: PillarForm,
+    number: u16,
+    /// Of rectangles whether the pad is told by its size, not by its rotation.
+    by_size: bool,
+}
+
+impl PadPillar {
+    /// The pillar that the design may write whose width is nearest to one that is asked for (nm).
+    fn of_width(design: &Design, width_nm: f64) -> Self {
+        Self {
+            form: PillarForm::of(design),
+            number: legal_width(design, width_nm),
+            by_size: false,
+        }
+    }
+
+    /// The rectangle of the design with the rotation nearest to one that is asked for (degrees).
+    fn rotated(design: &Design, pillars: Rectangles, rotation_deg: f64) -> Self {
+        Self {
+            form: PillarForm::of(design),
+            number: pillars.number(rotation_deg.to_radians()),
+            by_size: false,
+        }
+    }
+
+    /// An upright rectangle with both edges longer by this (nm), if it fits into its cell.
+    fn resized(design: &Design, pillars: Rectangles, by_nm: i64) -> Option<Self> {
+        let edge = |nm: u16| i64::from(nm) + by_nm;
+        let (width, length) = (edge(pillars.width_nm), edge(pillars.length_nm));
+        let fits = width >= SHORTEST && (width as f64).hypot(length as f64) <= f64::from(design.cell.pitch_nm);
+        let shape = PillarShape::Rectangle(Rectangles {
+            width_nm: u16::try_from(width).ok()?,
+            length_nm: u16::try_from(length).ok()?,
+            steps: pillars.steps,
+        });
+        fits.then(|| Self {
+            form: PillarForm::of(design).with_shape(shape),
+            number: pillars.steps,
+            by_size: true,
+        })
+    }
+
+    /// Corners about its middle (nm), counter-clockwise.
+    pub fn corners(&self) -> Vec<(i64, i64)> {
+        self.form.corners(self.number)
+    }
+
+    pub fn drawn(&self) -> DrawnSize {
+        DrawnSize::of(self.form.shape(), self.number)
+    }
+
+    /// What stands beside the pad, in digits: its width (nm), its rotation (degrees), or its edges.
+    pub fn digits(&self) -> String {
+        let drawn = self.drawn();
+        match (drawn.length_nm, drawn.rotation_deg) {
+            (Some(length), _) if self.by_size => format!("{}X{length}", drawn.width_nm),
+            (_, Some(deg)) => format!("{deg:.0}"),
+            _ => drawn.width_nm.to_string(),
+        }
+    }
+
+    /// Name of its cell.
+    pub fn cell_name(&self) -> String {
+        if self.by_size {
+            format!("W{}", self.digits())
+        } else {
+            self.form.cell_name(self.number)
+        }
+    }
+
+    /// Its size and direction in words.
+    pub fn words(&self) -> String {
+        let drawn = self.drawn();
+        match (drawn.length_nm, drawn.rotation_deg) {
+            (Some(length), Some(deg)) => {
+                format!("{} by {length} nm, rotated by {deg} degrees", drawn.width_nm)
+            }
+            _ if self.form.is_square() => format!("{} nm", drawn.width_nm),
+            _ => format!("{} nm in diameter", drawn.width_nm),
+        }
+    }
+}
+
+/// Pillars of the pads of a dose matrix.
+pub(super) fn dose_pads(design: &Design, process: &Process) -> Vec<PadPillar> {
+    match design.cell.shape.rectangles() {
+        Some(pillars) => DOSE_ROTATIONS_DEG
+            .iter()
+            .map(|&deg| PadPillar::rotated(design, pillars, deg))
+            .collect(),
+        None => {
+            let widths = process.dose_matrix.pad_widths_nm.iter();
+            widths.map(|&w| PadPillar::of_width(design, w)).collect()
+        }
+    }
+}
+
+/// Pillars of the pads of test structures: all widths in steps, from the narrowest to the widest that the design may write; of
+/// rectangles some rotations, then some sizes about that of the design.
+pub(super) fn test_pads(design: &Design, process: &Process) -> Vec<PadPillar> {
+    if let Some(pillars) = design.cell.shape.rectangles() {
+        // Edges stay even numbers.
+        let step = (process.tests.pad_width_step_nm / 2.0).round() as i64 * 2;
+        let rotated = TEST_ROTATIONS_DEG.iter();
+        let rotated = rotated.map(|&deg| PadPillar::rotated(design, pillars, deg));
+        let sized = SIZES
+            .iter()
+            .filter_map(|k| PadPillar::resized(design, pillars, k * step));
+        return rotated.chain(sized).collect();
+    }
+    let (low, high) = design.cell.width_range_nm;
+    let step = process
+        .tests
+        .pad_width_step_nm
+        .max(f64::from(design.cell.width_step_nm));
+    let count = (f64::from(high - low) / step).floor() as i64;
+    let mut pads: Vec<PadPillar> = (0..=count)
+        .map(|k| PadPillar::of_width(design, f64::from(low) + k as f64 * step))
+        .collect();
+    pads.dedup_by_key(|pad| pad.number);
+    pads
+}
+
+/// Width of a line to measure (nm), nearest to one that is asked for: one that pillars may have, or for rectangles any even one.
+pub(super) fn line_width(design: &Design, width_nm: f64) -> i64 {
+    match design.cell.shape.rectangles() {
+        Some(_) => (width_nm / 2.0).round() as i64 * 2,
+        None => i64::from(legal_width(design, width_nm)),
+    }
+}
+
+/// The width that the design may write nearest to one that is asked for (nm).
+pub(super) fn legal_width(design: &Design, width_nm: f64) -> u16 {
+    let nearest = design.cell.widths_nm().min_by(|a, b| {
+        let off = |w: &u16| (f64::from(*w) - width_nm).abs();
+        off(a).total_cmp(&off(b))
+    });
+    nearest.unwrap_or(design.cell.width_range_nm.0)
+}

@@ -1,0 +1,231 @@
+//! Hand-offs of round pillars and of rotated rectangles: what stands in their tables is what stands in their files.
+
+use std::collections::BTreeMap;
+use std::f64::consts::FRAC_PI_4;
+use std::path::{Path, PathBuf};
+
+use metalith_core::{PillarShape, Progress, Result, Silent, WidthRows};
+use metalith_design::{Design, PillarArray};
+use metalith_gds::{LayerNumber, Layout, Point, Selection, Shape, Transform, Visitor, circle_of, tilted_rectangle_of};
+use metalith_handoff::{Census, HandoffOptions, handoff, verify_handoff};
+use metalith_layout::LayoutFormat;
+use metalith_wave::Accuracy;
+
+use super::{PILLARS, SUMMED, TABLE_S, rows_in};
+
+/// Largest distance of a polygon from its circle where a design says nothing (nm), and the rounding of its corners.
+const CHORD_NM: f64 = 0.5;
+const ROUNDED_NM: f64 = 0.7072;
+
+/// Half a digit of the last decimal of a table (nm).
+const PLACE_NM: i64 = 1;
+
+fn design(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../designs/{name}.toml"))
+}
+
+/// A hand-off by the process of the program that etches the film.
+fn made(name: &str) -> PathBuf {
+    let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}_shapes"));
+    let _ = std::fs::remove_dir_all(&out);
+    let options = HandoffOptions {
+        compensate: None,
+        design: design(name),
+        process: None,
+        out: out.clone(),
+        command: format!("metalith handoff designs/{name}.toml"),
+        format: LayoutFormat::Gds,
+        fidelity: None,
+        accuracy: Accuracy::Fast,
+        waivers: None,
+    };
+    let made = handoff(&options, &Silent).unwrap();
+    for check in &made.checks {
+        assert_eq!(check.verdict.word(), "pass", "{name}: {}: {}", check.name, check.words);
+    }
+    assert!(verify_handoff(&out, &Silent).unwrap().holds());
+    out
+}
+
+/// Outlines of a layer as they are placed, by twice their middle (nm).
+struct Outlines {
+    found: BTreeMap<(i64, i64), Vec<Point>>,
+}
+
+impl Visitor for Outlines {
+    fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> Result<()> {
+        for placement in placements {
+            let points: Vec<Point> = shape.points.iter().map(|&p| placement.apply(p)).collect();
+            let ends = |of: fn(&Point) -> i64| {
+                let all = points.iter().map(of);
+                all.clone().min().unwrap() + all.max().unwrap()
+            };
+            self.found.insert((ends(|p| p.x), ends(|p| p.y)), points);
+        }
+        Ok(())
+    }
+}
+
+fn outlines(file: &Path, layer: LayerNumber) -> BTreeMap<(i64, i64), Vec<Point>> {
+    let mut visitor = Outlines { found: BTreeMap::new() };
+    let selection = Selection {
+        layers: Some(vec![layer]),
+        ..Default::default()
+    };
+    let progress: &dyn Progress = &Silent;
+    Layout::open(file)
+        .unwrap()
+        .visit(&selection, &mut visitor, progress)
+        .unwrap();
+    visitor.found
+}
+
+/// Area of a closed outline (nm^2).
+fn area(points: &[Point]) -> f64 {
+    let twice: i64 = points.windows(2).map(|w| w[0].x * w[1].y - w[1].x * w[0].y).sum();
+    twice.abs() as f64 / 2.0
+}
+
+/// Whether an outline is the pillar that a row of a table says is drawn.
+fn is_drawn(outline: &[Point], row: &BTreeMap<String, String>, shape: PillarShape) -> bool {
+    match shape {
+        PillarShape::Square => unreachable!("other tests look at squares"),
+        PillarShape::Circle => circle_of(outline).is_some_and(|r| r.width().to_string() == row["drawn_nm"]),
+        PillarShape::Rectangle(_) => {
+            let number = |key: &str| row[key].parse::<f64>().unwrap();
+            let drawn = metalith_core::Rectangles {
+                width_nm: number("drawn_width_nm") as u16,
+                length_nm: number("drawn_length_nm") as u16,
+                steps: 180,
+            };
+            let tilted = tilted_rectangle_of(outline, 1.0).unwrap();
+            tilted.number(drawn, 1.0) == Some(drawn.number(number("drawn_rotation_deg").to_radians()))
+        }
+    }
+}
+
+/// What the tables of a hand-off say of its pillars is found in its files; areas are those of the shapes, and times follow.
+fn tables_hold(name: &str, sites: usize, pads: usize) {
+    let folder = made(name);
+    let design = Design::read(&design(name)).unwrap();
+    let (shape, array) = (design.cell.shape, PillarArray::build(&design, &Silent).unwrap());
+    let file = folder.join(format!("layout/{name}_pillars.gds"));
+    let pillars = outlines(&file, PILLARS);
+    assert_eq!(pillars.len() as u64, array.pillars());
+
+    let at = |row: &BTreeMap<String, String>| {
+        let twice = |key: &str| (row[key].parse::<f64>().unwrap() * 2e3).round() as i64;
+        (twice("x_um"), twice("y_um"))
+    };
+    let table = rows_in(&folder, "metrology/cd_table.csv");
+    let on_lenses: Vec<_> = table.iter().filter(|row| row["file"] == "pillars").collect();
+    assert_eq!(on_lenses.len(), sites);
+    for row in on_lenses {
+        assert!(is_drawn(&pillars[&at(row)], row, shape), "{row:?}");
+    }
+
+    // The area drawn is the sum over all outlines, to the last square nanometre; and that of the shapes but for chords and the grid.
+    let census = Census::take(&file, &Silent).unwrap();
+    let counted = census.layer(1, 0).unwrap();
+    let drawn: f64 = pillars.values().map(|p| area(p)).sum::<f64>() * 1e-6;
+    assert!((counted.area_um2 - drawn).abs() < SUMMED * drawn);
+    let counts = array.classes[0].widths.histogram();
+    let each = counts.iter().enumerate().skip(1);
+    let (ideal, off) = each.fold((0.0, 0.0), |(ideal, off), (w, &n)| {
+        let (area_nm2, around_nm) = match shape {
+            PillarShape::Rectangle(r) => {
+                let (a, b) = (f64::from(r.width_nm), f64::from(r.length_nm));
+                (a * b, 2.0 * (a + b))
+            }
+            _ => (FRAC_PI_4 * (w * w) as f64, 4.0 * FRAC_PI_4 * w as f64),
+        };
+        (
+            ideal + n as f64 * area_nm2,
+            off + n as f64 * around_nm * (CHORD_NM + ROUNDED_NM),
+        )
+    });
+    assert!((drawn * 1e6 - ideal).abs() < off, "{drawn} um2, {} um2", ideal * 1e-6);
+    let times = rows_in(&folder, "dose/write_time.csv");
+    let two_na = times
+        .iter()
+        .find(|t| t["file"] == format!("{name}_pillars.gds") && t["current_na"] == "2");
+    let expected_s = 280e-6 * drawn * 1e-8 / 2e-9;
+    assert!((two_na.unwrap()["beam_s"].parse::<f64>().unwrap() - expected_s).abs() < TABLE_S);
+
+    // Uniform pads: each holds the pillar of the table alone, on the lattice of the design or one so many times as wide.
+    let tests = outlines(&folder.join(format!("tests/{name}_tests_pillars.gds")), PILLARS);
+    let mut seen = 0;
+    for row in rows_in(&folder, "tests/structures.csv") {
+        let dense = row["id"].starts_with('D');
+        if !(dense || row["id"].starts_with('S')) || row["purpose"].starts_with("solid") {
+            continue;
+        }
+        let nm = |key: &str| (row[key].parse::<f64>().unwrap() * 1e3).round() as i64;
+        let [x0, y0, x1] = ["x0_um", "y0_um", "x1_um"].map(nm);
+        let inside =
+            |&(x, y): &(i64, i64)| (2 * x0..=2 * x1).contains(&x) && (2 * y0..=2 * (y0 + x1 - x0)).contains(&y);
+        let pad: Vec<_> = tests.iter().filter(|(place, _)| inside(place)).collect();
+        let pitch = i64::from(design.cell.pitch_nm) * if dense { 1 } else { 3 };
+        let across = (x1 - x0) / pitch;
+        assert_eq!(pad.len() as i64, across * across, "{row:?}");
+        let mut columns: Vec<i64> = pad.iter().map(|(place, _)| place.0).collect();
+        columns.sort_unstable();
+        columns.dedup();
+        assert!(columns.windows(2).all(|w| (w[1] - w[0] - 2 * pitch).abs() <= PLACE_NM));
+        assert!(pad.iter().all(|(_, outline)| is_drawn(outline, &row, shape)), "{row:?}");
+        seen += 1;
+    }
+    assert_eq!(seen, 2 * pads);
+
+    // Nine blocks, alike but for their dose.
+    let matrix = Census::take(&folder.join(format!("dose/{name}_dose_matrix.gds")), &Silent).unwrap();
+    let first = matrix.layer(20, 1).unwrap();
+    let a_pad = (60_000 / u64::from(design.cell.pitch_nm)).pow(2);
+    assert!(first.shapes > 3 * a_pad);
+    for dose in 2..=9 {
+        let block = matrix.layer(20, dose).unwrap();
+        assert_eq!(block.shapes, first.shapes);
+        assert!((block.area_um2 - first.area_um2).abs() < SUMMED * first.area_um2);
+    }
+}
+
+/// Four of five diameters in three rings: the widest is beyond what the mapping writes.
+#[test]
+fn round_pillars_are_handed_over() {
+    tables_hold("asi_940", 12, 11);
+}
+
+/// Four rotations in three rings; six rotations and four sizes of pads.
+#[test]
+fn rotated_rectangles_are_handed_over() {
+    tables_hold("geometric_phase_532", 12, 10);
+}
+
+/// A process that has no rules for a shape says so, before anything is written.
+#[test]
+fn a_process_without_rules_for_a_shape_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../processes/jbx6300_asi.toml");
+    let rules = std::fs::canonicalize(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rules")).unwrap();
+    let text = std::fs::read_to_string(shipped).unwrap();
+    let text = text
+        .replace("[checks.circles]", "[checks.rectangles]")
+        .replace("../rules", rules.to_str().unwrap());
+    let process = folder.path().join("process.toml");
+    std::fs::write(&process, text).unwrap();
+    let out = folder.path().join("out");
+    let options = HandoffOptions {
+        compensate: None,
+        design: design("asi_940"),
+        process: Some(process),
+        out: out.clone(),
+        command: String::new(),
+        format: LayoutFormat::Gds,
+        fidelity: None,
+        accuracy: Accuracy::Fast,
+        waivers: None,
+    };
+    let said = handoff(&options, &Silent).unwrap_err().to_string();
+    assert!(said.contains("circles") && said.contains("no decks of rules"), "{said}");
+    assert!(!out.exists());
+}

@@ -1,0 +1,211 @@
+//! Apertures that are polygons: pillars stand in them and nowhere else, openings keep their margin, and all is read back.
+
+use metalith_core::Silent;
+use metalith_design::{Design, Hierarchy, PillarArray};
+use metalith_gds::extract::extract;
+use metalith_gds::{Layout, Selection, Shape, Transform, Visitor};
+use metalith_layout::{LayoutFormat, OasisEncoding, extraction_plan, write_apertures, write_pillars_as};
+use metalith_testing::design;
+
+/// A circle, a rectangle that is turned by a quarter, a hexagon, and an L.
+const ELEMENTS: &str = r#"
+[[element]]
+x_um = -70
+y_um = -70
+
+[[element]]
+x_um = 70
+y_um = -70
+aperture = "rectangle"
+aperture_um = [50, 20]
+rotation_deg = 90
+steering_x_deg = 4
+
+[[element]]
+x_um = 70
+y_um = 70
+aperture = "regular"
+aperture_sides = 6
+diameter_um = 48
+
+[[element]]
+x_um = -70
+y_um = 70
+aperture = "polygon"
+corners_x_um = [-10, 25, 25, 10, 10, -10]
+corners_y_um = [-15, -15, 5, 5, 24, 24]
+"#;
+
+const MARGIN_NM: i64 = 2_000;
+/// Corners of openings are whole nanometres.
+const ROUNDED_NM: f64 = 1.0;
+
+fn text(elements: &str) -> String {
+    let text = std::fs::read_to_string(design("hologram")).unwrap();
+    let (head, rest) = text.split_once("[[phase.term]]").unwrap();
+    let (_, array) = rest.split_once("[array]").unwrap();
+    let (array, _) = array.split_once("[[element]]").unwrap();
+    let (_, tail) = rest.split_once("[mapping]").unwrap();
+    let tail = tail.replace("size_um = [300, 200]", "size_um = [300, 300]");
+    format!("{head}[array]{array}{elements}\n[mapping]{tail}")
+}
+
+fn of(elements: &str) -> metalith_core::Result<Design> {
+    Design::parse(&design("hologram"), &text(elements))
+}
+
+/// Whether a place from the middle of an element is in its aperture, by what shapes are, not by polygons (nm); a place within a
+/// nanometre of the rim of the hexagon, whose corners are on no grid, may be either.
+fn inside(element: usize, x: i64, y: i64) -> Option<bool> {
+    let within = |a: i64, b: i64, c: i64, d: i64| (a..=b).contains(&x) && (c..=d).contains(&y);
+    match element {
+        0 => Some(x * x + y * y <= 30_000 * 30_000),
+        1 => Some(within(-10_000, 10_000, -25_000, 25_000)),
+        2 => {
+            let apothem = 24_000.0 * 3f64.sqrt() / 2.0;
+            let farthest = (0..6).map(|k| {
+                let (sin, cos) = (std::f64::consts::TAU * (f64::from(k) + 0.5) / 6.0).sin_cos();
+                x as f64 * cos + y as f64 * sin
+            });
+            let beyond = farthest.fold(f64::NEG_INFINITY, f64::max) - apothem;
+            (beyond.abs() > ROUNDED_NM).then_some(beyond < 0.0)
+        }
+        _ => Some(within(-10_000, 25_000, -15_000, 5_000) || within(-10_000, 10_000, -15_000, 24_000)),
+    }
+}
+
+#[test]
+fn pillars_stand_in_the_aperture_and_nowhere_else() {
+    let design = of(ELEMENTS).unwrap();
+    let array = PillarArray::build(&design, &Silent).unwrap();
+    let lattice = array.lattice;
+    for (k, placed) in array.placed.iter().enumerate() {
+        let widths = array.widths(placed);
+        for ((iy, ix), &w) in widths.width_nm.indexed_iter() {
+            let (x, y) = (lattice.coordinate_nm(ix), lattice.coordinate_nm(iy));
+            assert!(inside(k, x, y).is_none_or(|held| held == (w != 0)), "{k} at ({x}, {y})");
+        }
+    }
+    let computed = PillarArray::build_within(&design, 0, &Silent).unwrap();
+    for (a, b) in array.placed.iter().zip(&computed.placed) {
+        assert_eq!(array.widths(a).into_owned(), computed.widths(b).into_owned());
+    }
+    // The symmetries are those of what stands there: of a hexagon two mirrors and half a turn.
+    let members = |k: usize| array.classes[array.placed[k].class].group.members().len();
+    assert_eq!([0, 1, 2, 3].map(members), [8, 2, 4, 1]);
+}
+
+#[test]
+fn they_are_read_back_from_every_hierarchy_and_format() {
+    let design = of(ELEMENTS).unwrap();
+    let array = PillarArray::build(&design, &Silent).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    for format in [LayoutFormat::Gds, LayoutFormat::Oasis(OasisEncoding::Compact)] {
+        for hierarchy in [Hierarchy::Folded, Hierarchy::Sref, Hierarchy::Flat] {
+            let path = folder.path().join(format!("pillars.{}", format.extension()));
+            write_pillars_as(&design, &array, hierarchy, format, &path, &Silent).unwrap();
+            let layout = Layout::open(&path).unwrap();
+            let read = extract(&layout, &extraction_plan(&design), &Silent).unwrap();
+            assert_eq!((read.pillars, read.oddities.total()), (array.pillars(), 0));
+            for (element, placed) in read.elements.iter().zip(&array.placed) {
+                assert!(element.widths.width_nm == array.widths(placed).width_nm);
+            }
+        }
+    }
+}
+
+#[derive(Default)]
+struct Openings(Vec<Vec<(i64, i64)>>);
+
+impl Visitor for Openings {
+    fn shape(&mut self, shape: &Shape<'_>, _placements: &[Transform]) -> metalith_core::Result<()> {
+        self.0.push(shape.points.iter().map(|p| (p.x, p.y)).collect());
+        Ok(())
+    }
+}
+
+#[test]
+fn openings_are_the_apertures_with_their_margin() {
+    let design = of(ELEMENTS).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("apertures.gds");
+    write_apertures(&design, &path).unwrap();
+    let mut found = Openings::default();
+    let selection = Selection {
+        layers: Some(vec![design.layout.layers.apertures.number()]),
+        ..Default::default()
+    };
+    Layout::open(&path)
+        .unwrap()
+        .visit(&selection, &mut found, &Silent)
+        .unwrap();
+    let area = |k: usize| {
+        let twice: i64 = found.0[k].windows(2).map(|w| w[0].0 * w[1].1 - w[1].0 * w[0].1).sum();
+        twice as f64 / 2.0
+    };
+    let m = MARGIN_NM;
+    let (w, h) = ((20_000 + 2 * m) as f64, (50_000 + 2 * m) as f64);
+    let apothem = 24_000.0 * 3f64.sqrt() / 2.0 + m as f64;
+    let hexagon = 2.0 * 3f64.sqrt() * apothem * apothem;
+    let l = (35_000 + 2 * m) * (20_000 + 2 * m) + (20_000 + 2 * m) * 19_000;
+    for (k, corners, wanted, around) in [
+        (1, 4, w * h, 2.0 * (w + h)),
+        (2, 6, hexagon, 12.0 * apothem / 3f64.sqrt()),
+        (3, 6, l as f64, 200_000.0),
+    ] {
+        assert_eq!(found.0[k].len(), corners + 1);
+        assert!(
+            (area(k) - wanted).abs() <= around * ROUNDED_NM,
+            "{k}: {} {wanted}",
+            area(k)
+        );
+        let middle = design.elements()[k].centre_nm;
+        assert!(
+            found.0[k]
+                .iter()
+                .all(|&(x, y)| (x - middle.0).abs().max((y - middle.1).abs()) < 30_000)
+        );
+    }
+}
+
+#[test]
+fn apertures_that_cannot_be_are_refused() {
+    let l = "corners_x_um = [-10, 25, 25, 10, 10, -10]";
+    for (from, to, said) in [
+        (
+            l,
+            "corners_x_um = [-10, 25, 25, 10, 10]",
+            "5 places along x and 6 along y",
+        ),
+        (
+            l,
+            "corners_x_um = [-10, 25, -10, 10, 10, 25]",
+            "crosses or touches itself",
+        ),
+        (l, "corners_x_um = [15, 50, 50, 35, 35, 15]", "outside the outline"),
+        (
+            "aperture_um = [50, 20]",
+            "aperture_um = [50, 20]\ndiameter_um = 60",
+            "says its own size",
+        ),
+        ("aperture_sides = 6", "aperture_sides = 2", "aperture_sides"),
+        ("aperture = \"regular\"", "aperture = \"hexagon\"", "hexagon"),
+    ] {
+        assert!(ELEMENTS.contains(from));
+        let error = of(&ELEMENTS.replace(from, to)).unwrap_err().to_string();
+        assert!(error.contains(said), "{said} not in {error}");
+    }
+}
+
+/// The aperture of all elements of a grid.
+#[test]
+fn the_shared_lens_may_have_one() {
+    let text = std::fs::read_to_string(design("array_2x4")).unwrap();
+    let diameter = text.lines().find(|line| line.starts_with("diameter_um")).unwrap();
+    let square = text.replace(diameter, "aperture = \"rectangle\"\naperture_um = [20, 20]");
+    let design = Design::parse(&design("array_2x4"), &square).unwrap();
+    let array = PillarArray::build(&design, &Silent).unwrap();
+    let pitch = f64::from(design.cell.pitch_nm) * 1e-3;
+    let across = 2 * (10.0 / pitch + 0.5).floor() as u64;
+    assert_eq!(array.pillars(), 8 * across * across);
+}
