@@ -151,7 +151,7 @@ fn run_shards(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
         Some(jobs) if jobs > 1 => by_processes(args, &found.missing, jobs.into(), terminal)?,
         _ if found.missing.is_empty() => {}
         _ => {
-            let run = Run::open(&plan, terminal)?;
+            let run = Run::open(&plan)?;
             for number in found.missing {
                 run.shard(number, terminal)?;
             }

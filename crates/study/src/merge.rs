@@ -1,5 +1,6 @@
 //! All draws of a study, and what they say together.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -8,6 +9,7 @@ use metalith_verify::Verification;
 use serde::Serialize;
 
 use crate::plan::Plan;
+use crate::points::{GridPoint, combinations, each_value};
 use crate::record::DrawRecord;
 use crate::response::{Response, Table, Tightening};
 use crate::shard::{FOLDER, Run, read};
@@ -22,6 +24,10 @@ pub struct StudyResult {
     pub plan: Plan,
     /// Over each limit, then over all of them.
     pub yields: Vec<Yield>,
+    /// Draws at each value of each grid; none where there is no grid.
+    pub grid: Vec<GridPoint>,
+    /// Draws at each combination of values of several grids, where these are few enough to be read.
+    pub combinations: Vec<GridPoint>,
     /// Of the limits that depend on the draw.
     pub responses: Vec<Response>,
     /// What it takes for a yield of 90 %.
@@ -43,7 +49,7 @@ pub struct StudyResult {
 pub fn merge(plan: &Plan, show: usize, progress: &dyn Progress) -> Result<StudyResult> {
     let folder = plan.folder.join(FOLDER);
     let draws = whole(plan, &folder, &files(&folder)?)?;
-    let run = Run::open(plan, progress)?;
+    let run = Run::open(plan)?;
     let drawer = run.drawer();
     let count = plan.quantities.len();
     let names = plan.quantities.iter().map(|q| q.0.clone()).collect();
@@ -72,6 +78,8 @@ pub fn merge(plan: &Plan, show: usize, progress: &dyn Progress) -> Result<StudyR
     }
     Ok(StudyResult {
         tightenings: table.tightenings(WANTED_YIELD, &plan.limits, &responses, &draws),
+        grid: each_value(drawer, &plan.quantities, &draws),
+        combinations: combinations(drawer, &plan.quantities, &draws),
         plan: plan.clone(),
         yields,
         responses,
@@ -231,11 +239,8 @@ impl StudyResult {
             "" => name.clone(),
             unit => format!("{name}_{}", unit.replace(' ', "_")),
         }));
-        let figures: Vec<&String> = self
-            .draws
-            .first()
-            .map(|d| d.figures.keys().collect())
-            .unwrap_or_default();
+        // Designs of a grid may have figures of their own.
+        let figures: BTreeSet<&String> = self.draws.iter().flat_map(|d| d.figures.keys()).collect();
         head.extend(figures.iter().map(|k| (*k).clone()));
         head.extend(self.plan.limits.iter().map(|l| format!("limit_{}", l.key)));
         head.push("passed".into());
@@ -243,7 +248,11 @@ impl StudyResult {
         let number = |v: Option<f64>| v.map_or_else(String::new, |v| v.to_string());
         for d in &self.draws {
             let mut row = vec![d.draw.to_string()];
-            row.extend(d.amounts.iter().map(|a| a.to_string()));
+            let amounts = self.plan.quantities.iter().zip(&d.amounts);
+            row.extend(amounts.map(|((name, _), amount)| match d.design.get(name) {
+                Some(value) => quoted(&value.to_string()),
+                None => amount.to_string(),
+            }));
             row.extend(figures.iter().map(|k| number(d.figures.get(*k).copied().flatten())));
             row.extend(d.reached.iter().map(|r| number(*r)));
             row.push(d.passed.to_string());
@@ -254,9 +263,24 @@ impl StudyResult {
     }
 }
 
+/// A text as one field of CSV.
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn texts_are_one_field() {
+        assert_eq!(quoted("all_powers"), "all_powers");
+        assert_eq!(quoted("a \"b\", c"), "\"a \"\"b\"\", c\"");
+    }
 
     #[test]
     fn runs_of_numbers_are_named_by_their_ends() {
