@@ -95,7 +95,7 @@ struct MergeArgs {
     /// Folder of the study.
     study: PathBuf,
 
-    /// Table of the draws: .csv, .json or .jsonl; `result.csv` in the folder of the study if left out. The page is
+    /// Table of the draws: .csv, .json, .jsonl, or .parquet of a program with that feature; `result.csv` in the folder of the study if left out. The page is
     /// written beside it.
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,

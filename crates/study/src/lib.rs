@@ -19,15 +19,19 @@
 //! | `record` | what is kept of one draw |
 //! | `plan`, `shard` | the folder of a study |
 //! | `merge`, `yields`, `response`, `points` | all draws, and what they say |
+//! | `columns`, `parquet_file` | the draws as a table |
 //! | `page`, `grid_page` | what a person reads |
 //! | `slurm` | job arrays |
 
 mod bench;
+mod columns;
 mod designs;
 mod draw;
 mod grid_page;
 mod merge;
 mod page;
+#[cfg(feature = "parquet")]
+mod parquet_file;
 mod plan;
 mod points;
 mod record;

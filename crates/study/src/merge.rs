@@ -1,6 +1,5 @@
 //! All draws of a study, and what they say together.
 
-use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -8,6 +7,7 @@ use metalith_core::{Error, Progress, Result, WholeFile};
 use metalith_verify::Verification;
 use serde::Serialize;
 
+use crate::columns::{columns, csv};
 use crate::plan::Plan;
 use crate::points::{GridPoint, combinations, each_value};
 use crate::record::DrawRecord;
@@ -202,26 +202,42 @@ pub(crate) fn ranges(numbers: &[u64]) -> String {
 }
 
 impl StudyResult {
-    /// Write all draws as a table: CSV, JSON Lines or JSON by the ending of the name.
+    /// Write all draws as a table: CSV, JSON Lines, JSON, or Parquet by the ending of the name.
     ///
     /// # Errors
-    /// If the ending is another, or the file cannot be written.
+    /// If the ending is another, the program was built without Parquet, or the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let text = match path.extension().and_then(|e| e.to_str()) {
-            Some("csv") => self.csv(),
-            Some("jsonl") => self.lines(),
+        let bytes = match path.extension().and_then(|e| e.to_str()) {
+            Some("csv") => csv(&columns(self), self.draws.len()).into_bytes(),
+            Some("jsonl") => self.lines().into_bytes(),
             Some("json") => {
                 let whole = serde_json::json!({ "study": self, "draws": self.draws });
-                format!("{whole:#}\n")
+                format!("{whole:#}\n").into_bytes()
             }
+            Some("parquet") => self.parquet()?,
             _ => {
                 return Err(Error::invalid(
                     format!("{}: this ending is not known", path.display()),
-                    "name a file that ends in .csv, .json or .jsonl",
+                    "name a file that ends in .csv, .json, .jsonl or .parquet",
                 ));
             }
         };
-        WholeFile::write(path, text.as_bytes())
+        WholeFile::write(path, &bytes)
+    }
+
+    #[cfg(feature = "parquet")]
+    fn parquet(&self) -> Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        crate::parquet_file::write(&columns(self), &mut bytes)?;
+        Ok(bytes)
+    }
+
+    #[cfg(not(feature = "parquet"))]
+    fn parquet(&self) -> Result<Vec<u8>> {
+        Err(Error::invalid(
+            "this program was built without Parquet",
+            "build it with `--features parquet`, or name a file that ends in .csv, .json or .jsonl",
+        ))
     }
 
     fn lines(&self) -> String {
@@ -231,56 +247,11 @@ impl StudyResult {
         }
         text
     }
-
-    /// One row for each draw; empty where there is no number.
-    fn csv(&self) -> String {
-        let mut head = vec!["draw".to_owned()];
-        head.extend(self.plan.quantities.iter().map(|(name, unit)| match unit.as_str() {
-            "" => name.clone(),
-            unit => format!("{name}_{}", unit.replace(' ', "_")),
-        }));
-        // Designs of a grid may have figures of their own.
-        let figures: BTreeSet<&String> = self.draws.iter().flat_map(|d| d.figures.keys()).collect();
-        head.extend(figures.iter().map(|k| (*k).clone()));
-        head.extend(self.plan.limits.iter().map(|l| format!("limit_{}", l.key)));
-        head.push("passed".into());
-        let mut text = head.join(",") + "\n";
-        let number = |v: Option<f64>| v.map_or_else(String::new, |v| v.to_string());
-        for d in &self.draws {
-            let mut row = vec![d.draw.to_string()];
-            let amounts = self.plan.quantities.iter().zip(&d.amounts);
-            row.extend(amounts.map(|((name, _), amount)| match d.design.get(name) {
-                Some(value) => quoted(&value.to_string()),
-                None => amount.to_string(),
-            }));
-            row.extend(figures.iter().map(|k| number(d.figures.get(*k).copied().flatten())));
-            row.extend(d.reached.iter().map(|r| number(*r)));
-            row.push(d.passed.to_string());
-            text.push_str(&row.join(","));
-            text.push('\n');
-        }
-        text
-    }
-}
-
-/// A text as one field of CSV.
-fn quoted(text: &str) -> String {
-    if text.contains([',', '"']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn texts_are_one_field() {
-        assert_eq!(quoted("all_powers"), "all_powers");
-        assert_eq!(quoted("a \"b\", c"), "\"a \"\"b\"\", c\"");
-    }
 
     #[test]
     fn runs_of_numbers_are_named_by_their_ends() {

@@ -83,6 +83,16 @@ fn the_draws_depend_neither_on_the_cut_nor_on_the_order_nor_on_threads() {
     assert!(csv.starts_with("draw,cd_bias_nm,gap_um,"), "{csv}");
     assert_eq!(csv.lines().count(), 8);
     assert!(b.write(&folder.path().join("result.xls")).is_err());
+    let table = folder.path().join("result.parquet");
+    let written = b.write(&table);
+    if cfg!(feature = "parquet") {
+        written.unwrap();
+        // The four bytes that such a file begins with.
+        assert!(fs::read(&table).unwrap().starts_with(b"PAR1"));
+    } else {
+        assert!(written.unwrap_err().to_string().contains("--features parquet"));
+        assert!(!table.exists());
+    }
 }
 
 /// Without anything random, a design of a grid and the same design in a file of its own have the same figures to the bit.
