@@ -12,7 +12,7 @@ pip() { "$folder/venv/bin/pip" --disable-pip-version-check --quiet "$@"; }
 
 pip install ./python
 pip install -r scripts/requirements-python.txt
-"$folder/venv/bin/mypy" --strict --cache-dir "$folder/mypy" python/examples
+"$folder/venv/bin/mypy" --strict --cache-dir "$folder/mypy" python/examples python/tests
 "$folder/venv/bin/python" -m pytest -q -p no:cacheprovider python/tests
 for example in python/examples/*.py; do
     echo "== $example"
