@@ -7,6 +7,9 @@ use metalith_report::{Axis, Cell, Chart, Column, Figure, Page, Table, count, sig
 use crate::merge::StudyResult;
 use crate::points::{GridPoint, Spread};
 
+/// Room beside the outer points of a chart, so that these are seen whole, over the distance of the two.
+const BESIDE: f64 = 0.05;
+
 /// Limited figures that are drawn over a grid.
 const MOST_DRAWN: usize = 6;
 
@@ -18,7 +21,10 @@ pub(crate) fn over_grid(page: &mut Page, result: &StudyResult) {
     page.section("Over the grid");
     page.paragraph("Mean and standard deviation of each figure over the draws at each value.");
     for of_one in result.grid.chunk_by(|a, b| name(a) == name(b)) {
-        page.subsection(name(of_one.first().expect("chunks are not empty")));
+        page.subsection(match unit(result, &of_one[0]) {
+            "" => name(&of_one[0]).to_owned(),
+            unit => format!("{} [{unit}]", name(&of_one[0])),
+        });
         page.table(yields(of_one));
         let charts = charts(result, of_one);
         if !charts.is_empty() {
@@ -34,6 +40,12 @@ pub(crate) fn over_grid(page: &mut Page, result: &StudyResult) {
 
 fn name(point: &GridPoint) -> &str {
     &point.at[0].0
+}
+
+/// Unit of the quantity that a point holds first; empty for keys of a design, whose names say it.
+fn unit<'r>(result: &'r StudyResult, point: &GridPoint) -> &'r str {
+    let known = result.plan.quantities.iter().find(|(n, _)| n == name(point));
+    known.map_or("", |(_, unit)| unit.as_str())
 }
 
 fn yields(points: &[GridPoint]) -> Table {
@@ -78,8 +90,10 @@ fn charts(result: &StudyResult, points: &[GridPoint]) -> Vec<Figure> {
     let (Some(numbers), true) = (numbers, points.len() > 1) else {
         return Vec::new();
     };
-    let unit = result.plan.quantities.iter().find(|(n, _)| n == name(&points[0]));
-    let unit = unit.map_or("", |(_, unit)| unit.as_str());
+    let (low, high) = numbers
+        .iter()
+        .fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(*v), b.max(*v)));
+    let beside = BESIDE * (high - low);
     let limited = result.plan.limits.iter();
     let limited = limited.filter(|l| points.iter().all(|p| p.figures.contains_key(&l.key)));
     limited
@@ -87,7 +101,7 @@ fn charts(result: &StudyResult, points: &[GridPoint]) -> Vec<Figure> {
         .map(|limit| {
             let mut chart = Chart::new(
                 format!("`{}` over {}", limit.key, name(&points[0])),
-                Axis::linear(name(&points[0]), unit),
+                Axis::linear(name(&points[0]), unit(result, &points[0])).range(low - beside, high + beside),
                 Axis::linear(limit.key.clone(), ""),
             );
             let each = numbers.iter().zip(points).map(|(x, p)| {

@@ -223,8 +223,8 @@ fn over_one(result: &StudyResult, q: usize) -> Figure {
 }
 
 fn worst(result: &StudyResult) -> Table {
-    let names = result
-        .plan
+    let plan = &result.plan;
+    let names = plan
         .quantities
         .iter()
         .map(|(n, u)| Column::number(n.clone(), u.clone()));
@@ -233,7 +233,10 @@ fn worst(result: &StudyResult) -> Table {
     for k in result.worst.iter().take(10) {
         let d = &result.draws[*k as usize];
         let reached = d.reached.iter().map(|r| r.map_or_else(Cell::none, |r| Cell::sig(r, 4)));
-        let amounts = d.amounts.iter().map(|a| Cell::sig(*a, 3));
+        let amounts = plan.quantities.iter().zip(&d.amounts).map(|((name, _), amount)| {
+            let value = d.design.get(name);
+            value.map_or_else(|| Cell::sig(*amount, 3), |value| Cell::from(value.to_string()))
+        });
         table.row(std::iter::once(Cell::from(k.to_string())).chain(amounts).chain(reached));
     }
     table
