@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The Python package as a user gets it: installed into a fresh environment, its types checked, its tests and examples run.
+# The Python package as a user gets it: installed into a fresh environment, its types checked, its tests, notebooks and examples run.
 # Usage: scripts/python.sh [FOLDER]; FOLDER holds the environment, target/ci/python if left out.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -12,9 +12,9 @@ pip() { "$folder/venv/bin/pip" --disable-pip-version-check --quiet "$@"; }
 
 pip install ./python
 pip install -r scripts/requirements-python.txt
-"$folder/venv/bin/mypy" --strict --cache-dir "$folder/mypy" python/examples
+"$folder/venv/bin/mypy" --strict --cache-dir "$folder/mypy" python/examples python/tests
 "$folder/venv/bin/python" -m pytest -q -p no:cacheprovider python/tests
-for example in python/examples/*.py; do
-    echo "== $example"
-    "$folder/venv/bin/python" "$example"
-done
+python3 scripts/notebooks.py check
+"$folder/venv/bin/python" scripts/notebooks.py run
+echo "== tolerances"
+"$folder/venv/bin/python" python/examples/tolerances.py

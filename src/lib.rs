@@ -82,6 +82,7 @@ extern crate self as metalith;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod cli;
+mod session;
 
 pub use metalith_calibrate as calibrate;
 pub use metalith_camera as camera;
@@ -110,7 +111,8 @@ pub use metalith_wave as wave;
 
 pub use metalith_cell::{CellModel, Fidelity};
 pub use metalith_core::{
-    Error, Fault, Faults, Lattice, PillarShape, Progress, Result, Silent, Wedge, WholeFile, WidthMap, text,
+    ElementSite, Error, Fault, Faults, Lattice, PillarShape, Progress, Rectangles, Result, Silent, Wedge, WholeFile,
+    WidthMap, text,
 };
 pub use metalith_design::{Design, Hierarchy, PillarArray, cell_models};
 pub use metalith_gds::Layout;
@@ -119,3 +121,4 @@ pub use metalith_layout::{write_apertures, write_layer_properties, write_pillars
 pub use metalith_made::{CalibratedModel, MadeChip};
 pub use metalith_verify::{SimulationCase, SimulationCases, Verification, verify, write_report};
 pub use metalith_wave::Accuracy;
+pub use session::plan_session;

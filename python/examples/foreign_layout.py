@@ -1,12 +1,11 @@
 # %% [markdown]
 # # A layout from elsewhere
-# Pillars that another program wrote (here gdstk): read, checked against design rules, simulated, and written again from
+# Pillars that another program wrote (here KLayout): read, checked against design rules, simulated, and written again from
 # arrays.
 
 # %%
 import tempfile
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -46,15 +45,22 @@ def drawn(of: npt.NDArray[np.uint16]) -> npt.NDArray[np.uint16]:
 widths = lens()
 
 # %%
-from gdstk import Library, rectangle
+from klayout import db
 
-stream: Any = Library()
-cell: Any = stream.new_cell("LENS")
+foreign = db.Layout()
+foreign.dbu = 0.001
+top = foreign.create_cell("LENS")
+layer = foreign.layer(1, 0)
+# One cell for each width, placed as often as it is needed.
+squares: dict[int, db.Cell] = {}
 for iy, ix in np.argwhere(widths):
-    x, y = (np.array([ix, iy]) - 0.5 * (SITES - 1)) * PITCH_NM * 1e-3
-    h = 0.5e-3 * float(widths[iy, ix])
-    cell.add(rectangle((x - h, y - h), (x + h, y + h), layer=1))
-stream.write_gds(folder / "foreign.gds")
+    width = int(widths[iy, ix])
+    if width not in squares:
+        squares[width] = foreign.create_cell(f"W{width}")
+        squares[width].shapes(layer).insert(db.Box(-width // 2, -width // 2, width // 2, width // 2))
+    x, y = (int((2 * k - SITES + 1) * PITCH_NM // 2) for k in (ix, iy))
+    top.insert(db.CellInstArray(squares[width].cell_index(), db.Trans(x, y)))
+foreign.write(str(folder / "foreign.gds"))
 
 # %%
 layout = ml.read_layout(folder / "foreign.gds")

@@ -10,7 +10,7 @@ import numpy as np
 
 import metalith as ml
 
-root = Path(__file__).resolve().parents[2]
+root = next(p for p in (Path.cwd(), *Path.cwd().parents) if (p / "designs/mini_3x3.toml").is_file())
 folder = Path(tempfile.mkdtemp())
 
 # %%
@@ -22,6 +22,13 @@ widths = layout.widths[0]
 psfs = ml.psf(array, wavelengths_nm=[455, 530, 660], field_deg=[(0, 0), (15, 0)], elements=[4], fast=True)
 for psf in psfs:
     print(f"{psf.wavelength_nm:g} nm, {psf.field_deg[0]:g} deg: Strehl {psf.strehl:.3f}")
+
+# %% [markdown]
+# Figures and labelled arrays are of matplotlib and xarray, which are imported when they are asked for.
+
+# %%
+psfs.plot(columns=2)
+print(psfs.to_xarray().max(["x", "y"]).squeeze().values.round(1))
 
 # %% [markdown]
 # What was read is what was meant, pillar by pillar.
@@ -38,6 +45,7 @@ for centre, found in zip(layout.centres_nm, layout.widths):
 
 # %%
 drawn = np.unique(array.widths(4))[1:]
+ml.cell(drawn, [455.0]).plot()
 t = ml.cell(drawn, [530.0])[:, 0]
 table = np.zeros(int(drawn[-1]) + 1, dtype=complex)
 table[drawn] = t

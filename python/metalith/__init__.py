@@ -8,15 +8,16 @@ that are done, and all of them.
 
 from __future__ import annotations
 
-from ._layouts import Array, Design, Layout, read_layout, write_layout
-from ._light import Psf, PsfSet, cell, index, propagate, psf
+from ._layouts import Array, Design, Layout, Rectangles, Shape, read_layout, write_layout
+from ._light import Psf, PsfSet, Transmission, cell, index, propagate, psf
 from ._native import MetalithError, __version__
 from ._pictures import Frame, Studio, denoise
-from ._checks import CheckReport, Marker, Verification, calibrate, check, verify
+from ._checks import CapturePlan, CheckReport, Marker, Verification, calibrate, check, plan, verify
 from ._studies import Study, StudyResult
 
 __all__ = [
     "Array",
+    "CapturePlan",
     "CheckReport",
     "Design",
     "Frame",
@@ -25,9 +26,12 @@ __all__ = [
     "MetalithError",
     "Psf",
     "PsfSet",
+    "Rectangles",
+    "Shape",
     "Studio",
     "Study",
     "StudyResult",
+    "Transmission",
     "Verification",
     "__version__",
     "calibrate",
@@ -35,6 +39,7 @@ __all__ = [
     "check",
     "denoise",
     "index",
+    "plan",
     "propagate",
     "psf",
     "read_layout",

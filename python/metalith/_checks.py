@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from . import _native
@@ -98,3 +99,55 @@ def calibrate(
     ``model.toml`` are written into ``out``. It takes minutes."""
     found: Json = json.loads(_native.calibrate(measured, out, list(effects), progress))
     return found
+
+
+@dataclass(frozen=True)
+class CapturePlan:
+    """The captures that a bench should take of a design."""
+
+    folder: Path
+    """Folder of the measured set, its frames still to be taken."""
+    page: Path
+    """The check list, to print."""
+    sentence: str
+    """One line for a person."""
+    finds_all: bool
+    """Whether every effect is found at its wanted size."""
+    captures: list[Json] = field(repr=False)
+    """What to take: ``file``, ``element``, ``led_nm``, ``aoi_deg``, ``distance_um``, ``window_centre_um``, ``frames`` and
+    exposure."""
+    effects: list[Json] = field(repr=False)
+    """What is expected of each effect: ``name``, ``wanted``, ``detected`` and more."""
+    confusions: list[Json] = field(repr=False)
+    """Pairs of effects that the captures cannot tell apart, with the measurement that would."""
+    numbers: Json = field(repr=False)
+    """All of it, as in ``plan.json`` of ``metalith plan``."""
+
+
+def plan(
+    design: Design,
+    bench: PathLike,
+    out: PathLike,
+    *,
+    layout: PathLike | None = None,
+    effects: Sequence[str] = (),
+    progress: Progress | None = None,
+) -> CapturePlan:
+    """Plan a bench session into the folder ``out``: the fewest captures that find every effect of a chip at a wanted size
+    and tell it from the others.
+
+    ``bench``: a file of what the bench can do and what is wanted. ``layout``: the one that was written; left out, the pillars
+    of the design are written into ``out``. ``effects``: plan for these alone. A folder with frames is not overwritten. It
+    takes minutes."""
+    text, finds_all, sentence = _native.plan(design._native, bench, out, layout, list(effects), progress)
+    found = json.loads(text)
+    return CapturePlan(
+        folder=Path(found["folder"]),
+        page=Path(found["page"]),
+        sentence=sentence,
+        finds_all=finds_all,
+        captures=found["captures"],
+        effects=found["effects"],
+        confusions=found["confusions"],
+        numbers=found,
+    )

@@ -5,12 +5,56 @@ from __future__ import annotations
 import html
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any, Literal, TypeAlias, Union
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _native
-from ._types import PathLike, Progress, Widths
+from ._types import Float64, PathLike, Progress, Widths
+
+
+@dataclass(frozen=True)
+class Rectangles:
+    """Rectangular pillars of one size, which differ by their rotation."""
+
+    width_nm: int
+    """The shorter edge (nm), even, along the direction of the rotation."""
+    length_nm: int
+    """The longer edge (nm), even, across it."""
+    steps: int = 180
+    """Rotations in half a turn, which leaves a rectangle as it is."""
+
+    def numbers(self, rotations_deg: npt.ArrayLike) -> Widths:
+        """The numbers that stand in maps for rotations (degrees, from x towards y), each for the nearest step: 1 to
+        ``steps``, zero where a rotation is NaN."""
+        values = np.ascontiguousarray(rotations_deg, dtype=np.float64)
+        numbers = _native.rotation_numbers(values.ravel(), *_told(self)[1:])
+        return numbers.reshape(values.shape)
+
+    def rotations_deg(self, numbers: npt.ArrayLike) -> Float64:
+        """Rotations (degrees) from 0 up to 180; NaN where there is no pillar."""
+        values = _whole(np.asarray(numbers))
+        rotations = _native.rotations_deg(values.ravel(), *_told(self)[1:])
+        return rotations.reshape(values.shape)
+
+
+Shape: TypeAlias = Union[Literal["square", "circle"], Rectangles]
+"""What pillars are."""
+
+
+def _told(shape: Shape) -> tuple[str, int, int, int]:
+    """A shape as the native module has it: word, width and length (nm), steps."""
+    if isinstance(shape, Rectangles):
+        return ("rectangle", shape.width_nm, shape.length_nm, shape.steps)
+    return (shape, 0, 0, 0)
+
+
+def _shape(told: tuple[str, int, int, int]) -> Shape:
+    word, width, length, steps = told
+    if word == "rectangle":
+        return Rectangles(width, length, steps)
+    return "circle" if word == "circle" else "square"
 
 
 class Design:
@@ -124,6 +168,11 @@ class Array:
         return self._native.pitch_nm
 
     @property
+    def shape(self) -> Shape:
+        """What the pillars are."""
+        return _shape(self._native.shape)
+
+    @property
     def centres_nm(self) -> list[tuple[int, int]]:
         """Centre of each element (nm)."""
         return [(c[0], c[1]) for _, c, _ in self._native.elements]
@@ -132,8 +181,13 @@ class Array:
         return len(self._native.elements)
 
     def widths(self, element: int) -> Widths:
-        """Widths of the pillars of one element (nm): uint16, shape ``[sites, sites]``, zero where there is none."""
+        """Widths of the pillars of one element (nm), diameters of circles, numbers of rotations of rectangles: uint16,
+        shape ``[sites, sites]``, zero where there is none."""
         return self._native.widths(element)
+
+    def rotations_deg(self, element: int) -> Float64:
+        """Rotations of the rectangles of one element (degrees), NaN where there is none."""
+        return _rectangles(self.shape).rotations_deg(self.widths(element))
 
     def write(
         self,
@@ -158,7 +212,8 @@ class Layout:
     """The pillars that a layout file holds."""
 
     widths: list[Widths] = field(repr=False)
-    """Of each element (nm): uint16, shape ``[sites, sites]``, zero where there is no pillar."""
+    """Of each element (nm), diameters of circles, numbers of rotations of rectangles: uint16, shape ``[sites, sites]``,
+    zero where there is no pillar."""
     names: list[str] = field(repr=False)
     """Name of each element."""
     centres_nm: list[tuple[int, int]] = field(repr=False)
@@ -171,6 +226,18 @@ class Layout:
     """Shapes on the layer that are no pillar on a lattice."""
     top: str
     """Name of the cell that was read."""
+    shape: Shape = "square"
+    """What the pillars are."""
+
+    def rotations_deg(self, element: int) -> Float64:
+        """Rotations of the rectangles of one element (degrees), NaN where there is none."""
+        return _rectangles(self.shape).rotations_deg(self.widths[element])
+
+
+def _rectangles(shape: Shape) -> Rectangles:
+    if isinstance(shape, Rectangles):
+        return shape
+    raise _native.MetalithError(f"{shape}s have no rotation\n  help: ask for their widths")
 
 
 def read_layout(
@@ -179,12 +246,15 @@ def read_layout(
     layer: tuple[int, int] = (1, 0),
     top: str | None = None,
     design: Design | None = None,
+    array: Array | None = None,
     progress: Progress | None = None,
 ) -> Layout:
-    """Read the pillars of a GDSII or OASIS file, written by any program: at the elements of ``design``, or wherever
-    squares stand on a lattice on ``layer`` (layer and datatype)."""
-    native = design._native if design is not None else None
-    names, centres, pitches, widths, pillars, others, found = _native.read_layout(path, layer, top, native, progress)
+    """Read the pillars of a GDSII or OASIS file, written by any program: at the elements of ``design`` or of ``array``, or
+    wherever squares or circles stand on a lattice on ``layer`` (layer and datatype). Rectangles need one of the two."""
+    natives = (design._native if design is not None else None, array._native if array is not None else None)
+    names, centres, pitches, widths, pillars, others, found, shape = _native.read_layout(
+        path, layer, top, *natives, progress
+    )
     return Layout(
         widths=widths,
         names=names,
@@ -193,31 +263,37 @@ def read_layout(
         pillars=pillars,
         other_shapes=others,
         top=found,
+        shape=_shape(shape),
     )
 
 
 def write_layout(
     path: PathLike,
-    widths: Sequence[npt.ArrayLike] | Widths,
+    widths: Sequence[npt.ArrayLike] | npt.NDArray[Any],
     *,
     pitch_nm: int,
+    shape: Shape = "square",
     centres_nm: Sequence[tuple[int, int]] | None = None,
     layer: tuple[int, int] = (1, 0),
     hierarchy: str = "folded",
     progress: Progress | None = None,
 ) -> Array:
-    """Write maps of widths as a layout.
+    """Write maps of widths, diameters or rotations as a layout.
 
-    ``widths`` is one map or several, each a square array of whole, even nanometres, zero where there is no pillar, all of
-    one size. ``centres_nm`` are their places; one map alone stands at the origin. Maps that are copies of one another, or
+    ``widths`` is one map or several, all of one size, each a square array: of whole, even nanometres, zero where there is no
+    pillar, edges of squares or diameters of circles by ``shape``; or, where ``shape`` is :class:`Rectangles`, of rotations
+    in degrees from x towards y, NaN where there is none, which are rounded to the nearest step. ``centres_nm`` are their places; one map alone stands at the origin. Maps that are copies of one another, or
     symmetric, are stored once. Returns the array that was written."""
     if isinstance(widths, np.ndarray) and widths.ndim == 2:
         widths = [widths]
-    maps = [_whole(np.asarray(w)) for w in widths]
+    if isinstance(shape, Rectangles):
+        maps = [shape.numbers(w) for w in widths]
+    else:
+        maps = [_whole(np.asarray(w)) for w in widths]
     if centres_nm is None and len(maps) == 1:
         centres_nm = [(0, 0)]
     centres = [(int(x), int(y)) for x, y in centres_nm or []]
-    array = Array(_native.array_of_widths(maps, pitch_nm, centres, progress))
+    array = Array(_native.array_of_widths(maps, pitch_nm, centres, _told(shape), progress))
     array.write(path, hierarchy=hierarchy, layer=layer, progress=progress)
     return array
 

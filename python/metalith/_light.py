@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native
-from ._layouts import Array, Layout
+from ._figures import imported
+from ._layouts import Array, Layout, Rectangles, Shape, _told
 from ._types import Complex64, Complex128, Float64, Progress, Widths
 
 if TYPE_CHECKING:
@@ -49,6 +50,14 @@ class Psf:
     mtf_nyquist: tuple[float, float] = field(repr=False)
     """MTF at 85.3 line pairs a millimetre along x and y, without the pixel."""
 
+    def to_xarray(self) -> Any:
+        """As :meth:`PsfSet.to_xarray`, of this one."""
+        return PsfSet([self]).to_xarray()
+
+    def plot(self) -> Any:
+        """As :meth:`PsfSet.plot`, of this one."""
+        return PsfSet([self]).plot(columns=1)
+
 
 class PsfSet(Sequence[Psf]):
     """PSFs of elements, wavelengths and fields, in this order."""
@@ -81,8 +90,8 @@ class PsfSet(Sequence[Psf]):
         """An ``xarray.DataArray`` with dimensions element, wavelength_nm, field, y and x. Windows of steered elements
         lie elsewhere for each PSF: x and y count from the middle of the window, ``centre_x_um`` and ``centre_y_um`` are
         coordinates."""
-        import xarray
-
+        xarray = imported("xarray")
+        self._some()
         elements = list(dict.fromkeys(p.element for p in self._psfs))
         wavelengths = list(dict.fromkeys(p.wavelength_nm for p in self._psfs))
         fields = list(dict.fromkeys(p.field_deg for p in self._psfs))
@@ -115,9 +124,8 @@ class PsfSet(Sequence[Psf]):
 
     def plot(self, columns: int = 4) -> Any:
         """A matplotlib figure of all PSFs on one logarithmic scale of four decades."""
-        from matplotlib import pyplot
-        from matplotlib.colors import LogNorm
-
+        pyplot, colors = imported("matplotlib.pyplot"), imported("matplotlib.colors")
+        self._some()
         rows = -(-len(self) // columns)
         figure, axes = pyplot.subplots(rows, columns, squeeze=False, figsize=(3 * columns, 3 * rows))
         most = max(float(p.values.max()) for p in self)
@@ -125,12 +133,16 @@ class PsfSet(Sequence[Psf]):
             axis.set_axis_off()
         for axis, p in zip(axes.flat, self):
             extent = (p.x_um[0], p.x_um[-1], p.y_um[0], p.y_um[-1])
-            axis.imshow(p.values, origin="lower", extent=extent, norm=LogNorm(1e-4 * most, most))
+            axis.imshow(p.values, origin="lower", extent=extent, norm=colors.LogNorm(1e-4 * most, most))
             axis.set_title(f"{p.element}, {p.wavelength_nm:g} nm, {p.field_deg[0]:g} deg", fontsize=8)
             axis.set_xlabel("x [um]")
             axis.set_ylabel("y [um]")
         figure.tight_layout()
         return figure
+
+    def _some(self) -> None:
+        if not self._psfs:
+            raise _native.MetalithError("there is no PSF in this set\n  help: take a part of the set that holds one")
 
     def __repr__(self) -> str:
         return f"PsfSet({len(self)} PSFs)"
@@ -147,6 +159,8 @@ def psf(
     samples: int | None = None,
     distance_um: float | None = None,
     pitch_nm: int | None = None,
+    shape: Shape = "square",
+    arriving: str = "left",
     pillar_height_nm: float = 700.0,
     pillar: str = SILICON_NITRIDE,
     substrate: str = FUSED_SILICA,
@@ -158,7 +172,8 @@ def psf(
     normal), ``neighbours`` (each pillar among its own neighbours;
     solved in minutes for each direction of light, then kept), ``fitted`` or
     ``published``. ``fast`` allows errors of 1e-3 instead of 1e-5 of the peak. An array of a design knows its sensor and
-    its pillars; else ``distance_um`` and, for a map of widths, ``pitch_nm`` are needed."""
+    its pillars; else ``distance_um`` and, for a map of widths, ``pitch_nm`` are needed, and ``shape`` where pillars are no
+    squares. Rectangles are lit by circular polarisation, ``left`` or ``right`` (``arriving``), and by ``rigorous`` alone."""
     wavelengths = [float(nm) for nm in np.atleast_1d(np.asarray(wavelengths_nm, dtype=float))]
     fields = [(float(x), float(y)) for x, y in field_deg]
     if isinstance(of, Array) and of.design is not None:
@@ -167,7 +182,7 @@ def psf(
             of._native, wavelengths, fields, fidelity, fast, samples, chosen, progress
         )
         return PsfSet([Psf(**p) for p in found])
-    maps, pitch = _maps(of, pitch_nm)
+    maps, pitch, shape = _maps(of, pitch_nm, shape)
     if elements is not None:
         maps = [maps[k] for k in elements]
     if distance_um is None:
@@ -183,6 +198,8 @@ def psf(
         fidelity,
         fast,
         samples or 128,
+        _told(shape),
+        arriving,
         pillar_height_nm,
         pillar,
         substrate,
@@ -191,14 +208,74 @@ def psf(
     return PsfSet([Psf(**p) for p in found])
 
 
-def _maps(of: Array | Layout | Widths, pitch_nm: int | None) -> tuple[list[Widths], int]:
+def _maps(of: Array | Layout | Widths, pitch_nm: int | None, shape: Shape) -> tuple[list[Widths], int, Shape]:
     if isinstance(of, Layout):
-        return of.widths, of.pitch_nm
+        return of.widths, of.pitch_nm, of.shape
     if isinstance(of, Array):
-        return [of.widths(k) for k in range(len(of))], of.pitch_nm
+        return [of.widths(k) for k in range(len(of))], of.pitch_nm, of.shape
     if pitch_nm is None:
         raise _native.MetalithError("a map of widths has no pitch\n  help: give `pitch_nm`")
-    return [of], pitch_nm
+    return [shape.numbers(of) if isinstance(shape, Rectangles) else of], pitch_nm, shape
+
+
+class Transmission(np.ndarray[Any, np.dtype[np.complex128]]):
+    """Complex transmissions that know the widths and wavelengths they are of: an array like any other, which
+    :func:`cell` gives. What is computed from it, or taken out of it, knows them no longer."""
+
+    width_nm: Float64 | None
+    """Widths of the pillars (nm); the first axes are theirs."""
+    wavelength_nm: Float64 | None
+    """Wavelengths (nm); the last axes are theirs."""
+
+    def __array_finalize__(self, of: Any) -> None:
+        self.width_nm = None
+        self.wavelength_nm = None
+
+    def _coordinates(self) -> tuple[Float64, Float64]:
+        """Widths and wavelengths, both as lists."""
+        if self.width_nm is None or self.wavelength_nm is None:
+            raise _native.MetalithError(
+                "a part of an array of transmissions, or what was computed from one, has no widths and wavelengths\n"
+                "  help: call it on what `metalith.cell` gave, and take the part of the result"
+            )
+        if self.width_nm.ndim > 1 or self.wavelength_nm.ndim > 1:
+            raise _native.MetalithError(
+                "widths or wavelengths of more than one dimension\n  help: give `metalith.cell` a list of each"
+            )
+        return np.atleast_1d(self.width_nm), np.atleast_1d(self.wavelength_nm)
+
+    def to_xarray(self) -> Any:
+        """An ``xarray.DataArray`` with dimensions width_nm and wavelength_nm."""
+        widths, wavelengths = self._coordinates()
+        return imported("xarray").DataArray(
+            np.asarray(self).reshape(len(widths), len(wavelengths)),
+            dims=("width_nm", "wavelength_nm"),
+            coords={"width_nm": widths, "wavelength_nm": wavelengths},
+            name="transmission",
+            attrs={"long_name": "ratio of fields, from the foot of the pillars to their tops"},
+        )
+
+    def plot(self) -> Any:
+        """A matplotlib figure of modulus and phase: over the wavelength, a line for each width; over the width where
+        there is one wavelength."""
+        widths, wavelengths = self._coordinates()
+        pyplot = imported("matplotlib.pyplot")
+        t = np.asarray(self).reshape(len(widths), len(wavelengths))
+        over_width = len(wavelengths) == 1
+        x, lines = (widths, t.T) if over_width else (wavelengths, t)
+        names = [f"{v:g} nm" for v in (wavelengths if over_width else widths)]
+        figure, axes = pyplot.subplots(2, 1, sharex=True, figsize=(6, 6))
+        for line, name in zip(lines, names):
+            axes[0].plot(x, np.abs(line), label=name)
+            axes[1].plot(x, np.angle(line) / (2 * np.pi), label=name)
+        axes[0].set_ylabel("modulus")
+        axes[1].set_ylabel("phase [turns]")
+        axes[1].set_xlabel("width [nm]" if over_width else "wavelength [nm]")
+        # More names than this hide the lines.
+        if len(names) <= 12:
+            axes[0].legend(fontsize=8)
+        figure.tight_layout()
+        return figure
 
 
 def cell(
@@ -211,15 +288,18 @@ def cell(
     substrate: str = FUSED_SILICA,
     orders: int = 13,
     progress: Progress | None = None,
-) -> Complex128:
+) -> Transmission:
     """Complex zero-order transmission of square pillars on a lattice of equal ones, by rigorous coupled-wave analysis,
     for light along the normal from the substrate: complex128 of the shape of ``width_nm`` followed by that of
-    ``wavelength_nm``. It is a ratio of fields, from the foot of the pillars to their tops; ``orders`` along an axis, odd."""
+    ``wavelength_nm``. It is a ratio of fields, from the foot of the pillars to their tops; ``orders`` along an axis, odd.
+    ``.to_xarray()`` and ``.plot()`` show it with its widths and wavelengths."""
     widths, wavelengths = np.asarray(width_nm, dtype=float), np.asarray(wavelength_nm, dtype=float)
     found = _native.cell(
         widths.ravel(), wavelengths.ravel(), pitch_nm, pillar_height_nm, pillar, substrate, orders, progress
     )
-    return found.reshape(widths.shape + wavelengths.shape)
+    t = found.reshape(widths.shape + wavelengths.shape).view(Transmission)
+    t.width_nm, t.wavelength_nm = widths, wavelengths
+    return t
 
 
 def index(material: str, wavelength_nm: npt.ArrayLike) -> Complex128:

@@ -1,7 +1,7 @@
 """Types of the native module. It is not called by hand: ``metalith`` is written on it."""
 
 import os
-from typing import Any, final
+from typing import Any, TypeAlias, final
 
 import numpy as np
 import numpy.typing as npt
@@ -9,6 +9,9 @@ import numpy.typing as npt
 from ._types import Complex64, Complex128, Float64, PathLike, Progress, Widths
 
 __version__: str
+
+ToldShape: TypeAlias = tuple[str, int, int, int]
+"""Word, width and length (nm), rotations in half a turn."""
 
 class MetalithError(Exception): ...
 
@@ -49,6 +52,8 @@ class Array:
     @property
     def sites(self) -> int: ...
     @property
+    def shape(self) -> ToldShape: ...
+    @property
     def elements(self) -> list[tuple[str, tuple[int, int], int]]: ...
     def widths(self, element: int) -> Widths: ...
     def write(
@@ -65,14 +70,18 @@ def read_layout(
     layer: tuple[int, int] = (1, 0),
     top: str | None = None,
     design: Design | None = None,
+    array: Array | None = None,
     progress: Progress | None = None,
-) -> tuple[list[str], list[tuple[int, int]], list[int], list[Widths], int, int, str]: ...
+) -> tuple[list[str], list[tuple[int, int]], list[int], list[Widths], int, int, str, ToldShape]: ...
 def array_of_widths(
     widths: list[Widths],
     pitch_nm: int,
     centres_nm: list[tuple[int, int]],
+    shape: ToldShape,
     progress: Progress | None = None,
 ) -> Array: ...
+def rotation_numbers(rotations_deg: Float64, width_nm: int, length_nm: int, steps: int) -> Widths: ...
+def rotations_deg(numbers: Widths, width_nm: int, length_nm: int, steps: int) -> Float64: ...
 def psf_of_array(
     array: Array,
     wavelengths_nm: list[float],
@@ -92,6 +101,8 @@ def psf_of_widths(
     fidelity: str,
     fast: bool,
     samples: int,
+    shape: ToldShape,
+    arriving: str,
     height_nm: float,
     pillar: str,
     substrate: str,
@@ -144,6 +155,14 @@ def calibrate(
     effects: list[str] = ...,
     progress: Progress | None = None,
 ) -> str: ...
+def plan(
+    design: Design,
+    bench: PathLike,
+    out: PathLike,
+    layout: PathLike | None = None,
+    effects: list[str] = ...,
+    progress: Progress | None = None,
+) -> tuple[str, bool, str]: ...
 def study_plan(
     tolerance: PathLike,
     folder: PathLike,

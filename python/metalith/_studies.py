@@ -26,12 +26,22 @@ class StudyResult:
     """What contributes to the variance of the margin of each limit."""
     tightenings: list[Json] = field(repr=False)
     """What spreads would have to be multiplied by for a yield of 90 %."""
+    grid: list[Json] = field(repr=False)
+    """Draws at each value of a grid: ``at``, ``draws``, ``held``, and mean and ``sd`` of each of the ``figures``."""
+    combinations: list[Json] = field(repr=False)
+    """The same at each combination of values of several grids."""
 
     def table(self) -> list[dict[str, Any]]:
         """Draws as rows of amounts and figures, for ``pandas.DataFrame`` or a loop."""
         names = [name for name, _ in self.quantities]
         return [
-            {"draw": d["draw"], **dict(zip(names, d["amounts"])), **d["figures"], "passed": d["passed"]}
+            {
+                "draw": d["draw"],
+                **dict(zip(names, d["amounts"])),
+                **d.get("design", {}),
+                **d["figures"],
+                "passed": d["passed"],
+            }
             for d in self.draws
         ]
 
@@ -84,6 +94,8 @@ class Study:
             yields=study["yields"],
             responses=study["responses"],
             tightenings=study["tightenings"],
+            grid=study["grid"],
+            combinations=study["combinations"],
         )
 
 

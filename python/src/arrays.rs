@@ -5,11 +5,14 @@ use std::path::PathBuf;
 use metalith::extract::ExtractedElement;
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::layout::{FreeLayout, LayoutFormat, OasisEncoding, extraction_plan, write_free, write_pillars_as};
-use metalith::{Error, ExtractionPlan, Hierarchy, Lattice, Layout, PillarArray, PillarShape, Wedge, WidthMap, extract};
+use metalith::{
+    ElementSite, Error, ExtractionPlan, Hierarchy, Lattice, Layout, PillarArray, PillarShape, Wedge, WidthMap, extract,
+};
 use numpy::ndarray::Array2;
 use numpy::{PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 
+use crate::shapes::{ToldShape, shape_of, told};
 use crate::work::{error, work};
 
 /// A design: what is built, how it is written, and what must hold of it.
@@ -125,6 +128,12 @@ impl Array {
         self.array.lattice.sites()
     }
 
+    /// What the pillars are.
+    #[getter]
+    fn shape(&self) -> ToldShape {
+        told(self.array.shape)
+    }
+
     /// Label, centre (nm) and number of the distinct lens of each element.
     #[getter]
     fn elements(&self) -> Vec<(String, [i64; 2], usize)> {
@@ -191,7 +200,7 @@ impl Array {
                 let free = FreeLayout {
                     top: "TOP",
                     layer: LayerNumber::new(layer.0, layer.1),
-                    shape: PillarShape::Square,
+                    shape: self.array.shape,
                 };
                 write_free(&free, &self.array, hierarchy, format, &path, p)
             }
@@ -200,16 +209,18 @@ impl Array {
     }
 }
 
-/// An array of pillars that are given as widths, one map for each element.
+/// An array of pillars that are given as widths, or as numbers of rotations of rectangles, one map for each element.
 #[pyfunction]
-#[pyo3(signature = (widths, pitch_nm, centres_nm, progress=None))]
+#[pyo3(signature = (widths, pitch_nm, centres_nm, shape, progress=None))]
 pub fn array_of_widths(
     py: Python<'_>,
     widths: Vec<PyReadonlyArray2<'_, u16>>,
     pitch_nm: u32,
     centres_nm: Vec<(i64, i64)>,
+    shape: ToldShape,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Array> {
+    let shape = shape_of(shape).map_err(error)?;
     if widths.len() != centres_nm.len() || widths.is_empty() {
         return Err(error(Error::invalid(
             format!("{} maps of widths, {} centres", widths.len(), centres_nm.len()),
@@ -218,19 +229,19 @@ pub fn array_of_widths(
     }
     let maps: Vec<WidthMap> = widths
         .iter()
-        .map(|w| width_map(w.as_array().to_owned(), pitch_nm))
+        .map(|w| width_map(w.as_array().to_owned(), pitch_nm, shape))
         .collect::<metalith::Result<_>>()
         .map_err(error)?;
     drop(widths);
     let array = work(py, progress, |p| {
         let placed = maps.into_iter().zip(centres_nm).collect();
-        PillarArray::of_maps(placed, p)
+        PillarArray::of_maps(shape, placed, p)
     })?;
     Ok(Array { array, design: None })
 }
 
-/// A map of widths as the library has it.
-pub fn width_map(width_nm: Array2<u16>, pitch_nm: u32) -> metalith::Result<WidthMap> {
+/// A map of pillars of a shape as the library has it.
+pub fn width_map(width_nm: Array2<u16>, pitch_nm: u32, shape: PillarShape) -> metalith::Result<WidthMap> {
     let (rows, columns) = width_nm.dim();
     if rows != columns {
         return Err(Error::invalid(
@@ -239,7 +250,21 @@ pub fn width_map(width_nm: Array2<u16>, pitch_nm: u32) -> metalith::Result<Width
         ));
     }
     let lattice = Lattice::new(pitch_nm, rows)?;
-    if let Some(wrong) = width_nm.iter().find(|w| **w % 2 != 0 || u32::from(**w) > pitch_nm) {
+    if let Some(pillars) = shape.rectangles() {
+        let longer = pillars.width_nm.max(pillars.length_nm);
+        if u32::from(longer) > pitch_nm {
+            return Err(Error::invalid(
+                format!("rectangles {longer} nm long at a pitch of {pitch_nm} nm"),
+                "give edges of at most the pitch",
+            ));
+        }
+        if let Some(wrong) = width_nm.iter().find(|n| **n > pillars.steps) {
+            return Err(Error::invalid(
+                format!("a pillar of rotation number {wrong}"),
+                format!("numbers go from 1 to {}, the steps of half a turn", pillars.steps),
+            ));
+        }
+    } else if let Some(wrong) = width_nm.iter().find(|w| **w % 2 != 0 || u32::from(**w) > pitch_nm) {
         return Err(Error::invalid(
             format!("a pillar {wrong} nm wide"),
             format!("widths are even, so that edges are whole nanometres, and at most the pitch of {pitch_nm} nm"),
@@ -249,7 +274,7 @@ pub fn width_map(width_nm: Array2<u16>, pitch_nm: u32) -> metalith::Result<Width
 }
 
 /// What a layout holds: names, centres (nm), pitches (nm) and widths (nm) of its elements, number of pillars, number of
-/// other shapes on the layer, top cell.
+/// other shapes on the layer, top cell, shape of the pillars.
 type ReadLayout<'py> = (
     Vec<String>,
     Vec<[i64; 2]>,
@@ -258,32 +283,38 @@ type ReadLayout<'py> = (
     u64,
     u64,
     String,
+    ToldShape,
 );
 
-/// Read the pillars of a layout: at the elements of a design, or wherever there are squares on a lattice.
+/// Read the pillars of a layout: at the elements of a design or of an array, or wherever there are squares or circles on a
+/// lattice.
 #[pyfunction]
-#[pyo3(signature = (path, layer=(1, 0), top=None, design=None, progress=None))]
+#[pyo3(signature = (path, layer=(1, 0), top=None, design=None, array=None, progress=None))]
 pub fn read_layout<'py>(
     py: Python<'py>,
     path: PathBuf,
     layer: (u16, u16),
     top: Option<String>,
     design: Option<&Design>,
+    array: Option<&Array>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<ReadLayout<'py>> {
     let layer = LayerNumber::new(layer.0, layer.1);
     let design = design.map(|d| &d.design);
+    let array = array.map(|a| &a.array);
     let found = work(py, progress, |p| {
         let layout = Layout::open_with(&path, ReadLimits::default(), p)?;
-        let plan = match design {
-            None => ExtractionPlan::discover(layer),
-            Some(design) => extraction_plan(design),
+        let plan = match (design, array) {
+            (Some(design), _) => extraction_plan(design),
+            (None, Some(array)) => ExtractionPlan::given(layer, sites(array)).of_shape(array.shape),
+            (None, None) => ExtractionPlan::discover(layer),
         };
         Ok(extract(&layout, &ExtractionPlan { top, ..plan }, p)?)
     })?;
     let pillars = found.pillars;
     let others = found.oddities.total();
-    let mut out: ReadLayout<'py> = (vec![], vec![], vec![], vec![], pillars, others, found.top);
+    let shape = told(found.shape);
+    let mut out: ReadLayout<'py> = (vec![], vec![], vec![], vec![], pillars, others, found.top, shape);
     for ExtractedElement { site, widths } in found.elements {
         out.0.push(site.name);
         out.1.push(site.centre_nm);
@@ -292,6 +323,18 @@ pub fn read_layout<'py>(
         out.3.push(PyArray2::from_owned_array(py, widths.width_nm));
     }
     Ok(out)
+}
+
+/// Where the elements of an array are.
+fn sites(array: &PillarArray) -> Vec<ElementSite> {
+    let placed = array.placed.iter();
+    placed
+        .map(|p| ElementSite {
+            name: p.element.label(),
+            centre_nm: [p.element.centre_nm.0, p.element.centre_nm.1],
+            lattice: array.lattice,
+        })
+        .collect()
 }
 
 /// The direction of an element that steers nothing.

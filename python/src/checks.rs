@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use metalith::calibrate::Settings;
+use metalith::calibrate::{BenchFile, Settings};
 use metalith::cell::cache_folder;
 use metalith::drc::{self, CheckInput, Date, Deck, Waivers};
 use metalith::extract::GdsPillars;
@@ -107,5 +107,26 @@ pub fn calibrate(
         };
         let done = metalith::calibrate::calibrate(&[set], &[out], &settings, &GdsPillars, p)?;
         Ok(json(&done[0].diagnosis))
+    })
+}
+
+/// A bench session planned into a folder: its plan as JSON, whether it finds every effect at its wanted size, and one line
+/// for a person.
+#[pyfunction]
+#[pyo3(signature = (design, bench, out, layout=None, effects=vec![], progress=None))]
+pub fn plan(
+    py: Python<'_>,
+    design: &Design,
+    bench: PathBuf,
+    out: PathBuf,
+    layout: Option<PathBuf>,
+    effects: Vec<String>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(String, bool, String)> {
+    let design = &design.design;
+    work(py, progress, |p| {
+        let bench = BenchFile::read(&bench)?;
+        let planned = metalith::plan_session(design, &bench, layout.as_deref(), &out, effects, p)?;
+        Ok((json(&planned), planned.finds_all(), planned.sentence()))
     })
 }

@@ -8,6 +8,7 @@ mod arrays;
 mod checks;
 mod light;
 mod pictures;
+mod shapes;
 mod studies;
 mod work;
 
@@ -37,6 +38,8 @@ fn _native(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(main, m)?)?;
     m.add_function(wrap_pyfunction!(arrays::read_layout, m)?)?;
     m.add_function(wrap_pyfunction!(arrays::array_of_widths, m)?)?;
+    m.add_function(wrap_pyfunction!(shapes::rotation_numbers, m)?)?;
+    m.add_function(wrap_pyfunction!(shapes::rotations_deg, m)?)?;
     m.add_function(wrap_pyfunction!(light::psf_of_array, m)?)?;
     m.add_function(wrap_pyfunction!(light::psf_of_widths, m)?)?;
     m.add_function(wrap_pyfunction!(light::propagate, m)?)?;
@@ -48,6 +51,7 @@ fn _native(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(checks::check, m)?)?;
     m.add_function(wrap_pyfunction!(checks::verify, m)?)?;
     m.add_function(wrap_pyfunction!(checks::calibrate, m)?)?;
+    m.add_function(wrap_pyfunction!(checks::plan, m)?)?;
     m.add_function(wrap_pyfunction!(studies::study_plan, m)?)?;
     m.add_function(wrap_pyfunction!(studies::study_status, m)?)?;
     m.add_function(wrap_pyfunction!(studies::study_run, m)?)?;

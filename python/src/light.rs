@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use metalith::cell::{CellStack, FittedCell, PointwiseCell, PublishedCell, cache_folder};
+use metalith::cell::{CellStack, FittedCell, Handedness, PointwiseCell, PublishedCell, RotatedCell, cache_folder};
 use metalith::extract::{ElementSite, ExtractedElement, Extraction};
 use metalith::grating::{Mapping, NeighbourCell};
 use metalith::rcwa::{Material, Orders};
@@ -20,6 +20,7 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 
 use crate::arrays::{Array, no_wedge, width_map};
+use crate::shapes::{ToldShape, shape_of};
 use crate::work::{error, work};
 
 /// The cell that a word names.
@@ -36,9 +37,35 @@ fn fidelity(word: &str) -> Result<Fidelity> {
     }
 }
 
+/// The handedness that a word names.
+fn handedness(word: &str) -> Result<Handedness> {
+    let known = Handedness::CHOICES.iter().find(|(name, _)| *name == word);
+    known
+        .map(|(_, handedness)| *handedness)
+        .ok_or_else(|| Error::invalid(format!("there is no light of handedness `{word}`"), "use left or right"))
+}
+
+/// Cells that a shape does not have.
+fn refuse(wanted: Fidelity, shape: PillarShape) -> Result<()> {
+    let (had, hint) = match shape {
+        PillarShape::Square => return Ok(()),
+        // Its polynomials are of squares.
+        PillarShape::Circle => (wanted != Fidelity::Published, "use rigorous, neighbours or fitted"),
+        PillarShape::Rectangle(_) => (wanted == Fidelity::Rigorous, "use rigorous"),
+    };
+    if had {
+        return Ok(());
+    }
+    Err(Error::invalid(
+        format!("{} by the `{wanted}` cell", shape.plural()),
+        hint,
+    ))
+}
+
 /// An element to simulate.
 struct Lit {
     name: String,
+    shape: PillarShape,
     widths: WidthMap,
     wedge: Wedge,
 }
@@ -72,7 +99,7 @@ fn simulate(elements: Vec<Lit>, cell: &dyn CellModel, light: &Looked, progress: 
         };
         let extraction = Extraction {
             top: String::new(),
-            shape: PillarShape::Square,
+            shape: lit.shape,
             elements: vec![ExtractedElement {
                 site,
                 widths: lit.widths,
@@ -184,6 +211,7 @@ pub fn psf_of_array<'py>(
         let cells = cell_models(&design, &[wanted])?;
         let lit = chosen.iter().map(|k| Lit {
             name: placed[*k].element.label(),
+            shape: array.array.shape,
             widths: array.array.widths(&placed[*k]).into_owned(),
             wedge: placed[*k].element.wedge,
         });
@@ -212,8 +240,8 @@ fn stack(pitch_nm: f64, height_nm: f64, pillar: &str, substrate: &str) -> Result
 
 /// PSFs of maps of widths, without a design.
 #[pyfunction]
-#[pyo3(signature = (widths, pitch_nm, wavelengths_nm, fields_deg, distance_um, fidelity, fast, samples, height_nm, pillar,
-    substrate, progress=None))]
+#[pyo3(signature = (widths, pitch_nm, wavelengths_nm, fields_deg, distance_um, fidelity, fast, samples, shape, arriving,
+    height_nm, pillar, substrate, progress=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn psf_of_widths<'py>(
     py: Python<'py>,
@@ -225,34 +253,46 @@ pub fn psf_of_widths<'py>(
     fidelity: &str,
     fast: bool,
     samples: usize,
+    shape: ToldShape,
+    arriving: &str,
     height_nm: f64,
     pillar: &str,
     substrate: &str,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Vec<Bound<'py, PyDict>>> {
     let wanted = self::fidelity(fidelity).map_err(error)?;
-    let maps = widths.iter().map(|w| width_map(w.as_array().to_owned(), pitch_nm));
+    let shape = shape_of(shape).map_err(error)?;
+    let arriving = handedness(arriving).map_err(error)?;
+    refuse(wanted, shape).map_err(error)?;
+    let maps = widths
+        .iter()
+        .map(|w| width_map(w.as_array().to_owned(), pitch_nm, shape));
     let maps = maps.collect::<Result<Vec<_>>>().map_err(error)?;
     drop(widths);
-    let stack = stack(f64::from(pitch_nm), height_nm, pillar, substrate).map_err(error)?;
+    let stack = CellStack {
+        shape,
+        ..stack(f64::from(pitch_nm), height_nm, pillar, substrate).map_err(error)?
+    };
     let found = work(py, progress, |p| {
         let drawn = drawn(&maps);
-        let cell: Box<dyn CellModel> = match wanted {
-            Fidelity::Published => Box::new(PublishedCell::new(pitch_nm)),
-            Fidelity::Neighbours => {
+        let cell: Box<dyn CellModel> = match (wanted, shape.rectangles()) {
+            (_, Some(pillars)) => Box::new(RotatedCell::new(stack, pillars, arriving)),
+            (Fidelity::Published, None) => Box::new(PublishedCell::new(pitch_nm)),
+            (Fidelity::Neighbours, None) => {
                 let mapping = Mapping::of_widths(maps.iter().map(WidthMap::histogram))?;
                 Box::new(NeighbourCell::new(stack, vec![mapping], cache_folder()))
             }
-            Fidelity::Fitted => {
+            (Fidelity::Fitted, None) => {
                 let um = wavelengths_nm.iter().map(|nm| nm * 1e-3);
                 let band = um.fold((0.4, 0.7), |(a, b): (f64, f64), um| (a.min(um), b.max(um)));
                 let range = (*drawn.first().unwrap_or(&100), *drawn.last().unwrap_or(&300));
                 Box::new(FittedCell::of_stack(&stack, band, range)?)
             }
-            _ => Box::new(PointwiseCell::new(stack, drawn)),
+            (_, None) => Box::new(PointwiseCell::new(stack, drawn)),
         };
         let lit = maps.into_iter().enumerate().map(|(k, widths)| Lit {
             name: format!("element {k}"),
+            shape,
             widths,
             wedge: no_wedge(),
         });

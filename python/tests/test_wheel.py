@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -87,7 +88,7 @@ def test_any_aperture_is_propagated() -> None:
     sites, pitch_nm = 64, 400
     rng = np.random.default_rng(2)
     aperture = rng.normal(size=(sites, sites)) + 1j * rng.normal(size=(sites, sites))
-    light = dict(pitch_nm=pitch_nm, wavelength_nm=600.0, distance_um=80.0, samples=16)
+    light: dict[str, Any] = dict(pitch_nm=pitch_nm, wavelength_nm=600.0, distance_um=80.0, samples=16)
     folded, x_um, _ = ml.propagate(aperture, **light)
     direct, _, _ = ml.propagate(aperture, **light, direct=True)
     # What the accurate fold promises, of the field's largest value.

@@ -3,10 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::calibrate::{BenchFile, CapturePlan, PlanRequest, plan};
-use metalith::cell::cache_folder;
-use metalith::extract::GdsPillars;
-use metalith::{Error, PillarArray, Result, write_pillars};
+use metalith::calibrate::{BenchFile, CapturePlan};
+use metalith::{Result, plan_session};
 
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
@@ -40,9 +38,6 @@ pub struct PlanArgs {
     json: bool,
 }
 
-/// Name of the layout in the folder of the session.
-const LAYOUT: &str = "layout.gds";
-
 pub fn run(args: &PlanArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let design = standard_input::design(&args.design)?;
@@ -51,37 +46,8 @@ pub fn run(args: &PlanArgs, terminal: &Terminal) -> Result<Outcome> {
         Some(out) => out.clone(),
         None => Path::new("out").join(format!("{}_session", design.name)),
     };
-    // A session that was begun is not overwritten: its exposures and frames would no longer be those of its plan.
-    let begun = folder.join("captures");
-    if std::fs::read_dir(&begun).is_ok_and(|mut files| files.next().is_some()) {
-        return Err(Error::invalid(
-            format!("there are frames in {}", begun.display()),
-            "give another folder with --out, or move them away",
-        ));
-    }
-    let (layout, layout_in_set) = match &args.layout {
-        Some(file) => {
-            let whole = std::fs::canonicalize(file).map_err(Error::io("find", file))?;
-            let name = whole.display().to_string();
-            (whole, name)
-        }
-        None => {
-            let file = folder.join(LAYOUT);
-            let array = PillarArray::build(&design, terminal)?;
-            write_pillars(&design, &array, design.layout.hierarchy, &file, terminal)?;
-            (file, LAYOUT.to_owned())
-        }
-    };
-    let request = PlanRequest {
-        design: &design,
-        bench: &bench,
-        layout: &layout,
-        layout_in_set,
-        folder: &folder,
-        only: args.effects.clone(),
-        cache: cache_folder(),
-    };
-    let planned = plan(&request, &GdsPillars, terminal)?;
+    let layout = args.layout.as_deref();
+    let planned = plan_session(&design, &bench, layout, &folder, args.effects.clone(), terminal)?;
     terminal.clear();
     if args.json {
         print_json(&planned);

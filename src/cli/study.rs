@@ -95,7 +95,7 @@ struct MergeArgs {
     /// Folder of the study.
     study: PathBuf,
 
-    /// Table of the draws: .csv, .json or .jsonl; `result.csv` in the folder of the study if left out. The page is
+    /// Table of the draws: .csv, .json, .jsonl, or .parquet of a program with that feature; `result.csv` in the folder of the study if left out. The page is
     /// written beside it.
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -151,7 +151,7 @@ fn run_shards(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
         Some(jobs) if jobs > 1 => by_processes(args, &found.missing, jobs.into(), terminal)?,
         _ if found.missing.is_empty() => {}
         _ => {
-            let run = Run::open(&plan, terminal)?;
+            let run = Run::open(&plan)?;
             for number in found.missing {
                 run.shard(number, terminal)?;
             }

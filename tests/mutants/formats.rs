@@ -132,7 +132,7 @@ fn designs(folder: &Path) -> Vec<Format> {
             folder.join("mutant.toml"),
             Kind::Text,
             files("designs", "toml"),
-            |path| Design::read(path),
+            Design::read,
         ),
         Format::new(
             "zmx",
@@ -167,7 +167,7 @@ fn designs(folder: &Path) -> Vec<Format> {
             folder.join("material.csv"),
             Kind::Text,
             vec![file("golden/measured/film_nk.csv")],
-            |path| Material::read_csv(path),
+            Material::read_csv,
         ),
     ]
 }
@@ -194,7 +194,7 @@ fn settings(folder: &Path) -> Vec<Format> {
             toml("camera.toml"),
             Kind::Text,
             files("cameras", "toml"),
-            |path| Camera::read(path),
+            Camera::read,
         ),
         Format::new(
             "spectrum",
@@ -208,42 +208,42 @@ fn settings(folder: &Path) -> Vec<Format> {
             toml("rules.toml"),
             Kind::Text,
             files("rules", "toml"),
-            |path| Deck::read(path),
+            Deck::read,
         ),
         Format::new(
             "waivers",
             toml("waivers.toml"),
             Kind::Text,
             vec![b"[[waiver]]\nrule = \"pillar.width.min\"\nhash = \"f2a1c3d400112233\"\nreason = \"test pad\"\nauthor = \"N. N.\"\nexpires = \"2027-01-31\"\n".to_vec()],
-            |path| Waivers::read(path),
+            Waivers::read,
         ),
         Format::new(
             "process",
             processes.join("process.toml"),
             Kind::Text,
             files("processes", "toml"),
-            |path| Process::read(path),
+            Process::read,
         ),
         Format::new(
             "tolerance",
             toml("tolerance.toml"),
             Kind::Text,
             vec![file("scripts/study/tolerance.toml")],
-            |path| Tolerance::read(path),
+            Tolerance::read,
         ),
         Format::new(
             "slurm",
             toml("slurm.toml"),
             Kind::Text,
             vec![example("docs/guide/study.md", "max_array_size")],
-            |path| Slurm::read(path),
+            Slurm::read,
         ),
         Format::new(
             "bench",
             toml("bench.toml"),
             Kind::Text,
             vec![example("docs/guide/plan.md", "divergence_mrad")],
-            |path| BenchFile::read(path),
+            BenchFile::read,
         ),
         Format::new(
             "effects",
@@ -252,7 +252,7 @@ fn settings(folder: &Path) -> Vec<Format> {
             ["bow", "ghost"]
                 .map(|name| example("docs/guide/calibrate.md", &format!("name = \"{name}\"")))
                 .into(),
-            |path| DeclaredEffect::read(path),
+            DeclaredEffect::read,
         ),
         Format::new("model", model, Kind::Text, vec![model_text], |path| {
             CalibratedModel::read(path)
@@ -276,7 +276,7 @@ fn pictures(folder: &Path) -> Vec<Format> {
                 images::npy(&[16, 20, 3], images::FLOAT),
                 images::npy(&[16, 20], images::WORD),
             ],
-            |path| read_picture(path),
+            read_picture,
         ),
         Format::new("cube", folder.join("cube.npy"), Kind::Bytes, vec![cube], |path| {
             read_scene(&SceneFile {
@@ -294,7 +294,7 @@ fn pictures(folder: &Path) -> Vec<Format> {
                 images::png(24, 16, png::ColorType::Grayscale, png::BitDepth::Sixteen),
                 images::npy(&[16, 20], images::FLOAT),
             ],
-            |path| read_depth(path),
+            read_depth,
         ),
     ]
 }
@@ -393,7 +393,7 @@ fn kept(folder: &Path) -> Vec<Format> {
             folder.join("denoiser.safetensors"),
             Kind::Bytes,
             vec![file("crates/prior/weights/denoiser.safetensors")],
-            |path| NetworkDenoiser::read(path),
+            NetworkDenoiser::read,
         ),
     ]
 }

@@ -136,7 +136,7 @@ fn read(root: &Section<'_, '_>) -> DeckContents {
         parse_layer(text).unwrap_or_else(|| {
             section.fault(
                 key,
-                format!("\"{}\" is not a layer", quoted(&text)),
+                format!("\"{}\" is not a layer", quoted(text)),
                 "write layer and datatype as \"1/0\"",
             );
             LayerNumber::default()

@@ -1,9 +1,9 @@
-//! What draws are judged with: the design, its layout as read back, and tables of cells.
+//! What draws are judged with: the designs, their layouts as read back, and tables of cells.
 
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
-use metalith_cell::BAND_ORDERS;
+use metalith_cell::{BAND_ORDERS, CellStack};
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::array::PillarArray;
@@ -13,7 +13,7 @@ use metalith_made::{BankRange, CalibratedModel, CellBank, CellChange, MadeChip, 
 use metalith_verify::{ReadLayout, SimulationCases, Verification, wavelengths_um};
 
 use crate::draw::Drawer;
-use crate::plan::{CELLS, Plan, key};
+use crate::plan::{Plan, key};
 use crate::record::{DrawRecord, LimitStatement, figures, finite};
 use crate::tolerance::Tolerance;
 
@@ -37,66 +37,37 @@ impl Progress for Quiet<'_> {
 pub(crate) struct Bench {
     pub tolerance: Tolerance,
     pub drawer: Drawer,
-    pub bank: Arc<CellBank>,
+    made: MadeRange,
+    key: [u8; 32],
+    files: Files,
+    /// The design of the draws that are made now: one at a time is held, since draws of a design stand together.
+    current: Mutex<Option<Arc<Subject>>>,
+}
+
+/// Where the layout and the tables of each design are, by its number.
+pub(crate) struct Files {
+    pub layouts: Vec<std::path::PathBuf>,
+    pub cells: Vec<std::path::PathBuf>,
+}
+
+/// One design of a study, with what its draws are judged by.
+pub(crate) struct Subject {
+    number: u64,
     design: Design,
     array: PillarArray,
     layout: ReadLayout,
-    key: [u8; 32],
+    bank: Arc<CellBank>,
+}
+
+/// What all draws make of a pillar, at the least and at the most.
+struct MadeRange {
+    bias_nm: [f64; 2],
+    changes: [CellChange; 2],
 }
 
 impl Bench {
-    /// Read the layout back and solve the tables: once for a study.
-    pub fn make(
-        tolerance: Tolerance,
-        design: Design,
-        array: PillarArray,
-        layout: &Path,
-        key: [u8; 32],
-        progress: &dyn Progress,
-    ) -> Result<Self> {
-        let solve = |stated: &_, range| CellBank::solve(stated, range, progress);
-        Self::with_bank(tolerance, design, array, layout, key, &solve, progress)
-    }
-
-    /// The bench of a plan, with the tables that were solved for it.
-    ///
-    /// # Errors
-    /// If a file has changed since the plan was made, or the tables cannot be used.
-    pub fn open(plan: &Plan, progress: &dyn Progress) -> Result<Self> {
-        let tolerance = Tolerance::read(&plan.tolerance)?;
-        let design = Design::read(&tolerance.design)?;
-        let layout = plan.layout_path();
-        let key = key(&tolerance, &design, &layout)?;
-        if hex(&key) != plan.key {
-            return Err(Error::invalid(
-                format!(
-                    "the design, its layout, or another file of the study in {} has changed since it was planned, or \
-                     another version of the program planned it",
-                    plan.folder.display()
-                ),
-                "plan it again into another folder",
-            ));
-        }
-        let array = PillarArray::build(&design, &Quiet(progress))?;
-        let read = |stated: &_, range| CellBank::read(&plan.folder.join(CELLS), stated, range);
-        Self::with_bank(tolerance, design, array, &layout, key, &read, progress)
-    }
-
-    fn with_bank(
-        tolerance: Tolerance,
-        design: Design,
-        array: PillarArray,
-        layout: &Path,
-        key: [u8; 32],
-        bank: &dyn Fn(&metalith_cell::CellStack, BankRange) -> Result<CellBank>,
-        progress: &dyn Progress,
-    ) -> Result<Self> {
-        if design.verify.incidence == CellIncidence::AsLit {
-            return Err(Error::invalid(
-                "a study takes the cells along the normal, and the design asks for them as they are lit",
-                "leave out `incidence = \"as_lit\"` in [verify] of the design of the study",
-            ));
-        }
+    /// For a tolerance that was read. `key`: of the random numbers.
+    pub fn new(tolerance: Tolerance, key: [u8; 32], files: Files) -> Result<Self> {
         let base = match &tolerance.model {
             Some(path) => CalibratedModel::read(path)?.perturbation,
             None => Perturbation::default(),
@@ -108,34 +79,121 @@ impl Bench {
             ));
         }
         let drawer = Drawer::new(&tolerance, base);
-        let opened = Layout::open_with(layout, ReadLimits::default(), progress)?;
-        let layout = ReadLayout::of(&design, &array, &opened, progress)?;
-        let range = range(&drawer, key, &design, &layout)?;
-        let bank = Arc::new(bank(&design.cell_stack()?, range)?);
         Ok(Self {
+            made: MadeRange::of(&drawer, key)?,
             tolerance,
             drawer,
-            bank,
+            key,
+            files,
+            current: Mutex::default(),
+        })
+    }
+
+    /// The bench of a plan, with the tables that were solved for it; they are read when a draw asks for them.
+    ///
+    /// # Errors
+    /// If a file has changed since the plan was made.
+    pub fn open(plan: &Plan) -> Result<Self> {
+        let tolerance = Tolerance::read(&plan.tolerance)?;
+        let files = plan.files();
+        let known = if files.layouts.len() as u64 == tolerance.designs() {
+            Some(key(&tolerance, &files.layouts)?)
+        } else {
+            None
+        };
+        let Some(key) = known.filter(|key| hex(key) == plan.key) else {
+            return Err(Error::invalid(
+                format!(
+                    "the design, its layout, or another file of the study in {} has changed since it was planned, or \
+                     another version of the program planned it",
+                    plan.folder.display()
+                ),
+                "plan it again into another folder",
+            ));
+        };
+        Self::new(tolerance, key, files)
+    }
+
+    /// A design with the tables in its file.
+    fn subject(&self, number: u64, progress: &dyn Progress) -> Result<Arc<Subject>> {
+        let mut current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(subject) = current.as_ref().filter(|s| s.number == number) {
+            return Ok(subject.clone());
+        }
+        // The former one is not kept while this one is read.
+        *current = None;
+        let path = &self.files.cells[number as usize];
+        let read = |stated: &CellStack, range| CellBank::read(path, stated, range);
+        let subject = Arc::new(self.make(number, &read, progress)?);
+        *current = Some(subject.clone());
+        Ok(subject)
+    }
+
+    /// Take a design whose tables were solved, or found, by `bank`; its layout is read back.
+    ///
+    /// # Errors
+    /// If its layout cannot be read, or it cannot be judged in a study.
+    pub fn take(
+        &self,
+        number: u64,
+        bank: &dyn Fn(&CellStack, BankRange) -> Result<CellBank>,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let mut current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
+        *current = None;
+        *current = Some(Arc::new(self.make(number, bank, progress)?));
+        Ok(())
+    }
+
+    fn make(
+        &self,
+        number: u64,
+        bank: &dyn Fn(&CellStack, BankRange) -> Result<CellBank>,
+        progress: &dyn Progress,
+    ) -> Result<Subject> {
+        let design = self.tolerance.design(number)?;
+        if design.verify.incidence == CellIncidence::AsLit {
+            return Err(Error::invalid(
+                "a study takes the cells along the normal, and the design asks for them as they are lit",
+                "leave out `incidence = \"as_lit\"` in [verify] of the design of the study",
+            ));
+        }
+        let array = PillarArray::build(&design, &Quiet(progress))?;
+        let path: &Path = &self.files.layouts[number as usize];
+        let opened = Layout::open_with(path, ReadLimits::default(), progress)?;
+        let layout = ReadLayout::of(&design, &array, &opened, progress)?;
+        let range = self.made.range(&design, &layout)?;
+        let bank = Arc::new(bank(&design.cell_stack()?, range)?);
+        Ok(Subject {
+            number,
             design,
             array,
             layout,
-            key,
+            bank,
         })
+    }
+
+    /// Pillars whose tables the design that was taken last has, for every width and wavelength.
+    pub fn stacks(&self) -> usize {
+        let current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
+        current.as_ref().map_or(0, |s| s.bank.stacks())
     }
 
     /// Judge draw `k`.
     ///
     /// # Errors
-    /// If it cannot be simulated, or the user stopped it.
+    /// If the tables cannot be used, it cannot be simulated, or the user stopped it.
     pub fn draw(&self, k: u64, progress: &dyn Progress) -> Result<(DrawRecord, Verification)> {
+        let number = self.drawer.design_of(k);
+        let subject = self.subject(number, progress)?;
         let drawn = self.drawer.draw(self.key, k)?;
         let model = CalibratedModel::new(format!("draw {k}"), "drawn".into(), self.drawer.perturbation(&drawn));
-        let chip = MadeChip::of_bank(&self.bank, &model)?;
+        let chip = MadeChip::of_bank(&subject.bank, &model)?;
         let cases = SimulationCases::judged_by(&chip);
         let accuracy = self.tolerance.accuracy;
-        let found = self
+        let found = subject
             .layout
-            .judge(&self.design, &self.array, &cases, accuracy, progress)?;
+            .judge(&subject.design, &subject.array, &cases, accuracy, progress)?;
         let figures = figures(&found);
         let limits = self.limits(&found);
         let of_design = found.checks.iter().map(|c| finite(c.reached));
@@ -145,10 +203,12 @@ impl Bench {
             .iter()
             .map(|l| figures.get(&l.figure).copied().flatten());
         let reached: Vec<Option<f64>> = of_design.chain(own).collect();
+        let setting = self.tolerance.setting(number).into_iter();
         let record = DrawRecord {
             draw: k,
             passed: limits.iter().zip(&reached).all(|(l, r)| l.holds(*r)),
             amounts: drawn.amounts,
+            design: setting.map(|(key, value)| (key.to_owned(), value.clone())).collect(),
             figures,
             reached,
         };
@@ -164,38 +224,49 @@ impl Bench {
     }
 }
 
-/// What the tables must hold for all draws: every one is drawn, none is simulated.
-fn range(drawer: &Drawer, key: [u8; 32], design: &Design, layout: &ReadLayout) -> Result<BankRange> {
-    let histograms = layout.extraction().elements.iter().map(|e| e.widths.histogram());
-    let (mut narrow, mut wide) = (f64::MAX, 0.0_f64);
-    for histogram in histograms {
-        for (width, _) in histogram.iter().enumerate().skip(1).filter(|(_, n)| **n > 0) {
-            narrow = narrow.min(width as f64);
-            wide = wide.max(width as f64);
+impl MadeRange {
+    /// Every draw is drawn, none is simulated.
+    fn of(drawer: &Drawer, key: [u8; 32]) -> Result<Self> {
+        let (mut least, mut most) = (f64::MAX, f64::MIN);
+        let mut changes: Option<[CellChange; 2]> = None;
+        for k in 0..drawer.count() {
+            let made = drawer.perturbation(&drawer.draw(key, k)?);
+            // Area fractions are from zero to one.
+            for fill in [0.0, 1.0] {
+                least = least.min(made.geometry.bias_nm(fill));
+                most = most.max(made.geometry.bias_nm(fill));
+            }
+            let [low, high] = changes.unwrap_or([made.cell; 2]);
+            changes = Some([joined(low, made.cell, f64::min), joined(high, made.cell, f64::max)]);
         }
+        Ok(Self {
+            bias_nm: [least, most],
+            changes: changes.unwrap_or_default(),
+        })
     }
-    // The mapping's own widths are judged too, whatever was read.
-    narrow = narrow.min(f64::from(design.cell.width_range_nm.0));
-    wide = wide.max(f64::from(design.cell.width_range_nm.1));
-    let (mut least, mut most) = (f64::MAX, f64::MIN);
-    let mut changes: Option<[CellChange; 2]> = None;
-    for k in 0..drawer.count() {
-        let made = drawer.perturbation(&drawer.draw(key, k)?);
-        // Area fractions are from zero to one.
-        for fill in [0.0, 1.0] {
-            least = least.min(made.geometry.bias_nm(fill));
-            most = most.max(made.geometry.bias_nm(fill));
+
+    /// What the tables of a design must hold for all draws. Those of other designs count too: designs whose pillars are
+    /// alike then have the same tables.
+    fn range(&self, design: &Design, layout: &ReadLayout) -> Result<BankRange> {
+        let histograms = layout.extraction().elements.iter().map(|e| e.widths.histogram());
+        let (mut narrow, mut wide) = (f64::MAX, 0.0_f64);
+        for histogram in histograms {
+            for (width, _) in histogram.iter().enumerate().skip(1).filter(|(_, n)| **n > 0) {
+                narrow = narrow.min(width as f64);
+                wide = wide.max(width as f64);
+            }
         }
-        let [low, high] = changes.unwrap_or([made.cell; 2]);
-        changes = Some([joined(low, made.cell, f64::min), joined(high, made.cell, f64::max)]);
+        // The mapping's own widths are judged too, whatever was read.
+        narrow = narrow.min(f64::from(design.cell.width_range_nm.0));
+        wide = wide.max(f64::from(design.cell.width_range_nm.1));
+        let (single, band) = wavelengths_um(design)?;
+        let single = single.into_iter().map(|um| (um, ORDERS));
+        Ok(BankRange {
+            widths_nm: [narrow + self.bias_nm[0], wide + self.bias_nm[1]],
+            changes: self.changes,
+            colours: single.chain(band.into_iter().map(|um| (um, BAND_ORDERS))).collect(),
+        })
     }
-    let (single, band) = wavelengths_um(design)?;
-    let single = single.into_iter().map(|um| (um, ORDERS));
-    Ok(BankRange {
-        widths_nm: [narrow + least, wide + most],
-        changes: changes.unwrap_or_default(),
-        colours: single.chain(band.into_iter().map(|um| (um, BAND_ORDERS))).collect(),
-    })
 }
 
 fn joined(a: CellChange, b: CellChange, of: fn(f64, f64) -> f64) -> CellChange {

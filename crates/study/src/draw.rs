@@ -1,12 +1,14 @@
 //! The numbers of one draw, from the plan's key and its own number.
 
 use metalith_calibrate::Effect;
+use metalith_core::document::Scalar;
 use metalith_core::{Error, Result};
 use metalith_made::Perturbation;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, Normal, Uniform};
 
+use crate::designs::DesignGrid;
 use crate::tolerance::{Distribution, TAIL_SD, Tolerance, effects};
 
 /// Amounts that are drawn at the most until one is physical.
@@ -24,13 +26,15 @@ struct Quantity {
     /// Name of its effect, with the number of its parameter where there are several.
     name: String,
     unit: String,
-    effect: usize,
+    /// None for a key of the design.
+    effect: Option<usize>,
     source: Source,
 }
 
 enum Source {
     Random(Distribution),
     Grid(Vec<f64>),
+    Design(DesignGrid),
 }
 
 /// Makes the draws of a tolerance.
@@ -63,7 +67,7 @@ impl Drawer {
                         format!("{name}_{k}")
                     },
                     unit: effect.unit().to_owned(),
-                    effect: at(name),
+                    effect: Some(at(name)),
                     source: source(),
                 });
             }
@@ -71,9 +75,19 @@ impl Drawer {
         for grid in &tolerance.grids {
             add(&grid.effect, &|| Source::Grid(grid.values.clone()));
         }
+        // After the effects of a grid: draws of one design stand together.
+        let designs = tolerance.design_grids.iter().map(|grid| Quantity {
+            name: grid.key.clone(),
+            unit: String::new(),
+            effect: None,
+            source: Source::Design(grid.clone()),
+        });
         for varied in &tolerance.varied {
             add(&varied.effect, &|| Source::Random(varied.distribution));
         }
+        let random = |q: &Quantity| matches!(q.source, Source::Random(_));
+        let at = quantities.iter().position(random).unwrap_or(quantities.len());
+        quantities.splice(at..at, designs);
         Self {
             quantities,
             effects,
@@ -103,9 +117,31 @@ impl Drawer {
     fn points(&self) -> u64 {
         let sizes = self.quantities.iter().map(|q| match &q.source {
             Source::Grid(values) => values.len() as u64,
+            Source::Design(grid) => grid.values.len() as u64,
             Source::Random(_) => 1,
         });
         sizes.product()
+    }
+
+    /// Number of the design that a draw is of.
+    pub fn design_of(&self, k: u64) -> u64 {
+        let effects = self.quantities.iter().map(|q| match &q.source {
+            Source::Grid(values) => values.len() as u64,
+            Source::Design(_) | Source::Random(_) => 1,
+        });
+        k / (self.draws * effects.product::<u64>())
+    }
+
+    /// Amount and value at each place of the grid of a quantity; none for one that is drawn.
+    pub fn grid(&self, quantity: usize) -> Option<Vec<(f64, Scalar)>> {
+        match &self.quantities[quantity].source {
+            Source::Grid(values) => Some(values.iter().map(|v| (*v, Scalar::Number(*v))).collect()),
+            Source::Design(grid) => {
+                let each = grid.values.iter().enumerate();
+                Some(each.map(|(k, v)| (grid.amount(k), v.clone())).collect())
+            }
+            Source::Random(_) => None,
+        }
     }
 
     /// Draw `k`: the point of the grid `k / draws`, and random amounts from ChaCha8 with the key and stream `k`.
@@ -117,13 +153,15 @@ impl Drawer {
         rng.set_stream(k);
         let mut point = k / self.draws;
         let mut amounts = Vec::with_capacity(self.quantities.len());
+        let mut place = |size: usize| {
+            let place = (point % size as u64) as usize;
+            point /= size as u64;
+            place
+        };
         for quantity in &self.quantities {
             amounts.push(match &quantity.source {
-                Source::Grid(values) => {
-                    let value = values[(point % values.len() as u64) as usize];
-                    point /= values.len() as u64;
-                    value
-                }
+                Source::Grid(values) => values[place(values.len())],
+                Source::Design(grid) => grid.amount(place(grid.values.len())),
                 Source::Random(distribution) => self.amount(quantity, distribution, &mut rng)?,
             });
         }
@@ -131,7 +169,7 @@ impl Drawer {
     }
 
     fn amount(&self, quantity: &Quantity, distribution: &Distribution, rng: &mut ChaCha8Rng) -> Result<f64> {
-        let effect = &self.effects[quantity.effect];
+        let effect = &self.effects[quantity.effect.expect("effects alone are drawn")];
         let (low, high) = effect.parameters()[0].range;
         for _ in 0..MOST_TRIES {
             let (amount, inside) = match *distribution {
@@ -161,6 +199,10 @@ impl Drawer {
             Source::Random(Distribution::Normal { mean, .. }) => *mean,
             Source::Random(Distribution::Uniform { low, high }) => 0.5 * (low + high),
             Source::Grid(values) => values.iter().sum::<f64>() / values.len() as f64,
+            Source::Design(grid) => {
+                let amounts = (0..grid.values.len()).map(|k| grid.amount(k));
+                amounts.sum::<f64>() / grid.values.len() as f64
+            }
         }
     }
 
@@ -172,7 +214,7 @@ impl Drawer {
                 .quantities
                 .iter()
                 .zip(&drawn.amounts)
-                .filter(|(q, _)| q.effect == e);
+                .filter(|(q, _)| q.effect == Some(e));
             let parameters: Vec<f64> = own.map(|(_, amount)| effect.parameter(*amount)).collect();
             if !parameters.is_empty() {
                 effect.apply(&parameters, &mut to);
@@ -209,6 +251,10 @@ mod tests {
                 effect: "gap".into(),
                 values: vec![-5.0, 0.0, 5.0],
             }],
+            design_grids: vec![DesignGrid {
+                key: "mapping.basis".into(),
+                values: vec![Scalar::Text("all_powers".into()), Scalar::Text("even_powers".into())],
+            }],
             limits: Vec::new(),
         };
         Drawer::new(&tolerance, Perturbation::default())
@@ -218,24 +264,30 @@ mod tests {
     fn a_draw_follows_from_its_number_and_is_of_its_distribution() {
         let drawer = drawer(2.0);
         let names: Vec<String> = drawer.names().into_iter().map(|n| n.0).collect();
-        assert_eq!(names, ["gap", "cd_bias", "tilt_1", "tilt_2", "corner_rounding"]);
-        assert_eq!(drawer.count(), 3000);
+        assert_eq!(
+            names,
+            ["gap", "mapping.basis", "cd_bias", "tilt_1", "tilt_2", "corner_rounding"]
+        );
+        assert_eq!(drawer.count(), 6000);
         let draw = |k| drawer.draw([7; 32], k).unwrap().amounts;
         assert_eq!(draw(17), draw(17));
-        assert_ne!(draw(17)[1], draw(18)[1]);
+        assert_ne!(draw(17)[2], draw(18)[2]);
         assert_eq!([draw(0)[0], draw(1000)[0], draw(2999)[0]], [-5.0, 0.0, 5.0]);
-        let bias: Vec<f64> = (0..3000).map(|k| draw(k)[1]).collect();
+        // A choice counts by its place; draws of one design stand together.
+        assert_eq!([draw(2999)[1], draw(3000)[1]], [0.0, 1.0]);
+        assert_eq!([drawer.design_of(2999), drawer.design_of(3000)], [0, 1]);
+        let bias: Vec<f64> = (0..3000).map(|k| draw(k)[2]).collect();
         let mean = bias.iter().sum::<f64>() / 3000.0;
         let sd = (bias.iter().map(|b| (b - mean).powi(2)).sum::<f64>() / 3000.0).sqrt();
         // Four standard errors of 3000 draws; tails beyond three deviations are left out, which takes 1.3 % off.
         assert!(mean.abs() < 4.0 * 2.0 / 3000_f64.sqrt(), "{mean}");
         assert!((sd - 2.0 * 0.987).abs() < 4.0 * 2.0 / 6000_f64.sqrt(), "{sd}");
-        assert!((0..3000).all(|k| draw(k)[4] >= 0.0));
+        assert!((0..3000).all(|k| draw(k)[5] >= 0.0));
     }
 
     #[test]
     fn amounts_become_a_perturbation_in_the_unit_of_their_effect() {
-        let amounts = vec![5.0, -3.0, 1.0, 2.0, 20.0];
+        let amounts = vec![5.0, 1.0, -3.0, 1.0, 2.0, 20.0];
         let p = drawer(2.0).perturbation(&Drawn { amounts });
         assert_eq!(p.path.gap_um, 5.0);
         assert_eq!(p.geometry.cd_bias_nm, -3.0);

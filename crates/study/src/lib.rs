@@ -13,19 +13,27 @@
 //! | file | holds |
 //! | --- | --- |
 //! | `tolerance` | the file of a study, and its quantities as effects of the calibration |
+//! | `designs` | keys of the design that vary over a grid |
 //! | `draw` | the numbers of one draw |
-//! | `bench` | what draws are judged with: design, layout as read back, tables of cells |
+//! | `bench` | what draws are judged with: designs, layouts as read back, tables of cells |
 //! | `record` | what is kept of one draw |
 //! | `plan`, `shard` | the folder of a study |
-//! | `merge`, `yields`, `response` | all draws, and what they say |
-//! | `page` | what a person reads |
+//! | `merge`, `yields`, `response`, `points` | all draws, and what they say |
+//! | `columns`, `parquet_file` | the draws as a table |
+//! | `page`, `grid_page` | what a person reads |
 //! | `slurm` | job arrays |
 
 mod bench;
+mod columns;
+mod designs;
 mod draw;
+mod grid_page;
 mod merge;
 mod page;
+#[cfg(feature = "parquet")]
+mod parquet_file;
 mod plan;
+mod points;
 mod record;
 mod response;
 mod shard;
@@ -33,10 +41,12 @@ mod slurm;
 mod tolerance;
 mod yields;
 
+pub use designs::DesignGrid;
 pub use draw::Drawn;
 pub use merge::{StudyResult, merge};
 pub use page::write_page;
 pub use plan::{Layout, Plan, PlanSettings, Shard, plan};
+pub use points::{GridPoint, Spread};
 pub use record::{DrawRecord, LimitStatement};
 pub use response::{Response, Tightening};
 pub use shard::{Run, Status, run_shard, status};

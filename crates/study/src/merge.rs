@@ -7,7 +7,9 @@ use metalith_core::{Error, Progress, Result, WholeFile};
 use metalith_verify::Verification;
 use serde::Serialize;
 
+use crate::columns::{columns, csv};
 use crate::plan::Plan;
+use crate::points::{GridPoint, combinations, each_value};
 use crate::record::DrawRecord;
 use crate::response::{Response, Table, Tightening};
 use crate::shard::{FOLDER, Run, read};
@@ -22,6 +24,10 @@ pub struct StudyResult {
     pub plan: Plan,
     /// Over each limit, then over all of them.
     pub yields: Vec<Yield>,
+    /// Draws at each value of each grid; none where there is no grid.
+    pub grid: Vec<GridPoint>,
+    /// Draws at each combination of values of several grids, where these are few enough to be read.
+    pub combinations: Vec<GridPoint>,
     /// Of the limits that depend on the draw.
     pub responses: Vec<Response>,
     /// What it takes for a yield of 90 %.
@@ -43,7 +49,7 @@ pub struct StudyResult {
 pub fn merge(plan: &Plan, show: usize, progress: &dyn Progress) -> Result<StudyResult> {
     let folder = plan.folder.join(FOLDER);
     let draws = whole(plan, &folder, &files(&folder)?)?;
-    let run = Run::open(plan, progress)?;
+    let run = Run::open(plan)?;
     let drawer = run.drawer();
     let count = plan.quantities.len();
     let names = plan.quantities.iter().map(|q| q.0.clone()).collect();
@@ -72,6 +78,8 @@ pub fn merge(plan: &Plan, show: usize, progress: &dyn Progress) -> Result<StudyR
     }
     Ok(StudyResult {
         tightenings: table.tightenings(WANTED_YIELD, &plan.limits, &responses, &draws),
+        grid: each_value(drawer, &plan.quantities, &draws),
+        combinations: combinations(drawer, &plan.quantities, &draws),
         plan: plan.clone(),
         yields,
         responses,
@@ -194,61 +202,48 @@ pub(crate) fn ranges(numbers: &[u64]) -> String {
 }
 
 impl StudyResult {
-    /// Write all draws as a table: CSV, JSON Lines or JSON by the ending of the name.
+    /// Write all draws as a table: CSV, JSON Lines, JSON, or Parquet by the ending of the name.
     ///
     /// # Errors
-    /// If the ending is another, or the file cannot be written.
+    /// If the ending is another, the program was built without Parquet, or the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let text = match path.extension().and_then(|e| e.to_str()) {
-            Some("csv") => self.csv(),
-            Some("jsonl") => self.lines(),
+        let bytes = match path.extension().and_then(|e| e.to_str()) {
+            Some("csv") => csv(&columns(self), self.draws.len()).into_bytes(),
+            Some("jsonl") => self.lines().into_bytes(),
             Some("json") => {
                 let whole = serde_json::json!({ "study": self, "draws": self.draws });
-                format!("{whole:#}\n")
+                format!("{whole:#}\n").into_bytes()
             }
+            Some("parquet") => self.parquet()?,
             _ => {
                 return Err(Error::invalid(
                     format!("{}: this ending is not known", path.display()),
-                    "name a file that ends in .csv, .json or .jsonl",
+                    "name a file that ends in .csv, .json, .jsonl or .parquet",
                 ));
             }
         };
-        WholeFile::write(path, text.as_bytes())
+        WholeFile::write(path, &bytes)
+    }
+
+    #[cfg(feature = "parquet")]
+    fn parquet(&self) -> Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        crate::parquet_file::write(&columns(self), &mut bytes)?;
+        Ok(bytes)
+    }
+
+    #[cfg(not(feature = "parquet"))]
+    fn parquet(&self) -> Result<Vec<u8>> {
+        Err(Error::invalid(
+            "this program was built without Parquet",
+            "build it with `--features parquet`, or name a file that ends in .csv, .json or .jsonl",
+        ))
     }
 
     fn lines(&self) -> String {
         let mut text = String::new();
         for draw in &self.draws {
             let _ = writeln!(text, "{}", serde_json::to_string(draw).expect("plain data serialises"));
-        }
-        text
-    }
-
-    /// One row for each draw; empty where there is no number.
-    fn csv(&self) -> String {
-        let mut head = vec!["draw".to_owned()];
-        head.extend(self.plan.quantities.iter().map(|(name, unit)| match unit.as_str() {
-            "" => name.clone(),
-            unit => format!("{name}_{}", unit.replace(' ', "_")),
-        }));
-        let figures: Vec<&String> = self
-            .draws
-            .first()
-            .map(|d| d.figures.keys().collect())
-            .unwrap_or_default();
-        head.extend(figures.iter().map(|k| (*k).clone()));
-        head.extend(self.plan.limits.iter().map(|l| format!("limit_{}", l.key)));
-        head.push("passed".into());
-        let mut text = head.join(",") + "\n";
-        let number = |v: Option<f64>| v.map_or_else(String::new, |v| v.to_string());
-        for d in &self.draws {
-            let mut row = vec![d.draw.to_string()];
-            row.extend(d.amounts.iter().map(|a| a.to_string()));
-            row.extend(figures.iter().map(|k| number(d.figures.get(*k).copied().flatten())));
-            row.extend(d.reached.iter().map(|r| number(*r)));
-            row.push(d.passed.to_string());
-            text.push_str(&row.join(","));
-            text.push('\n');
         }
         text
     }

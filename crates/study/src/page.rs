@@ -5,6 +5,7 @@ use std::path::Path;
 use metalith_core::Result;
 use metalith_report::{Axis, Cell, Chart, Column, Figure, ImageGrid, Page, Ranking, Table, count, sig, write_json};
 
+use crate::grid_page::over_grid;
 use crate::merge::StudyResult;
 use crate::yields::{Yield, wilson};
 
@@ -91,8 +92,17 @@ fn page(result: &StudyResult) -> Page {
         page.table(tightenings(result));
     }
     page.section("Over one quantity");
-    let figures: Vec<Figure> = (0..plan.quantities.len()).map(|q| over_one(result, q)).collect();
+    // A choice has no axis.
+    let is_number = |q: &usize| {
+        let points = result.grid.iter().filter(|p| p.at[0].0 == plan.quantities[*q].0);
+        points.into_iter().all(|p| p.at[0].1.number().is_some())
+    };
+    let figures: Vec<Figure> = (0..plan.quantities.len())
+        .filter(is_number)
+        .map(|q| over_one(result, q))
+        .collect();
     page.row(figures);
+    over_grid(&mut page, result);
     if !result.shown.is_empty() {
         page.section("Worst draws");
         page.paragraph("By the least margin over the limits, in units of what that margin varies by.");
@@ -213,8 +223,8 @@ fn over_one(result: &StudyResult, q: usize) -> Figure {
 }
 
 fn worst(result: &StudyResult) -> Table {
-    let names = result
-        .plan
+    let plan = &result.plan;
+    let names = plan
         .quantities
         .iter()
         .map(|(n, u)| Column::number(n.clone(), u.clone()));
@@ -223,7 +233,10 @@ fn worst(result: &StudyResult) -> Table {
     for k in result.worst.iter().take(10) {
         let d = &result.draws[*k as usize];
         let reached = d.reached.iter().map(|r| r.map_or_else(Cell::none, |r| Cell::sig(r, 4)));
-        let amounts = d.amounts.iter().map(|a| Cell::sig(*a, 3));
+        let amounts = plan.quantities.iter().zip(&d.amounts).map(|((name, _), amount)| {
+            let value = d.design.get(name);
+            value.map_or_else(|| Cell::sig(*amount, 3), |value| Cell::from(value.to_string()))
+        });
         table.row(std::iter::once(Cell::from(k.to_string())).chain(amounts).chain(reached));
     }
     table

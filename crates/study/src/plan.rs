@@ -1,34 +1,33 @@
 //! The folder of a study: what it is, cut into shards.
 
+use std::cell::Cell;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use metalith_cell::CellStack;
 use metalith_cell::kept::solver_of;
 use metalith_core::file::read_at_most;
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result, WholeFile};
-use metalith_design::Design;
 use metalith_design::array::PillarArray;
 use metalith_layout::write_pillars;
+use metalith_made::{BankRange, CellBank};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::bench::{Bench, Quiet};
+use crate::bench::{Bench, Files, Quiet};
 use crate::record::LimitStatement;
 use crate::tolerance::Tolerance;
 
 /// Version of the format of the manifest.
-const SCHEMA: u32 = 1;
+const SCHEMA: u32 = 2;
 
 /// Time that a shard shall take (s): long enough for a queue to be worth it, short enough to lose one.
 const SHARD_SECONDS: f64 = 600.0;
 
 /// Name of the manifest within the folder.
 pub(crate) const MANIFEST: &str = "plan.json";
-
-/// Name of the tables of cells.
-pub(crate) const CELLS: &str = "cells.bank";
 
 /// Longest manifest.
 const LONGEST: u64 = 64 << 20;
@@ -61,16 +60,19 @@ pub struct Plan {
     pub key: String,
     /// The file of the study, absolute.
     pub tolerance: PathBuf,
-    pub layout: Layout,
+    /// Where the layout of each design is: one, or one for each combination of values of keys of the design.
+    pub layouts: Vec<Layout>,
+    /// Tables of cells of each design, by their names in the folder of the study; designs of one pillar share them.
+    pub cells: Vec<String>,
     /// Name and unit of what varies; those of a grid first.
     pub quantities: Vec<(String, String)>,
     pub limits: Vec<LimitStatement>,
     /// All draws, at all points of the grid.
     pub draws: u64,
     pub draws_per_shard: u64,
-    /// Wall time of the first draw on the machine and threads of the plan (s).
+    /// Wall time of the first draw on the machine and threads of the plan, of the slowest design (s).
     pub seconds_per_draw: f64,
-    /// Pillars whose tables were solved, for every width and wavelength.
+    /// Pillars, of all designs, whose tables were solved, for every width and wavelength.
     pub stacks: usize,
     /// The folder of the study.
     #[serde(skip)]
@@ -133,9 +135,23 @@ impl Plan {
         })
     }
 
-    /// Where the pillars are.
-    pub(crate) fn layout_path(&self) -> PathBuf {
-        layout_path(&self.layout, &self.folder)
+    /// Where the layouts and the tables are.
+    pub(crate) fn files(&self) -> Files {
+        let layouts = self.layouts.iter().map(|l| layout_path(l, &self.folder));
+        let cells = self.cells.iter().map(|name| self.folder.join(name));
+        Files {
+            layouts: layouts.collect(),
+            cells: cells.collect(),
+        }
+    }
+}
+
+/// Name of the file of one design of a study: `layout.gds` if it is the only one, else `layout_2.gds`.
+fn named(stem: &str, ending: &str, number: u64, designs: u64) -> String {
+    if designs == 1 {
+        format!("{stem}.{ending}")
+    } else {
+        format!("{stem}_{number}.{ending}")
     }
 }
 
@@ -146,30 +162,20 @@ fn layout_path(layout: &Layout, folder: &Path) -> PathBuf {
     }
 }
 
-/// Plan a study into a folder: layout, tables of cells, the first draw to know its time, manifest. A folder that holds
-/// the plan of the same study keeps it.
+/// Plan a study into a folder: layouts, tables of cells, the first draw of each design to know its time, manifest. A folder
+/// that holds the plan of the same study keeps it.
 ///
 /// # Errors
 /// If a file cannot be used, the folder holds another study, or the user stopped it.
 pub fn plan(tolerance_path: &Path, folder: &Path, settings: PlanSettings, progress: &dyn Progress) -> Result<Plan> {
     let tolerance_path = absolute(tolerance_path)?;
     let tolerance = Tolerance::read(&tolerance_path)?;
-    let design = Design::read(&tolerance.design)?;
-    let array = PillarArray::build(&design, progress)?;
     fs::create_dir_all(folder).map_err(Error::io("create the folder", folder))?;
-    let layout = match &tolerance.layout {
-        Some(path) => Layout::Given(absolute(path)?),
-        None => {
-            let name = "layout.gds".to_owned();
-            let path = folder.join(&name);
-            if !folder.join(MANIFEST).is_file() {
-                write_pillars(&design, &array, design.layout.hierarchy, &path, progress)?;
-            }
-            Layout::Written(name)
-        }
-    };
-    let key = key(&tolerance, &design, &layout_path(&layout, folder))?;
-    if folder.join(MANIFEST).is_file() {
+    let known = folder.join(MANIFEST).is_file();
+    let layouts = layouts(&tolerance, folder, known, progress)?;
+    let paths: Vec<PathBuf> = layouts.iter().map(|l| layout_path(l, folder)).collect();
+    let key = key(&tolerance, &paths)?;
+    if known {
         let known = Plan::open(folder)?;
         if known.key == hex(&key) {
             return Ok(known);
@@ -182,58 +188,137 @@ pub fn plan(tolerance_path: &Path, folder: &Path, settings: PlanSettings, progre
             "name another folder with --out, or remove this one",
         ));
     }
-    let bench = Bench::make(tolerance, design, array, &layout_path(&layout, folder), key, progress)?;
-    bench.bank.write(&folder.join(CELLS))?;
-    progress.begin("timing the first draw", 1);
-    let begun = Instant::now();
-    let (first, found) = bench.draw(0, &Quiet(progress))?;
-    let seconds_per_draw = begun.elapsed().as_secs_f64();
-    for limit in &bench.tolerance.limits {
-        if !first.figures.contains_key(&limit.figure) {
-            let known: Vec<&str> = first.figures.keys().map(String::as_str).collect();
-            return Err(Error::invalid(
-                format!("there is no figure `{}` to limit", limit.figure),
-                format!("this design has: {}", known.join(", ")),
-            ));
-        }
-    }
+    let designs = tolerance.designs();
+    // Where each design would keep tables of its own.
+    let own = (0..designs).map(|d| folder.join(named("cells", "bank", d, designs)));
+    let files = Files {
+        layouts: paths,
+        cells: own.collect(),
+    };
+    let bench = Bench::new(tolerance, key, files)?;
     let draws = bench.drawer.count();
-    let by_time = (SHARD_SECONDS / seconds_per_draw.max(1e-3)).floor().max(1.0) as u64;
-    let plan = Plan {
+    let mut plan = Plan {
         schema: SCHEMA,
         key: hex(&key),
         tolerance: tolerance_path,
-        layout,
+        layouts,
+        cells: Vec::new(),
         quantities: bench.drawer.names(),
-        limits: bench.limits(&found),
+        limits: Vec::new(),
         draws,
-        draws_per_shard: settings.draws_per_shard.unwrap_or(by_time).clamp(1, draws),
-        seconds_per_draw,
-        stacks: bench.bank.stacks(),
+        draws_per_shard: 1,
+        seconds_per_draw: 0.0,
+        stacks: 0,
         folder: folder.to_owned(),
     };
+    for design in 0..designs {
+        plan.take(design, designs, &bench, progress)?;
+    }
+    let by_time = (SHARD_SECONDS / plan.seconds_per_draw.max(1e-3)).floor().max(1.0) as u64;
+    plan.draws_per_shard = settings.draws_per_shard.unwrap_or(by_time).clamp(1, draws);
     let mut text = serde_json::to_string_pretty(&plan).expect("plain data serialises");
     text.push('\n');
     WholeFile::write(&folder.join(MANIFEST), text.as_bytes())?;
     Ok(plan)
 }
 
+/// The layout of each design, written if it is not there.
+fn layouts(tolerance: &Tolerance, folder: &Path, known: bool, progress: &dyn Progress) -> Result<Vec<Layout>> {
+    if let Some(path) = &tolerance.layout {
+        return Ok(vec![Layout::Given(absolute(path)?)]);
+    }
+    let designs = tolerance.designs();
+    let each = (0..designs).map(|number| {
+        let name = named("layout", "gds", number, designs);
+        let path = folder.join(&name);
+        if !known {
+            let design = tolerance.design(number)?;
+            let array = PillarArray::build(&design, progress)?;
+            write_pillars(&design, &array, design.layout.hierarchy, &path, progress)?;
+        }
+        Ok(Layout::Written(name))
+    });
+    each.collect()
+}
+
+impl Plan {
+    /// Solve the tables of one design, or find those that an earlier one has, and judge its first draw.
+    fn take(&mut self, design: u64, designs: u64, bench: &Bench, progress: &dyn Progress) -> Result<()> {
+        let name = named("cells", "bank", design, designs);
+        let shared = Cell::new(None);
+        let bank = |stated: &CellStack, range: BankRange| {
+            // A file of other cells says so.
+            let found = self.cells.iter().enumerate().rev().find_map(|(k, name)| {
+                let read = CellBank::read(&self.folder.join(name), stated, range.clone());
+                read.ok().map(|bank| (k, bank))
+            });
+            if let Some((k, bank)) = found {
+                shared.set(Some(k));
+                return Ok(bank);
+            }
+            let bank = CellBank::solve(stated, range, progress)?;
+            bank.write(&self.folder.join(&name))?;
+            Ok(bank)
+        };
+        bench.take(design, &bank, progress)?;
+        match shared.get() {
+            Some(k) => self.cells.push(self.cells[k].clone()),
+            None => {
+                self.stacks += bench.stacks();
+                self.cells.push(name);
+            }
+        }
+        progress.begin("timing the first draw", 1);
+        let begun = Instant::now();
+        let (first, found) = bench.draw(design * (self.draws / designs), &Quiet(progress))?;
+        self.seconds_per_draw = self.seconds_per_draw.max(begun.elapsed().as_secs_f64());
+        for limit in &bench.tolerance.limits {
+            if !first.figures.contains_key(&limit.figure) {
+                let known: Vec<&str> = first.figures.keys().map(String::as_str).collect();
+                return Err(Error::invalid(
+                    format!("there is no figure `{}` to limit", limit.figure),
+                    format!("this design has: {}", known.join(", ")),
+                ));
+            }
+        }
+        let limits = bench.limits(&found);
+        if design > 0 && limits != self.limits {
+            let setting = bench.tolerance.setting(design).into_iter();
+            let setting: Vec<String> = setting.map(|(key, value)| format!("{key} = {value}")).collect();
+            return Err(Error::invalid(
+                format!(
+                    "with {} other limits count than with the first values of the grid",
+                    setting.join(", ")
+                ),
+                "make a study of each of these designs",
+            ));
+        }
+        self.limits = limits;
+        Ok(())
+    }
+}
+
 /// SHA-256 of everything that decides the answers; how a study is cut is no part of it.
-pub(crate) fn key(tolerance: &Tolerance, design: &Design, layout: &Path) -> Result<[u8; 32]> {
+pub(crate) fn key(tolerance: &Tolerance, layouts: &[PathBuf]) -> Result<[u8; 32]> {
     let mut hash = Sha256::new();
     let mut add = |what: &str, bytes: &[u8]| {
         hash.update((bytes.len() as u64).to_le_bytes());
         hash.update(what);
         hash.update(bytes);
     };
-    let solver = solver_of(design.cell.shape);
-    add("version", format!("{} {solver}", env!("CARGO_PKG_VERSION")).as_bytes());
-    // A design names further files: its digest covers what they say.
-    add("design", design.digest().as_bytes());
-    let mut files = vec![tolerance.path.clone(), tolerance.design.clone(), layout.to_owned()];
+    let mut files = vec![tolerance.path.clone(), tolerance.design.clone()];
+    files.extend(layouts.iter().cloned());
     files.extend(tolerance.model.clone());
-    if let Some(camera) = &design.verify.camera {
-        files.extend(metalith_verify::camera_files(camera)?);
+    for number in 0..tolerance.designs() {
+        let design = tolerance.design(number)?;
+        let solver = solver_of(design.cell.shape);
+        add("version", format!("{} {solver}", env!("CARGO_PKG_VERSION")).as_bytes());
+        // A design names further files: its digest covers what they say.
+        add("design", design.digest().as_bytes());
+        // Nothing of [verify] varies over the grid.
+        if let (0, Some(camera)) = (number, &design.verify.camera) {
+            files.extend(metalith_verify::camera_files(camera)?);
+        }
     }
     for path in files {
         let mut one = Sha256::new();
@@ -255,7 +340,8 @@ pub(crate) fn test_plan(folder: &Path, layout: Layout, draws: u64, draws_per_sha
         schema: SCHEMA,
         key: hex(&[0; 32]),
         tolerance: "tolerance.toml".into(),
-        layout,
+        layouts: vec![layout],
+        cells: vec!["cells.bank".into()],
         quantities: Vec::new(),
         limits: Vec::new(),
         draws,

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use metalith_core::document::Scalar;
 use metalith_verify::{Check, Sense, Verification};
 use serde::{Deserialize, Serialize};
 
@@ -13,6 +14,9 @@ pub struct DrawRecord {
     pub draw: u64,
     /// In the order and units of the plan's quantities.
     pub amounts: Vec<f64>,
+    /// Values of the keys of the design that vary.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub design: BTreeMap<String, Scalar>,
     /// By key; the worst over the elements of the array. None where it is not a number.
     pub figures: BTreeMap<String, Option<f64>>,
     /// What was reached of each limit of the plan, in its order; none where it is not a number.

@@ -264,6 +264,7 @@ mod tests {
                 DrawRecord {
                     draw: k as u64,
                     amounts: vec![a, b],
+                    design: BTreeMap::new(),
                     figures: BTreeMap::new(),
                     reached: vec![Some(margin)],
                     passed: margin >= 0.0,

@@ -59,21 +59,21 @@ pub struct Run<'p> {
 }
 
 impl<'p> Run<'p> {
-    /// Read what the draws of a plan are judged with.
+    /// For the draws of a plan; layouts and tables are read when a draw asks for them.
     ///
     /// # Errors
-    /// If a file of the study has changed, or its tables of cells cannot be used: none are made here.
-    pub fn open(plan: &'p Plan, progress: &dyn Progress) -> Result<Self> {
+    /// If a file of the study has changed.
+    pub fn open(plan: &'p Plan) -> Result<Self> {
         Ok(Self {
             plan,
-            bench: Bench::open(plan, progress)?,
+            bench: Bench::open(plan)?,
         })
     }
 
     /// Make one shard, if it is not there.
     ///
     /// # Errors
-    /// If a draw cannot be simulated, the file cannot be written or is of another plan, or the user stopped it.
+    /// If tables of cells cannot be used (none are made here), a draw cannot be simulated, the file cannot be written or is of another plan, or the user stopped it.
     pub fn shard(&self, number: u64, progress: &dyn Progress) -> Result<()> {
         let shard = self.plan.shard(number)?;
         let path = self.plan.shard_path(number);
@@ -117,7 +117,7 @@ pub fn run_shard(plan: &Plan, number: u64, progress: &dyn Progress) -> Result<()
     if finished(plan, plan.shard(number)?)? {
         return Ok(());
     }
-    Run::open(plan, progress)?.shard(number, progress)
+    Run::open(plan)?.shard(number, progress)
 }
 
 /// Whether a shard is there.

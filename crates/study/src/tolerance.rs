@@ -8,6 +8,8 @@ use metalith_core::document::{Document, Limits, Section, load};
 use metalith_verify::Sense;
 use metalith_wave::Accuracy;
 
+use crate::designs::{self, DesignGrid, design_grid};
+
 /// Version of the format that is read.
 const SCHEMA: i64 = 1;
 
@@ -35,6 +37,8 @@ pub struct Tolerance {
     pub accuracy: Accuracy,
     pub varied: Vec<Varied>,
     pub grids: Vec<Grid>,
+    /// What varies in the design.
+    pub design_grids: Vec<DesignGrid>,
     /// Limits on figures, beside those of the design.
     pub limits: Vec<FigureLimit>,
 }
@@ -95,7 +99,8 @@ impl Tolerance {
         let mut used: Vec<String> = Vec::new();
         let mut once = |section: &Section<'_, '_>, name: &str| {
             if used.iter().any(|u| u == name) {
-                section.fault("effect", format!("`{name}` varies twice"), "keep one of the two");
+                let at = if section.has("key") { "key" } else { "effect" };
+                section.fault(at, format!("`{name}` varies twice"), "keep one of the two");
             }
             used.push(name.to_owned());
         };
@@ -104,12 +109,17 @@ impl Tolerance {
             .iter()
             .map(|s| vary(s, &known, &mut once))
             .collect();
-        let grids: Vec<Grid> = root
-            .sections("grid")
+        let (of_design, of_effects): (Vec<_>, Vec<_>) = root.sections("grid").into_iter().partition(|s| s.has("key"));
+        let grids: Vec<Grid> = of_effects.iter().map(|s| grid(s, &known, &mut once)).collect();
+        let design_grids: Vec<DesignGrid> = of_design
             .iter()
-            .map(|s| grid(s, &known, &mut once))
+            .map(|s| {
+                let grid = design_grid(s);
+                once(s, &grid.key);
+                grid
+            })
             .collect();
-        if varied.is_empty() && grids.is_empty() {
+        if varied.is_empty() && grids.is_empty() && design_grids.is_empty() {
             root.fault(
                 "vary",
                 "nothing varies",
@@ -117,10 +127,20 @@ impl Tolerance {
             );
         }
         let file = |key: &str| root.has(key).then(|| root.file(key));
+        let design = root.file("design");
+        let layout = file("layout");
+        if let (Some(first), Some(_)) = (of_design.first(), &layout) {
+            first.fault(
+                "key",
+                "the design varies, and one layout is given",
+                "leave out `layout`: each design writes its own",
+            );
+        }
+        designs::check(&design, root, &of_design, &design_grids);
         Self {
             path: path.to_owned(),
-            design: root.file("design"),
-            layout: file("layout"),
+            design,
+            layout,
             model: file("model"),
             draws: root.integer("draws", 1..=MOST_DRAWS, "draws") as u64,
             accuracy: root.choice(
@@ -131,6 +151,7 @@ impl Tolerance {
             limits: root.sections("limit").iter().map(limit).collect(),
             varied,
             grids,
+            design_grids,
         }
     }
 }
@@ -294,6 +315,96 @@ at_least = 0.6
         ] {
             assert!(error.contains(part), "{part} is not in {error}");
         }
+    }
+
+    /// The file with these grids, beside a design that can be read.
+    fn of_a_design(grids: &str) -> Result<Tolerance> {
+        let folder = tempfile::tempdir().unwrap();
+        let design = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/mini_3x3.toml");
+        std::fs::copy(design, folder.path().join("d.toml")).unwrap();
+        let path = folder.path().join("tolerance.toml");
+        std::fs::write(&path, format!("{GOOD}{grids}")).unwrap();
+        Tolerance::read(&path)
+    }
+
+    #[test]
+    fn a_design_varies_over_a_grid() {
+        let read = of_a_design(
+            "[[grid]]\nkey = \"cell.pillar_height_nm\"\nvalues = [650, 700.5]\n\
+             [[grid]]\nkey = \"layout.hierarchy\"\nvalues = [\"folded\", \"sref\", \"flat\"]\n",
+        )
+        .unwrap();
+        assert_eq!(read.designs(), 6);
+        let words = |k| {
+            let setting = read.setting(k).into_iter();
+            setting.map(|(k, v)| format!("{k}={v}")).collect::<Vec<_>>().join(" ")
+        };
+        assert_eq!(words(0), "cell.pillar_height_nm=650 layout.hierarchy=folded");
+        assert_eq!(words(3), "cell.pillar_height_nm=700.5 layout.hierarchy=sref");
+        assert_eq!(read.grids.len(), 1, "effects have grids beside it");
+    }
+
+    #[test]
+    fn a_grid_over_what_the_design_cannot_have_is_told_with_its_place() {
+        // Its lines follow those of the file before.
+        let line = GOOD.lines().count() + 2;
+        for (key, values, column, parts) in [
+            (
+                "cell.pillar_heigth_nm",
+                "[650]",
+                7,
+                "in d.toml, there is no `pillar_heigth_nm` in `cell`",
+            ),
+            ("cell", "[650]", 7, "is a table"),
+            (
+                "verify.pixel_um",
+                "[5]",
+                7,
+                "`verify.pixel_um` does not vary: all draws",
+            ),
+            (
+                "cell.pillar_height_nm",
+                "[650, -1]",
+                10,
+                "with `cell.pillar_height_nm = -1` the design has a mistake",
+            ),
+            ("layout.hierarchy", "[\"deep\"]", 10, "use one of: "),
+            ("cell.pillar_height_nm", "[]", 10, "a grid without values"),
+            (
+                "cell.pillar_height_nm",
+                "[[1]]",
+                11,
+                "a list of numbers, texts in quotes",
+            ),
+        ] {
+            let error = of_a_design(&format!("[[grid]]\nkey = \"{key}\"\nvalues = {values}\n")).unwrap_err();
+            let text = error.to_string();
+            // A fault of the values is one line below the key.
+            let line = if column == 7 { line } else { line + 1 };
+            assert!(text.contains(&format!("tolerance.toml:{line}:{column}: ")), "{text}");
+            assert!(text.contains(parts), "{parts}: {text}");
+        }
+        // Each value is possible, and not both.
+        let both = of_a_design(
+            "[[grid]]\nkey = \"cell.width_max_nm\"\nvalues = [300, 290]\n\
+             [[grid]]\nkey = \"mapping.coefficients.0\"\nvalues = [0.2923, 0.3]\n",
+        );
+        let text = both.unwrap_err().to_string();
+        assert!(
+            text.contains("with `cell.width_max_nm = 290` and `mapping.coefficients.0 = 0.3` the design has a mistake"),
+            "{text}"
+        );
+        let twice = of_a_design(
+            "[[grid]]\nkey = \"cell.pitch_nm\"\nvalues = [350]\n[[grid]]\nkey = \"cell.pitch_nm\"\nvalues = [350]\n",
+        );
+        assert!(twice.unwrap_err().to_string().contains("`cell.pitch_nm` varies twice"));
+        let many: Vec<String> = (0..40).map(|k| (650 + k).to_string()).collect();
+        let many = many.join(", ");
+        let many = of_a_design(&format!(
+            "[[grid]]\nkey = \"cell.pillar_height_nm\"\nvalues = [{many}]\n\
+             [[grid]]\nkey = \"lens.focal_length_um\"\nvalues = [{many}]\n"
+        ));
+        assert!(many.unwrap_err().to_string().contains("1600 designs"));
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use metalith_core::Silent;
+use metalith_core::document::Scalar;
 use metalith_study::{Plan, PlanSettings, Run, merge, plan, run_shard, status, write_page};
 
 /// A design that is solved in some seconds: one small lens, one wavelength and white light.
@@ -66,7 +67,7 @@ fn the_draws_depend_neither_on_the_cut_nor_on_the_order_nor_on_threads() {
     assert_eq!(one.key, many.key);
     let single = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     single.install(|| run_shard(&one, 0, &Silent)).unwrap();
-    let run = Run::open(&many, &Silent).unwrap();
+    let run = Run::open(&many).unwrap();
     for shard in [2, 0, 1] {
         run.shard(shard, &Silent).unwrap();
     }
@@ -82,6 +83,109 @@ fn the_draws_depend_neither_on_the_cut_nor_on_the_order_nor_on_threads() {
     assert!(csv.starts_with("draw,cd_bias_nm,gap_um,"), "{csv}");
     assert_eq!(csv.lines().count(), 8);
     assert!(b.write(&folder.path().join("result.xls")).is_err());
+    let table = folder.path().join("result.parquet");
+    let written = b.write(&table);
+    if cfg!(feature = "parquet") {
+        written.unwrap();
+        // The four bytes that such a file begins with.
+        assert!(fs::read(&table).unwrap().starts_with(b"PAR1"));
+    } else {
+        assert!(written.unwrap_err().to_string().contains("--features parquet"));
+        assert!(!table.exists());
+    }
+}
+
+/// Without anything random, a design of a grid and the same design in a file of its own have the same figures to the bit.
+#[test]
+#[ignore = "second tier: CPU time, run by .ci/run"]
+fn a_design_of_a_grid_is_the_design_of_its_own_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let (grid, own) = (folder.path().join("grid"), folder.path().join("own"));
+    let draws = |folder: &Path, keys: &str, change: &[(&str, &str)]| {
+        fs::create_dir(folder).unwrap();
+        let path = tolerance(folder, 1);
+        let text = fs::read_to_string(&path).unwrap();
+        let (head, limit) = (
+            &text[..text.find("[[vary]]").unwrap()],
+            &text[text.find("[[limit]]").unwrap()..],
+        );
+        let bias = "[[grid]]\neffect = \"cd_bias\"\nvalues = [-2.0, 3.0]\n";
+        fs::write(&path, format!("{head}{bias}{keys}{limit}")).unwrap();
+        let design = fs::read_to_string(folder.join("design.toml")).unwrap();
+        let design = change.iter().fold(design, |text, (from, to)| {
+            assert!(text.contains(from), "{from}");
+            text.replace(from, to)
+        });
+        fs::write(folder.join("design.toml"), design).unwrap();
+        let plan = in_shards(&path, &folder.join("study"), 2);
+        run_shard(&plan, 0, &Silent).unwrap();
+        let draws = merge(&plan, 0, &Silent).unwrap().draws;
+        let figures: Vec<_> = draws.into_iter().map(|d| (d.figures, d.reached)).collect();
+        (figures, fs::read(plan.folder.join("layout.gds")).unwrap())
+    };
+    let keys = "[[grid]]\nkey = \"lens.focal_length_um\"\nvalues = [40]\n\
+                [[grid]]\nkey = \"cell.pillar_height_nm\"\nvalues = [640]\n";
+    let change = [
+        ("focal_length_um = 48", "focal_length_um = 40"),
+        ("pillar_height_nm = 700", "pillar_height_nm = 640"),
+    ];
+    let (of_grid, of_file) = (draws(&grid, keys, &[]), draws(&own, "", &change));
+    assert_eq!(of_grid.0.len(), 2);
+    assert!(of_grid == of_file);
+}
+
+/// A grid over the design beside what is drawn.
+#[test]
+#[ignore = "second tier: CPU time, run by .ci/run"]
+fn designs_of_a_grid_are_each_judged_by_their_own_layout_and_tables() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = tolerance(folder.path(), 3);
+    let text = fs::read_to_string(&path).unwrap()
+        + "[[grid]]\nkey = \"lens.focal_length_um\"\nvalues = [48, 40]\n\
+           [[grid]]\nkey = \"cell.pillar_height_nm\"\nvalues = [700, 640]\n\
+           [[grid]]\neffect = \"stray_light\"\nvalues = [0.0, 0.2]\n";
+    fs::write(&path, text).unwrap();
+    let one = in_shards(&path, &folder.path().join("one"), 24);
+    let many = in_shards(&path, &folder.path().join("many"), 5);
+    assert_eq!((one.draws, one.key == many.key), (24, true));
+    // The focal length changes the layout, not the pillars: tables are of two heights.
+    assert_eq!((one.layouts.len(), one.stacks), (4, 2));
+    assert_eq!(one.cells[0], one.cells[1]);
+    assert_ne!(one.cells[1], one.cells[2]);
+    run_shard(&one, 0, &Silent).unwrap();
+    let run = Run::open(&many).unwrap();
+    for shard in [4, 1, 0, 3, 2] {
+        run.shard(shard, &Silent).unwrap();
+    }
+    let (a, b) = (merge(&one, 0, &Silent).unwrap(), merge(&many, 0, &Silent).unwrap());
+    assert_eq!(a.draws, b.draws);
+    // Values are recorded with the draw.
+    let last = &a.draws[23];
+    assert_eq!(last.design["lens.focal_length_um"], Scalar::Whole(40));
+    assert_eq!(last.design["cell.pillar_height_nm"], Scalar::Whole(640));
+    assert_eq!(last.amounts[..3], [0.2, 40.0, 640.0]);
+    let strehl = |k: usize| a.draws[k].figures["strehl_660nm_0deg"].unwrap();
+    assert_ne!(strehl(0), strehl(6));
+    // Figures by value: all draws of a value, and their mean.
+    assert_eq!((a.grid.len(), a.combinations.len()), (6, 8));
+    let short = a.grid.iter().find(|p| p.at[0].1 == Scalar::Whole(40)).unwrap();
+    assert_eq!((short.at[0].0.as_str(), short.draws), ("lens.focal_length_um", 12));
+    let of_it = a.draws.iter().filter(|d| d.amounts[1] == 40.0);
+    let mean = of_it.map(|d| d.figures["strehl_660nm_0deg"].unwrap()).sum::<f64>() / 12.0;
+    // The same twelve numbers, added in the same order.
+    assert_eq!(short.figures["strehl_660nm_0deg"].mean, mean);
+    write_page(&a, folder.path()).unwrap();
+    let page = fs::read_to_string(folder.path().join("report.html")).unwrap();
+    for part in ["Over the grid", "lens.focal_length_um", "Combinations"] {
+        assert!(page.contains(part), "{part}");
+    }
+    a.write(&folder.path().join("result.csv")).unwrap();
+    let csv = fs::read_to_string(folder.path().join("result.csv")).unwrap();
+    assert!(
+        csv.starts_with("draw,stray_light,lens.focal_length_um,cell.pillar_height_nm,cd_bias_nm,gap_um,"),
+        "{csv}"
+    );
+    assert!(csv.contains("\n23,0.2,40,640,"), "{csv}");
 }
 
 #[test]
@@ -134,7 +238,7 @@ fn shards_are_whole_are_of_one_plan_and_are_counted() {
     let design = folder.path().join("design.toml");
     let text = fs::read_to_string(&design).unwrap();
     fs::write(&design, text.replace("window_samples = 32", "window_samples = 34")).unwrap();
-    let changed = Run::open(&made, &Silent).err().unwrap().to_string();
+    let changed = Run::open(&made).err().unwrap().to_string();
     assert!(changed.contains("has changed"), "{changed}");
     assert!(plan(&path, &study, PlanSettings::default(), &Silent).is_err());
 }

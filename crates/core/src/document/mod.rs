@@ -6,9 +6,11 @@
 //! it would be a second fault for one mistake, and its advice would be wrong.
 
 mod fault;
+mod scalar;
 mod section;
 
 pub use fault::{Fault, Faults};
+pub use scalar::{NoPlace, Scalar, with_values};
 pub use section::{Limits, Section};
 
 use std::cell::{Cell, RefCell};

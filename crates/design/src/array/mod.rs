@@ -76,12 +76,12 @@ impl PillarArray {
         Self::build_within(design, MOST_HELD, progress)
     }
 
-    /// The array of square or round pillars that were not made from a design: maps of widths with the places of their centres (nm). Copies
-    /// and symmetries are found as those of a design are; nothing is steered.
+    /// The array of pillars that were not made from a design: maps of widths, or of the numbers of rotations of rectangles, with the
+    /// places of their centres (nm). Copies and symmetries are found as those of a design are; nothing is steered.
     ///
     /// # Errors
     /// If there is none, they are not of one lattice, a place is farther than 1 m from the middle, or the user stopped it.
-    pub fn of_maps(maps: Vec<(WidthMap, (i64, i64))>, progress: &dyn Progress) -> Result<Self> {
+    pub fn of_maps(shape: PillarShape, maps: Vec<(WidthMap, (i64, i64))>, progress: &dyn Progress) -> Result<Self> {
         let Some(lattice) = maps.first().map(|(map, _)| map.lattice) else {
             return Err(Error::invalid(
                 "an array without elements",
@@ -91,7 +91,7 @@ impl PillarArray {
         progress.begin("comparing elements", maps.len() as u64);
         let mut array = Self {
             lattice,
-            shape: PillarShape::default(),
+            shape,
             classes: Vec::new(),
             placed: Vec::new(),
             compensated: false,

@@ -12,6 +12,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::Document;
 use crate::text::quoted;
+pub(super) use values::number as float_of;
 use words::{article, describe, nearest};
 
 /// The values a number may take, with the unit it is in and why the limits are there.

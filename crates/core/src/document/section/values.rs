@@ -8,6 +8,7 @@ use toml::de::DeValue;
 
 use super::words::{describe, did_you_mean};
 use super::{Limits, Section};
+use crate::document::Scalar;
 use crate::text::{first_unprintable, quoted};
 
 impl<'t> Section<'_, 't> {
@@ -161,6 +162,25 @@ impl<'t> Section<'_, 't> {
             .collect()
     }
 
+    /// A list of numbers, texts or switches; an empty one where the key is left out.
+    pub fn scalars(&self, key: &str) -> Vec<Scalar> {
+        const EXPECTED: &str = "a list of numbers, texts in quotes, or true and false";
+        let Some(value) = self.get(key) else { return Vec::new() };
+        let DeValue::Array(items) = value.get_ref() else {
+            self.wrong_type(key, value, EXPECTED);
+            return Vec::new();
+        };
+        let scalar = |item: &Spanned<DeValue<'t>>| match Scalar::of(item.get_ref()) {
+            Some(Scalar::Text(text)) => Some(Scalar::Text(self.one_line(key, item.span(), &text))),
+            Some(other) => Some(other),
+            None => {
+                self.wrong_type(key, item, EXPECTED);
+                None
+            }
+        };
+        items.iter().filter_map(scalar).collect()
+    }
+
     /// Exactly `N` numbers that must be there, each within the limits.
     pub fn array<const N: usize>(&self, key: &str, limits: Limits) -> [f64; N] {
         match self.optional_array(key, limits.clone()) {
@@ -211,7 +231,8 @@ impl<'t> Section<'_, 't> {
     }
 }
 
-fn number(value: &DeValue<'_>) -> Option<f64> {
+/// As a number, if it is one.
+pub(in crate::document) fn number(value: &DeValue<'_>) -> Option<f64> {
     match value {
         DeValue::Integer(i) => i64::from_str_radix(i.as_str(), i.radix()).ok().map(|v| v as f64),
         DeValue::Float(f) => f.as_str().parse().ok(),

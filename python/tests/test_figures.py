@@ -1,0 +1,89 @@
+"""Figures and labelled arrays, and what is said where their packages are missing."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import metalith as ml
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def psfs() -> ml.PsfSet:
+    array = ml.Design.read(ROOT / "designs/mini_3x3.toml").array()
+    return ml.psf(array, [530, 660], [(0, 0), (15, 0)], elements=[0, 4], samples=32, fast=True)
+
+
+def test_psfs_are_a_labelled_array(psfs: ml.PsfSet) -> None:
+    labelled = psfs.to_xarray()
+    assert dict(labelled.sizes) == {"element": 2, "wavelength_nm": 2, "field": 2, "y": 32, "x": 32}
+    for psf in psfs:
+        here = labelled.sel(element=psf.element, wavelength_nm=psf.wavelength_nm)
+        here = here.isel(field=int(psf.field_deg[0] > 0))
+        assert np.array_equal(here.values, psf.values)
+        # Places count from the middle of the window, which is a coordinate.
+        assert np.allclose(here.x + float(here.centre_x_um), psf.x_um)
+    one = psfs[3].to_xarray()
+    assert np.array_equal(one.values[0, 0, 0], psfs[3].values)
+
+
+def test_cells_are_a_labelled_array() -> None:
+    widths, wavelengths = [150.0, 200.0, 250.0], np.array([530.0, 600.0])
+    t = ml.cell(widths, wavelengths)
+    labelled = t.to_xarray()
+    assert np.array_equal(labelled.sel(width_nm=200.0, wavelength_nm=600.0), t[1, 1])
+    one = ml.cell(200.0, wavelengths).to_xarray()
+    assert one.sizes["width_nm"] == 1 and np.array_equal(one.values[0], t[1])
+    # A part, or what is computed, is an array without names.
+    others: list[Any] = [t[0], t * 2, np.abs(t)]
+    for other in others:
+        with pytest.raises(ml.MetalithError, match="no widths and wavelengths\n  help: "):
+            other.to_xarray()
+    with pytest.raises(ml.MetalithError, match="more than one dimension"):
+        ml.cell([[150.0], [200.0]], 530.0).to_xarray()
+
+
+def test_figures_are_drawn_of_what_was_computed(psfs: ml.PsfSet) -> None:
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    figure = psfs.plot(columns=3)
+    drawn = [axis.images[0].get_array() for axis in figure.axes if axis.images]
+    assert len(drawn) == len(psfs) and all(np.array_equal(d, p.values) for d, p in zip(drawn, psfs))
+    assert len(psfs[0].plot().axes) == 1
+    t = ml.cell([150.0, 200.0], [530.0, 600.0, 660.0])
+    modulus, phase = t.plot().axes
+    assert [line.get_label() for line in modulus.lines] == ["150 nm", "200 nm"]
+    assert np.allclose(modulus.lines[1].get_ydata(), np.abs(t[1]))
+    assert np.allclose(phase.lines[0].get_ydata(), np.angle(t[0]) / (2 * np.pi))
+    over_width = ml.cell([150.0, 200.0, 250.0], 530.0).plot().axes[0]
+    assert np.allclose(over_width.lines[0].get_xdata(), [150, 200, 250])
+
+
+@pytest.mark.parametrize(
+    ("call", "package"),
+    [("t.to_xarray()", "xarray"), ("t.plot()", "matplotlib"), ("p.to_xarray()", "xarray"), ("p.plot()", "matplotlib")],
+)
+def test_a_package_that_is_missing_is_named_with_the_remedy(call: str, package: str) -> None:
+    code = (
+        "import sys, numpy as np, metalith as ml\n"
+        "assert not {'xarray', 'matplotlib'} & set(sys.modules), 'imported before they are asked for'\n"
+        # What Python's own search gives where a package is not installed.
+        "class Nothing:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name.partition('.')[0] in ('xarray', 'matplotlib'):\n"
+        "            raise ModuleNotFoundError(f'No module named {name!r}', name=name.partition('.')[0])\n"
+        "sys.meta_path.insert(0, Nothing())\n"
+        "t = ml.cell([200.0], [530.0], orders=3)\n"
+        "p = ml.psf(np.full((8, 8), 200, dtype=np.uint16), [530], pitch_nm=350, distance_um=20.0, samples=8, fast=True)\n"
+        f"try:\n    {call}\n"
+        "except ml.MetalithError as error:\n    print(error)\n"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert run.stdout == f"{package} is not installed\n  help: pip install {package}\n", run.stderr

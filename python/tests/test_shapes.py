@@ -1,0 +1,120 @@
+"""Round and rectangular pillars: from arrays to files, back, and to light."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import metalith as ml
+
+ROOT = Path(__file__).resolve().parents[2]
+RECTANGLES = ml.Rectangles(width_nm=100, length_nm=250, steps=180)
+TIO2 = "tio2_siefke_2016"
+
+
+@pytest.mark.parametrize("name", ["a.gds", "a.oas"])
+def test_circles_of_any_diameters_become_a_layout(tmp_path: Path, name: str) -> None:
+    diameters = (2 * np.random.default_rng(1).integers(50, 150, (40, 40))).astype(np.uint16)
+    array = ml.write_layout(tmp_path / name, diameters, pitch_nm=400, shape="circle")
+    assert array.shape == "circle"
+    layout = ml.read_layout(tmp_path / name)
+    assert (layout.shape, layout.pitch_nm, layout.other_shapes) == ("circle", 400, 0)
+    assert np.array_equal(layout.widths[0], diameters)
+    with pytest.raises(ml.MetalithError, match="circles have no rotation"):
+        layout.rotations_deg(0)
+
+
+@pytest.mark.parametrize("name", ["a.gds", "a.oas"])
+@pytest.mark.parametrize("hierarchy", ["folded", "sref", "flat"])
+def test_rectangles_of_any_rotations_become_a_layout(tmp_path: Path, name: str, hierarchy: str) -> None:
+    rng = np.random.default_rng(2)
+    rotations = rng.integers(0, 180, (20, 20)).astype(float)
+    rotations[rng.random(rotations.shape) < 0.1] = np.nan
+    # Half a turn of the whole map leaves each rectangle as it is: the second is a copy of the first.
+    maps = [rotations, rotations[::-1, ::-1]]
+    places = [(0, 0), (20_000, -3_000)]
+    array = ml.write_layout(
+        tmp_path / name, maps, pitch_nm=360, shape=RECTANGLES, centres_nm=places, hierarchy=hierarchy
+    )
+    assert array.pillars == 2 * np.count_nonzero(~np.isnan(rotations))
+    layout = ml.read_layout(tmp_path / name, array=array)
+    assert (layout.shape, layout.pillars, layout.other_shapes) == (RECTANGLES, array.pillars, 0)
+    assert layout.centres_nm == places
+    for k, wanted in enumerate(maps):
+        assert np.allclose(layout.rotations_deg(k), wanted, equal_nan=True)
+        assert np.allclose(array.rotations_deg(k), wanted, equal_nan=True)
+
+
+def test_rotations_go_to_the_nearest_step_and_half_a_turn_is_none() -> None:
+    coarse = ml.Rectangles(width_nm=100, length_nm=250, steps=4)
+    found = coarse.rotations_deg(coarse.numbers([0.0, 180.0, -45.0, 60.0, 170.0, np.nan]))
+    assert np.allclose(found, [0.0, 0.0, 135.0, 45.0, 0.0, np.nan], equal_nan=True)
+
+
+def test_what_cannot_be_a_pillar_is_refused(tmp_path: Path) -> None:
+    none = np.zeros((4, 4))
+    for shape, words in [
+        (ml.Rectangles(101, 250), "even edges"),
+        (ml.Rectangles(250, 100), "width below the length"),
+        (ml.Rectangles(100, 250, 0), "steps"),
+        (ml.Rectangles(100, 500), "at most the pitch"),
+        ("hexagon", "no shape `hexagon`"),
+    ]:
+        with pytest.raises(ml.MetalithError, match=words):
+            ml.write_layout(tmp_path / "a.gds", none, pitch_nm=360, shape=shape)  # type: ignore[arg-type]
+    with pytest.raises(ml.MetalithError, match="infinite"):
+        ml.write_layout(tmp_path / "a.gds", none + np.inf, pitch_nm=360, shape=RECTANGLES)
+    with pytest.raises(ml.MetalithError, match="even"):
+        ml.write_layout(tmp_path / "a.gds", none + 101, pitch_nm=360, shape="circle")
+    assert not (tmp_path / "a.gds").exists()
+
+
+@pytest.mark.parametrize("name", ["tio2_532", "geometric_phase_532"])
+def test_psfs_of_a_file_are_those_of_its_design(tmp_path: Path, name: str) -> None:
+    design = ml.Design.read(ROOT / f"designs/{name}.toml")
+    array = design.array()
+    array.write(tmp_path / "chip.oas")
+    layout = ml.read_layout(tmp_path / "chip.oas", design=design)
+    assert layout.shape == array.shape
+    light: dict[str, Any] = dict(fast=True, samples=64)
+    of_design = ml.psf(array, [532], [(0, 0), (5, 0)], **light)
+    of_file = ml.psf(
+        layout,
+        [532],
+        [(0, 0), (5, 0)],
+        distance_um=design.focal_length_um,
+        pillar_height_nm=design.pillar_height_nm,
+        pillar=TIO2,
+        **light,
+    )
+    for theirs, ours in zip(of_design, of_file):
+        # The same pillars in the same light: single precision of the fields.
+        assert np.allclose(ours.values, theirs.values, rtol=1e-4, atol=1e-5 * theirs.values.max())
+    with pytest.raises(ml.MetalithError, match="by the `published` cell"):
+        ml.psf(layout, [532], distance_um=80.0, fidelity="published", pillar=TIO2)
+
+
+def test_light_of_the_other_handedness_is_not_focused(tmp_path: Path) -> None:
+    design = ml.Design.read(ROOT / "designs/geometric_phase_532.toml")
+    array = design.array()
+    numbers = array.widths(0)
+    peaks = {}
+    for arriving in ("left", "right"):
+        psf = ml.psf(
+            numbers,
+            [532],
+            shape=array.shape,
+            arriving=arriving,
+            pitch_nm=design.pitch_nm,
+            distance_um=design.focal_length_um,
+            pillar_height_nm=design.pillar_height_nm,
+            pillar=TIO2,
+            fast=True,
+            samples=64,
+        )[0]
+        peaks[arriving] = psf.values.max()
+    # A lens for one is a diverging lens for the other.
+    assert peaks["right"] < 1e-2 * peaks["left"]

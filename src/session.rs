@@ -1,0 +1,61 @@
+//! A bench session planned from a design: its layout, then its captures.
+
+use std::path::Path;
+
+use metalith_calibrate::{BenchFile, CapturePlan, PlanRequest, plan};
+use metalith_cell::cache_folder;
+use metalith_core::{Error, Progress, Result};
+use metalith_design::{Design, PillarArray};
+use metalith_gds::extract::GdsPillars;
+use metalith_layout::write_pillars;
+
+/// Name of the layout in the folder of the session.
+const LAYOUT: &str = "layout.gds";
+
+/// Plan a bench session into a folder: the fewest captures that find every effect at a wanted size and tell it from the
+/// others. `layout` is the one that was written; without it the pillars of the design are written into the folder. `only`:
+/// names of the effects that it is planned for; all if empty.
+///
+/// # Errors
+/// If a file cannot be read or written, the folder holds frames of a session that was begun, an effect is not known, or the
+/// user stopped it.
+pub fn plan_session(
+    design: &Design,
+    bench: &BenchFile,
+    layout: Option<&Path>,
+    folder: &Path,
+    only: Vec<String>,
+    progress: &dyn Progress,
+) -> Result<CapturePlan> {
+    // A session that was begun is not overwritten: its exposures and frames would no longer be those of its plan.
+    let begun = folder.join("captures");
+    if std::fs::read_dir(&begun).is_ok_and(|mut files| files.next().is_some()) {
+        return Err(Error::invalid(
+            format!("there are frames in {}", begun.display()),
+            "give another folder with --out, or move them away",
+        ));
+    }
+    let (layout, layout_in_set) = match layout {
+        Some(file) => {
+            let whole = std::fs::canonicalize(file).map_err(Error::io("find", file))?;
+            let name = whole.display().to_string();
+            (whole, name)
+        }
+        None => {
+            let file = folder.join(LAYOUT);
+            let array = PillarArray::build(design, progress)?;
+            write_pillars(design, &array, design.layout.hierarchy, &file, progress)?;
+            (file, LAYOUT.to_owned())
+        }
+    };
+    let request = PlanRequest {
+        design,
+        bench,
+        layout: &layout,
+        layout_in_set,
+        folder,
+        only,
+        cache: cache_folder(),
+    };
+    plan(&request, &GdsPillars, progress)
+}
