@@ -4,7 +4,6 @@
 # predicted? The set is a synthetic one, so the answer is known: its pillars are 8 nm too narrow, its sensor 5 um too far.
 
 # %%
-import shutil
 import tempfile
 from pathlib import Path
 
@@ -13,14 +12,8 @@ import numpy as np
 import metalith as ml
 
 root = next(p for p in (Path.cwd(), *Path.cwd().parents) if (p / "golden/session").is_dir())
-folder = Path(tempfile.mkdtemp()) / "session"
-shutil.copytree(root / "golden/session", folder)
-
-# %% [markdown]
-# The layout that was written belongs to the set. This one is small enough to be made here.
-
-# %%
-ml.Design.read(root / "designs/mini_3x3.toml").array().write(folder / "layout.gds")
+folder = root / "golden/session"
+out = Path(tempfile.mkdtemp())
 for file in sorted(folder.glob("*.npy"))[:2]:
     frame = np.load(file)
     print(file.name, frame.shape, f"{frame.min():.0f} to {frame.max():.0f} DN")
@@ -30,7 +23,7 @@ for file in sorted(folder.glob("*.npy"))[:2]:
 
 # %%
 TRIED = ["cd_bias", "gap", "pixel_blur", "zero_order"]
-diagnosis = ml.calibrate(folder, folder / "out", effects=TRIED)
+diagnosis = ml.calibrate(folder, out, effects=TRIED)
 print("verdict:", diagnosis["verdict"])
 for effect in diagnosis["effects"]:
     low, high = effect["interval"]
@@ -53,4 +46,4 @@ for name, truth in (("cd_bias", -8.0), ("gap", 5.0)):
 # `model.toml` is the chip as it was made. Verification judges by it what was built, and a layout can be compensated for it.
 
 # %%
-print((folder / "out/model.toml").read_text()[:400])
+print((out / "model.toml").read_text()[:400])

@@ -70,6 +70,7 @@ pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
         study.steered = study_steered(&design, cache.as_deref(), terminal)?;
         terminal.clear();
     }
+    let _turn = terminal.turn_at(&folder)?;
     write_cell_report(&study, &folder)?;
     if args.json {
         print_json(&study);

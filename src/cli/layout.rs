@@ -179,6 +179,7 @@ pub fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
         let intended = std::mem::replace(&mut array, compensated.array.clone());
         compensation = Some((model, intended, compensated));
     }
+    let _turn = terminal.turn_at(&args.target.folder(&design))?;
     let written = args.target.write(&design, &array, terminal)?;
     if let Some((model, intended, compensated)) = &compensation {
         let folder = args.target.folder(&design);

@@ -140,7 +140,9 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
             .num_threads(threads.into())
             .build_global();
         if let Err(error) = pool {
-            eprintln!("error: {threads} threads cannot be started: {error}\n  help: use fewer with --threads");
+            output::tell(&format!(
+                "error: {threads} threads cannot be started: {error}\n  help: use fewer with --threads\n"
+            ));
             return 2;
         }
     }
@@ -148,7 +150,7 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let outcome = dispatch(&arguments.command, &terminal);
     terminal.clear();
     if let Some(reason) = output::failure() {
-        eprintln!("error: cannot write to standard output: {reason}");
+        output::tell(&format!("error: cannot write to standard output: {reason}\n"));
         return 3;
     }
     match outcome {
@@ -198,12 +200,12 @@ fn report(error: &Error) {
             .render_report(&mut drawn, &headline)
             .is_ok()
         {
-            eprint!("{drawn}");
+            output::tell(&drawn);
             return;
         }
     }
     // Names from files may hold what moves a cursor.
-    eprintln!("error: {}", printable_lines(&error.to_string()));
+    output::tell(&format!("error: {}\n", printable_lines(&error.to_string())));
 }
 
 /// The faults of a file under one line that counts them; each is then drawn at its place.

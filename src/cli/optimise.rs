@@ -104,6 +104,7 @@ pub fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
     let kept = folder.join("checkpoint.bin");
     let task = OptimiseTask::of(&design)?;
     let cells = Cells::of(&design, !args.no_report, terminal)?;
+    let _turn = terminal.turn_at(&folder)?;
     let checkpoint = if args.fresh {
         Checkpoint::begin(&design)
     } else {

@@ -1,7 +1,7 @@
 //! Standard output: answers go there, and whoever reads them may stop reading.
 
 use std::fmt::Arguments;
-use std::io::{ErrorKind, Write, stdout};
+use std::io::{ErrorKind, Write, stderr, stdout};
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -39,6 +39,11 @@ pub fn line(text: Arguments<'_>) {
     {
         let _ = FAILED.set(error.to_string());
     }
+}
+
+/// Write a text to standard error, as `eprint!` does, but without a panic where it cannot be written: what it says is no answer.
+pub fn tell(text: &str) {
+    let _ = stderr().lock().write_all(text.as_bytes());
 }
 
 /// Why something that was to be printed is not, if so. A closed pipe is no failure.

@@ -1,10 +1,9 @@
 //! `metalith run`: from a design file to a folder that a cleanroom can take.
 
-use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
-use metalith::{Error, PillarArray, Result};
+use metalith::{Error, PillarArray, Result, WholeFile};
 
 use super::layout::Target;
 use super::verify::Judging;
@@ -34,9 +33,10 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let array = PillarArray::build(&design, terminal)?;
     let folder = args.target.folder(&design);
+    let _turn = terminal.turn_at(&folder)?;
     // A report speaks of the layout beside it: the old one must not stand beside a new layout, whatever happens.
-    discard(&folder.join("report.html"))?;
-    discard(&folder.join("report.json"))?;
+    WholeFile::discard(&folder.join("report.html"))?;
+    WholeFile::discard(&folder.join("report.json"))?;
     let written = args.target.write(&design, &array, terminal)?;
     let judged = args
         .judging
@@ -49,12 +49,4 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
         ));
     }
     judged
-}
-
-/// Remove a file, if it is there.
-fn discard(path: &Path) -> Result<()> {
-    match std::fs::remove_file(path) {
-        Err(error) if error.kind() != ErrorKind::NotFound => Err(Error::io("replace", path)(error)),
-        _ => Ok(()),
-    }
 }

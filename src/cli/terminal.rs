@@ -1,12 +1,15 @@
 //! What the program shows while it works: progress bars on a terminal, a line now and then where there is none.
 
 use std::io::IsTerminal;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use metalith::Progress;
+use metalith::{FolderTurn, Progress};
+
+use super::output;
 
 /// Set by Ctrl-C in commands that can stop between two steps.
 static STOP: AtomicBool = AtomicBool::new(false);
@@ -69,10 +72,21 @@ impl Terminal {
         if self.quiet {
             return;
         }
+        let tell = || output::tell(&format!("{line}\n"));
         match &*self.bar.lock().unwrap_or_else(PoisonError::into_inner) {
-            Some(bar) => bar.suspend(|| eprintln!("{line}")),
-            None => eprintln!("{line}"),
+            Some(bar) => bar.suspend(tell),
+            None => tell(),
         }
+    }
+
+    /// Wait until no other process writes the files of a folder, which are made together.
+    pub fn turn_at(&self, folder: &Path) -> metalith::Result<FolderTurn> {
+        FolderTurn::wait(folder, self, || {
+            self.say(&format!(
+                "another process writes into {}: waiting for it",
+                folder.display()
+            ));
+        })
     }
 
     /// Let Ctrl-C ask for a stop between two steps instead of ending the process; a second one ends it.
@@ -125,7 +139,7 @@ impl Progress for Terminal {
         }
         let mut log = self.log.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(line) = log.as_mut().and_then(|log| log.advance(steps, Instant::now())) {
-            eprintln!("{line}");
+            output::tell(&format!("{line}\n"));
         }
     }
 

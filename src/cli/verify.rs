@@ -276,5 +276,6 @@ pub fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
         model: args.judging.model.clone().or_else(|| args.compensated.model.clone()),
         ..args.judging.clone()
     };
+    let _turn = terminal.turn_at(&folder)?;
     judging.judge(&design, &array, &layout, &folder, terminal)
 }

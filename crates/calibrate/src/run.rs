@@ -9,8 +9,11 @@ use crate::proposal::propose;
 use crate::search::Evidence;
 use crate::session::{Session, Settings, Simulations, check_effects};
 use crate::set::MeasuredSet;
-use metalith_core::{PillarReader, Progress, Result, WholeFile};
+use metalith_core::{FolderTurn, PillarReader, Progress, Result, WholeFile};
 use metalith_made::CalibratedModel;
+
+/// The file of the calibrated model, in the folder of the answers.
+const MODEL: &str = "model.toml";
 
 /// The files of a calibration.
 #[derive(Clone, Debug)]
@@ -71,6 +74,11 @@ fn finish(
     progress: &dyn Progress,
 ) -> Result<Calibration> {
     let (mut diagnosis, evidence) = session.diagnose(simulations, progress)?;
+    let _turn = FolderTurn::wait(out, progress, || {
+        progress.note("waiting for another run in this folder")
+    })?;
+    // This run may find none, and the model of another must not stand beside its answer.
+    WholeFile::discard(&out.join(MODEL))?;
     let proposed = match &evidence {
         Some(evidence) if diagnosis.verdict.leaves_a_residual() => propose(session, evidence),
         _ => Vec::new(),
@@ -117,7 +125,7 @@ fn write(
         None => None,
         Some(evidence) => {
             let perturbation = session.simulator.perturbation(&evidence.finding.after.theta);
-            let path = out.join("model.toml");
+            let path = out.join(MODEL);
             CalibratedModel::new(diagnosis.set.clone(), diagnosis.sentence(), perturbation).write(&path)?;
             Some(path)
         }

@@ -28,7 +28,7 @@ pub use cross::cross_corners;
 pub use document::{Fault, Faults};
 pub use eighth::EighthMap;
 pub use error::{Error, Result};
-pub use file::{WholeFile, WholeFolder};
+pub use file::{FolderTurn, WholeFile, WholeFolder};
 pub use lattice::{Lattice, WidthMap};
 pub use layer::LayerNumber;
 pub use pillars::{ElementSite, PillarReader};

@@ -5,10 +5,14 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::Perturbation;
+use metalith_core::text::quoted;
 use metalith_core::{Error, Result, WholeFile, document};
 
 /// Version of the format that is written. The first called its perturbation `departure`; it is still read.
 const SCHEMA: u32 = 2;
+
+/// Faults of a file that are told; the rest is counted.
+const MOST_FAULTS: usize = 50;
 
 /// What a session has taught, in a file that later designs are simulated and compensated with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -48,20 +52,29 @@ impl CalibratedModel {
     /// # Errors
     /// If it is not such a file; all numbers that cannot be at once.
     pub fn parse(path: &Path, text: &str) -> Result<Self> {
-        let fault = |what: String| Error::Table {
+        let fault_at = |line, what| Error::Table {
             path: path.to_owned(),
-            line: None,
+            line,
             what,
             hint: "give the `model.toml` that `metalith calibrate` has written".into(),
         };
-        let model: Self = toml::from_str(text).map_err(|e| fault(e.to_string()))?;
+        let fault = |what| fault_at(None, what);
+        let model: Self = toml::from_str(text).map_err(|e| {
+            let line = e.span().map(|at| text[..at.start].lines().count().max(1));
+            fault_at(line, quoted(e.message()))
+        })?;
         if !(1..=SCHEMA).contains(&model.schema) {
             return Err(fault(format!(
                 "this is a model of schema {}, 1 to {SCHEMA} are known",
                 model.schema
             )));
         }
-        let faults = model.perturbation.faults();
+        let mut faults = model.perturbation.faults();
+        if faults.len() > MOST_FAULTS {
+            let more = faults.len() - MOST_FAULTS;
+            faults.truncate(MOST_FAULTS);
+            faults.push(format!("and {more} more"));
+        }
         if !faults.is_empty() {
             return Err(fault(faults.join("\n")));
         }

@@ -1,5 +1,6 @@
 //! What may differ from what is stated: the numbers that every effect sets, all zero for a perfect chip.
 
+use metalith_core::text::quoted;
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
@@ -293,8 +294,7 @@ impl Perturbation {
         ];
         let mut faults: Vec<String> = checked
             .iter()
-            .flat_map(|(bound, values)| values.iter().map(move |v| (bound, *v)))
-            .filter(|(bound, v)| !(bound.range.0..=bound.range.1).contains(v))
+            .filter_map(|(b, values)| Some((b, values.iter().find(|v| !(b.range.0..=b.range.1).contains(*v))?)))
             .map(|(b, v)| format!("`{}` is {v}, not within {} to {}", b.name, b.range.0, b.range.1))
             .collect();
         for (name, v) in [("light.led_width", l.led_width), ("light.source_size", l.source_size)] {
@@ -322,9 +322,9 @@ impl Perturbation {
             if let Err(fault) = term.compiled() {
                 faults.push(format!(
                     "the expression of `{}`, column {}: {}",
-                    term.name,
+                    quoted(&term.name),
                     fault.at + 1,
-                    fault.what
+                    quoted(&fault.what)
                 ));
             }
         }

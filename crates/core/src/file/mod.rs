@@ -3,6 +3,7 @@
 mod folder;
 mod part;
 mod past_cache;
+mod turn;
 
 use std::fs;
 use std::io::{self, Read, Write};
@@ -10,6 +11,7 @@ use std::path::{Path, PathBuf};
 
 pub use folder::WholeFolder;
 pub use past_cache::{Ahead, Block};
+pub use turn::FolderTurn;
 
 use crate::error::{Error, Result};
 
@@ -54,6 +56,17 @@ pub struct WholeFile {
 }
 
 impl WholeFile {
+    /// Remove the file that an earlier run left at `target`, if there is one.
+    ///
+    /// # Errors
+    /// If it cannot be removed.
+    pub fn discard(target: &Path) -> Result<()> {
+        match fs::remove_file(target) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(Error::io("remove", target)(error)),
+            _ => Ok(()),
+        }
+    }
+
     /// Begin to write the file that is to stand at `target`, creating its folder if need be.
     ///
     /// # Errors

@@ -1,12 +1,12 @@
 //! Writes `golden/session`: a small measured set of a synthetic chip whose pillars are 8 nm too narrow and whose sensor is 5 um
-//! too far. `cargo run --release -p metalith-calibrate --example shipped_set FOLDER`. The set names `layout.gds`, the pillars
-//! of `designs/mini_3x3.toml`, which whoever reads the set writes beside it.
+//! too far, with the pillars of `designs/mini_3x3.toml` in OASIS. `cargo run --release --example shipped_set FOLDER`.
 
 use std::path::Path;
 
-use metalith_calibrate::{MeasuredSet, Sampling, Settings, Synthesizer};
-use metalith_core::Silent;
-use metalith_gds::extract::GdsPillars;
+use metalith::calibrate::{MeasuredSet, Sampling, Settings, Synthesizer};
+use metalith::extract::GdsPillars;
+use metalith::layout::{LayoutFormat, convert};
+use metalith::{Layout, Silent};
 use metalith_testing::session::{small_set, write_npy};
 
 /// What the chip has, beside noise.
@@ -19,7 +19,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = std::env::args().nth(1).ok_or("name the folder to write into")?;
     let folder = Path::new(&folder);
     std::fs::create_dir_all(folder)?;
-    small_set(folder);
+    let description = small_set(folder);
+    let [written, kept] = ["layout.gds", "layout.oas"].map(|name| folder.join(name));
+    convert(&Layout::open(&written)?, LayoutFormat::of_name(&kept), &kept, &Silent)?;
+    let text = std::fs::read_to_string(&description)?;
+    std::fs::write(&description, text.replace("\"layout.gds\"", "\"layout.oas\""))?;
     let like = MeasuredSet::read(folder, &GdsPillars, &Silent)?;
     let settings = Settings {
         only: EFFECTS.iter().map(|(name, _)| (*name).to_owned()).collect(),
@@ -36,7 +40,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for capture in &set.captures.raw {
         write_npy(&folder.join(format!("{}.npy", capture.name)), &capture.dn);
     }
-    // Who reads the set writes it: it is the layout of a design of this project.
-    std::fs::remove_file(folder.join("layout.gds"))?;
+    std::fs::remove_file(written)?;
     Ok(())
 }
