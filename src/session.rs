@@ -17,7 +17,7 @@ const LAYOUT: &str = "layout.gds";
 /// names of the effects that it is planned for; all if empty.
 ///
 /// # Errors
-/// If a file cannot be read or written, the folder holds frames of a session that was begun, an effect is not known, or the
+/// If elements have lenses of their own, a file cannot be read or written, the folder holds frames of a session that was begun, an effect is not known, or the
 /// user stopped it.
 pub fn plan_session(
     design: &Design,
@@ -27,6 +27,7 @@ pub fn plan_session(
     only: Vec<String>,
     progress: &dyn Progress,
 ) -> Result<CapturePlan> {
+    design.one_lens("a planned session")?;
     // A session that was begun is not overwritten: its exposures and frames would no longer be those of its plan.
     let begun = folder.join("captures");
     if std::fs::read_dir(&begun).is_ok_and(|mut files| files.next().is_some()) {

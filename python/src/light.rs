@@ -68,13 +68,14 @@ struct Lit {
     shape: PillarShape,
     widths: WidthMap,
     wedge: Wedge,
+    /// From the pillars to the plane that is looked at (um).
+    distance_um: f64,
 }
 
 /// In what light elements are looked at.
 struct Looked {
     wavelengths_nm: Vec<f64>,
     fields_deg: Vec<(f64, f64)>,
-    distance_um: f64,
     samples: usize,
     pixel_um: f64,
     fast: bool,
@@ -117,8 +118,8 @@ fn simulate(elements: Vec<Lit>, cell: &dyn CellModel, light: &Looked, progress: 
                     wavelengths_um: vec![um],
                     incidence_sin: [wave.sin_x, wave.sin_y],
                     cells_as_lit: false,
-                    distance_um: light.distance_um,
-                    at_um: landing_um(&lit.wedge, &wave, light.distance_um)?,
+                    distance_um: lit.distance_um,
+                    at_um: landing_um(&lit.wedge, &wave, lit.distance_um)?,
                     samples: light.samples,
                     pixel_um: light.pixel_um,
                     analyser: false,
@@ -214,11 +215,11 @@ pub fn psf_of_array<'py>(
             shape: array.array.shape,
             widths: array.array.widths(&placed[*k]).into_owned(),
             wedge: placed[*k].element.wedge,
+            distance_um: design.lens_of(&placed[*k].element).focal_length_um,
         });
         let light = Looked {
             wavelengths_nm,
             fields_deg,
-            distance_um: design.lens.focal_length_um,
             samples: samples.unwrap_or(design.verify.window_samples),
             pixel_um: design.verify.pixel_um,
             fast,
@@ -295,11 +296,11 @@ pub fn psf_of_widths<'py>(
             shape,
             widths,
             wedge: no_wedge(),
+            distance_um,
         });
         let light = Looked {
             wavelengths_nm,
             fields_deg,
-            distance_um,
             samples,
             pixel_um: 5.86,
             fast,

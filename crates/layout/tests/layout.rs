@@ -93,6 +93,7 @@ fn golden_digests_of_the_other_designs() {
         "silicon_10600",
         "hologram",
         "array_2x4",
+        "mixed_lenses",
     ];
     golden_records("other_designs.json", &names);
 }

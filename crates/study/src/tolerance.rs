@@ -126,6 +126,18 @@ impl Tolerance {
                 "add one [[vary]] with `effect` and `distribution` for each quantity",
             );
         }
+        let draws = root.integer("draws", 1..=MOST_DRAWS, "draws") as u64;
+        let sizes = grids.iter().map(|g| g.values.len());
+        let points = sizes
+            .chain(design_grids.iter().map(|g| g.values.len()))
+            .fold(1_u64, |all, n| all.saturating_mul(n as u64));
+        if points.saturating_mul(draws) > MOST_DRAWS as u64 {
+            root.fault(
+                "draws",
+                format!("{draws} draws at each of {points} points of the grid"),
+                format!("give fewer draws or values: a study has {MOST_DRAWS} draws at the most"),
+            );
+        }
         let file = |key: &str| root.has(key).then(|| root.file(key));
         let design = root.file("design");
         let layout = file("layout");
@@ -142,7 +154,7 @@ impl Tolerance {
             design,
             layout,
             model: file("model"),
-            draws: root.integer("draws", 1..=MOST_DRAWS, "draws") as u64,
+            draws,
             accuracy: root.choice(
                 "accuracy",
                 &[("fast", Accuracy::Fast), ("accurate", Accuracy::Accurate)],
@@ -325,6 +337,23 @@ at_least = 0.6
         let path = folder.path().join("tolerance.toml");
         std::fs::write(&path, format!("{GOOD}{grids}")).unwrap();
         Tolerance::read(&path)
+    }
+
+    #[test]
+    fn draws_at_all_points_are_counted() {
+        let values: Vec<String> = (0..1000).map(|k| format!("{}", f64::from(k) * 1e-3)).collect();
+        let grids: String = ["stray_light", "missing_pillars", "residual_mask", "pixel_blur"]
+            .map(|effect| {
+                format!(
+                    "[[grid]]\neffect = \"{effect}\"\nvalues = [{}]\n",
+                    values[..200].join(", ")
+                )
+            })
+            .concat();
+        let text = GOOD.replace("draws = 10", "draws = 10000000") + &grids;
+        let error = read(&text).unwrap_err().to_string();
+        // 200^4, and three values of the gap.
+        assert!(error.contains("10000000 draws at each of 4800000000 points"), "{error}");
     }
 
     #[test]

@@ -233,7 +233,11 @@ impl Ranked {
             held_out_gain_interval: tried.gain.map(|g| g.interval),
             value: (!tried.values.is_empty()).then(|| listed(&reported(simulator, tried.effect, &tried.values))),
             rejected: rejection.map(Rejection::sentence),
-            remark: rejection.map_or_else(|| "taken".into(), Rejection::remark),
+            remark: match rejection {
+                Some(rejection) => rejection.remark(),
+                None if tried.rejected.is_some() => "taken in a later step".into(),
+                None => "taken".into(),
+            },
         }
     }
 }

@@ -210,7 +210,7 @@ fn candidates(ranking: &[Ranked]) -> Table {
             r.value
                 .as_ref()
                 .map_or_else(Cell::none, |v| round_json(v).as_str().into()),
-            r.rejected.as_deref().map_or_else(|| "taken".into(), Cell::from),
+            Cell::from(r.rejected.as_deref().unwrap_or(&r.remark)),
         ]);
     }
     table

@@ -77,6 +77,15 @@ pub(super) fn confusable(page: &mut Page, session: &Session<'_>, simulations: &S
     let c = cosines(&problem, &evidence.finding.before);
     let slots = 0..session.simulator.slots.len();
     let names: Vec<String> = slots.map(|s| session.simulator.slot_name(s)).collect();
+    let mut pairs: Vec<(usize, usize)> = (0..names.len()).flat_map(|i| (0..i).map(move |j| (j, i))).collect();
+    pairs.retain(|&(i, j)| c[(i, j)].abs() > ALIKE);
+    pairs.sort_by(|a, b| c[*b].abs().total_cmp(&c[*a].abs()));
+    if pairs.is_empty() {
+        page.paragraph(format!(
+            "None of the effects that were tried: no two signatures have a cosine above {ALIKE}."
+        ));
+        return;
+    }
     let mut table = Table::new([
         Column::text("Effect"),
         Column::text("and"),
@@ -86,9 +95,6 @@ pub(super) fn confusable(page: &mut Page, session: &Session<'_>, simulations: &S
     .caption(
         "Cosines between the signatures of this layout in these captures, nuisances projected out, weighted by noise.",
     );
-    let mut pairs: Vec<(usize, usize)> = (0..names.len()).flat_map(|i| (0..i).map(move |j| (j, i))).collect();
-    pairs.retain(|&(i, j)| c[(i, j)].abs() > ALIKE);
-    pairs.sort_by(|a, b| c[*b].abs().total_cmp(&c[*a].abs()));
     for (i, j) in pairs {
         let [a, b] = [i, j].map(|k| session.simulator.slots[k].effect);
         let how = separating_measurement(&session.simulator, a, &[b]);

@@ -55,7 +55,7 @@ impl SteeredStudy {
 /// Find a mapping for each distinct steered element of a design; tables of neighbours are kept in the folder `cache`.
 ///
 /// # Errors
-/// If the common mapping is a table, a cell cannot be solved, or the user stopped it.
+/// If the common mapping is a table, elements have lenses of their own, a cell cannot be solved, or the user stopped it.
 pub fn study_steered(design: &Design, cache: Option<&Path>, progress: &dyn Progress) -> Result<Vec<SteeredStudy>> {
     if design.mapping.table.is_some() {
         return Err(Error::invalid(
@@ -63,6 +63,7 @@ pub fn study_steered(design: &Design, cache: Option<&Path>, progress: &dyn Progr
             "give `coefficients` in [mapping]",
         ));
     }
+    design.one_lens("the search for mappings of steered elements")?;
     let stack = design.cell_stack()?;
     let lens = LensPhase::new(design.lattice(), design.lens.diameter_nm, &design.lens.phase);
     steered(design)

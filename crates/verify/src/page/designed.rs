@@ -2,7 +2,7 @@
 
 use metalith_core::{Lattice, WidthMap, WidthRows};
 use metalith_design::array::PillarArray;
-use metalith_design::phase::{ElementPhase, LensPhase};
+use metalith_design::phase::{ElementPhase, LensPhase, RadialPhase};
 use metalith_design::{Design, LensSpec};
 use metalith_report::{Axis, Cell, Chart, Column, Page, PillarZoom, Plan, Table, exact};
 
@@ -174,6 +174,28 @@ fn aperture(lens: &LensSpec) -> String {
     }
 }
 
+/// The phase of a lens in words.
+fn phase(lens: &LensSpec) -> String {
+    let radial = match &lens.phase {
+        RadialPhase::Hyperbola {
+            wavelength_um,
+            focal_length_um,
+        } => format!(
+            "hyperbola, {} nm, {} um",
+            exact(wavelength_um * 1e3),
+            exact(*focal_length_um)
+        ),
+        RadialPhase::EvenPowers { .. } => "even powers".into(),
+        RadialPhase::Table { .. } => "a table".into(),
+        RadialPhase::Flat => "flat".into(),
+    };
+    match lens.terms.len() {
+        0 => radial,
+        1 => format!("{radial}, and a term"),
+        more => format!("{radial}, and {more} terms"),
+    }
+}
+
 /// What each element is that was placed by itself.
 fn own_lenses(design: &Design) -> Table {
     let mut table = Table::new([
@@ -190,7 +212,6 @@ fn own_lenses(design: &Design) -> Table {
     for element in design.elements() {
         let (lens, [x, y]) = (design.lens_of(&element), element.centre_um());
         let placed = design.array.placed(element.index);
-        let own = placed.is_some_and(|p| p.lens.as_ref().is_some_and(|l| l.phase != design.lens.phase));
         table.row([
             element.label().into(),
             Cell::fixed(x, 3),
@@ -199,7 +220,7 @@ fn own_lenses(design: &Design) -> Table {
             aperture(lens).into(),
             exact(lens.focal_length_um).into(),
             exact(placed.map_or(0.0, |p| p.rotation_deg)).into(),
-            if own { "its own" } else { "that of [phase]" }.into(),
+            phase(lens).into(),
         ]);
     }
     table
