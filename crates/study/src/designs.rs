@@ -64,7 +64,8 @@ impl Tolerance {
     }
 }
 
-fn count(grids: &[DesignGrid]) -> u64 {
+/// Combinations of the values of these keys.
+pub(crate) fn count(grids: &[DesignGrid]) -> u64 {
     let sizes = grids.iter().map(|g| g.values.len() as u64);
     sizes.fold(1, u64::saturating_mul)
 }

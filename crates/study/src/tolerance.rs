@@ -127,10 +127,8 @@ impl Tolerance {
             );
         }
         let draws = root.integer("draws", 1..=MOST_DRAWS, "draws") as u64;
-        let sizes = grids.iter().map(|g| g.values.len());
-        let points = sizes
-            .chain(design_grids.iter().map(|g| g.values.len()))
-            .fold(1_u64, |all, n| all.saturating_mul(n as u64));
+        let sizes = grids.iter().map(|g| g.values.len() as u64);
+        let points = sizes.fold(designs::count(&design_grids), u64::saturating_mul);
         if points.saturating_mul(draws) > MOST_DRAWS as u64 {
             root.fault(
                 "draws",

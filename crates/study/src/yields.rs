@@ -40,7 +40,10 @@ pub fn wilson(held: u64, of: u64) -> [f64; 2] {
     let middle = p + Z * Z / (2.0 * n);
     let half = Z * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt();
     let scale = 1.0 + Z * Z / n;
-    [((middle - half) / scale).max(0.0), ((middle + half) / scale).min(1.0)]
+    // Ends that are whole are so but for rounding, and a person would read 6e-16.
+    let low = if held == 0 { 0.0 } else { (middle - half) / scale };
+    let high = if held == of { 1.0 } else { (middle + half) / scale };
+    [low, high]
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::{PhaseTerm, RadialPhase};
+use crate::spec::OutlineRows;
 use crate::{Design, Element, LensOutline, LensSpec};
 use metalith_core::{Lattice, Wedge};
 
@@ -27,7 +28,7 @@ pub struct LensPhase {
     stride_log2: u32,
     offset: i64,
     /// Where pillars stand within that, if the lens is not round.
-    outline: Option<LensOutline>,
+    outline: Option<OutlineRows>,
     /// Phases over the plane that elements have besides.
     terms: Vec<PhaseTerm>,
     /// Elements, by their indices, whose lens is another or rotated.
@@ -83,10 +84,12 @@ enum TurnsOfRadius {
 impl LensPhase {
     /// The phase of the lens of a design, and of the lenses that elements have of their own.
     pub fn of(design: &Design) -> Self {
+        let lattice = design.lattice();
+        let rows = |outline: LensOutline| outline.rows(&lattice);
         let of_lens = |lens: &LensSpec| Self {
-            outline: lens.outline.clone(),
+            outline: lens.outline.clone().map(rows),
             terms: lens.terms.clone(),
-            ..Self::new(design.lattice(), lens.diameter_nm, &lens.phase)
+            ..Self::new(lattice, lens.diameter_nm, &lens.phase)
         };
         let mut shared = of_lens(&design.lens);
         // Elements of a round lens that are rotated alone share one table.
@@ -101,11 +104,11 @@ impl LensPhase {
             }
             let lens = match &placed.lens {
                 Some(_) => Arc::new(Self {
-                    outline: design.outline_of(&element),
+                    outline: design.outline_of(&element).map(rows),
                     ..of_lens(design.lens_of(&element))
                 }),
                 None if shared.outline.is_some() => Arc::new(Self {
-                    outline: design.outline_of(&element),
+                    outline: design.outline_of(&element).map(rows),
                     ..shared.clone()
                 }),
                 None => rotated.get_or_init(|| Arc::new(shared.clone())).clone(),
@@ -172,7 +175,7 @@ impl LensPhase {
     pub fn holds(&self, ix: usize, iy: usize) -> bool {
         let place = |i| self.lattice.coordinate_nm(i);
         self.lattice.half_radius2(ix, iy) <= self.limit
-            && self.outline.as_ref().is_none_or(|o| o.holds(place(ix), place(iy)))
+            && self.outline.as_ref().is_none_or(|o| o.holds(iy, place(ix), place(iy)))
     }
 }
 

@@ -17,4 +17,5 @@ pub use lens::LensSpec;
 pub use mapping::{MappingComparison, MappingSpec};
 pub use optimise::{MeritSpec, OptimiseSpec, RobustSpec, SolverSpec, StartSpec, ViewSpec};
 pub use outline::LensOutline;
+pub(crate) use outline::OutlineRows;
 pub use verify::{CellIncidence, FieldAngle, LimitSpec, VerifySpec};

@@ -122,19 +122,17 @@ impl LensOutline {
 
     /// Whether a place from the middle of the element (nm) is inside or on the rim.
     pub fn holds(&self, x: i64, y: i64) -> bool {
-        let mut inside = false;
-        for ((ax, ay), (bx, by)) in sides(&self.corners_nm) {
-            // Twice the area of side and place: its sign says on which side of the line the place is.
-            let across = (bx - ax) * (y - ay) - (by - ay) * (x - ax);
-            let within = |a: i64, b: i64, p: i64| (a.min(b)..=a.max(b)).contains(&p);
-            if across == 0 && within(ax, bx, x) && within(ay, by, y) {
-                return true;
-            }
-            if (ay > y) != (by > y) && (across > 0) == (by > ay) {
-                inside = !inside;
-            }
-        }
-        inside
+        is_inside(sides(&self.corners_nm), x, y)
+    }
+
+    /// Its sides by the rows of a lattice.
+    pub(crate) fn rows(&self, lattice: &Lattice) -> OutlineRows {
+        let reached = |iy| {
+            let y = lattice.coordinate_nm(iy);
+            let reaches = |((_, ay), (_, by)): &Side| (*ay.min(by)..=*ay.max(by)).contains(&y);
+            sides(&self.corners_nm).filter(reaches).collect()
+        };
+        OutlineRows((0..lattice.sites()).map(reached).collect())
     }
 
     /// The outline turned from x towards y about the middle; exact for quarter turns.
@@ -208,9 +206,40 @@ impl LensOutline {
     }
 }
 
+/// The sides of an outline that each row of a lattice reaches: its sites are held against these alone.
+#[derive(Clone, Debug)]
+pub(crate) struct OutlineRows(Vec<Vec<Side>>);
+
+impl OutlineRows {
+    /// As [`LensOutline::holds`] of a place in row `iy`.
+    pub(crate) fn holds(&self, iy: usize, x: i64, y: i64) -> bool {
+        is_inside(self.0[iy].iter().copied(), x, y)
+    }
+}
+
+/// From corner to corner (nm).
+type Side = ((i64, i64), (i64, i64));
+
 /// Sides of a closed polygon.
-fn sides(corners: &[(i64, i64)]) -> impl Iterator<Item = ((i64, i64), (i64, i64))> {
+fn sides(corners: &[(i64, i64)]) -> impl Iterator<Item = Side> {
     corners.iter().copied().zip(corners.iter().copied().cycle().skip(1))
+}
+
+/// Whether a place is inside a polygon or on its rim, by the sides that its row reaches, if not all.
+fn is_inside(sides: impl Iterator<Item = Side>, x: i64, y: i64) -> bool {
+    let mut inside = false;
+    for ((ax, ay), (bx, by)) in sides {
+        // Twice the area of side and place: its sign says on which side of the line the place is.
+        let across = (bx - ax) * (y - ay) - (by - ay) * (x - ax);
+        let within = |a: i64, b: i64, p: i64| (a.min(b)..=a.max(b)).contains(&p);
+        if across == 0 && within(ax, bx, x) && within(ay, by, y) {
+            return true;
+        }
+        if (ay > y) != (by > y) && (across > 0) == (by > ay) {
+            inside = !inside;
+        }
+    }
+    inside
 }
 
 /// Twice the area, positive if counter-clockwise.
@@ -232,12 +261,12 @@ fn is_simple(corners: &[(i64, i64)]) -> bool {
     let turn = |(ax, ay): (i64, i64), (bx, by): (i64, i64), (cx, cy): (i64, i64)| {
         ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)).signum()
     };
-    let on = |(a, b): ((i64, i64), (i64, i64)), p: (i64, i64)| {
+    let on = |(a, b): Side, p: (i64, i64)| {
         turn(a, b, p) == 0
             && (a.0.min(b.0)..=a.0.max(b.0)).contains(&p.0)
             && (a.1.min(b.1)..=a.1.max(b.1)).contains(&p.1)
     };
-    let meet = |(a, b): ((i64, i64), (i64, i64)), (c, d): ((i64, i64), (i64, i64))| {
+    let meet = |(a, b): Side, (c, d): Side| {
         (turn(a, b, c) * turn(a, b, d) < 0 && turn(c, d, a) * turn(c, d, b) < 0)
             || on((a, b), c)
             || on((a, b), d)
@@ -289,6 +318,17 @@ mod tests {
                 let (rx, ry) = (-y, x);
                 assert_eq!(l.rotated(90.0).holds(rx, ry), wanted);
             }
+        }
+    }
+
+    #[test]
+    fn rows_hold_the_places_that_the_outline_holds() {
+        let lattice = Lattice::new(350, 120).unwrap();
+        let l = outline(&L).rotated(33.0);
+        let rows = l.rows(&lattice);
+        for (iy, ix) in (0..120 * 120).map(|k| (k / 120, k % 120)) {
+            let [x, y] = [ix, iy].map(|i| lattice.coordinate_nm(i));
+            assert_eq!(rows.holds(iy, x, y), l.holds(x, y), "({x}, {y})");
         }
     }
 
