@@ -1,9 +1,10 @@
 //! Writes `golden/session`: a small measured set of a synthetic chip whose pillars are 8 nm too narrow and whose sensor is 5 um
-//! too far, with the pillars of `designs/mini_3x3.toml` in OASIS. `cargo run --release --example shipped_set FOLDER`.
+//! too far, with the pillars of `designs/mini_3x3.toml` in OASIS. `cargo run --release --example shipped_set FOLDER`. With `EFFECTS.toml
+//! NAME VALUE...` the chip has an effect of that file too.
 
 use std::path::Path;
 
-use metalith::calibrate::{MeasuredSet, Sampling, Settings, Synthesizer};
+use metalith::calibrate::{DeclaredEffect, MeasuredSet, Sampling, Settings, Synthesizer};
 use metalith::extract::GdsPillars;
 use metalith::layout::{LayoutFormat, convert};
 use metalith::{Layout, Silent};
@@ -16,8 +17,17 @@ const EFFECTS: [(&str, [f64; 1]); 2] = [("cd_bias", [-8.0]), ("gap", [5.0])];
 const SEED: u64 = 7;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let folder = std::env::args().nth(1).ok_or("name the folder to write into")?;
+    let mut args = std::env::args().skip(1);
+    let folder = args.next().ok_or("name the folder to write into")?;
     let folder = Path::new(&folder);
+    let mut effects: Vec<(String, Vec<f64>)> = EFFECTS.map(|(name, value)| (name.into(), value.into())).into();
+    let declared = match args.next() {
+        Some(file) => DeclaredEffect::read(Path::new(&file))?,
+        None => Vec::new(),
+    };
+    if let Some(name) = args.next() {
+        effects.push((name, args.map(|value| value.parse()).collect::<Result<_, _>>()?));
+    }
     std::fs::create_dir_all(folder)?;
     let description = small_set(folder);
     let [written, kept] = ["layout.gds", "layout.oas"].map(|name| folder.join(name));
@@ -26,14 +36,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     std::fs::write(&description, text.replace("\"layout.gds\"", "\"layout.oas\""))?;
     let like = MeasuredSet::read(folder, &GdsPillars, &Silent)?;
     let settings = Settings {
-        only: EFFECTS.iter().map(|(name, _)| (*name).to_owned()).collect(),
+        only: effects.iter().map(|(name, _)| name.clone()).collect(),
+        declared,
         sampling: Sampling::default(),
         ..Settings::default()
     };
     let synthesizer = Synthesizer::new(&like, &settings)?;
-    let chip = EFFECTS
+    let chip = effects
         .iter()
-        .map(|(name, number)| (*name, number.as_slice()))
+        .map(|(name, values)| (name.as_str(), values.as_slice()))
         .collect();
     let images = synthesizer.with_effects(&[chip], &Silent)?.remove(0);
     let set = synthesizer.draw(&images, SEED);
