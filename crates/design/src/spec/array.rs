@@ -251,11 +251,8 @@ impl ArraySpec {
 
     /// Diameter of the largest lens (nm).
     pub fn largest_nm(&self, shared: &LensSpec) -> u32 {
-        let each = self
-            .placed
-            .iter()
-            .map(|p| p.lens.as_ref().unwrap_or(shared).diameter_nm);
-        each.max().unwrap_or(shared.diameter_nm)
+        let each = self.lenses(shared).map(|lens| lens.diameter_nm);
+        each.max().expect("the shared one at least")
     }
 
     /// The elements: of a grid row by row from the lowest, else as they are listed.
