@@ -13,6 +13,7 @@ use metalith_made::{BankRange, CalibratedModel, CellBank, CellChange, MadeChip, 
 use metalith_verify::{ReadLayout, SimulationCases, Verification, wavelengths_um};
 
 use crate::draw::Drawer;
+use crate::picture::{KnownChip, PictureBench, TakenPicture};
 use crate::plan::{Plan, key};
 use crate::record::{DrawRecord, LimitStatement, figures, finite};
 use crate::tolerance::Tolerance;
@@ -37,6 +38,7 @@ impl Progress for Quiet<'_> {
 pub(crate) struct Bench {
     pub tolerance: Tolerance,
     pub drawer: Drawer,
+    picture: Option<PictureBench>,
     made: MadeRange,
     key: [u8; 32],
     files: Files,
@@ -57,6 +59,15 @@ pub(crate) struct Subject {
     array: PillarArray,
     layout: ReadLayout,
     bank: Arc<CellBank>,
+    /// What restorations know, if it is not the chip of the draw.
+    known: Option<KnownChip>,
+}
+
+/// A draw, judged.
+pub struct JudgedDraw {
+    pub record: DrawRecord,
+    pub found: Verification,
+    pub picture: Option<TakenPicture>,
 }
 
 /// What all draws make of a pillar, at the least and at the most.
@@ -79,8 +90,14 @@ impl Bench {
             ));
         }
         let drawer = Drawer::new(&tolerance, base);
+        let picture = tolerance.picture.as_ref().map(PictureBench::open).transpose()?;
+        let mut made = MadeRange::of(&drawer, key)?;
+        if picture.as_ref().is_some_and(PictureBench::knows_design) {
+            made.add(drawer.base());
+        }
         Ok(Self {
-            made: MadeRange::of(&drawer, key)?,
+            made,
+            picture,
             tolerance,
             drawer,
             key,
@@ -162,14 +179,29 @@ impl Bench {
         let path: &Path = &self.files.layouts[number as usize];
         let opened = Layout::open_with(path, ReadLimits::default(), progress)?;
         let layout = ReadLayout::of(&design, &array, &opened, progress)?;
-        let range = self.made.range(&design, &layout)?;
+        let mut range = self.made.range(&design, &layout)?;
+        if let Some(picture) = &self.picture {
+            range.colours.extend(picture.colours(&design)?);
+            // White light and pictures may be of one camera.
+            range.colours.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            range.colours.dedup();
+        }
         let bank = Arc::new(bank(&design.cell_stack()?, range)?);
+        let known = match &self.picture {
+            Some(picture) if picture.knows_design() => {
+                let model = self.model("as designed".into(), self.drawer.base().clone());
+                let chip = MadeChip::of_bank(&bank, &model)?;
+                Some(picture.known(&design, layout.extraction(), &chip, &Quiet(progress))?)
+            }
+            _ => None,
+        };
         Ok(Subject {
             number,
             design,
             array,
             layout,
             bank,
+            known,
         })
     }
 
@@ -183,18 +215,28 @@ impl Bench {
     ///
     /// # Errors
     /// If the tables cannot be used, it cannot be simulated, or the user stopped it.
-    pub fn draw(&self, k: u64, progress: &dyn Progress) -> Result<(DrawRecord, Verification)> {
+    pub fn draw(&self, k: u64, progress: &dyn Progress) -> Result<JudgedDraw> {
         let number = self.drawer.design_of(k);
         let subject = self.subject(number, progress)?;
         let drawn = self.drawer.draw(self.key, k)?;
-        let model = CalibratedModel::new(format!("draw {k}"), "drawn".into(), self.drawer.perturbation(&drawn));
+        let model = self.model(format!("draw {k}"), self.drawer.perturbation(&drawn));
         let chip = MadeChip::of_bank(&subject.bank, &model)?;
         let cases = SimulationCases::judged_by(&chip);
         let accuracy = self.tolerance.accuracy;
         let found = subject
             .layout
             .judge(&subject.design, &subject.array, &cases, accuracy, progress)?;
-        let figures = figures(&found);
+        let mut figures = figures(&found);
+        let picture = match &self.picture {
+            Some(bench) => {
+                let pillars = subject.layout.extraction();
+                Some(bench.take(&subject.design, pillars, &chip, subject.known.as_ref(), progress)?)
+            }
+            None => None,
+        };
+        for (key, value) in picture.iter().flat_map(TakenPicture::figures) {
+            figures.insert(key, finite(value));
+        }
         let limits = self.limits(&found);
         let of_design = found.checks.iter().map(|c| finite(c.reached));
         let own = self
@@ -212,7 +254,11 @@ impl Bench {
             figures,
             reached,
         };
-        Ok((record, found))
+        Ok(JudgedDraw { record, found, picture })
+    }
+
+    fn model(&self, set: String, perturbation: Perturbation) -> CalibratedModel {
+        CalibratedModel::new(set, "drawn".into(), perturbation)
     }
 
     /// All limits: of the design, then of the study.
@@ -227,22 +273,25 @@ impl Bench {
 impl MadeRange {
     /// Every draw is drawn, none is simulated.
     fn of(drawer: &Drawer, key: [u8; 32]) -> Result<Self> {
-        let (mut least, mut most) = (f64::MAX, f64::MIN);
-        let mut changes: Option<[CellChange; 2]> = None;
+        let first = drawer.perturbation(&drawer.draw(key, 0)?);
+        let mut range = Self {
+            bias_nm: [f64::MAX, f64::MIN],
+            changes: [first.cell; 2],
+        };
         for k in 0..drawer.count() {
-            let made = drawer.perturbation(&drawer.draw(key, k)?);
-            // Area fractions are from zero to one.
-            for fill in [0.0, 1.0] {
-                least = least.min(made.geometry.bias_nm(fill));
-                most = most.max(made.geometry.bias_nm(fill));
-            }
-            let [low, high] = changes.unwrap_or([made.cell; 2]);
-            changes = Some([joined(low, made.cell, f64::min), joined(high, made.cell, f64::max)]);
+            range.add(&drawer.perturbation(&drawer.draw(key, k)?));
         }
-        Ok(Self {
-            bias_nm: [least, most],
-            changes: changes.unwrap_or_default(),
-        })
+        Ok(range)
+    }
+
+    fn add(&mut self, made: &Perturbation) {
+        // Area fractions are from zero to one.
+        for fill in [0.0, 1.0] {
+            let bias = made.geometry.bias_nm(fill);
+            self.bias_nm = [self.bias_nm[0].min(bias), self.bias_nm[1].max(bias)];
+        }
+        let [low, high] = self.changes;
+        self.changes = [joined(low, made.cell, f64::min), joined(high, made.cell, f64::max)];
     }
 
     /// What the tables of a design must hold for all draws. Those of other designs count too: designs whose pillars are

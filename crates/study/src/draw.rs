@@ -96,6 +96,11 @@ impl Drawer {
         }
     }
 
+    /// What everything that does not vary is taken from.
+    pub fn base(&self) -> &Perturbation {
+        &self.base
+    }
+
     /// Name and unit of each quantity; grids first.
     pub fn names(&self) -> Vec<(String, String)> {
         self.quantities
@@ -255,6 +260,7 @@ mod tests {
                 key: "mapping.basis".into(),
                 values: vec![Scalar::Text("all_powers".into()), Scalar::Text("even_powers".into())],
             }],
+            picture: None,
             limits: Vec::new(),
         };
         Drawer::new(&tolerance, Perturbation::default())

@@ -16,6 +16,7 @@
 //! | `designs` | keys of the design that vary over a grid |
 //! | `draw` | the numbers of one draw |
 //! | `bench` | what draws are judged with: designs, layouts as read back, tables of cells |
+//! | `picture` | the picture that each draw takes |
 //! | `record` | what is kept of one draw |
 //! | `plan`, `shard` | the folder of a study |
 //! | `merge`, `yields`, `response`, `points` | all draws, and what they say |
@@ -32,6 +33,7 @@ mod merge;
 mod page;
 #[cfg(feature = "parquet")]
 mod parquet_file;
+mod picture;
 mod plan;
 mod points;
 mod record;
@@ -41,10 +43,12 @@ mod slurm;
 mod tolerance;
 mod yields;
 
+pub use bench::JudgedDraw;
 pub use designs::DesignGrid;
 pub use draw::Drawn;
 pub use merge::{StudyResult, merge};
 pub use page::write_page;
+pub use picture::{KnownKernels, PictureSpec, SceneChoice, TakenPicture};
 pub use plan::{Layout, Plan, PlanSettings, Shard, plan};
 pub use points::{GridPoint, Spread};
 pub use record::{DrawRecord, LimitStatement};

@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use metalith_core::{Error, Progress, Result, WholeFile};
-use metalith_verify::Verification;
 use serde::Serialize;
 
+use crate::bench::JudgedDraw;
 use crate::columns::{columns, csv};
 use crate::plan::Plan;
 use crate::points::{GridPoint, combinations, each_value};
@@ -39,7 +39,7 @@ pub struct StudyResult {
     pub worst: Vec<u64>,
     /// The worst draws in full.
     #[serde(skip)]
-    pub shown: Vec<(u64, Verification)>,
+    pub shown: Vec<JudgedDraw>,
 }
 
 /// Put the shards of a study together; `show` of its worst draws are simulated again for their PSFs.
@@ -73,7 +73,7 @@ pub fn merge(plan: &Plan, show: usize, progress: &dyn Progress) -> Result<StudyR
     let mut shown = Vec::new();
     progress.begin("simulating the worst draws", show as u64);
     for k in worst.iter().take(show) {
-        shown.push((*k, run.verification(*k, progress)?));
+        shown.push(run.judged(*k, progress)?);
         progress.advance(1);
     }
     Ok(StudyResult {

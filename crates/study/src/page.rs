@@ -3,7 +3,10 @@
 use std::path::Path;
 
 use metalith_core::Result;
-use metalith_report::{Axis, Cell, Chart, Column, Figure, ImageGrid, Page, Ranking, Table, count, sig, write_json};
+use metalith_picture::pictures_side_by_side;
+use metalith_report::{
+    Axis, Cell, Chart, Column, Figure, ImageGrid, Page, Ranking, Table, count, fixed, sig, write_json,
+};
 
 use crate::grid_page::over_grid;
 use crate::merge::StudyResult;
@@ -107,8 +110,18 @@ fn page(result: &StudyResult) -> Page {
         page.section("Worst draws");
         page.paragraph("By the least margin over the limits, in units of what that margin varies by.");
         page.table(worst(result));
-        for (k, found) in &result.shown {
-            let Some(element) = found.distinct.first() else {
+        for draw in &result.shown {
+            let k = draw.record.draw;
+            if let Some(taken) = &draw.picture {
+                let row = pictures_side_by_side(&taken.truth, &taken.frame, &taken.restored, &taken.channels);
+                let whole = &taken.scores[0];
+                page.figure(row.caption(format!(
+                    "Draw {k}: PSNR {} dB, SSIM {}.",
+                    fixed(whole.psnr_db, 1),
+                    fixed(whole.ssim, 2)
+                )));
+            }
+            let Some(element) = draw.found.distinct.first() else {
                 continue;
             };
             let mut grid = ImageGrid::new(format!("Draw {k}, element {}", element.element.label()), 3);

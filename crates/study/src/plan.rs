@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use metalith_camera::Camera;
 use metalith_cell::CellStack;
 use metalith_cell::kept::solver_of;
 use metalith_core::file::read_at_most;
@@ -17,6 +18,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::bench::{Bench, Files, Quiet};
+use crate::picture::SceneChoice;
 use crate::record::LimitStatement;
 use crate::tolerance::Tolerance;
 
@@ -270,18 +272,18 @@ impl Plan {
         }
         progress.begin("timing the first draw", 1);
         let begun = Instant::now();
-        let (first, found) = bench.draw(design * (self.draws / designs), &Quiet(progress))?;
+        let first = bench.draw(design * (self.draws / designs), &Quiet(progress))?;
         self.seconds_per_draw = self.seconds_per_draw.max(begun.elapsed().as_secs_f64());
         for limit in &bench.tolerance.limits {
-            if !first.figures.contains_key(&limit.figure) {
-                let known: Vec<&str> = first.figures.keys().map(String::as_str).collect();
+            if !first.record.figures.contains_key(&limit.figure) {
+                let known: Vec<&str> = first.record.figures.keys().map(String::as_str).collect();
                 return Err(Error::invalid(
                     format!("there is no figure `{}` to limit", limit.figure),
                     format!("this design has: {}", known.join(", ")),
                 ));
             }
         }
-        let limits = bench.limits(&found);
+        let limits = bench.limits(&first.found);
         if design > 0 && limits != self.limits {
             let setting = bench.tolerance.setting(design).into_iter();
             let setting: Vec<String> = setting.map(|(key, value)| format!("{key} = {value}")).collect();
@@ -309,6 +311,12 @@ pub(crate) fn key(tolerance: &Tolerance, layouts: &[PathBuf]) -> Result<[u8; 32]
     let mut files = vec![tolerance.path.clone(), tolerance.design.clone()];
     files.extend(layouts.iter().cloned());
     files.extend(tolerance.model.clone());
+    if let Some(picture) = &tolerance.picture {
+        files.extend(Camera::read(&picture.camera)?.files);
+        if let SceneChoice::File(path) = &picture.scene {
+            files.push(path.clone());
+        }
+    }
     for number in 0..tolerance.designs() {
         let design = tolerance.design(number)?;
         let solver = solver_of(design.cell.shape);

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use metalith_core::{Error, Progress, Result, WholeFile};
 use serde::{Deserialize, Serialize};
 
-use crate::bench::{Bench, Quiet};
+use crate::bench::{Bench, JudgedDraw, Quiet};
 use crate::plan::{Plan, Shard};
 use crate::record::DrawRecord;
 
@@ -85,7 +85,7 @@ impl<'p> Run<'p> {
         let mut text = line(&self.plan.header(shard));
         progress.begin(&format!("shard {number}"), shard.end - shard.first);
         for k in shard.first..shard.end {
-            text.push_str(&line(&self.bench.draw(k, &Quiet(progress))?.0));
+            text.push_str(&line(&self.bench.draw(k, &Quiet(progress))?.record));
             progress.advance(1);
         }
         file.write_all(text.as_bytes()).map_err(fault)?;
@@ -93,8 +93,8 @@ impl<'p> Run<'p> {
     }
 
     /// What a draw looks like in full.
-    pub(crate) fn verification(&self, k: u64, progress: &dyn Progress) -> Result<metalith_verify::Verification> {
-        Ok(self.bench.draw(k, &Quiet(progress))?.1)
+    pub(crate) fn judged(&self, k: u64, progress: &dyn Progress) -> Result<JudgedDraw> {
+        self.bench.draw(k, &Quiet(progress))
     }
 
     /// What draws are made by.

@@ -9,6 +9,7 @@ use metalith_verify::Sense;
 use metalith_wave::Accuracy;
 
 use crate::designs::{self, DesignGrid, design_grid};
+use crate::picture::{PictureSpec, picture_spec};
 
 /// Version of the format that is read.
 const SCHEMA: i64 = 1;
@@ -39,6 +40,8 @@ pub struct Tolerance {
     pub grids: Vec<Grid>,
     /// What varies in the design.
     pub design_grids: Vec<DesignGrid>,
+    /// The picture that each draw takes.
+    pub picture: Option<PictureSpec>,
     /// Limits on figures, beside those of the design.
     pub limits: Vec<FigureLimit>,
 }
@@ -158,6 +161,7 @@ impl Tolerance {
                 &[("fast", Accuracy::Fast), ("accurate", Accuracy::Accurate)],
                 Some(Accuracy::Fast),
             ),
+            picture: root.optional_section("picture").map(|s| picture_spec(&s)),
             limits: root.sections("limit").iter().map(limit).collect(),
             varied,
             grids,

@@ -5,6 +5,9 @@ use std::path::{Path, PathBuf};
 
 use metalith_core::Silent;
 use metalith_core::document::Scalar;
+use metalith_picture::restore::RestorationMethod;
+use metalith_picture::scene::{BuiltIn, chart};
+use metalith_picture::{Rehearsal, Studio, scores};
 use metalith_study::{Plan, PlanSettings, Run, merge, plan, run_shard, status, write_page};
 
 /// A design that is solved in some seconds: one small lens, one wavelength and white light.
@@ -260,4 +263,112 @@ fn a_limit_on_no_figure_is_told() {
         error.contains("strehl_670nm_0deg") && error.contains("strehl_660nm_0deg"),
         "{error}"
     );
+}
+
+/// Tables of draws are interpolated: what this does to a picture that `metalith picture` restores (dB).
+const INTERPOLATED_DB: f64 = 0.05;
+
+/// A camera for one lens of 20 um: small pixels, one channel.
+const SMALL_CAMERA: &str = r#"
+schema = 1
+name = "small"
+[sensor]
+pixel_um = 1.0
+columns = 96
+rows = 96
+filter = "none"
+offset_um = [0, 0]
+tilt_deg = [0, 0]
+bits = 12
+noise_photon = 4e-5
+noise_read = 1e-5
+[[channel]]
+name = "mono"
+band_nm = [600, 680]
+efficiency = 0.6
+[exposure]
+time_ms = 10
+white = 0.9
+[illuminant]
+source = "equal_energy"
+"#;
+
+/// The picture of a chip without faults is that of `metalith picture`; a chip that is 30 % out of focus loses more if its
+/// restoration does not know it.
+#[test]
+#[ignore = "second tier: CPU time, run by .ci/run"]
+fn pictures_are_figures_of_a_draw() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = tolerance(folder.path(), 1);
+    fs::write(folder.path().join("camera.toml"), SMALL_CAMERA).unwrap();
+    let text = fs::read_to_string(&path).unwrap();
+    let head = &text[..text.find("[[vary]]").unwrap()];
+    let psnr = |kernels: &str| {
+        let grid = "[[grid]]\neffect = \"gap\"\nvalues = [0.0, 14.0]\n";
+        let picture = format!(
+            "[picture]\ncamera = \"camera.toml\"\nscene = \"star\"\npixels = 64\nfield_deg = 50\nnodes = 5\nkernels = \"{kernels}\"\n"
+        );
+        let limit = "[[limit]]\nfigure = \"picture_psnr_db_centre\"\nat_least = 1.0\n";
+        fs::write(&path, format!("{head}{grid}{picture}{limit}")).unwrap();
+        let plan = in_shards(&path, &folder.path().join(kernels), 2);
+        run_shard(&plan, 0, &Silent).unwrap();
+        let merged = merge(&plan, 1, &Silent).unwrap();
+        assert_eq!(merged.shown[0].record.draw, merged.worst[0]);
+        assert!(merged.shown[0].picture.is_some());
+        write_page(&merged, &plan.folder).unwrap();
+        let page = fs::read_to_string(plan.folder.join("report.html")).unwrap();
+        assert!(page.contains("frame as recorded"));
+        let figures = merged.draws.iter().map(|d| d.figures.clone());
+        figures.collect::<Vec<_>>()
+    };
+    let (own, designed) = (psnr("draw"), psnr("design"));
+    let of = |figures: &std::collections::BTreeMap<String, Option<f64>>, key: &str| figures[key].unwrap();
+
+    let design = metalith_design::Design::read(&folder.path().join("design.toml")).unwrap();
+    let camera = metalith_camera::Camera::read(&folder.path().join("camera.toml")).unwrap();
+    let scene = chart(BuiltIn::Star, 64, 50.0, f64::INFINITY);
+    let layout = folder.path().join("draw/layout.gds");
+    let pillars = metalith_layout::read_pillars(&design, &layout, &Silent).unwrap();
+    let cells = metalith_design::cell_models(&design, &[metalith_cell::Fidelity::Rigorous]).unwrap();
+    let case = metalith_made::SimulationCase::Cell(cells[0].as_ref());
+    let studio = Studio::of_pillars(&design, &pillars, case, &camera, &scene, Some(5), &Silent).unwrap();
+    let frame = studio.record(&studio.simulation(), &scene, 1).unwrap();
+    let operator = studio.restoration();
+    let error = Rehearsal::new(&studio, &operator).operator_error;
+    let method = RestorationMethod::Tikhonov;
+    let picture = studio
+        .restore(&operator, &error, &frame, method, true, &Silent)
+        .unwrap();
+    let direct = scores(&picture, &studio.truth(&scene)).unwrap();
+    for (score, key) in direct.iter().zip(["picture_psnr_db", "picture_psnr_db_centre"]) {
+        let drawn = of(&own[0], key);
+        assert!(
+            (drawn - score.psnr_db).abs() < INTERPOLATED_DB,
+            "{key}: {drawn} for {}",
+            score.psnr_db
+        );
+    }
+    // Without a fault the chip that is known is the chip itself.
+    assert_eq!(own[0], designed[0]);
+    let lost = |figures: &[_]| of(&figures[0], "picture_psnr_db_centre") - of(&figures[1], "picture_psnr_db_centre");
+    assert!(lost(&own) > 0.0, "{}", lost(&own));
+    assert!(lost(&designed) > lost(&own), "{} for {}", lost(&designed), lost(&own));
+    assert!(own[0].contains_key("forecast_psnr_linear_db_corner"));
+}
+
+#[test]
+fn mistakes_of_a_picture_are_told_with_their_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = tolerance(folder.path(), 1);
+    let text = fs::read_to_string(&path).unwrap();
+    let bad = "[picture]\ncamera = \"no.toml\"\nscene = \"none.png\"\npixels = 64\nnodes = 4\nmethod = \"magic\"\n";
+    fs::write(&path, format!("{text}{bad}")).unwrap();
+    let error = metalith_study::Tolerance::read(&path).unwrap_err().to_string();
+    for part in [
+        "an image has its own number of pixels",
+        "an even number of places",
+        "use one of: tikhonov",
+    ] {
+        assert!(error.contains(part), "{part} is not in {error}");
+    }
 }

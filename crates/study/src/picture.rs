@@ -1,0 +1,252 @@
+//! The picture that each draw takes of a scene: how near the restored one comes to it.
+
+use std::path::PathBuf;
+
+use metalith_camera::Camera;
+use metalith_cell::BAND_ORDERS;
+use metalith_core::document::{Limits, Section};
+use metalith_core::{Progress, Result};
+use metalith_design::Design;
+use metalith_gds::extract::Extraction;
+use metalith_made::{MadeChip, SimulationCase};
+use metalith_picture::restore::RestorationMethod;
+use metalith_picture::scene::{BuiltIn, SceneFile, SceneImage, chart, read_scene};
+use metalith_picture::{Frame, FrameOperator, Rehearsal, Studio, Zone, ZoneScore, sampling_of, scores};
+use ndarray::Array3;
+
+/// Pixels an axis of a built-in scene, if nothing else is said.
+const PIXELS: i64 = 512;
+/// Angle from the left to the right edge of a scene, if nothing else is said (degrees), as `metalith picture` has it.
+const FIELD_DEG: f64 = 90.0;
+
+/// `[picture]` of a study.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PictureSpec {
+    /// The camera file.
+    pub camera: PathBuf,
+    pub scene: SceneChoice,
+    /// Angle from the left to the right edge of the scene (degrees).
+    pub field_deg: f64,
+    pub method: RestorationMethod,
+    pub kernels: KnownKernels,
+    /// Places an axis of the field of each element at which kernels are formed; as `metalith picture` has them if left out.
+    pub nodes: Option<usize>,
+    /// Of the noise, the same in all draws: they differ by the chip alone.
+    pub seed: u64,
+}
+
+/// What pictures are taken of.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SceneChoice {
+    /// A built-in scene of so many pixels an axis.
+    BuiltIn(BuiltIn, usize),
+    File(PathBuf),
+}
+
+/// Whose kernels the restoration knows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum KnownKernels {
+    /// Those of the draw: every camera is calibrated.
+    Draw,
+    /// Those of the chip as designed, or as the model of the study has it: no camera is calibrated.
+    Design,
+}
+
+/// The `[picture]` of a file.
+pub(crate) fn picture_spec(s: &Section<'_, '_>) -> PictureSpec {
+    let pixels = s.optional_integer("pixels", 64..=4096, "pixels");
+    let scene = match s.text("scene").parse() {
+        Ok(kind) => SceneChoice::BuiltIn(kind, pixels.unwrap_or(PIXELS) as usize),
+        Err(_) => {
+            if pixels.is_some() {
+                s.fault(
+                    "pixels",
+                    "an image has its own number of pixels",
+                    "leave it out, or name a built-in scene: chart, star, edge",
+                );
+            }
+            SceneChoice::File(s.file("scene"))
+        }
+    };
+    let nodes = s.optional_integer("nodes", 3..=65, "places");
+    if nodes.is_some_and(|n| n % 2 == 0) {
+        s.fault(
+            "nodes",
+            "an even number of places has none on the axis",
+            "give an odd number",
+        );
+    }
+    let methods = RestorationMethod::ALL.map(|m| (m.name(), m));
+    PictureSpec {
+        camera: s.file("camera"),
+        scene,
+        field_deg: s
+            .optional_float("field_deg", Limits::new(1.0..=174.0, "degrees"))
+            .unwrap_or(FIELD_DEG),
+        method: s.choice("method", &methods, Some(RestorationMethod::Tikhonov)),
+        kernels: s.choice(
+            "kernels",
+            &[("draw", KnownKernels::Draw), ("design", KnownKernels::Design)],
+            Some(KnownKernels::Draw),
+        ),
+        nodes: nodes.map(|n| n as usize),
+        seed: s
+            .optional_integer("seed", 0..=i64::MAX, "")
+            .map_or(1, |seed| seed as u64),
+    }
+}
+
+/// A scene before a camera, for the chips of all draws.
+pub(crate) struct PictureBench {
+    spec: PictureSpec,
+    camera: Camera,
+    scene: SceneImage,
+}
+
+/// The chip that a restoration knows when cameras are not calibrated.
+pub(crate) struct KnownChip {
+    studio: Studio,
+    operator_error: Vec<f64>,
+}
+
+/// The picture of one draw.
+pub struct TakenPicture {
+    /// What an ideal camera gives, linear sRGB `[row, column, colour]`.
+    pub truth: Array3<f64>,
+    pub frame: Frame,
+    /// Linear sRGB `[row, column, colour]`.
+    pub restored: Array3<f64>,
+    /// By zone.
+    pub scores: Vec<ZoneScore>,
+    /// Expected PSNR of linear light of natural scenes (dB), by zone; none of methods without a forecast.
+    pub forecast_db: Vec<f64>,
+    /// Names of the channels of the camera.
+    pub channels: Vec<String>,
+}
+
+impl PictureBench {
+    /// With the camera and the scene that are named.
+    ///
+    /// # Errors
+    /// If one of them cannot be read.
+    pub fn open(spec: &PictureSpec) -> Result<Self> {
+        let far = f64::INFINITY;
+        let scene = match &spec.scene {
+            SceneChoice::BuiltIn(kind, pixels) => chart(*kind, *pixels, spec.field_deg, far),
+            SceneChoice::File(path) => read_scene(&SceneFile {
+                path: path.clone(),
+                wavelengths_nm: None,
+                field_deg: spec.field_deg,
+                distance_um: far,
+            })?,
+        };
+        Ok(Self {
+            camera: Camera::read(&spec.camera)?,
+            scene,
+            spec: spec.clone(),
+        })
+    }
+
+    /// Wavelengths (um) and orders at which pictures of a design ask for cells.
+    pub fn colours(&self, design: &Design) -> Result<Vec<(f64, usize)>> {
+        let nm = sampling_of(design, &self.camera)?.wavelengths_nm;
+        Ok(nm.into_iter().map(|nm| (nm * 1e-3, BAND_ORDERS)).collect())
+    }
+
+    /// Whether restorations know the chip as designed, and not that of the draw.
+    pub fn knows_design(&self) -> bool {
+        self.spec.kernels == KnownKernels::Design
+    }
+
+    fn studio(
+        &self,
+        design: &Design,
+        extraction: &Extraction,
+        chip: &MadeChip,
+        progress: &dyn Progress,
+    ) -> Result<Studio> {
+        let case = SimulationCase::Made(chip);
+        Studio::of_pillars(
+            design,
+            extraction,
+            case,
+            &self.camera,
+            &self.scene,
+            self.spec.nodes,
+            progress,
+        )
+    }
+
+    /// The chip that restorations of all draws know.
+    ///
+    /// # Errors
+    /// As [`Studio::of_pillars`].
+    pub fn known(
+        &self,
+        design: &Design,
+        extraction: &Extraction,
+        chip: &MadeChip,
+        progress: &dyn Progress,
+    ) -> Result<KnownChip> {
+        let studio = self.studio(design, extraction, chip, progress)?;
+        let operator_error = Rehearsal::new(&studio, &studio.restoration()).operator_error;
+        Ok(KnownChip { studio, operator_error })
+    }
+
+    /// The picture that a chip takes; `known` is what its restoration knows, itself if left out.
+    ///
+    /// # Errors
+    /// As [`Studio::of_pillars`] and [`Studio::restore`].
+    pub fn take(
+        &self,
+        design: &Design,
+        extraction: &Extraction,
+        chip: &MadeChip,
+        known: Option<&KnownChip>,
+        progress: &dyn Progress,
+    ) -> Result<TakenPicture> {
+        let studio = self.studio(design, extraction, chip, progress)?;
+        let frame = studio.record(&studio.simulation(), &self.scene, self.spec.seed)?;
+        let operator: FrameOperator<'_> = known.map_or(&studio, |k| &k.studio).restoration();
+        let mut rehearsal = Rehearsal::new(&studio, &operator);
+        if let Some(known) = known {
+            // Nobody knows by how much this chip is another one.
+            rehearsal.operator_error.clone_from(&known.operator_error);
+        }
+        let method = self.spec.method;
+        let restored = studio.restore(&operator, &rehearsal.operator_error, &frame, method, true, progress)?;
+        let forecast_db = match method {
+            RestorationMethod::Tikhonov => rehearsal.forecast(&studio, &operator, progress)?,
+            _ => Vec::new(),
+        };
+        let truth = studio.truth(&self.scene);
+        Ok(TakenPicture {
+            scores: scores(&restored, &truth)?,
+            truth,
+            frame,
+            restored,
+            forecast_db,
+            channels: self.camera.channels.iter().map(|c| c.name.clone()).collect(),
+        })
+    }
+}
+
+impl TakenPicture {
+    /// Figures of a draw, by key.
+    pub fn figures(&self) -> Vec<(String, f64)> {
+        let of = |figure: &str, zone: Zone| match zone {
+            Zone::Whole => figure.to_owned(),
+            _ => format!("{figure}_{}", zone.name()),
+        };
+        let each = self.scores.iter().flat_map(|s| {
+            [
+                (of("picture_psnr_db", s.zone), s.psnr_db),
+                (of("picture_psnr_linear_db", s.zone), s.psnr_linear_db),
+                (of("picture_ssim", s.zone), s.ssim),
+            ]
+        });
+        let forecast = self.scores.iter().zip(&self.forecast_db);
+        each.chain(forecast.map(|(s, db)| (of("forecast_psnr_linear_db", s.zone), *db)))
+            .collect()
+    }
+}
