@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use metalith::study::{self, Plan, PlanSettings};
+use metalith::study::{self, Plan, PlanSettings, Work};
 use pyo3::prelude::*;
 
 use crate::work::{error, work};
@@ -19,13 +19,13 @@ pub fn study_plan(
 ) -> PyResult<String> {
     let settings = PlanSettings { draws_per_shard };
     let plan = work(py, progress, |p| study::plan(&tolerance, &folder, settings, p))?;
-    Ok(serde_json::json!({ "plan": plan, "shards": plan.shards() }).to_string())
+    Ok(serde_json::json!({ "plan": plan, "shards": plan.cut().shards() }).to_string())
 }
 
 /// Which shards are there.
 #[pyfunction]
 pub fn study_status(py: Python<'_>, folder: PathBuf) -> PyResult<String> {
-    let status = py.detach(|| study::status(&Plan::open(&folder)?)).map_err(error)?;
+    let status = py.detach(|| Work::open(&folder)?.cut().status()).map_err(error)?;
     Ok(serde_json::json!(status).to_string())
 }
 
@@ -33,7 +33,7 @@ pub fn study_status(py: Python<'_>, folder: PathBuf) -> PyResult<String> {
 #[pyfunction]
 #[pyo3(signature = (folder, shard, progress=None))]
 pub fn study_run(py: Python<'_>, folder: PathBuf, shard: u64, progress: Option<Py<PyAny>>) -> PyResult<()> {
-    work(py, progress, |p| study::run_shard(&Plan::open(&folder)?, shard, p))
+    work(py, progress, |p| Work::open(&folder)?.run(&[shard], p))
 }
 
 /// All draws and what they say; with a folder, the page is written there.

@@ -6,6 +6,7 @@ use clap::Args;
 use metalith::Result;
 use metalith::picture::scene::{SceneFile, read_scene};
 use metalith::picture::{Studio, write_dataset};
+use metalith::study::{PairsRequest, plan_pairs};
 
 use super::camera_args::{CameraArgs, CameraFiles};
 use super::standard_input::InputFile;
@@ -33,12 +34,48 @@ pub struct DatasetArgs {
     /// Folder for the pairs.
     #[arg(long, short, value_name = "FOLDER")]
     out: PathBuf,
+
+    /// Only plan the set, for shards that any number of machines make: `metalith study run`, `submit`, `status` and `merge`
+    /// of the folder.
+    #[arg(long)]
+    plan: bool,
+
+    /// Images of a shard; as many as take ten minutes if left out. The set does not depend on it.
+    #[arg(long, value_name = "N", requires = "plan", value_parser = clap::value_parser!(u64).range(1..))]
+    images_per_shard: Option<u64>,
+}
+
+/// The folder of a set that shards make.
+fn plan(args: &DatasetArgs, images: Vec<PathBuf>, terminal: &Terminal) -> Result<Outcome> {
+    let request = PairsRequest {
+        design: args.with.design.clone(),
+        layout: args.layout.clone(),
+        camera: args.with.camera.clone(),
+        model: args.with.model.clone(),
+        field_deg: args.with.field_deg,
+        seed: args.with.seed,
+        images,
+    };
+    let plan = plan_pairs(&request, &args.out, args.images_per_shard, terminal)?;
+    terminal.clear();
+    print_line!(
+        "{} images of {:.2} s in {} shards of {}: {}",
+        plan.digests.len(),
+        plan.seconds_per_image,
+        plan.cut().shards(),
+        plan.images_per_shard,
+        args.out.display()
+    );
+    Ok(Outcome::Fine)
 }
 
 pub fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let CameraFiles { design, camera, model } = args.with.read()?;
     let images = images::of_folder(&args.images)?;
+    if args.plan {
+        return plan(args, images, terminal);
+    }
     let read = |path: &Path| {
         read_scene(&SceneFile {
             path: path.to_owned(),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::{Child, Command};
 
 use clap::{Args, Subcommand};
-use metalith::study::{Plan, PlanSettings, Run, Slurm, merge, plan, run_shard, status, submissions, write_page};
+use metalith::study::{PairsPlan, Plan, PlanSettings, Slurm, Work, merge, plan, submissions, write_page};
 use metalith::{Error, Progress, Result};
 
 use super::{Outcome, Terminal, print_json, print_line};
@@ -126,7 +126,7 @@ fn plan_study(args: &PlanArgs, terminal: &Terminal) -> Result<Outcome> {
         "{} draws of {:.2} s in {} shards of {}: {}",
         plan.draws,
         plan.seconds_per_draw,
-        plan.shards(),
+        plan.cut().shards(),
         plan.draws_per_shard,
         args.out.display()
     );
@@ -134,13 +134,13 @@ fn plan_study(args: &PlanArgs, terminal: &Terminal) -> Result<Outcome> {
 }
 
 fn run_shards(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
-    let plan = Plan::open(&args.study)?;
+    let work = Work::open(&args.study)?;
     if let Some(number) = args.shard {
-        run_shard(&plan, number, terminal)?;
+        work.run(&[number], terminal)?;
         terminal.clear();
         return Ok(Outcome::Fine);
     }
-    let found = status(&plan)?;
+    let found = work.cut().status()?;
     if let Some((path, why)) = found.unusable.first() {
         return Err(Error::invalid(
             format!("{} cannot be used: {why}", path.display()),
@@ -149,16 +149,10 @@ fn run_shards(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     match args.jobs {
         Some(jobs) if jobs > 1 => by_processes(args, &found.missing, jobs.into(), terminal)?,
-        _ if found.missing.is_empty() => {}
-        _ => {
-            let run = Run::open(&plan)?;
-            for number in found.missing {
-                run.shard(number, terminal)?;
-            }
-        }
+        _ => work.run(&found.missing, terminal)?,
     }
     terminal.clear();
-    tell(&plan)
+    tell(&work)
 }
 
 /// Each shard by a process of its own, so many at a time.
@@ -203,16 +197,15 @@ fn by_processes(args: &RunArgs, missing: &[u64], jobs: usize, terminal: &Termina
     ))
 }
 
-/// One line on how far a study is.
-fn tell(plan: &Plan) -> Result<Outcome> {
-    let found = status(plan)?;
+/// One line on how far the work is.
+fn tell(work: &Work) -> Result<Outcome> {
+    let found = work.cut().status()?;
     print_line!("{} of {} shards are there", found.finished, found.shards);
     Ok(Outcome::Fine)
 }
 
 fn tell_status(args: &StatusArgs) -> Result<Outcome> {
-    let plan = Plan::open(&args.study)?;
-    let found = status(&plan)?;
+    let found = Work::open(&args.study)?.cut().status()?;
     if args.json {
         print_json(&found);
     } else {
@@ -225,14 +218,14 @@ fn tell_status(args: &StatusArgs) -> Result<Outcome> {
 }
 
 fn submit(args: &SubmitArgs) -> Result<Outcome> {
-    let plan = Plan::open(&args.study)?;
+    let cut = Work::open(&args.study)?.cut();
     let slurm = Slurm::read(&args.slurm)?;
-    let missing = status(&plan)?.missing;
+    let missing = cut.status()?.missing;
     if missing.is_empty() {
         print_line!("nothing is missing");
         return Ok(Outcome::Fine);
     }
-    for submission in submissions(&plan, &slurm, &missing)? {
+    for submission in submissions(&cut, &slurm, &missing)? {
         let shards = submission.shards.len();
         if args.dry_run {
             print_line!("{} shards: sbatch {}", shards, submission.script.display());
@@ -258,8 +251,26 @@ fn submit(args: &SubmitArgs) -> Result<Outcome> {
 }
 
 fn merge_shards(args: &MergeArgs, terminal: &Terminal) -> Result<Outcome> {
-    let plan = Plan::open(&args.study)?;
-    let result = merge(&plan, args.psfs, terminal)?;
+    match Work::open(&args.study)? {
+        Work::Study(plan) => merge_study(&plan, args, terminal),
+        Work::Pairs(plan) => merge_pairs(&plan, args),
+    }
+}
+
+fn merge_pairs(plan: &PairsPlan, args: &MergeArgs) -> Result<Outcome> {
+    if args.out.is_some() {
+        return Err(Error::invalid(
+            "a set of pairs has no table of draws",
+            "leave --out out: its manifest is written beside the pairs",
+        ));
+    }
+    let manifest = plan.merge()?;
+    print_line!("{} pairs in {}", manifest.pairs.len(), args.study.display());
+    Ok(Outcome::Fine)
+}
+
+fn merge_study(plan: &Plan, args: &MergeArgs, terminal: &Terminal) -> Result<Outcome> {
+    let result = merge(plan, args.psfs, terminal)?;
     let out = args.out.clone().unwrap_or_else(|| args.study.join("result.csv"));
     result.write(&out)?;
     let folder = out.parent().map_or_else(PathBuf::new, std::path::Path::to_owned);

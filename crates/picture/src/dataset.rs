@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use metalith_core::file::read_at_most;
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result, WholeFile, srgb};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::operator::FrameOperator;
@@ -23,7 +23,7 @@ const SHARD: usize = 1000;
 const LONGEST: u64 = 1 << 30;
 
 /// What stands in `manifest.json`.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DatasetManifest {
     pub design: String,
     pub camera: String,
@@ -35,7 +35,7 @@ pub struct DatasetManifest {
 }
 
 /// One frame and its scene.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DatasetPair {
     /// File name of the image that it is of.
     pub image: String,
@@ -55,6 +55,20 @@ fn shard(i: usize) -> String {
     format!("{first:06}-{:06}", first + SHARD - 1)
 }
 
+impl DatasetManifest {
+    /// Of a set that has no pairs yet.
+    pub fn of(studio: &Studio, seed: u64) -> Self {
+        Self {
+            design: studio.design.name.clone(),
+            camera: studio.camera.name.clone(),
+            seed,
+            field_deg: studio.view.field_deg,
+            gain: studio.gain.clone(),
+            pairs: Vec::new(),
+        }
+    }
+}
+
 /// Write one pair for each image into a folder, and the manifest when all are there. `read` gives the scene of an image.
 ///
 /// # Errors
@@ -70,55 +84,73 @@ pub fn write_dataset(
     progress: &dyn Progress,
 ) -> Result<DatasetManifest> {
     progress.begin("recording frames", images.len() as u64);
-    let mut pairs = Vec::new();
+    let mut manifest = DatasetManifest::of(studio, seed);
     for (i, image) in images.iter().enumerate() {
         if progress.stopped() {
             return Err(Error::Interrupted);
         }
-        let bytes = read_at_most(image, LONGEST, "an image")?;
-        let mut hasher = Sha256::new();
-        hasher.update(&bytes);
-        let image_digest = hasher.clone().finalize();
-        hasher.update(seed.to_le_bytes());
-        let own = hasher.finalize();
-        let own_seed = u64::from_le_bytes(own[..8].try_into().expect("eight bytes"));
-        let name = format!("{}/{i:06}", shard(i));
-        let (frame, truth) = (format!("{name}.frame.png"), format!("{name}.truth.png"));
-        if !folder.join(&frame).exists() || !folder.join(&truth).exists() {
-            let scene = read(image)?;
-            let recorded = studio.record(operator, &scene, own_seed)?;
-            WholeFile::write(&folder.join(&frame), &png16::grey(&recorded.planes))?;
-            WholeFile::write(
-                &folder.join(&truth),
-                &png16::colour(&studio.truth(&scene).mapv(srgb::encoded)),
-            )?;
-        }
-        let digest = |file: &str| {
-            let bytes = read_at_most(&folder.join(file), LONGEST, "a picture of the set")?;
-            Ok::<_, Error>(hex(&Sha256::digest(bytes)))
-        };
-        pairs.push(DatasetPair {
-            image: image
-                .file_name()
-                .map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
-            image_sha256: hex(&image_digest),
-            frame_sha256: digest(&frame)?,
-            truth_sha256: digest(&truth)?,
-            frame,
-            truth,
-        });
+        manifest
+            .pairs
+            .push(write_pair(studio, operator, image, i, read, seed, folder)?);
         progress.advance(1);
     }
-    let manifest = DatasetManifest {
-        design: studio.design.name.clone(),
-        camera: studio.camera.name.clone(),
-        seed,
-        field_deg: studio.view.field_deg,
-        gain: studio.gain.clone(),
-        pairs,
-    };
-    metalith_report::write_json(&folder.join("manifest.json"), "dataset", &manifest)?;
+    write_manifest(folder, &manifest)?;
     Ok(manifest)
+}
+
+/// Write `manifest.json` of a set.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write_manifest(folder: &Path, manifest: &DatasetManifest) -> Result<()> {
+    metalith_report::write_json(&folder.join("manifest.json"), "dataset", manifest)
+}
+
+/// Write the frame and the scene of image number `i`, if they are not there. `read` gives the scene of an image.
+///
+/// # Errors
+/// If the image cannot be read or is not of the size that the studio was opened for, or a file cannot be written.
+pub fn write_pair(
+    studio: &Studio,
+    operator: &FrameOperator<'_>,
+    image: &Path,
+    i: usize,
+    read: &dyn Fn(&Path) -> Result<SceneImage>,
+    seed: u64,
+    folder: &Path,
+) -> Result<DatasetPair> {
+    let bytes = read_at_most(image, LONGEST, "an image")?;
+    let mut hasher = Sha256::new();
+    hasher.update(&bytes);
+    let image_digest = hasher.clone().finalize();
+    hasher.update(seed.to_le_bytes());
+    let own = hasher.finalize();
+    let own_seed = u64::from_le_bytes(own[..8].try_into().expect("eight bytes"));
+    let name = format!("{}/{i:06}", shard(i));
+    let (frame, truth) = (format!("{name}.frame.png"), format!("{name}.truth.png"));
+    if !folder.join(&frame).exists() || !folder.join(&truth).exists() {
+        let scene = read(image)?;
+        let recorded = studio.record(operator, &scene, own_seed)?;
+        WholeFile::write(&folder.join(&frame), &png16::grey(&recorded.planes))?;
+        WholeFile::write(
+            &folder.join(&truth),
+            &png16::colour(&studio.truth(&scene).mapv(srgb::encoded)),
+        )?;
+    }
+    let digest = |file: &str| {
+        let bytes = read_at_most(&folder.join(file), LONGEST, "a picture of the set")?;
+        Ok::<_, Error>(hex(&Sha256::digest(bytes)))
+    };
+    Ok(DatasetPair {
+        image: image
+            .file_name()
+            .map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
+        image_sha256: hex(&image_digest),
+        frame_sha256: digest(&frame)?,
+        truth_sha256: digest(&truth)?,
+        frame,
+        truth,
+    })
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! How a studio is opened: kernels and veil of a chip made, or taken from the disk.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use metalith_camera::{Camera, ChannelSampling};
 use metalith_cell::{Fidelity, cache_folder};
@@ -34,6 +34,8 @@ const WINDOW: usize = 64;
 /// Least share of the light that travels to the sensor in the windows of the kernels: with less there is no image.
 /// `prototype_3x3` has 40 %.
 const LEAST_IN_WINDOWS: f64 = 0.02;
+/// Folder of kernels within that of a plan.
+const KERNELS: &str = "kernels";
 
 impl BankSpec {
     /// For the elements of a design before a camera.
@@ -44,6 +46,40 @@ impl BankSpec {
             nodes: NODES,
             reach_um: design.lens.focal_length_um * FIELD_DEG.to_radians().tan(),
             accurate: design.lens.radius_um() < SMALL_UM,
+        }
+    }
+}
+
+/// Where kernels and veil are kept between runs.
+#[derive(Clone, Debug)]
+pub struct KeptKernels {
+    /// Nowhere, if left out.
+    folder: Option<PathBuf>,
+    make: bool,
+}
+
+impl KeptKernels {
+    /// Where this user keeps tables of cells too.
+    pub fn of_user() -> Self {
+        Self {
+            folder: cache_folder(),
+            make: true,
+        }
+    }
+
+    /// In a folder; made if they are not there.
+    pub fn made(folder: &Path) -> Self {
+        Self {
+            folder: Some(folder.join(KERNELS)),
+            make: true,
+        }
+    }
+
+    /// In a folder where they were made.
+    pub fn only(folder: &Path) -> Self {
+        Self {
+            make: false,
+            ..Self::made(folder)
         }
     }
 }
@@ -100,15 +136,44 @@ impl Studio {
         scene: &SceneImage,
         progress: &dyn Progress,
     ) -> Result<Self> {
+        Self::open_kept(design, layout, camera, model, scene, &KeptKernels::of_user(), progress)
+    }
+
+    /// The same with kernels and veil that are kept elsewhere.
+    ///
+    /// # Errors
+    /// As [`Studio::open`]; if nothing may be made and something is not there.
+    pub fn open_kept(
+        design: &Design,
+        layout: &Path,
+        camera: &Camera,
+        model: Option<&CalibratedModel>,
+        scene: &SceneImage,
+        kept: &KeptKernels,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         let wanted = Wanted::new(design, camera, scene)?;
         progress.begin("reading the layout", 1);
         let inputs = wanted.inputs(&digest(layout)?, model)?;
         let field = format!("{}x{} {}", scene.view.rows, scene.view.columns, scene.view.field_deg);
         let veil_inputs = [&inputs[..], field.as_bytes()].concat();
-        let folder = cache_folder();
-        let bank = folder.as_deref().and_then(|f| cache::kept_bank(f, &inputs));
-        let veil = folder.as_deref().and_then(|f| cache::kept_veil(f, &veil_inputs));
+        let folder = kept.folder.as_deref();
+        let bank = folder.and_then(|f| cache::kept_bank(f, &inputs));
+        let veil = folder.and_then(|f| cache::kept_veil(f, &veil_inputs));
         let from_cache = [bank.is_some(), veil.is_some()];
+        if let (
+            KeptKernels {
+                folder: Some(folder),
+                make: false,
+            },
+            [false, _] | [_, false],
+        ) = (kept, from_cache)
+        {
+            return Err(Error::invalid(
+                format!("{} does not hold the kernels of this camera", folder.display()),
+                "plan the set again; a shard makes no kernels of its own",
+            ));
+        }
         let (bank, veil) = match (bank, veil) {
             (Some(bank), Some(veil)) => (bank, veil),
             (bank, _) => {
@@ -130,14 +195,14 @@ impl Studio {
                     Some(bank) => bank,
                     None => {
                         let bank = wanted.bank(&chip, progress)?;
-                        if let Some(folder) = &folder {
+                        if let Some(folder) = folder {
                             cache::keep_bank(folder, &inputs, &bank)?;
                         }
                         bank
                     }
                 };
                 let veil = wanted.veil(&chip, &bank, progress)?;
-                if let Some(folder) = &folder {
+                if let Some(folder) = folder {
                     cache::keep_veil(folder, &veil_inputs, &veil)?;
                 }
                 (bank, veil)

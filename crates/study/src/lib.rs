@@ -19,6 +19,8 @@
 //! | `picture` | the picture that each draw takes |
 //! | `record` | what is kept of one draw |
 //! | `plan`, `shard` | the folder of a study |
+//! | `pairs` | frames and scenes for learning, in shards |
+//! | `cut`, `work` | shards of whatever work |
 //! | `merge`, `yields`, `response`, `points` | all draws, and what they say |
 //! | `columns`, `parquet_file` | the draws as a table |
 //! | `page`, `grid_page` | what a person reads |
@@ -26,11 +28,13 @@
 
 mod bench;
 mod columns;
+mod cut;
 mod designs;
 mod draw;
 mod grid_page;
 mod merge;
 mod page;
+mod pairs;
 #[cfg(feature = "parquet")]
 mod parquet_file;
 mod picture;
@@ -41,19 +45,23 @@ mod response;
 mod shard;
 mod slurm;
 mod tolerance;
+mod work;
 mod yields;
 
 pub use bench::JudgedDraw;
+pub use cut::{Cut, Shard, Status};
 pub use designs::DesignGrid;
 pub use draw::Drawn;
 pub use merge::{StudyResult, merge};
 pub use page::write_page;
+pub use pairs::{PairsPlan, PairsRequest, plan_pairs};
 pub use picture::{KnownKernels, PictureSpec, SceneChoice, TakenPicture};
-pub use plan::{Layout, Plan, PlanSettings, Shard, plan};
+pub use plan::{Layout, Plan, PlanSettings, plan};
 pub use points::{GridPoint, Spread};
 pub use record::{DrawRecord, LimitStatement};
 pub use response::{Response, Tightening};
-pub use shard::{Run, Status, run_shard, status};
+pub use shard::Run;
 pub use slurm::{Slurm, Submission, submissions};
 pub use tolerance::{Distribution, FigureLimit, Grid, Tolerance, Varied};
+pub use work::Work;
 pub use yields::{Yield, wilson};

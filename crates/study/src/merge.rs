@@ -1,7 +1,7 @@
 //! All draws of a study, and what they say together.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use metalith_core::{Error, Progress, Result, WholeFile};
 use serde::Serialize;
@@ -12,7 +12,7 @@ use crate::plan::Plan;
 use crate::points::{GridPoint, combinations, each_value};
 use crate::record::DrawRecord;
 use crate::response::{Response, Table, Tightening};
-use crate::shard::{FOLDER, Run, read};
+use crate::shard::Run;
 use crate::yields::Yield;
 
 /// The yield that tolerances are asked for.
@@ -47,8 +47,7 @@ pub struct StudyResult {
 /// # Errors
 /// If draws are missing or there twice, all named; if a shard is of another plan; as [`Run::open`].
 pub fn merge(plan: &Plan, show: usize, progress: &dyn Progress) -> Result<StudyResult> {
-    let folder = plan.folder.join(FOLDER);
-    let draws = whole(plan, &folder, &files(&folder)?)?;
+    let draws = plan.cut().whole(&|d: &DrawRecord| Some(d.draw))?;
     let run = Run::open(plan)?;
     let drawer = run.drawer();
     let count = plan.quantities.len();
@@ -109,98 +108,6 @@ fn worst(plan: &Plan, draws: &[DrawRecord]) -> Vec<u64> {
     order.into_iter().map(|(_, k)| k).collect()
 }
 
-/// Files of shards, by name.
-fn files(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = match std::fs::read_dir(folder) {
-        Ok(entries) => entries,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(error) => return Err(Error::io("read", folder)(error)),
-    };
-    let mut files = Vec::new();
-    for entry in entries {
-        let path = entry.map_err(Error::io("read", folder))?.path();
-        let name = path
-            .file_name()
-            .map(|n| n.to_string_lossy().into_owned())
-            .unwrap_or_default();
-        // Hidden ones are being written, or were left by a run that was killed.
-        if name.ends_with(".jsonl") && !name.starts_with('.') {
-            files.push(path);
-        }
-    }
-    files.sort();
-    Ok(files)
-}
-
-/// All draws, each once.
-fn whole(plan: &Plan, folder: &Path, files: &[PathBuf]) -> Result<Vec<DrawRecord>> {
-    let mut found: Vec<Option<(DrawRecord, usize)>> = Vec::new();
-    found.resize_with(plan.draws as usize, || None);
-    let mut twice = Vec::new();
-    for (number, path) in files.iter().enumerate() {
-        for draw in read(plan, path)? {
-            let Some(place) = found.get_mut(draw.draw as usize) else {
-                return Err(Error::invalid(
-                    format!(
-                        "{} holds draw {}, and the study has {}",
-                        path.display(),
-                        draw.draw,
-                        plan.draws
-                    ),
-                    "remove the file",
-                ));
-            };
-            match place {
-                Some((_, other)) => twice.push((draw.draw, *other, number)),
-                None => *place = Some((draw, number)),
-            }
-        }
-    }
-    if let Some((draw, a, b)) = twice.first() {
-        return Err(Error::invalid(
-            format!(
-                "{} draws are there twice, the first is {draw}: in {} and in {}",
-                twice.len(),
-                files[*a].display(),
-                files[*b].display()
-            ),
-            "remove one of the two files",
-        ));
-    }
-    let missing: Vec<u64> = (0..plan.draws).filter(|k| found[*k as usize].is_none()).collect();
-    if !missing.is_empty() {
-        return Err(Error::invalid(
-            format!(
-                "{} of {} draws are missing in {}: {}",
-                missing.len(),
-                plan.draws,
-                folder.display(),
-                ranges(&missing)
-            ),
-            "make them with `metalith study run FOLDER --missing`",
-        ));
-    }
-    Ok(found.into_iter().flatten().map(|(d, _)| d).collect())
-}
-
-/// Rising numbers as `0-3, 7, 9-12`, the first twenty ranges.
-pub(crate) fn ranges(numbers: &[u64]) -> String {
-    let mut runs: Vec<(u64, u64)> = Vec::new();
-    for n in numbers {
-        match runs.last_mut() {
-            Some((_, end)) if *end + 1 == *n => *end = *n,
-            _ => runs.push((*n, *n)),
-        }
-    }
-    let more = runs.len() > 20;
-    let words: Vec<String> = runs
-        .iter()
-        .take(20)
-        .map(|(a, b)| if a == b { a.to_string() } else { format!("{a}-{b}") })
-        .collect();
-    words.join(", ") + if more { ", ..." } else { "" }
-}
-
 impl StudyResult {
     /// Write all draws as a table: CSV, JSON Lines, JSON, or Parquet by the ending of the name.
     ///
@@ -246,16 +153,5 @@ impl StudyResult {
             let _ = writeln!(text, "{}", serde_json::to_string(draw).expect("plain data serialises"));
         }
         text
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn runs_of_numbers_are_named_by_their_ends() {
-        assert_eq!(ranges(&[0, 1, 2, 5, 7, 8]), "0-2, 5, 7-8");
-        assert_eq!(ranges(&[]), "");
     }
 }

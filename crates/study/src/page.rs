@@ -43,7 +43,7 @@ fn page(result: &StudyResult) -> Page {
     let all = result.yields.last().expect("the yield over all limits is always there");
     page.facts(&[
         ("Draws", count(plan.draws)),
-        ("Shards", count(plan.shards())),
+        ("Shards", count(plan.cut().shards())),
         ("Yield over all limits", share(all)),
         (
             "Varied",

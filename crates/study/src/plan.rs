@@ -14,19 +14,18 @@ use metalith_core::{Error, Progress, Result, WholeFile};
 use metalith_design::array::PillarArray;
 use metalith_layout::write_pillars;
 use metalith_made::{BankRange, CellBank};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::bench::{Bench, Files, Quiet};
+use crate::cut::{Cut, parts_per_shard};
 use crate::picture::SceneChoice;
 use crate::record::LimitStatement;
 use crate::tolerance::Tolerance;
 
 /// Version of the format of the manifest.
 const SCHEMA: u32 = 2;
-
-/// Time that a shard shall take (s): long enough for a queue to be worth it, short enough to lose one.
-const SHARD_SECONDS: f64 = 600.0;
 
 /// Name of the manifest within the folder.
 pub(crate) const MANIFEST: &str = "plan.json";
@@ -42,15 +41,6 @@ pub enum Layout {
     Given(PathBuf),
     /// The file that was written from the design, by its name in the folder of the study.
     Written(String),
-}
-
-/// One part of a study.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Shard {
-    pub number: u64,
-    /// Its draws: from the first up to the one before `end`.
-    pub first: u64,
-    pub end: u64,
 }
 
 /// The manifest of a study.
@@ -94,47 +84,24 @@ impl Plan {
     /// # Errors
     /// If there is none, or its manifest cannot be read.
     pub fn open(folder: &Path) -> Result<Self> {
-        let path = folder.join(MANIFEST);
-        let bytes = read_at_most(&path, LONGEST, "the manifest of a study")?;
-        let fault = |what: String| Error::Table {
-            path: path.clone(),
-            line: None,
-            what,
-            hint: "plan the study with `metalith study plan`".into(),
-        };
-        let mut plan: Self = serde_json::from_slice(&bytes).map_err(|e| fault(e.to_string()))?;
+        let mut plan: Self = manifest(folder)?;
         if plan.schema != SCHEMA || plan.draws_per_shard == 0 {
-            return Err(fault(format!(
-                "a manifest of schema {}, {SCHEMA} is known",
-                plan.schema
-            )));
+            let what = format!("a manifest of schema {}, {SCHEMA} is known", plan.schema);
+            return Err(fault(folder, what));
         }
         plan.folder = folder.to_owned();
         Ok(plan)
     }
 
-    /// Number of shards.
-    pub fn shards(&self) -> u64 {
-        self.draws.div_ceil(self.draws_per_shard)
-    }
-
-    /// One shard.
-    ///
-    /// # Errors
-    /// If there is none of this number.
-    pub fn shard(&self, number: u64) -> Result<Shard> {
-        if number >= self.shards() {
-            return Err(Error::invalid(
-                format!("there is no shard {number}"),
-                format!("this study has shards 0 to {}", self.shards() - 1),
-            ));
+    /// How it is cut.
+    pub fn cut(&self) -> Cut {
+        Cut {
+            key: self.key.clone(),
+            part: "draw",
+            parts: self.draws,
+            per_shard: self.draws_per_shard,
+            folder: self.folder.clone(),
         }
-        let first = number * self.draws_per_shard;
-        Ok(Shard {
-            number,
-            first,
-            end: (first + self.draws_per_shard).min(self.draws),
-        })
     }
 
     /// Where the layouts and the tables are.
@@ -145,6 +112,21 @@ impl Plan {
             layouts: layouts.collect(),
             cells: cells.collect(),
         }
+    }
+}
+
+/// The manifest in a folder.
+pub(crate) fn manifest<T: DeserializeOwned>(folder: &Path) -> Result<T> {
+    let bytes = read_at_most(&folder.join(MANIFEST), LONGEST, "the manifest of a plan")?;
+    serde_json::from_slice(&bytes).map_err(|e| fault(folder, e.to_string()))
+}
+
+fn fault(folder: &Path, what: String) -> Error {
+    Error::Table {
+        path: folder.join(MANIFEST),
+        line: None,
+        what,
+        hint: "plan it again with `metalith study plan`, or `metalith dataset --plan`".into(),
     }
 }
 
@@ -216,8 +198,7 @@ pub fn plan(tolerance_path: &Path, folder: &Path, settings: PlanSettings, progre
     for design in 0..designs {
         plan.take(design, designs, &bench, progress)?;
     }
-    let by_time = (SHARD_SECONDS / plan.seconds_per_draw.max(1e-3)).floor().max(1.0) as u64;
-    plan.draws_per_shard = settings.draws_per_shard.unwrap_or(by_time).clamp(1, draws);
+    plan.draws_per_shard = parts_per_shard(settings.draws_per_shard, plan.seconds_per_draw, draws);
     let mut text = serde_json::to_string_pretty(&plan).expect("plain data serialises");
     text.push('\n');
     WholeFile::write(&folder.join(MANIFEST), text.as_bytes())?;
@@ -337,7 +318,7 @@ pub(crate) fn key(tolerance: &Tolerance, layouts: &[PathBuf]) -> Result<[u8; 32]
     Ok(hash.finalize().into())
 }
 
-fn absolute(path: &Path) -> Result<PathBuf> {
+pub(crate) fn absolute(path: &Path) -> Result<PathBuf> {
     std::path::absolute(path).map_err(Error::io("find", path))
 }
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use metalith_core::document::{Document, Section, load};
 use metalith_core::{Error, Result, WholeFile};
 
-use crate::plan::Plan;
+use crate::cut::Cut;
 
 /// What the jobs of a cluster need.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -59,12 +59,12 @@ impl Slurm {
     }
 }
 
-/// Write job scripts for some shards into the folder of a study, each an array below `max_array_size`. A task takes the
+/// Write job scripts for some shards into the folder of a plan, each an array below `max_array_size`. A task takes the
 /// number of its shard from a list beside the script: numbers of shards may be larger than indices of an array.
 ///
 /// # Errors
 /// If a file cannot be written.
-pub fn submissions(plan: &Plan, slurm: &Slurm, shards: &[u64]) -> Result<Vec<Submission>> {
+pub fn submissions(plan: &Cut, slurm: &Slurm, shards: &[u64]) -> Result<Vec<Submission>> {
     let folder = std::path::absolute(plan.folder.join("slurm")).map_err(Error::io("find", &plan.folder))?;
     let study = std::path::absolute(&plan.folder).map_err(Error::io("find", &plan.folder))?;
     // Indices run from zero to below the size.
@@ -140,7 +140,7 @@ mod tests {
         std::fs::write(&file, "partition = \"cpu\"\ncpus_per_task = 4\nmax_array_size = 1001\n").unwrap();
         let slurm = Slurm::read(&file).unwrap();
         let missing: Vec<u64> = (0..5000).filter(|k| k % 2 == 1).collect();
-        let all = submissions(&plan, &slurm, &missing).unwrap();
+        let all = submissions(&plan.cut(), &slurm, &missing).unwrap();
         assert_eq!(
             all.iter().map(|s| s.shards.len()).collect::<Vec<_>>(),
             [1001, 1001, 498]

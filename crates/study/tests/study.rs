@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use metalith_core::Silent;
 use metalith_core::document::Scalar;
 use metalith_picture::restore::RestorationMethod;
-use metalith_picture::scene::{BuiltIn, chart};
+use metalith_picture::scene::{BuiltIn, SceneFile, chart, read_scene};
 use metalith_picture::{Rehearsal, Studio, scores};
-use metalith_study::{Plan, PlanSettings, Run, merge, plan, run_shard, status, write_page};
+use metalith_study::{PairsRequest, Plan, PlanSettings, Run, Work, merge, plan, plan_pairs, write_page};
 
 /// A design that is solved in some seconds: one small lens, one wavelength and white light.
 fn tolerance(folder: &Path, draws: u64) -> PathBuf {
@@ -52,6 +52,10 @@ at_least = 0.01
     path
 }
 
+fn run_shard(plan: &Plan, number: u64) -> metalith_core::Result<()> {
+    Work::Study(plan.clone()).run(&[number], &Silent)
+}
+
 fn in_shards(tolerance: &Path, folder: &Path, draws_per_shard: u64) -> Plan {
     let settings = PlanSettings {
         draws_per_shard: Some(draws_per_shard),
@@ -66,10 +70,10 @@ fn the_draws_depend_neither_on_the_cut_nor_on_the_order_nor_on_threads() {
     let path = tolerance(folder.path(), 7);
     let one = in_shards(&path, &folder.path().join("one"), 7);
     let many = in_shards(&path, &folder.path().join("many"), 3);
-    assert_eq!((one.shards(), many.shards()), (1, 3));
+    assert_eq!((one.cut().shards(), many.cut().shards()), (1, 3));
     assert_eq!(one.key, many.key);
     let single = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    single.install(|| run_shard(&one, 0, &Silent)).unwrap();
+    single.install(|| run_shard(&one, 0)).unwrap();
     let run = Run::open(&many).unwrap();
     for shard in [2, 0, 1] {
         run.shard(shard, &Silent).unwrap();
@@ -121,7 +125,7 @@ fn a_design_of_a_grid_is_the_design_of_its_own_file() {
         });
         fs::write(folder.join("design.toml"), design).unwrap();
         let plan = in_shards(&path, &folder.join("study"), 2);
-        run_shard(&plan, 0, &Silent).unwrap();
+        run_shard(&plan, 0).unwrap();
         let draws = merge(&plan, 0, &Silent).unwrap().draws;
         let figures: Vec<_> = draws.into_iter().map(|d| (d.figures, d.reached)).collect();
         (figures, fs::read(plan.folder.join("layout.gds")).unwrap())
@@ -155,7 +159,7 @@ fn designs_of_a_grid_are_each_judged_by_their_own_layout_and_tables() {
     assert_eq!((one.layouts.len(), one.stacks), (4, 2));
     assert_eq!(one.cells[0], one.cells[1]);
     assert_ne!(one.cells[1], one.cells[2]);
-    run_shard(&one, 0, &Silent).unwrap();
+    run_shard(&one, 0).unwrap();
     let run = Run::open(&many).unwrap();
     for shard in [4, 1, 0, 3, 2] {
         run.shard(shard, &Silent).unwrap();
@@ -208,34 +212,34 @@ fn shards_are_whole_are_of_one_plan_and_are_counted() {
         missing.contains("4 of 4 draws are missing") && missing.contains("0-3"),
         "{missing}"
     );
-    run_shard(&made, 0, &Silent).unwrap();
+    run_shard(&made, 0).unwrap();
     // A shard that is there is left as it is, without reading anything else.
     let bank = study.join("cells.bank");
     let kept = fs::read(&bank).unwrap();
     fs::remove_file(&bank).unwrap();
-    run_shard(&made, 0, &Silent).unwrap();
-    let refused = run_shard(&made, 1, &Silent).err().unwrap().to_string();
+    run_shard(&made, 0).unwrap();
+    let refused = run_shard(&made, 1).err().unwrap().to_string();
     assert!(refused.contains("cells.bank"), "a shard makes no tables: {refused}");
     fs::write(&bank, &kept[..kept.len() - 1]).unwrap();
-    let refused = run_shard(&made, 1, &Silent).err().unwrap().to_string();
+    let refused = run_shard(&made, 1).err().unwrap().to_string();
     assert!(refused.contains("no tables of its own"), "{refused}");
     fs::write(&bank, &kept).unwrap();
-    run_shard(&made, 1, &Silent).unwrap();
-    assert_eq!(status(&made).unwrap().finished, 2);
+    run_shard(&made, 1).unwrap();
+    assert_eq!(made.cut().status().unwrap().finished, 2);
     // The same draws twice.
-    let twice = made.shard_path(7);
-    fs::copy(made.shard_path(0), &twice).unwrap();
+    let twice = made.cut().path(7);
+    fs::copy(made.cut().path(0), &twice).unwrap();
     let double = merge(&made, 0, &Silent).err().unwrap().to_string();
     assert!(double.contains("twice") && double.contains("000007.jsonl"), "{double}");
     fs::remove_file(&twice).unwrap();
     // A part of another plan.
-    let own = fs::read_to_string(made.shard_path(1)).unwrap();
-    fs::write(made.shard_path(1), own.replace(&made.key, &"0".repeat(64))).unwrap();
-    let foreign = run_shard(&made, 1, &Silent).err().unwrap().to_string();
+    let own = fs::read_to_string(made.cut().path(1)).unwrap();
+    fs::write(made.cut().path(1), own.replace(&made.key, &"0".repeat(64))).unwrap();
+    let foreign = run_shard(&made, 1).err().unwrap().to_string();
     assert!(foreign.contains("another plan"), "{foreign}");
     assert!(merge(&made, 0, &Silent).is_err());
-    assert_eq!(status(&made).unwrap().unusable.len(), 1);
-    fs::write(made.shard_path(1), own).unwrap();
+    assert_eq!(made.cut().status().unwrap().unusable.len(), 1);
+    fs::write(made.cut().path(1), own).unwrap();
     merge(&made, 0, &Silent).unwrap();
     // A design that has changed since.
     let design = folder.path().join("design.toml");
@@ -311,7 +315,7 @@ fn pictures_are_figures_of_a_draw() {
         let limit = "[[limit]]\nfigure = \"picture_psnr_db_centre\"\nat_least = 1.0\n";
         fs::write(&path, format!("{head}{grid}{picture}{limit}")).unwrap();
         let plan = in_shards(&path, &folder.path().join(kernels), 2);
-        run_shard(&plan, 0, &Silent).unwrap();
+        run_shard(&plan, 0).unwrap();
         let merged = merge(&plan, 1, &Silent).unwrap();
         assert_eq!(merged.shown[0].record.draw, merged.worst[0]);
         assert!(merged.shown[0].picture.is_some());
@@ -370,5 +374,77 @@ fn mistakes_of_a_picture_are_told_with_their_place() {
         "use one of: tikhonov",
     ] {
         assert!(error.contains(part), "{part} is not in {error}");
+    }
+}
+
+/// Frames of shards are those that one run writes, to the byte, and another image is noticed.
+#[test]
+#[ignore = "second tier: CPU time, run by .ci/run"]
+fn pairs_of_shards_are_those_of_one_run() {
+    let folder = tempfile::tempdir().unwrap();
+    tolerance(folder.path(), 1);
+    let at = |name: &str| folder.path().join(name);
+    fs::write(at("camera.toml"), SMALL_CAMERA).unwrap();
+    let design = metalith_design::Design::read(&at("design.toml")).unwrap();
+    let array = metalith_design::array::PillarArray::build(&design, &Silent).unwrap();
+    let layout = at("layout.gds");
+    metalith_layout::write_pillars(&design, &array, design.layout.hierarchy, &layout, &Silent).unwrap();
+    let image = |k: usize| {
+        let stripes = ndarray::Array3::from_shape_fn((64, 64, 3), |(y, x, c)| ((y * k + x + c) % 7) as f64 / 7.0);
+        let path = at(&format!("image_{k}.png"));
+        metalith_picture::write_picture(&path, &stripes).unwrap();
+        path
+    };
+    let images: Vec<PathBuf> = (1..6).map(image).collect();
+    let request = PairsRequest {
+        design: at("design.toml"),
+        layout: layout.clone(),
+        camera: at("camera.toml"),
+        model: None,
+        field_deg: 50.0,
+        seed: 3,
+        images: images.clone(),
+    };
+    let planned = plan_pairs(&request, &at("parts"), Some(2), &Silent).unwrap();
+    assert_eq!(plan_pairs(&request, &at("parts"), None, &Silent).unwrap(), planned);
+    let Work::Pairs(work) = Work::open(&at("parts")).unwrap() else {
+        panic!("the folder holds pairs");
+    };
+    assert_eq!(work.cut().shards(), 3);
+    let run = |shards: &[u64]| Work::Pairs(work.clone()).run(shards, &Silent);
+    run(&[2, 0]).unwrap();
+    assert_eq!(work.cut().status().unwrap().missing, [1]);
+    let missing = work.merge().unwrap_err().to_string();
+    assert!(missing.contains("2 of 5 pairs are missing"), "{missing}");
+    // Shards make no kernels of their own.
+    fs::rename(at("parts/kernels"), at("aside")).unwrap();
+    let refused = run(&[1]).unwrap_err().to_string();
+    assert!(refused.contains("makes no kernels"), "{refused}");
+    fs::rename(at("aside"), at("parts/kernels")).unwrap();
+    let kept = fs::read(&images[3]).unwrap();
+    fs::copy(&images[0], &images[3]).unwrap();
+    let changed = run(&[1]).unwrap_err().to_string();
+    assert!(changed.contains("image_4.png has changed"), "{changed}");
+    fs::write(&images[3], kept).unwrap();
+    run(&[1]).unwrap();
+    work.merge().unwrap();
+
+    let scene = |path: &Path| {
+        read_scene(&SceneFile {
+            path: path.to_owned(),
+            wavelengths_nm: None,
+            field_deg: 50.0,
+            distance_um: f64::INFINITY,
+        })
+    };
+    let camera = metalith_camera::Camera::read(&at("camera.toml")).unwrap();
+    let kept = metalith_picture::KeptKernels::made(&at("alone"));
+    let first = scene(&images[0]).unwrap();
+    let studio = Studio::open_kept(&design, &layout, &camera, None, &first, &kept, &Silent).unwrap();
+    metalith_picture::write_dataset(&studio, &studio.simulation(), &images, &scene, 3, &at("alone"), &Silent).unwrap();
+    let names = (0..5).flat_map(|k| ["frame", "truth"].map(|n| format!("000000-000999/{k:06}.{n}.png")));
+    for name in names.chain(["manifest.json".to_owned()]) {
+        let [a, b] = ["parts", "alone"].map(|f| fs::read(at(f).join(&name)).unwrap());
+        assert!(a == b, "{name}");
     }
 }

@@ -1,0 +1,281 @@
+//! Frames and scenes for learning, in shards: the same files as `metalith dataset` writes alone.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use metalith_camera::Camera;
+use metalith_core::file::read_at_most;
+use metalith_core::text::hex;
+use metalith_core::{Error, Progress, Result, WholeFile};
+use metalith_design::Design;
+use metalith_made::CalibratedModel;
+use metalith_picture::scene::{SceneFile, SceneImage, read_scene};
+use metalith_picture::{DatasetManifest, DatasetPair, FrameOperator, KeptKernels, Studio, write_manifest, write_pair};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::cut::{Cut, parts_per_shard};
+use crate::plan::{MANIFEST, absolute, manifest};
+
+/// Version of the format of the manifest.
+const SCHEMA: u32 = 1;
+/// Longest image (bytes).
+const LONGEST: u64 = 1 << 30;
+
+/// What a set for learning is made of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PairsRequest {
+    pub design: PathBuf,
+    pub layout: PathBuf,
+    pub camera: PathBuf,
+    /// The chip as made; as drawn if left out.
+    pub model: Option<PathBuf>,
+    /// Angle from the left to the right edge of a scene (degrees).
+    pub field_deg: f64,
+    /// Of the noise.
+    pub seed: u64,
+    /// In the order of the pairs.
+    pub images: Vec<PathBuf>,
+}
+
+/// The manifest of such a plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PairsPlan {
+    schema: u32,
+    work: String,
+    /// SHA-256 of all that decides the pairs, in hexadecimal.
+    pub key: String,
+    pub request: PairsRequest,
+    /// SHA-256 of each image.
+    pub digests: Vec<String>,
+    pub images_per_shard: u64,
+    /// Wall time of the first pair on the machine and threads of the plan (s).
+    pub seconds_per_image: f64,
+    /// The manifest of the set, but for its pairs.
+    head: DatasetManifest,
+    /// Folder of the plan and of the pairs.
+    #[serde(skip)]
+    pub folder: PathBuf,
+}
+
+fn image_digest(image: &Path) -> Result<String> {
+    Ok(hex(&Sha256::digest(read_at_most(image, LONGEST, "an image")?)))
+}
+
+impl PairsPlan {
+    /// What stands in the manifest under `work`.
+    pub(crate) const WORK: &'static str = "dataset";
+
+    /// The plan in a folder.
+    ///
+    /// # Errors
+    /// If there is none, or its manifest cannot be read.
+    pub fn open(folder: &Path) -> Result<Self> {
+        let mut plan: Self = manifest(folder)?;
+        if plan.schema != SCHEMA || plan.images_per_shard == 0 || plan.digests.len() != plan.request.images.len() {
+            return Err(Error::invalid(
+                format!("{} is the manifest of another version", folder.join(MANIFEST).display()),
+                "plan the set again into another folder",
+            ));
+        }
+        plan.folder = folder.to_owned();
+        Ok(plan)
+    }
+
+    /// How it is cut.
+    pub fn cut(&self) -> Cut {
+        Cut {
+            key: self.key.clone(),
+            part: "pair",
+            parts: self.digests.len() as u64,
+            per_shard: self.images_per_shard,
+            folder: self.folder.clone(),
+        }
+    }
+
+    /// Make shards with their pairs. Kernels are those of the plan: none are made here.
+    ///
+    /// # Errors
+    /// If a file has changed since it was planned, kernels are not there, a pair cannot be made, or the user stopped it.
+    pub fn run(&self, shards: &[u64], progress: &dyn Progress) -> Result<()> {
+        if hex(&self.request.key(&self.digests)?) != self.key {
+            return Err(Error::invalid(
+                format!(
+                    "a file of the set in {} has changed since it was planned, or another version of the program planned it",
+                    self.folder.display()
+                ),
+                "plan it again into another folder",
+            ));
+        }
+        let studio = self.request.studio(&KeptKernels::only(&self.folder), progress)?;
+        let operator = studio.simulation();
+        let pair = |k: u64| {
+            let k = k as usize;
+            let image = &self.request.images[k];
+            // Before anything of another image is written.
+            if image_digest(image)? != self.digests[k] {
+                return Err(Error::invalid(
+                    format!("{} has changed since the set was planned", image.display()),
+                    "plan it again into another folder",
+                ));
+            }
+            self.request.write(&studio, &operator, k, &self.folder)
+        };
+        shards.iter().try_for_each(|n| self.cut().make(*n, &pair, progress))
+    }
+
+    /// Write the manifest of the set when all pairs are there.
+    ///
+    /// # Errors
+    /// If pairs are missing or there twice, or the file cannot be written.
+    pub fn merge(&self) -> Result<DatasetManifest> {
+        let pairs: Vec<DatasetPair> = self.cut().whole(&|_| None)?;
+        let manifest = DatasetManifest {
+            pairs,
+            ..self.head.clone()
+        };
+        write_manifest(&self.folder, &manifest)?;
+        Ok(manifest)
+    }
+}
+
+impl PairsRequest {
+    /// SHA-256 of everything that decides the pairs.
+    fn key(&self, digests: &[String]) -> Result<[u8; 32]> {
+        let design = Design::read(&self.design)?;
+        let mut hash = Sha256::new();
+        let solver = metalith_cell::kept::solver_of(design.cell.shape);
+        hash.update(format!(
+            "{} {solver} {} {} {}",
+            env!("CARGO_PKG_VERSION"),
+            design.digest(),
+            self.field_deg,
+            self.seed
+        ));
+        let mut files = vec![self.layout.clone()];
+        files.extend(Camera::read(&self.camera)?.files);
+        files.extend(self.model.clone());
+        for path in files {
+            let mut file = std::fs::File::open(&path).map_err(Error::io("read", &path))?;
+            let mut one = Sha256::new();
+            std::io::copy(&mut file, &mut one).map_err(Error::io("read", &path))?;
+            hash.update(one.finalize());
+        }
+        for (image, digest) in self.images.iter().zip(digests) {
+            hash.update(image.file_name().unwrap_or_default().as_encoded_bytes());
+            hash.update(digest);
+        }
+        Ok(hash.finalize().into())
+    }
+
+    fn write(&self, studio: &Studio, operator: &FrameOperator<'_>, k: usize, folder: &Path) -> Result<DatasetPair> {
+        write_pair(
+            studio,
+            operator,
+            &self.images[k],
+            k,
+            &|p| self.scene(p),
+            self.seed,
+            folder,
+        )
+    }
+
+    fn scene(&self, image: &Path) -> Result<SceneImage> {
+        read_scene(&SceneFile {
+            path: image.to_owned(),
+            wavelengths_nm: None,
+            field_deg: self.field_deg,
+            distance_um: f64::INFINITY,
+        })
+    }
+
+    fn studio(&self, kept: &KeptKernels, progress: &dyn Progress) -> Result<Studio> {
+        let design = Design::read(&self.design)?;
+        let camera = Camera::read(&self.camera)?;
+        let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
+        let first = self.images.first();
+        let first = first.ok_or_else(|| Error::invalid("no images", "give a folder with at least one"))?;
+        Studio::open_kept(
+            &design,
+            &self.layout,
+            &camera,
+            model.as_ref(),
+            &self.scene(first)?,
+            kept,
+            progress,
+        )
+    }
+}
+
+/// Plan a set for learning into a folder: kernels, the first pair to know its time, manifest. A folder that holds the plan
+/// of the same set keeps it.
+///
+/// # Errors
+/// If a file cannot be used, the folder holds another plan, or the user stopped it.
+pub fn plan_pairs(
+    request: &PairsRequest,
+    folder: &Path,
+    images_per_shard: Option<u64>,
+    progress: &dyn Progress,
+) -> Result<PairsPlan> {
+    let request = request.placed()?;
+    std::fs::create_dir_all(folder).map_err(Error::io("create the folder", folder))?;
+    progress.begin("reading the images", request.images.len() as u64);
+    let mut digests = Vec::new();
+    for image in &request.images {
+        if progress.stopped() {
+            return Err(Error::Interrupted);
+        }
+        digests.push(image_digest(image)?);
+        progress.advance(1);
+    }
+    let key = hex(&request.key(&digests)?);
+    if folder.join(MANIFEST).is_file() {
+        let known = PairsPlan::open(folder)?;
+        if known.key == key {
+            return Ok(known);
+        }
+        return Err(Error::invalid(
+            format!(
+                "{} holds another plan, or one whose files have changed since",
+                folder.display()
+            ),
+            "name another folder with --out, or remove this one",
+        ));
+    }
+    let studio = request.studio(&KeptKernels::made(folder), progress)?;
+    let begun = Instant::now();
+    request.write(&studio, &studio.simulation(), 0, folder)?;
+    let seconds_per_image = begun.elapsed().as_secs_f64();
+    let plan = PairsPlan {
+        schema: SCHEMA,
+        work: PairsPlan::WORK.into(),
+        key,
+        images_per_shard: parts_per_shard(images_per_shard, seconds_per_image, digests.len() as u64),
+        seconds_per_image,
+        head: DatasetManifest::of(&studio, request.seed),
+        request,
+        digests,
+        folder: folder.to_owned(),
+    };
+    let mut text = serde_json::to_string_pretty(&plan).expect("plain data serialises");
+    text.push('\n');
+    WholeFile::write(&folder.join(MANIFEST), text.as_bytes())?;
+    Ok(plan)
+}
+
+impl PairsRequest {
+    /// The same with paths that hold wherever a shard is made.
+    fn placed(&self) -> Result<Self> {
+        Ok(Self {
+            design: absolute(&self.design)?,
+            layout: absolute(&self.layout)?,
+            camera: absolute(&self.camera)?,
+            model: self.model.as_deref().map(absolute).transpose()?,
+            images: self.images.iter().map(|i| absolute(i)).collect::<Result<_>>()?,
+            ..self.clone()
+        })
+    }
+}

@@ -1,0 +1,66 @@
+//! The folder of a plan, whatever the work is.
+
+use std::path::Path;
+
+use metalith_core::{Progress, Result};
+
+use crate::cut::Cut;
+use crate::pairs::PairsPlan;
+use crate::plan::{Plan, manifest};
+use crate::shard::Run;
+
+/// Work that was planned into a folder.
+pub enum Work {
+    /// Draws of a tolerance.
+    Study(Plan),
+    /// Frames and scenes for learning.
+    Pairs(PairsPlan),
+}
+
+impl Work {
+    /// The work in a folder.
+    ///
+    /// # Errors
+    /// If there is none, or its manifest cannot be read.
+    pub fn open(folder: &Path) -> Result<Self> {
+        let known: serde_json::Value = manifest(folder)?;
+        match known.get("work").and_then(|w| w.as_str()) {
+            Some(PairsPlan::WORK) => Ok(Self::Pairs(PairsPlan::open(folder)?)),
+            _ => Ok(Self::Study(Plan::open(folder)?)),
+        }
+    }
+
+    /// How it is cut.
+    pub fn cut(&self) -> Cut {
+        match self {
+            Self::Study(plan) => plan.cut(),
+            Self::Pairs(plan) => plan.cut(),
+        }
+    }
+
+    /// Make some shards, one after the other; those that are there are left as they are, and nothing is read but the
+    /// manifest if all are.
+    ///
+    /// # Errors
+    /// If a file of the plan has changed, a part cannot be made, a file cannot be written or is of another plan, or the user
+    /// stopped it.
+    pub fn run(&self, shards: &[u64], progress: &dyn Progress) -> Result<()> {
+        let cut = self.cut();
+        let mut missing = Vec::new();
+        for number in shards {
+            if !cut.finished(*number)? {
+                missing.push(*number);
+            }
+        }
+        if missing.is_empty() {
+            return Ok(());
+        }
+        match self {
+            Self::Study(plan) => {
+                let run = Run::open(plan)?;
+                missing.into_iter().try_for_each(|n| run.shard(n, progress))
+            }
+            Self::Pairs(plan) => plan.run(&missing, progress),
+        }
+    }
+}
