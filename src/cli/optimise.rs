@@ -3,14 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::cell::{RigorousCell, cache_folder};
+use metalith::cell::cache_folder;
 use metalith::layout::read_pillars;
 use metalith::optimise::{
-    Checkpoint, Deconvolution, Judged, OptimiseReport, OptimiseTask, Optimised, OverWavelength, cells_off_height,
-    lens_alone, mean_and_deviation, views, wavelengths, write_phase_table,
+    Checkpoint, Deconvolution, Judged, OptimiseReport, OptimiseTask, Optimised, OverWavelength, TaskCells, lens_alone,
+    mean_and_deviation, views, wavelengths, write_phase_table,
 };
 use metalith::report::sig;
-use metalith::{CellModel, Design, Fidelity, Hierarchy, PillarArray, Result, cell_models, write_pillars};
+use metalith::study::plan_starts;
+use metalith::{Design, Hierarchy, PillarArray, Result, write_pillars};
 
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
@@ -45,52 +46,15 @@ pub struct OptimiseArgs {
     /// Print `report.json` to standard output.
     #[arg(long)]
     json: bool,
-}
 
-/// Cells that a design is optimised and judged with.
-struct Cells {
-    /// What is optimised with.
-    own: Box<dyn CellModel>,
-    /// What is judged with, if there is a report.
-    judge: Option<Box<dyn CellModel>>,
-    off_height: Vec<RigorousCell>,
-}
+    /// Only plan so many starts with other random numbers, for shards that any number of machines make: `metalith study run`,
+    /// `submit`, `status` and `merge` of the folder. `merge` writes the phase of the best.
+    #[arg(long, value_name = "STARTS", value_parser = clap::value_parser!(u64).range(1..=1_000_000), conflicts_with_all = ["phase", "fresh", "no_report", "json"])]
+    plan: Option<u64>,
 
-impl Cells {
-    fn of(design: &Design, report: bool, terminal: &Terminal) -> Result<Self> {
-        let cache = cache_folder();
-        let rigorous = || -> Result<Box<dyn CellModel>> {
-            Ok(Box::new(
-                RigorousCell::obtain(&design.table_spec()?, cache.as_deref(), terminal)?.0,
-            ))
-        };
-        let fidelity = design.optimise.fidelity;
-        let own = match fidelity {
-            Fidelity::Rigorous => rigorous()?,
-            _ => cell_models(design, &[fidelity])?.remove(0),
-        };
-        let judge = (report && fidelity != Fidelity::Rigorous).then(rigorous).transpose()?;
-        let off_height = match &design.optimise.robust {
-            Some(robust) if fidelity == Fidelity::Rigorous && robust.height > 0.0 => {
-                cells_off_height(&design.table_spec()?, robust, cache.as_deref(), terminal)?
-            }
-            _ => Vec::new(),
-        };
-        Ok(Self { own, judge, off_height })
-    }
-
-    fn own(&self) -> &dyn CellModel {
-        self.own.as_ref()
-    }
-
-    fn rigorous(&self) -> &dyn CellModel {
-        self.judge.as_deref().unwrap_or(self.own())
-    }
-
-    fn all(&self) -> Vec<&dyn CellModel> {
-        let off_height = self.off_height.iter().map(|c| c as &dyn CellModel);
-        std::iter::once(self.own()).chain(off_height).collect()
-    }
+    /// Starts of a shard.
+    #[arg(long, value_name = "N", requires = "plan", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
+    starts_per_shard: u64,
 }
 
 pub fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
@@ -100,10 +64,21 @@ pub fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
         .out
         .clone()
         .unwrap_or_else(|| PathBuf::from("out").join(&design.name).join("optimise"));
+    if let Some(starts) = args.plan {
+        let plan = plan_starts(&args.design, starts, args.starts_per_shard, &folder, terminal)?;
+        terminal.clear();
+        print_line!(
+            "{} starts in {} shards: {}",
+            plan.starts,
+            plan.cut().shards(),
+            folder.display()
+        );
+        return Ok(Outcome::Fine);
+    }
     let phase = args.phase.clone().unwrap_or_else(|| folder.join("phase.csv"));
     let kept = folder.join("checkpoint.bin");
     let task = OptimiseTask::of(&design)?;
-    let cells = Cells::of(&design, !args.no_report, terminal)?;
+    let cells = TaskCells::of(&design, !args.no_report, cache_folder().as_deref(), terminal)?;
     let _turn = terminal.turn_at(&folder)?;
     let checkpoint = if args.fresh {
         Checkpoint::begin(&design)
@@ -169,7 +144,7 @@ fn findings(
     args: &OptimiseArgs,
     design: &Design,
     task: &OptimiseTask,
-    cells: &Cells,
+    cells: &TaskCells,
     found: &Optimised,
     phase: &Path,
     folder: &Path,
@@ -236,7 +211,7 @@ fn findings(
 /// with the same drawn errors.
 fn with_errors(
     task: &OptimiseTask,
-    cells: &Cells,
+    cells: &TaskCells,
     found: &Optimised,
     terminal: &Terminal,
 ) -> Result<Vec<(&'static str, Vec<f64>)>> {
@@ -267,7 +242,7 @@ fn terminal_step(terminal: &Terminal, what: &str) {
 /// Expected PSNR at wavelengths half a step off those optimised on, for designs that ask for it.
 fn expected_images(
     task: &OptimiseTask,
-    cells: &Cells,
+    cells: &TaskCells,
     before: &[u16],
     after: &[u16],
     terminal: &Terminal,

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 use std::process::{Child, Command};
 
 use clap::{Args, Subcommand};
-use metalith::study::{PairsPlan, Plan, PlanSettings, Slurm, Work, merge, plan, submissions, write_page};
+use metalith::report::sig;
+use metalith::study::{PairsPlan, Plan, PlanSettings, Slurm, StartsPlan, Work, merge, plan, submissions, write_page};
 use metalith::{Error, Progress, Result};
 
 use super::{Outcome, Terminal, print_json, print_line};
@@ -254,18 +255,39 @@ fn merge_shards(args: &MergeArgs, terminal: &Terminal) -> Result<Outcome> {
     match Work::open(&args.study)? {
         Work::Study(plan) => merge_study(&plan, args, terminal),
         Work::Pairs(plan) => merge_pairs(&plan, args),
+        Work::Starts(plan) => merge_starts(&plan, args),
+    }
+}
+
+/// Work that is no study has no table of draws.
+fn without_table(args: &MergeArgs) -> Result<()> {
+    match &args.out {
+        None => Ok(()),
+        Some(_) => Err(Error::invalid(
+            "this work has no table of draws",
+            "leave --out out: files are written into the folder of the plan",
+        )),
     }
 }
 
 fn merge_pairs(plan: &PairsPlan, args: &MergeArgs) -> Result<Outcome> {
-    if args.out.is_some() {
-        return Err(Error::invalid(
-            "a set of pairs has no table of draws",
-            "leave --out out: its manifest is written beside the pairs",
-        ));
-    }
+    without_table(args)?;
     let manifest = plan.merge()?;
     print_line!("{} pairs in {}", manifest.pairs.len(), args.study.display());
+    Ok(Outcome::Fine)
+}
+
+fn merge_starts(plan: &StartsPlan, args: &MergeArgs) -> Result<Outcome> {
+    without_table(args)?;
+    let result = plan.merge()?;
+    let best = &result.starts[result.best];
+    print_line!(
+        "best of {} starts: number {}, merit {}",
+        result.starts.len(),
+        best.start,
+        sig(best.merit, 4)
+    );
+    print_line!("phase: {}", result.phase.display());
     Ok(Outcome::Fine)
 }
 

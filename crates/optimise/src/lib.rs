@@ -21,6 +21,7 @@
 
 mod adam;
 mod blocks;
+mod cells;
 mod chain;
 mod checkpoint;
 mod deconvolution;
@@ -54,6 +55,7 @@ mod window;
 
 pub use adam::Adam;
 pub use blocks::BlockExchange;
+pub use cells::TaskCells;
 pub use checkpoint::Checkpoint;
 pub use deconvolution::Deconvolution;
 pub use exchange::{Exchange, Schedule};

@@ -94,7 +94,7 @@ pub fn write_dataset(
             .push(write_pair(studio, operator, image, i, read, seed, folder)?);
         progress.advance(1);
     }
-    write_manifest(folder, &manifest)?;
+    write_dataset_manifest(folder, &manifest)?;
     Ok(manifest)
 }
 
@@ -102,7 +102,7 @@ pub fn write_dataset(
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn write_manifest(folder: &Path, manifest: &DatasetManifest) -> Result<()> {
+pub fn write_dataset_manifest(folder: &Path, manifest: &DatasetManifest) -> Result<()> {
     metalith_report::write_json(&folder.join("manifest.json"), "dataset", manifest)
 }
 

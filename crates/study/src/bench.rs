@@ -14,7 +14,7 @@ use metalith_verify::{ReadLayout, SimulationCases, Verification, wavelengths_um}
 
 use crate::draw::Drawer;
 use crate::picture::{KnownChip, PictureBench, TakenPicture};
-use crate::plan::{Plan, key};
+use crate::plan::{Plan, another_plan, key};
 use crate::record::{DrawRecord, LimitStatement, figures, finite};
 use crate::tolerance::Tolerance;
 
@@ -119,14 +119,7 @@ impl Bench {
             None
         };
         let Some(key) = known.filter(|key| hex(key) == plan.key) else {
-            return Err(Error::invalid(
-                format!(
-                    "the design, its layout, or another file of the study in {} has changed since it was planned, or \
-                     another version of the program planned it",
-                    plan.folder.display()
-                ),
-                "plan it again into another folder",
-            ));
+            return Err(another_plan(&plan.folder));
         };
         Self::new(tolerance, key, files)
     }

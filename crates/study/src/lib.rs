@@ -19,7 +19,7 @@
 //! | `picture` | the picture that each draw takes |
 //! | `record` | what is kept of one draw |
 //! | `plan`, `shard` | the folder of a study |
-//! | `pairs` | frames and scenes for learning, in shards |
+//! | `pairs`, `starts` | frames and scenes for learning, starts of the optimiser, in shards |
 //! | `cut`, `work` | shards of whatever work |
 //! | `merge`, `yields`, `response`, `points` | all draws, and what they say |
 //! | `columns`, `parquet_file` | the draws as a table |
@@ -44,6 +44,7 @@ mod record;
 mod response;
 mod shard;
 mod slurm;
+mod starts;
 mod tolerance;
 mod work;
 mod yields;
@@ -62,6 +63,7 @@ pub use record::{DrawRecord, LimitStatement};
 pub use response::{Response, Tightening};
 pub use shard::Run;
 pub use slurm::{Slurm, Submission, submissions};
+pub use starts::{StartRecord, StartsPlan, StartsResult, plan_starts};
 pub use tolerance::{Distribution, FigureLimit, Grid, Tolerance, Varied};
 pub use work::Work;
 pub use yields::{Yield, wilson};

@@ -6,16 +6,18 @@ use std::time::Instant;
 use metalith_camera::Camera;
 use metalith_core::file::read_at_most;
 use metalith_core::text::hex;
-use metalith_core::{Error, Progress, Result, WholeFile};
+use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
 use metalith_made::CalibratedModel;
 use metalith_picture::scene::{SceneFile, SceneImage, read_scene};
-use metalith_picture::{DatasetManifest, DatasetPair, FrameOperator, KeptKernels, Studio, write_manifest, write_pair};
+use metalith_picture::{
+    DatasetManifest, DatasetPair, FrameOperator, KeptKernels, Studio, write_dataset_manifest, write_pair,
+};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::cut::{Cut, parts_per_shard};
-use crate::plan::{MANIFEST, absolute, manifest};
+use crate::plan::{MANIFEST, absolute, another_plan, manifest, write_manifest};
 
 /// Version of the format of the manifest.
 const SCHEMA: u32 = 1;
@@ -75,10 +77,7 @@ impl PairsPlan {
     pub fn open(folder: &Path) -> Result<Self> {
         let mut plan: Self = manifest(folder)?;
         if plan.schema != SCHEMA || plan.images_per_shard == 0 || plan.digests.len() != plan.request.images.len() {
-            return Err(Error::invalid(
-                format!("{} is the manifest of another version", folder.join(MANIFEST).display()),
-                "plan the set again into another folder",
-            ));
+            return Err(another_plan(folder));
         }
         plan.folder = folder.to_owned();
         Ok(plan)
@@ -101,13 +100,7 @@ impl PairsPlan {
     /// If a file has changed since it was planned, kernels are not there, a pair cannot be made, or the user stopped it.
     pub fn run(&self, shards: &[u64], progress: &dyn Progress) -> Result<()> {
         if hex(&self.request.key(&self.digests)?) != self.key {
-            return Err(Error::invalid(
-                format!(
-                    "a file of the set in {} has changed since it was planned, or another version of the program planned it",
-                    self.folder.display()
-                ),
-                "plan it again into another folder",
-            ));
+            return Err(another_plan(&self.folder));
         }
         let studio = self.request.studio(&KeptKernels::only(&self.folder), progress)?;
         let operator = studio.simulation();
@@ -136,7 +129,7 @@ impl PairsPlan {
             pairs,
             ..self.head.clone()
         };
-        write_manifest(&self.folder, &manifest)?;
+        write_dataset_manifest(&self.folder, &manifest)?;
         Ok(manifest)
     }
 }
@@ -237,13 +230,7 @@ pub fn plan_pairs(
         if known.key == key {
             return Ok(known);
         }
-        return Err(Error::invalid(
-            format!(
-                "{} holds another plan, or one whose files have changed since",
-                folder.display()
-            ),
-            "name another folder with --out, or remove this one",
-        ));
+        return Err(another_plan(folder));
     }
     let studio = request.studio(&KeptKernels::made(folder), progress)?;
     let begun = Instant::now();
@@ -260,9 +247,7 @@ pub fn plan_pairs(
         digests,
         folder: folder.to_owned(),
     };
-    let mut text = serde_json::to_string_pretty(&plan).expect("plain data serialises");
-    text.push('\n');
-    WholeFile::write(&folder.join(MANIFEST), text.as_bytes())?;
+    write_manifest(folder, &plan)?;
     Ok(plan)
 }
 

@@ -121,12 +121,29 @@ pub(crate) fn manifest<T: DeserializeOwned>(folder: &Path) -> Result<T> {
     serde_json::from_slice(&bytes).map_err(|e| fault(folder, e.to_string()))
 }
 
+pub(crate) fn write_manifest(folder: &Path, plan: &impl Serialize) -> Result<()> {
+    let mut text = serde_json::to_string_pretty(plan).expect("plain data serialises");
+    text.push('\n');
+    WholeFile::write(&folder.join(MANIFEST), text.as_bytes())
+}
+
+/// What to say of a folder whose plan is not that of these files.
+pub(crate) fn another_plan(folder: &Path) -> Error {
+    Error::invalid(
+        format!(
+            "{} holds another plan, or a file of it has changed since, or another version of the program planned it",
+            folder.display()
+        ),
+        "plan into another folder with --out, or remove this one",
+    )
+}
+
 fn fault(folder: &Path, what: String) -> Error {
     Error::Table {
         path: folder.join(MANIFEST),
         line: None,
         what,
-        hint: "plan it again with `metalith study plan`, or `metalith dataset --plan`".into(),
+        hint: "plan it again with `metalith study plan`, or `--plan` of `metalith dataset`, `optimize`".into(),
     }
 }
 
@@ -164,13 +181,7 @@ pub fn plan(tolerance_path: &Path, folder: &Path, settings: PlanSettings, progre
         if known.key == hex(&key) {
             return Ok(known);
         }
-        return Err(Error::invalid(
-            format!(
-                "{} holds another study, or one whose files have changed since",
-                folder.display()
-            ),
-            "name another folder with --out, or remove this one",
-        ));
+        return Err(another_plan(folder));
     }
     let designs = tolerance.designs();
     // Where each design would keep tables of its own.
@@ -199,9 +210,7 @@ pub fn plan(tolerance_path: &Path, folder: &Path, settings: PlanSettings, progre
         plan.take(design, designs, &bench, progress)?;
     }
     plan.draws_per_shard = parts_per_shard(settings.draws_per_shard, plan.seconds_per_draw, draws);
-    let mut text = serde_json::to_string_pretty(&plan).expect("plain data serialises");
-    text.push('\n');
-    WholeFile::write(&folder.join(MANIFEST), text.as_bytes())?;
+    write_manifest(folder, &plan)?;
     Ok(plan)
 }
 

@@ -8,6 +8,7 @@ use crate::cut::Cut;
 use crate::pairs::PairsPlan;
 use crate::plan::{Plan, manifest};
 use crate::shard::Run;
+use crate::starts::StartsPlan;
 
 /// Work that was planned into a folder.
 pub enum Work {
@@ -15,6 +16,8 @@ pub enum Work {
     Study(Plan),
     /// Frames and scenes for learning.
     Pairs(PairsPlan),
+    /// Starts of the optimiser.
+    Starts(StartsPlan),
 }
 
 impl Work {
@@ -26,6 +29,7 @@ impl Work {
         let known: serde_json::Value = manifest(folder)?;
         match known.get("work").and_then(|w| w.as_str()) {
             Some(PairsPlan::WORK) => Ok(Self::Pairs(PairsPlan::open(folder)?)),
+            Some(StartsPlan::WORK) => Ok(Self::Starts(StartsPlan::open(folder)?)),
             _ => Ok(Self::Study(Plan::open(folder)?)),
         }
     }
@@ -35,6 +39,7 @@ impl Work {
         match self {
             Self::Study(plan) => plan.cut(),
             Self::Pairs(plan) => plan.cut(),
+            Self::Starts(plan) => plan.cut(),
         }
     }
 
@@ -61,6 +66,7 @@ impl Work {
                 missing.into_iter().try_for_each(|n| run.shard(n, progress))
             }
             Self::Pairs(plan) => plan.run(&missing, progress),
+            Self::Starts(plan) => plan.run(&missing, progress),
         }
     }
 }

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 
 use metalith_core::Silent;
 use metalith_core::document::Scalar;
+use metalith_optimise::{Checkpoint, OptimiseTask, TaskCells};
 use metalith_picture::restore::RestorationMethod;
 use metalith_picture::scene::{BuiltIn, SceneFile, chart, read_scene};
 use metalith_picture::{Rehearsal, Studio, scores};
-use metalith_study::{PairsRequest, Plan, PlanSettings, Run, Work, merge, plan, plan_pairs, write_page};
+use metalith_study::{PairsRequest, Plan, PlanSettings, Run, Work, merge, plan, plan_pairs, plan_starts, write_page};
 
 /// A design that is solved in some seconds: one small lens, one wavelength and white light.
 fn tolerance(folder: &Path, draws: u64) -> PathBuf {
@@ -447,4 +448,41 @@ fn pairs_of_shards_are_those_of_one_run() {
         let [a, b] = ["parts", "alone"].map(|f| fs::read(at(f).join(&name)).unwrap());
         assert!(a == b, "{name}");
     }
+}
+
+/// The best of several starts, whoever makes them.
+#[test]
+#[ignore = "second tier: CPU time, run by .ci/run"]
+fn starts_of_the_optimiser_are_runs_with_their_seeds() {
+    let folder = tempfile::tempdir().unwrap();
+    tolerance(folder.path(), 1);
+    let path = folder.path().join("design.toml");
+    let section = "\n[optimise]\nsolver = \"exchange\"\ncell = \"published\"\nchains = 2\nhot_sweeps = 3\nblocks = 4\nseed = 5\nstart = \"random\"\n";
+    let text = fs::read_to_string(&path).unwrap();
+    let cut = text.find("\n[optimise]").unwrap_or(text.len());
+    fs::write(&path, format!("{}{section}", &text[..cut])).unwrap();
+    let planned = plan_starts(&path, 3, 2, &folder.path().join("starts"), &Silent).unwrap();
+    let work = Work::open(&planned.folder).unwrap();
+    work.run(&[1, 0], &Silent).unwrap();
+    let result = planned.merge().unwrap();
+    assert_eq!(result.starts.iter().map(|s| s.seed).collect::<Vec<_>>(), [5, 7, 9]);
+    let best = result.starts.iter().map(|s| s.merit).fold(f64::MIN, f64::max);
+    assert_eq!(result.starts[result.best].merit, best);
+    // The second one is the design with its seed.
+    let mut task = OptimiseTask::of(&metalith_design::Design::read(&path).unwrap()).unwrap();
+    task.spec.seed = 7;
+    let design = metalith_design::Design::read(&path).unwrap();
+    let cells = TaskCells::of(&design, false, None, &Silent).unwrap();
+    let own = task.solve(&cells.all(), Checkpoint::default(), &Silent).unwrap();
+    // Numbers of a line of JSON come back to rounding.
+    assert!((own.merit - result.starts[1].merit).abs() <= 1e-12 * own.merit.abs());
+    let phase = fs::read_to_string(&result.phase).unwrap();
+    assert!(phase.contains("The best of 3 starts"), "{phase}");
+    let table = fs::read_to_string(planned.folder.join("starts.csv")).unwrap();
+    assert_eq!(table.lines().count(), 4);
+    fs::write(&path, text).unwrap();
+    assert!(work.run(&[0], &Silent).is_ok(), "what is there needs no design");
+    fs::remove_file(planned.cut().path(0)).unwrap();
+    let changed = work.run(&[0], &Silent).unwrap_err().to_string();
+    assert!(changed.contains("a file of it has changed"), "{changed}");
 }

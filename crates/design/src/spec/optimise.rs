@@ -31,6 +31,16 @@ pub struct OptimiseSpec {
     pub memory_mb: u64,
 }
 
+impl OptimiseSpec {
+    /// Seeds that one run takes, one after the other from its own.
+    pub fn seeds(&self) -> u64 {
+        match self.solver {
+            SolverSpec::Exchange { chains, .. } => chains.into(),
+            SolverSpec::Adam { .. } => 1,
+        }
+    }
+}
+
 /// Which solver, and for how long.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]

@@ -1,0 +1,218 @@
+//! Starts of the optimiser, in shards: the same design begun from other random numbers, and the best that was found.
+
+use std::path::{Path, PathBuf};
+
+use metalith_core::text::hex;
+use metalith_core::{Error, Progress, Result, WholeFile};
+use metalith_design::Design;
+use metalith_optimise::{Checkpoint, OptimiseTask, TaskCells, write_phase_table};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::bench::Quiet;
+use crate::cut::Cut;
+use crate::plan::{MANIFEST, absolute, another_plan, manifest, write_manifest};
+
+/// Version of the format of the manifest.
+const SCHEMA: u32 = 1;
+/// Folder of the tables of cells within that of the plan.
+const CELLS: &str = "cells";
+
+/// The manifest of such a plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StartsPlan {
+    schema: u32,
+    work: String,
+    /// SHA-256 of all that decides the answers, in hexadecimal.
+    pub key: String,
+    /// The design file, absolute.
+    pub design: PathBuf,
+    pub starts: u64,
+    pub starts_per_shard: u64,
+    /// Files of tables of cells, in their folder.
+    cells: Vec<String>,
+    /// Folder of the plan.
+    #[serde(skip)]
+    pub folder: PathBuf,
+}
+
+/// What one start came to.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StartRecord {
+    pub start: u64,
+    /// Of its random numbers.
+    pub seed: u64,
+    /// Name of the phases that it began from.
+    pub from: String,
+    /// As it was optimised; larger is better.
+    pub merit: f64,
+    /// Phase of each ring (turns), in [0, 1).
+    pub turns: Vec<f64>,
+}
+
+/// All starts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StartsResult {
+    /// In their order.
+    pub starts: Vec<StartRecord>,
+    /// Which of them is the best; the first of equals.
+    pub best: usize,
+    /// Where its phase was written.
+    pub phase: PathBuf,
+}
+
+impl StartsPlan {
+    /// What stands in the manifest under `work`.
+    pub(crate) const WORK: &'static str = "starts";
+
+    /// The plan in a folder.
+    ///
+    /// # Errors
+    /// If there is none, or its manifest cannot be read.
+    pub fn open(folder: &Path) -> Result<Self> {
+        let mut plan: Self = manifest(folder)?;
+        if plan.schema != SCHEMA || plan.starts_per_shard == 0 {
+            return Err(another_plan(folder));
+        }
+        plan.folder = folder.to_owned();
+        Ok(plan)
+    }
+
+    /// How it is cut.
+    pub fn cut(&self) -> Cut {
+        Cut {
+            key: self.key.clone(),
+            part: "start",
+            parts: self.starts,
+            per_shard: self.starts_per_shard,
+            folder: self.folder.clone(),
+        }
+    }
+
+    /// Make shards. Tables of cells are those of the plan: none are made here.
+    ///
+    /// # Errors
+    /// If the design has changed since it was planned, tables are not there, or the user stopped it.
+    pub fn run(&self, shards: &[u64], progress: &dyn Progress) -> Result<()> {
+        let design = Design::read(&self.design)?;
+        if key(&self.design, &design)? != self.key {
+            return Err(another_plan(&self.folder));
+        }
+        let folder = self.folder.join(CELLS);
+        if let Some(gone) = self.cells.iter().map(|name| folder.join(name)).find(|p| !p.is_file()) {
+            return Err(Error::invalid(
+                format!("{} is not there", gone.display()),
+                "plan the starts again; a shard makes no tables of its own",
+            ));
+        }
+        let cells = TaskCells::of(&design, false, Some(&folder), &Quiet(progress))?;
+        let task = OptimiseTask::of(&design)?;
+        let start = |k: u64| {
+            let mut task = task.clone();
+            // Chains of one start have seeds one after the other.
+            task.spec.seed = task.spec.seed.wrapping_add(k.wrapping_mul(task.spec.seeds()));
+            let found = task.solve(&cells.all(), Checkpoint::default(), &Quiet(progress))?;
+            match found.interrupted {
+                Some(_) => Err(Error::Interrupted),
+                None => Ok(StartRecord {
+                    start: k,
+                    seed: task.spec.seed,
+                    from: found.start.to_owned(),
+                    merit: found.merit,
+                    turns: found.turns,
+                }),
+            }
+        };
+        shards.iter().try_for_each(|n| self.cut().make(*n, &start, progress))
+    }
+
+    /// The best of all starts: its phase in `phase.csv`, all merits in `starts.csv`.
+    ///
+    /// # Errors
+    /// If starts are missing or there twice, none has a merit, or a file cannot be written.
+    pub fn merge(&self) -> Result<StartsResult> {
+        let starts = self.cut().whole(&|s: &StartRecord| Some(s.start))?;
+        let design = Design::read(&self.design)?;
+        let task = OptimiseTask::of(&design)?;
+        let finite = starts.iter().enumerate().filter(|(_, s)| s.merit.is_finite());
+        let best = finite.max_by(|(i, a), (j, b)| a.merit.total_cmp(&b.merit).then(j.cmp(i)));
+        let (best, found) =
+            best.ok_or_else(|| Error::invalid("no start has a merit", "look at [optimise] of the design"))?;
+        let phase = self.folder.join("phase.csv");
+        let remarks = [
+            format!(
+                "Phase of each ring of {}, in the middle of the ring; nearest row.",
+                design.name
+            ),
+            format!(
+                "The best of {} starts: number {best}, seed {}, merit {}.",
+                starts.len(),
+                found.seed,
+                found.merit
+            ),
+        ];
+        write_phase_table(&phase, &task.lens.rings, &found.turns, &remarks)?;
+        let mut table = String::from("start,seed,from,merit\n");
+        for s in &starts {
+            table.push_str(&format!("{},{},{},{}\n", s.start, s.seed, s.from, s.merit));
+        }
+        WholeFile::write(&self.folder.join("starts.csv"), table.as_bytes())?;
+        Ok(StartsResult { starts, best, phase })
+    }
+}
+
+/// SHA-256 of everything that decides the answers.
+fn key(path: &Path, design: &Design) -> Result<String> {
+    let solver = metalith_cell::kept::solver_of(design.cell.shape);
+    let mut hash = Sha256::new();
+    hash.update(format!("{} {solver} {} ", env!("CARGO_PKG_VERSION"), design.digest()));
+    hash.update(std::fs::read(path).map_err(Error::io("read", path))?);
+    Ok(hex(&hash.finalize()))
+}
+
+/// Plan so many starts into a folder: tables of cells and manifest. A folder that holds the plan of the same starts keeps it.
+///
+/// # Errors
+/// If the design cannot be read or optimised, the folder holds another plan, or the user stopped it.
+pub fn plan_starts(
+    design_path: &Path,
+    starts: u64,
+    starts_per_shard: u64,
+    folder: &Path,
+    progress: &dyn Progress,
+) -> Result<StartsPlan> {
+    let path = absolute(design_path)?;
+    let design = Design::read(&path)?;
+    OptimiseTask::of(&design)?;
+    let key = key(&path, &design)?;
+    std::fs::create_dir_all(folder).map_err(Error::io("create the folder", folder))?;
+    if folder.join(MANIFEST).is_file() {
+        let known = StartsPlan::open(folder)?;
+        return match known.key == key && known.starts == starts {
+            true => Ok(known),
+            false => Err(another_plan(folder)),
+        };
+    }
+    let cells = folder.join(CELLS);
+    std::fs::create_dir_all(&cells).map_err(Error::io("create the folder", &cells))?;
+    TaskCells::of(&design, false, Some(&cells), progress)?;
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(&cells).map_err(Error::io("read", &cells))? {
+        let name = entry.map_err(Error::io("read", &cells))?.file_name();
+        names.push(name.to_string_lossy().into_owned());
+    }
+    names.sort();
+    let plan = StartsPlan {
+        schema: SCHEMA,
+        work: StartsPlan::WORK.into(),
+        key,
+        design: path,
+        starts,
+        starts_per_shard,
+        cells: names,
+        folder: folder.to_owned(),
+    };
+    write_manifest(folder, &plan)?;
+    Ok(plan)
+}
