@@ -4,18 +4,13 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
-use metalith::camera::Camera;
-use metalith::picture::restore::RestorationMethod;
-use metalith::picture::scene::{SceneFile, SceneImage, read_scene};
-use metalith::picture::{Assumed, Studio};
-use metalith::rivals::{
-    ArrayCamera, ComparedCamera, Comparison, Contender, DiffuserCam, DiffuserSpec, FlatCam, MaskSpec, compare,
-    write_comparison,
-};
+use metalith::picture::KeptKernels;
+use metalith::rivals::{Comparison, DiffuserSpec, Lensless, Lineup, ListedDesign, MaskSpec, write_comparison};
+use metalith::study::plan_comparison;
 use metalith::{Design, Error, Result};
 
 use super::paths::apart;
-use super::{Outcome, Terminal, images, output, print_json};
+use super::{Outcome, Terminal, images, output, print_json, print_line};
 
 /// Take the same photographs with several cameras, restore them in several ways, and print one table of scores.
 ///
@@ -93,6 +88,11 @@ pub struct CompareArgs {
     /// Print `compare.json` instead of the table.
     #[arg(long)]
     json: bool,
+
+    /// Only plan the comparison into --out, for shards of one camera each that any number of machines make: `metalith study
+    /// run`, `submit`, `status` and `merge` of the folder.
+    #[arg(long, conflicts_with = "json")]
+    plan: bool,
 }
 
 /// Whose assumptions are compared with the physics.
@@ -169,159 +169,79 @@ impl ComparedDesign {
     }
 }
 
-/// What all cameras are given.
-struct Given<'a> {
-    args: &'a CompareArgs,
-    photographs: Vec<SceneImage>,
-    methods: Vec<RestorationMethod>,
-    terminal: &'a Terminal,
+impl CompareArgs {
+    /// What is asked for, as the library has it.
+    fn lineup(&self) -> Result<Lineup> {
+        let listed = |asked: &ComparedDesign| {
+            Ok(ListedDesign {
+                name: asked.name.clone(),
+                layout: asked.layout(&Design::read(&asked.design)?)?,
+                design: asked.design.clone(),
+                camera: asked.camera.clone(),
+                field_deg: asked.field_deg,
+            })
+        };
+        let lensless = |rival: &Rival| {
+            Ok(match rival {
+                Rival::Flatcam => Lensless::FlatCam(MaskSpec::new(self.mask_feature_um, self.mask_distance_um)?),
+                Rival::Diffusercam => Lensless::DiffuserCam(DiffuserSpec::new(
+                    self.diffuser_distance_um,
+                    self.diffuser_grain_um,
+                    self.diffuser_opening,
+                )?),
+            })
+        };
+        Ok(Lineup {
+            camera: self.camera.clone(),
+            designs: self.design.iter().map(listed).collect::<Result<_>>()?,
+            lensless: self.rivals.iter().map(lensless).collect::<Result<_>>()?,
+            methods: self.method.clone(),
+            separate: self.separate,
+            paper: matches!(self.assume, Some(Assume::Paper)),
+            field_deg: self.field_deg,
+            seed: self.seed,
+            photographs: images::of_all(&self.photographs)?,
+        })
+    }
 }
 
 pub fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
-    if args.design.is_empty() && args.rivals.is_empty() {
-        return Err(Error::invalid(
-            "no camera to compare",
-            "give --design, --rivals or both",
-        ));
+    let lineup = args.lineup()?;
+    let outputs = ["compare.html", "compare.json"].map(|n| args.out.join(n));
+    apart(
+        lineup.photographs.iter().map(PathBuf::as_path),
+        &[&outputs[0], &outputs[1]],
+    )?;
+    if args.plan {
+        let plan = plan_comparison(&lineup, &args.out, terminal)?;
+        terminal.clear();
+        print_line!(
+            "{} cameras in as many shards: {}",
+            plan.cut().shards(),
+            args.out.display()
+        );
+        return Ok(Outcome::Fine);
     }
-    let methods: Vec<RestorationMethod> = args.method.iter().map(|m| m.parse()).collect::<Result<_>>()?;
-    let camera = Camera::read(&args.camera)?;
-    let files = images::of_all(&args.photographs)?;
-    let [page, numbers] = ["compare.html", "compare.json"].map(|n| args.out.join(n));
-    apart(files.iter().map(PathBuf::as_path), &[&page, &numbers])?;
-    let given = Given {
-        args,
-        photographs: files.iter().map(|f| read(f, args.field_deg)).collect::<Result<_>>()?,
-        methods,
-        terminal,
-    };
-    let first = &given.photographs[0].view;
-    if let Some(other) = given.photographs.iter().find(|p| p.view != *first) {
-        return Err(Error::invalid(
-            format!(
-                "`{}` has {} x {} pixels, the first photograph {} x {}",
-                other.name, other.view.columns, other.view.rows, first.columns, first.rows
-            ),
-            "give photographs of one size",
-        ));
-    }
-    // Mistakes before any work.
-    let opened = args
-        .design
-        .iter()
-        .map(|asked| {
-            let design = Design::read(&asked.design)?;
-            let layout = asked.layout(&design)?;
-            let own = asked.camera.as_deref().map(Camera::read).transpose()?;
-            Ok((asked, design, layout, own.unwrap_or_else(|| camera.clone())))
-        })
-        .collect::<Result<Vec<_>>>()?;
-    let mut cameras = Vec::new();
-    for (asked, design, layout, camera) in &opened {
-        given.take_by_design(asked, design, layout, camera, &mut cameras)?;
-    }
-    for rival in &args.rivals {
-        cameras.push(given.take_by_rival(*rival, &camera)?);
-    }
-    let comparison = Comparison {
-        photographs: given.photographs.iter().map(|p| p.name.clone()).collect(),
-        size: [first.rows, first.columns],
-        camera: camera.name.clone(),
-        seed: args.seed,
-        cameras,
-    };
-    write_comparison(&comparison, &args.out)?;
+    let open = lineup.open()?;
+    let kept = KeptKernels::of_user();
+    let take = |k| open.take(k, &kept, terminal);
+    let comparison = open.comparison((0..lineup.count()).map(take).collect::<Result<_>>()?);
     terminal.clear();
     match args.json {
-        true => print_json(&comparison),
-        false => {
-            output::line(format_args!("{}", comparison.markdown()));
-            output::line(format_args!("page: {}", page.display()));
+        true => {
+            write_comparison(&comparison, &args.out)?;
+            print_json(&comparison);
+            Ok(Outcome::Fine)
         }
+        false => tell(&comparison, &args.out),
     }
+}
+
+/// Write the page and the numbers of a comparison, and print its table.
+pub fn tell(comparison: &Comparison, folder: &Path) -> Result<Outcome> {
+    write_comparison(comparison, folder)?;
+    output::line(format_args!("{}", comparison.markdown()));
+    output::line(format_args!("page: {}", folder.join("compare.html").display()));
     Ok(Outcome::Fine)
-}
-
-fn read(path: &Path, field_deg: f64) -> Result<SceneImage> {
-    read_scene(&SceneFile {
-        path: path.to_owned(),
-        wavelengths_nm: None,
-        field_deg,
-        distance_um: f64::INFINITY,
-    })
-}
-
-impl Given<'_> {
-    fn take(
-        &self,
-        contender: &dyn Contender,
-        names: (&str, &str),
-        photographs: &[SceneImage],
-    ) -> Result<ComparedCamera> {
-        compare(contender, names, photographs, self.args.seed, self.terminal)
-    }
-
-    fn take_by_design(
-        &self,
-        asked: &ComparedDesign,
-        design: &Design,
-        layout: &Path,
-        camera: &Camera,
-        cameras: &mut Vec<ComparedCamera>,
-    ) -> Result<()> {
-        let name = asked.name.as_deref().unwrap_or(&design.name);
-        let mut photographs = self.photographs.clone();
-        if let Some(field_deg) = asked.field_deg {
-            photographs.iter_mut().for_each(|p| p.view.field_deg = field_deg);
-        }
-        let studio = Studio::open(design, layout, camera, None, &photographs[0], self.terminal)?;
-        let words = format!(
-            "the layout of `{}` behind `{}`, {} elements, pillars solved rigorously, veil and dispersion included.",
-            design.name,
-            camera.name,
-            design.elements().len()
-        );
-        {
-            let ready = ArrayCamera::new(&studio, &self.methods, self.args.separate);
-            cameras.push(self.take(&ready, (name, &words), &photographs)?);
-        }
-        if let Some(Assume::Paper) = self.args.assume {
-            let narrow = studio.open_without_dispersion(design, layout, None, &photographs[0], self.terminal)?;
-            drop(studio);
-            let studio = narrow.assuming(Assumed::paper())?;
-            let words = format!(
-                "`{}` as the paper assumes such cameras to be: one kernel for each element and colour, brightness by a Butterworth filter, one wavelength a colour, no veil, patches of 420 x 420 pixels.",
-                design.name
-            );
-            let ready = ArrayCamera::new(&studio, &self.methods, self.args.separate);
-            let name = format!("{name}, paper's assumptions");
-            cameras.push(self.take(&ready, (&name, &words), &photographs)?);
-        }
-        Ok(())
-    }
-
-    fn take_by_rival(&self, rival: Rival, camera: &Camera) -> Result<ComparedCamera> {
-        let (args, view, terminal) = (self.args, self.photographs[0].view, self.terminal);
-        match rival {
-            Rival::Flatcam => {
-                let mask = MaskSpec::new(args.mask_feature_um, args.mask_distance_um)?;
-                let words = format!(
-                    "a mask in place of a lens, the product of two sequences of maximum length (511 members of {} um), {} um before the sensor; Tikhonov in closed form by singular values.",
-                    mask.feature_um, mask.distance_um
-                );
-                let ready = FlatCam::new(&mask, camera, view, terminal)?;
-                self.take(&ready, ("FlatCam, ours", &words), &self.photographs)
-            }
-            Rival::Diffusercam => {
-                let spec = DiffuserSpec::new(args.diffuser_distance_um, args.diffuser_grain_um, args.diffuser_opening)?;
-                let words = format!(
-                    "a random smooth surface in place of a lens, numbers {} um apart, {} um before the sensor, its opening {} of the sensor along each axis; caustic by rays; total variation with the crop (ADMM).",
-                    spec.grain_um, spec.distance_um, spec.opening
-                );
-                let ready = DiffuserCam::new(&spec, camera, view, terminal)?;
-                self.take(&ready, ("DiffuserCam, ours", &words), &self.photographs)
-            }
-        }
-    }
 }

@@ -6,8 +6,8 @@ use clap::Args;
 use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
 use metalith::picture::scene::{BuiltIn, SceneFile, SceneImage, chart, read_depth, read_scene};
 use metalith::picture::{
-    Doubt, Frame, PicturePages, PictureReport, Rehearsal, RestorationReport, Studio, contrast_curves, scores,
-    worth_of_assumptions, write_pages,
+    Doubt, Frame, KeptKernels, PicturePages, PictureReport, Rehearsal, RestorationReport, Studio, contrast_curves,
+    scores, worth_of_assumptions, write_pages,
 };
 use metalith::{Error, Fidelity, Result};
 
@@ -174,7 +174,14 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     report.doubt = doubt.as_ref().map(|d| d.report(&truth)).transpose()?;
     if let Some(Assume::Paper) = args.assume {
         drop(operator);
-        let narrow = studio.open_without_dispersion(&design, &layout, model.as_ref(), &scene, terminal)?;
+        let narrow = studio.open_without_dispersion(
+            &design,
+            &layout,
+            model.as_ref(),
+            &scene,
+            &KeptKernels::of_user(),
+            terminal,
+        )?;
         report.worth = worth_of_assumptions(&studio, &narrow, &scene, args.with.seed, terminal)?;
     }
     let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();

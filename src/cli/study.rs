@@ -5,7 +5,9 @@ use std::process::{Child, Command};
 
 use clap::{Args, Subcommand};
 use metalith::report::sig;
-use metalith::study::{PairsPlan, Plan, PlanSettings, Slurm, StartsPlan, Work, merge, plan, submissions, write_page};
+use metalith::study::{
+    ComparisonPlan, PairsPlan, Plan, PlanSettings, Slurm, StartsPlan, Work, merge, plan, submissions, write_page,
+};
 use metalith::{Error, Progress, Result};
 
 use super::{Outcome, Terminal, print_json, print_line};
@@ -255,6 +257,7 @@ fn merge_shards(args: &MergeArgs, terminal: &Terminal) -> Result<Outcome> {
     match Work::open(&args.study)? {
         Work::Study(plan) => merge_study(&plan, args, terminal),
         Work::Pairs(plan) => merge_pairs(&plan, args),
+        Work::Comparison(plan) => merge_comparison(&plan, args, terminal),
         Work::Starts(plan) => merge_starts(&plan, args),
     }
 }
@@ -275,6 +278,13 @@ fn merge_pairs(plan: &PairsPlan, args: &MergeArgs) -> Result<Outcome> {
     let manifest = plan.merge()?;
     print_line!("{} pairs in {}", manifest.pairs.len(), args.study.display());
     Ok(Outcome::Fine)
+}
+
+fn merge_comparison(plan: &ComparisonPlan, args: &MergeArgs, terminal: &Terminal) -> Result<Outcome> {
+    without_table(args)?;
+    let comparison = plan.merge(terminal)?;
+    terminal.clear();
+    super::compare::tell(&comparison, &args.study)
 }
 
 fn merge_starts(plan: &StartsPlan, args: &MergeArgs) -> Result<Outcome> {

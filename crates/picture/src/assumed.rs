@@ -9,6 +9,7 @@ use metalith_core::{Progress, Result};
 use metalith_design::Design;
 use serde::Serialize;
 
+use crate::opening::KeptKernels;
 use crate::rehearsal::Rehearsal;
 use crate::restore::RestorationMethod;
 use crate::scene::SceneImage;
@@ -171,10 +172,11 @@ impl Studio {
         layout: &std::path::Path,
         model: Option<&metalith_made::CalibratedModel>,
         scene: &SceneImage,
+        kept: &KeptKernels,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let camera = without_dispersion(&self.camera, &self.channels, &self.bank.channel_um);
-        Self::open(design, layout, &camera, model, scene, progress)
+        Self::open_kept(design, layout, &camera, model, scene, kept, progress)
     }
 }
 

@@ -4,10 +4,10 @@ use metalith_core::srgb::encoded;
 use metalith_core::{Result, part};
 use metalith_wave::restore::{psnr_db, ssim_colour};
 use ndarray::{Array3, Axis};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A part of the field.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Zone {
     Whole,
@@ -48,7 +48,7 @@ impl Zone {
 }
 
 /// Scores of one zone.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ZoneScore {
     pub zone: Zone,
     /// Peak signal to noise ratio of sRGB values (dB).

@@ -4,13 +4,13 @@ use metalith_core::{Error, Progress, Result};
 use metalith_picture::scene::SceneImage;
 use metalith_picture::{Frame, Zone, ZoneScore, scores};
 use ndarray::Array3;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::contender::{Contender, Way};
 use crate::cpu::{cpu_seconds, since};
 
 /// Scores of one way of making pictures, in all zones.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct WayScores {
     /// None for the bare frame.
     pub way: Option<Way>,
@@ -25,7 +25,7 @@ pub struct WayScores {
 }
 
 /// A camera, as it was compared.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ComparedCamera {
     /// Name in the table.
     pub name: String,
@@ -37,9 +37,9 @@ pub struct ComparedCamera {
     pub ways: Vec<WayScores>,
     /// To simulate a frame (s), if the system tells.
     pub frame_cpu_s: Option<f64>,
-    /// The first photograph.
+    /// The first photograph; it is not kept with the scores.
     #[serde(skip)]
-    pub shown: Shown,
+    pub shown: Option<Shown>,
 }
 
 /// Pictures of the first photograph.
@@ -148,7 +148,7 @@ pub fn compare(
         field_deg: first.view.field_deg,
         ways: frames.into_iter().chain(restored).collect(),
         frame_cpu_s: each(frame_s),
-        shown: shown.expect("there is a photograph"),
+        shown,
     })
 }
 

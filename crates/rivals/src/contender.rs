@@ -4,10 +4,10 @@ use metalith_core::{Progress, Result};
 use metalith_picture::Frame;
 use metalith_picture::scene::SceneImage;
 use ndarray::Array3;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// One way of making a picture of a frame.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Way {
     /// Name of the method.
     pub method: String,

@@ -12,6 +12,7 @@
 //! | what cameras without a lens have in common | `lensless` |
 //! | a mask that is a product of two sequences | `flatcam/` |
 //! | the caustic of a random surface | `diffusercam/` |
+//! | which cameras, from their files | `lineup` |
 //! | scores of all photographs | `compare` |
 //! | the table, the page | `table`, `page` |
 
@@ -22,6 +23,7 @@ mod cpu;
 mod diffusercam;
 mod flatcam;
 mod lensless;
+mod lineup;
 mod page;
 mod table;
 
@@ -30,4 +32,5 @@ pub use compare::{ComparedCamera, Comparison, WayScores, compare};
 pub use contender::{Contender, Way};
 pub use diffusercam::{DiffuserCam, DiffuserSpec};
 pub use flatcam::{FlatCam, MaskSpec};
+pub use lineup::{Lensless, Lineup, ListedDesign, OpenLineup};
 pub use page::write_comparison;

@@ -23,8 +23,8 @@ fn page(comparison: &Comparison) -> Page {
         format!("{}, sensor and light of {}", comparison.counted(), comparison.camera),
     );
     let mut best = PhotoRow::new("Scene, and the picture of each camera", 220.0);
-    if let Some(first) = comparison.cameras.first() {
-        best.photo("scene", &first.shown.scene.mapv(srgb::encoded));
+    if let Some(first) = comparison.cameras.iter().find_map(|c| c.shown.as_ref()) {
+        best.photo("scene", &first.scene.mapv(srgb::encoded));
     }
     for camera in &comparison.cameras {
         if let Some((_, picture)) = camera.best() {
@@ -56,7 +56,7 @@ impl ComparedCamera {
     /// Name of the way with the highest PSNR, and its picture of the first photograph.
     pub fn best(&self) -> Option<(String, &ndarray::Array3<f64>)> {
         let restored = self.ways.iter().filter(|w| w.way.is_some());
-        let both = restored.zip(&self.shown.pictures);
+        let both = restored.zip(&self.shown.as_ref()?.pictures);
         let best = both.max_by(|a, b| a.0.mean[0].psnr_db.total_cmp(&b.0.mean[0].psnr_db))?;
         Some((best.0.words(), best.1))
     }
@@ -99,7 +99,9 @@ fn one(page: &mut Page, camera: &ComparedCamera) {
         "{} Its scenes fill {} degrees.",
         camera.words, camera.field_deg
     ));
-    let pictures = &camera.shown;
+    let Some(pictures) = &camera.shown else {
+        return;
+    };
     let mut row = PhotoRow::new(format!("Pictures of {}", camera.name), 220.0);
     row.photo("scene", &pictures.scene.mapv(srgb::encoded));
     row.photo("frame as recorded", &shown(&pictures.frame, &pictures.channel_names));

@@ -19,7 +19,7 @@
 //! | `picture` | the picture that each draw takes |
 //! | `record` | what is kept of one draw |
 //! | `plan`, `shard` | the folder of a study |
-//! | `pairs`, `starts` | frames and scenes for learning, starts of the optimiser, in shards |
+//! | `pairs`, `comparison`, `starts` | pairs for learning, cameras side by side, starts of the optimiser, in shards |
 //! | `cut`, `work` | shards of whatever work |
 //! | `merge`, `yields`, `response`, `points` | all draws, and what they say |
 //! | `columns`, `parquet_file` | the draws as a table |
@@ -28,6 +28,7 @@
 
 mod bench;
 mod columns;
+mod comparison;
 mod cut;
 mod designs;
 mod draw;
@@ -50,6 +51,7 @@ mod work;
 mod yields;
 
 pub use bench::JudgedDraw;
+pub use comparison::{ComparisonPlan, plan_comparison};
 pub use cut::{Cut, Shard, Status};
 pub use designs::DesignGrid;
 pub use draw::Drawn;

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::cut::{Cut, parts_per_shard};
-use crate::plan::{MANIFEST, absolute, another_plan, manifest, write_manifest};
+use crate::plan::{MANIFEST, absolute, another_plan, file_digest, manifest, write_manifest};
 
 /// Version of the format of the manifest.
 const SCHEMA: u32 = 1;
@@ -151,10 +151,7 @@ impl PairsRequest {
         files.extend(Camera::read(&self.camera)?.files);
         files.extend(self.model.clone());
         for path in files {
-            let mut file = std::fs::File::open(&path).map_err(Error::io("read", &path))?;
-            let mut one = Sha256::new();
-            std::io::copy(&mut file, &mut one).map_err(Error::io("read", &path))?;
-            hash.update(one.finalize());
+            hash.update(file_digest(&path)?);
         }
         for (image, digest) in self.images.iter().zip(digests) {
             hash.update(image.file_name().unwrap_or_default().as_encoded_bytes());

@@ -319,11 +319,16 @@ pub(crate) fn key(tolerance: &Tolerance, layouts: &[PathBuf]) -> Result<[u8; 32]
         }
     }
     for path in files {
-        let mut one = Sha256::new();
-        let mut file = fs::File::open(&path).map_err(Error::io("read", &path))?;
-        std::io::copy(&mut file, &mut one).map_err(Error::io("read", &path))?;
-        add("file", &one.finalize());
+        add("file", &file_digest(&path)?);
     }
+    Ok(hash.finalize().into())
+}
+
+/// SHA-256 of a file, read piece by piece.
+pub(crate) fn file_digest(path: &Path) -> Result<[u8; 32]> {
+    let mut hash = Sha256::new();
+    let mut file = fs::File::open(path).map_err(Error::io("read", path))?;
+    std::io::copy(&mut file, &mut hash).map_err(Error::io("read", path))?;
     Ok(hash.finalize().into())
 }
 

@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 
 use crate::bench::Quiet;
 use crate::cut::Cut;
-use crate::plan::{MANIFEST, absolute, another_plan, manifest, write_manifest};
+use crate::plan::{MANIFEST, absolute, another_plan, file_digest, manifest, write_manifest};
 
 /// Version of the format of the manifest.
 const SCHEMA: u32 = 1;
@@ -167,7 +167,7 @@ fn key(path: &Path, design: &Design) -> Result<String> {
     let solver = metalith_cell::kept::solver_of(design.cell.shape);
     let mut hash = Sha256::new();
     hash.update(format!("{} {solver} {} ", env!("CARGO_PKG_VERSION"), design.digest()));
-    hash.update(std::fs::read(path).map_err(Error::io("read", path))?);
+    hash.update(file_digest(path)?);
     Ok(hex(&hash.finalize()))
 }
 

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use metalith_core::{Progress, Result};
 
+use crate::comparison::ComparisonPlan;
 use crate::cut::Cut;
 use crate::pairs::PairsPlan;
 use crate::plan::{Plan, manifest};
@@ -16,6 +17,8 @@ pub enum Work {
     Study(Plan),
     /// Frames and scenes for learning.
     Pairs(PairsPlan),
+    /// Cameras side by side.
+    Comparison(ComparisonPlan),
     /// Starts of the optimiser.
     Starts(StartsPlan),
 }
@@ -29,6 +32,7 @@ impl Work {
         let known: serde_json::Value = manifest(folder)?;
         match known.get("work").and_then(|w| w.as_str()) {
             Some(PairsPlan::WORK) => Ok(Self::Pairs(PairsPlan::open(folder)?)),
+            Some(ComparisonPlan::WORK) => Ok(Self::Comparison(ComparisonPlan::open(folder)?)),
             Some(StartsPlan::WORK) => Ok(Self::Starts(StartsPlan::open(folder)?)),
             _ => Ok(Self::Study(Plan::open(folder)?)),
         }
@@ -39,6 +43,7 @@ impl Work {
         match self {
             Self::Study(plan) => plan.cut(),
             Self::Pairs(plan) => plan.cut(),
+            Self::Comparison(plan) => plan.cut(),
             Self::Starts(plan) => plan.cut(),
         }
     }
@@ -66,6 +71,7 @@ impl Work {
                 missing.into_iter().try_for_each(|n| run.shard(n, progress))
             }
             Self::Pairs(plan) => plan.run(&missing, progress),
+            Self::Comparison(plan) => plan.run(&missing, progress),
             Self::Starts(plan) => plan.run(&missing, progress),
         }
     }

@@ -1,57 +1,17 @@
 //! A study from its file to its result: the answer depends on nothing but the plan.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+mod common;
 
+use std::fs;
+use std::path::Path;
+
+use common::{SMALL_CAMERA, tolerance};
 use metalith_core::Silent;
 use metalith_core::document::Scalar;
-use metalith_optimise::{Checkpoint, OptimiseTask, TaskCells};
 use metalith_picture::restore::RestorationMethod;
-use metalith_picture::scene::{BuiltIn, SceneFile, chart, read_scene};
+use metalith_picture::scene::{BuiltIn, chart};
 use metalith_picture::{Rehearsal, Studio, scores};
-use metalith_study::{PairsRequest, Plan, PlanSettings, Run, Work, merge, plan, plan_pairs, plan_starts, write_page};
-
-/// A design that is solved in some seconds: one small lens, one wavelength and white light.
-fn tolerance(folder: &Path, draws: u64) -> PathBuf {
-    let design = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/mini_3x3.toml")).unwrap();
-    let small = [
-        ("diameter_um = 60", "diameter_um = 20"),
-        ("focal_length_um = 144", "focal_length_um = 48"),
-        ("elements = [3, 3]", "elements = [1, 1]"),
-        ("wavelengths_nm = [455, 530, 660]", "wavelengths_nm = [660]"),
-        ("field_x_deg = [0, 15]", "field_x_deg = [0]"),
-        ("field_y_deg = [0, 0]", "field_y_deg = [0]"),
-        ("window_samples = 128", "window_samples = 32"),
-        ("width_step_nm = 2 ", "width_step_nm = 10 "),
-    ];
-    let design = small.iter().fold(design, |text, (from, to)| {
-        assert!(text.contains(from), "{from}");
-        text.replace(from, to)
-    });
-    fs::write(folder.join("design.toml"), design).unwrap();
-    let text = format!(
-        r#"
-schema = 1
-design = "design.toml"
-draws = {draws}
-[[vary]]
-effect = "cd_bias"
-distribution = "normal"
-sd = 3.0
-[[vary]]
-effect = "gap"
-distribution = "uniform"
-low = -4.0
-high = 4.0
-[[limit]]
-figure = "strehl_660nm_0deg"
-at_least = 0.01
-"#
-    );
-    let path = folder.join("tolerance.toml");
-    fs::write(&path, text).unwrap();
-    path
-}
+use metalith_study::{Plan, PlanSettings, Run, Work, merge, plan, write_page};
 
 fn run_shard(plan: &Plan, number: u64) -> metalith_core::Result<()> {
     Work::Study(plan.clone()).run(&[number], &Silent)
@@ -273,31 +233,6 @@ fn a_limit_on_no_figure_is_told() {
 /// Tables of draws are interpolated: what this does to a picture that `metalith picture` restores (dB).
 const INTERPOLATED_DB: f64 = 0.05;
 
-/// A camera for one lens of 20 um: small pixels, one channel.
-const SMALL_CAMERA: &str = r#"
-schema = 1
-name = "small"
-[sensor]
-pixel_um = 1.0
-columns = 96
-rows = 96
-filter = "none"
-offset_um = [0, 0]
-tilt_deg = [0, 0]
-bits = 12
-noise_photon = 4e-5
-noise_read = 1e-5
-[[channel]]
-name = "mono"
-band_nm = [600, 680]
-efficiency = 0.6
-[exposure]
-time_ms = 10
-white = 0.9
-[illuminant]
-source = "equal_energy"
-"#;
-
 /// The picture of a chip without faults is that of `metalith picture`; a chip that is 30 % out of focus loses more if its
 /// restoration does not know it.
 #[test]
@@ -376,113 +311,4 @@ fn mistakes_of_a_picture_are_told_with_their_place() {
     ] {
         assert!(error.contains(part), "{part} is not in {error}");
     }
-}
-
-/// Frames of shards are those that one run writes, to the byte, and another image is noticed.
-#[test]
-#[ignore = "second tier: CPU time, run by .ci/run"]
-fn pairs_of_shards_are_those_of_one_run() {
-    let folder = tempfile::tempdir().unwrap();
-    tolerance(folder.path(), 1);
-    let at = |name: &str| folder.path().join(name);
-    fs::write(at("camera.toml"), SMALL_CAMERA).unwrap();
-    let design = metalith_design::Design::read(&at("design.toml")).unwrap();
-    let array = metalith_design::array::PillarArray::build(&design, &Silent).unwrap();
-    let layout = at("layout.gds");
-    metalith_layout::write_pillars(&design, &array, design.layout.hierarchy, &layout, &Silent).unwrap();
-    let image = |k: usize| {
-        let stripes = ndarray::Array3::from_shape_fn((64, 64, 3), |(y, x, c)| ((y * k + x + c) % 7) as f64 / 7.0);
-        let path = at(&format!("image_{k}.png"));
-        metalith_picture::write_picture(&path, &stripes).unwrap();
-        path
-    };
-    let images: Vec<PathBuf> = (1..6).map(image).collect();
-    let request = PairsRequest {
-        design: at("design.toml"),
-        layout: layout.clone(),
-        camera: at("camera.toml"),
-        model: None,
-        field_deg: 50.0,
-        seed: 3,
-        images: images.clone(),
-    };
-    let planned = plan_pairs(&request, &at("parts"), Some(2), &Silent).unwrap();
-    assert_eq!(plan_pairs(&request, &at("parts"), None, &Silent).unwrap(), planned);
-    let Work::Pairs(work) = Work::open(&at("parts")).unwrap() else {
-        panic!("the folder holds pairs");
-    };
-    assert_eq!(work.cut().shards(), 3);
-    let run = |shards: &[u64]| Work::Pairs(work.clone()).run(shards, &Silent);
-    run(&[2, 0]).unwrap();
-    assert_eq!(work.cut().status().unwrap().missing, [1]);
-    let missing = work.merge().unwrap_err().to_string();
-    assert!(missing.contains("2 of 5 pairs are missing"), "{missing}");
-    // Shards make no kernels of their own.
-    fs::rename(at("parts/kernels"), at("aside")).unwrap();
-    let refused = run(&[1]).unwrap_err().to_string();
-    assert!(refused.contains("makes no kernels"), "{refused}");
-    fs::rename(at("aside"), at("parts/kernels")).unwrap();
-    let kept = fs::read(&images[3]).unwrap();
-    fs::copy(&images[0], &images[3]).unwrap();
-    let changed = run(&[1]).unwrap_err().to_string();
-    assert!(changed.contains("image_4.png has changed"), "{changed}");
-    fs::write(&images[3], kept).unwrap();
-    run(&[1]).unwrap();
-    work.merge().unwrap();
-
-    let scene = |path: &Path| {
-        read_scene(&SceneFile {
-            path: path.to_owned(),
-            wavelengths_nm: None,
-            field_deg: 50.0,
-            distance_um: f64::INFINITY,
-        })
-    };
-    let camera = metalith_camera::Camera::read(&at("camera.toml")).unwrap();
-    let kept = metalith_picture::KeptKernels::made(&at("alone"));
-    let first = scene(&images[0]).unwrap();
-    let studio = Studio::open_kept(&design, &layout, &camera, None, &first, &kept, &Silent).unwrap();
-    metalith_picture::write_dataset(&studio, &studio.simulation(), &images, &scene, 3, &at("alone"), &Silent).unwrap();
-    let names = (0..5).flat_map(|k| ["frame", "truth"].map(|n| format!("000000-000999/{k:06}.{n}.png")));
-    for name in names.chain(["manifest.json".to_owned()]) {
-        let [a, b] = ["parts", "alone"].map(|f| fs::read(at(f).join(&name)).unwrap());
-        assert!(a == b, "{name}");
-    }
-}
-
-/// The best of several starts, whoever makes them.
-#[test]
-#[ignore = "second tier: CPU time, run by .ci/run"]
-fn starts_of_the_optimiser_are_runs_with_their_seeds() {
-    let folder = tempfile::tempdir().unwrap();
-    tolerance(folder.path(), 1);
-    let path = folder.path().join("design.toml");
-    let section = "\n[optimise]\nsolver = \"exchange\"\ncell = \"published\"\nchains = 2\nhot_sweeps = 3\nblocks = 4\nseed = 5\nstart = \"random\"\n";
-    let text = fs::read_to_string(&path).unwrap();
-    let cut = text.find("\n[optimise]").unwrap_or(text.len());
-    fs::write(&path, format!("{}{section}", &text[..cut])).unwrap();
-    let planned = plan_starts(&path, 3, 2, &folder.path().join("starts"), &Silent).unwrap();
-    let work = Work::open(&planned.folder).unwrap();
-    work.run(&[1, 0], &Silent).unwrap();
-    let result = planned.merge().unwrap();
-    assert_eq!(result.starts.iter().map(|s| s.seed).collect::<Vec<_>>(), [5, 7, 9]);
-    let best = result.starts.iter().map(|s| s.merit).fold(f64::MIN, f64::max);
-    assert_eq!(result.starts[result.best].merit, best);
-    // The second one is the design with its seed.
-    let mut task = OptimiseTask::of(&metalith_design::Design::read(&path).unwrap()).unwrap();
-    task.spec.seed = 7;
-    let design = metalith_design::Design::read(&path).unwrap();
-    let cells = TaskCells::of(&design, false, None, &Silent).unwrap();
-    let own = task.solve(&cells.all(), Checkpoint::default(), &Silent).unwrap();
-    // Numbers of a line of JSON come back to rounding.
-    assert!((own.merit - result.starts[1].merit).abs() <= 1e-12 * own.merit.abs());
-    let phase = fs::read_to_string(&result.phase).unwrap();
-    assert!(phase.contains("The best of 3 starts"), "{phase}");
-    let table = fs::read_to_string(planned.folder.join("starts.csv")).unwrap();
-    assert_eq!(table.lines().count(), 4);
-    fs::write(&path, text).unwrap();
-    assert!(work.run(&[0], &Silent).is_ok(), "what is there needs no design");
-    fs::remove_file(planned.cut().path(0)).unwrap();
-    let changed = work.run(&[0], &Silent).unwrap_err().to_string();
-    assert!(changed.contains("a file of it has changed"), "{changed}");
 }

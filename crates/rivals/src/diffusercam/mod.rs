@@ -23,7 +23,7 @@ use grid::{CoarseGrid, FineGrid, on_scene};
 use surface::RoughSurface;
 
 /// A rough surface before a sensor.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct DiffuserSpec {
     /// From the surface to the sensor (um).
     pub distance_um: f64,

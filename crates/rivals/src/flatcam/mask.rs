@@ -6,7 +6,7 @@ use num_complex::Complex64;
 use rustfft::FftPlanner;
 
 /// A mask before a sensor, open where both of two sequences are.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct MaskSpec {
     /// Width of one member of a sequence (um).
     pub feature_um: f64,

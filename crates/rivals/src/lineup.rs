@@ -1,0 +1,255 @@
+//! The cameras of a comparison, from their files.
+
+use std::path::{Path, PathBuf};
+
+use metalith_camera::Camera;
+use metalith_core::{Error, Progress, Result};
+use metalith_design::Design;
+use metalith_picture::restore::RestorationMethod;
+use metalith_picture::scene::{SceneFile, SceneImage, read_scene};
+use metalith_picture::{Assumed, KeptKernels, Studio};
+use serde::{Deserialize, Serialize};
+
+use crate::compare::{ComparedCamera, Comparison, compare};
+use crate::{ArrayCamera, Contender, DiffuserCam, DiffuserSpec, FlatCam, MaskSpec};
+
+/// What is compared: designs, cameras without a lens, photographs, and how.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Lineup {
+    /// Sensor, light, exposure and noise of all cameras that name no other.
+    pub camera: PathBuf,
+    pub designs: Vec<ListedDesign>,
+    pub lensless: Vec<Lensless>,
+    /// Names of the ways to restore the frames of designs.
+    pub methods: Vec<String>,
+    /// By each element of an array alone too.
+    pub separate: bool,
+    /// Each design also as the paper assumes such cameras to be.
+    pub paper: bool,
+    /// Angle from the left to the right edge of a photograph (degrees).
+    pub field_deg: f64,
+    /// Of the noise.
+    pub seed: u64,
+    pub photographs: Vec<PathBuf>,
+}
+
+/// A design that is compared.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ListedDesign {
+    /// That of the design if left out.
+    pub name: Option<String>,
+    pub design: PathBuf,
+    pub layout: PathBuf,
+    /// A camera of its own.
+    pub camera: Option<PathBuf>,
+    /// The field that a photograph fills, if it is another.
+    pub field_deg: Option<f64>,
+}
+
+/// A camera without a lens.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Lensless {
+    /// A mask that is a product of two sequences.
+    FlatCam(MaskSpec),
+    /// A rough surface.
+    DiffuserCam(DiffuserSpec),
+}
+
+/// A lineup whose files were read.
+pub struct OpenLineup<'a> {
+    of: &'a Lineup,
+    camera: Camera,
+    methods: Vec<RestorationMethod>,
+    /// With the camera of each.
+    designs: Vec<(Design, Camera)>,
+    photographs: Vec<SceneImage>,
+}
+
+/// What is done with a camera that is ready: it, its name and words in the table, its photographs.
+type Ready<'f> = dyn FnMut(&dyn Contender, (&str, &str), &[SceneImage]) -> Result<()> + 'f;
+
+impl Lineup {
+    /// Read all files: mistakes before any work.
+    ///
+    /// # Errors
+    /// If nothing is compared, a file cannot be read, or photographs are not of one size.
+    pub fn open(&self) -> Result<OpenLineup<'_>> {
+        if self.designs.is_empty() && self.lensless.is_empty() {
+            return Err(Error::invalid(
+                "no camera to compare",
+                "give --design, --rivals or both",
+            ));
+        }
+        let methods = self.methods.iter().map(|m| m.parse()).collect::<Result<_>>()?;
+        let camera = Camera::read(&self.camera)?;
+        let photographs: Vec<SceneImage> = self
+            .photographs
+            .iter()
+            .map(|p| self.photograph(p))
+            .collect::<Result<_>>()?;
+        let Some(first) = photographs.first().map(|p| p.view) else {
+            return Err(Error::invalid("no photographs", "give at least one"));
+        };
+        if let Some(other) = photographs.iter().find(|p| p.view != first) {
+            return Err(Error::invalid(
+                format!(
+                    "`{}` has {} x {} pixels, the first photograph {} x {}",
+                    other.name, other.view.columns, other.view.rows, first.columns, first.rows
+                ),
+                "give photographs of one size",
+            ));
+        }
+        let own = |listed: &ListedDesign| {
+            let own = listed.camera.as_deref().map(Camera::read).transpose()?;
+            Ok((Design::read(&listed.design)?, own.unwrap_or_else(|| camera.clone())))
+        };
+        let designs = self.designs.iter().map(own).collect::<Result<_>>()?;
+        Ok(OpenLineup {
+            of: self,
+            camera,
+            methods,
+            designs,
+            photographs,
+        })
+    }
+
+    fn photograph(&self, path: &Path) -> Result<SceneImage> {
+        read_scene(&SceneFile {
+            path: path.to_owned(),
+            wavelengths_nm: None,
+            field_deg: self.field_deg,
+            distance_um: f64::INFINITY,
+        })
+    }
+
+    /// Rows of the table: of each design one, or two with the assumptions of the paper, then those without a lens.
+    pub fn count(&self) -> usize {
+        self.designs.len() * self.kinds() + self.lensless.len()
+    }
+
+    fn kinds(&self) -> usize {
+        1 + usize::from(self.paper)
+    }
+}
+
+impl OpenLineup<'_> {
+    /// Let camera `k` take all photographs.
+    ///
+    /// # Errors
+    /// If it cannot be made ready, or the user stopped it.
+    pub fn take(&self, k: usize, kept: &KeptKernels, progress: &dyn Progress) -> Result<ComparedCamera> {
+        self.take_first(k, self.photographs.len(), kept, progress)
+    }
+
+    /// The same of the first so many photographs.
+    ///
+    /// # Errors
+    /// As [`OpenLineup::take`].
+    pub fn take_first(
+        &self,
+        k: usize,
+        photographs: usize,
+        kept: &KeptKernels,
+        progress: &dyn Progress,
+    ) -> Result<ComparedCamera> {
+        let mut found = None;
+        self.ready(k, kept, progress, &mut |contender, names, all| {
+            found = Some(compare(contender, names, &all[..photographs], self.of.seed, progress)?);
+            Ok(())
+        })?;
+        Ok(found.expect("a camera that is ready takes photographs"))
+    }
+
+    /// Make the kernels of camera `k` where they are kept.
+    ///
+    /// # Errors
+    /// As [`OpenLineup::take`].
+    pub fn prepare(&self, k: usize, kept: &KeptKernels, progress: &dyn Progress) -> Result<()> {
+        match k < self.designs.len() * self.of.kinds() {
+            true => self.ready(k, kept, progress, &mut |_, _, _| Ok(())),
+            false => Ok(()),
+        }
+    }
+
+    /// The table of these cameras.
+    pub fn comparison(&self, cameras: Vec<ComparedCamera>) -> Comparison {
+        let view = self.photographs[0].view;
+        Comparison {
+            photographs: self.photographs.iter().map(|p| p.name.clone()).collect(),
+            size: [view.rows, view.columns],
+            camera: self.camera.name.clone(),
+            seed: self.of.seed,
+            cameras,
+        }
+    }
+
+    fn ready(&self, k: usize, kept: &KeptKernels, progress: &dyn Progress, then: &mut Ready<'_>) -> Result<()> {
+        let kinds = self.of.kinds();
+        match k.checked_sub(self.designs.len() * kinds) {
+            None => self.ready_design(k / kinds, k % kinds == 1, kept, progress, then),
+            Some(k) => self.ready_lensless(&self.of.lensless[k], progress, then),
+        }
+    }
+
+    fn ready_design(
+        &self,
+        k: usize,
+        as_the_paper: bool,
+        kept: &KeptKernels,
+        progress: &dyn Progress,
+        then: &mut Ready<'_>,
+    ) -> Result<()> {
+        let (listed, (design, camera)) = (&self.of.designs[k], &self.designs[k]);
+        let name = listed.name.as_deref().unwrap_or(&design.name);
+        let mut photographs = self.photographs.clone();
+        if let Some(field_deg) = listed.field_deg {
+            photographs.iter_mut().for_each(|p| p.view.field_deg = field_deg);
+        }
+        let first = &photographs[0];
+        let studio = Studio::open_kept(design, &listed.layout, camera, None, first, kept, progress)?;
+        if !as_the_paper {
+            let words = format!(
+                "the layout of `{}` behind `{}`, {} elements, pillars solved rigorously, veil and dispersion included.",
+                design.name,
+                camera.name,
+                design.elements().len()
+            );
+            let ready = ArrayCamera::new(&studio, &self.methods, self.of.separate);
+            return then(&ready, (name, &words), &photographs);
+        }
+        let narrow = studio.open_without_dispersion(design, &listed.layout, None, first, kept, progress)?;
+        drop(studio);
+        let studio = narrow.assuming(Assumed::paper())?;
+        let words = format!(
+            "`{}` as the paper assumes such cameras to be: one kernel for each element and colour, brightness by a Butterworth filter, one wavelength a colour, no veil, patches of 420 x 420 pixels.",
+            design.name
+        );
+        let ready = ArrayCamera::new(&studio, &self.methods, self.of.separate);
+        then(&ready, (&format!("{name}, paper's assumptions"), &words), &photographs)
+    }
+
+    fn ready_lensless(&self, spec: &Lensless, progress: &dyn Progress, then: &mut Ready<'_>) -> Result<()> {
+        let view = self.photographs[0].view;
+        match spec {
+            Lensless::FlatCam(mask) => {
+                let words = format!(
+                    "a mask in place of a lens, the product of two sequences of maximum length (511 members of {} um), {} um before the sensor; Tikhonov in closed form by singular values.",
+                    mask.feature_um, mask.distance_um
+                );
+                let ready = FlatCam::new(mask, &self.camera, view, progress)?;
+                then(&ready, ("FlatCam, ours", &words), &self.photographs)
+            }
+            Lensless::DiffuserCam(spec) => {
+                let words = format!(
+                    "a random smooth surface in place of a lens, numbers {} um apart, {} um before the sensor, its opening {} of the sensor along each axis; caustic by rays; total variation with the crop (ADMM).",
+                    spec.grain_um, spec.distance_um, spec.opening
+                );
+                let ready = DiffuserCam::new(spec, &self.camera, view, progress)?;
+                then(&ready, ("DiffuserCam, ours", &words), &self.photographs)
+            }
+        }
+    }
+}

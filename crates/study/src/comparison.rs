@@ -1,0 +1,164 @@
+//! Cameras side by side, in shards of one camera each.
+
+use std::path::{Path, PathBuf};
+
+use metalith_camera::Camera;
+use metalith_core::text::hex;
+use metalith_core::{Error, Progress, Result};
+use metalith_design::Design;
+use metalith_picture::KeptKernels;
+use metalith_rivals::{ComparedCamera, Comparison, Lineup, ListedDesign};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::cut::Cut;
+use crate::plan::{MANIFEST, absolute, another_plan, file_digest, manifest, write_manifest};
+
+/// Version of the format of the manifest.
+const SCHEMA: u32 = 1;
+
+/// The manifest of such a plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ComparisonPlan {
+    schema: u32,
+    work: String,
+    /// SHA-256 of all that decides the answers, in hexadecimal.
+    pub key: String,
+    pub lineup: Lineup,
+    /// Folder of the plan.
+    #[serde(skip)]
+    pub folder: PathBuf,
+}
+
+impl ComparisonPlan {
+    /// What stands in the manifest under `work`.
+    pub(crate) const WORK: &'static str = "compare";
+
+    /// The plan in a folder.
+    ///
+    /// # Errors
+    /// If there is none, or its manifest cannot be read.
+    pub fn open(folder: &Path) -> Result<Self> {
+        let mut plan: Self = manifest(folder)?;
+        if plan.schema != SCHEMA {
+            return Err(another_plan(folder));
+        }
+        plan.folder = folder.to_owned();
+        Ok(plan)
+    }
+
+    /// How it is cut: each camera for itself.
+    pub fn cut(&self) -> Cut {
+        Cut {
+            key: self.key.clone(),
+            part: "camera",
+            parts: self.lineup.count() as u64,
+            per_shard: 1,
+            folder: self.folder.clone(),
+        }
+    }
+
+    /// Let the cameras of some shards take all photographs. Kernels are those of the plan: none are made here.
+    ///
+    /// # Errors
+    /// If a file has changed since it was planned, kernels are not there, or the user stopped it.
+    pub fn run(&self, shards: &[u64], progress: &dyn Progress) -> Result<()> {
+        if key(&self.lineup)? != self.key {
+            return Err(another_plan(&self.folder));
+        }
+        let open = self.lineup.open()?;
+        let kept = KeptKernels::only(&self.folder);
+        let camera = |k: u64| open.take(k as usize, &kept, progress);
+        shards.iter().try_for_each(|n| self.cut().make(*n, &camera, progress))
+    }
+
+    /// The table of all cameras. The first photograph is taken again, for the page.
+    ///
+    /// # Errors
+    /// If cameras are missing or there twice; as [`ComparisonPlan::run`].
+    pub fn merge(&self, progress: &dyn Progress) -> Result<Comparison> {
+        let mut cameras: Vec<ComparedCamera> = self.cut().whole(&|_| None)?;
+        if key(&self.lineup)? != self.key {
+            return Err(another_plan(&self.folder));
+        }
+        let open = self.lineup.open()?;
+        let kept = KeptKernels::only(&self.folder);
+        for (k, camera) in cameras.iter_mut().enumerate() {
+            camera.shown = open.take_first(k, 1, &kept, progress)?.shown;
+        }
+        Ok(open.comparison(cameras))
+    }
+}
+
+/// SHA-256 of everything that decides the answers.
+fn key(lineup: &Lineup) -> Result<String> {
+    let mut hash = Sha256::new();
+    hash.update(env!("CARGO_PKG_VERSION"));
+    // What is asked for, with the names of the files; what they say follows.
+    hash.update(serde_json::to_vec(lineup).map_err(|e| Error::invalid(e.to_string(), "report this"))?);
+    let mut files = Camera::read(&lineup.camera)?.files;
+    for listed in &lineup.designs {
+        let design = Design::read(&listed.design)?;
+        let solver = metalith_cell::kept::solver_of(design.cell.shape);
+        hash.update(format!("{solver} {} ", design.digest()));
+        files.push(listed.layout.clone());
+        if let Some(camera) = &listed.camera {
+            files.extend(Camera::read(camera)?.files);
+        }
+    }
+    files.extend(lineup.photographs.iter().cloned());
+    for path in files {
+        hash.update(file_digest(&path)?);
+    }
+    Ok(hex(&hash.finalize()))
+}
+
+/// Plan a comparison into a folder: the kernels of all designs, manifest. A folder that holds the plan of the same
+/// comparison keeps it.
+///
+/// # Errors
+/// If a file cannot be used, the folder holds another plan, or the user stopped it.
+pub fn plan_comparison(lineup: &Lineup, folder: &Path, progress: &dyn Progress) -> Result<ComparisonPlan> {
+    let lineup = placed(lineup)?;
+    let open = lineup.open()?;
+    let key = key(&lineup)?;
+    std::fs::create_dir_all(folder).map_err(Error::io("create the folder", folder))?;
+    if folder.join(MANIFEST).is_file() {
+        let known = ComparisonPlan::open(folder)?;
+        return match known.key == key {
+            true => Ok(known),
+            false => Err(another_plan(folder)),
+        };
+    }
+    for k in 0..lineup.count() {
+        open.prepare(k, &KeptKernels::made(folder), progress)?;
+    }
+    let plan = ComparisonPlan {
+        schema: SCHEMA,
+        work: ComparisonPlan::WORK.into(),
+        key,
+        lineup: lineup.clone(),
+        folder: folder.to_owned(),
+    };
+    write_manifest(folder, &plan)?;
+    Ok(plan)
+}
+
+/// The same with paths that hold wherever a shard is made.
+fn placed(lineup: &Lineup) -> Result<Lineup> {
+    let design = |listed: &ListedDesign| {
+        Ok(ListedDesign {
+            design: absolute(&listed.design)?,
+            layout: absolute(&listed.layout)?,
+            camera: listed.camera.as_deref().map(absolute).transpose()?,
+            ..listed.clone()
+        })
+    };
+    Ok(Lineup {
+        camera: absolute(&lineup.camera)?,
+        designs: lineup.designs.iter().map(design).collect::<Result<_>>()?,
+        photographs: lineup.photographs.iter().map(|p| absolute(p)).collect::<Result<_>>()?,
+        ..lineup.clone()
+    })
+}

@@ -1,0 +1,203 @@
+//! Work other than draws in the shards of a study.
+
+mod common;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use common::{SMALL_CAMERA, tolerance};
+use metalith_core::Silent;
+use metalith_design::Design;
+use metalith_optimise::{Checkpoint, OptimiseTask, TaskCells};
+use metalith_picture::Studio;
+use metalith_picture::scene::{SceneFile, read_scene};
+use metalith_rivals::{Comparison, Lensless, Lineup, ListedDesign, MaskSpec};
+use metalith_study::{PairsRequest, Work, plan_comparison, plan_pairs, plan_starts};
+
+/// The layout of a design, written into a folder.
+fn layout_of(design: &Design, folder: &Path) -> PathBuf {
+    let array = metalith_design::array::PillarArray::build(design, &Silent).unwrap();
+    let layout = folder.join("layout.gds");
+    metalith_layout::write_pillars(design, &array, design.layout.hierarchy, &layout, &Silent).unwrap();
+    layout
+}
+
+/// An image of stripes that differ with its number.
+fn image(folder: &Path, k: usize) -> PathBuf {
+    let stripes = ndarray::Array3::from_shape_fn((64, 64, 3), |(y, x, c)| ((y * k + x + c) % 7) as f64 / 7.0);
+    let path = folder.join(format!("image_{k}.png"));
+    metalith_picture::write_picture(&path, &stripes).unwrap();
+    path
+}
+
+/// Frames of shards are those that one run writes, to the byte, and another image is noticed.
+#[test]
+#[ignore = "second tier: CPU time, run by .ci/run"]
+fn pairs_of_shards_are_those_of_one_run() {
+    let folder = tempfile::tempdir().unwrap();
+    tolerance(folder.path(), 1);
+    let at = |name: &str| folder.path().join(name);
+    fs::write(at("camera.toml"), SMALL_CAMERA).unwrap();
+    let design = Design::read(&at("design.toml")).unwrap();
+    let layout = layout_of(&design, folder.path());
+    let images: Vec<PathBuf> = (1..6).map(|k| image(folder.path(), k)).collect();
+    let request = PairsRequest {
+        design: at("design.toml"),
+        layout: layout.clone(),
+        camera: at("camera.toml"),
+        model: None,
+        field_deg: 50.0,
+        seed: 3,
+        images: images.clone(),
+    };
+    let planned = plan_pairs(&request, &at("parts"), Some(2), &Silent).unwrap();
+    assert_eq!(plan_pairs(&request, &at("parts"), None, &Silent).unwrap(), planned);
+    let Work::Pairs(work) = Work::open(&at("parts")).unwrap() else {
+        panic!("the folder holds pairs");
+    };
+    assert_eq!(work.cut().shards(), 3);
+    let run = |shards: &[u64]| Work::Pairs(work.clone()).run(shards, &Silent);
+    run(&[2, 0]).unwrap();
+    assert_eq!(work.cut().status().unwrap().missing, [1]);
+    let missing = work.merge().unwrap_err().to_string();
+    assert!(missing.contains("2 of 5 pairs are missing"), "{missing}");
+    // Shards make no kernels of their own.
+    fs::rename(at("parts/kernels"), at("aside")).unwrap();
+    let refused = run(&[1]).unwrap_err().to_string();
+    assert!(refused.contains("makes no kernels"), "{refused}");
+    fs::rename(at("aside"), at("parts/kernels")).unwrap();
+    let kept = fs::read(&images[3]).unwrap();
+    fs::copy(&images[0], &images[3]).unwrap();
+    let changed = run(&[1]).unwrap_err().to_string();
+    assert!(changed.contains("image_4.png has changed"), "{changed}");
+    fs::write(&images[3], kept).unwrap();
+    run(&[1]).unwrap();
+    work.merge().unwrap();
+
+    let scene = |path: &Path| {
+        read_scene(&SceneFile {
+            path: path.to_owned(),
+            wavelengths_nm: None,
+            field_deg: 50.0,
+            distance_um: f64::INFINITY,
+        })
+    };
+    let camera = metalith_camera::Camera::read(&at("camera.toml")).unwrap();
+    let kept = metalith_picture::KeptKernels::made(&at("alone"));
+    let first = scene(&images[0]).unwrap();
+    let studio = Studio::open_kept(&design, &layout, &camera, None, &first, &kept, &Silent).unwrap();
+    metalith_picture::write_dataset(&studio, &studio.simulation(), &images, &scene, 3, &at("alone"), &Silent).unwrap();
+    let names = (0..5).flat_map(|k| ["frame", "truth"].map(|n| format!("000000-000999/{k:06}.{n}.png")));
+    for name in names.chain(["manifest.json".to_owned()]) {
+        let [a, b] = ["parts", "alone"].map(|f| fs::read(at(f).join(&name)).unwrap());
+        assert!(a == b, "{name}");
+    }
+}
+
+/// The best of several starts, whoever makes them.
+#[test]
+#[ignore = "second tier: CPU time, run by .ci/run"]
+fn starts_of_the_optimiser_are_runs_with_their_seeds() {
+    let folder = tempfile::tempdir().unwrap();
+    tolerance(folder.path(), 1);
+    let path = folder.path().join("design.toml");
+    let section = "\n[optimise]\nsolver = \"exchange\"\ncell = \"published\"\nchains = 2\nhot_sweeps = 3\nblocks = 4\nseed = 5\nstart = \"random\"\n";
+    let text = fs::read_to_string(&path).unwrap();
+    let cut = text.find("\n[optimise]").unwrap_or(text.len());
+    fs::write(&path, format!("{}{section}", &text[..cut])).unwrap();
+    let planned = plan_starts(&path, 3, 2, &folder.path().join("starts"), &Silent).unwrap();
+    let work = Work::open(&planned.folder).unwrap();
+    work.run(&[1, 0], &Silent).unwrap();
+    let result = planned.merge().unwrap();
+    assert_eq!(result.starts.iter().map(|s| s.seed).collect::<Vec<_>>(), [5, 7, 9]);
+    let best = result.starts.iter().map(|s| s.merit).fold(f64::MIN, f64::max);
+    assert_eq!(result.starts[result.best].merit, best);
+    // The second one is the design with its seed.
+    let mut task = OptimiseTask::of(&Design::read(&path).unwrap()).unwrap();
+    task.spec.seed = 7;
+    let design = Design::read(&path).unwrap();
+    let cells = TaskCells::of(&design, false, None, &Silent).unwrap();
+    let own = task.solve(&cells.all(), Checkpoint::default(), &Silent).unwrap();
+    // Numbers of a line of JSON come back to rounding.
+    assert!((own.merit - result.starts[1].merit).abs() <= 1e-12 * own.merit.abs());
+    let phase = fs::read_to_string(&result.phase).unwrap();
+    assert!(phase.contains("The best of 3 starts"), "{phase}");
+    let table = fs::read_to_string(planned.folder.join("starts.csv")).unwrap();
+    assert_eq!(table.lines().count(), 4);
+    fs::write(&path, text).unwrap();
+    assert!(work.run(&[0], &Silent).is_ok(), "what is there needs no design");
+    fs::remove_file(planned.cut().path(0)).unwrap();
+    let changed = work.run(&[0], &Silent).unwrap_err().to_string();
+    assert!(changed.contains("a file of it has changed"), "{changed}");
+}
+
+/// Cameras of shards have the scores of one run, and the page its pictures.
+#[test]
+#[ignore = "second tier: CPU time, run by .ci/run"]
+fn cameras_of_shards_are_those_of_one_comparison() {
+    let folder = tempfile::tempdir().unwrap();
+    tolerance(folder.path(), 1);
+    let at = |name: &str| folder.path().join(name);
+    // Cameras without a lens are compared in colours.
+    let mono = "[[channel]]\nname = \"mono\"\nband_nm = [600, 680]\nefficiency = 0.6\n";
+    assert!(SMALL_CAMERA.contains(mono));
+    let colours = ["red", "green", "blue"].iter().zip([620, 540, 460]);
+    let three = colours.map(|(name, nm)| {
+        format!(
+            "[[channel]]\nname = \"{name}\"\nband_nm = [{nm}, {}]\nefficiency = 0.6\n",
+            nm + 20
+        )
+    });
+    let camera = SMALL_CAMERA.replace(mono, &three.collect::<String>());
+    fs::write(at("camera.toml"), camera).unwrap();
+    let design = Design::read(&at("design.toml")).unwrap();
+    let lineup = Lineup {
+        camera: at("camera.toml"),
+        designs: vec![ListedDesign {
+            name: Some("small".into()),
+            layout: layout_of(&design, folder.path()),
+            design: at("design.toml"),
+            camera: None,
+            field_deg: None,
+        }],
+        lensless: vec![Lensless::FlatCam(MaskSpec::standard())],
+        methods: vec!["tikhonov".into()],
+        separate: true,
+        paper: true,
+        field_deg: 50.0,
+        seed: 2,
+        photographs: (1..4).map(|k| image(folder.path(), k)).collect(),
+    };
+    let planned = plan_comparison(&lineup, &at("parts"), &Silent).unwrap();
+    assert_eq!(planned.cut().shards(), 3);
+    let work = Work::open(&at("parts")).unwrap();
+    work.run(&[1, 2], &Silent).unwrap();
+    let missing = planned.merge(&Silent).err().unwrap().to_string();
+    assert!(missing.contains("1 of 3 cameras are missing"), "{missing}");
+    work.run(&[0], &Silent).unwrap();
+    let merged = planned.merge(&Silent).unwrap();
+    let open = lineup.open().unwrap();
+    let kept = metalith_picture::KeptKernels::only(&at("parts"));
+    let cameras = (0..3).map(|k| open.take(k, &kept, &Silent).unwrap()).collect();
+    let direct = open.comparison(cameras);
+    // Numbers of a line of JSON come back to rounding.
+    let scores = |c: &Comparison| {
+        let ways = c.cameras.iter().flat_map(|camera| &camera.ways);
+        let all = ways.flat_map(|w| w.mean.iter().chain(w.photographs.iter().flatten()));
+        all.map(|s| (s.zone, (s.psnr_db * 1e9).round(), (s.ssim * 1e9).round()))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(scores(&merged), scores(&direct));
+    let names = merged.cameras.iter().map(|c| c.name.as_str()).collect::<Vec<_>>();
+    assert_eq!(names, ["small", "small, paper's assumptions", "FlatCam, ours"]);
+    assert!(merged.cameras.iter().all(|c| c.shown.is_some()));
+    metalith_rivals::write_comparison(&merged, &at("page")).unwrap();
+    let page = fs::read_to_string(at("page/compare.html")).unwrap();
+    for part in ["Pictures of small", "Pictures of FlatCam, ours"] {
+        assert!(page.contains(part), "{part}");
+    }
+    fs::remove_file(planned.cut().path(1)).unwrap();
+    fs::copy(&lineup.photographs[0], &lineup.photographs[1]).unwrap();
+    let changed = work.run(&[1], &Silent).unwrap_err().to_string();
+    assert!(changed.contains("a file of it has changed"), "{changed}");
+}
