@@ -13,8 +13,9 @@ use metalith_made::{BankRange, CalibratedModel, CellBank, CellChange, MadeChip, 
 use metalith_verify::{ReadLayout, SimulationCases, Verification, wavelengths_um};
 
 use crate::draw::Drawer;
+use crate::manifest::another_plan;
 use crate::picture::{KnownChip, PictureBench, TakenPicture};
-use crate::plan::{Plan, another_plan, key};
+use crate::plan::{Plan, key};
 use crate::record::{DrawRecord, LimitStatement, figures, finite};
 use crate::tolerance::Tolerance;
 

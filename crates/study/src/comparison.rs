@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::cut::Cut;
-use crate::plan::{MANIFEST, absolute, another_plan, file_digest, manifest, write_manifest};
+use crate::manifest::{Manifest, absolute, another_plan, file_digest};
 
 /// Version of the format of the manifest.
 const SCHEMA: u32 = 1;
@@ -31,6 +31,20 @@ pub struct ComparisonPlan {
     pub folder: PathBuf,
 }
 
+impl Manifest for ComparisonPlan {
+    fn key(&self) -> &str {
+        &self.key
+    }
+
+    fn is_known(&self) -> bool {
+        self.schema == SCHEMA
+    }
+
+    fn place(&mut self, folder: &Path) {
+        self.folder = folder.to_owned();
+    }
+}
+
 impl ComparisonPlan {
     /// What stands in the manifest under `work`.
     pub(crate) const WORK: &'static str = "compare";
@@ -40,12 +54,7 @@ impl ComparisonPlan {
     /// # Errors
     /// If there is none, or its manifest cannot be read.
     pub fn open(folder: &Path) -> Result<Self> {
-        let mut plan: Self = manifest(folder)?;
-        if plan.schema != SCHEMA {
-            return Err(another_plan(folder));
-        }
-        plan.folder = folder.to_owned();
-        Ok(plan)
+        Self::open_in(folder)
     }
 
     /// How it is cut: each camera for itself.
@@ -123,13 +132,8 @@ pub fn plan_comparison(lineup: &Lineup, folder: &Path, progress: &dyn Progress) 
     let lineup = placed(lineup)?;
     let open = lineup.open()?;
     let key = key(&lineup)?;
-    std::fs::create_dir_all(folder).map_err(Error::io("create the folder", folder))?;
-    if folder.join(MANIFEST).is_file() {
-        let known = ComparisonPlan::open(folder)?;
-        return match known.key == key {
-            true => Ok(known),
-            false => Err(another_plan(folder)),
-        };
+    if let Some(known) = ComparisonPlan::known_in(folder, &key)? {
+        return Ok(known);
     }
     for k in 0..lineup.count() {
         open.prepare(k, &KeptKernels::made(folder), progress)?;
@@ -141,7 +145,7 @@ pub fn plan_comparison(lineup: &Lineup, folder: &Path, progress: &dyn Progress) 
         lineup: lineup.clone(),
         folder: folder.to_owned(),
     };
-    write_manifest(folder, &plan)?;
+    plan.write_in(folder)?;
     Ok(plan)
 }
 

@@ -20,7 +20,7 @@
 //! | `record` | what is kept of one draw |
 //! | `plan`, `shard` | the folder of a study |
 //! | `pairs`, `comparison`, `starts` | pairs for learning, cameras side by side, starts of the optimiser, in shards |
-//! | `cut`, `work` | shards of whatever work |
+//! | `cut`, `manifest`, `work` | shards of whatever work |
 //! | `merge`, `yields`, `response`, `points` | all draws, and what they say |
 //! | `columns`, `parquet_file` | the draws as a table |
 //! | `page`, `grid_page` | what a person reads |
@@ -33,6 +33,7 @@ mod cut;
 mod designs;
 mod draw;
 mod grid_page;
+mod manifest;
 mod merge;
 mod page;
 mod pairs;

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::cut::{Cut, parts_per_shard};
-use crate::plan::{MANIFEST, absolute, another_plan, file_digest, manifest, write_manifest};
+use crate::manifest::{Manifest, absolute, another_plan, file_digest};
 
 /// Version of the format of the manifest.
 const SCHEMA: u32 = 1;
@@ -66,6 +66,20 @@ fn image_digest(image: &Path) -> Result<String> {
     Ok(hex(&Sha256::digest(read_at_most(image, LONGEST, "an image")?)))
 }
 
+impl Manifest for PairsPlan {
+    fn key(&self) -> &str {
+        &self.key
+    }
+
+    fn is_known(&self) -> bool {
+        self.schema == SCHEMA && self.images_per_shard > 0 && self.digests.len() == self.request.images.len()
+    }
+
+    fn place(&mut self, folder: &Path) {
+        self.folder = folder.to_owned();
+    }
+}
+
 impl PairsPlan {
     /// What stands in the manifest under `work`.
     pub(crate) const WORK: &'static str = "dataset";
@@ -75,12 +89,7 @@ impl PairsPlan {
     /// # Errors
     /// If there is none, or its manifest cannot be read.
     pub fn open(folder: &Path) -> Result<Self> {
-        let mut plan: Self = manifest(folder)?;
-        if plan.schema != SCHEMA || plan.images_per_shard == 0 || plan.digests.len() != plan.request.images.len() {
-            return Err(another_plan(folder));
-        }
-        plan.folder = folder.to_owned();
-        Ok(plan)
+        Self::open_in(folder)
     }
 
     /// How it is cut.
@@ -211,7 +220,6 @@ pub fn plan_pairs(
     progress: &dyn Progress,
 ) -> Result<PairsPlan> {
     let request = request.placed()?;
-    std::fs::create_dir_all(folder).map_err(Error::io("create the folder", folder))?;
     progress.begin("reading the images", request.images.len() as u64);
     let mut digests = Vec::new();
     for image in &request.images {
@@ -222,12 +230,8 @@ pub fn plan_pairs(
         progress.advance(1);
     }
     let key = hex(&request.key(&digests)?);
-    if folder.join(MANIFEST).is_file() {
-        let known = PairsPlan::open(folder)?;
-        if known.key == key {
-            return Ok(known);
-        }
-        return Err(another_plan(folder));
+    if let Some(known) = PairsPlan::known_in(folder, &key)? {
+        return Ok(known);
     }
     let studio = request.studio(&KeptKernels::made(folder), progress)?;
     let begun = Instant::now();
@@ -244,7 +248,7 @@ pub fn plan_pairs(
         digests,
         folder: folder.to_owned(),
     };
-    write_manifest(folder, &plan)?;
+    plan.write_in(folder)?;
     Ok(plan)
 }
 

@@ -8,30 +8,23 @@ use std::time::Instant;
 use metalith_camera::Camera;
 use metalith_cell::CellStack;
 use metalith_cell::kept::solver_of;
-use metalith_core::file::read_at_most;
 use metalith_core::text::hex;
-use metalith_core::{Error, Progress, Result, WholeFile};
+use metalith_core::{Error, Progress, Result};
 use metalith_design::array::PillarArray;
 use metalith_layout::write_pillars;
 use metalith_made::{BankRange, CellBank};
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::bench::{Bench, Files, Quiet};
 use crate::cut::{Cut, parts_per_shard};
+use crate::manifest::{Manifest, absolute, file_digest, is_planned};
 use crate::picture::SceneChoice;
 use crate::record::LimitStatement;
 use crate::tolerance::Tolerance;
 
 /// Version of the format of the manifest.
 const SCHEMA: u32 = 2;
-
-/// Name of the manifest within the folder.
-pub(crate) const MANIFEST: &str = "plan.json";
-
-/// Longest manifest.
-const LONGEST: u64 = 64 << 20;
 
 /// Where the pillars of a study are read from.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -84,13 +77,7 @@ impl Plan {
     /// # Errors
     /// If there is none, or its manifest cannot be read.
     pub fn open(folder: &Path) -> Result<Self> {
-        let mut plan: Self = manifest(folder)?;
-        if plan.schema != SCHEMA || plan.draws_per_shard == 0 {
-            let what = format!("a manifest of schema {}, {SCHEMA} is known", plan.schema);
-            return Err(fault(folder, what));
-        }
-        plan.folder = folder.to_owned();
-        Ok(plan)
+        Self::open_in(folder)
     }
 
     /// How it is cut.
@@ -115,35 +102,17 @@ impl Plan {
     }
 }
 
-/// The manifest in a folder.
-pub(crate) fn manifest<T: DeserializeOwned>(folder: &Path) -> Result<T> {
-    let bytes = read_at_most(&folder.join(MANIFEST), LONGEST, "the manifest of a plan")?;
-    serde_json::from_slice(&bytes).map_err(|e| fault(folder, e.to_string()))
-}
+impl Manifest for Plan {
+    fn key(&self) -> &str {
+        &self.key
+    }
 
-pub(crate) fn write_manifest(folder: &Path, plan: &impl Serialize) -> Result<()> {
-    let mut text = serde_json::to_string_pretty(plan).expect("plain data serialises");
-    text.push('\n');
-    WholeFile::write(&folder.join(MANIFEST), text.as_bytes())
-}
+    fn is_known(&self) -> bool {
+        self.schema == SCHEMA && self.draws_per_shard > 0
+    }
 
-/// What to say of a folder whose plan is not that of these files.
-pub(crate) fn another_plan(folder: &Path) -> Error {
-    Error::invalid(
-        format!(
-            "{} holds another plan, or a file of it has changed since, or another version of the program planned it",
-            folder.display()
-        ),
-        "plan into another folder with --out, or remove this one",
-    )
-}
-
-fn fault(folder: &Path, what: String) -> Error {
-    Error::Table {
-        path: folder.join(MANIFEST),
-        line: None,
-        what,
-        hint: "plan it again with `metalith study plan`, or `--plan` of `metalith dataset`, `optimize`".into(),
+    fn place(&mut self, folder: &Path) {
+        self.folder = folder.to_owned();
     }
 }
 
@@ -172,16 +141,12 @@ pub fn plan(tolerance_path: &Path, folder: &Path, settings: PlanSettings, progre
     let tolerance_path = absolute(tolerance_path)?;
     let tolerance = Tolerance::read(&tolerance_path)?;
     fs::create_dir_all(folder).map_err(Error::io("create the folder", folder))?;
-    let known = folder.join(MANIFEST).is_file();
+    let known = is_planned(folder);
     let layouts = layouts(&tolerance, folder, known, progress)?;
     let paths: Vec<PathBuf> = layouts.iter().map(|l| layout_path(l, folder)).collect();
     let key = key(&tolerance, &paths)?;
-    if known {
-        let known = Plan::open(folder)?;
-        if known.key == hex(&key) {
-            return Ok(known);
-        }
-        return Err(another_plan(folder));
+    if let Some(known) = Plan::known_in(folder, &hex(&key))? {
+        return Ok(known);
     }
     let designs = tolerance.designs();
     // Where each design would keep tables of its own.
@@ -210,7 +175,7 @@ pub fn plan(tolerance_path: &Path, folder: &Path, settings: PlanSettings, progre
         plan.take(design, designs, &bench, progress)?;
     }
     plan.draws_per_shard = parts_per_shard(settings.draws_per_shard, plan.seconds_per_draw, draws);
-    write_manifest(folder, &plan)?;
+    plan.write_in(folder)?;
     Ok(plan)
 }
 
@@ -322,18 +287,6 @@ pub(crate) fn key(tolerance: &Tolerance, layouts: &[PathBuf]) -> Result<[u8; 32]
         add("file", &file_digest(&path)?);
     }
     Ok(hash.finalize().into())
-}
-
-/// SHA-256 of a file, read piece by piece.
-pub(crate) fn file_digest(path: &Path) -> Result<[u8; 32]> {
-    let mut hash = Sha256::new();
-    let mut file = fs::File::open(path).map_err(Error::io("read", path))?;
-    std::io::copy(&mut file, &mut hash).map_err(Error::io("read", path))?;
-    Ok(hash.finalize().into())
-}
-
-pub(crate) fn absolute(path: &Path) -> Result<PathBuf> {
-    std::path::absolute(path).map_err(Error::io("find", path))
 }
 
 /// A plan of nothing, for tests of what is done with plans.

@@ -4,9 +4,10 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use metalith_core::document::{Document, Section, load};
-use metalith_core::{Error, Result, WholeFile};
+use metalith_core::{Result, WholeFile};
 
 use crate::cut::Cut;
+use crate::manifest::absolute;
 
 /// What the jobs of a cluster need.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -65,8 +66,8 @@ impl Slurm {
 /// # Errors
 /// If a file cannot be written.
 pub fn submissions(plan: &Cut, slurm: &Slurm, shards: &[u64]) -> Result<Vec<Submission>> {
-    let folder = std::path::absolute(plan.folder.join("slurm")).map_err(Error::io("find", &plan.folder))?;
-    let study = std::path::absolute(&plan.folder).map_err(Error::io("find", &plan.folder))?;
+    let folder = absolute(&plan.folder.join("slurm"))?;
+    let study = absolute(&plan.folder)?;
     // Indices run from zero to below the size.
     let most = slurm.max_array_size as usize;
     let mut all = Vec::new();

@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 
 use crate::bench::Quiet;
 use crate::cut::Cut;
-use crate::plan::{MANIFEST, absolute, another_plan, file_digest, manifest, write_manifest};
+use crate::manifest::{Manifest, absolute, another_plan, file_digest};
 
 /// Version of the format of the manifest.
 const SCHEMA: u32 = 1;
@@ -62,6 +62,20 @@ pub struct StartsResult {
     pub phase: PathBuf,
 }
 
+impl Manifest for StartsPlan {
+    fn key(&self) -> &str {
+        &self.key
+    }
+
+    fn is_known(&self) -> bool {
+        self.schema == SCHEMA && self.starts_per_shard > 0
+    }
+
+    fn place(&mut self, folder: &Path) {
+        self.folder = folder.to_owned();
+    }
+}
+
 impl StartsPlan {
     /// What stands in the manifest under `work`.
     pub(crate) const WORK: &'static str = "starts";
@@ -71,12 +85,7 @@ impl StartsPlan {
     /// # Errors
     /// If there is none, or its manifest cannot be read.
     pub fn open(folder: &Path) -> Result<Self> {
-        let mut plan: Self = manifest(folder)?;
-        if plan.schema != SCHEMA || plan.starts_per_shard == 0 {
-            return Err(another_plan(folder));
-        }
-        plan.folder = folder.to_owned();
-        Ok(plan)
+        Self::open_in(folder)
     }
 
     /// How it is cut.
@@ -96,7 +105,7 @@ impl StartsPlan {
     /// If the design has changed since it was planned, tables are not there, or the user stopped it.
     pub fn run(&self, shards: &[u64], progress: &dyn Progress) -> Result<()> {
         let design = Design::read(&self.design)?;
-        if key(&self.design, &design)? != self.key {
+        if key(&self.design, &design, self.starts)? != self.key {
             return Err(another_plan(&self.folder));
         }
         let folder = self.folder.join(CELLS);
@@ -163,10 +172,14 @@ impl StartsPlan {
 }
 
 /// SHA-256 of everything that decides the answers.
-fn key(path: &Path, design: &Design) -> Result<String> {
+fn key(path: &Path, design: &Design, starts: u64) -> Result<String> {
     let solver = metalith_cell::kept::solver_of(design.cell.shape);
     let mut hash = Sha256::new();
-    hash.update(format!("{} {solver} {} ", env!("CARGO_PKG_VERSION"), design.digest()));
+    hash.update(format!(
+        "{} {solver} {} {starts} ",
+        env!("CARGO_PKG_VERSION"),
+        design.digest()
+    ));
     hash.update(file_digest(path)?);
     Ok(hex(&hash.finalize()))
 }
@@ -185,14 +198,9 @@ pub fn plan_starts(
     let path = absolute(design_path)?;
     let design = Design::read(&path)?;
     OptimiseTask::of(&design)?;
-    let key = key(&path, &design)?;
-    std::fs::create_dir_all(folder).map_err(Error::io("create the folder", folder))?;
-    if folder.join(MANIFEST).is_file() {
-        let known = StartsPlan::open(folder)?;
-        return match known.key == key && known.starts == starts {
-            true => Ok(known),
-            false => Err(another_plan(folder)),
-        };
+    let key = key(&path, &design, starts)?;
+    if let Some(known) = StartsPlan::known_in(folder, &key)? {
+        return Ok(known);
     }
     let cells = folder.join(CELLS);
     std::fs::create_dir_all(&cells).map_err(Error::io("create the folder", &cells))?;
@@ -213,6 +221,6 @@ pub fn plan_starts(
         cells: names,
         folder: folder.to_owned(),
     };
-    write_manifest(folder, &plan)?;
+    plan.write_in(folder)?;
     Ok(plan)
 }

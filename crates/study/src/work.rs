@@ -6,8 +6,9 @@ use metalith_core::{Progress, Result};
 
 use crate::comparison::ComparisonPlan;
 use crate::cut::Cut;
+use crate::manifest;
 use crate::pairs::PairsPlan;
-use crate::plan::{Plan, manifest};
+use crate::plan::Plan;
 use crate::shard::Run;
 use crate::starts::StartsPlan;
 
@@ -29,7 +30,7 @@ impl Work {
     /// # Errors
     /// If there is none, or its manifest cannot be read.
     pub fn open(folder: &Path) -> Result<Self> {
-        let known: serde_json::Value = manifest(folder)?;
+        let known: serde_json::Value = manifest::read(folder)?;
         match known.get("work").and_then(|w| w.as_str()) {
             Some(PairsPlan::WORK) => Ok(Self::Pairs(PairsPlan::open(folder)?)),
             Some(ComparisonPlan::WORK) => Ok(Self::Comparison(ComparisonPlan::open(folder)?)),

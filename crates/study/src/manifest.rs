@@ -1,0 +1,113 @@
+//! The manifest of work that is cut into shards: one file in its folder.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use metalith_core::file::read_at_most;
+use metalith_core::{Error, Result, WholeFile};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use sha2::{Digest, Sha256};
+
+/// Name of the manifest within the folder.
+const MANIFEST: &str = "plan.json";
+/// Longest manifest.
+const LONGEST: u64 = 64 << 20;
+
+/// What stands in the manifest of one kind of work.
+pub(crate) trait Manifest: Serialize + DeserializeOwned {
+    /// SHA-256 of all that decides the answers, in hexadecimal.
+    fn key(&self) -> &str;
+
+    /// Whether this version of the program can go by it.
+    fn is_known(&self) -> bool;
+
+    /// Remember where it was read.
+    fn place(&mut self, folder: &Path);
+
+    /// That of a folder.
+    ///
+    /// # Errors
+    /// If there is none, or it cannot be read.
+    fn open_in(folder: &Path) -> Result<Self> {
+        let mut found: Self = read(folder)?;
+        if !found.is_known() {
+            return Err(fault(folder, "a manifest of another version of the program".into()));
+        }
+        found.place(folder);
+        Ok(found)
+    }
+
+    /// That of a folder if it holds one, which must be of this key.
+    ///
+    /// # Errors
+    /// If it cannot be read, or is another.
+    fn known_in(folder: &Path, key: &str) -> Result<Option<Self>> {
+        fs::create_dir_all(folder).map_err(Error::io("create the folder", folder))?;
+        if !is_planned(folder) {
+            return Ok(None);
+        }
+        let known = Self::open_in(folder)?;
+        match known.key() == key {
+            true => Ok(Some(known)),
+            false => Err(another_plan(folder)),
+        }
+    }
+
+    /// Write it into a folder: the last thing that a plan does.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    fn write_in(&self, folder: &Path) -> Result<()> {
+        let mut text = serde_json::to_string_pretty(self).expect("plain data serialises");
+        text.push('\n');
+        WholeFile::write(&folder.join(MANIFEST), text.as_bytes())
+    }
+}
+
+/// Whether a folder holds a plan.
+pub(crate) fn is_planned(folder: &Path) -> bool {
+    folder.join(MANIFEST).is_file()
+}
+
+/// The manifest of a folder.
+///
+/// # Errors
+/// If there is none, or it is no manifest.
+pub(crate) fn read<T: DeserializeOwned>(folder: &Path) -> Result<T> {
+    let bytes = read_at_most(&folder.join(MANIFEST), LONGEST, "the manifest of a plan")?;
+    serde_json::from_slice(&bytes).map_err(|e| fault(folder, e.to_string()))
+}
+
+fn fault(folder: &Path, what: String) -> Error {
+    Error::Table {
+        path: folder.join(MANIFEST),
+        line: None,
+        what,
+        hint: "plan it again: `metalith study plan`, or `--plan` of `metalith dataset`, `compare`, `optimise`".into(),
+    }
+}
+
+/// What to say of a folder whose plan is not that of these files.
+pub(crate) fn another_plan(folder: &Path) -> Error {
+    Error::invalid(
+        format!(
+            "{} holds another plan, or a file of it has changed since, or another version of the program planned it",
+            folder.display()
+        ),
+        "plan into another folder with --out, or remove this one",
+    )
+}
+
+/// SHA-256 of a file, read piece by piece.
+pub(crate) fn file_digest(path: &Path) -> Result<[u8; 32]> {
+    let mut hash = Sha256::new();
+    let mut file = fs::File::open(path).map_err(Error::io("read", path))?;
+    std::io::copy(&mut file, &mut hash).map_err(Error::io("read", path))?;
+    Ok(hash.finalize().into())
+}
+
+/// A path that holds wherever a shard is made.
+pub(crate) fn absolute(path: &Path) -> Result<PathBuf> {
+    std::path::absolute(path).map_err(Error::io("find", path))
+}
