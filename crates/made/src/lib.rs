@@ -39,7 +39,7 @@ mod stitching;
 pub mod zernike;
 
 pub use bank::{BankRange, CellBank};
-pub use camera::veiled;
+pub use camera::{KernelFilter, blur, veiled};
 pub use case::SimulationCase;
 pub use cells::{NODE_STEP_NM, RealisedCells, SolvedWidths, lagrange};
 pub use chip::{MadeChip, MadeView, ModelStatement, spread};

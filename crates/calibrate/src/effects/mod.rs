@@ -54,6 +54,8 @@ pub struct Parameter {
     pub range: (f64, f64),
     /// A typical magnitude.
     pub typical: f64,
+    /// A value that is sound although it may be an end of the range: no effect, or a size of zero.
+    pub sound_end: f64,
 }
 
 impl Parameter {
@@ -61,6 +63,7 @@ impl Parameter {
         Self {
             range: (low, high),
             typical,
+            sound_end: 0.0,
         }
     }
 
