@@ -433,6 +433,21 @@ fn a_pair_is_found_where_neither_of_the_two_helps() {
     assert_eq!(gains[0], gains[1]);
 }
 
+/// Pillars that are higher at the rim of every lens: much of it is a defocus, which the gap does not hold for all colours and
+/// widths.
+#[test]
+fn heights_that_differ_over_the_lens_are_found() {
+    const HIGHER_NM: f64 = 20.0;
+    let set = synthetic(&[("rim_height", &[HIGHER_NM])], 32);
+    let session = Session::new(&set, with_effects(&["rim_height", "gap", "cd_bias", "tilt"])).unwrap();
+    let (d, evidence) = session.diagnose(&session.simulate(&Silent).unwrap(), &Silent).unwrap();
+    assert_eq!(names(&d), ["rim_height"], "{} {:?}", d.sentence(), d.error);
+    assert_eq!(d.verdict, SetVerdict::Explained);
+    assert_eq!(d.effects[0].holds(HIGHER_NM), Some(true), "{}", d.sentence());
+    let made = session.simulator.perturbation(&evidence.unwrap().finding.after.theta);
+    assert!((made.cell.rim_height_nm / HIGHER_NM - 1.0).abs() < 0.1);
+}
+
 /// Missing pillars make a speckle that no fit predicts: it is counted as noise, and gives the same share as their
 /// mean.
 #[test]

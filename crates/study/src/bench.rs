@@ -236,8 +236,13 @@ impl MadeRange {
                 least = least.min(made.geometry.bias_nm(fill));
                 most = most.max(made.geometry.bias_nm(fill));
             }
-            let [low, high] = changes.unwrap_or([made.cell; 2]);
-            changes = Some([joined(low, made.cell, f64::min), joined(high, made.cell, f64::max)]);
+            for cell in [Some(made.cell.in_the_middle()), made.cell.at_the_rim()]
+                .into_iter()
+                .flatten()
+            {
+                let [low, high] = changes.unwrap_or([cell; 2]);
+                changes = Some([joined(low, cell, f64::min), joined(high, cell, f64::max)]);
+            }
         }
         Ok(Self {
             bias_nm: [least, most],
@@ -276,5 +281,6 @@ fn joined(a: CellChange, b: CellChange, of: fn(f64, f64) -> f64) -> CellChange {
         taper_deg: of(a.taper_deg, b.taper_deg),
         corner_rounding_nm: of(a.corner_rounding_nm, b.corner_rounding_nm),
         residual_mask_nm: of(a.residual_mask_nm, b.residual_mask_nm),
+        ..a.in_the_middle()
     }
 }

@@ -17,6 +17,7 @@ mod led_width;
 mod missing_pillars;
 mod pixel_blur;
 mod residual_mask;
+mod rim_height;
 mod sensor_tilt;
 mod sidewall_taper;
 mod source_distance;
@@ -172,6 +173,7 @@ fn single() -> Vec<Box<dyn Effect>> {
         Box::new(cd_bias::CdBias),
         Box::new(cd_bias_density::CdBiasDensity),
         Box::new(film_height::FilmHeight),
+        Box::new(rim_height::RimHeight),
         Box::new(film_index::FilmIndex),
         Box::new(sidewall_taper::SidewallTaper),
         Box::new(corner_rounding::CornerRounding),
