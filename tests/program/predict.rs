@@ -90,6 +90,17 @@ fn what_cannot_be_undone_is_made_less() {
 }
 
 #[test]
+fn heights_that_differ_over_the_lens_are_not_compensated() {
+    let design = mini();
+    let array = PillarArray::build(&design, &Silent).unwrap();
+    let error = compensate(&design, &array, &model(|d| d.cell.rim_height_nm = 10.0), &Silent)
+        .err()
+        .unwrap();
+    assert_eq!(error.exit_code(), 2);
+    assert!(error.to_string().contains("rim_height_nm"), "{error}");
+}
+
+#[test]
 #[ignore = "second tier: CPU time, run by .ci/run"]
 fn the_program_predicts_and_compensates() {
     let folder = tempfile::tempdir().unwrap();

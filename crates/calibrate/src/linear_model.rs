@@ -59,6 +59,7 @@ pub struct LinearModel {
 pub const PARAMETER: Parameter = Parameter {
     range: (-1.0, 1.0),
     typical: 0.02,
+    sound_end: 0.0,
 };
 
 /// Periods of the pattern of a smooth term; no effect of a test may use these.

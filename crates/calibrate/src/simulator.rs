@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use super::bench::{Bench, Lit};
-use super::cells::CellSource;
+use super::cells::{CellSource, PillarTable};
 use super::effects::Effect;
 use super::forward_model::Slot;
 use super::optics::PixelGrid;
 use metalith_core::{Progress, Result};
-use metalith_made::Perturbation;
+use metalith_made::{CellChange, Perturbation, to_middle_tops};
 
 /// Widths that a bias may add or take (nm); cells are tabulated so far beyond the layout.
 pub const WIDTH_ROOM_NM: f64 = 36.0;
@@ -127,13 +127,17 @@ impl<'a> Simulator<'a> {
         // Cells first: they bring their own progress.
         let mut work = Vec::new();
         for step in steps {
-            let cells = self.cells.table(
-                &perturbations[step[0]].cell,
-                &self.wavelengths_nm,
-                self.widths_nm,
-                progress,
-            )?;
-            work.push((step, cells));
+            let change = &perturbations[step[0]].cell;
+            let table = |change: &CellChange| self.cells.table(change, &self.wavelengths_nm, self.widths_nm, progress);
+            let cells = table(&change.in_the_middle())?;
+            // Models of lower fidelity know no heights.
+            let rim = match change.at_the_rim() {
+                Some(rim) if matches!(self.cells, CellSource::Rigorous(_)) => {
+                    Some(self.at_middle_tops((*table(&rim)?).clone(), change.rim_height_nm)?)
+                }
+                _ => None,
+            };
+            work.push((step, cells, rim));
         }
         progress.begin("captures as they should be", work.len() as u64);
         while !work.is_empty() {
@@ -142,25 +146,26 @@ impl<'a> Simulator<'a> {
             let mut together = Vec::new();
             work = work
                 .into_iter()
-                .filter_map(|(step, cells)| {
-                    if together.len() < TOGETHER && perturbations[step[0]].path == *path {
-                        together.push((step, cells));
+                .filter_map(|own| {
+                    if together.len() < TOGETHER && perturbations[own.0[0]].path == *path {
+                        together.push(own);
                         return None;
                     }
-                    Some((step, cells))
+                    Some(own)
                 })
                 .collect();
             let chips: Vec<Lit<'_>> = together
                 .iter()
-                .map(|(step, cells)| Lit {
+                .map(|(step, cells, rim)| Lit {
                     cells: Arc::clone(cells),
+                    rim: rim.clone(),
                     geometry: &perturbations[step[0]].geometry,
                     lights: step.iter().map(|&i| &perturbations[i].light).collect(),
                     scatter,
                 })
                 .collect();
             let intensities = self.bench.intensities(&chips, path, progress)?;
-            for ((step, _), of_lights) in together.iter().zip(&intensities) {
+            for ((step, ..), of_lights) in together.iter().zip(&intensities) {
                 for (&i, planes) in step.iter().zip(of_lights) {
                     out[i] = Some(self.bench.grids(planes, &perturbations[i]));
                 }
@@ -171,5 +176,15 @@ impl<'a> Simulator<'a> {
             .into_iter()
             .map(|g| g.expect("every perturbation is in one step"))
             .collect())
+    }
+
+    /// A table of pillars at the rim, so much higher than in the middle, from their own tops to those in the middle.
+    fn at_middle_tops(&self, mut rim: PillarTable, higher_nm: f64) -> Result<Arc<PillarTable>> {
+        let stack = &self.bench.set().stack.cell;
+        for ((nm, row), bare) in self.wavelengths_nm.iter().zip(&mut rim.t).zip(&mut rim.bare) {
+            let phase = to_middle_tops(stack, higher_nm, nm * 1e-3)?;
+            row.iter_mut().chain([bare]).for_each(|t| *t *= phase);
+        }
+        Ok(Arc::new(rim))
     }
 }

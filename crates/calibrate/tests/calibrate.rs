@@ -318,7 +318,11 @@ fn a_declared_effect_is_found_and_kept_in_the_model() {
     assert!((made.geometry.declared[0].values["a"] / BOW_NM - 1.0).abs() < 0.1);
 }
 
-/// What is left leads to the effect that the list lacks: proposed, adopted, and it explains the set.
+/// A second image of 4 % whose spots are blurred by 0.5 um, as a lens behind the relay makes one.
+const BLURRED_GHOST: &str = include_str!("../../../golden/ghost.toml");
+
+/// What is left leads to the effect that the list lacks: proposed, adopted, and it explains the set. One proposal of a second
+/// image serves sharp and blurred ones.
 #[test]
 fn an_effect_outside_the_list_is_proposed_and_adopted() {
     /// Reduced chi-square per pixel that may be left on captures left out: the aim, and what the coarse spectrum of these
@@ -327,11 +331,31 @@ fn an_effect_outside_the_list_is_proposed_and_adopted() {
     /// Relative: synthetic sets have another sampling.
     const TOLERANCE: f64 = 0.1;
     let tried = ["gap", "cd_bias"];
-    for (unlisted, name, expected) in [
-        (UnlistedEffect::Ghost(0.1, [4.0, -3.0]), "ghost", vec![0.1, 4.0, -3.0]),
-        (UnlistedEffect::Astigmatism(25.0), "wavefront_path", vec![25.0]),
+    let file = FOLDERS[0].join("ghost.toml");
+    fs::write(&file, BLURRED_GHOST).unwrap();
+    let declaring = Settings {
+        declared: DeclaredEffect::read(&file).unwrap(),
+        ..settings()
+    };
+    let off_list = |what| SYNTHESIZER.off_list(what, &Silent).unwrap();
+    // The file starts from a place of (5, -3) um.
+    let blurred = Synthesizer::new(&LIKE, &declaring)
+        .and_then(|s| s.with_effect("ghost", &[0.04, 0.5, -0.5], &Silent))
+        .unwrap();
+    for (images, name, expected) in [
+        (blurred, "ghost", vec![0.04, 5.5, -3.5, 0.5 * 0.5]),
+        (
+            off_list(UnlistedEffect::Ghost(0.1, [4.0, -3.0])),
+            "ghost",
+            vec![0.1, 4.0, -3.0],
+        ),
+        (
+            off_list(UnlistedEffect::Astigmatism(25.0)),
+            "wavefront_path",
+            vec![25.0],
+        ),
     ] {
-        let set = SYNTHESIZER.draw(&SYNTHESIZER.off_list(unlisted, &Silent).unwrap(), 27);
+        let set = SYNTHESIZER.draw(&images, 27);
         let session = Session::new(&set, with_effects(&tried)).unwrap();
         let (before, evidence) = session.diagnose(&session.simulate(&Silent).unwrap(), &Silent).unwrap();
         assert!(
@@ -340,7 +364,8 @@ fn an_effect_outside_the_list_is_proposed_and_adopted() {
             before.sentence()
         );
         let proposed = propose(&session, &evidence.unwrap());
-        assert!(proposed.iter().any(|e| e.name == name), "{proposed:?}");
+        let copies = proposed.iter().filter(|e| e.name == "ghost").count();
+        assert!(proposed.iter().any(|e| e.name == name) && copies <= 1, "{proposed:?}");
         let wider = session.adopting(proposed).unwrap();
         let (after, _) = wider.diagnose(&wider.simulate(&Silent).unwrap(), &Silent).unwrap();
         assert_eq!(names(&after), [name], "{} {:?}", after.sentence(), after.error);
@@ -406,6 +431,21 @@ fn a_pair_is_found_where_neither_of_the_two_helps() {
     }
     // They were taken in one step.
     assert_eq!(gains[0], gains[1]);
+}
+
+/// Pillars that are higher at the rim of every lens: much of it is a defocus, which the gap does not hold for all colours and
+/// widths.
+#[test]
+fn heights_that_differ_over_the_lens_are_found() {
+    const HIGHER_NM: f64 = 20.0;
+    let set = synthetic(&[("rim_height", &[HIGHER_NM])], 32);
+    let session = Session::new(&set, with_effects(&["rim_height", "gap", "cd_bias", "tilt"])).unwrap();
+    let (d, evidence) = session.diagnose(&session.simulate(&Silent).unwrap(), &Silent).unwrap();
+    assert_eq!(names(&d), ["rim_height"], "{} {:?}", d.sentence(), d.error);
+    assert_eq!(d.verdict, SetVerdict::Explained);
+    assert_eq!(d.effects[0].holds(HIGHER_NM), Some(true), "{}", d.sentence());
+    let made = session.simulator.perturbation(&evidence.unwrap().finding.after.theta);
+    assert!((made.cell.rim_height_nm / HIGHER_NM - 1.0).abs() < 0.1);
 }
 
 /// Missing pillars make a speckle that no fit predicts: it is counted as noise, and gives the same share as their

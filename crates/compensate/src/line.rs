@@ -52,6 +52,12 @@ impl Line {
                 "compensate for widths that depend on `w`, `fill` and `r` alone, or take the term out of the model",
             ));
         }
+        if model.perturbation.cell.rim_height_nm != 0.0 {
+            return Err(Error::invalid(
+                "pillars that are higher at the rim of a lens are not compensated: a width is chosen for its cell, not for its place",
+                "take `rim_height_nm` out of the model; `metalith run --model` shows what it does",
+            ));
+        }
         let stack = design.cell_stack()?;
         let chip = MadeChip::new(&stack, model)?;
         let nothing = CalibratedModel::new(String::new(), String::new(), Perturbation::default());

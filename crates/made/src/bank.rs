@@ -66,6 +66,7 @@ fn change_of([height_nm, index, taper_deg, corner_rounding_nm, residual_mask_nm]
         taper_deg,
         corner_rounding_nm,
         residual_mask_nm,
+        ..CellChange::default()
     }
 }
 
@@ -352,6 +353,7 @@ impl CellBank {
         Ok(SolvedWidths {
             pillars: vec![widths_nm.iter().map(at).collect::<Result<_>>()?],
             bare: vec![row[length - 1]],
+            rim: None,
         })
     }
 

@@ -1,4 +1,6 @@
-//! What the camera of a perturbation makes of a PSF: a Gaussian blur, and a veil.
+//! What the camera of a perturbation makes of a PSF: declared kernels, a Gaussian blur, and a veil.
+
+mod kernels;
 
 use std::sync::Arc;
 
@@ -6,28 +8,23 @@ use ndarray::Array2;
 use num_complex::Complex64;
 use rustfft::{Fft, FftPlanner};
 
+pub use kernels::KernelFilter;
+
 use super::CameraChange;
 use super::declared::compiled;
 use metalith_wave::Psf;
 
 impl CameraChange {
-    /// Add what declared kernels make of an image: at each sample, the light of all others through the kernel. Rows
-    /// along +y; `step_um` between samples.
-    pub fn add_kernels(&self, image: &mut Array2<f64>, step_um: f64) {
-        for term in compiled(&self.declared, |_| true) {
-            let kernel = |dy: isize, dx: isize| {
-                let place = [dx as f64 * step_um, dy as f64 * step_um];
-                term.value(&place) * step_um * step_um
-            };
-            let spread = convolved(image, &kernel);
-            *image += &spread;
-        }
+    /// What declared kernels make of images of `rows` x `cols` samples `step_um` apart; none where none is declared.
+    pub fn kernels(&self, (rows, cols): (usize, usize), step_um: f64) -> Option<KernelFilter> {
+        let terms = compiled(&self.declared, |_| true);
+        (!terms.is_empty()).then(|| KernelFilter::new(&terms, [rows, cols], step_um))
     }
 
     /// Blur a PSF and spread the stray share of its light evenly over its window. The energy in the window stays.
     pub fn apply(&self, psf: &mut Psf) {
-        self.add_kernels(&mut psf.values, psf.window.step_um);
-        if !self.declared.is_empty() {
+        if let Some(kernels) = self.kernels(psf.values.dim(), psf.window.step_um) {
+            kernels.apply(&mut psf.values);
             // A kernel of any shape has no transfer along a line that its window's samples would not show better.
             psf.otf = None;
         }
@@ -54,43 +51,9 @@ pub fn veiled(value: f64, mean: f64, stray: f64) -> f64 {
     value + stray * (mean - value)
 }
 
-/// The convolution of an image with a kernel, given for steps along y and x; nothing comes from beyond the image.
-fn convolved(image: &Array2<f64>, kernel: &dyn Fn(isize, isize) -> f64) -> Array2<f64> {
-    let (rows, cols) = image.dim();
-    let padded = (2 * rows, 2 * cols);
-    let wrapped = |i: usize, n: usize| if i < n { i as isize } else { i as isize - 2 * n as isize };
-    let place = |(y, x): (usize, usize)| Complex64::from(kernel(wrapped(y, rows), wrapped(x, cols)));
-    let mut filter = Array2::from_shape_fn(padded, place);
-    let lit = |(y, x): (usize, usize)| image.get((y, x)).map_or(Complex64::ZERO, |v| Complex64::from(*v));
-    let mut light = Array2::from_shape_fn(padded, lit);
-    transform(&mut filter, false);
-    transform(&mut light, false);
-    light *= &filter;
-    transform(&mut light, true);
-    let scale = 1.0 / (4 * rows * cols) as f64;
-    Array2::from_shape_fn((rows, cols), |place| light[place].re * scale)
-}
-
-/// The Fourier transform over both axes, not scaled.
-fn transform(plane: &mut Array2<Complex64>, inverse: bool) {
-    let mut planner = FftPlanner::new();
-    for _ in 0..2 {
-        let n = plane.ncols();
-        let fft = if inverse {
-            planner.plan_fft_inverse(n)
-        } else {
-            planner.plan_fft_forward(n)
-        };
-        if let Some(lines) = plane.as_slice_mut() {
-            fft.process(lines);
-        }
-        *plane = plane.t().as_standard_layout().into_owned();
-    }
-}
-
 /// Convolve with a Gaussian of `sigma` samples, the image mirrored at its border: the spectrum of an image and its
 /// mirror is multiplied with exp(-2 (pi sigma f)^2), which is exact for an image that its samples hold.
-fn blur(values: &mut Array2<f64>, sigma: f64) {
+pub fn blur(values: &mut Array2<f64>, sigma: f64) {
     for _ in 0..2 {
         blur_rows(values, sigma);
         *values = values.t().as_standard_layout().into_owned();
@@ -177,34 +140,5 @@ mod tests {
         // The ratio of two sums over all samples, each with its own rounding.
         const RATIO: f64 = 1e-9;
         assert!((a / b - 0.75).abs() < RATIO, "{a} {b}");
-    }
-
-    /// A kernel that holds all of its light in one sample a few steps off makes a second image there.
-    #[test]
-    fn a_narrow_kernel_makes_a_ghost() {
-        let plain = gaussian(1.2);
-        let mut image = plain.values.clone();
-        let text = "a * exp(-((x - 2)^2 + (y + 1.5)^2) / (2 * s^2)) / (2 * pi * s^2)";
-        let change = CameraChange {
-            declared: vec![crate::DeclaredTerm {
-                name: "ghost".into(),
-                quantity: crate::DeclaredQuantity::Kernel,
-                expression: text.into(),
-                // Wide enough for samples of 0.5 um.
-                values: [("a".to_owned(), 0.1), ("s".to_owned(), 0.5)].into(),
-            }],
-            ..CameraChange::default()
-        };
-        change.add_kernels(&mut image, 0.5);
-        // The ghost of a Gaussian is one of the summed variance, 4 samples off along x and -3 along y.
-        let ghost = gaussian(1.3);
-        // The tail of the kernel that its samples alias, exp(-2 (pi 0.5 / 0.5)^2), and of the image at the border.
-        const ALIASED: f64 = 1e-6;
-        for iy in 8..56 {
-            for ix in 8..56 {
-                let want = plain.values[[iy, ix]] + 0.1 * ghost.values[[iy + 3, ix - 4]];
-                assert!((image[[iy, ix]] - want).abs() < ALIASED, "{iy} {ix}");
-            }
-        }
     }
 }

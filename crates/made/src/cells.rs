@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::CellChange;
 use super::bank::CellBank;
-use super::stack::{off_cutoff, perturbed, possible_width_nm};
+use super::stack::{off_cutoff, perturbed, possible_width_nm, to_middle_tops};
 use metalith_cell::{BAND_ORDERS, CellStack, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, dark};
 use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::Orders;
@@ -51,6 +51,8 @@ pub struct RealisedCells {
     known: Mutex<HashMap<(WaveKey, Solve), Polarised>>,
     /// Where transmissions are taken from instead of being solved.
     bank: Option<(Arc<CellBank>, CellChange)>,
+    /// The cells at the rim of a lens, where they differ from these in its middle, and how much higher they are (nm).
+    rim: Option<(Box<Self>, f64)>,
 }
 
 /// What sites of some widths transmit: one table for light along the normal; else one for each polarisation that is
@@ -61,6 +63,8 @@ pub struct SolvedWidths {
     pub pillars: Vec<Vec<Complex64>>,
     /// Of a site without pillar, for each table.
     pub bare: Vec<Complex64>,
+    /// The same at the rim of a lens, to the tops of the pillars in its middle; none where it is alike.
+    pub rim: Option<Box<Self>>,
 }
 
 /// Where a width lies among the nodes.
@@ -97,14 +101,29 @@ impl RealisedCells {
             offset_nm: bias_nm - bias_nm.floor(),
             known: Mutex::default(),
             bank: None,
+            rim: None,
+        }
+    }
+
+    /// Cells of a stated stack with a change, in the middle of a lens and at its rim; `bias_nm` as for [`Self::new`].
+    pub fn changed(stated: &CellStack, change: &CellChange, bias_nm: f64) -> Self {
+        let of = |change: &CellChange| Self::new(perturbed(stated, change), bias_nm);
+        let rim = change
+            .at_the_rim()
+            .map(|rim| (Box::new(of(&rim)), change.rim_height_nm));
+        Self {
+            rim,
+            ..of(&change.in_the_middle())
         }
     }
 
     /// Cells of a changed pillar, all taken from a bank: light off the normal has no answer, nor has what is outside
     /// of the bank.
     pub fn of_bank(bank: &Arc<CellBank>, change: &CellChange) -> Self {
+        let rim = change.at_the_rim();
         Self {
-            bank: Some((Arc::clone(bank), *change)),
+            bank: Some((Arc::clone(bank), change.in_the_middle())),
+            rim: rim.map(|rim| (Box::new(Self::of_bank(bank, &rim)), change.rim_height_nm)),
             ..Self::new(perturbed(bank.stated(), change), 0.0)
         }
     }
@@ -158,6 +177,28 @@ impl RealisedCells {
         sines: [f64; 2],
         progress: &dyn Progress,
     ) -> Result<SolvedWidths> {
+        let (mut solved, columns) = self.solve_columns(orders, widths_nm, wavelength_um, sines, None, progress)?;
+        if let Some((cells, higher_nm)) = &self.rim {
+            let asked = Some(columns.as_slice());
+            let (mut rim, _) = cells.solve_columns(orders, widths_nm, wavelength_um, sines, asked, progress)?;
+            let phase = to_middle_tops(&self.stack, *higher_nm, wavelength_um)?;
+            let all = rim.pillars.iter_mut().flatten().chain(&mut rim.bare);
+            all.for_each(|t| *t *= phase);
+            solved.rim = Some(Box::new(rim));
+        }
+        Ok(solved)
+    }
+
+    /// Transmissions, and which of the four polarisations they are of: those in `asked`, or all that are not dark.
+    fn solve_columns(
+        &self,
+        orders: usize,
+        widths_nm: &[f64],
+        wavelength_um: f64,
+        sines: [f64; 2],
+        asked: Option<&[usize]>,
+        progress: &dyn Progress,
+    ) -> Result<(SolvedWidths, Vec<usize>)> {
         if let Some((bank, change)) = &self.bank {
             if sines != [0.0; 2] {
                 return Err(Error::invalid(
@@ -165,7 +206,7 @@ impl RealisedCells {
                     "leave out `incidence = \"as_lit\"`",
                 ));
             }
-            return bank.transmissions(change, orders, widths_nm, wavelength_um);
+            return Ok((bank.transmissions(change, orders, widths_nm, wavelength_um)?, vec![0]));
         }
         let [um, x, y] = [wavelength_um, sines[0], sines[1]].map(f64::to_bits);
         let place = [um, x, y, orders as u64];
@@ -201,12 +242,14 @@ impl RealisedCells {
         let polarisations = if sines == [0.0; 2] { 0..1 } else { 0..4 };
         let (columns, pillars) = polarisations
             .map(|p| (p, of(p)))
-            .filter(|(p, t)| *p < 2 || !dark(t))
+            .filter(|(p, t)| asked.map_or_else(|| *p < 2 || !dark(t), |asked| asked.contains(p)))
             .unzip::<_, _, Vec<_>, Vec<_>>();
-        Ok(SolvedWidths {
+        let solved = SolvedWidths {
             pillars,
             bare: columns.iter().map(|&p| known[&(place, Solve::Bare)][p]).collect(),
-        })
+            rim: None,
+        };
+        Ok((solved, columns))
     }
 
     fn known(&self) -> MutexGuard<'_, HashMap<(WaveKey, Solve), Polarised>> {

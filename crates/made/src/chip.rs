@@ -6,7 +6,6 @@ use num_complex::Complex64;
 use serde::Serialize;
 
 use super::cells::{RealisedCells, SolvedWidths};
-use super::stack::perturbed;
 use super::{
     ArrivingLight, CalibratedModel, CameraChange, CellBank, ClassTable, DrawnElement, MadeElement, NotApplied,
     Perturbation, cell_direction, mixed, realised_nm,
@@ -56,7 +55,7 @@ impl MadeChip {
         }
         let perturbation = &model.perturbation;
         Ok(Self {
-            cells: RealisedCells::new(perturbed(stated, &perturbation.cell), perturbation.geometry.cd_bias_nm),
+            cells: RealisedCells::changed(stated, &perturbation.cell, perturbation.geometry.cd_bias_nm),
             model: model.clone(),
         })
     }
@@ -198,10 +197,18 @@ impl<'a> MadeView<'a> {
         perturbation: &Perturbation,
         solved: &SolvedWidths,
     ) -> Self {
-        let polarisations = solved.pillars.iter().zip(&solved.bare);
+        let tables = |solved: &SolvedWidths| -> Vec<ClassTable> {
+            let polarisations = solved.pillars.iter().zip(&solved.bare);
+            polarisations.map(|(t, bare)| element.table_of(t, *bare)).collect()
+        };
+        let mut own = tables(solved);
+        if let Some(rim) = &solved.rim {
+            let pairs = own.iter_mut().zip(tables(rim));
+            pairs.for_each(|(table, rim)| table.set_rim(&rim));
+        }
         Self {
             element,
-            tables: polarisations.map(|(t, bare)| element.table_of(t, *bare)).collect(),
+            tables: own,
             light,
             gap_um: perturbation.path.added_distance_um(element.centre_um()),
             camera: perturbation.camera.clone(),

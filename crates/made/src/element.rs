@@ -140,6 +140,8 @@ pub fn realised_nm(drawn_nm: u16, geometry: &GeometryChange, density_steps: i32)
 pub struct MadeElement {
     lattice: Lattice,
     radius_um: f64,
+    /// Radius of the opening in the metal: the rim of the lens (um).
+    rim_um: f64,
     centre_um: [f64; 2],
     geometry: GeometryChange,
     /// Share of the pillars that are missing and counted with their mean.
@@ -159,8 +161,10 @@ pub struct MadeElement {
 /// What the sites of each class transmit at one wavelength and polarisation.
 #[derive(Clone, Debug)]
 pub struct ClassTable {
-    /// Field ratio, foot to top of the pillars; zero for class zero.
+    /// Field ratio, foot to top of the pillars; zero for class zero. Of pillars that differ over the lens, in its middle.
     pub t: Vec<Complex32>,
+    /// Logarithm of the ratio of the transmission at the rim of the lens to that in its middle; empty where they are alike.
+    to_rim: Vec<Complex32>,
     /// |t|^2 summed over sites of what missing pillars scatter, each on its own.
     pub scattered: f64,
 }
@@ -223,6 +227,7 @@ impl MadeElement {
             lattice,
             pupil,
             radius_um: (radius2 as f64).sqrt() * 0.5 * lattice.pitch_um(),
+            rim_um: drawn.aperture_radius_um,
             centre_um: drawn.centre_um,
             geometry: geometry.clone(),
             missing: geometry.missing_pillars,
@@ -300,6 +305,7 @@ impl MadeElement {
         }
         ClassTable {
             t,
+            to_rim: Vec::new(),
             scattered: self.missing * (1.0 - self.missing) * scattered,
         }
     }
@@ -308,7 +314,7 @@ impl MadeElement {
     pub fn aperture<'a>(&'a self, table: &'a ClassTable, wavelength_um: f64) -> MadeAperture<'a> {
         MadeAperture {
             element: self,
-            table: &table.t,
+            table,
             wavelength_um,
             sphere: None,
         }
@@ -341,7 +347,7 @@ fn too_many() -> Error {
 /// A made element at one wavelength, row by row.
 pub struct MadeAperture<'a> {
     element: &'a MadeElement,
-    table: &'a [Complex32],
+    table: &'a ClassTable,
     wavelength_um: f64,
     /// Curvature of the wave along an axis; the same for both.
     sphere: Option<Vec<Complex32>>,
@@ -361,7 +367,10 @@ impl Aperture for MadeAperture<'_> {
         let pattern = |iy: usize, row: &mut [Complex32]| {
             let classes = &self.element.class[iy * n..][..n];
             for (to, &class) in row.iter_mut().zip(classes) {
-                *to = self.table[usize::from(class)];
+                *to = self.table.t[usize::from(class)];
+            }
+            if !self.table.to_rim.is_empty() {
+                self.towards_rim(iy, classes, row);
             }
         };
         pattern(iy, row);
@@ -380,6 +389,38 @@ impl Aperture for MadeAperture<'_> {
                 *to *= along_x * sphere[iy];
             }
         }
+    }
+}
+
+impl MadeAperture<'_> {
+    /// Take what sites of a row transmit in the middle of the lens to their radius. Amplitude and phase of a pillar change
+    /// in proportion to its height, but beside resonances.
+    fn towards_rim(&self, iy: usize, classes: &[u16], row: &mut [Complex32]) {
+        let (lattice, rim2) = (self.element.lattice, self.element.rim_um.powi(2));
+        let y2 = lattice.coordinate_um(iy).powi(2);
+        for ((ix, to), &class) in row.iter_mut().enumerate().zip(classes) {
+            let share = (lattice.coordinate_um(ix).powi(2) + y2) / rim2;
+            let all = self.table.to_rim[usize::from(class)];
+            let turns = share * f64::from(all.im) / std::f64::consts::TAU;
+            *to *= cis(turns) * (share as f32 * all.re).exp();
+        }
+    }
+}
+
+impl ClassTable {
+    /// Say what the same sites transmit at the rim of the lens; between it and the middle, the logarithm of the
+    /// transmission goes with the square of the radius.
+    pub fn set_rim(&mut self, rim: &Self) {
+        let ratio = |(middle, rim): (&Complex32, &Complex32)| {
+            let ratio = rim / middle;
+            // Sites that are dark stay so.
+            if ratio.is_finite() && ratio != Complex32::ZERO {
+                ratio.ln()
+            } else {
+                Complex32::ZERO
+            }
+        };
+        self.to_rim = self.t.iter().zip(&rim.t).map(ratio).collect();
     }
 }
 

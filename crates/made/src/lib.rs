@@ -13,7 +13,7 @@
 //! | part | applied to |
 //! | --- | --- |
 //! | `geometry` | width of each site (bias, bias by the density around it, declared terms), open sites (aperture offset), places of pillars beyond a boundary (stitching), transmission of each class (missing pillars, light that sees no pillar, free amplitude), path, phase and amplitude of each site (wavefront, declared terms) |
-//! | `cell` | the stack that every realised width is solved with |
+//! | `cell` | the stack that every realised width is solved with; pillars that are higher at the rim of a lens, from the stacks in its middle and at its rim |
 //! | `path` | the wave that arrives (tilt, curvature) and the distance of the sensor (gap, tilt of the sensor, declared terms) |
 //! | `camera` | the PSF: declared kernels, Gaussian blur, veil over its window |
 //! | `light` | spectra and source of a bench; a PSF of one wavelength and one point names them with [`Perturbation::not_applied`] |
@@ -39,7 +39,7 @@ mod stitching;
 pub mod zernike;
 
 pub use bank::{BankRange, CellBank};
-pub use camera::veiled;
+pub use camera::{KernelFilter, blur, veiled};
 pub use case::SimulationCase;
 pub use cells::{NODE_STEP_NM, RealisedCells, SolvedWidths, lagrange};
 pub use chip::{MadeChip, MadeView, ModelStatement, spread};
@@ -50,5 +50,5 @@ pub use light::{ArrivingLight, cell_direction};
 pub use model::CalibratedModel;
 pub use not_applied::NotApplied;
 pub use perturbation::{CameraChange, CellChange, GeometryChange, LightChange, PathChange, Perturbation, legendre};
-pub use stack::{off_cutoff, perturbed, possible_width_nm};
+pub use stack::{off_cutoff, perturbed, possible_width_nm, to_middle_tops};
 pub use stitching::Stitching;

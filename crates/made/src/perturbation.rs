@@ -58,6 +58,10 @@ pub struct GeometryChange {
 pub struct CellChange {
     /// Added to the height (nm).
     pub height_nm: f64,
+    /// Added to the height at the rim of a lens over that in its middle, with the square of the radius between (nm).
+    /// Pillars stand on a flat substrate; their tops differ.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub rim_height_nm: f64,
     /// Added to the index of the film.
     pub index: f64,
     /// Lean of the walls, the width at the top kept; positive is wider at the foot (deg).
@@ -66,6 +70,30 @@ pub struct CellChange {
     pub corner_rounding_nm: f64,
     /// Alumina left on top (nm).
     pub residual_mask_nm: f64,
+}
+
+/// Models that say nothing of the rim are written as they always were.
+fn is_zero(v: &f64) -> bool {
+    *v == 0.0
+}
+
+impl CellChange {
+    /// That of the pillars in the middle of a lens.
+    #[must_use]
+    pub fn in_the_middle(&self) -> Self {
+        Self {
+            rim_height_nm: 0.0,
+            ..*self
+        }
+    }
+
+    /// That of the pillars at its rim; none where they are like those in the middle.
+    pub fn at_the_rim(&self) -> Option<Self> {
+        (self.rim_height_nm != 0.0).then(|| Self {
+            height_nm: self.height_nm + self.rim_height_nm,
+            ..self.in_the_middle()
+        })
+    }
 }
 
 /// The path of the light to the chip and from it.
@@ -249,7 +277,7 @@ impl Perturbation {
             range: (low, high),
         };
         let one = |v: f64| vec![v];
-        let checked: [(Bound, Vec<f64>); 23] = [
+        let checked: [(Bound, Vec<f64>); 24] = [
             (bound("geometry.cd_bias_nm", -500.0, 500.0), one(g.cd_bias_nm)),
             (
                 bound("geometry.cd_bias_density_nm", -500.0, 500.0),
@@ -276,6 +304,7 @@ impl Perturbation {
                 g.transmission_range_nm.to_vec(),
             ),
             (bound("cell.height_nm", -1e4, 1e4), one(c.height_nm)),
+            (bound("cell.rim_height_nm", -1e4, 1e4), one(c.rim_height_nm)),
             (bound("cell.index", -2.0, 2.0), one(c.index)),
             (bound("cell.taper_deg", -30.0, 30.0), one(c.taper_deg)),
             (bound("cell.corner_rounding_nm", 0.0, 1e4), one(c.corner_rounding_nm)),

@@ -2,6 +2,7 @@
 
 use metalith_cell::CellStack;
 use metalith_core::Result;
+use num_complex::Complex64;
 
 use super::CellChange;
 
@@ -18,6 +19,16 @@ pub fn perturbed(stated: &CellStack, change: &CellChange) -> CellStack {
         mask_height_nm: stated.mask_height_nm + change.residual_mask_nm,
         ..stated.clone()
     }
+}
+
+/// What brings the transmission of pillars at the rim, `rim_nm` higher than those in the middle, from their tops to the plane
+/// of the tops in the middle: the air between them is counted once.
+///
+/// # Errors
+/// If the wavelength is outside the range of the ambient.
+pub fn to_middle_tops(stack: &CellStack, rim_nm: f64, wavelength_um: f64) -> Result<Complex64> {
+    let turns = -stack.ambient.index(wavelength_um)?.re * rim_nm * 1e-3 / wavelength_um;
+    Ok(Complex64::cis(std::f64::consts::TAU * turns))
 }
 
 /// The nearest width that a pillar of this stack can have, its foot within the pitch (nm).

@@ -270,7 +270,7 @@ impl MadeRange {
         let first = drawer.perturbation(&drawer.draw(key, 0)?);
         let mut range = Self {
             bias_nm: [f64::MAX, f64::MIN],
-            changes: [first.cell; 2],
+            changes: [first.cell.in_the_middle(); 2],
         };
         for k in 0..drawer.count() {
             range.add(&drawer.perturbation(&drawer.draw(key, k)?));
@@ -284,8 +284,11 @@ impl MadeRange {
             let bias = made.geometry.bias_nm(fill);
             self.bias_nm = [self.bias_nm[0].min(bias), self.bias_nm[1].max(bias)];
         }
-        let [low, high] = self.changes;
-        self.changes = [joined(low, made.cell, f64::min), joined(high, made.cell, f64::max)];
+        let pillars = [Some(made.cell.in_the_middle()), made.cell.at_the_rim()];
+        for cell in pillars.into_iter().flatten() {
+            let [low, high] = self.changes;
+            self.changes = [joined(low, cell, f64::min), joined(high, cell, f64::max)];
+        }
     }
 
     /// What the tables of a design must hold for all draws. Those of other designs count too: designs whose pillars are
@@ -319,5 +322,6 @@ fn joined(a: CellChange, b: CellChange, of: fn(f64, f64) -> f64) -> CellChange {
         taper_deg: of(a.taper_deg, b.taper_deg),
         corner_rounding_nm: of(a.corner_rounding_nm, b.corner_rounding_nm),
         residual_mask_nm: of(a.residual_mask_nm, b.residual_mask_nm),
+        ..a.in_the_middle()
     }
 }

@@ -16,6 +16,8 @@ use metalith_wave::{Aperture, PlaneWave};
 /// A candidate chip, and the light that it is illuminated with.
 pub struct Lit<'a> {
     pub cells: Arc<PillarTable>,
+    /// Those at the rim of each lens, to the tops of the pillars in its middle, where they differ.
+    pub rim: Option<Arc<PillarTable>>,
     pub geometry: &'a GeometryChange,
     pub lights: Vec<&'a LightChange>,
     /// Seed of the random positions of missing pillars; without one, their mean effect is used.
@@ -168,7 +170,12 @@ pub(super) fn light(group: &FocusSeries, path: &PathChange, wavelength_um: f64) 
 
 /// Transmission of the sites of an element at one of the wavelengths.
 fn table(chip: &Lit<'_>, element: &MadeElement, wavelength: usize) -> ClassTable {
-    element.table(|width| chip.cells.at(wavelength, width), chip.cells.bare[wavelength])
+    let of = |cells: &PillarTable| element.table(|width| cells.at(wavelength, width), cells.bare[wavelength]);
+    let mut table = of(&chip.cells);
+    if let Some(rim) = &chip.rim {
+        table.set_rim(&of(rim));
+    }
+    table
 }
 
 /// Intensity at the centre of the window of a focus series for a unit of |t|^2 that one site scatters incoherently.

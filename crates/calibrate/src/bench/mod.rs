@@ -12,7 +12,7 @@ pub use light::Lit;
 
 use super::optics::{Optic, PixelGrid, Quadrature};
 use super::set::{CaptureIndex, ElementIndex, LedIndex, MeasuredSet, PerCapture, PerElement, PerLed, RelayCamera};
-use metalith_made::{CameraChange, DrawnElement, GeometryChange, Perturbation, veiled};
+use metalith_made::{DrawnElement, GeometryChange, KernelFilter, Perturbation, veiled};
 use metalith_wave::propagation::{Distances, DistancesPlan};
 
 /// Sampling of the simulated bench.
@@ -163,6 +163,14 @@ impl<'a> Bench<'a> {
             work.sort_by_key(|w| w.1);
             work
         };
+        // Most windows are alike, and so are the filters of kernels on them.
+        let mut kernels: Vec<(usize, f64, Option<KernelFilter>)> = Vec::new();
+        for plan in self.groups.iter().map(|g| &g.plan) {
+            let (n, step) = (plan.window(), plan.step_um());
+            if !kernels.iter().any(|k| (k.0, k.1) == (n, step)) {
+                kernels.push((n, step, perturbation.camera.kernels((n, n), step)));
+            }
+        }
         work.par_iter()
             .map(|(group, capture)| {
                 let centre = self.set.elements[group.element].centre_um;
@@ -176,8 +184,9 @@ impl<'a> Bench<'a> {
                 let (step, n) = (group.plan.step_um(), group.plan.window());
                 let off = self.off_um(group, z, perturbation);
                 let mut light = Cow::Borrowed(intensities[*capture].as_slice());
-                if !perturbation.camera.declared.is_empty() {
-                    light = Cow::Owned(with_kernels(&perturbation.camera, &light, n, step));
+                let own = kernels.iter().find(|k| (k.0, k.1) == (n, step));
+                if let Some(kernels) = own.and_then(|k| k.2.as_ref()) {
+                    light = Cow::Owned(filtered(kernels, &light, n));
                 }
                 if stray != 0.0 {
                     let mean = window_mean(&light, n, self.set.camera.pixel_um / step, camera);
@@ -222,9 +231,9 @@ impl<'a> Bench<'a> {
 }
 
 /// The light of a square of samples with what declared kernels add.
-fn with_kernels(camera: &CameraChange, light: &[f32], n: usize, step_um: f64) -> Vec<f32> {
+fn filtered(kernels: &KernelFilter, light: &[f32], n: usize) -> Vec<f32> {
     let mut image = Array2::from_shape_fn((n, n), |(y, x)| f64::from(light[y * n + x]));
-    camera.add_kernels(&mut image, step_um);
+    kernels.apply(&mut image);
     image.iter().map(|v| *v as f32).collect()
 }
 

@@ -64,8 +64,9 @@ mod tests {
     const OF_THE_PEAK: f64 = 2e-3;
 
     /// Effects that the published cell cannot show, since it has no layer stack.
-    const OF_THE_STACK: [&str; 5] = [
+    const OF_THE_STACK: [&str; 6] = [
         "film_height",
+        "rim_height",
         "film_index",
         "sidewall_taper",
         "corner_rounding",
@@ -115,6 +116,7 @@ mod tests {
                 let solved = SolvedWidths {
                     pillars: vec![element.widths_nm().iter().map(|w| between(&table, *w)).collect()],
                     bare: vec![Complex64::ONE],
+                    rim: None,
                 };
                 let window = Window {
                     centre_um: capture.window_centre_um,

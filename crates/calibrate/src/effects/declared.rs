@@ -249,7 +249,11 @@ impl Effect for DeclaredEffect {
     }
 
     fn parameters(&self) -> Vec<Parameter> {
-        let of = |p: &DeclaredParameter| Parameter::new(p.range.0 - p.start, p.range.1 - p.start, p.prior);
+        let of = |p: &DeclaredParameter| Parameter {
+            // The width of a spot may well be zero, the lower end of its range, wherever a fit starts from.
+            sound_end: if p.range.0 == 0.0 { -p.start } else { 0.0 },
+            ..Parameter::new(p.range.0 - p.start, p.range.1 - p.start, p.prior)
+        };
         self.parameters.iter().map(of).collect()
     }
 

@@ -17,6 +17,7 @@ mod led_width;
 mod missing_pillars;
 mod pixel_blur;
 mod residual_mask;
+mod rim_height;
 mod sensor_tilt;
 mod sidewall_taper;
 mod source_distance;
@@ -54,6 +55,8 @@ pub struct Parameter {
     pub range: (f64, f64),
     /// A typical magnitude.
     pub typical: f64,
+    /// A value that is sound although it may be an end of the range: no effect, or a size of zero.
+    pub sound_end: f64,
 }
 
 impl Parameter {
@@ -61,6 +64,7 @@ impl Parameter {
         Self {
             range: (low, high),
             typical,
+            sound_end: 0.0,
         }
     }
 
@@ -169,6 +173,7 @@ fn single() -> Vec<Box<dyn Effect>> {
         Box::new(cd_bias::CdBias),
         Box::new(cd_bias_density::CdBiasDensity),
         Box::new(film_height::FilmHeight),
+        Box::new(rim_height::RimHeight),
         Box::new(film_index::FilmIndex),
         Box::new(sidewall_taper::SidewallTaper),
         Box::new(corner_rounding::CornerRounding),

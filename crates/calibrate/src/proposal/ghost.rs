@@ -1,11 +1,11 @@
-//! A second image: a share of all light again, displaced by the same distance in every capture.
+//! A second image: a share of all light again, displaced by the same distance and blurred alike in every capture.
 
 use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::effects::{DeclaredEffect, DeclaredParameter};
 use crate::fit::{Fit, FitProblem, dot};
-use metalith_made::DeclaredQuantity;
+use metalith_made::{DeclaredQuantity, blur};
 
 /// Part of a frame's edge that displacements go to: light from farther is not in the frame.
 const REACH: f64 = 0.25;
@@ -13,14 +13,25 @@ const REACH: f64 = 0.25;
 /// Nearest displacement (pixels): what is nearer is a blur.
 const NEAREST: i32 = 2;
 
-/// Added to distances from the middle of the kernel (um), whose value would be 0 / 0 there.
-const OFF_ZERO_UM: f64 = 1e-6;
+/// Blurs that are tried, standard deviations in pixels: none first.
+const BLURS: [f64; 9] = [0.0, 0.35, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6];
+
+/// Largest blur of a proposed ghost (pixels): beyond, it is a veil.
+const MOST_BLUR_PIXELS: f64 = 8.0;
+
+/// How far a blur may be off, as a share of its variance, and at the least (pixels^2): the step between those that are
+/// tried, and the one from none.
+const BLUR_OFF: f64 = 0.6;
+const LEAST_BLUR_OFF: f64 = 0.12;
+
+/// Standard deviation of the spot that stands for a point (pixels): of what a pixel resolves it takes 3 % or less.
+const POINT_PIXELS: f64 = 0.15;
 
 /// Largest share of a ghost: beyond, it is the image.
 const MOST_SHARE: f64 = 0.5;
 
 /// How far the place of a proposed ghost may be off (pixels).
-const ROOM_PIXELS: f64 = 4.0;
+const ROOM_PIXELS: i32 = 4;
 
 /// The displaced copy that removes most of what is left.
 pub(super) struct Ghost {
@@ -28,13 +39,16 @@ pub(super) struct Ghost {
     share: f64,
     /// Displacement along x and y (pixels).
     at: [i32; 2],
+    /// Blur over that of the image: standard deviation (pixels).
+    blur: f64,
     /// By how much it lowers chi-square.
     pub removed: f64,
 }
 
 /// Whitened pixels of one capture, with what nuisances explain taken out of the residual.
+#[derive(Clone)]
 struct Frame {
-    /// The image as predicted, in DN.
+    /// The image as predicted, in DN, with the blur that is tried.
     model: Array2<f32>,
     weight: Array2<f32>,
     residual: Vec<f32>,
@@ -77,6 +91,16 @@ impl Frame {
         }
     }
 
+    /// The same with its image blurred.
+    fn blurred(&self, pixels: f64) -> Self {
+        let mut image = self.model.mapv(f64::from);
+        blur(&mut image, pixels);
+        Self {
+            model: image.mapv(|v| v as f32),
+            ..self.clone()
+        }
+    }
+
     /// Product of the displaced image with the residual, and with itself, nuisances taken out.
     fn products(&self, [dx, dy]: [i32; 2]) -> [f64; 2] {
         let (rows, cols) = self.model.dim();
@@ -108,14 +132,32 @@ pub(super) fn strongest(problem: &FitProblem<'_>, fit: &Fit) -> Option<Ghost> {
         })
         .collect();
     let (rows, cols) = frames.first()?.model.dim();
-    let reach = |edge: usize| (REACH * edge as f64) as i32;
-    let places: Vec<[i32; 2]> = (-reach(rows)..=reach(rows))
-        .flat_map(|dy| (-reach(cols)..=reach(cols)).map(move |dx| [dx, dy]))
-        .filter(|at| at.iter().any(|d| d.abs() >= NEAREST))
-        .collect();
+    let [rows, cols] = [rows, cols].map(|edge| (REACH * edge as f64) as i32);
+    let all = |[y, x]: [i32; 2], [rows, cols]: [i32; 2]| {
+        let places = (y - rows..=y + rows).flat_map(move |dy| (x - cols..=x + cols).map(move |dx| [dx, dy]));
+        places
+            .filter(|at| at.iter().any(|d| d.abs() >= NEAREST))
+            .collect::<Vec<_>>()
+    };
+    let mut best = strongest_of(&frames, 0.0, &all([0; 2], [rows, cols]))?;
+    // A blurred copy is centred where the sharp one that is most like it is, or close by.
+    let [x, y] = best.at;
+    let around = all([y, x], [ROOM_PIXELS; 2]);
+    for pixels in BLURS.into_iter().filter(|b| *b > 0.0) {
+        let blurred: Vec<Frame> = frames.iter().map(|f| f.blurred(pixels)).collect();
+        match strongest_of(&blurred, pixels, &around) {
+            Some(ghost) if ghost.removed > best.removed => best = ghost,
+            _ => break,
+        }
+    }
+    Some(best)
+}
+
+/// Of copies that are blurred so much (pixels) and displaced to these places, the one that removes most.
+fn strongest_of(frames: &[Frame], blur: f64, places: &[[i32; 2]]) -> Option<Ghost> {
     let tried: Vec<Ghost> = places
-        .into_par_iter()
-        .filter_map(|at| {
+        .par_iter()
+        .filter_map(|&at| {
             let sum = frames
                 .iter()
                 .map(|f| f.products(at))
@@ -123,6 +165,7 @@ pub(super) fn strongest(problem: &FitProblem<'_>, fit: &Fit) -> Option<Ghost> {
             (sum[0] > 0.0 && sum[1] > 0.0).then(|| Ghost {
                 share: sum[0] / sum[1],
                 at,
+                blur,
                 removed: sum[0] * sum[0] / sum[1],
             })
         })
@@ -131,15 +174,11 @@ pub(super) fn strongest(problem: &FitProblem<'_>, fit: &Fit) -> Option<Ghost> {
 }
 
 impl Ghost {
-    /// As an effect to be fitted. The kernel is sin(pi x) / (pi x) along both axes, x in pixels: it displaces all that pixels resolve and
-    /// changes nothing else.
+    /// As an effect to be fitted: a copy with a spot of its own, a Gaussian whose variance may be zero. One form serves sharp
+    /// and blurred copies, so that no two proposals compete for the same light.
     pub fn declared(&self, pixel_um: f64) -> DeclaredEffect {
-        let sinc = |axis: &str, at: &str| {
-            let turn = format!("pi * ({axis} - {at} + {OFF_ZERO_UM:?}) / {pixel_um:?}");
-            format!("sin({turn}) / ({turn})")
-        };
         let place = |name: &str, at: i32| {
-            let (start, room) = (f64::from(at) * pixel_um, ROOM_PIXELS * pixel_um);
+            let (start, room) = (f64::from(at) * pixel_um, f64::from(ROOM_PIXELS) * pixel_um);
             DeclaredParameter {
                 name: name.into(),
                 range: (start - room, start + room),
@@ -153,12 +192,20 @@ impl Ghost {
             prior: self.share.clamp(1e-3, MOST_SHARE),
             start: 0.0,
         };
+        let um2 = |pixels2: f64| pixels2 * pixel_um * pixel_um;
+        let variance = DeclaredParameter {
+            name: "variance".into(),
+            range: (0.0, um2(MOST_BLUR_PIXELS.powi(2))),
+            prior: um2((BLUR_OFF * self.blur.powi(2)).max(LEAST_BLUR_OFF)),
+            start: um2(self.blur.powi(2)),
+        };
+        let spot = format!("max(variance, {:?})", um2(POINT_PIXELS.powi(2)));
         DeclaredEffect {
             name: "ghost".into(),
-            unit: "fraction".into(),
+            unit: "fraction, um, um, um^2".into(),
             quantity: DeclaredQuantity::Kernel,
-            expression: format!("a * {} * {} / {pixel_um:?}^2", sinc("x", "u"), sinc("y", "v")),
-            parameters: vec![share, place("u", self.at[0]), place("v", self.at[1])],
+            expression: format!("a * exp(-((x - u)^2 + (y - v)^2) / (2 * {spot})) / (2 * pi * {spot})"),
+            parameters: vec![share, place("u", self.at[0]), place("v", self.at[1]), variance],
         }
     }
 }

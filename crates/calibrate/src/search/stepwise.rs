@@ -4,6 +4,7 @@ use metalith_core::{Progress, Result};
 
 use super::signatures::score_effects;
 use super::state::SearchState;
+use crate::effects::Parameter;
 use crate::fit::{
     Fit, FitProblem, Gain, HeldOutErrors, change_energy, gain, half_widths, held_out, mean_error, null_gain,
 };
@@ -238,12 +239,16 @@ const LEAST_ERROR: f64 = 1e-6;
 /// A parameter this near to an end of its range, relative to the range, is at the end.
 const AT_END: f64 = 1e-6;
 
-/// Whether the parameters lie within their physical ranges, not at the ends.
+/// Whether the parameters lie within their physical ranges, not at the ends; an end that is a sound value counts as within.
 pub fn physical(problem: &FitProblem<'_>, fit: &Fit, slots: &[usize]) -> bool {
     slots.iter().all(|&s| {
-        let (a, b) = problem.model.slots()[s].parameter.range;
+        let Parameter {
+            range: (a, b),
+            sound_end,
+            ..
+        } = problem.model.slots()[s].parameter;
         let room = AT_END * (b - a);
-        fit.theta[s] > a + room && fit.theta[s] < b - room || fit.theta[s] == 0.0
+        fit.theta[s] > a + room && fit.theta[s] < b - room || (fit.theta[s] - sound_end).abs() <= room
     })
 }
 

@@ -142,6 +142,7 @@ impl<'a> Synthesizer<'a> {
                 };
                 let chips = tables.map(|table| Lit {
                     cells: Arc::new(table),
+                    rim: None,
                     geometry: &perturbation.geometry,
                     lights: vec![&perturbation.light],
                     scatter: None,

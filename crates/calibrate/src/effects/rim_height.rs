@@ -1,0 +1,54 @@
+//! Pillars at the rim of a lens are higher or lower than in its middle: the etch is loaded by what is open around it
+//! (C. J. Mogab, J. Electrochem. Soc. 124, 1262 (1977)), so that masks and tops wear unevenly, or the film is not flat.
+
+use super::{Effect, Parameter, Stage};
+use metalith_made::Perturbation;
+
+/// Height added at the rim over that in the middle, with the square of the radius between: the first term of any smooth
+/// change that is the same all around. It is the same in every lens.
+pub struct RimHeight;
+
+impl Effect for RimHeight {
+    fn name(&self) -> String {
+        "rim_height".into()
+    }
+
+    fn unit(&self) -> &str {
+        "nm"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Stack
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        // As of the height of the film, whose cells then serve both.
+        vec![Parameter::new(-60.0, 60.0, 10.0)]
+    }
+
+    fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
+        to.cell.rim_height_nm = parameters[0];
+    }
+
+    fn confusions(&self) -> &'static [(&'static str, &'static str)] {
+        &[
+            (
+                "gap",
+                "heights by AFM in the middle and at the rim of a lens, or the distance by another way",
+            ),
+            (
+                "source_distance",
+                "heights by AFM in the middle and at the rim of a lens",
+            ),
+            ("film_height", "heights by AFM in the middle and at the rim of a lens"),
+            (
+                "spherical_aberration",
+                "heights by AFM in the middle and at the rim of a lens",
+            ),
+            (
+                "cd_bias_density",
+                "widths by SEM in the middle and at the rim of a lens",
+            ),
+        ]
+    }
+}
