@@ -88,54 +88,100 @@ struct Found {
     psf: SinglePsf,
 }
 
-/// Elements one by one: each looks elsewhere, and its light lands elsewhere.
+/// All elements, each in every light. Those that look the same way are simulated together: their cells are solved once, and
+/// of those with the same pillars one is.
 fn simulate(elements: Vec<Lit>, cell: &dyn CellModel, light: &Looked, progress: &dyn Progress) -> Result<Vec<Found>> {
-    let mut all = Vec::new();
-    for lit in elements {
-        let pillars = lit.widths.pillars();
-        let site = ElementSite {
+    let mut found: Vec<(usize, Vec<Found>)> = Vec::new();
+    let mut waiting: Vec<(usize, Lit)> = elements.into_iter().enumerate().collect();
+    while let Some((_, first)) = waiting.first() {
+        let (wedge, distance_um, shape) = (first.wedge, first.distance_um, first.shape);
+        let (together, others) = waiting
+            .into_iter()
+            .partition(|(_, lit)| (lit.wedge, lit.distance_um) == (wedge, distance_um));
+        waiting = others;
+        found.extend(simulate_together(
+            together,
+            wedge,
+            distance_um,
+            shape,
+            cell,
+            light,
+            progress,
+        )?);
+    }
+    found.sort_by_key(|(k, _)| *k);
+    Ok(found.into_iter().flat_map(|(_, own)| own).collect())
+}
+
+/// Elements that look the same way, by their numbers.
+fn simulate_together(
+    elements: Vec<(usize, Lit)>,
+    wedge: Wedge,
+    distance_um: f64,
+    shape: PillarShape,
+    cell: &dyn CellModel,
+    light: &Looked,
+    progress: &dyn Progress,
+) -> Result<Vec<(usize, Vec<Found>)>> {
+    let mut found: Vec<(usize, Vec<Found>)> = elements.iter().map(|(k, _)| (*k, Vec::new())).collect();
+    let named = elements.into_iter().map(|(_, lit)| ExtractedElement {
+        site: ElementSite {
             name: lit.name,
             centre_nm: [0; 2],
             lattice: lit.widths.lattice,
-        };
-        let extraction = Extraction {
-            top: String::new(),
-            shape: lit.shape,
-            elements: vec![ExtractedElement {
-                site,
-                widths: lit.widths,
-            }],
-            pillars,
-            oddities: Default::default(),
-            survey: Default::default(),
-        };
-        for nm in &light.wavelengths_nm {
-            for field_deg in &light.fields_deg {
-                let um = nm * 1e-3;
-                let field_rad = [field_deg.0, field_deg.1].map(f64::to_radians);
-                let wave = incident(&lit.wedge, um, field_rad)?;
-                let lighting = Lighting {
-                    wavelengths_um: vec![um],
-                    incidence_sin: [wave.sin_x, wave.sin_y],
-                    cells_as_lit: false,
-                    distance_um: lit.distance_um,
-                    at_um: landing_um(&lit.wedge, &wave, lit.distance_um)?,
-                    samples: light.samples,
-                    pixel_um: light.pixel_um,
-                    analyser: false,
-                    aperture_radius_um: None,
-                    accuracy: if light.fast { Accuracy::Fast } else { Accuracy::Accurate },
-                };
-                let psfs = single_psfs(&extraction, SimulationCase::Cell(cell), &lighting, progress)?;
-                all.extend(psfs.into_iter().map(|psf| Found {
+        },
+        widths: lit.widths,
+    });
+    let elements: Vec<ExtractedElement> = named.collect();
+    // The simulation leaves out what is the same as one before.
+    let like = |k: usize| {
+        let of = &elements[k].widths;
+        elements[..k].iter().position(|e| e.widths == *of).unwrap_or(k)
+    };
+    let like: Vec<usize> = (0..elements.len()).map(like).collect();
+    let simulated: Vec<usize> = (0..elements.len()).filter(|k| like[*k] == *k).collect();
+    let names: Vec<String> = elements.iter().map(|e| e.site.name.clone()).collect();
+    let extraction = Extraction {
+        top: String::new(),
+        shape,
+        pillars: elements.iter().map(|e| e.widths.pillars()).sum(),
+        elements,
+        oddities: Default::default(),
+        survey: Default::default(),
+    };
+    for nm in &light.wavelengths_nm {
+        for field_deg in &light.fields_deg {
+            let um = nm * 1e-3;
+            let field_rad = [field_deg.0, field_deg.1].map(f64::to_radians);
+            let wave = incident(&wedge, um, field_rad)?;
+            let lighting = Lighting {
+                wavelengths_um: vec![um],
+                incidence_sin: [wave.sin_x, wave.sin_y],
+                cells_as_lit: false,
+                distance_um,
+                at_um: landing_um(&wedge, &wave, distance_um)?,
+                samples: light.samples,
+                pixel_um: light.pixel_um,
+                analyser: false,
+                aperture_radius_um: None,
+                accuracy: if light.fast { Accuracy::Fast } else { Accuracy::Accurate },
+            };
+            let psfs = single_psfs(&extraction, SimulationCase::Cell(cell), &lighting, progress)?;
+            for (k, (_, own)) in found.iter_mut().enumerate() {
+                let place = simulated.iter().position(|s| *s == like[k]);
+                let psf = psfs[place.expect("what is like another is simulated")].clone();
+                own.push(Found {
                     field_deg: *field_deg,
                     incidence_sin: lighting.incidence_sin,
-                    psf,
-                }));
+                    psf: SinglePsf {
+                        element: names[k].clone(),
+                        ..psf
+                    },
+                });
             }
         }
     }
-    Ok(all)
+    Ok(found)
 }
 
 /// PSFs for Python: a dictionary for each.
