@@ -87,3 +87,23 @@ def test_a_package_that_is_missing_is_named_with_the_remedy(call: str, package: 
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert run.stdout == f"{package} is not installed\n  help: pip install {package}\n", run.stderr
+
+
+def test_each_element_has_its_psf_also_where_another_is_alike(tmp_path: Path) -> None:
+    """Elements of one layout are simulated together, and one that is like another takes its PSF."""
+    lens = np.full((16, 16), 200, dtype=np.uint16)
+    other = lens.copy()
+    other[:, :8] = 120
+    centres = [(0, 0), (14000, 0), (28000, 0)]
+    array = ml.write_layout(tmp_path / "chip.gds", [lens, other, lens], pitch_nm=350, centres_nm=centres)
+
+    def look(elements: list[int] | None) -> ml.PsfSet:
+        return ml.psf(array, [530, 660], elements=elements, distance_um=20.0, samples=16)
+
+    together = look(None)
+    names = [(p.element, round(p.wavelength_nm)) for p in together]
+    assert names == [(f"element {k}", nm) for k in range(3) for nm in (530, 660)]
+    assert np.array_equal(together[0].values, together[4].values)
+    for k in range(3):
+        for alone, here in zip(look([k]), together[2 * k : 2 * k + 2], strict=True):
+            assert np.array_equal(alone.values, here.values) and alone.strehl == here.strehl
