@@ -24,26 +24,27 @@ for file in sorted(folder.glob("*.npy"))[:2]:
 # %%
 TRIED = ["cd_bias", "gap", "pixel_blur", "zero_order"]
 diagnosis = ml.calibrate(folder, out, effects=TRIED)
-print("verdict:", diagnosis["verdict"])
-for effect in diagnosis["effects"]:
-    low, high = effect["interval"]
-    print(f"{effect['name']}: {effect['value']:.2f} {effect['unit']}, 95 % from {low:.2f} to {high:.2f}")
+print(diagnosis)
+for effect in diagnosis.effects:
+    low, high = effect.interval
+    print(f"{effect.name}: {effect.value:.2f} {effect.unit}, 95 % from {low:.2f} to {high:.2f}")
 
 # %% [markdown]
 # The error is the reduced chi-square per pixel: of captures that the effects were fitted to, and of those that were held out.
 
 # %%
-for when in ("before", "after"):
-    error = diagnosis["error"][when]
-    print(f"{when}: fitted {error['fit']:.2f}, held out {error['held_out']:.2f}")
-found = {e["name"]: e["interval"] for e in diagnosis["effects"]}
-assert sorted(found) == ["cd_bias", "gap"]
+for when, fitted, held_out in zip(("before", "after"), diagnosis.fitted, diagnosis.held_out, strict=True):
+    print(f"{when}: fitted {fitted:.2f}, held out {held_out:.2f}")
+assert sorted(e.name for e in diagnosis.effects) == ["cd_bias", "gap"]
 for name, truth in (("cd_bias", -8.0), ("gap", 5.0)):
-    low, high = found[name]
-    assert low < truth < high, (name, truth, found[name])
+    found = diagnosis.effect(name)
+    assert found is not None and found.interval[0] < truth < found.interval[1], (name, truth, found)
+for tried in diagnosis.ranking:
+    print(f"{tried.name}: {tried.rejected or 'taken'}")
 
 # %% [markdown]
 # `model.toml` is the chip as it was made. Verification judges by it what was built, and a layout can be compensated for it.
 
 # %%
-print((out / "model.toml").read_text()[:400])
+assert diagnosis.model is not None
+print(diagnosis.model.read_text()[:400])

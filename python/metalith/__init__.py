@@ -12,7 +12,8 @@ from ._layouts import Array, Design, Layout, Rectangles, Shape, read_layout, wri
 from ._light import Psf, PsfSet, Transmission, cell, index, propagate, psf
 from ._native import MetalithError, __version__
 from ._pictures import Frame, Studio, denoise
-from ._checks import CapturePlan, CheckReport, Marker, Verification, calibrate, check, plan, verify
+from ._checks import CapturePlan, CheckReport, Marker, Verification, check, plan, verify
+from ._diagnosis import Diagnosis, FoundEffect, RankedEffect, calibrate
 from ._studies import Study, StudyResult
 
 __all__ = [
@@ -20,12 +21,15 @@ __all__ = [
     "CapturePlan",
     "CheckReport",
     "Design",
+    "Diagnosis",
+    "FoundEffect",
     "Frame",
     "Layout",
     "Marker",
     "MetalithError",
     "Psf",
     "PsfSet",
+    "RankedEffect",
     "Rectangles",
     "Shape",
     "Studio",

@@ -1,4 +1,4 @@
-"""Design rules, verification and calibration."""
+"""Design rules, verification, and the plan of a measurement."""
 
 from __future__ import annotations
 
@@ -86,19 +86,6 @@ def verify(
     text, passed = _native.verify(design._native, layout, fast, model, out, progress)
     found = json.loads(text)
     return Verification(passed=passed, checks=found["checks"], numbers=found)
-
-
-def calibrate(
-    measured: PathLike,
-    out: PathLike,
-    *,
-    effects: Sequence[str] = (),
-    progress: Progress | None = None,
-) -> Json:
-    """Find the effects by which a measured set differs from its model: the diagnosis, as in ``diagnosis.json``. Page and
-    ``model.toml`` are written into ``out``. It takes minutes."""
-    found: Json = json.loads(_native.calibrate(measured, out, list(effects), progress))
-    return found
 
 
 @dataclass(frozen=True)

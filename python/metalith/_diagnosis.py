@@ -1,0 +1,147 @@
+"""Calibration of a measured set."""
+
+from __future__ import annotations
+
+import html
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from . import _native
+from ._types import Json, PathLike, Progress
+
+
+@dataclass(frozen=True)
+class FoundEffect:
+    """An effect that explains a part of what was measured."""
+
+    name: str
+    unit: str
+    values: tuple[float, ...]
+    """Its parameters, in ``unit``: one, or one along each axis."""
+    intervals: tuple[tuple[float, float], ...]
+    """95 % interval of each."""
+    confounded_with: tuple[str, ...]
+    """Effects that this set cannot tell it from."""
+    separate_by: str | None
+    """The measurement that would."""
+
+    @property
+    def value(self) -> float:
+        """The first parameter: the only one of most effects."""
+        return self.values[0]
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of the first parameter."""
+        return self.intervals[0]
+
+    def __str__(self) -> str:
+        both = zip(self.values, self.intervals, strict=True)
+        each = ", ".join(f"{v:.4g} ({low:.4g} to {high:.4g})" for v, (low, high) in both)
+        return f"{self.name} = {each} {self.unit}"
+
+
+@dataclass(frozen=True)
+class RankedEffect:
+    """A candidate that was tried."""
+
+    name: str
+    score: float
+    """Share of the residual that it alone explains."""
+    gain: float | None
+    """By how much it lowers the reduced chi-square of captures held out."""
+    gain_interval: tuple[float, float] | None
+    """95 % interval of the gain."""
+    rejected: str | None
+    """Why it was not taken; none for the one that was."""
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What a measured set says of a chip."""
+
+    verdict: str
+    """``no_residual``, ``explained``, ``one_of``, ``partly``, ``unexplained`` or ``data_unfit``."""
+    effects: tuple[FoundEffect, ...]
+    ranking: tuple[RankedEffect, ...] = field(repr=False)
+    """Candidates of the first step, the best first."""
+    held_out: tuple[float, float]
+    """Reduced chi-square per pixel of captures held out, before and after."""
+    fitted: tuple[float, float] = field(repr=False)
+    """The same of those that the effects were fitted to."""
+    page: Path = field(repr=False)
+    model: Path | None = field(repr=False)
+    """``model.toml``, the chip as it was made; none where the verdict has none."""
+    numbers: Json = field(repr=False)
+    """All of it, as in ``diagnosis.json``."""
+
+    def effect(self, name: str) -> FoundEffect | None:
+        """The effect of this name, if it was found."""
+        return next((e for e in self.effects if e.name == name), None)
+
+    def __str__(self) -> str:
+        before, after = self.held_out
+        lines = [f"{self.verdict}: held-out error {before:.4g} before, {after:.4g} after"]
+        return "\n".join(lines + [f"  {e}" for e in self.effects])
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><td>{html.escape(e.name)}</td><td>{html.escape(str(e).partition(' = ')[2])}</td>"
+            f"<td>{html.escape(', '.join(e.confounded_with))}</td></tr>"
+            for e in self.effects
+        )
+        head = html.escape(str(self).partition("\n")[0])
+        return f"<p>{head}</p><table><tr><th>effect</th><th>95 % interval</th><th>or</th></tr>{rows}</table>"
+
+
+def _found(told: Json) -> FoundEffect:
+    # Effects along two axes have a list of values, and of intervals.
+    several = isinstance(told["value"], list)
+    values = told["value"] if several else [told["value"]]
+    intervals = told["interval"] if several else [told["interval"]]
+    return FoundEffect(
+        name=told["name"],
+        unit=told["unit"],
+        values=tuple(values),
+        intervals=tuple((low, high) for low, high in intervals),
+        confounded_with=tuple(told["confounded_with"]),
+        separate_by=told["separate_by"],
+    )
+
+
+def _ranked(told: Json) -> RankedEffect:
+    interval = told["held_out_gain_interval"]
+    return RankedEffect(
+        name=told["name"],
+        score=told["score"],
+        gain=told["held_out_gain"],
+        gain_interval=None if interval is None else (interval[0], interval[1]),
+        rejected=told["rejected"],
+    )
+
+
+def calibrate(
+    measured: PathLike,
+    out: PathLike,
+    *,
+    effects: Sequence[str] = (),
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Find the effects by which a measured set differs from its model. Page, ``diagnosis.json`` and ``model.toml`` are written
+    into ``out``. ``effects`` are those that are tried, all if left out. It takes minutes."""
+    told: Json = json.loads(_native.calibrate(measured, out, list(effects), progress))
+    before, after = told["error"]["before"], told["error"]["after"]
+    folder = Path(out)
+    model = folder / "model.toml"
+    return Diagnosis(
+        verdict=told["verdict"],
+        effects=tuple(_found(e) for e in told["effects"]),
+        ranking=tuple(_ranked(e) for e in told["ranking"]),
+        held_out=(before["held_out"], after["held_out"]),
+        fitted=(before["fit"], after["fit"]),
+        page=folder / "report.html",
+        model=model if model.is_file() else None,
+        numbers=told,
+    )
