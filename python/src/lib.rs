@@ -8,6 +8,7 @@ mod arrays;
 mod checks;
 mod light;
 mod pictures;
+mod psf;
 mod shapes;
 mod studies;
 mod work;
@@ -40,8 +41,8 @@ fn _native(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(arrays::array_of_widths, m)?)?;
     m.add_function(wrap_pyfunction!(shapes::rotation_numbers, m)?)?;
     m.add_function(wrap_pyfunction!(shapes::rotations_deg, m)?)?;
-    m.add_function(wrap_pyfunction!(light::psf_of_array, m)?)?;
-    m.add_function(wrap_pyfunction!(light::psf_of_widths, m)?)?;
+    m.add_function(wrap_pyfunction!(psf::psf_of_array, m)?)?;
+    m.add_function(wrap_pyfunction!(psf::psf_of_widths, m)?)?;
     m.add_function(wrap_pyfunction!(light::propagate, m)?)?;
     m.add_function(wrap_pyfunction!(light::cell, m)?)?;
     m.add_function(wrap_pyfunction!(light::index, m)?)?;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::Result;
-use metalith::picture::scene::{SceneFile, read_scene};
+use metalith::picture::scene::read_far_scene;
 use metalith::picture::{Studio, write_dataset};
 use metalith::study::{PairsRequest, plan_pairs};
 
@@ -76,14 +76,7 @@ pub fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     if args.plan {
         return plan(args, images, terminal);
     }
-    let read = |path: &Path| {
-        read_scene(&SceneFile {
-            path: path.to_owned(),
-            wavelengths_nm: None,
-            field_deg: args.with.field_deg,
-            distance_um: f64::INFINITY,
-        })
-    };
+    let read = |path: &Path| read_far_scene(path, args.with.field_deg);
     let layout = InputFile::of(&args.layout)?;
     let studio = Studio::open(&design, &layout, &camera, model.as_ref(), &read(&images[0])?, terminal)?;
     let operator = studio.simulation();

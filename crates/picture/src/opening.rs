@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use metalith_camera::{Camera, ChannelSampling};
 use metalith_cell::{Fidelity, cache_folder};
+use metalith_core::file::file_digest;
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::{Design, cell_models};
@@ -11,7 +12,6 @@ use metalith_gds::extract::Extraction;
 use metalith_layout::read_pillars;
 use metalith_made::{CalibratedModel, MadeChip, SimulationCase};
 use serde::Serialize;
-use sha2::{Digest, Sha256};
 
 use crate::assumed::Assumed;
 use crate::kernels::{BankSpec, KernelBank};
@@ -113,14 +113,6 @@ struct Inputs<'a> {
     scene_distance_um: f64,
 }
 
-/// SHA-256 of a file, read piece by piece.
-fn digest(path: &Path) -> Result<String> {
-    let mut file = std::fs::File::open(path).map_err(Error::io("read", path))?;
-    let mut hasher = Sha256::new();
-    std::io::copy(&mut file, &mut hasher).map_err(Error::io("read", path))?;
-    Ok(hex(&hasher.finalize()))
-}
-
 impl Studio {
     /// For a layout of a design behind a camera file, as drawn or as a calibrated model says, and scenes of a field. Kernels
     /// and veil are kept on the disk.
@@ -154,7 +146,7 @@ impl Studio {
     ) -> Result<Self> {
         let wanted = Wanted::new(design, camera, scene)?;
         progress.begin("reading the layout", 1);
-        let inputs = wanted.inputs(&digest(layout)?, model)?;
+        let inputs = wanted.inputs(&hex(&file_digest(layout)?), model)?;
         let field = format!("{}x{} {}", scene.view.rows, scene.view.columns, scene.view.field_deg);
         let veil_inputs = [&inputs[..], field.as_bytes()].concat();
         let folder = kept.folder.as_deref();

@@ -6,7 +6,7 @@ use metalith_camera::Camera;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
 use metalith_picture::restore::RestorationMethod;
-use metalith_picture::scene::{SceneFile, SceneImage, read_scene};
+use metalith_picture::scene::{SceneImage, read_far_scene};
 use metalith_picture::{Assumed, KeptKernels, Studio};
 use serde::{Deserialize, Serialize};
 
@@ -117,12 +117,7 @@ impl Lineup {
     }
 
     fn photograph(&self, path: &Path) -> Result<SceneImage> {
-        read_scene(&SceneFile {
-            path: path.to_owned(),
-            wavelengths_nm: None,
-            field_deg: self.field_deg,
-            distance_um: f64::INFINITY,
-        })
+        read_far_scene(path, self.field_deg)
     }
 
     /// Rows of the table: of each design one, or two with the assumptions of the paper, then those without a lens.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use metalith_camera::Camera;
+use metalith_core::file::file_digest;
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
@@ -12,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::cut::Cut;
-use crate::manifest::{Manifest, absolute, another_plan, file_digest};
+use crate::manifest::{Manifest, absolute, another_plan};
 
 /// Version of the format of the manifest.
 const SCHEMA: u32 = 1;

@@ -7,7 +7,6 @@ use metalith_core::file::read_at_most;
 use metalith_core::{Error, Result, WholeFile};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use sha2::{Digest, Sha256};
 
 /// Name of the manifest within the folder.
 const MANIFEST: &str = "plan.json";
@@ -97,14 +96,6 @@ pub(crate) fn another_plan(folder: &Path) -> Error {
         ),
         "plan into another folder with --out, or remove this one",
     )
-}
-
-/// SHA-256 of a file, read piece by piece.
-pub(crate) fn file_digest(path: &Path) -> Result<[u8; 32]> {
-    let mut hash = Sha256::new();
-    let mut file = fs::File::open(path).map_err(Error::io("read", path))?;
-    std::io::copy(&mut file, &mut hash).map_err(Error::io("read", path))?;
-    Ok(hash.finalize().into())
 }
 
 /// A path that holds wherever a shard is made.

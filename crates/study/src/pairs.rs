@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use metalith_camera::Camera;
-use metalith_core::file::read_at_most;
+use metalith_core::file::{file_digest, read_at_most};
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
 use metalith_made::CalibratedModel;
-use metalith_picture::scene::{SceneFile, SceneImage, read_scene};
+use metalith_picture::scene::{SceneImage, read_far_scene};
 use metalith_picture::{
     DatasetManifest, DatasetPair, FrameOperator, KeptKernels, Studio, write_dataset_manifest, write_pair,
 };
@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::cut::{Cut, parts_per_shard};
-use crate::manifest::{Manifest, absolute, another_plan, file_digest};
+use crate::manifest::{Manifest, absolute, another_plan};
 
 /// Version of the format of the manifest.
 const SCHEMA: u32 = 1;
@@ -182,12 +182,7 @@ impl PairsRequest {
     }
 
     fn scene(&self, image: &Path) -> Result<SceneImage> {
-        read_scene(&SceneFile {
-            path: image.to_owned(),
-            wavelengths_nm: None,
-            field_deg: self.field_deg,
-            distance_um: f64::INFINITY,
-        })
+        read_far_scene(image, self.field_deg)
     }
 
     fn studio(&self, kept: &KeptKernels, progress: &dyn Progress) -> Result<Studio> {

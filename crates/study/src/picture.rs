@@ -10,7 +10,7 @@ use metalith_design::Design;
 use metalith_gds::extract::Extraction;
 use metalith_made::{MadeChip, SimulationCase};
 use metalith_picture::restore::RestorationMethod;
-use metalith_picture::scene::{BuiltIn, SceneFile, SceneImage, chart, read_scene};
+use metalith_picture::scene::{BuiltIn, SceneImage, chart, read_far_scene};
 use metalith_picture::{Frame, FrameOperator, Rehearsal, Studio, Zone, ZoneScore, sampling_of, scores};
 use ndarray::Array3;
 
@@ -133,12 +133,7 @@ impl PictureBench {
         let far = f64::INFINITY;
         let scene = match &spec.scene {
             SceneChoice::BuiltIn(kind, pixels) => chart(*kind, *pixels, spec.field_deg, far),
-            SceneChoice::File(path) => read_scene(&SceneFile {
-                path: path.clone(),
-                wavelengths_nm: None,
-                field_deg: spec.field_deg,
-                distance_um: far,
-            })?,
+            SceneChoice::File(path) => read_far_scene(path, spec.field_deg)?,
         };
         Ok(Self {
             camera: Camera::read(&spec.camera)?,

@@ -8,6 +8,7 @@ use std::time::Instant;
 use metalith_camera::Camera;
 use metalith_cell::CellStack;
 use metalith_cell::kept::solver_of;
+use metalith_core::file::file_digest;
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::array::PillarArray;
@@ -18,7 +19,7 @@ use sha2::{Digest, Sha256};
 
 use crate::bench::{Bench, Files, Quiet};
 use crate::cut::{Cut, parts_per_shard};
-use crate::manifest::{Manifest, absolute, file_digest, is_planned};
+use crate::manifest::{Manifest, absolute, is_planned};
 use crate::picture::SceneChoice;
 use crate::record::LimitStatement;
 use crate::tolerance::Tolerance;

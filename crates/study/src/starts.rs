@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use metalith_core::file::file_digest;
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result, WholeFile};
 use metalith_design::Design;
@@ -11,7 +12,7 @@ use sha2::{Digest, Sha256};
 
 use crate::bench::Quiet;
 use crate::cut::Cut;
-use crate::manifest::{Manifest, absolute, another_plan, file_digest};
+use crate::manifest::{Manifest, absolute, another_plan};
 
 /// Version of the format of the manifest.
 const SCHEMA: u32 = 1;

@@ -10,7 +10,7 @@ use metalith_core::Silent;
 use metalith_design::Design;
 use metalith_optimise::{Checkpoint, OptimiseTask, TaskCells};
 use metalith_picture::Studio;
-use metalith_picture::scene::{SceneFile, read_scene};
+use metalith_picture::scene::read_far_scene;
 use metalith_rivals::{Comparison, Lensless, Lineup, ListedDesign, MaskSpec};
 use metalith_study::{PairsRequest, Work, plan_comparison, plan_pairs, plan_starts};
 
@@ -74,14 +74,7 @@ fn pairs_of_shards_are_those_of_one_run() {
     run(&[1]).unwrap();
     work.merge().unwrap();
 
-    let scene = |path: &Path| {
-        read_scene(&SceneFile {
-            path: path.to_owned(),
-            wavelengths_nm: None,
-            field_deg: 50.0,
-            distance_um: f64::INFINITY,
-        })
-    };
+    let scene = |path: &Path| read_far_scene(path, 50.0);
     let camera = metalith_camera::Camera::read(&at("camera.toml")).unwrap();
     let kept = metalith_picture::KeptKernels::made(&at("alone"));
     let first = scene(&images[0]).unwrap();

@@ -1,5 +1,6 @@
 //! Files that appear whole or not at all.
 
+mod digest;
 mod folder;
 mod part;
 mod past_cache;
@@ -9,6 +10,7 @@ use std::fs;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
+pub use digest::file_digest;
 pub use folder::WholeFolder;
 pub use past_cache::{Ahead, Block};
 pub use turn::FolderTurn;

@@ -20,7 +20,7 @@ use crate::spectra::{SceneSpectrum, linear_rgb, rgb_basis};
 pub use chart::{BuiltIn, chart};
 pub(crate) use chart::{LEAN_DEG, SPOKES, STAR};
 pub use depth::read_depth;
-pub use read::{SceneFile, read_picture, read_scene};
+pub use read::{SceneFile, read_far_scene, read_picture, read_scene};
 
 /// A scene: planes of light, each with the spectrum of its reflectance.
 ///

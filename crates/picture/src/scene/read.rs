@@ -31,6 +31,19 @@ pub struct SceneFile {
     pub distance_um: f64,
 }
 
+/// Read a scene that is far away and no spectral cube; `field_deg` from its left to its right edge.
+///
+/// # Errors
+/// As [`read_scene`].
+pub fn read_far_scene(path: &Path, field_deg: f64) -> Result<SceneImage> {
+    read_scene(&SceneFile {
+        path: path.to_owned(),
+        wavelengths_nm: None,
+        field_deg,
+        distance_um: f64::INFINITY,
+    })
+}
+
 /// Read a scene: PNG of 8 or 16 bits or JPEG in sRGB; NPY of linear light, `[row, column]` or `[row, column, colour]`;
 /// NPY `[row, column, band]` of reflectance with the wavelengths of its bands.
 ///
