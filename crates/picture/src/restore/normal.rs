@@ -4,7 +4,7 @@
 //! They are solved by conjugate gradients, preconditioned by what `precondition` says.
 
 use metalith_core::{Error, Progress, Result};
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView1, Axis, Slice};
 
 use super::Recorded;
 use super::precondition::Preconditioner;
@@ -92,7 +92,7 @@ impl<'a> NormalSystem<'a> {
                 .statistics
                 .adjoint(&operator.adjoint_elements(&products, elements, veil)),
             scale: f64::from(most),
-            preconditioner: Preconditioner::new(&share),
+            preconditioner: Preconditioner::new(&share, operator.inputs(), |x| term.apply(x)),
             term,
         }
     }
@@ -142,7 +142,10 @@ impl<'a> NormalSystem<'a> {
             ..terms
         };
         let sizes = self.statistics().sizes();
-        let filters: Vec<Vec<f32>> = sizes.iter().map(|s| self.preconditioner.filter(of_plane(*s))).collect();
+        let planes = sizes.iter().enumerate();
+        let filters: Vec<Vec<f32>> = planes
+            .map(|(plane, size)| self.preconditioner.filter(plane, of_plane(*size)))
+            .collect();
         let mut z = self.preconditioner.apply(&residual, &filters);
         let mut direction = z.clone();
         let mut old = dot(&residual, &z);
@@ -176,8 +179,14 @@ impl<'a> NormalSystem<'a> {
 }
 
 fn dot(a: &[Array2<f32>], b: &[Array2<f32>]) -> f64 {
-    let pairs = a.iter().zip(b).flat_map(|(a, b)| a.iter().zip(b));
-    pairs.map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
+    let of_row = |(a, b): (ArrayView1<'_, f32>, ArrayView1<'_, f32>)| -> f64 {
+        a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
+    };
+    a.iter()
+        .zip(b)
+        .flat_map(|(a, b)| a.rows().into_iter().zip(b.rows()))
+        .map(of_row)
+        .sum()
 }
 
 /// Slopes towards the next row and the next column; zero at the last.
@@ -217,14 +226,28 @@ pub fn slopes_adjoint([down, right]: &[Array2<f32>; 2]) -> Array2<f32> {
     })
 }
 
+/// Sums of the slopes that meet at a pixel: the adjoint of [`slopes`] of the slopes.
+fn bends(x: &Array2<f32>) -> Array2<f32> {
+    let mut out = Array2::zeros(x.dim());
+    for axis in [Axis(0), Axis(1)] {
+        let [near, far] = [Slice::from(..-1), Slice::from(1..)];
+        let slope = &x.slice_axis(axis, far) - &x.slice_axis(axis, near);
+        let mut to = out.slice_axis_mut(axis, far);
+        to += &slope;
+        let mut to = out.slice_axis_mut(axis, near);
+        to -= &slope;
+    }
+    out
+}
+
 fn add_prior(to: &mut Array2<f32>, x: &Array2<f32>, terms: Terms) {
     if terms.slopes == 0.0 && terms.bends == 0.0 {
         return;
     }
-    let bent = slopes_adjoint(&slopes(x));
+    let bent = bends(x);
     to.scaled_add(terms.slopes as f32, &bent);
     if terms.bends != 0.0 {
-        to.scaled_add(terms.bends as f32, &slopes_adjoint(&slopes(&bent)));
+        to.scaled_add(terms.bends as f32, &bends(&bent));
     }
 }
 
@@ -240,5 +263,6 @@ mod tests {
         let b = (&x * &slopes_adjoint(&y)).sum();
         // Sums of whole numbers.
         assert_eq!(a, b);
+        assert_eq!(bends(&x), slopes_adjoint(&slopes(&x)));
     }
 }

@@ -7,33 +7,44 @@ use crate::SceneView;
 
 /// Gather the light of a plane of the scene into squares: hats about their middles, times projected solid angle.
 pub fn gather(view: &SceneView, plane: ArrayView2<'_, f32>) -> Vec<f64> {
+    let [down, across] = scene_hats(view);
     let mut cells = vec![0.0; SCENE_CELLS * SCENE_CELLS];
-    for_scene(view, |y, x, weight, cell| {
-        cells[cell] += weight * f64::from(plane[[y, x]])
-    });
+    for ((y, row), hat) in plane.rows().into_iter().enumerate().zip(&down) {
+        let angles = solid_angles(view, y);
+        let light = row.iter().zip(angles).map(|(v, angle)| angle * f64::from(*v));
+        gather_row(light, &across, hat, SCENE_CELLS, &mut cells);
+    }
     cells
 }
 
 /// The adjoint of [`gather`]: adds to a plane.
 pub fn spread(view: &SceneView, cells: &[f64], plane: &mut Array2<f32>) {
-    for_scene(view, |y, x, weight, cell| {
-        plane[[y, x]] += (weight * cells[cell]) as f32
-    });
+    let [down, across] = scene_hats(view);
+    for ((y, mut row), hat) in plane.rows_mut().into_iter().enumerate().zip(&down) {
+        let line = line_of(cells, hat, SCENE_CELLS);
+        let values = row.iter_mut().zip(&across).zip(solid_angles(view, y));
+        values.for_each(|((to, hat), angle)| *to += (angle * between(&line, hat)) as f32);
+    }
 }
 
 /// From squares to the pixels of the sensor: straight lines between the middles of squares.
 pub fn lay(cells: &[f64], shape: [usize; 2], frame: &mut Array2<f32>) {
-    for_sensor(frame.dim().into(), shape, |y, x, weight, cell| {
-        frame[[y, x]] += (weight * cells[cell]) as f32
-    });
+    let [down, across] = sensor_hats(frame.dim().into(), shape);
+    for (mut row, hat) in frame.rows_mut().into_iter().zip(&down) {
+        let line = line_of(cells, hat, shape[1]);
+        let values = row.iter_mut().zip(&across);
+        values.for_each(|(to, hat)| *to += (PIXEL_SHARE * between(&line, hat)) as f32);
+    }
 }
 
 /// The adjoint of [`lay`].
 pub fn lift(frame: &Array2<f32>, shape: [usize; 2]) -> Vec<f64> {
+    let [down, across] = sensor_hats(frame.dim().into(), shape);
     let mut cells = vec![0.0; shape[0] * shape[1]];
-    for_sensor(frame.dim().into(), shape, |y, x, weight, cell| {
-        cells[cell] += weight * f64::from(frame[[y, x]])
-    });
+    for (row, hat) in frame.rows().into_iter().zip(&down) {
+        let light = row.iter().map(|v| PIXEL_SHARE * f64::from(*v));
+        gather_row(light, &across, hat, shape[1], &mut cells);
+    }
     cells
 }
 
@@ -43,28 +54,32 @@ pub fn solid_angle(view: &SceneView, row: f64, column: f64) -> f64 {
     (view.pixel() / (1.0 + tx * tx + ty * ty)).powi(2)
 }
 
-fn for_scene(view: &SceneView, mut act: impl FnMut(usize, usize, f64, usize)) {
-    let axis = |n: usize| hats(n, n as f64 / SCENE_CELLS as f64, SCENE_CELLS);
-    for_hats(
-        &axis(view.rows),
-        &axis(view.columns),
-        SCENE_CELLS,
-        |y, x, weight, cell| {
-            act(y, x, weight * solid_angle(view, y as f64, x as f64), cell);
-        },
-    );
+/// The same of the pixels of a row.
+fn solid_angles(view: &SceneView, row: usize) -> impl Iterator<Item = f64> {
+    let pixel = view.pixel();
+    let [first, ty] = view.tangents(row as f64, 0.0);
+    (0..view.columns).map(move |x| {
+        let tx = first + x as f64 * pixel;
+        (pixel / (1.0 + tx * tx + ty * ty)).powi(2)
+    })
 }
 
-fn for_sensor(frame: [usize; 2], shape: [usize; 2], mut act: impl FnMut(usize, usize, f64, usize)) {
-    let scale = 1.0 / (CELL_PIXELS * CELL_PIXELS) as f64;
-    let axis = |a: usize| hats(frame[a], CELL_PIXELS as f64, shape[a]);
-    for_hats(&axis(0), &axis(1), shape[1], |y, x, weight, cell| {
-        act(y, x, scale * weight, cell)
-    });
+/// What a pixel has of the light of its square.
+const PIXEL_SHARE: f64 = 1.0 / (CELL_PIXELS * CELL_PIXELS) as f64;
+
+/// The two squares on both sides of a pixel along an axis, with its weights in them.
+type Hat = [(usize, f64); 2];
+
+fn scene_hats(view: &SceneView) -> [Vec<Hat>; 2] {
+    [view.rows, view.columns].map(|n| hats(n, n as f64 / SCENE_CELLS as f64, SCENE_CELLS))
+}
+
+fn sensor_hats(frame: [usize; 2], shape: [usize; 2]) -> [Vec<Hat>; 2] {
+    [0, 1].map(|a| hats(frame[a], CELL_PIXELS as f64, shape[a]))
 }
 
 /// For each of `n` pixels the squares on both sides, `pixels` wide, with their weights.
-fn hats(n: usize, pixels: f64, cells: usize) -> Vec<[(usize, f64); 2]> {
+fn hats(n: usize, pixels: f64, cells: usize) -> Vec<Hat> {
     let one = |i: usize| {
         let place = ((i as f64 + 0.5) / pixels - 0.5).clamp(0.0, (cells - 1) as f64);
         let low = (place as usize).min(cells.saturating_sub(2));
@@ -74,20 +89,30 @@ fn hats(n: usize, pixels: f64, cells: usize) -> Vec<[(usize, f64); 2]> {
     (0..n).map(one).collect()
 }
 
-/// Row, column, weight and square, for all pixels and the four squares about each.
-fn for_hats(
-    rows: &[[(usize, f64); 2]],
-    columns: &[[(usize, f64); 2]],
-    stride: usize,
-    mut act: impl FnMut(usize, usize, f64, usize),
+/// The values between two rows of squares.
+fn line_of(cells: &[f64], [(low, a), (high, b)]: &Hat, columns: usize) -> Vec<f64> {
+    let row = |y: usize| &cells[y * columns..][..columns];
+    row(*low).iter().zip(row(*high)).map(|(v, w)| a * v + b * w).collect()
+}
+
+fn between(line: &[f64], [(low, a), (high, b)]: &Hat) -> f64 {
+    a * line[*low] + b * line[*high]
+}
+
+/// Add a row of light to the squares on both of its sides.
+fn gather_row(
+    light: impl Iterator<Item = f64>,
+    across: &[Hat],
+    [(low, a), (high, b)]: &Hat,
+    columns: usize,
+    cells: &mut [f64],
 ) {
-    for (y, row) in rows.iter().enumerate() {
-        for (x, column) in columns.iter().enumerate() {
-            for (cy, wy) in row {
-                for (cx, wx) in column {
-                    act(y, x, wy * wx, cy * stride + cx);
-                }
-            }
-        }
+    let mut line = vec![0.0; columns];
+    for (value, hat) in light.zip(across) {
+        hat.iter().for_each(|(cell, weight)| line[*cell] += weight * value);
+    }
+    for (row, weight) in [(low, a), (high, b)] {
+        let to = &mut cells[row * columns..][..columns];
+        to.iter_mut().zip(&line).for_each(|(t, v)| *t += weight * v);
     }
 }
