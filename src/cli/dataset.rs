@@ -15,7 +15,7 @@ use super::{Outcome, Terminal, images, print_line};
 /// Record the frame of every image of a folder, for learning: frames, what an ideal camera gives, and a manifest.
 ///
 /// Images are taken in the order of their names and must be of one size. The noise of each follows from its bytes and the
-/// seed. Pairs that are there are kept: a set that was stopped goes on.
+/// seed. Pairs that are there are kept if they are of the same image, seed, chip and camera: a set that was stopped goes on.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  metalith dataset photographs --layout out/prototype_3x3/prototype_3x3_pillars.gds \\\n    --camera cameras/gt1930.toml --design designs/prototype_3x3.toml --out out/pairs"

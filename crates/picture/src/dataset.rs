@@ -1,8 +1,8 @@
 //! Pairs for learning: frames, and the scenes that they are of.
 //!
 //! The noise of an image follows from its own bytes and the seed of the set, so that its frame is the same whatever the
-//! order, the number of threads or the machine. Files appear whole; what is there already is kept, so that a set that was
-//! stopped goes on where it was.
+//! order, the number of threads or the machine. Files appear whole and say what they were made from: a pair that is there is kept
+//! if it is of this image, seed, chip and camera, so that a set that was stopped goes on where it was.
 
 use std::path::{Path, PathBuf};
 
@@ -85,13 +85,12 @@ pub fn write_dataset(
 ) -> Result<DatasetManifest> {
     progress.begin("recording frames", images.len() as u64);
     let mut manifest = DatasetManifest::of(studio, seed);
+    let writer = PairWriter::new(studio, operator, seed, folder);
     for (i, image) in images.iter().enumerate() {
         if progress.stopped() {
             return Err(Error::Interrupted);
         }
-        manifest
-            .pairs
-            .push(write_pair(studio, operator, image, i, read, seed, folder)?);
+        manifest.pairs.push(writer.write(image, i, read)?);
         progress.advance(1);
     }
     write_dataset_manifest(folder, &manifest)?;
@@ -106,51 +105,68 @@ pub fn write_dataset_manifest(folder: &Path, manifest: &DatasetManifest) -> Resu
     metalith_report::write_json(&folder.join("manifest.json"), "dataset", manifest)
 }
 
-/// Write the frame and the scene of image number `i`, if they are not there. `read` gives the scene of an image.
-///
-/// # Errors
-/// If the image cannot be read or is not of the size that the studio was opened for, or a file cannot be written.
-pub fn write_pair(
-    studio: &Studio,
-    operator: &FrameOperator<'_>,
-    image: &Path,
-    i: usize,
-    read: &dyn Fn(&Path) -> Result<SceneImage>,
+/// What writes the pairs of a set.
+pub struct PairWriter<'a> {
+    studio: &'a Studio,
+    operator: &'a FrameOperator<'a>,
     seed: u64,
-    folder: &Path,
-) -> Result<DatasetPair> {
-    let bytes = read_at_most(image, LONGEST, "an image")?;
-    let mut hasher = Sha256::new();
-    hasher.update(&bytes);
-    let image_digest = hasher.clone().finalize();
-    hasher.update(seed.to_le_bytes());
-    let own = hasher.finalize();
-    let own_seed = u64::from_le_bytes(own[..8].try_into().expect("eight bytes"));
-    let name = format!("{}/{i:06}", shard(i));
-    let (frame, truth) = (format!("{name}.frame.png"), format!("{name}.truth.png"));
-    if !folder.join(&frame).exists() || !folder.join(&truth).exists() {
-        let scene = read(image)?;
-        let recorded = studio.record(operator, &scene, own_seed)?;
-        WholeFile::write(&folder.join(&frame), &png16::grey(&recorded.planes))?;
-        WholeFile::write(
-            &folder.join(&truth),
-            &png16::colour(&studio.truth(&scene).mapv(srgb::encoded)),
-        )?;
+    folder: &'a Path,
+    /// Of chip and camera.
+    studio_digest: [u8; 32],
+}
+
+impl<'a> PairWriter<'a> {
+    /// For the simulation of a studio, noise of a seed, and a folder.
+    pub fn new(studio: &'a Studio, operator: &'a FrameOperator<'a>, seed: u64, folder: &'a Path) -> Self {
+        Self {
+            studio,
+            operator,
+            seed,
+            folder,
+            studio_digest: studio.digest(),
+        }
     }
-    let digest = |file: &str| {
-        let bytes = read_at_most(&folder.join(file), LONGEST, "a picture of the set")?;
-        Ok::<_, Error>(hex(&Sha256::digest(bytes)))
-    };
-    Ok(DatasetPair {
-        image: image
-            .file_name()
-            .map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
-        image_sha256: hex(&image_digest),
-        frame_sha256: digest(&frame)?,
-        truth_sha256: digest(&truth)?,
-        frame,
-        truth,
-    })
+
+    /// Write the frame and the scene of image number `i`, if they are not there. `read` gives the scene of an image.
+    ///
+    /// # Errors
+    /// If the image cannot be read or is not of the size that the studio was opened for, or a file cannot be written.
+    pub fn write(&self, image: &Path, i: usize, read: &dyn Fn(&Path) -> Result<SceneImage>) -> Result<DatasetPair> {
+        let bytes = read_at_most(image, LONGEST, "an image")?;
+        let mut hasher = Sha256::new();
+        hasher.update(&bytes);
+        let image_digest = hasher.clone().finalize();
+        hasher.update(self.seed.to_le_bytes());
+        let own = hasher.clone().finalize();
+        let own_seed = u64::from_le_bytes(own[..8].try_into().expect("eight bytes"));
+        hasher.update(self.studio_digest);
+        let source = hex(&hasher.finalize());
+        let name = format!("{}/{i:06}", shard(i));
+        let (frame, truth) = (format!("{name}.frame.png"), format!("{name}.truth.png"));
+        let (frame_file, truth_file) = (self.folder.join(&frame), self.folder.join(&truth));
+        let is_there = |file: &Path| png16::source_of(file).is_some_and(|s| s == source);
+        if !is_there(&frame_file) || !is_there(&truth_file) {
+            let scene = read(image)?;
+            let recorded = self.studio.record(self.operator, &scene, own_seed)?;
+            let ideal = self.studio.truth(&scene).mapv(srgb::encoded);
+            WholeFile::write(&frame_file, &png16::grey(&recorded.planes, &source))?;
+            WholeFile::write(&truth_file, &png16::colour(&ideal, Some(&source)))?;
+        }
+        let digest = |file: &Path| {
+            let bytes = read_at_most(file, LONGEST, "a picture of the set")?;
+            Ok::<_, Error>(hex(&Sha256::digest(bytes)))
+        };
+        Ok(DatasetPair {
+            image: image
+                .file_name()
+                .map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
+            image_sha256: hex(&image_digest),
+            frame_sha256: digest(&frame_file)?,
+            truth_sha256: digest(&truth_file)?,
+            frame,
+            truth,
+        })
+    }
 }
 
 #[cfg(test)]

@@ -33,7 +33,7 @@ mod veil;
 pub use assumed::{Assumed, AssumedScore, worth_of_assumptions};
 pub use chip::{ChipInLight, element_views, sampling_of};
 pub use colour::ChannelColours;
-pub use dataset::{DatasetManifest, DatasetPair, write_dataset, write_dataset_manifest, write_pair};
+pub use dataset::{DatasetManifest, DatasetPair, PairWriter, write_dataset, write_dataset_manifest};
 pub use doubt::{Doubt, DoubtReport};
 pub use exposure::{Frame, channel_at, expose, gains, sensitivity};
 pub use geometry::{ElementView, SceneSpace, SceneView};

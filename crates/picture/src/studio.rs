@@ -4,6 +4,7 @@ use metalith_camera::{Camera, ChannelSampling};
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
 use ndarray::{Array2, Array3};
+use sha2::{Digest, Sha256};
 
 use crate::assumed::Assumed;
 use crate::exposure::{Frame, expose, gains, sensitivity};
@@ -117,6 +118,22 @@ impl Studio {
         }
         let light = operator.apply(&scene.planes);
         Ok(expose(&self.camera, &self.gain, &light, seed))
+    }
+
+    /// SHA-256 of all that decides the frame of a scene but its noise: kernels and veil, elements, camera, field, exposure.
+    pub fn digest(&self) -> [u8; 32] {
+        let mut hasher = Sha256::new();
+        let distinct = self.bank.distinct.iter().map(|d| &d.values);
+        for number in distinct.chain([&self.veil.values]).flatten() {
+            hasher.update(number.to_le_bytes());
+        }
+        let camera = serde_json::to_vec(&self.camera).expect("plain data serialises");
+        hasher.update(camera);
+        hasher.update(format!(
+            "{:?} {:?} {:?} {:?} {:?}",
+            self.bank.elements, self.elements, self.view, self.gain, self.assumed
+        ));
+        hasher.finalize().into()
     }
 
     /// The picture restored from a frame, linear sRGB `[row, column, colour]`.

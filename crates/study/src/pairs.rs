@@ -10,9 +10,7 @@ use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
 use metalith_made::CalibratedModel;
 use metalith_picture::scene::{SceneImage, read_far_scene};
-use metalith_picture::{
-    DatasetManifest, DatasetPair, FrameOperator, KeptKernels, Studio, write_dataset_manifest, write_pair,
-};
+use metalith_picture::{DatasetManifest, DatasetPair, KeptKernels, PairWriter, Studio, write_dataset_manifest};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -113,6 +111,7 @@ impl PairsPlan {
         }
         let studio = self.request.studio(&KeptKernels::only(&self.folder), progress)?;
         let operator = studio.simulation();
+        let writer = PairWriter::new(&studio, &operator, self.request.seed, &self.folder);
         let pair = |k: u64| {
             let k = k as usize;
             let image = &self.request.images[k];
@@ -123,7 +122,7 @@ impl PairsPlan {
                     "plan it again into another folder",
                 ));
             }
-            self.request.write(&studio, &operator, k, &self.folder)
+            writer.write(image, k, &|p| self.request.scene(p))
         };
         shards.iter().try_for_each(|n| self.cut().make(*n, &pair, progress))
     }
@@ -167,18 +166,6 @@ impl PairsRequest {
             hash.update(digest);
         }
         Ok(hash.finalize().into())
-    }
-
-    fn write(&self, studio: &Studio, operator: &FrameOperator<'_>, k: usize, folder: &Path) -> Result<DatasetPair> {
-        write_pair(
-            studio,
-            operator,
-            &self.images[k],
-            k,
-            &|p| self.scene(p),
-            self.seed,
-            folder,
-        )
     }
 
     fn scene(&self, image: &Path) -> Result<SceneImage> {
@@ -230,7 +217,9 @@ pub fn plan_pairs(
     }
     let studio = request.studio(&KeptKernels::made(folder), progress)?;
     let begun = Instant::now();
-    request.write(&studio, &studio.simulation(), 0, folder)?;
+    let operator = studio.simulation();
+    let writer = PairWriter::new(&studio, &operator, request.seed, folder);
+    writer.write(&request.images[0], 0, &|p| request.scene(p))?;
     let seconds_per_image = begun.elapsed().as_secs_f64();
     let plan = PairsPlan {
         schema: SCHEMA,

@@ -85,6 +85,32 @@ fn pairs_of_shards_are_those_of_one_run() {
         let [a, b] = ["parts", "alone"].map(|f| fs::read(at(f).join(&name)).unwrap());
         assert!(a == b, "{name}");
     }
+
+    // A pair that is there is kept if it is of this image and seed, and made anew if not.
+    let (frame, other) = (
+        at("alone/000000-000999/000001.frame.png"),
+        at("alone/000000-000999/000002.frame.png"),
+    );
+    let right = fs::read(&frame).unwrap();
+    fs::copy(&other, &frame).unwrap();
+    let untouched = fs::metadata(&other).unwrap().modified().unwrap();
+    let again = |seed| {
+        metalith_picture::write_dataset(
+            &studio,
+            &studio.simulation(),
+            &images,
+            &scene,
+            seed,
+            &at("alone"),
+            &Silent,
+        )
+        .unwrap()
+    };
+    again(3);
+    assert!(fs::read(&frame).unwrap() == right);
+    assert_eq!(fs::metadata(&other).unwrap().modified().unwrap(), untouched);
+    again(4);
+    assert!(fs::read(&frame).unwrap() != right);
 }
 
 /// The best of several starts, whoever makes them.

@@ -1,0 +1,7 @@
+//! Measured sets: all faults are named at once, effects are found, and nothing is found where there is none.
+
+mod bench;
+mod listed;
+mod set;
+mod unlisted;
+mod validation;

@@ -1,0 +1,65 @@
+//! The small set that all tests are of, with effects or without.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use metalith_calibrate::{Diagnosis, MeasuredSet, Sampling, Session, Settings, Simulations, Synthesizer};
+use metalith_core::Silent;
+use metalith_gds::extract::GdsPillars;
+use metalith_testing::session::small_set;
+
+/// The small set on disk, and a folder for tables of cells: every test would solve the same ones. Both are emptied
+/// by the first test that needs them, so that no run depends on another.
+pub static FOLDERS: LazyLock<[PathBuf; 2]> = LazyLock::new(|| {
+    ["small-set", "cells"].map(|name| {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("calibrate").join(name);
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(&folder).unwrap();
+        folder
+    })
+});
+
+pub static LIKE: LazyLock<MeasuredSet> = LazyLock::new(|| {
+    let [folder, _] = &*FOLDERS;
+    small_set(folder);
+    MeasuredSet::read(folder, &GdsPillars, &Silent).unwrap()
+});
+
+/// With some of the effects whose cells need not be solved again.
+pub static SIMULATIONS: LazyLock<Simulations> =
+    LazyLock::new(|| Session::new(&LIKE, settings()).unwrap().simulate(&Silent).unwrap());
+
+pub static SYNTHESIZER: LazyLock<Synthesizer<'static>> =
+    LazyLock::new(|| Synthesizer::new(&LIKE, &settings()).unwrap());
+
+pub fn settings() -> Settings {
+    with_effects(&["cd_bias", "gap", "tilt", "led_width", "zero_order", "pixel_blur"])
+}
+
+pub fn with_effects(names: &[&str]) -> Settings {
+    Settings {
+        sampling: Sampling {
+            spectrum: 0.34,
+            ..Sampling::default()
+        },
+        cache: Some(FOLDERS[1].clone()),
+        only: names.iter().map(|n| (*n).into()).collect(),
+        compare_fidelities: false,
+        refine: true,
+        ..Settings::default()
+    }
+}
+
+/// A set like the small one with some effects.
+pub fn synthetic(parts: &[(&str, &[f64])], seed: u64) -> MeasuredSet {
+    let images = SYNTHESIZER.with_effects(&[parts.to_vec()], &Silent).unwrap().remove(0);
+    SYNTHESIZER.draw(&images, seed)
+}
+
+/// The names of what was found, in order of the alphabet.
+pub fn names(d: &Diagnosis) -> Vec<&str> {
+    let mut found: Vec<&str> = d.effects.iter().map(|e| e.name.as_str()).collect();
+    found.sort_unstable();
+    found
+}
