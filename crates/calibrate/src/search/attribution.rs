@@ -4,9 +4,10 @@
 use metalith_core::{Progress, Result};
 
 use super::alternatives::{Alternative, alternatives, drop_redundant};
+use super::exchange::find_exchange;
 use super::pairs::find_pair;
 use super::state::SearchState;
-use super::stepwise::{LEAST_GAIN, RESIDUAL, TriedEffect, step_forward};
+use super::stepwise::{LEAST_GAIN, RESIDUAL, Rejection, TriedEffect, step_forward};
 use crate::fit::{Fit, FitProblem, HeldOutErrors, half_widths, mean_error};
 use crate::optics::PixelGrid;
 use crate::set::PerCapture;
@@ -90,6 +91,18 @@ impl SearchHistory {
         self.chosen.push(tried.effect);
         self.runners_up.push(runners_up);
     }
+
+    /// Take an effect in the place of one that was taken before.
+    fn replace(&mut self, place: usize, effect: usize) {
+        let removed = std::mem::replace(&mut self.chosen[place], effect);
+        for known in self.ranking.iter_mut().chain(self.later.iter_mut().flatten()) {
+            if known.effect == removed && known.rejected.is_none() {
+                known.rejected = Some(Rejection::Second);
+            } else if known.effect == effect && known.rejected == Some(Rejection::Second) {
+                known.rejected = None;
+            }
+        }
+    }
 }
 
 /// Attribute the residual of a problem to effects. With `full`, what is found is refined with full simulations, and
@@ -152,14 +165,28 @@ fn add_effects(
             if full {
                 now.refine(progress)?;
             }
-        } else if now.error() > RESIDUAL && history.chosen.len() + 2 <= MOST_EFFECTS {
-            let Some(pair) = find_pair(now, &history.chosen, full, progress)? else {
-                break;
+        } else if now.error() > RESIDUAL {
+            let room_for_two = history.chosen.len() + 2 <= MOST_EFFECTS;
+            let pair = match room_for_two {
+                true => find_pair(now, &history.chosen, full, progress)?,
+                false => None,
             };
-            for tried in &pair.tried {
-                history.take(tried, pair.runners_up.clone());
+            if let Some(pair) = pair {
+                for tried in &pair.tried {
+                    history.take(tried, pair.runners_up.clone());
+                }
+                *now = pair.state;
+            } else {
+                let before = mean_error(&history.held_before);
+                let (chosen, runners_up) = (&history.chosen, &history.runners_up);
+                let Some(found) = find_exchange(now, chosen, runners_up, before, full, progress)? else {
+                    break;
+                };
+                history.replace(found.place, found.effect);
+                history.keep(found.tried, found.null_gain);
+                history.take(&found.taken, found.leaders);
+                *now = found.state;
             }
-            *now = pair.state;
         } else {
             break;
         }
@@ -225,6 +252,24 @@ mod tests {
         both.extend(found.alternatives[0].iter().map(|a| a.effect));
         both.sort_unstable();
         assert_eq!(both, [0, 1]);
+    }
+
+    /// One effect is taken for another that is much like it, because a third is hidden: with the third, the right one explains
+    /// all. There is no room for both beside the wrong one.
+    #[test]
+    fn an_effect_is_exchanged_where_a_hidden_one_then_explains_the_rest() {
+        let mixed = Term {
+            patterns: vec![([2, 3], 1.0), ([5, 4], 0.5), ([3, 6], 0.2)],
+            ..Term::linear([2, 3])
+        };
+        let clear = [[6, 2], [4, 5]].map(Term::linear);
+        let terms = [&clear[..], &[Term::linear([2, 3]), mixed, Term::linear([5, 4])]].concat();
+        let model = LinearModel::new(terms, beams(2, 2, 2));
+        let data = model.data(|_| vec![0.08, 0.08, 0.04, 0.0, 0.02], Some(5));
+        let mut found = attribute(model.problem(&data), false, &Silent).unwrap();
+        found.chosen.sort_unstable();
+        assert_eq!(found.chosen, [0, 1, 2, 4]);
+        assert!(mean_error(&found.held_after) < 1.0 + LEAST_GAIN);
     }
 
     #[test]

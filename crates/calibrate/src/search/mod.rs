@@ -5,6 +5,7 @@ mod attribution;
 mod capture_screening;
 mod defect_noise;
 mod evidence;
+mod exchange;
 mod pairs;
 mod patterns;
 mod refinement;
