@@ -69,6 +69,7 @@ pub fn alternatives(
         } else {
             runners_up.get(place)
         };
+        let far = mean_error(before) - now.error();
         let mut best = Substitute {
             effect: chosen[place],
             state: now.clone(),
@@ -78,7 +79,8 @@ pub fn alternatives(
             let mut set = chosen.to_vec();
             set[place] = other;
             let mut substitute = Substitute::new(now, chosen[place], other, &set);
-            if !substitute.is_worth_refining(now, mean_error(before)) {
+            let behind = substitute.state.error() - now.error();
+            if behind > ALIKE_WITHIN.max(WORTH_REFINING * far) || !substitute.physical() {
                 continue;
             }
             if full {
@@ -110,24 +112,18 @@ fn refit(now: &SearchState<'_>, removed: usize, set: &[usize]) -> Fit {
 }
 
 /// An explanation with a certain effect in the place of one that was found.
-pub struct Substitute<'a> {
-    pub effect: usize,
-    pub state: SearchState<'a>,
+struct Substitute<'a> {
+    effect: usize,
+    state: SearchState<'a>,
 }
 
 impl<'a> Substitute<'a> {
     /// With an effect in the place of one that is `removed`; `set` are all effects then.
-    pub fn new(now: &SearchState<'a>, removed: usize, effect: usize, set: &[usize]) -> Self {
+    fn new(now: &SearchState<'a>, removed: usize, effect: usize, set: &[usize]) -> Self {
         Self {
             effect,
             state: SearchState::new(now.problem.clone(), refit(now, removed, set)),
         }
-    }
-
-    /// Whether it may explain as much when it is refined: `before` is the error when nothing was found.
-    pub fn is_worth_refining(&self, now: &SearchState<'_>, before: f64) -> bool {
-        let (behind, far) = (self.state.error() - now.error(), before - now.error());
-        behind <= ALIKE_WITHIN.max(WORTH_REFINING * far) && self.physical()
     }
 
     fn physical(&self) -> bool {

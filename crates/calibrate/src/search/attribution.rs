@@ -4,7 +4,7 @@
 use metalith_core::{Progress, Result};
 
 use super::alternatives::{Alternative, alternatives, drop_redundant};
-use super::exchange::find_exchange;
+use super::exchange::{find_exchange, much_alike};
 use super::pairs::find_pair;
 use super::state::SearchState;
 use super::stepwise::{LEAST_GAIN, RESIDUAL, Rejection, TriedEffect, step_forward};
@@ -56,6 +56,8 @@ struct SearchHistory {
     ranking: Vec<TriedEffect>,
     later: Vec<Vec<TriedEffect>>,
     runners_up: Vec<Vec<usize>>,
+    /// For each effect: those that gained nearly as much when it was taken.
+    alike: Vec<Vec<TriedEffect>>,
 }
 
 impl SearchHistory {
@@ -69,6 +71,7 @@ impl SearchHistory {
             ranking: Vec::new(),
             later: Vec::new(),
             runners_up: Vec::new(),
+            alike: Vec::new(),
         }
     }
 
@@ -82,14 +85,15 @@ impl SearchHistory {
         }
     }
 
-    /// Take an effect; `runners_up` were fitted as well.
-    fn take(&mut self, tried: &TriedEffect, runners_up: Vec<usize>) {
+    /// Take an effect; `runners_up` were fitted as well, and those in `alike` gained nearly as much.
+    fn take(&mut self, tried: &TriedEffect, runners_up: Vec<usize>, alike: Vec<TriedEffect>) {
         if let Some(known) = self.ranking.iter_mut().find(|t| t.effect == tried.effect) {
             let score = known.score;
             *known = TriedEffect { score, ..tried.clone() };
         }
         self.chosen.push(tried.effect);
         self.runners_up.push(runners_up);
+        self.alike.push(alike);
     }
 
     /// Take an effect in the place of one that was taken before.
@@ -158,14 +162,19 @@ fn add_effects(
 ) -> Result<()> {
     while history.chosen.len() < MOST_EFFECTS {
         let step = step_forward(now, &history.chosen, full, progress)?;
-        history.keep(step.tried, step.null_gain);
         if let Some((tried, fit, held)) = step.taken {
-            history.take(&tried, step.leaders);
+            let alike = much_alike(&step.tried, &tried);
+            history.keep(step.tried, step.null_gain);
+            history.take(&tried, step.leaders, alike);
             (now.fit, now.held_out) = (fit, held);
             if full {
                 now.refine(progress)?;
             }
-        } else if now.error() > RESIDUAL {
+        } else {
+            history.keep(step.tried, step.null_gain);
+            if now.error() <= RESIDUAL {
+                break;
+            }
             let room_for_two = history.chosen.len() + 2 <= MOST_EFFECTS;
             let pair = match room_for_two {
                 true => find_pair(now, &history.chosen, full, progress)?,
@@ -173,22 +182,19 @@ fn add_effects(
             };
             if let Some(pair) = pair {
                 for tried in &pair.tried {
-                    history.take(tried, pair.runners_up.clone());
+                    history.take(tried, pair.runners_up.clone(), Vec::new());
                 }
                 *now = pair.state;
             } else {
-                let before = mean_error(&history.held_before);
-                let (chosen, runners_up) = (&history.chosen, &history.runners_up);
-                let Some(found) = find_exchange(now, chosen, runners_up, before, full, progress)? else {
+                let (chosen, alike) = (&history.chosen, &history.alike);
+                let Some(found) = find_exchange(now, chosen, alike, full, progress)? else {
                     break;
                 };
                 history.replace(found.place, found.effect);
                 history.keep(found.tried, found.null_gain);
-                history.take(&found.taken, found.leaders);
+                history.take(&found.taken, found.leaders, Vec::new());
                 *now = found.state;
             }
-        } else {
-            break;
         }
         let awake = history.chosen.last().is_some_and(|&e| now.problem.model.dormant(e));
         if full && (awake || now.error() > MORE_IS_LEFT) {

@@ -5,13 +5,15 @@
 
 use metalith_core::{Progress, Result};
 
-use super::alternatives::Substitute;
 use super::state::SearchState;
 use super::stepwise::{SelectionStep, TriedEffect, step_forward};
 use crate::fit::mean_error;
 
 /// Substitutes that are followed.
 const FOLLOWED: usize = 3;
+
+/// Share of the gain of an effect that was taken by which another is much like it.
+const ALIKE: f64 = 0.8;
 
 /// Share of the error above noise that an exchange may leave: less would trade one half-truth for another.
 const MAY_LEAVE: f64 = 0.25;
@@ -29,37 +31,36 @@ pub struct Exchange<'a> {
     pub state: SearchState<'a>,
 }
 
-/// The exchange that leaves least, if one explains what effects in `chosen` leave. `runners_up` were fitted when each was taken;
-/// `before` is the error when nothing was found. With `full`, all is refined with full simulations.
+/// Effects of a step that gained nearly as much as the one that was taken, best first.
+pub fn much_alike(tried: &[TriedEffect], taken: &TriedEffect) -> Vec<TriedEffect> {
+    let gain = |t: &TriedEffect| t.gain.map_or(0.0, |g| g.value);
+    let alike = |t: &&TriedEffect| t.effect != taken.effect && gain(t) > ALIKE * gain(taken);
+    let mut found: Vec<TriedEffect> = tried.iter().filter(alike).cloned().collect();
+    found.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+    found
+}
+
+/// The exchange that leaves least, if one explains what effects in `chosen` leave; `alike` are those that gained nearly as much
+/// when each was taken. With `full`, all is refined with full simulations.
 ///
 /// # Errors
 /// If a simulation fails, or the user stopped it.
 pub fn find_exchange<'a>(
     now: &SearchState<'a>,
     chosen: &[usize],
-    runners_up: &[Vec<usize>],
-    before: f64,
+    alike: &[Vec<TriedEffect>],
     full: bool,
     progress: &dyn Progress,
 ) -> Result<Option<Exchange<'a>>> {
-    let mut substitutes = Vec::new();
-    for (place, others) in runners_up.iter().enumerate() {
-        for &effect in others.iter().filter(|o| !chosen.contains(o)) {
-            let mut set = chosen.to_vec();
-            set[place] = effect;
-            let substitute = Substitute::new(now, chosen[place], effect, &set);
-            if substitute.is_worth_refining(now, before) {
-                substitutes.push((place, set, substitute));
-            }
-        }
-    }
-    substitutes.sort_by(|a, b| a.2.state.error().total_cmp(&b.2.state.error()));
+    let others = alike
+        .iter()
+        .enumerate()
+        .flat_map(|(place, a)| a.iter().map(move |t| (place, t)));
     let mut best: Option<Exchange<'a>> = None;
-    for (place, set, Substitute { effect, mut state }) in substitutes.into_iter().take(FOLLOWED) {
-        if full {
-            state.refine(progress)?;
-            state.recentre(progress)?;
-        }
+    for (place, other) in others.filter(|(_, t)| !chosen.contains(&t.effect)).take(FOLLOWED) {
+        let mut set = chosen.to_vec();
+        set[place] = other.effect;
+        let mut state = replaced(now, chosen[place], other, &set, full, progress)?;
         let step = step_forward(&mut state, &set, full, progress)?;
         let SelectionStep {
             tried,
@@ -74,13 +75,14 @@ pub fn find_exchange<'a>(
         if full {
             state.refine(progress)?;
         }
-        let least = best
-            .as_ref()
-            .map_or(1.0 + MAY_LEAVE * (now.error() - 1.0), |b| b.state.error());
+        let least = match &best {
+            Some(best) => best.state.error(),
+            None => 1.0 + MAY_LEAVE * (now.error() - 1.0),
+        };
         if mean_error(&state.held_out) < least {
             best = Some(Exchange {
                 place,
-                effect,
+                effect: other.effect,
                 tried,
                 taken,
                 leaders,
@@ -90,4 +92,32 @@ pub fn find_exchange<'a>(
         }
     }
     Ok(best)
+}
+
+/// With another effect in the place of one that is removed, simulated anew about the values that it had when it was tried: a
+/// surrogate about the one that is removed says little of it.
+fn replaced<'a>(
+    now: &SearchState<'a>,
+    removed: usize,
+    other: &TriedEffect,
+    set: &[usize],
+    full: bool,
+    progress: &dyn Progress,
+) -> Result<SearchState<'a>> {
+    let (mut state, model) = (now.clone(), now.problem.model);
+    for slot in model.slots_of(removed) {
+        state.fit.theta[slot] = 0.0;
+    }
+    for (slot, value) in model.slots_of(other.effect).into_iter().zip(&other.values) {
+        state.fit.theta[slot] = *value;
+    }
+    state.fit.active = model.slots_of_all(set);
+    if full {
+        state.recentre(progress)?;
+        state.refine(progress)?;
+    } else {
+        let fit = state.problem.fit(&state.fit.active, &state.fit);
+        state.move_to(fit);
+    }
+    Ok(state)
 }
