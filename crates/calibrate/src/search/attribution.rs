@@ -175,8 +175,7 @@ fn add_effects(
             if now.error() <= RESIDUAL {
                 break;
             }
-            let room_for_two = history.chosen.len() + 2 <= MOST_EFFECTS;
-            let pair = match room_for_two {
+            let pair = match history.chosen.len() + 2 <= MOST_EFFECTS {
                 true => find_pair(now, &history.chosen, full, progress)?,
                 false => None,
             };

@@ -7,7 +7,6 @@ use metalith_core::{Progress, Result};
 
 use super::state::SearchState;
 use super::stepwise::{SelectionStep, TriedEffect, step_forward};
-use crate::fit::mean_error;
 
 /// Substitutes that are followed.
 const FOLLOWED: usize = 3;
@@ -15,7 +14,7 @@ const FOLLOWED: usize = 3;
 /// Share of the gain of an effect that was taken by which another is much like it.
 const ALIKE: f64 = 0.8;
 
-/// Share of the error above noise that an exchange may leave: less would trade one half-truth for another.
+/// Share of the error above noise that an exchange may leave: more would trade one half-truth for another.
 const MAY_LEAVE: f64 = 0.25;
 
 /// An exchange that explains what was left.
@@ -79,7 +78,7 @@ pub fn find_exchange<'a>(
             Some(best) => best.state.error(),
             None => 1.0 + MAY_LEAVE * (now.error() - 1.0),
         };
-        if mean_error(&state.held_out) < least {
+        if state.error() < least {
             best = Some(Exchange {
                 place,
                 effect: other.effect,
