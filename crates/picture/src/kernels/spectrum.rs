@@ -122,7 +122,7 @@ impl KernelPlan {
         }
         let mut square = vec![0.0; size * size];
         let finished = sums.iter_mut().map(|sum| {
-            self.fft.inverse(sum, &mut square, scratch);
+            self.fft.inverse(sum, &mut square, size, scratch);
             self.pixels(&square)
         });
         finished.collect()

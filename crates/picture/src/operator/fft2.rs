@@ -64,32 +64,32 @@ impl SquareFft {
         self.prepare(scratch);
         let (n, half) = (self.size, self.size / 2 + 1);
         let FftScratch { lines, work } = scratch;
-        for (row, line) in square
-            .chunks_exact_mut(n)
-            .zip(lines.chunks_exact_mut(half))
-            .take(filled)
-        {
+        let rows = square.chunks_exact_mut(n).zip(lines.chunks_exact_mut(half));
+        for (row, line) in rows.take(filled) {
             // Fails for wrong lengths alone.
             self.rows
                 .process_with_scratch(row, line, &mut work[..self.rows.get_scratch_len()])
                 .expect("lengths are those of the plan");
         }
-        lines[filled * half..].fill(Complex32::ZERO);
-        transpose(lines, spectrum, n, half);
+        // What is not filled stays zero.
+        spectrum.fill(Complex32::ZERO);
+        transpose(&lines[..filled * half], half, spectrum, n);
         let need = self.columns.get_inplace_scratch_len();
         self.columns.process_with_scratch(spectrum, &mut work[..need]);
     }
 
-    /// The square of a spectrum, which is used up. Scaled so that it undoes [`SquareFft::forward`].
-    pub fn inverse(&self, spectrum: &mut [Complex32], square: &mut [f32], scratch: &mut FftScratch) {
+    /// The first `wanted` rows of the square of a spectrum, which is used up. Scaled so that it undoes
+    /// [`SquareFft::forward`].
+    pub fn inverse(&self, spectrum: &mut [Complex32], square: &mut [f32], wanted: usize, scratch: &mut FftScratch) {
         self.prepare(scratch);
         let (n, half) = (self.size, self.size / 2 + 1);
         let FftScratch { lines, work } = scratch;
         let need = self.columns_back.get_inplace_scratch_len();
         self.columns_back.process_with_scratch(spectrum, &mut work[..need]);
-        transpose(spectrum, lines, half, n);
+        transpose(spectrum, n, lines, half);
         let scale = 1.0 / (n * n) as f32;
-        for (row, line) in square.chunks_exact_mut(n).zip(lines.chunks_exact_mut(half)) {
+        let rows = square.chunks_exact_mut(n).zip(lines.chunks_exact_mut(half));
+        for (row, line) in rows.take(wanted) {
             // Rounding leaves next to nothing where a real square has exactly none.
             line[0].im = 0.0;
             line[half - 1].im = 0.0;
@@ -101,16 +101,21 @@ impl SquareFft {
     }
 }
 
-/// `to[j][i] = from[i][j]`, for `rows` x `columns` values, by blocks that fit the cache.
-fn transpose(from: &[Complex32], to: &mut [Complex32], rows: usize, columns: usize) {
-    const BLOCK: usize = 16;
-    for i0 in (0..rows).step_by(BLOCK) {
-        for j0 in (0..columns).step_by(BLOCK) {
-            for j in j0..(j0 + BLOCK).min(columns) {
-                for i in i0..(i0 + BLOCK).min(rows) {
-                    to[j * rows + i] = from[i * columns + j];
-                }
-            }
+/// `to[j][i] = from[i][j]` for all of `from`, with so many values a row of both, by blocks that fit the cache.
+fn transpose(from: &[Complex32], columns: usize, to: &mut [Complex32], rows: usize) {
+    const BLOCK: usize = 8;
+    let mut bands = from.chunks_exact(BLOCK * columns);
+    for (band, block) in bands.by_ref().enumerate() {
+        let lines: [&[Complex32]; BLOCK] = std::array::from_fn(|k| &block[k * columns..][..columns]);
+        for (j, to) in to.chunks_exact_mut(rows).take(columns).enumerate() {
+            let to = &mut to[band * BLOCK..][..BLOCK];
+            to.iter_mut().zip(&lines).for_each(|(t, line)| *t = line[j]);
+        }
+    }
+    let done = from.len() / columns / BLOCK * BLOCK;
+    for (k, line) in bands.remainder().chunks_exact(columns).enumerate() {
+        for (j, value) in line.iter().enumerate() {
+            to[j * rows + done + k] = *value;
         }
     }
 }
@@ -138,7 +143,7 @@ mod tests {
         fft.forward(&mut b.clone(), n, &mut spectra[1], &mut scratch);
         let mut product: Vec<Complex32> = spectra[0].iter().zip(&spectra[1]).map(|(x, y)| x * y).collect();
         let mut got = vec![0.0; n * n];
-        fft.inverse(&mut product, &mut got, &mut scratch);
+        fft.inverse(&mut product, &mut got, n, &mut scratch);
         for (y, x) in [(0, 0), (3, 20), (17, 5)] {
             let mut want = 0.0;
             for (i, a) in a.iter().enumerate() {

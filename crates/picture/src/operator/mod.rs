@@ -8,16 +8,22 @@
 //! | --- | --- |
 //! | which place of the scene a pixel looks at | `warp` |
 //! | kernels on the pixels of a grid | `source` |
-//! | kernels of a node as spectra | `node` |
+//! | an element: its warps, kernels of its nodes as spectra | `element` |
+//! | light through an element, and back | `pass` |
+//! | its pixels on the frame | `sub_image` |
+//! | the innermost loops | `loops` |
 //! | fewer of them than inputs | `mixed` |
 //! | a scene without what its grid cannot hold | `smooth` |
 //! | transforms | `fft2` |
 
+mod element;
 mod fft2;
+mod loops;
 mod mixed;
-mod node;
+mod pass;
 mod smooth;
 mod source;
+mod sub_image;
 mod warp;
 
 use std::borrow::Cow;
@@ -33,8 +39,8 @@ use crate::kernels::KernelBank;
 use crate::veil::{self, Veil};
 use crate::{ElementView, SceneSpace, SceneView};
 
+use element::ElementOperator;
 pub use fft2::{FftScratch, SquareFft};
-use node::ElementOperator;
 use smooth::Smoothing;
 use source::KernelSource;
 

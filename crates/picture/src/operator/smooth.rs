@@ -1,6 +1,7 @@
 //! A scene without what a coarse grid of points cannot hold.
 
-use ndarray::{Array2, ArrayView1, ArrayViewMut1, Axis};
+use ndarray::{Array2, ArrayView2};
+use pulp::Arch;
 
 use super::source::{LOBES, lanczos};
 
@@ -29,48 +30,57 @@ impl Smoothing {
     }
 
     pub fn apply(&self, plane: &Array2<f32>) -> Array2<f32> {
-        self.along_both(plane, |from, mut to| {
-            for i in 0..from.len() {
-                to[i] = self.weights[0] * from[i];
-                for (k, w) in self.weights.iter().enumerate().skip(1) {
-                    to[i] += w * (from[i.saturating_sub(k)] + from[(i + k).min(from.len() - 1)]);
-                }
-            }
+        self.along_both(plane, |from, to| {
+            let reach = self.weights.len() - 1;
+            let padded = [&vec![from[0]; reach][..], from, &vec![from[from.len() - 1]; reach]].concat();
+            self.sums(&padded, to);
         })
     }
 
     /// The adjoint of [`Smoothing::apply`].
     pub fn adjoint(&self, plane: &Array2<f32>) -> Array2<f32> {
-        self.along_both(plane, |from, mut to| {
-            to.fill(0.0);
-            let last = from.len() - 1;
-            for i in 0..from.len() {
-                to[i] += self.weights[0] * from[i];
-                for (k, w) in self.weights.iter().enumerate().skip(1) {
-                    to[i.saturating_sub(k)] += w * from[i];
-                    to[(i + k).min(last)] += w * from[i];
-                }
-            }
+        self.along_both(plane, |from, to| {
+            let (reach, n) = (self.weights.len() - 1, from.len());
+            let dark = vec![0.0; 2 * reach];
+            let mut wide = vec![0.0; n + 2 * reach];
+            self.sums(&[&dark[..], from, &dark].concat(), &mut wide);
+            // What went beyond the borders came from the pixels there.
+            to.copy_from_slice(&wide[reach..reach + n]);
+            to[0] += wide[..reach].iter().sum::<f32>();
+            to[n - 1] += wide[reach + n..].iter().sum::<f32>();
         })
     }
 
-    fn along_both(
-        &self,
-        plane: &Array2<f32>,
-        line: impl Fn(ArrayView1<'_, f32>, ArrayViewMut1<'_, f32>),
-    ) -> Array2<f32> {
+    /// Weighted sums over the neighbours of values of which so many more are given on both sides.
+    fn sums(&self, padded: &[f32], to: &mut [f32]) {
+        let (reach, n) = (self.weights.len() - 1, to.len());
+        Arch::new().dispatch(|| {
+            let own = padded[reach..].iter().zip(&mut *to);
+            own.for_each(|(v, t)| *t = self.weights[0] * v);
+            for (k, w) in self.weights.iter().enumerate().skip(1) {
+                let sides = padded[reach - k..][..n].iter().zip(&padded[reach + k..][..n]);
+                to.iter_mut().zip(sides).for_each(|(t, (a, b))| *t += w * (a + b));
+            }
+        });
+    }
+
+    fn along_both(&self, plane: &Array2<f32>, line: impl Fn(&[f32], &mut [f32])) -> Array2<f32> {
         if self.weights.len() == 1 {
             return plane.clone();
         }
-        let mut from = plane.clone();
-        let mut to = Array2::zeros(plane.dim());
-        for axis in [Axis(1), Axis(0)] {
-            for (a, b) in from.lanes(axis).into_iter().zip(to.lanes_mut(axis)) {
-                line(a, b);
+        let along_rows = |from: ArrayView2<'_, f32>| {
+            let mut to = Array2::zeros(from.dim());
+            for (from, mut to) in from.rows().into_iter().zip(to.rows_mut()) {
+                line(
+                    from.as_slice().expect("rows are whole"),
+                    to.as_slice_mut().expect("rows are whole"),
+                );
             }
-            std::mem::swap(&mut from, &mut to);
-        }
-        from
+            to
+        };
+        let rows = along_rows(plane.as_standard_layout().view());
+        let both = along_rows(rows.t().as_standard_layout().view());
+        both.t().as_standard_layout().into_owned()
     }
 }
 

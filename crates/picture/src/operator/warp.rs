@@ -3,6 +3,7 @@
 use metalith_camera::Sensor;
 use ndarray::Array2;
 
+use super::sub_image::PixelGrid;
 use crate::ElementView;
 use crate::assumed::{Assumed, butterworth};
 use crate::geometry::SceneSpace;
@@ -16,14 +17,24 @@ pub struct Warp {
     pub origin: [i64; 2],
     /// Rows and columns of cells.
     pub shape: [usize; 2],
-    /// For each cell: place in the scene's picture (row, column).
-    scene: Vec<[f32; 2]>,
+    /// Where in the scene's picture the lit cells look.
+    looks: Vec<Look>,
     /// For each cell: place among the nodes of the kernels (row, column).
     pub nodes: Vec<[f32; 2]>,
     /// For each cell: projected solid angle, zero where the scene or the field of the kernels ends.
     flux: Vec<f32>,
     /// Rows and columns of the scene.
     size: [usize; 2],
+}
+
+/// Where a cell looks in the scene's picture.
+#[derive(Clone, Copy)]
+struct Look {
+    cell: u32,
+    /// The upper left of the four pixels about the place.
+    pixel: u32,
+    /// From it to the next row and the next column.
+    share: [f32; 2],
 }
 
 /// Where in each cell the scene is sampled.
@@ -79,7 +90,7 @@ impl Warp {
         let mut warp = Self {
             origin: first,
             shape,
-            scene: vec![[0.0; 2]; shape[0] * shape[1]],
+            looks: Vec::new(),
             nodes: vec![[0.0; 2]; shape[0] * shape[1]],
             flux: vec![0.0; shape[0] * shape[1]],
             size: [space.view.rows, space.view.columns],
@@ -99,7 +110,7 @@ impl Warp {
             let inside = (0..2).all(|a| scene[a] >= -0.5 && scene[a] <= warp.size[a] as f64 - 0.5);
             let inside = inside && place.iter().all(|v| v.abs() <= patch_um);
             if inside && landing.iter().all(|v| v.abs() <= spec.reach_um) {
-                warp.scene[i] = scene.map(|v| v as f32);
+                warp.looks.push(Look::new(i, scene, warp.size));
                 warp.nodes[i] = [spec.place(landing[1]) as f32, spec.place(landing[0]) as f32];
                 warp.flux[i] = (brightness(place) * pixel * pixel * area) as f32;
             }
@@ -107,45 +118,50 @@ impl Warp {
         warp
     }
 
-    /// The pixels of the scene on both sides, and the shares of the latter.
-    fn between(&self, i: usize) -> ([usize; 2], [usize; 2], [f32; 2]) {
-        let at = self.scene[i];
-        let axis = |a: usize| {
-            let place = at[a].clamp(0.0, self.size[a] as f32 - 1.0);
-            let low = place as usize;
-            (low, (low + 1).min(self.size[a] - 1), place - low as f32)
-        };
-        let (y, x) = (axis(0), axis(1));
-        ([y.0, x.0], [y.1, x.1], [y.2, x.2])
-    }
-
-    /// Light of a plane of the scene on each cell.
-    pub fn sample(&self, plane: &Array2<f32>, out: &mut [f32]) {
-        for (i, (to, flux)) in out.iter_mut().zip(&self.flux).enumerate() {
-            if *flux == 0.0 {
-                *to = 0.0;
-                continue;
-            }
-            let (low, high, share) = self.between(i);
-            let above = plane[[low[0], low[1]]] * (1.0 - share[1]) + plane[[low[0], high[1]]] * share[1];
-            let below = plane[[high[0], low[1]]] * (1.0 - share[1]) + plane[[high[0], high[1]]] * share[1];
-            *to = flux * (above * (1.0 - share[0]) + below * share[0]);
+    /// The pixels of the sensor that are one phase of its cells, and of `beyond` more cells on each side.
+    pub fn pixels(&self, cell: usize, phase: [usize; 2], beyond: usize) -> PixelGrid {
+        PixelGrid {
+            origin: [0, 1].map(|a| (self.origin[a] - beyond as i64) * cell as i64 + phase[a] as i64),
+            step: cell,
+            shape: self.shape.map(|n| n + 2 * beyond),
         }
     }
 
-    /// The adjoint of [`Warp::sample`]: adds to a plane of the scene.
-    pub fn scatter(&self, light: &[f32], plane: &mut Array2<f32>) {
-        for (i, (value, flux)) in light.iter().zip(&self.flux).enumerate() {
-            if *flux == 0.0 || *value == 0.0 {
-                continue;
+    /// Light of planes of the scene on each cell.
+    pub fn sample(&self, planes: &[&Array2<f32>]) -> Vec<Vec<f32>> {
+        let from: Vec<_> = planes.iter().map(|p| p.as_standard_layout()).collect();
+        let sample = |plane: &[f32]| {
+            let mut out = vec![0.0; self.flux.len()];
+            for Look { cell, pixel, share } in &self.looks {
+                let at = *pixel as usize;
+                let (above, below) = (&plane[at..at + 2], &plane[at + self.size[1]..][..2]);
+                let above = above[0] + share[1] * (above[1] - above[0]);
+                let below = below[0] + share[1] * (below[1] - below[0]);
+                out[*cell as usize] = self.flux[*cell as usize] * (above + share[0] * (below - above));
             }
-            let (low, high, share) = self.between(i);
-            let value = value * flux;
-            let [above, below] = [value * (1.0 - share[0]), value * share[0]];
-            plane[[low[0], low[1]]] += above * (1.0 - share[1]);
-            plane[[low[0], high[1]]] += above * share[1];
-            plane[[high[0], low[1]]] += below * (1.0 - share[1]);
-            plane[[high[0], high[1]]] += below * share[1];
+            out
+        };
+        from.iter()
+            .map(|p| sample(p.as_slice().expect("rows are whole")))
+            .collect()
+    }
+
+    /// The adjoint of [`Warp::sample`]: adds to planes of the scene, whose rows are whole.
+    pub fn scatter(&self, light: &[&[f32]], planes: &mut [Array2<f32>]) {
+        for (light, plane) in light.iter().zip(planes) {
+            let plane = plane.as_slice_mut().expect("rows are whole");
+            for Look { cell, pixel, share } in &self.looks {
+                let at = *pixel as usize;
+                let value = light[*cell as usize] * self.flux[*cell as usize];
+                let below = share[0] * value;
+                let above = value - below;
+                let to = &mut plane[at..at + 2];
+                to[0] += above - share[1] * above;
+                to[1] += share[1] * above;
+                let to = &mut plane[at + self.size[1]..][..2];
+                to[0] += below - share[1] * below;
+                to[1] += share[1] * below;
+            }
         }
     }
 
@@ -162,6 +178,20 @@ impl Warp {
             }
         }
         (low[0] != usize::MAX).then(|| (low, [high[0] - low[0] + 1, high[1] - low[1] + 1]))
+    }
+}
+
+impl Look {
+    /// For a place (row, column) in a picture of so many rows and columns, at least two each; nothing is beyond the middles of its
+    /// outermost pixels.
+    fn new(cell: usize, place: [f64; 2], size: [usize; 2]) -> Self {
+        let place = [0, 1].map(|a| place[a].clamp(0.0, (size[a] - 1) as f64));
+        let low = [0, 1].map(|a| (place[a] as usize).min(size[a] - 2));
+        Self {
+            cell: cell as u32,
+            pixel: (low[0] * size[1] + low[1]) as u32,
+            share: [0, 1].map(|a| (place[a] - low[a] as f64) as f32),
+        }
     }
 }
 

@@ -140,7 +140,8 @@ impl Preconditioner {
         let mut spectrum = self.spectrum(&(right * &self.unit));
         spectrum.iter_mut().zip(filter).for_each(|(v, f)| *v *= f);
         let mut square = vec![0.0f32; size * size];
-        self.fft.inverse(&mut spectrum, &mut square, &mut FftScratch::default());
+        self.fft
+            .inverse(&mut spectrum, &mut square, right.nrows(), &mut FftScratch::default());
         Array2::from_shape_fn(right.dim(), |(y, x)| square[y * size + x] * self.unit[[y, x]])
     }
 }

@@ -122,7 +122,7 @@ impl SceneStatistics {
                     (self.power / (s + s * s)).sqrt() as f32
                 };
             }
-            fft.inverse(&mut spectrum, &mut square, &mut scratch);
+            fft.inverse(&mut spectrum, &mut square, view.rows, &mut scratch);
             Array2::from_shape_fn((view.rows, view.columns), |(y, x)| square[y * size + x])
         };
         let independent: Planes = (0..self.mix.len()).map(|_| plane()).collect();

@@ -15,7 +15,7 @@ mod squares;
 mod trace;
 
 use metalith_camera::Sensor;
-use ndarray::ArrayView2;
+use pulp::Arch;
 
 pub use shares::LightShares;
 pub use squares::{gather, lay, lift, spread};
@@ -58,26 +58,43 @@ impl Veil {
         }
     }
 
-    fn block(&self, channel: usize, basis: usize) -> ArrayView2<'_, f32> {
-        let shape = (SCENE_CELLS * SCENE_CELLS, self.cells[0] * self.cells[1]);
-        let from = (channel * self.bases + basis) * shape.0 * shape.1;
-        ArrayView2::from_shape(shape, &self.values[from..from + shape.0 * shape.1]).expect("as it was made")
+    /// For each square of the scene the light on those of the sensor.
+    fn block(&self, channel: usize, basis: usize) -> impl Iterator<Item = &[f32]> {
+        let (rows, columns) = (SCENE_CELLS * SCENE_CELLS, self.cells[0] * self.cells[1]);
+        let from = (channel * self.bases + basis) * rows * columns;
+        self.values[from..from + rows * columns].chunks_exact(columns)
     }
 
     /// Light on the squares of the sensor, from that of the scene's squares.
     pub fn apply(&self, channel: usize, basis: usize, scene: &[f64]) -> Vec<f64> {
         let mut cells = vec![0.0; self.cells[0] * self.cells[1]];
-        for (light, row) in scene.iter().zip(self.block(channel, basis).rows()) {
-            cells.iter_mut().zip(row).for_each(|(c, v)| *c += light * f64::from(*v));
+        for (light, row) in scene.iter().zip(self.block(channel, basis)) {
+            Arch::new().dispatch(|| {
+                cells.iter_mut().zip(row).for_each(|(c, v)| *c += light * f64::from(*v));
+            });
         }
         cells
     }
 
     /// The adjoint of [`Veil::apply`].
     pub fn adjoint(&self, channel: usize, basis: usize, cells: &[f64]) -> Vec<f64> {
-        let block = self.block(channel, basis);
-        let sum = |row: ndarray::ArrayView1<'_, f32>| row.iter().zip(cells).map(|(v, c)| f64::from(*v) * c).sum();
-        block.rows().into_iter().map(sum).collect()
+        // Sums beside one another, for registers.
+        const SUMS: usize = 16;
+        let sum = |row: &[f32]| {
+            Arch::new().dispatch(|| {
+                let (rows, row) = row.as_chunks::<SUMS>();
+                let (cells, rest) = cells.as_chunks::<SUMS>();
+                let mut sums = [0.0; SUMS];
+                for (row, cells) in rows.iter().zip(cells) {
+                    for k in 0..SUMS {
+                        sums[k] += f64::from(row[k]) * cells[k];
+                    }
+                }
+                let rest: f64 = row.iter().zip(rest).map(|(v, c)| f64::from(*v) * c).sum();
+                sums.iter().sum::<f64>() + rest
+            })
+        };
+        self.block(channel, basis).map(sum).collect()
     }
 
     /// The veil of a surface whose spectrum is the sum of some of the basis, in each channel.

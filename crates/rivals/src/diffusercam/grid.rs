@@ -231,6 +231,6 @@ pub fn transformed(fft: &SquareFft, plane: &Array2<f32>) -> Vec<Complex32> {
 pub fn inverse(fft: &SquareFft, spectrum: &mut [Complex32]) -> Array2<f32> {
     let n = fft.size();
     let mut square = vec![0.0f32; n * n];
-    fft.inverse(spectrum, &mut square, &mut FftScratch::default());
+    fft.inverse(spectrum, &mut square, fft.size(), &mut FftScratch::default());
     Array2::from_shape_vec((n, n), square).expect("as many values")
 }
