@@ -86,8 +86,9 @@ impl<'a> ElementOperator<'a> {
             let node = [i / n, i % n];
             if let Some((first, shape)) = middle.support(node) {
                 // Points within a pixel lie in the hat where its middle does not.
-                let low = first.map(|f| f.saturating_sub(1));
-                let high = [0, 1].map(|a| (first[a] + shape[a] + 1).min(middle.shape[a]));
+                let beyond = usize::from(self.source.points.offsets().len() > 1);
+                let low = first.map(|f| f.saturating_sub(beyond));
+                let high = [0, 1].map(|a| (first[a] + shape[a] + beyond).min(middle.shape[a]));
                 nodes.push(NodePlan {
                     node,
                     first: low,
@@ -98,7 +99,7 @@ impl<'a> ElementOperator<'a> {
             }
         }
         let longest = nodes.iter().flat_map(|n| n.shape).max().unwrap_or(1);
-        let fft = Arc::new(SquareFft::new(fft_size(longest + 2 * self.source.reach() + 1)));
+        let fft = Arc::new(SquareFft::new(fft_size(longest + 2 * self.source.reach())));
         let mut warps = Vec::new();
         if self.source.points.offsets().len() == 1 {
             let mut scratch = FftScratch::default();
