@@ -190,7 +190,7 @@ pub fn denoise<'py>(
                 "give both with shape (rows, columns, 3)",
             ));
         }
-        Ok(denoiser.denoise(&values, &deviation))
+        denoiser.denoise(&values, &deviation)
     })?;
     Ok(PyArray3::from_owned_array(py, clean))
 }

@@ -35,7 +35,8 @@ pub struct DenoiseArgs {
     #[arg(long, default_value_t = 1)]
     seed: u64,
 
-    /// File of weights that `metalith train` wrote; those of the program if left out.
+    /// File of weights that `metalith train` wrote, or a network of one's own as `.onnx`; those of the program if left
+    /// out.
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
 
@@ -84,7 +85,7 @@ pub fn run(args: &DenoiseArgs, terminal: &Terminal) -> Result<Outcome> {
         true => with_noise(&single, deviation, args.seed),
         false => single,
     };
-    let clean = denoiser.denoise_even(&noisy, deviation);
+    let clean = denoiser.denoise_even(&noisy, deviation)?;
     let values = |p: &Array3<f32>| p.mapv(|v| f64::from(v.clamp(0.0, 1.0)));
     if let Some(out) = &args.out {
         write_picture(out, &values(&clean))?;

@@ -61,7 +61,8 @@ pub struct PictureArgs {
     #[arg(long)]
     separate: bool,
 
-    /// File of weights for the learnt prior that `metalith train` wrote; those of the program if left out.
+    /// File of weights for the learnt prior that `metalith train` wrote, or a denoiser of one's own as `.onnx`; those of
+    /// the program if left out.
     #[arg(long, value_name = "FILE")]
     prior: Option<PathBuf>,
 

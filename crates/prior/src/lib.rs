@@ -17,6 +17,8 @@ mod denoiser;
 mod examples;
 mod features;
 mod network;
+#[cfg(feature = "onnx")]
+mod onnx;
 mod sample;
 mod training;
 mod weights;

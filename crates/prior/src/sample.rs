@@ -6,6 +6,7 @@
 //! diffusion implicit models, arXiv:2010.02502) with the network's answer as the clean picture, in units in which noise
 //! grows and the picture stays (x_t over sqrt(a_t) there).
 
+use metalith_core::Result;
 use ndarray::{Array3, Zip};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -25,7 +26,10 @@ const ANEW: f32 = 0.3;
 impl NetworkDenoiser {
     /// A picture drawn from those that `estimate` may be of, whose error is normal with this deviation from pixel to pixel;
     /// all are `[row, column, colour]` in sRGB values.
-    pub fn sample(&self, estimate: &Array3<f32>, deviation: &Array3<f32>, seed: u64) -> Array3<f32> {
+    ///
+    /// # Errors
+    /// As [`NetworkDenoiser::denoise`].
+    pub fn sample(&self, estimate: &Array3<f32>, deviation: &Array3<f32>, seed: u64) -> Result<Array3<f32>> {
         sample(estimate, deviation, seed, |picture, deviation| {
             self.denoise(picture, deviation)
         })
@@ -37,8 +41,8 @@ fn sample(
     estimate: &Array3<f32>,
     deviation: &Array3<f32>,
     seed: u64,
-    expected: impl Fn(&Array3<f32>, &Array3<f32>) -> Array3<f32>,
-) -> Array3<f32> {
+    expected: impl Fn(&Array3<f32>, &Array3<f32>) -> Result<Array3<f32>>,
+) -> Result<Array3<f32>> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut noise = || -> Array3<f32> {
         let drawn = StandardNormal.sample_iter(&mut random).take(estimate.len()).collect();
@@ -47,7 +51,7 @@ fn sample(
     let bound = |from: f32, pick: fn(f32, f32) -> f32| deviation.iter().copied().fold(from, pick);
     let (most, least) = (bound(0.0, f32::max) * RANGE[0], bound(f32::MAX, f32::min) * RANGE[1]);
     let level = |k: usize| most * (least / most).powf(k as f32 / (SAMPLING_STEPS - 1) as f32);
-    let mut clean = expected(estimate, deviation);
+    let mut clean = expected(estimate, deviation)?;
     let mut now = &clean + &(noise() * most);
     for k in 0..SAMPLING_STEPS {
         let level_now = level(k);
@@ -61,7 +65,7 @@ fn sample(
                 *value = (*value * by_now + estimate * by_estimate) / (by_now + by_estimate);
                 *left = (by_now + by_estimate).sqrt().recip();
             });
-        clean = expected(&both, &left);
+        clean = expected(&both, &left)?;
         if k + 1 < SAMPLING_STEPS {
             let next = level(k + 1);
             let fresh = ANEW * next * (1.0 - (next / level_now).powi(2)).max(0.0).sqrt();
@@ -69,7 +73,7 @@ fn sample(
             now = &clean + &((&now - &clean) * kept) + noise() * fresh;
         }
     }
-    clean
+    Ok(clean)
 }
 
 #[cfg(test)]
@@ -84,12 +88,12 @@ mod tests {
         let (mean, contrast, error) = (0.4f32, 0.2f32, 0.1f32);
         let precision = |d: f32| 1.0 / (d * d);
         let expected = |picture: &Array3<f32>, deviation: &Array3<f32>| {
-            Zip::from(picture).and(deviation).map_collect(|p, d| {
+            Ok(Zip::from(picture).and(deviation).map_collect(|p, d| {
                 (p * precision(*d) + mean * precision(contrast)) / (precision(*d) + precision(contrast))
-            })
+            }))
         };
         let estimate = Array3::from_elem((100, 100, 3), 0.7f32);
-        let drawn = sample(&estimate, &Array3::from_elem(estimate.dim(), error), 5, expected);
+        let drawn = sample(&estimate, &Array3::from_elem(estimate.dim(), error), 5, expected).unwrap();
         let n = drawn.len() as f64;
         let found = drawn.iter().map(|v| f64::from(*v)).sum::<f64>() / n;
         let spread = (drawn.iter().map(|v| (f64::from(*v) - found).powi(2)).sum::<f64>() / n).sqrt();

@@ -49,7 +49,16 @@ impl LearnedDenoiser {
     }
 
     /// A picture drawn from those that this one may be of, its noise having this standard deviation in linear light.
-    pub fn draw(&self, picture: &[Array2<f32>], near: Option<&[Array2<f32>]>, deviation: f64, seed: u64) -> Planes {
+    ///
+    /// # Errors
+    /// If a network of the user's own cannot take a picture of this size.
+    pub fn draw(
+        &self,
+        picture: &[Array2<f32>],
+        near: Option<&[Array2<f32>]>,
+        deviation: f64,
+        seed: u64,
+    ) -> Result<Planes> {
         by_colours(picture, near, |p, n| {
             self.colours(p, n, deviation, |values, noise| {
                 self.network.sample(values, noise, seed)
@@ -63,8 +72,8 @@ impl LearnedDenoiser {
         picture: [&Array2<f32>; COLOURS],
         near: [&Array2<f32>; COLOURS],
         deviation: f64,
-        clean: impl Fn(&Array3<f32>, &Array3<f32>) -> Array3<f32>,
-    ) -> [Array2<f32>; COLOURS] {
+        clean: impl Fn(&Array3<f32>, &Array3<f32>) -> Result<Array3<f32>>,
+    ) -> Result<[Array2<f32>; COLOURS]> {
         let (rows, columns) = picture[0].dim();
         let mut noise = Array3::zeros((rows, columns, COLOURS));
         let mut values = Array3::zeros((rows, columns, COLOURS));
@@ -74,10 +83,10 @@ impl LearnedDenoiser {
             *value = encoded(light) + slope * (picture[c][[y, x]] - light);
             noise[[y, x, c]] = (slope * deviation as f32).min(MOST);
         }
-        let clean = clean(&values, &noise);
-        std::array::from_fn(|c| {
+        let clean = clean(&values, &noise)?;
+        Ok(std::array::from_fn(|c| {
             Array2::from_shape_fn((rows, columns), |(y, x)| linear(clean[[y, x, c]].clamp(0.0, 1.0)))
-        })
+        }))
     }
 }
 
@@ -85,8 +94,8 @@ impl LearnedDenoiser {
 fn by_colours(
     picture: &[Array2<f32>],
     near: Option<&[Array2<f32>]>,
-    clean: impl Fn([&Array2<f32>; COLOURS], [&Array2<f32>; COLOURS]) -> [Array2<f32>; COLOURS],
-) -> Planes {
+    clean: impl Fn([&Array2<f32>; COLOURS], [&Array2<f32>; COLOURS]) -> Result<[Array2<f32>; COLOURS]>,
+) -> Result<Planes> {
     let smooth: Planes;
     let near = match near {
         Some(near) => near,
@@ -96,17 +105,17 @@ fn by_colours(
         }
     };
     if let ([r, g, b], [nr, ng, nb]) = (picture, near) {
-        return clean([r, g, b], [nr, ng, nb]).into();
+        return Ok(clean([r, g, b], [nr, ng, nb])?.into());
     }
     let grey = |(p, n)| {
-        let [r, g, b] = clean([p; COLOURS], [n; COLOURS]);
-        (r + g + b) / COLOURS as f32
+        let [r, g, b] = clean([p; COLOURS], [n; COLOURS])?;
+        Ok((r + g + b) / COLOURS as f32)
     };
     picture.iter().zip(near).map(grey).collect()
 }
 
 impl Denoiser for LearnedDenoiser {
-    fn denoise(&self, picture: &[Array2<f32>], near: Option<&[Array2<f32>]>, deviation: f64) -> Planes {
+    fn denoise(&self, picture: &[Array2<f32>], near: Option<&[Array2<f32>]>, deviation: f64) -> Result<Planes> {
         by_colours(picture, near, |p, n| {
             self.colours(p, n, deviation, |values, noise| self.network.denoise(values, noise))
         })
@@ -175,12 +184,14 @@ mod tests {
                 .map(|(a, b)| (a - b) * (a - b));
             (squares.sum::<f32>() / (3.0 * 50.0 * 62.0)).sqrt()
         };
-        let once = denoiser.denoise(&noisy, None, DEVIATION.into());
-        let twice = denoiser.denoise(&noisy, Some(&once), DEVIATION.into());
+        let once = denoiser.denoise(&noisy, None, DEVIATION.into()).unwrap();
+        let twice = denoiser.denoise(&noisy, Some(&once), DEVIATION.into()).unwrap();
         // Flat patches with edges every 20 pixels: less than half of the noise is left.
         assert!(error(&twice) < DEVIATION / 2.0, "{} {}", error(&once), error(&twice));
         // A grey picture stays one plane.
-        let grey = denoiser.denoise(&noisy[..1], Some(&once[..1]), DEVIATION.into());
+        let grey = denoiser
+            .denoise(&noisy[..1], Some(&once[..1]), DEVIATION.into())
+            .unwrap();
         assert_eq!(grey.len(), 1);
     }
 }

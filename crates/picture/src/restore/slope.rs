@@ -1,5 +1,6 @@
 //! The picture of least total variation near another one.
 
+use metalith_core::Result;
 use ndarray::Array2;
 use rayon::prelude::*;
 
@@ -52,7 +53,7 @@ impl SlopeDenoiser {
 }
 
 impl Denoiser for SlopeDenoiser {
-    fn denoise(&self, picture: &[Array2<f32>], _near: Option<&[Array2<f32>]>, deviation: f64) -> Planes {
+    fn denoise(&self, picture: &[Array2<f32>], _near: Option<&[Array2<f32>]>, deviation: f64) -> Result<Planes> {
         let independent = self.statistics.independent(picture);
         let sizes = self.statistics.sizes();
         let clean: Planes = independent
@@ -60,7 +61,7 @@ impl Denoiser for SlopeDenoiser {
             .zip(&sizes)
             .map(|(p, size)| self.plane(p, deviation / size.sqrt()))
             .collect();
-        self.statistics.picture(&clean)
+        Ok(self.statistics.picture(&clean))
     }
 
     fn schedule(&self) -> Schedule {
@@ -87,6 +88,7 @@ mod tests {
         let denoised = |deviation: f64| {
             denoiser
                 .denoise(std::slice::from_ref(&noisy), None, deviation)
+                .unwrap()
                 .remove(0)
         };
         let got = denoised(0.05);

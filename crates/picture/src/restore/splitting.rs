@@ -13,7 +13,10 @@ use super::tikhonov;
 pub trait Denoiser: Sync {
     /// Planes of a picture in linear light, white being one, without noise of this standard deviation, which is the same
     /// everywhere. `near` is the picture as it was known before, if it was.
-    fn denoise(&self, picture: &[Array2<f32>], near: Option<&[Array2<f32>]>, deviation: f64) -> Planes;
+    ///
+    /// # Errors
+    /// If it cannot take a picture of this size.
+    fn denoise(&self, picture: &[Array2<f32>], near: Option<&[Array2<f32>]>, deviation: f64) -> Result<Planes>;
 
     /// Deviations of the noise that is left in the picture, round by round.
     fn schedule(&self) -> Schedule;
@@ -68,11 +71,11 @@ impl Standing {
         system: &NormalSystem<'_>,
         schedule: &Schedule,
         progress: &dyn Progress,
-        z: impl FnOnce(&[Array2<f32>], Option<&[Array2<f32>]>, f64) -> Planes,
+        z: impl FnOnce(&[Array2<f32>], Option<&[Array2<f32>]>, f64) -> Result<Planes>,
     ) -> Result<()> {
         let statistics = system.statistics();
         let deviation = schedule.deviation(self.rounds);
-        let near = z(&statistics.picture(&self.x), self.near.as_deref(), deviation);
+        let near = z(&statistics.picture(&self.x), self.near.as_deref(), deviation)?;
         let terms = Terms {
             slopes: 0.0,
             bends: 0.0,
@@ -96,7 +99,7 @@ impl Standing {
         }
         let statistics = system.statistics();
         let picture = statistics.picture(&self.x);
-        let last = denoiser.denoise(&picture, self.near.as_deref(), schedule.deviation(self.rounds));
+        let last = denoiser.denoise(&picture, self.near.as_deref(), schedule.deviation(self.rounds))?;
         Ok(statistics.independent(&last))
     }
 }
