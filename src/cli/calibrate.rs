@@ -132,6 +132,12 @@ fn describe(done: &Calibration) {
         error.before.held_out,
         error.after.held_out
     );
+    for remark in &done.diagnosis.remarks {
+        print_line!("{remark}");
+    }
+    for pattern in &done.diagnosis.patterns {
+        print_line!("{}", pattern.sentence());
+    }
     if let Some(proposal) = &done.diagnosis.proposal {
         print_line!("{}", proposal.sentence(&done.diagnosis));
     }

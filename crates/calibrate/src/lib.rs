@@ -44,13 +44,15 @@ mod validate;
 
 pub use bench::{Bench, Sampling};
 pub use diagnosis::{
-    Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePattern, GroupValue, LeftOut, Proposal, Ranked, SetVerdict,
+    Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePattern, GroupValue, LeftOut, PatternCourse, Proposal, Ranked,
+    SetVerdict, Slope,
 };
 pub use effects::{DeclaredEffect, DeclaredParameter, Effect, Parameter, Stage, all as all_effects, of_any_chip};
 pub use fidelity::Rung;
 pub use planning::{BenchFile, CapturePlan, Confusion, PlanRequest, PlannedCapture, PlannedEffect, SemOffer, plan};
-pub use proposal::propose;
+pub use proposal::{Proposed, propose};
 pub use run::{Calibration, calibrate};
+pub use search::Evidence;
 pub use session::{Screening, Session, Settings, Simulations};
 pub use set::{Bayer, Capture, Channel, Led, MeasuredElement, MeasuredSet, RelayCamera, SemSite, Stack};
 pub use set::{CaptureIndex, ElementIndex, LedIndex, PerCapture, PerElement, PerLed};

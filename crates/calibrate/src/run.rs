@@ -87,10 +87,16 @@ fn finish(
         return write(session, simulations, diagnosis, evidence, out);
     }
     let file = out.join("proposal.toml");
+    let reasons: Vec<String> = proposed
+        .iter()
+        .map(|p| format!("`{}`: {}", p.effect.name, p.reason))
+        .collect();
+    let proposed: Vec<DeclaredEffect> = proposed.into_iter().map(|p| p.effect).collect();
     WholeFile::write(&file, DeclaredEffect::text(&proposed).as_bytes())?;
     let mut proposal = Proposal {
         file: file.display().to_string(),
         effects: proposed.iter().map(|e| e.name.clone()).collect(),
+        reasons,
         held_out_without: None,
     };
     if !session.settings.adopt {

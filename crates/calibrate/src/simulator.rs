@@ -13,7 +13,7 @@ use metalith_made::{CellChange, Perturbation, to_middle_tops};
 /// Widths that a bias may add or take (nm); cells are tabulated so far beyond the layout.
 pub const WIDTH_ROOM_NM: f64 = 36.0;
 
-/// Chips that are sent along one path at once; each takes a few megabytes.
+/// Most chips that are sent along one path at once; of large lenses fewer, by memory.
 const TOGETHER: usize = 8;
 
 /// A bench, its cells and the effects that are tried on it.
@@ -140,6 +140,7 @@ impl<'a> Simulator<'a> {
             work.push((step, cells, rim));
         }
         progress.begin("captures as they should be", work.len() as u64);
+        let most = TOGETHER.min(self.bench.chips_at_once());
         while !work.is_empty() {
             // Those on one path go together, as many as memory likes.
             let path = &perturbations[work[0].0[0]].path;
@@ -147,7 +148,7 @@ impl<'a> Simulator<'a> {
             work = work
                 .into_iter()
                 .filter_map(|own| {
-                    if together.len() < TOGETHER && perturbations[own.0[0]].path == *path {
+                    if together.len() < most && perturbations[own.0[0]].path == *path {
                         together.push(own);
                         return None;
                     }

@@ -170,6 +170,9 @@ pub struct ClassTable {
 }
 
 impl MadeElement {
+    /// Most memory that a site takes (bytes): class, path, phase and amplitude, and while it is made the steps of its width.
+    pub const MOST_BYTES_PER_SITE: usize = 2 + 3 * 4 + 4;
+
     /// What a change of pillars and apertures makes of an element. Each site has the width of its pillar, biased
     /// and by the density around it; sites that the shifted aperture covers are blocked. Light through the
     /// crescent that opens on the other side meets no pillar, is not focused, and is left out.

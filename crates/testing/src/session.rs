@@ -1,4 +1,4 @@
-//! A small bench session on disk: two elements, two colours, two distances.
+//! A small bench session on disk: two elements, two colours, two distances; or three elements.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,8 +12,8 @@ use npyz::WriterBuilder;
 /// Edge of a capture of the small set (pixels).
 pub const PIXELS: usize = 48;
 
-/// Elements of the small set, with the light that they steer to their axis.
-const BEAMS: [([i64; 2], f64); 2] = [([0, 0], 0.0), ([1, 0], -15.0)];
+/// Elements of the small sets, with the light that they steer to their axis (degrees along x and y).
+const BEAMS: [([i64; 2], [f64; 2]); 3] = [([0, 0], [0.0; 2]), ([1, 0], [-15.0, 0.0]), ([0, 1], [0.0, -15.0])];
 
 /// Write a frame.
 pub fn write_npy(path: &Path, values: &Array2<f32>) {
@@ -60,8 +60,17 @@ fwhm_nm = 6.0
     )
 }
 
-/// Write a session with lenses of 60 um, its frames still dark; its `measurement.toml`.
+/// Write a session with two lenses of 60 um, its frames still dark; its `measurement.toml`.
 pub fn small_set(folder: &Path) -> PathBuf {
+    set_of(folder, &BEAMS[..2])
+}
+
+/// The same with three lenses that are not in one line.
+pub fn set_of_three(folder: &Path) -> PathBuf {
+    set_of(folder, &BEAMS)
+}
+
+fn set_of(folder: &Path, beams: &[([i64; 2], [f64; 2])]) -> PathBuf {
     let root = crate::root();
     let design = Design::read(&root.join("designs/mini_3x3.toml")).unwrap();
     let array = PillarArray::build(&design, &Silent).unwrap();
@@ -89,31 +98,36 @@ focal_length_um = 144.0
 
 {bench}"#
     );
-    for (index, _) in BEAMS {
+    for ([m, n], _) in beams {
         text.push_str(&format!(
-            "\n[[element]]\nindex = [{0}, 0]\ncentre_um = [{1}.0, 0.0]\naperture_diameter_um = 60.0\n",
-            index[0],
-            150 * index[0]
+            "\n[[element]]\nindex = [{m}, {n}]\ncentre_um = [{}.0, {}.0]\naperture_diameter_um = 60.0\n",
+            150 * m,
+            150 * n
         ));
     }
-    for (index, aoi) in BEAMS {
+    for (index, aoi) in beams {
         for led in [500, 560] {
             // Where the wedge of 550 nm sends this colour.
-            let sine = 0.258_819 * f64::from(led) / 550.0 + aoi.to_radians().sin();
-            let x = if index[0] == 0 {
-                0.0
-            } else {
+            let [x, y] = [0, 1].map(|axis| {
+                if index[axis] == 0 {
+                    return 0.0;
+                }
+                let sine = 0.258_819 * f64::from(led) / 550.0 + aoi[axis].to_radians().sin();
                 144.0 * sine / (1.0 - sine * sine).sqrt()
+            });
+            let element = match index {
+                [m, 0] => format!("e{m}"),
+                [m, n] => format!("e{m}{n}"),
             };
             for (z, distance) in [139.0, 146.0].into_iter().enumerate() {
-                let name = format!("e{}_{led}_z{z}", index[0]);
+                let name = format!("{element}_{led}_z{z}");
                 write_npy(
                     &folder.join(format!("{name}.npy")),
                     &Array2::from_elem((PIXELS, PIXELS), 40.0),
                 );
                 text.push_str(&format!(
-                    "\n[[capture]]\nfile = \"{name}.npy\"\nelement = [{}, 0]\nled_nm = {led}\naoi_deg = [{aoi:.1}, 0.0]\ndistance_um = {distance:.1}\nwindow_centre_um = [{x:.3}, 0.0]\nscale_dn = 1.0\nframes = 64\n",
-                    index[0]
+                    "\n[[capture]]\nfile = \"{name}.npy\"\nelement = [{}, {}]\nled_nm = {led}\naoi_deg = [{:.1}, {:.1}]\ndistance_um = {distance:.1}\nwindow_centre_um = [{x:.3}, {y:?}]\nscale_dn = 1.0\nframes = 64\n",
+                    index[0], index[1], aoi[0], aoi[1]
                 ));
             }
         }

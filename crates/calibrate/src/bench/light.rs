@@ -1,5 +1,6 @@
 //! Light from the LEDs through the pillars to the windows of the camera.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use num_complex::Complex32;
@@ -12,6 +13,15 @@ use metalith_core::{Error, Lattice, Progress, Result};
 use metalith_made::{ArrivingLight, ClassTable, GeometryChange, LightChange, MadeElement, PathChange, spread};
 use metalith_wave::propagation::{DistancesScratch, FillRow};
 use metalith_wave::{Aperture, PlaneWave};
+
+/// Memory for elements as they are made, all chips that are worked on at once together (bytes): eight chips with one lens
+/// of 1 mm.
+const MADE_BYTES: usize = 1_200_000_000;
+
+/// What an element on a lattice takes as it is made (bytes).
+fn made_bytes(lattice: Lattice) -> usize {
+    MadeElement::MOST_BYTES_PER_SITE * lattice.sites() * lattice.sites()
+}
 
 /// A candidate chip, and the light that it is illuminated with.
 pub struct Lit<'a> {
@@ -36,39 +46,73 @@ impl Bench<'_> {
         path: &PathChange,
         progress: &dyn Progress,
     ) -> Result<Vec<Vec<PerCapture<Vec<f32>>>>> {
-        let elements: Vec<Vec<MadeElement>> = (0..self.set.elements.len())
-            .into_par_iter()
-            .map(|e| {
-                chips
-                    .iter()
-                    .map(|chip| self.element(e.into(), chip))
-                    .collect::<Result<_>>()
-            })
-            .collect::<Result<_>>()?;
-        let tasks: Vec<_> = self
-            .groups
-            .par_iter()
-            .map(|group| {
-                if progress.stopped() {
-                    return Err(Error::Interrupted);
-                }
-                Ok(self.group(group, chips, &elements[usize::from(group.element)], path))
-            })
-            .collect::<Result<_>>()?;
         let mut out: Vec<_> = chips
             .iter()
             .map(|chip| vec![PerCapture::from(vec![Vec::new(); self.set.captures.len()]); chip.lights.len()])
             .collect();
-        for (group, of_chips) in self.groups.iter().zip(tasks) {
-            for (out, of_lights) in out.iter_mut().zip(of_chips) {
-                for (out, planes) in out.iter_mut().zip(of_lights) {
-                    for (plane, &capture) in planes.into_iter().zip(&group.captures) {
-                        out[capture] = plane;
+        for batch in self.batches(chips.len()) {
+            let elements: Vec<Vec<MadeElement>> = batch
+                .clone()
+                .into_par_iter()
+                .map(|e| {
+                    chips
+                        .iter()
+                        .map(|chip| self.element(e.into(), chip))
+                        .collect::<Result<_>>()
+                })
+                .collect::<Result<_>>()?;
+            let groups: Vec<&FocusSeries> = self
+                .groups
+                .iter()
+                .filter(|g| batch.contains(&usize::from(g.element)))
+                .collect();
+            let tasks: Vec<_> = groups
+                .par_iter()
+                .map(|group| {
+                    if progress.stopped() {
+                        return Err(Error::Interrupted);
+                    }
+                    let own = usize::from(group.element) - batch.start;
+                    Ok(self.group(group, chips, &elements[own], path))
+                })
+                .collect::<Result<_>>()?;
+            for (group, of_chips) in groups.into_iter().zip(tasks) {
+                for (out, of_lights) in out.iter_mut().zip(of_chips) {
+                    for (out, planes) in out.iter_mut().zip(of_lights) {
+                        for (plane, &capture) in planes.into_iter().zip(&group.captures) {
+                            out[capture] = plane;
+                        }
                     }
                 }
             }
         }
         Ok(out)
+    }
+
+    /// Elements whose versions for so many chips are held at once: as many as [`MADE_BYTES`] hold, one at least.
+    fn batches(&self, chips: usize) -> Vec<Range<usize>> {
+        let mut out: Vec<Range<usize>> = Vec::new();
+        let mut held = 0;
+        for (e, element) in self.set.elements.iter().enumerate() {
+            let bytes = chips * made_bytes(element.pillars.lattice);
+            match out.last_mut() {
+                Some(last) if held + bytes <= MADE_BYTES => {
+                    last.end = e + 1;
+                    held += bytes;
+                }
+                _ => {
+                    out.push(e..e + 1);
+                    held = bytes;
+                }
+            }
+        }
+        out
+    }
+
+    /// Chips of which [`MADE_BYTES`] hold the largest element, one at least.
+    pub fn chips_at_once(&self) -> usize {
+        let largest = self.set.elements.iter().map(|e| made_bytes(e.pillars.lattice)).max();
+        (MADE_BYTES / largest.unwrap_or(1).max(1)).max(1)
     }
 
     /// An element of a candidate chip.

@@ -1,17 +1,17 @@
 //! From the evidence of a search to the diagnosis.
 
+use std::collections::BTreeSet;
+
 use serde::Serialize;
 use serde_json::Value;
 
-use super::{
-    CaptureError, Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePattern, GroupValue, LeftOut, Ranked, SetVerdict,
-};
+use super::pattern::untold_tilt;
+use super::{CaptureError, Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePattern, LeftOut, Ranked, SetVerdict};
+use crate::effects::Effect;
 use crate::fidelity::Rung;
 use crate::fit::{Fit, HeldOutErrors, mean_error};
-use crate::search::{
-    Evidence, Finding, Grouping, Pattern, RESIDUAL, Rejection, TriedEffect, UnusableCapture, patterns,
-};
-use crate::set::{CaptureIndex, MeasuredSet};
+use crate::search::{Evidence, Finding, RESIDUAL, Rejection, TriedEffect, UnusableCapture};
+use crate::set::MeasuredSet;
 use crate::simulator::Simulator;
 use crate::simulator_model::separating_measurement;
 
@@ -55,10 +55,9 @@ impl Diagnosis {
         };
         let unexplained_share = unexplained_share(&error, finding);
         let verdict = verdict(&error, finding, unexplained_share);
-        let patterns = if verdict.leaves_a_residual() {
-            free_patterns(simulator, evidence)
-        } else {
-            Vec::new()
+        let patterns = match verdict.leaves_a_residual() {
+            true => evidence.patterns(simulator),
+            false => &[],
         };
         let ranked = |tried: &Vec<TriedEffect>| tried.iter().map(|t| Ranked::new(simulator, finding, t)).collect();
         let captures = set.captures.iter_enumerated().map(|(c, capture)| CaptureError {
@@ -69,11 +68,12 @@ impl Diagnosis {
         Self {
             set: set.title.clone(),
             verdict,
+            remarks: remarks(simulator, evidence, verdict),
             effects: found_effects(simulator, finding, verdict),
             error,
             ranking: ranked(&finding.ranking),
             later_rankings: finding.later.iter().map(ranked).collect(),
-            patterns,
+            patterns: patterns.iter().map(|p| FreePattern::new(simulator, p)).collect(),
             proposal: None,
             unexplained_share,
             missing_by_grain: evidence.missing_by_speckle,
@@ -93,6 +93,7 @@ impl Diagnosis {
             set: set.title.clone(),
             verdict: SetVerdict::DataUnfit,
             effects: Vec::new(),
+            remarks: Vec::new(),
             error: ErrorReport {
                 measure: MEASURE.into(),
                 before: pair,
@@ -111,54 +112,6 @@ impl Diagnosis {
             ladder: Vec::new(),
         }
     }
-}
-
-fn free_patterns(simulator: &Simulator<'_>, evidence: &Evidence) -> Vec<FreePattern> {
-    let set = simulator.bench.set();
-    let problem = evidence.problem(simulator);
-    let label = |by: Grouping, c: CaptureIndex| {
-        let capture = &set.captures[c];
-        match by {
-            Grouping::Element => format!("{:?}", set.elements[capture.element].index),
-            Grouping::Colour => format!("{} nm", set.leds[capture.led].name()),
-            Grouping::Distance => format!("{} um", capture.distance_um),
-            Grouping::Angle => format!("{:.1?} deg", capture.aoi_rad.map(f64::to_degrees)),
-        }
-    };
-    let one = |p: Pattern| {
-        let slot = simulator.slots[p.slot];
-        let effect = &simulator.effects[slot.effect];
-        let plane = p.plane(set);
-        let values = p.groups.iter().zip(&p.values);
-        FreePattern {
-            quantity: match effect.parameters().len() {
-                1 => effect.name(),
-                _ => format!("{}[{}]", effect.name(), slot.index),
-            },
-            // Some effects report another number than the one that is fitted.
-            unit: if effect.value(1.0, set) == 1.0 {
-                effect.unit().into()
-            } else {
-                "of its parameter".into()
-            },
-            by: p.by.word().into(),
-            values: values
-                .map(|(&c, &(value, sigma))| GroupValue {
-                    group: label(p.by, c),
-                    value,
-                    sigma,
-                })
-                .collect(),
-            before: p.chi2.1,
-            after: p.chi2.0,
-            slope_per_mm: plane.map(|(slopes, _)| slopes.map(|s| 1e3 * s)),
-            off_plane: plane.map(|p| p.1),
-        }
-    };
-    patterns(&problem, &evidence.finding.after)
-        .into_iter()
-        .map(one)
-        .collect()
 }
 
 /// Share of the error above noise that the finding leaves.
@@ -213,6 +166,29 @@ fn found_effects(simulator: &Simulator<'_>, finding: &Finding, verdict: SetVerdi
         }
     }
     effects
+}
+
+/// What captures of few elements leave open: distances of their own would do as well as a tilt of the sensor.
+fn remarks(simulator: &Simulator<'_>, evidence: &Evidence, verdict: SetVerdict) -> Vec<String> {
+    let (set, finding) = (simulator.bench.set(), &evidence.finding);
+    let used = set.captures.iter_enumerated().filter(|(c, _)| evidence.used[*c]);
+    let elements: BTreeSet<usize> = used.map(|(_, capture)| usize::from(capture.element)).collect();
+    let is_found = |is: fn(&dyn Effect) -> bool| finding.chosen.iter().any(|&e| is(simulator.effects[e].as_ref()));
+    let (gap, tilt) = (
+        is_found(|e| e.name() == "gap"),
+        is_found(|e| e.gradient_of() == Some("gap")),
+    );
+    let is_open = match elements.len() {
+        1 => gap,
+        2 => tilt,
+        3 => tilt && gap,
+        _ => false,
+    };
+    let claims = verdict != SetVerdict::Unexplained;
+    (is_open && claims)
+        .then(|| untold_tilt(elements.len()))
+        .into_iter()
+        .collect()
 }
 
 fn left_out(set: &MeasuredSet, unusable: &[UnusableCapture]) -> Vec<LeftOut> {

@@ -1,12 +1,15 @@
 //! What `calibrate` answers: `diagnosis.json`.
 
 mod assemble;
+mod pattern;
 
 use std::path::Path;
 
 use metalith_core::{Result, WholeFile};
 use serde::Serialize;
 use serde_json::Value;
+
+pub use pattern::{FreePattern, GroupValue, PatternCourse, Slope};
 
 use crate::fidelity::Rung;
 
@@ -88,61 +91,6 @@ pub struct Ranked {
     pub remark: String,
 }
 
-/// A quantity that was fitted free for each element, colour, distance or angle, where this removes most of what is left.
-#[derive(Clone, Debug, Serialize)]
-pub struct FreePattern {
-    /// The effect whose parameter it is, with the number of the parameter if it has several.
-    pub quantity: String,
-    /// Unit of the parameter.
-    pub unit: String,
-    /// `element`, `colour`, `distance` or `angle`.
-    pub by: String,
-    pub values: Vec<GroupValue>,
-    /// Reduced chi-square per pixel without and with it.
-    pub before: f64,
-    pub after: f64,
-    /// Where the values are by element: their slopes over the place of the element along x and y, per mm.
-    pub slope_per_mm: Option<[f64; 2]>,
-    /// How far the farthest value is from that plane.
-    pub off_plane: Option<f64>,
-}
-
-/// The value of a quantity in one group of captures.
-#[derive(Clone, Debug, Serialize)]
-pub struct GroupValue {
-    pub group: String,
-    pub value: f64,
-    /// One standard deviation.
-    pub sigma: f64,
-}
-
-impl FreePattern {
-    /// One line for a person.
-    pub fn sentence(&self) -> String {
-        let one = |v: &GroupValue| {
-            let (value, sigma) = (metalith_report::sig(v.value, 3), metalith_report::sig(v.sigma, 1));
-            format!("{}: {value} +- {sigma}", v.group)
-        };
-        let values: Vec<String> = self.values.iter().map(one).collect();
-        let plane = self.slope_per_mm.map_or_else(String::new, |[x, y]| {
-            format!(
-                "; over the place of the element it rises by {} and {} {} per mm",
-                metalith_report::sig(x, 3),
-                metalith_report::sig(y, 3),
-                self.unit
-            )
-        });
-        format!(
-            "`{}` by {} ({}){plane}: reduced chi-square {} to {}",
-            self.quantity,
-            self.by,
-            values.join(", "),
-            metalith_report::sig(self.before, 3),
-            metalith_report::sig(self.after, 3)
-        )
-    }
-}
-
 /// A capture that was left out.
 #[derive(Clone, Debug, Serialize)]
 pub struct LeftOut {
@@ -156,6 +104,8 @@ pub struct Diagnosis {
     pub set: String,
     pub verdict: SetVerdict,
     pub effects: Vec<FoundEffect>,
+    /// What these captures cannot tell of them, beside other effects.
+    pub remarks: Vec<String>,
     pub error: ErrorReport,
     pub ranking: Vec<Ranked>,
     /// Candidates on top of each effect that was taken.
@@ -183,6 +133,8 @@ pub struct Proposal {
     pub file: String,
     /// Names of the effects in it.
     pub effects: Vec<String>,
+    /// What each was seen by, with its name.
+    pub reasons: Vec<String>,
     /// The error on captures left out without them, where they were tried.
     pub held_out_without: Option<f64>,
 }

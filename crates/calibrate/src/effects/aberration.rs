@@ -1,7 +1,7 @@
 //! The wavefront behind the lens is bent: by the substrate, by stress, or by the writer.
 
 use super::{Effect, Parameter, Stage};
-use metalith_made::Perturbation;
+use metalith_made::{DeclaredQuantity, Perturbation};
 
 /// Optical path over every lens by some Zernike polynomials of one kind, the same at all colours.
 pub struct Aberration {
@@ -45,6 +45,11 @@ impl Effect for Aberration {
 
     fn parameters(&self) -> Vec<Parameter> {
         vec![Parameter::new(-200.0, 200.0, 12.0); self.noll.len()]
+    }
+
+    fn declared_form(&self, parameter: usize) -> Option<(DeclaredQuantity, String)> {
+        let j = self.noll.get(parameter)?;
+        Some((DeclaredQuantity::OpdNm, format!("zernike({j}, x / R, y / R)")))
     }
 
     fn apply(&self, parameters: &[f64], to: &mut Perturbation) {

@@ -1,7 +1,7 @@
 //! Every pillar is wider or narrower than drawn by the same amount.
 
 use super::{Effect, Parameter, Stage};
-use metalith_made::Perturbation;
+use metalith_made::{DeclaredQuantity, Perturbation};
 
 /// Width added to every pillar.
 pub struct CdBias;
@@ -21,6 +21,14 @@ impl Effect for CdBias {
 
     fn parameters(&self) -> Vec<Parameter> {
         vec![Parameter::new(-30.0, 30.0, 5.0)]
+    }
+
+    fn declared_form(&self, _parameter: usize) -> Option<(DeclaredQuantity, String)> {
+        Some((DeclaredQuantity::WidthNm, "1".into()))
+    }
+
+    fn as_gradient(&self) -> Option<&'static str> {
+        Some("a dose or an etch that is not the same all over the chip")
     }
 
     fn apply(&self, parameters: &[f64], to: &mut Perturbation) {

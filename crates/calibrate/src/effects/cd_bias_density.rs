@@ -1,7 +1,7 @@
 //! Pillars are wider where more is exposed around them: backscattered electrons, or loading of the etch.
 
 use super::{Effect, Parameter, Stage};
-use metalith_made::Perturbation;
+use metalith_made::{DeclaredQuantity, Perturbation};
 
 /// Width added for each unit of area fraction, averaged over the range of the backscatter.
 pub struct CdBiasDensity;
@@ -21,6 +21,10 @@ impl Effect for CdBiasDensity {
 
     fn parameters(&self) -> Vec<Parameter> {
         vec![Parameter::new(-80.0, 80.0, 15.0)]
+    }
+
+    fn declared_form(&self, _parameter: usize) -> Option<(DeclaredQuantity, String)> {
+        Some((DeclaredQuantity::WidthNm, "fill".into()))
     }
 
     fn apply(&self, parameters: &[f64], to: &mut Perturbation) {

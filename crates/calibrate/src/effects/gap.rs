@@ -1,7 +1,7 @@
 //! The camera's plane is farther from the chip than stated.
 
 use super::{Effect, Parameter, Stage};
-use metalith_made::Perturbation;
+use metalith_made::{DeclaredQuantity, Perturbation};
 
 /// Added to every distance.
 pub struct Gap;
@@ -21,6 +21,14 @@ impl Effect for Gap {
 
     fn parameters(&self) -> Vec<Parameter> {
         vec![Parameter::new(-60.0, 60.0, 4.0)]
+    }
+
+    fn declared_form(&self, _parameter: usize) -> Option<(DeclaredQuantity, String)> {
+        Some((DeclaredQuantity::DistanceUm, "1".into()))
+    }
+
+    fn as_gradient(&self) -> Option<&'static str> {
+        Some("a sensor that is tilted against the chip: um per mm are mrad")
     }
 
     fn apply(&self, parameters: &[f64], to: &mut Perturbation) {

@@ -31,7 +31,7 @@ pub use declared::{DeclaredEffect, DeclaredParameter};
 
 use super::set::MeasuredSet;
 use metalith_core::{Error, Result};
-use metalith_made::Perturbation;
+use metalith_made::{DeclaredQuantity, Perturbation};
 
 /// Where in the model an effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,6 +101,22 @@ pub trait Effect: Send + Sync {
     /// Whether it acts on single pillars at random, so that its parameters do not determine the capture.
     fn random(&self) -> bool {
         false
+    }
+
+    /// What a file declares for a unit of one of its parameters: the quantity, and its expression. None where no quantity that
+    /// can be declared does the same.
+    fn declared_form(&self, _parameter: usize) -> Option<(DeclaredQuantity, String)> {
+        None
+    }
+
+    /// The effect that this one varies linearly over the chip, where it does that.
+    fn gradient_of(&self) -> Option<&'static str> {
+        None
+    }
+
+    /// What is so if it is linear in the place of the element, in words.
+    fn as_gradient(&self) -> Option<&'static str> {
+        None
     }
 
     /// Set its parameters.

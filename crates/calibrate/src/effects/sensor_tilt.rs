@@ -57,6 +57,10 @@ impl Effect for SensorTilt {
         self.axes.iter().map(of).collect()
     }
 
+    fn gradient_of(&self) -> Option<&'static str> {
+        Some("gap")
+    }
+
     fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
         for ((axis, _), mrad) in self.axes.iter().zip(parameters) {
             to.path.sensor_tilt_mrad[*axis] = *mrad;

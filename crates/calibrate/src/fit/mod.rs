@@ -16,7 +16,7 @@ mod registration;
 mod widths;
 
 pub use capture_equations::dot;
-pub use cross_validation::{Gain, HeldOutErrors, beam_groups, gain, half_widths, held_out, mean_error};
+pub use cross_validation::{Gain, HeldOutErrors, SIGMAS_95, beam_groups, gain, half_widths, held_out, mean_error};
 pub use data::{CaptureSetup, Data};
 pub use model_error::{change_energy, projected};
 pub use normal_equations::{covariance, minimise};

@@ -63,13 +63,14 @@ pub fn write_page(
     if !diagnosis.patterns.is_empty() {
         page.section("Patterns of what is left");
         page.paragraph(
-            "Each quantity was also fitted free for each element, colour, distance and angle. These remove most of what is left; how the values follow the group says which effect is missing.",
+            "Each quantity was also fitted free for each element, colour, distance and angle. These remove most of what is left; what the values follow says which effect is missing.",
         );
         page.list(diagnosis.patterns.iter().map(FreePattern::sentence));
     }
     if let Some(proposal) = &diagnosis.proposal {
         page.section("Proposal");
         page.paragraph(capitalised(&proposal.sentence(diagnosis)));
+        page.list(&proposal.reasons);
     }
     ladder(&mut page, session, diagnosis);
     if let Some(evidence) = evidence {
@@ -119,6 +120,9 @@ fn effects(page: &mut Page, diagnosis: &Diagnosis) {
         ]);
     }
     page.table(table);
+    for remark in &diagnosis.remarks {
+        page.paragraph(remark);
+    }
 }
 
 fn ladder(page: &mut Page, session: &Session<'_>, diagnosis: &Diagnosis) {

@@ -4,8 +4,10 @@
 //! cross-validated and held against all other effects like these.
 
 mod ghost;
+mod gradient;
 mod wavefront;
 
+use crate::diagnosis::FreePattern;
 use crate::effects::DeclaredEffect;
 use crate::search::Evidence;
 use crate::session::Session;
@@ -14,21 +16,45 @@ use crate::smooth_residual::SmoothResidual;
 /// A shape is proposed if it removes this share of the chi-square above noise: less is a part of something else.
 const WORTH_PROPOSING: f64 = 0.3;
 
-/// Effects that may explain what a finding leaves, those that remove most first; none where nothing stands out.
-pub fn propose(session: &Session<'_>, evidence: &Evidence) -> Vec<DeclaredEffect> {
+/// An effect that may explain what a finding leaves.
+#[derive(Clone, Debug)]
+pub struct Proposed {
+    pub effect: DeclaredEffect,
+    /// What it was seen by, for a person.
+    pub reason: String,
+}
+
+/// Effects that may explain what a finding leaves, those that remove most first; none where nothing stands out. What has the
+/// name of an effect that was tried is left out.
+pub fn propose(session: &Session<'_>, evidence: &Evidence) -> Vec<Proposed> {
     let problem = evidence.problem(&session.simulator);
     let fit = &evidence.finding.after;
     let above_noise = fit.chi2 - problem.pixels();
     let mut found = Vec::new();
     if let Some(ghost) = ghost::strongest(&problem, fit) {
         let effect = ghost.declared(session.set().camera.pixel_um);
-        found.push((ghost.removed, vec![effect]));
+        let reason = "a displaced copy of the image in every capture".to_owned();
+        found.push((ghost.removed, vec![Proposed { effect, reason }]));
     }
     if let Some(smooth) = SmoothResidual::new(&session.simulator, &problem, fit) {
         let removed = (smooth.chi2.0 - smooth.chi2.1) * problem.pixels();
-        found.push((removed, wavefront::declared(&smooth, session.set())));
+        let of = |effect| Proposed {
+            effect,
+            reason: "a smooth path that every lens has".into(),
+        };
+        let both = wavefront::declared(&smooth, session.set()).into_iter().map(of);
+        found.push((removed, both.collect()));
+    }
+    for pattern in evidence.patterns(&session.simulator) {
+        let removed = (pattern.chi2.1 - pattern.chi2.0) * problem.pixels();
+        let of = |effect| Proposed {
+            effect,
+            reason: FreePattern::new(&session.simulator, pattern).sentence(),
+        };
+        found.extend(gradient::declared(&session.simulator, pattern).map(|effect| (removed, vec![of(effect)])));
     }
     found.retain(|(removed, _)| *removed > WORTH_PROPOSING * above_noise);
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
-    found.into_iter().flat_map(|(_, effects)| effects).collect()
+    let is_new = |p: &Proposed| session.simulator.effects.iter().all(|e| e.name() != p.effect.name);
+    found.into_iter().flat_map(|(_, own)| own).filter(is_new).collect()
 }

@@ -1,9 +1,12 @@
 //! The search on a whole set, repeated with defect noise where pillars are missing.
 
+use std::sync::OnceLock;
+
 use metalith_core::{Progress, Result};
 
 use super::attribution::{Finding, attribute};
 use super::defect_noise::DefectNoise;
+use super::patterns::{Pattern, patterns};
 use super::stepwise::RESIDUAL;
 use crate::fit::{Data, FitProblem, mean_error};
 use crate::forward_model::ForwardModel;
@@ -31,12 +34,20 @@ pub struct Evidence {
     pub used: PerCapture<bool>,
     /// Share of missing pillars by their speckle, where that counts as noise.
     pub missing_by_speckle: Option<f64>,
+    /// Made when first asked for.
+    patterns: OnceLock<Vec<Pattern>>,
 }
 
 impl Evidence {
     /// The problem that the finding solves.
     pub fn problem<'a>(&'a self, model: &'a dyn ForwardModel) -> FitProblem<'a> {
         problem_of(model, &self.data, &self.used, &self.finding)
+    }
+
+    /// Quantities that remove most of what is left if they are free for each element, colour, distance or angle; best first.
+    pub fn patterns(&self, model: &dyn ForwardModel) -> &[Pattern] {
+        let made = || patterns(&self.problem(model), &self.finding.after);
+        self.patterns.get_or_init(made)
     }
 }
 
@@ -78,6 +89,7 @@ pub fn attribute_set(
         data: problem.data.clone(),
         used: problem.used.clone(),
         missing_by_speckle: None,
+        patterns: OnceLock::new(),
     }))
 }
 
@@ -141,6 +153,7 @@ fn attribute_with_defects(
             data,
             used: problem.used.clone(),
             missing_by_speckle: Some(share),
+            patterns: OnceLock::new(),
         }));
     }
     Ok(None)

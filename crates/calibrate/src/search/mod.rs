@@ -3,6 +3,7 @@
 mod alternatives;
 mod attribution;
 mod capture_screening;
+mod course;
 mod defect_noise;
 mod evidence;
 mod exchange;
@@ -16,8 +17,9 @@ mod stepwise;
 pub use alternatives::SEM_DECIDES;
 pub use attribution::{Finding, MODEL_SHARE};
 pub use capture_screening::{UnusableCapture, unusable_captures};
+pub use course::Course;
 pub use defect_noise::DefectNoise;
 pub use evidence::{Evidence, attribute_set};
-pub use patterns::{Grouping, Pattern, patterns};
+pub use patterns::{Grouping, Pattern};
 pub use signatures::cosines;
 pub use stepwise::{LEAST_GAIN, RESIDUAL, Rejection, TriedEffect};

@@ -7,6 +7,7 @@
 
 use nalgebra::DMatrix;
 
+use super::course::Course;
 use crate::fit::{CaptureSetup, Fit, FitProblem, covariance, minimise};
 use crate::set::{CaptureIndex, MeasuredSet, PerCapture};
 
@@ -66,22 +67,10 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// Slopes of the values over the place of the element along x and y (per um), and the largest distance of a value
-    /// from that plane; none unless the values differ by element and the elements span a plane.
-    pub fn plane(&self, set: &MeasuredSet) -> Option<([f64; 2], f64)> {
-        if self.by != Grouping::Element || self.groups.len() < 3 {
-            return None;
-        }
-        let places: Vec<[f64; 2]> = self
-            .groups
-            .iter()
-            .map(|&c| set.elements[set.captures[c].element].centre_um)
-            .collect();
-        let a = DMatrix::from_fn(places.len(), 3, |i, j| if j == 2 { 1.0 } else { places[i][j] });
-        let b = DMatrix::from_fn(places.len(), 1, |i, _| self.values[i].0);
-        let x = (a.transpose() * &a).try_inverse()? * a.transpose() * &b;
-        let off = (&a * &x - b).amax();
-        Some(([x[0], x[1]], off))
+    /// What its values are like over what its groups differ in; none where that is a single place.
+    pub fn course(&self, set: &MeasuredSet) -> Option<Course> {
+        let at: Vec<[f64; 2]> = self.groups.iter().map(|&c| self.by.coordinates(set, c)).collect();
+        Course::new(&at, &self.values)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Effects of the list, alone and in pairs.
 
-use metalith_calibrate::{MeasuredSet, Session, SetVerdict, Synthesizer, UnlistedEffect};
+use metalith_calibrate::{MeasuredSet, Session, SetVerdict, Synthesizer, UnlistedEffect, propose};
 use metalith_core::Silent;
 
 use crate::set::{LIKE, SIMULATIONS, SYNTHESIZER, names, settings, synthetic, with_effects};
@@ -98,17 +98,23 @@ fn a_tilt_of_the_sensor_is_found() {
     let d = session.diagnose(&simulations, &Silent).unwrap().0;
     assert_eq!(names(&d), ["sensor_tilt_x"], "{}", d.sentence());
     assert_eq!(d.effects[0].holds(TILT_MRAD), Some(true), "{}", d.sentence());
+    assert!(d.remarks[0].contains("cannot be told apart"), "{:?}", d.remarks);
     // Without the tilt in the list, the page says that the gap differs by element.
     let session = Session::new(&set, with_effects(&["gap", "tilt", "cd_bias"])).unwrap();
-    let d = session
-        .diagnose(&session.simulate(&Silent).unwrap(), &Silent)
-        .unwrap()
-        .0;
+    let (d, evidence) = session.diagnose(&session.simulate(&Silent).unwrap(), &Silent).unwrap();
     let pattern = d.patterns.first().unwrap_or_else(|| panic!("{}", d.sentence()));
     assert_eq!((pattern.quantity.as_str(), pattern.by.as_str()), ("gap", "element"));
     let apart_um = pattern.values[1].value - pattern.values[0].value;
     // 40 mrad over the 150 um between the elements.
     assert!((apart_um / 6.0 - 1.0).abs() < 0.05, "{}", pattern.sentence());
+    // Two values are always on a line: that is said, and nothing is proposed for it.
+    assert!(
+        pattern.sentence().contains("cannot be told apart"),
+        "{}",
+        pattern.sentence()
+    );
+    let proposed = propose(&session, &evidence.unwrap());
+    assert!(proposed.iter().all(|p| p.effect.name != "gap_gradient"), "{proposed:?}");
 }
 
 /// The half of each lens beyond a boundary stands off its place.

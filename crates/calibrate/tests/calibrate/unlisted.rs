@@ -2,9 +2,13 @@
 
 use std::fs;
 
-use metalith_calibrate::{DeclaredEffect, Session, SetVerdict, Settings, Synthesizer, UnlistedEffect, propose};
+use metalith_calibrate::{
+    DeclaredEffect, Evidence, MeasuredSet, Session, SetVerdict, Settings, Synthesizer, UnlistedEffect, propose,
+};
 use metalith_core::Silent;
+use metalith_gds::extract::GdsPillars;
 use metalith_made::CalibratedModel;
+use metalith_testing::session::set_of_three;
 
 use crate::set::{FOLDERS, LIKE, SYNTHESIZER, names, settings, with_effects};
 
@@ -39,6 +43,11 @@ fn a_declared_effect_is_found_and_kept_in_the_model() {
         .unwrap();
     assert_eq!(CalibratedModel::read(&path).unwrap().perturbation, made);
     assert!((made.geometry.declared[0].values["a"] / BOW_NM - 1.0).abs() < 0.1);
+}
+
+/// The effects that are proposed for what a session leaves.
+fn proposed(session: &Session<'_>, evidence: &Evidence) -> Vec<DeclaredEffect> {
+    propose(session, evidence).into_iter().map(|p| p.effect).collect()
 }
 
 /// A second image of 4 % whose spots are blurred by 0.5 um, as a lens behind the relay makes one.
@@ -86,7 +95,7 @@ fn an_effect_outside_the_list_is_proposed_and_adopted() {
             "{}",
             before.sentence()
         );
-        let proposed = propose(&session, &evidence.unwrap());
+        let proposed = proposed(&session, &evidence.unwrap());
         let copies = proposed.iter().filter(|e| e.name == "ghost").count();
         assert!(proposed.iter().any(|e| e.name == name) && copies <= 1, "{proposed:?}");
         let wider = session.adopting(proposed).unwrap();
@@ -101,6 +110,60 @@ fn an_effect_outside_the_list_is_proposed_and_adopted() {
         for truth in expected {
             let is_found = values.iter().any(|found| (found / truth - 1.0).abs() < TOLERANCE);
             assert!(is_found, "{}", after.sentence());
+        }
+    }
+}
+
+/// With the tilt of the sensor and a bias that rises over the chip out of the list: the free values by element lead to
+/// both, and they are adopted with their slopes.
+#[test]
+fn what_is_linear_in_the_place_of_the_element_is_proposed_and_adopted() {
+    /// Reduced chi-square per pixel that may be left on captures left out, as above.
+    const EXPLAINED: f64 = 1.1 + 0.1;
+    /// Relative to the steeper slope: synthetic sets have another sampling.
+    const TOLERANCE: f64 = 0.05;
+    let folder = tempfile::tempdir().unwrap();
+    set_of_three(folder.path());
+    let like = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
+    // A tilt in mrad is um per mm; the bias rises from (75, 75) um on.
+    let file = folder.path().join("bias.toml");
+    fs::write(
+        &file,
+        "[[effect]]\nname = \"rising\"\nunit = \"nm\"\nrange = [-1.0, 1.0]\nprior = 0.05\n\
+         stage = \"width\"\nwidth_nm = \"a * (X - 75) - 0.5 * a * (Y - 75)\"\n",
+    )
+    .unwrap();
+    let declaring = Settings {
+        declared: DeclaredEffect::read(&file).unwrap(),
+        ..settings()
+    };
+    let synthesizer = Synthesizer::new(&like, &declaring).unwrap();
+    for (name, truth, proposal, slopes) in [
+        ("sensor_tilt", vec![60.0, -35.0], "gap_gradient", [60.0, -35.0]),
+        ("rising", vec![0.08], "cd_bias_gradient", [80.0, -40.0]),
+    ] {
+        let images = synthesizer.with_effect(name, &truth, &Silent).unwrap();
+        let set = synthesizer.draw(&images, 33);
+        let session = Session::new(&set, with_effects(&["gap", "cd_bias"])).unwrap();
+        let (before, evidence) = session.diagnose(&session.simulate(&Silent).unwrap(), &Silent).unwrap();
+        assert!(before.verdict.leaves_a_residual(), "{}", before.sentence());
+        let course = before.patterns[0].course.as_ref().unwrap();
+        assert!(
+            course.is_linear && course.spare == 0 && course.remark.is_some(),
+            "{course:?}"
+        );
+        let effects = proposed(&session, &evidence.unwrap());
+        assert!(effects.iter().any(|e| e.name == proposal), "{effects:?}");
+        // It is in the form of the files that a person writes.
+        fs::write(&file, DeclaredEffect::text(&effects)).unwrap();
+        assert_eq!(DeclaredEffect::read(&file).unwrap(), effects);
+        let wider = session.adopting(effects).unwrap();
+        let (after, _) = wider.diagnose(&wider.simulate(&Silent).unwrap(), &Silent).unwrap();
+        assert_eq!(names(&after), [proposal], "{} {:?}", after.sentence(), after.error);
+        assert!(after.error.after.held_out < EXPLAINED, "{:?}", after.error);
+        let found: Vec<f64> = serde_json::from_value(after.effects[0].value.clone()).unwrap();
+        for (found, slope) in found.iter().zip(slopes) {
+            assert!((found - slope).abs() < TOLERANCE * slopes[0], "{}", after.sentence());
         }
     }
 }

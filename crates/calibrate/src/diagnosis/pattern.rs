@@ -1,0 +1,222 @@
+//! A quantity that was fitted free for each element, colour, distance or angle, and what its values follow.
+
+use metalith_report::sig;
+use serde::Serialize;
+
+use crate::search::{Course, Grouping, Pattern};
+use crate::set::{CaptureIndex, MeasuredSet};
+use crate::simulator::Simulator;
+
+/// A quantity that was fitted free for each element, colour, distance or angle, where this removes most of what is left.
+#[derive(Clone, Debug, Serialize)]
+pub struct FreePattern {
+    /// The effect whose parameter it is, with the number of the parameter if it has several.
+    pub quantity: String,
+    /// Unit of the parameter.
+    pub unit: String,
+    /// `element`, `colour`, `distance` or `angle`.
+    pub by: String,
+    pub values: Vec<GroupValue>,
+    /// Reduced chi-square per pixel without and with it.
+    pub before: f64,
+    pub after: f64,
+    /// What the values are like over the place of the element, the wavelength, the distance or the angle.
+    pub course: Option<PatternCourse>,
+}
+
+/// The value of a quantity in one group of captures.
+#[derive(Clone, Debug, Serialize)]
+pub struct GroupValue {
+    pub group: String,
+    pub value: f64,
+    /// One standard deviation.
+    pub sigma: f64,
+}
+
+/// Values put as linear in what the groups differ in.
+#[derive(Clone, Debug, Serialize)]
+pub struct PatternCourse {
+    /// In words: the place of the element, the wavelength, the distance, the angle of incidence.
+    pub of: String,
+    /// Whether they are linear in it, to what they are known to.
+    pub is_linear: bool,
+    /// Middle of what the groups span: um on the chip, nm, um, or degrees.
+    pub middle: [f64; 2],
+    /// Value there, with its standard deviation.
+    pub at_middle: [f64; 2],
+    pub slopes: Vec<Slope>,
+    /// How far the farthest value is from that.
+    pub off: f64,
+    /// Values beyond as many as determine it: of none, any values would do.
+    pub spare: usize,
+    /// What it comes from if they are linear.
+    pub means: Option<String>,
+    /// What these groups cannot tell apart.
+    pub remark: Option<String>,
+}
+
+/// How fast values rise along one direction.
+#[derive(Clone, Debug, Serialize)]
+pub struct Slope {
+    /// Unit vector.
+    pub along: [f64; 2],
+    pub value: f64,
+    /// One standard deviation.
+    pub sigma: f64,
+    pub unit: String,
+}
+
+/// What groups differ in: in words, the unit that slopes are given per, and how many of the unit of the coordinates that is.
+fn course_of(by: Grouping) -> (&'static str, &'static str, f64) {
+    match by {
+        Grouping::Element => ("place of the element", "mm", 1e3),
+        Grouping::Colour => ("wavelength", "100 nm", 100.0),
+        Grouping::Distance => ("distance", "um", 1.0),
+        Grouping::Angle => ("angle of incidence", "degree", 1.0),
+    }
+}
+
+impl FreePattern {
+    /// As it is reported.
+    pub fn new(simulator: &Simulator<'_>, pattern: &Pattern) -> Self {
+        let set = simulator.bench.set();
+        let slot = simulator.slots[pattern.slot];
+        let effect = &simulator.effects[slot.effect];
+        // Some effects report another number than the one that is fitted.
+        let unit = match effect.value(1.0, set) == 1.0 {
+            true => effect.unit(),
+            false => "of its parameter",
+        };
+        let values = pattern.groups.iter().zip(&pattern.values);
+        let mut out = Self {
+            quantity: match effect.parameters().len() {
+                1 => effect.name(),
+                _ => format!("{}[{}]", effect.name(), slot.index),
+            },
+            unit: unit.into(),
+            by: pattern.by.word().into(),
+            values: values
+                .map(|(&c, &(value, sigma))| GroupValue {
+                    group: label(set, pattern.by, c),
+                    value,
+                    sigma,
+                })
+                .collect(),
+            before: pattern.chi2.1,
+            after: pattern.chi2.0,
+            course: None,
+        };
+        let gradient = effect.as_gradient().filter(|_| pattern.by == Grouping::Element);
+        out.course = pattern.course(set).map(|c| out.course_from(&c, pattern.by, gradient));
+        out
+    }
+
+    fn course_from(&self, course: &Course, by: Grouping, gradient: Option<&str>) -> PatternCourse {
+        let (of, per, factor) = course_of(by);
+        let slopes = course.directions.iter().zip(&course.slopes);
+        let slopes = slopes.map(|(along, (value, sigma))| Slope {
+            along: *along,
+            value: factor * value,
+            sigma: factor * sigma,
+            unit: format!("{} per {per}", self.unit),
+        });
+        PatternCourse {
+            of: of.into(),
+            is_linear: course.is_linear,
+            middle: course.middle,
+            at_middle: [course.at_middle.0, course.at_middle.1],
+            slopes: slopes.collect(),
+            off: course.off,
+            spare: course.spare,
+            means: gradient.filter(|_| course.is_linear).map(str::to_owned),
+            remark: (course.spare == 0).then(|| match by == Grouping::Element && self.quantity == "gap" {
+                true => untold_tilt(self.values.len()),
+                false => untold(self.values.len(), &self.by, "a slope", "a value of its own"),
+            }),
+        }
+    }
+
+    /// One line for a person.
+    pub fn sentence(&self) -> String {
+        let one = |v: &GroupValue| format!("{}: {} +- {}", v.group, sig(v.value, 3), sig(v.sigma, 1));
+        let values: Vec<String> = self.values.iter().map(one).collect();
+        let course = self
+            .course
+            .as_ref()
+            .map_or_else(String::new, |c| c.sentence(&self.unit));
+        format!(
+            "`{}` by {} ({}): reduced chi-square {} to {}.{course}",
+            self.quantity,
+            self.by,
+            values.join(", "),
+            sig(self.before, 3),
+            sig(self.after, 3)
+        )
+    }
+}
+
+impl PatternCourse {
+    fn sentence(&self, unit: &str) -> String {
+        let slope = |s: &Slope| {
+            let along = match s.along {
+                _ if self.of != "place of the element" && self.slopes.len() == 1 => String::new(),
+                [1.0, 0.0] => " along x".into(),
+                [0.0, 1.0] => " along y".into(),
+                [x, y] => format!(" along ({}, {})", sig(x, 3), sig(y, 3)),
+            };
+            format!("{} +- {} {}{along}", sig(s.value, 3), sig(s.sigma, 1), s.unit)
+        };
+        let slopes: Vec<String> = self.slopes.iter().map(slope).collect();
+        let [middle, sigma] = self.at_middle;
+        let mut text = match self.is_linear {
+            true => format!(
+                " It is linear in the {}: {}, {} +- {} {unit} in the middle.",
+                self.of,
+                slopes.join(" and "),
+                sig(middle, 3),
+                sig(sigma, 1)
+            ),
+            false => format!(
+                " It is not linear in the {}: the farthest value is {} {unit} off.",
+                self.of,
+                sig(self.off, 3)
+            ),
+        };
+        if let Some(means) = &self.means {
+            text.push_str(&format!(" That is {means}."));
+        }
+        if let Some(remark) = &self.remark {
+            text.push_str(&format!(" {remark}"));
+        }
+        text
+    }
+}
+
+/// What values cannot tell apart of which there are as many as numbers: `count` of them, one for each element, colour, distance
+/// or angle.
+fn untold(count: usize, by: &str, slope: &str, own: &str) -> String {
+    match count {
+        1 => format!("Of one {by}, {slope} and {own} cannot be told apart; captures of another {by} would tell."),
+        2 => format!(
+            "Of two, {slope} and {own} for each {by} cannot be told apart: two values are always on a line; captures of a third {by} would tell."
+        ),
+        _ => format!(
+            "Of three that are not in line, {slope} with another value in the middle and {own} for each {by} cannot be told apart: three values are always on a plane; captures of a fourth {by} would tell."
+        ),
+    }
+}
+
+/// That so many elements do not tell a tilt of the sensor from distances of their own.
+pub(super) fn untold_tilt(elements: usize) -> String {
+    untold(elements, "element", "a tilt of the sensor", "a distance of its own")
+}
+
+fn label(set: &MeasuredSet, by: Grouping, c: CaptureIndex) -> String {
+    let capture = &set.captures[c];
+    match by {
+        Grouping::Element => format!("{:?}", set.elements[capture.element].index),
+        Grouping::Colour => format!("{} nm", set.leds[capture.led].name()),
+        Grouping::Distance => format!("{} um", capture.distance_um),
+        Grouping::Angle => format!("{:.1?} deg", capture.aoi_rad.map(f64::to_degrees)),
+    }
+}
