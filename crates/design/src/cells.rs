@@ -138,6 +138,10 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
                 };
             }
             match fidelity {
+                Fidelity::Published | Fidelity::Neighbours if !design.cell.lattice.is_square() => Err(Error::invalid(
+                    format!("a hexagonal lattice by the `{fidelity}` cell"),
+                    "ask for `rigorous` or `fitted`: the other is made of square lattices",
+                )),
                 Fidelity::Published => Ok(Box::new(PublishedCell::new(design.cell.pitch_nm))),
                 Fidelity::Rigorous => {
                     let stack = design.cell_stack()?;
