@@ -1,11 +1,11 @@
-//! Jones matrices of cells of circles and of rotated rectangles, for `scripts/shape_peers.py`:
+//! Jones matrices of cells of circles, on a square and on a hexagonal lattice, and of rotated rectangles, for `scripts/shape_peers.py`:
 //! `cargo run --release --example shapes -- 17 25`.
 //!
-//! One line of JSON for each number of orders: all cases of [`CIRCLES`] at five diameters, all of [`RECTANGLES`] at five
-//! angles, along the normal.
+//! One line of JSON for each number of orders: all cases of [`CIRCLES`] at five diameters on both lattices, all of
+//! [`RECTANGLES`] at five angles, along the normal.
 
 use metalith::cell::{CellStack, Material, RotatedRectangle};
-use metalith::rcwa::Orders;
+use metalith::rcwa::{CellLattice, Orders};
 use metalith::{PillarShape, Result};
 use num_complex::Complex64;
 
@@ -60,15 +60,23 @@ fn main() -> Result<()> {
         let along_axis: usize = argument.parse().expect("a number of orders");
         let orders = Orders::new(along_axis)?;
         let mut points = Vec::new();
-        for (film, pitch, height, wavelength, first, step) in CIRCLES {
-            let stack = CellStack {
-                shape: PillarShape::Circle,
-                ..stack(film, pitch, height)?
-            };
-            for diameter in (0..5).map(|k| first + step * f64::from(k)) {
-                let t = stack.transmission(diameter, wavelength, orders)?;
-                let jones = [[t, Complex64::ZERO], [Complex64::ZERO, t]];
-                points.push(point(&stack, wavelength, &format!("\"diameter\": {diameter}"), jones)?);
+        for hexagonal in [false, true] {
+            for (film, pitch, height, wavelength, first, step) in CIRCLES {
+                let stack = CellStack {
+                    shape: PillarShape::Circle,
+                    lattice: if hexagonal {
+                        CellLattice::hexagonal(pitch)
+                    } else {
+                        CellLattice::Square
+                    },
+                    ..stack(film, pitch, height)?
+                };
+                for diameter in (0..5).map(|k| first + step * f64::from(k)) {
+                    let t = stack.transmission(diameter, wavelength, orders)?;
+                    let jones = [[t, Complex64::ZERO], [Complex64::ZERO, t]];
+                    let shape = format!("\"diameter\": {diameter}, \"hexagonal\": {hexagonal}");
+                    points.push(point(&stack, wavelength, &shape, jones)?);
+                }
             }
         }
         for (film, pitch, height, wavelength, width_nm, length_nm) in RECTANGLES {

@@ -1,12 +1,14 @@
-"""Cells of circles and of rotated rectangles: ours beside fmmax, which solves the same cells by an independent code.
+"""Cells of circles, on a square and on a hexagonal lattice, and of rotated rectangles: ours beside fmmax, which solves the
+same cells by an independent code.
 
-usage: python scripts/shape_peers.py [--shape circle rectangle] [--ours 13 17 21 29] [--peer 13 17] [--formulation JONES_DIRECT]
+usage: python scripts/shape_peers.py [--shape circle hexagonal rectangle] [--ours 13 17 21 29] [--peer 13 17] [--formulation JONES_DIRECT]
 needs: pip install fmmax
 
-Thirty points of each shape: silicon nitride, titanium dioxide and amorphous silicon, 455 to 1550 nm; circles of five diameters,
+Thirty points of each kind: silicon nitride, titanium dioxide and amorphous silicon, 455 to 1550 nm; circles of five diameters,
 rectangles at five angles. Answers are Jones matrices of the zero order, field above the pillar over arriving field at its foot;
 the distance of two is that of the entries farthest apart. All rows are held to ours with the most orders, to which both codes
-should come as orders are added; what the peer keeps of a distance is its grid, of 1600 x 1600 places that are inside or not.
+should come as orders are added; what the peer keeps of a distance is its grid, of 1600 x 1600 places that are inside or not; on a hexagonal lattice along its two vectors, with as many orders as a square
+lattice has, in a circle.
 """
 import argparse
 import json
@@ -17,6 +19,7 @@ import time
 
 GRID = 1600
 GOAL = 0.005
+KINDS = ["circle", "hexagonal", "rectangle"]
 
 
 def raster(point, inside):
@@ -25,6 +28,9 @@ def raster(point, inside):
     pitch = point["pitch"]
     middles = (np.arange(GRID) + 0.5) / GRID * pitch - pitch / 2
     x, y = middles[:, None], middles[None, :]
+    if point.get("hexagonal"):
+        # Along u and v; the circle in the middle of the cell reaches no other.
+        x, y = x + y / 2, y * np.sqrt(3) / 2
     if "diameter" in point:
         within = x**2 + y**2 < point["diameter"] ** 2 / 4
     else:
@@ -46,8 +52,11 @@ def peer(point, along, formulation):
     pitch, wavelength = point["pitch"], point["wavelength"]
     film, below = complex(*point["film"]), point["below"]
     lattice = fmmax.LatticeVectors(u=pitch * fmmax.X, v=pitch * fmmax.Y)
-    expansion = fmmax.generate_expansion(lattice, approximate_num_terms=along**2,
-                                         truncation=fmmax.Truncation.PARALLELOGRAMIC)
+    truncation = fmmax.Truncation.PARALLELOGRAMIC
+    if point.get("hexagonal"):
+        lattice = fmmax.LatticeVectors(u=pitch * fmmax.X, v=pitch * (0.5 * fmmax.X + np.sqrt(0.75) * fmmax.Y))
+        truncation = fmmax.Truncation.CIRCULAR
+    expansion = fmmax.generate_expansion(lattice, approximate_num_terms=along**2, truncation=truncation)
 
     def layer(permittivity):
         return fmmax.eigensolve_isotropic_media(
@@ -80,7 +89,8 @@ def ours(orders):
 
 
 def compare(shape, found, options):
-    keep = [k for k, p in enumerate(next(iter(found.values()))) if ("diameter" in p) == (shape == "circle")]
+    kind = lambda p: "rectangle" if "size" in p else "hexagonal" if p["hexagonal"] else "circle"
+    keep = [k for k, p in enumerate(next(iter(found.values()))) if kind(p) == shape]
     points = [next(iter(found.values()))[k] for k in keep]
     rows = [(f"ours, {n}", [[complex(*t) for t in found[n][k]["jones"]] for k in keep]) for n in options.ours]
     for along in options.peer:
@@ -88,13 +98,14 @@ def compare(shape, found, options):
         rows.append((f"fmmax, {along}", [peer(point, along, options.formulation) for point in points]))
         print(f"fmmax with {along} x {along} orders: {time.process_time() - begin:.0f} CPU s", flush=True)
     reference = rows[len(options.ours) - 1]
+    title = {"circle": "circles", "hexagonal": "circles, hexagonal", "rectangle": "rectangles"}[shape] + ", orders an axis"
     far = lambda a, b: max(abs(x - y) for x, y in zip(a, b))
-    print(f"\n{shape + 's, orders an axis':<26}{'rms':>9}{'median':>9}{'worst':>9}{'within':>9}   "
+    print(f"\n{title:<34}{'rms':>9}{'median':>9}{'worst':>9}{'within':>9}   "
           f"distance from {reference[0]}; how many of {len(points)} within {GOAL}")
     for name, values in rows:
         apart = sorted(far(a, b) for a, b in zip(values, reference[1]))
         rms = (sum(d * d for d in apart) / len(apart)) ** 0.5
-        print(f"{name:<26}{rms:>9.4f}{apart[len(apart) // 2]:>9.4f}{apart[-1]:>9.4f}{sum(d <= GOAL for d in apart):>9}")
+        print(f"{name:<34}{rms:>9.4f}{apart[len(apart) // 2]:>9.4f}{apart[-1]:>9.4f}{sum(d <= GOAL for d in apart):>9}")
     print()
     if options.points:
         for k, point in enumerate(points):
@@ -105,7 +116,7 @@ def compare(shape, found, options):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--shape", nargs="+", default=["circle", "rectangle"], choices=["circle", "rectangle"])
+    parser.add_argument("--shape", nargs="+", default=KINDS, choices=KINDS)
     parser.add_argument("--ours", type=int, nargs="+", default=[13, 17, 21, 29], help="the last is what the others are held to")
     parser.add_argument("--peer", type=int, nargs="*", default=[13, 17])
     parser.add_argument("--formulation", default="JONES_DIRECT", help="of fmmax")

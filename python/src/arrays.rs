@@ -309,7 +309,14 @@ pub fn read_layout<'py>(
             (None, Some(array)) => ExtractionPlan::given(layer, sites(array)).of_shape(array.shape),
             (None, None) => ExtractionPlan::discover(layer),
         };
-        Ok(extract(&layout, &ExtractionPlan { top, ..plan }, p)?)
+        let found = extract(&layout, &ExtractionPlan { top, ..plan }, p)?;
+        if found.elements.iter().any(|e| !e.site.lattice.is_square()) {
+            return Err(metalith::Error::invalid(
+                format!("{}: pillars on a hexagonal lattice", path.display()),
+                "arrays of widths are of square lattices; `metalith check` and `diff` know this layout",
+            ));
+        }
+        Ok(found)
     })?;
     let pillars = found.pillars;
     let others = found.oddities.total();

@@ -50,7 +50,10 @@ pub struct CellsArgs {
 /// Do it.
 pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
-    let design = standard_input::design(&args.design)?;
+    let design = standard_input::design_any(&args.design)?;
+    if args.steered {
+        design.square_lattice("--steered")?;
+    }
     let folder = args
         .out
         .clone()

@@ -98,7 +98,7 @@ pub fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
     args.paths_are_apart()?;
     let deck = args.rules.as_deref().map_or_else(|| Ok(Deck::standard()), Deck::read)?;
     let waivers = args.waivers.as_deref().map(Waivers::read).transpose()?;
-    let mut design = args.design.as_deref().map(standard_input::design).transpose()?;
+    let mut design = args.design.as_deref().map(standard_input::design_any).transpose()?;
     terminal.stop_on_interrupt();
     let file = InputFile::of(&args.layout)?;
     let open = |path: &Path| Layout::open_with(path, ReadLimits::default(), terminal);

@@ -344,6 +344,16 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     };
     let found = extract(&layout, &plan, terminal)?;
     mostly_pillars(args, &found)?;
+    if let Some(element) = found.elements.iter().find(|e| !e.site.lattice.is_square()) {
+        return Err(Error::invalid(
+            format!(
+                "{}: {} stands on a hexagonal lattice",
+                args.layout.display(),
+                element.site.name
+            ),
+            "`metalith check`, `diff` and `convert` know this layout; simulation knows square lattices alone",
+        ));
+    }
     let assumptions = args.assumptions(&found);
     let made = match &args.model {
         Some(path) => Some(MadeChip::new(&args.stack(&found)?, &CalibratedModel::read(path)?)?),

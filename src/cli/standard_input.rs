@@ -75,9 +75,27 @@ impl Deref for InputFile {
 /// # Errors
 /// As [`Design::read`]; also if standard input is no text, or too long.
 pub fn design(path: &Path) -> Result<Design> {
-    if !is_standard_input(path) {
-        return Design::read(path);
+    if is_standard_input(path) {
+        Design::parse(Path::new(NAME), &design_text()?)
+    } else {
+        Design::read(path)
     }
+}
+
+/// As [`design`], on a lattice of any kind.
+///
+/// # Errors
+/// As [`Design::read_any`]; also if standard input is no text, or too long.
+pub fn design_any(path: &Path) -> Result<Design> {
+    if is_standard_input(path) {
+        Design::parse_any(Path::new(NAME), &design_text()?)
+    } else {
+        Design::read_any(path)
+    }
+}
+
+/// The text of a design on standard input.
+fn design_text() -> Result<String> {
     let name = Path::new(NAME);
     let mut text = String::new();
     let read = take()?.take(LONGEST_DESIGN + 1).read_to_string(&mut text);
@@ -88,5 +106,5 @@ pub fn design(path: &Path) -> Result<Design> {
             "pipe in the text of a design file",
         ));
     }
-    Design::parse(name, &text)
+    Ok(text)
 }

@@ -132,7 +132,7 @@ fn designs(folder: &Path) -> Vec<Format> {
             folder.join("mutant.toml"),
             Kind::Text,
             files("designs", "toml"),
-            Design::read,
+            Design::read_any,
         ),
         Format::new(
             "zmx",

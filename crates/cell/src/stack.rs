@@ -6,13 +6,16 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use metalith_core::{Error, PillarShape, Result};
-use metalith_rcwa::{Incidence, Layer, LayerStack, Material, Orders, Outline, Side, solve, transmit};
+use metalith_rcwa::{CellLattice, Incidence, Layer, LayerStack, Material, Orders, Outline, Side, solve, transmit};
 
 /// A pillar on its substrate, as etched: everything that decides its transmission but its width.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CellStack {
     /// Pitch of the lattice (nm).
     pub pitch_nm: f64,
+    /// How the pillars stand.
+    #[serde(skip_serializing_if = "is_square")]
+    pub lattice: CellLattice,
     /// Height of the pillar (nm).
     pub height_nm: f64,
     /// Cross-section of the pillar; its width is the edge of a square, the diameter of a circle.
@@ -36,6 +39,10 @@ pub struct CellStack {
     pub mask: Material,
 }
 
+fn is_square(lattice: &CellLattice) -> bool {
+    *lattice == CellLattice::Square
+}
+
 /// A layer without structure.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct UniformLayer {
@@ -56,6 +63,7 @@ impl CellStack {
     pub fn paper(pitch_nm: f64, height_nm: f64) -> Result<Self> {
         Ok(Self {
             pitch_nm,
+            lattice: CellLattice::Square,
             height_nm,
             shape: PillarShape::Square,
             film: Material::named("sin_luke_2015")?,
@@ -113,6 +121,7 @@ impl CellStack {
         }
         Ok(LayerStack {
             pitch_nm: self.pitch_nm,
+            lattice: self.lattice,
             below: self.substrate.index(wavelength_um)?,
             layers,
             above: ambient,

@@ -248,10 +248,11 @@ impl CellTable {
 }
 
 impl TableSpec {
-    /// A leaning wall may be too wide at its foot before its top fills the pitch: such widths, which no
-    /// layout has, count as the widest that fits.
+    /// A leaning wall may be too wide at its foot before its top fills the pitch, and staggered rows may be nearer than that:
+    /// such widths, which no layout has, count as the widest that fits.
     fn reachable(&self, width_nm: u16) -> f64 {
         let lean = 2.0 * self.stack.taper.max(0.0).tan() * self.stack.height_nm;
-        f64::from(width_nm).min(self.stack.pitch_nm - lean).max(0.0)
+        let nearest = self.stack.lattice.nearest_nm(self.stack.pitch_nm);
+        f64::from(width_nm).min(nearest - lean).max(0.0)
     }
 }

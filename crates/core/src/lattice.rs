@@ -1,26 +1,70 @@
-//! The square lattice that pillars stand on.
+//! The lattice that pillars stand on: square or hexagonal.
 
 use ndarray::Array2;
+use serde::Serialize;
 
 use crate::WidthRows;
 use crate::error::{Error, Result};
 
-/// A square lattice of `sites` x `sites` places about the centre of an element.
+/// How the sites of a lattice lie.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LatticeKind {
+    /// One pitch apart along x and along y.
+    #[default]
+    Square,
+    /// Rows along x, one pitch apart in a row, each row shifted by half a pitch against the next: six neighbours one pitch
+    /// away.
+    Hexagonal,
+}
+
+impl LatticeKind {
+    /// Whether it is square.
+    pub fn is_square(&self) -> bool {
+        *self == Self::Square
+    }
+
+    /// Distance of two rows (nm). On a hexagonal lattice half the root of three of the pitch, rounded to whole nanometres:
+    /// neighbours in the next row are up to 0.43 nm nearer or farther than those in a row.
+    pub fn row_nm(self, pitch_nm: u32) -> u32 {
+        match self {
+            Self::Square => pitch_nm,
+            Self::Hexagonal => (0.75 * f64::from(pitch_nm).powi(2)).sqrt().round() as u32,
+        }
+    }
+}
+
+/// A lattice about the centre of an element, in a grid of `sites` x `sites` places.
 ///
-/// Site `i` of an axis is at `(2 i - (sites - 1)) * pitch / 2`: with an even number of sites the centre
-/// of the element is a corner between four sites, and a lens has all eight symmetries of the square.
+/// On a square lattice every place is a site: number `i` of an axis is at `(2 i - (sites - 1)) * pitch / 2`. With an even
+/// number of sites the centre of the element is a corner between four sites, and a lens has all eight symmetries of the
+/// square.
+///
+/// The grid of a hexagonal lattice has places half a pitch apart along x and a row apart along y, an odd number of them along
+/// an axis. A place is a site if the sum of column and row is even ([`Lattice::has`]), so that one is in the centre, and a lens
+/// has the four symmetries of a rectangle. The grid is as many places high as wide, more than the sites reach
+/// ([`Lattice::reach`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Lattice {
+    kind: LatticeKind,
     pitch_nm: u32,
     sites: usize,
 }
 
 impl Lattice {
-    /// A lattice of `sites` places an axis, `pitch_nm` apart.
+    /// A square lattice of `sites` places an axis, `pitch_nm` apart.
     ///
     /// # Errors
     /// If the pitch is zero or odd (half of it must be whole nanometres), or there are no sites.
     pub fn new(pitch_nm: u32, sites: usize) -> Result<Self> {
+        Self::of_kind(LatticeKind::Square, pitch_nm, sites)
+    }
+
+    /// A lattice of a kind in a grid of `sites` places an axis.
+    ///
+    /// # Errors
+    /// As [`Lattice::new`]; also if the places of a hexagonal lattice are an even number.
+    pub fn of_kind(kind: LatticeKind, pitch_nm: u32, sites: usize) -> Result<Self> {
         if pitch_nm == 0 || !pitch_nm.is_multiple_of(2) {
             return Err(Error::invalid(
                 format!("a pitch of {pitch_nm} nm puts pillar centres off the 1 nm grid"),
@@ -33,19 +77,49 @@ impl Lattice {
                 "use between 1 and 1,048,576 sites an axis",
             ));
         }
-        Ok(Self { pitch_nm, sites })
+        if kind == LatticeKind::Hexagonal && sites.is_multiple_of(2) {
+            return Err(Error::invalid(
+                format!("a hexagonal lattice of {sites} places an axis"),
+                "use an odd number: one is in the centre",
+            ));
+        }
+        Ok(Self { kind, pitch_nm, sites })
     }
 
-    /// The smallest lattice with an even number of sites that covers a disc of this diameter.
+    /// The smallest square lattice with an even number of sites that covers a disc of this diameter.
     ///
     /// # Errors
     /// As [`Lattice::new`].
     pub fn covering(diameter_nm: u32, pitch_nm: u32) -> Result<Self> {
+        Self::of_kind_covering(LatticeKind::Square, diameter_nm, pitch_nm)
+    }
+
+    /// The smallest lattice of a kind that covers a disc of this diameter: a square one with an even number of sites.
+    ///
+    /// # Errors
+    /// As [`Lattice::new`].
+    pub fn of_kind_covering(kind: LatticeKind, diameter_nm: u32, pitch_nm: u32) -> Result<Self> {
         if pitch_nm == 0 {
             return Self::new(0, 1);
         }
-        let sites = diameter_nm.div_ceil(pitch_nm) as usize;
-        Self::new(pitch_nm, sites + sites % 2)
+        let across = diameter_nm.div_ceil(pitch_nm) as usize;
+        let sites = match kind {
+            LatticeKind::Square => across + across % 2,
+            LatticeKind::Hexagonal if across == 0 => 0,
+            // Half a pitch apart, and the middle.
+            LatticeKind::Hexagonal => 2 * across + 1,
+        };
+        Self::of_kind(kind, pitch_nm, sites)
+    }
+
+    /// How the sites lie.
+    pub fn kind(&self) -> LatticeKind {
+        self.kind
+    }
+
+    /// Whether it is square.
+    pub fn is_square(&self) -> bool {
+        self.kind.is_square()
     }
 
     /// Distance of neighbouring sites (nm).
@@ -58,27 +132,86 @@ impl Lattice {
         f64::from(self.pitch_nm) * 1e-3
     }
 
-    /// Number of sites an axis.
+    /// Number of places of the grid along an axis; on a square lattice each is a site.
     pub fn sites(&self) -> usize {
         self.sites
     }
 
-    /// Place of site `i` in half pitches from the centre: odd for an even number of sites.
+    /// Distance of the places of the grid along x and along y (nm).
+    pub fn steps_nm(&self) -> [u32; 2] {
+        match self.kind {
+            LatticeKind::Square => [self.pitch_nm; 2],
+            LatticeKind::Hexagonal => [self.pitch_nm / 2, self.kind.row_nm(self.pitch_nm)],
+        }
+    }
+
+    /// Area of the chip for each site (um^2).
+    pub fn cell_um2(&self) -> f64 {
+        self.pitch_um() * f64::from(self.kind.row_nm(self.pitch_nm)) * 1e-3
+    }
+
+    /// Whether a place of the grid is a site.
+    pub fn has(&self, ix: usize, iy: usize) -> bool {
+        self.is_square() || (ix + iy).is_multiple_of(2)
+    }
+
+    /// Columns and rows of the grid that a lens may reach: all, but on a hexagonal lattice only as many rows as are in a square.
+    pub fn reach(&self) -> [std::ops::Range<usize>; 2] {
+        let all = 0..self.sites;
+        let [x, y] = self.steps_nm();
+        if x >= y {
+            return [all.clone(), all];
+        }
+        let middle = self.sites / 2;
+        let rows = (middle as u64 * u64::from(x) / u64::from(y)) as usize;
+        [all, middle - rows..middle + rows + 1]
+    }
+
+    /// Steps along columns and rows from a site to half of its neighbours; the others are on the opposite sides.
+    pub fn neighbours(&self) -> &'static [[i64; 2]] {
+        match self.kind {
+            LatticeKind::Square => &[[1, 0], [0, 1]],
+            LatticeKind::Hexagonal => &[[2, 0], [1, 1], [-1, 1]],
+        }
+    }
+
+    /// Place of column (axis 0) or row (axis 1) number `i` from the centre (nm).
+    pub fn place_nm(&self, axis: usize, i: usize) -> i64 {
+        let step = i64::from(self.steps_nm()[axis]);
+        match self.kind {
+            LatticeKind::Square => self.half_index(i) * (step / 2),
+            // An odd number of places: twice the place is even.
+            LatticeKind::Hexagonal => self.half_index(i) / 2 * step,
+        }
+    }
+
+    /// Place of column (axis 0) or row (axis 1) number `i` from the centre (um).
+    pub fn place_um(&self, axis: usize, i: usize) -> f64 {
+        self.place_nm(axis, i) as f64 * 1e-3
+    }
+
+    /// Square of the distance of a place from the centre (nm^2), exact.
+    pub fn radius2_nm2(&self, ix: usize, iy: usize) -> i64 {
+        self.place_nm(0, ix).pow(2) + self.place_nm(1, iy).pow(2)
+    }
+
+    /// Place number `i` of an axis in half steps from the centre: odd for an even number of places.
     pub fn half_index(&self, i: usize) -> i64 {
         2 * i as i64 - (self.sites as i64 - 1)
     }
 
-    /// Place of site `i` of an axis from the centre (nm).
+    /// Place of site `i` of an axis of a square lattice from the centre (nm); see [`Lattice::place_nm`].
     pub fn coordinate_nm(&self, i: usize) -> i64 {
+        debug_assert!(self.is_square(), "both axes are asked for as one");
         self.half_index(i) * i64::from(self.pitch_nm / 2)
     }
 
-    /// Place of site `i` of an axis from the centre (um).
+    /// Place of site `i` of an axis of a square lattice from the centre (um).
     pub fn coordinate_um(&self, i: usize) -> f64 {
         self.coordinate_nm(i) as f64 * 1e-3
     }
 
-    /// Square of a site's distance from the centre, in half pitches: exact, so that sites related by
+    /// Square of a site's distance from the centre of a square lattice, in half pitches: exact, so that sites related by
     /// symmetry agree to the last bit in everything computed from it.
     pub fn half_radius2(&self, ix: usize, iy: usize) -> i64 {
         let (x, y) = (self.half_index(ix), self.half_index(iy));
@@ -121,5 +254,69 @@ impl WidthMap {
     /// Number of pillars of each width; index is the width (nm), the first entry counts empty sites.
     pub fn histogram(&self) -> Vec<u64> {
         WidthRows::histogram(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hexagonal_lattice_has_six_neighbours() {
+        // Rows are rounded to whole nanometres.
+        const ROUNDED_NM: f64 = 0.44;
+        for pitch in [350, 480, 650, 1000] {
+            let lattice = Lattice::of_kind_covering(LatticeKind::Hexagonal, 10_000, pitch).unwrap();
+            let n = lattice.sites();
+            let middle = n / 2;
+            assert!(lattice.has(middle, middle) && lattice.radius2_nm2(middle, middle) == 0);
+            assert!(lattice.place_nm(0, n - 1) * 2 >= 10_000 - i64::from(pitch));
+            let distances: Vec<f64> = (0..n * n)
+                .map(|k| (k % n, k / n))
+                .filter(|&(ix, iy)| lattice.has(ix, iy) && (ix, iy) != (middle, middle))
+                .map(|(ix, iy)| (lattice.radius2_nm2(ix, iy) as f64).sqrt())
+                .filter(|r| *r < 1.4 * f64::from(pitch))
+                .collect();
+            assert_eq!(distances.len(), 6);
+            assert!(
+                distances.iter().all(|r| (r - f64::from(pitch)).abs() < ROUNDED_NM),
+                "{distances:?}"
+            );
+            for [dx, dy] in lattice.neighbours() {
+                let [ix, iy] = [dx, dy].map(|d| (middle as i64 + d) as usize);
+                assert!(lattice.has(ix, iy));
+                let r = (lattice.radius2_nm2(ix, iy) as f64).sqrt();
+                assert!((r - f64::from(pitch)).abs() < ROUNDED_NM);
+            }
+            // As many sites as there are cells in the square.
+            let [columns, rows] = lattice.reach();
+            assert_eq!(columns, 0..n);
+            let sites = rows
+                .clone()
+                .flat_map(|iy| (0..n).map(move |ix| (ix, iy)))
+                .filter(|&(x, y)| lattice.has(x, y));
+            let [x, y] = lattice.steps_nm();
+            let area = 1e-6 * f64::from(x) * n as f64 * f64::from(y) * rows.len() as f64;
+            let share = sites.count() as f64 * lattice.cell_um2() / area;
+            assert!((share - 1.0).abs() < 1.0 / n as f64, "{share}");
+        }
+        assert!(Lattice::of_kind(LatticeKind::Hexagonal, 350, 4).is_err());
+        assert!(Lattice::of_kind_covering(LatticeKind::Hexagonal, 0, 350).is_err());
+    }
+
+    #[test]
+    fn places_of_a_square_lattice_are_alike_along_both_axes() {
+        for sites in [4, 5] {
+            let lattice = Lattice::new(350, sites).unwrap();
+            for i in 0..sites {
+                assert!(
+                    [0, 1]
+                        .iter()
+                        .all(|&axis| lattice.place_nm(axis, i) == lattice.coordinate_nm(i))
+                );
+            }
+            assert_eq!(lattice.reach(), [0..sites, 0..sites]);
+            assert_eq!(4 * lattice.radius2_nm2(1, 2), lattice.half_radius2(1, 2) * 350 * 350);
+        }
     }
 }

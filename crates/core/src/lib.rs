@@ -29,7 +29,7 @@ pub use document::{Fault, Faults};
 pub use eighth::EighthMap;
 pub use error::{Error, Result};
 pub use file::{FolderTurn, WholeFile, WholeFolder};
-pub use lattice::{Lattice, WidthMap};
+pub use lattice::{Lattice, LatticeKind, WidthMap};
 pub use layer::LayerNumber;
 pub use pillars::{ElementSite, PillarReader};
 pub use plane::part;

@@ -6,9 +6,9 @@ use metalith_cell::{
     CellModel, CellStack, Fidelity, FittedCell, PointwiseCell, PublishedCell, RotatedCell, TableSpec, UniformLayer,
     cache_folder,
 };
-use metalith_core::{Error, Result};
+use metalith_core::{Error, LatticeKind, Result};
 use metalith_grating::{Mapping, NeighbourCell};
-use metalith_rcwa::Material;
+use metalith_rcwa::{CellLattice, Material};
 
 use crate::spec::UnderSpec;
 use crate::{Design, WidthRule};
@@ -39,6 +39,13 @@ impl Design {
         };
         let cell = &self.cell;
         Ok(CellStack {
+            lattice: match cell.lattice {
+                LatticeKind::Square => CellLattice::Square,
+                // As it is written: rows are whole nanometres apart.
+                LatticeKind::Hexagonal => CellLattice::Staggered {
+                    row_nm: f64::from(cell.lattice.row_nm(cell.pitch_nm)),
+                },
+            },
             shape: cell.shape,
             film: material(&cell.pillar_material)?,
             substrate: material(&cell.substrate_material)?,
@@ -131,6 +138,10 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
                 };
             }
             match fidelity {
+                Fidelity::Published | Fidelity::Neighbours if !design.cell.lattice.is_square() => Err(Error::invalid(
+                    format!("a hexagonal lattice by the `{fidelity}` cell"),
+                    "ask for `rigorous` or `fitted`: the other is made of square lattices",
+                )),
                 Fidelity::Published => Ok(Box::new(PublishedCell::new(design.cell.pitch_nm))),
                 Fidelity::Rigorous => {
                     let stack = design.cell_stack()?;

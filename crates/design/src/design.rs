@@ -36,11 +36,12 @@ pub struct Design {
 }
 
 impl Design {
-    /// Read the design file at `path`, and the files that it names.
+    /// Read the design file at `path`, and the files that it names: a design on a square lattice.
     ///
     /// # Errors
     /// [`metalith_core::Error::Text`] with every mistake of the file, each with line, column and remedy;
-    /// [`metalith_core::Error::Table`] for a phase table that cannot be used.
+    /// [`metalith_core::Error::Table`] for a phase table that cannot be used. A design on a hexagonal lattice is one: whoever
+    /// knows that reads it by [`Design::read_any`].
     pub fn read(path: &Path) -> Result<Self> {
         Self::parse(path, &load(path)?)
     }
@@ -50,7 +51,34 @@ impl Design {
     /// # Errors
     /// As [`Design::read`], but for reading the file itself.
     pub fn parse(path: &Path, text: &str) -> Result<Self> {
-        let design = Document::read(path, text, |root| Self::sections(path, root))?;
+        Self::document(path, text, false)
+    }
+
+    /// As [`Design::read`], on a lattice of any kind.
+    ///
+    /// # Errors
+    /// As [`Design::read`], but for the lattice.
+    pub fn read_any(path: &Path) -> Result<Self> {
+        Self::parse_any(path, &load(path)?)
+    }
+
+    /// As [`Design::parse`], on a lattice of any kind.
+    ///
+    /// # Errors
+    /// As [`Design::parse`], but for the lattice.
+    pub fn parse_any(path: &Path, text: &str) -> Result<Self> {
+        Self::document(path, text, true)
+    }
+
+    fn document(path: &Path, text: &str, any_lattice: bool) -> Result<Self> {
+        let design = Document::read(path, text, |root| {
+            let design = Self::sections(path, root)?;
+            if !any_lattice && !design.cell.lattice.is_square() {
+                root.section("cell")
+                    .fault("lattice", "a hexagonal lattice, which is not known here yet", KNOWN_TO);
+            }
+            Ok::<_, Error>(design)
+        })?;
         design?.with_files()
     }
 
@@ -113,7 +141,8 @@ impl Design {
     /// The lattice that the pillars of each element stand on: it covers the largest.
     pub fn lattice(&self) -> Lattice {
         let largest_nm = self.array.largest_nm(&self.lens);
-        Lattice::covering(largest_nm, self.cell.pitch_nm).expect("checked when the design was read")
+        Lattice::of_kind_covering(self.cell.lattice, largest_nm, self.cell.pitch_nm)
+            .expect("checked when the design was read")
     }
 
     /// The lens of an element: its own, or that all share.
@@ -142,6 +171,23 @@ impl Design {
             ));
         }
         Ok(())
+    }
+
+    /// Nothing, if the pillars stand on a square lattice.
+    ///
+    /// # Errors
+    /// If they do not; `who` knows square lattices alone.
+    pub fn square_lattice(&self, who: &str) -> Result<()> {
+        if self.cell.lattice.is_square() {
+            return Ok(());
+        }
+        Err(Error::invalid(
+            format!(
+                "{who} knows square lattices alone, and {} is a design on a hexagonal one",
+                self.path.display()
+            ),
+            KNOWN_TO,
+        ))
     }
 
     /// The outline of an element as it stands on the chip, from its middle; none where it is a circle.
@@ -237,6 +283,9 @@ fn check_directions(section: &Section<'_, '_>, array: &ArraySpec, verify: &Verif
         }
     }
 }
+
+/// What a hexagonal lattice is good for.
+const KNOWN_TO: &str = "use `metalith cells`, `layout`, `check` and `diff` with this design, or a square lattice here";
 
 /// Leaves room within the 32 characters of a GDSII cell name for the parts a layout adds.
 const MAX_NAME: usize = 24;

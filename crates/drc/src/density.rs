@@ -31,11 +31,14 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, _context: &Context) -> Opti
     }))
 }
 
-/// The windows of one element, a whole number of sites wide, one of them in the middle.
+/// The windows of one element, a whole number of columns and rows wide, one of them in the middle.
 struct Windows {
-    sites: usize,
-    first: i64,
-    count: usize,
+    /// Columns and rows of a window.
+    sites: [usize; 2],
+    /// The first column and row of the first window.
+    first: [usize; 2],
+    /// Windows along x and y.
+    count: [usize; 2],
     /// Share of area that is pillar, row by row; none where a site is empty.
     fill: Vec<Option<f64>>,
 }
@@ -43,29 +46,35 @@ struct Windows {
 impl Windows {
     fn of(flat: &FlatLayout<'_>, element: usize, window_um: f64) -> Self {
         let e = &flat.elements[element];
-        let pitch = e.site.lattice.pitch_um();
-        let (n, sites) = (e.site.lattice.sites(), ((window_um / pitch) as usize).max(1));
-        // Windows on each side of the middle one.
-        let beside = (n as i64 - sites as i64).max(-1).div_euclid(2 * sites as i64);
-        let first = (n as i64 - sites as i64) / 2 - beside * sites as i64;
-        let count = if n < sites { 0 } else { (2 * beside + 1) as usize };
+        let lattice = e.site.lattice;
+        let n = lattice.sites();
+        let (mut sites, mut first, mut count) = ([0; 2], [0; 2], [0; 2]);
+        for (axis, step) in lattice.steps_nm().into_iter().enumerate() {
+            let own = ((window_um / (f64::from(step) * 1e-3)) as usize).max(1);
+            // Windows on each side of the middle one.
+            let beside = (n as i64 - own as i64).max(-1).div_euclid(2 * own as i64);
+            sites[axis] = own;
+            first[axis] = ((n as i64 - own as i64) / 2 - beside * own as i64).max(0) as usize;
+            count[axis] = if n < own { 0 } else { (2 * beside + 1) as usize };
+        }
         // Squared widths of the pillars of each window (nm^2); none where a site is empty.
-        let mut areas: Vec<Option<u64>> = vec![Some(0); count * count];
+        let mut areas: Vec<Option<u64>> = vec![Some(0); count[0] * count[1]];
         let mut room = Vec::new();
-        for k in 0..count * sites {
-            let row = e.widths.row(
-                first as usize + k,
-                first as usize..first as usize + count * sites,
-                &mut room,
-            );
-            let windows = &mut areas[k / sites * count..][..count];
-            for (area, part) in windows.iter_mut().zip(row.chunks(sites)) {
-                let full = part.iter().all(|&w| w != 0);
+        let rows = if count[0] == 0 { 0 } else { count[1] * sites[1] };
+        for k in 0..rows {
+            let iy = first[1] + k;
+            let row = e.widths.row(iy, first[0]..first[0] + count[0] * sites[0], &mut room);
+            let windows = &mut areas[k / sites[1] * count[0]..][..count[0]];
+            for (j, (area, part)) in windows.iter_mut().zip(row.chunks(sites[0])).enumerate() {
+                let ix = first[0] + j * sites[0];
+                let full = (ix..).zip(part).all(|(ix, &w)| w != 0 || !lattice.has(ix, iy));
                 let more: u64 = part.iter().map(|&w| flat.shape.square_nm2(w)).sum();
                 *area = area.filter(|_| full).map(|area| area + more);
             }
         }
-        let share = |area: u64| area as f64 * flat.shape.area_share() / (sites as f64 * pitch * 1e3).powi(2);
+        // On a square lattice the square of one number, to the last bit.
+        let [wide, high] = [0, 1].map(|axis| sites[axis] as f64 * (f64::from(lattice.steps_nm()[axis]) * 1e-3) * 1e3);
+        let share = |area: u64| area as f64 * flat.shape.area_share() / (wide * high);
         let fill = areas.into_iter().map(|area| area.map(share)).collect();
         Self {
             sites,
@@ -78,17 +87,17 @@ impl Windows {
     /// The area of window `k`.
     fn place(&self, flat: &FlatLayout<'_>, element: usize, k: usize) -> Rect {
         let site = &flat.elements[element].site;
-        let pitch = i64::from(site.lattice.pitch_nm());
+        let steps = site.lattice.steps_nm().map(i64::from);
         let corner = |axis: usize, at: usize| {
-            let first = self.first + (at * self.sites) as i64;
-            site.centre_nm[axis] + site.lattice.coordinate_nm(0) + first * pitch - pitch / 2
+            let first = (self.first[axis] + at * self.sites[axis]) as i64;
+            site.centre_nm[axis] + site.lattice.place_nm(axis, 0) + first * steps[axis] - steps[axis] / 2
         };
         let unit = |nm: i64| flat.units(nm as f64).round() as i64;
-        let (x, y) = (corner(0, k % self.count), corner(1, k / self.count));
-        let size = self.sites as i64 * pitch;
+        let (x, y) = (corner(0, k % self.count[0]), corner(1, k / self.count[0]));
+        let size = [0, 1].map(|axis| self.sites[axis] as i64 * steps[axis]);
         let mut r = Rect::EMPTY;
         r.include(Point::new(unit(x), unit(y)));
-        r.include(Point::new(unit(x + size), unit(y + size)));
+        r.include(Point::new(unit(x + size[0]), unit(y + size[1])));
         r
     }
 }
@@ -122,8 +131,9 @@ impl Rule for FillRule {
                         });
                     }
                     FillLimit::Gradient(max) => {
-                        let right = (k % all.count + 1 < all.count).then_some(k + 1);
-                        for other in right.into_iter().chain(Some(k + all.count)) {
+                        let across = all.count[0];
+                        let right = (k % across + 1 < across).then_some(k + 1);
+                        for other in right.into_iter().chain(Some(k + across)) {
                             let Some(&Some(beside)) = all.fill.get(other) else {
                                 continue;
                             };

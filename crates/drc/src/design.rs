@@ -122,13 +122,40 @@ fn phase_step(flat: &FlatLayout<'_>, design: &Design, most: f64, found: &mut Fin
 
 /// Steps between neighbouring sites, and those beyond half a turn.
 fn steps(work: &Work<'_>, lattice: Lattice, phase: &ElementPhase<'_>) -> Result<(u64, u64), Stop> {
+    if !lattice.is_square() {
+        return steps_to_neighbours(work, lattice, phase);
+    }
     if phase.is_radial() {
         return radial_steps(work, lattice, phase);
     }
     all_steps(work, lattice, phase)
 }
 
-/// As [`steps`], of any phase.
+/// As [`steps`], to the neighbours of a lattice of any kind.
+fn steps_to_neighbours(work: &Work<'_>, lattice: Lattice, phase: &ElementPhase<'_>) -> Result<(u64, u64), Stop> {
+    let (n, mut all, mut steep) = (lattice.sites(), 0, 0);
+    let phases = |iy: usize| -> Vec<Option<f64>> { (0..n).map(|ix| phase.turns(ix, iy)).collect() };
+    let mut own = phases(0);
+    for iy in 0..n {
+        work.look()?;
+        let above = if iy + 1 < n { phases(iy + 1) } else { Vec::new() };
+        for (ix, here) in own.iter().enumerate() {
+            let Some(here) = here else { continue };
+            for &[right, up] in lattice.neighbours() {
+                let row = if up == 0 { &own } else { &above };
+                let column = ix.checked_add_signed(right as isize);
+                if let Some(Some(there)) = column.and_then(|c| row.get(c)) {
+                    all += 1;
+                    steep += u64::from((here - there).abs() > 0.5);
+                }
+            }
+        }
+        own = above;
+    }
+    Ok((all, steep))
+}
+
+/// As [`steps`], of any phase on a square lattice.
 fn all_steps(work: &Work<'_>, lattice: Lattice, phase: &ElementPhase<'_>) -> Result<(u64, u64), Stop> {
     let (mut all, mut steep) = (0, 0);
     // Phases of the row before; every site is computed once.
@@ -183,7 +210,8 @@ fn lattice_orders(design: &Design, found: &mut Findings) -> RuleOutcome {
         Ok(material) => material,
         Err(error) => return Err(NotRun::Failed(error.to_string())),
     };
-    let pitch_nm = f64::from(design.cell.pitch_nm);
+    // The nearest orders of a hexagonal lattice go by the distance of its rows.
+    let pitch_nm = f64::from(design.cell.lattice.row_nm(design.cell.pitch_nm));
     for &wavelength_um in &design.verify.wavelengths_um {
         let wavelength_nm = wavelength_um * 1e3;
         let index = match substrate.index(wavelength_um) {
@@ -226,6 +254,7 @@ mod tests {
             let work = Work::new(&Allowance::of([]), &Silent);
             let whole = all_steps(&work, lattice, &phase).unwrap();
             assert_eq!(radial_steps(&work, lattice, &phase).unwrap(), whole);
+            assert_eq!(steps_to_neighbours(&work, lattice, &phase).unwrap(), whole);
             assert!(sites < 40 || (whole.1 > 0 && whole.1 < whole.0));
         }
     }

@@ -63,25 +63,35 @@ impl FieldRule {
         }
     }
 
-    /// Rows or columns whose pillars could reach over a boundary, with the boundary's distance from them.
-    fn lines(&self, flat: &FlatLayout<'_>, element: usize, axis: usize) -> Vec<(usize, f64)> {
+    /// Rows or columns whose pillars could reach over a boundary, with the boundary's distance from them: pillars are at most a
+    /// pitch wide, and on a hexagonal lattice more lines than the nearest are within half of that.
+    fn reaching(&self, flat: &FlatLayout<'_>, element: usize, axis: usize) -> Vec<(usize, f64)> {
+        let lattice = flat.elements[element].site.lattice;
+        self.lines(flat, element, axis, if lattice.is_square() { 0 } else { 1 })
+    }
+
+    /// Rows or columns nearest to boundaries, and so many on either side, with the boundary's distance from them.
+    fn lines(&self, flat: &FlatLayout<'_>, element: usize, axis: usize, beside: i64) -> Vec<(usize, f64)> {
         let site = &flat.elements[element].site;
         let (lattice, centre) = (site.lattice, self.centre(site.centre_nm));
-        let pitch = f64::from(lattice.pitch_nm());
-        let first = (site.centre_nm[axis] + lattice.coordinate_nm(0)) as f64;
-        let last = first + (lattice.sites() - 1) as f64 * pitch;
+        let (pitch, step) = (f64::from(lattice.pitch_nm()), f64::from(lattice.steps_nm()[axis]));
+        let first = (site.centre_nm[axis] + lattice.place_nm(axis, 0)) as f64;
+        let (most, last) = (lattice.sites() - 1, first + (lattice.sites() - 1) as f64 * step);
         self.boundaries(axis, centre[axis], first - pitch / 2.0, last + pitch / 2.0)
-            .map(|b| {
-                let site = ((b - first) / pitch).round().clamp(0.0, (lattice.sites() - 1) as f64);
-                (site as usize, (b - first - site * pitch).abs())
+            .flat_map(|b| {
+                let nearest = ((b - first) / step).round().clamp(0.0, most as f64);
+                (-beside..=beside)
+                    .map(move |k| nearest + k as f64)
+                    .filter(move |line| (0.0..=most as f64).contains(line))
+                    .map(move |line| (line as usize, (b - first - line * step).abs()))
             })
             .collect()
     }
 
     fn cut_on_lattices(&self, flat: &FlatLayout<'_>, found: &mut Findings) {
         for (k, e) in flat.elements.iter().enumerate() {
-            let columns = self.lines(flat, k, 0);
-            let rows = self.lines(flat, k, 1);
+            let columns = self.reaching(flat, k, 0);
+            let rows = self.reaching(flat, k, 1);
             let (n, mut room) = (e.site.lattice.sites(), Vec::new());
             let cut = |w: u16, axis: usize, distance: f64| w != 0 && distance < flat.half_nm(w)[axis] - ROUNDING_NM;
             let words = || "cut by a field boundary".to_owned();
@@ -149,13 +159,13 @@ impl Rule for FieldRule {
         for (k, e) in flat.elements.iter().enumerate() {
             // Small lenses stand in the middle of the lattice of the largest.
             let n = e.site.lattice.sites();
-            let columns = self.lines(flat, k, 0).into_iter();
+            let columns = self.lines(flat, k, 0, 0).into_iter();
             let columns = columns.filter(|&(column, _)| (0..n).any(|row| e.widths.width(column, row) != 0));
-            let rows = self.lines(flat, k, 1).into_iter();
+            let rows = self.lines(flat, k, 1, 0).into_iter();
             let rows = rows.filter(|&(row, _)| (0..n).any(|column| e.widths.width(column, row) != 0));
             let lines = columns.count() + rows.count();
             if lines > 0 {
-                let half = (e.site.lattice.coordinate_nm(0).abs() + i64::from(e.site.lattice.pitch_nm()) / 2) as f64;
+                let half = (e.site.lattice.place_nm(0, 0).abs() + i64::from(e.site.lattice.pitch_nm()) / 2) as f64;
                 let unit = |nm: f64| flat.units(nm).round() as i64;
                 let c = e.site.centre_nm.map(|c| c as f64);
                 let lens = Rect {

@@ -106,8 +106,8 @@ impl FlatLayout<'_> {
             PillarShape::Circle => Body::Disc(around),
             PillarShape::Rectangle(pillars) => {
                 let (e, unit) = (&self.elements[element], |nm: i64| self.units(nm as f64).round() as i64);
-                let x = e.site.centre_nm[0] + e.site.lattice.coordinate_nm(column);
-                let y = e.site.centre_nm[1] + e.site.lattice.coordinate_nm(row);
+                let x = e.site.centre_nm[0] + e.site.lattice.place_nm(0, column);
+                let y = e.site.centre_nm[1] + e.site.lattice.place_nm(1, row);
                 let corner = |(dx, dy): (i64, i64)| Point::new(unit(x + dx), unit(y + dy));
                 let [a, b, c, d] = pillars.corners(e.widths.width(column, row)).map(corner);
                 Body::Tilted([a, b, c, d, a])
@@ -130,8 +130,8 @@ impl FlatLayout<'_> {
     pub fn pillar(&self, element: usize, row: usize, column: usize) -> Rect {
         let e = &self.elements[element];
         let [half_x, half_y] = self.half_nm(e.widths.width(column, row));
-        let x = (e.site.centre_nm[0] + e.site.lattice.coordinate_nm(column)) as f64;
-        let y = (e.site.centre_nm[1] + e.site.lattice.coordinate_nm(row)) as f64;
+        let x = (e.site.centre_nm[0] + e.site.lattice.place_nm(0, column)) as f64;
+        let y = (e.site.centre_nm[1] + e.site.lattice.place_nm(1, row)) as f64;
         let unit = |nm: f64| self.units(nm).round() as i64;
         Rect {
             x0: unit(x - half_x),

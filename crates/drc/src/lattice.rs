@@ -162,6 +162,15 @@ impl Rule for ExposureGrid {
                     )
                 });
             }
+            let row = f64::from(e.site.lattice.kind().row_nm(e.site.lattice.pitch_nm()));
+            if row != pitch && self.remainder(row).abs() > ROUNDING_NM {
+                found.plain(&format!("{} rows", e.site.name), || {
+                    format!(
+                        "{}: rows {row} nm apart are no multiple of {} nm",
+                        e.site.name, self.step_nm
+                    )
+                });
+            }
             let histogram = e.widths.histogram();
             let off: Vec<bool> = (0..histogram.len())
                 .map(|w| w > 0 && self.remainder(w as f64).abs() > ROUNDING_NM)

@@ -147,8 +147,8 @@ fn pillars_out(flat: &FlatLayout<'_>, out: &impl Fn(&Rect) -> bool, found: &mut 
         let site = |row, column| {
             let half = i64::from(e.site.lattice.pitch_nm()) / 2;
             let unit = |nm: i64| flat.units(nm as f64).round() as i64;
-            let x = e.site.centre_nm[0] + e.site.lattice.coordinate_nm(column);
-            let y = e.site.centre_nm[1] + e.site.lattice.coordinate_nm(row);
+            let x = e.site.centre_nm[0] + e.site.lattice.place_nm(0, column);
+            let y = e.site.centre_nm[1] + e.site.lattice.place_nm(1, row);
             Rect {
                 x0: unit(x - half),
                 y0: unit(y - half),

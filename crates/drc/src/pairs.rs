@@ -73,16 +73,17 @@ pub(super) fn near<'s>(
 fn sites_in(flat: &FlatLayout<'_>, element: usize, r: &Rect) -> (Range<i64>, Range<i64>) {
     let site = &flat.elements[element].site;
     let (sites, pitch) = (site.lattice.sites() as i64, f64::from(site.lattice.pitch_nm()));
-    let range = |low: i64, high: i64, centre: i64| {
+    let range = |axis: usize, low: i64, high: i64| {
         // Widths are at most a pitch: sites within half a pitch of the rectangle.
-        let first = site.lattice.coordinate_nm(0) as f64 + centre as f64;
-        let index = |v: i64, half: f64| (v as f64 * flat.unit_nm + half - first) / pitch;
+        let first = site.lattice.place_nm(axis, 0) as f64 + site.centre_nm[axis] as f64;
+        let step = f64::from(site.lattice.steps_nm()[axis]);
+        let index = |v: i64, half: f64| (v as f64 * flat.unit_nm + half - first) / step;
         let from = index(low, -pitch / 2.0).floor().max(0.0) as i64;
         let to = index(high, pitch / 2.0).ceil().min((sites - 1) as f64) as i64;
         from..to + 1
     };
-    let columns = range(r.x0, r.x1, site.centre_nm[0]);
-    let rows = range(r.y0, r.y1, site.centre_nm[1]);
+    let columns = range(0, r.x0, r.x1);
+    let rows = range(1, r.y0, r.y1);
     (rows, columns)
 }
 

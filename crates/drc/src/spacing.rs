@@ -7,8 +7,8 @@ use super::flat::FlatLayout;
 use super::pairs::{near, place};
 use super::rule::{NotRun, Rule, RuleOutcome};
 use super::tolerance::ROUNDING_NM;
-use metalith_core::WidthRows;
 use metalith_core::document::{Limits, Section};
+use metalith_core::{LatticeKind, WidthRows};
 use metalith_gds::LayerNumber;
 
 #[derive(Clone, Copy, PartialEq)]
@@ -105,21 +105,47 @@ fn report_gap(
     });
 }
 
-/// Gaps between pillars on one lattice: neighbours along the axes and diagonals. Pillars are at most a
-/// pitch wide, so farther ones are at least a pitch apart.
+/// Steps up and right to the neighbours on a square lattice, along the axes and diagonals: of pillars that are at most a pitch
+/// wide, farther ones are at least a pitch apart.
+const SQUARE: &[(usize, isize)] = &[(0, 1), (1, 0), (1, 1), (1, -1)];
+
+/// The same to half of the six neighbours on a hexagonal lattice, in its grid. Farther ones are the root of three of a pitch away.
+const HEXAGONAL: &[(usize, isize)] = &[(0, 2), (1, 1), (1, -1)];
+
+/// Share of the pitch below which gaps to farther ones than these are not.
+const HEXAGONAL_REACH: f64 = 0.73;
+
+/// Gaps between pillars on one lattice.
 fn on_lattices(flat: &FlatLayout<'_>, nm: f64, height_nm: Option<f64>, found: &mut Findings) -> Result<(), String> {
     for (k, e) in flat.elements.iter().enumerate() {
         let pitch = f64::from(e.site.lattice.pitch_nm());
-        if nm > pitch {
+        let lattice = e.site.lattice;
+        let (neighbours, reach) = match lattice.kind() {
+            LatticeKind::Square => (SQUARE, pitch),
+            LatticeKind::Hexagonal => (HEXAGONAL, HEXAGONAL_REACH * pitch),
+        };
+        if nm > reach {
             return Err(format!(
-                "a gap of {nm} nm is beyond the pitch of {pitch} nm of {}",
+                "a gap of {nm} nm is beyond {} of {reach} nm of {}",
+                if lattice.is_square() {
+                    "the pitch"
+                } else {
+                    "0.73 pitches"
+                },
                 e.site.name
             ));
         }
+        let steps = lattice.steps_nm().map(f64::from);
+        let apart = |up: usize, right: isize| [steps[0] * right as f64, steps[1] * up as f64];
+        let nearest = neighbours
+            .iter()
+            .map(|&(up, right)| apart(up, right))
+            .map(|[x, y]| x.hypot(y))
+            .fold(f64::INFINITY, f64::min);
         let widest = flat
             .shape
             .widest_nm(e.widths.histogram().len().saturating_sub(1) as u16);
-        if pitch - widest >= nm {
+        if nearest - widest >= nm {
             continue;
         }
         let n = e.site.lattice.sites();
@@ -133,13 +159,12 @@ fn on_lattices(flat: &FlatLayout<'_>, nm: f64, height_nm: Option<f64>, found: &m
                 lines[1].extend_from_slice(e.widths.row(row + 1, 0..n, &mut room));
             }
             for (column, &own) in lines[0].iter().enumerate().filter(|(_, w)| **w != 0) {
-                for (up, right) in [(0, 1), (1, 0), (1, 1), (1, -1)] {
+                for &(up, right) in neighbours {
                     let Some(c) = column.checked_add_signed(right) else {
                         continue;
                     };
                     let Some(&other) = lines[up].get(c) else { continue };
-                    let apart = [pitch * right as f64, pitch * up as f64];
-                    let gap = flat.shape.gap([own, other].map(f64::from), apart);
+                    let gap = flat.shape.gap([own, other].map(f64::from), apart(up, right));
                     if other != 0 && gap < nm - ROUNDING_NM {
                         let (a, b) = (flat.body(k, row, column), flat.body(k, row + up, c));
                         report_gap(flat, &a, &b, gap / flat.unit_nm, height_nm, found);

@@ -221,7 +221,7 @@ impl<'a> PillarWriter<'a> {
     ) -> Result<()> {
         let lattice = widths.lattice();
         let n = lattice.sites();
-        let places = (0..n).map(|i| coordinate(lattice.coordinate_nm(i))).collect::<Vec<_>>();
+        let places = [0, 1].map(|axis| -> Vec<i32> { (0..n).map(|i| coordinate(lattice.place_nm(axis, i))).collect() });
         for side_by_side in blocks(n, &runs).chunks(BLOCKS) {
             if self.progress.stopped() {
                 return Err(Error::Interrupted);
@@ -236,7 +236,7 @@ impl<'a> PillarWriter<'a> {
                     for (iy, run) in rows.clone().flat_map(|iy| runs(iy).map(|run| (iy, run))) {
                         let row = widths.row(iy, run.clone(), &mut room);
                         for (ix, &width) in run.zip(row).filter(|(_, w)| **w != 0) {
-                            let (x, y) = (places[ix], places[iy]);
+                            let (x, y) = (places[0][ix], places[1][iy]);
                             encode(out, PlacedPillar { x, y, width });
                             pillars += 1;
                         }

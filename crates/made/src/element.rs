@@ -178,9 +178,15 @@ impl MadeElement {
     /// crescent that opens on the other side meets no pillar, is not focused, and is left out.
     ///
     /// # Errors
-    /// If the widths fall into more classes than can be numbered.
+    /// If the widths fall into more classes than can be numbered, or the lattice is hexagonal.
     pub fn new(drawn: &DrawnElement<'_>, geometry: &GeometryChange) -> Result<Self> {
         let lattice = drawn.pillars.lattice;
+        if !lattice.is_square() {
+            return Err(Error::invalid(
+                "a chip whose pillars stand on a hexagonal lattice",
+                "what a process makes of a chip is known on square lattices alone",
+            ));
+        }
         let n = lattice.sites();
         let steps = drawn.site_steps(geometry);
         let [ox, oy] = geometry.aperture_offset_um;

@@ -119,6 +119,7 @@ pub mod tests {
     /// The rule of the shipped designs but for the coefficients.
     pub fn rule(coefficients: &[f64]) -> WidthRule {
         let cell = CellSpec {
+            lattice: Default::default(),
             pitch_nm: 350,
             pillar_height_nm: 700.0,
             width_range_nm: (100, 300),

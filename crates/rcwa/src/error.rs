@@ -56,6 +56,13 @@ pub enum Error {
     },
     #[error("a lattice with a pitch of {pitch_nm} nm")]
     Pitch { pitch_nm: f64 },
+    #[error("rows {row_nm} nm apart")]
+    Row { row_nm: f64 },
+    /// Layers count from one, the lowest.
+    #[error("layer {layer} of a cell of staggered rows has a pillar that is no circle")]
+    StaggeredOutline { layer: usize },
+    #[error("a supercell of cells of staggered rows")]
+    StaggeredSites,
     #[error("a medium with the index {} + {} i", index.re, index.im)]
     Index { index: Complex64 },
     /// Layers count from one, the lowest.
@@ -159,10 +166,13 @@ impl Error {
                 format!("use fewer orders or fewer sites: at most {most} unknowns are solved for")
             }
             Self::Pitch { .. } => "use a positive number of nanometres".into(),
+            Self::Row { .. } => "use a positive number of nanometres".into(),
+            Self::StaggeredOutline { .. } => "use circles, or a square lattice".into(),
+            Self::StaggeredSites => "use a square lattice: supercells know no other".into(),
             Self::Index { .. } => "use n >= 0 and k >= 0, not both zero; gain is not supported".into(),
             Self::Height { .. } => "give a positive thickness, or leave the layer out".into(),
             Self::Width { .. } => {
-                "make the width at most the pitch; walls that lean outwards count at their foot".into()
+                "make the width at most the distance of the nearest pillars; walls that lean outwards count at their foot".into()
             }
             Self::Polarising => "solve for its Jones matrix instead".into(),
             Self::NoModes { .. } => "change the wavelength, the width or the number of orders a little".into(),

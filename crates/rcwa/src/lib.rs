@@ -26,7 +26,7 @@ pub use outline::Outline;
 use permittivity::CrossSection;
 use propagate::{Ends, propagate_wave};
 pub use response::{Convergence, DiffractionOrder, Response, converge};
-pub use stack::{Layer, LayerStack, Orders};
+pub use stack::{CellLattice, Layer, LayerStack, Orders};
 pub use supercell::{SiteLattice, SiteLayer, Supercell, SupercellOrder, SupercellResponse, solve_supercell};
 
 pub use error::{Error, Result, TableError};
@@ -189,22 +189,33 @@ fn solve_once(stack: &LayerStack, incidence: &Incidence, orders: Orders, symmetr
     Response::new(&problem, incidence, parts)
 }
 
-/// Zero-order transmission of a square cell along the normal: Ex where the stack ends over the incident
-/// Ex where it begins. One polarisation is solved for, the other is alike.
+/// Zero-order transmission of a cell along the normal, where it is the same for both polarisations: Ex where the stack ends
+/// over the incident Ex where it begins. One polarisation is solved for, the other is alike. Of staggered rows that are
+/// not quite a hexagonal lattice, it is the mean of both.
 ///
 /// # Errors
-/// As [`solve`]; also if the cell tells x from y.
+/// As [`solve`]; also if a pillar tells x from y.
 pub fn transmit(stack: &LayerStack, wavelength_um: f64, side: Side, orders: Orders) -> Result<Complex64> {
-    if !stack.is_square() {
-        return Err(Error::Polarising);
-    }
+    stack.check()?;
+    let polarisations = match stack.lattice {
+        CellLattice::Square if !stack.is_square() => return Err(Error::Polarising),
+        CellLattice::Square => 1,
+        CellLattice::Staggered { .. } if stack.lattice.is_hexagonal(stack.pitch_nm) => 1,
+        CellLattice::Staggered { .. } => 2,
+    };
     off_cutoff(wavelength_um, |wavelength_um| {
         let problem = Problem::new(stack, &Incidence::normal(wavelength_um, side), orders)?;
-        let part = problem.part(
-            Family::Product(Space::Even, Space::Even),
-            &[[Complex64::ONE, Complex64::ZERO]],
-        )?;
-        response::finite(part.amplitude(&part.ends.transmitted, 0, 0, 0)[0])
+        let along = |axis: usize| -> Result<Complex64> {
+            let space = [Space::Even, Space::Odd][axis];
+            let mut arriving = [Complex64::ZERO; 2];
+            arriving[axis] = Complex64::ONE;
+            let part = problem.part(Family::Product(space, space), &[arriving])?;
+            response::finite(part.amplitude(&part.ends.transmitted, 0, 0, 0)[axis])
+        };
+        match polarisations {
+            1 => along(0),
+            _ => Ok(0.5 * (along(0)? + along(1)?)),
+        }
     })
 }
 
@@ -226,8 +237,8 @@ struct Problem {
     stack: LayerStack,
     orders: Orders,
     k: [f64; 2],
-    /// Wavelength over pitch: the lattice vector over k0.
-    step: f64,
+    /// Wavelength over the periods along x and y: the vectors of the orders over k0.
+    steps: [f64; 2],
     k0_per_nm: f64,
 }
 
@@ -253,7 +264,7 @@ impl Problem {
         let wavelength_nm = incidence.wavelength_um * 1e3;
         Ok(Self {
             k: incidence.sines,
-            step: wavelength_nm / stack.pitch_nm,
+            steps: stack.steps(wavelength_nm),
             k0_per_nm: TAU / wavelength_nm,
             stack,
             orders,
@@ -261,7 +272,7 @@ impl Problem {
     }
 
     fn part(&self, family: Family, incident: &[[Complex64; 2]]) -> Result<Part> {
-        let basis = FieldBasis::new(self.orders.highest(), family, self.k, self.step);
+        let basis = FieldBasis::new(self.orders.of(self.stack.lattice), family, self.k, self.steps);
         if basis.rows.len() > MOST_UNKNOWNS {
             return Err(Error::TooLarge {
                 along_axis: self.orders.along_axis(),
@@ -275,6 +286,7 @@ impl Problem {
                 inside: layer.inside * layer.inside,
                 outside: layer.outside * layer.outside,
                 pitch_nm: self.stack.pitch_nm,
+                lattice: self.stack.lattice,
             };
             Ok((Modes::of(&section, &basis)?, layer.height_nm))
         });

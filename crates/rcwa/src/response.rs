@@ -26,7 +26,7 @@ pub struct Response {
 /// Power of one order over the incident power, for s and p incident.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DiffractionOrder {
-    /// Order along x and y.
+    /// Order along x and y; of staggered rows, by their rectangle of one pitch by two rows.
     pub order: [i32; 2],
     /// Power that goes on, for s and p incident.
     pub transmitted: [f64; 2],
@@ -49,11 +49,12 @@ impl Response {
     }
 
     pub(super) fn new(problem: &Problem, incidence: &Incidence, parts: Vec<Part>) -> Result<Self> {
-        let highest = problem.orders.highest() as i32;
+        let kept = problem.orders.of(problem.stack.lattice);
+        let [x, y] = kept.reach().map(|order| order as i32);
         let fields = Fields::new(problem, incidence, &parts);
         let mut orders = Vec::new();
-        for m in -highest..=highest {
-            for n in -highest..=highest {
+        for m in -x..=x {
+            for n in (-y..=y).filter(|&n| kept.has([m, n])) {
                 orders.extend(fields.order(m, n)?);
             }
         }
@@ -114,8 +115,8 @@ impl<'a> Fields<'a> {
     }
 
     fn wave_vector(&self, m: i32, n: i32) -> [f64; 2] {
-        let Problem { k, step, .. } = self.problem;
-        [k[0] + f64::from(m) * step, k[1] + f64::from(n) * step]
+        let Problem { k, steps, .. } = self.problem;
+        [k[0] + f64::from(m) * steps[0], k[1] + f64::from(n) * steps[1]]
     }
 
     fn order(&self, m: i32, n: i32) -> Result<Option<DiffractionOrder>> {

@@ -1,15 +1,68 @@
-//! What the solver is given: layers on a square lattice, in optical constants.
+//! What the solver is given: layers on a lattice, in optical constants.
 
 use num_complex::Complex64;
+use serde::Serialize;
 
+use super::basis::Kept;
 use super::outline::Outline;
 use super::{Error, Result};
 
-/// Layers between two half-spaces, all on one square lattice, centred on one another.
+/// Where the pillars of a cell stand.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CellLattice {
+    /// One pitch apart along x and along y.
+    #[default]
+    Square,
+    /// Rows along x, one pitch apart in a row, each row shifted by half a pitch against the next. Orders of such a lattice
+    /// are counted by its rectangle of one pitch by two rows; those whose sum is odd do not exist.
+    Staggered {
+        /// Distance of two rows (nm).
+        row_nm: f64,
+    },
+}
+
+impl CellLattice {
+    /// Staggered rows in which every pillar has six neighbours one pitch away.
+    pub fn hexagonal(pitch_nm: f64) -> Self {
+        Self::Staggered {
+            row_nm: ROW_OF_HEXAGONAL * pitch_nm,
+        }
+    }
+
+    /// Distance of two rows (nm).
+    pub fn row_nm(self, pitch_nm: f64) -> f64 {
+        match self {
+            Self::Square => pitch_nm,
+            Self::Staggered { row_nm } => row_nm,
+        }
+    }
+
+    /// Distance of the nearest two pillars (nm), which is as wide as a pillar may be.
+    pub fn nearest_nm(self, pitch_nm: f64) -> f64 {
+        match self {
+            Self::Square => pitch_nm,
+            Self::Staggered { row_nm } => pitch_nm.min((0.5 * pitch_nm).hypot(row_nm)).min(2.0 * row_nm),
+        }
+    }
+
+    /// Whether a sixth of a turn leaves it alike, but for rounding.
+    pub fn is_hexagonal(self, pitch_nm: f64) -> bool {
+        const ROUNDING: f64 = 1e-12;
+        matches!(self, Self::Staggered { row_nm } if (row_nm - ROW_OF_HEXAGONAL * pitch_nm).abs() <= ROUNDING * pitch_nm)
+    }
+}
+
+/// Distance of the rows of a hexagonal lattice over its pitch: half the root of three.
+const ROW_OF_HEXAGONAL: f64 = 0.866_025_403_784_438_6;
+
+/// Layers between two half-spaces, all on one lattice, centred on one another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LayerStack {
     /// Pitch of the lattice (nm).
     pub pitch_nm: f64,
+    /// How the pillars stand; rows that are staggered have circles.
+    pub lattice: CellLattice,
     /// Complex index of the half-space below, where the substrate is.
     pub below: Complex64,
     /// From the substrate upwards.
@@ -43,7 +96,8 @@ impl Layer {
     }
 }
 
-/// Number of diffraction orders kept along each axis, odd: 13 keeps -6..=6.
+/// Number of diffraction orders kept along each axis, odd: 13 keeps -6..=6. Of staggered rows, along each of the three
+/// directions of a hexagonal lattice, and all others as near: 13 keeps 127 orders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Orders(usize);
 
@@ -71,6 +125,14 @@ impl Orders {
     pub(super) fn highest(self) -> usize {
         self.0 / 2
     }
+
+    /// Which of a lattice they are.
+    pub(super) fn of(self, lattice: CellLattice) -> Kept {
+        match lattice {
+            CellLattice::Square => Kept::Square(self.highest()),
+            CellLattice::Staggered { .. } => Kept::Circle(self.highest()),
+        }
+    }
 }
 
 impl LayerStack {
@@ -78,15 +140,25 @@ impl LayerStack {
     pub(super) fn flipped(&self) -> Self {
         Self {
             pitch_nm: self.pitch_nm,
+            lattice: self.lattice,
             below: self.above,
             layers: self.layers.iter().rev().cloned().collect(),
             above: self.below,
         }
     }
 
-    /// Whether x and y polarisation see the same.
+    /// Whether a quarter of a turn leaves it alike, so that x and y polarisation see the same.
     pub(super) fn is_square(&self) -> bool {
-        self.layers.iter().all(|l| l.outline.is_square())
+        self.lattice == CellLattice::Square && self.layers.iter().all(|l| l.outline.is_square())
+    }
+
+    /// Wavelength over the periods along x and y, whose orders are counted.
+    pub(super) fn steps(&self, wavelength_nm: f64) -> [f64; 2] {
+        let along_y = match self.lattice {
+            CellLattice::Square => self.pitch_nm,
+            CellLattice::Staggered { row_nm } => 2.0 * row_nm,
+        };
+        [wavelength_nm / self.pitch_nm, wavelength_nm / along_y]
     }
 
     /// Whether both axes mirror it.
@@ -107,6 +179,11 @@ impl LayerStack {
         if !(pitch.is_finite() && pitch > 0.0) {
             return Err(Error::Pitch { pitch_nm: pitch });
         }
+        let row_nm = self.lattice.row_nm(pitch);
+        if !(row_nm.is_finite() && row_nm > 0.0) {
+            return Err(Error::Row { row_nm });
+        }
+        let nearest = self.lattice.nearest_nm(pitch);
         let indices = self
             .layers
             .iter()
@@ -130,11 +207,14 @@ impl LayerStack {
                 .extent_nm()
                 .into_iter()
                 .fold(0.0, |a, b| if b > a || b.is_nan() { b } else { a });
-            if !layer.outline.is_sound() || widest > pitch {
+            if !layer.outline.is_sound() || widest > nearest {
                 return Err(Error::Width {
                     width_nm: widest,
-                    pitch_nm: pitch,
+                    pitch_nm: nearest,
                 });
+            }
+            if self.lattice != CellLattice::Square && !layer.outline.is_circle() && !layer.outline.is_empty() {
+                return Err(Error::StaggeredOutline { layer: number + 1 });
             }
         }
         Ok(())

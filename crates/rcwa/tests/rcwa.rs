@@ -1,7 +1,7 @@
 //! The solver against closed forms, reciprocity, itself without symmetry, and tabulated truth.
 
 use metalith_rcwa::{
-    Incidence, Layer, LayerStack, Orders, Outline, Side, converge, solve, solve_without_symmetry, transmit,
+    CellLattice, Incidence, Layer, LayerStack, Orders, Outline, Side, converge, solve, solve_without_symmetry, transmit,
 };
 use num_complex::Complex64;
 
@@ -75,6 +75,7 @@ fn pillar(width_nm: f64, wavelength_um: f64) -> LayerStack {
     let (film, silica) = indices(wavelength_um);
     LayerStack {
         pitch_nm: 350.0,
+        lattice: CellLattice::Square,
         below: silica,
         layers: vec![Layer {
             height_nm: 700.0,
@@ -183,6 +184,7 @@ fn bare_interface_is_fresnel() {
         for theta in [0.0, 0.3, 1.1] {
             let stack = LayerStack {
                 pitch_nm: 350.0,
+                lattice: CellLattice::Square,
                 below: index(1.46),
                 layers: vec![],
                 above: index(1.0),
@@ -205,6 +207,7 @@ fn uniform_films_are_airy() {
             for theta in [0.0, 0.5] {
                 let stack = LayerStack {
                     pitch_nm: 350.0,
+                    lattice: CellLattice::Square,
                     below: index(1.46),
                     layers: vec![Layer {
                         height_nm: 700.0,

@@ -1,8 +1,8 @@
 //! Circles and rotated rectangles: symmetry, power, convergence, and what an independent code says.
 
 use metalith_rcwa::{
-    Error, Incidence, Layer, LayerStack, Orders, Outline, Response, Side, SiteLattice, Supercell, circular, solve,
-    solve_without_symmetry, transmit,
+    CellLattice, Error, Incidence, Layer, LayerStack, Orders, Outline, Response, Side, SiteLattice, Supercell,
+    circular, solve, solve_without_symmetry, transmit,
 };
 use num_complex::Complex64;
 
@@ -15,6 +15,7 @@ const TOLD_APART: f64 = 1e-7;
 fn stack(outline: Outline) -> LayerStack {
     LayerStack {
         pitch_nm: 330.0,
+        lattice: CellLattice::Square,
         below: Complex64::from(1.46),
         layers: vec![Layer {
             height_nm: 600.0,

@@ -3,7 +3,8 @@
 use std::f64::consts::TAU;
 
 use metalith_rcwa::{
-    Incidence, Layer, LayerStack, Material, Outline, Side, SiteLattice, Supercell, SupercellResponse, solve_supercell,
+    CellLattice, Incidence, Layer, LayerStack, Material, Outline, Side, SiteLattice, Supercell, SupercellResponse,
+    solve_supercell,
 };
 use num_complex::Complex64;
 
@@ -65,6 +66,7 @@ fn solve(row: &[&str]) -> SupercellResponse {
             let duty = duty.iter().rev().fold(0.0, |sum, c| sum * u + c);
             LayerStack {
                 pitch_nm: 350.0,
+                lattice: CellLattice::Square,
                 below: index("fused_silica_malitson_1965"),
                 layers: vec![Layer {
                     height_nm: 700.0,

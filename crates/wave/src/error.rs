@@ -34,6 +34,10 @@ pub enum WaveError {
     #[error("an aperture on {given:?}, planned for {planned:?}")]
     Lattice { given: Lattice, planned: Lattice },
 
+    /// An aperture on a hexagonal lattice, where rows and columns are taken for equally far apart.
+    #[error("a hexagonal lattice of {} nm, where square ones alone are known", lattice.pitch_nm())]
+    Hexagonal { lattice: Lattice },
+
     /// A band of wavelengths without light.
     #[error("no PSF of a band can be had from {samples} wavelengths and {parts} parts: one of them must have a weight")]
     Band { samples: usize, parts: usize },
@@ -105,6 +109,15 @@ pub enum WaveError {
 }
 
 impl WaveError {
+    /// Nothing, if a lattice is square.
+    pub(crate) fn unless_square(lattice: &Lattice) -> Result<()> {
+        if lattice.is_square() {
+            Ok(())
+        } else {
+            Err(Self::Hexagonal { lattice: *lattice })
+        }
+    }
+
     /// What to do about it.
     pub fn hint(&self) -> String {
         match self {
@@ -114,6 +127,7 @@ impl WaveError {
             Self::Fade { .. } => "make the lens or the window smaller, or the fade wider".into(),
             Self::Wave { .. } => "plan one propagator a wavelength, and keep the sine of the angle below one".into(),
             Self::Lattice { .. } => "plan one propagator a lattice".into(),
+            Self::Hexagonal { .. } => "use the direct sum, which knows both kinds, or a square lattice".into(),
             Self::Band { .. } => {
                 "give at least one wavelength, and parts with finite weights, one of them positive".into()
             }

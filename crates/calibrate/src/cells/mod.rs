@@ -353,6 +353,7 @@ mod tests {
     fn a_change_solved_with_few_orders_is_that_with_many() {
         let constant = |n| Material::constant(n, 0.0).unwrap();
         let stack = CellStack {
+            lattice: metalith_rcwa::CellLattice::Square,
             pitch_nm: 350.0,
             height_nm: 700.0,
             shape: metalith_core::PillarShape::Square,

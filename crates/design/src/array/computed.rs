@@ -49,7 +49,8 @@ impl ComputedWidths {
         if !own.is_steered_alone() || !other.is_steered_alone() {
             return symmetry == Symmetry::IDENTITY && self.element == to.element;
         }
-        Arc::ptr_eq(&self.lens, &to.lens)
+        symmetry.keeps_lattice(self.lens.lattice())
+            && Arc::ptr_eq(&self.lens, &to.lens)
             && own.is_of_lens(&other)
             && self.rule == to.rule
             && self.element.wedge.wavelength_um == to.element.wedge.wavelength_um

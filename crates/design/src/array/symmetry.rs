@@ -1,6 +1,6 @@
 //! The eight symmetries of the square, and those of them that leave a lens as it is.
 
-use metalith_core::{PillarShape, WidthMap};
+use metalith_core::{Lattice, PillarShape, WidthMap};
 use ndarray::{Array2, ArrayView2, Axis};
 
 /// One of the eight symmetries of the square, as GDSII writes it: mirrored about the x axis first
@@ -85,6 +85,11 @@ impl Symmetry {
         shape.rectangles().is_none() || (!self.mirrored && self.quarter_turns.is_multiple_of(2))
     }
 
+    /// Whether it takes a lattice into itself: a hexagonal one has the symmetries of a rectangle.
+    pub fn keeps_lattice(self, lattice: Lattice) -> bool {
+        lattice.is_square() || self.quarter_turns.is_multiple_of(2)
+    }
+
     /// Where a vector that is no whole number of anything goes.
     pub fn vector(self, [x, y]: [f64; 2]) -> [f64; 2] {
         let ((ax, ay), (bx, by)) = (self.point(1, 0), self.point(0, 1));
@@ -122,7 +127,9 @@ impl Symmetry {
         let seen = self.seen(&from.width_nm);
         // From the middle outwards: sites that differ are found at once there, the rim is mostly empty.
         let mut rows = (0..n).map(|k| if k % 2 == 0 { n / 2 + k / 2 } else { n / 2 - 1 - k / 2 });
-        from.lattice == to.lattice && rows.all(|iy| iy >= n || seen.row(iy) == to.width_nm.row(iy))
+        from.lattice == to.lattice
+            && self.keeps_lattice(from.lattice)
+            && rows.all(|iy| iy >= n || seen.row(iy) == to.width_nm.row(iy))
     }
 }
 
@@ -182,7 +189,6 @@ impl SymmetryGroup {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use metalith_core::Lattice;
 
     /// A lens of 12 sites across, whose widths follow from twice the place from the middle.
     pub fn lens(f: impl Fn(i64, i64) -> u16) -> WidthMap {

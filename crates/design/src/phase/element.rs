@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::{PhaseTerm, RadialPhase};
 use crate::spec::OutlineRows;
 use crate::{Design, Element, LensOutline, LensSpec};
-use metalith_core::{Lattice, Wedge};
+use metalith_core::{Lattice, LatticeKind, Wedge};
 
 /// Radii that are tabulated at most: 64 MB. A lens of 1 mm has a million.
 const MOST_ENTRIES: i64 = 1 << 23;
@@ -21,7 +21,7 @@ const MOST_ENTRIES: i64 = 1 << 23;
 #[derive(Clone, Debug)]
 pub struct LensPhase {
     lattice: Lattice,
-    /// Greatest squared radius inside the lens, in squared half pitches.
+    /// Greatest squared radius inside the lens: of a square lattice in squared half pitches, else of the diameter in nm^2.
     limit: i64,
     turns: TurnsOfRadius,
     /// Entries are this power of two apart in squared half pitches: a shift, since this is done for each pillar.
@@ -128,7 +128,10 @@ impl LensPhase {
     fn with_entries(lattice: Lattice, diameter_nm: u32, radial: &RadialPhase, most: i64) -> Self {
         // r^2 <= R^2 in half pitches: (2 R / p)^2, floored; exact in integers.
         let (d, p) = (i128::from(diameter_nm), i128::from(lattice.pitch_nm()));
-        let limit = (d * d / (p * p)) as i64;
+        let limit = match lattice.kind() {
+            LatticeKind::Square => (d * d / (p * p)) as i64,
+            LatticeKind::Hexagonal => i64::from(diameter_nm).pow(2),
+        };
         let (stride_log2, offset) = if lattice.sites().is_multiple_of(2) {
             (3, 2)
         } else {
@@ -139,7 +142,7 @@ impl LensPhase {
         } else {
             ((limit - offset) >> stride_log2) + 1
         };
-        let turns = if entries > most {
+        let turns = if entries > most || !lattice.is_square() {
             TurnsOfRadius::Computed(radial.clone())
         } else {
             let at = |k: i64| radial.turns(radius2_um2(lattice, (k << stride_log2) + offset));
@@ -164,7 +167,7 @@ impl LensPhase {
 
     /// Phase over the radius at a site (turns), not reduced; none outside the lens.
     pub fn turns(&self, ix: usize, iy: usize) -> Option<f64> {
-        let r2 = self.lattice.half_radius2(ix, iy);
+        let r2 = self.squared(ix, iy);
         self.holds(ix, iy).then(|| match &self.turns {
             TurnsOfRadius::Tabulated(turns) => turns[((r2 - self.offset) >> self.stride_log2) as usize],
             TurnsOfRadius::Computed(radial) => radial.turns(radius2_um2(self.lattice, r2)),
@@ -173,15 +176,31 @@ impl LensPhase {
 
     /// Whether a site is inside the lens.
     pub fn holds(&self, ix: usize, iy: usize) -> bool {
-        let place = |i| self.lattice.coordinate_nm(i);
-        self.lattice.half_radius2(ix, iy) <= self.limit
-            && self.outline.as_ref().is_none_or(|o| o.holds(iy, place(ix), place(iy)))
+        let place = |axis, i| self.lattice.place_nm(axis, i);
+        self.squared(ix, iy) <= self.limit
+            && self.lattice.has(ix, iy)
+            && self
+                .outline
+                .as_ref()
+                .is_none_or(|o| o.holds(iy, place(0, ix), place(1, iy)))
+    }
+
+    /// The squared radius of a place, in the unit of `limit`.
+    #[inline]
+    fn squared(&self, ix: usize, iy: usize) -> i64 {
+        match self.lattice.kind() {
+            LatticeKind::Square => self.lattice.half_radius2(ix, iy),
+            LatticeKind::Hexagonal => 4 * self.lattice.radius2_nm2(ix, iy),
+        }
     }
 }
 
-/// Squared radius (um^2) of one in squared half pitches.
+/// Squared radius (um^2) of one in the unit of [`LensPhase::squared`].
 fn radius2_um2(lattice: Lattice, r2: i64) -> f64 {
-    let half_pitch_um = lattice.pitch_um() / 2.0;
+    let half_pitch_um = match lattice.kind() {
+        LatticeKind::Square => lattice.pitch_um() / 2.0,
+        LatticeKind::Hexagonal => 0.5e-3,
+    };
     r2 as f64 * half_pitch_um * half_pitch_um
 }
 
@@ -193,7 +212,7 @@ pub struct ElementPhase<'a> {
     terms: Vec<&'a PhaseTerm>,
     /// What phases over the plane are rotated by.
     rotation: Rotation,
-    /// Turns a half pitch along x and y.
+    /// Turns a half step of the lattice along x and y.
     step: (f64, f64),
 }
 
@@ -213,12 +232,15 @@ impl<'a> ElementPhase<'a> {
 
     /// The lens with a wedge on it and nothing else.
     pub fn new(lens: &'a LensPhase, wedge: &Wedge) -> Self {
-        let half_pitch_turns = lens.lattice.pitch_um() / 2.0 / wedge.wavelength_um;
+        let [x, y] = lens
+            .lattice
+            .steps_nm()
+            .map(|step| f64::from(step) * 1e-3 / 2.0 / wedge.wavelength_um);
         Self {
             lens,
             terms: Vec::new(),
             rotation: Rotation::NONE,
-            step: (half_pitch_turns * wedge.sin_x, half_pitch_turns * wedge.sin_y),
+            step: (x * wedge.sin_x, y * wedge.sin_y),
         }
     }
 
@@ -261,9 +283,7 @@ impl<'a> ElementPhase<'a> {
             return Some(steered);
         }
         let lattice = self.lens.lattice;
-        let (x_um, y_um) = self
-            .rotation
-            .before(lattice.coordinate_um(ix), lattice.coordinate_um(iy));
+        let (x_um, y_um) = self.rotation.before(lattice.place_um(0, ix), lattice.place_um(1, iy));
         Some(
             self.terms
                 .iter()
@@ -280,7 +300,7 @@ impl<'a> ElementPhase<'a> {
         })
     }
 
-    /// Phases modulo one turn of consecutive sites from a distance to the middle (um) on; the direction is along an axis
+    /// Phases modulo one turn of consecutive sites of a square lattice from a distance to the middle (um) on; the direction is along an axis
     /// or a diagonal, where there is a site at every step along either axis. None if the lens ends before.
     pub fn row(&self, radius_um: f64, direction: [i32; 2], sites: usize) -> Option<Vec<f64>> {
         let lattice = self.lattice();

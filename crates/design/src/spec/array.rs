@@ -204,10 +204,10 @@ impl ArraySpec {
 
     /// Elements stand on lattices of one size: their squares must not overlap, or pillars could be of either.
     fn apart(&self, lens: &LensSpec, cell: &CellSpec, sections: &[Section<'_, '_>]) {
-        let Ok(lattice) = Lattice::covering(self.largest_nm(lens), cell.pitch_nm) else {
+        let Ok(lattice) = Lattice::of_kind_covering(cell.lattice, self.largest_nm(lens), cell.pitch_nm) else {
             return;
         };
-        let side_nm = lattice.sites() as i64 * i64::from(lattice.pitch_nm());
+        let side_nm = lattice.sites() as i64 * i64::from(lattice.steps_nm()[0]);
         for (k, s) in sections.iter().enumerate() {
             let (x, y) = self.placed[k].centre_nm;
             let near = |p: &PlacedSpec| (x - p.centre_nm.0).abs().max((y - p.centre_nm.1).abs()) < side_nm;

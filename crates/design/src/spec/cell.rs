@@ -5,13 +5,16 @@ use serde::Serialize;
 use super::lens::WAVELENGTH;
 use metalith_cell::{Handedness, InversePolynomial};
 use metalith_core::document::{Limits, Section};
-use metalith_core::{PillarShape, Rectangles};
+use metalith_core::{LatticeKind, PillarShape, Rectangles};
 
-/// The unit cell: a pillar on a square lattice.
+/// The unit cell: a pillar on a lattice.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CellSpec {
     /// Distance of neighbouring pillars (nm), even.
     pub pitch_nm: u32,
+    /// How they stand; on a hexagonal lattice they are circles.
+    #[serde(skip_serializing_if = "LatticeKind::is_square")]
+    pub lattice: LatticeKind,
     /// Cross-section of the pillars.
     #[serde(skip_serializing_if = "PillarShape::is_square")]
     pub shape: PillarShape,
@@ -72,8 +75,10 @@ impl CellSpec {
             );
         }
         // A pitch with a fault bounds nothing.
+        let kinds = [("square", LatticeKind::Square), ("hexagonal", LatticeKind::Hexagonal)];
+        let lattice = s.choice("lattice", &kinds, Some(LatticeKind::Square));
         let widest = if s.sound(&["cell.pitch_nm"]) {
-            pitch_nm
+            nearest_nm(lattice, pitch_nm)
         } else {
             WIDEST_PITCH_NM
         };
@@ -90,6 +95,14 @@ impl CellSpec {
                 (PillarShape::Rectangle(pillars), (1, pillars.steps), 1)
             }
         };
+        if !lattice.is_square() && shape != PillarShape::Circle {
+            s.fault_given(
+                &["cell.shape"],
+                "lattice",
+                "a hexagonal lattice of pillars that are no circles",
+                "add `shape = \"circle\"`, or use the square lattice",
+            );
+        }
         let arriving = shape
             .rectangles()
             .map(|_| s.choice("arriving", &Handedness::CHOICES, Some(Handedness::default())));
@@ -100,6 +113,7 @@ impl CellSpec {
             .unwrap_or_else(|| DEFAULT_FILM.into());
         let cell = Self {
             pitch_nm: pitch_nm & !1,
+            lattice,
             shape,
             arriving,
             pillar_height_nm: s.float("pillar_height_nm", Limits::new(10.0..=TALLEST_NM, "nm")),
@@ -124,6 +138,7 @@ impl CellSpec {
     /// air. Published polynomials, and errors that were measured against truth data, are of it.
     pub fn is_of_the_paper(&self) -> bool {
         self.shape.is_square()
+            && self.lattice.is_square()
             && self.pitch_nm == 350
             && self.pillar_height_nm == 700.0
             && self.pillar_material == DEFAULT_FILM
@@ -145,7 +160,7 @@ impl CellSpec {
     /// The largest width (nm) or number that a pillar can have: no width is beyond the pitch.
     pub fn most(&self) -> u16 {
         match self.shape {
-            PillarShape::Square | PillarShape::Circle => self.pitch_nm as u16,
+            PillarShape::Square | PillarShape::Circle => nearest_nm(self.lattice, self.pitch_nm) as u16,
             PillarShape::Rectangle(pillars) => pillars.steps,
         }
     }
@@ -153,6 +168,18 @@ impl CellSpec {
     /// All widths that may be written (nm), narrowest first; of rectangles all numbers.
     pub fn widths_nm(&self) -> impl Iterator<Item = u16> + use<> {
         (self.width_range_nm.0..=self.width_range_nm.1).step_by(usize::from(self.width_step_nm))
+    }
+}
+
+/// Distance of the nearest pillars, to an even number below (nm): rows of a hexagonal lattice are rounded.
+fn nearest_nm(lattice: LatticeKind, pitch_nm: u32) -> u32 {
+    match lattice {
+        LatticeKind::Square => pitch_nm,
+        LatticeKind::Hexagonal => {
+            let row_nm = f64::from(lattice.row_nm(pitch_nm));
+            let across_nm = (0.5 * f64::from(pitch_nm)).hypot(row_nm);
+            (across_nm.min(f64::from(pitch_nm)) as u32) & !1
+        }
     }
 }
 

@@ -120,7 +120,7 @@ pub(super) fn read_diameter(s: &Section<'_, '_>, cell: &CellSpec) -> u32 {
             "round it to 0.001 um",
         );
     }
-    if Lattice::covering(diameter_nm, cell.pitch_nm).is_err() {
+    if Lattice::of_kind_covering(cell.lattice, diameter_nm, cell.pitch_nm).is_err() {
         s.fault_given(
             &["cell.pitch_nm"],
             "diameter_um",

@@ -89,7 +89,9 @@ pub(super) fn read(s: &Section<'_, '_>, cell: &CellSpec) -> (u32, Option<LensOut
     let outline = LensOutline::rounded(corners_um.into_iter());
     let diameter_nm = outline.diameter_nm();
     let largest_nm = DIAMETER.range.end() * 1e3;
-    if f64::from(diameter_nm) > largest_nm || Lattice::covering(diameter_nm, cell.pitch_nm).is_err() {
+    if f64::from(diameter_nm) > largest_nm
+        || Lattice::of_kind_covering(cell.lattice, diameter_nm, cell.pitch_nm).is_err()
+    {
         s.fault_given(
             &["cell.pitch_nm"],
             key,
@@ -128,7 +130,7 @@ impl LensOutline {
     /// Its sides by the rows of a lattice.
     pub(crate) fn rows(&self, lattice: &Lattice) -> OutlineRows {
         let reached = |iy| {
-            let y = lattice.coordinate_nm(iy);
+            let y = lattice.place_nm(1, iy);
             let reaches = |((_, ay), (_, by)): &Side| (*ay.min(by)..=*ay.max(by)).contains(&y);
             sides(&self.corners_nm).filter(reaches).collect()
         };

@@ -22,9 +22,9 @@ pub(super) fn unite(known: &mut Vec<ElementSite>, more: Vec<ElementSite>) {
 
 /// Outermost sites along an axis (nm).
 fn ends(site: &ElementSite, axis: usize) -> (i64, i64) {
-    let last = site.lattice.sites() - 1;
-    let at = |k| site.centre_nm[axis] + site.lattice.coordinate_nm(k);
-    (at(0), at(last))
+    let reach = &site.lattice.reach()[axis];
+    let at = |k| site.centre_nm[axis] + site.lattice.place_nm(axis, k);
+    (at(reach.start), at(reach.end - 1))
 }
 
 fn overlap(a: &ElementSite, b: &ElementSite) -> bool {
@@ -34,11 +34,18 @@ fn overlap(a: &ElementSite, b: &ElementSite) -> bool {
     })
 }
 
-/// The smallest square lattice with the sites of both, if they are on one.
+/// The smallest square lattice with the sites of both, if they are on one; of hexagonal ones the larger, about one middle.
 fn cover(a: &ElementSite, b: &ElementSite) -> Option<ElementSite> {
     let pitch = i64::from(a.lattice.pitch_nm());
-    if a.lattice.pitch_nm() != b.lattice.pitch_nm() {
+    if a.lattice.pitch_nm() != b.lattice.pitch_nm() || a.lattice.kind() != b.lattice.kind() {
         return None;
+    }
+    if !a.lattice.is_square() {
+        let larger = if a.lattice.sites() < b.lattice.sites() { b } else { a };
+        return (a.centre_nm == b.centre_nm).then(|| ElementSite {
+            name: a.name.clone(),
+            ..larger.clone()
+        });
     }
     let mut first = [0; 2];
     let mut sites = 0;

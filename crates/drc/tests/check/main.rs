@@ -5,6 +5,7 @@ mod circles;
 mod decks;
 mod design;
 mod forms;
+mod hexagonal;
 mod on_lattice;
 mod openings;
 mod pillars;

@@ -9,7 +9,7 @@ use crate::{
     Error, ExtractionError, LayerNumber, Layout, LayoutCell, Point, Rect, Result, Selection, Shape, Transform, Visitor,
     pillar_of,
 };
-use metalith_core::{ElementSite, Lattice, PillarShape, Progress};
+use metalith_core::{ElementSite, Lattice, LatticeKind, PillarShape, Progress};
 
 /// Wider shapes are pads or marks (nm).
 const WIDEST_NM: i64 = 6000;
@@ -201,9 +201,9 @@ impl Map {
         if squares < FEWEST {
             return Ok(None);
         }
-        let mut steps: BTreeMap<i64, u64> = BTreeMap::new();
+        let mut steps = [BTreeMap::<i64, u64>::new(), BTreeMap::new()];
         for &k in cluster {
-            for axis in [|s: Point| s.x, |s: Point| s.y] {
+            for (axis, steps) in AXES.into_iter().zip(&mut steps) {
                 let mut places: Vec<i64> = self.tiles.samples(k).map(axis).collect();
                 places.sort_unstable();
                 places.dedup();
@@ -212,24 +212,19 @@ impl Map {
                 }
             }
         }
+        if let Some(element) = self.hexagonal(cluster, squares, &steps)? {
+            return Ok(Some(element));
+        }
+        let [mut steps, along_y] = steps;
+        along_y
+            .into_iter()
+            .for_each(|(step, count)| *steps.entry(step).or_default() += count);
         let Some(step) = most_common(steps) else {
             return Ok(None);
         };
-        let mut bounds = Rect::EMPTY;
-        cluster.iter().for_each(|&k| bounds.unite(&self.tiles.bounds(k)));
-        let axis = |of: fn(Point) -> i64, from: i64, to: i64| {
-            let mut phases: BTreeMap<i64, u64> = BTreeMap::new();
-            for s in cluster.iter().flat_map(|&k| self.tiles.samples(k)) {
-                *phases.entry(of(s).rem_euclid(step)).or_default() += 1;
-            }
-            let phase = most_common(phases).unwrap_or(0);
-            // Outermost places on the lattice: what is off it does not widen it.
-            let first = from + (phase - from).rem_euclid(step);
-            let last = to - (to - phase).rem_euclid(step);
-            (first, (last - first).max(0) / step + 1)
-        };
-        let (x, columns) = axis(|s| s.x, bounds.x0, bounds.x1);
-        let (y, rows) = axis(|s| s.y, bounds.y0, bounds.y1);
+        let bounds = self.bounds(cluster);
+        let (x, columns) = self.places(cluster, 0, step, [bounds.x0, bounds.x1]);
+        let (y, rows) = self.places(cluster, 1, step, [bounds.y0, bounds.y1]);
         let sites = columns.max(rows);
         if (sites as u64).saturating_pow(2) > squares.saturating_mul(SITES_PER_PILLAR) + (1 << 16) {
             return Err(ExtractionError::Sparse {
@@ -259,6 +254,90 @@ impl Map {
         }))
     }
 }
+
+impl Map {
+    /// Around all centres of a cluster (half nm).
+    fn bounds(&self, cluster: &[usize]) -> Rect {
+        let mut bounds = Rect::EMPTY;
+        cluster.iter().for_each(|&k| bounds.unite(&self.tiles.bounds(k)));
+        bounds
+    }
+
+    /// The first place of a lattice with this step along an axis, between two ends, and the number of its places (half nm).
+    fn places(&self, cluster: &[usize], axis: usize, step: i64, [from, to]: [i64; 2]) -> (i64, i64) {
+        let mut phases: BTreeMap<i64, u64> = BTreeMap::new();
+        for s in cluster.iter().flat_map(|&k| self.tiles.samples(k)) {
+            *phases.entry(AXES[axis](s).rem_euclid(step)).or_default() += 1;
+        }
+        let phase = most_common(phases).unwrap_or(0);
+        // Outermost places on the lattice: what is off it does not widen it.
+        let first = from + (phase - from).rem_euclid(step);
+        let last = to - (to - phase).rem_euclid(step);
+        (first, (last - first).max(0) / step + 1)
+    }
+
+    /// The hexagonal lattice of a cluster, if most centres are a pitch or half of one apart along x, and along y as far as its
+    /// rows. Samples of a tile may be of one row alone.
+    fn hexagonal(
+        &self,
+        cluster: &[usize],
+        squares: u64,
+        steps: &[BTreeMap<i64, u64>; 2],
+    ) -> Result<Option<ElementSite>, ExtractionError> {
+        let [Some(step_x), Some(step_y)] = [0, 1].map(|axis: usize| most_common(steps[axis].clone())) else {
+            return Ok(None);
+        };
+        // Half a pitch in half nanometres is a pitch in nanometres.
+        let pitches = [step_x / 2, step_x].map(|pitch| u32::try_from(pitch).unwrap_or(0));
+        let fits = |pitch: &u32| {
+            pitch.is_multiple_of(2) && *pitch > 0 && step_y == 2 * i64::from(LatticeKind::Hexagonal.row_nm(*pitch))
+        };
+        let Some(pitch_nm) = pitches.into_iter().find(fits) else {
+            return Ok(None);
+        };
+        let step_x = i64::from(pitch_nm);
+        let bounds = self.bounds(cluster);
+        let (x, columns) = self.places(cluster, 0, step_x, [bounds.x0, bounds.x1]);
+        let (y, rows) = self.places(cluster, 1, step_y, [bounds.y0, bounds.y1]);
+        let staggered = |s: Point| ((s.x - x).div_euclid(step_x) + (s.y - y).div_euclid(step_y)).rem_euclid(2);
+        let mut parities: BTreeMap<i64, u64> = BTreeMap::new();
+        for s in cluster.iter().flat_map(|&k| self.tiles.samples(k)) {
+            *parities.entry(staggered(s)).or_default() += 1;
+        }
+        // A site in the middle, or beside it.
+        let row = rows / 2;
+        let column = columns / 2;
+        let column = column + (column + row + most_common(parities).unwrap_or(0)).rem_euclid(2);
+        let reach = column.max(columns - 1 - column);
+        let high = row.max(rows - 1 - row);
+        let sites = 2 * reach.max((high * step_y + step_x - 1) / step_x) + 1;
+        let centre = [x + column * step_x, y + row * step_y];
+        if (sites as u64).saturating_pow(2) > squares.saturating_mul(SITES_PER_PILLAR) + (1 << 16) {
+            return Err(ExtractionError::Sparse {
+                squares,
+                at_nm: [bounds.x0 / 2, bounds.y0 / 2],
+                columns,
+                rows,
+                pitch_nm: f64::from(pitch_nm),
+            });
+        }
+        let lattice = Lattice::of_kind(LatticeKind::Hexagonal, pitch_nm, sites as usize);
+        match lattice {
+            Ok(lattice) if centre.iter().all(|c| c % 2 == 0) => Ok(Some(ElementSite {
+                name: String::new(),
+                centre_nm: centre.map(|c| c / 2),
+                lattice,
+            })),
+            _ => Err(ExtractionError::Lattice {
+                pitch_nm: f64::from(pitch_nm),
+                centre_nm: centre.map(|c| c as f64 / 2.0),
+            }),
+        }
+    }
+}
+
+/// Coordinates of a place along x and along y.
+const AXES: [fn(Point) -> i64; 2] = [|s| s.x, |s| s.y];
 
 /// The key counted most often, the smallest of equals.
 fn most_common(counts: BTreeMap<i64, u64>) -> Option<i64> {

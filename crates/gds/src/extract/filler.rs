@@ -124,6 +124,9 @@ impl Filler {
         if !placements.len().is_multiple_of(4) || placements.len() > 8 * self.elements.len() {
             return None;
         }
+        if self.elements.iter().any(|e| !e.site.lattice.is_square()) {
+            return None;
+        }
         let mut sets: HashMap<(i64, i64), (u8, Vec<usize>)> = HashMap::new();
         for (k, placement) in placements.iter().enumerate() {
             let Transform::Square { orientation, dx, dy } = *placement else {

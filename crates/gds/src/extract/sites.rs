@@ -57,23 +57,27 @@ pub(super) enum Standing {
 #[derive(Clone, Copy, Debug)]
 struct Grid {
     first: [i64; 2],
-    step: i64,
-    inverse: f64,
-    sites: i64,
+    step: [i64; 2],
+    inverse: [f64; 2],
+    /// Columns and rows that pillars may be in: the first, and the one after the last.
+    reach: [[i64; 2]; 2],
+    /// Whether columns and rows whose sum is odd are no sites.
+    staggered: bool,
     pitch_nm: i64,
 }
 
 impl Grid {
     fn new(site: &ElementSite, scale: Scale) -> Self {
-        let pitch = i64::from(site.lattice.pitch_nm());
-        let sites = site.lattice.sites() as i64;
-        let step = 2 * pitch * scale.den;
+        let lattice = site.lattice;
+        let step = lattice.steps_nm().map(|nm| 2 * i64::from(nm) * scale.den);
+        let first = |axis: usize| 2 * (site.centre_nm[axis] + lattice.place_nm(axis, 0)) * scale.den;
         Self {
-            first: site.centre_nm.map(|c| (2 * c - (sites - 1) * pitch) * scale.den),
+            first: [first(0), first(1)],
             step,
-            inverse: 1.0 / step as f64,
-            sites,
-            pitch_nm: pitch,
+            inverse: step.map(|step| 1.0 / step as f64),
+            reach: lattice.reach().map(|reach| [reach.start as i64, reach.end as i64]),
+            staggered: !lattice.is_square(),
+            pitch_nm: i64::from(lattice.pitch_nm()),
         }
     }
 
@@ -82,14 +86,23 @@ impl Grid {
     fn nearest(&self, axis: usize, place: i64) -> (i64, i64) {
         let from_first = place - self.first[axis];
         // A conversion cuts off, and needs no call as rounding does: this is the innermost loop of reading.
-        let sites = from_first as f64 * self.inverse;
+        let sites = from_first as f64 * self.inverse[axis];
         let site = (sites + 0.5f64.copysign(sites)) as i64;
-        (site, from_first - site * self.step)
+        (site, from_first - site * self.step[axis])
     }
 
     #[inline]
-    fn holds(&self, site: i64) -> bool {
-        (0..self.sites).contains(&site)
+    fn holds(&self, axis: usize, site: i64) -> bool {
+        let [from, to] = self.reach[axis];
+        (from..to).contains(&site)
+    }
+
+    /// The first place along both axes that may hold a pillar, and the width of all of them.
+    fn extent(&self) -> [[i64; 2]; 2] {
+        [0, 1].map(|axis| {
+            let [from, to] = self.reach[axis];
+            [self.first[axis] + from * self.step[axis], (to - from) * self.step[axis]]
+        })
     }
 }
 
@@ -105,11 +118,13 @@ pub(super) struct Sites {
 impl Sites {
     pub fn new(sites: &[ElementSite], scale: Scale) -> Self {
         let grids: Vec<Grid> = sites.iter().map(|s| Grid::new(s, scale)).collect();
-        let tile = grids.iter().map(|g| g.step * g.sites).max().unwrap_or(1).max(1);
+        let widths = grids.iter().flat_map(|g| g.extent().map(|[_, width]| width));
+        let tile = widths.max().unwrap_or(1).max(1);
         let mut tiles: HashMap<(i64, i64), Vec<u32>> = HashMap::new();
         for (k, g) in grids.iter().enumerate() {
-            let from = g.first.map(|f| (f - g.step / 2).div_euclid(tile));
-            let to = g.first.map(|f| (f + g.step * g.sites).div_euclid(tile));
+            let extent = g.extent();
+            let from = [0, 1].map(|axis| (extent[axis][0] - g.step[axis] / 2).div_euclid(tile));
+            let to = extent.map(|[first, width]| (first + width).div_euclid(tile));
             for y in from[1]..=to[1] {
                 for x in from[0]..=to[0] {
                     tiles.entry((x, y)).or_default().push(k as u32);
@@ -159,10 +174,11 @@ impl Sites {
         let grid = self.grids.get(element as usize)?;
         let (column, dx) = grid.nearest(0, x);
         let (row, dy) = grid.nearest(1, y);
-        if !grid.holds(column) || !grid.holds(row) {
+        if !grid.holds(0, column) || !grid.holds(1, row) {
             return None;
         }
-        Some(if dx.abs() <= slack && dy.abs() <= slack {
+        let is_site = !grid.staggered || (column + row) % 2 == 0;
+        Some(if dx.abs() <= slack && dy.abs() <= slack && is_site {
             Standing::Site(element, row as usize, column as usize)
         } else {
             Standing::Between(element)
@@ -173,7 +189,7 @@ impl Sites {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metalith_core::Lattice;
+    use metalith_core::{Lattice, LatticeKind};
 
     fn square(x: i64, y: i64, w: i64) -> Rect {
         Rect {
@@ -207,6 +223,28 @@ mod tests {
         assert_eq!(sites.stand(&square(5_000, 175, 100), &mut guess), Standing::Outside);
         // 101 nm about a whole centre cannot be nearer than half a unit.
         assert_eq!(sites.stand(&square(175, 175, 101), &mut guess), Standing::Site(0, 2, 2));
+    }
+
+    /// Every other place of the grid of a hexagonal lattice, and rows no farther than columns.
+    #[test]
+    fn sites_of_a_hexagonal_lattice() {
+        let lattice = Lattice::of_kind(LatticeKind::Hexagonal, 400, 9).unwrap();
+        let site = ElementSite {
+            name: String::new(),
+            centre_nm: [1000, 0],
+            lattice,
+        };
+        let sites = Sites::new(&[site], Scale { num: 1, den: 1 });
+        let mut guess = 0;
+        let mut stand = |x, y| sites.stand(&square(x, y, 100), &mut guess);
+        assert_eq!(stand(1000, 0), Standing::Site(0, 4, 4));
+        assert_eq!(stand(1400, 0), Standing::Site(0, 4, 6));
+        assert_eq!(stand(1200, 346), Standing::Site(0, 5, 5));
+        assert_eq!(stand(1000, -692), Standing::Site(0, 2, 4));
+        assert_eq!(stand(1200, 0), Standing::Between(0));
+        assert_eq!(stand(1200, 347), Standing::Between(0));
+        // Three rows above the middle is beyond a square about it.
+        assert_eq!(stand(1200, 1038), Standing::Outside);
     }
 
     /// A database unit of 0.5 nm and one of 5 nm see the same sites.

@@ -313,7 +313,8 @@ impl<'a> ElementPillars<'a> {
     /// Write the lists of a strip and empty them.
     fn put_lists(&self, out: &mut Packer) {
         let lattice = self.widths.lattice();
-        let at = |ix: i32, iy: i32| [ix, iy].map(|i| lattice.coordinate_nm(i as usize));
+        let at = |ix: i32, iy: i32| [lattice.place_nm(0, ix as usize), lattice.place_nm(1, iy as usize)];
+        let steps = lattice.steps_nm();
         for width in 1..out.lists.len() {
             let mut places = std::mem::take(&mut out.lists[width]);
             let Some(&first) = places.first() else {
@@ -332,7 +333,14 @@ impl<'a> ElementPillars<'a> {
             let count = places.len() as u64;
             places.remove(0);
             places.iter_mut().for_each(|p| *p = [p[0] - first[0], p[1] - first[1]]);
-            let grid = i64::from(lattice.pitch_nm());
+            let mut grid = i64::from(steps[0]);
+            if steps[0] != steps[1] {
+                // No number of nanometres but 1 divides both steps in general.
+                places
+                    .iter_mut()
+                    .for_each(|p| *p = [p[0] * steps[0] as i32, p[1] * steps[1] as i32]);
+                grid = 1;
+            }
             let list = Repetition::List { grid, places };
             let (centre, copies) = (at(first[0], first[1]), (count > 1).then_some(&list));
             if self.form.is_square() {
@@ -361,7 +369,7 @@ impl<'a> ElementPillars<'a> {
                 && width != 0
             {
                 let out = &mut out[part];
-                let centre = [lattice.coordinate_nm(ix), lattice.coordinate_nm(iy)];
+                let centre = [lattice.place_nm(0, ix), lattice.place_nm(1, iy)];
                 let side = i64::from(width);
                 if encoding == PillarEncoding::References {
                     let cell = self.width_cells[usize::from(width)];

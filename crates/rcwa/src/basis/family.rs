@@ -61,23 +61,21 @@ impl Family {
         }
     }
 
-    /// Part of the plane wave of an order in a function: where that stands, and by what factor.
-    pub fn plane_wave(self, [m, n]: [i32; 2], highest: usize) -> Option<(usize, f64)> {
+    /// The order of the function that the plane wave of an order is part of, and the factor of that part.
+    pub fn function(self, [m, n]: [i32; 2]) -> ([i32; 2], f64) {
         match self {
             Self::Product(x, y) => {
-                let (i, a) = x.plane_wave(m, highest)?;
-                let (j, b) = y.plane_wave(n, highest)?;
-                Some((i * y.len(highest) + j, a * b))
+                let ((m, a), (n, b)) = (x.function(m), y.function(n));
+                ([m, n], a * b)
             }
             Self::Alike | Self::Reversed => {
                 let upper = m > 0 || (m == 0 && n >= 0);
-                let place = self.position(if upper { [m, n] } else { [-m, -n] }, highest)?;
                 let factor = match self {
                     Self::Alike if m == 0 && n == 0 => 1.0,
                     Self::Reversed if !upper => -FRAC_1_SQRT_2,
                     _ => FRAC_1_SQRT_2,
                 };
-                Some((place, factor))
+                (if upper { [m, n] } else { [-m, -n] }, factor)
             }
         }
     }

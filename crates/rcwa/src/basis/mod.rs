@@ -1,12 +1,14 @@
 //! Plane waves of the lattice, and the symmetric combinations of them that a mirror plane leaves.
 
 mod family;
+mod kept;
 
 use faer::Mat;
 use num_complex::Complex64;
 
 use super::scalar::Scalar;
 pub(super) use family::Family;
+pub(super) use kept::Kept;
 
 /// Functions of one axis.
 ///
@@ -55,16 +57,14 @@ impl Space {
         (order >= first && order <= highest as i32).then(|| (order - first) as usize)
     }
 
-    /// Part of the plane wave e_order in a function of this space: where it stands, and by what factor.
-    pub fn plane_wave(self, order: i32, highest: usize) -> Option<(usize, f64)> {
+    /// The order of the function that the plane wave e_order is part of, and the factor of that part.
+    pub fn function(self, order: i32) -> (i32, f64) {
         let half = std::f64::consts::FRAC_1_SQRT_2;
         match self {
-            Self::Full => self.position(order, highest).map(|p| (p, 1.0)),
-            Self::Even if order == 0 => Some((0, 1.0)),
-            Self::Even => self.position(order.abs(), highest).map(|p| (p, half)),
-            Self::Odd => self
-                .position(order.abs(), highest)
-                .map(|p| (p, if order < 0 { -half } else { half })),
+            Self::Full => (order, 1.0),
+            Self::Even if order == 0 => (0, 1.0),
+            Self::Even => (order.abs(), half),
+            Self::Odd => (order.abs(), if order < 0 { -half } else { half }),
         }
     }
 
@@ -130,46 +130,51 @@ impl Rows {
 /// The transverse field of a lattice in one symmetry.
 #[derive(Clone)]
 pub(super) struct FieldBasis {
-    pub highest: usize,
+    pub kept: Kept,
     /// What Ex, Ey and Ez are made of.
     pub families: [Family; 3],
+    /// The orders of their functions.
+    pub orders: [Vec<[i32; 2]>; 3],
     pub rows: Rows,
 }
 
 impl FieldBasis {
-    /// `family` is that of Ex, `k` the wave vector of the zero order over k0, `step` the wavelength over the pitch. The k of
-    /// an axis in an even or odd space is zero, and both are in a family that half a turn tells.
-    pub fn new(highest: usize, family: Family, k: [f64; 2], step: f64) -> Self {
+    /// `family` is that of Ex, `k` the wave vector of the zero order over k0, `steps` the wavelength over the periods along
+    /// the axes. The k of an axis in an even or odd space is zero, and both are in a family that half a turn tells.
+    pub fn new(kept: Kept, family: Family, k: [f64; 2], steps: [f64; 2]) -> Self {
         let families = family.of_components();
-        let orders = families.map(|f| f.orders(highest));
-        let place = |family: Family, order: [i32; 2]| family.position(order, highest);
+        let orders = families.map(|f| kept.orders(f));
+        let place = |c: usize, order: [i32; 2]| kept.position(families[c], &orders[c], order);
         let rows_x = orders[0].len();
         let mut rows = Vec::with_capacity(rows_x + orders[1].len());
         for component in [0, 1] {
             for &order in &orders[component] {
-                let partner = place(families[1 - component], order);
+                let partner = place(1 - component, order);
                 rows.push(FieldRow {
                     component,
-                    k: [0, 1].map(|axis| k[axis] + f64::from(order[axis]) * step),
+                    k: [0, 1].map(|axis| k[axis] + f64::from(order[axis]) * steps[axis]),
                     partner: partner.map(|p| if component == 0 { rows_x + p } else { p }),
-                    z: place(families[2], order),
+                    z: place(2, order),
                 });
             }
         }
         Self {
-            highest,
+            kept,
             families,
             rows: Rows {
                 list: rows,
                 of_x: rows_x,
                 of_z: orders[2].len(),
             },
+            orders,
         }
     }
 
     /// Row and factor of the plane wave of order (m, n) in a component.
     pub fn plane_wave(&self, component: usize, m: i32, n: i32) -> Option<(usize, f64)> {
-        let (place, factor) = self.families[component].plane_wave([m, n], self.highest)?;
+        let family = self.families[component];
+        let (order, factor) = family.function([m, n]);
+        let place = self.kept.position(family, &self.orders[component], order)?;
         Some((component * self.rows.of_x + place, factor))
     }
 

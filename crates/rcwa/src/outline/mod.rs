@@ -149,6 +149,11 @@ impl Outline {
         }
     }
 
+    /// Whether it is a circle.
+    pub(super) fn is_circle(&self) -> bool {
+        matches!(self.0, Form::Slanted(SlantedForm::Circle { .. }))
+    }
+
     /// Whether both axes mirror it.
     pub(super) fn is_mirrored(&self) -> bool {
         !matches!(self.0, Form::Slanted(SlantedForm::Rectangle { .. }))

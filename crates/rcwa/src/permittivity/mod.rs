@@ -15,6 +15,7 @@ use num_complex::Complex64;
 use super::basis::{Family, FieldBasis, Rows};
 use super::outline::{Outline, Sides};
 use super::scalar::Scalar;
+use super::stack::CellLattice;
 
 /// So much more permittivity, relative, has Ey where half a turn is the only symmetry that is used: modes that a quarter of
 /// a turn exchanges would have one constant, and the vectors of such a pair lose their digits. The field changes by about as
@@ -29,6 +30,7 @@ pub(super) struct CrossSection<'a> {
     /// Permittivity around it.
     pub outside: Complex64,
     pub pitch_nm: f64,
+    pub lattice: CellLattice,
 }
 
 impl CrossSection<'_> {

@@ -7,25 +7,27 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::outline::SlantedForm;
+use crate::stack::CellLattice;
 
-/// Fourier coefficients of a function of the cell for orders of -highest..=highest along both axes; those of opposite order
+/// Fourier coefficients of a function of the cell for orders of -highest..=highest along each axis; those of opposite order
 /// are equal, as the function is alike after half a turn.
 pub(super) struct Coefficients {
-    highest: i32,
+    highest: [i32; 2],
     values: Vec<f64>,
 }
 
 impl Coefficients {
-    fn new(highest: usize) -> Self {
-        let side = 2 * highest + 1;
+    fn new(highest: [usize; 2]) -> Self {
+        let [x, y] = highest.map(|highest| 2 * highest + 1);
         Self {
-            highest: highest as i32,
-            values: vec![0.0; side * side],
+            highest: highest.map(|highest| highest as i32),
+            values: vec![0.0; x * y],
         }
     }
 
     fn place(&self, m: i32, n: i32) -> usize {
-        ((m + self.highest) * (2 * self.highest + 1) + n + self.highest) as usize
+        let [x, y] = self.highest;
+        ((m + x) * (2 * y + 1) + n + y) as usize
     }
 
     pub fn at(&self, m: i32, n: i32) -> f64 {
@@ -44,12 +46,17 @@ pub(super) struct Moments {
 }
 
 impl Moments {
-    /// For orders up to `highest`.
-    pub fn of(form: &SlantedForm, pitch_nm: f64, highest: usize) -> Self {
-        match *form {
-            SlantedForm::Circle { diameter_nm } => Self::of_circle(diameter_nm / pitch_nm, highest),
-            SlantedForm::Rectangle { halves_nm, rotation } => {
-                Self::of_rectangle(halves_nm.map(|half| half / pitch_nm), rotation, highest)
+    /// For orders up to `highest` along each axis, equal ones on a square lattice. Staggered rows have circles.
+    pub fn of(form: &SlantedForm, pitch_nm: f64, lattice: CellLattice, highest: [usize; 2]) -> Self {
+        match (*form, lattice) {
+            (SlantedForm::Circle { diameter_nm }, CellLattice::Square) => {
+                Self::of_circle(diameter_nm / pitch_nm, highest[0])
+            }
+            (SlantedForm::Circle { diameter_nm }, CellLattice::Staggered { row_nm }) => {
+                Self::of_staggered_circle(diameter_nm / pitch_nm, row_nm / pitch_nm, highest)
+            }
+            (SlantedForm::Rectangle { halves_nm, rotation }, _) => {
+                Self::of_rectangle(halves_nm.map(|half| half / pitch_nm), rotation, highest[0])
             }
         }
     }
@@ -59,7 +66,7 @@ impl Moments {
     /// integrals over the disc are those of Bessel functions, 2 pi R^2 J1(g) / g and, with twice the angle of k,
     /// -2 pi R^2 J3(g) / g.
     fn of_circle(duty: f64, highest: usize) -> Self {
-        let [mut pillar, mut cosine, mut sine] = [(); 3].map(|()| Coefficients::new(highest));
+        let [mut pillar, mut cosine, mut sine] = [(); 3].map(|()| Coefficients::new([highest; 2]));
         let area = PI * duty * duty / 4.0;
         let last = highest as i32;
         for m in 0..=last {
@@ -85,11 +92,42 @@ impl Moments {
         Self { pillar, cosine, sine }
     }
 
+    /// As [`Moments::of_circle`] for two circles in a rectangle of one pitch by two rows, each row this share of the pitch:
+    /// one in the middle, one at the corners. Where the sum of both orders is odd they cancel, and all is zero.
+    fn of_staggered_circle(duty: f64, row: f64, highest: [usize; 2]) -> Self {
+        let [mut pillar, mut cosine, mut sine] = [(); 3].map(|()| Coefficients::new(highest));
+        let filling = PI * duty * duty / (4.0 * row);
+        for m in 0..=highest[0] as i32 {
+            for n in (m % 2..=highest[1] as i32).step_by(2) {
+                // The wave vector times the pitch, over one turn.
+                let [x, y] = [f64::from(m), f64::from(n) / (2.0 * row)];
+                let square = x * x + y * y;
+                let g = PI * duty * square.sqrt();
+                let (disc, twice) = if square == 0.0 {
+                    (filling, 0.0)
+                } else {
+                    (
+                        2.0 * filling * libm::j1(g) / g,
+                        -2.0 * filling * libm::jn(3, g) / g / square,
+                    )
+                };
+                let (c, s) = (twice * (x * x - y * y), twice * 2.0 * x * y);
+                for (p, q, mirror) in [(m, n, 1.0), (-m, n, -1.0), (m, -n, -1.0), (-m, -n, 1.0)] {
+                    let place = pillar.place(p, q);
+                    pillar.values[place] = disc;
+                    cosine.values[place] = c;
+                    sine.values[place] = mirror * s;
+                }
+            }
+        }
+        Self { pillar, cosine, sine }
+    }
+
     /// A rectangle with these half-widths over the pitch, turned. Its normals are turned by that angle or a quarter more, so
     /// that c and s are cosine and sine of twice the angle times one function, 1 on the first pair of sides and -1 on the
     /// second (see [`Interior`]).
     fn of_rectangle(halves: [f64; 2], rotation: f64, highest: usize) -> Self {
-        let [mut pillar, mut cosine, mut sine] = [(); 3].map(|()| Coefficients::new(highest));
+        let [mut pillar, mut cosine, mut sine] = [(); 3].map(|()| Coefficients::new([highest; 2]));
         let ((sin, cos), (sin2, cos2)) = (rotation.sin_cos(), (2.0 * rotation).sin_cos());
         let interior = Interior::of(halves);
         let last = highest as i32;
@@ -204,6 +242,35 @@ mod tests {
                 assert!((a - b).abs() < SUMMED, "{m} {n}: {found:?} {sums:?}");
             }
         }
+    }
+
+    /// The cell of staggered rows by sums over its disc, as above; two discs in a rectangle have the same coefficients.
+    #[test]
+    fn a_staggered_circle_has_the_moments_of_its_disc() {
+        const SUMMED: f64 = 1e-5;
+        let (duty, row) = (0.7, 0.9);
+        let moments = Moments::of_staggered_circle(duty, row, [3, 5]);
+        for (m, n) in [(0, 0), (1, 1), (2, -4), (-3, 5), (0, 2)] {
+            let mut sums = [0.0; 3];
+            for i in 0..400 {
+                let r = (f64::from(i) + 0.5) / 400.0;
+                for j in 0..200 {
+                    let angle = TAU * f64::from(j) / 200.0;
+                    let (sin, cos) = angle.sin_cos();
+                    let turns = 0.5 * duty * r * (f64::from(m) * cos + f64::from(n) / (2.0 * row) * sin);
+                    let share = 0.25 * duty * duty * r / 400.0 * TAU / 200.0 / row;
+                    let values = [1.0, r * r * (2.0 * angle).cos(), r * r * (2.0 * angle).sin()];
+                    for (sum, value) in sums.iter_mut().zip(values) {
+                        *sum += (TAU * turns).cos() * share * value;
+                    }
+                }
+            }
+            let found = [&moments.pillar, &moments.cosine, &moments.sine].map(|c| c.at(m, n));
+            for (a, b) in found.iter().zip(sums) {
+                assert!((a - b).abs() < SUMMED, "{m} {n}: {found:?} {sums:?}");
+            }
+        }
+        assert_eq!(moments.pillar.at(1, 2), 0.0);
     }
 
     /// Half a square has its normal along one axis, half along the other: there is no mean. At the wave vector of one side the

@@ -28,7 +28,8 @@ pub(super) fn permittivity<T: Scalar>(
     basis: &FieldBasis,
     form: &SlantedForm,
 ) -> Permittivity<T> {
-    let moments = Moments::of(form, section.pitch_nm, 2 * basis.highest);
+    let reach = basis.kept.reach().map(|order| 2 * order);
+    let moments = Moments::of(form, section.pitch_nm, section.lattice, reach);
     let (inside, outside) = (section.inside, section.outside);
     let split = basis.rows.of_x;
     let size = basis.rows.len();
@@ -74,13 +75,13 @@ fn multiplication<T: Scalar>(
     constant: Complex64,
 ) -> Mat<T> {
     // Coefficients of the sum by the difference of two orders.
-    let reach = 2 * basis.highest as i32;
-    let side = 2 * reach + 1;
-    let place = |[m, n]: [i32; 2]| m * side + n;
-    let middle = place([reach, reach]);
-    let mut table: Vec<T> = Vec::with_capacity((side * side) as usize);
-    for m in -reach..=reach {
-        for n in -reach..=reach {
+    let reach = basis.kept.reach().map(|order| 2 * order as i32);
+    let sides = reach.map(|reach| 2 * reach + 1);
+    let place = |[m, n]: [i32; 2]| m * sides[1] + n;
+    let middle = place(reach);
+    let mut table: Vec<T> = Vec::with_capacity((sides[0] * sides[1]) as usize);
+    for m in -reach[0]..=reach[0] {
+        for n in -reach[1]..=reach[1] {
             table.push(T::of(
                 sum.iter().map(|(factor, function)| factor * function.at(m, n)).sum(),
             ));
@@ -89,11 +90,11 @@ fn multiplication<T: Scalar>(
     table[middle as usize] += T::of(constant);
 
     let families = [target, source].map(|c| basis.families[c]);
-    let [to, from] = families.map(|family| family.orders(basis.highest));
+    let [to, from] = [target, source].map(|c| &basis.orders[c]);
     let [scale_to, scale_from] = [0, 1].map(|end| -> Vec<f64> {
         let images = families[end].images();
         let same = |[m, n]: [i32; 2]| images.iter().filter(|([p, q], _)| [p * m, q * n] == [m, n]).count();
-        [&to, &from][end]
+        [to, from][end]
             .iter()
             .map(|&order| (same(order) as f64).sqrt().recip())
             .collect()
@@ -104,7 +105,7 @@ fn multiplication<T: Scalar>(
         let column = matrix.col_as_slice_mut(j);
         for ([p, q], sign) in &images {
             let start = middle - place([p * m, q * n]);
-            for ((entry, order), scale) in column.iter_mut().zip(&to).zip(&scale_to) {
+            for ((entry, order), scale) in column.iter_mut().zip(to).zip(&scale_to) {
                 *entry += table[(start + place(*order)) as usize] * T::real(sign * scale * scale_from[j]);
             }
         }

@@ -17,21 +17,23 @@ pub(super) fn permittivity<T: Scalar>(
     let Family::Product(x, y) = basis.families[0] else {
         unreachable!("pillars with upright sides are solved in products")
     };
+    // All orders up to one along either axis: staggered rows have no pillars with upright sides.
+    let [highest, _] = basis.kept.reach();
     let laurent = |space: Space, half_width: f64| -> Mat<T> {
-        let f: Vec<T> = slab_coefficients(half_width, section.pitch_nm, 2 * basis.highest)
+        let f: Vec<T> = slab_coefficients(half_width, section.pitch_nm, 2 * highest)
             .into_iter()
             .map(T::real)
             .collect();
-        space.toeplitz(&f, basis.highest)
+        space.toeplitz(&f, highest)
     };
     // 1 / (Toeplitz matrix of 1 / permittivity), less the permittivity outside.
     let inverse_rule = |space: Space, half_width: f64| -> Mat<T> {
-        let mut f: Vec<T> = slab_coefficients(half_width, section.pitch_nm, 2 * basis.highest)
+        let mut f: Vec<T> = slab_coefficients(half_width, section.pitch_nm, 2 * highest)
             .into_iter()
             .map(|c| T::of((section.inside.inv() - section.outside.inv()) * c))
             .collect();
         f[0] += T::of(section.outside.inv());
-        let mut inverse = invert(space.toeplitz(&f, basis.highest));
+        let mut inverse = invert(space.toeplitz(&f, highest));
         for i in 0..inverse.nrows() {
             inverse[(i, i)] -= T::of(section.outside);
         }

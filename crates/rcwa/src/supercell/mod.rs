@@ -19,7 +19,7 @@ use crate::basis::Space;
 use crate::error::{Error, Result};
 use crate::layer::Modes;
 use crate::propagate::{Ends, propagate_wave};
-use crate::{Incidence, Layer, LayerStack, MOST_UNKNOWNS, Orders, Outline, Side, off_cutoff};
+use crate::{CellLattice, Incidence, Layer, LayerStack, MOST_UNKNOWNS, Orders, Outline, Side, off_cutoff};
 use permittivity::permittivity;
 use waves::Waves;
 
@@ -55,7 +55,7 @@ impl Supercell {
     /// Cells side by side, one for each site. They share all but the cross-sections of their pillars.
     ///
     /// # Errors
-    /// If their number is not that of the sites, or they differ in more than the cross-sections.
+    /// If their number is not that of the sites, they differ in more than the cross-sections, or are of staggered rows.
     pub fn of_cells(lattice: SiteLattice, cells: &[LayerStack]) -> Result<Self> {
         let Some(first) = cells.first().filter(|_| cells.len() == lattice.len()) else {
             return Err(Error::CellCount {
@@ -63,6 +63,9 @@ impl Supercell {
                 sites: lattice.len(),
             });
         };
+        if cells.iter().any(|cell| cell.lattice != CellLattice::Square) {
+            return Err(Error::StaggeredSites);
+        }
         for (number, cell) in cells.iter().enumerate() {
             let same_media = cell.pitch_nm == first.pitch_nm && cell.below == first.below && cell.above == first.above;
             let same_layers = cell.layers.len() == first.layers.len()
@@ -120,6 +123,7 @@ impl Supercell {
             });
             let cell = LayerStack {
                 pitch_nm: self.pitch_nm,
+                lattice: CellLattice::Square,
                 below: self.below,
                 layers: layers.collect(),
                 above: self.above,

@@ -13,6 +13,7 @@ fn stack(width_nm: f64, slices: usize) -> LayerStack {
     };
     LayerStack {
         pitch_nm: 350.0,
+        lattice: CellLattice::Square,
         below: Complex64::new(1.46, 0.0),
         layers: (0..slices).map(layer).collect(),
         above: Complex64::ONE,

@@ -1,6 +1,6 @@
 //! The transmission of an element, row by row.
 
-use metalith_core::{Lattice, WidthRows};
+use metalith_core::{Lattice, LatticeKind, WidthRows};
 use num_complex::{Complex32, Complex64};
 
 use crate::error::{Result, WaveError};
@@ -17,7 +17,8 @@ pub trait Aperture: Sync {
     /// diagonal of the lattice unless better is known; a tight one makes every propagation cheaper.
     fn radius_um(&self) -> f64 {
         let lattice = self.lattice();
-        let outermost = lattice.coordinate_um(lattice.sites() - 1);
+        // Rows of a hexagonal lattice with sites on them reach no farther than columns.
+        let outermost = lattice.place_um(0, lattice.sites() - 1);
         outermost * std::f64::consts::SQRT_2
     }
 
@@ -120,25 +121,37 @@ impl<F: Fn(f64, f64) -> u16 + Sync> Aperture for PillarFunction<F> {
     }
 
     fn fill_row(&self, iy: usize, row: &mut [Complex32]) {
-        let y = self.lattice.coordinate_um(iy);
+        let y = self.lattice.place_um(1, iy);
         let inside = sites_inside(&self.lattice, self.radius_um, iy);
         row.fill(Complex32::ZERO);
-        for (ix, t) in inside.clone().zip(&mut row[inside]) {
-            let width = (self.width_nm)(self.lattice.coordinate_um(ix), y);
+        for (ix, t) in inside
+            .clone()
+            .zip(&mut row[inside])
+            .filter(|(ix, _)| self.lattice.has(*ix, iy))
+        {
+            let width = (self.width_nm)(self.lattice.place_um(0, ix), y);
             *t = self.table.get(usize::from(width)).copied().unwrap_or_default();
         }
     }
 }
 
-/// Sites of row `iy` inside a circle about the centre. Counted in whole half pitches, so that sites related
-/// by symmetry agree.
+/// Places of row `iy` inside a circle about the centre. Counted in whole half pitches, so that sites related
+/// by symmetry agree; on a hexagonal lattice in half nanometres.
 pub(super) fn sites_inside(lattice: &Lattice, radius_um: f64, iy: usize) -> std::ops::Range<usize> {
     let n = lattice.sites();
-    let radius = radius_um * 1e3 / (0.5 * f64::from(lattice.pitch_nm()));
+    let unit_nm = match lattice.kind() {
+        LatticeKind::Square => 0.5 * f64::from(lattice.pitch_nm()),
+        LatticeKind::Hexagonal => 0.5,
+    };
+    let radius = radius_um * 1e3 / unit_nm;
     // A radius of whole half pitches must include the sites on it, however its decimals were rounded.
     const ROUNDING: f64 = 1e-12;
     let limit = (radius * radius * (1.0 + ROUNDING)).floor() as i64;
-    let first = (0..n.div_ceil(2)).find(|&ix| lattice.half_radius2(ix, iy) <= limit);
+    let squared = |ix| match lattice.kind() {
+        LatticeKind::Square => lattice.half_radius2(ix, iy),
+        LatticeKind::Hexagonal => 4 * lattice.radius2_nm2(ix, iy),
+    };
+    let first = (0..n.div_ceil(2)).find(|&ix| squared(ix) <= limit);
     first.map_or(0..0, |first| first..n - first)
 }
 

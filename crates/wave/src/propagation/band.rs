@@ -102,6 +102,7 @@ impl FrequencyBand {
 
     /// With a period and a fade of one's own: `fade_um` is where it begins and where it ends.
     pub fn new(lattice: Lattice, wavelength_um: f64, window: &Window, bins: usize, fade_um: [f64; 2]) -> Result<Self> {
+        WaveError::unless_square(&lattice)?;
         window.check(wavelength_um)?;
         let [full_um, zero_um] = fade_um;
         if bins > MOST_BINS || bins == 0 || full_um.is_nan() || zero_um <= full_um {

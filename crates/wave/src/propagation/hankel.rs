@@ -61,6 +61,7 @@ impl Hankel {
     /// # Errors
     /// As [`Hankel::new`].
     pub fn of_lattice(wavelength_um: f64, distance_um: f64, lattice: &Lattice, radius_um: f64) -> Result<Self> {
+        WaveError::unless_square(lattice)?;
         let n = lattice.sites();
         let half_pitch = 0.5 * lattice.pitch_um();
         // A radius of whole half pitches must include the sites on it, however its decimals were rounded.

@@ -49,6 +49,7 @@ impl Landing {
     pub fn of(aperture: &dyn Aperture, wave: &PlaneWave, towards: [f64; 2], grid: LandingGrid) -> Result<Self> {
         grid.check()?;
         let lattice = aperture.lattice();
+        WaveError::unless_square(&lattice)?;
         let n = lattice.sites();
         let rays = Rays::new(lattice.pitch_um(), wave, towards, grid.distance_um);
         let arriving = [wave.sin_x, wave.sin_y].map(|sine| {
