@@ -1,4 +1,4 @@
-//! A small bench session on disk: two elements, two colours, two distances; or three elements.
+//! Bench sessions on disk: small lenses, two or three of them in two colours at two distances, and full-size ones.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -60,19 +60,63 @@ fwhm_nm = 6.0
     )
 }
 
+/// The lenses of a design, and how they are looked at.
+struct Lenses {
+    design: &'static str,
+    diameter_um: f64,
+    focal_um: f64,
+    spacing_um: i64,
+    distances_um: [f64; 2],
+    scale_dn: f64,
+    leds: &'static [i32],
+}
+
+const SMALL: Lenses = Lenses {
+    design: "designs/mini_3x3.toml",
+    diameter_um: 60.0,
+    focal_um: 144.0,
+    spacing_um: 150,
+    distances_um: [139.0, 146.0],
+    scale_dn: 1.0,
+    leds: &[500, 560],
+};
+
+/// One colour: the transforms of a lens of 1 mm take 0.1 CPU s at each of its 21 wavelengths.
+const FULL_SIZE: Lenses = Lenses {
+    design: "designs/prototype_3x3.toml",
+    diameter_um: 1000.0,
+    focal_um: 2400.0,
+    spacing_um: 2420,
+    distances_um: [2360.0, 2430.0],
+    scale_dn: 0.2,
+    leds: &[560],
+};
+
 /// Write a session with two lenses of 60 um, its frames still dark; its `measurement.toml`.
 pub fn small_set(folder: &Path) -> PathBuf {
-    set_of(folder, &BEAMS[..2])
+    set_of(folder, &SMALL, &BEAMS[..2])
 }
 
 /// The same with three lenses that are not in one line.
 pub fn set_of_three(folder: &Path) -> PathBuf {
-    set_of(folder, &BEAMS)
+    set_of(folder, &SMALL, &BEAMS)
 }
 
-fn set_of(folder: &Path, beams: &[([i64; 2], [f64; 2])]) -> PathBuf {
+/// The same with one to three lenses of 1 mm in one colour.
+pub fn full_size_set(folder: &Path, elements: usize) -> PathBuf {
+    set_of(folder, &FULL_SIZE, &BEAMS[..elements.clamp(1, BEAMS.len())])
+}
+
+fn set_of(folder: &Path, lenses: &Lenses, beams: &[([i64; 2], [f64; 2])]) -> PathBuf {
+    let Lenses {
+        diameter_um,
+        focal_um,
+        spacing_um,
+        scale_dn,
+        ..
+    } = lenses;
     let root = crate::root();
-    let design = Design::read(&root.join("designs/mini_3x3.toml")).unwrap();
+    let design = Design::read(&root.join(lenses.design)).unwrap();
     let array = PillarArray::build(&design, &Silent).unwrap();
     write_pillars(&design, &array, Hierarchy::Sref, &folder.join("layout.gds"), &Silent).unwrap();
     fs::copy(root.join("golden/measured/film_nk.csv"), folder.join("film_nk.csv")).unwrap();
@@ -93,40 +137,40 @@ pillar_index = "film_nk.csv"
 substrate = "fused_silica_malitson_1965"
 ambient_index = 1.0
 incidence = "substrate"
-lens_diameter_um = 60.0
-focal_length_um = 144.0
+lens_diameter_um = {diameter_um:?}
+focal_length_um = {focal_um:?}
 
 {bench}"#
     );
     for ([m, n], _) in beams {
         text.push_str(&format!(
-            "\n[[element]]\nindex = [{m}, {n}]\ncentre_um = [{}.0, {}.0]\naperture_diameter_um = 60.0\n",
-            150 * m,
-            150 * n
+            "\n[[element]]\nindex = [{m}, {n}]\ncentre_um = [{}.0, {}.0]\naperture_diameter_um = {diameter_um:?}\n",
+            spacing_um * m,
+            spacing_um * n
         ));
     }
     for (index, aoi) in beams {
-        for led in [500, 560] {
+        for led in lenses.leds {
             // Where the wedge of 550 nm sends this colour.
             let [x, y] = [0, 1].map(|axis| {
                 if index[axis] == 0 {
                     return 0.0;
                 }
-                let sine = 0.258_819 * f64::from(led) / 550.0 + aoi[axis].to_radians().sin();
-                144.0 * sine / (1.0 - sine * sine).sqrt()
+                let sine = 0.258_819 * f64::from(*led) / 550.0 + aoi[axis].to_radians().sin();
+                focal_um * sine / (1.0 - sine * sine).sqrt()
             });
             let element = match index {
                 [m, 0] => format!("e{m}"),
                 [m, n] => format!("e{m}{n}"),
             };
-            for (z, distance) in [139.0, 146.0].into_iter().enumerate() {
+            for (z, distance) in lenses.distances_um.into_iter().enumerate() {
                 let name = format!("{element}_{led}_z{z}");
                 write_npy(
                     &folder.join(format!("{name}.npy")),
                     &Array2::from_elem((PIXELS, PIXELS), 40.0),
                 );
                 text.push_str(&format!(
-                    "\n[[capture]]\nfile = \"{name}.npy\"\nelement = [{}, {}]\nled_nm = {led}\naoi_deg = [{:.1}, {:.1}]\ndistance_um = {distance:.1}\nwindow_centre_um = [{x:.3}, {y:?}]\nscale_dn = 1.0\nframes = 64\n",
+                    "\n[[capture]]\nfile = \"{name}.npy\"\nelement = [{}, {}]\nled_nm = {led}\naoi_deg = [{:.1}, {:.1}]\ndistance_um = {distance:.1}\nwindow_centre_um = [{x:.3}, {y:?}]\nscale_dn = {scale_dn:?}\nframes = 64\n",
                     index[0], index[1], aoi[0], aoi[1]
                 ));
             }

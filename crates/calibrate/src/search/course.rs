@@ -101,7 +101,8 @@ fn directions(at: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
     } else {
         whole
     };
-    let line = farthest.map(|c| c / sign);
+    // No negative zero: it is shown.
+    let line = farthest.map(|c| c / sign + 0.0);
     let is_in_line = |p: &[f64; 2]| {
         let [x, y] = apart(p);
         (x * line[1] - y * line[0]).abs() <= IN_LINE * whole
