@@ -109,7 +109,7 @@ impl Bench<'_> {
         out
     }
 
-    /// Chips of which [`MADE_BYTES`] hold the largest element, one at least.
+    /// Chips of which 1.2 GB hold the largest element, one at least.
     pub fn chips_at_once(&self) -> usize {
         let largest = self.set.elements.iter().map(|e| made_bytes(e.pillars.lattice)).max();
         (MADE_BYTES / largest.unwrap_or(1).max(1)).max(1)
