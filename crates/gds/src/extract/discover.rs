@@ -226,15 +226,7 @@ impl Map {
         let (x, columns) = self.places(cluster, 0, step, [bounds.x0, bounds.x1]);
         let (y, rows) = self.places(cluster, 1, step, [bounds.y0, bounds.y1]);
         let sites = columns.max(rows);
-        if (sites as u64).saturating_pow(2) > squares.saturating_mul(SITES_PER_PILLAR) + (1 << 16) {
-            return Err(ExtractionError::Sparse {
-                squares,
-                at_nm: [bounds.x0 / 2, bounds.y0 / 2],
-                columns,
-                rows,
-                pitch_nm: step as f64 / 2.0,
-            });
-        }
+        dense_enough(squares, sites, &bounds, [columns, rows], step as f64 / 2.0)?;
         let centre = |first: i64, count: i64| first - (sites - count) / 2 * step + (sites - 1) * step / 2;
         let (twice_x, twice_y) = (centre(x, columns), centre(y, rows));
         let bad = ExtractionError::Lattice {
@@ -312,15 +304,7 @@ impl Map {
         let high = row.max(rows - 1 - row);
         let sites = 2 * reach.max((high * step_y + step_x - 1) / step_x) + 1;
         let centre = [x + column * step_x, y + row * step_y];
-        if (sites as u64).saturating_pow(2) > squares.saturating_mul(SITES_PER_PILLAR) + (1 << 16) {
-            return Err(ExtractionError::Sparse {
-                squares,
-                at_nm: [bounds.x0 / 2, bounds.y0 / 2],
-                columns,
-                rows,
-                pitch_nm: f64::from(pitch_nm),
-            });
-        }
+        dense_enough(squares, sites, &bounds, [columns, rows], pitch_nm.into())?;
         let lattice = Lattice::of_kind(LatticeKind::Hexagonal, pitch_nm, sites as usize);
         match lattice {
             Ok(lattice) if centre.iter().all(|c| c % 2 == 0) => Ok(Some(ElementSite {
@@ -338,6 +322,26 @@ impl Map {
 
 /// Coordinates of a place along x and along y.
 const AXES: [fn(Point) -> i64; 2] = [|s| s.x, |s| s.y];
+
+/// Nothing, if so many squares fill a lattice of so many places an axis well enough to be one.
+fn dense_enough(
+    squares: u64,
+    sites: i64,
+    bounds: &Rect,
+    [columns, rows]: [i64; 2],
+    pitch_nm: f64,
+) -> Result<(), ExtractionError> {
+    if (sites as u64).saturating_pow(2) <= squares.saturating_mul(SITES_PER_PILLAR) + (1 << 16) {
+        return Ok(());
+    }
+    Err(ExtractionError::Sparse {
+        squares,
+        at_nm: [bounds.x0 / 2, bounds.y0 / 2],
+        columns,
+        rows,
+        pitch_nm,
+    })
+}
 
 /// The key counted most often, the smallest of equals.
 fn most_common(counts: BTreeMap<i64, u64>) -> Option<i64> {

@@ -212,63 +212,54 @@ mod tests {
     /// Sums of a few products of numbers of size one.
     const ROUNDING: f64 = 1e-13;
 
-    /// The disc and its normal by sums over a fine polar grid.
-    #[test]
-    fn a_circle_has_the_moments_of_its_disc() {
-        // The rule of rectangles along the radius, 400 points; angles are exact.
-        const SUMMED: f64 = 1e-5;
-        let duty = 0.6;
-        let moments = Moments::of_circle(duty, 4);
-        for (m, n) in [(0, 0), (1, 0), (2, 3), (-4, 1)] {
-            let mut sums = [0.0; 3];
-            for i in 0..400 {
-                let r = (f64::from(i) + 0.5) / 400.0;
-                for j in 0..200 {
-                    let angle = TAU * f64::from(j) / 200.0;
-                    let (sin, cos) = angle.sin_cos();
-                    let wave = (TAU * 0.5 * duty * r * (f64::from(m) * cos + f64::from(n) * sin)).cos();
-                    let area = 0.25 * duty * duty * r / 400.0 * TAU / 200.0;
-                    let turn = r * r;
-                    for (sum, value) in
-                        sums.iter_mut()
-                            .zip([1.0, turn * (2.0 * angle).cos(), turn * (2.0 * angle).sin()])
-                    {
-                        *sum += wave * area * value;
-                    }
+    /// The rule of rectangles along the radius, 400 points; angles are exact.
+    const SUMMED: f64 = 1e-5;
+
+    /// The three moments of a disc in a cell of unit area, by sums over a fine polar grid; the wave vector times the pitch,
+    /// over one turn.
+    fn disc_sums(duty: f64, [x, y]: [f64; 2]) -> [f64; 3] {
+        let mut sums = [0.0; 3];
+        for i in 0..400 {
+            let r = (f64::from(i) + 0.5) / 400.0;
+            for j in 0..200 {
+                let angle = TAU * f64::from(j) / 200.0;
+                let (sin, cos) = angle.sin_cos();
+                let wave = (TAU * 0.5 * duty * r * (x * cos + y * sin)).cos();
+                let area = 0.25 * duty * duty * r / 400.0 * TAU / 200.0;
+                let turn = r * r;
+                let values = [1.0, turn * (2.0 * angle).cos(), turn * (2.0 * angle).sin()];
+                for (sum, value) in sums.iter_mut().zip(values) {
+                    *sum += wave * area * value;
                 }
             }
-            let found = [&moments.pillar, &moments.cosine, &moments.sine].map(|c| c.at(m, n));
-            for (a, b) in found.iter().zip(sums) {
-                assert!((a - b).abs() < SUMMED, "{m} {n}: {found:?} {sums:?}");
-            }
+        }
+        sums
+    }
+
+    fn assert_has(moments: &Moments, m: i32, n: i32, sums: [f64; 3]) {
+        let found = [&moments.pillar, &moments.cosine, &moments.sine].map(|c| c.at(m, n));
+        for (a, b) in found.iter().zip(sums) {
+            assert!((a - b).abs() < SUMMED, "{m} {n}: {found:?} {sums:?}");
         }
     }
 
-    /// The cell of staggered rows by sums over its disc, as above; two discs in a rectangle have the same coefficients.
+    #[test]
+    fn a_circle_has_the_moments_of_its_disc() {
+        let duty = 0.6;
+        let moments = Moments::of_circle(duty, 4);
+        for (m, n) in [(0, 0), (1, 0), (2, 3), (-4, 1)] {
+            assert_has(&moments, m, n, disc_sums(duty, [m, n].map(f64::from)));
+        }
+    }
+
+    /// The cell of staggered rows holds one disc; two in a rectangle have the same coefficients.
     #[test]
     fn a_staggered_circle_has_the_moments_of_its_disc() {
-        const SUMMED: f64 = 1e-5;
         let (duty, row) = (0.7, 0.9);
         let moments = Moments::of_staggered_circle(duty, row, [3, 5]);
         for (m, n) in [(0, 0), (1, 1), (2, -4), (-3, 5), (0, 2)] {
-            let mut sums = [0.0; 3];
-            for i in 0..400 {
-                let r = (f64::from(i) + 0.5) / 400.0;
-                for j in 0..200 {
-                    let angle = TAU * f64::from(j) / 200.0;
-                    let (sin, cos) = angle.sin_cos();
-                    let turns = 0.5 * duty * r * (f64::from(m) * cos + f64::from(n) / (2.0 * row) * sin);
-                    let share = 0.25 * duty * duty * r / 400.0 * TAU / 200.0 / row;
-                    let values = [1.0, r * r * (2.0 * angle).cos(), r * r * (2.0 * angle).sin()];
-                    for (sum, value) in sums.iter_mut().zip(values) {
-                        *sum += (TAU * turns).cos() * share * value;
-                    }
-                }
-            }
-            let found = [&moments.pillar, &moments.cosine, &moments.sine].map(|c| c.at(m, n));
-            for (a, b) in found.iter().zip(sums) {
-                assert!((a - b).abs() < SUMMED, "{m} {n}: {found:?} {sums:?}");
-            }
+            let sums = disc_sums(duty, [f64::from(m), f64::from(n) / (2.0 * row)]);
+            assert_has(&moments, m, n, sums.map(|s| s / row));
         }
         assert_eq!(moments.pillar.at(1, 2), 0.0);
     }
