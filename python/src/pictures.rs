@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use metalith::camera::Camera;
 use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
 use metalith::picture::scene::SceneImage;
-use metalith::picture::{self, Rehearsal};
+use metalith::picture::{self, OperatorError, Rehearsal};
 use metalith::prior::NetworkDenoiser;
 use metalith::{CalibratedModel, Error, Result};
 use ndarray::Array3;
@@ -24,7 +24,7 @@ const FAR: f64 = f64::INFINITY;
 pub struct Studio {
     studio: picture::Studio,
     /// What the operator of the restoration errs by; found when it is first needed.
-    operator_error: OnceLock<Vec<f64>>,
+    operator_error: OnceLock<OperatorError>,
 }
 
 /// A frame that was recorded.
@@ -158,7 +158,7 @@ impl Studio {
         Ok(SceneImage::of_rgb("scene", rgb, view.field_deg, view.distance_um))
     }
 
-    fn operator_error(&self, operator: &picture::FrameOperator<'_>) -> &[f64] {
+    fn operator_error(&self, operator: &picture::FrameOperator<'_>) -> &OperatorError {
         self.operator_error
             .get_or_init(|| Rehearsal::new(&self.studio, operator).operator_error)
     }

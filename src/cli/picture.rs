@@ -158,7 +158,7 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         Fidelity::Rigorous
     };
     let mut report = report(args, &studio, &scene, &frame, found, fidelity.name());
-    report.operator_error.clone_from(error);
+    report.operator_error.clone_from(&error.overall);
     if let Ok(kind) = args.scene.parse::<BuiltIn>() {
         report.contrast = contrast_curves(&studio, kind, &truth, &frame, &pictures[0]);
     }

@@ -141,7 +141,7 @@ pub fn worth_of_assumptions(
             Ok(AssumedScore {
                 assumption,
                 scores: scores(&picture, &studio.truth(scene))?,
-                operator_error: error,
+                operator_error: error.overall,
             })
         })
         .collect()

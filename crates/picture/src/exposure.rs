@@ -7,6 +7,8 @@ use ndarray::Array2;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
+use crate::operator_error::OperatorError;
+
 /// A frame as it was recorded.
 #[derive(Clone, Debug)]
 pub struct Frame {
@@ -137,7 +139,7 @@ impl Frame {
     /// a share of the light, by channel, and of no less than the mean light of the frame: light in dark places comes from
     /// bright ones. Both follow from the mean signal about a pixel: by its own, one that noise has
     /// made dark would be trusted more than its neighbours.
-    pub fn light(&self, camera: &Camera, error: &[f64]) -> (Vec<Array2<f32>>, Vec<Array2<f32>>) {
+    pub fn light(&self, camera: &Camera, error: &OperatorError) -> (Vec<Array2<f32>>, Vec<Array2<f32>>) {
         let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();
         let (mut light, mut trust) = (Vec::new(), Vec::new());
         for (channel, gain) in self.gain.iter().enumerate() {
@@ -153,7 +155,7 @@ impl Frame {
             light.push(signal.mapv(|v| (v / gain) as f32));
             trust.push(Array2::from_shape_fn(plane.dim(), |at| {
                 let mean = (sums[at] / numbers[at].max(1.0)).max(0.0);
-                let variance = self.noise.variance(mean) + (error[channel] * mean.max(overall)).powi(2);
+                let variance = self.noise.variance(mean) + (error.about(channel, at) * mean.max(overall)).powi(2);
                 (known[at] * gain * gain / variance.max(f64::MIN_POSITIVE)) as f32
             }));
         }
@@ -223,7 +225,7 @@ mod tests {
         // 400 pixels with noise of 0.007: three standard errors.
         assert!((mean(1, 1) - 0.2).abs() < 1e-3 && (mean(0, 1) - 0.5).abs() < 1.2e-3);
         assert_eq!(expose(&camera, &[1.0, 1.0, 1.0], &light, 3).planes, frame.planes);
-        let (light, trust) = frame.light(&camera, &[0.0; 3]);
+        let (light, trust) = frame.light(&camera, &OperatorError::none(3));
         assert!(frame.is_of([40, 40], 3).is_ok());
         for (size, channels) in [([40, 41], 3), ([40, 40], 1)] {
             let error = frame.is_of(size, channels).unwrap_err().to_string();

@@ -6,6 +6,7 @@ use ndarray::Array2;
 
 use crate::exposure::{channel_at, expose};
 use crate::operator::{Detail, FrameOperator, SceneInputs};
+use crate::operator_error::OperatorError;
 use crate::restore::{RestorationMethod, SceneStatistics};
 use crate::scene::SceneImage;
 use crate::score::scores;
@@ -16,9 +17,8 @@ use crate::studio::Studio;
 pub struct Rehearsal {
     scene: SceneImage,
     light: Vec<Array2<f32>>,
-    /// What the operator of the restoration errs by against the simulation, as a share of the light (root mean square), by
-    /// channel.
-    pub operator_error: Vec<f64>,
+    /// What the operator of the restoration errs by against the simulation.
+    pub operator_error: OperatorError,
 }
 
 /// Of the scene and of its noise.
@@ -47,15 +47,11 @@ impl Rehearsal {
         };
         let names: Vec<String> = studio.camera.channels.iter().map(|c| c.name.clone()).collect();
         let filter = studio.camera.sensor.filter;
-        let error = |(channel, (a, b))| {
-            let counts = |y, x| channel_at(filter, &names, y, x).is_none_or(|c| c == channel);
-            relative(a, b, counts)
-        };
-        let operator_error = light.iter().zip(&known).enumerate().map(error).collect();
+        let counts = |channel, (y, x)| channel_at(filter, &names, y, x).is_none_or(|c| c == channel);
         Self {
+            operator_error: OperatorError::between(&light, &known, counts),
             scene,
             light,
-            operator_error,
         }
     }
 
@@ -76,16 +72,4 @@ impl Rehearsal {
         let found = scores(&picture, &studio.truth(&self.scene))?;
         Ok(found.iter().map(|s| s.psnr_linear_db).collect())
     }
-}
-
-/// Root mean square difference over that of the first, of the pixels that count.
-fn relative(a: &Array2<f32>, b: &Array2<f32>, counts: impl Fn(usize, usize) -> bool) -> f64 {
-    let (mut off, mut all) = (0.0, 0.0);
-    for (((y, x), a), b) in a.indexed_iter().zip(b) {
-        if counts(y, x) {
-            off += f64::from(a - b).powi(2);
-            all += f64::from(*a).powi(2);
-        }
-    }
-    (off / f64::max(all, f64::MIN_POSITIVE)).sqrt()
 }

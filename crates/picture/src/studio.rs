@@ -10,6 +10,7 @@ use crate::assumed::Assumed;
 use crate::exposure::{Frame, expose, gains, sensitivity};
 use crate::kernels::KernelBank;
 use crate::operator::{Detail, FrameOperator, SceneInputs, ScenePoints};
+use crate::operator_error::OperatorError;
 use crate::restore::{
     LearnedDenoiser, Recorded, RestorationMethod, SceneStatistics, restore_joint, restore_samples, restore_separate,
 };
@@ -143,7 +144,7 @@ impl Studio {
     pub fn restore(
         &self,
         operator: &FrameOperator<'_>,
-        error: &[f64],
+        error: &OperatorError,
         frame: &Frame,
         method: RestorationMethod,
         joint: bool,
@@ -165,7 +166,7 @@ impl Studio {
     pub fn samples(
         &self,
         operator: &FrameOperator<'_>,
-        error: &[f64],
+        error: &OperatorError,
         frame: &Frame,
         seeds: std::ops::Range<u64>,
         progress: &dyn Progress,
@@ -190,7 +191,12 @@ impl Studio {
     }
 
     /// What a frame says: its light, and how far each pixel is to be trusted.
-    fn known(&self, operator: &FrameOperator<'_>, error: &[f64], frame: &Frame) -> Result<[Vec<Array2<f32>>; 2]> {
+    fn known(
+        &self,
+        operator: &FrameOperator<'_>,
+        error: &OperatorError,
+        frame: &Frame,
+    ) -> Result<[Vec<Array2<f32>>; 2]> {
         frame.is_of(operator.frame(), self.gain.len())?;
         Ok(frame.light(&self.camera, error).into())
     }
@@ -208,7 +214,7 @@ impl Studio {
     /// A frame as a picture without any restoration, linear sRGB `[row, column, colour]`: pixels where they look, over those
     /// of a white scene.
     pub fn unrestored(&self, operator: &FrameOperator<'_>, frame: &Frame) -> Array3<f64> {
-        let (light, trust) = frame.light(&self.camera, &vec![0.0; self.gain.len()]);
+        let (light, trust) = frame.light(&self.camera, &OperatorError::none(self.gain.len()));
         self.colours.rgb(&operator.unrestored(&light, &trust))
     }
 

@@ -3,7 +3,7 @@
 use metalith_core::{Progress, Result};
 use metalith_picture::restore::RestorationMethod;
 use metalith_picture::scene::SceneImage;
-use metalith_picture::{Frame, FrameOperator, Rehearsal, Studio};
+use metalith_picture::{Frame, FrameOperator, OperatorError, Rehearsal, Studio};
 use ndarray::Array3;
 
 use crate::contender::{Contender, Way};
@@ -13,7 +13,7 @@ pub struct ArrayCamera<'a> {
     studio: &'a Studio,
     simulation: FrameOperator<'a>,
     restoration: FrameOperator<'a>,
-    error: Vec<f64>,
+    error: OperatorError,
     ways: Vec<(RestorationMethod, bool)>,
 }
 

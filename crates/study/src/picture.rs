@@ -11,7 +11,7 @@ use metalith_gds::extract::Extraction;
 use metalith_made::{MadeChip, SimulationCase};
 use metalith_picture::restore::RestorationMethod;
 use metalith_picture::scene::{BuiltIn, SceneImage, chart, read_far_scene};
-use metalith_picture::{Frame, FrameOperator, Rehearsal, Studio, Zone, ZoneScore, sampling_of, scores};
+use metalith_picture::{Frame, FrameOperator, OperatorError, Rehearsal, Studio, Zone, ZoneScore, sampling_of, scores};
 use ndarray::Array3;
 
 /// Pixels an axis of a built-in scene, if nothing else is said.
@@ -106,7 +106,7 @@ pub(crate) struct PictureBench {
 /// The chip that a restoration knows when cameras are not calibrated.
 pub(crate) struct KnownChip {
     studio: Studio,
-    operator_error: Vec<f64>,
+    operator_error: OperatorError,
 }
 
 /// The picture of one draw.

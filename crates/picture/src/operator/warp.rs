@@ -84,6 +84,9 @@ impl Warp {
         ];
         let (low, high) = extent(element, spec, channel_um);
         let step = cell as f64;
+        // Of what a point stands for: in pixels of the scene in the middle of the field, and on the sensor (um).
+        let side = area.sqrt() * pixel;
+        let sides = [side / (element.focal_um * space.view.pixel()), side];
         let first = [1, 0].map(|a| ((axis[1 - a] + low[a] / pixel) / step).floor() as i64);
         let last = [1, 0].map(|a| ((axis[1 - a] + high[a] / pixel) / step).ceil() as i64);
         let shape = [0, 1].map(|a| (last[a] - first[a] + 1).max(1) as usize);
@@ -107,12 +110,20 @@ impl Warp {
                 .zip(space.tangents(element, sines));
             let Some((landing, tangents)) = found else { continue };
             let scene = space.view.place(tangents);
-            let inside = (0..2).all(|a| scene[a] >= -0.5 && scene[a] <= warp.size[a] as f64 - 0.5);
-            let inside = inside && place.iter().all(|v| v.abs() <= patch_um);
-            if inside && landing.iter().all(|v| v.abs() <= spec.reach_um) {
+            // How much of what the point stands for is in the scene, in the field of the kernels and in the patch.
+            let left = (0..2).map(|a| {
+                let [scene_side, side] = sides;
+                let share = |room: f64, side: f64| (room / side + 0.5).clamp(0.0, 1.0);
+                share((scene[a] + 0.5).min(warp.size[a] as f64 - 0.5 - scene[a]), scene_side)
+                    * share(spec.reach_um - landing[a].abs(), side)
+                    * share(patch_um - place[a].abs(), side)
+            });
+            let left: f64 = left.product();
+            if left > 0.0 {
+                let last = (spec.nodes - 1) as f64;
                 warp.looks.push(Look::new(i, scene, warp.size));
-                warp.nodes[i] = [spec.place(landing[1]) as f32, spec.place(landing[0]) as f32];
-                warp.flux[i] = (brightness(place) * pixel * pixel * area) as f32;
+                warp.nodes[i] = [landing[1], landing[0]].map(|um| spec.place(um).clamp(0.0, last) as f32);
+                warp.flux[i] = (left * brightness(place) * pixel * pixel * area) as f32;
             }
         }
         warp

@@ -121,11 +121,13 @@ impl Denoiser for LearnedDenoiser {
         })
     }
 
+    /// Few rounds that come near their ends: eight of three steps from 0.06 to 0.008 leave photographs of 800 x 800 with 0.2 to 0.5 dB
+    /// less, and 0.7 to 1.4 dB less for a camera of one kernel for each element and colour.
     fn schedule(&self) -> Schedule {
         Schedule {
-            deviations: [0.06, 0.008],
-            rounds: 8,
-            steps: 3,
+            deviations: [0.04, 0.01],
+            rounds: 5,
+            steps: 6,
             trust: 0.25,
         }
     }

@@ -23,7 +23,7 @@ pub trait Denoiser: Sync {
 }
 
 /// Rounds before samples are drawn.
-const DRAWN_AFTER: usize = 3;
+const DRAWN_AFTER: usize = 2;
 
 /// Rounds of a splitting.
 #[derive(Clone, Copy, Debug)]

@@ -13,7 +13,7 @@ use metalith_core::{Error, Progress, Result};
 use metalith_picture::restore::SceneStatistics;
 use metalith_picture::scene::SceneImage;
 use metalith_picture::spectra::rgb_basis;
-use metalith_picture::{Frame, SceneView};
+use metalith_picture::{Frame, OperatorError, SceneView};
 use ndarray::Array2;
 use rayon::prelude::*;
 
@@ -86,7 +86,7 @@ pub struct DiffuserCam {
     /// By channel.
     solvers: Vec<Deconvolution>,
     /// What the operator of the restoration errs by, as a share of the light, by channel.
-    error: Vec<f64>,
+    error: OperatorError,
 }
 
 impl DiffuserCam {
@@ -137,7 +137,7 @@ impl DiffuserCam {
             spec: *spec,
             fine,
             solvers,
-            error: Vec::new(),
+            error: OperatorError::default(),
         };
         let white = camera.light(&camera.bench.white());
         camera.bench = camera.bench.exposed(&white)?;
@@ -146,12 +146,12 @@ impl DiffuserCam {
     }
 
     /// Root mean square difference of what the restoration knows and the simulation on a random scene, over the light.
-    fn operator_error(&self) -> Vec<f64> {
+    fn operator_error(&self) -> OperatorError {
         let planes = SceneStatistics::colours().random_scene(&self.bench.view, SEED);
         let scene = self.bench.scene_of(planes);
         let light = self.light(&scene);
         let ideal = self.bench.ideal(&scene);
-        (0..light.len())
+        let overall = (0..light.len())
             .into_par_iter()
             .map(|c| {
                 let solver = &self.solvers[c];
@@ -161,7 +161,8 @@ impl DiffuserCam {
                 let all: f64 = seen.iter().map(|v| f64::from(*v).powi(2)).sum();
                 (off / all.max(f64::MIN_POSITIVE)).sqrt()
             })
-            .collect()
+            .collect();
+        OperatorError::uniform(overall)
     }
 }
 
@@ -222,7 +223,11 @@ mod tests {
             ..DiffuserSpec::standard()
         };
         let diffuser = DiffuserCam::new(&spec, &camera, scene.view, &Silent).unwrap();
-        assert!(diffuser.error.iter().all(|e| *e < OPERATOR), "{:?}", diffuser.error);
+        assert!(
+            diffuser.error.overall.iter().all(|e| *e < OPERATOR),
+            "{:?}",
+            diffuser.error.overall
+        );
         let frame = diffuser.record(&scene, 1).unwrap();
         let picture = diffuser.restore(&frame, 0, &Silent).unwrap();
         let found = scores(&picture, &diffuser.truth(&scene)).unwrap()[0];

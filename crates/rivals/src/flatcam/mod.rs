@@ -13,7 +13,7 @@ use metalith_camera::Camera;
 use metalith_core::{Error, Progress, Result};
 use metalith_picture::restore::SceneStatistics;
 use metalith_picture::scene::SceneImage;
-use metalith_picture::{Frame, SceneView};
+use metalith_picture::{Frame, OperatorError, SceneView};
 use ndarray::{Array2, Axis, Slice};
 use rayon::prelude::*;
 
@@ -118,7 +118,7 @@ impl FlatCam {
             .scene_of(SceneStatistics::colours().random_scene(&self.bench.view, SEED));
         let frame = self.bench.record(&self.light(&scene), SEED);
         let truth = self.bench.ideal(&scene);
-        let (light, _) = frame.light(&self.bench.camera, &vec![0.0; self.bench.channels()]);
+        let (light, _) = frame.light(&self.bench.camera, &OperatorError::none(self.bench.channels()));
         let ([first, last], steps) = STRENGTHS;
         let tried: Vec<f64> = (0..steps)
             .map(|k| 10f64.powf(first + (last - first) * k as f64 / (steps - 1) as f64))
@@ -203,7 +203,7 @@ impl Lensless for FlatCam {
 
     fn sent(&self, frame: &Frame, progress: &dyn Progress) -> Result<Vec<Array2<f32>>> {
         progress.begin("restoring", self.bench.channels() as u64);
-        let (light, _) = frame.light(&self.bench.camera, &vec![0.0; self.bench.channels()]);
+        let (light, _) = frame.light(&self.bench.camera, &OperatorError::none(self.bench.channels()));
         let sent = light
             .par_iter()
             .enumerate()
