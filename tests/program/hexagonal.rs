@@ -155,6 +155,72 @@ rotation_deg = 20
     );
 }
 
+/// What a process and a bench do to a chip costs a lens the same share of its Strehl ratio on either lattice.
+#[test]
+fn a_chip_as_made_loses_as_much_as_on_a_square_lattice() {
+    /// Pillars of the two lattices differ in how they answer to a bias, and rims have other sites.
+    const ALIKE: f64 = 0.015;
+    /// What the effects are made to cost, together.
+    const COSTS: f64 = 0.7;
+    let folder = tempfile::tempdir().unwrap();
+    let smaller = [
+        ("diameter_um = 160", "diameter_um = 80"),
+        ("focal_length_um = 240", "focal_length_um = 120"),
+    ];
+    let square = [
+        smaller[0],
+        smaller[1],
+        ("lattice = \"hexagonal\"", "lattice = \"square\""),
+    ];
+    let effects = [
+        "wavefront_nm = [120.0, 0.0, 60.0]\ncd_bias_density_nm = 20.0",
+        "stitching = [{ axis = 0, at_um = 5.0, by_nm = [180.0, 90.0] }, { axis = 1, at_um = -10.0, by_nm = [-60.0, 240.0] }]",
+        "missing_pillars = 0.05\naperture_offset_um = [8.0, -5.0]",
+    ];
+    let paths = ["source_per_m = 150.0", "tilt_mrad = [40.0, 25.0]", "gap_um = 5.0"];
+    let strehl = |changes: &[(&str, &str)], geometry: &str, path: &str| {
+        let design = changed(&folder, changes);
+        let layout = folder.path().join("hexagonal_1550_pillars.gds");
+        let output = metalith(&["layout", "--out"], &[folder.path(), &design]);
+        assert_eq!(
+            output.status.code(),
+            Some(0),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        let model = folder.path().join("model.toml");
+        let text = format!(
+            "schema = 2\nset = \"made up\"\nfinding = \"made up\"\n[perturbation.geometry]\n{geometry}\n[perturbation.cell]\n\
+             [perturbation.path]\n{path}\n[perturbation.light]\n[perturbation.camera]\n"
+        );
+        fs::write(&model, text).unwrap();
+        let flags = ["verify", "--fast", "--out"];
+        let output = metalith(&flags, &[folder.path(), &design, &layout, "--model".as_ref(), &model]);
+        assert_eq!(
+            output.status.code(),
+            Some(0),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        numbers(&report(folder.path()))["distinct"][0]["spots"][0]["extracted_strehl"][0][1]
+            .as_f64()
+            .unwrap()
+    };
+    let plain = [&smaller[..], &square[..]].map(|lattice| strehl(lattice, "", ""));
+    let mut all = 1.0;
+    for (geometry, path) in effects.into_iter().zip(paths) {
+        let [hexagonal, square] = [(&smaller[..], plain[0]), (&square[..], plain[1])]
+            .map(|(lattice, plain)| strehl(lattice, geometry, path) / plain);
+        println!("{geometry}; {path}: {hexagonal:.4}, {square:.4}");
+        assert!(
+            (hexagonal - square).abs() < ALIKE,
+            "{geometry}; {path}: {hexagonal}, {square}"
+        );
+        all *= hexagonal;
+    }
+    assert!(all < COSTS, "{all}");
+}
+
 /// What knows squares alone names the line of the design that says otherwise, and does nothing.
 #[test]
 fn what_knows_squares_alone_refuses_it_by_line_and_column() {
