@@ -8,11 +8,12 @@ use metalith::camera::Camera;
 use metalith::cell::{CellStack, FittedCell, Handedness, PointwiseCell, PublishedCell, RotatedCell, cache_folder};
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::grating::{Mapping, NeighbourCell};
-use metalith::rcwa::Material;
+use metalith::rcwa::{CellLattice, Material};
 use metalith::report::{count, sig};
 use metalith::verify::{Lighting, SimulationCase, SinglePsfReport, single_psfs, single_white, write_single_psf_report};
 use metalith::{
-    Accuracy, CalibratedModel, CellModel, Error, Extraction, ExtractionPlan, Layout, MadeChip, Result, Wedge, extract,
+    Accuracy, CalibratedModel, CellModel, Error, Extraction, ExtractionPlan, LatticeKind, Layout, MadeChip, Result,
+    Wedge, extract,
 };
 
 use super::standard_input::InputFile;
@@ -180,10 +181,18 @@ impl PsfArgs {
         found.elements.first().map_or(350, |e| e.site.lattice.pitch_nm())
     }
 
-    /// The cell of the layout's own pitch.
+    fn lattice_kind(found: &Extraction) -> LatticeKind {
+        found
+            .elements
+            .first()
+            .map_or(LatticeKind::Square, |e| e.site.lattice.kind())
+    }
+
+    /// The cell of the layout's own lattice.
     fn stack(&self, found: &Extraction) -> Result<CellStack> {
         let here = Path::new("");
         Ok(CellStack {
+            lattice: CellLattice::drawn(Self::lattice_kind(found), Self::pitch_nm(found)),
             shape: found.shape,
             film: Material::resolve(&self.pillar_material, here)?,
             substrate: Material::resolve(&self.substrate_material, here)?,
@@ -194,7 +203,13 @@ impl PsfArgs {
     /// What no layout says, and is taken from the options or their defaults.
     fn assumptions(&self, found: &Extraction) -> Vec<(&'static str, String)> {
         let mut all = vec![
-            ("pitch, as found", format!("{} nm", Self::pitch_nm(found))),
+            (
+                "pitch, as found",
+                match Self::lattice_kind(found) {
+                    LatticeKind::Square => format!("{} nm", Self::pitch_nm(found)),
+                    LatticeKind::Hexagonal => format!("{} nm, of a hexagonal lattice", Self::pitch_nm(found)),
+                },
+            ),
             (
                 "distance from pillar tops to sensor",
                 format!("{} um", sig(self.distance_um, 6)),
@@ -335,6 +350,32 @@ fn mostly_pillars(args: &PsfArgs, found: &Extraction) -> Result<()> {
     ))
 }
 
+/// One cell is solved for all elements: their pillars stand on lattices of one kind, which the cell must know.
+fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
+    let kind = PsfArgs::lattice_kind(found);
+    if let Some(other) = found.elements.iter().find(|e| e.site.lattice.kind() != kind) {
+        return Err(Error::invalid(
+            format!(
+                "{}: {} stands on another kind of lattice than the elements before it",
+                args.layout.display(),
+                other.site.name
+            ),
+            "name a cell with elements of one kind by --top, or look at what is there with --extract-only --json",
+        ));
+    }
+    let squares_alone = matches!(args.fidelity, FidelityArg::Published | FidelityArg::Neighbours);
+    if squares_alone && args.model.is_none() && !args.extract_only && !kind.is_square() {
+        return Err(Error::invalid(
+            format!(
+                "{}: a hexagonal lattice by a cell that is made of square ones",
+                args.layout.display()
+            ),
+            "use --fidelity rigorous or fitted",
+        ));
+    }
+    Ok(())
+}
+
 pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let layout = Layout::open_with(&InputFile::of(&args.layout)?, ReadLimits::default(), terminal)?;
@@ -344,16 +385,7 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     };
     let found = extract(&layout, &plan, terminal)?;
     mostly_pillars(args, &found)?;
-    if let Some(element) = found.elements.iter().find(|e| !e.site.lattice.is_square()) {
-        return Err(Error::invalid(
-            format!(
-                "{}: {} stands on a hexagonal lattice",
-                args.layout.display(),
-                element.site.name
-            ),
-            "`metalith check`, `diff` and `convert` know this layout; simulation knows square lattices alone",
-        ));
-    }
+    one_kind(args, &found)?;
     let assumptions = args.assumptions(&found);
     let made = match &args.model {
         Some(path) => Some(MadeChip::new(&args.stack(&found)?, &CalibratedModel::read(path)?)?),
@@ -397,6 +429,7 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
                 "name": e.site.name,
                 "centre_nm": e.site.centre_nm,
                 "pitch_nm": e.site.lattice.pitch_nm(),
+                "lattice": e.site.lattice.kind(),
                 "sites": e.site.lattice.sites(),
                 "pillars": e.widths.pillars(),
             })
@@ -417,14 +450,15 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     for element in &found.elements {
         let (site, lattice) = (&element.site, element.site.lattice);
         print_line!(
-            "{} at ({}, {}) um: {} pillars on {} x {} sites of {} nm",
+            "{} at ({}, {}) um: {} pillars on {}",
             site.name,
             sig(site.centre_nm[0] as f64 * 1e-3, 8),
             sig(site.centre_nm[1] as f64 * 1e-3, 8),
             count(element.widths.pillars()),
-            lattice.sites(),
-            lattice.sites(),
-            lattice.pitch_nm(),
+            match lattice.kind() {
+                LatticeKind::Square => format!("{0} x {0} sites of {1} nm", lattice.sites(), lattice.pitch_nm()),
+                LatticeKind::Hexagonal => format!("a hexagonal lattice of {} nm", lattice.pitch_nm()),
+            },
         );
     }
     print_line!("{} other shapes on layer {}", count(found.oddities.total()), args.layer);

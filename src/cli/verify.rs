@@ -110,6 +110,9 @@ impl Judging {
     /// # Errors
     /// If it could be neither simulated nor compared with its design.
     pub fn simulation(&self, design: &Design, path: &Path) -> Result<Simulation> {
+        if self.picture.is_some() {
+            design.square_lattice("the simulation of pictures")?;
+        }
         let by_site = self.model.is_some() || self.fidelity(design) == Fidelity::Neighbours;
         Simulation::choose(design, path, self.accuracy(), by_site, self.memory_mb)
     }
@@ -256,7 +259,7 @@ fn summary(found: &Verification, folder: &Path) {
 }
 
 pub fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
-    let mut design = standard_input::design(&args.design)?;
+    let mut design = standard_input::design_any(&args.design)?;
     let layout = InputFile::of(&args.layout)?;
     Judging::announce(&args.judging.simulation(&design, &layout)?, terminal);
     terminal.stop_on_interrupt();

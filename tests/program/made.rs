@@ -151,7 +151,7 @@ impl Files {
         let element = bench.element_of(0.into(), perturbation).unwrap();
         let light = bench.direction_of(0.into(), perturbation, UM);
         let sines = if self.design.verify.incidence == CellIncidence::AsLit {
-            metalith::made::cell_direction(&light.plane)
+            metalith::made::cell_direction(&light.plane, metalith::LatticeKind::Square)
         } else {
             [0.0; 2]
         };

@@ -5,6 +5,7 @@ mod cells;
 mod check;
 mod compare;
 mod handoff;
+mod hexagonal;
 mod made;
 mod new;
 mod oasis;

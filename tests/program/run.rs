@@ -7,7 +7,7 @@ use assert_cmd::Command;
 use metalith_testing::{design, golden};
 use serde_json::{Value, json};
 
-fn metalith(args: &[&str], paths: &[&Path]) -> std::process::Output {
+pub(super) fn metalith(args: &[&str], paths: &[&Path]) -> std::process::Output {
     Command::cargo_bin("metalith")
         .unwrap()
         .args(args)
@@ -16,12 +16,12 @@ fn metalith(args: &[&str], paths: &[&Path]) -> std::process::Output {
         .unwrap()
 }
 
-fn report(folder: &Path) -> Value {
+pub(super) fn report(folder: &Path) -> Value {
     serde_json::from_slice(&fs::read(folder.join("report.json")).unwrap()).unwrap()
 }
 
 /// Numbers that must not change unnoticed, to as many digits as hold on every machine.
-fn numbers(report: &Value) -> Value {
+pub(super) fn numbers(report: &Value) -> Value {
     const DIGITS: i32 = 4;
     let round = |v: &Value| {
         let x = v.as_f64().unwrap();

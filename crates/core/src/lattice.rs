@@ -145,9 +145,20 @@ impl Lattice {
         }
     }
 
+    /// Distance of the places of the grid along x and along y (um).
+    pub fn steps_um(&self) -> [f64; 2] {
+        self.steps_nm().map(|step| f64::from(step) * 1e-3)
+    }
+
+    /// Edges of a rectangle of the chip for each site: the pitch, and the distance of two rows (um).
+    pub fn cell_um(&self) -> [f64; 2] {
+        [self.pitch_nm, self.kind.row_nm(self.pitch_nm)].map(|edge| f64::from(edge) * 1e-3)
+    }
+
     /// Area of the chip for each site (um^2).
     pub fn cell_um2(&self) -> f64 {
-        self.pitch_um() * f64::from(self.kind.row_nm(self.pitch_nm)) * 1e-3
+        let [x, y] = self.cell_um();
+        x * y
     }
 
     /// Whether a place of the grid is a site.
@@ -193,6 +204,25 @@ impl Lattice {
     /// Square of the distance of a place from the centre (nm^2), exact.
     pub fn radius2_nm2(&self, ix: usize, iy: usize) -> i64 {
         self.place_nm(0, ix).pow(2) + self.place_nm(1, iy).pow(2)
+    }
+
+    /// Square of the distance of a place from the centre in units of [`Lattice::unit_um`]: exact, so that sites related by
+    /// symmetry agree to the last bit in everything computed from it.
+    #[inline]
+    pub fn units2(&self, ix: usize, iy: usize) -> i64 {
+        match self.kind {
+            LatticeKind::Square => self.half_radius2(ix, iy),
+            LatticeKind::Hexagonal => 4 * self.radius2_nm2(ix, iy),
+        }
+    }
+
+    /// A length of which distances along both axes are whole numbers: half a pitch, or half a nanometre on a hexagonal
+    /// lattice (um).
+    pub fn unit_um(&self) -> f64 {
+        match self.kind {
+            LatticeKind::Square => 0.5 * self.pitch_um(),
+            LatticeKind::Hexagonal => 0.5e-3,
+        }
     }
 
     /// Place number `i` of an axis in half steps from the centre: odd for an even number of places.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::{Lattice, LatticeKind, WidthMap};
+use crate::{Lattice, WidthMap};
 
 /// Pillar widths of one element. An element of 10 mm has 800 million sites: who reads it row by row needs none but a row
 /// of them in memory.
@@ -55,22 +55,14 @@ pub trait WidthRows: Sync {
     fn circle_um(&self) -> f64 {
         let lattice = self.lattice();
         let (n, mut radius2, mut room) = (lattice.sites(), 0, Vec::new());
-        let squared = |ix, iy| match lattice.kind() {
-            LatticeKind::Square => lattice.half_radius2(ix, iy),
-            LatticeKind::Hexagonal => lattice.radius2_nm2(ix, iy),
-        };
         for iy in 0..n {
             let row = self.occupied(iy, 0..n, &mut room);
             let mut ends = row.iter().enumerate().filter(|(_, w)| **w != 0).map(|(ix, _)| ix);
             for ix in ends.next().into_iter().chain(ends.next_back()) {
-                radius2 = radius2.max(squared(ix, iy));
+                radius2 = radius2.max(lattice.units2(ix, iy));
             }
         }
-        let unit_um = match lattice.kind() {
-            LatticeKind::Square => 0.5 * lattice.pitch_um(),
-            LatticeKind::Hexagonal => 1e-3,
-        };
-        (radius2 as f64).sqrt() * unit_um
+        (radius2 as f64).sqrt() * lattice.unit_um()
     }
 
     /// All of them as a map, if that is how they are held.

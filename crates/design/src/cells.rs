@@ -6,7 +6,7 @@ use metalith_cell::{
     CellModel, CellStack, Fidelity, FittedCell, PointwiseCell, PublishedCell, RotatedCell, TableSpec, UniformLayer,
     cache_folder,
 };
-use metalith_core::{Error, LatticeKind, Result};
+use metalith_core::{Error, Result};
 use metalith_grating::{Mapping, NeighbourCell};
 use metalith_rcwa::{CellLattice, Material};
 
@@ -39,13 +39,7 @@ impl Design {
         };
         let cell = &self.cell;
         Ok(CellStack {
-            lattice: match cell.lattice {
-                LatticeKind::Square => CellLattice::Square,
-                // As it is written: rows are whole nanometres apart.
-                LatticeKind::Hexagonal => CellLattice::Staggered {
-                    row_nm: f64::from(cell.lattice.row_nm(cell.pitch_nm)),
-                },
-            },
+            lattice: CellLattice::drawn(cell.lattice, cell.pitch_nm),
             shape: cell.shape,
             film: material(&cell.pillar_material)?,
             substrate: material(&cell.substrate_material)?,

@@ -31,16 +31,25 @@ fn hexagonal() -> Design {
 fn expected(design: &Design, element: usize) -> BTreeMap<(i64, i64), u16> {
     let lens = LensPhase::of(design);
     let element = design.elements()[element];
+    let own = design.lens_of(&element);
+    let outline = design.outline_of(&element);
+    // Convex and counter-clockwise: inside is what is to the left of every side, or on it.
+    let within = |x: i64, y: i64| {
+        let corners = outline.as_ref().map_or(&[][..], |o| o.corners_nm());
+        let next = corners.iter().cycle().skip(1);
+        let left = |((ax, ay), (bx, by)): (&(i64, i64), &(i64, i64))| (bx - ax) * (y - ay) - (by - ay) * (x - ax) >= 0;
+        corners.iter().zip(next).all(left)
+    };
     let phase = ElementPhase::of(&lens, &element);
     let rule = WidthRule::of_element(design, element.index);
     let lattice = design.lattice();
     let middle = lattice.sites() as i64 / 2;
-    let radius2 = (design.lens.radius_um() * 1e3).powi(2);
+    let radius2 = (own.radius_um() * 1e3).powi(2);
     let mut pillars = BTreeMap::new();
     for row in -middle..=middle {
         for k in -middle..=middle {
             let (x, y) = (k * PITCH_NM + row.rem_euclid(2) * PITCH_NM / 2, row * ROW_NM);
-            if (x * x + y * y) as f64 > radius2 {
+            if (x * x + y * y) as f64 > radius2 || !within(x, y) {
                 continue;
             }
             let [ix, iy] = [middle + 2 * k + row.rem_euclid(2), middle + row].map(|i| i as usize);
@@ -104,6 +113,39 @@ fn pillars_are_read_back_from_every_hierarchy_and_format() {
         let format = LayoutFormat::Oasis(encoding);
         write_pillars_as(&design, &array, Hierarchy::Folded, format, &path, &Silent).unwrap();
         holds(&path, &design, &array);
+    }
+}
+
+/// Elements that are placed one by one: a round lens, a smaller one in a hexagon that is steered, and a rotated rectangle.
+#[test]
+fn own_lenses_and_polygons_stand_on_the_lattice() {
+    let elements = "\n\
+        [[element]]\nx_um = -60\ny_um = -10\n\n\
+        [[element]]\nx_um = 60\ny_um = 7.35\ndiameter_um = 40\nfocal_length_um = 90\naperture = \"regular\"\n\
+        aperture_sides = 6\nsteering_x_deg = 10\n\n\
+        [[element]]\nx_um = 0\ny_um = 90\naperture = \"rectangle\"\naperture_um = [40, 25]\nrotation_deg = 20\n";
+    let text = text("")
+        .replacen("spacing_um = 150\n", "", 1)
+        .replacen("steering_deg = 15 ", "# ", 1)
+        .replacen("[mapping]", &format!("{elements}\n[mapping]"), 1);
+    let design = Design::parse_any(&design("mini_3x3"), &text).unwrap();
+    let array = PillarArray::build(&design, &Silent).unwrap();
+    assert_eq!(array.placed.len(), 3);
+    let folder = tempfile::tempdir().unwrap();
+    for hierarchy in [Hierarchy::Folded, Hierarchy::Flat] {
+        let path = folder.path().join("own.gds");
+        write_pillars_as(&design, &array, hierarchy, LayoutFormat::Gds, &path, &Silent).unwrap();
+        let read = extract(&Layout::open(&path).unwrap(), &extraction_plan(&design), &Silent).unwrap();
+        assert_eq!((read.pillars, read.oddities.total()), (array.pillars(), 0));
+        for (k, element) in read.elements.iter().enumerate() {
+            let lattice = element.site.lattice;
+            let mut there = BTreeMap::new();
+            element.widths.each_pillar(|iy, ix, width| {
+                there.insert((lattice.place_nm(0, ix), lattice.place_nm(1, iy)), width);
+            });
+            assert!(there.len() > 1000);
+            assert_eq!(there, expected(&design, k), "element {k}, {hierarchy:?}");
+        }
     }
 }
 

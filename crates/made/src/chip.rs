@@ -119,7 +119,7 @@ impl MadeChip {
         as_lit: bool,
         progress: &dyn Progress,
     ) -> Result<MadeView<'a>> {
-        let sines = self.cell_sines(stated, as_lit);
+        let sines = self.cell_sines(element, stated, as_lit);
         let solved = self
             .cells
             .solve(element.widths_nm(), stated.wavelength_um, sines, progress)?;
@@ -138,17 +138,18 @@ impl MadeChip {
         as_lit: bool,
         progress: &dyn Progress,
     ) -> Result<MadeView<'a>> {
-        let sines = self.cell_sines(stated, as_lit);
+        let sines = self.cell_sines(element, stated, as_lit);
         let solved = self
             .cells
             .solve_in_band(element.widths_nm(), stated.wavelength_um, sines, progress)?;
         Ok(self.viewed(element, stated, &solved))
     }
 
-    /// The direction that cells are solved for.
-    fn cell_sines(&self, stated: &PlaneWave, as_lit: bool) -> [f64; 2] {
+    /// The direction that cells of an element are solved for.
+    fn cell_sines(&self, element: &MadeElement, stated: &PlaneWave, as_lit: bool) -> [f64; 2] {
         if as_lit {
-            cell_direction(&ArrivingLight::new(stated, &self.perturbation().path).plane)
+            let plane = ArrivingLight::new(stated, &self.perturbation().path).plane;
+            cell_direction(&plane, element.lattice().kind())
         } else {
             [0.0; 2]
         }
@@ -244,7 +245,7 @@ impl<'a> MadeView<'a> {
                 let mut psf = Psf::formed(propagator, &aperture, &self.light.plane, lp_mm, scratch)?;
                 psf.values += self.scattered(table, psf.window.centre_um, psf.window.distance_um);
                 if let Some(otf) = &mut psf.otf {
-                    otf.power_um2 += table.scattered * self.element.lattice().pitch_um().powi(2);
+                    otf.power_um2 += table.scattered * self.element.lattice().cell_um2();
                 }
                 Ok(psf)
             })
@@ -265,14 +266,14 @@ impl<'a> MadeView<'a> {
 
     fn scattered(&self, table: &ClassTable, at_um: [f64; 2], distance_um: f64) -> f64 {
         let um = self.light.plane.wavelength_um;
-        table.scattered * spread(self.element.lattice().pitch_um(), at_um, distance_um, um)
+        table.scattered * spread(self.element.lattice().cell_um2(), at_um, distance_um, um)
     }
 }
 
 /// Intensity at a place on the sensor for a unit of |t|^2 that one site scatters on its own: the square of a term
-/// of the Rayleigh-Sommerfeld sum, far from the site, that of the element's centre for all. Lengths in um.
-pub fn spread(pitch_um: f64, at_um: [f64; 2], distance_um: f64, wavelength_um: f64) -> f64 {
+/// of the Rayleigh-Sommerfeld sum, far from the site, that of the element's centre for all. `cell_um2` is the area of the cell of a site; lengths in um.
+pub fn spread(cell_um2: f64, at_um: [f64; 2], distance_um: f64, wavelength_um: f64) -> f64 {
     let [x, y] = at_um;
     let r2 = x * x + y * y + distance_um * distance_um;
-    (pitch_um.powi(2) / (wavelength_um * r2) * distance_um).powi(2)
+    (cell_um2 / (wavelength_um * r2) * distance_um).powi(2)
 }

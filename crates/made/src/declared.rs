@@ -153,8 +153,8 @@ pub(crate) struct RowPlaces {
 
 impl RowPlaces {
     pub fn new(lattice: Lattice, iy: usize, radius_um: f64, centre_um: [f64; 2]) -> Self {
-        let x: Vec<f64> = (0..lattice.sites()).map(|ix| lattice.coordinate_um(ix)).collect();
-        let y = lattice.coordinate_um(iy);
+        let x: Vec<f64> = (0..lattice.sites()).map(|ix| lattice.place_um(0, ix)).collect();
+        let y = lattice.place_um(1, iy);
         Self {
             r: x.iter().map(|x| x.hypot(y)).collect(),
             theta: x.iter().map(|x| y.atan2(*x)).collect(),

@@ -16,21 +16,27 @@ const STRIP: usize = 16;
 /// values, each between 0 and 1; what is around the lattice counts as empty.
 pub fn fill(pillars: &WidthMap) -> Vec<f32> {
     let lattice = pillars.lattice;
-    let (n, pitch) = (lattice.sites(), lattice.pitch_um());
-    let reach = (CUT_RANGES * RANGE_UM / pitch).ceil() as usize;
-    let kernel: Vec<f32> = (0..=reach)
-        .map(|k| (-(k as f64 * pitch / RANGE_UM).powi(2)).exp() as f32)
-        .collect();
-    let total = kernel[0] + 2.0 * kernel[1..].iter().sum::<f32>();
-    let kernel: Vec<f32> = kernel.into_iter().map(|k| k / total).collect();
-    let area = |w: u16| (f64::from(w) / f64::from(lattice.pitch_nm())).powi(2) as f32;
+    let n = lattice.sites();
+    let steps_nm = lattice.steps_nm().map(f64::from);
+    // Of the place in the grid of the lattice: beside each pillar of a hexagonal one is an empty place.
+    let area = |w: u16| (f64::from(w) / steps_nm[0] * (f64::from(w) / steps_nm[1])) as f32;
     let mut plane: Vec<f32> = pillars.width_nm.iter().map(|&w| area(w)).collect();
     // Rows, then columns as the rows of the transposed plane.
-    for _ in 0..2 {
-        blur_rows(&mut plane, n, &kernel);
+    for step_um in lattice.steps_um() {
+        blur_rows(&mut plane, n, &kernel(step_um));
         plane = transposed(&plane, n);
     }
     plane
+}
+
+/// The Gaussian from its middle on, a step of the lattice's grid apart; with its other half it adds up to one.
+fn kernel(step_um: f64) -> Vec<f32> {
+    let reach = (CUT_RANGES * RANGE_UM / step_um).ceil() as usize;
+    let kernel: Vec<f32> = (0..=reach)
+        .map(|k| (-(k as f64 * step_um / RANGE_UM).powi(2)).exp() as f32)
+        .collect();
+    let total = kernel[0] + 2.0 * kernel[1..].iter().sum::<f32>();
+    kernel.into_iter().map(|k| k / total).collect()
 }
 
 /// Convolve each row with a symmetric kernel, given from its middle on; zeros beyond the ends.
@@ -68,7 +74,7 @@ fn transposed(plane: &[f32], n: usize) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metalith_core::Lattice;
+    use metalith_core::{Lattice, LatticeKind};
 
     #[test]
     fn fill_is_the_share_of_area_inside_and_half_of_it_at_an_edge() {
@@ -84,6 +90,32 @@ mod tests {
         const CUT: f64 = 1e-3;
         assert!((at(200) - 0.25).abs() < CUT);
         assert!((0.5 * (at(499) + at(500)) - 0.125).abs() < CUT);
+    }
+
+    #[test]
+    fn fill_of_a_hexagonal_lattice_is_the_share_of_its_cells() {
+        let lattice = Lattice::of_kind_covering(LatticeKind::Hexagonal, 300_000, 600).unwrap();
+        let mut map = WidthMap::empty(lattice);
+        let n = lattice.sites();
+        // Half of the lattice: what is to the left of its middle.
+        for (iy, ix) in (0..n * n).map(|k| (k / n, k % n)).filter(|(_, ix)| *ix < n / 2) {
+            if lattice.has(ix, iy) {
+                map.width_nm[[iy, ix]] = 300;
+            }
+        }
+        let fill = fill(&map);
+        let share = 0.09 / lattice.cell_um2();
+        // What the cut of the kernel leaves out, and a step of the lattice at the edge.
+        const CUT: f64 = 2e-3;
+        let middle = n / 2;
+        for (ix, iy, want) in [
+            (middle / 2, middle, share),
+            (middle, middle, 0.5 * share),
+            (middle / 2, middle + 1, share),
+        ] {
+            let got = f64::from(fill[iy * n + ix]);
+            assert!((got - want).abs() < CUT, "{ix} {iy}: {got}, not {want}");
+        }
     }
 
     #[test]

@@ -178,23 +178,14 @@ impl MadeElement {
     /// crescent that opens on the other side meets no pillar, is not focused, and is left out.
     ///
     /// # Errors
-    /// If the widths fall into more classes than can be numbered, or the lattice is hexagonal.
+    /// If the widths fall into more classes than can be numbered.
     pub fn new(drawn: &DrawnElement<'_>, geometry: &GeometryChange) -> Result<Self> {
         let lattice = drawn.pillars.lattice;
-        if !lattice.is_square() {
-            return Err(Error::invalid(
-                "a chip whose pillars stand on a hexagonal lattice",
-                "what a process makes of a chip is known on square lattices alone",
-            ));
-        }
         let n = lattice.sites();
         let steps = drawn.site_steps(geometry);
         let [ox, oy] = geometry.aperture_offset_um;
         let covered = |site: usize| {
-            let (x, y) = (
-                lattice.coordinate_um(site % n) - ox,
-                lattice.coordinate_um(site / n) - oy,
-            );
+            let (x, y) = (lattice.place_um(0, site % n) - ox, lattice.place_um(1, site / n) - oy);
             (ox != 0.0 || oy != 0.0) && x * x + y * y > drawn.aperture_radius_um.powi(2)
         };
         let mut known: HashMap<u64, u16> = HashMap::new();
@@ -218,7 +209,7 @@ impl MadeElement {
             };
             class[site] = own;
             count[usize::from(own)] += 1;
-            radius2 = radius2.max(lattice.half_radius2(site % n, site / n));
+            radius2 = radius2.max(lattice.units2(site % n, site / n));
         }
         let mut path_um = if geometry.wavefront_nm.is_empty() {
             Vec::new()
@@ -235,7 +226,7 @@ impl MadeElement {
         Ok(Self {
             lattice,
             pupil,
-            radius_um: (radius2 as f64).sqrt() * 0.5 * lattice.pitch_um(),
+            radius_um: (radius2 as f64).sqrt() * lattice.unit_um(),
             rim_um: drawn.aperture_radius_um,
             centre_um: drawn.centre_um,
             geometry: geometry.clone(),
@@ -359,7 +350,7 @@ pub struct MadeAperture<'a> {
     table: &'a ClassTable,
     wavelength_um: f64,
     /// Curvature of the wave along an axis; the same for both.
-    sphere: Option<Vec<Complex32>>,
+    sphere: Option<[Vec<Complex32>; 2]>,
 }
 
 impl Aperture for MadeAperture<'_> {
@@ -393,9 +384,9 @@ impl Aperture for MadeAperture<'_> {
             }
         }
         self.element.pupil.multiply(iy, self.wavelength_um, row);
-        if let Some(sphere) = &self.sphere {
-            for (to, along_x) in row.iter_mut().zip(sphere) {
-                *to *= along_x * sphere[iy];
+        if let Some([along_x, along_y]) = &self.sphere {
+            for (to, along_x) in row.iter_mut().zip(along_x) {
+                *to *= along_x * along_y[iy];
             }
         }
     }
@@ -406,9 +397,9 @@ impl MadeAperture<'_> {
     /// in proportion to its height, but beside resonances.
     fn towards_rim(&self, iy: usize, classes: &[u16], row: &mut [Complex32]) {
         let (lattice, rim2) = (self.element.lattice, self.element.rim_um.powi(2));
-        let y2 = lattice.coordinate_um(iy).powi(2);
+        let y2 = lattice.place_um(1, iy).powi(2);
         for ((ix, to), &class) in row.iter_mut().enumerate().zip(classes) {
-            let share = (lattice.coordinate_um(ix).powi(2) + y2) / rim2;
+            let share = (lattice.place_um(0, ix).powi(2) + y2) / rim2;
             let all = self.table.to_rim[usize::from(class)];
             let turns = share * f64::from(all.im) / std::f64::consts::TAU;
             *to *= cis(turns) * (share as f32 * all.re).exp();

@@ -3,7 +3,7 @@
 use num_complex::Complex32;
 
 use super::PathChange;
-use metalith_core::Lattice;
+use metalith_core::{Lattice, LatticeKind};
 use metalith_wave::PlaneWave;
 use metalith_wave::kernels::cis;
 
@@ -49,24 +49,29 @@ impl ArrivingLight {
         let sine = [self.plane.sin_x, self.plane.sin_y][axis];
         (0..lattice.sites())
             .map(|i| {
-                let x = lattice.coordinate_um(i);
+                let x = lattice.place_um(axis, i);
                 cis((x * sine + self.sag_um(x)) / self.plane.wavelength_um)
             })
             .collect()
     }
 
-    /// What curvature alone makes of the wave along either axis; nothing for a plane wave.
-    pub fn sphere(&self, lattice: Lattice) -> Option<Vec<Complex32>> {
-        let turns = |i| self.sag_um(lattice.coordinate_um(i)) / self.plane.wavelength_um;
-        (self.source_per_m != 0.0).then(|| (0..lattice.sites()).map(|i| cis(turns(i))).collect())
+    /// What curvature alone makes of the wave along x and along y; nothing for a plane wave.
+    pub fn sphere(&self, lattice: Lattice) -> Option<[Vec<Complex32>; 2]> {
+        let turns = |axis, i| self.sag_um(lattice.place_um(axis, i)) / self.plane.wavelength_um;
+        let along = |axis| (0..lattice.sites()).map(|i| cis(turns(axis, i))).collect();
+        (self.source_per_m != 0.0).then(|| [0, 1].map(along))
     }
 }
 
 /// Directions closer than this see the same cell (sine): a thousandth of the angle over which a resonance passes.
 const SAME_DIRECTION: f64 = 1e-5;
 
-/// The direction that a square cell cannot tell from that of a wave: both sines positive, the larger along x.
-pub fn cell_direction(wave: &PlaneWave) -> [f64; 2] {
+/// The direction that a cell of such a lattice cannot tell from that of a wave: both sines positive, and on a square lattice
+/// the larger along x.
+pub fn cell_direction(wave: &PlaneWave, lattice: LatticeKind) -> [f64; 2] {
     let [x, y] = [wave.sin_x, wave.sin_y].map(|s| (s.abs() / SAME_DIRECTION).round() * SAME_DIRECTION);
-    [x.max(y), x.min(y)]
+    match lattice {
+        LatticeKind::Square => [x.max(y), x.min(y)],
+        LatticeKind::Hexagonal => [x, y],
+    }
 }

@@ -31,10 +31,11 @@ pub fn to_middle_tops(stack: &CellStack, rim_nm: f64, wavelength_um: f64) -> Res
     Ok(Complex64::cis(std::f64::consts::TAU * turns))
 }
 
-/// The nearest width that a pillar of this stack can have, its foot within the pitch (nm).
+/// The nearest width that a pillar of this stack can have, its foot not in that of its neighbour (nm).
 pub fn possible_width_nm(stack: &CellStack, width_nm: f64) -> f64 {
     let foot = (2.0 * stack.taper.tan() * stack.height_nm).max(0.0);
-    let most = (stack.pitch_nm - LEAST_NM - foot).max(LEAST_NM);
+    let nearest_nm = stack.lattice.nearest_nm(stack.pitch_nm);
+    let most = (nearest_nm - LEAST_NM - foot).max(LEAST_NM);
     width_nm.clamp(LEAST_NM, most)
 }
 

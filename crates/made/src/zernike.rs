@@ -17,8 +17,8 @@ pub fn map(coefficients_nm: &[f64], lattice: Lattice, radius_um: f64) -> Vec<f32
     (0..n * n)
         .map(|site| {
             let (x, y) = (
-                lattice.coordinate_um(site % n) / radius_um,
-                lattice.coordinate_um(site / n) / radius_um,
+                lattice.place_um(0, site % n) / radius_um,
+                lattice.place_um(1, site / n) / radius_um,
             );
             if x * x + y * y > 1.0 {
                 return 0.0;

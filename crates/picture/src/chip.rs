@@ -200,7 +200,7 @@ fn zero_order(made: &MadeElement, classes: &[ClassTable], full: f64, area_um2: f
     for class in made.classes() {
         counts[usize::from(*class)] += 1;
     }
-    let site_um2 = made.lattice().pitch_um().powi(2);
+    let site_um2 = made.lattice().cell_um2();
     let of = |table: &ClassTable| {
         let sum: num_complex::Complex64 = counts
             .iter()

@@ -233,6 +233,7 @@ impl Studio {
 impl<'a> Wanted<'a> {
     fn new(design: &'a Design, camera: &'a Camera, scene: &'a SceneImage) -> Result<Self> {
         design.one_lens("the simulation of pictures")?;
+        design.square_lattice("the simulation of pictures")?;
         let elements = element_views(design, camera);
         let mut basis = scene.basis.clone();
         let primaries = if basis == rgb_basis() { 0 } else { basis.len() };

@@ -1,5 +1,6 @@
 //! What the solver is given: layers on a lattice, in optical constants.
 
+use metalith_core::LatticeKind;
 use num_complex::Complex64;
 use serde::Serialize;
 
@@ -27,6 +28,16 @@ impl CellLattice {
     pub fn hexagonal(pitch_nm: f64) -> Self {
         Self::Staggered {
             row_nm: ROW_OF_HEXAGONAL * pitch_nm,
+        }
+    }
+
+    /// The lattice of such a kind as it is drawn, where rows are whole nanometres apart.
+    pub fn drawn(kind: LatticeKind, pitch_nm: u32) -> Self {
+        match kind {
+            LatticeKind::Square => Self::Square,
+            LatticeKind::Hexagonal => Self::Staggered {
+                row_nm: f64::from(kind.row_nm(pitch_nm)),
+            },
         }
     }
 

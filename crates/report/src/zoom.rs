@@ -28,21 +28,19 @@ impl PillarZoom {
         let lattice = map.lattice;
         let span_um = span_um.clamp(lattice.pitch_um(), MOST * lattice.pitch_um());
         let half = (span_um + lattice.pitch_um()) / 2.0;
-        let near =
-            |centre: f64| (0..lattice.sites()).filter(move |&i| (lattice.coordinate_um(i) - centre).abs() <= half);
+        let near = |axis: usize, centre: f64| {
+            (0..lattice.sites()).filter(move |&i| (lattice.place_um(axis, i) - centre).abs() <= half)
+        };
         let mut pillars = Vec::new();
         let origin = (nm(centre_um.0), nm(centre_um.1));
-        for iy in near(centre_um.1) {
-            for ix in near(centre_um.0) {
+        for iy in near(1, centre_um.1) {
+            for ix in near(0, centre_um.0) {
                 let width = map.width_nm[[iy, ix]];
                 if width == 0 {
                     continue;
                 }
                 // The drawing counts nanometres from its middle, y downwards.
-                let (x, y) = (
-                    lattice.coordinate_nm(ix) - origin.0,
-                    origin.1 - lattice.coordinate_nm(iy),
-                );
+                let (x, y) = (lattice.place_nm(0, ix) - origin.0, origin.1 - lattice.place_nm(1, iy));
                 pillars.push(([x, y], width));
             }
         }

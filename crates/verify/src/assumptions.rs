@@ -41,7 +41,7 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
             "Each pillar passes light as in an infinite lattice of equal pillars",
             if design.cell.is_of_the_paper() {
                 neighbours(design)
-            } else if design.cell.shape.rectangles().is_some() {
+            } else if design.cell.shape.rectangles().is_some() || !design.cell.lattice.is_square() {
                 "not known; at the rim neighbours differ most".into()
             } else {
                 "not known for this cell; --fidelity neighbours tells".into()

@@ -6,8 +6,7 @@ use std::collections::hash_map::Entry;
 use num_complex::Complex64;
 
 use metalith_cell::{CellModel, NeighbourResponse, ObliqueTables, POLARISATION_SHARE};
-use metalith_core::Progress;
-use metalith_core::{Error, Result, WidthRows};
+use metalith_core::{Error, LatticeKind, Progress, Result, WidthRows};
 use metalith_grating::NeighbourPillars;
 use metalith_made::{SimulationCase, cell_direction};
 use metalith_wave::{Aperture, Fold, Pillars, PlaneWave, Psf, Scratch};
@@ -66,20 +65,23 @@ pub(super) struct TransmissionTables {
     neighbours: HashMap<[u64; 2], [NeighbourResponse; 2]>,
     /// Whether it is one of many wavelengths of a band.
     in_band: bool,
+    /// What the pillars stand on.
+    lattice: LatticeKind,
 }
 
 impl TransmissionTables {
-    /// Solve a cell along the normal.
+    /// Solve a cell of pillars on such a lattice along the normal.
     ///
     /// # Errors
     /// If it has no answer at this wavelength.
-    pub fn new(cell: &dyn CellModel, wavelength_um: f64, widest_nm: u16) -> Result<Self> {
+    pub fn new(cell: &dyn CellModel, lattice: LatticeKind, wavelength_um: f64, widest_nm: u16) -> Result<Self> {
         Ok(Self {
             normal: cell.transmissions(wavelength_um, widest_nm)?,
             unconverted: cell.unconverted(wavelength_um, widest_nm)?,
             oblique: HashMap::new(),
             neighbours: HashMap::new(),
             in_band: false,
+            lattice,
         })
     }
 
@@ -87,13 +89,14 @@ impl TransmissionTables {
     ///
     /// # Errors
     /// As [`TransmissionTables::new`].
-    pub fn in_band(cell: &dyn CellModel, wavelength_um: f64, widest_nm: u16) -> Result<Self> {
+    pub fn in_band(cell: &dyn CellModel, lattice: LatticeKind, wavelength_um: f64, widest_nm: u16) -> Result<Self> {
         Ok(Self {
             normal: cell.transmissions_in_band(wavelength_um, widest_nm)?,
             unconverted: cell.unconverted_in_band(wavelength_um, widest_nm)?,
             oblique: HashMap::new(),
             neighbours: HashMap::new(),
             in_band: true,
+            lattice,
         })
     }
 
@@ -119,7 +122,7 @@ impl TransmissionTables {
             if progress.stopped() {
                 return Err(Error::Interrupted);
             }
-            let sines = cell_direction(wave);
+            let sines = cell_direction(wave, self.lattice);
             if sines != [0.0; 2] && !self.oblique.contains_key(&key(sines)) {
                 let tables = if self.in_band {
                     cell.oblique_in_band(wave.wavelength_um, sines, widest_nm)?
@@ -141,7 +144,7 @@ impl TransmissionTables {
     /// If the cell has no answer, or the user stopped it.
     pub fn add_neighbours(&mut self, cell: &dyn CellModel, waves: &[PlaneWave], progress: &dyn Progress) -> Result<()> {
         for wave in waves {
-            let sines = cell_direction(wave);
+            let sines = cell_direction(wave, self.lattice);
             if let Entry::Vacant(place) = self.neighbours.entry(key(sines)) {
                 let Some(responses) = cell.among_neighbours(wave.wavelength_um, sines, progress)? else {
                     return Ok(());
@@ -161,7 +164,7 @@ impl TransmissionTables {
         widths: &'w dyn WidthRows,
         lit: &PlaneWave,
     ) -> Result<Option<[NeighbourPillars<'w>; 2]>> {
-        let Some(responses) = self.neighbours.get(&key(cell_direction(lit))) else {
+        let Some(responses) = self.neighbours.get(&key(cell_direction(lit, self.lattice))) else {
             return Ok(None);
         };
         let widths = widths.held().ok_or_else(not_held)?;
@@ -190,7 +193,7 @@ impl TransmissionTables {
             return Ok(Psf::sum(psfs, POLARISATION_SHARE));
         }
         let mut of = |table: &Vec<Complex64>| of(&Pillars::new(widths, table)?);
-        match self.oblique.get(&key(cell_direction(lit))) {
+        match self.oblique.get(&key(cell_direction(lit, self.lattice))) {
             Some(tables) => Ok(Psf::sum(
                 tables.passed().map(of).collect::<Result<_>>()?,
                 POLARISATION_SHARE,

@@ -290,7 +290,7 @@ fn judge(
             element,
             copies,
             phase: responses.errors(&read, &phase, &rule, progress)?,
-            steepness: Steepness::of(array.lattice.sites(), |ix, iy| phase.turns(ix, iy)),
+            steepness: Steepness::of(&array.lattice, |ix, iy| phase.turns(ix, iy)),
             orders: simulator.orders(&element, &phase, &rule, &read, progress)?,
             spots: simulator.simulate(&element, &phase, &read, progress)?,
             white: match &white {

@@ -89,13 +89,14 @@ fn whole_mb(design: &Design) -> f64 {
     BASE_MB + 1e-6 * sites * (READ_BYTES * elements + DESIGNED_BYTES * distinct + SIMULATED_BYTES)
 }
 
-/// How elements are held that are read folded: of those that are round lenses and nothing else, an eighth.
+/// How elements are held that are read folded: of those that are round lenses and nothing else on a square
+/// lattice, an eighth.
 fn holdings(design: &Design) -> Vec<Holding> {
     let held = |element: &Element| {
         let lens = design.lens_of(element);
         let round = lens.outline.is_none() && !lens.terms.iter().any(|term| term.is_of(element.index));
         match (element.wedge.sin_x, element.wedge.sin_y) {
-            (0.0, 0.0) if round => Holding::Eighth,
+            (0.0, 0.0) if round && design.cell.lattice.is_square() => Holding::Eighth,
             _ => Holding::Whole,
         }
     };

@@ -77,7 +77,8 @@ impl<'a> ElementSimulator<'a> {
                     tables: match case {
                         SimulationCase::Made(_) => None,
                         SimulationCase::Cell(cell) => {
-                            let tables = TransmissionTables::new(*cell, wavelength_um, widest_nm(design))?;
+                            let widest_nm = widest_nm(design);
+                            let tables = TransmissionTables::new(*cell, lattice.kind(), wavelength_um, widest_nm)?;
                             Some(tables.behind_analyser(design.verify.analyser))
                         }
                     },

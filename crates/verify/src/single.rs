@@ -15,7 +15,7 @@ use super::single_white::SingleWhite;
 use super::white::CameraStatement;
 use super::white_page;
 use metalith_cell::{CellModel, Fidelity};
-use metalith_core::{Error, Lattice, Progress, Result, Silent, WholeFile, WidthMap};
+use metalith_core::{Error, Lattice, LatticeKind, Progress, Result, Silent, WholeFile, WidthMap};
 use metalith_gds::extract::{ElementSite, Extraction};
 use metalith_made::{DrawnElement, MadeChip, ModelStatement, SimulationCase};
 use metalith_report::{Cell, Column, ImageGrid, Page, PillarZoom, Table, count, sig, write_json};
@@ -108,7 +108,8 @@ fn by_cell(
     progress: &dyn Progress,
 ) -> Result<Vec<Psf>> {
     let widest = widest_nm(elements);
-    let mut tables = TransmissionTables::new(cell, wavelength_um, widest)?.behind_analyser(light.analyser);
+    let lattice = kind_of(elements);
+    let mut tables = TransmissionTables::new(cell, lattice, wavelength_um, widest)?.behind_analyser(light.analyser);
     let wave = light.wave(wavelength_um);
     if light.cells_as_lit {
         tables.add_directions(cell, &[wave], widest, &Silent)?;
@@ -169,6 +170,11 @@ fn as_made(
             Ok(psf)
         })
         .collect()
+}
+
+/// The kind of lattice that the elements of a layout stand on.
+pub(super) fn kind_of(elements: &[(&ElementSite, &WidthMap)]) -> LatticeKind {
+    elements.first().map_or(LatticeKind::Square, |(_, w)| w.lattice.kind())
 }
 
 pub(super) fn widest_nm(elements: &[(&ElementSite, &WidthMap)]) -> u16 {

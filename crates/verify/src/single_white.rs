@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::case::TransmissionTables;
-use super::single::{Lighting, distinct, widest_nm};
+use super::single::{Lighting, distinct, kind_of, widest_nm};
 use super::white::{CameraStatement, Channels, Point, STEP_NM, WhiteChannel, per_light};
 use metalith_camera::Camera;
 use metalith_core::{Error, Progress, Result, Wedge};
@@ -51,7 +51,8 @@ pub fn single_white(
     let tables = sampling.wavelengths_nm.iter().map(|nm| match case {
         SimulationCase::Made(_) => Ok(None),
         SimulationCase::Cell(cell) => {
-            let mut tables = TransmissionTables::in_band(cell, nm * 1e-3, widest)?.behind_analyser(light.analyser);
+            let tables = TransmissionTables::in_band(cell, kind_of(&elements), nm * 1e-3, widest)?;
+            let mut tables = tables.behind_analyser(light.analyser);
             if light.cells_as_lit {
                 tables.add_directions(cell, &[point().wave(nm * 1e-3)], widest, &metalith_core::Silent)?;
             }

@@ -190,7 +190,7 @@ impl<'a> WhiteSimulator<'a> {
             let tables = match judge {
                 SimulationCase::Made(_) => None,
                 SimulationCase::Cell(cell) => {
-                    let tables = TransmissionTables::in_band(cell, wavelength_um, widest_nm)?;
+                    let tables = TransmissionTables::in_band(cell, lattice.kind(), wavelength_um, widest_nm)?;
                     Some(tables.behind_analyser(design.verify.analyser))
                 }
             };

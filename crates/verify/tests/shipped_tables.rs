@@ -24,7 +24,7 @@ fn tables_of_the_shipped_designs_come_with_the_program() {
                 let wave = incident(&element.wedge, wavelength_um, [0.0; 2]).unwrap();
                 let spec = NeighbourTableSpec {
                     wavelength_um,
-                    sines: cell_direction(&wave),
+                    sines: cell_direction(&wave, design.cell.lattice),
                 };
                 assert!(
                     NeighbourTable::is_shipped(&spec, &stack, &mappings),

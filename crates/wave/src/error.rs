@@ -20,8 +20,12 @@ pub enum WaveError {
     Window { wavelength_um: f64, window: Window },
 
     /// A fade that does not end after it begins, or a period that no memory holds.
-    #[error("a fade from {full_um} to {zero_um} um and {bins} bins an axis")]
-    Fade { bins: usize, full_um: f64, zero_um: f64 },
+    #[error("a fade from {full_um} to {zero_um} um and {} x {} bins", bins[0], bins[1])]
+    Fade {
+        bins: [usize; 2],
+        full_um: f64,
+        zero_um: f64,
+    },
 
     /// A wave of another wavelength than the propagator's, or one that does not propagate.
     #[error(
@@ -33,10 +37,6 @@ pub enum WaveError {
     /// An aperture on another lattice than the propagator's.
     #[error("an aperture on {given:?}, planned for {planned:?}")]
     Lattice { given: Lattice, planned: Lattice },
-
-    /// An aperture on a hexagonal lattice, where rows and columns are taken for equally far apart.
-    #[error("a hexagonal lattice of {} nm, where square ones alone are known", lattice.pitch_nm())]
-    Hexagonal { lattice: Lattice },
 
     /// A band of wavelengths without light.
     #[error("no PSF of a band can be had from {samples} wavelengths and {parts} parts: one of them must have a weight")]
@@ -109,15 +109,6 @@ pub enum WaveError {
 }
 
 impl WaveError {
-    /// Nothing, if a lattice is square.
-    pub(crate) fn unless_square(lattice: &Lattice) -> Result<()> {
-        if lattice.is_square() {
-            Ok(())
-        } else {
-            Err(Self::Hexagonal { lattice: *lattice })
-        }
-    }
-
     /// What to do about it.
     pub fn hint(&self) -> String {
         match self {
@@ -127,7 +118,6 @@ impl WaveError {
             Self::Fade { .. } => "make the lens or the window smaller, or the fade wider".into(),
             Self::Wave { .. } => "plan one propagator a wavelength, and keep the sine of the angle below one".into(),
             Self::Lattice { .. } => "plan one propagator a lattice".into(),
-            Self::Hexagonal { .. } => "use the direct sum, which knows both kinds, or a square lattice".into(),
             Self::Band { .. } => {
                 "give at least one wavelength, and parts with finite weights, one of them positive".into()
             }

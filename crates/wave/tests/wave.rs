@@ -234,7 +234,7 @@ fn adjoints_are_adjoint() {
     let norm = |a: &Array2<Complex32>| dot(a, a).re.sqrt();
     let fold = |accuracy| Fold::plan(lens.lattice, 20.0, 0.5, window, accuracy).unwrap();
     // A period shorter than the lattice, so that sites are folded onto one another.
-    let folded = Fold::with_fade(lens.lattice, 0.5, window, 96, [12.0, 15.0]).unwrap();
+    let folded = Fold::with_fade(lens.lattice, 0.5, window, [96, 96], [12.0, 15.0]).unwrap();
     let direct = Direct::plan(lens.lattice, 0.5, window).unwrap();
     let (accurate, fast) = (fold(Accuracy::Accurate), fold(Accuracy::Fast));
     let all: [&dyn Propagator; 4] = [&accurate, &fast, &folded, &direct];

@@ -224,5 +224,5 @@ fn table(chip: &Lit<'_>, element: &MadeElement, wavelength: usize) -> ClassTable
 
 /// Intensity at the centre of the window of a focus series for a unit of |t|^2 that one site scatters incoherently.
 fn scattered_to(group: &FocusSeries, lattice: Lattice, distance_um: f64, wavelength_um: f64) -> f64 {
-    spread(lattice.pitch_um(), group.centre_um, distance_um, wavelength_um)
+    spread(lattice.cell_um2(), group.centre_um, distance_um, wavelength_um)
 }

@@ -167,7 +167,7 @@ impl LensPhase {
 
     /// Phase over the radius at a site (turns), not reduced; none outside the lens.
     pub fn turns(&self, ix: usize, iy: usize) -> Option<f64> {
-        let r2 = self.squared(ix, iy);
+        let r2 = self.lattice.units2(ix, iy);
         self.holds(ix, iy).then(|| match &self.turns {
             TurnsOfRadius::Tabulated(turns) => turns[((r2 - self.offset) >> self.stride_log2) as usize],
             TurnsOfRadius::Computed(radial) => radial.turns(radius2_um2(self.lattice, r2)),
@@ -177,31 +177,18 @@ impl LensPhase {
     /// Whether a site is inside the lens.
     pub fn holds(&self, ix: usize, iy: usize) -> bool {
         let place = |axis, i| self.lattice.place_nm(axis, i);
-        self.squared(ix, iy) <= self.limit
+        self.lattice.units2(ix, iy) <= self.limit
             && self.lattice.has(ix, iy)
             && self
                 .outline
                 .as_ref()
                 .is_none_or(|o| o.holds(iy, place(0, ix), place(1, iy)))
     }
-
-    /// The squared radius of a place, in the unit of `limit`.
-    #[inline]
-    fn squared(&self, ix: usize, iy: usize) -> i64 {
-        match self.lattice.kind() {
-            LatticeKind::Square => self.lattice.half_radius2(ix, iy),
-            LatticeKind::Hexagonal => 4 * self.lattice.radius2_nm2(ix, iy),
-        }
-    }
 }
 
-/// Squared radius (um^2) of one in the unit of [`LensPhase::squared`].
+/// Squared radius (um^2) of one of [`Lattice::units2`].
 fn radius2_um2(lattice: Lattice, r2: i64) -> f64 {
-    let half_pitch_um = match lattice.kind() {
-        LatticeKind::Square => lattice.pitch_um() / 2.0,
-        LatticeKind::Hexagonal => 0.5e-3,
-    };
-    r2 as f64 * half_pitch_um * half_pitch_um
+    r2 as f64 * lattice.unit_um() * lattice.unit_um()
 }
 
 /// The phase of one element: that of its lens, and its wedge.

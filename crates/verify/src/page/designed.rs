@@ -46,8 +46,9 @@ pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
         ),
     };
     page.paragraph(format!(
-        "{elements} at {} nm; pillars, {pillars}, on a lattice of {} nm.",
+        "{elements} at {} nm; pillars, {pillars}, on a {}lattice of {} nm.",
         exact(design.array.wedge_wavelength_um * 1e3),
+        if array.lattice.is_square() { "" } else { "hexagonal " },
         design.cell.pitch_nm,
     ));
     let centre = array.central();
@@ -72,7 +73,7 @@ pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
     let phase = ElementPhase::of(&lens, &centre.element);
     let n = array.lattice.sites();
     let along = |value: &dyn Fn(usize) -> Option<f64>| {
-        let radius = |ix| array.lattice.coordinate_um(ix);
+        let radius = |ix| array.lattice.place_um(0, ix);
         (n / 2..n)
             .filter_map(|ix| Some((radius(ix), value(ix)?)))
             .collect::<Vec<_>>()
@@ -124,7 +125,8 @@ fn middle(rows: &impl WidthRows) -> WidthMap {
     let lattice = rows.lattice();
     let n = lattice.sites();
     let beside = n.saturating_sub(2 * RADIUS_POINTS) / 2;
-    let shown = Lattice::new(lattice.pitch_nm(), n - 2 * beside).expect("a part of a lattice is one");
+    let shown =
+        Lattice::of_kind(lattice.kind(), lattice.pitch_nm(), n - 2 * beside).expect("a part of a lattice is one");
     let mut map = WidthMap::empty(shown);
     for ((iy, ix), width) in map.width_nm.indexed_iter_mut() {
         *width = rows.width(ix + beside, iy + beside);

@@ -155,7 +155,7 @@ fn method(page: &mut Page, design: &Design, found: &Verification) {
         .max()
         .unwrap_or(0);
     page.paragraph(format!(
-        "Design `{}`, digest `{}`. Everything about the layout is computed from the file that was read back. Fields: the lattice of point samples, each of weight pitch², folded ({} mode), frequencies weighed by where their rays land; at most {} frequency bins had to be relabelled towards the mean ray. PSF: |E|² over that of the incident wave. Strehl: against the same aperture passing all its power in the zero order with the perfect phase for the place where the chief ray lands. MTF: the transform of the PSF over all light that the element passes, of which what lands outside of the window is a veil. Field angles count from where an element looks at each wavelength.",
+        "Design `{}`, digest `{}`. Everything about the layout is computed from the file that was read back. Fields: the lattice of point samples, each with the area of its cell as weight, folded ({} mode), frequencies weighed by where their rays land; at most {} frequency bins had to be relabelled towards the mean ray. PSF: |E|² over that of the incident wave. Strehl: against the same aperture passing all its power in the zero order with the perfect phase for the place where the chief ray lands. MTF: the transform of the PSF over all light that the element passes, of which what lands outside of the window is a veil. Field angles count from where an element looks at each wavelength.",
         found.design, found.design_digest, found.accuracy, count(relabelled),
     ));
     page.paragraph(format!(

@@ -8,7 +8,8 @@ use crate::error::{Result, WaveError};
 /// The complex transmission of one element on its lattice.
 ///
 /// Rows are asked for one at a time and in any order, so that an element never has to be held as
-/// complex numbers: 8.2 million sites of a 1 mm lens are 16 MB of widths or nothing at all.
+/// complex numbers: 8.2 million sites of a 1 mm lens are 16 MB of widths or nothing at all. Nothing passes where the lattice
+/// has no site, nor in rows that it does not reach ([`Lattice::has`], [`Lattice::reach`]): nobody asks for those rows.
 pub trait Aperture: Sync {
     /// Where the samples are.
     fn lattice(&self) -> Lattice;
@@ -136,9 +137,12 @@ impl<F: Fn(f64, f64) -> u16 + Sync> Aperture for PillarFunction<F> {
 }
 
 /// Places of row `iy` inside a circle about the centre. Counted in whole half pitches, so that sites related
-/// by symmetry agree; on a hexagonal lattice in half nanometres.
+/// by symmetry agree; on a hexagonal lattice in half nanometres. None in a row that the lattice does not reach.
 pub(super) fn sites_inside(lattice: &Lattice, radius_um: f64, iy: usize) -> std::ops::Range<usize> {
     let n = lattice.sites();
+    if !lattice.reach()[1].contains(&iy) {
+        return 0..0;
+    }
     let unit_nm = match lattice.kind() {
         LatticeKind::Square => 0.5 * f64::from(lattice.pitch_nm()),
         LatticeKind::Hexagonal => 0.5,
@@ -147,11 +151,7 @@ pub(super) fn sites_inside(lattice: &Lattice, radius_um: f64, iy: usize) -> std:
     // A radius of whole half pitches must include the sites on it, however its decimals were rounded.
     const ROUNDING: f64 = 1e-12;
     let limit = (radius * radius * (1.0 + ROUNDING)).floor() as i64;
-    let squared = |ix| match lattice.kind() {
-        LatticeKind::Square => lattice.half_radius2(ix, iy),
-        LatticeKind::Hexagonal => 4 * lattice.radius2_nm2(ix, iy),
-    };
-    let first = (0..n.div_ceil(2)).find(|&ix| squared(ix) <= limit);
+    let first = (0..n.div_ceil(2)).find(|&ix| lattice.units2(ix, iy) <= limit);
     first.map_or(0..0, |first| first..n - first)
 }
 

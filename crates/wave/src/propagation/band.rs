@@ -22,14 +22,14 @@ pub enum Accuracy {
 /// How a field was folded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fade {
-    /// Period of the transform on both axes (um).
-    pub period_um: f64,
+    /// Period of the transform along x and along y (um).
+    pub period_um: [f64; 2],
     /// Frequencies whose ray from the element's centre lands this near to the window's middle count in full (um).
     pub full_um: f64,
     /// Frequencies whose ray lands this far from the window's middle, or farther, do not count (um).
     pub zero_um: f64,
-    /// Frequencies inside the fade that are not in the transform's own period, -1/2 to 1/2 a pitch, and had
-    /// to be relabelled by a multiple of 1 / pitch towards the rays that reach the window.
+    /// Frequencies inside the fade that are not in the transform's own period, -1/2 to 1/2 a step of the lattice's grid
+    /// along each axis, and had to be relabelled by a multiple of 1 / step towards the rays that reach the window.
     pub relabelled: u64,
 }
 
@@ -55,9 +55,9 @@ const FAST_PERIOD: f64 = 1.19;
 /// More bins an axis than any element of this program needs: a lens of 30 mm has 94,000.
 const MOST_BINS: usize = 1 << 17;
 
-/// The frequency bins that count: `bins` an axis in a period, of which a disc (in landing points) is kept.
+/// The frequency bins that count: `bins` of each axis in a period, of which a disc (in landing points) is kept.
 pub(super) struct FrequencyBand {
-    pub bins: usize,
+    pub bins: [usize; 2],
     /// First kept bin of each axis, counted from zero frequency; may be outside the transform's own period.
     pub first: [i64; 2],
     /// Number of kept bins of each axis.
@@ -91,35 +91,46 @@ impl FrequencyBand {
             Accuracy::Fast if gain * FAST_STRAY > 1.0 => FAST_PERIOD * (radius_um + half),
             Accuracy::Fast => 2.0 * (radius_um + half) + FAST_MARGIN * edge,
         };
-        let bins = fft_size((period / lattice.pitch_um()).ceil() as usize);
+        let steps = lattice.steps_um();
+        let bins = steps.map(|step| fft_size((period / step).ceil() as usize));
         let zero = match accuracy {
             // What rounding the period up leaves makes the fade wider; it costs nothing.
-            Accuracy::Accurate => bins as f64 * lattice.pitch_um() - radius_um - half - FADE_MARGINS[1] * edge,
+            Accuracy::Accurate => {
+                let [x, y] = periods_um(bins, &lattice);
+                x.min(y) - radius_um - half - FADE_MARGINS[1] * edge
+            }
             Accuracy::Fast => full + width,
         };
         Self::new(lattice, wavelength_um, window, bins, [full, zero])
     }
 
     /// With a period and a fade of one's own: `fade_um` is where it begins and where it ends.
-    pub fn new(lattice: Lattice, wavelength_um: f64, window: &Window, bins: usize, fade_um: [f64; 2]) -> Result<Self> {
-        WaveError::unless_square(&lattice)?;
+    pub fn new(
+        lattice: Lattice,
+        wavelength_um: f64,
+        window: &Window,
+        bins: [usize; 2],
+        fade_um: [f64; 2],
+    ) -> Result<Self> {
         window.check(wavelength_um)?;
         let [full_um, zero_um] = fade_um;
-        if bins > MOST_BINS || bins == 0 || full_um.is_nan() || zero_um <= full_um {
+        let held = bins.iter().all(|bins| (1..=MOST_BINS).contains(bins));
+        if !held || full_um.is_nan() || zero_um <= full_um {
             return Err(WaveError::Fade { bins, full_um, zero_um });
         }
-        let period_um = bins as f64 * lattice.pitch_um();
+        let period_um = periods_um(bins, &lattice);
         let z = window.distance_um;
         // Bins per unit of sine; along the rim of the disc neighbouring samples are less than a bin apart.
-        let per_sine = period_um / wavelength_um;
-        let samples = (8.0 * std::f64::consts::PI * zero_um / z * per_sine).ceil() as usize + 64;
+        let per_sine = period_um.map(|period| period / wavelength_um);
+        let most = per_sine[0].max(per_sine[1]);
+        let samples = (8.0 * std::f64::consts::PI * zero_um / z * most).ceil() as usize + 64;
         let rim: Vec<[i64; 2]> = (0..samples)
             .map(|i| {
                 let (sin, cos) = (std::f64::consts::TAU * i as f64 / samples as f64).sin_cos();
                 let x = window.centre_um[0] + zero_um * cos;
                 let y = window.centre_um[1] + zero_um * sin;
                 let ray = (x * x + y * y + z * z).sqrt();
-                [x, y].map(|s| (s / ray * per_sine).floor() as i64)
+                [x / ray * per_sine[0], y / ray * per_sine[1]].map(|bin| bin.floor() as i64)
             })
             .collect();
         let lowest = [0, 1].map(|a| rim.iter().map(|b| b[a]).min().unwrap_or(0));
@@ -150,23 +161,25 @@ impl FrequencyBand {
     }
 
     fn relabelled(&self) -> u64 {
-        let half = (self.bins / 2) as i64;
-        let own = |first: i64, range: &Range<usize>| {
-            let start = (first + range.start as i64).max(-half);
-            let end = (first + range.end as i64).min(self.bins as i64 - half);
+        let own = |axis: usize, range: &Range<usize>| {
+            let (first, bins) = (self.first[axis], self.bins[axis] as i64);
+            let start = (first + range.start as i64).max(-(bins / 2));
+            let end = (first + range.end as i64).min(bins - bins / 2);
             (end - start).max(0) as u64
         };
         let mut moved = 0;
         for (k, rows) in self.rows.iter().enumerate() {
-            let kept = if own(self.first[0], &(k..k + 1)) == 1 {
-                own(self.first[1], rows)
-            } else {
-                0
-            };
+            let kept = if own(0, &(k..k + 1)) == 1 { own(1, rows) } else { 0 };
             moved += rows.len() as u64 - kept;
         }
         moved
     }
+}
+
+/// Length of so many places of the grid of a lattice along each axis (um).
+fn periods_um(bins: [usize; 2], lattice: &Lattice) -> [f64; 2] {
+    let steps = lattice.steps_um();
+    [0, 1].map(|a| bins[a] as f64 * steps[a])
 }
 
 /// Size of the diffraction of a sharp edge along the steepest ray that is needed, which lands `reach_um` from the

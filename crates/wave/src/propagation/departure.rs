@@ -4,9 +4,10 @@
 //! the power spectra of the tiles are formed once; where the light lands for a direction of arrival follows from them
 //! alone. [`Landing::of`] does the same for one direction, tile by tile; here tiles are gathered into blocks.
 
+use metalith_core::Lattice;
 use num_complex::Complex32;
 
-use super::tiles::{HOP, TILE, for_tiles, power_scale};
+use super::tiles::{HOP, Leaving, TILE, for_tiles, power_scale};
 use super::{Aperture, Landing, LandingGrid};
 use crate::error::Result;
 
@@ -14,7 +15,7 @@ use crate::error::Result;
 #[derive(Clone, Debug)]
 pub struct Departure {
     blocks: Vec<Block>,
-    pitch_um: f64,
+    lattice: Lattice,
     wavelength_um: f64,
     /// All power that the aperture passes (um^2).
     power_um2: f64,
@@ -38,14 +39,18 @@ impl Departure {
     /// Of an element at one wavelength (um), its tiles gathered into `blocks` x `blocks` squares over its lattice.
     pub fn of(aperture: &dyn Aperture, wavelength_um: f64, blocks: usize) -> Self {
         let lattice = aperture.lattice();
-        let (n, blocks) = (lattice.sites(), blocks.max(1));
+        let (reach, blocks) = (lattice.reach(), blocks.max(1));
         let mut spectra = vec![vec![0.0f64; 0]; blocks * blocks];
         let mut moments = vec![[0.0f64; 3]; blocks * blocks];
         let scale = power_scale(&lattice);
-        let block_of = |first: i64| ((first + HOP as i64) as usize * blocks / (n + HOP)).min(blocks - 1);
+        let block_of = |axis: usize, first: i64| {
+            let (start, places) = (reach[axis].start as i64, reach[axis].len());
+            let from = (first + HOP as i64 - start).max(0) as usize;
+            (from * blocks / (places + HOP)).min(blocks - 1)
+        };
         let fill_row = |iy: usize, row: &mut [Complex32]| aperture.fill_row(iy, row);
         for_tiles(&lattice, fill_row, |tile| {
-            let [column, row] = tile.first.map(block_of);
+            let [column, row] = [0, 1].map(|axis| block_of(axis, tile.first[axis]));
             let block = row * blocks + column;
             let sums = &mut spectra[block];
             sums.resize(TILE * TILE, 0.0);
@@ -67,7 +72,7 @@ impl Departure {
         Self {
             power_um2: moments.iter().map(|m| m[2]).sum(),
             blocks,
-            pitch_um: lattice.pitch_um(),
+            lattice,
             wavelength_um,
         }
     }
@@ -83,32 +88,20 @@ impl Departure {
     /// If the map is none or too large.
     pub fn landing(&self, sines: [f64; 2], towards: [f64; 2], grid: LandingGrid) -> Result<Landing> {
         grid.check()?;
-        let leaves = [0, 1].map(|a| self.leaving(sines[a], towards[a]));
+        let leaves = Leaving::new(&self.lattice, self.wavelength_um, sines, towards);
         let mut landing = Landing::empty(grid);
         for block in &self.blocks {
             let kept: f64 = block.bins.iter().map(|b| f64::from(b.1)).sum();
             let fill = 1.0 + block.rest_um2 / kept.max(f64::MIN_POSITIVE);
             for ([kx, ky], power) in &block.bins {
                 let power = f64::from(*power) * fill;
-                let [sx, sy] = [leaves[0][usize::from(*kx)], leaves[1][usize::from(*ky)]];
+                let [sx, sy] = leaves.sines(usize::from(*kx), usize::from(*ky));
                 let cosine2 = 1.0 - sx * sx - sy * sy;
                 let shift = (cosine2 > 0.0).then(|| [sx, sy].map(|s| grid.distance_um / cosine2.sqrt() * s));
                 landing.add(block.place_um, shift, power);
             }
         }
         Ok(landing)
-    }
-
-    /// Sine of each bin of one axis behind the element, moved by whole periods of the lattice to the one nearest to
-    /// `towards`.
-    fn leaving(&self, arriving: f64, towards: f64) -> Vec<f64> {
-        let period = self.wavelength_um / self.pitch_um;
-        (0..TILE)
-            .map(|k| {
-                let own = k as f64 / TILE as f64 * period + arriving;
-                own + ((towards - own) / period).round() * period
-            })
-            .collect()
     }
 }
 
@@ -139,7 +132,6 @@ impl Block {
 mod tests {
     use super::*;
     use crate::{PhaseFunction, PlaneWave};
-    use metalith_core::Lattice;
     use std::f64::consts::TAU;
 
     #[test]

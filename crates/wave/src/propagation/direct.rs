@@ -38,13 +38,15 @@ impl Direct {
     pub fn at(aperture: &dyn Aperture, wave: &PlaneWave, points_um: &[[f64; 3]]) -> Vec<Complex64> {
         let lattice = aperture.lattice();
         let n = lattice.sites();
+        let [_, rows] = lattice.reach();
         let weight = lattice.cell_um2();
         points_um
             .par_iter()
             .map(|point| {
                 let mut row = vec![Complex32::ZERO; n];
                 // Rows are summed before they are added up, which keeps rounding near 1e-15 of the largest sum.
-                let sum: Complex64 = (0..n)
+                let sum: Complex64 = rows
+                    .clone()
                     .map(|iy| {
                         aperture.fill_row(iy, &mut row);
                         row_sum(&row, &lattice, iy, wave, point)
@@ -115,11 +117,12 @@ impl Propagator for Direct {
         check_shape(values, &self.window)?;
         let n = self.lattice.sites();
         let weight = self.lattice.cell_um2();
+        let [_, rows] = self.lattice.reach();
         let sites: Vec<Complex32> = (0..n * n)
             .into_par_iter()
             .map(|site| {
                 let (ix, iy) = (site % n, site / n);
-                if !self.lattice.has(ix, iy) {
+                if !rows.contains(&iy) || !self.lattice.has(ix, iy) {
                     return Complex32::ZERO;
                 }
                 let (x, y) = (self.lattice.place_um(0, ix), self.lattice.place_um(1, iy));

@@ -3,6 +3,7 @@
 use metalith_core::Lattice;
 use num_complex::Complex64;
 
+use super::aperture::sites_inside;
 use super::direct::kernel;
 use crate::error::{Result, WaveError};
 
@@ -61,27 +62,14 @@ impl Hankel {
     /// # Errors
     /// As [`Hankel::new`].
     pub fn of_lattice(wavelength_um: f64, distance_um: f64, lattice: &Lattice, radius_um: f64) -> Result<Self> {
-        WaveError::unless_square(lattice)?;
-        let n = lattice.sites();
-        let half_pitch = 0.5 * lattice.pitch_um();
-        // A radius of whole half pitches must include the sites on it, however its decimals were rounded.
-        const ROUNDING: f64 = 1e-12;
-        let limit = (radius_um / half_pitch).powi(2) * (1.0 + ROUNDING);
-        // One octant: sites at x >= y >= 0, each standing for its images.
+        let [columns, rows] = lattice.reach();
+        // One quadrant: sites at x, y >= 0, each standing for its images.
         let mut rings: Vec<(i64, u32)> = Vec::new();
-        for iy in n / 2..n {
-            for ix in iy..n {
-                let r2 = lattice.half_radius2(ix, iy);
-                if r2 as f64 > limit {
-                    break;
-                }
-                let [x, y] = [ix, iy].map(|i| lattice.half_index(i));
-                let images = match (x == y, y == 0) {
-                    (true, true) => 1,
-                    (true, false) | (false, true) => 4,
-                    (false, false) => 8,
-                };
-                rings.push((r2, images));
+        for iy in lattice.sites() / 2..rows.end {
+            let inside = sites_inside(lattice, radius_um, iy);
+            for ix in (lattice.sites() / 2..inside.end.min(columns.end)).filter(|ix| lattice.has(*ix, iy)) {
+                let images = [(0, ix), (1, iy)].map(|(axis, i)| if lattice.place_nm(axis, i) == 0 { 1 } else { 2 });
+                rings.push((lattice.radius2_nm2(ix, iy), images[0] * images[1]));
             }
         }
         rings.sort_unstable();
@@ -90,8 +78,8 @@ impl Hankel {
             kept.1 += if same { next.1 } else { 0 };
             same
         });
-        let radii = rings.iter().map(|r| (r.0 as f64).sqrt() * half_pitch).collect();
-        let site = lattice.pitch_um().powi(2);
+        let radii = rings.iter().map(|r| (r.0 as f64).sqrt() * 1e-3).collect();
+        let site = lattice.cell_um2();
         let areas = rings.iter().map(|r| f64::from(r.1) * site).collect();
         Self::new(wavelength_um, distance_um, radii, areas)
     }

@@ -6,10 +6,11 @@
 //! less than the size of a tile and its diffraction is not resolved. That is sqrt(wavelength * distance) at best,
 //! 35 um for a lens of 2.4 mm focal length, and for what is finer there is [`Fold`](crate::Fold).
 
+use metalith_core::Lattice;
 use ndarray::Array2;
 use num_complex::Complex32;
 
-use super::tiles::{TILE, for_tiles, power_scale};
+use super::tiles::{Leaving, TILE, for_tiles, power_scale};
 use super::{Aperture, PlaneWave};
 use crate::error::{Result, WaveError};
 use crate::kernels::cis_all;
@@ -41,20 +42,20 @@ pub struct Landing {
 }
 
 impl Landing {
-    /// Of an element in a plane wave. Frequencies of a lattice are known but for multiples of 1 / pitch: each is taken
-    /// for the one nearest to `towards`, the sines of the direction that the light is meant to leave in.
+    /// Of an element in a plane wave. Frequencies of a lattice are known but for its orders, on a square one multiples
+    /// of 1 / pitch: each is taken for the one nearest to `towards`, the sines of the direction that the light is meant to
+    /// leave in.
     ///
     /// # Errors
     /// If the map is none or too large.
     pub fn of(aperture: &dyn Aperture, wave: &PlaneWave, towards: [f64; 2], grid: LandingGrid) -> Result<Self> {
         grid.check()?;
         let lattice = aperture.lattice();
-        WaveError::unless_square(&lattice)?;
         let n = lattice.sites();
-        let rays = Rays::new(lattice.pitch_um(), wave, towards, grid.distance_um);
-        let arriving = [wave.sin_x, wave.sin_y].map(|sine| {
+        let rays = Rays::new(&lattice, wave, towards, grid.distance_um);
+        let arriving = [(0, wave.sin_x), (1, wave.sin_y)].map(|(axis, sine)| {
             let turns: Vec<f64> = (0..n)
-                .map(|i| lattice.coordinate_um(i) * sine / wave.wavelength_um)
+                .map(|i| lattice.place_um(axis, i) * sine / wave.wavelength_um)
                 .collect();
             let mut phasors = vec![Complex32::ZERO; n];
             cis_all(&turns, &mut phasors);
@@ -131,20 +132,11 @@ struct Rays {
 }
 
 impl Rays {
-    fn new(pitch_um: f64, wave: &PlaneWave, towards: [f64; 2], distance_um: f64) -> Self {
-        // Sines of the bins of one axis, each moved by whole periods to the one nearest to where light should go.
-        let period = wave.wavelength_um / pitch_um;
-        let sines = towards.map(|sine| {
-            (0..TILE)
-                .map(|k| {
-                    let own = k as f64 / TILE as f64 * period;
-                    own + ((sine - own) / period).round() * period
-                })
-                .collect::<Vec<_>>()
-        });
+    fn new(lattice: &Lattice, wave: &PlaneWave, towards: [f64; 2], distance_um: f64) -> Self {
+        let leaving = Leaving::new(lattice, wave.wavelength_um, [0.0; 2], towards);
         let shift_um = (0..TILE * TILE)
             .map(|i| {
-                let [sx, sy] = [sines[0][i / TILE], sines[1][i % TILE]];
+                let [sx, sy] = leaving.sines(i / TILE, i % TILE);
                 let cosine2 = 1.0 - sx * sx - sy * sy;
                 (cosine2 > 0.0).then(|| [sx, sy].map(|s| distance_um * s / cosine2.sqrt()))
             })
@@ -158,7 +150,6 @@ mod tests {
     use super::*;
     use crate::propagation::aperture::sites_inside;
     use crate::{Accuracy, Fold, PhaseFunction, Propagator, Scratch, Window};
-    use metalith_core::Lattice;
     use rand::{Rng, SeedableRng};
     use std::f64::consts::{PI, TAU};
 

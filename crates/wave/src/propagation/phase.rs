@@ -36,7 +36,7 @@ impl<F: Fn(f64, f64) -> f64 + Sync> Aperture for PhaseFunction<F> {
     fn fill_row(&self, iy: usize, row: &mut [Complex32]) {
         // Phases are reduced in double precision, chunk by chunk, before they become single.
         const CHUNK: usize = 256;
-        let y = self.lattice.coordinate_um(iy);
+        let y = self.lattice.place_um(1, iy);
         let inside = sites_inside(&self.lattice, self.radius_um, iy);
         let (first, amplitude) = (inside.start, self.amplitude as f32);
         let mut turns = [0.0; CHUNK];
@@ -44,13 +44,17 @@ impl<F: Fn(f64, f64) -> f64 + Sync> Aperture for PhaseFunction<F> {
         for (chunk, out) in row[inside].chunks_mut(CHUNK).enumerate() {
             let turns = &mut turns[..out.len()];
             for (i, turns) in turns.iter_mut().enumerate() {
-                let x = self.lattice.coordinate_um(first + chunk * CHUNK + i);
+                let x = self.lattice.place_um(0, first + chunk * CHUNK + i);
                 *turns = (self.phase_rad)(x, y) / TAU;
             }
             cis_all(turns, out);
             for t in out {
                 *t = Complex32::new(t.re * amplitude, t.im * amplitude);
             }
+        }
+        if !self.lattice.is_square() {
+            let between = row.iter_mut().enumerate().filter(|(ix, _)| !self.lattice.has(*ix, iy));
+            between.for_each(|(_, t)| *t = Complex32::ZERO);
         }
     }
 }
@@ -65,20 +69,21 @@ pub struct PhaseMap {
 }
 
 impl PhaseMap {
-    /// `turns` is the phase at column `ix` and row `iy`, not reduced; nothing passes where there is none. No site that
-    /// passes light may be farther from the centre than `radius_um`.
+    /// `turns` is the phase at column `ix` and row `iy`, not reduced; nothing passes where there is none, and none is asked
+    /// for where the lattice has no site. No site that passes light may be farther from the centre than `radius_um`.
     pub fn new(lattice: Lattice, radius_um: f64, turns: impl Fn(usize, usize) -> Option<f64>) -> Self {
         let n = lattice.sites();
         Self {
             lattice,
             radius_um,
-            turns: Array2::from_shape_fn([n; 2], |(iy, ix)| reduced(turns(ix, iy))),
+            turns: Array2::from_shape_fn([n; 2], |(iy, ix)| at_site(&lattice, &turns, ix, iy)),
         }
     }
 }
 
-/// Within half a turn of zero; NaN where there is none.
-fn reduced(turns: Option<f64>) -> f32 {
+/// The phase of a place within half a turn of zero; NaN where there is none.
+fn at_site(lattice: &Lattice, turns: &impl Fn(usize, usize) -> Option<f64>, ix: usize, iy: usize) -> f32 {
+    let turns = lattice.has(ix, iy).then(|| turns(ix, iy)).flatten();
     turns.map_or(f32::NAN, |turns| (turns - turns.round()) as f32)
 }
 
@@ -90,7 +95,8 @@ pub struct PhaseSites<F> {
     pub lattice: Lattice,
     /// No site that passes light is farther from the centre (um).
     pub radius_um: f64,
-    /// The phase at column `ix` and row `iy` (turns), not reduced; nothing passes where there is none.
+    /// The phase at column `ix` and row `iy` (turns), not reduced; nothing passes where there is none, and none is asked
+    /// for where the lattice has no site.
     pub turns: F,
 }
 
@@ -104,7 +110,9 @@ impl<F: Fn(usize, usize) -> Option<f64> + Sync> Aperture for PhaseSites<F> {
     }
 
     fn fill_row(&self, iy: usize, row: &mut [Complex32]) {
-        let turns: Vec<f32> = (0..row.len()).map(|ix| reduced((self.turns)(ix, iy))).collect();
+        let turns: Vec<f32> = (0..row.len())
+            .map(|ix| at_site(&self.lattice, &self.turns, ix, iy))
+            .collect();
         cis_where(&turns, row);
     }
 }

@@ -1,13 +1,14 @@
 //! Where a phase is too steep for its lattice.
 
+use metalith_core::Lattice;
 use serde::Serialize;
 
 /// Where a phase is too steep for its lattice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Steepness {
-    /// Largest step of the phase from a site to the next along x or y (rad).
+    /// Largest step of the phase from a site to a neighbour (rad).
     pub largest_step_rad: f64,
-    /// Sites with a step of more than pi to a neighbour at larger x or y: there the lattice cannot tell the phase from
+    /// Sites with a step of more than pi to a neighbour in the same row at larger x, or in the next row at larger y: there the lattice cannot tell the phase from
     /// one that falls.
     pub steep_sites: u64,
     /// All sites with a phase.
@@ -16,48 +17,60 @@ pub struct Steepness {
     pub from_pitches: Option<f64>,
 }
 
+/// Columns from a site to its farthest neighbour.
+const BESIDE: usize = 2;
+
 impl Steepness {
-    /// Of a phase (turns), not reduced, at sites `(ix, iy)` of a square lattice of `sites` an axis; none where there is
-    /// no pillar.
-    pub fn of(sites: usize, turns: impl Fn(usize, usize) -> Option<f64>) -> Self {
+    /// Of a phase (turns), not reduced, at sites `(ix, iy)` of a lattice; none where there is no pillar.
+    pub fn of(lattice: &Lattice, turns: impl Fn(usize, usize) -> Option<f64>) -> Self {
         let mut found = Self::default();
         let mut nearest2 = i64::MAX;
-        let half = |i: usize| 2 * i as i64 - (sites as i64 - 1);
+        let [columns, rows] = lattice.reach();
+        // Neighbours are in the same row or in the next one, this far along it; columns are counted from as many before the
+        // first as the farthest is away.
+        let neighbours: Vec<(usize, bool)> = lattice
+            .neighbours()
+            .iter()
+            .map(|[dx, dy]| ((dx + BESIDE as i64) as usize, *dy == 0))
+            .collect();
         // NaN where there is no phase, beyond the last row and column too: `f64::max` leaves it out.
         let fill = |line: &mut [f64], iy: usize| {
-            for (ix, value) in line[..sites].iter_mut().enumerate() {
-                *value = turns(ix, iy).unwrap_or(f64::NAN);
+            for ix in columns.clone() {
+                let turns = lattice.has(ix, iy).then(|| turns(ix, iy)).flatten();
+                line[ix + BESIDE] = turns.unwrap_or(f64::NAN);
             }
         };
-        let mut here = vec![f64::NAN; sites + 1];
+        let mut here = vec![f64::NAN; lattice.sites() + 2 * BESIDE];
         let mut above = here.clone();
         let mut largest_step: f64 = 0.0;
-        if sites > 0 {
-            fill(&mut here, 0);
-        }
-        for iy in 0..sites {
-            if iy + 1 < sites {
+        fill(&mut here, rows.start);
+        for iy in rows.clone() {
+            if iy + 1 < rows.end {
                 fill(&mut above, iy + 1);
             } else {
                 above.fill(f64::NAN);
             }
-            for ix in 0..sites {
-                let phase = here[ix];
+            for ix in columns.clone() {
+                let phase = here[ix + BESIDE];
                 if phase.is_nan() {
                     continue;
                 }
                 found.sites += 1;
-                let step = (here[ix + 1] - phase).abs().max((above[ix] - phase).abs());
+                let step = neighbours.iter().fold(f64::NAN, |largest, &(dx, same_row)| {
+                    let line = if same_row { &here } else { &above };
+                    largest.max((line[ix + dx] - phase).abs())
+                });
                 largest_step = largest_step.max(step);
                 if step > 0.5 {
                     found.steep_sites += 1;
-                    nearest2 = nearest2.min(half(ix).pow(2) + half(iy).pow(2));
+                    nearest2 = nearest2.min(lattice.radius2_nm2(ix, iy));
                 }
             }
             std::mem::swap(&mut here, &mut above);
         }
         found.largest_step_rad = largest_step * std::f64::consts::TAU;
-        found.from_pitches = (found.steep_sites > 0).then(|| 0.5 * (nearest2 as f64).sqrt());
+        let pitch2 = f64::from(lattice.pitch_nm()).powi(2);
+        found.from_pitches = (found.steep_sites > 0).then(|| (nearest2 as f64 / pitch2).sqrt());
         found
     }
 }
@@ -72,7 +85,8 @@ mod tests {
         let (sites, rim) = (200, 80.0);
         let half = |i: usize| 0.5 * (2.0 * i as f64 - 199.0);
         let lens = |ix: usize, iy: usize| Some(-0.25 * (half(ix).powi(2) + half(iy).powi(2)) / rim);
-        let steep = Steepness::of(sites, lens);
+        let lattice = Lattice::new(350, sites).unwrap();
+        let steep = Steepness::of(&lattice, lens);
         assert_eq!(steep.sites, 40_000);
         // Sites are whole pitches.
         assert!((steep.from_pitches.unwrap() - rim).abs() < 1.0);
@@ -81,6 +95,6 @@ mod tests {
         // All but a square of twice the radius, to a site at each of its edges.
         let flat = 2.0 * rim;
         assert!((steep.steep_sites as f64 - (40_000.0 - flat * flat)).abs() < 4.0 * flat);
-        assert_eq!(Steepness::of(sites, |_, _| Some(0.0)).from_pitches, None);
+        assert_eq!(Steepness::of(&lattice, |_, _| Some(0.0)).from_pitches, None);
     }
 }

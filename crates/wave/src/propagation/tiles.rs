@@ -8,7 +8,7 @@ use metalith_core::Lattice;
 use num_complex::Complex32;
 use rustfft::FftPlanner;
 
-/// Sites an axis of a tile: 22 um at a pitch of 350 nm, two thirds of the best size for 2.4 mm, and a power of two.
+/// Places of the lattice's grid an axis of a tile: 22 um at a pitch of 350 nm, two thirds of the best size for 2.4 mm, and a power of two.
 pub(super) const TILE: usize = 64;
 /// From one tile to the next [sites]: sine windows that overlap by half add up to one when squared.
 pub(super) const HOP: usize = TILE / 2;
@@ -25,7 +25,7 @@ pub(super) struct Tile<'a> {
 
 /// Power (um^2) of a bin whose amplitude is one.
 pub(super) fn power_scale(lattice: &Lattice) -> f64 {
-    lattice.pitch_um().powi(2) / (TILE * TILE) as f64
+    lattice.cell_um2() / (TILE * TILE) as f64
 }
 
 /// Visit the tiles of an element whose rows `fill_row` gives.
@@ -34,7 +34,9 @@ pub(super) fn for_tiles(
     fill_row: impl Fn(usize, &mut [Complex32]),
     mut visit: impl FnMut(&Tile<'_>),
 ) {
-    let (n, pitch) = (lattice.sites(), lattice.pitch_um());
+    let (n, steps) = (lattice.sites(), lattice.steps_um());
+    let middle_um =
+        |axis: usize, first: i64| lattice.place_um(axis, 0) + (first as f64 + 0.5 * (TILE as f64 - 1.0)) * steps[axis];
     let fft = FftPlanner::<f32>::new().plan_fft_forward(TILE);
     let mut work = vec![Complex32::ZERO; fft.get_inplace_scratch_len()];
     let taper: Vec<f32> = (0..TILE)
@@ -64,8 +66,52 @@ pub(super) fn for_tiles(
             visit(&Tile {
                 spectrum: &turned,
                 first,
-                middle_um: first.map(|i| lattice.coordinate_um(0) + (i as f64 + 0.5 * (TILE as f64 - 1.0)) * pitch),
+                middle_um: [0, 1].map(|axis| middle_um(axis, first[axis])),
             });
+        }
+    }
+}
+
+/// Directions that the light of a tile leaves in. Frequencies of a lattice are known but for its orders: each is taken for
+/// the one whose sines are nearest to where light is meant to go.
+pub(super) struct Leaving {
+    towards: [f64; 2],
+    /// Sines of the bins along x and along y, each moved by whole periods of the grid.
+    whole: [Vec<f64>; 2],
+    /// On a hexagonal lattice, the same half a period away along both axes.
+    half: Option<[Vec<f64>; 2]>,
+}
+
+impl Leaving {
+    /// For light that arrives with these sines.
+    pub fn new(lattice: &Lattice, wavelength_um: f64, arriving: [f64; 2], towards: [f64; 2]) -> Self {
+        let steps = lattice.steps_um();
+        let moved = |offset: f64| {
+            [0, 1].map(|a| {
+                let period = wavelength_um / steps[a];
+                let sine = |k: usize| {
+                    let own = k as f64 / TILE as f64 * period + arriving[a] + offset * period;
+                    own + ((towards[a] - own) / period).round() * period
+                };
+                (0..TILE).map(sine).collect()
+            })
+        };
+        Self {
+            towards,
+            whole: moved(0.0),
+            half: (!lattice.is_square()).then(|| moved(0.5)),
+        }
+    }
+
+    /// Sines of a bin along x and one along y.
+    #[inline]
+    pub fn sines(&self, kx: usize, ky: usize) -> [f64; 2] {
+        let of = |[x, y]: &[Vec<f64>; 2]| [x[kx], y[ky]];
+        let away = |s: [f64; 2]| (s[0] - self.towards[0]).powi(2) + (s[1] - self.towards[1]).powi(2);
+        let whole = of(&self.whole);
+        match self.half.as_ref().map(of) {
+            Some(half) if away(half) < away(whole) => half,
+            _ => whole,
         }
     }
 }

@@ -16,8 +16,8 @@ pub(super) struct Transfer<'a> {
     /// From the first site of the lattice to where the inverse transform has its origin (um).
     pub shift_um: [f64; 2],
     pub fade: &'a Fade,
-    /// Pitch of the lattice (um).
-    pub pitch_um: f64,
+    /// Edges of the cell of a site (um).
+    pub cell_um: [f64; 2],
 }
 
 /// One column of frequencies: kx is the same for all, ky rises by one.
@@ -44,19 +44,19 @@ impl Transfer<'_> {
     /// Works out how much each frequency of a column counts for the window, by where its ray from the element's
     /// centre lands `distance_um` behind it: it fades from `full_um` to `zero_um` of the window's middle.
     pub fn fade(&self, distance_um: f64, column: FrequencyColumn, faded: &mut FadedColumn) {
-        let df = 1.0 / self.fade.period_um;
-        let [fx, first] = column.first.map(|f| f as f64 * df);
+        let df = self.fade.period_um.map(|period| 1.0 / period);
+        let [fx, first] = [0, 1].map(|a| column.first[a] as f64 * df[a]);
         let rest = self.wavelength_um.powi(-2) - fx * fx;
         let [cx, cy] = self.centre_um;
         let Fade { full_um, zero_um, .. } = *self.fade;
         let slope = 1.0 / (zero_um - full_um);
-        // Pitch^2 of the sum over the aperture, 1 / period^2 of that over frequencies.
-        let scale = (self.pitch_um * df).powi(2) as f32;
+        // The cell of the sum over the aperture, 1 / period along each axis of that over frequencies.
+        let scale = (self.cell_um[0] * df[0] * (self.cell_um[1] * df[1])) as f32;
         faded.axial.resize(column.count, 0.0);
         faded.weight.resize(column.count, 0.0);
         pulp::Arch::new().dispatch(|| {
             for (i, (axial, weight)) in faded.axial.iter_mut().zip(&mut faded.weight).enumerate() {
-                let fy = first + i as f64 * df;
+                let fy = first + i as f64 * df[1];
                 let fz = (rest - fy * fy).max(GRAZING).sqrt();
                 let (sx, sy) = (distance_um * fx / fz - cx, distance_um * fy / fz - cy);
                 let share = ((sx * sx + sy * sy).sqrt() - full_um) * slope;
@@ -68,13 +68,13 @@ impl Transfer<'_> {
 
     /// `out[i]` is what multiplies frequency `i` of a column on its way to `distance_um`.
     pub fn to_distance(&self, distance_um: f64, column: FrequencyColumn, faded: &FadedColumn, out: &mut [Complex32]) {
-        let df = 1.0 / self.fade.period_um;
-        let [fx, first] = column.first.map(|f| f as f64 * df);
+        let df = self.fade.period_um.map(|period| 1.0 / period);
+        let [fx, first] = [0, 1].map(|a| column.first[a] as f64 * df[a]);
         let along_x = fx * self.shift_um[0];
         let along_y = self.shift_um[1];
         pulp::Arch::new().dispatch(|| {
             for (i, (out, (fz, weight))) in out.iter_mut().zip(faded.axial.iter().zip(&faded.weight)).enumerate() {
-                let fy = first + i as f64 * df;
+                let fy = first + i as f64 * df[1];
                 let way = cis(distance_um * fz + along_x + fy * along_y);
                 *out = Complex32 {
                     re: way.re * weight,

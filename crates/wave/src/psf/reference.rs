@@ -18,18 +18,18 @@ impl Matched {
     /// For the sites of `aperture` that pass anything, each with |t| = `full_transmission`, in focus at `focus_um`,
     /// x, y and z from the element's centre.
     ///
-    /// In phase, moduli add: the Rayleigh-Sommerfeld sum of p^2 Z / (2 pi R^2) |1/R - i k|.
+    /// In phase, moduli add: the Rayleigh-Sommerfeld sum of A Z / (2 pi R^2) |1/R - i k|, with A the area of the cell of a site.
     pub fn of(aperture: &dyn Aperture, focus_um: [f64; 3], wavelength_um: f64, full_transmission: f64) -> Self {
         let lattice = aperture.lattice();
         let n = lattice.sites();
         let [px, py, z] = focus_um;
         let k = std::f64::consts::TAU / wavelength_um;
-        let x2: Vec<f64> = (0..n).map(|i| (lattice.coordinate_um(i) - px).powi(2)).collect();
+        let x2: Vec<f64> = (0..n).map(|i| (lattice.place_um(0, i) - px).powi(2)).collect();
         let mut row = vec![Complex32::ZERO; n];
         let (mut sum, mut sites) = (0.0, 0u64);
         for iy in 0..n {
             aperture.fill_row(iy, &mut row);
-            let rest = (lattice.coordinate_um(iy) - py).powi(2) + z * z;
+            let rest = (lattice.place_um(1, iy) - py).powi(2) + z * z;
             let mut line = 0.0;
             for (_, x2) in row.iter().zip(&x2).filter(|(t, _)| **t != Complex32::ZERO) {
                 let r2 = x2 + rest;
@@ -38,7 +38,7 @@ impl Matched {
             }
             sum += line;
         }
-        let site_um2 = lattice.pitch_um().powi(2);
+        let site_um2 = lattice.cell_um2();
         let amplitude = full_transmission * site_um2 * z / std::f64::consts::TAU * sum;
         Self {
             peak: amplitude * amplitude,

@@ -28,7 +28,7 @@ const LATEST_FADE: f64 = 0.9;
 /// Where intensity is wanted, for one element and one direction of light.
 #[derive(Clone, Copy, Debug)]
 pub struct Distances {
-    /// Where the samples of the element are.
+    /// Where the samples of the element are, on a square lattice.
     pub lattice: Lattice,
     /// Radius outside of which the element is opaque (um).
     pub radius_um: f64,
@@ -80,7 +80,11 @@ struct KeptFrequencies {
 
 impl DistancesPlan {
     /// Plan for a window; `margin` more samples are kept on each side of it.
+    ///
+    /// # Panics
+    /// If the lattice is not square: samples are equally far apart along both axes.
     pub fn new(wanted: Distances, margin: usize) -> Self {
+        assert!(wanted.lattice.is_square(), "a square lattice");
         // A period of whole steps must not gain one by rounding.
         const ROUNDING: f64 = 1e-9;
         let pitch = wanted.lattice.pitch_um();
@@ -174,7 +178,7 @@ impl DistancesPlan {
         let [cx, cy] = self.wanted.centre_um;
         let (reach, end) = (self.reach_um(), self.fade_end_um());
         Fade {
-            period_um: self.period_um,
+            period_um: [self.period_um; 2],
             full_um: (reach + (middle_um / least_um - 1.0) * (reach + cx.hypot(cy))).min(LATEST_FADE * end),
             zero_um: end,
             relabelled: 0,

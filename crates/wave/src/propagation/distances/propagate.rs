@@ -29,7 +29,7 @@ impl DistancesPlan {
             centre_um: self.wanted.centre_um,
             shift_um: self.wanted.centre_um.map(|c| c + first_sample - x0),
             fade: &self.fade(middle, least),
-            pitch_um: self.wanted.lattice.pitch_um(),
+            cell_um: self.wanted.lattice.cell_um(),
         };
         scratch.transfer.resize(distances_um.len() * kx * ky, Complex32::ZERO);
         for k in 0..kx {

@@ -30,7 +30,7 @@ impl Fold {
 
     /// The adjoint of `columns_forward`.
     pub(super) fn columns_adjoint(&self, scratch: &mut Scratch) {
-        let (m, residues, samples) = (self.band.bins, self.residues(), self.window.samples);
+        let (m, residues, samples) = (self.band.bins[1], self.residues(), self.window.samples);
         let [kx, ky] = self.band.count;
         let Scratch {
             tiles,
@@ -63,7 +63,7 @@ impl Fold {
             multiply_conj(kept, transfer);
             column.fill(Complex32::ZERO);
             scatter(column, kept, self.band.first[1] + rows.start as i64);
-            process(&*self.inverse, column, fft);
+            process(&*self.inverse[1], column, fft);
             let tile = &mut tiles[k / LANES * residues * LANES..];
             for (line, value) in tile.chunks_exact_mut(LANES).zip(&column[..residues]) {
                 line[k % LANES] = *value;
@@ -73,7 +73,7 @@ impl Fold {
 
     /// The adjoint of `rows_forward`, into one value a site.
     pub(super) fn rows_adjoint(&self, wave: &PlaneWave, scratch: &mut Scratch, sites: &mut Array2<Complex32>) {
-        let (n, m, residues) = (self.lattice.sites(), self.band.bins, self.residues());
+        let (m, residues) = (self.band.bins[0], self.residues());
         self.fill_wave(wave, scratch);
         let Scratch {
             wave: [wave_x, wave_y],
@@ -92,12 +92,14 @@ impl Fold {
             }
             folded.fill(Complex32::ZERO);
             scatter(folded, &spectrum[..self.band.count[0]], self.band.first[0]);
-            process(&*self.inverse, folded, fft);
-            for iy in (r..n).step_by(m) {
+            process(&*self.inverse[0], folded, fft);
+            for iy in self.rows_of(r) {
                 let wy = wave_y[iy].conj();
                 let mut line = sites.row_mut(iy);
                 for (ix, (site, wx)) in line.iter_mut().zip(wave_x.iter()).enumerate() {
-                    *site = folded[ix % m] * wx.conj() * wy;
+                    if self.lattice.has(ix, iy) {
+                        *site = folded[ix % m] * wx.conj() * wy;
+                    }
                 }
             }
         }

@@ -19,7 +19,7 @@ impl Fold {
         blocks: Range<usize>,
         scratch: &mut Scratch,
     ) -> f64 {
-        let (n, m, residues) = (self.lattice.sites(), self.band.bins, self.residues());
+        let (n, m, residues) = (self.lattice.sites(), self.band.bins[0], self.residues());
         self.fill_wave(wave, scratch);
         let Scratch {
             row,
@@ -47,21 +47,21 @@ impl Fold {
         let mut power = 0.0;
         for r in 0..residues {
             folded.fill(Complex32::ZERO);
-            for iy in (r..n).step_by(m) {
+            for iy in self.rows_of(r) {
                 aperture.fill_row(iy, row);
                 power += product_sum(row, row).re;
                 for (part, wave) in row.chunks(m).zip(wave_x.chunks(m)) {
                     accumulate(&mut folded[..part.len()], part, wave, wave_y[iy]);
                 }
             }
-            process(&*self.forward, folded, fft);
+            process(&*self.forward[0], folded, fft);
             gather(&mut spectrum[..kept], folded, self.band.first[0] + first as i64);
             for (block, lanes) in spectrum.chunks_exact(LANES).enumerate() {
                 let at = (block * residues + r) * LANES;
                 tiles[at..at + LANES].copy_from_slice(lanes);
             }
         }
-        power * self.lattice.pitch_um().powi(2)
+        power * self.lattice.cell_um2()
     }
 
     /// Transforms these blocks along y, sends each frequency to the sensor, shows it to `observe`, and forms the window's
@@ -72,7 +72,7 @@ impl Fold {
         scratch: &mut Scratch,
         observe: &mut dyn FnMut(&[Complex32]),
     ) {
-        let (m, residues, samples) = (self.band.bins, self.residues(), self.window.samples);
+        let (m, residues, samples) = (self.band.bins[1], self.residues(), self.window.samples);
         let [kx, ky] = self.band.count;
         let Scratch {
             tiles,
@@ -102,7 +102,7 @@ impl Fold {
             for (lane, column) in columns.chunks_exact_mut(m).enumerate().take(lanes) {
                 let k = block * LANES + lane;
                 let rows = self.band.rows[k].clone();
-                process(&*self.forward, column, fft);
+                process(&*self.forward[1], column, fft);
                 spectrum.fill(Complex32::ZERO);
                 let kept = &mut spectrum[rows.clone()];
                 gather(kept, column, self.band.first[1] + rows.start as i64);

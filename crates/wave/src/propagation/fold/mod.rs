@@ -2,8 +2,9 @@
 //!
 //! Samples of the aperture are added up modulo the period and transformed; each frequency goes its way to
 //! the sensor, weighed by a fade of where its ray lands; the window alone is formed, by chirps.
-//! A lattice of point samples is periodic in frequency with 1 / pitch: each frequency that lands near the
-//! window takes the bin it is equal to modulo 1 / pitch, so a steep wedge needs no finer lattice.
+//! A lattice of point samples is periodic in frequency with 1 / step of its grid: each frequency that lands near the
+//! window takes the bin it is equal to modulo 1 / step, so a steep wedge needs no finer lattice. A hexagonal lattice is
+//! a grid of which every other place passes nothing: its orders are among the frequencies of the grid.
 //!
 //! Folding and the fade are exact but for light that leaves the window's neighbourhood; a hard band limit
 //! (Matsushima and Shimobaba, Opt. Express 17, 19662 (2009)) would ring instead.
@@ -12,6 +13,7 @@ mod adjoint;
 mod forward;
 mod otf;
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use metalith_core::Lattice;
@@ -39,8 +41,8 @@ pub struct Fold {
     window: Window,
     accuracy: Accuracy,
     band: FrequencyBand,
-    forward: Arc<dyn Fft<f32>>,
-    inverse: Arc<dyn Fft<f32>>,
+    forward: [Arc<dyn Fft<f32>>; 2],
+    inverse: [Arc<dyn Fft<f32>>; 2],
     zoom: [Zoom; 2],
     /// Blocks of columns whose spectra are held at a time; the rows of the aperture are asked for and transformed once for
     /// each such part.
@@ -65,7 +67,7 @@ impl Fold {
         Ok(Self::with_band(lattice, wavelength_um, window, accuracy, band))
     }
 
-    /// With a period of `bins` samples and a fade of one's own, from `fade_um[0]` to `fade_um[1]`: for those
+    /// With a period of `bins` places of the lattice's grid along x and y and a fade of one's own, from `fade_um[0]` to `fade_um[1]`: for those
     /// who study the method.
     ///
     /// # Errors
@@ -74,7 +76,7 @@ impl Fold {
         lattice: Lattice,
         wavelength_um: f64,
         window: Window,
-        bins: usize,
+        bins: [usize; 2],
         fade_um: [f64; 2],
     ) -> Result<Self> {
         let band = FrequencyBand::new(lattice, wavelength_um, &window, bins, fade_um)?;
@@ -95,16 +97,18 @@ impl Fold {
         band: FrequencyBand,
     ) -> Self {
         let mut planner = FftPlanner::new();
-        let cycles = window.step_um / band.fade.period_um;
-        let zoom = [0, 1].map(|a| Zoom::new(&mut planner, band.count[a], band.first[a], window.samples, cycles));
+        let zoom = [0, 1].map(|a| {
+            let cycles = window.step_um / band.fade.period_um[a];
+            Zoom::new(&mut planner, band.count[a], band.first[a], window.samples, cycles)
+        });
         Self {
             blocks_at_once: band.count[0].div_ceil(LANES),
             lattice,
             wavelength_um,
             window,
             accuracy,
-            forward: planner.plan_fft_forward(band.bins),
-            inverse: planner.plan_fft_inverse(band.bins),
+            forward: band.bins.map(|bins| planner.plan_fft_forward(bins)),
+            inverse: band.bins.map(|bins| planner.plan_fft_inverse(bins)),
             zoom,
             band,
         }
@@ -197,9 +201,21 @@ impl Fold {
         }
     }
 
-    /// Rows of the lattice that a row of the period is the sum of.
+    /// Rows of the lattice that pass anything.
+    fn rows(&self) -> Range<usize> {
+        let [_, rows] = self.lattice.reach();
+        rows
+    }
+
+    /// Rows of the period that rows of the lattice are added up in.
     fn residues(&self) -> usize {
-        self.lattice.sites().min(self.band.bins)
+        self.rows().len().min(self.band.bins[1])
+    }
+
+    /// Rows of the lattice that are added up in a row of the period.
+    fn rows_of(&self, residue: usize) -> std::iter::StepBy<Range<usize>> {
+        let rows = self.rows();
+        (rows.start + residue..rows.end).step_by(self.band.bins[1])
     }
 
     fn blocks(&self) -> usize {
@@ -209,13 +225,13 @@ impl Fold {
     /// What multiplies the kept frequencies of column `k` of the band.
     fn transfer(&self, k: usize, faded: &mut FadedColumn, out: &mut [Complex32]) {
         let z = self.window.distance_um;
-        let x0 = self.lattice.coordinate_um(0);
+        let first = [0, self.rows().start];
         let transfer = Transfer {
             wavelength_um: self.wavelength_um,
             centre_um: self.window.centre_um,
-            shift_um: self.window.centre_um.map(|c| c - x0),
+            shift_um: [0, 1].map(|a| self.window.centre_um[a] - self.lattice.place_um(a, first[a])),
             fade: &self.band.fade,
-            pitch_um: self.lattice.pitch_um(),
+            cell_um: self.lattice.cell_um(),
         };
         let column = FrequencyColumn {
             first: [
@@ -234,7 +250,7 @@ impl Fold {
         for (axis, sine) in [wave.sin_x, wave.sin_y].into_iter().enumerate() {
             let turns = &mut scratch.turns;
             turns.clear();
-            turns.extend((0..n).map(|i| self.lattice.coordinate_um(i) * sine / wave.wavelength_um));
+            turns.extend((0..n).map(|i| self.lattice.place_um(axis, i) * sine / wave.wavelength_um));
             scratch.wave[axis].resize(n, Complex32::ZERO);
             cis_all(turns, &mut scratch.wave[axis]);
         }

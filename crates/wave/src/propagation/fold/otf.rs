@@ -72,23 +72,24 @@ impl Fold {
         scratch: &mut Scratch,
     ) -> Result<(Field, Otf)> {
         let period_um = self.band.fade.period_um;
-        let at = |f: &f64| f * 1e-3 * period_um;
-        let mut shifts: Vec<usize> = lp_mm
-            .iter()
-            .flat_map(|f| [at(f) as usize, at(f) as usize + 1])
-            .collect();
-        shifts.sort_unstable();
-        shifts.dedup();
+        let at = |axis: usize, f: &f64| f * 1e-3 * period_um[axis];
+        let shifts = [0, 1].map(|axis| {
+            let around = |f| [at(axis, f) as usize, at(axis, f) as usize + 1];
+            let mut shifts: Vec<usize> = lp_mm.iter().flat_map(around).collect();
+            shifts.sort_unstable();
+            shifts.dedup();
+            shifts
+        });
         let mut correlation = Correlation::new(shifts, self.band.count[1]);
         let mut values = Array2::zeros([self.window.samples; 2]);
         let power_um2 = self.field_observed(aperture, wave, scratch, values.view_mut(), &mut |column| {
             correlation.add(column)
         })?;
         let transform_um2 = [0, 1].map(|axis| {
-            let of = |shift: usize| correlation.sum(axis, shift) * period_um * period_um;
+            let of = |shift: usize| correlation.sum(axis, shift) * period_um[0] * period_um[1];
             let between = |f: &f64| {
-                let share = at(f).fract();
-                of(at(f) as usize) * (1.0 - share) + of(at(f) as usize + 1) * share
+                let (bin, share) = (at(axis, f) as usize, at(axis, f).fract());
+                of(bin) * (1.0 - share) + of(bin + 1) * share
             };
             lp_mm.iter().map(between).collect()
         });
@@ -103,19 +104,19 @@ impl Fold {
 
 /// Autocorrelation of a spectrum that comes column by column, at some shifts along x and along y.
 struct Correlation {
-    /// Bins, ascending.
-    shifts: Vec<usize>,
+    /// Bins along x and along y, ascending.
+    shifts: [Vec<usize>; 2],
     sums: [Vec<Complex64>; 2],
-    /// The last columns, as many as the greatest shift, and one.
+    /// The last columns, as many as the greatest shift along x, and one.
     ring: Vec<Vec<Complex32>>,
     seen: usize,
 }
 
 impl Correlation {
-    fn new(shifts: Vec<usize>, rows: usize) -> Self {
-        let columns = shifts.last().copied().unwrap_or(0) + 1;
+    fn new(shifts: [Vec<usize>; 2], rows: usize) -> Self {
+        let columns = shifts[0].last().copied().unwrap_or(0) + 1;
         Self {
-            sums: [0, 1].map(|_| vec![Complex64::ZERO; shifts.len()]),
+            sums: [0, 1].map(|axis: usize| vec![Complex64::ZERO; shifts[axis].len()]),
             shifts,
             ring: vec![vec![Complex32::ZERO; rows]; columns],
             seen: 0,
@@ -127,10 +128,13 @@ impl Correlation {
         let place = self.seen % columns;
         self.ring[place].copy_from_slice(column);
         let [along_x, along_y] = &mut self.sums;
-        for ((&shift, x), y) in self.shifts.iter().zip(along_x).zip(along_y) {
+        let [shifts_x, shifts_y] = &self.shifts;
+        for (&shift, x) in shifts_x.iter().zip(along_x) {
             if shift <= self.seen {
                 *x += product_sum(column, &self.ring[(self.seen - shift) % columns]);
             }
+        }
+        for (&shift, y) in shifts_y.iter().zip(along_y) {
             if shift < column.len() {
                 *y += product_sum(&column[shift..], &column[..column.len() - shift]);
             }
@@ -139,7 +143,9 @@ impl Correlation {
     }
 
     fn sum(&self, axis: usize, shift: usize) -> Complex64 {
-        let place = self.shifts.binary_search(&shift).expect("asked for when it was made");
+        let place = self.shifts[axis]
+            .binary_search(&shift)
+            .expect("asked for when it was made");
         self.sums[axis][place]
     }
 }

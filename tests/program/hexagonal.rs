@@ -1,0 +1,251 @@
+//! A design on a hexagonal lattice through the program: written, read back, simulated and judged; and what does not know it.
+
+use std::fs;
+use std::path::PathBuf;
+
+use metalith_testing::{design, golden};
+use serde_json::Value;
+
+use super::run::{metalith, numbers, report};
+
+/// The text of the shipped design with changes of it, in a folder.
+fn changed(folder: &tempfile::TempDir, changes: &[(&str, &str)]) -> PathBuf {
+    let mut text = fs::read_to_string(design("hexagonal_1550")).unwrap();
+    for (from, to) in changes {
+        assert!(text.contains(from), "{from}");
+        text = text.replacen(from, to, 1);
+    }
+    let path = folder.path().join("hexagonal.toml");
+    fs::write(&path, text).unwrap();
+    path
+}
+
+#[test]
+fn golden_numbers_of_the_hexagonal_design() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = design("hexagonal_1550");
+    let output = metalith(&["run", "--out"], &[folder.path(), &path]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    let run = report(folder.path());
+    golden("hexagonal_1550.json", format!("{:#}\n", numbers(&run)).as_bytes());
+    let html = fs::read_to_string(folder.path().join("report.html")).unwrap();
+    assert!(html.contains("limits hold") && html.contains("on a hexagonal lattice of 700 nm"));
+
+    // Either format, by itself, is what was simulated.
+    let other = tempfile::tempdir().unwrap();
+    let layout = folder.path().join("hexagonal_1550_pillars.gds");
+    let oasis = other.path().join("pillars.oas");
+    assert_eq!(metalith(&["convert"], &[&layout, &oasis]).status.code(), Some(0));
+    let output = metalith(&["verify", "--out"], &[other.path(), &path, &oasis]);
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    assert_eq!(numbers(&report(other.path())), numbers(&run));
+
+    // Without a design: the lattice is found, and the lens is as sharp.
+    let args = [
+        "psf",
+        "--distance-um",
+        "240",
+        "--wavelength-nm",
+        "1550",
+        "--height-nm",
+        "900",
+        "--pillar-material",
+        "a_si_pierce_1972",
+        "--samples",
+        "96",
+        "--json",
+    ];
+    let output = metalith(&args, &[&layout]);
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(found["elements"][0]["lattice"], "hexagonal");
+    assert_eq!(found["elements"][0]["pillars"], found["pillars"]);
+    let strehl = |numbers: &Value| {
+        numbers["distinct"][0]["spots"][0]["extracted_strehl"][0][1]
+            .as_f64()
+            .unwrap()
+    };
+    let (here, there) = (found["psfs"][0]["strehl"].as_f64().unwrap(), strehl(&numbers(&run)));
+    // Both sample the peak on the same lattice of samples; the rest is rounding to four digits.
+    const FOUR_DIGITS: f64 = 1e-3;
+    assert!((here / there - 1.0).abs() < FOUR_DIGITS, "{here} against {there}");
+    let output = metalith(&["psf", "--fidelity", "published"], &[&layout]);
+    assert_eq!(output.status.code(), Some(2));
+}
+
+/// Elements that are steered apart, a lens of its own among them, one of a polygon: a limit that does not hold fails the run.
+#[test]
+fn steered_elements_own_lenses_and_polygons_are_simulated() {
+    let folder = tempfile::tempdir().unwrap();
+    let elements = "\
+[[element]]
+x_um = -40
+y_um = 0
+steering_x_deg = 8
+
+[[element]]
+x_um = 40
+y_um = 0
+diameter_um = 40
+focal_length_um = 60
+aperture = \"regular\"
+aperture_sides = 6
+steering_y_deg = 5
+
+[[element]]
+x_um = 0
+y_um = 70
+aperture = \"rectangle\"
+aperture_um = [40, 30]
+rotation_deg = 20
+";
+    let path = changed(
+        &folder,
+        &[
+            ("diameter_um = 160", "diameter_um = 50"),
+            ("focal_length_um = 240", "focal_length_um = 75"),
+            ("elements = [1, 1]\nspacing_um = 250\n", ""),
+            ("[mapping]", &format!("{elements}\n[mapping]")),
+        ],
+    );
+    let output = metalith(&["run", "--out"], &[folder.path(), &path]);
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let found = report(folder.path());
+    let distinct = found["verification"]["distinct"]
+        .as_array()
+        .or_else(|| found["distinct"].as_array())
+        .unwrap();
+    assert_eq!(distinct.len(), 3);
+    for element in distinct {
+        // Along the axis of the element's field a lens is perfect but for the cells, which blur it by a tenth or so.
+        let spot = &element["spots"][0];
+        let designed = spot["designed"]["strehl"].as_f64().unwrap();
+        let extracted = spot["extracted"][0][1]["strehl"].as_f64().unwrap();
+        assert!(designed > 0.98, "{designed}");
+        assert!(extracted > 0.8 && extracted < designed, "{extracted}");
+    }
+    // A pillar that is wider than it was designed is found.
+    let layout = folder.path().join("hexagonal_1550_pillars.gds");
+    let mut text = fs::read_to_string(&path).unwrap();
+    text = text.replacen("coefficients = [0.2363", "coefficients = [0.2263", 1);
+    let other = folder.path().join("other.toml");
+    fs::write(&other, text).unwrap();
+    let output = metalith(&["verify", "--out"], &[folder.path(), &other, &layout]);
+    assert_eq!(
+        output.status.code(),
+        Some(1),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+}
+
+/// What a process and a bench do to a chip costs a lens the same share of its Strehl ratio on either lattice.
+#[test]
+fn a_chip_as_made_loses_as_much_as_on_a_square_lattice() {
+    /// Pillars of the two lattices differ in how they answer to a bias, and rims have other sites.
+    const ALIKE: f64 = 0.015;
+    /// What the effects are made to cost, together.
+    const COSTS: f64 = 0.7;
+    let folder = tempfile::tempdir().unwrap();
+    let smaller = [
+        ("diameter_um = 160", "diameter_um = 80"),
+        ("focal_length_um = 240", "focal_length_um = 120"),
+    ];
+    let square = [
+        smaller[0],
+        smaller[1],
+        ("lattice = \"hexagonal\"", "lattice = \"square\""),
+    ];
+    let effects = [
+        "wavefront_nm = [120.0, 0.0, 60.0]\ncd_bias_density_nm = 20.0",
+        "stitching = [{ axis = 0, at_um = 5.0, by_nm = [180.0, 90.0] }, { axis = 1, at_um = -10.0, by_nm = [-60.0, 240.0] }]",
+        "missing_pillars = 0.05\naperture_offset_um = [8.0, -5.0]",
+    ];
+    let paths = ["source_per_m = 150.0", "tilt_mrad = [40.0, 25.0]", "gap_um = 5.0"];
+    let strehl = |changes: &[(&str, &str)], geometry: &str, path: &str| {
+        let design = changed(&folder, changes);
+        let layout = folder.path().join("hexagonal_1550_pillars.gds");
+        let output = metalith(&["layout", "--out"], &[folder.path(), &design]);
+        assert_eq!(
+            output.status.code(),
+            Some(0),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        let model = folder.path().join("model.toml");
+        let text = format!(
+            "schema = 2\nset = \"made up\"\nfinding = \"made up\"\n[perturbation.geometry]\n{geometry}\n[perturbation.cell]\n\
+             [perturbation.path]\n{path}\n[perturbation.light]\n[perturbation.camera]\n"
+        );
+        fs::write(&model, text).unwrap();
+        let flags = ["verify", "--fast", "--out"];
+        let output = metalith(&flags, &[folder.path(), &design, &layout, "--model".as_ref(), &model]);
+        assert_eq!(
+            output.status.code(),
+            Some(0),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        numbers(&report(folder.path()))["distinct"][0]["spots"][0]["extracted_strehl"][0][1]
+            .as_f64()
+            .unwrap()
+    };
+    let plain = [&smaller[..], &square[..]].map(|lattice| strehl(lattice, "", ""));
+    let mut all = 1.0;
+    for (geometry, path) in effects.into_iter().zip(paths) {
+        let [hexagonal, square] = [(&smaller[..], plain[0]), (&square[..], plain[1])]
+            .map(|(lattice, plain)| strehl(lattice, geometry, path) / plain);
+        println!("{geometry}; {path}: {hexagonal:.4}, {square:.4}");
+        assert!(
+            (hexagonal - square).abs() < ALIKE,
+            "{geometry}; {path}: {hexagonal}, {square}"
+        );
+        all *= hexagonal;
+    }
+    assert!(all < COSTS, "{all}");
+}
+
+/// What knows squares alone names the line of the design that says otherwise, and does nothing.
+#[test]
+fn what_knows_squares_alone_refuses_it_by_line_and_column() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = design("hexagonal_1550");
+    let text = fs::read_to_string(&path).unwrap();
+    let line = 1 + text.lines().position(|line| line.starts_with("lattice")).unwrap();
+    for command in ["optimise", "handoff"] {
+        let out = folder.path().join(command);
+        let output = metalith(&[command, "--out"], &[&out, &path]);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{command}: {said}");
+        assert!(
+            said.contains(&format!("hexagonal_1550.toml:{line}:11")),
+            "{command}: {said}"
+        );
+        assert!(!out.exists(), "{command} left something behind");
+    }
+    let camera = metalith_testing::root().join("cameras/gt1930.toml");
+    let out = folder.path().join("picture");
+    let output = metalith(&["run", "--out"], &[&out, &path, "--picture".as_ref(), &camera]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(
+        said.contains("pictures") && said.contains("hexagonal") && !out.exists(),
+        "{said}"
+    );
+}
