@@ -7,6 +7,7 @@ mod exact;
 mod fit;
 pub mod kept;
 mod model;
+mod neighbour_band;
 mod neighbours;
 mod pointwise;
 mod polynomial;
@@ -25,7 +26,8 @@ pub use fit::{
 };
 pub use metalith_rcwa::Material;
 pub use model::{CellModel, Fidelity, ObliqueTables, POLARISATION_SHARE, dark};
-pub use neighbours::{NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourBasis, NeighbourResponse};
+pub use neighbour_band::{BandNode, BandResponse};
+pub use neighbours::{NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourBasis, NeighbourResponse, SiteResponse};
 pub use pointwise::PointwiseCell;
 pub use pointwise::{BAND_ORDERS, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, tabulate};
 pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use metalith_core::{Error, Progress, Result};
 
-use crate::NeighbourResponse;
+use crate::{BandResponse, NeighbourResponse};
 
 /// How truly a cell is described. Every result names the one it was made with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -177,6 +177,21 @@ pub trait CellModel: Sync {
         _sines: [f64; 2],
         _progress: &dyn Progress,
     ) -> Result<Option<[NeighbourResponse; 2]>> {
+        Ok(None)
+    }
+
+    /// The same for one of many wavelengths that a band is averaged over, s and p as one: without a table of its own, between
+    /// the wavelengths that have one. `looks` is the direction that light of a wavelength (um) arrives from, as above. Nothing
+    /// also of a model that knows no wavelengths with tables.
+    ///
+    /// # Errors
+    /// As [`CellModel::among_neighbours`].
+    fn among_neighbours_in_band(
+        &self,
+        _wavelength_um: f64,
+        _looks: &dyn Fn(f64) -> [f64; 2],
+        _progress: &dyn Progress,
+    ) -> Result<Option<BandResponse>> {
         Ok(None)
     }
 

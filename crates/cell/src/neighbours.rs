@@ -69,6 +69,11 @@ impl NeighbourBasis {
         basis
     }
 
+    /// Narrowest and widest pillar (nm).
+    pub fn range_nm(&self) -> (f64, f64) {
+        self.range_nm
+    }
+
     /// All terms for a pillar and its neighbours (nm), the latter in the order of [`NEIGHBOURS`].
     pub fn terms(&self, own_nm: f64, neighbours_nm: &[f64; NEIGHBOURS.len()]) -> [f64; NEIGHBOUR_TERMS] {
         let mut terms = [0.0; NEIGHBOUR_TERMS];
@@ -132,14 +137,28 @@ pub struct NeighbourResponse {
     pub weights: Vec<Complex64>,
 }
 
-impl NeighbourResponse {
+/// A sum over pairs in one light.
+pub trait SiteResponse: Sync {
     /// What a pillar (nm) transmits on the mean over its neighbours.
-    pub fn own(&self, width_nm: f64) -> Complex64 {
+    fn own(&self, width_nm: f64) -> Complex64;
+
+    /// What the neighbour at the offset of this number in [`NEIGHBOURS`] adds; widths in nm.
+    fn pair(&self, number: usize, own_nm: f64, neighbour_nm: f64) -> Complex64;
+
+    /// What a pillar transmits among neighbours of these widths (nm), in the order of [`NEIGHBOURS`].
+    fn among(&self, own_nm: f64, neighbours_nm: &[f64; NEIGHBOURS.len()]) -> Complex64 {
+        let pairs = neighbours_nm.iter().enumerate();
+        let pairs: Complex64 = pairs.map(|(k, other)| self.pair(k, own_nm, *other)).sum();
+        self.own(own_nm) + pairs
+    }
+}
+
+impl SiteResponse for NeighbourResponse {
+    fn own(&self, width_nm: f64) -> Complex64 {
         sum(&self.weights[..OWN_TERMS], &self.basis.own(width_nm))
     }
 
-    /// What the neighbour at the offset of this number in [`NEIGHBOURS`] adds; widths in nm.
-    pub fn pair(&self, number: usize, own_nm: f64, neighbour_nm: f64) -> Complex64 {
+    fn pair(&self, number: usize, own_nm: f64, neighbour_nm: f64) -> Complex64 {
         let first = OWN_TERMS + number * PAIR_TERMS;
         sum(
             &self.weights[first..first + PAIR_TERMS],

@@ -141,11 +141,10 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
                     let stack = design.cell_stack()?;
                     Ok(Box::new(PointwiseCell::new(stack, design.cell.widths_nm())))
                 }
-                Fidelity::Neighbours => Ok(Box::new(NeighbourCell::new(
-                    design.cell_stack()?,
-                    mappings(design),
-                    cache_folder(),
-                ))),
+                Fidelity::Neighbours => {
+                    let cell = NeighbourCell::new(design.cell_stack()?, mappings(design), cache_folder());
+                    Ok(Box::new(cell.tabulated_at(&design.verify.wavelengths_um)))
+                }
                 Fidelity::Calibrated => Err(Error::invalid(
                     "a calibrated cell without the model it is calibrated by",
                     "read the model that `metalith calibrate` wrote and make a `MadeChip` of it",

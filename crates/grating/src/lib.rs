@@ -58,7 +58,7 @@ pub use cell::{COARSE, CoarseCell};
 pub use mapping::Mapping;
 pub use neighbour_cell::NeighbourCell;
 pub use neighbour_pillars::NeighbourPillars;
-pub use neighbour_table::{NeighbourTable, NeighbourTableSpec};
+pub use neighbour_table::{NeighbourTable, NeighbourTableSpec, sites_by};
 pub use node::{FIRST_KEPT, GratingVector, KEPT, OrderAmplitudes};
 pub use orientation::Orientation;
 pub use rows::{ElementRow, RealRow, SolvedRow};

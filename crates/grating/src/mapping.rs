@@ -73,6 +73,13 @@ impl Mapping {
         f64::from(self.widths_nm[i])
     }
 
+    /// A phase (turns, 0 to 1) that is drawn with the width nearest to this (nm).
+    pub fn nearest_phase(&self, width_nm: f64) -> f64 {
+        let off = |i: &usize| (f64::from(self.widths_nm[*i]) - width_nm).abs();
+        let nearest = (0..SAMPLES).min_by(|a, b| off(a).total_cmp(&off(b)));
+        phase_of(nearest.expect("there are samples"))
+    }
+
     /// Phase that a drawn width (nm) stands for (turns, 0 to 1); none if the mapping does not draw it.
     pub fn phase(&self, width_nm: u16) -> Option<f64> {
         self.phases.get(usize::from(width_nm)).copied().flatten()

@@ -2,7 +2,7 @@
 
 use num_complex::{Complex32, Complex64};
 
-use metalith_cell::{NEIGHBOURS, NeighbourResponse};
+use metalith_cell::{NEIGHBOURS, NeighbourResponse, SiteResponse};
 use metalith_core::{Error, Lattice, Result, WidthMap};
 use metalith_wave::Aperture;
 
@@ -30,19 +30,27 @@ pub struct NeighbourPillars<'a> {
 }
 
 impl<'a> NeighbourPillars<'a> {
-    /// `sines` is the direction of arrival at the element; `responses` are those for s and p of the direction that
-    /// [`Orientation`] turns it to; `polarisation` is 0 for s, 1 for p of the element's light.
+    /// In light of one polarisation, 0 for s and 1 for p: as [`NeighbourPillars::new`], with responses for s and p.
     ///
     /// # Errors
-    /// If there are too many widths to make a table of their pairs.
-    pub fn new(
+    /// As [`NeighbourPillars::new`].
+    pub fn polarised(
         widths: &'a WidthMap,
         responses: &[NeighbourResponse; 2],
         sines: [f64; 2],
         polarisation: usize,
     ) -> Result<Self> {
         let orientation = Orientation::of(sines, [0.0; 2]);
-        let response = &responses[orientation.polarisation(polarisation)];
+        Self::new(widths, &responses[orientation.polarisation(polarisation)], sines)
+    }
+
+    /// `sines` is the direction of arrival at the element; the response is that of the direction that [`Orientation`] turns
+    /// it to.
+    ///
+    /// # Errors
+    /// If there are too many widths to make a table of their pairs.
+    pub fn new(widths: &'a WidthMap, response: &impl SiteResponse, sines: [f64; 2]) -> Result<Self> {
+        let orientation = Orientation::of(sines, [0.0; 2]);
         let counts = widths.histogram().into_iter().enumerate().skip(1);
         let drawn: Vec<u16> = counts.filter(|(_, n)| *n > 0).map(|(w, _)| w as u16).collect();
         let count = drawn.len();
@@ -163,7 +171,7 @@ mod tests {
     fn sites_transmit_the_sum_over_their_neighbours() {
         let (widths, responses) = (widths(), [response(3), response(5)]);
         // Arriving from -y: the table is for light along +x, so that (0, -1) there is (1, 0).
-        let pillars = NeighbourPillars::new(&widths, &responses, [0.0, -0.3], 1).unwrap();
+        let pillars = NeighbourPillars::polarised(&widths, &responses, [0.0, -0.3], 1).unwrap();
         let mut row = vec![Complex32::ZERO; 9];
         for iy in 0..9_usize {
             pillars.fill_row(iy, &mut row);
@@ -191,7 +199,7 @@ mod tests {
     #[test]
     fn nothing_passes_without_pillars() {
         let widths = WidthMap::empty(Lattice::new(350, 4).unwrap());
-        let pillars = NeighbourPillars::new(&widths, &[response(3), response(5)], [0.0; 2], 0).unwrap();
+        let pillars = NeighbourPillars::new(&widths, &response(3), [0.0; 2]).unwrap();
         let mut row = vec![Complex32::ONE; 4];
         pillars.fill_row(2, &mut row);
         assert_eq!(row, vec![Complex32::ZERO; 4]);

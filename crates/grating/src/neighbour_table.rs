@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use metalith_cell::kept::{self, KeptTable};
-use metalith_cell::{CellStack, NEIGHBOUR_TERMS, NeighbourBasis, NeighbourResponse};
+use metalith_cell::{CellStack, NEIGHBOUR_TERMS, NeighbourBasis, NeighbourResponse, SiteResponse};
 use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::SiteLattice;
 
@@ -91,15 +91,7 @@ impl NeighbourTable {
     /// What the sites of a supercell transmit by the sum over pairs, `[polarisation][site]`, where |t| of a site that
     /// passes all its light is `full`; one width (nm) for each site.
     pub fn sites(&self, lattice: &SiteLattice, widths_nm: &[f64], full: f64) -> [Vec<Complex64>; 2] {
-        self.responses(full).map(|response| {
-            let site = |i: usize| {
-                let terms = response
-                    .basis
-                    .terms(widths_nm[i], &neighbours_nm(lattice, widths_nm, i));
-                response.weights.iter().zip(terms).map(|(w, t)| w * t).sum()
-            };
-            (0..lattice.len()).map(site).collect()
-        })
+        self.responses(full).map(|r| sites_by(&r, lattice, widths_nm))
     }
 
     /// Light that the sum over pairs puts elsewhere than supercells do that it was not fitted to: mean of |t - t'|^2 over
@@ -107,6 +99,12 @@ impl NeighbourTable {
     pub fn left_out(&self) -> f64 {
         self.left_out
     }
+}
+
+/// What the sites of a supercell transmit by a sum over pairs; one width (nm) for each site.
+pub fn sites_by(response: &impl SiteResponse, lattice: &SiteLattice, widths_nm: &[f64]) -> Vec<Complex64> {
+    let site = |i: usize| response.among(widths_nm[i], &neighbours_nm(lattice, widths_nm, i));
+    (0..lattice.len()).map(site).collect()
 }
 
 fn check(spec: &NeighbourTableSpec, mappings: &[Mapping]) -> Result<()> {

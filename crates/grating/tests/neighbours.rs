@@ -8,8 +8,10 @@ mod truth_rows;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
+use metalith_cell::Fidelity;
 use metalith_core::Silent;
-use metalith_grating::{Blaze, NeighbourTable, NeighbourTableSpec};
+use metalith_design::cell_models;
+use metalith_grating::{Blaze, CoarseCell, NeighbourTable, NeighbourTableSpec, sites_by};
 use metalith_rcwa::SiteLattice;
 use num_complex::Complex64;
 use prototype_rows::Prototype;
@@ -207,6 +209,83 @@ fn blazed_rows_of_the_truth_are_met_better_than_by_equal_neighbours() {
     let squares = |of: fn(&Off) -> f64| parts[0].iter().map(|o| of(o).powi(2)).sum::<f64>();
     assert!(squares(|o| o.mean_equal) > GAIN * GAIN * squares(|o| o.mean));
 }
+
+/// Share of the first order of blazed rows at wavelengths without a table, mean over where their phase starts and over s and p,
+/// rms over gratings and wavelengths. Measured: 0.015 along the normal, where equal neighbours miss 0.16, and 0.028 for gratings
+/// about the wedge of an element that is steered by 15 degrees and lit from where it looks, where they miss 0.045.
+const BETWEEN: [f64; 2] = [0.025, 0.035];
+
+#[test]
+#[ignore = "second tier: supercells at ten wavelengths"]
+fn between_the_tables_blazed_rows_are_met_as_well() {
+    let prototype = Prototype::new();
+    let stack = prototype.design.cell_stack().unwrap();
+    let cells = cell_models(&prototype.design, &[Fidelity::Neighbours, Fidelity::Rigorous]).unwrap();
+    let pitch_nm = f64::from(prototype.design.cell.pitch_nm);
+    let steered = 15f64.to_radians().sin() / 0.55;
+    let lights = [
+        ("normal", 0.0, vec![(3, 1), (5, 2), (6, 1), (9, 1), (18, 1)]),
+        (
+            "steered",
+            steered,
+            vec![(5, 1), (6, 1), (7, 1), (8, 1), (11, 2), (9, 2), (10, 1)],
+        ),
+    ];
+    for ((name, per_um, rows), most) in lights.into_iter().zip(BETWEEN) {
+        let looks = |um: f64| [(per_um * um * 1e5).round() * 1e-5, 0.0];
+        let (mut off, mut off_equal) = (Vec::new(), Vec::new());
+        for um in [0.41, 0.43, 0.48, 0.505, 0.545, 0.56, 0.59, 0.62, 0.675, 0.69] {
+            let coarse = CoarseCell::new(&stack, um, prototype.mapping.range_nm()).unwrap();
+            let full = coarse.full_transmission().unwrap();
+            let band = cells[0].among_neighbours_in_band(um, &looks, &Silent).unwrap().unwrap();
+            let equal = cells[1].transmissions_in_band(um, pitch_nm as u16).unwrap();
+            for (cells, turns) in &rows {
+                let lattice = SiteLattice::row(*cells).unwrap();
+                let mut sums = [0.0; 3];
+                for start in 0..STARTS {
+                    // Tables are for light along +x, which a phase that falls along x turns to the normal.
+                    let turns = if per_um == 0.0 { *turns } else { -turns };
+                    let blaze = Blaze {
+                        turns: [turns, 0],
+                        sites: *cells,
+                        offset_turns: start as f64 / (STARTS * cells) as f64,
+                    };
+                    let width = |u: f64| prototype.mapping.width_nm(u);
+                    let solved = blaze.solve(&coarse, width, looks(um)).unwrap().order(1).share;
+                    let widths = blaze.widths_nm(&lattice, width);
+                    let first = |sites: &[Complex64]| {
+                        let back = |x: usize| Complex64::cis(-TAU * blaze.phase(x, 0));
+                        let sum: Complex64 = sites.iter().enumerate().map(|(x, t)| t * back(x)).sum();
+                        (sum / (*cells as f64 * full)).norm_sqr()
+                    };
+                    let alone: Vec<Complex64> = widths.iter().map(|w| equal[*w as usize]).collect();
+                    let shares = [
+                        0.5 * (solved[0] + solved[1]),
+                        first(&sites_by(&band, &lattice, &widths)),
+                        first(&alone),
+                    ];
+                    sums.iter_mut().zip(shares).for_each(|(to, v)| *to += v / STARTS as f64);
+                }
+                let [truth, found, alone] = sums;
+                println!(
+                    "| {name} | {:.0} | {cells}, {turns} | {truth:.3} | {:+.3} | {:+.3} |",
+                    um * 1e3,
+                    found - truth,
+                    alone - truth
+                );
+                off.push(found - truth);
+                off_equal.push(alone - truth);
+            }
+        }
+        let rms = |all: &[f64]| (all.iter().map(|v| v * v).sum::<f64>() / all.len() as f64).sqrt();
+        println!("{name}: {:.4}, equal neighbours {:.4}", rms(&off), rms(&off_equal));
+        assert!(rms(&off) < most, "{name}: {}", rms(&off));
+        assert!(rms(&off) < rms(&off_equal), "{name}");
+    }
+}
+
+/// Where the phase of a row starts, so many times.
+const STARTS: usize = 4;
 
 /// Mathematical libraries of machines differ in their last digits, which a fit over thousands of sites adds up.
 const ROUNDING: f64 = 1e-6;

@@ -5,8 +5,8 @@ use std::collections::hash_map::Entry;
 
 use num_complex::Complex64;
 
-use metalith_cell::{CellModel, NeighbourResponse, ObliqueTables, POLARISATION_SHARE};
-use metalith_core::{Error, LatticeKind, Progress, Result, WidthRows};
+use metalith_cell::{BandResponse, CellModel, NeighbourResponse, ObliqueTables, POLARISATION_SHARE};
+use metalith_core::{Error, LatticeKind, Progress, Result, Wedge, WidthRows};
 use metalith_grating::NeighbourPillars;
 use metalith_made::{SimulationCase, cell_direction};
 use metalith_wave::{Aperture, Fold, Pillars, PlaneWave, Psf, Scratch};
@@ -61,12 +61,20 @@ pub(super) struct TransmissionTables {
     pub unconverted: Option<Vec<Complex64>>,
     /// By direction, for s and p; empty where the design asks for normal incidence, or the cell knows no angles.
     oblique: HashMap<[u64; 2], ObliqueTables>,
-    /// By direction, for s and p, of a cell that knows unlike neighbours.
-    neighbours: HashMap<[u64; 2], [NeighbourResponse; 2]>,
+    /// By direction, of a cell that knows unlike neighbours.
+    neighbours: HashMap<[u64; 2], Neighbourhood>,
     /// Whether it is one of many wavelengths of a band.
     in_band: bool,
     /// What the pillars stand on.
     lattice: LatticeKind,
+}
+
+/// What pillars transmit among unlike neighbours in one light.
+enum Neighbourhood {
+    /// For s and p.
+    Polarised([NeighbourResponse; 2]),
+    /// For one of many wavelengths of a band.
+    Band(BandResponse),
 }
 
 impl TransmissionTables {
@@ -149,13 +157,41 @@ impl TransmissionTables {
                 let Some(responses) = cell.among_neighbours(wave.wavelength_um, sines, progress)? else {
                     return Ok(());
                 };
-                place.insert(responses);
+                place.insert(Neighbourhood::Polarised(responses));
             }
         }
         Ok(())
     }
 
-    /// An element among its own neighbours for s and p, in light for which that is known.
+    /// The same for one of many wavelengths of a band (um), in light from where elements with these wedges look.
+    ///
+    /// # Errors
+    /// As [`TransmissionTables::add_neighbours`].
+    pub fn add_neighbours_in_band(
+        &mut self,
+        cell: &dyn CellModel,
+        wavelength_um: f64,
+        wedges: &[Wedge],
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        for wedge in wedges {
+            let looks = |um: f64| cell_direction(&PlaneWave::looked_at(wedge, um), self.lattice);
+            if let Entry::Vacant(place) = self.neighbours.entry(key(looks(wavelength_um))) {
+                let Some(response) = cell.among_neighbours_in_band(wavelength_um, &looks, progress)? else {
+                    return Ok(());
+                };
+                place.insert(Neighbourhood::Band(response));
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether unlike neighbours are known in this light.
+    pub fn knows_neighbours(&self, lit: &PlaneWave) -> bool {
+        self.neighbours.contains_key(&key(cell_direction(lit, self.lattice)))
+    }
+
+    /// An element among its own neighbours, in light for which that is known: for s and p, or one for both.
     ///
     /// # Errors
     /// If it has too many widths, or they are not held as a map.
@@ -163,13 +199,19 @@ impl TransmissionTables {
         &self,
         widths: &'w dyn WidthRows,
         lit: &PlaneWave,
-    ) -> Result<Option<[NeighbourPillars<'w>; 2]>> {
-        let Some(responses) = self.neighbours.get(&key(cell_direction(lit, self.lattice))) else {
+    ) -> Result<Option<Vec<NeighbourPillars<'w>>>> {
+        let Some(known) = self.neighbours.get(&key(cell_direction(lit, self.lattice))) else {
             return Ok(None);
         };
         let widths = widths.held().ok_or_else(not_held)?;
-        let of = |polarisation| NeighbourPillars::new(widths, responses, [lit.sin_x, lit.sin_y], polarisation);
-        Ok(Some([of(0)?, of(1)?]))
+        let sines = [lit.sin_x, lit.sin_y];
+        Ok(Some(match known {
+            Neighbourhood::Polarised(both) => [0, 1]
+                .into_iter()
+                .map(|polarisation| NeighbourPillars::polarised(widths, both, sines, polarisation))
+                .collect::<Result<_>>()?,
+            Neighbourhood::Band(one) => vec![NeighbourPillars::new(widths, one, sines)?],
+        }))
     }
 
     /// The PSF of pillars for a wave on a window: the mean over polarisations where cells are solved at an angle, the sum of
@@ -188,9 +230,10 @@ impl TransmissionTables {
         scratch: &mut Scratch,
     ) -> Result<Psf> {
         let mut of = |aperture: &dyn Aperture| Ok(Psf::formed(fold, aperture, wave, lp_mm, scratch)?);
-        if let Some(both) = self.among_neighbours(widths, lit)? {
-            let psfs = both.iter().map(|a| of(a)).collect::<Result<_>>()?;
-            return Ok(Psf::sum(psfs, POLARISATION_SHARE));
+        if let Some(all) = self.among_neighbours(widths, lit)? {
+            let share = 1.0 / all.len() as f64;
+            let psfs = all.iter().map(|a| of(a)).collect::<Result<_>>()?;
+            return Ok(Psf::sum(psfs, share));
         }
         let mut of = |table: &Vec<Complex64>| of(&Pillars::new(widths, table)?);
         match self.oblique.get(&key(cell_direction(lit, self.lattice))) {

@@ -216,10 +216,10 @@ impl<'a> ElementSimulator<'a> {
             let middle = arriving(element, colour.wavelength_um, MIDDLE)?;
             for (at, case) in colour.cases.iter().zip(&self.cases) {
                 if let Some(tables) = &at.tables
-                    && let Some(both) = tables.among_neighbours(read.widths, &middle)?
+                    && let Some(pillars) = tables.among_neighbours(read.widths, &middle)?
                 {
-                    let both = both.each_ref().map(|a| -> &dyn Aperture { a });
-                    let found = site_shares(&both, phase, at.full);
+                    let pillars: Vec<&dyn Aperture> = pillars.iter().map(|a| a as _).collect();
+                    let found = site_shares(&pillars, phase, at.full);
                     all.push(OrderEfficiencies {
                         wavelength_um: colour.wavelength_um,
                         fidelity: at.fidelity,

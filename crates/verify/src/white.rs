@@ -216,7 +216,8 @@ impl<'a> WhiteSimulator<'a> {
         }))
     }
 
-    /// Solve the cells for light as it arrives at these elements, if the design asks for it.
+    /// Obtain what pillars transmit among unlike neighbours, from a cell that knows, in light from where these elements look;
+    /// and solve the cells for light as it arrives, if the design asks for it.
     ///
     /// # Errors
     /// If a cell has no answer, or the user stopped it.
@@ -224,6 +225,12 @@ impl<'a> WhiteSimulator<'a> {
         let SimulationCase::Cell(cell) = self.judge else {
             return Ok(());
         };
+        let wedges: Vec<_> = elements.iter().map(|e| e.wedge).collect();
+        for colour in &mut self.colours {
+            if let Some(tables) = &mut colour.tables {
+                tables.add_neighbours_in_band(cell, colour.wavelength_um, &wedges, progress)?;
+            }
+        }
         if self.design.verify.incidence != CellIncidence::AsLit {
             return Ok(());
         }
@@ -322,7 +329,9 @@ impl<'a> WhiteSimulator<'a> {
                     Some(bytes) => fold.within(bytes),
                     None => fold,
                 };
-                tables.psf(read.widths, &wave, &wave, &fold, &self.lp_mm, scratch)?
+                let looks = PlaneWave::looked_at(&element.wedge, colour.wavelength_um);
+                let lit = if tables.knows_neighbours(&looks) { looks } else { wave };
+                tables.psf(read.widths, &wave, &lit, &fold, &self.lp_mm, scratch)?
             }
             (None, None) => unreachable!("a case is a cell or a made chip"),
         };

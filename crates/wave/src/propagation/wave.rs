@@ -25,6 +25,16 @@ impl PlaneWave {
         }
     }
 
+    /// From the middle of the field of an element with this wedge.
+    pub fn looked_at(wedge: &Wedge, wavelength_um: f64) -> Self {
+        let (sin_x, sin_y) = wedge.looks_at(wavelength_um);
+        Self {
+            wavelength_um,
+            sin_x,
+            sin_y,
+        }
+    }
+
     /// Phase at a place of the aperture (turns).
     pub fn turns(&self, x_um: f64, y_um: f64) -> f64 {
         (x_um * self.sin_x + y_um * self.sin_y) / self.wavelength_um
