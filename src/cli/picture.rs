@@ -155,9 +155,9 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     let fidelity = if model.is_some() {
         Fidelity::Calibrated
     } else {
-        Fidelity::Rigorous
+        studio.design.verify.fidelity
     };
-    let mut report = report(args, &studio, &scene, &frame, found, fidelity.name());
+    let mut report = report(args, &studio, &scene, &frame, found, fidelity);
     report.operator_error.clone_from(&error.overall);
     if let Ok(kind) = args.scene.parse::<BuiltIn>() {
         report.contrast = contrast_curves(&studio, kind, &truth, &frame, &pictures[0]);
@@ -233,7 +233,7 @@ fn report(
     scene: &SceneImage,
     frame: &Frame,
     restorations: Vec<RestorationReport>,
-    fidelity: &str,
+    fidelity: Fidelity,
 ) -> PictureReport {
     let name = |path: &PathBuf| {
         path.file_name()

@@ -7,6 +7,7 @@ use num_complex::{Complex32, Complex64};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::class_table::ClassTable;
 use super::declared::{CompiledTerm, DeclaredQuantity, RowPlaces, compiled};
 use super::expression::Input;
 use super::pupil::PupilTerms;
@@ -158,17 +159,6 @@ pub struct MadeElement {
     pupil: PupilTerms,
 }
 
-/// What the sites of each class transmit at one wavelength and polarisation.
-#[derive(Clone, Debug)]
-pub struct ClassTable {
-    /// Field ratio, foot to top of the pillars; zero for class zero. Of pillars that differ over the lens, in its middle.
-    pub t: Vec<Complex32>,
-    /// Logarithm of the ratio of the transmission at the rim of the lens to that in its middle; empty where they are alike.
-    to_rim: Vec<Complex32>,
-    /// |t|^2 summed over sites of what missing pillars scatter, each on its own.
-    pub scattered: f64,
-}
-
 impl MadeElement {
     /// Most memory that a site takes (bytes): class, path, phase and amplitude, and while it is made the steps of its width.
     pub const MOST_BYTES_PER_SITE: usize = 2 + 3 * 4 + 4;
@@ -303,11 +293,7 @@ impl MadeElement {
             scattered += f64::from(*count) * (pillar - bare).norm_sqr();
             t.push(single(mixed(&self.geometry, self.missing, pillar, bare)));
         }
-        ClassTable {
-            t,
-            to_rim: Vec::new(),
-            scattered: self.missing * (1.0 - self.missing) * scattered,
-        }
+        ClassTable::of_widths(t, self.missing * (1.0 - self.missing) * scattered)
     }
 
     /// The element as an aperture at one wavelength (um), without the wave that arrives.
@@ -365,7 +351,7 @@ impl Aperture for MadeAperture<'_> {
     fn fill_row(&self, iy: usize, row: &mut [Complex32]) {
         let n = self.element.lattice.sites();
         let pattern = |iy: usize, row: &mut [Complex32]| {
-            let classes = &self.element.class[iy * n..][..n];
+            let classes = &self.table.classes(&self.element.class)[iy * n..][..n];
             for (to, &class) in row.iter_mut().zip(classes) {
                 *to = self.table.t[usize::from(class)];
             }
@@ -404,23 +390,6 @@ impl MadeAperture<'_> {
             let turns = share * f64::from(all.im) / std::f64::consts::TAU;
             *to *= cis(turns) * (share as f32 * all.re).exp();
         }
-    }
-}
-
-impl ClassTable {
-    /// Say what the same sites transmit at the rim of the lens; between it and the middle, the logarithm of the
-    /// transmission goes with the square of the radius.
-    pub fn set_rim(&mut self, rim: &Self) {
-        let ratio = |(middle, rim): (&Complex32, &Complex32)| {
-            let ratio = rim / middle;
-            // Sites that are dark stay so.
-            if ratio.is_finite() && ratio != Complex32::ZERO {
-                ratio.ln()
-            } else {
-                Complex32::ZERO
-            }
-        };
-        self.to_rim = self.t.iter().zip(&rim.t).map(ratio).collect();
     }
 }
 

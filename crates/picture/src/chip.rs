@@ -1,46 +1,62 @@
 //! The chip before its sensor: elements as read from a layout, in light.
 
 use metalith_camera::{Camera, Sampling};
+use metalith_cell::{BandResponse, CellModel};
 use metalith_core::{Error, Progress, Result, WidthMap};
 use metalith_design::Design;
 use metalith_design::array::{Symmetry, SymmetryGroup};
 use metalith_gds::extract::Extraction;
+use metalith_grating::NeighbourPillars;
 use metalith_made::{
     ArrivingLight, CameraChange, ClassTable, DrawnElement, MadeElement, MadeView, PathChange, Perturbation,
-    SimulationCase,
+    SimulationCase, cell_direction,
 };
 use metalith_wave::{Matched, PhaseFunction, PlaneWave};
+use num_complex::Complex64;
+use rayon::prelude::*;
 
 use crate::ElementView;
 
 /// An element that differs from all others by more than a symmetry.
-pub struct DistinctChipElement {
+pub struct DistinctChipElement<'a> {
     pub view: ElementView,
+    widths: &'a WidthMap,
     made: MadeElement,
     /// Symmetries that leave its pillars and its wedge as they are.
     pub symmetries: Vec<Symmetry>,
+    /// What its pillars transmit among unlike neighbours, of a cell that knows; one for each wavelength.
+    among_neighbours: Vec<Option<BandResponse>>,
 }
 
-/// All elements of a chip, with what they transmit at the wavelengths of a camera.
-pub struct ChipInLight {
+/// All elements of a chip, with what decides what they transmit at the wavelengths of a camera.
+pub struct ChipInLight<'a> {
     pub elements: Vec<ElementView>,
     /// For each element the distinct one that it is a copy of, and what turns that one into it.
     pub copies: Vec<(usize, Symmetry)>,
-    pub distinct: Vec<DistinctChipElement>,
+    pub distinct: Vec<DistinctChipElement<'a>>,
     pub sampling: Sampling,
-    /// Transmission by distinct element and wavelength.
-    tables: Vec<Vec<Tables>>,
+    case: SimulationCase<'a>,
+    /// Transmission of a cell by wavelength and width.
+    by_width: Vec<Vec<Complex64>>,
     perturbation: Perturbation,
     /// Power of the light that arrives at an element, at each wavelength, in the unit of a PSF's energy (um^2).
     pub arriving_um2: Vec<f64>,
+    /// Area of the sites of an element (um^2).
+    open_um2: f64,
     /// One over the distance of the scene (1/m).
     source_per_m: f64,
 }
 
+/// A distinct element in the light of some wavelengths of the camera.
+pub struct ElementInLight<'c> {
+    chip: &'c ChipInLight<'c>,
+    distinct: usize,
+    /// By wavelength of the camera; of those that were not asked for, nothing.
+    tables: Vec<Option<Tables>>,
+}
+
 struct Tables {
     classes: Vec<ClassTable>,
-    /// Share of the light that arrives and leaves undiffracted.
-    zero_order: f64,
     gap_um: f64,
     camera: CameraChange,
 }
@@ -68,15 +84,15 @@ pub fn sampling_of(design: &Design, camera: &Camera) -> Result<Sampling> {
     camera.sampling([low * 1e3, high * 1e3], STEP_NM)
 }
 
-impl ChipInLight {
+impl<'a> ChipInLight<'a> {
     /// Elements as they were read, at the wavelengths of a camera, before a scene at a distance (um).
     ///
     /// # Errors
     /// If a cell has no answer, a channel no light, or the user stopped it.
     pub fn new(
         design: &Design,
-        extraction: &Extraction,
-        case: SimulationCase<'_>,
+        extraction: &'a Extraction,
+        case: SimulationCase<'a>,
         camera: &Camera,
         scene_distance_um: f64,
         progress: &dyn Progress,
@@ -88,98 +104,121 @@ impl ChipInLight {
             SimulationCase::Made(chip) => chip.perturbation().clone(),
         };
         let symmetric = keeps_symmetry(&perturbation) && elements.iter().all(|e| e.slope == [0.0; 2]);
-        let turns = if symmetric { &Symmetry::ALL[..] } else { &[] };
-        let centres: Vec<[f64; 2]> = design
-            .elements()
-            .iter()
-            .map(metalith_design::Element::centre_um)
-            .collect();
         let widths: Vec<&WidthMap> = extraction.elements.iter().map(|e| &e.widths).collect();
-        let (mut distinct, mut copies): (Vec<(usize, Vec<Symmetry>)>, Vec<_>) = (Vec::new(), Vec::new());
-        for (k, view) in elements.iter().enumerate() {
-            let copy = distinct.iter().enumerate().find_map(|(base, (of, _))| {
-                let is = |t: &&Symmetry| same_wedge(**t, &elements[*of], view) && t.maps(widths[*of], widths[k]);
-                Some((base, *turns.iter().find(is)?))
-            });
-            copies.push(copy.unwrap_or((distinct.len(), Symmetry::IDENTITY)));
-            if copy.is_none() {
-                let group = match symmetric {
-                    true => SymmetryGroup::of(widths[k]),
-                    false => SymmetryGroup::trivial(),
-                };
-                let own = group.members().iter().copied().filter(|t| same_wedge(*t, view, view));
-                distinct.push((k, own.collect()));
-            }
-        }
-        progress.begin(
-            "solving the cells",
-            (distinct.len() * sampling.wavelengths_nm.len()) as u64,
-        );
-        let full = |um: f64| case.full_transmission(um);
+        let (chosen, copies) = distinct_of(&elements, &widths, symmetric);
         let ones = PhaseFunction {
             lattice: design.lattice(),
             radius_um: design.lens.radius_um(),
             amplitude: 1.0,
             phase_rad: |_, _| 0.0,
         };
-        let area = Matched::of(
-            &ones,
-            [0.0, 0.0, design.lens.focal_length_um],
-            design.mapping.wavelength_um,
-            1.0,
-        )
-        .power_um2;
-        let arriving = |nm: &f64| Ok(full(nm * 1e-3)?.powi(2) * area);
-        let arriving_um2 = sampling.wavelengths_nm.iter().map(arriving).collect::<Result<_>>()?;
-        let mut found = Vec::new();
-        let mut tables = Vec::new();
-        let cells = CellTables::new(case, &sampling, design, progress)?;
-        for (k, symmetries) in distinct {
-            let drawn = DrawnElement::new(widths[k], design.aperture_radius_um()).placed(centres[k]);
-            let made = MadeElement::new(&drawn, &perturbation.geometry)?;
-            let mut own = Vec::new();
-            for (i, nm) in sampling.wavelengths_nm.iter().enumerate() {
-                if progress.stopped() {
-                    return Err(Error::Interrupted);
-                }
-                let mut tables = cells.of(&made, i, nm * 1e-3, progress)?;
-                tables.zero_order = zero_order(&made, &tables.classes, full(nm * 1e-3)?, area);
-                own.push(tables);
-                progress.advance(1);
-            }
-            tables.push(own);
-            found.push(DistinctChipElement {
+        let focus = [0.0, 0.0, design.lens.focal_length_um];
+        let open_um2 = Matched::of(&ones, focus, design.mapping.wavelength_um, 1.0).power_um2;
+        let arriving = |nm: &f64| Ok(case.full_transmission(nm * 1e-3)?.powi(2) * open_um2);
+        progress.begin("solving the cells", sampling.wavelengths_nm.len() as u64);
+        let by_width = match case {
+            SimulationCase::Made(_) => Vec::new(),
+            SimulationCase::Cell(cell) => by_width(cell, &sampling, design, progress)?,
+        };
+        let mut distinct = Vec::new();
+        for (k, symmetries) in chosen {
+            let placed = design.elements()[k].centre_um();
+            let drawn = DrawnElement::new(widths[k], design.aperture_radius_um()).placed(placed);
+            distinct.push(DistinctChipElement {
                 view: elements[k],
-                made,
+                widths: widths[k],
+                made: MadeElement::new(&drawn, &perturbation.geometry)?,
                 symmetries,
+                among_neighbours: among_neighbours(case, &sampling, &elements[k], widths[k], progress)?,
             });
         }
         Ok(Self {
-            elements,
             copies,
-            distinct: found,
+            distinct,
+            arriving_um2: sampling.wavelengths_nm.iter().map(arriving).collect::<Result<_>>()?,
             sampling,
-            tables,
+            elements,
+            case,
+            by_width,
             perturbation,
-            arriving_um2,
+            open_um2,
             source_per_m: 1e6 / scene_distance_um,
         })
     }
 
-    /// A distinct element in the light of one wavelength, by its index, from a direction.
-    pub fn lit(&self, distinct: usize, wavelength: usize, sines: [f64; 2]) -> MadeView<'_> {
+    /// A distinct element in the light of some wavelengths, by their indices. Where pillars have unlike neighbours, each
+    /// wavelength takes two bytes a site.
+    ///
+    /// # Errors
+    /// If a cell has no answer, or the user stopped it.
+    pub fn in_light(
+        &'a self,
+        distinct: usize,
+        wavelengths: &[usize],
+        progress: &dyn Progress,
+    ) -> Result<ElementInLight<'a>> {
+        let mut tables: Vec<Option<Tables>> = self.sampling.wavelengths_nm.iter().map(|_| None).collect();
+        for i in wavelengths {
+            if progress.stopped() {
+                return Err(Error::Interrupted);
+            }
+            tables[*i] = Some(self.tables(&self.distinct[distinct], *i, progress)?);
+        }
+        Ok(ElementInLight {
+            chip: self,
+            distinct,
+            tables,
+        })
+    }
+
+    fn tables(&self, element: &DistinctChipElement<'_>, index: usize, progress: &dyn Progress) -> Result<Tables> {
+        let um = self.sampling.wavelengths_nm[index] * 1e-3;
+        if let SimulationCase::Made(chip) = self.case {
+            let view = chip.view_in_band(&element.made, &PlaneWave::normal(um), false, progress)?;
+            return Ok(Tables {
+                classes: view.tables,
+                gap_um: view.gap_um,
+                camera: view.camera,
+            });
+        }
+        let table = match &element.among_neighbours[index] {
+            Some(response) => {
+                let (x, y) = element.view.wedge.looks_at(um);
+                ClassTable::of_sites(&NeighbourPillars::new(element.widths, response, [x, y])?)
+            }
+            None => {
+                let table = &self.by_width[index];
+                let pillar = |width: f64| table.get(width.round() as usize).copied().unwrap_or_default();
+                element.made.table(pillar, Complex64::ZERO)
+            }
+        };
+        Ok(Tables {
+            classes: vec![table],
+            gap_um: 0.0,
+            camera: CameraChange::default(),
+        })
+    }
+}
+
+impl ElementInLight<'_> {
+    /// In the light of one wavelength, by its index, from a direction.
+    ///
+    /// # Panics
+    /// If it was not made for this wavelength.
+    pub fn lit(&self, wavelength: usize, sines: [f64; 2]) -> MadeView<'_> {
+        let chip = self.chip;
         let stated = PlaneWave {
-            wavelength_um: self.sampling.wavelengths_nm[wavelength] * 1e-3,
+            wavelength_um: chip.sampling.wavelengths_nm[wavelength] * 1e-3,
             sin_x: sines[0],
             sin_y: sines[1],
         };
-        let tables = &self.tables[distinct][wavelength];
+        let tables = self.at(wavelength);
         let path = PathChange {
-            source_per_m: self.perturbation.path.source_per_m + self.source_per_m,
-            ..self.perturbation.path.clone()
+            source_per_m: chip.perturbation.path.source_per_m + chip.source_per_m,
+            ..chip.perturbation.path.clone()
         };
         MadeView {
-            element: &self.distinct[distinct].made,
+            element: &chip.distinct[self.distinct].made,
             tables: tables.classes.clone(),
             light: ArrivingLight::new(&stated, &path),
             gap_um: tables.gap_um,
@@ -187,29 +226,91 @@ impl ChipInLight {
         }
     }
 
-    /// Share of the light that leaves a distinct element in the direction it came from, as one wave: the square of the
-    /// mean transmission of its sites, at a wavelength by its index.
-    pub fn zero_order(&self, distinct: usize, wavelength: usize) -> f64 {
-        self.tables[distinct][wavelength].zero_order
+    /// Share of the light that leaves the element in the direction it came from, as one wave: the square of the mean
+    /// transmission of its sites, at a wavelength by its index, mean over polarisations.
+    ///
+    /// # Panics
+    /// As [`ElementInLight::lit`].
+    pub fn zero_order(&self, wavelength: usize) -> f64 {
+        let made = &self.chip.distinct[self.distinct].made;
+        let classes = &self.at(wavelength).classes;
+        // The power of a wave is the square of its sum over the area, over the area.
+        let site_um2 = made.lattice().cell_um2();
+        let all = self.chip.arriving_um2[wavelength] * self.chip.open_um2;
+        let of = |table: &ClassTable| (table.sum(made.classes()) * site_um2).norm_sqr() / all;
+        classes.iter().map(of).sum::<f64>() / classes.len() as f64
+    }
+
+    fn at(&self, wavelength: usize) -> &Tables {
+        self.tables[wavelength]
+            .as_ref()
+            .expect("wavelengths are asked for before")
     }
 }
 
-/// |mean t|^2 over what a cell that passes everything has, mean over polarisations.
-fn zero_order(made: &MadeElement, classes: &[ClassTable], full: f64, area_um2: f64) -> f64 {
-    let mut counts = vec![0u32; made.widths_nm().len() + 1];
-    for class in made.classes() {
-        counts[usize::from(*class)] += 1;
+/// Distinct elements with the symmetries that leave each as it is; and for each element the distinct one that it is a copy
+/// of, and how turned.
+#[allow(clippy::type_complexity, reason = "both halves are taken apart at once")]
+fn distinct_of(
+    elements: &[ElementView],
+    widths: &[&WidthMap],
+    symmetric: bool,
+) -> (Vec<(usize, Vec<Symmetry>)>, Vec<(usize, Symmetry)>) {
+    let turns = if symmetric { &Symmetry::ALL[..] } else { &[] };
+    let (mut distinct, mut copies): (Vec<(usize, Vec<Symmetry>)>, Vec<_>) = (Vec::new(), Vec::new());
+    for (k, view) in elements.iter().enumerate() {
+        let copy = distinct.iter().enumerate().find_map(|(base, (of, _))| {
+            let is = |t: &&Symmetry| same_wedge(**t, &elements[*of], view) && t.maps(widths[*of], widths[k]);
+            Some((base, *turns.iter().find(is)?))
+        });
+        copies.push(copy.unwrap_or((distinct.len(), Symmetry::IDENTITY)));
+        if copy.is_none() {
+            let group = match symmetric {
+                true => SymmetryGroup::of(widths[k]),
+                false => SymmetryGroup::trivial(),
+            };
+            let own = group.members().iter().copied().filter(|t| same_wedge(*t, view, view));
+            distinct.push((k, own.collect()));
+        }
     }
-    let site_um2 = made.lattice().cell_um2();
-    let of = |table: &ClassTable| {
-        let sum: num_complex::Complex64 = counts
-            .iter()
-            .zip(&table.t)
-            .map(|(n, t)| num_complex::Complex64::new(f64::from(t.re), f64::from(t.im)) * f64::from(*n))
-            .sum();
-        (sum * site_um2 / (full * area_um2)).norm_sqr()
+    (distinct, copies)
+}
+
+/// Transmission of a cell along the normal by wavelength and width (nm).
+fn by_width(
+    cell: &dyn CellModel,
+    sampling: &Sampling,
+    design: &Design,
+    progress: &dyn Progress,
+) -> Result<Vec<Vec<Complex64>>> {
+    let widest = design.cell.pitch_nm as u16;
+    let nm = sampling.wavelengths_nm.par_iter();
+    nm.map(|nm| {
+        if progress.stopped() {
+            return Err(Error::Interrupted);
+        }
+        progress.advance(1);
+        cell.transmissions_in_band(nm * 1e-3, widest)
+    })
+    .collect()
+}
+
+/// What the pillars of an element transmit among unlike neighbours, at each wavelength; nothing of cells that take them for
+/// equals.
+fn among_neighbours(
+    case: SimulationCase<'_>,
+    sampling: &Sampling,
+    view: &ElementView,
+    widths: &WidthMap,
+    progress: &dyn Progress,
+) -> Result<Vec<Option<BandResponse>>> {
+    let lattice = widths.lattice.kind();
+    let looks = |um: f64| cell_direction(&PlaneWave::looked_at(&view.wedge, um), lattice);
+    let of = |nm: &f64| match case {
+        SimulationCase::Cell(cell) => cell.among_neighbours_in_band(nm * 1e-3, &looks, progress),
+        SimulationCase::Made(_) => Ok(None),
     };
-    classes.iter().map(of).sum::<f64>() / classes.len() as f64
+    sampling.wavelengths_nm.iter().map(of).collect()
 }
 
 /// Whether what a process and a bench do has no direction of its own.
@@ -227,55 +328,4 @@ fn same_wedge(turn: Symmetry, from: &ElementView, to: &ElementView) -> bool {
     const ROUNDING: f64 = 1e-12;
     let wedge = turn.vector([from.wedge.sin_x, from.wedge.sin_y]);
     (wedge[0] - to.wedge.sin_x).abs() < ROUNDING && (wedge[1] - to.wedge.sin_y).abs() < ROUNDING
-}
-
-/// Cells along the normal at all wavelengths.
-struct CellTables<'a> {
-    case: SimulationCase<'a>,
-    by_width: Vec<Vec<num_complex::Complex64>>,
-}
-
-impl<'a> CellTables<'a> {
-    fn new(case: SimulationCase<'a>, sampling: &Sampling, design: &Design, progress: &dyn Progress) -> Result<Self> {
-        use rayon::prelude::*;
-        let widest = design.cell.pitch_nm as u16;
-        let by_width = match case {
-            SimulationCase::Made(_) => Vec::new(),
-            SimulationCase::Cell(cell) => sampling
-                .wavelengths_nm
-                .par_iter()
-                .map(|nm| {
-                    if progress.stopped() {
-                        return Err(Error::Interrupted);
-                    }
-                    cell.transmissions_in_band(nm * 1e-3, widest)
-                })
-                .collect::<Result<_>>()?,
-        };
-        Ok(Self { case, by_width })
-    }
-
-    fn of(&self, made: &MadeElement, index: usize, um: f64, progress: &dyn Progress) -> Result<Tables> {
-        match self.case {
-            SimulationCase::Cell(_) => {
-                let table = &self.by_width[index];
-                let pillar = |width: f64| table.get(width.round() as usize).copied().unwrap_or_default();
-                Ok(Tables {
-                    zero_order: 0.0,
-                    classes: vec![made.table(pillar, num_complex::Complex64::ZERO)],
-                    gap_um: 0.0,
-                    camera: CameraChange::default(),
-                })
-            }
-            SimulationCase::Made(chip) => {
-                let view = chip.view_in_band(made, &PlaneWave::normal(um), false, progress)?;
-                Ok(Tables {
-                    zero_order: 0.0,
-                    classes: view.tables,
-                    gap_um: view.gap_um,
-                    camera: view.camera,
-                })
-            }
-        }
-    }
 }

@@ -32,7 +32,7 @@ mod thumbnail;
 mod veil;
 
 pub use assumed::{Assumed, AssumedScore, worth_of_assumptions};
-pub use chip::{ChipInLight, element_views, sampling_of};
+pub use chip::{ChipInLight, ElementInLight, element_views, sampling_of};
 pub use colour::ChannelColours;
 pub use dataset::{DatasetManifest, DatasetPair, PairWriter, write_dataset, write_dataset_manifest};
 pub use doubt::{Doubt, DoubtReport};

@@ -108,6 +108,9 @@ struct Inputs<'a> {
     elements: &'a [ElementView],
     camera: &'a Camera,
     model: &'a str,
+    /// The cell that pillars are simulated by, and the wavelengths that it has tables of unlike neighbours for.
+    fidelity: Fidelity,
+    tabulated_um: &'a [f64],
     basis: &'a [SceneSpectrum],
     spec: &'a BankSpec,
     scene_distance_um: f64,
@@ -178,7 +181,7 @@ impl Studio {
                         SimulationCase::Made(&made)
                     }
                     None => {
-                        models = cell_models(design, &[Fidelity::Rigorous])?;
+                        models = cell_models(design, &[design.verify.fidelity])?;
                         SimulationCase::Cell(models[0].as_ref())
                     }
                 };
@@ -271,6 +274,8 @@ impl<'a> Wanted<'a> {
             elements: &self.elements,
             camera: &unexposed,
             model: &model_text,
+            fidelity: model.map_or(self.design.verify.fidelity, |_| Fidelity::Calibrated),
+            tabulated_um: &self.design.verify.wavelengths_um,
             basis: &self.basis,
             spec: &self.spec,
             // JSON knows no infinity.
@@ -279,16 +284,21 @@ impl<'a> Wanted<'a> {
         serde_json::to_vec(&inputs).map_err(|e| Error::invalid(e.to_string(), "report this"))
     }
 
-    fn chip(&self, extraction: &Extraction, case: SimulationCase<'_>, progress: &dyn Progress) -> Result<ChipInLight> {
+    fn chip<'c>(
+        &self,
+        extraction: &'c Extraction,
+        case: SimulationCase<'c>,
+        progress: &dyn Progress,
+    ) -> Result<ChipInLight<'c>> {
         let distance_um = self.scene.view.distance_um;
         ChipInLight::new(self.design, extraction, case, self.camera, distance_um, progress)
     }
 
-    fn bank(&self, chip: &ChipInLight, progress: &dyn Progress) -> Result<KernelBank> {
+    fn bank(&self, chip: &ChipInLight<'_>, progress: &dyn Progress) -> Result<KernelBank> {
         KernelBank::build(chip, &self.basis, self.spec, progress)
     }
 
-    fn veil(&self, chip: &ChipInLight, bank: &KernelBank, progress: &dyn Progress) -> Result<Veil> {
+    fn veil(&self, chip: &ChipInLight<'_>, bank: &KernelBank, progress: &dyn Progress) -> Result<Veil> {
         Veil::build(chip, bank, &self.basis, &self.camera.sensor, &self.scene.view, progress)
     }
 

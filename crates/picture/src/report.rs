@@ -3,6 +3,8 @@
 use nalgebra::DMatrix;
 use serde::Serialize;
 
+use metalith_cell::Fidelity;
+
 use crate::assumed::AssumedScore;
 use crate::doubt::DoubtReport;
 use crate::resolution::ContrastCurve;
@@ -140,17 +142,30 @@ impl Studio {
     }
 
     /// What was assumed, in words.
-    pub fn assumptions(&self, fidelity: &str) -> Vec<Assumption> {
+    pub fn assumptions(&self, fidelity: Fidelity) -> Vec<Assumption> {
+        let cell = match fidelity {
+            Fidelity::Neighbours => {
+                let nm: Vec<String> = self
+                    .design
+                    .verify
+                    .wavelengths_um
+                    .iter()
+                    .map(|um| fixed(um * 1e3))
+                    .collect();
+                format!(
+                    "`{fidelity}`: pillars among unlike neighbours, from tables at {} nm, between them by paths; lit from the middle of each element's field, whatever the angle of arrival, both polarisations as one",
+                    nm.join(", ")
+                )
+            }
+            _ => format!("`{fidelity}`, solved along the normal, whatever the angle of arrival"),
+        };
         let assumption = |what: &str, value: String| Assumption {
             what: what.to_owned(),
             value,
         };
         let spec = &self.bank.spec;
         vec![
-            assumption(
-                "cell",
-                format!("`{fidelity}`, solved along the normal, whatever the angle of arrival"),
-            ),
+            assumption("cell", cell),
             assumption(
                 "field of the kernels",
                 format!(

@@ -1,15 +1,18 @@
 //! The operator against a direct sum over points of the scene and wavelengths, and against its adjoint.
 
 use metalith_camera::{Camera, Channel, Illuminant, Response, Sensor};
+use metalith_cell::CellModel;
 use metalith_core::Silent;
 use metalith_design::array::PillarArray;
 use metalith_design::{Design, cell_models};
+use metalith_gds::extract::Extraction;
 use metalith_layout::{read_pillars, write_pillars};
 use metalith_made::SimulationCase;
 use metalith_picture::restore::SceneStatistics;
 use metalith_picture::scene::SceneImage;
 use metalith_picture::{
-    BankSpec, ChipInLight, Detail, FrameOperator, KernelBank, SceneInputs, ScenePoints, SceneSpace, Veil, element_views,
+    BankSpec, ChipInLight, Detail, ElementInLight, FrameOperator, KernelBank, SceneInputs, ScenePoints, SceneSpace,
+    Veil, element_views,
 };
 use metalith_wave::{Accuracy, Scratch, Window};
 use ndarray::{Array2, Array3};
@@ -50,14 +53,28 @@ fn camera(bands: &[[f64; 2]]) -> Camera {
 struct Setup {
     design: Design,
     camera: Camera,
-    chip: ChipInLight,
+    extraction: Extraction,
+    cells: Vec<Box<dyn CellModel>>,
     scene: SceneImage,
 }
 
 impl Setup {
-    fn veil(&self, bank: &KernelBank) -> Veil {
+    fn chip(&self) -> ChipInLight<'_> {
+        let case = SimulationCase::Cell(self.cells[0].as_ref());
+        ChipInLight::new(
+            &self.design,
+            &self.extraction,
+            case,
+            &self.camera,
+            f64::INFINITY,
+            &Silent,
+        )
+        .unwrap()
+    }
+
+    fn veil(&self, chip: &ChipInLight<'_>, bank: &KernelBank) -> Veil {
         let (sensor, scene) = (&self.camera.sensor, &self.scene);
-        Veil::build(&self.chip, bank, &scene.basis, sensor, &scene.view, &Silent).unwrap()
+        Veil::build(chip, bank, &scene.basis, sensor, &scene.view, &Silent).unwrap()
     }
 }
 
@@ -70,13 +87,12 @@ fn setup(bands: &[[f64; 2]], size: usize) -> Setup {
     let extraction = read_pillars(&design, &layout, &Silent).unwrap();
     let camera = camera(bands);
     let cells = cell_models(&design, &[metalith_cell::Fidelity::Published]).unwrap();
-    let case = SimulationCase::Cell(cells[0].as_ref());
-    let chip = ChipInLight::new(&design, &extraction, case, &camera, f64::INFINITY, &Silent).unwrap();
     let scene = waves(size, [0.0; 2]);
     Setup {
         design,
         camera,
-        chip,
+        extraction,
+        cells,
         scene,
     }
 }
@@ -122,7 +138,12 @@ fn value(plane: &Array2<f32>, row: f64, column: f64) -> f64 {
 
 /// Each point of the scene at each wavelength, through each element, onto every pixel of the sensor.
 fn direct_sum(setup: &Setup, scene: &SceneImage, elements: &[usize], points: usize, nm: &[f64]) -> Array2<f64> {
-    let Setup { camera, chip, .. } = setup;
+    let camera = &setup.camera;
+    let chip = setup.chip();
+    let every: Vec<usize> = (0..chip.sampling.wavelengths_nm.len()).collect();
+    let lights: Vec<ElementInLight<'_>> = (0..chip.distinct.len())
+        .map(|k| chip.in_light(k, &every, &Silent).unwrap())
+        .collect();
     let (view, sensor) = (&scene.view, &camera.sensor);
     let views = element_views(&setup.design, camera);
     let weights: Vec<f64> = nm
@@ -165,7 +186,7 @@ fn direct_sum(setup: &Setup, scene: &SceneImage, elements: &[usize], points: usi
                         "an element of its own"
                     );
                     let index = chip.sampling.wavelengths_nm.iter().position(|w| w == nm).unwrap();
-                    let lit = chip.lit(distinct, index, sines);
+                    let lit = lights[distinct].lit(index, sines);
                     let window = Window {
                         centre_um: [0, 1].map(|a| middle[a] - views[*e].centre_um[a]),
                         step_um: 0.5,
@@ -203,9 +224,10 @@ fn a_frame_is_the_direct_sum_over_points_and_wavelengths() {
     const SIZE: usize = 80;
     // Two wavelengths, both simulated.
     let setup = setup(&[[550.0, 551.0]], SIZE);
-    let nm = setup.chip.sampling.wavelengths_nm.clone();
+    let chip = setup.chip();
+    let nm = chip.sampling.wavelengths_nm.clone();
     assert_eq!(nm.len(), 2);
-    let bank = KernelBank::build(&setup.chip, &setup.scene.basis, spec(96, 9), &Silent).unwrap();
+    let bank = KernelBank::build(&chip, &setup.scene.basis, spec(96, 9), &Silent).unwrap();
     let veil = Veil::none(&setup.camera.sensor, 1, 3);
     let views = element_views(&setup.design, &setup.camera);
     // The neighbour below looks up.
@@ -250,7 +272,8 @@ fn copies_are_what_symmetry_makes_of_them() {
     /// Single precision, of the range.
     const SINGLE: f64 = 1e-5;
     let setup = setup(&[[520.0, 560.0]], 40);
-    let bank = KernelBank::build(&setup.chip, &setup.scene.basis, spec(24, 5), &Silent).unwrap();
+    let chip = setup.chip();
+    let bank = KernelBank::build(&chip, &setup.scene.basis, spec(24, 5), &Silent).unwrap();
     let veil = Veil::none(&setup.camera.sensor, 1, 3);
     let views = element_views(&setup.design, &setup.camera);
     // The neighbour below looks up.
@@ -280,7 +303,8 @@ fn a_coarse_grid_of_points_sees_the_same() {
     /// square; 5.6e-3 for one point a pixel, 1.1e-2 for one a square.
     const COARSE: f64 = 0.015;
     let setup = setup(&[[550.0, 551.0]], 40);
-    let bank = KernelBank::build(&setup.chip, &setup.scene.basis, spec(24, 5), &Silent).unwrap();
+    let chip = setup.chip();
+    let bank = KernelBank::build(&chip, &setup.scene.basis, spec(24, 5), &Silent).unwrap();
     let veil = Veil::none(&setup.camera.sensor, 1, 3);
     let views = element_views(&setup.design, &setup.camera);
     let space = SceneSpace::flat(&setup.scene.view);
@@ -312,8 +336,9 @@ fn the_adjoint_is_that_of_the_operator() {
     /// Single precision of sums over some ten thousand products of both signs.
     const ADJOINT: f64 = 1e-6;
     let setup = setup(&[[450.0, 470.0], [520.0, 560.0]], 20);
-    let bank = KernelBank::build(&setup.chip, &setup.scene.basis, spec(24, 5), &Silent).unwrap();
-    let veil = setup.veil(&bank);
+    let chip = setup.chip();
+    let bank = KernelBank::build(&chip, &setup.scene.basis, spec(24, 5), &Silent).unwrap();
+    let veil = setup.veil(&chip, &bank);
     let views = element_views(&setup.design, &setup.camera);
     for detail in [
         Detail::simulation(3),
@@ -363,8 +388,9 @@ fn all_light_is_accounted_for() {
     /// The target, of the light that arrives.
     const ACCOUNT: f64 = 0.01;
     let setup = setup(&[[450.0, 470.0], [520.0, 560.0]], 20);
-    let bank = KernelBank::build(&setup.chip, &setup.scene.basis, spec(24, 5), &Silent).unwrap();
-    let veil = setup.veil(&bank);
+    let chip = setup.chip();
+    let bank = KernelBank::build(&chip, &setup.scene.basis, spec(24, 5), &Silent).unwrap();
+    let veil = setup.veil(&chip, &bank);
     for shares in veil.budget.chunks(3) {
         let all = metalith_picture::LightShares::sum(shares);
         let found = all.in_kernels + all.veil + all.beyond + all.evanescent + all.not_passed;

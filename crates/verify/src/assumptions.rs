@@ -34,7 +34,7 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
         row(
             "Each pillar passes light by its own width and those of its twelve nearest neighbours",
             equal_neighbours(found),
-            "a sum over pairs, fitted to supercells of unlike pillars; rows of real pillars are met to some hundredths of the light. Figures of white light still take neighbours for equals",
+            "a sum over pairs, fitted to supercells of unlike pillars; rows of real pillars are met to some hundredths of the light; white light is between the wavelengths that have tables. Phase errors of the mapping still take neighbours for equals",
         );
     } else if found.fidelity != Fidelity::Published && found.fidelity != Fidelity::Fitted {
         row(

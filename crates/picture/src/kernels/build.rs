@@ -6,7 +6,8 @@ use rayon::prelude::*;
 
 use super::bank::{BankSpec, DistinctKernels, KernelBank};
 use super::spectrum::{KernelPlan, MovedPart, QUARTERS};
-use crate::chip::ChipInLight;
+use crate::ElementView;
+use crate::chip::{ChipInLight, ElementInLight};
 use crate::operator::FftScratch;
 use crate::spectra::SceneSpectrum;
 
@@ -15,47 +16,54 @@ impl KernelBank {
     ///
     /// # Errors
     /// If light cannot be brought to a window, or the user stopped it.
-    pub fn build(chip: &ChipInLight, basis: &[SceneSpectrum], spec: BankSpec, progress: &dyn Progress) -> Result<Self> {
+    pub fn build(
+        chip: &ChipInLight<'_>,
+        basis: &[SceneSpectrum],
+        spec: BankSpec,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         let channel_um = channel_um(chip);
-        let mut tasks = Vec::new();
-        let mut maps = Vec::new();
-        for (k, distinct) in chip.distinct.iter().enumerate() {
-            let (unique, nodes) = orbits(spec.nodes, &distinct.symmetries);
-            tasks.extend(unique.into_iter().map(|node| (k, node)));
-            maps.push(nodes);
-        }
+        let orbits: Vec<_> = chip
+            .distinct
+            .iter()
+            .map(|d| orbits(spec.nodes, &d.symmetries))
+            .collect();
+        let count: usize = orbits.iter().map(|(unique, _)| unique.len()).sum();
         progress.begin(
             "simulating kernels",
-            (tasks.len() * chip.sampling.wavelengths_nm.len()) as u64,
+            (count * chip.sampling.wavelengths_nm.len()) as u64,
         );
         let plan = KernelPlan::new(spec.window);
-        let found: Vec<NodeKernels> = tasks
-            .par_iter()
-            .map_init(
-                || (Scratch::default(), FftScratch::default()),
-                |(scratch, fft), (k, node)| {
-                    let builder = Builder {
-                        chip,
-                        basis,
-                        spec: &spec,
-                        plan: &plan,
-                        channel_um: &channel_um,
-                    };
-                    builder.node(*k, *node, scratch, fft, progress)
-                },
-            )
-            .collect::<Result<_>>()?;
-        let mut distinct: Vec<DistinctKernels> = maps
-            .into_iter()
-            .map(|nodes| DistinctKernels {
+        let all: Vec<usize> = (0..chip.sampling.wavelengths_nm.len()).collect();
+        let mut distinct = Vec::new();
+        // One element after the other: what its sites transmit at all wavelengths is held while it is at work.
+        for (k, (unique, nodes)) in orbits.into_iter().enumerate() {
+            let builder = Builder {
+                light: &chip.in_light(k, &all, progress)?,
+                view: chip.distinct[k].view,
+                chip,
+                basis,
+                spec: &spec,
+                plan: &plan,
+                channel_um: &channel_um,
+            };
+            let found: Vec<NodeKernels> = unique
+                .par_iter()
+                .map_init(
+                    || (Scratch::default(), FftScratch::default()),
+                    |(scratch, fft), node| builder.node(*node, scratch, fft, progress),
+                )
+                .collect::<Result<_>>()?;
+            let mut kernels = DistinctKernels {
                 nodes,
                 values: Vec::new(),
                 in_window: Vec::new(),
-            })
-            .collect();
-        for ((k, _), node) in tasks.iter().zip(found) {
-            distinct[*k].values.extend(node.values);
-            distinct[*k].in_window.extend(node.in_window);
+            };
+            for node in found {
+                kernels.values.extend(node.values);
+                kernels.in_window.extend(node.in_window);
+            }
+            distinct.push(kernels);
         }
         Ok(Self {
             spec,
@@ -68,7 +76,7 @@ impl KernelBank {
 }
 
 /// Mean wavelength of the light that each channel counts (um).
-fn channel_um(chip: &ChipInLight) -> Vec<f64> {
+fn channel_um(chip: &ChipInLight<'_>) -> Vec<f64> {
     let mean = |channel: &metalith_camera::ChannelSampling| {
         let sums = channel.parts.iter().fold((0.0, 0.0), |(a, b), p| {
             (a + p.weight, b + p.weight * 0.5 * (p.nm[0] + p.nm[1]))
@@ -105,8 +113,11 @@ struct NodeKernels {
     in_window: Vec<f32>,
 }
 
+/// Kernels of one distinct element.
 struct Builder<'a> {
-    chip: &'a ChipInLight,
+    chip: &'a ChipInLight<'a>,
+    light: &'a ElementInLight<'a>,
+    view: ElementView,
     basis: &'a [SceneSpectrum],
     spec: &'a BankSpec,
     plan: &'a KernelPlan,
@@ -116,13 +127,12 @@ struct Builder<'a> {
 impl Builder<'_> {
     fn node(
         &self,
-        distinct: usize,
         node: [usize; 2],
         scratch: &mut Scratch,
         fft: &mut FftScratch,
         progress: &dyn Progress,
     ) -> Result<NodeKernels> {
-        let view = self.chip.distinct[distinct].view;
+        let view = self.view;
         let place = [self.spec.node_um(node[1]), self.spec.node_um(node[0])];
         let sines = view.sines_of_landing(place, view.wedge.wavelength_um);
         let (mut spectra, mut in_window) = (Vec::new(), Vec::new());
@@ -130,28 +140,22 @@ impl Builder<'_> {
             if progress.stopped() {
                 return Err(Error::Interrupted);
             }
-            let quarters = self.quarters(distinct, i, nm * 1e-3, sines, scratch)?;
+            let quarters = self.quarters(i, nm * 1e-3, sines, scratch)?;
             in_window.push(quarters.iter().map(|v| f64::from(*v)).sum::<f64>() as f32);
             spectra.push(self.plan.spectrum(&quarters, fft));
             progress.advance(1);
         }
         let mut values = Vec::new();
         for (channel, reference_um) in self.chip.sampling.channels.iter().zip(self.channel_um) {
-            let parts = self.parts(distinct, sines, channel, *reference_um);
+            let parts = self.parts(sines, channel, *reference_um);
             let kernels = self.plan.kernels(&spectra, &parts, self.basis, fft);
             values.extend(kernels.into_iter().flatten());
         }
         Ok(NodeKernels { values, in_window })
     }
 
-    fn parts(
-        &self,
-        distinct: usize,
-        sines: [f64; 2],
-        channel: &metalith_camera::ChannelSampling,
-        reference_um: f64,
-    ) -> Vec<MovedPart> {
-        let view = self.chip.distinct[distinct].view;
+    fn parts(&self, sines: [f64; 2], channel: &metalith_camera::ChannelSampling, reference_um: f64) -> Vec<MovedPart> {
+        let view = self.view;
         let Some(from) = view.landing_um(sines, reference_um) else {
             return Vec::new();
         };
@@ -166,16 +170,9 @@ impl Builder<'_> {
 
     /// Share of the light of one wavelength in each quarter of the pixels about its chief ray; nothing where that does
     /// not reach the sensor.
-    fn quarters(
-        &self,
-        distinct: usize,
-        wavelength: usize,
-        um: f64,
-        sines: [f64; 2],
-        scratch: &mut Scratch,
-    ) -> Result<Vec<f32>> {
+    fn quarters(&self, wavelength: usize, um: f64, sines: [f64; 2], scratch: &mut Scratch) -> Result<Vec<f32>> {
         let side = self.spec.window * QUARTERS;
-        let view = self.chip.distinct[distinct].view;
+        let view = self.view;
         let mut quarters = vec![0.0f32; side * side];
         if sines[0].hypot(sines[1]) >= 1.0 {
             return Ok(quarters);
@@ -183,7 +180,7 @@ impl Builder<'_> {
         let Some(landing) = view.landing_um(sines, um) else {
             return Ok(quarters);
         };
-        let lit = self.chip.lit(distinct, wavelength, sines);
+        let lit = self.light.lit(wavelength, sines);
         // The PSF has no structure finer than wavelength / (2 NA).
         let aperture = (lit.element.radius_um() / view.focal_um).atan().sin();
         let quarter = self.spec.pixel_um / QUARTERS as f64;

@@ -24,7 +24,7 @@ impl Veil {
     /// # Errors
     /// If the user stopped it, or a map is too large.
     pub fn build(
-        chip: &ChipInLight,
+        chip: &ChipInLight<'_>,
         bank: &KernelBank,
         basis: &[SceneSpectrum],
         sensor: &Sensor,
@@ -55,19 +55,21 @@ impl Veil {
             if progress.stopped() {
                 return Err(Error::Interrupted);
             }
+            let light = chip.in_light(distinct, &chosen, progress)?;
             let departures: Vec<Departure> = chosen
                 .par_iter()
                 .map(|i| {
-                    let lit = chip.lit(distinct, *i, [0.0; 2]);
+                    let lit = light.lit(*i, [0.0; 2]);
                     // One polarisation stands for both: their tables differ in obliquely lit cells alone.
                     let aperture = lit.element.lit_aperture(&lit.tables[0], &lit.light);
                     Departure::of(&aperture, all[*i] * 1e-3, BLOCKS)
                 })
                 .collect();
+            let zero_orders: Vec<f64> = chosen.iter().map(|i| light.zero_order(*i)).collect();
             for element in (0..chip.elements.len()).filter(|e| chip.copies[*e].0 == distinct) {
                 let traced: Vec<Traced> = (0..SCENE_CELLS * SCENE_CELLS)
                     .into_par_iter()
-                    .map(|cell| tracer.trace(element, cell, &departures))
+                    .map(|cell| tracer.trace(element, cell, &departures, &zero_orders))
                     .collect::<Result<_>>()?;
                 for (cell, one) in traced.iter().enumerate() {
                     for (pair, total) in budget.iter_mut().enumerate() {
@@ -91,7 +93,7 @@ impl Veil {
 }
 
 /// Shares of a channel's light at the chosen wavelengths, for each spectrum: channel, spectrum, wavelength.
-fn weights(chip: &ChipInLight, basis: &[SceneSpectrum], chosen: &[usize]) -> Vec<Vec<f64>> {
+fn weights(chip: &ChipInLight<'_>, basis: &[SceneSpectrum], chosen: &[usize]) -> Vec<Vec<f64>> {
     let nm: Vec<f64> = chosen.iter().map(|i| chip.sampling.wavelengths_nm[*i]).collect();
     let of = |channel: &ChannelSampling, spectrum: &SceneSpectrum| {
         let total: f64 = channel.parts.iter().map(|p| p.weight).sum();
@@ -111,7 +113,7 @@ fn weights(chip: &ChipInLight, basis: &[SceneSpectrum], chosen: &[usize]) -> Vec
 }
 
 struct Tracer<'a> {
-    chip: &'a ChipInLight,
+    chip: &'a ChipInLight<'a>,
     bank: &'a KernelBank,
     sensor: &'a Sensor,
     view: &'a SceneView,
@@ -144,7 +146,7 @@ impl Tracer<'_> {
         solid_angle(self.view, row, column) * pixels
     }
 
-    fn trace(&self, element: usize, cell: usize, departures: &[Departure]) -> Result<Traced> {
+    fn trace(&self, element: usize, cell: usize, departures: &[Departure], zero_orders: &[f64]) -> Result<Traced> {
         let pairs = self.weights.len();
         let view: &ElementView = &self.chip.elements[element];
         let [row, column] = self.middle(cell);
@@ -163,8 +165,12 @@ impl Tracer<'_> {
         let maps: Vec<LandedLight> = self
             .chosen
             .iter()
-            .zip(departures)
-            .map(|(i, departure)| self.landed(element, *i, sines, departure, place))
+            .zip(departures.iter().zip(zero_orders))
+            .map(|(i, (departure, zero_order))| {
+                let mut landed = self.landed(element, *i, sines, departure, place)?;
+                landed.zero_order = *zero_order;
+                Ok(landed)
+            })
             .collect::<Result<_>>()?;
         let bases = self.bank.bases;
         for pair in 0..pairs {
@@ -267,7 +273,6 @@ impl Tracer<'_> {
         found.outside = found.travelling - inside;
         found.cells = sparse(&all);
         found.cells_outside = sparse(&outside);
-        found.zero_order = self.chip.zero_order(base, wavelength);
         Ok(found)
     }
 }
