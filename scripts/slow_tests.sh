@@ -5,4 +5,4 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 cargo test --release -p metalith-prior --features onnx --lib onnx
-cargo test --release --test program --test table --test neighbours --test forward -- --ignored "$@"
+cargo test --release --test program --test table --test neighbours --test forward --test veil -- --ignored "$@"

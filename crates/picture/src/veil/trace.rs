@@ -14,7 +14,7 @@ use crate::spectra::SceneSpectrum;
 use crate::{ElementView, SceneView};
 
 /// Blocks an axis of an element.
-const BLOCKS: usize = 8;
+const BLOCKS: usize = 12;
 /// Wavelengths of the veil are at most so far apart (nm): it moves with the chief ray by less than a square.
 const VEIL_STEP_NM: f64 = 38.0;
 

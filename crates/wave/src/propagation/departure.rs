@@ -15,6 +15,8 @@ use crate::error::Result;
 #[derive(Clone, Debug)]
 pub struct Departure {
     blocks: Vec<Block>,
+    /// Edge of a block (um).
+    edge_um: f64,
     lattice: Lattice,
     wavelength_um: f64,
     /// All power that the aperture passes (um^2).
@@ -24,12 +26,20 @@ pub struct Departure {
 /// Neighbouring tiles.
 #[derive(Clone, Debug)]
 struct Block {
-    /// Mean place of its light (um).
-    place_um: [f64; 2],
-    /// Bin of frequency along x and y (cycles a tile), and power (um^2); bins with next to no power are left out.
-    bins: Vec<([u16; 2], f32)>,
+    /// Directions; those with next to no power are left out.
+    bins: Vec<Bin>,
     /// What was left out (um^2): it is taken to be spread as the rest.
     rest_um2: f64,
+}
+
+/// The light of a block that leaves in one direction.
+#[derive(Clone, Copy, Debug)]
+struct Bin {
+    /// Bin of frequency along x times [`TILE`], and along y (cycles a tile).
+    direction: u16,
+    /// Mean place that it comes from (um): a lens sends the light of each place of a block elsewhere.
+    place_um: [f32; 2],
+    power_um2: f32,
 }
 
 /// Share of the power of a block that may be left out with its weakest bins.
@@ -40,8 +50,8 @@ impl Departure {
     pub fn of(aperture: &dyn Aperture, wavelength_um: f64, blocks: usize) -> Self {
         let lattice = aperture.lattice();
         let (reach, blocks) = (lattice.reach(), blocks.max(1));
-        let mut spectra = vec![vec![0.0f64; 0]; blocks * blocks];
-        let mut moments = vec![[0.0f64; 3]; blocks * blocks];
+        // Power, and power times place along x and y, of each direction.
+        let mut spectra: Vec<Vec<[f32; 3]>> = vec![Vec::new(); blocks * blocks];
         let scale = power_scale(&lattice);
         let block_of = |axis: usize, first: i64| {
             let (start, places) = (reach[axis].start as i64, reach[axis].len());
@@ -51,27 +61,24 @@ impl Departure {
         let fill_row = |iy: usize, row: &mut [Complex32]| aperture.fill_row(iy, row);
         for_tiles(&lattice, fill_row, |tile| {
             let [column, row] = [0, 1].map(|axis| block_of(axis, tile.first[axis]));
-            let block = row * blocks + column;
-            let sums = &mut spectra[block];
-            sums.resize(TILE * TILE, 0.0);
-            let mut power = 0.0;
+            let sums = &mut spectra[row * blocks + column];
+            sums.resize(TILE * TILE, [0.0; 3]);
+            let [x, y] = tile.middle_um.map(|v| v as f32);
             for (to, value) in sums.iter_mut().zip(tile.spectrum) {
-                let own = f64::from(value.norm_sqr()) * scale;
-                *to += own;
-                power += own;
-            }
-            for (to, value) in moments[block]
-                .iter_mut()
-                .zip([tile.middle_um[0], tile.middle_um[1], 1.0])
-            {
-                *to += value * power;
+                let power = value.norm_sqr() * scale as f32;
+                to[0] += power;
+                to[1] += power * x;
+                to[2] += power * y;
             }
         });
-        let blocks = spectra.iter().zip(&moments).filter(|(_, m)| m[2] > 0.0);
-        let blocks: Vec<Block> = blocks.map(|(s, m)| Block::of(s, *m)).collect();
+        let steps = lattice.steps_um();
+        let edge = |axis: usize| (reach[axis].len() + HOP) as f64 * steps[axis] / blocks as f64;
+        let edge_um = edge(0).max(edge(1));
+        let blocks: Vec<Block> = spectra.iter().filter_map(|sums| Block::of(sums)).collect();
         Self {
-            power_um2: moments.iter().map(|m| m[2]).sum(),
+            power_um2: blocks.iter().map(Block::power_um2).sum(),
             blocks,
+            edge_um,
             lattice,
             wavelength_um,
         }
@@ -90,15 +97,24 @@ impl Departure {
         grid.check()?;
         let leaves = Leaving::new(&self.lattice, self.wavelength_um, sines, towards);
         let mut landing = Landing::empty(grid);
+        // How far light of each direction lands from where it leaves, the same for all blocks.
+        let shift = |i: usize| {
+            let [sx, sy] = leaves.sines(i / TILE, i % TILE);
+            let cosine2 = 1.0 - sx * sx - sy * sy;
+            (cosine2 > 0.0).then(|| [sx, sy].map(|s| grid.distance_um / cosine2.sqrt() * s))
+        };
+        let shifts: Vec<Option<[f64; 2]>> = (0..TILE * TILE).map(shift).collect();
         for block in &self.blocks {
-            let kept: f64 = block.bins.iter().map(|b| f64::from(b.1)).sum();
+            let kept = block.power_um2() - block.rest_um2;
             let fill = 1.0 + block.rest_um2 / kept.max(f64::MIN_POSITIVE);
-            for ([kx, ky], power) in &block.bins {
-                let power = f64::from(*power) * fill;
-                let [sx, sy] = leaves.sines(usize::from(*kx), usize::from(*ky));
-                let cosine2 = 1.0 - sx * sx - sy * sy;
-                let shift = (cosine2 > 0.0).then(|| [sx, sy].map(|s| grid.distance_um / cosine2.sqrt() * s));
-                landing.add(block.place_um, shift, power);
+            for bin in &block.bins {
+                let power = f64::from(bin.power_um2) * fill;
+                landing.add_spread(
+                    bin.place_um.map(f64::from),
+                    shifts[usize::from(bin.direction)],
+                    self.edge_um,
+                    power,
+                );
             }
         }
         Ok(landing)
@@ -106,25 +122,39 @@ impl Departure {
 }
 
 impl Block {
-    /// From the summed power spectra of its tiles, columns first, and the moments of their places.
-    fn of(spectrum: &[f64], moments: [f64; 3]) -> Self {
-        let mut order: Vec<usize> = (0..spectrum.len()).collect();
-        order.sort_by(|a, b| spectrum[*b].total_cmp(&spectrum[*a]).then(a.cmp(b)));
-        let total: f64 = spectrum.iter().sum();
+    /// From the power of each direction, columns first, and its moments along x and y; none of a block without light.
+    fn of(sums: &[[f32; 3]]) -> Option<Self> {
+        let power = |i: usize| sums[i][0];
+        let total: f64 = (0..sums.len()).map(|i| f64::from(power(i))).sum();
+        if total <= 0.0 {
+            return None;
+        }
+        let mut order: Vec<usize> = (0..sums.len()).collect();
+        order.sort_by(|a, b| power(*b).total_cmp(&power(*a)).then(a.cmp(b)));
         let mut kept = 0.0;
         let mut bins = Vec::new();
         for i in order {
             if kept >= (1.0 - LEFT_OUT) * total {
                 break;
             }
-            kept += spectrum[i];
-            bins.push(([(i / TILE) as u16, (i % TILE) as u16], spectrum[i] as f32));
+            kept += f64::from(power(i));
+            let [power_um2, x, y] = sums[i];
+            bins.push(Bin {
+                direction: i as u16,
+                place_um: [x / power_um2, y / power_um2],
+                power_um2,
+            });
         }
-        Self {
-            place_um: [moments[0] / moments[2], moments[1] / moments[2]],
+        // In the order of directions, which is that of places on the plane.
+        bins.sort_by_key(|b| b.direction);
+        Some(Self {
             rest_um2: total - kept,
             bins,
-        }
+        })
+    }
+
+    fn power_um2(&self) -> f64 {
+        self.bins.iter().map(|b| f64::from(b.power_um2)).sum::<f64>() + self.rest_um2
     }
 }
 
