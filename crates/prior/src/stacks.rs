@@ -102,6 +102,11 @@ impl Stack {
         self.pictures.iter().chain(&self.clean).copied()
     }
 
+    /// How many pictures there are of the frame.
+    pub fn pictures(&self) -> usize {
+        self.pictures.dim().2 / COLOURS
+    }
+
     /// Rows and columns.
     pub fn size(&self) -> [usize; 2] {
         let (rows, columns, _) = self.clean.dim();
@@ -157,7 +162,7 @@ impl Stacks {
     /// # Errors
     /// If there are fewer than two, one has another number of pictures, or is smaller than a piece.
     pub fn new(stacks: Vec<Stack>, taught: Taught, piece: usize) -> Result<Self> {
-        let fits = |s: &Stack| s.pictures.dim().2 == taught.pictures * COLOURS && s.size().iter().all(|n| *n >= piece);
+        let fits = |s: &Stack| s.pictures() == taught.pictures && s.size().iter().all(|n| *n >= piece);
         if stacks.len() < 2 || !stacks.iter().all(fits) {
             return Err(Error::invalid(
                 format!("{} frames, or frames too small, to learn from", stacks.len()),

@@ -3,14 +3,20 @@
 use std::path::{Path, PathBuf};
 
 use metalith_camera::Camera;
-use metalith_core::{Error, Progress, Result};
+use metalith_core::file::file_digest;
+use metalith_core::text::hex;
+use metalith_core::{Error, Progress, Result, Silent, part};
 use metalith_design::Design;
 use metalith_picture::restore::RestorationMethod;
 use metalith_picture::scene::{SceneImage, read_far_scene};
-use metalith_picture::{Assumed, KeptKernels, Studio};
+use metalith_picture::{Assumed, KeptKernels, SceneView, Studio};
+use metalith_prior::{Stack, Taught};
+use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
 use crate::compare::{ComparedCamera, Comparison, compare};
+use crate::contender::no_stage;
+use crate::stage::{Stage, StageKind, camera_digest, encoded};
 use crate::{ArrayCamera, Contender, DiffuserCam, DiffuserSpec, FlatCam, MaskSpec};
 
 /// What is compared: designs, cameras without a lens, photographs, and how.
@@ -32,6 +38,12 @@ pub struct Lineup {
     /// Of the noise.
     pub seed: u64,
     pub photographs: Vec<PathBuf>,
+    /// Photographs are cut to the square of so many pixels in their middle.
+    #[serde(default)]
+    pub pixels: Option<usize>,
+    /// Weights of learnt last stages, each behind the cameras that it was taught for.
+    #[serde(default)]
+    pub learnt: Vec<PathBuf>,
 }
 
 /// A design that is compared.
@@ -66,6 +78,7 @@ pub struct OpenLineup<'a> {
     /// With the camera of each.
     designs: Vec<(Design, Camera)>,
     photographs: Vec<SceneImage>,
+    stages: Vec<Stage>,
 }
 
 /// What is done with a camera that is ready: it, its name and words in the table, its photographs.
@@ -107,17 +120,24 @@ impl Lineup {
             Ok((Design::read(&listed.design)?, own.unwrap_or_else(|| camera.clone())))
         };
         let designs = self.designs.iter().map(own).collect::<Result<_>>()?;
-        Ok(OpenLineup {
+        let open = OpenLineup {
             of: self,
             camera,
             methods,
             designs,
             photographs,
-        })
+            stages: self.learnt.iter().map(|p| Stage::read(p)).collect::<Result<_>>()?,
+        };
+        open.stages_have_cameras()?;
+        Ok(open)
     }
 
     fn photograph(&self, path: &Path) -> Result<SceneImage> {
-        read_far_scene(path, self.field_deg)
+        let scene = read_far_scene(path, self.field_deg)?;
+        match self.pixels {
+            Some(pixels) => middle(scene, pixels),
+            None => Ok(scene),
+        }
     }
 
     /// Rows of the table: of each design one, or two with the assumptions of the paper, then those without a lens.
@@ -130,7 +150,132 @@ impl Lineup {
     }
 }
 
+/// The square of so many pixels in the middle of a scene.
+fn middle(mut scene: SceneImage, pixels: usize) -> Result<SceneImage> {
+    let SceneView { rows, columns, .. } = scene.view;
+    if rows.min(columns) < pixels {
+        return Err(Error::invalid(
+            format!("`{}` has {columns} x {rows} pixels, fewer than {pixels}", scene.name),
+            "give a smaller --pixels, or larger photographs",
+        ));
+    }
+    let (top, left) = ((rows - pixels) / 2, (columns - pixels) / 2);
+    let cut = |plane: &Array2<f32>| part(plane.view(), top..top + pixels, left..left + pixels).to_owned();
+    scene.planes = scene.planes.iter().map(cut).collect();
+    scene.depth_um = scene.depth_um.as_ref().map(cut);
+    (scene.view.rows, scene.view.columns) = (pixels, pixels);
+    Ok(scene)
+}
+
 impl OpenLineup<'_> {
+    /// What decides the frames of each camera of the table that a last stage can follow: its digest and the kinds of stages. Cameras
+    /// with the assumptions of others have none.
+    fn digests(&self) -> Result<Vec<(String, Vec<StageKind>)>> {
+        let first = self.photographs[0].view;
+        let design = |(listed, (design, camera)): (&ListedDesign, &(Design, Camera))| {
+            let field_deg = listed.field_deg.unwrap_or(first.field_deg);
+            let optics = (design.digest(), hex(&file_digest(&listed.layout)?));
+            let digest = camera_digest(&optics, camera, &SceneView { field_deg, ..first })?;
+            Ok((digest, vec![StageKind::MultiWiener, StageKind::Blending]))
+        };
+        let lensless = |spec: &Lensless| {
+            let kind = match spec {
+                Lensless::FlatCam(_) => StageKind::FlatNet,
+                Lensless::DiffuserCam(_) => StageKind::UnrolledDiffuser,
+            };
+            Ok((camera_digest(spec, &self.camera, &first)?, vec![kind]))
+        };
+        let designs = self.of.designs.iter().zip(&self.designs).map(design);
+        designs.chain(self.of.lensless.iter().map(lensless)).collect()
+    }
+
+    /// Refuse weights that none of the cameras can use.
+    fn stages_have_cameras(&self) -> Result<()> {
+        if self.stages.is_empty() {
+            return Ok(());
+        }
+        let digests = self.digests()?;
+        for (stage, path) in self.stages.iter().zip(&self.of.learnt) {
+            let fits = |(digest, kinds): &(String, Vec<StageKind>)| {
+                kinds.contains(&stage.kind) && *digest == stage.taught().camera
+            };
+            if !digests.iter().any(fits) {
+                return Err(Error::invalid(
+                    format!(
+                        "{}: the last stage `{}` was taught for none of these cameras at this size and field of photographs",
+                        path.display(),
+                        stage.kind.name()
+                    ),
+                    "compare the camera that it was taught for, or teach it by `metalith train --stage`",
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// The stages that were taught for camera `k`, of those without assumptions.
+    fn stages_of(&self, k: usize) -> Result<Vec<Stage>> {
+        if self.stages.is_empty() {
+            return Ok(Vec::new());
+        }
+        let (digest, kinds) = self.digests()?.swap_remove(k);
+        let fits = |stage: &&Stage| kinds.contains(&stage.kind) && stage.taught().camera == digest;
+        Ok(self.stages.iter().filter(fits).cloned().collect())
+    }
+
+    /// Pictures of all photographs by camera `k` for a last stage, each with its scene, and what is taught by them. Each is kept in a file
+    /// of a folder, and taken from there if it is of the same camera, photograph and noise. Camera `k` is counted without assumptions.
+    ///
+    /// # Errors
+    /// If the camera has no such stage or cannot be made ready, a file cannot be written, or the user stopped it.
+    pub fn lessons(
+        &self,
+        k: usize,
+        kind: StageKind,
+        folder: &Path,
+        kept: &KeptKernels,
+        progress: &dyn Progress,
+    ) -> Result<(Vec<Stack>, Taught)> {
+        let (camera, kinds) = self.digests()?.swap_remove(k);
+        if !kinds.contains(&kind) {
+            return no_stage(kind, "this camera");
+        }
+        let mut stacks = Vec::new();
+        let mut pictures = 0;
+        self.ready(k, kept, progress, &mut |contender, _, photographs| {
+            progress.begin("pictures to learn from", photographs.len() as u64);
+            for (i, (scene, path)) in photographs.iter().zip(&self.of.photographs).enumerate() {
+                if progress.stopped() {
+                    return Err(Error::Interrupted);
+                }
+                let seed = self.of.seed + i as u64;
+                let of = format!("{} {camera} {} {seed}", kind.name(), hex(&file_digest(path)?));
+                let file = folder.join(format!("{i:06}.safetensors"));
+                let stack = match Stack::kept(&file, &of) {
+                    Some(stack) => stack,
+                    None => {
+                        let frame = contender.record(scene, seed)?;
+                        let made = contender.pictures(&frame, kind, &Silent)?;
+                        let shown: Vec<_> = made.iter().map(encoded).collect();
+                        let stack = Stack::new(&shown, &encoded(&contender.truth(scene)))?;
+                        stack.write(&file, &of)?;
+                        stack
+                    }
+                };
+                pictures = stack.pictures();
+                stacks.push(stack);
+                progress.advance(1);
+            }
+            Ok(())
+        })?;
+        let taught = Taught {
+            kind: kind.name().into(),
+            camera,
+            pictures,
+        };
+        Ok((stacks, taught))
+    }
+
     /// Let camera `k` take all photographs.
     ///
     /// # Errors
@@ -185,7 +330,7 @@ impl OpenLineup<'_> {
         let kinds = self.of.kinds();
         match k.checked_sub(self.designs.len() * kinds) {
             None => self.ready_design(k / kinds, k % kinds == 1, kept, progress, then),
-            Some(k) => self.ready_lensless(&self.of.lensless[k], progress, then),
+            Some(k) => self.ready_lensless(k, progress, then),
         }
     }
 
@@ -212,7 +357,7 @@ impl OpenLineup<'_> {
                 camera.name,
                 design.elements().len()
             );
-            let ready = ArrayCamera::new(&studio, &self.methods, self.of.separate);
+            let ready = ArrayCamera::new(&studio, &self.methods, self.of.separate).with_stages(self.stages_of(k)?);
             return then(&ready, (name, &words), &photographs);
         }
         let narrow = studio.open_without_dispersion(design, &listed.layout, None, first, kept, progress)?;
@@ -226,15 +371,16 @@ impl OpenLineup<'_> {
         then(&ready, (&format!("{name}, paper's assumptions"), &words), &photographs)
     }
 
-    fn ready_lensless(&self, spec: &Lensless, progress: &dyn Progress, then: &mut Ready<'_>) -> Result<()> {
+    fn ready_lensless(&self, k: usize, progress: &dyn Progress, then: &mut Ready<'_>) -> Result<()> {
         let view = self.photographs[0].view;
-        match spec {
+        let stage = self.stages_of(self.designs.len() + k)?.pop();
+        match &self.of.lensless[k] {
             Lensless::FlatCam(mask) => {
                 let words = format!(
                     "a mask in place of a lens, the product of two sequences of maximum length (511 members of {} um), {} um before the sensor; Tikhonov in closed form by singular values.",
                     mask.feature_um, mask.distance_um
                 );
-                let ready = FlatCam::new(mask, &self.camera, view, progress)?;
+                let ready = FlatCam::new(mask, &self.camera, view, progress)?.with_stage(stage);
                 then(&ready, ("FlatCam, ours", &words), &self.photographs)
             }
             Lensless::DiffuserCam(spec) => {
@@ -242,7 +388,7 @@ impl OpenLineup<'_> {
                     "a random smooth surface in place of a lens, numbers {} um apart, {} um before the sensor, its opening {} of the sensor along each axis; caustic by rays; total variation with the crop (ADMM).",
                     spec.grain_um, spec.distance_um, spec.opening
                 );
-                let ready = DiffuserCam::new(spec, &self.camera, view, progress)?;
+                let ready = DiffuserCam::new(spec, &self.camera, view, progress)?.with_stage(stage);
                 then(&ready, ("DiffuserCam, ours", &words), &self.photographs)
             }
         }
