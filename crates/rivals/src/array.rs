@@ -1,10 +1,10 @@
 //! The chip of a design before its sensor, as a contender.
 
 use metalith_core::{Progress, Result};
-use metalith_picture::restore::{Recorded, RestorationMethod, restore_each};
+use metalith_picture::restore::{Blend, Recorded, RestorationMethod, restore_each};
 use metalith_picture::scene::SceneImage;
 use metalith_picture::{Frame, FrameOperator, OperatorError, Rehearsal, Studio};
-use ndarray::{Array2, Array3};
+use ndarray::{Array2, Array3, Zip};
 
 use crate::contender::{Contender, Way, no_stage};
 use crate::stage::{Stage, StageKind};
@@ -52,36 +52,30 @@ impl<'a> ArrayCamera<'a> {
 
     /// The blend of all elements, then the picture of each alone.
     fn blend_and_elements(&self, recorded: &Recorded<'_>, progress: &dyn Progress) -> Result<Vec<Vec<Array2<f32>>>> {
+        let shape = (self.studio.view.rows, self.studio.view.columns);
+        let mut blend = Blend::new(shape, self.restoration.inputs());
         let mut alone = Vec::new();
         restore_each(
             recorded,
             RestorationMethod::Tikhonov,
             progress,
             &mut |picture, trust| {
-                alone.push((picture.to_vec(), mean(trust)));
+                blend.add(picture, trust);
+                alone.push((picture.to_vec(), trust.to_vec()));
             },
         )?;
-        let shape = (self.studio.view.rows, self.studio.view.columns);
-        let planes = self.restoration.inputs();
-        let mut blend = vec![Array2::<f32>::zeros(shape); planes];
-        let mut all = Array2::<f32>::zeros(shape);
-        for (picture, trust) in &alone {
-            blend.iter_mut().zip(picture).for_each(|(b, p)| *b += &(p * trust));
-            all += trust;
-        }
-        all.mapv_inplace(|t| if t > 0.0 { t.recip() } else { 0.0 });
-        blend.iter_mut().for_each(|b| *b *= &all);
+        let blend = blend.finished();
         for (picture, trust) in &mut alone {
-            let least = LEAST_TRUST * trust.iter().copied().fold(0.0, f32::max);
-            for (plane, blend) in picture.iter_mut().zip(&blend) {
-                ndarray::Zip::from(plane)
-                    .and(blend)
+            for ((plane, trust), blend) in picture.iter_mut().zip(trust).zip(&blend) {
+                let least = LEAST_TRUST * trust.iter().copied().fold(0.0, f32::max);
+                Zip::from(plane)
                     .and(&*trust)
-                    .for_each(|p, b, t| *p = if *t > least { *p } else { *b });
+                    .and(blend)
+                    .for_each(|p, t, b| *p = if *t > least { *p } else { *b });
             }
         }
         // Elements that see nothing of the scene have no picture of their own.
-        alone.resize(self.restoration.elements(), (blend.clone(), Array2::zeros(shape)));
+        alone.resize(self.restoration.elements(), (blend.clone(), Vec::new()));
         Ok([blend].into_iter().chain(alone.into_iter().map(|(p, _)| p)).collect())
     }
 
@@ -94,13 +88,6 @@ impl<'a> ArrayCamera<'a> {
             false => self.studio.colours.rgb(planes),
         }
     }
-}
-
-/// Mean of planes.
-fn mean(planes: &[Array2<f32>]) -> Array2<f32> {
-    let mut sum = Array2::zeros(planes[0].dim());
-    planes.iter().for_each(|p| sum.scaled_add(1.0 / planes.len() as f32, p));
-    sum
 }
 
 impl Contender for ArrayCamera<'_> {
@@ -168,5 +155,64 @@ impl Contender for ArrayCamera<'_> {
             }
             _ => no_stage(kind, "an array"),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stage::PICTURES;
+    use metalith_camera::{Camera, Sensor};
+    use metalith_core::Silent;
+    use metalith_design::array::PillarArray;
+    use metalith_design::{Design, cell_models};
+    use metalith_layout::{read_pillars, write_pillars};
+    use metalith_made::SimulationCase;
+
+    #[test]
+    #[ignore = "second tier: CPU time, run by scripts/slow_tests.sh"]
+    fn pictures_that_last_stages_see_are_pictures_of_the_scene() {
+        /// Correlation of a picture by Wiener filters with the scene, in the middle; of a frame of nothing it is zero.
+        const ALIKE: f64 = 0.5;
+        let design = Design::read("../../designs/mini_3x3.toml".as_ref()).unwrap();
+        let array = PillarArray::build(&design, &Silent).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let layout = folder.path().join("mini.gds");
+        write_pillars(&design, &array, design.layout.hierarchy, &layout, &Silent).unwrap();
+        let extraction = read_pillars(&design, &layout, &Silent).unwrap();
+        let plain = Camera::three_bands(2.0);
+        let camera = Camera {
+            sensor: Sensor {
+                columns: 280,
+                rows: 280,
+                ..plain.sensor
+            },
+            ..plain
+        };
+        let cells = cell_models(&design, &[metalith_cell::Fidelity::Published]).unwrap();
+        let case = SimulationCase::Cell(cells[0].as_ref());
+        let rgb = Array3::from_shape_fn((64, 64, 3), |(y, x, c)| {
+            0.1 + 0.7 * f64::from(u8::from((x / 8 + y / 11 + c) % 3 == 0))
+        });
+        let scene = SceneImage::of_rgb("", &rgb, 60.0, f64::INFINITY);
+        let studio = Studio::of_pillars(&design, &extraction, case, &camera, &scene, Some(5), &Silent).unwrap();
+        let ready = ArrayCamera::new(&studio, &[RestorationMethod::Tikhonov], true);
+        let frame = ready.record(&scene, 1).unwrap();
+        let truth = ready.truth(&scene);
+        let wiener = ready.pictures(&frame, StageKind::MultiWiener, &Silent).unwrap();
+        assert_eq!(wiener.len(), PICTURES);
+        let middle = |p: &Array3<f64>| Array2::from_shape_fn((24, 24), |(y, x)| p[[y + 20, x + 20, 1]]);
+        let (found, want) = (middle(&wiener[0]), middle(&truth));
+        let centred = |p: &Array2<f64>| p - p.mean().unwrap();
+        let (a, b) = (centred(&found), centred(&want));
+        let alike = (&a * &b).sum() / ((&a * &a).sum() * (&b * &b).sum()).sqrt();
+        assert!(alike > ALIKE, "{alike}");
+        let alone = ready.pictures(&frame, StageKind::Blending, &Silent).unwrap();
+        assert_eq!(alone.len(), 1 + 9);
+        assert!(
+            alone[0] == ready.restore(&frame, 1, &Silent).unwrap(),
+            "the blend is that of --separate"
+        );
+        assert!(ready.pictures(&frame, StageKind::FlatNet, &Silent).is_err());
     }
 }

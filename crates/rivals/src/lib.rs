@@ -12,7 +12,7 @@
 //! | what cameras without a lens have in common | `lensless` |
 //! | a mask that is a product of two sequences | `flatcam/` |
 //! | the caustic of a random surface | `diffusercam/` |
-//! | learnt last stages, and pictures by Wiener filters for one of them | `stage`, `wiener` |
+//! | learnt last stages, what they are taught by, and pictures by Wiener filters for one of them | `stage`, `teaching`, `wiener` |
 //! | which cameras, from their files | `lineup` |
 //! | scores of all photographs | `compare` |
 //! | the table, the page | `table`, `page` |
@@ -28,6 +28,7 @@ mod lineup;
 mod page;
 mod stage;
 mod table;
+mod teaching;
 mod wiener;
 
 pub use array::ArrayCamera;

@@ -270,5 +270,9 @@ mod tests {
         let found = scores(&picture, &flat.truth(&scene)).unwrap()[0];
         assert!(found.psnr_linear_db > LEAST_DB, "{found:?}");
         assert!(flat.record(&small(40, 300, 260).1, 1).is_err());
+        // The first picture of the last stage is this one, the others are of other strengths.
+        let all = flat.pictures(&frame, StageKind::FlatNet, &Silent).unwrap();
+        assert!(all.len() == PICTURES && all[0] == picture && all[1] != picture);
+        assert!(flat.pictures(&frame, StageKind::Blending, &Silent).is_err());
     }
 }
