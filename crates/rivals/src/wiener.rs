@@ -232,3 +232,27 @@ fn prior(studio: &Studio, fft: &SquareFft) -> Vec<f32> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn missing_pixels_are_between_their_neighbours_and_count_as_noise() {
+        /// Sums of a few numbers in single precision.
+        const ROUNDING: f32 = 1e-5;
+        let ramp = Array2::from_shape_fn((12, 14), |(y, x)| 1.0 + 0.3 * y as f32 + 0.2 * x as f32);
+        // One pixel of a square of two by two is known, with a variance of a quarter.
+        let trust = Array2::from_shape_fn(ramp.dim(), |(y, x)| if y % 2 == 0 && x % 2 == 1 { 4.0 } else { 0.0 });
+        let light = &ramp * &trust.mapv(|t| t / 4.0);
+        let found = filled(&light, &trust);
+        for y in 1..10 {
+            for x in 1..12 {
+                assert!((found[[y, x]] - ramp[[y, x]]).abs() < ROUNDING, "{y} {x}");
+            }
+        }
+        // Four pixels for each that is known, light of two.
+        let noise = relative_noise(&trust, &Array2::from_elem(ramp.dim(), 2.0));
+        assert!((noise - 0.25 * 4.0 / 4.0).abs() < ROUNDING, "{noise}");
+    }
+}
