@@ -61,7 +61,7 @@ impl<'a> ArrayCamera<'a> {
             progress,
             &mut |picture, trust| {
                 blend.add(picture, trust);
-                alone.push((picture.to_vec(), trust.to_vec()));
+                alone.push((picture.clone(), trust.clone()));
             },
         )?;
         let blend = blend.finished();

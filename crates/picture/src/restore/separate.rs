@@ -70,7 +70,7 @@ pub fn restore_each(
     recorded: &Recorded<'_>,
     method: RestorationMethod,
     progress: &dyn Progress,
-    take: &mut dyn FnMut(&[Array2<f32>], &[Array2<f32>]),
+    take: &mut dyn FnMut(&Planes, &Planes),
 ) -> Result<()> {
     let operator = recorded.operator;
     let grey = GreyLight::of(recorded);
