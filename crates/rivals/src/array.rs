@@ -78,16 +78,6 @@ impl<'a> ArrayCamera<'a> {
         alone.resize(self.restoration.elements(), (blend.clone(), Vec::new()));
         Ok([blend].into_iter().chain(alone.into_iter().map(|(p, _)| p)).collect())
     }
-
-    /// Planes of the restoration in linear sRGB `[row, column, colour]`.
-    fn picture(&self, planes: &[Array2<f32>]) -> Array3<f64> {
-        match self.restoration.sees_colours() {
-            true => Array3::from_shape_fn((self.studio.view.rows, self.studio.view.columns, 3), |(y, x, c)| {
-                f64::from(planes[c][[y, x]])
-            }),
-            false => self.studio.colours.rgb(planes),
-        }
-    }
 }
 
 impl Contender for ArrayCamera<'_> {
@@ -151,7 +141,10 @@ impl Contender for ArrayCamera<'_> {
             }
             StageKind::Blending => {
                 let all = self.blend_and_elements(&recorded, progress)?;
-                Ok(all.iter().map(|planes| self.picture(planes)).collect())
+                Ok(all
+                    .iter()
+                    .map(|planes| self.studio.picture(&self.restoration, planes))
+                    .collect())
             }
             _ => no_stage(kind, "an array"),
         }
