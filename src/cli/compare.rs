@@ -57,29 +57,21 @@ pub struct CompareArgs {
     #[arg(long, default_value_t = 90.0)]
     field_deg: f64,
 
+    /// Cut each photograph to the square of so many pixels in its middle.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(16..=4096))]
+    pixels: Option<u16>,
+
+    /// Weights of learnt last stages that `metalith train --stage` wrote, separated by commas: each gives the camera that it was
+    /// taught for one more way of making a picture.
+    #[arg(long, value_delimiter = ',', value_name = "FILE,...")]
+    learnt: Vec<PathBuf>,
+
     /// Seed of the noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
 
-    /// Distance of the mask of `flatcam` from the sensor (um).
-    #[arg(long, default_value_t = MaskSpec::standard().distance_um, value_name = "UM")]
-    mask_distance_um: f64,
-
-    /// Width of an opening of this mask (um).
-    #[arg(long, default_value_t = MaskSpec::standard().feature_um, value_name = "UM")]
-    mask_feature_um: f64,
-
-    /// Distance of the rough surface of `diffusercam` from the sensor (um).
-    #[arg(long, default_value_t = DiffuserSpec::standard().distance_um, value_name = "UM")]
-    diffuser_distance_um: f64,
-
-    /// Distance of the random numbers that this surface is made of (um): bumps are about twice as wide.
-    #[arg(long, default_value_t = DiffuserSpec::standard().grain_um, value_name = "UM")]
-    diffuser_grain_um: f64,
-
-    /// Its opening over the sensor, along each axis.
-    #[arg(long, default_value_t = DiffuserSpec::standard().opening, value_name = "SHARE")]
-    diffuser_opening: f64,
+    #[command(flatten)]
+    bare: LenslessArgs,
 
     /// Folder for `compare.html` and `compare.json`.
     #[arg(long, short, default_value = "out/compare", value_name = "FOLDER")]
@@ -101,9 +93,50 @@ enum Assume {
     Paper,
 }
 
+/// What stands before the sensor of a camera without a lens.
+#[derive(Args)]
+pub struct LenslessArgs {
+    /// Distance of the mask of `flatcam` from the sensor (um).
+    #[arg(long, default_value_t = MaskSpec::standard().distance_um, value_name = "UM")]
+    mask_distance_um: f64,
+
+    /// Width of an opening of this mask (um).
+    #[arg(long, default_value_t = MaskSpec::standard().feature_um, value_name = "UM")]
+    mask_feature_um: f64,
+
+    /// Distance of the rough surface of `diffusercam` from the sensor (um).
+    #[arg(long, default_value_t = DiffuserSpec::standard().distance_um, value_name = "UM")]
+    diffuser_distance_um: f64,
+
+    /// Distance of the random numbers that this surface is made of (um): bumps are about twice as wide.
+    #[arg(long, default_value_t = DiffuserSpec::standard().grain_um, value_name = "UM")]
+    diffuser_grain_um: f64,
+
+    /// Its opening over the sensor, along each axis.
+    #[arg(long, default_value_t = DiffuserSpec::standard().opening, value_name = "SHARE")]
+    diffuser_opening: f64,
+}
+
+impl LenslessArgs {
+    /// A camera of this kind.
+    ///
+    /// # Errors
+    /// If a length is out of its range.
+    pub fn camera(&self, rival: Rival) -> Result<Lensless> {
+        Ok(match rival {
+            Rival::Flatcam => Lensless::FlatCam(MaskSpec::new(self.mask_feature_um, self.mask_distance_um)?),
+            Rival::Diffusercam => Lensless::DiffuserCam(DiffuserSpec::new(
+                self.diffuser_distance_um,
+                self.diffuser_grain_um,
+                self.diffuser_opening,
+            )?),
+        })
+    }
+}
+
 /// A camera without a lens.
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
-enum Rival {
+pub enum Rival {
     /// A mask that is a product of two sequences.
     Flatcam,
     /// A rough surface.
@@ -112,7 +145,7 @@ enum Rival {
 
 /// A design, as it is asked for.
 #[derive(Clone)]
-struct ComparedDesign {
+pub struct ComparedDesign {
     name: Option<String>,
     design: PathBuf,
     layout: Option<PathBuf>,
@@ -150,6 +183,20 @@ impl FromStr for ComparedDesign {
 }
 
 impl ComparedDesign {
+    /// As the library has it.
+    ///
+    /// # Errors
+    /// If the design cannot be read, or has no layout.
+    pub fn listed(&self) -> Result<ListedDesign> {
+        Ok(ListedDesign {
+            name: self.name.clone(),
+            layout: self.layout(&Design::read(&self.design)?)?,
+            design: self.design.clone(),
+            camera: self.camera.clone(),
+            field_deg: self.field_deg,
+        })
+    }
+
     /// The layout that is named, or the one that the program writes by default.
     fn layout(&self, design: &Design) -> Result<PathBuf> {
         if let Some(layout) = &self.layout {
@@ -172,35 +219,22 @@ impl ComparedDesign {
 impl CompareArgs {
     /// What is asked for, as the library has it.
     fn lineup(&self) -> Result<Lineup> {
-        let listed = |asked: &ComparedDesign| {
-            Ok(ListedDesign {
-                name: asked.name.clone(),
-                layout: asked.layout(&Design::read(&asked.design)?)?,
-                design: asked.design.clone(),
-                camera: asked.camera.clone(),
-                field_deg: asked.field_deg,
-            })
-        };
-        let lensless = |rival: &Rival| {
-            Ok(match rival {
-                Rival::Flatcam => Lensless::FlatCam(MaskSpec::new(self.mask_feature_um, self.mask_distance_um)?),
-                Rival::Diffusercam => Lensless::DiffuserCam(DiffuserSpec::new(
-                    self.diffuser_distance_um,
-                    self.diffuser_grain_um,
-                    self.diffuser_opening,
-                )?),
-            })
-        };
         Ok(Lineup {
             camera: self.camera.clone(),
-            designs: self.design.iter().map(listed).collect::<Result<_>>()?,
-            lensless: self.rivals.iter().map(lensless).collect::<Result<_>>()?,
+            designs: self.design.iter().map(ComparedDesign::listed).collect::<Result<_>>()?,
+            lensless: self
+                .rivals
+                .iter()
+                .map(|r| self.bare.camera(*r))
+                .collect::<Result<_>>()?,
             methods: self.method.clone(),
             separate: self.separate,
             paper: matches!(self.assume, Some(Assume::Paper)),
             field_deg: self.field_deg,
             seed: self.seed,
             photographs: images::of_all(&self.photographs)?,
+            pixels: self.pixels.map(usize::from),
+            learnt: self.learnt.clone(),
         })
     }
 }

@@ -1,22 +1,32 @@
-//! `metalith train`: teach the prior of restorations from photographs.
+//! `metalith train`: teach the prior of restorations, or the last stage of a camera, from photographs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::Result;
+use metalith::picture::KeptKernels;
 use metalith::picture::scene::read_picture;
-use metalith::prior::{Photographs, TrainingSpec, train};
+use metalith::prior::{Photographs, Stacks, TrainingReport, TrainingSpec, train, train_finisher};
+use metalith::rivals::{Lineup, StageKind};
+use metalith::{Error, Result};
 
+use super::compare::{ComparedDesign, LenslessArgs, Rival};
 use super::paths::apart;
 use super::{Outcome, Terminal, images, print_json, print_line};
 
-/// Teach the network that takes noise out of pictures from the photographs of a folder.
+/// Teach a network from the photographs of a folder: the one that takes noise out of pictures, or the last stage of a camera.
 ///
 /// The weights depend on the photographs, the seed and the numbers below, not on the number of threads. Training that was
 /// stopped goes on: where it stands is kept beside the weights, in a file that ends in `.state`. One photograph of twelve is
 /// held out, and the network judged by it.
+///
+/// With `--stage` the photographs are taken by a simulated camera first, and restored by the means that the stage begins with; these
+/// pictures are kept in a folder beside the weights that ends in `.pictures`.
 #[derive(Args)]
-#[command(after_help = "Example:\n  metalith train photographs --out denoiser.safetensors --steps 9000")]
+#[command(
+    after_help = "Examples:\n  metalith train photographs --out denoiser.safetensors --steps 9000\n  \
+    metalith train photographs --stage flatnet --camera cameras/gt1930.toml --field-deg 80 --pixels 512 --steps 1200 \\\n    \
+    --out flatnet.safetensors"
+)]
 pub struct TrainArgs {
     /// Folder of PNG, JPEG or NPY photographs.
     folder: PathBuf,
@@ -41,9 +51,84 @@ pub struct TrainArgs {
     #[arg(long, default_value_t = TrainingSpec::default().seed)]
     seed: u64,
 
+    /// Teach the last stage of a camera instead: of the rivals `flatnet` (a mask), `unrolled-diffuser` (a rough surface) and
+    /// `multi-wiener` (the array of --design), or `blending`, the picture of one element alone after the other.
+    #[arg(long, value_name = "KIND", requires = "camera")]
+    stage: Option<StageKind>,
+
+    /// The camera file of this camera: sensor, light, exposure and noise.
+    #[arg(long, requires = "stage")]
+    camera: Option<PathBuf>,
+
+    /// The design of this camera, if it has one: DESIGN.toml[:LAYOUT].
+    #[arg(long, value_name = "DESIGN[:LAYOUT]", requires = "stage")]
+    design: Option<ComparedDesign>,
+
+    /// Angle from the left to the right edge of its photographs (degrees).
+    #[arg(long, default_value_t = 90.0, requires = "stage")]
+    field_deg: f64,
+
+    /// Cut each photograph to the square of so many pixels in its middle: a last stage is for pictures of one size.
+    #[arg(long, value_name = "N", requires = "stage", value_parser = clap::value_parser!(u16).range(32..=4096))]
+    pixels: Option<u16>,
+
+    #[command(flatten)]
+    bare: LenslessArgs,
+
     /// Print what came out as JSON.
     #[arg(long)]
     json: bool,
+}
+
+impl TrainArgs {
+    /// The camera that a last stage is for.
+    fn lineup(&self, kind: StageKind, photographs: Vec<PathBuf>) -> Result<Lineup> {
+        let wrong = |what: &str, hint: &str| Err(Error::invalid(what, hint));
+        let lensless = match (kind, &self.design) {
+            (StageKind::FlatNet, None) => vec![self.bare.camera(Rival::Flatcam)?],
+            (StageKind::UnrolledDiffuser, None) => vec![self.bare.camera(Rival::Diffusercam)?],
+            (_, Some(_)) if kind.is_of_design() => Vec::new(),
+            (_, Some(_)) => return wrong("a camera without a lens has no design", "leave --design out"),
+            (_, None) => return wrong("this last stage is of the array of a design", "name it by --design"),
+        };
+        Ok(Lineup {
+            camera: self.camera.clone().unwrap_or_default(),
+            designs: self.design.iter().map(ComparedDesign::listed).collect::<Result<_>>()?,
+            lensless,
+            methods: Vec::new(),
+            separate: false,
+            paper: false,
+            field_deg: self.field_deg,
+            seed: self.seed,
+            photographs,
+            pixels: self.pixels.map(usize::from),
+            learnt: Vec::new(),
+        })
+    }
+
+    /// Teach a last stage.
+    fn stage(
+        &self,
+        kind: StageKind,
+        photographs: Vec<PathBuf>,
+        spec: &TrainingSpec,
+        state: &Path,
+        terminal: &Terminal,
+    ) -> Result<TrainingReport> {
+        let lineup = self.lineup(kind, photographs)?;
+        let open = lineup.open()?;
+        let kept = KeptKernels::of_user();
+        let (stacks, taught) = open.lessons(0, kind, &beside(&self.out, ".pictures"), &kept, terminal)?;
+        let stacks = Stacks::new(stacks, taught, spec.piece)?;
+        train_finisher(&stacks, spec, &self.out, state, terminal)
+    }
+}
+
+/// A file beside another.
+fn beside(path: &Path, ending: &str) -> PathBuf {
+    let mut name = path.to_owned().into_os_string();
+    name.push(ending);
+    name.into()
 }
 
 pub fn run(args: &TrainArgs, terminal: &Terminal) -> Result<Outcome> {
@@ -55,26 +140,34 @@ pub fn run(args: &TrainArgs, terminal: &Terminal) -> Result<Outcome> {
         seed: args.seed,
     };
     let files = images::of_folder(&args.folder)?;
-    let mut state = args.out.clone().into_os_string();
-    state.push(".state");
-    let state = PathBuf::from(state);
+    let state = beside(&args.out, ".state");
     apart(files.iter().map(PathBuf::as_path), &[&args.out, &state])?;
-    let mut pictures = Vec::new();
-    for file in &files {
-        let name = file.display().to_string();
-        pictures.push((name, read_picture(file)?.mapv(|v| v as f32)));
-    }
-    let photographs = Photographs::new(pictures, spec.piece)?;
-    let report = train(&photographs, &spec, &args.out, &state, terminal)?;
+    let report = match args.stage {
+        Some(kind) => args.stage(kind, files, &spec, &state, terminal)?,
+        None => {
+            let mut pictures = Vec::new();
+            for file in &files {
+                let name = file.display().to_string();
+                pictures.push((name, read_picture(file)?.mapv(|v| v as f32)));
+            }
+            let photographs = Photographs::new(pictures, spec.piece)?;
+            train(&photographs, &spec, &args.out, &state, terminal)?
+        }
+    };
     terminal.clear();
     if args.json {
         print_json(&report);
     } else {
         print_line!(
-            "{}: {} weights, {:.2} dB for photographs that were held out, with noise of 25 / 255",
+            "{}: {} weights, {:.2} dB for photographs that were held out{}",
             args.out.display(),
             report.weights,
-            report.held_out_psnr_db
+            report.held_out_psnr_db,
+            if args.stage.is_some() {
+                ""
+            } else {
+                ", with noise of 25 / 255"
+            }
         );
     }
     Ok(Outcome::Fine)

@@ -76,9 +76,67 @@ fn a_table_comes_out_of_photographs() {
     compare(&arguments, &out)
         .assert()
         .success()
-        .stdout(contains("| FlatCam, ours | tikhonov |").and(contains("1 photograph of 48 x 48 pixels")));
+        .stdout(contains("| FlatCam, ours | tikhonov |").and(contains("1 photograph of 48 x 48 pixels")))
+        // Nobody has given the weights of that measure: its column stays empty.
+        .stdout(contains("| SSIM | 1 - LPIPS |").and(contains(" |  | ")));
     let page = fs::read_to_string(Path::new(&out).join("compare.html")).unwrap();
     assert!(page.contains("Cameras side by side"));
     let numbers = fs::read_to_string(Path::new(&out).join("compare.json")).unwrap();
     assert!(numbers.contains("psnr_linear_db"));
+}
+
+#[test]
+fn a_last_stage_is_taught_and_used_by_its_camera_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["a.png", "b.png", "c.png"] {
+        photograph(&folder.path().join(name), 56);
+    }
+    let photographs = folder.path().display().to_string();
+    let at = |name: &str| folder.path().join("out").join(name).display().to_string();
+    let camera = ["--camera", "cameras/gt1930.toml", "--field-deg", "60", "--pixels", "48"];
+    let train = |stage: &str| {
+        let mut command = Command::cargo_bin("metalith").unwrap();
+        command
+            .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")))
+            .args(["train", &photographs, "--stage", stage, "--steps", "2", "--batch", "1"])
+            .args(["--piece", "32", "--out", &at("stage.safetensors")])
+            .args(camera);
+        command
+    };
+    train("blending")
+        .assert()
+        .code(2)
+        .stderr(contains("name it by --design"));
+    train("magic").assert().code(2).stderr(contains("no learnt last stage"));
+    train("flatnet").assert().success().stdout(contains("weights"));
+    let whole = fs::read(at("stage.safetensors")).unwrap();
+    // Pictures that are there are taken again.
+    fs::remove_file(at("stage.safetensors.state")).ok();
+    let kept = Path::new(&at("stage.safetensors.pictures")).join("000001.safetensors");
+    let before = fs::metadata(&kept).unwrap().modified().unwrap();
+    train("flatnet").assert().success();
+    assert_eq!(fs::metadata(&kept).unwrap().modified().unwrap(), before);
+    assert!(fs::read(at("stage.safetensors")).unwrap() == whole);
+
+    let learnt = ["--rivals", "flatcam", "--learnt", &at("stage.safetensors")];
+    compare(
+        &[&[photographs.as_str()], &camera[..], &learnt].concat(),
+        &at("compare"),
+    )
+    .assert()
+    .success()
+    .stdout(contains("| FlatCam, ours | FlatNet-like |"));
+    let other = ["--camera", "cameras/gt1930.toml", "--field-deg", "50", "--pixels", "48"];
+    compare(&[&[photographs.as_str()], &other[..], &learnt].concat(), &at("compare"))
+        .assert()
+        .code(2)
+        .stderr(contains("was taught for none of these cameras"));
+    fs::write(at("stage.safetensors"), &whole[..whole.len() - 1]).unwrap();
+    compare(
+        &[&[photographs.as_str()], &camera[..], &learnt].concat(),
+        &at("compare"),
+    )
+    .assert()
+    .code(2)
+    .stderr(contains("no file of weights"));
 }

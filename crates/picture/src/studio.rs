@@ -202,7 +202,7 @@ impl Studio {
     }
 
     /// Planes of a restoration in linear sRGB `[row, column, colour]`.
-    fn picture(&self, operator: &FrameOperator<'_>, planes: &[Array2<f32>]) -> Array3<f64> {
+    pub fn picture(&self, operator: &FrameOperator<'_>, planes: &[Array2<f32>]) -> Array3<f64> {
         match operator.sees_colours() {
             true => Array3::from_shape_fn((self.view.rows, self.view.columns, 3), |(y, x, c)| {
                 f64::from(planes[c][[y, x]])

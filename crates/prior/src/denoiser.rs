@@ -6,11 +6,9 @@ use metalith_core::Result;
 use ndarray::{Array2, Array3, ArrayView2, Axis};
 
 use crate::features::Features;
-use crate::network::{COLOURS, INPUTS, MULTIPLE, Network, Plan};
+use crate::network::{COLOURS, Network, Plan, Size};
+use crate::squares::{SIDE, corrected, mirrored, squares};
 use crate::weights::{read_weights, shipped_weights};
-
-/// Sides of the network's input in the picture: two pixels a square, and halves of them.
-const SIDE: usize = 2 * MULTIPLE;
 
 /// A network that takes noise out of pictures.
 #[derive(Clone, Debug)]
@@ -62,9 +60,13 @@ impl NetworkDenoiser {
         })
     }
 
-    pub(crate) fn of_weights(weights: &[f32]) -> Self {
+    fn of_weights(weights: &[f32]) -> Self {
+        Self::of_network(Network::new(&Plan::new(Size::DENOISER), weights))
+    }
+
+    pub(crate) fn of_network(network: Network) -> Self {
         Self {
-            network: Kind::Own(Network::new(&Plan::new(), weights)),
+            network: Kind::Own(network),
         }
     }
 
@@ -87,7 +89,7 @@ impl NetworkDenoiser {
             mirrored(deviation, whole(rows), whole(columns)),
         );
         let clean = match &self.network {
-            Kind::Own(network) => clean(network, picture, &deviation),
+            Kind::Own(network) => corrected(network, input(&picture, &deviation), picture),
             #[cfg(feature = "onnx")]
             Kind::Onnx(network) => network.denoise(&picture, &deviation)?,
         };
@@ -103,41 +105,10 @@ impl NetworkDenoiser {
     }
 }
 
-/// By the own network, which answers with what is to be added.
-fn clean(network: &Network, mut picture: Array3<f32>, deviation: &Array3<f32>) -> Array3<f32> {
-    let answer = network.apply(input(&picture, deviation)).shuffled();
-    for c in 0..COLOURS {
-        let mut plane = picture.index_axis_mut(Axis(2), c);
-        for (y, mut to) in plane.rows_mut().into_iter().enumerate() {
-            to.iter_mut().zip(answer.row(c, y)).for_each(|(to, v)| *to += v);
-        }
-    }
-    picture
-}
-
-/// Larger by its mirror image at the far sides.
-fn mirrored(picture: &Array3<f32>, rows: usize, columns: usize) -> Array3<f32> {
-    let (h, w, n) = picture.dim();
-    let back = |i: usize, n: usize| if i < n { i } else { (2 * n - 1).saturating_sub(i) };
-    Array3::from_shape_fn((rows, columns, n), |(y, x, c)| picture[[back(y, h), back(x, w), c]])
-}
-
 /// What the network sees.
 pub(crate) fn input(picture: &Array3<f32>, deviation: &Array3<f32>) -> Features {
-    let (rows, columns, _) = picture.dim();
-    let mut planes = Features::zero(COLOURS, rows, columns);
-    for c in 0..COLOURS {
-        planes.set(c, picture.index_axis(Axis(2), c));
-    }
-    let squares = planes.unshuffled();
-    let mut out = Features::zero(INPUTS, squares.rows, squares.columns);
-    let n = squares.values.len();
-    out.values[..n].copy_from_slice(&squares.values);
-    for c in 0..COLOURS {
-        let mean = over_squares(deviation.index_axis(Axis(2), c));
-        out.set(4 * COLOURS + c, mean.view());
-    }
-    out
+    let means: Vec<Array2<f32>> = deviation.axis_iter(Axis(2)).map(over_squares).collect();
+    squares(picture, &means)
 }
 
 /// Means over squares of 2 x 2.

@@ -1,22 +1,48 @@
 //! The network: a U of three resolutions, blocks of two convolutions each, no biases.
 //!
-//! It sees a noisy picture and a map of the noise, squares of 2 x 2 pixels as channels (Zhang, Zuo and Zhang, IEEE Trans.
-//! Image Process. 27, 4608 (2018)), and answers with what is to be added to the picture. Residual blocks
-//! between changes of resolution follow Zhang et al., IEEE Trans. Pattern Anal. Mach. Intell. 44, 6360 (2022).
+//! It sees pictures and maps that say more of them, squares of 2 x 2 pixels as channels (Zhang, Zuo and Zhang, IEEE Trans.
+//! Image Process. 27, 4608 (2018)), and answers with what is to be added to the first picture. Residual blocks
+//! between changes of resolution follow Zhang et al., IEEE Trans. Pattern Anal. Mach. Intell. 44, 6360 (2022). The denoiser
+//! sees one noisy picture and a map of its noise; the last stage of a camera several pictures of one frame.
 
 use crate::convolution::{Packed, Shape, add_weight_gradient};
 use crate::features::Features;
 
-/// Channels at a half, a quarter and an eighth of the resolution.
-const CHANNELS: [usize; 3] = [32, 64, 96];
-/// Residual blocks at each of them, on the way down and on the way up.
-const BLOCKS: usize = 2;
+/// Resolutions: a half, a quarter and an eighth of the picture's.
+const LEVELS: usize = 3;
 /// Colours of a picture.
 pub const COLOURS: usize = 3;
-/// Four pixels of each colour, and the noise of each colour.
-pub(crate) const INPUTS: usize = 4 * COLOURS + COLOURS;
 /// Rows and columns that the network takes are multiples of this, in its own resolution: half of the picture's.
-pub(crate) const MULTIPLE: usize = 1 << (CHANNELS.len() - 1);
+pub(crate) const MULTIPLE: usize = 1 << (LEVELS - 1);
+
+/// How large a network is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Size {
+    /// Channels that it sees, in its own resolution.
+    pub inputs: usize,
+    /// Channels at each resolution.
+    channels: [usize; LEVELS],
+    /// Residual blocks at each of them, on the way down and on the way up.
+    blocks: usize,
+}
+
+impl Size {
+    /// Of the denoiser: four pixels of each colour, and the noise of each colour.
+    pub const DENOISER: Self = Self {
+        inputs: 4 * COLOURS + COLOURS,
+        channels: [32, 64, 96],
+        blocks: 2,
+    };
+
+    /// Of the last stage of a camera that sees so many pictures, and one map of where it is.
+    pub fn finisher(pictures: usize) -> Self {
+        Self {
+            inputs: 4 * COLOURS * pictures + 1,
+            channels: [24, 48, 64],
+            blocks: 1,
+        }
+    }
+}
 
 /// A step of the network.
 #[derive(Clone, Copy, Debug)]
@@ -40,7 +66,7 @@ pub(crate) struct Layer {
     pub start: usize,
 }
 
-/// What the network does, without its weights.
+/// What a network does, without its weights.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
     pub layers: Vec<Layer>,
@@ -48,32 +74,37 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    /// The one there is.
-    pub fn new() -> Self {
+    /// Of a network of this size.
+    pub fn new(size: Size) -> Self {
         let mut plan = Self {
             layers: Vec::new(),
             steps: Vec::new(),
         };
-        let head = plan.layer("head", INPUTS, CHANNELS[0], 9);
+        let Size {
+            inputs,
+            channels,
+            blocks,
+        } = size;
+        let head = plan.layer("head", inputs, channels[0], 9);
         plan.steps.push(Step::Convolution(head));
-        let last = CHANNELS.len() - 1;
+        let last = LEVELS - 1;
         for level in 0..last {
-            plan.blocks(&format!("down{level}"), CHANNELS[level]);
+            plan.blocks(&format!("down{level}"), channels[level], blocks);
             let down = plan.layer(
                 &format!("down{level}.scale"),
-                4 * CHANNELS[level],
-                CHANNELS[level + 1],
+                4 * channels[level],
+                channels[level + 1],
                 1,
             );
             plan.steps.push(Step::Down(down));
         }
-        plan.blocks("middle", CHANNELS[last]);
+        plan.blocks("middle", channels[last], blocks);
         for level in (0..last).rev() {
-            let up = plan.layer(&format!("up{level}.scale"), CHANNELS[level + 1], 4 * CHANNELS[level], 1);
+            let up = plan.layer(&format!("up{level}.scale"), channels[level + 1], 4 * channels[level], 1);
             plan.steps.push(Step::Up(up));
-            plan.blocks(&format!("up{level}"), CHANNELS[level]);
+            plan.blocks(&format!("up{level}"), channels[level], blocks);
         }
-        let tail = plan.layer("tail", CHANNELS[0], 4 * COLOURS, 9);
+        let tail = plan.layer("tail", channels[0], 4 * COLOURS, 9);
         plan.steps.push(Step::Convolution(tail));
         plan
     }
@@ -88,8 +119,8 @@ impl Plan {
         self.layers.len() - 1
     }
 
-    fn blocks(&mut self, name: &str, channels: usize) {
-        for block in 0..BLOCKS {
+    fn blocks(&mut self, name: &str, channels: usize, count: usize) {
+        for block in 0..count {
             let first = self.layer(&format!("{name}.{block}.first"), channels, channels, 9);
             let second = self.layer(&format!("{name}.{block}.second"), channels, channels, 9);
             self.steps.push(Step::Residual(first, second));
@@ -146,7 +177,7 @@ impl Network {
         &weights[layer.start..layer.start + layer.shape.weights()]
     }
 
-    /// The answer of the network: `[12, rows, columns]` of `[15, rows, columns]`, both sides multiples of [`MULTIPLE`].
+    /// The answer of the network: `[12, rows, columns]` of `[inputs, rows, columns]`, both sides multiples of [`MULTIPLE`].
     pub fn apply(&self, input: Features) -> Features {
         self.walk(input, |_, _| ())
     }

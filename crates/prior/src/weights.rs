@@ -8,21 +8,52 @@ use metalith_core::file::read_at_most;
 use metalith_core::{Error, Result, WholeFile};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 
-use crate::network::{Layer, Plan};
+use crate::network::{Layer, Plan, Size};
 
 /// The weights that come with the program: see its model card, `crates/prior/weights/README.md`.
 static SHIPPED: &[u8] = include_bytes!("../weights/denoiser.safetensors");
+/// Where a file says what its weights were learnt from: one word alone, so that the same weights are the same bytes.
+const TRAINING: &str = "training";
 /// Longest file of weights (bytes): a hundred times what the network needs.
 const LONGEST: u64 = 256 << 20;
 
 /// Those that come with the program.
 pub(crate) fn shipped_weights() -> Result<Vec<f32>> {
-    parse(SHIPPED, Path::new("the shipped weights"))
+    let path = Path::new("the shipped weights");
+    parse(SHIPPED, path, &Plan::new(Size::DENOISER))
 }
 
-/// Those of a file.
+/// Those of a denoiser in a file.
 pub(crate) fn read_weights(path: &Path) -> Result<Vec<f32>> {
-    parse(&read_at_most(path, LONGEST, "a file of weights")?, path)
+    parse(&read(path)?, path, &Plan::new(Size::DENOISER))
+}
+
+/// Those of a network whose size follows from what the file says they were learnt from.
+pub(crate) fn read_described<T>(
+    path: &Path,
+    described: impl Fn(&serde_json::Value) -> Option<(T, Size)>,
+) -> Result<(T, Vec<f32>)> {
+    let bytes = read(path)?;
+    let (_, header) =
+        SafeTensors::read_metadata(&bytes).map_err(|e| fault(path, format!("it is no file of weights: {e}")))?;
+    let training = header.metadata().as_ref().and_then(|words| words.get(TRAINING));
+    let (about, size) = training
+        .and_then(|text| described(&serde_json::from_str(text).ok()?))
+        .ok_or_else(|| fault(path, "it does not say which camera its network was taught for".into()))?;
+    Ok((about, parse(&bytes, path, &Plan::new(size))?))
+}
+
+fn read(path: &Path) -> Result<Vec<u8>> {
+    read_at_most(path, LONGEST, "a file of weights")
+}
+
+fn fault(path: &Path, what: String) -> Error {
+    Error::Table {
+        path: path.to_owned(),
+        line: None,
+        what,
+        hint: "give a file that `metalith train` wrote".into(),
+    }
 }
 
 fn shape(layer: &Layer) -> Vec<usize> {
@@ -30,9 +61,9 @@ fn shape(layer: &Layer) -> Vec<usize> {
     vec![layer.shape.outputs, layer.shape.inputs, side, side]
 }
 
-/// Write weights in half precision, with words on their origin.
-pub(crate) fn write_weights(path: &Path, weights: &[f32], origin: HashMap<String, String>) -> Result<()> {
-    let plan = Plan::new();
+/// Write weights in half precision, with what they were learnt from.
+pub(crate) fn write_weights(path: &Path, plan: &Plan, weights: &[f32], training: &str) -> Result<()> {
+    let about = HashMap::from([(TRAINING.to_owned(), training.to_owned())]);
     let halves: Vec<Vec<u8>> = plan
         .layers
         .iter()
@@ -45,20 +76,13 @@ pub(crate) fn write_weights(path: &Path, weights: &[f32], origin: HashMap<String
         let view = TensorView::new(Dtype::F16, shape(layer), bytes).expect("two bytes a weight");
         (layer.name.clone(), view)
     });
-    let bytes =
-        safetensors::serialize(views, Some(origin)).map_err(|e| Error::invalid(e.to_string(), "report this"))?;
+    let bytes = safetensors::serialize(views, Some(about)).map_err(|e| Error::invalid(e.to_string(), "report this"))?;
     WholeFile::write(path, &bytes)
 }
 
-fn parse(bytes: &[u8], path: &Path) -> Result<Vec<f32>> {
-    let fault = |what: String| Error::Table {
-        path: path.to_owned(),
-        line: None,
-        what,
-        hint: "give a file that `metalith train` wrote".into(),
-    };
+fn parse(bytes: &[u8], path: &Path, plan: &Plan) -> Result<Vec<f32>> {
+    let fault = |what: String| fault(path, what);
     let file = SafeTensors::deserialize(bytes).map_err(|e| fault(format!("it is no file of weights: {e}")))?;
-    let plan = Plan::new();
     let mut weights = Vec::with_capacity(plan.weights());
     for layer in &plan.layers {
         let tensor = file

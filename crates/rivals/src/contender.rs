@@ -6,6 +6,8 @@ use metalith_picture::scene::SceneImage;
 use ndarray::Array3;
 use serde::{Deserialize, Serialize};
 
+use crate::stage::StageKind;
+
 /// One way of making a picture of a frame.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Way {
@@ -51,4 +53,18 @@ pub trait Contender {
     /// # Errors
     /// If the frame is of another camera, or the user stopped it.
     fn restore(&self, frame: &Frame, way: usize, progress: &dyn Progress) -> Result<Array3<f64>>;
+
+    /// Pictures of a frame that a learnt last stage sees, linear sRGB, in their order.
+    ///
+    /// # Errors
+    /// If there is no such stage for this camera, the frame is of another one, or the user stopped it.
+    fn pictures(&self, frame: &Frame, kind: StageKind, progress: &dyn Progress) -> Result<Vec<Array3<f64>>>;
+}
+
+/// That a camera has no such last stage.
+pub(crate) fn no_stage<T>(kind: StageKind, camera: &str) -> Result<T> {
+    Err(metalith_core::Error::invalid(
+        format!("the last stage `{}` is not for {camera}", kind.name()),
+        "flatnet is for FlatCam, unrolled-diffuser for DiffuserCam, multi-wiener and blending for arrays",
+    ))
 }

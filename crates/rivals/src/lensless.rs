@@ -7,7 +7,8 @@ use metalith_picture::spectra::{SceneSpectrum, rgb_basis};
 use metalith_picture::{ChannelColours, Frame, SceneView, channel_at, expose, gains, sensitivity};
 use ndarray::{Array2, Array3, Zip};
 
-use crate::contender::{Contender, Way};
+use crate::contender::{Contender, Way, no_stage};
+use crate::stage::{Stage, StageKind};
 
 /// A sensor in the light of scenes of one size and field, whatever stands before it.
 pub struct LenslessBench {
@@ -36,14 +37,28 @@ pub trait Lensless {
     /// # Errors
     /// If the user stopped it.
     fn sent(&self, frame: &Frame, progress: &dyn Progress) -> Result<Vec<Array2<f32>>>;
+
+    /// Which learnt last stage can follow.
+    fn stage_kind(&self) -> StageKind;
+
+    /// The one that does.
+    fn stage(&self) -> Option<&Stage>;
+
+    /// Sent light of each channel from a frame for each of the pictures that this stage sees.
+    ///
+    /// # Errors
+    /// If the user stopped it.
+    fn stage_light(&self, frame: &Frame, progress: &dyn Progress) -> Result<Vec<Vec<Array2<f32>>>>;
 }
 
 impl<T: Lensless> Contender for T {
     fn ways(&self) -> Vec<Way> {
-        vec![Way {
-            method: self.method().into(),
+        let learnt = self.stage().map(|stage| stage.kind.words());
+        let way = |method: &str| Way {
+            method: method.into(),
             joint: None,
-        }]
+        };
+        [self.method()].into_iter().chain(learnt).map(way).collect()
     }
 
     fn channel_names(&self) -> Vec<String> {
@@ -63,10 +78,25 @@ impl<T: Lensless> Contender for T {
         None
     }
 
-    fn restore(&self, frame: &Frame, _way: usize, progress: &dyn Progress) -> Result<Array3<f64>> {
+    fn restore(&self, frame: &Frame, way: usize, progress: &dyn Progress) -> Result<Array3<f64>> {
         let bench = self.bench();
+        match self.stage().filter(|_| way > 0) {
+            Some(stage) => stage.finish(&self.pictures(frame, stage.kind, progress)?),
+            None => {
+                frame.is_of(bench.frame(), bench.channels())?;
+                Ok(bench.picture(&self.sent(frame, progress)?))
+            }
+        }
+    }
+
+    fn pictures(&self, frame: &Frame, kind: StageKind, progress: &dyn Progress) -> Result<Vec<Array3<f64>>> {
+        let bench = self.bench();
+        if kind != self.stage_kind() {
+            return no_stage(kind, "a camera without a lens of another kind");
+        }
         frame.is_of(bench.frame(), bench.channels())?;
-        Ok(bench.picture(&self.sent(frame, progress)?))
+        let all = self.stage_light(frame, progress)?;
+        Ok(all.iter().map(|sent| bench.picture(sent)).collect())
     }
 }
 

@@ -12,6 +12,7 @@
 //! | what cameras without a lens have in common | `lensless` |
 //! | a mask that is a product of two sequences | `flatcam/` |
 //! | the caustic of a random surface | `diffusercam/` |
+//! | learnt last stages, what they are taught by, and pictures by Wiener filters for one of them | `stage`, `teaching`, `wiener` |
 //! | which cameras, from their files | `lineup` |
 //! | scores of all photographs | `compare` |
 //! | the table, the page | `table`, `page` |
@@ -25,7 +26,10 @@ mod flatcam;
 mod lensless;
 mod lineup;
 mod page;
+mod stage;
 mod table;
+mod teaching;
+mod wiener;
 
 pub use array::ArrayCamera;
 pub use compare::{ComparedCamera, Comparison, WayScores, compare};
@@ -34,3 +38,4 @@ pub use diffusercam::{DiffuserCam, DiffuserSpec};
 pub use flatcam::{FlatCam, MaskSpec};
 pub use lineup::{Lensless, Lineup, ListedDesign, OpenLineup};
 pub use page::write_comparison;
+pub use stage::{Stage, StageKind};

@@ -3,14 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use metalith_camera::Camera;
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Error, Progress, Result, part};
 use metalith_design::Design;
 use metalith_picture::restore::RestorationMethod;
 use metalith_picture::scene::{SceneImage, read_far_scene};
-use metalith_picture::{Assumed, KeptKernels, Studio};
+use metalith_picture::{Assumed, KeptKernels, SceneView, Studio};
+use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
 use crate::compare::{ComparedCamera, Comparison, compare};
+use crate::stage::Stage;
 use crate::{ArrayCamera, Contender, DiffuserCam, DiffuserSpec, FlatCam, MaskSpec};
 
 /// What is compared: designs, cameras without a lens, photographs, and how.
@@ -32,6 +34,12 @@ pub struct Lineup {
     /// Of the noise.
     pub seed: u64,
     pub photographs: Vec<PathBuf>,
+    /// Photographs are cut to the square of so many pixels in their middle.
+    #[serde(default)]
+    pub pixels: Option<usize>,
+    /// Weights of learnt last stages, each behind the cameras that it was taught for.
+    #[serde(default)]
+    pub learnt: Vec<PathBuf>,
 }
 
 /// A design that is compared.
@@ -60,16 +68,17 @@ pub enum Lensless {
 
 /// A lineup whose files were read.
 pub struct OpenLineup<'a> {
-    of: &'a Lineup,
-    camera: Camera,
+    pub(crate) of: &'a Lineup,
+    pub(crate) camera: Camera,
     methods: Vec<RestorationMethod>,
     /// With the camera of each.
-    designs: Vec<(Design, Camera)>,
-    photographs: Vec<SceneImage>,
+    pub(crate) designs: Vec<(Design, Camera)>,
+    pub(crate) photographs: Vec<SceneImage>,
+    pub(crate) stages: Vec<Stage>,
 }
 
 /// What is done with a camera that is ready: it, its name and words in the table, its photographs.
-type Ready<'f> = dyn FnMut(&dyn Contender, (&str, &str), &[SceneImage]) -> Result<()> + 'f;
+pub(crate) type Ready<'f> = dyn FnMut(&dyn Contender, (&str, &str), &[SceneImage]) -> Result<()> + 'f;
 
 impl Lineup {
     /// Read all files: mistakes before any work.
@@ -107,17 +116,24 @@ impl Lineup {
             Ok((Design::read(&listed.design)?, own.unwrap_or_else(|| camera.clone())))
         };
         let designs = self.designs.iter().map(own).collect::<Result<_>>()?;
-        Ok(OpenLineup {
+        let open = OpenLineup {
             of: self,
             camera,
             methods,
             designs,
             photographs,
-        })
+            stages: self.learnt.iter().map(|p| Stage::read(p)).collect::<Result<_>>()?,
+        };
+        open.stages_have_cameras()?;
+        Ok(open)
     }
 
     fn photograph(&self, path: &Path) -> Result<SceneImage> {
-        read_far_scene(path, self.field_deg)
+        let scene = read_far_scene(path, self.field_deg)?;
+        match self.pixels {
+            Some(pixels) => middle(scene, pixels),
+            None => Ok(scene),
+        }
     }
 
     /// Rows of the table: of each design one, or two with the assumptions of the paper, then those without a lens.
@@ -128,6 +144,23 @@ impl Lineup {
     fn kinds(&self) -> usize {
         1 + usize::from(self.paper)
     }
+}
+
+/// The square of so many pixels in the middle of a scene.
+fn middle(mut scene: SceneImage, pixels: usize) -> Result<SceneImage> {
+    let SceneView { rows, columns, .. } = scene.view;
+    if rows.min(columns) < pixels {
+        return Err(Error::invalid(
+            format!("`{}` has {columns} x {rows} pixels, fewer than {pixels}", scene.name),
+            "give a smaller --pixels, or larger photographs",
+        ));
+    }
+    let (top, left) = ((rows - pixels) / 2, (columns - pixels) / 2);
+    let cut = |plane: &Array2<f32>| part(plane.view(), top..top + pixels, left..left + pixels).to_owned();
+    scene.planes = scene.planes.iter().map(cut).collect();
+    scene.depth_um = scene.depth_um.as_ref().map(cut);
+    (scene.view.rows, scene.view.columns) = (pixels, pixels);
+    Ok(scene)
 }
 
 impl OpenLineup<'_> {
@@ -181,11 +214,18 @@ impl OpenLineup<'_> {
         }
     }
 
-    fn ready(&self, k: usize, kept: &KeptKernels, progress: &dyn Progress, then: &mut Ready<'_>) -> Result<()> {
+    /// Make camera `k` ready and use it.
+    pub(crate) fn ready(
+        &self,
+        k: usize,
+        kept: &KeptKernels,
+        progress: &dyn Progress,
+        then: &mut Ready<'_>,
+    ) -> Result<()> {
         let kinds = self.of.kinds();
         match k.checked_sub(self.designs.len() * kinds) {
             None => self.ready_design(k / kinds, k % kinds == 1, kept, progress, then),
-            Some(k) => self.ready_lensless(&self.of.lensless[k], progress, then),
+            Some(k) => self.ready_lensless(k, progress, then),
         }
     }
 
@@ -212,7 +252,7 @@ impl OpenLineup<'_> {
                 camera.name,
                 design.elements().len()
             );
-            let ready = ArrayCamera::new(&studio, &self.methods, self.of.separate);
+            let ready = ArrayCamera::new(&studio, &self.methods, self.of.separate).with_stages(self.stages_of(k)?);
             return then(&ready, (name, &words), &photographs);
         }
         let narrow = studio.open_without_dispersion(design, &listed.layout, None, first, kept, progress)?;
@@ -226,15 +266,16 @@ impl OpenLineup<'_> {
         then(&ready, (&format!("{name}, paper's assumptions"), &words), &photographs)
     }
 
-    fn ready_lensless(&self, spec: &Lensless, progress: &dyn Progress, then: &mut Ready<'_>) -> Result<()> {
+    fn ready_lensless(&self, k: usize, progress: &dyn Progress, then: &mut Ready<'_>) -> Result<()> {
         let view = self.photographs[0].view;
-        match spec {
+        let stage = self.stages_of(self.designs.len() + k)?.pop();
+        match &self.of.lensless[k] {
             Lensless::FlatCam(mask) => {
                 let words = format!(
                     "a mask in place of a lens, the product of two sequences of maximum length (511 members of {} um), {} um before the sensor; Tikhonov in closed form by singular values.",
                     mask.feature_um, mask.distance_um
                 );
-                let ready = FlatCam::new(mask, &self.camera, view, progress)?;
+                let ready = FlatCam::new(mask, &self.camera, view, progress)?.with_stage(stage);
                 then(&ready, ("FlatCam, ours", &words), &self.photographs)
             }
             Lensless::DiffuserCam(spec) => {
@@ -242,7 +283,7 @@ impl OpenLineup<'_> {
                     "a random smooth surface in place of a lens, numbers {} um apart, {} um before the sensor, its opening {} of the sensor along each axis; caustic by rays; total variation with the crop (ADMM).",
                     spec.grain_um, spec.distance_um, spec.opening
                 );
-                let ready = DiffuserCam::new(spec, &self.camera, view, progress)?;
+                let ready = DiffuserCam::new(spec, &self.camera, view, progress)?.with_stage(stage);
                 then(&ready, ("DiffuserCam, ours", &words), &self.photographs)
             }
         }

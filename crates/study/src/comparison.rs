@@ -117,7 +117,7 @@ fn key(lineup: &Lineup) -> Result<String> {
             files.extend(Camera::read(camera)?.files);
         }
     }
-    files.extend(lineup.photographs.iter().cloned());
+    files.extend(lineup.photographs.iter().chain(&lineup.learnt).cloned());
     for path in files {
         hash.update(file_digest(&path)?);
     }
@@ -164,6 +164,7 @@ fn placed(lineup: &Lineup) -> Result<Lineup> {
         camera: absolute(&lineup.camera)?,
         designs: lineup.designs.iter().map(design).collect::<Result<_>>()?,
         photographs: lineup.photographs.iter().map(|p| absolute(p)).collect::<Result<_>>()?,
+        learnt: lineup.learnt.iter().map(|p| absolute(p)).collect::<Result<_>>()?,
         ..lineup.clone()
     })
 }

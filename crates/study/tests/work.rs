@@ -186,6 +186,8 @@ fn cameras_of_shards_are_those_of_one_comparison() {
         field_deg: 50.0,
         seed: 2,
         photographs: (1..4).map(|k| image(folder.path(), k)).collect(),
+        pixels: None,
+        learnt: Vec::new(),
     };
     let planned = plan_comparison(&lineup, &at("parts"), &Silent).unwrap();
     assert_eq!(planned.cut().shards(), 3);

@@ -33,6 +33,7 @@ use crate::operator::FrameOperator;
 
 pub use learned::LearnedDenoiser;
 pub use prior::{SceneStatistics, squared_frequencies};
+pub use separate::{Blend, restore_each, without_veil};
 pub use slope::SlopeDenoiser;
 pub use splitting::{Denoiser, Schedule};
 

@@ -6,61 +6,143 @@ use ndarray::{Array2, Zip};
 use super::normal::Planes;
 use super::{Recorded, RestorationMethod, restore_by};
 
-/// An element alone knows nothing of the light that others bring to its pixels. The veil of a grey scene with the light
-/// of the frame is subtracted; what neighbours' sub-images overlap stays.
+/// The blend of pictures by how much each is to be trusted at each place.
+pub struct Blend {
+    sums: Planes,
+    trusts: Planes,
+}
+
+impl Blend {
+    /// Of nothing yet.
+    pub fn new(shape: (usize, usize), planes: usize) -> Self {
+        let black = || vec![Array2::zeros(shape); planes];
+        Self {
+            sums: black(),
+            trusts: black(),
+        }
+    }
+
+    /// Add a picture, and one over the variance of each of its values.
+    pub fn add(&mut self, picture: &[Array2<f32>], trust: &[Array2<f32>]) {
+        let to = self.sums.iter_mut().zip(&mut self.trusts);
+        for (((sum, all), p), t) in to.zip(picture).zip(trust) {
+            Zip::from(sum).and(all).and(p).and(t).for_each(|sum, all, p, t| {
+                *sum += t * p;
+                *all += t;
+            });
+        }
+    }
+
+    /// The blend, black where no picture says anything.
+    pub fn finished(mut self) -> Planes {
+        for (sum, all) in self.sums.iter_mut().zip(&self.trusts) {
+            Zip::from(sum)
+                .and(all)
+                .for_each(|s, t| *s = if *t > 0.0 { *s / t } else { 0.0 });
+        }
+        self.sums
+    }
+}
+
+/// Restore by each element alone, then blend.
 pub fn restore(recorded: &Recorded<'_>, method: RestorationMethod, progress: &dyn Progress) -> Result<Planes> {
     let operator = recorded.operator;
+    let mut blend = Blend::new((operator.view().rows, operator.view().columns), operator.inputs());
+    restore_each(recorded, method, progress, &mut |picture, trust| {
+        blend.add(picture, trust)
+    })?;
+    Ok(blend.finished())
+}
+
+/// What light of other elements differs from that of a grey scene, as a share of it: about the deviation of natural scenes over their mean.
+const OTHERS_UNKNOWN: f32 = 1.0;
+
+/// Restore by each element alone: `take` gets its picture and how much it is to be trusted at each place, one over the variance that
+/// noise leaves, both as planes of the operator. Elements that see nothing of the scene are left out.
+///
+/// An element alone knows nothing of the light that others bring to its pixels. That of a grey scene with the light of the frame is
+/// subtracted, and what others' sub-images may bring beside it counts as noise: pixels that two elements share say little to either. Without
+/// it each picture has bright edges where the others' begin.
+///
+/// # Errors
+/// If the user stopped it.
+pub fn restore_each(
+    recorded: &Recorded<'_>,
+    method: RestorationMethod,
+    progress: &dyn Progress,
+    take: &mut dyn FnMut(&Planes, &Planes),
+) -> Result<()> {
+    let operator = recorded.operator;
+    let grey = GreyLight::of(recorded);
     let view = operator.view();
     let ones = vec![Array2::<f32>::ones((view.rows, view.columns)); operator.inputs()];
-    let all: Vec<usize> = (0..operator.elements()).collect();
-    let with = operator.apply_elements(&ones, &all, true);
-    let without = operator.apply_elements(&ones, &all, false);
-    let light: Planes = (0..with.len())
-        .map(|c| {
-            let known = |f: &Array2<f32>| {
-                let pairs = f.iter().zip(&recorded.trust[c]).filter(|(_, t)| **t > 0.0);
-                pairs.map(|(v, _)| f64::from(*v)).sum::<f64>()
-            };
-            let level = (known(&recorded.light[c]) / known(&with[c]).max(f64::MIN_POSITIVE)) as f32;
-            Zip::from(&recorded.light[c])
-                .and(&with[c])
-                .and(&without[c])
-                .map_collect(|s, a, b| s - level * (a - b))
-        })
-        .collect();
-    let shape = (view.rows, view.columns);
-    let mut sums: Planes = vec![Array2::zeros(shape); operator.inputs()];
-    let mut weights: Planes = vec![Array2::zeros(shape); operator.inputs()];
-    for element in all {
-        let own = Recorded {
-            operator,
-            light: &light,
-            trust: recorded.trust,
-            prior: recorded.prior,
-        };
+    for element in 0..operator.elements() {
         let seen = operator.apply_elements(&ones, &[element], false);
-        let weighted: Planes = seen.iter().zip(recorded.trust).map(|(s, t)| s * t).collect();
-        // One over the variance that noise leaves: the light that this element sends to pixels that are trusted.
+        let (mut light, mut trust) = (grey.without_veil(recorded), recorded.trust.to_vec());
+        for c in 0..light.len() {
+            let others = (&grey.images[c] - &seen[c]) * grey.level[c];
+            light[c] -= &others;
+            Zip::from(&mut trust[c]).and(&others).for_each(|t, o| {
+                *t /= 1.0 + *t * (OTHERS_UNKNOWN * o).powi(2);
+            });
+        }
+        let weighted: Planes = seen.iter().zip(&trust).map(|(s, t)| s * t).collect();
+        // The light that this element sends to pixels that are trusted.
         let weight = operator.adjoint_elements(&weighted, &[element], false);
         if weight.iter().flatten().all(|w| *w <= 0.0) {
             continue;
         }
-        let picture = restore_by(&own, method, &[element], false, progress)?;
-        for c in 0..sums.len() {
-            Zip::from(&mut sums[c])
-                .and(&mut weights[c])
-                .and(&picture[c])
-                .and(&weight[c])
-                .for_each(|s, w, p, v| {
-                    *s += v * p;
-                    *w += v;
-                });
+        let own = Recorded {
+            operator,
+            light: &light,
+            trust: &trust,
+            prior: recorded.prior,
+        };
+        take(&restore_by(&own, method, &[element], false, progress)?, &weight);
+    }
+    Ok(())
+}
+
+/// Light of a frame less the veil that a grey scene of as much light as the frame has would bring.
+pub fn without_veil(recorded: &Recorded<'_>) -> Planes {
+    GreyLight::of(recorded).without_veil(recorded)
+}
+
+/// What a white scene would bring, and how grey the scene of a frame is.
+struct GreyLight {
+    /// Of all sub-images, by channel.
+    images: Planes,
+    veil: Planes,
+    /// Light of the frame over that of a white scene, by channel.
+    level: Vec<f32>,
+}
+
+impl GreyLight {
+    fn of(recorded: &Recorded<'_>) -> Self {
+        let operator = recorded.operator;
+        let view = operator.view();
+        let ones = vec![Array2::<f32>::ones((view.rows, view.columns)); operator.inputs()];
+        let all: Vec<usize> = (0..operator.elements()).collect();
+        let with = operator.apply_elements(&ones, &all, true);
+        let images = operator.apply_elements(&ones, &all, false);
+        let level = |c: usize| {
+            let known = |f: &Array2<f32>| {
+                let pairs = f.iter().zip(&recorded.trust[c]).filter(|(_, t)| **t > 0.0);
+                pairs.map(|(v, _)| f64::from(*v)).sum::<f64>()
+            };
+            (known(&recorded.light[c]) / known(&with[c]).max(f64::MIN_POSITIVE)) as f32
+        };
+        Self {
+            level: (0..with.len()).map(level).collect(),
+            veil: with.iter().zip(&images).map(|(a, b)| a - b).collect(),
+            images,
         }
     }
-    for (sum, weight) in sums.iter_mut().zip(&weights) {
-        Zip::from(sum)
-            .and(weight)
-            .for_each(|s, w| *s = if *w > 0.0 { *s / w } else { 0.0 });
+
+    fn without_veil(&self, recorded: &Recorded<'_>) -> Planes {
+        let channels = recorded.light.iter().zip(&self.veil).zip(&self.level);
+        channels
+            .map(|((light, veil), level)| Zip::from(light).and(veil).map_collect(|s, v| s - level * v))
+            .collect()
     }
-    Ok(sums)
 }

@@ -10,8 +10,23 @@ use num_complex::Complex32;
 
 use super::grid::{CoarseGrid, inverse, transformed};
 
-/// Rounds of all steps.
-pub const ROUNDS: usize = 80;
+/// How far a scene is sought, and how strongly slopes are held down.
+#[derive(Clone, Copy, Debug)]
+pub struct Descent {
+    /// Of all steps.
+    pub rounds: usize,
+    /// The penalty of slopes over that which follows from the noise.
+    pub slopes: f32,
+}
+
+impl Descent {
+    /// To the end, by the noise.
+    pub const WHOLE: Self = Self {
+        rounds: 80,
+        slopes: 1.0,
+    };
+}
+
 /// Root mean square slope that is expected of a channel from one place to the next: photographs have 0.043 between
 /// neighbouring pixels of 576, and twice as much between every second.
 const EXPECTED_SLOPE: f64 = 0.075;
@@ -69,11 +84,18 @@ impl Deconvolution {
     ///
     /// # Errors
     /// If the user stopped it.
-    pub fn solve(&self, data: &Array2<f32>, variance: f64, progress: &dyn Progress) -> Result<Array2<f32>> {
+    pub fn solve(
+        &self,
+        data: &Array2<f32>,
+        variance: f64,
+        descent: Descent,
+        progress: &dyn Progress,
+    ) -> Result<Array2<f32>> {
         let n = self.grid.size;
         let [rows, columns] = self.grid.data;
         let [scene_rows, scene_columns] = self.grid.scene();
-        let slope_weight = (PENALTY * variance / EXPECTED_SLOPE.powi(2)).max(LEAST_SLOPES) as f32;
+        let by_noise = (PENALTY * variance / EXPECTED_SLOPE.powi(2)).max(LEAST_SLOPES) as f32;
+        let slope_weight = descent.slopes * by_noise;
         let threshold = (std::f64::consts::SQRT_2 * EXPECTED_SLOPE / PENALTY) as f32;
         let (crop, border) = (CROP as f32, BORDER as f32 * slope_weight);
         let zero = || Array2::<f32>::zeros((n, n));
@@ -81,7 +103,7 @@ impl Deconvolution {
         // Prices of the three splits, in units of their penalties.
         let (mut crop_price, mut border_price) = (zero(), zero());
         let mut slope_price = [zero(), zero()];
-        for _ in 0..ROUNDS {
+        for _ in 0..descent.rounds {
             if progress.stopped() {
                 return Err(Error::Interrupted);
             }

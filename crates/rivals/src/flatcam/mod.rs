@@ -18,6 +18,7 @@ use ndarray::{Array2, Axis, Slice};
 use rayon::prelude::*;
 
 use crate::lensless::{Lensless, LenslessBench};
+use crate::stage::{PICTURES, Stage, StageKind};
 pub use mask::MaskSpec;
 use mask::Shadow;
 use solve::{Factor, TwoFactors};
@@ -27,6 +28,9 @@ const STEP_NM: f64 = 25.0;
 /// Strengths of the prior that are tried on a random scene: powers of ten from the first to the last, relative to the
 /// largest singular value, in steps.
 const STRENGTHS: ([f64; 2], usize) = ([-9.0, -1.0], 17);
+/// Strengths of the pictures that the learnt last stage sees, over the chosen one: that one first. What it does with them is a filter of
+/// singular values of its own, as these pictures can be added with any weights.
+const STAGE_STRENGTHS: [f64; PICTURES] = [1.0, 0.1, 10.0, 0.01, 100.0];
 /// Of the random scene and of its noise.
 const SEED: u64 = 1;
 
@@ -39,6 +43,7 @@ pub struct FlatCam {
     systems: Vec<Vec<([usize; 2], TwoFactors)>>,
     /// By channel.
     strength: Vec<f64>,
+    stage: Option<Stage>,
 }
 
 impl FlatCam {
@@ -104,11 +109,19 @@ impl FlatCam {
             shadows,
             systems,
             strength: Vec::new(),
+            stage: None,
         };
         let white = camera.light(&camera.bench.white());
         camera.bench = camera.bench.exposed(&white)?;
         camera.strength = camera.chosen_strengths();
         Ok(camera)
+    }
+
+    /// With a learnt last stage behind it.
+    #[must_use]
+    pub fn with_stage(mut self, stage: Option<Stage>) -> Self {
+        self.stage = stage;
+        self
     }
 
     /// By channel, the strength that restores a random scene best.
@@ -126,31 +139,50 @@ impl FlatCam {
         (0..self.bench.channels())
             .into_par_iter()
             .map(|c| {
-                let error = |strength: &f64| -> f64 {
-                    let picture = self.bench.unsent(&[self.solved(c, &light[c], *strength)]).remove(0);
+                let error = |sent: Array2<f32>| -> f64 {
+                    let picture = self.bench.unsent(&[sent]).remove(0);
                     let off = picture.iter().zip(&truth[c]);
                     off.map(|(a, b)| f64::from(a - b).powi(2)).sum()
                 };
-                let errors = tried.iter().map(error);
+                let errors = self.solved(c, &light[c], &tried).into_iter().map(error);
                 let best = errors.zip(&tried).min_by(|a, b| a.0.total_cmp(&b.0));
                 best.map_or(tried[0], |(_, strength)| *strength)
             })
             .collect()
     }
 
-    /// Sent light of a channel, the mean over the places of its pixels.
-    fn solved(&self, channel: usize, light: &Array2<f32>, strength: f64) -> Array2<f32> {
+    /// Sent light of a channel, the mean over the places of its pixels, for each strength.
+    fn solved(&self, channel: usize, light: &Array2<f32>, strengths: &[f64]) -> Vec<Array2<f32>> {
         let view = &self.bench.view;
         let places = &self.systems[channel];
-        let mut sum = Array2::<f32>::zeros((view.rows, view.columns));
+        let mut sums = vec![Array2::<f32>::zeros((view.rows, view.columns)); strengths.len()];
         for ([row, column], system) in places {
             let mut own = light.view();
             own.slice_axis_inplace(Axis(0), Slice::new(*row as isize, None, 2));
             own.slice_axis_inplace(Axis(1), Slice::new(*column as isize, None, 2));
-            sum += &system.solve(&own, strength);
+            let solved = system.solve(&own, strengths);
+            sums.iter_mut().zip(&solved).for_each(|(sum, own)| *sum += own);
         }
         let scale = (view.rows * view.columns) as f32 / places.len() as f32;
-        sum.mapv(|v| v * scale)
+        sums.into_iter().map(|sum| sum.mapv(|v| v * scale)).collect()
+    }
+
+    /// By relative strength, sent light of each channel.
+    fn sent_by(&self, frame: &Frame, relative: &[f64], progress: &dyn Progress) -> Vec<Vec<Array2<f32>>> {
+        progress.begin("restoring", self.bench.channels() as u64);
+        let (light, _) = frame.light(&self.bench.camera, &OperatorError::none(self.bench.channels()));
+        let by_channel: Vec<Vec<Array2<f32>>> = light
+            .par_iter()
+            .enumerate()
+            .map(|(c, l)| {
+                let strengths: Vec<f64> = relative.iter().map(|r| r * self.strength[c]).collect();
+                let own = self.solved(c, l, &strengths);
+                progress.advance(1);
+                own
+            })
+            .collect();
+        let one = |k: usize| by_channel.iter().map(|own| own[k].clone()).collect();
+        (0..relative.len()).map(one).collect()
     }
 }
 
@@ -202,18 +234,19 @@ impl Lensless for FlatCam {
     }
 
     fn sent(&self, frame: &Frame, progress: &dyn Progress) -> Result<Vec<Array2<f32>>> {
-        progress.begin("restoring", self.bench.channels() as u64);
-        let (light, _) = frame.light(&self.bench.camera, &OperatorError::none(self.bench.channels()));
-        let sent = light
-            .par_iter()
-            .enumerate()
-            .map(|(c, l)| {
-                let own = self.solved(c, l, self.strength[c]);
-                progress.advance(1);
-                own
-            })
-            .collect();
-        Ok(sent)
+        Ok(self.sent_by(frame, &[1.0], progress).remove(0))
+    }
+
+    fn stage_kind(&self) -> StageKind {
+        StageKind::FlatNet
+    }
+
+    fn stage(&self) -> Option<&Stage> {
+        self.stage.as_ref()
+    }
+
+    fn stage_light(&self, frame: &Frame, progress: &dyn Progress) -> Result<Vec<Vec<Array2<f32>>>> {
+        Ok(self.sent_by(frame, &STAGE_STRENGTHS, progress))
     }
 }
 
@@ -237,5 +270,9 @@ mod tests {
         let found = scores(&picture, &flat.truth(&scene)).unwrap()[0];
         assert!(found.psnr_linear_db > LEAST_DB, "{found:?}");
         assert!(flat.record(&small(40, 300, 260).1, 1).is_err());
+        // The first picture of the last stage is this one, the others are of other strengths.
+        let all = flat.pictures(&frame, StageKind::FlatNet, &Silent).unwrap();
+        assert!(all.len() == PICTURES && all[0] == picture && all[1] != picture);
+        assert!(flat.pictures(&frame, StageKind::Blending, &Silent).is_err());
     }
 }

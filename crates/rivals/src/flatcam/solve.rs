@@ -65,19 +65,21 @@ impl TwoFactors {
 
     /// The picture X that is likeliest for pixels Y, if both are normal: noise of one variance, and a picture whose
     /// covariance is a product of both axes. `strength` is the noise over the picture, of the largest singular value, squared.
-    pub fn solve(&self, pixels: &ArrayView2<'_, f32>, strength: f64) -> Array2<f32> {
+    /// One picture for each strength.
+    pub fn solve(&self, pixels: &ArrayView2<'_, f32>, strengths: &[f64]) -> Vec<Array2<f32>> {
         let y = Mat::from_fn(pixels.nrows(), pixels.ncols(), |i, j| f64::from(pixels[[i, j]]));
-        let mut modes = self.down.left.transpose() * y * &self.across.left;
+        let modes = self.down.left.transpose() * y * &self.across.left;
         let largest = self.down.values[0] * self.across.values[0];
-        let noise = strength * largest * largest;
-        for j in 0..modes.ncols() {
-            for i in 0..modes.nrows() {
+        let solved = |strength: &f64| {
+            let noise = strength * largest * largest;
+            let filtered = Mat::from_fn(modes.nrows(), modes.ncols(), |i, j| {
                 let s = self.down.values[i] * self.across.values[j];
-                modes[(i, j)] *= s / (s * s + noise);
-            }
-        }
-        let picture = &self.down.right * modes * self.across.right.transpose();
-        Array2::from_shape_fn((picture.nrows(), picture.ncols()), |at| picture[at] as f32)
+                modes[(i, j)] * s / (s * s + noise)
+            });
+            let picture = &self.down.right * filtered * self.across.right.transpose();
+            Array2::from_shape_fn((picture.nrows(), picture.ncols()), |at| picture[at] as f32)
+        };
+        strengths.iter().map(solved).collect()
     }
 }
 
@@ -95,7 +97,7 @@ mod tests {
         let pixels = Array2::from_shape_fn((20, 18), |(i, j)| ((i * 5 + j * 3) % 17) as f32 / 17.0);
         let two = TwoFactors::new(Factor::new(&a, 1).unwrap(), Factor::new(&b, 0).unwrap());
         let strength = 1e-3;
-        let x = two.solve(&pixels.view(), strength);
+        let x = two.solve(&pixels.view(), &[strength]).remove(0);
         let noise = strength * (two.down.values[0] * two.across.values[0]).powi(2);
         // A* (Y - A X B^T) B = noise C1^-1 X C2^-1, multiplied by both covariances.
         let own = |m: &Mat<f64>, first: usize, rows: usize| Mat::from_fn(rows, n, |i, j| m[(2 * i + first, j)]);

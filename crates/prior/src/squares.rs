@@ -1,0 +1,49 @@
+//! Pictures as a network sees them, and what it makes of them.
+
+use ndarray::{Array2, Array3, Axis};
+
+use crate::features::Features;
+use crate::network::{COLOURS, MULTIPLE, Network};
+
+/// Sides of a network's input in the picture: two pixels a square, and halves of them.
+pub(crate) const SIDE: usize = 2 * MULTIPLE;
+
+/// Planes `[row, column, plane]` of pictures, four pixels of a square as channels, and maps of half as many rows and columns.
+pub(crate) fn squares(pictures: &Array3<f32>, maps: &[Array2<f32>]) -> Features {
+    let (rows, columns, count) = pictures.dim();
+    let mut planes = Features::zero(count, rows, columns);
+    for (c, plane) in pictures.axis_iter(Axis(2)).enumerate() {
+        planes.set(c, plane);
+    }
+    let small = planes.unshuffled();
+    let mut out = Features::zero(small.channels + maps.len(), small.rows, small.columns);
+    out.values[..small.values.len()].copy_from_slice(&small.values);
+    for (k, map) in maps.iter().enumerate() {
+        out.set(small.channels + k, map.view());
+    }
+    out
+}
+
+/// A picture with what the network answers added to it.
+pub(crate) fn corrected(network: &Network, input: Features, mut picture: Array3<f32>) -> Array3<f32> {
+    let answer = network.apply(input).shuffled();
+    for c in 0..COLOURS {
+        let mut plane = picture.index_axis_mut(Axis(2), c);
+        for (y, mut to) in plane.rows_mut().into_iter().enumerate() {
+            to.iter_mut().zip(answer.row(c, y)).for_each(|(to, v)| *to += v);
+        }
+    }
+    picture
+}
+
+/// Larger by its mirror image at the far sides.
+pub(crate) fn mirrored(picture: &Array3<f32>, rows: usize, columns: usize) -> Array3<f32> {
+    let (h, w, n) = picture.dim();
+    let back = |i: usize, n: usize| if i < n { i } else { (2 * n - 1).saturating_sub(i) };
+    Array3::from_shape_fn((rows, columns, n), |(y, x, c)| picture[[back(y, h), back(x, w), c]])
+}
+
+/// A piece of so many rows, columns and planes from a place on; the first planes alone.
+pub(crate) fn cut<T: Copy>(planes: &Array3<T>, place: [usize; 2], size: [usize; 3]) -> Array3<T> {
+    Array3::from_shape_fn(size, |(y, x, c)| planes[[place[0] + y, place[1] + x, c]])
+}

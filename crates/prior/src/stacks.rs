@@ -1,0 +1,266 @@
+//! What the last stage of a camera learns from: pictures of frames, and the scenes that they are of.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use half::f16;
+use metalith_core::file::read_at_most;
+use metalith_core::text::hex;
+use metalith_core::{Error, Result, WholeFile};
+use ndarray::{Array2, Array3, Axis, concatenate};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use sha2::{Digest, Sha256};
+
+use crate::features::Features;
+use crate::finisher::{Finisher, STAGE, Taught};
+use crate::learning::{Lesson, Lessons, TrainingSpec, psnr_db};
+use crate::network::{COLOURS, Network, Size};
+use crate::squares::{cut, squares};
+
+/// Longest file of the pictures of a frame (bytes).
+const LONGEST: u64 = 4 << 30;
+/// Tensors in such a file.
+const NAMES: [&str; 2] = ["pictures", "clean"];
+/// One frame of so many is held out, and at least one.
+const HELD_OUT: usize = 12;
+
+/// The pictures of one frame and its scene, all in sRGB values, in half precision.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stack {
+    /// `[row, column, colour]`, picture after picture.
+    pictures: Array3<f16>,
+    clean: Array3<f16>,
+}
+
+impl Stack {
+    /// Of pictures `[row, column, colour]` and the clean one, all of one size; the first picture is the one that is corrected.
+    ///
+    /// # Errors
+    /// If there is no picture, or one has another size.
+    pub fn new(pictures: &[Array3<f32>], clean: &Array3<f32>) -> Result<Self> {
+        Ok(Self {
+            pictures: piled(pictures, clean.dim())?.mapv(f16::from_f32),
+            clean: clean.mapv(f16::from_f32),
+        })
+    }
+
+    /// Keep it in a file, with what it is of.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(&self, path: &Path, of: &str) -> Result<()> {
+        let bytes = [&self.pictures, &self.clean].map(|planes| planes.iter().flat_map(|v| v.to_le_bytes()).collect());
+        let about = HashMap::from([
+            ("of".to_owned(), of.to_owned()),
+            ("sha256".to_owned(), digest(&bytes, of)),
+        ]);
+        let shapes = [&self.pictures, &self.clean].map(|planes| planes.shape().to_vec());
+        let views = NAMES.iter().zip(shapes).zip(&bytes).map(|((name, shape), bytes)| {
+            let view = TensorView::new(Dtype::F16, shape, bytes).expect("two bytes a number");
+            (*name, view)
+        });
+        let file =
+            safetensors::serialize(views, Some(about)).map_err(|e| Error::invalid(e.to_string(), "report this"))?;
+        WholeFile::write(path, &file)
+    }
+
+    /// The one that a file keeps, if it is whole and of the same; else it has to be made again.
+    pub fn kept(path: &Path, of: &str) -> Option<Self> {
+        let file = read_at_most(path, LONGEST, "pictures of a frame").ok()?;
+        let (_, header) = SafeTensors::read_metadata(&file).ok()?;
+        let about = header.metadata().as_ref()?;
+        let tensors = SafeTensors::deserialize(&file).ok()?;
+        let [pictures, clean] = NAMES.map(|name| {
+            let tensor = tensors.tensor(name).ok()?;
+            let [rows, columns, planes] = *tensor.shape() else {
+                return None;
+            };
+            let values = tensor
+                .data()
+                .as_chunks()
+                .0
+                .iter()
+                .map(|b| f16::from_le_bytes(*b))
+                .collect();
+            Array3::from_shape_vec((rows, columns, planes), values).ok()
+        });
+        let kept = Self {
+            pictures: pictures?,
+            clean: clean?,
+        };
+        let bytes = [&kept.pictures, &kept.clean].map(|planes| planes.iter().flat_map(|v| v.to_le_bytes()).collect());
+        let same = about.get("of").is_some_and(|o| o == of) && about.get("sha256") == Some(&digest(&bytes, of));
+        let (rows, columns, planes) = kept.clean.dim();
+        let fits = planes == COLOURS && (rows, columns) == (kept.pictures.dim().0, kept.pictures.dim().1);
+        (same && fits).then_some(kept)
+    }
+
+    /// All numbers in their order: pictures pixel by pixel, then the clean one.
+    fn values(&self) -> impl Iterator<Item = f16> {
+        self.pictures.iter().chain(&self.clean).copied()
+    }
+
+    /// How many pictures there are of the frame.
+    pub fn pictures(&self) -> usize {
+        self.pictures.dim().2 / COLOURS
+    }
+
+    /// Rows and columns.
+    pub fn size(&self) -> [usize; 2] {
+        let (rows, columns, _) = self.clean.dim();
+        [rows, columns]
+    }
+}
+
+/// SHA-256 of what is kept of a frame.
+fn digest(bytes: &[Vec<u8>; 2], of: &str) -> String {
+    let mut hasher = Sha256::new();
+    bytes.iter().for_each(|b| hasher.update(b));
+    hasher.update(of);
+    hex(&hasher.finalize())
+}
+
+/// Pictures behind one another: `[row, column, colour]`.
+pub(crate) fn piled(pictures: &[Array3<f32>], size: (usize, usize, usize)) -> Result<Array3<f32>> {
+    if pictures.is_empty() || pictures.iter().any(|p| p.dim() != size) || size.2 != COLOURS {
+        return Err(Error::invalid(
+            "pictures of one frame that differ in size, or none",
+            "give pictures in colour of the size of the scene",
+        ));
+    }
+    let views: Vec<_> = pictures.iter().map(|p| p.view()).collect();
+    Ok(concatenate(Axis(2), &views).expect("all are of one size"))
+}
+
+/// What the last stage sees of a piece of such pictures whose first pixel is at `place` of a whole of so many rows and columns: the
+/// squared distance from its middle, a corner's being one, tells where it is.
+pub(crate) fn seen(piece: &Array3<f32>, place: [usize; 2], whole: [usize; 2]) -> Features {
+    let (rows, columns, _) = piece.dim();
+    let from_middle = |i: usize, a: usize| {
+        let half = 0.5 * whole[a] as f32;
+        ((place[a] + 2 * i + 1) as f32 - half) / half
+    };
+    let map = Array2::from_shape_fn((rows / 2, columns / 2), |(y, x)| {
+        0.5 * (from_middle(y, 0).powi(2) + from_middle(x, 1).powi(2))
+    });
+    squares(piece, &[map])
+}
+
+/// Stacks of one camera to learn from, and others to be judged by.
+#[derive(Clone, Debug)]
+pub struct Stacks {
+    learnt: Vec<Stack>,
+    held_out: Vec<Stack>,
+    taught: Taught,
+}
+
+impl Stacks {
+    /// Of what a network is taught for; every twelfth is held out.
+    ///
+    /// # Errors
+    /// If there are fewer than two, one has another number of pictures, or is smaller than a piece.
+    pub fn new(stacks: Vec<Stack>, taught: Taught, piece: usize) -> Result<Self> {
+        let fits = |s: &Stack| s.pictures() == taught.pictures && s.size().iter().all(|n| *n >= piece);
+        if stacks.len() < 2 || !stacks.iter().all(fits) {
+            return Err(Error::invalid(
+                format!("{} frames, or frames too small, to learn from", stacks.len()),
+                format!("give at least two photographs of {piece} x {piece} pixels or more"),
+            ));
+        }
+        let (mut learnt, mut held_out) = (Vec::new(), Vec::new());
+        for (i, stack) in stacks.into_iter().enumerate() {
+            match i % HELD_OUT == 0 {
+                true => held_out.push(stack),
+                false => learnt.push(stack),
+            }
+        }
+        Ok(Self {
+            learnt,
+            held_out,
+            taught,
+        })
+    }
+
+    /// What the network is taught for.
+    pub fn taught(&self) -> &Taught {
+        &self.taught
+    }
+
+    /// SHA-256 of all pixels.
+    fn digest(&self) -> String {
+        let mut hasher = Sha256::new();
+        for stack in self.learnt.iter().chain(&self.held_out) {
+            hasher.update(stack.size().map(|n| (n as u64).to_le_bytes()).concat());
+            stack.values().for_each(|v| hasher.update(v.to_le_bytes()));
+        }
+        hex(&hasher.finalize())
+    }
+}
+
+impl Lessons for Stacks {
+    fn size(&self) -> Size {
+        Size::finisher(self.taught.pictures)
+    }
+
+    fn origin(&self, spec: &TrainingSpec) -> serde_json::Value {
+        serde_json::json!({ "spec": spec, STAGE: self.taught, "pictures": self.digest() })
+    }
+
+    fn lesson(&self, spec: &TrainingSpec, k: u64) -> Lesson {
+        let mut random = ChaCha8Rng::seed_from_u64(spec.seed);
+        random.set_stream(k);
+        let stack = &self.learnt[random.random_range(0..self.learnt.len())];
+        let [rows, columns] = stack.size();
+        let piece = spec.piece;
+        let place = [
+            random.random_range(0..=rows - piece),
+            random.random_range(0..=columns - piece),
+        ];
+        let of = |planes: &Array3<f16>| cut(planes, place, [piece, piece, planes.dim().2]).mapv(f16::to_f32);
+        let pictures = of(&stack.pictures);
+        Lesson {
+            input: seen(&pictures, place, stack.size()),
+            picture: cut(&pictures, [0; 2], [piece, piece, COLOURS]),
+            clean: of(&stack.clean),
+            weight: 1.0,
+        }
+    }
+
+    fn held_out(&self, network: Network) -> f64 {
+        let finisher = Finisher::of_network(network, self.taught.clone());
+        let all = self.held_out.iter().map(|stack| {
+            let found = finisher.corrected(&stack.pictures.mapv(f16::to_f32));
+            psnr_db(&found, &stack.clean.mapv(f16::to_f32))
+        });
+        all.sum::<f64>() / self.held_out.len() as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::learning::tests::picture;
+
+    #[test]
+    fn pictures_of_a_frame_are_kept_and_damage_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("stack");
+        assert!(Stack::kept(&path, "a").is_none());
+        let stack = Stack::new(&[picture(1, 24), picture(2, 24)], &picture(3, 24)).unwrap();
+        stack.write(&path, "a").unwrap();
+        assert_eq!(Stack::kept(&path, "a").as_ref(), Some(&stack));
+        assert!(Stack::kept(&path, "b").is_none());
+        let whole = std::fs::read(&path).unwrap();
+        for k in (0..whole.len()).step_by(97) {
+            let mut bytes = whole.clone();
+            bytes[k] ^= 4;
+            std::fs::write(&path, bytes).unwrap();
+            // Spaces of the header decide nothing.
+            assert!(Stack::kept(&path, "a").is_none_or(|found| found == stack), "byte {k}");
+        }
+        assert!(Stack::new(&[picture(1, 24)], &picture(3, 32)).is_err());
+        assert!(Stack::new(&[], &picture(3, 32)).is_err());
+    }
+}
