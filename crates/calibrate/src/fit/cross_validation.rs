@@ -8,7 +8,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::data::{CaptureSetup, Data};
-use super::model_error::{model_half_widths, projected};
+use super::model_error::{ModelError, model_half_widths, projected};
 use super::normal_equations::{NormalEquations, covariance, hold, minimise};
 use super::problem::{Fit, FitProblem};
 use crate::set::{CaptureIndex, PerCapture};
@@ -226,8 +226,27 @@ pub fn beam_groups(problem: &FitProblem<'_>) -> Vec<Vec<CaptureIndex>> {
 /// noise alone gives, and wider by the error of the model.
 pub fn half_widths(problem: &FitProblem<'_>, fit: &Fit) -> Vec<f64> {
     let slots = problem.model.slots();
+    let own = widths_with(problem, fit, &ModelError::MEASURED);
+    let least = fit
+        .active
+        .iter()
+        .map(|&s| LEAST_HALF_WIDTH * slots[s].parameter.typical);
+    own.into_iter().zip(least).map(|(w, least)| w.max(least)).collect()
+}
+
+/// The same by which a claim is judged: the model may err by as much as could be.
+pub fn cautious_half_widths(problem: &FitProblem<'_>, fit: &Fit) -> Vec<f64> {
+    widths_with(problem, fit, &ModelError::CAUTIOUS)
+}
+
+/// No interval is narrower than this share of a typical size on each side: gaps, which are known best, come out to 3e-4 of it (rms)
+/// in sets by a program that shares nothing with this one.
+pub const LEAST_HALF_WIDTH: f64 = 1e-3;
+
+fn widths_with(problem: &FitProblem<'_>, fit: &Fit, error: &ModelError) -> Vec<f64> {
+    let slots = problem.model.slots();
     let sampled = sampled_half_widths(problem, fit).into_iter();
-    let both = sampled.zip(model_half_widths(problem, fit)).zip(&fit.active);
+    let both = sampled.zip(model_half_widths(problem, fit, error)).zip(&fit.active);
     both.map(|((sampled, of_model), &s)| {
         let (least, most) = slots[s].parameter.range;
         // A parameter that changes nothing here may have any value.

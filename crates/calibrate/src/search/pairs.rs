@@ -9,7 +9,7 @@ use metalith_core::{Progress, Result};
 use super::signatures::score_pairs;
 use super::state::SearchState;
 use super::stepwise::{Candidate, LEAST_GAIN, TriedEffect, fit_with};
-use crate::fit::{held_out, mean_error, null_gain};
+use crate::fit::{Fit, change_energy, held_out, mean_error, null_gain};
 
 /// Pairs that are fitted on the surrogate.
 const FITTED: usize = 16;
@@ -60,14 +60,26 @@ pub fn find_pair<'a>(
     fits.sort_by(|a, b| mean_error(&a.3).total_cmp(&mean_error(&b.3)));
     fits.retain(|f| mean_error(&f.3) - 1.0 < PROMISING * above_noise);
     // On the surrogate, where effects merely add, the wrong pair may leave less: all are brought to rest before one is taken, the
-    // dear ones last.
+    // dear ones last, and only if the others leave more than the model may err by.
     fits.truncate(REFINED);
-    fits.sort_by_key(|(pair, _, fit, _)| {
+    let is_dear = |pair: &[usize], fit: &Fit| {
         let slots = problem.model.slots_of_all(pair);
         slots.iter().any(|&s| problem.model.is_dear_beside(&fit.theta, s))
-    });
+    };
+    fits.sort_by_key(|(pair, _, fit, _)| is_dear(pair, fit));
     let mut best: Option<FoundPair<'a>> = None;
     for (pair, score, fit, held) in fits {
+        let may_leave = |found: &FoundPair<'_>| {
+            let FoundPair { state, .. } = found;
+            let of_model = change_energy(&state.problem, &state.fit) / state.problem.pixels().max(1.0);
+            LEAST_GAIN + if is_dear(&pair, &fit) { of_model } else { 0.0 }
+        };
+        if best
+            .as_ref()
+            .is_some_and(|found| found.state.error() < 1.0 + may_leave(found))
+        {
+            break;
+        }
         let problem = problem.clone();
         let mut state = SearchState {
             problem,
@@ -89,7 +101,6 @@ pub fn find_pair<'a>(
         let gain = now.error() - state.error();
         let is_better = best.as_ref().is_none_or(|b| state.error() < b.state.error());
         if whole && sound && is_better && gain > null_gain(&now.problem, &now.fit, &now.held_out, parameters) {
-            let leaves_nothing = state.error() < 1.0 + LEAST_GAIN;
             best = Some(FoundPair {
                 tried: both.map(|c| TriedEffect {
                     rejected: None,
@@ -99,9 +110,6 @@ pub fn find_pair<'a>(
                 // Effects that explain as much in the place of either are found as alternatives.
                 runners_up: runners_up.clone(),
             });
-            if leaves_nothing {
-                break;
-            }
         }
     }
     Ok(best)

@@ -18,7 +18,7 @@ use metalith_core::{Error, Progress, Result};
 use metalith_made::Perturbation;
 
 /// Diffraction orders along an axis; fits use others.
-const ORDERS: usize = 11;
+pub(crate) const ORDERS: usize = 11;
 
 /// And for the change by tapered walls, which takes six layers.
 const TAPER_ORDERS: usize = 9;
