@@ -196,7 +196,6 @@ fn add_effects(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::forward_model::ForwardModel;
     use crate::linear_model::{LinearModel, Term, beams};
     use metalith_core::Silent;
 
