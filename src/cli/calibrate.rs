@@ -47,9 +47,18 @@ pub struct CalibrateArgs {
     #[arg(long, alias = "proof")]
     validate: bool,
 
-    /// Synthetic sets without effect in the validation.
-    #[arg(long, value_name = "N", default_value_t = 60, requires = "validate")]
-    nulls: u64,
+    /// Synthetic sets without effect in the validation: 60, and none beside `--trial` or `--random`.
+    #[arg(long, value_name = "N", requires = "validate")]
+    nulls: Option<u64>,
+
+    /// Validate on a synthetic set with these effects alone, sizes in typical sizes: `cd_bias=1+film_index=-0.5`. May be given
+    /// several times.
+    #[arg(long, value_name = "EFFECTS", requires = "validate")]
+    trial: Vec<String>,
+
+    /// Validate on so many synthetic sets with one effect or two of random size alone: what intervals are worth.
+    #[arg(long, value_name = "N", requires = "validate", default_value_t = 0)]
+    random: u64,
 
     /// Print the diagnosis as JSON.
     #[arg(long)]
@@ -92,10 +101,14 @@ pub fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> {
     };
     if args.validate {
         let (set, out) = (MeasuredSet::read(&args.sets[0], &GdsPillars, terminal)?, &outs[0]);
+        let base = match args.trial.is_empty() && args.random == 0 {
+            true => ValidationPlan::default(),
+            false => ValidationPlan::only(args.trial.clone(), args.random),
+        };
         let plan = ValidationPlan {
-            nulls: args.nulls,
+            nulls: args.nulls.unwrap_or(base.nulls),
             effects: args.effects.clone(),
-            ..ValidationPlan::default()
+            ..base
         };
         let validation = validate(&set, &settings, &plan, terminal)?;
         write_validation(out, &validation)?;

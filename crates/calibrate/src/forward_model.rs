@@ -101,6 +101,11 @@ pub trait ForwardModel: Send + Sync {
         0.0
     }
 
+    /// By how much the value that is found for an effect may be wrong, relative, as one standard deviation.
+    fn value_share(&self, _effect: usize) -> f64 {
+        0.0
+    }
+
     /// Step of a parameter on whose multiples simulations are cheap, because parts of them are likely to be
     /// stored; none where every value costs the same.
     fn cheap_step(&self, slot: usize) -> Option<f64>;

@@ -57,4 +57,6 @@ pub use session::{Screening, Session, Settings, Simulations};
 pub use set::{Bayer, Capture, Channel, Led, MeasuredElement, MeasuredSet, RelayCamera, SemSite, Stack};
 pub use set::{CaptureIndex, ElementIndex, LedIndex, PerCapture, PerElement, PerLed};
 pub use validate::synthetic::{Synthesizer, SyntheticImages, UnlistedEffect};
-pub use validate::{DetectionLimit, Validation, ValidationPlan, ValidationTrial, validate, write_validation};
+pub use validate::{
+    ClaimedNumber, Coverage, DetectionLimit, Validation, ValidationPlan, ValidationTrial, validate, write_validation,
+};

@@ -52,6 +52,18 @@ pub struct FoundEffect {
 }
 
 impl FoundEffect {
+    /// Its values, each with the ends of its interval.
+    pub fn numbers(&self) -> Vec<(f64, [f64; 2])> {
+        let pair = |value: &Value, interval: &Value| {
+            let ends = interval.as_array()?;
+            Some((value.as_f64()?, [ends.first()?.as_f64()?, ends.get(1)?.as_f64()?]))
+        };
+        let (Value::Array(values), Value::Array(intervals)) = (&self.value, &self.interval) else {
+            return pair(&self.value, &self.interval).into_iter().collect();
+        };
+        values.iter().zip(intervals).filter_map(|(v, i)| pair(v, i)).collect()
+    }
+
     /// Whether the interval of an effect with one value contains this value; none for an effect along two axes.
     pub fn holds(&self, value: f64) -> Option<bool> {
         let ends = self.interval.as_array()?;

@@ -8,13 +8,18 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::data::{CaptureSetup, Data};
-use super::model_error::model_half_widths;
+use super::model_error::{ModelError, model_half_widths, projected};
 use super::normal_equations::{NormalEquations, covariance, hold, minimise};
 use super::problem::{Fit, FitProblem};
 use crate::set::{CaptureIndex, PerCapture};
 
-/// A parameter is not predicted from a training set that holds less than this share of the information on it.
+/// Nothing is predicted from a training set that holds less than this share of the information on a parameter, or on any
+/// combination of them.
 const UNINFORMED: f64 = 1e-3;
+
+/// Least share of what all captures say of a parameter that they say of it beside the others (rounding of single-precision
+/// images): combinations that no capture tells apart are no matter of who is left out.
+const TOLD_APART: f64 = 1e-7;
 
 /// Draws of a bootstrap; enough for the ends of a 95 % interval.
 const DRAWS: usize = 400;
@@ -94,7 +99,7 @@ fn predicted(
     let own = equations.sum_of(left);
     let test = &own + fit.nuisances.prior(problem.data, size);
     let train = whole - own;
-    if (shared..size - 1).any(|k| train[(k, k)] < UNINFORMED * whole[(k, k)]) {
+    if least_information(&train, whole, shared) < UNINFORMED {
         return None;
     }
     let at = trained(problem, fit, &train);
@@ -108,6 +113,32 @@ fn predicted(
         all[k] = -v;
     }
     Some(all)
+}
+
+/// The least share of the information of `whole` on any combination of the parameters that is in `train`, nuisances projected out:
+/// of a tilt along x and y, for one, two elements tell one combination alone, however well either axis shows in both.
+fn least_information(train: &DMatrix<f64>, whole: &DMatrix<f64>, shared: usize) -> f64 {
+    let (train, whole) = (projected(train, shared), projected(whole, shared));
+    // Of a parameter that shows nowhere, everything is known.
+    let shown: Vec<usize> = (0..whole.nrows()).filter(|&k| whole[(k, k)] > 0.0).collect();
+    let n = shown.len();
+    if n == 0 {
+        return 1.0;
+    }
+    let scaled = |of: &DMatrix<f64>| {
+        DMatrix::from_fn(n, n, |i, j| {
+            let (i, j) = (shown[i], shown[j]);
+            of[(i, j)] / (whole[(i, i)] * whole[(j, j)]).sqrt()
+        })
+    };
+    // Relative to the whole, whose combinations are first made alike: train v = share whole v.
+    let all = scaled(&whole).symmetric_eigen();
+    let told: Vec<usize> = (0..n).filter(|&k| all.eigenvalues[k] > TOLD_APART).collect();
+    let to_whole = DMatrix::from_fn(n, told.len(), |i, k| {
+        all.eigenvectors[(i, told[k])] / all.eigenvalues[told[k]].sqrt()
+    });
+    let shares = (to_whole.transpose() * scaled(&train) * to_whole).symmetric_eigenvalues();
+    shares.iter().copied().fold(1.0, f64::min)
 }
 
 /// The parameters that the training data ask for, as steps from the fit, none beyond what physics allows.
@@ -195,8 +226,27 @@ pub fn beam_groups(problem: &FitProblem<'_>) -> Vec<Vec<CaptureIndex>> {
 /// noise alone gives, and wider by the error of the model.
 pub fn half_widths(problem: &FitProblem<'_>, fit: &Fit) -> Vec<f64> {
     let slots = problem.model.slots();
+    let own = widths_with(problem, fit, &ModelError::MEASURED);
+    let least = fit
+        .active
+        .iter()
+        .map(|&s| LEAST_HALF_WIDTH * slots[s].parameter.typical);
+    own.into_iter().zip(least).map(|(w, least)| w.max(least)).collect()
+}
+
+/// The same by which a claim is judged: the model may err by as much as could be.
+pub fn cautious_half_widths(problem: &FitProblem<'_>, fit: &Fit) -> Vec<f64> {
+    widths_with(problem, fit, &ModelError::CAUTIOUS)
+}
+
+/// No interval is narrower than this share of a typical size on each side: gaps, which are known best, come out to 3e-4 of it (rms)
+/// in sets by a program that shares nothing with this one.
+pub const LEAST_HALF_WIDTH: f64 = 1e-3;
+
+fn widths_with(problem: &FitProblem<'_>, fit: &Fit, error: &ModelError) -> Vec<f64> {
+    let slots = problem.model.slots();
     let sampled = sampled_half_widths(problem, fit).into_iter();
-    let both = sampled.zip(model_half_widths(problem, fit)).zip(&fit.active);
+    let both = sampled.zip(model_half_widths(problem, fit, error)).zip(&fit.active);
     both.map(|((sampled, of_model), &s)| {
         let (least, most) = slots[s].parameter.range;
         // A parameter that changes nothing here may have any value.
@@ -272,6 +322,26 @@ mod tests {
             let error = error.unwrap();
             assert!((error / expected - 1.0).abs() < TOLERANCE, "{error} {expected}");
         }
+    }
+
+    /// Two elements at opposite places see a tilt along x and y as a + b and as a - b: either alone tells of both parameters, and of
+    /// one combination nothing.
+    #[test]
+    fn a_combination_that_no_training_capture_tells_of_is_not_predicted() {
+        // One nuisance that no parameter is like, two parameters, the residual.
+        let form = |a: f64, b: f64| {
+            let column = DVector::from_vec(vec![0.0, a, b, 0.0]);
+            let mut form = &column * column.transpose();
+            (form[(0, 0)], form[(3, 3)]) = (1.0, 1.0);
+            form
+        };
+        let (one, other) = (form(1.0, 1.0), form(1.0, -1.0));
+        let whole = &one + &other;
+        // Rounding.
+        assert!(least_information(&one, &whole, 1).abs() < 1e-12);
+        // Of the second combination a tenth is left.
+        let train = one + other * 0.1;
+        assert!((least_information(&train, &whole, 1) - 0.1).abs() < 1e-12);
     }
 
     /// Where all captures agree, nothing is left; where nothing is fitted, the whole pattern is left.

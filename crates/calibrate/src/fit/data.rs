@@ -67,7 +67,7 @@ impl Data {
                     if full[at] {
                         return 0.0;
                     }
-                    let variance = camera.variance_dn2(f64::from(v - black), 1.0, c.frames);
+                    let variance = camera.variance_dn2(f64::from(v - black), c.frames);
                     variance.sqrt().recip() as f32
                 })
             })

@@ -16,8 +16,12 @@ mod registration;
 mod widths;
 
 pub use capture_equations::dot;
-pub use cross_validation::{Gain, HeldOutErrors, SIGMAS_95, beam_groups, gain, half_widths, held_out, mean_error};
+pub use cross_validation::{
+    Gain, HeldOutErrors, SIGMAS_95, beam_groups, cautious_half_widths, gain, half_widths, held_out, mean_error,
+};
 pub use data::{CaptureSetup, Data};
+#[cfg(test)]
+pub use model_error::ModelError;
 pub use model_error::{change_energy, projected};
 pub use normal_equations::{covariance, minimise};
 pub use nuisances::Nuisances;

@@ -119,7 +119,7 @@ pub fn exposed(set: &MeasuredSet, surrogate: &Surrogate, peak: f64) -> MeasuredS
             let signal = |v: f32| f64::from(v) - camera.black_level_dn;
             Array2::from_shape_fn(capture.dn.dim(), |at| {
                 if bayer.has(at, channel) {
-                    camera.variance_dn2(signal(capture.dn[at]), 1.0, capture.frames) as f32
+                    camera.variance_dn2(signal(capture.dn[at]), capture.frames) as f32
                 } else {
                     f32::INFINITY
                 }

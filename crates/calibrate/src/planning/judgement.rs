@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::choice::{Choice, NEEDED, Picked, Requirement, energy, lookalike};
 use crate::effects::Effect;
 use crate::fit::{Data, FitProblem, Nuisances, half_widths};
-use crate::search::{MODEL_SHARE, SEM_DECIDES};
+use crate::search::SEM_DECIDES;
 use crate::set::MeasuredSet;
 use crate::simulator::Simulator;
 use crate::simulator_model::separating_measurement;
@@ -102,7 +102,7 @@ pub fn effects(
         let problem = FitProblem::new(simulator, surrogate.clone(), &data);
         let own = simulator.slots_of(slot.effect);
         let fit = problem.at(&own, theta, Nuisances::stated(&data));
-        let half = fit.pick(&[r.slot], &half_widths(&problem, &fit))[0].max(MODEL_SHARE * slot.parameter.typical);
+        let half = fit.pick(&[r.slot], &half_widths(&problem, &fit))[0];
         let width = |by: f64| amount(effect, (r.size + by).clamp(0.0, slot.parameter.range.1), exposed);
         let wanted = amount(effect, r.size, exposed);
         let half_interval = 0.5 * (width(half) - width(-half)).abs();

@@ -21,10 +21,6 @@ const MOST_EFFECTS: usize = 4;
 /// that is centred elsewhere.
 const MORE_IS_LEFT: f64 = 1.01;
 
-/// No confidence interval is narrower than this share of a typical size on each side: two correct forward models
-/// differ by this much.
-pub const MODEL_SHARE: f64 = 0.03;
-
 /// The outcome of a search.
 pub struct Finding {
     /// Effects, strongest first.
@@ -115,7 +111,6 @@ impl SearchHistory {
 /// # Errors
 /// If a simulation fails, or the user stopped it.
 pub fn attribute(problem: FitProblem<'_>, full: bool, progress: &dyn Progress) -> Result<Finding> {
-    let model = problem.model;
     let nothing = problem.nuisance_fit();
     let mut now = SearchState::new(problem, nothing);
     let mut history = SearchHistory::start(&now);
@@ -126,17 +121,8 @@ pub fn attribute(problem: FitProblem<'_>, full: bool, progress: &dyn Progress) -
         now.refine(progress)?;
     }
     let (runners_up, before) = (&history.runners_up, &history.held_before);
-    let mut alternatives = alternatives(&mut now, &mut history.chosen, runners_up, before, full, progress)?;
-    let least = |slot: usize| MODEL_SHARE * model.slots()[slot].parameter.typical;
-    let mut widths = half_widths(&now.problem, &now.fit);
-    for (w, &s) in widths.iter_mut().zip(&now.fit.active) {
-        *w = w.max(least(s));
-    }
-    for a in alternatives.iter_mut().flatten() {
-        for (w, s) in a.half_widths.iter_mut().zip(model.slots_of(a.effect)) {
-            *w = w.max(least(s));
-        }
-    }
+    let alternatives = alternatives(&mut now, &mut history.chosen, runners_up, before, full, progress)?;
+    let widths = half_widths(&now.problem, &now.fit);
     Ok(Finding {
         chosen: history.chosen,
         alternatives,
@@ -210,7 +196,6 @@ fn add_effects(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::forward_model::ForwardModel;
     use crate::linear_model::{LinearModel, Term, beams};
     use metalith_core::Silent;
 
@@ -275,16 +260,5 @@ mod tests {
         found.chosen.sort_unstable();
         assert_eq!(found.chosen, [0, 1, 2, 4]);
         assert!(mean_error(&found.held_after) < 1.0 + LEAST_GAIN);
-    }
-
-    #[test]
-    fn widths_are_never_below_the_floor() {
-        let model = six_effects();
-        let data = model.data(|_| vec![0.02, 0.0, 0.0, 0.0, 0.0, 0.0], None);
-        let problem = model.problem(&data);
-        let found = attribute(problem.clone(), false, &Silent).unwrap();
-        let bare = half_widths(&problem, &found.after)[0];
-        let floor = MODEL_SHARE * model.slots()[0].parameter.typical;
-        assert_eq!(found.half_widths, [bare.max(floor)]);
     }
 }

@@ -15,7 +15,7 @@ mod state;
 mod stepwise;
 
 pub use alternatives::SEM_DECIDES;
-pub use attribution::{Finding, MODEL_SHARE};
+pub use attribution::Finding;
 pub use capture_screening::{UnusableCapture, unusable_captures};
 pub use course::Course;
 pub use defect_noise::DefectNoise;

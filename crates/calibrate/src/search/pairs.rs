@@ -8,8 +8,8 @@ use metalith_core::{Progress, Result};
 
 use super::signatures::score_pairs;
 use super::state::SearchState;
-use super::stepwise::{Candidate, TriedEffect, fit_with};
-use crate::fit::{held_out, mean_error, null_gain};
+use super::stepwise::{Candidate, LEAST_GAIN, TriedEffect, fit_with};
+use crate::fit::{Fit, change_energy, held_out, mean_error, null_gain};
 
 /// Pairs that are fitted on the surrogate.
 const FITTED: usize = 16;
@@ -34,8 +34,8 @@ pub struct FoundPair<'a> {
     pub runners_up: Vec<usize>,
 }
 
-/// The pair that explains what is left on top of those in `chosen`, if one does. With `full`, it is refined with
-/// full simulations.
+/// The pair that explains most of what is left on top of those in `chosen`, if one explains all but little. With `full`, pairs are
+/// refined with full simulations before they are compared.
 ///
 /// # Errors
 /// If a simulation fails, or the user stopped it.
@@ -59,7 +59,27 @@ pub fn find_pair<'a>(
     runners_up.dedup();
     fits.sort_by(|a, b| mean_error(&a.3).total_cmp(&mean_error(&b.3)));
     fits.retain(|f| mean_error(&f.3) - 1.0 < PROMISING * above_noise);
-    for (pair, score, fit, held) in fits.into_iter().take(REFINED) {
+    // On the surrogate, where effects merely add, the wrong pair may leave less: all are brought to rest before one is taken, the
+    // dear ones last, and only if the others leave more than the model may err by.
+    fits.truncate(REFINED);
+    let is_dear = |pair: &[usize], fit: &Fit| {
+        let slots = problem.model.slots_of_all(pair);
+        slots.iter().any(|&s| problem.model.is_dear_beside(&fit.theta, s))
+    };
+    fits.sort_by_key(|(pair, _, fit, _)| is_dear(pair, fit));
+    let mut best: Option<FoundPair<'a>> = None;
+    for (pair, score, fit, held) in fits {
+        let may_leave = |found: &FoundPair<'_>| {
+            let FoundPair { state, .. } = found;
+            let of_model = change_energy(&state.problem, &state.fit) / state.problem.pixels().max(1.0);
+            LEAST_GAIN + if is_dear(&pair, &fit) { of_model } else { 0.0 }
+        };
+        if best
+            .as_ref()
+            .is_some_and(|found| found.state.error() < 1.0 + may_leave(found))
+        {
+            break;
+        }
         let problem = problem.clone();
         let mut state = SearchState {
             problem,
@@ -79,17 +99,18 @@ pub fn find_pair<'a>(
         let sound = both.iter().all(|c| c.fault(&state.problem, &now.held_out).is_none());
         let parameters = state.fit.active.len() - now.fit.active.len();
         let gain = now.error() - state.error();
-        if whole && sound && gain > null_gain(&now.problem, &now.fit, &now.held_out, parameters) {
-            // Effects that explain as much in the place of either are found as alternatives.
-            return Ok(Some(FoundPair {
+        let is_better = best.as_ref().is_none_or(|b| state.error() < b.state.error());
+        if whole && sound && is_better && gain > null_gain(&now.problem, &now.fit, &now.held_out, parameters) {
+            best = Some(FoundPair {
                 tried: both.map(|c| TriedEffect {
                     rejected: None,
                     ..c.tried
                 }),
                 state,
-                runners_up,
-            }));
+                // Effects that explain as much in the place of either are found as alternatives.
+                runners_up: runners_up.clone(),
+            });
         }
     }
-    Ok(None)
+    Ok(best)
 }

@@ -6,7 +6,7 @@ use super::signatures::score_effects;
 use super::state::SearchState;
 use crate::effects::Parameter;
 use crate::fit::{
-    Fit, FitProblem, Gain, HeldOutErrors, change_energy, gain, half_widths, held_out, mean_error, null_gain,
+    Fit, FitProblem, Gain, HeldOutErrors, cautious_half_widths, change_energy, gain, held_out, mean_error, null_gain,
 };
 
 /// Candidates that are fitted in full at each step.
@@ -339,7 +339,7 @@ impl Candidate {
         if !physical(problem, fit, &slots) {
             return Some(Rejection::Unphysical);
         }
-        let widths = half_widths(problem, fit);
+        let widths = cautious_half_widths(problem, fit);
         let sure = slots
             .iter()
             .any(|&s| fit.position(s).is_some_and(|k| fit.theta[s].abs() > widths[k]));

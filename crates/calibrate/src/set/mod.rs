@@ -129,11 +129,11 @@ pub struct RelayCamera {
 }
 
 impl RelayCamera {
-    /// Variance of a pixel (DN^2) in the mean of so many frames: shot noise of this signal above the black level (DN), and read
-    /// noise. `response` is what a flat frame divided the pixel by, one without.
-    pub fn variance_dn2(&self, signal_dn: f64, response: f64, frames: u32) -> f64 {
-        let shot = signal_dn.max(0.0) / (self.gain_e_per_dn * response);
-        (shot + (self.read_noise_dn / response).powi(2)) / f64::from(frames)
+    /// Variance of a pixel as recorded (DN^2) in the mean of so many frames: shot noise of this signal above the black level (DN),
+    /// and read noise.
+    pub fn variance_dn2(&self, signal_dn: f64, frames: u32) -> f64 {
+        let shot = signal_dn.max(0.0) / self.gain_e_per_dn;
+        (shot + self.read_noise_dn.powi(2)) / f64::from(frames)
     }
 }
 

@@ -1,5 +1,7 @@
 //! Validation of the calibration on synthetic sets: false claims, detection limits, confusions.
 
+mod chips;
+mod coverage;
 mod page;
 mod summary;
 pub mod synthetic;
@@ -7,43 +9,29 @@ pub mod synthetic;
 use ndarray::Array2;
 use rayon::prelude::*;
 use serde::Serialize;
-use serde_json::Value;
 
+pub use coverage::{ClaimedNumber, Coverage};
 pub use page::write_validation;
 pub use summary::{DetectionLimit, Validation};
 
 use crate::diagnosis::{Diagnosis, SetVerdict};
-use crate::effects::Parameter;
+use crate::effects::Effect;
 use crate::search::Evidence;
 use crate::session::{Session, Settings, check_effects};
 use crate::set::{CaptureIndex, MeasuredSet};
 use crate::smooth_residual::SmoothResidual;
+use chips::{AppliedEffect, SyntheticChip};
 use metalith_core::{Progress, Result};
 use synthetic::{Synthesizer, SyntheticImages, UnlistedEffect};
-
-/// Sizes at which every effect is tried (typical sizes).
-pub const SIZES: [f64; 3] = [0.5, 1.0, 2.0];
-
-/// Effects that are tried together, each at its typical size: of one stage and of several, alike and unlike.
-const PAIRS: [(&str, &str); 8] = [
-    ("cd_bias", "gap"),
-    ("cd_bias", "film_index"),
-    ("film_height", "zero_order"),
-    ("sidewall_taper", "pixel_blur"),
-    ("cd_bias_density", "stray_light"),
-    ("tilt", "source_size"),
-    ("missing_pillars", "cd_bias"),
-    ("source_distance", "led_width"),
-];
-
-/// The truth of a set without any effect.
-pub const NOTHING: &str = "nothing";
 
 /// First seed of the sets that thresholds are compared with; none of these is judged.
 const THRESHOLD_SEED: u64 = 900_000;
 
 /// First seed of the sets that are judged.
 const JUDGED_SEED: u64 = 1000;
+
+/// Seed of the chips that are drawn at random.
+const RANDOM_SEED: u64 = 15;
 
 /// One synthetic set and its diagnosis.
 #[derive(Clone, Debug, Serialize)]
@@ -56,19 +44,18 @@ pub struct ValidationTrial {
     pub pair: bool,
     /// Its size in typical sizes.
     pub size: f64,
-    /// Its value as it is reported, for effects of one value.
-    pub value: Option<f64>,
-    pub unit: String,
     pub seed: u64,
     pub verdict: SetVerdict,
     /// What was claimed.
     pub found: Vec<String>,
     /// Whether the true effect (both of two) is among the effects found, alone or as one of several alternatives.
     pub named: bool,
-    pub found_value: Option<Value>,
-    pub interval: Option<Value>,
-    /// Whether the interval of the true effect (of each of two) includes its true value, for effects of one value.
-    pub inside: Option<bool>,
+    /// What was claimed and is neither there nor an alternative to what is there.
+    pub not_there: Vec<String>,
+    /// Numbers of the true effects that were named, beside the true ones.
+    pub numbers: Vec<ClaimedNumber>,
+    /// Unit of the effect; empty for two.
+    pub unit: String,
     /// Largest gain of any single effect on captures left out.
     pub largest_gain: f64,
     pub held_out_before: f64,
@@ -106,6 +93,11 @@ pub struct ValidationPlan {
     pub effects: Vec<String>,
     /// Whether effects that are not listed are tried.
     pub off_list: bool,
+    /// Chips in the place of one for each effect, size and pair: effects with their sizes in typical sizes, as in
+    /// `cd_bias=1+film_index=-0.5`.
+    pub trials: Vec<String>,
+    /// So many chips with one or two effects of random sizes, in the place of one for each effect, size and pair.
+    pub random: u64,
 }
 
 impl Default for ValidationPlan {
@@ -115,6 +107,23 @@ impl Default for ValidationPlan {
             threshold_nulls: 10,
             effects: Vec::new(),
             off_list: true,
+            trials: Vec::new(),
+            random: 0,
+        }
+    }
+}
+
+impl ValidationPlan {
+    /// These chips alone: no others, and no effects that are not listed.
+    #[must_use]
+    pub fn only(trials: Vec<String>, random: u64) -> Self {
+        Self {
+            nulls: 0,
+            threshold_nulls: 0,
+            off_list: false,
+            trials,
+            random,
+            ..Self::default()
         }
     }
 }
@@ -135,9 +144,9 @@ pub fn validate(
     };
     let session = Session::new(like, settings.clone())?;
     check_effects(&session.simulator.effects, &plan.effects)?;
+    let chips = chips(&session, plan)?;
     let simulations = session.simulate(progress)?;
     let synthesizer = Synthesizer::new(like, &settings)?;
-    let chips = chips(&session, plan);
     let wanted: Vec<Vec<(&str, &[f64])>> = chips
         .iter()
         .map(|chip| {
@@ -193,64 +202,20 @@ pub fn validate(
     Ok(Validation::new(like.title.clone(), &trials, judged))
 }
 
-/// An effect with its parameters.
-type AppliedEffect = (String, Vec<f64>);
-
-/// A chip and a bench that sets are made of.
-struct SyntheticChip {
-    truth: String,
-    size: f64,
-    parts: Vec<AppliedEffect>,
-}
-
-impl SyntheticChip {
-    fn single(name: &str, size: f64, numbers: Vec<f64>) -> Self {
-        Self {
-            truth: name.into(),
-            size,
-            parts: vec![(name.into(), numbers)],
-        }
+/// One chip without effect, then those that the plan asks for.
+fn chips(session: &Session<'_>, plan: &ValidationPlan) -> Result<Vec<SyntheticChip>> {
+    let known: Vec<&dyn Effect> = session.simulator.effects.iter().map(AsRef::as_ref).collect();
+    let is_wanted = |e: &&&dyn Effect| plan.effects.is_empty() || plan.effects.contains(&e.name());
+    let wanted: Vec<&dyn Effect> = known.iter().filter(is_wanted).copied().collect();
+    let mut chips = vec![SyntheticChip::stated()];
+    if plan.trials.is_empty() && plan.random == 0 {
+        chips.extend(chips::of_each_effect(&wanted));
     }
-}
-
-/// One chip without effect, one for each effect and size, one for each pair.
-fn chips(session: &Session<'_>, plan: &ValidationPlan) -> Vec<SyntheticChip> {
-    let wanted = |name: &str| plan.effects.is_empty() || plan.effects.iter().any(|e| e == name);
-    let effects: Vec<_> = session.simulator.effects.iter().filter(|e| wanted(&e.name())).collect();
-    // The two parameters of an effect along two axes are unequal and of opposite signs.
-    let numbers = |parameters: Vec<Parameter>, size: f64| -> Vec<f64> {
-        let parts = parameters.iter().zip([1.0, -0.6]);
-        parts.map(|(p, s)| s * size * p.typical).collect()
-    };
-    let mut chips = vec![SyntheticChip {
-        truth: NOTHING.into(),
-        size: 0.0,
-        parts: Vec::new(),
-    }];
-    for effect in &effects {
-        for size in SIZES {
-            chips.push(SyntheticChip::single(
-                &effect.name(),
-                size,
-                numbers(effect.parameters(), size),
-            ));
-        }
+    for text in &plan.trials {
+        chips.push(chips::of_text(&known, text)?);
     }
-    for (a, b) in PAIRS {
-        let both: Vec<AppliedEffect> = [a, b]
-            .iter()
-            .filter_map(|name| effects.iter().find(|e| e.name() == *name))
-            .map(|e| (e.name(), numbers(e.parameters(), 1.0)))
-            .collect();
-        if both.len() == 2 {
-            chips.push(SyntheticChip {
-                truth: format!("{a} + {b}"),
-                size: 1.0,
-                parts: both,
-            });
-        }
-    }
-    chips
+    chips.extend(chips::at_random(&wanted, plan.random, RANDOM_SEED));
+    Ok(chips)
 }
 
 /// Passes on that the user wants to stop, but not the progress of each of many sets.
@@ -273,15 +238,13 @@ impl ValidationTrial {
             off_list: false,
             pair: chip.parts.len() > 1,
             size: chip.size,
-            value: None,
-            unit: String::new(),
             seed,
             verdict: SetVerdict::DataUnfit,
             found: Vec::new(),
             named: false,
-            found_value: None,
-            interval: None,
-            inside: None,
+            not_there: Vec::new(),
+            numbers: Vec::new(),
+            unit: String::new(),
             largest_gain: 0.0,
             held_out_before: 0.0,
             held_out_after: 0.0,
@@ -293,28 +256,29 @@ impl ValidationTrial {
         self.verdict = diagnosis.verdict;
         self.found = diagnosis.effects.iter().map(|e| e.name.clone()).collect();
         self.named = !parts.is_empty() && parts.iter().all(|(name, _)| self.found.contains(name));
-        let mut inside = Vec::new();
+        let mut allowed: Vec<&str> = Vec::new();
         for (name, numbers) in parts {
             let Some(effect) = session.simulator.effects.iter().find(|e| e.name() == *name) else {
                 continue;
             };
-            let value = match effect
-                .reported(numbers, &vec![0.0; numbers.len()], session.set())
-                .as_slice()
-            {
-                [(value, _)] => Some(*value),
-                _ => None,
-            };
-            let own = diagnosis.effects.iter().find(|e| e.name == *name);
-            inside.extend(own.zip(value).and_then(|(own, value)| own.holds(value)));
             if !self.pair {
                 self.unit = effect.unit().into();
-                self.value = value;
-                self.found_value = own.map(|e| e.value.clone());
-                self.interval = own.map(|e| e.interval.clone());
             }
+            allowed.push(name);
+            let Some(own) = diagnosis.effects.iter().find(|e| e.name == *name) else {
+                continue;
+            };
+            allowed.extend(own.confounded_with.iter().map(String::as_str));
+            let truth = effect.reported(numbers, &vec![0.0; numbers.len()], session.set());
+            let truth: Vec<f64> = truth.into_iter().map(|r| r.0).collect();
+            self.numbers.extend(ClaimedNumber::all(own, &truth));
         }
-        self.inside = (!inside.is_empty()).then(|| inside.iter().all(|i| *i));
+        self.not_there = self
+            .found
+            .iter()
+            .filter(|f| !allowed.contains(&f.as_str()))
+            .cloned()
+            .collect();
         let gains = diagnosis.ranking.iter().filter_map(|r| r.held_out_gain);
         self.largest_gain = gains.fold(0.0, f64::max);
         self.held_out_before = diagnosis.error.before.held_out;

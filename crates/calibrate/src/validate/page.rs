@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::{NOTHING, Validation, ValidationTrial};
-use crate::page::round_json;
+use super::chips::NOTHING;
+use super::{ClaimedNumber, Validation, ValidationTrial};
 use metalith_core::{Result, WholeFile};
 use metalith_report::{Axis, Cell, Column, HeatMap, ImageGrid, Matrix, Page, Table, Verdict, sig, write_json};
 
@@ -47,9 +47,13 @@ pub fn write_validation(folder: &Path, validation: &Validation) -> Result<()> {
         ),
         ("Least gain of a claim", sig(validation.least_gain, 2)),
         (
-            "Intervals that include the true value",
-            format!("{} of {}", validation.intervals_inside, validation.intervals),
+            "Sets with effects of the list",
+            format!(
+                "{} of {}: all of them named; {}: something beside them",
+                validation.with_effects_named, validation.with_effects, validation.with_effects_beside
+            ),
         ),
+        ("Intervals", validation.coverage.sentence()),
     ]);
     page.paragraph(
         "Each synthetic set has its own registration, flux, black level and noise. Its wavelengths, samples and diffraction orders differ from those of the fits, and single pillars are missing. Which effects can be distinguished depends on these captures and their noise.",
@@ -63,6 +67,7 @@ pub fn write_validation(folder: &Path, validation: &Validation) -> Result<()> {
         "Percent of the trials of each true effect, all sizes together. Effects that cannot be distinguished share their trial.",
     ));
     limits(&mut page, validation);
+    coverage(&mut page, validation);
     off_list(&mut page, validation);
     page.section("Every trial");
     page.details("Trials", |inner| {
@@ -82,7 +87,7 @@ fn limits(page: &mut Page, validation: &Validation) {
     ])
     .caption("The smallest size from which on an effect was named, alone or as one of several alternatives; the estimated limit is the size at which its residual would reach the least gain of a claim.");
     for limit in &validation.limits {
-        let at = |t: &&ValidationTrial| t.truth == limit.name && Some(t.size) == limit.named_from;
+        let at = |t: &&ValidationTrial| t.truth == limit.name && Some(t.size.abs()) == limit.named_from;
         let first = validation.trials.iter().find(at);
         let unit = first.map_or("", |t| t.unit.as_str());
         table.row([
@@ -91,13 +96,47 @@ fn limits(page: &mut Page, validation: &Validation) {
                 || "not at twice its typical size".into(),
                 |s| format!("{} typical", sig(s, 2)).as_str().into(),
             ),
-            first
-                .and_then(|t| t.value)
-                .map_or_else(Cell::none, |v| format!("{} {unit}", sig(v, 4)).as_str().into()),
-            first
-                .and_then(|t| t.interval.as_ref())
-                .map_or_else(Cell::none, |v| round_json(v).as_str().into()),
+            first.map_or_else(Cell::none, |t| listed(t, unit, |c| sig(c.truth, 4))),
+            first.map_or_else(Cell::none, |t| listed(t, "", interval)),
             limit.estimate.map_or_else(Cell::none, |e| Cell::sig(e, 2)),
+        ]);
+    }
+    page.table(table);
+}
+
+/// Something of each number that was claimed.
+fn listed(t: &ValidationTrial, unit: &str, of: impl Fn(&ClaimedNumber) -> String) -> Cell {
+    if t.numbers.is_empty() {
+        return Cell::none();
+    }
+    let all: Vec<String> = t.numbers.iter().map(of).collect();
+    format!("{} {unit}", all.join(", ")).trim().into()
+}
+
+fn interval(c: &ClaimedNumber) -> String {
+    format!("{} to {}", sig(c.interval[0], 4), sig(c.interval[1], 4))
+}
+
+fn coverage(page: &mut Page, validation: &Validation) {
+    if validation.coverage_by_effect.is_empty() {
+        return;
+    }
+    page.section("Intervals");
+    let mut table = Table::new([
+        Column::text("Effect"),
+        Column::number("Numbers", ""),
+        Column::number("Inside", "%"),
+        Column::number("Error, rms", "standard deviations"),
+        Column::number("Error, rms", "of the true value"),
+    ])
+    .caption("Numbers that were claimed beside the true ones. A standard deviation is half of one side of the interval; errors of one are what intervals promise, smaller ones say that they are too wide.");
+    for own in &validation.coverage_by_effect {
+        table.row([
+            Cell::code(&own.effect),
+            Cell::sig(own.numbers as f64, 4),
+            Cell::sig(own.percent(), 3),
+            Cell::sig(own.rms_sigmas, 2),
+            Cell::sig(own.rms_relative, 2),
         ]);
     }
     page.table(table);
@@ -174,22 +213,15 @@ fn trials(validation: &Validation) -> Table {
         .iter()
         .filter(|t| t.truth != NOTHING || !t.found.is_empty())
     {
-        let json =
-            |v: &Option<serde_json::Value>| v.as_ref().map_or_else(Cell::none, |v| round_json(v).as_str().into());
         table.row([
             Cell::code(&t.truth),
             Cell::sig(t.size, 2),
-            t.value
-                .map_or_else(Cell::none, |v| format!("{} {}", sig(v, 4), t.unit).as_str().into()),
+            listed(t, &t.unit, |c| sig(c.truth, 4)),
             t.verdict_name().as_str().into(),
             t.found.join(", ").as_str().into(),
-            json(&t.found_value),
-            json(&t.interval),
-            match t.inside {
-                None => Cell::none(),
-                Some(true) => "yes".into(),
-                Some(false) => "no".into(),
-            },
+            listed(t, "", |c| sig(c.found, 4)),
+            listed(t, "", interval),
+            listed(t, "", |c| if c.is_inside() { "yes" } else { "no" }.into()),
             Cell::sig(t.held_out_before, 4),
             Cell::sig(t.held_out_after, 4),
         ]);

@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use super::{NOTHING, ValidationTrial};
+use super::chips::NOTHING;
+use super::{ClaimedNumber, Coverage, ValidationTrial};
 use crate::diagnosis::SetVerdict;
 use crate::search::LEAST_GAIN;
 use metalith_report::sig;
@@ -28,9 +29,14 @@ pub struct Validation {
     /// For each truth: shares of its trials in which each column was claimed.
     pub confusion: Vec<(String, Vec<f64>)>,
     pub limits: Vec<DetectionLimit>,
-    /// Effects of one value that were named, and how many of their intervals include the true value.
-    pub intervals: usize,
-    pub intervals_inside: usize,
+    /// Sets with one listed effect or two, in how many of them all of these were named, and in how many something was claimed that
+    /// is not there.
+    pub with_effects: usize,
+    pub with_effects_named: usize,
+    pub with_effects_beside: usize,
+    /// All numbers of effects that were named, and those of each effect.
+    pub coverage: Coverage,
+    pub coverage_by_effect: Vec<Coverage>,
     pub trials: Vec<ValidationTrial>,
 }
 
@@ -82,7 +88,8 @@ impl Validation {
             .filter(|t| *t != NOTHING && !trials.iter().any(|o| o.truth == **t && (o.off_list || o.pair)))
             .map(|name| DetectionLimit::new(name, &trials))
             .collect();
-        let inside: Vec<bool> = trials.iter().filter_map(|t| t.inside).collect();
+        let listed: Vec<&ValidationTrial> = trials.iter().filter(|t| t.truth != NOTHING && !t.off_list).collect();
+        let numbers: Vec<&ClaimedNumber> = trials.iter().flat_map(|t| &t.numbers).collect();
         Self {
             like,
             nulls: nulls.len(),
@@ -93,8 +100,11 @@ impl Validation {
             claimed,
             confusion,
             limits,
-            intervals: inside.len(),
-            intervals_inside: inside.iter().filter(|i| **i).count(),
+            with_effects: listed.len(),
+            with_effects_named: listed.iter().filter(|t| t.named).count(),
+            with_effects_beside: listed.iter().filter(|t| !t.not_there.is_empty()).count(),
+            coverage: Coverage::of("", &numbers),
+            coverage_by_effect: Coverage::by_effect(&numbers),
             trials,
         }
     }
@@ -102,23 +112,39 @@ impl Validation {
     /// As text: shares, then one line for each trial.
     pub fn text(&self) -> String {
         let mut text = format!(
-            "{} false claims in {} sets without effect\nlargest gain by chance in {} others {}, least gain of a claim {}\n{} of {} intervals include the true value\n\n",
-            self.false_claims,
-            self.nulls,
-            self.threshold_nulls,
-            sig(self.largest_gain_by_chance, 2),
-            self.least_gain,
-            self.intervals_inside,
-            self.intervals
+            "{} false claims in {} sets without effect\n",
+            self.false_claims, self.nulls
         );
+        if self.threshold_nulls > 0 {
+            text.push_str(&format!(
+                "largest gain by chance in {} others {}, least gain of a claim {}\n",
+                self.threshold_nulls,
+                sig(self.largest_gain_by_chance, 2),
+                self.least_gain
+            ));
+        }
+        text.push_str(&format!(
+            "{} of {} sets with effects: all of them named; {}: something beside them\n{}\n\n",
+            self.with_effects_named,
+            self.with_effects,
+            self.with_effects_beside,
+            self.coverage.sentence()
+        ));
+        for own in &self.coverage_by_effect {
+            text.push_str(&format!(
+                "{:29} {:3} of {:3} inside, rms {:5.2} standard deviations, {:.4} relative\n",
+                own.effect, own.inside, own.numbers, own.rms_sigmas, own.rms_relative
+            ));
+        }
+        text.push('\n');
         for t in self.trials.iter().filter(|t| t.truth != NOTHING) {
-            let inside = match t.inside {
-                Some(true) => "inside",
-                Some(false) => "OUTSIDE",
-                None => "",
+            let inside = match t.numbers.iter().all(ClaimedNumber::is_inside) {
+                _ if t.numbers.is_empty() => "",
+                true => "inside",
+                false => "OUTSIDE",
             };
             text.push_str(&format!(
-                "{:29} x{:<4} {:12} {:40} {inside:8} {:10.4} -> {:.4}\n",
+                "{:29} x{:<4.2} {:12} {:40} {inside:8} {:10.4} -> {:.4}\n",
                 t.truth,
                 t.size,
                 t.verdict_name(),
@@ -126,6 +152,18 @@ impl Validation {
                 t.held_out_before,
                 t.held_out_after
             ));
+            for c in &t.numbers {
+                text.push_str(&format!(
+                    "{:34} {} = {}, truth {}, {} to {}, {:.2} standard deviations\n",
+                    "",
+                    c.effect,
+                    sig(c.found, 5),
+                    sig(c.truth, 5),
+                    sig(c.interval[0], 5),
+                    sig(c.interval[1], 5),
+                    c.sigmas
+                ));
+            }
         }
         text
     }
@@ -155,11 +193,12 @@ impl ValidationTrial {
 
 impl DetectionLimit {
     fn new(name: &str, trials: &[ValidationTrial]) -> Self {
-        let own: Vec<&ValidationTrial> = trials.iter().filter(|t| t.truth == name).collect();
-        let named_from = own.iter().rev().take_while(|t| t.named).last().map(|t| t.size);
+        let mut own: Vec<&ValidationTrial> = trials.iter().filter(|t| t.truth == name).collect();
+        own.sort_by(|a, b| a.size.abs().total_cmp(&b.size.abs()));
+        let named_from = own.iter().rev().take_while(|t| t.named).last().map(|t| t.size.abs());
         let estimate = own.first().and_then(|t| {
             let above = t.held_out_before - 1.0;
-            (above > LEAST_GAIN).then(|| t.size * (LEAST_GAIN / above).sqrt())
+            (above > LEAST_GAIN).then(|| t.size.abs() * (LEAST_GAIN / above).sqrt())
         });
         Self {
             name: name.into(),

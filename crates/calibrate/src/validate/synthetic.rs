@@ -18,7 +18,7 @@ use metalith_core::{Error, Progress, Result};
 use metalith_made::Perturbation;
 
 /// Diffraction orders along an axis; fits use others.
-const ORDERS: usize = 11;
+pub(crate) const ORDERS: usize = 11;
 
 /// And for the change by tapered walls, which takes six layers.
 const TAPER_ORDERS: usize = 9;
@@ -206,7 +206,7 @@ impl<'a> Synthesizer<'a> {
                 let variance = match own {
                     Some(own) if own[at].is_finite() => f64::from(own[at]),
                     Some(_) => 0.0,
-                    None => camera.variance_dn2(signal, 1.0, frames),
+                    None => camera.variance_dn2(signal, frames),
                 };
                 (black + signal + variance.sqrt() * normal(&mut rng)) as f32
             });

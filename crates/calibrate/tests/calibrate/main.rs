@@ -2,6 +2,7 @@
 
 mod bench;
 mod listed;
+mod recorded;
 mod set;
 mod unlisted;
 mod validation;

@@ -13,6 +13,7 @@ fn a_validation_counts_claims() {
         threshold_nulls: 1,
         effects: vec!["gap".into()],
         off_list: false,
+        ..ValidationPlan::default()
     };
     let validation = validate(&LIKE, &settings(), &plan, &Silent).unwrap();
     assert_eq!(

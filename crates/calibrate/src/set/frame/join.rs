@@ -3,7 +3,7 @@
 use ndarray::Array2;
 
 use super::bayer::{Bayer, Channel};
-use super::{SensorFrames, saturated};
+use super::{SensorPixels, saturated};
 use crate::set::RelayCamera;
 
 /// A mean frame of one exposure.
@@ -29,28 +29,30 @@ pub struct Joined {
 
 /// Join exposures of one scene: the mean of what they say of the light, each weighted by one over its variance; an
 /// exposure in which a pixel is saturated, or beside one that is, says nothing of it. Variances follow from a first mean of
-/// all exposures, not from each by itself, which would favour those that came out too dark. With `filter`, pixels under
-/// other filters are masked.
+/// all exposures, not from each by itself, which would favour those that came out too dark. The noise of dark and flat frames
+/// is common to all exposures: it has no part in the weights, and is added to the variance of the mean. With `filter`, pixels
+/// under other filters are masked.
 ///
 /// # Panics
 /// If there is no exposure.
 pub fn joined(
     mut exposures: Vec<Exposure>,
-    sensor: &SensorFrames,
+    sensor: Option<&SensorPixels>,
     camera: &RelayCamera,
     filter: Option<(Bayer, Channel)>,
 ) -> Joined {
-    exposures.iter_mut().for_each(|e| sensor.take_out(&mut e.dn, camera));
     let longest = exposures.iter().max_by(|a, b| a.scale_dn.total_cmp(&b.scale_dn));
     let (scale_dn, frames) = longest.map(|e| (e.scale_dn, e.frames)).expect("at least one exposure");
-    let response = sensor.responses(camera);
-    if let ([only], None, None) = (exposures.as_slice(), &response, filter) {
+    if let ([_], None, None) = (exposures.as_slice(), sensor, filter) {
         return Joined {
-            dn: only.dn.clone(),
+            dn: exposures.remove(0).dn,
             noise: None,
             scale_dn,
             frames,
         };
+    }
+    if let Some(sensor) = sensor {
+        exposures.iter_mut().for_each(|e| sensor.take_out(&mut e.dn));
     }
     let black = camera.black_level_dn;
     let masks: Vec<Array2<bool>> = exposures
@@ -79,15 +81,23 @@ pub fn joined(
                 as f32;
             continue;
         }
-        let (first, response) = (light / weight, response.as_ref().map_or(1.0, |r| f64::from(r[at])));
-        let (mut sum, mut certainty) = (0.0, 0.0);
+        let first = light / weight;
+        let (mut sum, mut certainty, mut shared) = (0.0, 0.0, [0.0; 2]);
         for e in usable() {
-            let own = e.scale_dn * e.scale_dn / camera.variance_dn2(first * e.scale_dn, response, e.frames);
+            let expected = first * e.scale_dn;
+            let variance = sensor.map_or_else(
+                || camera.variance_dn2(expected, e.frames),
+                |s| s.own_variance_dn2(at, expected, e.frames),
+            );
+            let own = e.scale_dn * e.scale_dn / variance;
             sum += own * signal(e) / e.scale_dn;
             certainty += own;
+            let errors = sensor.map_or([0.0; 2], |s| s.shared_errors_dn(at, expected));
+            shared = [0, 1].map(|k| shared[k] + own * errors[k] / e.scale_dn);
         }
         *to = (black + scale_dn * sum / certainty) as f32;
-        noise[at] = (scale_dn * scale_dn / certainty) as f32;
+        let of_sensor: f64 = shared.iter().map(|error| (error / certainty).powi(2)).sum();
+        noise[at] = (scale_dn * scale_dn * (1.0 / certainty + of_sensor)) as f32;
     }
     if let Some((bayer, channel)) = filter {
         dn = bayer.filled(&dn, channel);
@@ -128,7 +138,7 @@ mod tests {
         (camera.saturation_dn, camera.gain_e_per_dn, camera.read_noise_dn) = (1000.0, 2.0, 3.0);
         let long = exposure(100.0, 4, [1000.0, 440.0, 340.0, 240.0, 140.0, 40.0]);
         let short = exposure(10.0, 16, [540.0, 80.0, 70.0, 60.0, 50.0, 40.0]);
-        let joined = joined(vec![short, long], &SensorFrames::default(), &camera, None);
+        let joined = joined(vec![short, long], None, &camera, None);
         assert_eq!((joined.scale_dn, joined.frames), (100.0, 4));
         let noise = joined.noise.unwrap();
         // Pixels beside the saturated one are the short exposure's alone: 40 DN over black in 16 frames, times ten.
@@ -155,7 +165,7 @@ mod tests {
     fn pixels_under_other_filters_are_masked() {
         let filter = Some((Bayer::CHOICES[0].1, Channel::Green));
         let frame = exposure(1.0, 1, [900.0, 50.0, 900.0, 60.0, 900.0, 70.0]);
-        let joined = joined(vec![frame], &SensorFrames::default(), &camera(), filter);
+        let joined = joined(vec![frame], None, &camera(), filter);
         let noise = joined.noise.unwrap();
         let counts: Vec<bool> = noise.iter().map(|v| v.is_finite()).collect();
         assert_eq!(counts, [false, true, false, true, false, true]);

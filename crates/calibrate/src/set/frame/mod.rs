@@ -8,7 +8,7 @@ mod tiff;
 
 pub use bayer::{Bayer, Channel};
 pub use join::{Exposure, joined};
-pub use sensor::SensorFrames;
+pub use sensor::{SensorFrame, SensorFrames, SensorPixels};
 
 use std::path::Path;
 

@@ -2,54 +2,131 @@
 
 use ndarray::Array2;
 
+use super::Channel;
 use crate::set::{RelayCamera, SATURATED};
+
+/// A mean frame of the sensor by itself.
+pub struct SensorFrame {
+    /// As recorded, black level included (DN).
+    pub dn: Array2<f32>,
+    /// Frames that it is the mean of.
+    pub frames: u32,
+}
 
 /// Frames without light and in even light: what the sensor adds by itself.
 #[derive(Default)]
 pub struct SensorFrames {
-    /// Without light, black level included (DN).
-    pub dark: Option<Array2<f32>>,
-    /// In even light, dark frame included (DN).
-    pub flat: Option<Array2<f32>>,
+    /// Without light, black level included.
+    pub dark: Option<SensorFrame>,
+    /// In even light, dark frame included.
+    pub flat: Option<SensorFrame>,
 }
 
 impl SensorFrames {
-    /// Take both out of a frame: every pixel has the stated black level and the mean response after. Saturated pixels
-    /// stay saturated.
-    pub fn take_out(&self, dn: &mut Array2<f32>, camera: &RelayCamera) {
-        if self.dark.is_none() && self.flat.is_none() {
-            return;
-        }
-        let (black, full) = (camera.black_level_dn as f32, camera.saturation_dn as f32);
-        let responses = self.responses(camera);
-        for (at, v) in dn.indexed_iter_mut() {
-            if f64::from(*v) >= SATURATED * camera.saturation_dn {
-                *v = full;
-                continue;
+    /// What they make of the pixels of a camera; none without any such frame.
+    pub fn pixels(&self, camera: &RelayCamera) -> Option<SensorPixels> {
+        let shape = self.dark.as_ref().or(self.flat.as_ref())?.dn.dim();
+        let black = camera.black_level_dn as f32;
+        let dark = self
+            .dark
+            .as_ref()
+            .map_or_else(|| Array2::from_elem(shape, black), |d| d.dn.clone());
+        let dark_noise = self.dark.as_ref().map(|d| {
+            let variance = |v: &f32| camera.variance_dn2(f64::from(v - black), d.frames);
+            d.dn.map(variance)
+        });
+        let flat = self.flat.as_ref().map(|flat| {
+            let lit = &flat.dn - &dark;
+            let level = levels(&lit, camera);
+            FlatPixels {
+                response: &lit / &level,
+                noise: flat.dn.map(|v| camera.variance_dn2(f64::from(v - black), flat.frames)),
+                level,
             }
-            let response = responses.as_ref().map_or(1.0, |r| r[at]);
+        });
+        Some(SensorPixels {
+            camera: *camera,
+            dark,
+            dark_noise,
+            flat,
+        })
+    }
+}
+
+/// Mean of the even light at the pixels that have the filter of a pixel, at each pixel: colours of a light are unlike, and
+/// `scale_dn` is that of the pixels of one filter.
+fn levels(lit: &Array2<f32>, camera: &RelayCamera) -> Array2<f32> {
+    let group = |(y, x): (usize, usize)| {
+        let bayer = camera.bayer?;
+        Channel::CHOICES.iter().position(|(_, c)| bayer.has((y, x), *c))
+    };
+    let mut sums = [(0.0f64, 0usize); Channel::CHOICES.len()];
+    for (at, v) in lit.indexed_iter() {
+        let sum = &mut sums[group(at).unwrap_or(0)];
+        *sum = (sum.0 + f64::from(*v), sum.1 + 1);
+    }
+    let means = sums.map(|(sum, n)| (sum / n.max(1) as f64) as f32);
+    Array2::from_shape_fn(lit.dim(), |at| means[group(at).unwrap_or(0)])
+}
+
+/// What dark and flat frames say of each pixel, and how well.
+pub struct SensorPixels {
+    camera: RelayCamera,
+    /// Without light, black level included (DN).
+    dark: Array2<f32>,
+    /// Variance of that (DN^2); none where the stated black level stands in.
+    dark_noise: Option<Array2<f64>>,
+    flat: Option<FlatPixels>,
+}
+
+struct FlatPixels {
+    /// Relative to the mean of the pixels of one filter.
+    response: Array2<f32>,
+    /// This mean (DN above dark).
+    level: Array2<f32>,
+    /// Variance of the flat frame (DN^2).
+    noise: Array2<f64>,
+}
+
+impl SensorPixels {
+    /// Take both frames out of a capture: every pixel has the stated black level and the mean response after. Saturated
+    /// pixels stay saturated.
+    pub fn take_out(&self, dn: &mut Array2<f32>) {
+        let (black, full) = (self.camera.black_level_dn as f32, self.camera.saturation_dn);
+        for (at, v) in dn.indexed_iter_mut() {
+            let response = self.response(at);
             // A dead pixel tells nothing: it is masked like a saturated one.
-            *v = if response > LEAST_RESPONSE {
-                black + (*v - self.dark_at(at, black)) / response
+            *v = if f64::from(*v) >= SATURATED * full || response <= LEAST_RESPONSE {
+                full as f32
             } else {
-                full
+                black + (*v - self.dark[at]) / response
             };
         }
     }
 
-    /// Response of each pixel, relative to the mean of all; none without a flat frame.
-    pub fn responses(&self, camera: &RelayCamera) -> Option<Array2<f32>> {
-        let flat = self.flat.as_ref()?;
-        let black = camera.black_level_dn as f32;
-        let mut lit = Array2::from_shape_fn(flat.dim(), |at| flat[at] - self.dark_at(at, black));
-        let sum: f64 = lit.iter().map(|v| f64::from(*v)).sum();
-        let mean = (sum / lit.len() as f64) as f32;
-        lit.mapv_inplace(|v| v / mean);
-        Some(lit)
+    /// Variance of a corrected pixel by the noise of its own exposure (DN^2), which shows `signal_dn` above black in the mean of
+    /// so many frames: shot noise of all that was recorded, dark current included, and read noise, both divided by the response.
+    pub fn own_variance_dn2(&self, at: (usize, usize), signal_dn: f64, frames: u32) -> f64 {
+        let response = f64::from(self.response(at));
+        let recorded = response * signal_dn + f64::from(self.dark[at]) - self.camera.black_level_dn;
+        self.camera.variance_dn2(recorded, frames) / (response * response)
     }
 
-    fn dark_at(&self, at: (usize, usize), black: f32) -> f32 {
-        self.dark.as_ref().map_or(black, |d| d[at])
+    /// By how much a corrected pixel that shows `signal_dn` is off if the dark frame, and if the flat frame, is too bright by
+    /// one standard deviation (DN). A dark frame that is too bright takes too much out of the capture and makes the pixel
+    /// look less sensitive; a flat frame that is too bright makes it look more so. All exposures share both.
+    pub fn shared_errors_dn(&self, at: (usize, usize), signal_dn: f64) -> [f64; 2] {
+        let response = f64::from(self.response(at));
+        let of_level = self.flat.as_ref().map_or(0.0, |f| signal_dn / f64::from(f.level[at]));
+        let sigma = |noise: Option<&Array2<f64>>| noise.map_or(0.0, |n| n[at].sqrt());
+        [
+            (of_level - 1.0) / response * sigma(self.dark_noise.as_ref()),
+            -of_level / response * sigma(self.flat.as_ref().map(|f| &f.noise)),
+        ]
+    }
+
+    fn response(&self, at: (usize, usize)) -> f32 {
+        self.flat.as_ref().map_or(1.0, |f| f.response[at])
     }
 }
 
@@ -59,6 +136,7 @@ const LEAST_RESPONSE: f32 = 0.1;
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::set::Bayer;
 
     pub fn camera() -> RelayCamera {
         RelayCamera {
@@ -76,16 +154,25 @@ pub(super) mod tests {
         }
     }
 
+    fn frames(dark: Array2<f32>, flat: Array2<f32>, frames: u32) -> SensorFrames {
+        let frame = |dn| Some(SensorFrame { dn, frames });
+        SensorFrames {
+            dark: frame(dark),
+            flat: frame(flat),
+        }
+    }
+
     #[test]
     fn dark_and_flat_frames_are_taken_out() {
-        let frames = SensorFrames {
-            dark: Some(ndarray::arr2(&[[41.0, 40.0, 40.0], [40.0, 40.0, 40.0]])),
-            // Responses of 0.5 and 1.5 of the mean, and a dead pixel.
-            flat: Some(ndarray::arr2(&[[91.0, 190.0, 240.0], [240.0, 40.0, 240.0]])),
-        };
+        // Responses of 0.5 and 1.5 of the mean, and a dead pixel.
+        let frames = frames(
+            ndarray::arr2(&[[41.0, 40.0, 40.0], [40.0, 40.0, 40.0]]),
+            ndarray::arr2(&[[91.0, 190.0, 240.0], [240.0, 40.0, 240.0]]),
+            1,
+        );
         let mean: f32 = (50.0 + 150.0 + 200.0 + 200.0 + 0.0 + 200.0) / 6.0;
         let mut dn = ndarray::arr2(&[[66.0, 115.0, 999.0], [140.0, 50.0, 140.0]]);
-        frames.take_out(&mut dn, &camera());
+        frames.pixels(&camera()).unwrap().take_out(&mut dn);
         // Single precision.
         const ROUNDING: f32 = 1e-3;
         for (at, want) in [
@@ -96,6 +183,79 @@ pub(super) mod tests {
             ((1, 1), 1000.0),
         ] {
             assert!((dn[at] - want).abs() < ROUNDING, "{at:?}: {}", dn[at]);
+        }
+    }
+
+    /// Even light that is not white: pixels of unlike filters are as bright as their filter, and none is a better pixel.
+    #[test]
+    fn responses_are_relative_to_the_pixels_of_one_filter() {
+        let camera = RelayCamera {
+            bayer: Some(Bayer::CHOICES[0].1),
+            ..camera()
+        };
+        // Red 100, green 300 but for one of 200, blue 50.
+        let flat = ndarray::arr2(&[[140.0, 340.0, 140.0], [340.0, 90.0, 240.0]]);
+        let frames = frames(Array2::from_elem((2, 3), 40.0), flat, 1);
+        let pixels = frames.pixels(&camera).unwrap();
+        let green = (300.0 + 300.0 + 200.0) / 3.0;
+        // Single precision.
+        const ROUNDING: f32 = 1e-6;
+        for (at, want) in [
+            ((0, 0), 1.0),
+            ((0, 1), 300.0 / green),
+            ((1, 0), 300.0 / green),
+            ((1, 2), 200.0 / green),
+            ((1, 1), 1.0),
+        ] {
+            assert!((pixels.response(at) / want - 1.0).abs() < ROUNDING, "{at:?}");
+        }
+    }
+
+    /// A pixel that is recorded and corrected many times, with a dark and a flat frame of its own each time, scatters as stated.
+    #[test]
+    fn the_scatter_of_a_corrected_pixel_is_its_variance() {
+        use rand::{Rng, SeedableRng};
+        const DRAWS: usize = 20_000;
+        /// Relative: four standard deviations of a variance from so many draws, and that a pixel is part of the mean response.
+        const TOLERANCE: f64 = 0.05;
+        /// Pixels along an edge: one of them is a hundredth of the mean response.
+        const EDGE: usize = 10;
+        let camera = camera();
+        let (lit, dark_current, signal) = (120.0, 150.0, 60.0);
+        let (of_sensor, of_capture) = (4, 8);
+        let even = |dn: f32| Array2::from_elem((EDGE, EDGE), dn);
+        let (mut dark, mut flat, mut capture) = (even(40.0), even(240.0), even(100.0));
+        let black = camera.black_level_dn;
+        dark[(0, 0)] = (black + dark_current) as f32;
+        flat[(0, 0)] = (black + dark_current + lit) as f32;
+        let expected = frames(dark.clone(), flat.clone(), of_sensor).pixels(&camera).unwrap();
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        // Uniform noise of the variance that a camera has at this level.
+        let mut recorded = |dn: f64, frames: u32| {
+            let sigma = camera.variance_dn2(dn, frames).sqrt();
+            (black + dn + sigma * 12f64.sqrt() * (rng.random::<f64>() - 0.5)) as f32
+        };
+        let mut values = Vec::new();
+        for _ in 0..DRAWS {
+            dark[(0, 0)] = recorded(dark_current, of_sensor);
+            flat[(0, 0)] = recorded(dark_current + lit, of_sensor);
+            capture[(0, 0)] = recorded(dark_current + signal, of_capture);
+            let mut dn = capture.clone();
+            frames(dark.clone(), flat.clone(), of_sensor)
+                .pixels(&camera)
+                .unwrap()
+                .take_out(&mut dn);
+            values.push(f64::from(dn[(0, 0)]) - black);
+        }
+        let mean = values.iter().sum::<f64>() / DRAWS as f64;
+        let scatter = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / DRAWS as f64;
+        let own = expected.own_variance_dn2((0, 0), mean, of_capture);
+        let [of_dark, of_flat] = expected.shared_errors_dn((0, 0), mean).map(|e| e * e);
+        let stated = own + of_dark + of_flat;
+        assert!((scatter / stated - 1.0).abs() < TOLERANCE, "{scatter} {stated}");
+        // None of the three is beside the point.
+        for part in [own, of_dark, of_flat] {
+            assert!(part > 2.0 * TOLERANCE * stated, "{own} {of_dark} {of_flat}");
         }
     }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use ndarray::Array2;
 
-use crate::set::frame::{Exposure, SensorFrames};
+use crate::set::frame::{Exposure, SensorPixels};
 use crate::set::{
     Capture, ElementIndex, Led, LedIndex, MeasuredElement, PerElement, PerLed, RelayCamera, SemSite, frame, sem,
 };
@@ -13,7 +13,7 @@ use metalith_core::document::{Limits, Section};
 pub(super) fn captures(
     root: &Section<'_, '_>,
     camera: &RelayCamera,
-    sensor: &SensorFrames,
+    sensor: Option<&SensorPixels>,
     leds: &PerLed<Led>,
     elements: &PerElement<MeasuredElement>,
 ) -> Vec<Capture> {

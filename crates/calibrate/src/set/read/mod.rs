@@ -5,7 +5,7 @@ mod elements;
 
 use std::path::Path;
 
-use super::frame::{self, Bayer, Channel, SensorFrames};
+use super::frame::{self, Bayer, Channel, SensorFrame, SensorFrames};
 use super::{Led, MeasuredSet, PerElement, PerLed, RelayCamera, Stack};
 use captures::{captures, widths};
 use elements::elements;
@@ -61,7 +61,7 @@ fn sections(path: &Path, root: &Section<'_, '_>, layouts: &dyn PillarReader, pro
         let read = |sites: &[ElementSite]| layouts.pillars(&layout, pillar_layer, sites, progress);
         elements(root, &stack, &layout, &read).into()
     };
-    let captures = captures(root, &camera, &frames, &leds, &elements);
+    let captures = captures(root, &camera, frames.pixels(&camera).as_ref(), &leds, &elements);
     let (sem, sem_offset_sigma_nm) = widths(root, &elements);
     let field_boundary_um = field_boundary(root);
     MeasuredSet {
@@ -201,19 +201,20 @@ pub(crate) fn camera(s: &Section<'_, '_>) -> (RelayCamera, SensorFrames) {
             .unwrap_or(0.0),
         bayer: s.has("bayer").then(|| s.choice("bayer", &Bayer::CHOICES, None)),
     };
-    let sensor_frame = |key| {
-        s.has(key)
-            .then(|| s.file(key))
-            .filter(|path| path.is_file())
-            .and_then(|path| {
-                let read = frame::read(&path, camera.rows, camera.cols, f64::INFINITY);
-                read.map_err(|what| s.fault(key, what, "give a frame as large as the captures"))
-                    .ok()
-            })
+    let sensor_frame = |key, count| {
+        if !s.has(key) {
+            return None;
+        }
+        let (path, frames) = (s.file(key), s.integer(count, 1..=1_000_000, "frames") as u32);
+        let read = |path: &Path| frame::read(path, camera.rows, camera.cols, f64::INFINITY);
+        let dn = path.is_file().then(|| read(&path))?;
+        dn.map_err(|what| s.fault(key, what, "give a frame as large as the captures"))
+            .ok()
+            .map(|dn| SensorFrame { dn, frames })
     };
     let frames = SensorFrames {
-        dark: sensor_frame("dark_frame"),
-        flat: sensor_frame("flat_frame"),
+        dark: sensor_frame("dark_frame", "dark_frames"),
+        flat: sensor_frame("flat_frame", "flat_frames"),
     };
     s.finish();
     (camera, frames)
