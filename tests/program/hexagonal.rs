@@ -5,8 +5,7 @@ use std::path::PathBuf;
 
 use metalith::compensate::compensate;
 use metalith::made::{CalibratedModel, Perturbation};
-use metalith::optimise::{OptimiseTask, lens_alone};
-use metalith::{Design, Fidelity, PillarArray, Silent, cell_models};
+use metalith::{Design, PillarArray, Silent};
 use metalith_testing::{design, golden};
 use serde_json::Value;
 
@@ -232,7 +231,7 @@ fn what_knows_squares_alone_refuses_it_by_line_and_column() {
     let path = design("hexagonal_1550");
     let text = fs::read_to_string(&path).unwrap();
     let line = 1 + text.lines().position(|line| line.starts_with("lattice")).unwrap();
-    for command in ["plan"] {
+    for command in ["optimise"] {
         let out = folder.path().join(command);
         let output = metalith(&[command, "--out"], &[&out, &path]);
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -285,7 +284,7 @@ fn a_hexagonal_layout_is_compensated() {
     let [before, after] = wide.error;
     assert!(before > FELT && after < ROUNDING, "{before} {after}");
     assert!((wide.moved_rms_nm - 8.0).abs() < ROUNDING, "{}", wide.moved_rms_nm);
-    let [before, after] = summary(&|d| d.geometry.cd_bias_density_nm = 40.0).error;
+    let [before, after] = summary(&|d| d.geometry.cd_bias_density_nm = 80.0).error;
     assert!(before > FELT && after < FOLLOWED * before, "{before} {after}");
 }
 
@@ -321,61 +320,4 @@ fn a_hexagonal_design_is_studied() {
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(0), "{command}: {said}");
     }
-}
-
-/// The optimised phase of the program becomes a layout that is as good as its rings, and published polynomials are refused.
-#[test]
-fn a_hexagonal_lens_is_optimised() {
-    /// Single sums in another order.
-    const SAME: f64 = 1e-9;
-    let folder = tempfile::tempdir().unwrap();
-    let how = |cell: &str| {
-        let section = format!(
-            "[optimise]\ncell = {cell:?}\nband_nm = [1510, 1590]\nstep_nm = 10\nchains = 1\nhot_sweeps = 5\n\n[verify.limits]"
-        );
-        changed(
-            &folder,
-            &[
-                ("diameter_um = 160", "diameter_um = 60"),
-                ("focal_length_um = 240", "focal_length_um = 90"),
-                ("[verify.limits]", &section),
-            ],
-        )
-    };
-    let phase = folder.path().join("phase.csv");
-    let asked = |path: &std::path::Path| {
-        let flags: [&std::path::Path; 5] = [
-            "--no-report".as_ref(),
-            "--phase".as_ref(),
-            &phase,
-            "--out".as_ref(),
-            folder.path(),
-        ];
-        metalith(&["optimise"], &[&[path], &flags[..]].concat())
-    };
-    let refused = asked(&how("published"));
-    assert_eq!(refused.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&refused.stderr).contains("a hexagonal lattice by the `published` cell"));
-    let path = how("fitted");
-    let output = asked(&path);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(0), "{said}");
-
-    let design = Design::read_any(&path).unwrap();
-    let alone = lens_alone(&design, &phase).unwrap();
-    let (task, before) = (OptimiseTask::of(&alone).unwrap(), OptimiseTask::of(&design).unwrap());
-    let cell = cell_models(&design, &[Fidelity::Fitted]).unwrap().remove(0);
-    let rings = task.judge_rings(&task.own_turns, cell.as_ref()).unwrap();
-    let array = PillarArray::build(&alone, &Silent).unwrap();
-    let found = task
-        .judge_layout(&array.widths(array.central()), cell.as_ref())
-        .unwrap();
-    assert!((found.geometric_mean / rings.geometric_mean - 1.0).abs() < SAME);
-    let hyperbola = before.judge_rings(&before.own_turns, cell.as_ref()).unwrap();
-    assert!(
-        rings.geometric_mean > hyperbola.geometric_mean,
-        "{} {}",
-        rings.geometric_mean,
-        hyperbola.geometric_mean
-    );
 }

@@ -285,7 +285,7 @@ fn check_directions(section: &Section<'_, '_>, array: &ArraySpec, verify: &Verif
 }
 
 /// What a hexagonal lattice is good for.
-const KNOWN_TO: &str = "use `metalith run`, `layout`, `verify`, `check`, `diff`, `psf`, `cells`, `optimise`, `handoff` and `study` with this design, or a square \
+const KNOWN_TO: &str = "use `metalith run`, `layout`, `verify`, `check`, `diff`, `psf`, `cells`, `handoff` and `study` with this design, or a square \
                         lattice here";
 
 /// Leaves room within the 32 characters of a GDSII cell name for the parts a layout adds.
