@@ -1,12 +1,14 @@
 //! `metalith cells`: the library of a design's cell, its fits, and where its mapping sends the light.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::Result;
-use metalith::cell::{CellTable, Origin, RigorousCell, cache_folder};
-use metalith::cell_study::{CellStudy, StudyOptions, study_steered, write_cell_report};
+use metalith::cell::{CellTable, MappingError, Origin, RigorousCell, cache_folder};
+use metalith::cell_study::{
+    CellStudy, RotationStudy, StudyOptions, rotation_keys, study_steered, write_cell_report, write_rotation_report,
+};
 use metalith::report::{fixed, sig};
+use metalith::{Design, Error, Result};
 
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
@@ -58,6 +60,9 @@ pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
         .out
         .clone()
         .unwrap_or_else(|| PathBuf::from("out").join(&design.name));
+    if design.cell.shape.rectangles().is_some() {
+        return rotations(args, &design, &folder, terminal);
+    }
     let mut spec = design.table_spec()?;
     spec.orders = args.orders;
     spec.tolerance = args.tolerance;
@@ -120,6 +125,44 @@ pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
             light.collect::<Vec<_>>().join(", "),
             fixed(study.gain(), 3)
         );
+    }
+    print_line!("report: {}", folder.join("cells.html").display());
+    Ok(Outcome::Fine)
+}
+
+/// The study of a design of rectangles: a few cells, and no library.
+fn rotations(args: &CellsArgs, design: &Design, folder: &Path, terminal: &Terminal) -> Result<Outcome> {
+    if args.steered {
+        return Err(Error::invalid(
+            "mappings of steered elements for rectangles",
+            "leave out --steered: unlike neighbours are known of squares alone",
+        ));
+    }
+    let study = RotationStudy::new(design)?;
+    let _turn = terminal.turn_at(folder)?;
+    write_rotation_report(&study, folder)?;
+    if args.json {
+        print_json(&study);
+        return Ok(Outcome::Fine);
+    }
+    let [low, high] = study.converted();
+    print_line!(
+        "at {} nm {} to {} of the light is converted; phase of the pillars as drawn against that of the mapping:",
+        sig(study.wavelength_um * 1e3, 4),
+        fixed(low, 3),
+        fixed(high, 3)
+    );
+    let line = |name: &str, error: MappingError| {
+        let (rms, worst) = (fixed(error.rms_rad, 4), fixed(error.worst_rad, 4));
+        print_line!("{name:26} {rms} rad rms, {worst} at most");
+    };
+    line("half of the phase", study.half);
+    line("design", study.design);
+    for fit in &study.fits {
+        line(&format!("{} terms", fit.mapping.sines.len()), fit.error);
+    }
+    if let Some(fit) = study.fits.get(1) {
+        print_line!("{}", rotation_keys(fit));
     }
     print_line!("report: {}", folder.join("cells.html").display());
     Ok(Outcome::Fine)

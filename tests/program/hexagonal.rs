@@ -3,6 +3,9 @@
 use std::fs;
 use std::path::PathBuf;
 
+use metalith::compensate::compensate;
+use metalith::made::{CalibratedModel, Perturbation};
+use metalith::{Design, PillarArray, Silent};
 use metalith_testing::{design, golden};
 use serde_json::Value;
 
@@ -228,7 +231,7 @@ fn what_knows_squares_alone_refuses_it_by_line_and_column() {
     let path = design("hexagonal_1550");
     let text = fs::read_to_string(&path).unwrap();
     let line = 1 + text.lines().position(|line| line.starts_with("lattice")).unwrap();
-    for command in ["optimise", "handoff"] {
+    for command in ["optimise"] {
         let out = folder.path().join(command);
         let output = metalith(&[command, "--out"], &[&out, &path]);
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -248,4 +251,73 @@ fn what_knows_squares_alone_refuses_it_by_line_and_column() {
         said.contains("pictures") && said.contains("hexagonal") && !out.exists(),
         "{said}"
     );
+}
+
+/// Widths that are drawn for what a line does to them: a bias of whole steps is drawn the other way, and what follows density is
+/// followed, here of circles, which fill less than their squares.
+#[test]
+fn a_hexagonal_layout_is_compensated() {
+    /// Relative error: rounding of tables of some hundred widths.
+    const ROUNDING: f64 = 1e-9;
+    /// A relative change that nobody would call rounding.
+    const FELT: f64 = 0.05;
+    /// Steps of 2 nm leave a part of a bias that differs from site to site.
+    const FOLLOWED: f64 = 0.6;
+    let folder = tempfile::tempdir().unwrap();
+    let path = changed(
+        &folder,
+        &[
+            ("diameter_um = 160", "diameter_um = 40"),
+            ("focal_length_um = 240", "focal_length_um = 60"),
+            ("width_min_nm = 150", "width_min_nm = 130"),
+        ],
+    );
+    let design = Design::read_any(&path).unwrap();
+    let array = PillarArray::build(&design, &Silent).unwrap();
+    let summary = |change: &dyn Fn(&mut Perturbation)| {
+        let mut perturbation = Perturbation::default();
+        change(&mut perturbation);
+        let model = CalibratedModel::new("twin".into(), "as made".into(), perturbation);
+        compensate(&design, &array, &model, &Silent).unwrap().summary
+    };
+    let wide = summary(&|d| d.geometry.cd_bias_nm = 8.0);
+    let [before, after] = wide.error;
+    assert!(before > FELT && after < ROUNDING, "{before} {after}");
+    assert!((wide.moved_rms_nm - 8.0).abs() < ROUNDING, "{}", wide.moved_rms_nm);
+    let [before, after] = summary(&|d| d.geometry.cd_bias_density_nm = 80.0).error;
+    assert!(before > FELT && after < FOLLOWED * before, "{before} {after}");
+}
+
+/// Draws of a study are simulated on the lattice of the design.
+#[test]
+fn a_hexagonal_design_is_studied() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = changed(
+        &folder,
+        &[
+            ("diameter_um = 160", "diameter_um = 30"),
+            ("focal_length_um = 240", "focal_length_um = 45"),
+            (
+                "field_x_deg = [0, 10]\nfield_y_deg = [0, 0]",
+                "field_x_deg = [0]\nfield_y_deg = [0]",
+            ),
+        ],
+    );
+    let study = folder.path().join("tolerance.toml");
+    let text = format!(
+        "schema = 1\ndesign = {path:?}\ndraws = 2\n[[vary]]\neffect = \"gap\"\ndistribution = \"uniform\"\nlow = -2.0\nhigh = 2.0\n\
+         [[limit]]\nfigure = \"strehl_1550nm_0deg\"\nat_least = 0.5\n"
+    );
+    fs::write(&study, text).unwrap();
+    let plan = folder.path().join("plan");
+    for (command, last) in [("plan", &study), ("run", &plan)] {
+        let mut arguments: Vec<&std::path::Path> = vec![command.as_ref(), last];
+        match command {
+            "plan" => arguments.extend(["--out".as_ref(), plan.as_path()]),
+            _ => arguments.push("--missing".as_ref()),
+        }
+        let output = metalith(&["study"], &arguments);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(0), "{command}: {said}");
+    }
 }

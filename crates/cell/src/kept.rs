@@ -16,12 +16,16 @@ use metalith_core::{Error, PillarShape, Progress, Result, WholeFile, file::read_
 pub const SOLVER: u32 = 1;
 
 /// How often the solver has changed what it answers for circles alone.
-const SOLVER_OF_CIRCLES: u32 = 1;
+const SOLVER_OF_CIRCLES: u32 = 2;
+
+/// The same for rotated rectangles.
+const SOLVER_OF_RECTANGLES: u32 = 1;
 
 /// [`SOLVER`] for pillars of a shape: raised where the answers for that shape alone have changed.
 pub fn solver_of(shape: PillarShape) -> u32 {
     match shape {
-        PillarShape::Square | PillarShape::Rectangle(_) => SOLVER,
+        PillarShape::Square => SOLVER,
+        PillarShape::Rectangle(_) => SOLVER + SOLVER_OF_RECTANGLES,
         PillarShape::Circle => SOLVER + SOLVER_OF_CIRCLES,
     }
 }

@@ -15,6 +15,7 @@ mod published;
 mod rectangle;
 mod rigorous;
 mod rotated;
+mod rotation;
 mod stack;
 mod table;
 
@@ -22,7 +23,8 @@ pub use cache::cache_folder;
 pub use curve::{BadCell, PhaseCurve, bad_cells};
 pub use exact::{MappingTable, RampOrders, simplex};
 pub use fit::{
-    FittedCell, ForwardFit, InverseFit, MappingError, curves_over, fit_forward, fit_inverse, forward_errors, round_trip,
+    FittedCell, ForwardFit, InverseFit, MappingError, RotationCurve, RotationFit, curves_over, fit_forward,
+    fit_inverse, forward_errors, round_trip,
 };
 pub use metalith_rcwa::Material;
 pub use model::{CellModel, Fidelity, ObliqueTables, POLARISATION_SHARE, dark};
@@ -35,5 +37,6 @@ pub use published::PublishedCell;
 pub use rectangle::{Handedness, RotatedRectangle};
 pub use rigorous::RigorousCell;
 pub use rotated::{ROTATED_ORDERS, RotatedCell};
+pub use rotation::RotationMapping;
 pub use stack::{CellStack, UniformLayer};
 pub use table::{CellTable, Origin, TableSpec};

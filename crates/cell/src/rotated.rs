@@ -25,7 +25,8 @@ pub const ROTATED_ORDERS: usize = 17;
 /// The same for one of many wavelengths of a band.
 const BAND_ORDERS: usize = 9;
 
-/// What rectangular pillars do to circularly polarised light, in an infinite lattice of pillars that are all rotated alike.
+/// What rectangular pillars do to circularly polarised light, in an infinite lattice of pillars that are all rotated alike. By its
+/// number a pillar is rotated as it is drawn, with its corners on the grid; that these also shear it a little is left out.
 ///
 /// A pillar that is rotated by an angle converts light to the other circular polarisation with twice that angle as phase, more
 /// or less: the lattice does not turn with it. What the lattice adds repeats every quarter turn, and is solved at a few
@@ -56,6 +57,16 @@ impl RotatedCell {
             arriving,
             solved: Mutex::default(),
         }
+    }
+
+    /// The pillars.
+    pub fn pillars(&self) -> Rectangles {
+        self.pillars
+    }
+
+    /// The handedness of the light.
+    pub fn arriving(&self) -> Handedness {
+        self.arriving
     }
 
     /// Converted and unconverted light of a pillar of any rotation (rad), as ratios of fields.
@@ -126,7 +137,7 @@ impl RotatedCell {
 
     fn table(&self, wavelength_um: f64, orders: usize, most: u16, which: usize) -> Result<Vec<Complex64>> {
         let series = self.series(wavelength_um, orders)?;
-        let of = |number: u16| series.at(self.pillars.rotation(number), self.arriving)[which];
+        let of = |number: u16| series.at(self.pillars.drawn_rotation(number), self.arriving)[which];
         Ok(std::iter::once(Complex64::ZERO).chain((1..=most).map(of)).collect())
     }
 }
@@ -219,14 +230,14 @@ mod tests {
                 Handedness::Right => (1, 0),
             };
             for degrees in [7.0_f64, 31.0, 70.0, 124.0] {
+                let number = PILLARS.number(degrees.to_radians());
                 let pillar = RotatedRectangle {
                     width_nm: 100.0,
                     length_nm: 250.0,
-                    rotation: degrees.to_radians(),
+                    rotation: PILLARS.drawn_rotation(number),
                 };
                 let orders = Orders::new(BAND_ORDERS).unwrap();
                 let exact = circular(titania().jones(&pillar, 0.532, [0.0; 2], orders).unwrap());
-                let number = PILLARS.number(pillar.rotation);
                 let converted = cell.transmissions_in_band(0.532, 180).unwrap()[usize::from(number)];
                 let unconverted = cell.unconverted_in_band(0.532, 180).unwrap().unwrap()[usize::from(number)];
                 let (a, b) = (

@@ -10,7 +10,7 @@ use metalith_core::{Error, Progress, Result, WidthMap};
 use metalith_design::array::PillarArray;
 use metalith_design::{CellIncidence, Design, Element};
 use metalith_layout::read_pillars;
-use metalith_made::{DrawnElement, MadeChip, MadeElement};
+use metalith_made::{MadeChip, MadeElement};
 use metalith_verify::PsfResult;
 use metalith_wave::propagation::{incident, landing_um};
 use metalith_wave::psf::{CURVE_LP_MM, Matched, Psf};
@@ -82,9 +82,7 @@ fn of_element(
     ];
     let made: Vec<MadeElement> = chips
         .iter()
-        .map(|(_, chip, widths)| {
-            chip.element(&DrawnElement::new(widths, line.aperture_radius_um).placed(element.centre_um()))
-        })
+        .map(|(_, chip, widths)| chip.element(&chip.drawn(widths, line.aperture_radius_um).placed(element.centre_um())))
         .collect::<Result<_>>()?;
     let as_lit = design.verify.incidence == CellIncidence::AsLit;
     let mut scratch = Scratch::default();

@@ -63,7 +63,7 @@ pub struct CompensationSummary {
 /// Compensate the pillars of a design for what a model says of the line.
 ///
 /// # Errors
-/// If elements have lenses of their own, the lattice is not square, a cell cannot be solved, or the user stopped it.
+/// If elements have lenses of their own, pillars are rectangles, a cell cannot be solved, or the user stopped it.
 pub fn compensate(
     design: &Design,
     array: &PillarArray,
@@ -71,7 +71,6 @@ pub fn compensate(
     progress: &dyn Progress,
 ) -> Result<Compensated> {
     design.one_lens("the compensation")?;
-    design.square_lattice("the compensation")?;
     let mut line = Line::new(design, model)?;
     let copies = |class: usize| array.placed.iter().filter(|p| p.class == class).count() as u64;
     let mut drawn = array.clone();

@@ -5,7 +5,7 @@ use num_complex::Complex64;
 use metalith_cell::{CellModel, PointwiseCell};
 use metalith_core::{Error, Progress, Result, WidthMap};
 use metalith_design::Design;
-use metalith_made::{CalibratedModel, DrawnElement, MadeChip, Perturbation};
+use metalith_made::{CalibratedModel, MadeChip, Perturbation};
 
 /// Transmissions at one wavelength.
 #[derive(Clone, Debug)]
@@ -88,7 +88,7 @@ impl Line {
 
     /// Steps that density adds to the width at every site of a layout as drawn, row by row.
     pub fn steps(&self, drawn: &WidthMap) -> Vec<i32> {
-        let element = DrawnElement::new(drawn, self.aperture_radius_um);
+        let element = self.chip.drawn(drawn, self.aperture_radius_um);
         let steps = element.site_steps(&self.chip.perturbation().geometry);
         steps.unwrap_or_else(|| vec![0; drawn.width_nm.len()])
     }

@@ -67,6 +67,11 @@ impl Rectangles {
         apart - PI * (apart / PI).round()
     }
 
+    /// Rotation of a pillar as it is drawn, its corners on the grid (rad).
+    pub fn drawn_rotation(self, number: u16) -> f64 {
+        self.rotation(number) + self.turned_by_grid(number)
+    }
+
     /// Distance of two pillars of these numbers whose centres are (dx, dy) apart (nm), as drawn; negative where they overlap.
     pub fn gap(self, numbers: [u16; 2], [dx, dy]: [f64; 2]) -> f64 {
         let a = self.corners(numbers[0]).map(|(x, y)| [x as f64, y as f64]);

@@ -47,6 +47,11 @@ impl PillarShape {
         }
     }
 
+    /// Area of a pillar (nm^2).
+    pub fn area_nm2(self, number: u16) -> f64 {
+        self.square_nm2(number) as f64 * self.area_share()
+    }
+
     /// The rectangles, if it is one.
     pub fn rectangles(self) -> Option<Rectangles> {
         match self {

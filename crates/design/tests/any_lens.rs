@@ -2,7 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use metalith_cell::RotatedRectangle;
 use metalith_core::Silent;
+use metalith_rcwa::{Orders, circular};
+
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, PillarArray};
 
@@ -127,13 +130,25 @@ fn mistakes_are_said() {
             "geometric_phase_532",
             "[mapping]  ",
             "[mapping]\ncoefficients = [0.3, 0.5]\n#",
-            "rectangles have no mapping",
+            "rectangles have no widths to map to",
         ),
         (
             "geometric_phase_532",
             "pillar_height_nm = 600",
             "pillar_height_nm = 600\nwidth_min_nm = 100",
             "width_min_nm",
+        ),
+        (
+            "geometric_phase_532",
+            "rotation_sines_deg = [",
+            "rotation_sines_deg = [0, 0, 0, 0, 0, 0, ",
+            "8 terms, at most 6",
+        ),
+        (
+            "tio2_532",
+            "[mapping]  ",
+            "[mapping]\nrotation_sines_deg = [0.1]\n#",
+            "the pillars are no rectangles",
         ),
         ("hologram", "x_um = 60", "x_um = -20", "overlaps that of element (1, 0)"),
         (
@@ -159,5 +174,34 @@ fn mistakes_are_said() {
     ] {
         let error = changed(name, from, to).unwrap_err().to_string();
         assert!(error.contains(wanted), "{to}: {error}");
+    }
+}
+
+/// The phase of the converted light of pillars as drawn is that which the mapping of the shipped design has them for, by more orders
+/// than the mapping was fitted with.
+#[test]
+fn a_geometric_phase_is_that_of_the_mapping() {
+    /// Asked of the converted channel (rad).
+    const GEOMETRIC: f64 = 0.01;
+    const ORDERS: usize = 21;
+    let design = Design::read(&path("geometric_phase_532")).unwrap();
+    let pillars = design.cell.shape.rectangles().unwrap();
+    let stack = design.cell_stack().unwrap();
+    let off = [180, 17, 40, 71].map(|number| {
+        let rotation = pillars.drawn_rotation(number);
+        let pillar = RotatedRectangle {
+            width_nm: f64::from(pillars.width_nm),
+            length_nm: f64::from(pillars.length_nm),
+            rotation,
+        };
+        let orders = Orders::new(ORDERS).unwrap();
+        let [_, [converted, _]] = circular(stack.jones(&pillar, 0.532, [0.0; 2], orders).unwrap());
+        converted.arg() - design.mapping.rotation.phase(rotation)
+    });
+    for (k, one) in off.iter().enumerate() {
+        let turns = (one - off[0]) / std::f64::consts::TAU;
+        let apart = std::f64::consts::TAU * (turns - turns.round());
+        println!("{k}: {apart} rad");
+        assert!(apart.abs() < GEOMETRIC, "{k}: {apart} rad");
     }
 }

@@ -87,7 +87,7 @@ impl Writing {
             if *layer == flat.pillars {
                 for e in &flat.elements {
                     for (w, &count) in e.widths.histogram().iter().enumerate().skip(1) {
-                        area_nm2 += count as f64 * flat.shape.square_nm2(w as u16) as f64;
+                        area_nm2 += count as f64 * flat.shape.area_nm2(w as u16);
                         shapes += count as f64;
                     }
                 }

@@ -13,7 +13,7 @@ use metalith_core::text::quoted;
 use metalith_gds::LayerNumber;
 
 /// The decks that ship with the program, by the names of their files; the first is the standard one.
-const SHIPPED: [(&str, &str); 16] = [
+const SHIPPED: [(&str, &str); 17] = [
     ("sin_pillars.toml", include_str!("../../../rules/sin_pillars.toml")),
     ("sin_apertures.toml", include_str!("../../../rules/sin_apertures.toml")),
     ("dose_matrix.toml", include_str!("../../../rules/dose_matrix.toml")),
@@ -26,6 +26,10 @@ const SHIPPED: [(&str, &str); 16] = [
     ("rectangles.toml", include_str!("../../../rules/rectangles.toml")),
     ("openings.toml", include_str!("../../../rules/openings.toml")),
     ("asi_pillars.toml", include_str!("../../../rules/asi_pillars.toml")),
+    (
+        "asi_900_pillars.toml",
+        include_str!("../../../rules/asi_900_pillars.toml"),
+    ),
     ("tio2_circles.toml", include_str!("../../../rules/tio2_circles.toml")),
     (
         "tio2_rectangles.toml",

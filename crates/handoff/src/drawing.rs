@@ -117,14 +117,14 @@ impl Sheet {
         self.elements.push(reference.into());
     }
 
-    /// An array of copies along x and y, the first at a given position.
-    pub fn array(&mut self, cell: &str, (x, y): (i64, i64), (columns, rows): (i16, i16), pitch: i64) {
+    /// An array of copies along x and y with these steps, the first at a given position.
+    pub fn array(&mut self, cell: &str, (x, y): (i64, i64), (columns, rows): (i16, i16), steps: [i64; 2]) {
         let reference = GdsArrayRef {
             name: cell.to_owned(),
             xy: [
                 point(x, y),
-                point(x + i64::from(columns) * pitch, y),
-                point(x, y + i64::from(rows) * pitch),
+                point(x + i64::from(columns) * steps[0], y),
+                point(x, y + i64::from(rows) * steps[1]),
             ],
             cols: columns,
             rows,
@@ -241,7 +241,7 @@ impl Drawing {
                     .zip(class.widths.row(iy, run, &mut room))
                     .filter(|(_, w)| **w != 0)
                 {
-                    let at = (lattice.coordinate_nm(ix), lattice.coordinate_nm(iy));
+                    let at = (lattice.place_nm(0, ix), lattice.place_nm(1, iy));
                     if form.is_square() {
                         sheet.polygon(layer, at, &form.corners(width));
                     } else {

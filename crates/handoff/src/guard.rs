@@ -21,7 +21,7 @@ pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
         ));
     }
     let film = design.cell.pillar_material.as_str();
-    if !process.transfer.films.iter().any(|f| f == film) {
+    if !process.transfer.etches(film) {
         return Err(Error::invalid(
             format!(
                 "the film of the design is \"{film}\", but the process etches {}: {}",
@@ -29,6 +29,18 @@ pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
                 process.transfer.etch
             ),
             "use a process file for this film, or, if its etch is right for it, add the film to `films` in [transfer]",
+        ));
+    }
+    if let (false, Some([low, high])) = (
+        process.transfer.reaches(design.cell.pillar_height_nm),
+        process.transfer.film_nm,
+    ) {
+        return Err(Error::invalid(
+            format!(
+                "the film of the design is {} nm thick, but the etch and the rules of {} are for {low} to {high} nm",
+                design.cell.pillar_height_nm, process.name
+            ),
+            "use a process file for this thickness; if its etch and its rules are right for it, change `film_nm` in [transfer]",
         ));
     }
     if process.checks.of_shape(design.cell.shape).is_none() {

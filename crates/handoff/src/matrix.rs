@@ -6,7 +6,7 @@ use super::dose::doses;
 use super::drawing::{Drawing, LayerPair, RectNm, Sheet, nm, number};
 use super::pad::dose_pads;
 use super::process::Process;
-use metalith_core::{Result, Silent};
+use metalith_core::{LatticeKind, Result, Silent};
 use metalith_design::Design;
 use metalith_design::array::{Class, PillarArray, Symmetry};
 use metalith_design::phase::RadialPhase;
@@ -138,7 +138,14 @@ pub(super) fn write(path: &Path, design: &Design, process: &Process) -> Result<V
             let cell = format!("D{}_{}", block.number, pad.cell_name());
             drawing.add_pillar(&cell, layer, &pad.corners());
             let x = block.pads.0 - span / 2 + k as i64 * (nm(spec.pad_um) + APART);
-            top_pad(&mut top, &cell, (x, block.pads.1), nm(spec.pad_um), pitch);
+            top_pad(
+                &mut top,
+                &cell,
+                (x, block.pads.1),
+                nm(spec.pad_um),
+                design.cell.lattice,
+                pitch,
+            );
         }
         let left = block.lens.0 - nm(spec.lens_diameter_um) / 2 - APART - NUMERAL * 3 / 5;
         top.numerals(marks, (left, block.lens.1), NUMERAL, &block.number.to_string());
@@ -156,9 +163,34 @@ pub(super) fn write(path: &Path, design: &Design, process: &Process) -> Result<V
     Ok(blocks)
 }
 
-/// A square pad of pillars about a place.
-pub(super) fn top_pad(sheet: &mut Sheet, pillar: &str, (x, y): (i64, i64), side: i64, pitch: i64) {
-    let n = (side / pitch).max(1);
-    let first = -(n - 1) * pitch / 2;
-    sheet.array(pillar, (x + first, y + first), (n as i16, n as i16), pitch);
+/// A square pad of pillars about a place, on a lattice of this kind. Of a hexagonal one every other row is an array, and a pillar
+/// is in the middle.
+pub(super) fn top_pad(sheet: &mut Sheet, pillar: &str, (x, y): (i64, i64), side: i64, kind: LatticeKind, pitch: i64) {
+    let row = i64::from(kind.row_nm(pitch as u32));
+    let mut lines = |columns: i64, rows: i64, steps: [i64; 2]| {
+        let first = [columns, rows].map(|n| -(n - 1));
+        let at = (x + first[0] * steps[0] / 2, y + first[1] * steps[1] / 2);
+        sheet.array(pillar, at, (columns as i16, rows as i16), steps);
+    };
+    match kind {
+        LatticeKind::Square => {
+            let n = (side / pitch).max(1);
+            lines(n, n, [pitch; 2]);
+        }
+        LatticeKind::Hexagonal => {
+            // As many pitches and rows as fit, half of one beyond the outermost pillars.
+            let above = (side / row - 1).max(0) / 2;
+            let steps = [pitch, 2 * row];
+            lines(odd((side / pitch).max(1)), odd(above + 1), steps);
+            let (columns, rows) = (side / pitch / 2 * 2, (above + 1) / 2 * 2);
+            if columns > 0 && rows > 0 {
+                lines(columns, rows, steps);
+            }
+        }
+    }
+}
+
+/// The largest odd number up to this one, which is positive.
+fn odd(n: i64) -> i64 {
+    n - 1 + n % 2
 }

@@ -1,6 +1,6 @@
 //! Places on the chip at which widths are to be measured, and crosses to align by.
 
-use metalith_core::{PillarShape, WidthMap, part};
+use metalith_core::{LatticeKind, PillarShape, WidthMap};
 use serde::Serialize;
 
 use super::pad::{DrawnSize, legal_width, whole_mdeg};
@@ -9,9 +9,9 @@ use super::structures::Structure;
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
 
-/// Pillars on each side of a site whose widths should be nearly equal: an SEM then measures the right one even
-/// when it counts wrong by one.
-const NEIGHBOURS: usize = 1;
+/// Neighbours on the sides of a pillar of a square lattice and across its corners, by columns and rows. All neighbours of a
+/// site should be nearly as wide: an SEM then measures the right one even when it counts wrong by one.
+const AROUND_SQUARE: [[i64; 2]; 4] = [[1, 0], [0, 1], [1, 1], [-1, 1]];
 /// Widths between the narrowest and the widest that are looked for on the lenses.
 const WIDTHS: usize = 5;
 /// Rotations of rectangles that are looked for (degrees): along the axes, where an SEM measures best, and between them.
@@ -66,7 +66,7 @@ pub(super) fn sites(
         let radius_um = design.lens_of(&placed.element).radius_um();
         for best in best_sites(&map, array.shape, radius_um, &widths, zones) {
             let (around_nm, around_deg) = neighbours(array.shape, &best);
-            let (x, y) = (map.lattice.coordinate_nm(best.ix), map.lattice.coordinate_nm(best.iy));
+            let (x, y) = (map.lattice.place_nm(0, best.ix), map.lattice.place_nm(1, best.iy));
             sites.push(MetrologySite {
                 id: format!("L{:02}", sites.len() + 1),
                 file: "pillars",
@@ -155,8 +155,8 @@ fn from_own(shape: PillarShape, own: u16, other: u16) -> i32 {
 fn best_sites(map: &WidthMap, shape: PillarShape, radius_um: f64, targets: &[u16], zones: usize) -> Vec<BestSite> {
     let n = map.lattice.sites();
     let mut best: Vec<Option<(u64, BestSite)>> = (0..targets.len() * zones).map(|_| None).collect();
-    for iy in NEIGHBOURS..n.saturating_sub(NEIGHBOURS) {
-        for ix in NEIGHBOURS..n.saturating_sub(NEIGHBOURS) {
+    for iy in 0..n {
+        for ix in 0..n {
             let number = map.width_nm[[iy, ix]];
             let Some(target) = targets.iter().position(|&w| w == number) else {
                 continue;
@@ -164,10 +164,10 @@ fn best_sites(map: &WidthMap, shape: PillarShape, radius_um: f64, targets: &[u16
             let Some(around) = around(map, shape, ix, iy) else {
                 continue;
             };
-            let r_um = map.lattice.coordinate_um(ix).hypot(map.lattice.coordinate_um(iy));
+            let r_um = map.lattice.place_um(0, ix).hypot(map.lattice.place_um(1, iy));
             let zone = ((r_um / radius_um * zones as f64) as usize).min(zones - 1);
             let difference = u64::from(around.0.unsigned_abs().max(around.1.unsigned_abs()));
-            let aside = map.lattice.half_index(iy).unsigned_abs();
+            let aside = map.lattice.place_nm(1, iy).unsigned_abs();
             let score = (difference << 32) | aside;
             let held = &mut best[target * zones + zone];
             if held.as_ref().is_none_or(|(known, _)| score < *known) {
@@ -179,15 +179,17 @@ fn best_sites(map: &WidthMap, shape: PillarShape, radius_um: f64, targets: &[u16
     best.into_iter().flatten().map(|(_, site)| site).collect()
 }
 
-/// Least and greatest pillar in the square about a site, from its own; none where one is missing.
+/// Least and greatest pillar about a site, from its own; none where one is missing.
 fn around(map: &WidthMap, shape: PillarShape, ix: usize, iy: usize) -> Option<(i32, i32)> {
-    let part = part(
-        map.width_nm.view(),
-        iy - NEIGHBOURS..iy + NEIGHBOURS + 1,
-        ix - NEIGHBOURS..ix + NEIGHBOURS + 1,
-    );
+    let half = match map.lattice.kind() {
+        LatticeKind::Square => &AROUND_SQUARE[..],
+        LatticeKind::Hexagonal => map.lattice.neighbours(),
+    };
     let own = map.width_nm[[iy, ix]];
-    part.iter().try_fold((0, 0), |(low, high), &other| {
+    let all = half.iter().flat_map(|[x, y]| [[*x, *y], [-x, -y]]);
+    all.into_iter().try_fold((0, 0), |(low, high), [x, y]| {
+        let place = [iy.checked_add_signed(y as isize)?, ix.checked_add_signed(x as isize)?];
+        let other = *map.width_nm.get(place)?;
         let apart = from_own(shape, own, other);
         (other > 0).then_some((low.min(apart), high.max(apart)))
     })

@@ -47,10 +47,10 @@ impl Sources {
     /// Mistakes in one of them; a file that cannot be read, is no ordinary file, or changes while it is read.
     pub fn read(options: &HandoffOptions) -> Result<Self> {
         let (design, mut kept) = read_design(&options.design)?;
-        let process = options
-            .process
-            .as_deref()
-            .map_or_else(|| Ok(Process::of_film(&design.cell.pillar_material)), Process::read)?;
+        let process = match &options.process {
+            Some(path) => Process::read(path)?,
+            None => Process::of_film(&design.cell.pillar_material, design.cell.pillar_height_nm),
+        };
         // The process and its decks may be those of the program, which are no files.
         let (path, text) = process.source();
         kept.push(InputCopy::new("process_", path, "the process values", text.as_bytes()));
@@ -161,9 +161,9 @@ fn unique(taken: &BTreeSet<String>, name: &str) -> String {
 /// Read the design and the files it names. What is kept is what was read: the files are read before and after the
 /// design is, and must not change in between.
 fn read_design(path: &Path) -> Result<(Design, Vec<InputCopy>)> {
-    let named = files_of(path, &Design::read(path)?)?;
+    let named = files_of(path, &Design::read_any(path)?)?;
     let before = bytes_of(&named)?;
-    let design = Design::read(path)?;
+    let design = Design::read_any(path)?;
     let same_files = files_of(path, &design)? == named;
     for ((path, ..), bytes) in named.iter().zip(&before) {
         if !same_files || read_at_most(path, LONGEST, "an input of a hand-off")? != *bytes {

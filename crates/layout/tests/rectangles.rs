@@ -69,9 +69,9 @@ fn rectangles_are_read_back_from_every_hierarchy_and_format() {
 }
 
 #[test]
-fn rotations_are_half_of_the_phase() {
-    // Half a step of rotation, twice of phase, and rounding.
-    const HALF_STEP: f64 = 0.5 / 180.0 + 1e-9;
+fn rotations_are_half_of_the_phase_and_what_the_lattice_asks_for() {
+    // Half a step of rotation, twice of phase, what the grid turns neighbouring rotations apart, and rounding.
+    const HALF_STEP: f64 = 0.5 / 180.0 + 0.29 / 180.0 + 1e-9;
     for (arriving, sign) in [("left", 1.0), ("right", -1.0)] {
         let path = design("geometric_phase_532");
         let text = std::fs::read_to_string(&path).unwrap();
@@ -83,8 +83,11 @@ fn rotations_are_half_of_the_phase() {
         let phase = metalith_design::phase::ElementPhase::of(&lens, &array.central().element);
         let mut pillars = 0;
         for ((iy, ix), &number) in widths.width_nm.indexed_iter().filter(|(_, n)| **n != 0) {
-            let turns = sign * PILLARS.rotation(number) / std::f64::consts::PI;
-            let off = turns - phase.wrapped(ix, iy).unwrap();
+            let turns = sign * PILLARS.drawn_rotation(number) / std::f64::consts::PI;
+            let wanted = phase.wrapped(ix, iy).unwrap();
+            let added = design.mapping.rotation.added(std::f64::consts::TAU * wanted) / std::f64::consts::PI;
+            assert!(added.abs() > 0.0 && added.abs() < 0.3 / 180.0);
+            let off = turns - wanted - added;
             assert!((off - off.round()).abs() <= HALF_STEP, "({ix}, {iy}): {off}");
             pillars += 1;
         }

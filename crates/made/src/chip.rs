@@ -11,7 +11,7 @@ use super::{
     Perturbation, cell_direction, mixed, realised_nm,
 };
 use metalith_cell::{CellStack, POLARISATION_SHARE};
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Error, Progress, Result, WidthMap};
 use metalith_wave::Psf;
 use metalith_wave::{Accuracy, Fold, PlaneWave, Propagator, Scratch, Window};
 
@@ -97,6 +97,11 @@ impl MadeChip {
     /// If the wavelength is outside the range of a material.
     pub fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {
         self.cells.stack().full_transmission(wavelength_um)
+    }
+
+    /// Pillars of this chip's shape as drawn, with the radius of the opening in the metal around them (um).
+    pub fn drawn<'a>(&self, pillars: &'a WidthMap, aperture_radius_um: f64) -> DrawnElement<'a> {
+        DrawnElement::new(pillars, aperture_radius_um).of_shape(self.cells.stack().shape)
     }
 
     /// An element as it is made.

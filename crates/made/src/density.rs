@@ -1,6 +1,6 @@
 //! How much is exposed around a pillar.
 
-use metalith_core::WidthMap;
+use metalith_core::{PillarShape, WidthMap};
 use rayon::prelude::*;
 
 /// Range of the backscattered electrons over which fill is averaged (um): exp(-r^2 / range^2).
@@ -12,14 +12,18 @@ const CUT_RANGES: f64 = 3.0;
 /// Rows or columns that a task copies at once: a few cache lines of either side.
 const STRIP: usize = 16;
 
-/// Area fraction around each site, averaged with a Gaussian of [`RANGE_UM`]. Row by row, `sites * sites`
+/// Area fraction of pillars of a shape around each site, averaged with a Gaussian of [`RANGE_UM`]. Row by row, `sites * sites`
 /// values, each between 0 and 1; what is around the lattice counts as empty.
-pub fn fill(pillars: &WidthMap) -> Vec<f32> {
+pub fn fill(pillars: &WidthMap, shape: PillarShape) -> Vec<f32> {
     let lattice = pillars.lattice;
     let n = lattice.sites();
     let steps_nm = lattice.steps_nm().map(f64::from);
     // Of the place in the grid of the lattice: beside each pillar of a hexagonal one is an empty place.
-    let area = |w: u16| (f64::from(w) / steps_nm[0] * (f64::from(w) / steps_nm[1])) as f32;
+    let area = |w: u16| match shape.rectangles() {
+        None => (f64::from(w) / steps_nm[0] * (f64::from(w) / steps_nm[1]) * shape.area_share()) as f32,
+        Some(_) if w == 0 => 0.0,
+        Some(_) => (shape.area_nm2(w) / (steps_nm[0] * steps_nm[1])) as f32,
+    };
     let mut plane: Vec<f32> = pillars.width_nm.iter().map(|&w| area(w)).collect();
     // Rows, then columns as the rows of the transposed plane.
     for step_um in lattice.steps_um() {
@@ -84,7 +88,7 @@ mod tests {
                 map.width_nm[[iy, ix]] = 175;
             }
         }
-        let fill = fill(&map);
+        let fill = fill(&map, PillarShape::Square);
         let at = |ix: usize| f64::from(fill[500 * 1000 + ix]);
         // What the cut of the kernel leaves out, and a step of the lattice at the edge.
         const CUT: f64 = 1e-3;
@@ -103,8 +107,8 @@ mod tests {
                 map.width_nm[[iy, ix]] = 300;
             }
         }
-        let fill = fill(&map);
-        let share = 0.09 / lattice.cell_um2();
+        let fill = fill(&map, PillarShape::Circle);
+        let share = 0.25 * std::f64::consts::PI * 0.09 / lattice.cell_um2();
         // What the cut of the kernel leaves out, and a step of the lattice at the edge.
         const CUT: f64 = 2e-3;
         let middle = n / 2;
@@ -124,7 +128,7 @@ mod tests {
         for (i, w) in map.width_nm.iter_mut().enumerate() {
             *w = (i * 7919 % 200) as u16;
         }
-        let fill = fill(&map);
+        let fill = fill(&map, PillarShape::Square);
         let along = |k: i64| (-(k as f64 * 0.35 / RANGE_UM).powi(2)).exp();
         let reach = (CUT_RANGES * RANGE_UM / 0.35).ceil() as i64;
         // Sums over a few hundred taps in single precision, three times: along both axes and in the norm.

@@ -13,7 +13,7 @@ use super::expression::Input;
 use super::pupil::PupilTerms;
 use super::stitching::displace;
 use super::{ArrivingLight, GeometryChange, NODE_STEP_NM, density, zernike};
-use metalith_core::{Error, Lattice, Result, WidthMap};
+use metalith_core::{Error, Lattice, PillarShape, Result, WidthMap};
 use metalith_wave::Aperture;
 use metalith_wave::kernels::cis;
 
@@ -28,6 +28,7 @@ const STEPS_PER_NM: f64 = 10.0;
 pub struct DrawnElement<'a> {
     pillars: &'a WidthMap,
     aperture_radius_um: f64,
+    shape: PillarShape,
     /// Centre of the element on the chip (um).
     centre_um: [f64; 2],
     /// Area fraction around each site, made when first asked for.
@@ -35,11 +36,12 @@ pub struct DrawnElement<'a> {
 }
 
 impl<'a> DrawnElement<'a> {
-    /// The pillars as read from a layout, and the radius of the opening in the metal around them (um).
+    /// The pillars as read from a layout, squares, and the radius of the opening in the metal around them (um).
     pub fn new(pillars: &'a WidthMap, aperture_radius_um: f64) -> Self {
         Self {
             pillars,
             aperture_radius_um,
+            shape: PillarShape::Square,
             centre_um: [0.0; 2],
             fill: OnceLock::new(),
         }
@@ -51,6 +53,12 @@ impl<'a> DrawnElement<'a> {
         Self { centre_um, ..self }
     }
 
+    /// The same of pillars of another shape: how much of the area they fill depends on it.
+    #[must_use]
+    pub fn of_shape(self, shape: PillarShape) -> Self {
+        Self { shape, ..self }
+    }
+
     /// The pillars.
     pub fn pillars(&self) -> &'a WidthMap {
         self.pillars
@@ -58,7 +66,7 @@ impl<'a> DrawnElement<'a> {
 
     /// Area fraction around each site, row by row; see [`density::fill`].
     pub fn fill(&self) -> &[f32] {
-        self.fill.get_or_init(|| density::fill(self.pillars))
+        self.fill.get_or_init(|| density::fill(self.pillars, self.shape))
     }
 
     /// Width added to the pillar at a site, counted row by row, by bias, density and declared terms (nm).

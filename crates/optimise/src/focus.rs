@@ -118,12 +118,12 @@ impl Lens {
         let mut terms = BTreeMap::<(i64, u16), u32>::new();
         for ((iy, ix), &width) in widths.width_nm.indexed_iter() {
             if width != 0 {
-                *terms.entry((widths.lattice.half_radius2(ix, iy), width)).or_default() += 1;
+                *terms.entry((widths.lattice.units2(ix, iy), width)).or_default() += 1;
             }
         }
         let terms = terms.into_iter().collect::<Vec<_>>();
         let widest = terms.iter().map(|t| t.0.1).max().unwrap_or(0);
-        let half_pitch2 = (0.5 * widths.lattice.pitch_um()).powi(2);
+        let unit_um2 = widths.lattice.unit_um().powi(2);
         let ratio = wavelengths_um
             .par_iter()
             .map(|&wavelength_um| {
@@ -132,7 +132,7 @@ impl Lens {
                 let sum = terms
                     .iter()
                     .map(|&((r2, width), count)| {
-                        f64::from(count) * field.point(r2 as f64 * half_pitch2) * t[usize::from(width)]
+                        f64::from(count) * field.point(r2 as f64 * unit_um2) * t[usize::from(width)]
                     })
                     .sum::<Complex64>();
                 Ok((sum / (field.matched() * cell.full_transmission(wavelength_um)?)).norm_sqr())

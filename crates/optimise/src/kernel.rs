@@ -79,7 +79,7 @@ impl<'r> RingField<'r> {
         let r2 = lateral2_um2 + self.gap_um * self.gap_um;
         let r = r2.sqrt();
         let path = lateral2_um2 / (r + self.gap_um);
-        let area = self.rings.lattice().pitch_um().powi(2);
+        let area = self.rings.lattice().cell_um2();
         area * self.gap_um / (TAU * r2)
             * Complex64::new(1.0 / r, -self.wavenumber)
             * Complex64::cis(self.wavenumber * path)
@@ -89,10 +89,13 @@ impl<'r> RingField<'r> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metalith_core::Lattice;
+    use metalith_core::{Lattice, LatticeKind};
 
-    fn rings(diameter_nm: u32) -> Rings {
-        Rings::new(Lattice::covering(diameter_nm, 350).unwrap(), diameter_nm).unwrap()
+    const KINDS: [LatticeKind; 2] = [LatticeKind::Square, LatticeKind::Hexagonal];
+
+    fn rings(kind: LatticeKind, diameter_nm: u32) -> Rings {
+        let lattice = Lattice::of_kind_covering(kind, diameter_nm, 350).unwrap();
+        Rings::new(lattice, diameter_nm).unwrap()
     }
 
     /// Rayleigh-Sommerfeld over all sites of the real lattice, on the axis and off it.
@@ -102,22 +105,23 @@ mod tests {
         for ix in 0..lattice.sites() {
             for iy in 0..lattice.sites() {
                 let Some(ring) = rings.ring_at(ix, iy) else { continue };
-                let (x, y) = (lattice.coordinate_um(ix) - at.0, lattice.coordinate_um(iy) - at.1);
+                let (x, y) = (lattice.place_um(0, ix) - at.0, lattice.place_um(1, iy) - at.1);
                 let lateral2 = x * x + y * y;
                 let r = (lateral2 + z * z).sqrt();
                 let path = k * (lateral2 / (r + z)) + phase(ring);
                 sum += z / (TAU * r * r) * Complex64::new(1.0 / r, -k) * Complex64::cis(path);
             }
         }
-        sum * lattice.pitch_um().powi(2)
+        sum * lattice.cell_um2()
     }
 
     #[test]
     fn on_the_axis_it_is_the_sum_over_all_sites() {
         /// The nodes err by 1e-9 of a ring; more would be a fault.
         const TOLERANCE: f64 = 1e-8;
-        let rings = rings(200_000);
-        for (wavelength, z) in [(0.4, 480.0), (0.7, 300.0)] {
+        let cases = KINDS.map(|kind| [(kind, 0.4, 480.0), (kind, 0.7, 300.0)]);
+        for (kind, wavelength, z) in cases.into_iter().flatten() {
+            let rings = rings(kind, 200_000);
             let field = RingField::new(&rings, wavelength, z);
             let phase = |ring: usize| (ring * ring) as f64 * 0.37;
             let quick = (0..rings.len())
@@ -133,19 +137,19 @@ mod tests {
     fn near_the_axis_it_is_the_average_around_it() {
         /// Of the matched peak: where the series for the path ends.
         const TOLERANCE: f64 = 2e-5;
-        /// Angles within a quarter turn that the brute force is averaged over; the lattice has that symmetry.
-        const ANGLES: u32 = 12;
-        let rings = rings(100_000);
+        /// Angles within a half turn that the brute force is averaged over, which leaves either lattice alike.
+        const ANGLES: u32 = 24;
         let (bessel, wavelength, z) = (Bessel::up_to(100.0), 0.5, 240.0);
-        let field = RingField::new(&rings, wavelength, z);
-        let phase = |ring: usize| -TAU / 0.55 * (rings.middle_um(ring).hypot(z) - z);
-        for rho in [0.0, 1.3, 7.0] {
+        let rings = KINDS.map(|kind| rings(kind, 100_000));
+        for (rings, rho) in rings.iter().flat_map(|rings| [0.0, 1.3, 7.0].map(|rho| (rings, rho))) {
+            let field = RingField::new(rings, wavelength, z);
+            let phase = |ring: usize| -TAU / 0.55 * (rings.middle_um(ring).hypot(z) - z);
             let quick = (0..rings.len())
                 .map(|k| field.at_radius(k, rho, &bessel) * Complex64::cis(phase(k)))
                 .sum::<Complex64>();
             let exact = (0..ANGLES)
-                .map(|i| std::f64::consts::FRAC_PI_2 * (f64::from(i) + 0.3) / f64::from(ANGLES))
-                .map(|a| brute_force(&rings, phase, wavelength, z, (rho * a.cos(), rho * a.sin())))
+                .map(|i| std::f64::consts::PI * (f64::from(i) + 0.3) / f64::from(ANGLES))
+                .map(|a| brute_force(rings, phase, wavelength, z, (rho * a.cos(), rho * a.sin())))
                 .sum::<Complex64>()
                 / f64::from(ANGLES);
             let error = (quick - exact).norm() / field.matched();

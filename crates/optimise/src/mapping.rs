@@ -142,6 +142,7 @@ pub mod tests {
             polynomial,
             table_file: None,
             table: None,
+            rotation: Default::default(),
             steered: Vec::new(),
             comparison: MappingComparison::default(),
         };

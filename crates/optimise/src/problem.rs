@@ -81,7 +81,7 @@ fn side_lobe_rows(
     cells: &[&dyn CellModel],
 ) -> Result<Vec<FieldPoint>> {
     let lengths = wavelengths(spec.band_um.0 * 1e3, spec.band_um.1 * 1e3, SIDE_LOBE_STEP_NM);
-    let area = lens.rings.sites() as f64 * lens.rings.lattice().pitch_um().powi(2);
+    let area = lens.rings.sites() as f64 * lens.rings.lattice().cell_um2();
     let width = 3.0 * radius_um / SIDE_LOBE_POINTS as f64;
     let edge = 0.5e-3 * f64::from(lens.rings.diameter_nm());
     let largest = std::f64::consts::TAU / spec.band_um.0 * edge * 4.0 * radius_um / lens.gap_um;

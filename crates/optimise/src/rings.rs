@@ -1,7 +1,7 @@
 //! The rings of a lens: what the phases are optimised over.
 
 use metalith_core::{Error, Result};
-use metalith_core::{Lattice, WidthMap};
+use metalith_core::{Lattice, LatticeKind, WidthMap};
 
 /// Points at which a ring is sampled along r^2. The kernels turn by at most 1.2 rad across a ring of
 /// one pitch (400 nm, NA 0.2); Chebyshev interpolation at eight points then errs by 1e-9.
@@ -9,8 +9,8 @@ const NODES: usize = 8;
 
 /// The lattice sites of a round lens, ring by ring.
 ///
-/// Ring `k` is the set of sites with floor(r / pitch) = k, r from the centre of the lens. On a lattice
-/// with an even number of sites no site lies on a boundary, since 4 r^2 / pitch^2 is 2 modulo 8. Sites
+/// Ring `k` is the set of sites with floor(r / pitch) = k, r from the centre of the lens, formed from exact squares. On a square
+/// lattice with an even number of sites no site lies on a boundary, since 4 r^2 / pitch^2 is 2 modulo 8. Sites
 /// next to one another are in the same ring or in neighbouring ones.
 ///
 /// The sum over the sites of a ring of a function smooth in r^2 is a weighted sum over eight radii,
@@ -19,8 +19,8 @@ const NODES: usize = 8;
 pub struct Rings {
     lattice: Lattice,
     diameter_nm: u32,
-    /// Number of sites at half_radius2 = 8 i + 2.
-    counts: Vec<u32>,
+    /// Squares of the distances of sites in units of the lattice ([`Lattice::units2`]), rising, and the number of sites at each.
+    counts: Vec<(i64, u32)>,
     sites: Vec<u32>,
     nodes: Vec<[Node; NODES]>,
 }
@@ -38,9 +38,10 @@ impl Rings {
     /// The rings of a lens of this diameter: all sites with their centre within it.
     ///
     /// # Errors
-    /// If the lattice has an odd number of sites, or is smaller than the lens.
+    /// If a square lattice has an odd number of sites, or the lattice is smaller than the lens.
     pub fn new(lattice: Lattice, diameter_nm: u32) -> Result<Self> {
-        if !lattice.sites().is_multiple_of(2) || diameter_nm / lattice.pitch_nm() < 2 {
+        let odd = lattice.is_square() && !lattice.sites().is_multiple_of(2);
+        if odd || diameter_nm / lattice.pitch_nm() < 2 {
             return Err(Error::invalid(
                 format!(
                     "a lens of {diameter_nm} nm on a lattice of {} sites has no rings",
@@ -49,32 +50,21 @@ impl Rings {
                 "use an even number of sites and a lens of several pitches",
             ));
         }
-        if (lattice.sites() as u64) * u64::from(lattice.pitch_nm()) < u64::from(diameter_nm) {
+        if (lattice.sites() as u64) * u64::from(lattice.steps_nm()[0]) < u64::from(diameter_nm) {
             return Err(Error::invalid(
                 format!("{} sites do not hold a lens of {diameter_nm} nm", lattice.sites()),
                 "use more sites or a smaller lens",
             ));
         }
-        let largest = half_radius2_within(diameter_nm, lattice.pitch_nm());
-        let half = lattice.sites() / 2;
-        let mut counts = vec![0u32; (largest.max(2) as usize - 2) / 8 + 1];
-        for ix in half..lattice.sites() {
-            for iy in half..=ix {
-                let r2 = lattice.half_radius2(ix, iy);
-                if r2 > largest {
-                    break;
-                }
-                counts[(r2 as usize - 2) / 8] += if ix == iy { 4 } else { 8 };
-            }
-        }
         let mut rings = Self {
             lattice,
             diameter_nm,
-            counts,
+            counts: counts(lattice, diameter_nm),
             sites: Vec::new(),
             nodes: Vec::new(),
         };
-        let count = ring_of(rings.half_radius2_of(rings.counts.len() - 1)) + 1;
+        let (largest, _) = *rings.counts.last().expect("a lens of several pitches has sites");
+        let count = rings.ring_of(largest) + 1;
         (rings.sites, rings.nodes) = (0..count).map(|k| rings.sample(k)).unzip();
         Ok(rings)
     }
@@ -116,8 +106,8 @@ impl Rings {
 
     /// The ring of a site.
     pub fn ring_at(&self, ix: usize, iy: usize) -> Option<usize> {
-        let r2 = self.lattice.half_radius2(ix, iy);
-        (r2 <= half_radius2_within(self.diameter_nm, self.lattice.pitch_nm())).then(|| ring_of(r2))
+        let r2 = self.lattice.units2(ix, iy);
+        (self.lattice.has(ix, iy) && r2 <= largest_units2(self.lattice, self.diameter_nm)).then(|| self.ring_of(r2))
     }
 
     /// Pillars of one width a ring. The array that a layout of this lens alone would hold.
@@ -139,39 +129,40 @@ impl Rings {
     /// Every distinct distance of a ring's sites (um) with its number of sites: the oracle of [`Node`].
     #[cfg(test)]
     pub fn distances(&self, ring: usize) -> impl Iterator<Item = (f64, u32)> {
-        let half_pitch = 0.5 * self.lattice.pitch_um();
-        self.bins(ring)
-            .filter(|&i| self.counts[i] > 0)
-            .map(move |i| ((self.half_radius2_of(i) as f64).sqrt() * half_pitch, self.counts[i]))
+        let unit_um = self.lattice.unit_um();
+        self.of_ring(ring)
+            .iter()
+            .map(move |&(r2, n)| ((r2 as f64).sqrt() * unit_um, n))
     }
 
-    fn half_radius2_of(&self, bin: usize) -> i64 {
-        8 * bin as i64 + 2
+    /// floor(r / pitch) from the square of a distance in units, exactly.
+    fn ring_of(&self, units2: i64) -> usize {
+        (units2 as u64).isqrt() as usize / units_of_pitch(self.lattice) as usize
     }
 
-    /// Bins of `counts` with 4 k^2 <= half_radius2 < 4 (k + 1)^2.
-    fn bins(&self, ring: usize) -> std::ops::Range<usize> {
-        let first = |k: usize| (4 * k * k).saturating_sub(2).div_ceil(8);
-        first(ring)..first(ring + 1).min(self.counts.len())
+    /// Those of `counts` that are of a ring.
+    fn of_ring(&self, ring: usize) -> &[(i64, u32)] {
+        let first = |k: usize| {
+            let least = (units_of_pitch(self.lattice) * k as i64).pow(2);
+            self.counts.partition_point(|(r2, _)| *r2 < least)
+        };
+        &self.counts[first(ring)..first(ring + 1)]
     }
 
     fn sample(&self, ring: usize) -> (u32, [Node; NODES]) {
-        let (low, high) = (4.0 * (ring * ring) as f64, 4.0 * ((ring + 1) * (ring + 1)) as f64);
+        let end = |k: usize| (units_of_pitch(self.lattice) * k as i64).pow(2) as f64;
+        let (low, high) = (end(ring), end(ring + 1));
         let mut at = [0.0; NODES];
         let mut nodes = [Node::default(); NODES];
         for (j, (at, node)) in at.iter_mut().zip(&mut nodes).enumerate() {
             let angle = std::f64::consts::PI * (j as f64 + 0.5) / NODES as f64;
             *at = 0.5 * (low + high) + 0.5 * (high - low) * angle.cos();
-            node.radius_um = 0.5 * self.lattice.pitch_um() * at.sqrt();
+            node.radius_um = self.lattice.unit_um() * at.sqrt();
         }
         let mut sites = 0;
-        for bin in self.bins(ring) {
-            let count = self.counts[bin];
-            if count == 0 {
-                continue;
-            }
+        for &(r2, count) in self.of_ring(ring) {
             sites += count;
-            let s = self.half_radius2_of(bin) as f64;
+            let s = r2 as f64;
             for (j, node) in nodes.iter_mut().enumerate() {
                 let mut lagrange = f64::from(count);
                 for (i, other) in at.iter().enumerate() {
@@ -186,15 +177,43 @@ impl Rings {
     }
 }
 
-/// Largest square of a distance, in half pitches, within a diameter.
-fn half_radius2_within(diameter_nm: u32, pitch_nm: u32) -> i64 {
-    let (d, p) = (i64::from(diameter_nm), i64::from(pitch_nm));
-    d * d / (p * p)
+/// A pitch in the units of [`Lattice::units2`].
+fn units_of_pitch(lattice: Lattice) -> i64 {
+    match lattice.kind() {
+        LatticeKind::Square => 2,
+        LatticeKind::Hexagonal => 2 * i64::from(lattice.pitch_nm()),
+    }
 }
 
-/// floor(r / pitch) from 4 r^2 / pitch^2, exactly.
-pub fn ring_of(half_radius2: i64) -> usize {
-    (half_radius2 as u64).isqrt() as usize / 2
+/// Largest square of a distance within a diameter, in the units of [`Lattice::units2`].
+fn largest_units2(lattice: Lattice, diameter_nm: u32) -> i64 {
+    let d = i64::from(diameter_nm);
+    match lattice.kind() {
+        LatticeKind::Square => d * d / i64::from(lattice.pitch_nm()).pow(2),
+        LatticeKind::Hexagonal => d * d,
+    }
+}
+
+/// Squares of the distances of the sites within a diameter, and how many sites are at each: of the quarter to the upper right, whose
+/// sites stand for their mirror images.
+fn counts(lattice: Lattice, diameter_nm: u32) -> Vec<(i64, u32)> {
+    let largest = largest_units2(lattice, diameter_nm);
+    let n = lattice.sites();
+    let images = |i: usize| if 2 * i + 1 == n { 1 } else { 2 };
+    let mut all = Vec::new();
+    for iy in n / 2..n {
+        for ix in (n / 2..n).filter(|&ix| lattice.has(ix, iy)) {
+            let r2 = lattice.units2(ix, iy);
+            if r2 > largest {
+                break;
+            }
+            all.push((r2, images(ix) * images(iy)));
+        }
+    }
+    all.sort_unstable();
+    all.chunk_by(|a, b| a.0 == b.0)
+        .map(|same| (same[0].0, same.iter().map(|(_, sites)| sites).sum()))
+        .collect()
 }
 
 #[cfg(test)]
@@ -215,23 +234,26 @@ mod tests {
 
     #[test]
     fn every_site_is_in_the_ring_of_its_radius() {
-        let rings = Rings::new(Lattice::covering(40_000, 350).unwrap(), 40_000).unwrap();
-        let n = rings.lattice().sites();
-        let mut sites = vec![0; rings.len()];
-        for ix in 0..n {
-            for iy in 0..n {
-                let r = rings
-                    .lattice()
-                    .coordinate_um(ix)
-                    .hypot(rings.lattice().coordinate_um(iy));
-                let ring = rings.ring_at(ix, iy);
-                assert_eq!(ring, (r <= 20.0).then(|| (r / 0.35).floor() as usize));
+        for kind in [LatticeKind::Square, LatticeKind::Hexagonal] {
+            let rings = Rings::new(Lattice::of_kind_covering(kind, 40_000, 350).unwrap(), 40_000).unwrap();
+            let lattice = rings.lattice();
+            let n = lattice.sites();
+            let mut sites = vec![0; rings.len()];
+            for (iy, ix) in (0..n * n).map(|k| (k / n, k % n)) {
+                // Squares in nanometres are exact.
+                let r2 = if lattice.is_square() {
+                    lattice.half_radius2(ix, iy) * 175 * 175
+                } else {
+                    lattice.radius2_nm2(ix, iy)
+                };
+                let ring = (lattice.has(ix, iy) && r2 <= 20_000 * 20_000).then(|| (r2 as u64).isqrt() as usize / 350);
+                assert_eq!(rings.ring_at(ix, iy), ring);
                 if let Some(k) = ring {
                     sites[k] += 1;
                 }
             }
+            assert_eq!(sites, rings.sites);
         }
-        assert_eq!(sites, rings.sites);
     }
 
     /// Sums over a ring of the fastest function the kernels hold, against all of its sites.
@@ -239,9 +261,14 @@ mod tests {
     fn nodes_stand_for_the_sites() {
         /// Error of Chebyshev interpolation, `NODES`, times a margin of ten for the sum.
         const TOLERANCE: f64 = 1e-8;
-        let rings = lens();
+        let hexagonal = Lattice::of_kind_covering(LatticeKind::Hexagonal, 1_000_000, 350).unwrap();
+        let hexagonal = Rings::new(hexagonal, 1_000_000).unwrap();
         let k = std::f64::consts::TAU / 0.4;
-        for ring in [0, 1, 2, 10, 700, 1427, 1428] {
+        let rings = [lens(), hexagonal];
+        for (rings, ring) in rings
+            .iter()
+            .flat_map(|r| [0, 1, 2, 10, 700, 1427, 1428].map(|ring| (r, ring)))
+        {
             let wave = |r: f64| num_complex::Complex64::cis(k * (r.hypot(2000.0) - 2000.0));
             let exact = rings
                 .distances(ring)

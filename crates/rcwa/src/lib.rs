@@ -272,7 +272,7 @@ impl Problem {
     }
 
     fn part(&self, family: Family, incident: &[[Complex64; 2]]) -> Result<Part> {
-        let basis = FieldBasis::new(self.orders.of(self.stack.lattice), family, self.k, self.steps);
+        let basis = FieldBasis::new(self.stack.kept(self.orders), family, self.k, self.steps);
         if basis.rows.len() > MOST_UNKNOWNS {
             return Err(Error::TooLarge {
                 along_axis: self.orders.along_axis(),

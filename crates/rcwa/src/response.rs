@@ -49,7 +49,7 @@ impl Response {
     }
 
     pub(super) fn new(problem: &Problem, incidence: &Incidence, parts: Vec<Part>) -> Result<Self> {
-        let kept = problem.orders.of(problem.stack.lattice);
+        let kept = problem.stack.kept(problem.orders);
         let [x, y] = kept.reach().map(|order| order as i32);
         let fields = Fields::new(problem, incidence, &parts);
         let mut orders = Vec::new();

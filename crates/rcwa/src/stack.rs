@@ -107,8 +107,8 @@ impl Layer {
     }
 }
 
-/// Number of diffraction orders kept along each axis, odd: 13 keeps -6..=6. Of staggered rows, along each of the three
-/// directions of a hexagonal lattice, and all others as near: 13 keeps 127 orders.
+/// Number of diffraction orders kept along each axis, odd: 13 keeps -6..=6. Of pillars that have sides in all directions, and of
+/// staggered rows, as many orders as that makes or some fewer, in a circle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Orders(usize);
 
@@ -135,14 +135,6 @@ impl Orders {
     /// The highest order kept.
     pub(super) fn highest(self) -> usize {
         self.0 / 2
-    }
-
-    /// Which of a lattice they are.
-    pub(super) fn of(self, lattice: CellLattice) -> Kept {
-        match lattice {
-            CellLattice::Square => Kept::Square(self.highest()),
-            CellLattice::Staggered { .. } => Kept::Circle(self.highest()),
-        }
     }
 }
 
@@ -182,6 +174,22 @@ impl LayerStack {
         self.layers
             .iter()
             .any(|l| l.outline.is_upright() && !l.outline.is_empty())
+    }
+
+    /// Whether any pillar has sides that are not along the axes.
+    fn has_slanted(&self) -> bool {
+        self.layers
+            .iter()
+            .any(|l| !l.outline.is_upright() && !l.outline.is_empty())
+    }
+
+    /// Which plane waves are kept of so many orders.
+    pub(super) fn kept(&self, orders: Orders) -> Kept {
+        match self.lattice {
+            CellLattice::Square if self.has_slanted() && !self.has_upright() => Kept::disc(orders.along_axis()),
+            CellLattice::Square => Kept::Square(orders.highest()),
+            CellLattice::Staggered { .. } => Kept::circle(orders.along_axis()),
+        }
     }
 
     /// Refuses what cannot be, before anything is computed from it.

@@ -183,7 +183,7 @@ impl<'a> ElementSimulator<'a> {
     pub fn read<'w>(&self, element: &Element, widths: &'w dyn WidthRows) -> Result<ReadElement<'w>> {
         let drawn = widths.held().map(|map| {
             let drawn = DrawnElement::new(map, self.design.aperture_radius_of_um(element));
-            drawn.placed(element.centre_um())
+            drawn.of_shape(self.design.cell.shape).placed(element.centre_um())
         });
         let made = |case: &SimulationCase<'_>| match (case, &drawn) {
             (SimulationCase::Cell(_), _) => Ok(None),

@@ -20,7 +20,7 @@ pub struct PhaseError {
 /// What a written element does to the phase that was asked of it, at the wavelength of the mapping.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PhaseErrors {
-    /// Width as written against the unrounded width, by [`WidthRule::turns_of_width`].
+    /// Width as written, or rotation as drawn, against the unrounded one, by [`WidthRule::turns_of_width`].
     pub rounding: PhaseError,
     /// Phase of the pillar as the cell has it against the design phase, less the mean.
     pub mapping: PhaseError,
@@ -44,7 +44,7 @@ impl PhaseErrors {
     ) -> Self {
         let by_width = |nm: f64| TAU * rule.turns_of_width(nm);
         let written = (0..=widths.widest_nm())
-            .map(|w| by_width(f64::from(w)))
+            .map(|w| TAU * rule.turns_of_written(w))
             .collect::<Vec<_>>();
         let turns_of = |t: &Complex64| (t.norm() > 0.0).then(|| t.arg() / TAU);
         let turns: Vec<Option<f64>> = response.table.iter().map(turns_of).collect();
@@ -53,7 +53,9 @@ impl PhaseErrors {
         // One walk for the rounding and the mean of the mapping, one for the mapping about its mean.
         let first = per_row(widths, phase, |pillars| {
             pillars.fold((Sums::default(), Complex64::ZERO), |(mut sums, mean), pillar| {
-                sums.add(written[usize::from(pillar.width_nm)] - by_width(rule.unrounded_nm(pillar.design_turns)));
+                let rounded = written[usize::from(pillar.width_nm)] - by_width(rule.unrounded_nm(pillar.design_turns));
+                // The last rotation is next to the first.
+                sums.add(rounded - TAU * (rounded / TAU).round());
                 let unit = off(pillar).map_or(Complex64::ZERO, |turns| Complex64::cis(TAU * turns));
                 (sums, mean + unit)
             })

@@ -17,7 +17,7 @@ use super::white_page;
 use metalith_cell::{CellModel, Fidelity};
 use metalith_core::{Error, Lattice, LatticeKind, Progress, Result, Silent, WholeFile, WidthMap};
 use metalith_gds::extract::{ElementSite, Extraction};
-use metalith_made::{DrawnElement, MadeChip, ModelStatement, SimulationCase};
+use metalith_made::{MadeChip, ModelStatement, SimulationCase};
 use metalith_report::{Cell, Column, ImageGrid, Page, PillarZoom, Table, count, sig, write_json};
 use metalith_wave::psf::{CONTRAST_LP_MM, Matched, Psf, PsfMetrics};
 use metalith_wave::{Accuracy, Fold, Pillars, PlaneWave, Scratch, Window};
@@ -146,7 +146,7 @@ fn as_made(
     let made = elements
         .iter()
         .map(|(site, widths)| {
-            let drawn = DrawnElement::new(widths, radius_um(widths));
+            let drawn = chip.drawn(widths, radius_um(widths));
             chip.element(&drawn.placed(site.centre_nm.map(|c| c as f64 * 1e-3)))
         })
         .collect::<Result<Vec<_>>>()?;

@@ -10,7 +10,7 @@ use super::white::{CameraStatement, Channels, Point, STEP_NM, WhiteChannel, per_
 use metalith_camera::Camera;
 use metalith_core::{Error, Progress, Result, Wedge};
 use metalith_gds::extract::Extraction;
-use metalith_made::{DrawnElement, SimulationCase};
+use metalith_made::SimulationCase;
 use metalith_wave::psf::{BandSample, CURVE_LP_MM, Matched};
 use metalith_wave::{Accuracy, Fold, Pillars, Scratch, Window};
 
@@ -66,7 +66,9 @@ pub fn single_white(
             SimulationCase::Cell(_) => None,
             SimulationCase::Made(chip) => {
                 let radius = light.aperture_radius_um.unwrap_or_else(|| widths.circle_um());
-                let drawn = DrawnElement::new(widths, radius).placed(site.centre_nm.map(|c| c as f64 * 1e-3));
+                let drawn = chip
+                    .drawn(widths, radius)
+                    .placed(site.centre_nm.map(|c| c as f64 * 1e-3));
                 Some((chip, chip.element(&drawn)?))
             }
         };

@@ -3,6 +3,7 @@
 mod fitted_cell;
 mod forward;
 mod inverse;
+mod rotation;
 
 use num_complex::Complex64;
 use serde::Serialize;
@@ -10,6 +11,7 @@ use serde::Serialize;
 pub use fitted_cell::FittedCell;
 pub use forward::{ForwardFit, curves_over, fit_forward, forward_errors};
 pub use inverse::{InverseFit, fit_inverse, round_trip};
+pub use rotation::{RotationCurve, RotationFit};
 
 use metalith_core::{Error, Result};
 

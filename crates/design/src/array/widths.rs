@@ -1,10 +1,12 @@
 //! Phase to width, site by site.
 
+use std::f64::consts::{PI, TAU};
+
 use rayon::prelude::*;
 
 use crate::phase::ElementPhase;
 use crate::{CellSpec, Design, MappingSpec};
-use metalith_cell::{ForwardPolynomial, Handedness, InversePolynomial, MappingTable};
+use metalith_cell::{ForwardPolynomial, Handedness, InversePolynomial, MappingTable, RotationMapping};
 use metalith_core::{PillarShape, Rectangles, WidthMap};
 
 /// Rounds the duty cycle that a mapping asks for to a width that may be written.
@@ -17,8 +19,85 @@ pub struct WidthRule {
     range_nm: (f64, f64),
     /// Published phase over width of the paper's cell, and the wavelength of the mapping (um).
     forward: Option<(ForwardPolynomial, f64)>,
-    /// Of rectangles, for light that arrives so: everything else does not count.
-    rotation: Option<(Rectangles, Handedness)>,
+    /// Of rectangles: everything else does not count.
+    rotation: Option<RotationRule>,
+}
+
+/// Phase to the number of a rotation.
+#[derive(Clone, Debug, PartialEq)]
+struct RotationRule {
+    pillars: Rectangles,
+    /// Of the light that arrives.
+    arriving: Handedness,
+    mapping: RotationMapping,
+    /// What the grid adds to the rotation of each number, in steps; the first stands for no pillar.
+    turned: Vec<f64>,
+}
+
+impl RotationRule {
+    fn new(pillars: Rectangles, arriving: Handedness, mapping: RotationMapping) -> Self {
+        let in_steps = |number: u16| pillars.turned_by_grid(number) / PI * f64::from(pillars.steps);
+        Self {
+            pillars,
+            arriving,
+            mapping,
+            turned: std::iter::once(0.0).chain((1..=pillars.steps).map(in_steps)).collect(),
+        }
+    }
+
+    fn steps(&self) -> f64 {
+        f64::from(self.pillars.steps)
+    }
+
+    /// The number before rounding for a phase of `u` turns, from half to half beyond the last. Half a turn of rotation is a
+    /// turn of phase.
+    fn unrounded(&self, u: f64) -> f64 {
+        let steps = self.steps();
+        let added = match self.mapping.is_half() {
+            true => 0.0,
+            false => self.mapping.added(TAU * u) / PI * steps,
+        };
+        let number = match self.arriving {
+            Handedness::Left => u * steps + added,
+            Handedness::Right => (1.0 - u) * steps - added,
+        };
+        if number < 0.5 {
+            number + steps
+        } else if number >= steps + 0.5 {
+            number - steps
+        } else {
+            number
+        }
+    }
+
+    /// The pillar whose rotation as drawn is nearest to that for a phase of `u` turns; of two the first.
+    fn number(&self, u: f64) -> u16 {
+        let wanted = self.unrounded(u);
+        let nearest = wanted.round();
+        let mut best = (f64::INFINITY, 1);
+        // What the grid adds is less than a step.
+        for beside in [-1.0, 0.0, 1.0] {
+            let number = match (nearest + beside) as i64 {
+                n if n < 1 => n + i64::from(self.pillars.steps),
+                n if n > i64::from(self.pillars.steps) => n - i64::from(self.pillars.steps),
+                n => n,
+            } as u16;
+            let off = nearest + beside + self.turned[usize::from(number)] - wanted;
+            if off.abs() < best.0 {
+                best = (off.abs(), number);
+            }
+        }
+        best.1
+    }
+
+    /// Turns of phase of so many steps of rotation.
+    fn turns(&self, steps: f64) -> f64 {
+        let turns = steps / self.steps();
+        match self.arriving {
+            Handedness::Left => turns,
+            Handedness::Right => -turns,
+        }
+    }
 }
 
 /// The largest phase below a turn that tables of mappings tell from one.
@@ -61,27 +140,21 @@ impl WidthRule {
             rotation: cell
                 .shape
                 .rectangles()
-                .map(|pillars| (pillars, cell.arriving.unwrap_or_default())),
+                .map(|pillars| RotationRule::new(pillars, cell.arriving.unwrap_or_default(), mapping.rotation.clone())),
         }
     }
 
     /// What the pillars are, as far as symmetry is asked: rectangles, or what a mirror leaves as it is.
     pub(super) fn shape(&self) -> PillarShape {
-        self.rotation
-            .map_or(PillarShape::Square, |(pillars, _)| PillarShape::Rectangle(pillars))
+        let rotation = self.rotation.as_ref();
+        rotation.map_or(PillarShape::Square, |rule| PillarShape::Rectangle(rule.pillars))
     }
 
     /// Width before rounding (nm) for a phase of `u` turns, `0 <= u < 1`; of rectangles the number of the rotation, from half to
     /// half beyond the last.
     pub fn unrounded_nm(&self, u: f64) -> f64 {
-        if let Some((pillars, arriving)) = &self.rotation {
-            // Half a turn of rotation is a turn of phase.
-            let steps = f64::from(pillars.steps);
-            let number = match arriving {
-                Handedness::Left => u * steps,
-                Handedness::Right => (1.0 - u) * steps,
-            };
-            return if number < 0.5 { number + steps } else { number };
+        if let Some(rule) = &self.rotation {
+            return rule.unrounded(u);
         }
         match &self.table {
             Some(table) => f64::from(table.width_nm(u)),
@@ -92,12 +165,8 @@ impl WidthRule {
     /// Phase (turns) that stands for a width (nm) where what counts is the difference of two: by the published polynomial for
     /// the cell of the paper, else by the mean slope of the mapping.
     pub fn turns_of_width(&self, nm: f64) -> f64 {
-        if let Some((pillars, arriving)) = &self.rotation {
-            let turns = nm / f64::from(pillars.steps);
-            return match arriving {
-                Handedness::Left => turns,
-                Handedness::Right => -turns,
-            };
+        if let Some(rule) = &self.rotation {
+            return rule.turns(nm);
         }
         if let Some(forward) = &self.forward {
             return forward.0.turns(nm / self.pitch_nm, forward.1);
@@ -106,8 +175,22 @@ impl WidthRule {
         nm / span_nm.abs().max(self.step_nm)
     }
 
+    /// The same of a width that is written, or of the number of a rotation as it is drawn.
+    pub fn turns_of_written(&self, width_nm: u16) -> f64 {
+        match &self.rotation {
+            Some(rule) => {
+                let turned = rule.turned.get(usize::from(width_nm)).copied().unwrap_or(0.0);
+                rule.turns(f64::from(width_nm) + turned)
+            }
+            None => self.turns_of_width(f64::from(width_nm)),
+        }
+    }
+
     /// Width to write (nm) for a phase of `u` turns, `0 <= u < 1`; of rectangles the number of the rotation.
     pub fn width_nm(&self, u: f64) -> u16 {
+        if let Some(rule) = &self.rotation {
+            return rule.number(u);
+        }
         let width = (self.unrounded_nm(u) / self.step_nm).round() * self.step_nm;
         width.clamp(self.range_nm.0, self.range_nm.1) as u16
     }
@@ -171,6 +254,40 @@ mod tests {
         assert_eq!(WidthRule::all(&own).len(), 2);
         // A design without them is what it was.
         assert!(!serde_json::to_string(&common.mapping).unwrap().contains("steered"));
+    }
+
+    /// Each phase gets the pillar whose rotation as drawn is nearest to what the mapping asks for, for both hands.
+    #[test]
+    fn rotations_are_those_drawn_nearest() {
+        let pillars = Rectangles {
+            width_nm: 100,
+            length_nm: 250,
+            steps: 180,
+        };
+        let mapping = RotationMapping {
+            sines: vec![0.004],
+            cosines: vec![-0.003, 0.001],
+        };
+        for arriving in [Handedness::Left, Handedness::Right] {
+            let rule = RotationRule::new(pillars, arriving, mapping.clone());
+            let half = RotationRule::new(pillars, arriving, RotationMapping::default());
+            for k in 0..2000 {
+                let u = f64::from(k) / 2000.0;
+                let sign = if arriving == Handedness::Left { 1.0 } else { -1.0 };
+                let wanted = sign * (PI * u + mapping.added(TAU * u));
+                let off = |number: u16| {
+                    let apart = pillars.drawn_rotation(number) - wanted;
+                    (apart - PI * (apart / PI).round()).abs()
+                };
+                let best = (1..=180).map(off).fold(f64::INFINITY, f64::min);
+                // Rounding of sums of numbers below 200.
+                assert!(off(rule.number(u)) < best + 1e-12, "{arriving:?} {u}");
+                assert!(
+                    (half.unrounded(u) - 0.5).rem_euclid(180.0) - (180.0 * sign * u - 0.5).rem_euclid(180.0) < 1e-9
+                );
+                assert!((0.5..180.5).contains(&rule.unrounded(u)));
+            }
+        }
     }
 
     #[test]

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::cell::read_band;
 use super::lens::WAVELENGTH;
 use super::{ArraySpec, CellSpec, Element};
-use metalith_cell::{Basis, InversePolynomial, MappingTable};
+use metalith_cell::{Basis, InversePolynomial, MappingTable, RotationMapping};
 use metalith_core::Result;
 use metalith_core::document::{Limits, Section};
 
@@ -26,6 +26,9 @@ pub struct MappingSpec {
     /// What that file holds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<MappingTable>,
+    /// Of rectangles: what their rotation has beside half of the phase.
+    #[serde(skip_serializing_if = "RotationMapping::is_half")]
+    pub rotation: RotationMapping,
     /// Mappings of steered elements, where they have their own.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub steered: Vec<SteeredMapping>,
@@ -89,11 +92,12 @@ impl MappingSpec {
             {
                 s.fault(
                     key,
-                    "rectangles have no mapping: the phase is twice their rotation",
-                    format!("leave `{key}` out, or use squares or circles"),
+                    "rectangles have no widths to map to: the phase is twice their rotation",
+                    format!("leave `{key}` out, or use squares or circles; `rotation_sines_deg` and `rotation_cosines_deg` correct it"),
                 );
             }
         }
+        let rotation = read_rotation(s, rotated);
         // A table is held to the widths of the cell when it is read.
         if !s.has("table") && !rotated {
             check_widths(s, cell, &polynomial);
@@ -133,6 +137,7 @@ impl MappingSpec {
             polynomial,
             table_file,
             table: None,
+            rotation,
             steered,
             comparison,
         }
@@ -151,6 +156,40 @@ impl MappingSpec {
             self.table = Some(MappingTable::read_csv(file, &allowed)?);
         }
         Ok(())
+    }
+}
+
+/// Largest coefficient of a correction of rotations (degrees): what a lattice adds is some degrees at most.
+const ROTATION: Limits = Limits::new(-10.0..=10.0, "degrees");
+
+/// Terms of such a correction at most.
+const MOST_TERMS: usize = 6;
+
+fn read_rotation(s: &Section<'_, '_>, rotated: bool) -> RotationMapping {
+    let read = |key: &str| -> Vec<f64> {
+        if !s.has(key) {
+            return Vec::new();
+        }
+        if !rotated {
+            s.fault(
+                key,
+                "a correction of rotations, and the pillars are no rectangles",
+                format!("leave `{key}` out, or use `shape = \"rectangle\"`"),
+            );
+        }
+        let list = s.floats(key, ROTATION);
+        if list.len() > MOST_TERMS {
+            s.fault(
+                key,
+                format!("{} terms, at most {MOST_TERMS}", list.len()),
+                "take the first of them: `metalith cells` says what they leave",
+            );
+        }
+        list.into_iter().map(f64::to_radians).collect()
+    };
+    RotationMapping {
+        sines: read("rotation_sines_deg"),
+        cosines: read("rotation_cosines_deg"),
     }
 }
 

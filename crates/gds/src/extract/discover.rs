@@ -17,6 +17,11 @@ const WIDEST_NM: i64 = 6000;
 const FEWEST: u64 = 16;
 /// Elements found at most.
 const MOST_ELEMENTS: usize = 4096;
+/// One in so many tiles at least shows a row between those of its samples, where two arrays make a hexagonal lattice: all do but
+/// those that pillars reach by their rims.
+const ROWS_BETWEEN: usize = 4;
+/// All centres but one in so many at most are sites of a hexagonal lattice.
+const SHARE_OF_SITES: u64 = 4;
 /// Lattice sites for each square found: a lens fills 0.79 of its lattice.
 const SITES_PER_PILLAR: u64 = 64;
 
@@ -268,8 +273,23 @@ impl Map {
         (first, (last - first).max(0) / step + 1)
     }
 
+    /// Whether enough of the last centres of the tiles of a cluster are in rows between those of its samples, and shifted as those of
+    /// a hexagonal lattice with this half pitch and distance of rows (half nm).
+    fn has_rows_between(&self, cluster: &[usize], half_pitch: i64, row: i64) -> bool {
+        let between = |&&k: &&usize| {
+            let (Some(first), Some(last)) = (self.tiles.samples(k).next(), self.tiles.last(k)) else {
+                return false;
+            };
+            let [x, y] = [last.x - first.x, last.y - first.y];
+            let whole = x % half_pitch == 0 && y % row == 0;
+            whole && x / half_pitch % 2 != 0 && y / row % 2 != 0
+        };
+        cluster.iter().filter(between).count() * ROWS_BETWEEN >= cluster.len()
+    }
+
     /// The hexagonal lattice of a cluster, if most centres are a pitch or half of one apart along x, and along y as far as its
-    /// rows. Samples of a tile may be of one row alone.
+    /// rows, or twice as far with rows between them. Samples of a tile may be of one row alone, or of every other one where two
+    /// arrays make the lattice.
     fn hexagonal(
         &self,
         cluster: &[usize],
@@ -281,13 +301,16 @@ impl Map {
         };
         // Half a pitch in half nanometres is a pitch in nanometres.
         let pitches = [step_x / 2, step_x].map(|pitch| u32::try_from(pitch).unwrap_or(0));
+        let row = |pitch_nm: u32| 2 * i64::from(LatticeKind::Hexagonal.row_nm(pitch_nm));
         let fits = |pitch: &u32| {
-            pitch.is_multiple_of(2) && *pitch > 0 && step_y == 2 * i64::from(LatticeKind::Hexagonal.row_nm(*pitch))
+            let row = row(*pitch);
+            let sound = pitch.is_multiple_of(2) && *pitch > 0;
+            sound && (step_y == row || (step_y == 2 * row && self.has_rows_between(cluster, (*pitch).into(), row)))
         };
         let Some(pitch_nm) = pitches.into_iter().find(fits) else {
             return Ok(None);
         };
-        let step_x = i64::from(pitch_nm);
+        let (step_x, step_y) = (i64::from(pitch_nm), row(pitch_nm));
         let bounds = self.bounds(cluster);
         let (x, columns) = self.places(cluster, 0, step_x, [bounds.x0, bounds.x1]);
         let (y, rows) = self.places(cluster, 1, step_y, [bounds.y0, bounds.y1]);
@@ -295,6 +318,11 @@ impl Map {
         let mut parities: BTreeMap<i64, u64> = BTreeMap::new();
         for s in cluster.iter().flat_map(|&k| self.tiles.samples(k)) {
             *parities.entry(staggered(s)).or_default() += 1;
+        }
+        // Where as many centres are on the other places of the grid it is no lattice of such rows.
+        let most = most_common_count(&parities);
+        if SHARE_OF_SITES * most < (SHARE_OF_SITES - 1) * parities.values().sum::<u64>() {
+            return Ok(None);
         }
         // A site in the middle, or beside it.
         let row = rows / 2;
@@ -341,6 +369,11 @@ fn dense_enough(
         rows,
         pitch_nm,
     })
+}
+
+/// How often the key counted most often was.
+fn most_common_count(counts: &BTreeMap<i64, u64>) -> u64 {
+    counts.values().copied().max().unwrap_or(0)
 }
 
 /// The key counted most often, the smallest of equals.

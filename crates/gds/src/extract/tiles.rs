@@ -60,6 +60,8 @@ pub(super) struct TileMap {
     tiles: Vec<((i64, i64), Tile)>,
     /// Some centres in each tile, as in the tile.
     samples: Vec<[(u16, u16); SAMPLES]>,
+    /// The last centre of each tile that could have been a sample, alike: rows that are drawn after others are in no sample.
+    last: Vec<(u16, u16)>,
     /// Tiles met lately, by the low bits of their place: most squares are looked up here, without a hash.
     lately: Vec<u32>,
 }
@@ -70,6 +72,7 @@ impl TileMap {
             numbers: HashMap::new(),
             tiles: Vec::new(),
             samples: Vec::new(),
+            last: Vec::new(),
             lately: vec![0; 1 << (2 * LATELY)],
         }
     }
@@ -78,6 +81,7 @@ impl TileMap {
         self.numbers.clear();
         self.tiles.clear();
         self.samples.clear();
+        self.last.clear();
     }
 
     /// Number of tiles.
@@ -113,6 +117,13 @@ impl TileMap {
             .map(move |&(x, y)| Point::new(TILE * column + i64::from(x), TILE * row + i64::from(y)))
     }
 
+    /// The last centre met in a tile that has samples (half nm).
+    pub fn last(&self, tile: usize) -> Option<Point> {
+        let ((column, row), Tile { sampled, .. }) = &self.tiles[tile];
+        let (x, y) = self.last[tile];
+        (*sampled > 0).then(|| Point::new(TILE * column + i64::from(x), TILE * row + i64::from(y)))
+    }
+
     /// The tile that holds a place; `guess` is the one to try first, and is set to it.
     #[inline]
     fn at(&mut self, place: Point, guess: &mut u32) -> usize {
@@ -126,6 +137,7 @@ impl TileMap {
                 if *lately == next {
                     self.tiles.push((key, Tile::EMPTY));
                     self.samples.push([(0, 0); SAMPLES]);
+                    self.last.push((0, 0));
                 }
             }
             *guess = *lately;
@@ -140,6 +152,7 @@ impl TileMap {
             self.samples[tile][usize::from(*sampled)] = (x as u16, y as u16);
             *sampled += 1;
         }
+        self.last[tile] = (x as u16, y as u16);
     }
 
     /// Count a square by its centre; it serves as a sample of the lattice if it is an `even` number of nm wide.
@@ -179,7 +192,7 @@ impl TileMap {
                     counted = self.at(placement.apply(Point::new(x, y)), &mut guess);
                 }
             }
-            for sample in cell.samples(number) {
+            for sample in cell.samples(number).chain(cell.last(number)) {
                 let sample = placement.apply(sample);
                 let tile = self.at(sample, &mut guess);
                 self.sample(tile, sample.x.rem_euclid(TILE), sample.y.rem_euclid(TILE));

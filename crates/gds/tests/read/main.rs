@@ -6,7 +6,7 @@ mod trees;
 
 use std::path::PathBuf;
 
-use metalith_core::{Lattice, PillarShape, Silent, WidthMap};
+use metalith_core::{Lattice, LatticeKind, PillarShape, Silent, WidthMap};
 use metalith_gds::extract::{ElementSite, ExtractionPlan, Why, extract};
 use metalith_gds::{
     Error, LayerNumber, Layout, LayoutError, Limit, Point, ReadLimits, Rect, Selection, Shape, Transform, Visitor,
@@ -222,6 +222,37 @@ fn everything_that_is_not_a_pillar_is_listed() {
 }
 
 /// Several lenses, found without being told, one of them a mirrored and magnified copy.
+/// A hexagonal lattice as people draw one: an array of every other row, then an array of the rows between. The same rows without
+/// those between are no hexagonal lattice, and as many shapes are found as are drawn.
+#[test]
+fn two_arrays_are_one_hexagonal_lattice() {
+    let rows = |between: bool| {
+        let mut gds = Gds::library();
+        gds.cell("P").square(1, 0, 0, 300).end_cell();
+        let place = |gds: &mut Gds, x: i32, y: i32, columns: i16, rows: i16| {
+            let ends = [x + 700 * i32::from(columns), y, x, y + 1212 * i32::from(rows)];
+            gds.array("P", columns, rows, [x, y, ends[0], ends[1], ends[2], ends[3]]);
+        };
+        gds.cell("TOP");
+        place(&mut gds, -28_000, -29_088, 81, 49);
+        if between {
+            place(&mut gds, -28_350, -28_482, 82, 48);
+        }
+        gds.end_cell();
+        extract(&layout(gds.end()), &ExtractionPlan::discover(PILLARS), &Silent)
+    };
+    let found = rows(true).unwrap();
+    let [element] = &found.elements[..] else {
+        panic!("{} elements", found.elements.len())
+    };
+    assert_eq!(element.site.lattice.kind(), LatticeKind::Hexagonal);
+    assert_eq!((element.site.lattice.pitch_nm(), element.site.centre_nm), (700, [0, 0]));
+    assert_eq!(element.widths.pillars(), 81 * 49 + 82 * 48);
+    if let Ok(other) = rows(false) {
+        assert!(other.elements.iter().all(|e| e.site.lattice.is_square()));
+    }
+}
+
 #[test]
 fn elements_are_discovered() {
     let read = extract(&layout(gds::everything()), &ExtractionPlan::discover(PILLARS), &Silent).unwrap();

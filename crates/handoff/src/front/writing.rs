@@ -86,7 +86,7 @@ pub(super) fn write_time(page: &mut Page, c: &Contents<'_>) {
         }
     }
     page.table(table);
-    let pitch = f64::from(c.design.cell.pitch_nm);
+    let (lattice, pitch_nm) = (c.design.cell.lattice, c.design.cell.pitch_nm);
     let mut snap = Table::new([
         Column::number("Current", "nA"),
         Column::number("Shot step", "nm"),
@@ -96,8 +96,8 @@ pub(super) fn write_time(page: &mut Page, c: &Contents<'_>) {
     ])
     .caption("What the shots of each beam do to the pillars of the array");
     for (beam, rms) in &c.documents.snapping {
-        let rest = pitch % beam.shot_step_nm;
-        let pitch = if rest == 0.0 {
+        let fits = |nm: u32| f64::from(nm) % beam.shot_step_nm == 0.0;
+        let pitch = if fits(pitch_nm) && fits(lattice.row_nm(pitch_nm)) {
             "a multiple of the step".to_owned()
         } else {
             format!(

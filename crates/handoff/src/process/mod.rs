@@ -12,7 +12,7 @@ use metalith_design::Design;
 use metalith_drc::Deck;
 
 /// The processes that ship with the program, by the names of their files; the first is the standard one.
-const SHIPPED: [(&str, &str); 4] = [
+const SHIPPED: [(&str, &str); 5] = [
     (
         "processes/jbx6300_zep520a.toml",
         include_str!("../../../../processes/jbx6300_zep520a.toml"),
@@ -20,6 +20,10 @@ const SHIPPED: [(&str, &str); 4] = [
     (
         "processes/jbx6300_asi.toml",
         include_str!("../../../../processes/jbx6300_asi.toml"),
+    ),
+    (
+        "processes/jbx6300_asi_900.toml",
+        include_str!("../../../../processes/jbx6300_asi_900.toml"),
     ),
     (
         "processes/jbx6300_tio2.toml",
@@ -123,6 +127,22 @@ pub struct PatternTransfer {
     pub etch: String,
     /// Films that this etch is for, by the names that designs give to the material of their pillars.
     pub films: Vec<String>,
+    /// Least and greatest thickness of the film (nm), where the etch and the rules are for some alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub film_nm: Option<[f64; 2]>,
+}
+
+impl PatternTransfer {
+    /// Whether it is for a film of this material.
+    pub(super) fn etches(&self, film: &str) -> bool {
+        self.films.iter().any(|known| known == film)
+    }
+
+    /// Whether it is for films of this thickness (nm).
+    pub(super) fn reaches(&self, thickness_nm: f64) -> bool {
+        let within = |[low, high]: [f64; 2]| (low..=high).contains(&thickness_nm);
+        self.film_nm.is_none_or(within)
+    }
 }
 
 /// Backscatter of electrons: range (um) and ratio to the direct dose, with their uncertainty.
@@ -258,11 +278,13 @@ impl Process {
         Self::shipped(0)
     }
 
-    /// The process that ships with the program and etches a film, as designs name it, if there is one; else the standard one.
-    pub fn of_film(film: &str) -> Self {
+    /// The process that ships with the program and etches a film of a material, as designs name it: one for its thickness (nm)
+    /// before others; the standard one where none does.
+    pub fn of_film(film: &str, thickness_nm: f64) -> Self {
         let all = (0..SHIPPED.len()).map(Self::shipped);
-        let mut fitting = all.filter(|process| process.transfer.films.iter().any(|known| known == film));
-        fitting.next().unwrap_or_else(Self::standard)
+        let mut fitting: Vec<Self> = all.filter(|process| process.transfer.etches(film)).collect();
+        fitting.sort_by_key(|process| !process.transfer.reaches(thickness_nm));
+        fitting.into_iter().next().unwrap_or_else(Self::standard)
     }
 
     fn shipped(k: usize) -> Self {
@@ -339,10 +361,14 @@ mod tests {
             }
             assert!(process.exposes_pillars());
             for film in &process.transfer.films {
-                assert_eq!(Process::of_film(film), process);
+                let thickness_nm = process.transfer.film_nm.map_or(600.0, |[low, high]| 0.5 * (low + high));
+                assert_eq!(Process::of_film(film, thickness_nm), process);
             }
         }
-        assert_eq!(Process::of_film("no film that is known"), Process::standard());
+        // None is for films so thin: one for the material, which says so.
+        let thin = Process::of_film("a_si_pierce_1972", 10.0);
+        assert_eq!(thin.name, "jbx6300_asi");
+        assert_eq!(Process::of_film("no film that is known", 600.0), Process::standard());
         assert_eq!(Process::standard().resist.dose_uc_cm2, 280.0);
     }
 

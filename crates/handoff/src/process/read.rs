@@ -132,6 +132,7 @@ fn transfer(s: &Section<'_, '_>) -> PatternTransfer {
         mask_thickness_nm: within(s, "mask_thickness_nm", 0.0, 10_000.0, "nm"),
         etch: s.text("etch"),
         films: films(s),
+        film_nm: s.has("film_nm").then(|| range(s, "film_nm", 1.0, 1e6, "nm")),
     }
 }
 

@@ -5,11 +5,22 @@ use crate::drawing::{RectNm, Sheet, nm};
 use crate::matrix::top_pad;
 use crate::pad::{DrawnSize, line_width, test_pads};
 use crate::process::Process;
-use metalith_core::PillarShape;
+use metalith_core::{LatticeKind, PillarShape};
 use metalith_design::Design;
 
 /// Lines of a dense CD group; odd, so that the middle one is as dense as lines get.
 const LINES: i64 = 5;
+
+/// Pitch of a pad with one pillar in so many pitches of the design (nm). Between sparse rows of a hexagonal lattice there is an even
+/// number of nanometres, as shot steps are, and the pitch is as much wider.
+fn pad_pitch_nm(kind: LatticeKind, pitch_nm: u32, sparse: i64) -> i64 {
+    let wanted = pitch_nm * sparse as u32;
+    let mut fitting = (wanted..)
+        .step_by(2)
+        .filter(|pitch| kind.row_nm(*pitch).is_multiple_of(2));
+    let found = if sparse == 1 { None } else { fitting.next() };
+    i64::from(found.unwrap_or(wanted))
+}
 
 impl Structures {
     /// A row of uniform pads, and the line along which to cleave through the dense ones.
@@ -23,7 +34,7 @@ impl Structures {
         y: i64,
     ) -> RectNm {
         let side = nm(process.tests.pad_um);
-        let pitch = i64::from(design.cell.pitch_nm) * sparse;
+        let pitch = pad_pitch_nm(design.cell.lattice, design.cell.pitch_nm, sparse);
         let cleave = sparse == 1;
         let sizes = match design.cell.shape {
             PillarShape::Square => "width",
@@ -37,7 +48,7 @@ impl Structures {
             let cell = self.pillar(pillar);
             x = clear_of_borders(x, side, nm(process.writer.field_used_um));
             let pad = RectNm::at(x, y, side, side);
-            top_pad(&mut self.top, &cell, pad.centre(), side, pitch);
+            top_pad(&mut self.top, &cell, pad.centre(), side, design.cell.lattice, pitch);
             let words = pillar.digits();
             let numeral = pad.centre().0 - Sheet::numerals_width(NUMERAL, &words) / 2;
             self.top
@@ -135,5 +146,21 @@ impl Structures {
             x = bounds.x1 + APART;
         }
         row
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sparse_pads_stand_on_the_shots() {
+        for pitch in [350, 450, 700] {
+            assert_eq!(pad_pitch_nm(LatticeKind::Square, pitch, 3), 3 * i64::from(pitch));
+            assert_eq!(pad_pitch_nm(LatticeKind::Hexagonal, pitch, 1), i64::from(pitch));
+            let sparse = pad_pitch_nm(LatticeKind::Hexagonal, pitch, 3) as u32;
+            assert!((3 * pitch..3 * pitch + 10).contains(&sparse), "{sparse}");
+            assert!(LatticeKind::Hexagonal.row_nm(sparse).is_multiple_of(2) && sparse.is_multiple_of(2));
+        }
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_4;
 use std::path::{Path, PathBuf};
 
-use metalith_core::{PillarShape, Progress, Result, Silent, WidthRows};
+use metalith_core::{LatticeKind, PillarShape, Progress, Result, Silent, WidthRows};
 use metalith_design::{Design, PillarArray};
 use metalith_gds::{LayerNumber, Layout, Point, Selection, Shape, Transform, Visitor, circle_of, tilted_rectangle_of};
 use metalith_handoff::{Census, HandoffOptions, handoff, verify_handoff};
@@ -107,7 +107,7 @@ fn is_drawn(outline: &[Point], row: &BTreeMap<String, String>, shape: PillarShap
 /// What the tables of a hand-off say of its pillars is found in its files; areas are those of the shapes, and times follow.
 fn tables_hold(name: &str, sites: usize, pads: usize) {
     let folder = made(name);
-    let design = Design::read(&design(name)).unwrap();
+    let design = Design::read_any(&design(name)).unwrap();
     let (shape, array) = (design.cell.shape, PillarArray::build(&design, &Silent).unwrap());
     let file = folder.join(format!("layout/{name}_pillars.gds"));
     let pillars = outlines(&file, PILLARS);
@@ -152,7 +152,8 @@ fn tables_hold(name: &str, sites: usize, pads: usize) {
     let expected_s = 280e-6 * drawn * 1e-8 / 2e-9;
     assert!((two_na.unwrap()["beam_s"].parse::<f64>().unwrap() - expected_s).abs() < TABLE_S);
 
-    // Uniform pads: each holds the pillar of the table alone, on the lattice of the design or one so many times as wide.
+    // Uniform pads: each holds the pillar of the table alone, on the lattice of the design or one so many times as wide. All of a
+    // pad within its side less half a pitch and half a row is a site.
     let tests = outlines(&folder.join(format!("tests/{name}_tests_pillars.gds")), PILLARS);
     let mut seen = 0;
     for row in rows_in(&folder, "tests/structures.csv") {
@@ -165,13 +166,33 @@ fn tables_hold(name: &str, sites: usize, pads: usize) {
         let inside =
             |&(x, y): &(i64, i64)| (2 * x0..=2 * x1).contains(&x) && (2 * y0..=2 * (y0 + x1 - x0)).contains(&y);
         let pad: Vec<_> = tests.iter().filter(|(place, _)| inside(place)).collect();
+        let apart = |axis: usize| {
+            let mut all: Vec<i64> = pad.iter().map(|(place, _)| [place.0, place.1][axis]).collect();
+            all.sort_unstable();
+            all.dedup();
+            let steps: Vec<i64> = all.windows(2).map(|w| w[1] - w[0]).collect();
+            assert!(steps.iter().all(|s| (s - steps[0]).abs() <= PLACE_NM), "{row:?}");
+            (steps[0], all.len() as i64)
+        };
+        let ((x_step, columns), (y_step, rows)) = (apart(0), apart(1));
         let pitch = i64::from(design.cell.pitch_nm) * if dense { 1 } else { 3 };
-        let across = (x1 - x0) / pitch;
-        assert_eq!(pad.len() as i64, across * across, "{row:?}");
-        let mut columns: Vec<i64> = pad.iter().map(|(place, _)| place.0).collect();
-        columns.sort_unstable();
-        columns.dedup();
-        assert!(columns.windows(2).all(|w| (w[1] - w[0] - 2 * pitch).abs() <= PLACE_NM));
+        match design.cell.lattice {
+            LatticeKind::Square => {
+                let across = (x1 - x0) / pitch;
+                assert_eq!([x_step, y_step], [2 * pitch; 2]);
+                assert_eq!(pad.len() as i64, across * across, "{row:?}");
+            }
+            LatticeKind::Hexagonal => {
+                // Places are doubled, so half a pitch is one; sparse ones are wider by the even rows that they have.
+                assert!((pitch..pitch + 10).contains(&x_step) && (dense || y_step % 4 == 0));
+                assert_eq!(y_step, 2 * i64::from(LatticeKind::Hexagonal.row_nm(x_step as u32)));
+                let (half, side) = (columns / 2 * x_step, x1 - x0);
+                assert!((side - 2 * x_step..=side).contains(&(half + x_step)), "{row:?}");
+                assert!((2 * side - 3 * y_step..=2 * side).contains(&(rows * y_step)), "{row:?}");
+                // Every other place of the grid, whichever the corners are.
+                assert!((2 * pad.len() as i64 - columns * rows).abs() <= 1, "{row:?}");
+            }
+        }
         assert!(pad.iter().all(|(_, outline)| is_drawn(outline, &row, shape)), "{row:?}");
         seen += 1;
     }
@@ -180,7 +201,7 @@ fn tables_hold(name: &str, sites: usize, pads: usize) {
     // Nine blocks, alike but for their dose.
     let matrix = Census::take(&folder.join(format!("dose/{name}_dose_matrix.gds")), &Silent).unwrap();
     let first = matrix.layer(20, 1).unwrap();
-    let a_pad = (60_000 / u64::from(design.cell.pitch_nm)).pow(2);
+    let a_pad = (0.95 * 60_f64.powi(2) / design.lattice().cell_um2()) as u64;
     assert!(first.shapes > 3 * a_pad);
     for dose in 2..=9 {
         let block = matrix.layer(20, dose).unwrap();
@@ -195,10 +216,40 @@ fn round_pillars_are_handed_over() {
     tables_hold("asi_940", 12, 11);
 }
 
-/// Four rotations in three rings; six rotations and four sizes of pads.
+/// A hexagonal lattice, with the process for its thicker film: pads are two arrays each, and sites have six neighbours.
+#[test]
+fn a_hexagonal_lattice_is_handed_over() {
+    tables_hold("hexagonal_1550", 14, 8);
+}
+
+/// A film that is thicker than etch and rules are for is refused; without a process there is one for it.
+#[test]
+fn a_process_for_another_thickness_is_refused() {
+    let process = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../processes/jbx6300_asi.toml");
+    let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("thicker");
+    let options = HandoffOptions {
+        compensate: None,
+        design: design("hexagonal_1550"),
+        process: Some(process),
+        out: out.clone(),
+        command: String::new(),
+        format: LayoutFormat::Gds,
+        fidelity: None,
+        accuracy: Accuracy::Fast,
+        waivers: None,
+    };
+    let said = handoff(&options, &Silent).unwrap_err().to_string();
+    assert!(
+        said.contains("900 nm thick") && said.contains("400 to 700 nm"),
+        "{said}"
+    );
+    assert!(!out.exists());
+}
+
+/// Four rotations in three rings but for one that a ring has none of; six rotations and four sizes of pads.
 #[test]
 fn rotated_rectangles_are_handed_over() {
-    tables_hold("geometric_phase_532", 12, 10);
+    tables_hold("geometric_phase_532", 11, 10);
 }
 
 /// A process that has no rules for a shape says so, before anything is written.

@@ -6,7 +6,7 @@ use super::super::Rings;
 use super::super::focus::Lens;
 use super::super::views::window_offset_um;
 use super::*;
-use metalith_core::Lattice;
+use metalith_core::{Lattice, LatticeKind};
 
 const WINDOW: PixelWindow = PixelWindow {
     pixels: 24,
@@ -14,7 +14,12 @@ const WINDOW: PixelWindow = PixelWindow {
 };
 
 fn lens() -> Lens {
-    let rings = Rings::new(Lattice::covering(100_000, 350).unwrap(), 100_000).unwrap();
+    lens_on(LatticeKind::Square)
+}
+
+fn lens_on(kind: LatticeKind) -> Lens {
+    let lattice = Lattice::of_kind_covering(kind, 100_000, 350).unwrap();
+    let rings = Rings::new(lattice, 100_000).unwrap();
     Lens { rings, gap_um: 240.0 }
 }
 
@@ -36,7 +41,7 @@ fn brute_force(lens: &Lens, phases: &[f64], wavelength: f64, angle: f64, places:
             let Some(ring) = lens.rings.ring_at(ix, iy) else {
                 continue;
             };
-            let (x, y) = (lattice.coordinate_um(ix), lattice.coordinate_um(iy));
+            let (x, y) = (lattice.place_um(0, ix), lattice.place_um(1, iy));
             let incident = phases[ring] + k * x * angle.sin();
             for (sum, place) in sums.iter_mut().zip(places) {
                 let r = ((x - place.0).powi(2) + (y - place.1).powi(2) + z * z).sqrt();
@@ -44,19 +49,19 @@ fn brute_force(lens: &Lens, phases: &[f64], wavelength: f64, angle: f64, places:
             }
         }
     }
-    sums.iter()
-        .map(|e| (e * lattice.pitch_um().powi(2)).norm_sqr())
-        .collect()
+    sums.iter().map(|e| (e * lattice.cell_um2()).norm_sqr()).collect()
 }
 
 #[test]
 fn intensities_are_those_of_all_sites() {
     /// Of the peak: what the expansion of the path leaves out at 10 um from the chief ray, 30 degrees.
     const TOLERANCE: f64 = 0.02;
-    let lens = lens();
-    let (phases, wavelength) = (phases(&lens), 0.5);
-    let t = planes(&phases);
-    for angle in [0.0f64, 15.0, 30.0].map(f64::to_radians) {
+    let wavelength = 0.5;
+    let cases = [LatticeKind::Square, LatticeKind::Hexagonal].map(|kind| [0.0f64, 15.0, 30.0].map(|deg| (kind, deg)));
+    for (kind, angle) in cases.into_iter().flatten() {
+        let (lens, angle) = (lens_on(kind), angle.to_radians());
+        let phases = phases(&lens);
+        let t = planes(&phases);
         let offset = window_offset_um(&lens, angle, WINDOW.side_um());
         let pupil = Pupil::new(&lens, wavelength, angle, WINDOW, offset).unwrap();
         let n = pupil.size;
@@ -69,7 +74,7 @@ fn intensities_are_those_of_all_sites() {
             (landing + x * spacing, y as f64 * spacing)
         });
         let exact = brute_force(&lens, &phases, wavelength, angle, &places);
-        let area = lens.rings.sites() as f64 * 0.35f64.powi(2);
+        let area = lens.rings.sites() as f64 * lens.rings.lattice().cell_um2();
         let scale = spacing * spacing / area;
         let peak = found.iter().copied().fold(0.0f32, f32::max);
         for (&(x, y), exact) in samples.iter().zip(exact) {

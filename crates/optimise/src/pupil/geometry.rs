@@ -6,7 +6,6 @@ use num_complex::Complex64;
 
 use crate::PixelWindow;
 use crate::focus::Lens;
-use crate::rings::ring_of;
 
 /// Where light comes from and goes to.
 pub(super) struct Geometry<'l> {
@@ -31,7 +30,7 @@ pub(super) struct SitePair {
 
 impl<'l> Geometry<'l> {
     pub(super) fn new(lens: &'l Lens, wavelength_um: f64, angle_rad: f64, window: PixelWindow, offset_um: f64) -> Self {
-        let pitch2 = lens.rings.lattice().pitch_um().powi(2);
+        let cell_um2 = lens.rings.lattice().cell_um2();
         Self {
             lens,
             wavelength_um,
@@ -41,7 +40,7 @@ impl<'l> Geometry<'l> {
             side_um: window.side_um(),
             offset_um,
             // Root of the area of a sample over that of the lens; the number of samples comes later.
-            scale: window.side_um() / (lens.rings.sites() as f64 * pitch2).sqrt(),
+            scale: window.side_um() / (lens.rings.sites() as f64 * cell_um2).sqrt(),
         }
     }
 
@@ -76,7 +75,7 @@ impl<'l> Geometry<'l> {
         let path = (x * x - 2.0 * x * x0 + y * y) / (r + self.distance_um) + x * self.sine;
         let turns = path / self.wavelength_um + q_x * self.offset_um;
         let k = TAU / self.wavelength_um;
-        let area = self.lens.rings.lattice().pitch_um().powi(2);
+        let area = self.lens.rings.lattice().cell_um2();
         let amplitude = self.scale * area * z / (TAU * r2);
         let value = amplitude * Complex64::new(1.0 / r, -k) * Complex64::cis(TAU * (turns - turns.round()));
         SitePair { ring, q, value }
@@ -86,11 +85,15 @@ impl<'l> Geometry<'l> {
         let lattice = self.lens.rings.lattice();
         let half = lattice.sites() / 2;
         for iy in half..lattice.sites() {
-            let y = lattice.coordinate_um(iy);
+            let y = lattice.place_um(1, iy);
             for ix in 0..lattice.sites() {
-                if self.lens.rings.ring_at(ix, iy).is_some() {
-                    let ring = ring_of(lattice.half_radius2(ix, iy)) as u32;
-                    visit(&self.site(lattice.coordinate_um(ix), y, ring, with_value));
+                if let Some(ring) = self.lens.rings.ring_at(ix, iy) {
+                    let mut site = self.site(lattice.place_um(0, ix), y, ring as u32, with_value);
+                    if y == 0.0 {
+                        // On the axis of the mirror, where a site is its own image.
+                        site.value *= 0.5;
+                    }
+                    visit(&site);
                 }
             }
         }

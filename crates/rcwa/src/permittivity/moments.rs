@@ -43,6 +43,8 @@ pub(super) struct Moments {
     pub cosine: Coefficients,
     /// Of s alike.
     pub sine: Coefficients,
+    /// Of c c + s s alike.
+    pub square: Coefficients,
 }
 
 impl Moments {
@@ -62,72 +64,69 @@ impl Moments {
     }
 
     /// Of a circle whose diameter is this share of the pitch. The normal is the radius; c and s are continued by harmonic
-    /// functions, r^2 cos 2a and r^2 sin 2a over the radius squared. With g = k R for the wave vector k and the radius R the
-    /// integrals over the disc are those of Bessel functions, 2 pi R^2 J1(g) / g and, with twice the angle of k,
-    /// -2 pi R^2 J3(g) / g.
+    /// functions, r^2 cos 2a and r^2 sin 2a over the radius squared; the sum of their squares is r^4 over R^4.
     fn of_circle(duty: f64, highest: usize) -> Self {
-        let [mut pillar, mut cosine, mut sine] = [(); 3].map(|()| Coefficients::new([highest; 2]));
+        let [mut pillar, mut cosine, mut sine, mut fourth] = [(); 4].map(|()| Coefficients::new([highest; 2]));
         let area = PI * duty * duty / 4.0;
         let last = highest as i32;
         for m in 0..=last {
             for n in 0..=m {
                 let square = f64::from(m * m + n * n);
-                let g = PI * duty * square.sqrt();
-                let (disc, twice) = if square == 0.0 {
-                    (area, 0.0)
-                } else {
-                    (2.0 * area * libm::j1(g) / g, -2.0 * area * libm::jn(3, g) / g / square)
-                };
+                let [disc, twice, r4] = disc_integrals(area, PI * duty * square.sqrt(), square);
                 let (c, s) = (twice * f64::from(m * m - n * n), twice * f64::from(2 * m * n));
                 for (p, q, turn) in [(m, n, 1.0), (n, m, -1.0)] {
                     for (x, y, mirror) in [(p, q, 1.0), (-p, q, -1.0), (p, -q, -1.0), (-p, -q, 1.0)] {
                         let place = pillar.place(x, y);
                         pillar.values[place] = disc;
+                        fourth.values[place] = r4;
                         cosine.values[place] = turn * c;
                         sine.values[place] = mirror * s;
                     }
                 }
             }
         }
-        Self { pillar, cosine, sine }
+        Self {
+            pillar,
+            cosine,
+            sine,
+            square: fourth,
+        }
     }
 
     /// As [`Moments::of_circle`] for two circles in a rectangle of one pitch by two rows, each row this share of the pitch:
     /// one in the middle, one at the corners. Where the sum of both orders is odd they cancel, and all is zero.
     fn of_staggered_circle(duty: f64, row: f64, highest: [usize; 2]) -> Self {
-        let [mut pillar, mut cosine, mut sine] = [(); 3].map(|()| Coefficients::new(highest));
+        let [mut pillar, mut cosine, mut sine, mut fourth] = [(); 4].map(|()| Coefficients::new(highest));
         let filling = PI * duty * duty / (4.0 * row);
         for m in 0..=highest[0] as i32 {
             for n in (m % 2..=highest[1] as i32).step_by(2) {
                 // The wave vector times the pitch, over one turn.
                 let [x, y] = [f64::from(m), f64::from(n) / (2.0 * row)];
                 let square = x * x + y * y;
-                let g = PI * duty * square.sqrt();
-                let (disc, twice) = if square == 0.0 {
-                    (filling, 0.0)
-                } else {
-                    (
-                        2.0 * filling * libm::j1(g) / g,
-                        -2.0 * filling * libm::jn(3, g) / g / square,
-                    )
-                };
+                let [disc, twice, r4] = disc_integrals(filling, PI * duty * square.sqrt(), square);
                 let (c, s) = (twice * (x * x - y * y), twice * 2.0 * x * y);
                 for (p, q, mirror) in [(m, n, 1.0), (-m, n, -1.0), (m, -n, -1.0), (-m, -n, 1.0)] {
                     let place = pillar.place(p, q);
                     pillar.values[place] = disc;
+                    fourth.values[place] = r4;
                     cosine.values[place] = c;
                     sine.values[place] = mirror * s;
                 }
             }
         }
-        Self { pillar, cosine, sine }
+        Self {
+            pillar,
+            cosine,
+            sine,
+            square: fourth,
+        }
     }
 
     /// A rectangle with these half-widths over the pitch, turned. Its normals are turned by that angle or a quarter more, so
     /// that c and s are cosine and sine of twice the angle times one function, 1 on the first pair of sides and -1 on the
     /// second (see [`Interior`]).
     fn of_rectangle(halves: [f64; 2], rotation: f64, highest: usize) -> Self {
-        let [mut pillar, mut cosine, mut sine] = [(); 3].map(|()| Coefficients::new([highest; 2]));
+        let [mut pillar, mut cosine, mut sine, mut square] = [(); 4].map(|()| Coefficients::new([highest; 2]));
         let ((sin, cos), (sin2, cos2)) = (rotation.sin_cos(), (2.0 * rotation).sin_cos());
         let interior = Interior::of(halves);
         let last = highest as i32;
@@ -136,16 +135,38 @@ impl Moments {
                 let k = [m, n].map(|order| TAU * f64::from(order));
                 let k = [k[0] * cos + k[1] * sin, k[1] * cos - k[0] * sin];
                 let area = slab(k[0], halves[0]) * slab(k[1], halves[1]);
-                let v = interior.transform(k);
+                let [v, v_squared] = interior.transform(k);
                 for place in [pillar.place(m, n), pillar.place(-m, -n)] {
                     pillar.values[place] = area;
+                    square.values[place] = v_squared;
                     cosine.values[place] = v * cos2;
                     sine.values[place] = v * sin2;
                 }
             }
         }
-        Self { pillar, cosine, sine }
+        Self {
+            pillar,
+            cosine,
+            sine,
+            square,
+        }
     }
+}
+
+/// Integrals over a disc with this share of the cell, with g = k R for the wave vector k and the radius R, and the square of k in
+/// the units that c and s count in: of one, 2 pi R^2 J1(g) / g; of (r / R)^2 times cosine or sine of twice the angle, with
+/// twice the angle of k, -2 pi R^2 J3(g) / g, here over that square; of (r / R)^4,
+/// 2 pi R^2 (J1(g) / g - 4 J2(g) / g^2 + 8 J3(g) / g^3).
+fn disc_integrals(filling: f64, g: f64, square: f64) -> [f64; 3] {
+    if square == 0.0 {
+        return [filling, 0.0, filling / 3.0];
+    }
+    let [first, second, third] = [libm::j1(g), libm::jn(2, g), libm::jn(3, g)];
+    [
+        2.0 * filling * first / g,
+        -2.0 * filling * third / g / square,
+        2.0 * filling * (first - (4.0 * second - 8.0 * third / g) / g) / g,
+    ]
 }
 
 /// Integral of cos(k x) over |x| < half.
@@ -167,8 +188,8 @@ const POINTS: usize = 48;
 struct Interior {
     /// Places along each half edge, over the pitch.
     places: [Vec<f64>; 2],
-    /// Values times weights, the second place running fastest.
-    values: Vec<f64>,
+    /// Values times weights, and their squares times weights, the second place running fastest.
+    values: [Vec<f64>; 2],
 }
 
 impl Interior {
@@ -180,13 +201,15 @@ impl Interior {
                 [t - sin / TAU, (1.0 - cos) / POINTS as f64]
             })
             .collect();
-        let mut values = Vec::with_capacity(POINTS * POINTS);
+        let mut values = [(); 2].map(|()| Vec::with_capacity(POINTS * POINTS));
         for [x, weight_x] in &nodes {
             for [y, weight_y] in &nodes {
                 let [a, b] = [(1.0 - x) * halves[0], (1.0 - y) * halves[1]].map(|distance| distance.powf(TURN));
                 // Each quarter has as much of a wave that half a turn leaves alike.
                 let weight = 4.0 * halves[0] * weight_x * halves[1] * weight_y;
-                values.push(weight * (b - a) / (b + a));
+                let turned = (b - a) / (b + a);
+                values[0].push(weight * turned);
+                values[1].push(weight * turned * turned);
             }
         }
         Self {
@@ -195,13 +218,15 @@ impl Interior {
         }
     }
 
-    /// Transform at a wave vector along the sides of the rectangle.
-    fn transform(&self, k: [f64; 2]) -> f64 {
+    /// Transforms of the function and of its square at a wave vector along the sides of the rectangle.
+    fn transform(&self, k: [f64; 2]) -> [f64; 2] {
         let [x, y] = [0, 1]
             .map(|axis: usize| -> Vec<f64> { self.places[axis].iter().map(|place| (k[axis] * place).cos()).collect() });
-        let rows = self.values.chunks_exact(POINTS).zip(&x);
-        rows.map(|(row, x)| x * row.iter().zip(&y).map(|(v, y)| v * y).sum::<f64>())
-            .sum()
+        [0, 1].map(|which: usize| {
+            let rows = self.values[which].chunks_exact(POINTS).zip(&x);
+            rows.map(|(row, x)| x * row.iter().zip(&y).map(|(v, y)| v * y).sum::<f64>())
+                .sum()
+        })
     }
 }
 
@@ -215,10 +240,10 @@ mod tests {
     /// The rule of rectangles along the radius, 400 points; angles are exact.
     const SUMMED: f64 = 1e-5;
 
-    /// The three moments of a disc in a cell of unit area, by sums over a fine polar grid; the wave vector times the pitch,
+    /// The four moments of a disc in a cell of unit area, by sums over a fine polar grid; the wave vector times the pitch,
     /// over one turn.
-    fn disc_sums(duty: f64, [x, y]: [f64; 2]) -> [f64; 3] {
-        let mut sums = [0.0; 3];
+    fn disc_sums(duty: f64, [x, y]: [f64; 2]) -> [f64; 4] {
+        let mut sums = [0.0; 4];
         for i in 0..400 {
             let r = (f64::from(i) + 0.5) / 400.0;
             for j in 0..200 {
@@ -227,7 +252,7 @@ mod tests {
                 let wave = (TAU * 0.5 * duty * r * (x * cos + y * sin)).cos();
                 let area = 0.25 * duty * duty * r / 400.0 * TAU / 200.0;
                 let turn = r * r;
-                let values = [1.0, turn * (2.0 * angle).cos(), turn * (2.0 * angle).sin()];
+                let values = [1.0, turn * (2.0 * angle).cos(), turn * (2.0 * angle).sin(), turn * turn];
                 for (sum, value) in sums.iter_mut().zip(values) {
                     *sum += wave * area * value;
                 }
@@ -236,8 +261,8 @@ mod tests {
         sums
     }
 
-    fn assert_has(moments: &Moments, m: i32, n: i32, sums: [f64; 3]) {
-        let found = [&moments.pillar, &moments.cosine, &moments.sine].map(|c| c.at(m, n));
+    fn assert_has(moments: &Moments, m: i32, n: i32, sums: [f64; 4]) {
+        let found = [&moments.pillar, &moments.cosine, &moments.sine, &moments.square].map(|c| c.at(m, n));
         for (a, b) in found.iter().zip(sums) {
             assert!((a - b).abs() < SUMMED, "{m} {n}: {found:?} {sums:?}");
         }
@@ -271,23 +296,29 @@ mod tests {
         // Coefficients count against the area of the rectangle, 0.15 here.
         const INTEGRATED: f64 = 1e-5;
         let square = Interior::of([0.3, 0.3]);
-        assert!(square.transform([0.0, 0.0]).abs() < ROUNDING);
-        assert!((square.transform([8.0, 3.0]) + square.transform([3.0, 8.0])).abs() < ROUNDING);
+        assert!(square.transform([0.0, 0.0])[0].abs() < ROUNDING);
+        let [one, other] = [[8.0, 3.0], [3.0, 8.0]].map(|k| square.transform(k));
+        assert!((one[0] + other[0]).abs() < ROUNDING && (one[1] - other[1]).abs() < ROUNDING);
         let halves = [0.15, 0.25];
         let rectangle = Interior::of(halves);
         for k in [[0.0, 0.0], [20.0, 0.0], [9.0, 60.0], [100.0, 100.0]] {
             let fine = 1000;
-            let mut sum = 0.0;
+            let mut sums = [0.0; 2];
             for i in 0..fine {
                 for j in 0..fine {
                     let [x, y] = [i, j].map(|i| (f64::from(i) + 0.5) / f64::from(fine));
                     let [a, b] = [(1.0 - x) * halves[0], (1.0 - y) * halves[1]].map(|distance| distance.powf(TURN));
-                    sum += (b - a) / (b + a) * (k[0] * x * halves[0]).cos() * (k[1] * y * halves[1]).cos();
+                    let turned = (b - a) / (b + a);
+                    let wave = (k[0] * x * halves[0]).cos() * (k[1] * y * halves[1]).cos();
+                    sums[0] += turned * wave;
+                    sums[1] += turned * turned * wave;
                 }
             }
-            sum *= 4.0 * halves[0] * halves[1] / f64::from(fine * fine);
             let found = rectangle.transform(k);
-            assert!((found - sum).abs() < INTEGRATED, "{k:?}: {found} {sum}");
+            for (found, sum) in found.into_iter().zip(sums) {
+                let sum = sum * 4.0 * halves[0] * halves[1] / f64::from(fine * fine);
+                assert!((found - sum).abs() < INTEGRATED, "{k:?}: {found} {sum}");
+            }
         }
     }
 }

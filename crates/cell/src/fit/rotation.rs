@@ -1,0 +1,182 @@
+//! The rotation that a phase asks for, fitted to the rigorous cell.
+
+use std::f64::consts::{PI, TAU};
+
+use num_complex::Complex64;
+use serde::Serialize;
+
+use super::MappingError;
+use crate::{Handedness, RotatedCell, RotationMapping};
+use metalith_core::{Rectangles, Result};
+
+/// Phases over half a turn, after which what a lattice adds repeats, that a series is fitted to: four times as many as the
+/// fastest term of [`RotatedCell`] has.
+const PHASES: usize = 48;
+
+/// Rounds of an equation whose error shrinks by what the lattice adds for a radian of phase, some hundredths, in each.
+const ROUNDS: usize = 40;
+
+/// Phase of converted light over rotation, for light that arrives left circularly polarised: that of the other handedness over
+/// the opposite rotation.
+#[derive(Debug)]
+pub struct RotationCurve<'a> {
+    cell: &'a RotatedCell,
+    wavelength_um: f64,
+    /// Phase of all rotations together (rad): what the lattice adds is counted from it.
+    mean: f64,
+}
+
+/// A mapping of phase to rotation with what it leaves.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RotationFit {
+    pub mapping: RotationMapping,
+    /// Phase of pillars as drawn against the phase that the mapping has them for.
+    pub error: MappingError,
+}
+
+impl<'a> RotationCurve<'a> {
+    /// Solve the cell at a wavelength (um).
+    ///
+    /// # Errors
+    /// As [`RotatedCell::response`].
+    pub fn new(cell: &'a RotatedCell, wavelength_um: f64) -> Result<Self> {
+        let mut curve = Self {
+            cell,
+            wavelength_um,
+            mean: 0.0,
+        };
+        let sum = (0..PHASES).map(|k| curve.beyond(PI / 2.0 * k as f64 / PHASES as f64));
+        let sum = sum.sum::<Result<Complex64>>()?;
+        curve.mean = sum.arg();
+        Ok(curve)
+    }
+
+    /// Amplitude of converted light with twice the rotation taken off its phase.
+    fn beyond(&self, rotation: f64) -> Result<Complex64> {
+        let own = match self.cell.arriving() {
+            Handedness::Left => rotation,
+            Handedness::Right => -rotation,
+        };
+        let [converted, _] = self.cell.response(own, self.wavelength_um)?;
+        Ok(converted * Complex64::cis(-2.0 * rotation))
+    }
+
+    /// What the lattice adds to twice a rotation (rad).
+    ///
+    /// # Errors
+    /// As [`RotatedCell::response`].
+    pub fn added(&self, rotation: f64) -> Result<f64> {
+        Ok((self.beyond(rotation)? * Complex64::cis(-self.mean)).arg())
+    }
+
+    /// Rotation (rad) whose phase is this one (rad) and a constant.
+    fn rotation(&self, phase: f64, constant: f64) -> Result<f64> {
+        (0..ROUNDS).try_fold(0.5 * phase, |rotation, _| {
+            Ok(0.5 * (phase + constant - self.added(rotation)?))
+        })
+    }
+
+    /// The series of so many terms that takes back what the lattice adds, with what it leaves of the pillars as drawn.
+    ///
+    /// # Errors
+    /// As [`RotatedCell::response`].
+    pub fn fit(&self, terms: usize) -> Result<RotationFit> {
+        let phases = (0..PHASES).map(|k| PI * k as f64 / PHASES as f64);
+        let off = |constant: f64| -> Result<Vec<f64>> {
+            let each = phases
+                .clone()
+                .map(|phase| Ok(self.rotation(phase, constant)? - 0.5 * phase));
+            each.collect()
+        };
+        // The constant is free: that which leaves no mean.
+        let mut constant = 0.0;
+        let mut left = off(constant)?;
+        for _ in 0..ROUNDS {
+            constant -= 2.0 * left.iter().sum::<f64>() / PHASES as f64;
+            left = off(constant)?;
+        }
+        let coefficient = |k: usize, wave: fn(f64) -> f64| -> f64 {
+            let each = phases.clone().zip(&left);
+            let sum: f64 = each.map(|(phase, off)| off * wave(2.0 * k as f64 * phase)).sum();
+            2.0 * sum / PHASES as f64
+        };
+        let mapping = RotationMapping {
+            sines: (1..=terms).map(|k| coefficient(k, f64::sin)).collect(),
+            cosines: (1..=terms).map(|k| coefficient(k, f64::cos)).collect(),
+        };
+        let error = self.error(&mapping, self.cell.pillars())?;
+        Ok(RotationFit { mapping, error })
+    }
+
+    /// Phase of pillars as drawn, all numbers, against the phase that a mapping has them for; their mean is taken off. What a site
+    /// is rounded to a number by is not in it.
+    ///
+    /// # Errors
+    /// As [`RotatedCell::response`].
+    pub fn error(&self, mapping: &RotationMapping, pillars: Rectangles) -> Result<MappingError> {
+        let turns = (1..=pillars.steps).map(|number| {
+            let rotation = match self.cell.arriving() {
+                Handedness::Left => pillars.drawn_rotation(number),
+                Handedness::Right => -pillars.drawn_rotation(number),
+            };
+            let own = 2.0 * rotation + self.added(rotation)?;
+            Ok((own - mapping.phase(rotation)) / TAU)
+        });
+        let turns: Vec<f64> = turns.collect::<Result<_>>()?;
+        Ok(MappingError::of_turns(turns.into_iter()))
+    }
+}
+
+impl RotationMapping {
+    /// The phase (rad) that asks for a rotation (rad).
+    pub fn phase(&self, rotation: f64) -> f64 {
+        (0..ROUNDS).fold(2.0 * rotation, |phase, _| 2.0 * (rotation - self.added(phase)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::rectangle::tests::titania;
+    use super::*;
+
+    const PILLARS: Rectangles = Rectangles {
+        width_nm: 100,
+        length_nm: 250,
+        steps: 180,
+    };
+
+    /// What is left of the phase (rad): 0.004 by the harmonics beyond the second, and rounding. Without the series it is 0.014.
+    const LEFT: f64 = 0.005;
+
+    #[test]
+    fn a_phase_and_the_rotation_that_it_asks_for_are_one_another() {
+        let mapping = RotationMapping {
+            sines: vec![0.01, -0.004],
+            cosines: vec![0.02],
+        };
+        for k in 0..60 {
+            let phase = 0.1 * f64::from(k);
+            let rotation = 0.5 * phase + mapping.added(phase);
+            // Rounding of a few sums of numbers below ten.
+            assert!((mapping.phase(rotation) - phase).abs() < 1e-12);
+        }
+        assert!(RotationMapping::default().is_half() && !mapping.is_half());
+    }
+
+    #[test]
+    fn a_series_takes_back_what_the_lattice_adds() {
+        let fits = [Handedness::Left, Handedness::Right].map(|arriving| {
+            let cell = RotatedCell::new(titania(), PILLARS, arriving);
+            let curve = RotationCurve::new(&cell, 0.532).unwrap();
+            let half = curve.error(&RotationMapping::default(), PILLARS).unwrap();
+            let fit = curve.fit(2).unwrap();
+            println!("{half:?} {fit:?}");
+            assert!(fit.error.worst_rad < LEFT && fit.error.worst_rad < 0.5 * half.worst_rad);
+            fit.mapping
+        });
+        // A mirror takes one handedness to the other.
+        for (a, b) in fits[0].sines.iter().zip(&fits[1].sines) {
+            assert!((a - b).abs() < 1e-9, "{fits:?}");
+        }
+    }
+}
