@@ -197,6 +197,7 @@ mod tests {
     use super::*;
     use crate::Mapping;
     use crate::training::random;
+    use metalith_cell::SiteResponse;
 
     /// The ridge keeps back one part in 1e4 of each weight, and more of those of high degree, which are small here.
     const KEPT_BACK: f64 = 1e-3;

@@ -123,7 +123,9 @@ impl<'a> ChipInLight<'a> {
         let mut distinct = Vec::new();
         for (k, symmetries) in chosen {
             let placed = design.elements()[k].centre_um();
-            let drawn = DrawnElement::new(widths[k], design.aperture_radius_um()).placed(placed);
+            let drawn = DrawnElement::new(widths[k], design.aperture_radius_um())
+                .of_shape(design.cell.shape)
+                .placed(placed);
             distinct.push(DistinctChipElement {
                 view: elements[k],
                 widths: widths[k],

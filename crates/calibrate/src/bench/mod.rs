@@ -117,7 +117,11 @@ impl<'a> Bench<'a> {
             drawn: set
                 .elements
                 .iter()
-                .map(|e| DrawnElement::new(&e.pillars, 0.5 * e.aperture_diameter_um).placed(e.centre_um))
+                .map(|e| {
+                    DrawnElement::new(&e.pillars, 0.5 * e.aperture_diameter_um)
+                        .of_shape(set.stack.cell.shape)
+                        .placed(e.centre_um)
+                })
                 .collect(),
             follows: true,
         }

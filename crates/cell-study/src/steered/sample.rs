@@ -94,6 +94,7 @@ impl SiteSample {
 mod tests {
     use super::*;
     use metalith_cell::NeighbourBasis;
+    use metalith_cell::SiteResponse;
     use metalith_core::Lattice;
     use metalith_design::phase::RadialPhase;
 

@@ -120,7 +120,8 @@ mod tests {
     fn a_circle_has_as_many_orders_as_a_square_or_a_shell_less() {
         for along_axis in [1, 3, 5, 9, 13, 17, 33, 127] {
             let count = |kept: Kept| kept.orders(Family::Product(Space::Full, Space::Full)).len();
-            let bounds: [(Kept, fn(usize) -> Kept); 2] = [
+            type Counted = fn(usize) -> Kept;
+            let bounds: [(Kept, Counted); 2] = [
                 (Kept::disc(along_axis), Kept::Disc),
                 (Kept::circle(along_axis), Kept::Circle),
             ];
