@@ -271,7 +271,7 @@ fn budget(page: &mut Page, report: &PictureReport) {
         ]);
     }
     page.table(table.caption(
-        "Of the light that arrives at the openings of all elements from a white scene. Images are what lands within the kernels' windows; undiffracted light is a part of veil and of what lands beside the sensor.",
+        "Of the light that arrives at the openings of all elements from a white scene. Images are what lands within the kernels' windows; undiffracted light is a part of veil and of what lands beside the sensor. What is not passed is reflected, absorbed, left in the glass, or leaves more steeply than half a wavelength over the pitch.",
     ));
 }
 

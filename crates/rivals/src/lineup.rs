@@ -247,10 +247,11 @@ impl OpenLineup<'_> {
         let studio = Studio::open_kept(design, &listed.layout, camera, None, first, kept, progress)?;
         if !as_the_paper {
             let words = format!(
-                "the layout of `{}` behind `{}`, {} elements, pillars solved rigorously, veil and dispersion included.",
+                "the layout of `{}` behind `{}`, {} elements, pillars by the cell `{}`, veil and dispersion included.",
                 design.name,
                 camera.name,
-                design.elements().len()
+                design.elements().len(),
+                design.verify.fidelity
             );
             let ready = ArrayCamera::new(&studio, &self.methods, self.of.separate).with_stages(self.stages_of(k)?);
             return then(&ready, (name, &words), &photographs);
