@@ -35,7 +35,7 @@ impl ClassTable {
         }
     }
 
-    /// Of an element whose sites transmit as an aperture says, each by itself, rounded to [`STEPS`]. Sites that pass nothing
+    /// Of an element whose sites transmit as an aperture says, each by itself, rounded to 127 steps of its real and imaginary part. Sites that pass nothing
     /// pass nothing after it.
     pub fn of_sites(aperture: &dyn Aperture) -> Self {
         let n = aperture.lattice().sites();
