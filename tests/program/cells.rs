@@ -3,7 +3,7 @@
 use std::fs;
 
 #[test]
-#[ignore = "second tier: CPU time, run by .ci/run"]
+#[ignore = "second tier: CPU time, in scripts/slow_tests.sh"]
 fn the_command_reports_on_a_cell_and_reuses_its_library() {
     let folder = tempfile::tempdir().unwrap();
     // Three orders and a tenth in t: wrong by far, but all of the way from the design to the report.

@@ -193,7 +193,7 @@ fn largest_difference(a: &Array2<f64>, b: &Array2<f64>) -> f64 {
 }
 
 #[test]
-#[ignore = "second tier: a minute of CPU time, run by .ci/run"]
+#[ignore = "second tier: a minute of CPU time, in scripts/slow_tests.sh"]
 fn every_effect_is_the_same_in_every_command() {
     let folder = tempfile::tempdir().unwrap();
     let files = Files::write(folder.path());
@@ -220,7 +220,7 @@ fn every_effect_is_the_same_in_every_command() {
 }
 
 #[test]
-#[ignore = "second tier: CPU time, run by .ci/run"]
+#[ignore = "second tier: CPU time, in scripts/slow_tests.sh"]
 fn cells_as_lit_are_the_same_in_every_command() {
     let folder = tempfile::tempdir().unwrap();
     let mut files = Files::write(folder.path());
@@ -235,7 +235,7 @@ fn cells_as_lit_are_the_same_in_every_command() {
 }
 
 #[test]
-#[ignore = "second tier: CPU time, run by .ci/run"]
+#[ignore = "second tier: CPU time, in scripts/slow_tests.sh"]
 fn the_program_applies_what_it_once_left_out_and_names_what_it_cannot() {
     let folder = tempfile::tempdir().unwrap();
     let files = Files::write(folder.path());

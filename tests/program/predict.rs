@@ -65,7 +65,7 @@ fn a_bias_of_whole_steps_is_drawn_the_other_way() {
 }
 
 #[test]
-#[ignore = "second tier: CPU time, run by .ci/run"]
+#[ignore = "second tier: CPU time, in scripts/slow_tests.sh"]
 fn what_cannot_be_undone_is_made_less() {
     let design = mini();
     let array = PillarArray::build(&design, &Silent).unwrap();
@@ -101,7 +101,7 @@ fn heights_that_differ_over_the_lens_are_not_compensated() {
 }
 
 #[test]
-#[ignore = "second tier: CPU time, run by .ci/run"]
+#[ignore = "second tier: CPU time, in scripts/slow_tests.sh"]
 fn the_program_predicts_and_compensates() {
     let folder = tempfile::tempdir().unwrap();
     let narrow = folder.path().join("narrow.toml");

@@ -23,7 +23,7 @@ fn tolerance(folder: &Path) {
 }
 
 #[test]
-#[ignore = "second tier: CPU time, run by .ci/run"]
+#[ignore = "second tier: CPU time, in scripts/slow_tests.sh"]
 fn shards_by_processes_are_those_of_one_process() {
     let folder = tempfile::tempdir().unwrap();
     tolerance(folder.path());

@@ -211,7 +211,7 @@ fn direct_sum(setup: &Setup, scene: &SceneImage, elements: &[usize], points: usi
 /// Overlapping patches, kernels between nodes, spectra of the scene and of the channel, against some
 /// thousand fields over the whole sensor.
 #[test]
-#[ignore = "second tier: a minute of CPU time, run by .ci/run"]
+#[ignore = "second tier: a minute of CPU time, in scripts/slow_tests.sh"]
 fn a_frame_is_the_direct_sum_over_points_and_wavelengths() {
     /// Root mean square over the image of the scene, of the range. The goal is 1e-3; 1.14e-3 is reached behind the middle
     /// element and 1.36e-3 behind one that steers.

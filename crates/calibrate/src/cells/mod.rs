@@ -453,7 +453,7 @@ mod tests {
     /// The error of a cell that intervals count with is that of its truncation: of the orders of fits against many more, and of
     /// those of fits against those of synthetic sets, which intervals are judged by.
     #[test]
-    #[ignore = "second tier: a minute of CPU time, run by .ci/run"]
+    #[ignore = "second tier: a minute of CPU time, in scripts/slow_tests.sh"]
     fn the_error_of_a_cell_in_intervals_is_that_of_its_truncation() {
         use crate::fit::ModelError;
         /// Relative: the constants are rounded, and other films have other resonances.
