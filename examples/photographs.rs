@@ -6,14 +6,14 @@
 //!
 //! Takes every PNG and JPEG of a folder, which must be of one size. PSNR is that of the mean squared error over the
 //! photographs, SSIM the mean. The row `frame` is the frame itself, its pixels laid where they look and divided by those of a
-//! white scene. The forecast was made from kernels, noise and the spectrum of scenes, without these photographs.
+//! white scene. The forecasts are made without any picture, for the spectra of these photographs and for those of natural scenes.
 
 use std::path::{Path, PathBuf};
 
 use metalith::camera::Camera;
 use metalith::picture::restore::RestorationMethod;
 use metalith::picture::scene::{SceneFile, read_scene};
-use metalith::picture::{Rehearsal, Studio, Zone, ZoneScore, scores};
+use metalith::picture::{Rehearsal, ScenePower, Studio, Zone, ZoneScore, scores};
 use metalith::{Design, Error, Result, Silent};
 
 /// Scores of all photographs by one way.
@@ -56,6 +56,7 @@ fn main() -> Result<()> {
     let rehearsal = Rehearsal::new(&studio, &operator);
     let forecast = rehearsal.forecast(&studio, &operator, &Silent)?;
     let mut rows: Vec<Row> = Vec::new();
+    let mut powers = Vec::new();
     let mut keep = |way: String, found: Vec<ZoneScore>| match rows.iter_mut().find(|r| r.way == way) {
         Some(row) => row.found.push(found),
         None => rows.push(Row {
@@ -67,6 +68,7 @@ fn main() -> Result<()> {
         let scene = read(path)?;
         let frame = studio.record(&simulation, &scene, 1)?;
         let truth = studio.truth(&scene);
+        powers.push(ScenePower::of(&truth));
         keep("frame".into(), scores(&studio.unrestored(&operator, &frame), &truth)?);
         for method in &methods {
             for joint in [true, false] {
@@ -98,8 +100,15 @@ fn main() -> Result<()> {
             row.cell(2, |s| 10f64.powf(-0.1 * s.psnr_linear_db), |v| -10.0 * v.log10()),
         );
     }
-    let forecast: Vec<String> = forecast.iter().map(|db| format!("{db:.2}")).collect();
-    println!("| forecast, tikhonov, joint | | | {} |", forecast.join(", "));
+    let theirs = ScenePower::mean(&powers).expect("there are photographs");
+    for (of, power) in [("their spectra", theirs), ("natural scenes", ScenePower::natural())] {
+        let db: Vec<String> = forecast
+            .psnr_linear_db(&power)
+            .iter()
+            .map(|db| format!("{db:.2}"))
+            .collect();
+        println!("| forecast for {of}, tikhonov, joint | | | {} |", db.join(", "));
+    }
     Ok(())
 }
 

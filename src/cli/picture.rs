@@ -6,8 +6,8 @@ use clap::Args;
 use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
 use metalith::picture::scene::{BuiltIn, SceneFile, SceneImage, chart, read_depth, read_scene};
 use metalith::picture::{
-    Doubt, Frame, KeptKernels, PicturePages, PictureReport, Rehearsal, RestorationReport, Studio, contrast_curves,
-    scores, worth_of_assumptions, write_pages,
+    Doubt, Frame, KeptKernels, PicturePages, PictureReport, Rehearsal, RestorationReport, ScenePower, Studio,
+    contrast_curves, scores, worth_of_assumptions, write_pages,
 };
 use metalith::{Error, Fidelity, Result};
 
@@ -143,9 +143,11 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
             if joint || args.separate {
                 let picture = studio.restore(&operator, error, &frame, method, joint, terminal)?;
                 let mut restoration = RestorationReport::new(method, joint, scores(&picture, &truth)?);
-                // The forecast is of the picture that normal slopes expect.
+                // What is lost by other methods depends on more than the spectrum of a scene.
                 if method == RestorationMethod::Tikhonov && joint && !args.no_forecast {
-                    restoration.forecast_db = rehearsal.forecast(&studio, &operator, terminal)?;
+                    let forecast = rehearsal.forecast(&studio, &operator, terminal)?;
+                    restoration.forecast_db = forecast.psnr_linear_db(&ScenePower::natural());
+                    restoration.forecast_of_scene_db = forecast.psnr_linear_db(&ScenePower::of(&truth));
                 }
                 found.push(restoration);
                 pictures.push(picture);

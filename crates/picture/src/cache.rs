@@ -14,7 +14,7 @@ use crate::kernels::{BankSpec, DistinctKernels, KernelBank};
 use crate::veil::{LightShares, Veil};
 
 const BANK_MAGIC: [u8; 8] = *b"MLKERN\0\x02";
-const VEIL_MAGIC: [u8; 8] = *b"MLVEIL\0\x03";
+const VEIL_MAGIC: [u8; 8] = *b"MLVEIL\0\x04";
 /// Longest kept file (bytes).
 const LONGEST: u64 = 4 << 30;
 

@@ -5,11 +5,11 @@ use metalith_core::{Progress, Result};
 use ndarray::Array2;
 
 use crate::exposure::{channel_at, expose};
+use crate::forecast::Forecast;
 use crate::operator::{Detail, FrameOperator, SceneInputs};
 use crate::operator_error::OperatorError;
 use crate::restore::{RestorationMethod, SceneStatistics};
 use crate::scene::SceneImage;
-use crate::score::scores;
 use crate::spectra::rgb_basis;
 use crate::studio::Studio;
 
@@ -55,8 +55,8 @@ impl Rehearsal {
         }
     }
 
-    /// Expected PSNR of linear light in each zone (dB) by Tikhonov and all elements: of scenes with the mean and the
-    /// spectra of photographs, with everything that the simulation knows and the restoration does not.
+    /// What is lost of scenes by Tikhonov and all elements: everything that the simulation knows and the restoration does
+    /// not, noise, and unfinished iterations.
     ///
     /// # Errors
     /// If the user stopped it.
@@ -65,11 +65,10 @@ impl Rehearsal {
         studio: &Studio,
         restoration: &FrameOperator<'_>,
         progress: &dyn Progress,
-    ) -> Result<Vec<f64>> {
+    ) -> Result<Forecast> {
         let frame = expose(&studio.camera, &studio.gain, &self.light, SEED);
         let method = RestorationMethod::Tikhonov;
         let picture = studio.restore(restoration, &self.operator_error, &frame, method, true, progress)?;
-        let found = scores(&picture, &studio.truth(&self.scene))?;
-        Ok(found.iter().map(|s| s.psnr_linear_db).collect())
+        Ok(Forecast::between(&studio.truth(&self.scene), &picture))
     }
 }

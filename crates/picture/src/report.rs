@@ -48,8 +48,10 @@ pub struct RestorationReport {
     /// By all elements at once, or each alone.
     pub joint: bool,
     pub scores: Vec<ZoneScore>,
-    /// Expected PSNR of linear light in each zone (dB), where there is a forecast.
+    /// Expected PSNR of linear light in each zone (dB), of natural scenes, where there is a forecast.
     pub forecast_db: Vec<f64>,
+    /// The same of scenes with the spectrum of this one.
+    pub forecast_of_scene_db: Vec<f64>,
 }
 
 /// Where the light of one channel goes.
@@ -83,6 +85,7 @@ impl RestorationReport {
             joint,
             scores,
             forecast_db: Vec::new(),
+            forecast_of_scene_db: Vec::new(),
         }
     }
 }

@@ -11,7 +11,9 @@ use metalith_gds::extract::Extraction;
 use metalith_made::{MadeChip, SimulationCase};
 use metalith_picture::restore::RestorationMethod;
 use metalith_picture::scene::{BuiltIn, SceneImage, chart, read_far_scene};
-use metalith_picture::{Frame, FrameOperator, OperatorError, Rehearsal, Studio, Zone, ZoneScore, sampling_of, scores};
+use metalith_picture::{
+    Frame, FrameOperator, OperatorError, Rehearsal, ScenePower, Studio, Zone, ZoneScore, sampling_of, scores,
+};
 use ndarray::Array3;
 
 /// Pixels an axis of a built-in scene, if nothing else is said.
@@ -211,7 +213,9 @@ impl PictureBench {
         let method = self.spec.method;
         let restored = studio.restore(&operator, &rehearsal.operator_error, &frame, method, true, progress)?;
         let forecast_db = match method {
-            RestorationMethod::Tikhonov => rehearsal.forecast(&studio, &operator, progress)?,
+            RestorationMethod::Tikhonov => rehearsal
+                .forecast(&studio, &operator, progress)?
+                .psnr_linear_db(&ScenePower::natural()),
             _ => Vec::new(),
         };
         let truth = studio.truth(&self.scene);

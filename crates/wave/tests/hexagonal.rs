@@ -376,7 +376,7 @@ fn rays_land_where_wave_optics_has_them() {
     let power = Matched::of(&lens, [0.0, 0.0, z], um, 1.0).power_um2;
     let all = map.travelling_um2() + map.evanescent_um2;
     assert!((all / power - 1.0).abs() < ROUNDING, "{}", all / power);
-    let departing = Departure::of(&lens, um, 8).landing([0.0; 2], steered, grid).unwrap();
+    let departing = Departure::of(&lens, um, z, 8).landing([0.0; 2], steered, grid).unwrap();
     let moved: f64 = departing
         .power_um2
         .iter()

@@ -14,7 +14,7 @@ use crate::spectra::SceneSpectrum;
 use crate::{ElementView, SceneView};
 
 /// Blocks an axis of an element.
-const BLOCKS: usize = 12;
+const BLOCKS: usize = 20;
 /// Wavelengths of the veil are at most so far apart (nm): it moves with the chief ray by less than a square.
 const VEIL_STEP_NM: f64 = 38.0;
 
@@ -62,7 +62,12 @@ impl Veil {
                     let lit = light.lit(*i, [0.0; 2]);
                     // One polarisation stands for both: their tables differ in obliquely lit cells alone.
                     let aperture = lit.element.lit_aperture(&lit.tables[0], &lit.light);
-                    Departure::of(&aperture, all[*i] * 1e-3, BLOCKS)
+                    Departure::of(
+                        &aperture,
+                        all[*i] * 1e-3,
+                        chip.distinct[distinct].view.distance_um([0.0; 2]),
+                        BLOCKS,
+                    )
                 })
                 .collect();
             let zero_orders: Vec<f64> = chosen.iter().map(|i| light.zero_order(*i)).collect();

@@ -7,7 +7,7 @@
 use metalith_core::Lattice;
 use num_complex::Complex32;
 
-use super::tiles::{HOP, Leaving, TILE, for_tiles, power_scale};
+use super::tiles::{Leaving, Tiling, for_tiles, power_scale};
 use super::{Aperture, Landing, LandingGrid};
 use crate::error::Result;
 
@@ -15,8 +15,7 @@ use crate::error::Result;
 #[derive(Clone, Debug)]
 pub struct Departure {
     blocks: Vec<Block>,
-    /// Edge of a block (um).
-    edge_um: f64,
+    tiling: Tiling,
     lattice: Lattice,
     wavelength_um: f64,
     /// All power that the aperture passes (um^2).
@@ -26,8 +25,10 @@ pub struct Departure {
 /// Neighbouring tiles.
 #[derive(Clone, Debug)]
 struct Block {
-    /// Directions; those with next to no power are left out.
-    bins: Vec<Bin>,
+    /// Directions that most of the light leaves in.
+    strong: Vec<Bin>,
+    /// The others, [`GROUP`] x [`GROUP`] of them gathered into one.
+    weak: Vec<Bin>,
     /// What was left out (um^2): it is taken to be spread as the rest.
     rest_um2: f64,
 }
@@ -35,50 +36,67 @@ struct Block {
 /// The light of a block that leaves in one direction.
 #[derive(Clone, Copy, Debug)]
 struct Bin {
-    /// Bin of frequency along x times [`TILE`], and along y (cycles a tile).
+    /// Bin of frequency along x times the bins an axis, and along y (cycles a tile).
     direction: u16,
     /// Mean place that it comes from (um): a lens sends the light of each place of a block elsewhere.
     place_um: [f32; 2],
+    /// Edges of the rectangle about it whose moments are those of the places it comes from (um).
+    edges_um: [f32; 2],
     power_um2: f32,
 }
 
-/// Share of the power of a block that may be left out with its weakest bins.
+/// Share of the power of a block that its weak directions have.
+const WEAK: f64 = 0.06;
+/// Directions along an axis that are gathered where they are weak.
+const GROUP: usize = 4;
+/// Share of the power of a block that may be left out with its weakest groups.
 const LEFT_OUT: f64 = 2e-3;
 
 impl Departure {
-    /// Of an element at one wavelength (um), its tiles gathered into `blocks` x `blocks` squares over its lattice.
-    pub fn of(aperture: &dyn Aperture, wavelength_um: f64, blocks: usize) -> Self {
+    /// Of an element at one wavelength (um), its tiles gathered into `blocks` x `blocks` squares over its lattice, for a plane at
+    /// about this distance from the pillar tops (um).
+    pub fn of(aperture: &dyn Aperture, wavelength_um: f64, distance_um: f64, blocks: usize) -> Self {
         let lattice = aperture.lattice();
+        let tiling = Tiling::at(&lattice, wavelength_um, distance_um);
+        let (side, hop) = (tiling.side, tiling.hop());
         let (reach, blocks) = (lattice.reach(), blocks.max(1));
-        // Power, and power times place along x and y, of each direction.
-        let mut spectra: Vec<Vec<[f32; 3]>> = vec![Vec::new(); blocks * blocks];
-        let scale = power_scale(&lattice);
+        let mut spectra: Vec<Vec<Moments>> = vec![Vec::new(); blocks * blocks];
+        let steps = lattice.steps_um();
+        // Middle of a block along an axis, from which its places are counted.
+        let middle_um = |axis: usize, block: usize| {
+            let sites = (block as f64 + 0.5) * (reach[axis].len() + hop) as f64 / blocks as f64;
+            lattice.place_um(axis, 0)
+                + (reach[axis].start as f64 - hop as f64 + sites + 0.5 * side as f64) * steps[axis]
+        };
+        let scale = power_scale(&lattice, tiling);
         let block_of = |axis: usize, first: i64| {
             let (start, places) = (reach[axis].start as i64, reach[axis].len());
-            let from = (first + HOP as i64 - start).max(0) as usize;
-            (from * blocks / (places + HOP)).min(blocks - 1)
+            let from = (first + hop as i64 - start).max(0) as usize;
+            (from * blocks / (places + hop)).min(blocks - 1)
         };
         let fill_row = |iy: usize, row: &mut [Complex32]| aperture.fill_row(iy, row);
-        for_tiles(&lattice, fill_row, |tile| {
+        for_tiles(&lattice, tiling, fill_row, |tile| {
             let [column, row] = [0, 1].map(|axis| block_of(axis, tile.first[axis]));
             let sums = &mut spectra[row * blocks + column];
-            sums.resize(TILE * TILE, [0.0; 3]);
-            let [x, y] = tile.middle_um.map(|v| v as f32);
+            sums.resize(tiling.directions(), Moments::default());
+            let middle = [middle_um(0, column), middle_um(1, row)];
+            let place = [0, 1].map(|a| (tile.middle_um[a] - middle[a]) as f32);
             for (to, value) in sums.iter_mut().zip(tile.spectrum) {
-                let power = value.norm_sqr() * scale as f32;
-                to[0] += power;
-                to[1] += power * x;
-                to[2] += power * y;
+                to.add(value.norm_sqr() * scale as f32, place);
             }
         });
-        let steps = lattice.steps_um();
-        let edge = |axis: usize| (reach[axis].len() + HOP) as f64 * steps[axis] / blocks as f64;
-        let edge_um = edge(0).max(edge(1));
-        let blocks: Vec<Block> = spectra.iter().filter_map(|sums| Block::of(sums)).collect();
+        let blocks: Vec<Block> = spectra
+            .iter()
+            .enumerate()
+            .filter_map(|(k, sums)| {
+                let middle = [middle_um(0, k % blocks), middle_um(1, k / blocks)];
+                Block::of(sums, tiling, middle, steps.map(|step| hop as f64 * step))
+            })
+            .collect();
         Self {
             power_um2: blocks.iter().map(Block::power_um2).sum(),
             blocks,
-            edge_um,
+            tiling,
             lattice,
             wavelength_um,
         }
@@ -95,67 +113,167 @@ impl Departure {
     /// If the map is none or too large.
     pub fn landing(&self, sines: [f64; 2], towards: [f64; 2], grid: LandingGrid) -> Result<Landing> {
         grid.check()?;
-        let leaves = Leaving::new(&self.lattice, self.wavelength_um, sines, towards);
+        let leaves = Leaving::new(&self.lattice, self.tiling, self.wavelength_um, sines, towards);
         let mut landing = Landing::empty(grid);
+        let side = self.tiling.side;
         // How far light of each direction lands from where it leaves, the same for all blocks.
         let shift = |i: usize| {
-            let [sx, sy] = leaves.sines(i / TILE, i % TILE);
+            let [sx, sy] = leaves.sines(i / side, i % side);
             let cosine2 = 1.0 - sx * sx - sy * sy;
             (cosine2 > 0.0).then(|| [sx, sy].map(|s| grid.distance_um / cosine2.sqrt() * s))
         };
-        let shifts: Vec<Option<[f64; 2]>> = (0..TILE * TILE).map(shift).collect();
+        let shifts: Vec<Option<[f64; 2]>> = (0..self.tiling.directions()).map(shift).collect();
+        // How far the directions of a group land apart.
+        let group_um = self.lattice.steps_um().map(|step| {
+            let sines = GROUP as f64 * self.wavelength_um / (side as f64 * step);
+            grid.distance_um * sines
+        });
         for block in &self.blocks {
-            let kept = block.power_um2() - block.rest_um2;
-            let fill = 1.0 + block.rest_um2 / kept.max(f64::MIN_POSITIVE);
-            for bin in &block.bins {
-                let power = f64::from(bin.power_um2) * fill;
-                landing.add_spread(
-                    bin.place_um.map(f64::from),
-                    shifts[usize::from(bin.direction)],
-                    self.edge_um,
-                    power,
-                );
+            let fill = block.power_um2() / (block.power_um2() - block.rest_um2).max(f64::MIN_POSITIVE);
+            let mut add = |bin: &Bin, edges_um: [f64; 2]| {
+                let (place, shift) = (bin.place_um.map(f64::from), shifts[usize::from(bin.direction)]);
+                landing.add_spread(place, shift, edges_um, f64::from(bin.power_um2) * fill);
+            };
+            for bin in &block.strong {
+                add(bin, bin.edges_um.map(f64::from));
+            }
+            for bin in &block.weak {
+                add(bin, [0, 1].map(|a| f64::from(bin.edges_um[a]).hypot(group_um[a])));
             }
         }
         Ok(landing)
     }
 }
 
+/// Power of a direction, and where it comes from.
+#[derive(Clone, Copy, Debug, Default)]
+struct Moments {
+    power_um2: f32,
+    /// Power times place along x and y, from the middle of the block (um).
+    first: [f32; 2],
+    /// Power times the square of the place.
+    second: [f32; 2],
+}
+
+impl Moments {
+    #[inline]
+    fn add(&mut self, power_um2: f32, place_um: [f32; 2]) {
+        self.power_um2 += power_um2;
+        for (a, place) in place_um.into_iter().enumerate() {
+            self.first[a] += power_um2 * place;
+            self.second[a] += power_um2 * place * place;
+        }
+    }
+
+    fn gather(&mut self, other: &Self) {
+        self.power_um2 += other.power_um2;
+        for a in 0..2 {
+            self.first[a] += other.first[a];
+            self.second[a] += other.second[a];
+        }
+    }
+
+    /// Mean place, and the edges of a rectangle with the same second moments, of tiles that are `hop_um` wide.
+    fn places(&self, middle_um: [f64; 2], hop_um: [f64; 2]) -> [[f32; 2]; 2] {
+        let mean = self.first.map(|v| v / self.power_um2);
+        let edge = |a: usize| {
+            let variance = (self.second[a] / self.power_um2 - mean[a] * mean[a]).max(0.0);
+            (12.0 * f64::from(variance) + hop_um[a] * hop_um[a]).sqrt() as f32
+        };
+        [
+            [0, 1].map(|a| (middle_um[a] + f64::from(mean[a])) as f32),
+            [edge(0), edge(1)],
+        ]
+    }
+}
+
 impl Block {
-    /// From the power of each direction, columns first, and its moments along x and y; none of a block without light.
-    fn of(sums: &[[f32; 3]]) -> Option<Self> {
-        let power = |i: usize| sums[i][0];
+    /// From the power of each direction, columns first; none of a block without light.
+    fn of(sums: &[Moments], tiling: Tiling, middle_um: [f64; 2], hop_um: [f64; 2]) -> Option<Self> {
+        let power = |i: usize| sums[i].power_um2;
         let total: f64 = (0..sums.len()).map(|i| f64::from(power(i))).sum();
         if total <= 0.0 {
             return None;
         }
-        let mut order: Vec<usize> = (0..sums.len()).collect();
-        order.sort_by(|a, b| power(*b).total_cmp(&power(*a)).then(a.cmp(b)));
-        let mut kept = 0.0;
-        let mut bins = Vec::new();
-        for i in order {
-            if kept >= (1.0 - LEFT_OUT) * total {
-                break;
+        let bin = |direction: usize, sums: &Moments| {
+            let [place_um, edges_um] = sums.places(middle_um, hop_um);
+            Bin {
+                direction: direction as u16,
+                place_um,
+                edges_um,
+                power_um2: sums.power_um2,
             }
-            kept += f64::from(power(i));
-            let [power_um2, x, y] = sums[i];
-            bins.push(Bin {
-                direction: i as u16,
-                place_um: [x / power_um2, y / power_um2],
-                power_um2,
-            });
+        };
+        let (kept, others) = strongest(total, 1.0 - WEAK, power, sums.len());
+        let strong = kept.into_iter().map(|i| bin(i, &sums[i])).collect();
+        let across = tiling.side / GROUP;
+        let mut groups = vec![Group::default(); across * across];
+        for i in others {
+            let [column, row] = [i / tiling.side, i % tiling.side].map(|k| k / GROUP);
+            groups[column * across + row].add(i, tiling, &sums[i]);
         }
-        // In the order of directions, which is that of places on the plane.
-        bins.sort_by_key(|b| b.direction);
+        let all: f64 = groups.iter().map(|g| f64::from(g.sums.power_um2)).sum();
+        let share = 1.0 - LEFT_OUT * total / all.max(f64::MIN_POSITIVE);
+        let (kept, left_out) = strongest(all, share, |i| groups[i].sums.power_um2, groups.len());
         Some(Self {
-            rest_um2: total - kept,
-            bins,
+            strong,
+            weak: kept
+                .into_iter()
+                .map(|i| bin(groups[i].direction(tiling), &groups[i].sums))
+                .collect(),
+            rest_um2: left_out.into_iter().map(|i| f64::from(groups[i].sums.power_um2)).sum(),
         })
     }
 
     fn power_um2(&self) -> f64 {
-        self.bins.iter().map(|b| f64::from(b.power_um2)).sum::<f64>() + self.rest_um2
+        let bins = self.strong.iter().chain(&self.weak);
+        bins.map(|b| f64::from(b.power_um2)).sum::<f64>() + self.rest_um2
     }
+}
+
+/// Weak directions beside one another.
+#[derive(Clone, Copy, Debug, Default)]
+struct Group {
+    sums: Moments,
+    /// Power times the index of the direction along x and along y.
+    directions: [f32; 2],
+}
+
+impl Group {
+    fn add(&mut self, direction: usize, tiling: Tiling, one: &Moments) {
+        self.sums.gather(one);
+        for (sum, k) in self
+            .directions
+            .iter_mut()
+            .zip([direction / tiling.side, direction % tiling.side])
+        {
+            *sum += one.power_um2 * k as f32;
+        }
+    }
+
+    /// The direction that is nearest to the mean.
+    fn direction(&self, tiling: Tiling) -> usize {
+        let [x, y] = self.directions.map(|sum| (sum / self.sums.power_um2).round() as usize);
+        let last = tiling.side - 1;
+        x.min(last) * tiling.side + y.min(last)
+    }
+}
+
+/// The fewest of `n` that have a share of a power, and the others that have any, each in their own order.
+fn strongest(total: f64, share: f64, power: impl Fn(usize) -> f32, n: usize) -> (Vec<usize>, Vec<usize>) {
+    let mut order: Vec<usize> = (0..n).filter(|i| power(*i) > 0.0).collect();
+    order.sort_by(|a, b| power(*b).total_cmp(&power(*a)).then(a.cmp(b)));
+    let mut sum = 0.0;
+    let enough = order.iter().position(|i| {
+        let before = sum;
+        sum += f64::from(power(*i));
+        before >= share * total
+    });
+    let mut others = order.split_off(enough.unwrap_or(order.len()));
+    // Directions beside one another land beside one another.
+    order.sort_unstable();
+    others.sort_unstable();
+    (order, others)
 }
 
 #[cfg(test)]
@@ -177,7 +295,7 @@ mod tests {
             amplitude: 0.9,
             phase_rad: |x: f64, y: f64| -TAU * ((x * x + y * y + z * z).sqrt() - z) / um,
         };
-        let departure = Departure::of(&lens, um, 8);
+        let departure = Departure::of(&lens, um, z, 8);
         for sines in [[0.0, 0.0], [0.3, -0.1]] {
             let wave = PlaneWave {
                 wavelength_um: um,

@@ -10,7 +10,7 @@ use metalith_core::Lattice;
 use ndarray::Array2;
 use num_complex::Complex32;
 
-use super::tiles::{Leaving, TILE, for_tiles, power_scale};
+use super::tiles::{Leaving, Tiling, for_tiles, power_scale};
 use super::{Aperture, PlaneWave};
 use crate::error::{Result, WaveError};
 use crate::kernels::cis_all;
@@ -52,7 +52,8 @@ impl Landing {
         grid.check()?;
         let lattice = aperture.lattice();
         let n = lattice.sites();
-        let rays = Rays::new(&lattice, wave, towards, grid.distance_um);
+        let tiling = Tiling::at(&lattice, wave.wavelength_um, grid.distance_um);
+        let rays = Rays::new(&lattice, tiling, wave, towards, grid.distance_um);
         let arriving = [(0, wave.sin_x), (1, wave.sin_y)].map(|(axis, sine)| {
             let turns: Vec<f64> = (0..n)
                 .map(|i| lattice.place_um(axis, i) * sine / wave.wavelength_um)
@@ -69,8 +70,8 @@ impl Landing {
             }
         };
         let mut landing = Self::empty(grid);
-        let scale = power_scale(&lattice);
-        for_tiles(&lattice, fill_row, |tile| {
+        let scale = power_scale(&lattice, tiling);
+        for_tiles(&lattice, tiling, fill_row, |tile| {
             for (value, shift) in tile.spectrum.iter().zip(&rays.shift_um) {
                 let power = f64::from(value.norm_sqr()) * scale;
                 landing.add(tile.middle_um, *shift, power);
@@ -112,17 +113,17 @@ impl Landing {
 }
 
 impl Landing {
-    /// The same for light that leaves all over a square about a place, whose edge (um) is at most that of the map's squares.
+    /// The same for light that leaves all over a rectangle about a place, whose edges (um) are at most those of the map's squares.
     #[inline]
-    pub(super) fn add_spread(&mut self, from_um: [f64; 2], shift_um: Option<[f64; 2]>, edge_um: f64, power: f64) {
+    pub(super) fn add_spread(&mut self, from_um: [f64; 2], shift_um: Option<[f64; 2]>, edges_um: [f64; 2], power: f64) {
         let Some(shift) = shift_um else {
             self.evanescent_um2 += power;
             return;
         };
         let half = 0.5 * self.grid.cells as f64;
-        let edge = (edge_um / self.grid.cell_um).clamp(f64::MIN_POSITIVE, 1.0);
         // Along each axis the square whose border is crossed, and the share of the light on its near side.
         let [x, y] = [0, 1].map(|a| {
+            let edge = (edges_um[a] / self.grid.cell_um).clamp(f64::MIN_POSITIVE, 1.0);
             let low = (from_um[a] + shift[a]) / self.grid.cell_um + half - 0.5 * edge;
             let first = low.floor();
             (first as i64, ((first + 1.0 - low) / edge).min(1.0))
@@ -160,11 +161,11 @@ struct Rays {
 }
 
 impl Rays {
-    fn new(lattice: &Lattice, wave: &PlaneWave, towards: [f64; 2], distance_um: f64) -> Self {
-        let leaving = Leaving::new(lattice, wave.wavelength_um, [0.0; 2], towards);
-        let shift_um = (0..TILE * TILE)
+    fn new(lattice: &Lattice, tiling: Tiling, wave: &PlaneWave, towards: [f64; 2], distance_um: f64) -> Self {
+        let leaving = Leaving::new(lattice, tiling, wave.wavelength_um, [0.0; 2], towards);
+        let shift_um = (0..tiling.directions())
             .map(|i| {
-                let [sx, sy] = leaving.sines(i / TILE, i % TILE);
+                let [sx, sy] = leaving.sines(i / tiling.side, i % tiling.side);
                 let cosine2 = 1.0 - sx * sx - sy * sy;
                 (cosine2 > 0.0).then(|| [sx, sy].map(|s| distance_um * s / cosine2.sqrt()))
             })

@@ -8,10 +8,41 @@ use metalith_core::Lattice;
 use num_complex::Complex32;
 use rustfft::FftPlanner;
 
-/// Places of the lattice's grid an axis of a tile: 22 um at a pitch of 350 nm, two thirds of the best size for 2.4 mm, and a power of two.
-pub(super) const TILE: usize = 64;
-/// From one tile to the next [sites]: sine windows that overlap by half add up to one when squared.
-pub(super) const HOP: usize = TILE / 2;
+/// How an element is cut: sine windows that overlap by half add up to one when squared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Tiling {
+    /// Places of the lattice's grid an axis of a tile, a power of two.
+    pub side: usize,
+}
+
+/// Edge of a tile over sqrt(wavelength * distance). A tile says where light comes from the worse, and where it goes the
+/// better, the larger it is: of tiles of 22, 45, 67 and 90 um those of 45 um have the light of a lens of 2.4 mm nearest to where the
+/// field has it.
+const BEST_EDGE: f64 = 1.25;
+/// Fewer places would not tell directions apart, more would be a block of their own.
+const SIDES: [f64; 2] = [16.0, 256.0];
+
+impl Tiling {
+    /// For light that lands at a distance from the pillars (um).
+    pub fn at(lattice: &Lattice, wavelength_um: f64, distance_um: f64) -> Self {
+        let [x, y] = lattice.steps_um();
+        let places = BEST_EDGE * (wavelength_um * distance_um).sqrt() / x.max(y);
+        let [least, most] = SIDES.map(f64::log2);
+        Self {
+            side: 1 << places.log2().round().clamp(least, most) as usize,
+        }
+    }
+
+    /// From one tile to the next (places).
+    pub fn hop(self) -> usize {
+        self.side / 2
+    }
+
+    /// Directions of a tile.
+    pub fn directions(self) -> usize {
+        self.side * self.side
+    }
+}
 
 /// A tile with light in it.
 pub(super) struct Tile<'a> {
@@ -24,43 +55,45 @@ pub(super) struct Tile<'a> {
 }
 
 /// Power (um^2) of a bin whose amplitude is one.
-pub(super) fn power_scale(lattice: &Lattice) -> f64 {
-    lattice.cell_um2() / (TILE * TILE) as f64
+pub(super) fn power_scale(lattice: &Lattice, tiling: Tiling) -> f64 {
+    lattice.cell_um2() / tiling.directions() as f64
 }
 
 /// Visit the tiles of an element whose rows `fill_row` gives.
 pub(super) fn for_tiles(
     lattice: &Lattice,
+    tiling: Tiling,
     fill_row: impl Fn(usize, &mut [Complex32]),
     mut visit: impl FnMut(&Tile<'_>),
 ) {
     let (n, steps) = (lattice.sites(), lattice.steps_um());
+    let (side, hop) = (tiling.side, tiling.hop());
     let middle_um =
-        |axis: usize, first: i64| lattice.place_um(axis, 0) + (first as f64 + 0.5 * (TILE as f64 - 1.0)) * steps[axis];
-    let fft = FftPlanner::<f32>::new().plan_fft_forward(TILE);
+        |axis: usize, first: i64| lattice.place_um(axis, 0) + (first as f64 + 0.5 * (side as f64 - 1.0)) * steps[axis];
+    let fft = FftPlanner::<f32>::new().plan_fft_forward(side);
     let mut work = vec![Complex32::ZERO; fft.get_inplace_scratch_len()];
-    let taper: Vec<f32> = (0..TILE)
-        .map(|i| (PI * (i as f64 + 0.5) / TILE as f64).sin() as f32)
+    let taper: Vec<f32> = (0..side)
+        .map(|i| (PI * (i as f64 + 0.5) / side as f64).sin() as f32)
         .collect();
     // Rows of the tiles of one strip; half of them serve the next strip as well.
-    let mut strip = vec![Complex32::ZERO; TILE * n];
-    let mut tile = vec![Complex32::ZERO; TILE * TILE];
+    let mut strip = vec![Complex32::ZERO; side * n];
+    let mut tile = vec![Complex32::ZERO; side * side];
     let mut turned = tile.clone();
     // The first strip begins half a tile before the lattice, so that every site is in two of them.
-    for first_row in (-(HOP as i64)..n as i64).step_by(HOP) {
-        strip.copy_within(HOP * n.., 0);
-        for (k, row) in strip.chunks_exact_mut(n).enumerate().skip(HOP) {
+    for first_row in (-(hop as i64)..n as i64).step_by(hop) {
+        strip.copy_within(hop * n.., 0);
+        for (k, row) in strip.chunks_exact_mut(n).enumerate().skip(hop) {
             match usize::try_from(first_row + k as i64).ok().filter(|iy| *iy < n) {
                 Some(iy) => fill_row(iy, row),
                 None => row.fill(Complex32::ZERO),
             }
         }
-        for first in (-(HOP as i64)..n as i64).step_by(HOP) {
+        for first in (-(hop as i64)..n as i64).step_by(hop) {
             if !cut(&strip, n, first, &taper, &mut tile) {
                 continue;
             }
             fft.process_with_scratch(&mut tile, &mut work);
-            transpose(&tile, &mut turned);
+            transpose(&tile, side, &mut turned);
             fft.process_with_scratch(&mut turned, &mut work);
             let first = [first, first_row];
             visit(&Tile {
@@ -84,16 +117,16 @@ pub(super) struct Leaving {
 
 impl Leaving {
     /// For light that arrives with these sines.
-    pub fn new(lattice: &Lattice, wavelength_um: f64, arriving: [f64; 2], towards: [f64; 2]) -> Self {
+    pub fn new(lattice: &Lattice, tiling: Tiling, wavelength_um: f64, arriving: [f64; 2], towards: [f64; 2]) -> Self {
         let steps = lattice.steps_um();
         let moved = |offset: f64| {
             [0, 1].map(|a| {
                 let period = wavelength_um / steps[a];
                 let sine = |k: usize| {
-                    let own = k as f64 / TILE as f64 * period + arriving[a] + offset * period;
+                    let own = k as f64 / tiling.side as f64 * period + arriving[a] + offset * period;
                     own + ((towards[a] - own) / period).round() * period
                 };
-                (0..TILE).map(sine).collect()
+                (0..tiling.side).map(sine).collect()
             })
         };
         Self {
@@ -119,7 +152,7 @@ impl Leaving {
 /// Cuts a tapered tile out of a strip of rows of `n` sites. Whether there is light in it.
 fn cut(strip: &[Complex32], n: usize, first: i64, taper: &[f32], tile: &mut [Complex32]) -> bool {
     let mut light = false;
-    for ((row, out), wy) in strip.chunks_exact(n).zip(tile.chunks_exact_mut(TILE)).zip(taper) {
+    for ((row, out), wy) in strip.chunks_exact(n).zip(tile.chunks_exact_mut(taper.len())).zip(taper) {
         for ((k, to), wx) in out.iter_mut().enumerate().zip(taper) {
             let at = first + k as i64;
             *to = match usize::try_from(at).ok().and_then(|at| row.get(at)) {
@@ -132,10 +165,10 @@ fn cut(strip: &[Complex32], n: usize, first: i64, taper: &[f32], tile: &mut [Com
     light
 }
 
-fn transpose(tile: &[Complex32], turned: &mut [Complex32]) {
-    for (i, row) in tile.chunks_exact(TILE).enumerate() {
+fn transpose(tile: &[Complex32], side: usize, turned: &mut [Complex32]) {
+    for (i, row) in tile.chunks_exact(side).enumerate() {
         for (j, value) in row.iter().enumerate() {
-            turned[j * TILE + i] = *value;
+            turned[j * side + i] = *value;
         }
     }
 }

@@ -1,0 +1,246 @@
+//! The error of a restored picture, expected from the spectrum of its scene.
+//!
+//! A restoration by Tikhonov's method is linear in the scene but for noise: of each frequency, in each part of the field and
+//! each plane of colour, it loses a share of the power. The shares are found on one random scene ([`crate::Rehearsal`]);
+//! times the power that scenes have there they are the expected error.
+
+use ndarray::{Array2, Array3, Axis};
+use num_complex::Complex32;
+use rayon::prelude::*;
+
+use crate::Zone;
+use crate::operator::{FftScratch, SquareFft};
+use crate::restore::SceneStatistics;
+
+/// Parts of the field that power is told apart in, each with its part of the whole.
+const PARTS: [(Zone, f64); 3] = [
+    (Zone::Centre, 1.0 / 9.0),
+    (Zone::Edge, 4.0 / 9.0),
+    (Zone::Corner, 4.0 / 9.0),
+];
+
+/// Upper ends of bands of frequency (cycles a pixel): half of the power of a restoration is lost somewhere between the fifth and
+/// the tenth, by the part of the field. The last one holds all that is finer.
+const BANDS: [f64; 14] = [
+    0.008, 0.016, 0.03, 0.045, 0.06, 0.08, 0.1, 0.125, 0.15, 0.2, 0.25, 0.3, 0.4, 1.0,
+];
+
+/// Power of a picture, mean square of its light: by part of the field, plane of colour and band of frequency.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScenePower {
+    parts: [Vec<[f64; BANDS.len()]>; PARTS.len()],
+}
+
+impl ScenePower {
+    /// Of linear sRGB `[row, column, colour]`.
+    pub fn of(picture: &Array3<f64>) -> Self {
+        let colours = picture.axis_iter(Axis(2));
+        let planes: Vec<Array2<f32>> = colours.map(|plane| plane.mapv(|v| v as f32)).collect();
+        let independent = SceneStatistics::colours().independent(&planes);
+        let bands: Vec<[[f64; BANDS.len()]; PARTS.len()]> = independent.par_iter().map(bands).collect();
+        Self {
+            parts: std::array::from_fn(|part| bands.iter().map(|b| b[part]).collect()),
+        }
+    }
+
+    /// Expected of photographs, the same everywhere.
+    pub fn natural() -> Self {
+        let planes = SceneStatistics::colours().band_powers(&BANDS);
+        Self {
+            parts: std::array::from_fn(|_| planes.clone()),
+        }
+    }
+
+    /// The mean over pictures; none of none.
+    pub fn mean(all: &[Self]) -> Option<Self> {
+        let (first, rest) = all.split_first()?;
+        let mut sum = first.clone();
+        for one in rest {
+            sum.values_mut().zip(one.values()).for_each(|(a, b)| *a += b);
+        }
+        sum.values_mut().for_each(|v| *v /= all.len() as f64);
+        Some(sum)
+    }
+
+    fn values(&self) -> impl Iterator<Item = &f64> {
+        self.parts.iter().flatten().flatten()
+    }
+
+    fn values_mut(&mut self) -> impl Iterator<Item = &mut f64> {
+        self.parts.iter_mut().flatten().flatten()
+    }
+}
+
+/// What a camera and a restoration lose of any scene.
+#[derive(Clone, Debug)]
+pub struct Forecast {
+    /// Power of the error over that of the scene.
+    lost: ScenePower,
+}
+
+impl Forecast {
+    /// From a scene and the picture that was restored of it, linear sRGB `[row, column, colour]`.
+    pub fn between(truth: &Array3<f64>, picture: &Array3<f64>) -> Self {
+        let mut lost = ScenePower::of(&(picture - truth));
+        let scene = ScenePower::of(truth);
+        lost.values_mut()
+            .zip(scene.values())
+            .for_each(|(lost, scene)| *lost /= scene.max(f64::MIN_POSITIVE));
+        Self { lost }
+    }
+
+    /// Expected PSNR of linear light (dB) in all zones ([`Zone::ALL`]) of scenes with this power: that of the mean squared
+    /// error.
+    pub fn psnr_linear_db(&self, scenes: &ScenePower) -> Vec<f64> {
+        let sizes = SceneStatistics::colours().sizes();
+        let error = |part: usize| -> f64 {
+            let planes = self.lost.parts[part].iter().zip(&scenes.parts[part]).zip(&sizes);
+            let plane = |((lost, power), size): ((&[f64; BANDS.len()], &[f64; BANDS.len()]), &f64)| {
+                size * lost.iter().zip(power).map(|(l, p)| l * p).sum::<f64>()
+            };
+            planes.map(plane).sum::<f64>() / sizes.len() as f64
+        };
+        let of = |zone: &Zone| {
+            let parts = PARTS
+                .iter()
+                .enumerate()
+                .filter(|(_, (part, _))| *zone == Zone::Whole || part == zone);
+            let sums = parts.fold((0.0, 0.0), |(sum, all), (i, (_, share))| {
+                (sum + share * error(i), all + share)
+            });
+            -10.0 * (sums.0 / sums.1).log10()
+        };
+        Zone::ALL.iter().map(of).collect()
+    }
+}
+
+/// Mean squares of a plane by part and band. The plane is continued by its mirror images on all sides, so that its borders are
+/// no edges.
+fn bands(plane: &Array2<f32>) -> [[f64; BANDS.len()]; PARTS.len()] {
+    let (rows, columns) = plane.dim();
+    let size = metalith_wave::kernels::fft_size(2 * rows.max(columns));
+    let fft = SquareFft::new(size);
+    let mut scratch = FftScratch::default();
+    let from = [(size - rows) / 2, (size - columns) / 2];
+    let mirrored = |i: usize, from: usize, n: usize| {
+        let place = (i as i64 - from as i64).rem_euclid(2 * n as i64) as usize;
+        place.min(2 * n - 1 - place)
+    };
+    let mut square = vec![0.0; size * size];
+    for (iy, line) in square.chunks_exact_mut(size).enumerate() {
+        let row = plane.row(mirrored(iy, from[0], rows));
+        for (ix, v) in line.iter_mut().enumerate() {
+            *v = row[mirrored(ix, from[1], columns)];
+        }
+    }
+    let mut spectrum = vec![Complex32::ZERO; fft.entries()];
+    fft.forward(&mut square, size, &mut spectrum, &mut scratch);
+    let cycles = |k: usize| k.min(size - k) as f64 / size as f64;
+    let mut powers = [[0.0; BANDS.len()]; PARTS.len()];
+    let mut lower = 0.0;
+    for (band, upper) in BANDS.into_iter().enumerate() {
+        let inside = |i: usize| (lower..upper).contains(&cycles(i / size).hypot(cycles(i % size)));
+        let mut part: Vec<Complex32> = spectrum
+            .iter()
+            .enumerate()
+            .map(|(i, v)| if inside(i) { *v } else { Complex32::ZERO })
+            .collect();
+        fft.inverse(&mut part, &mut square, size, &mut scratch);
+        for (powers, (zone, _)) in powers.iter_mut().zip(PARTS) {
+            let (mut sum, mut count) = (0.0, 0);
+            for [y, x] in zone.rectangles(rows, columns) {
+                for iy in y {
+                    let line = &square[(iy + from[0]) * size + from[1]..][x.clone()];
+                    sum += line.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
+                    count += line.len();
+                }
+            }
+            powers[band] = sum / count.max(1) as f64;
+        }
+        lower = upper;
+    }
+    powers
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::SceneView;
+
+    fn random(seed: u64, rows: usize, columns: usize) -> Array3<f64> {
+        let view = SceneView {
+            rows,
+            columns,
+            field_deg: 60.0,
+            distance_um: f64::INFINITY,
+        };
+        let planes = SceneStatistics::colours().random_scene(&view, seed);
+        Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| f64::from(planes[c][[y, x]]))
+    }
+
+    #[test]
+    fn power_of_all_bands_is_the_mean_square() {
+        /// Products of bands are zero over the whole picture, but for mirrors that do not fit the square of its
+        /// transform; not in its parts.
+        const TOLERANCE: [f64; 4] = [0.03, 0.1, 0.1, 0.1];
+        let picture = random(3, 150, 120);
+        let power = ScenePower::of(&picture);
+        // Lost altogether.
+        let all = Forecast {
+            lost: ScenePower {
+                parts: std::array::from_fn(|_| vec![[1.0; BANDS.len()]; 3]),
+            },
+        };
+        let scores = crate::scores(&Array3::zeros(picture.dim()), &picture).unwrap();
+        for ((got, want), tolerance) in all.psnr_linear_db(&power).iter().zip(scores).zip(TOLERANCE) {
+            let ratio = 10f64.powf(0.1 * (want.psnr_linear_db - got));
+            assert!((ratio - 1.0).abs() < tolerance, "{got} {want:?}");
+        }
+    }
+
+    #[test]
+    fn natural_power_is_the_mean_over_random_scenes() {
+        /// Of forty draws, whose brightest places have much of the power.
+        const DRAWS: f64 = 0.15;
+        let all: Vec<ScenePower> = (0..40).map(|seed| ScenePower::of(&random(seed, 256, 256))).collect();
+        let (found, natural) = (ScenePower::mean(&all).unwrap(), ScenePower::natural());
+        for part in 0..PARTS.len() {
+            for plane in 0..3 {
+                // Coarser bands than the picture resolves are left out.
+                for band in 3..BANDS.len() {
+                    let [a, b] = [&found, &natural].map(|p| p.parts[part][plane][band]);
+                    assert!((a / b - 1.0).abs() < DRAWS, "{part} {plane} {band}: {a} {b}");
+                }
+            }
+        }
+    }
+
+    /// What a blur loses is found on one scene, and holds for another of other power.
+    #[test]
+    fn what_is_lost_of_one_scene_is_lost_of_another() {
+        /// Decibels, of one draw.
+        const DRAW_DB: f64 = 0.3;
+        let blurred = |picture: &Array3<f64>| {
+            let (rows, columns, _) = picture.dim();
+            Array3::from_shape_fn(picture.dim(), |(y, x, c)| {
+                let near = |i: usize, n: usize| [i.saturating_sub(1), i, (i + 1).min(n - 1)];
+                let mut sum = 0.0;
+                for iy in near(y, rows) {
+                    for ix in near(x, columns) {
+                        sum += picture[[iy, ix, c]] / 9.0;
+                    }
+                }
+                sum
+            })
+        };
+        let rehearsed = random(1, 160, 160);
+        let forecast = Forecast::between(&rehearsed, &blurred(&rehearsed));
+        // Twice as fine, and of another contrast.
+        let fine = random(2, 320, 320);
+        let other = Array3::from_shape_fn((160, 160, 3), |(y, x, c)| 0.5 * fine[[2 * y, 2 * x, c]]);
+        let scores = crate::scores(&blurred(&other), &other).unwrap();
+        for (got, want) in forecast.psnr_linear_db(&ScenePower::of(&other)).iter().zip(scores) {
+            assert!((got - want.psnr_linear_db).abs() < DRAW_DB, "{got} {want:?}");
+        }
+    }
+}
