@@ -71,7 +71,8 @@ impl Channel {
 }
 
 impl Camera {
-    /// Wavelengths for all channels, at most `step_nm` apart, within `range_nm`.
+    /// Wavelengths for all channels, within `range_nm`: at most `step_nm` apart, and closer where a channel counts light of a
+    /// narrow band, a quarter of it, for images of a point change within it.
     ///
     /// # Errors
     /// If a channel counts no light in this range.
@@ -107,7 +108,24 @@ impl Camera {
                 counted: kept / total,
             });
         }
-        Ok(placed(channels, step_nm))
+        let narrowest = channels.iter().map(ChannelSampling::width_nm).fold(f64::MAX, f64::min);
+        let closer = (narrowest / STEPS_IN_A_BAND).max(CLOSEST_NM);
+        Ok(placed(channels, step_nm.min(closer)))
+    }
+}
+
+/// Of the narrowest channel.
+const STEPS_IN_A_BAND: f64 = 4.0;
+/// Wavelengths are at least so far apart (nm), unless less is asked for: an LED of 18 nm behind a lens of 60 um errs by 0.4 % of
+/// the peak then.
+const CLOSEST_NM: f64 = 5.0;
+
+impl ChannelSampling {
+    /// Width of a flat band with the same sum and sum of squares (nm).
+    fn width_nm(&self) -> f64 {
+        let sum = |of: &dyn Fn(&ChannelPart) -> f64| self.parts.iter().map(of).sum::<f64>();
+        let density = |p: &ChannelPart| p.weight / (p.nm[1] - p.nm[0]);
+        sum(&|p| p.weight).powi(2) / sum(&|p| p.weight * density(p))
     }
 }
 

@@ -1,6 +1,8 @@
 //! The simulated bench: from pillars to the expected pixels of each capture, under any perturbation.
 
 mod light;
+#[cfg(test)]
+mod scene;
 mod view;
 
 use std::borrow::Cow;

@@ -114,8 +114,8 @@ impl Departure {
     pub fn landing(&self, sines: [f64; 2], towards: [f64; 2], grid: LandingGrid) -> Result<Landing> {
         grid.check()?;
         let leaves = Leaving::new(&self.lattice, self.tiling, self.wavelength_um, sines, towards);
-        let mut landing = Landing::empty(grid);
         let side = self.tiling.side;
+        let mut spread = SpreadLight::new(grid);
         // How far light of each direction lands from where it leaves, the same for all blocks.
         let shift = |i: usize| {
             let [sx, sy] = leaves.sines(i / side, i % side);
@@ -128,20 +128,79 @@ impl Departure {
             let sines = GROUP as f64 * self.wavelength_um / (side as f64 * step);
             grid.distance_um * sines
         });
+        let mut evanescent_um2 = 0.0;
         for block in &self.blocks {
             let fill = block.power_um2() / (block.power_um2() - block.rest_um2).max(f64::MIN_POSITIVE);
-            let mut add = |bin: &Bin, edges_um: [f64; 2]| {
-                let (place, shift) = (bin.place_um.map(f64::from), shifts[usize::from(bin.direction)]);
-                landing.add_spread(place, shift, edges_um, f64::from(bin.power_um2) * fill);
+            let mut add = |bin: &Bin, edges_um: [f32; 2]| {
+                let power = f64::from(bin.power_um2) * fill;
+                match shifts[usize::from(bin.direction)] {
+                    Some(shift) => spread.add([0, 1].map(|a| f64::from(bin.place_um[a]) + shift[a]), edges_um, power),
+                    None => evanescent_um2 += power,
+                }
             };
             for bin in &block.strong {
-                add(bin, bin.edges_um.map(f64::from));
+                add(bin, bin.edges_um);
             }
             for bin in &block.weak {
-                add(bin, [0, 1].map(|a| f64::from(bin.edges_um[a]).hypot(group_um[a])));
+                add(bin, [0, 1].map(|a| bin.edges_um[a].hypot(group_um[a] as f32)));
             }
         }
-        Ok(landing)
+        Ok(spread.landing(evanescent_um2))
+    }
+}
+
+/// A map that rectangles of light are added to, with a border for all that lands beyond it.
+struct SpreadLight {
+    grid: LandingGrid,
+    /// Squares an axis with the border: one before the map, and two after it for what begins in the first.
+    across: usize,
+    power_um2: Vec<f64>,
+}
+
+impl SpreadLight {
+    fn new(grid: LandingGrid) -> Self {
+        let across = grid.cells + 3;
+        Self {
+            grid,
+            across,
+            power_um2: vec![0.0; across * across],
+        }
+    }
+
+    /// Light all over a rectangle about a place (um), whose edges (um) are at most those of the map's squares.
+    #[inline]
+    fn add(&mut self, middle_um: [f64; 2], edges_um: [f32; 2], power: f64) {
+        let half = 0.5 * self.grid.cells as f64 + 1.0;
+        let last = (self.grid.cells + 1) as f64;
+        let cell = 1.0 / self.grid.cell_um;
+        // Along each axis the square in which it begins, and the share of the light in that one.
+        let [(x, wx), (y, wy)] = [0, 1].map(|a| {
+            let edge = (f64::from(edges_um[a]) * cell).clamp(f64::MIN_POSITIVE, 1.0);
+            let low = (middle_um[a] * cell + half - 0.5 * edge).clamp(0.0, last);
+            let first = low.floor();
+            (first as usize, ((first + 1.0 - low) / edge).min(1.0))
+        });
+        let at = y * self.across + x;
+        let (near, far) = (power * wy, power * (1.0 - wy));
+        self.power_um2[at] += near * wx;
+        self.power_um2[at + 1] += near * (1.0 - wx);
+        self.power_um2[at + self.across] += far * wx;
+        self.power_um2[at + self.across + 1] += far * (1.0 - wx);
+    }
+
+    fn landing(self, evanescent_um2: f64) -> Landing {
+        let mut landing = Landing::empty(self.grid);
+        for (y, row) in self.power_um2.chunks_exact(self.across).enumerate() {
+            for (x, power) in row.iter().enumerate() {
+                let place = y.checked_sub(1).zip(x.checked_sub(1));
+                match place.and_then(|(y, x)| landing.power_um2.get_mut([y, x])) {
+                    Some(to) => *to += power,
+                    None => landing.beyond_um2 += power,
+                }
+            }
+        }
+        landing.evanescent_um2 = evanescent_um2;
+        landing
     }
 }
 

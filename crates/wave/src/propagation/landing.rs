@@ -112,34 +112,6 @@ impl Landing {
     }
 }
 
-impl Landing {
-    /// The same for light that leaves all over a rectangle about a place, whose edges (um) are at most those of the map's squares.
-    #[inline]
-    pub(super) fn add_spread(&mut self, from_um: [f64; 2], shift_um: Option<[f64; 2]>, edges_um: [f64; 2], power: f64) {
-        let Some(shift) = shift_um else {
-            self.evanescent_um2 += power;
-            return;
-        };
-        let half = 0.5 * self.grid.cells as f64;
-        // Along each axis the square whose border is crossed, and the share of the light on its near side.
-        let [x, y] = [0, 1].map(|a| {
-            let edge = (edges_um[a] / self.grid.cell_um).clamp(f64::MIN_POSITIVE, 1.0);
-            let low = (from_um[a] + shift[a]) / self.grid.cell_um + half - 0.5 * edge;
-            let first = low.floor();
-            (first as i64, ((first + 1.0 - low) / edge).min(1.0))
-        });
-        for (iy, wy) in [(y.0, y.1), (y.0 + 1, 1.0 - y.1)] {
-            for (ix, wx) in [(x.0, x.1), (x.0 + 1, 1.0 - x.1)] {
-                let place = usize::try_from(iy).ok().zip(usize::try_from(ix).ok());
-                match place.and_then(|(iy, ix)| self.power_um2.get_mut([iy, ix])) {
-                    Some(to) => *to += power * wy * wx,
-                    None => self.beyond_um2 += power * wy * wx,
-                }
-            }
-        }
-    }
-}
-
 impl LandingGrid {
     pub(super) fn check(&self) -> Result<()> {
         let sane =
