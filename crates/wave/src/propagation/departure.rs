@@ -116,33 +116,36 @@ impl Departure {
         let leaves = Leaving::new(&self.lattice, self.tiling, self.wavelength_um, sines, towards);
         let side = self.tiling.side;
         let mut spread = SpreadLight::new(grid);
-        // How far light of each direction lands from where it leaves, the same for all blocks.
+        // How far light of each direction lands from where it leaves, the same for all blocks; not a number if it does not travel.
         let shift = |i: usize| {
             let [sx, sy] = leaves.sines(i / side, i % side);
             let cosine2 = 1.0 - sx * sx - sy * sy;
-            (cosine2 > 0.0).then(|| [sx, sy].map(|s| grid.distance_um / cosine2.sqrt() * s))
+            let travels = if cosine2 > 0.0 {
+                grid.distance_um / cosine2.sqrt()
+            } else {
+                f64::NAN
+            };
+            [sx, sy].map(|s| (travels * s) as f32)
         };
-        let shifts: Vec<Option<[f64; 2]>> = (0..self.tiling.directions()).map(shift).collect();
-        // How far the directions of a group land apart.
-        let group_um = self.lattice.steps_um().map(|step| {
+        let shifts: Vec<[f32; 2]> = (0..self.tiling.directions()).map(shift).collect();
+        // How far the directions of a group land apart, squared.
+        let group = self.lattice.steps_um().map(|step| {
             let sines = GROUP as f64 * self.wavelength_um / (side as f64 * step);
-            grid.distance_um * sines
+            (grid.distance_um * sines).powi(2) as f32
         });
         let mut evanescent_um2 = 0.0;
         for block in &self.blocks {
             let fill = block.power_um2() / (block.power_um2() - block.rest_um2).max(f64::MIN_POSITIVE);
-            let mut add = |bin: &Bin, edges_um: [f32; 2]| {
-                let power = f64::from(bin.power_um2) * fill;
-                match shifts[usize::from(bin.direction)] {
-                    Some(shift) => spread.add([0, 1].map(|a| f64::from(bin.place_um[a]) + shift[a]), edges_um, power),
-                    None => evanescent_um2 += power,
+            for (bins, wider) in [(&block.strong, [0.0; 2]), (&block.weak, group)] {
+                for bin in bins {
+                    let (power, shift) = (f64::from(bin.power_um2) * fill, shifts[usize::from(bin.direction)]);
+                    if shift[0].is_nan() {
+                        evanescent_um2 += power;
+                        continue;
+                    }
+                    let edges_um = [0, 1].map(|a| (bin.edges_um[a] * bin.edges_um[a] + wider[a]).sqrt());
+                    spread.add([0, 1].map(|a| bin.place_um[a] + shift[a]), edges_um, power);
                 }
-            };
-            for bin in &block.strong {
-                add(bin, bin.edges_um);
-            }
-            for bin in &block.weak {
-                add(bin, [0, 1].map(|a| bin.edges_um[a].hypot(group_um[a] as f32)));
             }
         }
         Ok(spread.landing(evanescent_um2))
@@ -169,16 +172,16 @@ impl SpreadLight {
 
     /// Light all over a rectangle about a place (um), whose edges (um) are at most those of the map's squares.
     #[inline]
-    fn add(&mut self, middle_um: [f64; 2], edges_um: [f32; 2], power: f64) {
-        let half = 0.5 * self.grid.cells as f64 + 1.0;
-        let last = (self.grid.cells + 1) as f64;
-        let cell = 1.0 / self.grid.cell_um;
+    fn add(&mut self, middle_um: [f32; 2], edges_um: [f32; 2], power: f64) {
+        let half = 0.5 * self.grid.cells as f32 + 1.0;
+        let last = (self.grid.cells + 1) as f32;
+        let cell = self.grid.cell_um as f32;
         // Along each axis the square in which it begins, and the share of the light in that one.
         let [(x, wx), (y, wy)] = [0, 1].map(|a| {
-            let edge = (f64::from(edges_um[a]) * cell).clamp(f64::MIN_POSITIVE, 1.0);
-            let low = (middle_um[a] * cell + half - 0.5 * edge).clamp(0.0, last);
-            let first = low.floor();
-            (first as usize, ((first + 1.0 - low) / edge).min(1.0))
+            let edge = (edges_um[a] / cell).clamp(f32::MIN_POSITIVE, 1.0);
+            let low = (middle_um[a] / cell + half - 0.5 * edge).clamp(0.0, last);
+            let first = low as usize;
+            (first, f64::from(((first as f32 + 1.0 - low) / edge).min(1.0)))
         });
         let at = y * self.across + x;
         let (near, far) = (power * wy, power * (1.0 - wy));
