@@ -66,6 +66,11 @@ pub struct CompareArgs {
     #[arg(long, value_delimiter = ',', value_name = "FILE,...")]
     learnt: Vec<PathBuf>,
 
+    /// Weights of the learned perceptual distance (LPIPS, of AlexNet): the `state_dict` of the authors' package as safetensors. They
+    /// fill a column of the table that is empty without them.
+    #[arg(long, value_name = "FILE")]
+    lpips: Option<PathBuf>,
+
     /// Seed of the noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -235,6 +240,7 @@ impl CompareArgs {
             photographs: images::of_all(&self.photographs)?,
             pixels: self.pixels.map(usize::from),
             learnt: self.learnt.clone(),
+            lpips: self.lpips.clone(),
         })
     }
 }

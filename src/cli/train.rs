@@ -103,6 +103,7 @@ impl TrainArgs {
             photographs,
             pixels: self.pixels.map(usize::from),
             learnt: Vec::new(),
+            lpips: None,
         })
     }
 

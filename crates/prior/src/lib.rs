@@ -6,6 +6,7 @@
 //! the same, and a seed               -> one of the pictures it may be of  (`NetworkDenoiser::sample`)
 //! pictures of frames, their scenes   -> weights                      (`train_finisher`)
 //! pictures restored from one frame   -> one picture                  (`Finisher::finish`)
+//! two pictures, weights of others    -> how different they look      (`PerceptualDistance`)
 //! ```
 //!
 //! The denoiser has 0.8 million weights, the last stage of a camera 0.2. Its convolutions and their gradients are made here, in registers: what they are
@@ -23,6 +24,7 @@ mod learning;
 mod network;
 #[cfg(feature = "onnx")]
 mod onnx;
+mod perceptual;
 mod sample;
 mod squares;
 mod stacks;
@@ -34,6 +36,7 @@ pub use examples::{Photographs, with_noise};
 pub use finisher::{Finisher, Taught, train_finisher};
 pub use learning::{TrainingReport, TrainingSpec};
 pub use network::COLOURS;
+pub use perceptual::PerceptualDistance;
 pub use sample::SAMPLING_STEPS;
 pub use stacks::{Stack, Stacks};
 pub use training::{JUDGED, train};

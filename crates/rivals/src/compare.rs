@@ -1,8 +1,10 @@
 //! Scores of cameras over photographs.
 
+use metalith_core::srgb::encoded;
 use metalith_core::{Error, Progress, Result};
 use metalith_picture::scene::SceneImage;
 use metalith_picture::{Frame, Zone, ZoneScore, scores};
+use metalith_prior::PerceptualDistance;
 use ndarray::Array3;
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +18,7 @@ pub struct WayScores {
     pub way: Option<Way>,
     /// Over the photographs: PSNR of the mean squared error, mean of SSIM.
     pub mean: Vec<ZoneScore>,
-    /// One less the learned perceptual distance (LPIPS): nobody has given the weights of that measure.
+    /// One less the learned perceptual distance (LPIPS) of sRGB values, mean over the photographs; none without its weights.
     pub one_less_lpips: Option<f64>,
     /// For a picture (s), if the system tells; of a bare frame, none.
     pub cpu_s: Option<f64>,
@@ -67,7 +69,8 @@ pub struct Comparison {
     pub cameras: Vec<ComparedCamera>,
 }
 
-/// Let a camera take photographs and restore them in all its ways. `name` and `words` are those of the table.
+/// Let a camera take photographs and restore them in all its ways. `name` and `words` are those of the table; pictures are judged by a
+/// perceptual distance too, if there is one.
 ///
 /// # Errors
 /// If there are none, they differ in size, or the user stopped it.
@@ -76,14 +79,16 @@ pub fn compare(
     (name, words): (&str, &str),
     photographs: &[SceneImage],
     seed: u64,
+    perceptual: Option<&PerceptualDistance>,
     progress: &dyn Progress,
 ) -> Result<ComparedCamera> {
     let first = photographs
         .first()
         .ok_or_else(|| Error::invalid("no photographs", "give at least one"))?;
     let ways = contender.ways();
-    let mut bare: Vec<Vec<ZoneScore>> = Vec::new();
-    let mut found: Vec<Vec<Vec<ZoneScore>>> = vec![Vec::new(); ways.len()];
+    let judge = Judge { perceptual };
+    let mut bare = Judged::default();
+    let mut found: Vec<Judged> = ways.iter().map(|_| Judged::default()).collect();
     let mut seconds: Vec<Option<f64>> = vec![Some(0.0); ways.len()];
     let mut frame_s = Some(0.0);
     let mut shown = None;
@@ -94,7 +99,7 @@ pub fn compare(
         add(&mut frame_s, begun);
         let truth = contender.truth(photograph);
         if let Some(picture) = contender.unrestored(&frame) {
-            bare.push(scores(&picture, &truth)?);
+            judge.add(&mut bare, &picture, &truth)?;
         }
         let mut pictures = Vec::new();
         for (k, way) in ways.iter().enumerate() {
@@ -104,8 +109,9 @@ pub fn compare(
             let begun = cpu_seconds();
             let picture = contender.restore(&frame, k, progress)?;
             add(&mut seconds[k], begun);
-            found[k].push(scores(&picture, &truth)?);
-            let whole = &found[k][found[k].len() - 1][0];
+            judge.add(&mut found[k], &picture, &truth)?;
+            let scores = &found[k].scores;
+            let whole = &scores[scores.len() - 1][0];
             progress.note(&format!(
                 "{}, {}: {:.2} dB",
                 photograph.name,
@@ -124,12 +130,12 @@ pub fn compare(
         });
     }
     let each = |sum: Option<f64>| sum.map(|s| s / photographs.len() as f64);
-    let frames = (!bare.is_empty()).then(|| WayScores {
+    let frames = (!bare.scores.is_empty()).then(|| WayScores {
         way: None,
-        mean: mean(&bare),
-        one_less_lpips: None,
+        mean: mean(&bare.scores),
+        one_less_lpips: bare.one_less(),
         cpu_s: None,
-        photographs: bare,
+        photographs: bare.scores,
     });
     let restored = ways
         .into_iter()
@@ -137,10 +143,10 @@ pub fn compare(
         .zip(seconds)
         .map(|((way, own), s)| WayScores {
             way: Some(way),
-            mean: mean(&own),
-            one_less_lpips: None,
+            mean: mean(&own.scores),
+            one_less_lpips: own.one_less(),
             cpu_s: each(s),
-            photographs: own,
+            photographs: own.scores,
         });
     Ok(ComparedCamera {
         name: name.to_owned(),
@@ -150,6 +156,37 @@ pub fn compare(
         frame_cpu_s: each(frame_s),
         shown,
     })
+}
+
+/// What pictures are judged by.
+struct Judge<'a> {
+    perceptual: Option<&'a PerceptualDistance>,
+}
+
+/// Pictures of one way, judged.
+#[derive(Default)]
+struct Judged {
+    scores: Vec<Vec<ZoneScore>>,
+    /// Perceptual distances, if they are known.
+    distances: Vec<f64>,
+}
+
+impl Judge<'_> {
+    fn add(&self, to: &mut Judged, picture: &Array3<f64>, truth: &Array3<f64>) -> Result<()> {
+        to.scores.push(scores(picture, truth)?);
+        if let Some(perceptual) = self.perceptual {
+            let [picture, truth] = [picture, truth].map(|p| p.mapv(encoded));
+            to.distances.push(perceptual.between(picture.view(), truth.view())?);
+        }
+        Ok(())
+    }
+}
+
+impl Judged {
+    fn one_less(&self) -> Option<f64> {
+        let mean = self.distances.iter().sum::<f64>() / self.distances.len() as f64;
+        (!self.distances.is_empty()).then_some(1.0 - mean)
+    }
 }
 
 /// Over photographs: PSNR of the mean squared error, mean of SSIM.

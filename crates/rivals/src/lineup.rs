@@ -8,6 +8,7 @@ use metalith_design::Design;
 use metalith_picture::restore::RestorationMethod;
 use metalith_picture::scene::{SceneImage, read_far_scene};
 use metalith_picture::{Assumed, KeptKernels, SceneView, Studio};
+use metalith_prior::PerceptualDistance;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
@@ -40,6 +41,9 @@ pub struct Lineup {
     /// Weights of learnt last stages, each behind the cameras that it was taught for.
     #[serde(default)]
     pub learnt: Vec<PathBuf>,
+    /// Weights of the learned perceptual distance, if pictures are judged by it.
+    #[serde(default)]
+    pub lpips: Option<PathBuf>,
 }
 
 /// A design that is compared.
@@ -75,6 +79,8 @@ pub struct OpenLineup<'a> {
     pub(crate) designs: Vec<(Design, Camera)>,
     pub(crate) photographs: Vec<SceneImage>,
     pub(crate) stages: Vec<Stage>,
+    /// What pictures are judged by too.
+    perceptual: Option<PerceptualDistance>,
 }
 
 /// What is done with a camera that is ready: it, its name and words in the table, its photographs.
@@ -123,6 +129,7 @@ impl Lineup {
             designs,
             photographs,
             stages: self.learnt.iter().map(|p| Stage::read(p)).collect::<Result<_>>()?,
+            perceptual: self.lpips.as_deref().map(PerceptualDistance::read).transpose()?,
         };
         open.stages_have_cameras()?;
         Ok(open)
@@ -185,7 +192,8 @@ impl OpenLineup<'_> {
     ) -> Result<ComparedCamera> {
         let mut found = None;
         self.ready(k, kept, progress, &mut |contender, names, all| {
-            found = Some(compare(contender, names, &all[..photographs], self.of.seed, progress)?);
+            let (all, perceptual) = (&all[..photographs], self.perceptual.as_ref());
+            found = Some(compare(contender, names, all, self.of.seed, perceptual, progress)?);
             Ok(())
         })?;
         Ok(found.expect("a camera that is ready takes photographs"))

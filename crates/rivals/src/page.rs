@@ -42,7 +42,7 @@ fn page(comparison: &Comparison) -> Page {
         s.psnr_linear_db
     });
     page.paragraph(
-        "Means over the photographs: PSNR of the mean squared error, SSIM the mean. Zones are the middle, the four edges and the four corners of a division by three. PSNR and SSIM are of sRGB values if nothing else is said. CPU seconds are of one picture. Frames of cameras without a lens are no pictures and have no scores. LPIPS needs weights that nobody has given: its column is empty.",
+        "Means over the photographs: PSNR of the mean squared error, SSIM the mean. Zones are the middle, the four edges and the four corners of a division by three. PSNR and SSIM are of sRGB values if nothing else is said. CPU seconds are of one picture. Frames of cameras without a lens are no pictures and have no scores. LPIPS needs the weights of that measure (`--lpips`): without them its column is empty.",
     );
     for camera in &comparison.cameras {
         one(&mut page, camera);

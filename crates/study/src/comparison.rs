@@ -117,7 +117,14 @@ fn key(lineup: &Lineup) -> Result<String> {
             files.extend(Camera::read(camera)?.files);
         }
     }
-    files.extend(lineup.photographs.iter().chain(&lineup.learnt).cloned());
+    files.extend(
+        lineup
+            .photographs
+            .iter()
+            .chain(&lineup.learnt)
+            .chain(&lineup.lpips)
+            .cloned(),
+    );
     for path in files {
         hash.update(file_digest(&path)?);
     }
@@ -165,6 +172,7 @@ fn placed(lineup: &Lineup) -> Result<Lineup> {
         designs: lineup.designs.iter().map(design).collect::<Result<_>>()?,
         photographs: lineup.photographs.iter().map(|p| absolute(p)).collect::<Result<_>>()?,
         learnt: lineup.learnt.iter().map(|p| absolute(p)).collect::<Result<_>>()?,
+        lpips: lineup.lpips.as_deref().map(absolute).transpose()?,
         ..lineup.clone()
     })
 }

@@ -188,6 +188,7 @@ fn cameras_of_shards_are_those_of_one_comparison() {
         photographs: (1..4).map(|k| image(folder.path(), k)).collect(),
         pixels: None,
         learnt: Vec::new(),
+        lpips: None,
     };
     let planned = plan_comparison(&lineup, &at("parts"), &Silent).unwrap();
     assert_eq!(planned.cut().shards(), 3);
