@@ -36,7 +36,7 @@ fn what_cannot_be_compared_is_refused() {
     let out = folder.path().join("out").display().to_string();
     let camera = ["--camera", "cameras/gt1930.toml"];
     let flatcam = ["--rivals", "flatcam"];
-    let cases: [(&[&str], &str); 8] = [
+    let cases: [(&[&str], &str); 9] = [
         (&[&one], "no camera to compare"),
         (&[&one, &other, flatcam[0], flatcam[1]], "of one size"),
         (&[&one, "--rivals", "pinhole"], "possible values"),
@@ -48,6 +48,10 @@ fn what_cannot_be_compared_is_refused() {
         ),
         (&[&one, flatcam[0], flatcam[1], "--mask-distance-um", "0"], "from 1 to"),
         (&[&one, "--rivals", "diffusercam", "--diffuser-opening", "9"], "opening"),
+        (
+            &[&one, flatcam[0], flatcam[1], "--lpips", "cameras/gt1930.toml"],
+            "no file of safetensors",
+        ),
     ];
     for (arguments, words) in cases {
         compare(&[arguments, &camera].concat(), &out)
@@ -83,6 +87,56 @@ fn a_table_comes_out_of_photographs() {
     assert!(page.contains("Cameras side by side"));
     let numbers = fs::read_to_string(Path::new(&out).join("compare.json")).unwrap();
     assert!(numbers.contains("psnr_linear_db"));
+}
+
+/// Weights of the perceptual distance that find no difference anywhere: zeros of the shapes of AlexNet.
+fn weights_of_zeros(path: &Path) -> String {
+    let convolutions = [
+        ("net.slice1.0", 64, 3, 11),
+        ("net.slice2.3", 192, 64, 5),
+        ("net.slice3.6", 384, 192, 3),
+        ("net.slice4.8", 256, 384, 3),
+        ("net.slice5.10", 256, 256, 3),
+    ];
+    let (mut header, mut end) = (Vec::new(), 0);
+    let mut put = |name: String, shape: &[usize]| {
+        let begin = end;
+        end += 4 * shape.iter().product::<usize>();
+        header.push(format!(
+            r#""{name}":{{"dtype":"F32","shape":{shape:?},"data_offsets":[{begin},{end}]}}"#
+        ));
+    };
+    for (k, (name, to, from, taps)) in convolutions.into_iter().enumerate() {
+        put(format!("{name}.weight"), &[to, from, taps, taps]);
+        put(format!("{name}.bias"), &[to]);
+        put(format!("lin{k}.model.1.weight"), &[1, to, 1, 1]);
+    }
+    let header = format!("{{{}}}", header.join(","));
+    let mut bytes = (header.len() as u64).to_le_bytes().to_vec();
+    bytes.extend(header.bytes());
+    bytes.resize(bytes.len() + end, 0);
+    fs::write(path, bytes).unwrap();
+    path.display().to_string()
+}
+
+#[test]
+fn a_perceptual_distance_fills_its_column() {
+    let folder = tempfile::tempdir().unwrap();
+    let stripes = photograph(&folder.path().join("stripes.png"), 48);
+    let weights = weights_of_zeros(&folder.path().join("zeros.safetensors"));
+    let out = folder.path().join("out").display().to_string();
+    let camera = ["--camera", "cameras/gt1930.toml", "--field-deg", "60"];
+    compare(
+        &[
+            &[stripes.as_str(), "--rivals", "flatcam", "--lpips", &weights],
+            &camera[..],
+        ]
+        .concat(),
+        &out,
+    )
+    .assert()
+    .success()
+    .stdout(contains(" | 1.000 | "));
 }
 
 #[test]
