@@ -1,11 +1,12 @@
 //! The most light that any pillars could send into the first order of a steep blazed row: an upper bound for mappings of
 //! steered elements.
 //!
-//! Rows of 3 pillars a turn and of 5 in two turns, as at the places of an element that is steered by 30 degrees, in light
+//! Rows of 6 pillars a turn, as in the middle of an element that is steered by 15 degrees, of 3 a turn and of 5 in two turns, as at the
+//! places of one that is steered by 30 degrees, in light
 //! from where it looks. Any widths that `designs/wide_5x5.toml` may write, whatever the phase that they leave: what a lens
 //! asks of the phase can only take light away. Widths are climbed one by one from many random starts, so that the best
 //! found is the best there is if several starts end there. Beside it the mapping of the design, mean over where its phase
-//! starts. From the folder `crates/grating`: `cargo run --release --example best_rows`; 4 CPU minutes.
+//! starts. From the folder `crates/grating`: `cargo run --release --example best_rows`; 5 CPU minutes.
 
 use metalith_design::{Design, WidthRule};
 use metalith_grating::{Blaze, CoarseCell};
@@ -31,7 +32,7 @@ fn main() {
     let range = design.cell.width_range_nm;
     let (low, high) = (f64::from(range.0), f64::from(range.1));
     let cells = LIGHT_UM.map(|um| CoarseCell::new(&stack, um, (low, high)).expect("a cell"));
-    for (sites, turns) in [(3, 1), (5, 2)] {
+    for (sites, turns) in [(6, 1), (3, 1), (5, 2)] {
         let lattice = SiteLattice::row(sites).expect("a row");
         let shares = |widths: &[f64]| {
             cells.each_ref().map(|cell| {

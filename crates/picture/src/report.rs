@@ -189,7 +189,7 @@ impl Studio {
             assumption(
                 "wavelengths",
                 format!(
-                    "{} nm apart; between them the PSF is blended and moves with the chief ray",
+                    "at most {} nm apart, nearer in the light of narrow lamps; between them the PSF is blended and moves with the chief ray",
                     crate::chip::STEP_NM
                 ),
             ),
