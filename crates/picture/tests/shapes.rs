@@ -10,7 +10,7 @@ use metalith_layout::{read_pillars, write_pillars};
 use metalith_made::SimulationCase;
 use metalith_picture::scene::SceneImage;
 use metalith_picture::{BankSpec, ChipInLight, KernelBank, Veil};
-use metalith_wave::{Accuracy, Direct, Pillars, PlaneWave, Propagator, Psf, Scratch, Window};
+use metalith_wave::{Direct, Pillars, PlaneWave, Propagator, Psf, Scratch, Window};
 use ndarray::Array3;
 
 /// Degrees of the scene from side to side.
@@ -77,13 +77,23 @@ fn taken<'a>(design: &Design, extraction: &'a Extraction, cell: &'a dyn CellMode
     Taken { chip, bank, veil }
 }
 
-/// Share of the light that arrives at the pillars of the only element and leaves it as `table` says.
-fn passed(extraction: &Extraction, table: &[num_complex::Complex64], full: f64) -> f64 {
-    let widths = extraction.elements[0].widths.width_nm.iter().filter(|w| **w > 0);
-    let (count, power) = widths.fold((0.0, 0.0), |(n, sum), w| {
-        (n + 1.0, sum + table[usize::from(*w)].norm_sqr())
-    });
-    power / (count * full * full)
+/// Share of the light that arrives at the pillars of the only element and leaves it as the tables of a cell say, mean over
+/// wavelengths.
+fn passed(
+    extraction: &Extraction,
+    nm: &[f64],
+    cell: &dyn CellModel,
+    table: impl Fn(f64) -> Vec<num_complex::Complex64>,
+) -> f64 {
+    let of = |nm: &f64| {
+        let (table, full) = (table(nm * 1e-3), cell.full_transmission(nm * 1e-3).unwrap());
+        let widths = extraction.elements[0].widths.width_nm.iter().filter(|w| **w > 0);
+        let (count, power) = widths.fold((0.0, 0.0), |(n, sum), w| {
+            (n + 1.0, sum + table[usize::from(*w)].norm_sqr())
+        });
+        power / (count * full * full)
+    };
+    nm.iter().map(of).sum::<f64>() / nm.len() as f64
 }
 
 /// Image, veil and what is lost are all the light, and what is not passed is what the cells do not pass.
@@ -116,9 +126,10 @@ fn a_hexagonal_lens_takes_pictures() {
     let cell = cell_models(&design, &[design.verify.fidelity]).unwrap().remove(0);
     let um = nm * 1e-3;
     let table = cell.transmissions_in_band(um, design.cell.most()).unwrap();
-    let full = cell.full_transmission(um).unwrap();
     let taken = taken(&design, &extraction, cell.as_ref(), nm);
-    assert_all_light(&taken, passed(&extraction, &table, full));
+    let of = |um| cell.transmissions_in_band(um, design.cell.most()).unwrap();
+    let wanted = passed(&extraction, &taken.chip.sampling.wavelengths_nm, cell.as_ref(), of);
+    assert_all_light(&taken, wanted);
 
     let pillars = Pillars::new(&extraction.elements[0].widths, &table).unwrap();
     let window = Window {
@@ -162,23 +173,25 @@ fn light_that_is_not_converted_is_in_the_veil() {
         ("pillar_length_nm = 250", "pillar_length_nm = 180"),
     ];
     let analyser = [&small[..], &[("[verify]\n", "[verify]\nanalyser = \"circular\"\n")]].concat();
-    let um = nm * 1e-3;
     let mut shares = Vec::new();
     for changed in [&small[..], &analyser] {
         let (design, extraction) = lens("geometric_phase_532", changed);
         let cell = cell_models(&design, &[design.verify.fidelity]).unwrap().remove(0);
-        let full = cell.full_transmission(um).unwrap();
-        let most = design.cell.most();
-        let converted = passed(&extraction, &cell.transmissions_in_band(um, most).unwrap(), full);
-        let other = cell.unconverted_in_band(um, most).unwrap().unwrap();
-        let other = passed(&extraction, &other, full);
+        let taken = taken(&design, &extraction, cell.as_ref(), nm);
+        let (most, nm) = (design.cell.most(), &taken.chip.sampling.wavelengths_nm);
+        let converted = passed(&extraction, nm, cell.as_ref(), |um| {
+            cell.transmissions_in_band(um, most).unwrap()
+        });
+        let other = passed(&extraction, nm, cell.as_ref(), |um| {
+            cell.unconverted_in_band(um, most).unwrap().unwrap()
+        });
         assert!(other > 0.1, "{other}");
         let wanted = if design.verify.analyser {
             converted
         } else {
             converted + other
         };
-        let taken = taken(&design, &extraction, cell.as_ref(), nm);
+        println!("{converted} {other} {:?}", taken.veil.budget);
         assert_all_light(&taken, wanted);
         shares.push(taken.veil.budget[0].zero_order / taken.veil.budget[0].arrives);
     }
