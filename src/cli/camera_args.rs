@@ -46,7 +46,7 @@ impl CameraArgs {
     /// If one cannot be read.
     pub fn read(&self) -> Result<CameraFiles> {
         Ok(CameraFiles {
-            design: standard_input::design(&self.design)?,
+            design: standard_input::design_any(&self.design)?,
             camera: Camera::read(&self.camera)?,
             model: self.model.as_deref().map(CalibratedModel::read).transpose()?,
         })

@@ -22,6 +22,16 @@ const MOST_SIDES: u32 = 190;
 /// Finer than this no writer places an edge of metal (nm).
 const FINEST_CHORD_NM: f64 = 5.0;
 
+/// What the cell of the template is made for (nm).
+const CELL_NM: std::ops::RangeInclusive<f64> = 400.0..=700.0;
+
+/// Designs of the repository whose cells are for longer waves, each up to a wavelength (nm).
+const LONGER: [(f64, &str); 3] = [
+    (1200.0, "asi_940"),
+    (2000.0, "hexagonal_1550"),
+    (f64::INFINITY, "silicon_10600"),
+];
+
 /// Write a commented design file to start from.
 #[derive(Args)]
 #[command(
@@ -43,7 +53,7 @@ pub struct NewArgs {
     #[arg(long, value_name = "UM")]
     focal_length_um: Option<f64>,
 
-    /// Wavelength that the phase focuses and the wedges are made for (nm).
+    /// Wavelength that the phase focuses and the wedges are made for (nm); the cell is one for 400 to 700 nm.
     #[arg(long, value_name = "NM", default_value_t = 550.0)]
     wavelength_nm: f64,
 
@@ -84,7 +94,7 @@ impl NewArgs {
     }
 }
 
-pub fn run(args: &NewArgs, _terminal: &Terminal) -> Result<Outcome> {
+pub fn run(args: &NewArgs, terminal: &Terminal) -> Result<Outcome> {
     if args.design.exists() {
         return Err(Error::invalid(
             format!("{} exists", args.design.display()),
@@ -96,6 +106,20 @@ pub fn run(args: &NewArgs, _terminal: &Terminal) -> Result<Outcome> {
     // What cannot be is said before a file stands there.
     Design::parse(&args.design, &text)?;
     WholeFile::write(&args.design, text.as_bytes())?;
+    let nm = args.wavelength_nm;
+    if !CELL_NM.contains(&nm) {
+        let longer = LONGER.iter().find(|(most_nm, _)| nm > *CELL_NM.end() && nm <= *most_nm);
+        let like = longer.map_or(String::new(), |(_, like)| {
+            format!("take those of designs/{like}.toml, or ")
+        });
+        terminal.say(&format!(
+            "note: [cell], [mapping] and [verify] of {} are for {} to {} nm, not for {nm} nm: {like}change them, and let `metalith \
+             cells` find the mapping",
+            args.design.display(),
+            CELL_NM.start(),
+            CELL_NM.end(),
+        ));
+    }
     print_line!("{}", args.design.display());
     print_line!("next: metalith run {}", args.design.display());
     Ok(Outcome::Fine)

@@ -58,7 +58,7 @@ pub struct OptimiseArgs {
 }
 
 pub fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
-    let design = standard_input::design(&args.design)?;
+    let design = standard_input::design_any(&args.design)?;
     terminal.stop_on_interrupt();
     let folder = args
         .out

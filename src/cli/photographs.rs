@@ -43,7 +43,7 @@ pub struct PhotographsArgs {
 }
 
 pub fn run(args: &PhotographsArgs, terminal: &Terminal) -> Result<Outcome> {
-    let design = standard_input::design(&args.design)?;
+    let design = standard_input::design_any(&args.design)?;
     terminal.stop_on_interrupt();
     let task = OptimiseTask::of(&design)?;
     let images = args

@@ -110,9 +110,6 @@ impl Judging {
     /// # Errors
     /// If it could be neither simulated nor compared with its design.
     pub fn simulation(&self, design: &Design, path: &Path) -> Result<Simulation> {
-        if self.picture.is_some() {
-            design.square_lattice("the simulation of pictures")?;
-        }
         let by_site = self.model.is_some() || self.fidelity(design) == Fidelity::Neighbours;
         Simulation::choose(design, path, self.accuracy(), by_site, self.memory_mb)
     }

@@ -62,6 +62,25 @@ fn a_new_design_replaces_nothing_and_says_what_cannot_be() {
     assert!(!folder.path().join("none.toml").exists() && !folder.path().join("nan.toml").exists());
 }
 
+/// The cell of a new design is one for the visible, and whoever asks for other waves is told so.
+#[test]
+fn a_new_design_for_long_waves_says_what_its_cell_is_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let new = |nm: &str| {
+        let name = format!("mine_{nm}.toml");
+        metalith()
+            .current_dir(folder.path())
+            .args(["new", &name, "--wavelength-nm", nm])
+            .assert()
+            .success()
+    };
+    new("940").stderr(contains("designs/asi_940.toml"));
+    new("1550").stderr(contains("designs/hexagonal_1550.toml"));
+    new("380").stderr(contains("not for 380 nm: change them"));
+    let quiet = new("633");
+    assert!(quiet.get_output().stderr.is_empty());
+}
+
 /// A design that is piped in makes the layout of the same design in a file.
 #[test]
 fn a_design_may_come_by_standard_input() {

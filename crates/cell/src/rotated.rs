@@ -19,8 +19,9 @@ const SOLVED: usize = 7;
 /// Rotations over the quarter turn that the solved ones stand for.
 const SAMPLES: usize = 2 * (SOLVED - 1);
 
-/// Diffraction orders an axis: as for other pillars along the normal.
-pub const ROTATED_ORDERS: usize = 17;
+/// Diffraction orders an axis: of thirty cells of three materials all are within 0.005 in the complex transmission, of 17 orders
+/// 22 (`scripts/shape_peers.py`). Seven rotations a wavelength bear that.
+pub const ROTATED_ORDERS: usize = 25;
 
 /// The same for one of many wavelengths of a band.
 const BAND_ORDERS: usize = 9;

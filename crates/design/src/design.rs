@@ -285,8 +285,8 @@ fn check_directions(section: &Section<'_, '_>, array: &ArraySpec, verify: &Verif
 }
 
 /// What a hexagonal lattice is good for.
-const KNOWN_TO: &str = "use `metalith run`, `layout`, `verify`, `check`, `diff`, `psf`, `cells`, `handoff` and `study` with this design, or a square \
-                        lattice here";
+const KNOWN_TO: &str =
+    "use a square lattice here: `plan`, `calibrate`, `cells --steered` and Python know no other; the other commands do";
 
 /// Leaves room within the 32 characters of a GDSII cell name for the parts a layout adds.
 const MAX_NAME: usize = 24;

@@ -37,6 +37,9 @@ pub struct MadeView<'a> {
     pub element: &'a MadeElement,
     /// What sites transmit, as [`SolvedWidths`] has it.
     pub tables: Vec<ClassTable>,
+    /// Of the light that arrives, what is in the polarisation of each table. What leaves by different tables does not
+    /// interfere: intensities are added.
+    pub share: f64,
     pub light: ArrivingLight,
     /// Added to the distance of the sensor (um).
     pub gap_um: f64,
@@ -214,6 +217,7 @@ impl<'a> MadeView<'a> {
         }
         Self {
             element,
+            share: if own.len() == 1 { 1.0 } else { POLARISATION_SHARE },
             tables: own,
             light,
             gap_um: perturbation.path.added_distance_um(element.centre_um()),
@@ -255,18 +259,9 @@ impl<'a> MadeView<'a> {
                 Ok(psf)
             })
             .collect::<Result<Vec<_>>>()?;
-        let mut psf = Psf::sum(psfs, self.share());
+        let mut psf = Psf::sum(psfs, self.share);
         self.camera.apply(&mut psf);
         Ok(psf)
-    }
-
-    /// Of light that is not polarised, what arrives in the polarisation of each table. What leaves by different tables
-    /// does not interfere: intensities are added.
-    pub fn share(&self) -> f64 {
-        match self.tables.len() {
-            1 => 1.0,
-            _ => POLARISATION_SHARE,
-        }
     }
 
     fn scattered(&self, table: &ClassTable, at_um: [f64; 2], distance_um: f64) -> f64 {

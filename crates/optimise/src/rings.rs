@@ -10,8 +10,9 @@ const NODES: usize = 8;
 /// The lattice sites of a round lens, ring by ring.
 ///
 /// Ring `k` is the set of sites with floor(r / pitch) = k, r from the centre of the lens, formed from exact squares. On a square
-/// lattice with an even number of sites no site lies on a boundary, since 4 r^2 / pitch^2 is 2 modulo 8. Sites
-/// next to one another are in the same ring or in neighbouring ones.
+/// lattice with an even number of sites no site lies on a boundary, since 4 r^2 / pitch^2 is 2 modulo 8; on a hexagonal one
+/// the sites of its rows through the centre do, and are of the outer ring, as they are of the outer row of a table of phases.
+/// Sites next to one another are in the same ring or in neighbouring ones.
 ///
 /// The sum over the sites of a ring of a function smooth in r^2 is a weighted sum over eight radii,
 /// whose weights reproduce the sum over the real sites of every polynomial in r^2 of degree seven.
@@ -218,7 +219,10 @@ fn counts(lattice: Lattice, diameter_nm: u32) -> Vec<(i64, u32)> {
 
 #[cfg(test)]
 mod tests {
+    use metalith_design::phase::{Interpolation, LensPhase, RadialPhase};
+
     use super::*;
+    use crate::write_phase_table;
 
     fn lens() -> Rings {
         Rings::new(Lattice::covering(1_000_000, 350).unwrap(), 1_000_000).unwrap()
@@ -253,6 +257,39 @@ mod tests {
                 }
             }
             assert_eq!(sites, rings.sites);
+        }
+    }
+
+    /// What is optimised is what is written: the table of a phase, one row a ring, gives every site its own ring, those on the
+    /// borders of rings as well, which are many on a hexagonal lattice.
+    #[test]
+    fn a_layout_gives_every_site_its_ring() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("phase.csv");
+        let diameter_nm = 160_000;
+        for (kind, pitch_nm) in [
+            (LatticeKind::Square, 350),
+            (LatticeKind::Hexagonal, 350),
+            (LatticeKind::Hexagonal, 480),
+            (LatticeKind::Hexagonal, 652),
+        ] {
+            let lattice = Lattice::of_kind_covering(kind, diameter_nm, pitch_nm).unwrap();
+            let rings = Rings::new(lattice, diameter_nm).unwrap();
+            let count = rings.len() as f64;
+            let turns: Vec<f64> = (0..rings.len()).map(|k| k as f64 / count).collect();
+            write_phase_table(&file, &rings, &turns, &[]).unwrap();
+            let radius_um = 0.5e-3 * f64::from(diameter_nm);
+            let table = RadialPhase::read_table(&file, Interpolation::Nearest, radius_um).unwrap();
+            let written = LensPhase::new(lattice, diameter_nm, &table);
+            let n = lattice.sites();
+            let mut borders = 0;
+            for (iy, ix) in (0..n * n).map(|k| (k / n, k % n)) {
+                let ring = written.turns(ix, iy).map(|turns| (turns * count).round() as usize);
+                assert_eq!(rings.ring_at(ix, iy), ring, "{kind:?}, {pitch_nm} nm: {ix} {iy}");
+                let units = units_of_pitch(lattice) * ring.unwrap_or(0) as i64;
+                borders += usize::from(units > 0 && lattice.units2(ix, iy) == units.pow(2));
+            }
+            assert_eq!(kind.is_square(), borders == 0);
         }
     }
 

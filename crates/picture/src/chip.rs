@@ -38,6 +38,8 @@ pub struct ChipInLight<'a> {
     case: SimulationCase<'a>,
     /// Transmission of a cell by wavelength and width.
     by_width: Vec<Vec<Complex64>>,
+    /// Of a cell that changes polarisation, the light that it leaves as it was, unless an analyser keeps it from the sensor.
+    unconverted: Vec<Option<Vec<Complex64>>>,
     perturbation: Perturbation,
     /// Power of the light that arrives at an element, at each wavelength, in the unit of a PSF's energy (um^2).
     pub arriving_um2: Vec<f64>,
@@ -57,6 +59,8 @@ pub struct ElementInLight<'c> {
 
 struct Tables {
     classes: Vec<ClassTable>,
+    /// As [`MadeView::share`].
+    share: f64,
     gap_um: f64,
     camera: CameraChange,
 }
@@ -120,6 +124,10 @@ impl<'a> ChipInLight<'a> {
             SimulationCase::Made(_) => Vec::new(),
             SimulationCase::Cell(cell) => by_width(cell, &sampling, design, progress)?,
         };
+        let unconverted = match case {
+            SimulationCase::Cell(cell) if !design.verify.analyser => unconverted(cell, &sampling, design)?,
+            _ => vec![None; sampling.wavelengths_nm.len()],
+        };
         let mut distinct = Vec::new();
         for (k, symmetries) in chosen {
             let placed = design.elements()[k].centre_um();
@@ -142,6 +150,7 @@ impl<'a> ChipInLight<'a> {
             elements,
             case,
             by_width,
+            unconverted,
             perturbation,
             open_um2,
             source_per_m: 1e6 / scene_distance_um,
@@ -179,23 +188,33 @@ impl<'a> ChipInLight<'a> {
             let view = chip.view_in_band(&element.made, &PlaneWave::normal(um), false, progress)?;
             return Ok(Tables {
                 classes: view.tables,
+                share: view.share,
                 gap_um: view.gap_um,
                 camera: view.camera,
             });
         }
-        let table = match &element.among_neighbours[index] {
+        let classes = match &element.among_neighbours[index] {
             Some(response) => {
                 let (x, y) = element.view.wedge.looks_at(um);
-                ClassTable::of_sites(&NeighbourPillars::new(element.widths, response, [x, y])?)
+                vec![ClassTable::of_sites(&NeighbourPillars::new(
+                    element.widths,
+                    response,
+                    [x, y],
+                )?)]
             }
             None => {
-                let table = &self.by_width[index];
-                let pillar = |width: f64| table.get(width.round() as usize).copied().unwrap_or_default();
-                element.made.table(pillar, Complex64::ZERO)
+                let of = |table: &Vec<Complex64>| {
+                    let pillar = |width: f64| table.get(width.round() as usize).copied().unwrap_or_default();
+                    element.made.table(pillar, Complex64::ZERO)
+                };
+                let tables = std::iter::once(&self.by_width[index]).chain(&self.unconverted[index]);
+                tables.map(of).collect()
             }
         };
         Ok(Tables {
-            classes: vec![table],
+            classes,
+            // Of converted light beside what is not, all arrives in one polarisation.
+            share: 1.0,
             gap_um: 0.0,
             camera: CameraChange::default(),
         })
@@ -222,6 +241,7 @@ impl ElementInLight<'_> {
         MadeView {
             element: &chip.distinct[self.distinct].made,
             tables: tables.classes.clone(),
+            share: tables.share,
             light: ArrivingLight::new(&stated, &path),
             gap_um: tables.gap_um,
             camera: tables.camera.clone(),
@@ -229,18 +249,18 @@ impl ElementInLight<'_> {
     }
 
     /// Share of the light that leaves the element in the direction it came from, as one wave: the square of the mean
-    /// transmission of its sites, at a wavelength by its index, mean over polarisations.
+    /// transmission of its sites, at a wavelength by its index, mean over the polarisations in which it arrives.
     ///
     /// # Panics
     /// As [`ElementInLight::lit`].
     pub fn zero_order(&self, wavelength: usize) -> f64 {
         let made = &self.chip.distinct[self.distinct].made;
-        let classes = &self.at(wavelength).classes;
+        let Tables { classes, share, .. } = self.at(wavelength);
         // The power of a wave is the square of its sum over the area, over the area.
         let site_um2 = made.lattice().cell_um2();
         let all = self.chip.arriving_um2[wavelength] * self.chip.open_um2;
         let of = |table: &ClassTable| (table.sum(made.classes()) * site_um2).norm_sqr() / all;
-        classes.iter().map(of).sum::<f64>() / classes.len() as f64
+        classes.iter().map(of).sum::<f64>() * share
     }
 
     fn at(&self, wavelength: usize) -> &Tables {
@@ -278,14 +298,26 @@ fn distinct_of(
     (distinct, copies)
 }
 
-/// Transmission of a cell along the normal by wavelength and width (nm).
+/// Largest index of a table of the cells of a design: a width (nm), or the number of a rotation.
+fn last_index(design: &Design) -> u16 {
+    let shape = design.cell.shape.rectangles();
+    shape.map_or(design.cell.pitch_nm as u16, |pillars| pillars.steps)
+}
+
+/// Light that a cell leaves in the polarisation in which it arrived, of one that converts the rest.
+fn unconverted(cell: &dyn CellModel, sampling: &Sampling, design: &Design) -> Result<Vec<Option<Vec<Complex64>>>> {
+    let of = |nm: &f64| cell.unconverted_in_band(nm * 1e-3, last_index(design));
+    sampling.wavelengths_nm.iter().map(of).collect()
+}
+
+/// Transmission of a cell along the normal by wavelength and width (nm), or number of a rotation.
 fn by_width(
     cell: &dyn CellModel,
     sampling: &Sampling,
     design: &Design,
     progress: &dyn Progress,
 ) -> Result<Vec<Vec<Complex64>>> {
-    let widest = design.cell.pitch_nm as u16;
+    let widest = last_index(design);
     let nm = sampling.wavelengths_nm.par_iter();
     nm.map(|nm| {
         if progress.stopped() {

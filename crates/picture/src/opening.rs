@@ -111,6 +111,9 @@ struct Inputs<'a> {
     /// The cell that pillars are simulated by, and the wavelengths that it has tables of unlike neighbours for.
     fidelity: Fidelity,
     tabulated_um: &'a [f64],
+    /// Of pillars that change polarisation, whether an analyser is before the sensor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    analyser: Option<bool>,
     basis: &'a [SceneSpectrum],
     spec: &'a BankSpec,
     scene_distance_um: f64,
@@ -236,7 +239,6 @@ impl Studio {
 impl<'a> Wanted<'a> {
     fn new(design: &'a Design, camera: &'a Camera, scene: &'a SceneImage) -> Result<Self> {
         design.one_lens("the simulation of pictures")?;
-        design.square_lattice("the simulation of pictures")?;
         let elements = element_views(design, camera);
         let mut basis = scene.basis.clone();
         let primaries = if basis == rgb_basis() { 0 } else { basis.len() };
@@ -276,6 +278,7 @@ impl<'a> Wanted<'a> {
             model: &model_text,
             fidelity: model.map_or(self.design.verify.fidelity, |_| Fidelity::Calibrated),
             tabulated_um: &self.design.verify.wavelengths_um,
+            analyser: (self.design.cell.shape.rectangles()).map(|_| self.design.verify.analyser),
             basis: &self.basis,
             spec: &self.spec,
             // JSON knows no infinity.

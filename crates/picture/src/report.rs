@@ -167,7 +167,17 @@ impl Studio {
             value,
         };
         let spec = &self.bank.spec;
-        vec![
+        let polarised = self.design.cell.arriving.map(|arriving| {
+            let unconverted = match self.design.verify.analyser {
+                true => "an analyser keeps what is not converted from the sensor",
+                false => "what is not converted lands as it came, in image and veil",
+            };
+            assumption(
+                "polarisation",
+                format!("all light arrives {arriving} circularly polarised, as behind a filter; {unconverted}"),
+            )
+        });
+        let mut all = vec![
             assumption("cell", cell),
             assumption(
                 "field of the kernels",
@@ -213,7 +223,9 @@ impl Studio {
                 "metal",
                 "opaque; light passes the openings alone, and nothing is reflected twice".into(),
             ),
-        ]
+        ];
+        all.extend(polarised);
+        all
     }
 }
 

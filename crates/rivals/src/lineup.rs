@@ -119,7 +119,7 @@ impl Lineup {
         }
         let own = |listed: &ListedDesign| {
             let own = listed.camera.as_deref().map(Camera::read).transpose()?;
-            Ok((Design::read(&listed.design)?, own.unwrap_or_else(|| camera.clone())))
+            Ok((Design::read_any(&listed.design)?, own.unwrap_or_else(|| camera.clone())))
         };
         let designs = self.designs.iter().map(own).collect::<Result<_>>()?;
         let open = OpenLineup {

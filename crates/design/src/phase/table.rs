@@ -97,7 +97,11 @@ pub(super) fn unwrap(phase_rad: &mut [f64]) {
     }
 }
 
-/// The phase at radius `r`; beyond the ends of the table, that of the end.
+/// Roundings, of a radius and of the middle of two rows, that a radius may be short of that middle and be on it.
+const ROUNDINGS: f64 = 8.0;
+
+/// The phase at radius `r`; beyond the ends of the table, that of the end. As near to two rows, as sites of a hexagonal lattice
+/// are whose rows are the middles of rings, it is the outer one: a ring holds its inner border, whichever way numbers round.
 pub(super) fn at(radius_um: &[f64], phase_rad: &[f64], interpolation: Interpolation, r: f64) -> f64 {
     let above = radius_um.partition_point(|&x| x < r);
     if above == 0 {
@@ -106,10 +110,16 @@ pub(super) fn at(radius_um: &[f64], phase_rad: &[f64], interpolation: Interpolat
     if above == radius_um.len() {
         return phase_rad[above - 1];
     }
-    let share = (r - radius_um[above - 1]) / (radius_um[above] - radius_um[above - 1]);
+    let [inner, outer] = [radius_um[above - 1], radius_um[above]];
     match interpolation {
-        Interpolation::Linear => phase_rad[above - 1] + share * (phase_rad[above] - phase_rad[above - 1]),
-        Interpolation::Nearest => phase_rad[if share < 0.5 { above - 1 } else { above }],
+        Interpolation::Linear => {
+            let share = (r - inner) / (outer - inner);
+            phase_rad[above - 1] + share * (phase_rad[above] - phase_rad[above - 1])
+        }
+        Interpolation::Nearest => {
+            let is_inner = r < 0.5 * (inner + outer) - ROUNDINGS * f64::EPSILON * r;
+            phase_rad[if is_inner { above - 1 } else { above }]
+        }
     }
 }
 
@@ -129,5 +139,23 @@ mod tests {
             assert!((turns - turns.round()).abs() < ROUNDING);
         }
         assert!(phases.windows(2).all(|p| (p[1] - p[0]).abs() <= TAU / 2.0));
+    }
+
+    /// Rows in the middles of rings, sites on their borders: the square of a radius may round to either side.
+    #[test]
+    fn a_border_is_of_the_outer_row() {
+        let radius_um: Vec<f64> = (0..1000).map(|k| (f64::from(k) + 0.5) * 0.652).collect();
+        let rows: Vec<f64> = (0..1000).map(f64::from).collect();
+        for k in 1..1000 {
+            let border = f64::from(k) * 652.0 * 1e-3;
+            for (r, row) in [
+                (border, k),
+                (border.powi(2).sqrt().next_down(), k),
+                // The next shorter distance of a site, whose square is a whole number of nm^2.
+                ((border.powi(2) - 1e-6).sqrt(), k - 1),
+            ] {
+                assert_eq!(at(&radius_um, &rows, Interpolation::Nearest, r), f64::from(row), "{r}");
+            }
+        }
     }
 }

@@ -56,18 +56,19 @@ impl Veil {
                 return Err(Error::Interrupted);
             }
             let light = chip.in_light(distinct, &chosen, progress)?;
-            let departures: Vec<Departure> = chosen
+            let distance_um = chip.distinct[distinct].view.distance_um([0.0; 2]);
+            let departures: Vec<Vec<Departure>> = chosen
                 .par_iter()
                 .map(|i| {
                     let lit = light.lit(*i, [0.0; 2]);
-                    // One polarisation stands for both: their tables differ in obliquely lit cells alone.
-                    let aperture = lit.element.lit_aperture(&lit.tables[0], &lit.light);
-                    Departure::of(
-                        &aperture,
-                        all[*i] * 1e-3,
-                        chip.distinct[distinct].view.distance_um([0.0; 2]),
-                        BLOCKS,
-                    )
+                    // Where light arrives in two polarisations one stands for both: their tables differ in obliquely lit
+                    // cells alone.
+                    let parts = if lit.share < 1.0 { &lit.tables[..1] } else { &lit.tables };
+                    let of = |table| {
+                        let aperture = lit.element.lit_aperture(table, &lit.light);
+                        Departure::of(&aperture, all[*i] * 1e-3, distance_um, BLOCKS)
+                    };
+                    parts.iter().map(of).collect()
                 })
                 .collect();
             let zero_orders: Vec<f64> = chosen.iter().map(|i| light.zero_order(*i)).collect();
@@ -151,7 +152,7 @@ impl Tracer<'_> {
         solid_angle(self.view, row, column) * pixels
     }
 
-    fn trace(&self, element: usize, cell: usize, departures: &[Departure], zero_orders: &[f64]) -> Result<Traced> {
+    fn trace(&self, element: usize, cell: usize, departures: &[Vec<Departure>], zero_orders: &[f64]) -> Result<Traced> {
         let pairs = self.weights.len();
         let view: &ElementView = &self.chip.elements[element];
         let [row, column] = self.middle(cell);
@@ -171,8 +172,8 @@ impl Tracer<'_> {
             .chosen
             .iter()
             .zip(departures.iter().zip(zero_orders))
-            .map(|(i, (departure, zero_order))| {
-                let mut landed = self.landed(element, *i, sines, departure, place)?;
+            .map(|(i, (departures, zero_order))| {
+                let mut landed = self.landed(element, *i, sines, departures, place)?;
                 landed.zero_order = *zero_order;
                 Ok(landed)
             })
@@ -214,7 +215,7 @@ impl Tracer<'_> {
         element: usize,
         wavelength: usize,
         sines: [f64; 2],
-        departure: &Departure,
+        departures: &[Departure],
         place: Option<[f64; 2]>,
     ) -> Result<LandedLight> {
         let view = &self.chip.elements[element];
@@ -238,7 +239,14 @@ impl Tracer<'_> {
             cells: 2 * (far / cell_um).ceil() as usize + 2,
             distance_um: view.distance_um([0.0; 2]),
         };
-        let landing = departure.landing(own, towards, grid)?;
+        let mut landing = departures[0].landing(own, towards, grid)?;
+        // What is not converted goes on as it came.
+        for departure in &departures[1..] {
+            let other = departure.landing(own, own, grid)?;
+            landing.power_um2 += &other.power_um2;
+            landing.beyond_um2 += other.beyond_um2;
+            landing.evanescent_um2 += other.evanescent_um2;
+        }
         let share = 1.0 / self.chip.arriving_um2[wavelength];
         let chief = place.and_then(|_| view.landing_um(sines, um));
         let window = 0.5 * self.bank.spec.window as f64 * pixel;

@@ -1,9 +1,9 @@
 //! Phase surfaces out of lens files of OpticStudio (`.zmx`).
 //!
-//! A surface begins with `SURF n`; its `TYPE` is `BINARY_1` or `BINARY_2`. `PARM 0` is the order of diffraction, which the
-//! phase is multiplied by. Of the extra data, `XDAT 1` is the number of coefficients, `XDAT 2` the radius that lengths are
-//! divided by (in the unit of `UNIT`), and those after are coefficients (rad): of x, y, x^2, xy, y^2, x^3, ... for Binary 1,
-//! of r^2, r^4, ... for Binary 2.
+//! A surface begins with `SURF n`; its `TYPE` is `BINARY_1` or `BINARY_2`, and stands before or behind its other lines. `PARM 0` is
+//! the order of diffraction, which the phase is multiplied by. Of the extra data, `XDAT 1` is the number of coefficients, `XDAT 2`
+//! the radius that lengths are divided by (in the unit of `UNIT`), and those after are coefficients (rad): of x, y, x^2, xy, y^2,
+//! x^3, ... for Binary 1, of r^2, r^4, ... for Binary 2. `CURV`, `CONI` and `PARM 1` to `PARM 8` bend the surface; a chip is flat.
 
 use std::path::{Path, PathBuf};
 
@@ -17,12 +17,17 @@ const LONGEST: u64 = 16 << 20;
 
 /// What is known of one surface.
 #[derive(Default)]
-struct Surface {
+struct Surface<'t> {
     number: u32,
-    kind: Option<Kind>,
+    /// The word of its `TYPE`; none where it is left out, as makers of lenses do.
+    kind: Option<&'t str>,
     order: Option<f64>,
     /// Extra data by number, from one.
     data: Vec<f64>,
+    /// The line that bends it.
+    bent: Option<(usize, &'t str)>,
+    /// Its other lines with their numbers.
+    lines: Vec<(usize, &'t str)>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -34,77 +39,113 @@ enum Kind {
 /// The phase of a surface of a file; the only one that has a phase if none is named.
 ///
 /// # Errors
-/// If the file cannot be read, or has no such surface or several.
+/// If the file cannot be read, or has no such surface or several, or it is not flat.
 pub(super) fn read(path: &Path, wanted: Option<u32>) -> Result<TermForm> {
     let bytes = read_at_most(path, LONGEST, "a lens file")?;
     let fault = Fault(path);
     let text = decoded(&bytes);
-    let (mut unit_um, mut surfaces) = (1e3, Vec::<Surface>::new());
+    let (mut unit_um, mut surfaces) = (1e3, Vec::<Surface<'_>>::new());
     for (line, text) in text.lines().enumerate().map(|(k, line)| (k + 1, line.trim())) {
         let mut words = text.split_ascii_whitespace();
-        let Some(key) = words.next() else { continue };
-        let mut number = |what: &str| {
-            let word = words.next().unwrap_or_default();
-            word.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| {
-                fault.at(
-                    line,
-                    format!("`{key}` needs {what}, not `{}`", metalith_core::text::quoted(word)),
-                )
-            })
-        };
-        match key {
-            "UNIT" => unit_um = unit(words.next()).ok_or_else(|| fault.at(line, "an unknown unit of length".into()))?,
-            "SURF" => surfaces.push(Surface {
-                number: number("the number of the surface")? as u32,
+        match words.next() {
+            Some("UNIT") => {
+                unit_um = unit(words.next()).ok_or_else(|| fault.at(line, "an unknown unit of length".into()))?;
+            }
+            Some("SURF") => surfaces.push(Surface {
+                number: fault.number(line, "SURF", words.next(), "the number of the surface")? as u32,
                 ..Surface::default()
             }),
-            _ => {
-                let Some(surface) = surfaces.last_mut() else { continue };
-                match key {
-                    "TYPE" => {
-                        surface.kind = match words.next() {
-                            Some("BINARY_1") => Some(Kind::Binary1),
-                            Some("BINARY_2") => Some(Kind::Binary2),
-                            _ => None,
-                        }
-                    }
-                    "PARM" if surface.kind.is_some() && number("the number of the parameter")? == 0.0 => {
-                        surface.order = Some(number("a value")?);
-                    }
-                    "XDAT" if surface.kind.is_some() => {
-                        let at = number("the number of the entry")?;
-                        let value = number("a value")?;
-                        if !(1.0..=MOST_DATA as f64).contains(&at) || at.fract() != 0.0 {
-                            return Err(fault.at(line, format!("entry {at} of the extra data")));
-                        }
-                        let at = at as usize;
-                        if surface.data.len() < at {
-                            surface.data.resize(at, 0.0);
-                        }
-                        surface.data[at - 1] = value;
-                    }
-                    _ => {}
+            Some("TYPE") => {
+                if let Some(surface) = surfaces.last_mut() {
+                    surface.kind = words.next();
                 }
             }
+            Some("PARM" | "XDAT" | "CURV" | "CONI") => {
+                if let Some(surface) = surfaces.last_mut() {
+                    surface.lines.push((line, text));
+                }
+            }
+            _ => {}
         }
     }
-    let known: Vec<&Surface> = surfaces.iter().filter(|s| s.kind.is_some()).collect();
-    let chosen = match (wanted, known.as_slice()) {
-        (None, [one]) => *one,
+    let (mut known, others): (Vec<_>, Vec<_>) = surfaces.into_iter().partition(|s| s.phase().is_some());
+    let place = match (wanted, known.as_slice()) {
+        (None, [_]) => 0,
         (Some(number), _) => known
             .iter()
-            .find(|s| s.number == number)
-            .ok_or_else(|| fault.whole(format!("surface {number} has no phase; {}", list(&known))))?,
-        (None, _) => return Err(fault.whole(list(&known))),
+            .position(|s| s.number == number)
+            .ok_or_else(|| fault.whole(format!("surface {number} has no phase; {}", list(&known, &others))))?,
+        (None, _) => return Err(fault.whole(list(&known, &others))),
     };
+    let mut chosen = known.swap_remove(place);
+    chosen.read(&fault)?;
     chosen.form(unit_um, &fault)
 }
+
+/// Parameters from one to this are coefficients of an asphere.
+const LAST_ASPHERE: f64 = 8.0;
 
 /// Most entries of the extra data: Binary 1 has 230 coefficients.
 const MOST_DATA: usize = 242;
 
-impl Surface {
+impl Surface<'_> {
+    /// The kind of its phase, if it has one.
+    fn phase(&self) -> Option<Kind> {
+        match self.kind? {
+            "BINARY_1" => Some(Kind::Binary1),
+            "BINARY_2" => Some(Kind::Binary2),
+            _ => None,
+        }
+    }
+
+    /// What its lines say.
+    fn read(&mut self, fault: &Fault<'_>) -> Result<()> {
+        for (line, text) in std::mem::take(&mut self.lines) {
+            let mut words = text.split_ascii_whitespace();
+            let key = words.next().unwrap_or_default();
+            let mut number = |what: &str| fault.number(line, key, words.next(), what);
+            match key {
+                "PARM" => {
+                    let (at, value) = (number("the number of the parameter")?, number("a value")?);
+                    if at == 0.0 {
+                        self.order = Some(value);
+                    } else if value != 0.0 && at <= LAST_ASPHERE {
+                        self.bent.get_or_insert((line, text));
+                    }
+                }
+                "XDAT" => {
+                    let (at, value) = (number("the number of the entry")?, number("a value")?);
+                    if !(1.0..=MOST_DATA as f64).contains(&at) || at.fract() != 0.0 {
+                        return Err(fault.at(line, format!("entry {at} of the extra data")));
+                    }
+                    let at = at as usize;
+                    if self.data.len() < at {
+                        self.data.resize(at, 0.0);
+                    }
+                    self.data[at - 1] = value;
+                }
+                // A conic constant bends what is curved alone.
+                "CURV" if number("a value")? != 0.0 => {
+                    self.bent.get_or_insert((line, text));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
     fn form(&self, unit_um: f64, fault: &Fault<'_>) -> Result<TermForm> {
+        if let Some((line, text)) = self.bent {
+            return Err(fault.error(
+                Some(line),
+                format!(
+                    "surface {} is not flat: `{}`",
+                    self.number,
+                    metalith_core::text::quoted(text)
+                ),
+                "a chip is flat and has the phase alone: optimise the lens with a flat surface (no curvature, parameters 1 to 8 at 0)",
+            ));
+        }
         let count = self.data.first().copied().unwrap_or(0.0).max(0.0) as usize;
         let radius_um = self.data.get(1).copied().unwrap_or(0.0) * unit_um;
         let coefficients = self.data.get(2..2 + count).unwrap_or_default();
@@ -117,7 +158,7 @@ impl Surface {
         }
         let order = self.order.unwrap_or(1.0);
         let coefficients = coefficients.iter().map(|a| a * order);
-        Ok(match self.kind {
+        Ok(match self.phase() {
             Some(Kind::Binary1) => TermForm::Polynomial {
                 terms: powers().zip(coefficients).map(|((i, j), a)| (i, j, a)).collect(),
                 radius_um,
@@ -135,18 +176,20 @@ fn powers() -> impl Iterator<Item = (u32, u32)> {
     (1..).flat_map(|sum| (0..=sum).map(move |j| (sum - j, j)))
 }
 
-/// The file as text: UTF-16 with a mark of its byte order, as the program saves it, or plain.
+/// The file as text: UTF-16, with a mark of its byte order as the program saves it or without one, or plain. What is no Unicode
+/// stands in names and notes alone.
 fn decoded(bytes: &[u8]) -> String {
-    let wide = |order: fn([u8; 2]) -> u16| {
-        let units: Vec<u16> = bytes[2..]
-            .chunks_exact(2)
-            .map(|pair| order([pair[0], pair[1]]))
-            .collect();
+    let wide = |bytes: &[u8], order: fn([u8; 2]) -> u16| {
+        let units: Vec<u16> = bytes.as_chunks().0.iter().map(|pair| order(*pair)).collect();
         String::from_utf16_lossy(&units)
     };
     match bytes {
-        [0xff, 0xfe, ..] => wide(u16::from_le_bytes),
-        [0xfe, 0xff, ..] => wide(u16::from_be_bytes),
+        [0xff, 0xfe, rest @ ..] => wide(rest, u16::from_le_bytes),
+        [0xfe, 0xff, rest @ ..] => wide(rest, u16::from_be_bytes),
+        [0xef, 0xbb, 0xbf, rest @ ..] => String::from_utf8_lossy(rest).into_owned(),
+        // Keywords are ASCII: of two bytes one is nothing.
+        [key, 0, ..] if *key > 0 => wide(bytes, u16::from_le_bytes),
+        [0, key, ..] if *key > 0 => wide(bytes, u16::from_be_bytes),
         _ => String::from_utf8_lossy(bytes).into_owned(),
     }
 }
@@ -161,13 +204,24 @@ fn unit(name: Option<&str>) -> Option<f64> {
     })
 }
 
-fn list(known: &[&Surface]) -> String {
-    match known {
-        [] => "no surface of type BINARY_1 or BINARY_2 is in the file".into(),
-        _ => {
-            let numbers: Vec<String> = known.iter().map(|s| s.number.to_string()).collect();
-            format!("phases are on surfaces {}", numbers.join(", "))
-        }
+/// Which surfaces have a phase, or what they are if none has.
+fn list(known: &[Surface<'_>], others: &[Surface<'_>]) -> String {
+    if !known.is_empty() {
+        let numbers: Vec<String> = known.iter().map(|s| s.number.to_string()).collect();
+        return format!("phases are on surfaces {}", numbers.join(", "));
+    }
+    let mut kinds: Vec<String> = others
+        .iter()
+        .filter_map(|s| s.kind)
+        .map(metalith_core::text::quoted)
+        .collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    let none = "no surface of type BINARY_1 or BINARY_2 is in the file";
+    match (others.is_empty(), kinds.is_empty()) {
+        (true, _) => format!("{none}, nor any other: it is no lens in text"),
+        (false, true) => none.into(),
+        (false, false) => format!("{none}; there are {}", kinds.join(", ")),
     }
 }
 
@@ -175,23 +229,35 @@ fn list(known: &[&Surface]) -> String {
 struct Fault<'a>(&'a Path);
 
 impl Fault<'_> {
-    fn error(&self, line: Option<usize>, what: String) -> Error {
+    fn error(&self, line: Option<usize>, what: String, hint: &str) -> Error {
         Error::Table {
             path: PathBuf::from(self.0),
             line,
             what,
-            hint: "save the lens as .zmx, and name the surface with `surface` if several have a phase".into(),
+            hint: hint.into(),
         }
     }
 
     fn at(&self, line: usize, what: String) -> Error {
-        self.error(Some(line), what)
+        self.error(Some(line), what, SAVE)
     }
 
     fn whole(&self, what: String) -> Error {
-        self.error(None, what)
+        self.error(None, what, SAVE)
+    }
+
+    /// The number that a word of a line is.
+    fn number(&self, line: usize, key: &str, word: Option<&str>, what: &str) -> Result<f64> {
+        let word = word.unwrap_or_default();
+        word.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| {
+            let word = metalith_core::text::quoted(word);
+            self.at(line, format!("`{key}` needs {what}, not `{word}`"))
+        })
     }
 }
+
+/// What to do with a file that does not say it.
+const SAVE: &str = "save the lens as .zmx, and name the surface with `surface` if several have a phase";
 
 #[cfg(test)]
 mod tests {
@@ -201,6 +267,56 @@ mod tests {
                         PARM 1 0\n  XDAT 1 2.0 0 0 1.0 0.0 0 \"\"\n  XDAT 2 0.5 0 0 1.0 0.0 0 \"\"\n  XDAT 3 -600.0 0 0\n  \
                         XDAT 4 25.0 0 0\nSURF 2\n  TYPE BINARY_1\n  PARM 0 2\n  XDAT 1 5\n  XDAT 2 1.0\n  XDAT 3 1\n  XDAT 4 2\n  \
                         XDAT 5 3\n  XDAT 6 4\n  XDAT 7 5\n";
+
+    /// A lens as the program saves it: a stop, a flat plate with the phase on its second side, the sensor; with the lines that
+    /// stand about what is asked for, and text that is no ASCII.
+    const SAVED: &str = include_str!("../../../../../golden/foreign/flat_lens.zmx");
+
+    fn utf16(text: &str, order: fn(u16) -> [u8; 2], mark: bool) -> Vec<u8> {
+        let mark = mark.then_some(0xfeff);
+        mark.into_iter().chain(text.encode_utf16()).flat_map(order).collect()
+    }
+
+    #[test]
+    fn a_lens_as_it_is_saved_is_read_in_every_coding() {
+        let lines = SAVED.replace('\n', "\r\n");
+        let latin: Vec<u8> = lines.chars().map(|c| c as u8).collect();
+        let wanted = TermForm::Radial(RadialPhase::EvenPowers {
+            coefficients_rad: vec![-2.718281828459e2, 1.25, 0.0, 3.5e-3],
+            normalisation_um: 80.0,
+        });
+        for bytes in [
+            utf16(&lines, u16::to_le_bytes, true),
+            utf16(&lines, u16::to_be_bytes, true),
+            utf16(&lines, u16::to_le_bytes, false),
+            utf16(&lines, u16::to_be_bytes, false),
+            [b"\xef\xbb\xbf", lines.as_bytes()].concat(),
+            latin,
+        ] {
+            assert_eq!(read_text(&bytes, None).unwrap(), wanted);
+        }
+        // The type behind what it is the type of.
+        let later = SAVED
+            .replace("  TYPE BINARY_2\n", "")
+            .replace("  XDAT 1 ", "  TYPE BINARY_2\n  XDAT 1 ");
+        assert_eq!(read_text(later.as_bytes(), None).unwrap(), wanted);
+    }
+
+    #[test]
+    fn a_surface_that_is_not_flat_is_refused() {
+        for (flat, bent) in [
+            (
+                "  CURV 0.0 0 0 0 0 \"\"\n  HIDE 0 1",
+                "  CURV 0.02 0 0 0 0 \"\"\n  HIDE 0 1",
+            ),
+            ("PARM 2 0", "PARM 2 1E-5"),
+        ] {
+            let text = SAVED.replace(flat, bent);
+            assert_ne!(text, SAVED);
+            let error = read_text(text.as_bytes(), None).unwrap_err().to_string();
+            assert!(error.contains("surface 2 is not flat"), "{error}");
+        }
+    }
 
     fn read_text(bytes: &[u8], surface: Option<u32>) -> Result<TermForm> {
         let folder = tempfile::tempdir().unwrap();
@@ -247,6 +363,8 @@ mod tests {
             ("SURF 1\nTYPE BINARY_2\nXDAT 1 x\n", None, "needs a value"),
             ("SURF 1\nTYPE BINARY_2\nXDAT 999999999 1\n", None, "entry 999999999"),
             ("UNIT PARSEC\n", None, "unknown unit"),
+            ("SURF 0\nTYPE SZERNPHA\nSURF 1\n", None, "there are SZERNPHA"),
+            ("PK\u{3}\u{4}", None, "no lens in text"),
         ] {
             let error = read_text(text.as_bytes(), surface).unwrap_err().to_string();
             assert!(error.contains(wanted), "{error}");
