@@ -270,7 +270,7 @@ mod tests {
 
     /// A lens as the program saves it: a stop, a flat plate with the phase on its second side, the sensor; with the lines that
     /// stand about what is asked for, and text that is no ASCII.
-    const SAVED: &str = include_str!("../../../../../golden/foreign/flat_lens.zmx");
+    const SAVED: &str = include_str!("../../../../../golden/lenses/flat_lens.zmx");
 
     fn utf16(text: &str, order: fn(u16) -> [u8; 2], mark: bool) -> Vec<u8> {
         let mark = mark.then_some(0xfeff);
