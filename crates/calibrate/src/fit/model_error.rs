@@ -69,9 +69,10 @@ pub struct WidthParts {
 }
 
 impl WidthParts {
-    /// All of them together.
+    /// All of them together; no number where captures tell nothing.
     pub fn half_width(&self) -> f64 {
-        self.noise.hypot(self.of_model()).max(self.least)
+        let all = self.noise.hypot(self.of_model());
+        if all.is_nan() { all } else { all.max(self.least) }
     }
 
     /// What the model errs by.

@@ -27,6 +27,7 @@ use crate::smooth_residual::SmoothResidual;
 use chips::{AppliedEffect, SyntheticChip};
 use journal::Journal;
 use metalith_core::{Progress, Result};
+use metalith_rcwa::Orders;
 use synthetic::{Synthesizer, SyntheticImages, UnlistedEffect};
 
 /// First seed of the sets that thresholds are compared with; none of these is judged.
@@ -164,6 +165,8 @@ pub fn validate(
         compare_fidelities: false,
         ..settings.clone()
     };
+    // Simulations take minutes before the first of these cells is solved.
+    Orders::new(plan.orders)?;
     let session = Session::new(like, settings.clone())?;
     check_effects(&session.simulator.effects, &plan.effects)?;
     let chips = chips(&session, plan)?;
