@@ -122,10 +122,6 @@ pub fn attribute(problem: FitProblem<'_>, full: bool, progress: &dyn Progress) -
     }
     let (runners_up, before) = (&history.runners_up, &history.held_before);
     let alternatives = alternatives(&mut now, &mut history.chosen, runners_up, before, full, progress)?;
-    if full && !history.chosen.is_empty() {
-        // A search is content with less than intervals promise.
-        now.refine(progress)?;
-    }
     let widths = half_widths(&now.problem, &now.fit);
     Ok(Finding {
         chosen: history.chosen,
