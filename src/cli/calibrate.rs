@@ -60,6 +60,18 @@ pub struct CalibrateArgs {
     #[arg(long, value_name = "N", requires = "validate", default_value_t = 0)]
     random: u64,
 
+    /// Other synthetic sets: other chips of `--random`, another noise and another bench of all.
+    #[arg(long, value_name = "N", requires = "validate", default_value_t = 0)]
+    seed: u32,
+
+    /// Sets without noise, and only what is there is fitted: what values err by then is the model's own error.
+    #[arg(long, requires = "validate")]
+    noiseless: bool,
+
+    /// Diffraction orders along an axis that cells of synthetic sets are solved with, odd; fits use 13.
+    #[arg(long, value_name = "N", requires = "validate")]
+    orders: Option<usize>,
+
     /// Print the diagnosis as JSON.
     #[arg(long)]
     json: bool,
@@ -108,6 +120,10 @@ pub fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> {
         let plan = ValidationPlan {
             nulls: args.nulls.unwrap_or(base.nulls),
             effects: args.effects.clone(),
+            seed: args.seed,
+            noiseless: args.noiseless,
+            journal: Some(out.join("validation_trials.jsonl")),
+            orders: args.orders.unwrap_or(base.orders),
             ..base
         };
         let validation = validate(&set, &settings, &plan, terminal)?;

@@ -6,7 +6,7 @@
 
 use metalith_core::{Progress, Result};
 
-use crate::effects::Parameter;
+use crate::effects::{Parameter, ValueError};
 use crate::optics::PixelGrid;
 use crate::set::PerCapture;
 
@@ -101,9 +101,9 @@ pub trait ForwardModel: Send + Sync {
         0.0
     }
 
-    /// By how much the value that is found for an effect may be wrong, relative, as one standard deviation.
-    fn value_share(&self, _effect: usize) -> f64 {
-        0.0
+    /// What the value that is found for an effect may be wrong by, beside noise and cell.
+    fn value_error(&self, _effect: usize) -> ValueError {
+        ValueError::NONE
     }
 
     /// Step of a parameter on whose multiples simulations are cheap, because parts of them are likely to be

@@ -10,9 +10,9 @@ use crate::cells::{CellSource, RigorousCells};
 use crate::diagnosis::Diagnosis;
 use crate::effects::{self, DeclaredEffect, Effect};
 use crate::fidelity::compare_fidelities;
-use crate::fit::{Data, Fit, FitProblem};
+use crate::fit::{Data, Fit, FitProblem, WidthParts, half_widths};
 use crate::names::unknown_names;
-use crate::search::{DefectNoise, Evidence, UnusableCapture, attribute_set, unusable_captures};
+use crate::search::{DefectNoise, Evidence, UnusableCapture, attribute_set, fit_of, unusable_captures};
 use crate::set::{MeasuredSet, PerCapture};
 use crate::simulator::{Simulator, WIDTH_ROOM_NM};
 use crate::surrogate::Surrogate;
@@ -172,6 +172,24 @@ impl<'a> Session<'a> {
         let problem = self.screened(simulations, screening);
         let defects = simulations.defects.as_ref().map(|(effect, noise)| (*effect, noise));
         attribute_set(&problem, self.settings.refine, defects, progress)
+    }
+
+    /// The fit of these effects and of no others, without a search, and what half of a 95 % interval of each of their parameters is
+    /// made of. With `full`, it is refined with full simulations.
+    ///
+    /// # Errors
+    /// If a simulation fails, or the user stopped it.
+    pub fn fitted(
+        &self,
+        simulations: &Simulations,
+        effects: &[usize],
+        full: bool,
+        progress: &dyn Progress,
+    ) -> Result<(Fit, Vec<WidthParts>)> {
+        let problem = self.problem(simulations);
+        let fit = fit_of(problem, effects, full && self.settings.refine, progress)?;
+        let parts = half_widths(&fit.problem, &fit.fit);
+        Ok((fit.fit, parts))
     }
 
     /// The answer for the set, and the evidence for it where there was enough to search in.

@@ -2,7 +2,7 @@
 
 use metalith_core::{Progress, Result};
 
-use crate::effects::{Stage, separate_by};
+use crate::effects::{Stage, ValueError, separate_by};
 use crate::forward_model::{ForwardModel, ParameterPoint, Slot, SmoothTerm, TRANSMISSION_TERMS};
 use crate::optics::PixelGrid;
 use crate::set::PerCapture;
@@ -17,12 +17,6 @@ const CELL_STEP: f64 = 1.0 / 16.0;
 const ERROR_OF_STACK: f64 = 0.03;
 const ERROR_OF_GEOMETRY: f64 = 0.01;
 const ERROR_OF_LIGHT: f64 = 0.002;
-
-/// Relative errors of the values that are found, by the same stages, root mean square over sets whose truth is known: taper,
-/// index and rim; biases, density and light of the zero order; gaps, tilts and widths of LEDs.
-const VALUE_OF_STACK: f64 = 0.01;
-const VALUE_OF_GEOMETRY: f64 = 0.002;
-const VALUE_OF_LIGHT: f64 = 0.002;
 
 impl Simulator<'_> {
     fn perturbation_at(&self, point: &ParameterPoint) -> Perturbation {
@@ -76,12 +70,9 @@ impl ForwardModel for Simulator<'_> {
         }
     }
 
-    fn value_share(&self, effect: usize) -> f64 {
-        match self.effects[effect].stage() {
-            Stage::Stack => VALUE_OF_STACK,
-            Stage::Geometry => VALUE_OF_GEOMETRY,
-            Stage::Diffraction | Stage::Source | Stage::Camera => VALUE_OF_LIGHT,
-        }
+    fn value_error(&self, effect: usize) -> ValueError {
+        let effect = &self.effects[effect];
+        ValueError::of(&effect.name(), effect.stage())
     }
 
     fn cheap_step(&self, slot: usize) -> Option<f64> {

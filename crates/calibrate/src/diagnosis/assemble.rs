@@ -9,7 +9,7 @@ use super::pattern::untold_tilt;
 use super::{CaptureError, Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePattern, LeftOut, Ranked, SetVerdict};
 use crate::effects::Effect;
 use crate::fidelity::Rung;
-use crate::fit::{Fit, HeldOutErrors, mean_error};
+use crate::fit::{Fit, HeldOutErrors, WidthParts, mean_error};
 use crate::search::{Evidence, Finding, RESIDUAL, Rejection, TriedEffect, UnusableCapture};
 use crate::set::MeasuredSet;
 use crate::simulator::Simulator;
@@ -156,12 +156,12 @@ fn found_effects(simulator: &Simulator<'_>, finding: &Finding, verdict: SetVerdi
         let values: Vec<f64> = slots.iter().map(|&s| finding.after.theta[s]).collect();
         let widths = finding.after.pick(&slots, &finding.half_widths);
         let others: Vec<usize> = alternatives.iter().map(|a| a.effect).collect();
-        effects.push(found(simulator, effect, &values, &widths, &others));
+        effects.push(FoundEffect::new(simulator, effect, &values, &widths, &others));
         if verdict == SetVerdict::OneOf {
             for a in alternatives {
                 let rest = others.iter().copied().filter(|&o| o != a.effect);
                 let rest: Vec<usize> = rest.chain([effect]).collect();
-                effects.push(found(simulator, a.effect, &a.values, &a.half_widths, &rest));
+                effects.push(FoundEffect::new(simulator, a.effect, &a.values, &a.half_widths, &rest));
             }
         }
     }
@@ -231,17 +231,32 @@ fn reported(simulator: &Simulator<'_>, effect: usize, values: &[f64]) -> Vec<f64
     all.into_iter().map(|r| r.0).collect()
 }
 
-fn found(simulator: &Simulator<'_>, effect: usize, values: &[f64], widths: &[f64], others: &[usize]) -> FoundEffect {
-    let own = &simulator.effects[effect];
-    let (values, intervals): (Vec<f64>, Vec<[f64; 2]>) =
-        own.reported(values, widths, simulator.bench.set()).into_iter().unzip();
-    FoundEffect {
-        name: own.name(),
-        value: listed(&values),
-        unit: own.unit().into(),
-        interval: listed(&intervals),
-        confounded_with: others.iter().map(|&o| simulator.effects[o].name()).collect(),
-        separate_by: separating_measurement(simulator, effect, others),
+impl FoundEffect {
+    /// With the parameters of an effect and what half of their intervals is made of; `others` would do as well.
+    pub(crate) fn new(
+        simulator: &Simulator<'_>,
+        effect: usize,
+        numbers: &[f64],
+        widths: &[WidthParts],
+        others: &[usize],
+    ) -> Self {
+        let half_widths: Vec<f64> = widths.iter().map(WidthParts::half_width).collect();
+        let set = simulator.bench.set();
+        let own = &simulator.effects[effect];
+        let (values, intervals): (Vec<f64>, Vec<[f64; 2]>) =
+            own.reported(numbers, &half_widths, set).into_iter().unzip();
+        // An interval may end where physics does: its longer side counts.
+        let side = |(value, [low, high]): (f64, [f64; 2])| (value - low).max(high - value);
+        let of_each = |part: &[f64]| own.reported(numbers, part, set).into_iter().map(side).collect();
+        Self {
+            name: own.name(),
+            value: listed(&values),
+            unit: own.unit().into(),
+            interval: listed(&intervals),
+            interval_from: WidthParts::map(widths, of_each),
+            confounded_with: others.iter().map(|&o| simulator.effects[o].name()).collect(),
+            separate_by: separating_measurement(simulator, effect, others),
+        }
     }
 }
 

@@ -12,6 +12,7 @@ use serde_json::Value;
 pub use pattern::{FreePattern, GroupValue, PatternCourse, Slope};
 
 use crate::fidelity::Rung;
+use crate::fit::WidthParts;
 
 /// The verdict on a set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -47,6 +48,8 @@ pub struct FoundEffect {
     pub unit: String,
     /// 95 % interval; a list of them for an effect along two axes.
     pub interval: Value,
+    /// What half of the interval of each value is made of.
+    pub interval_from: Vec<WidthParts>,
     pub confounded_with: Vec<String>,
     pub separate_by: Option<String>,
 }

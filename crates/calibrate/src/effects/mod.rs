@@ -25,9 +25,11 @@ mod source_size;
 mod stitching;
 mod stray_light;
 mod tilt;
+mod value_error;
 mod zero_order;
 
 pub use declared::{DeclaredEffect, DeclaredParameter};
+pub use value_error::ValueError;
 
 use super::set::MeasuredSet;
 use metalith_core::{Error, Result};

@@ -8,7 +8,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::data::{CaptureSetup, Data};
-use super::model_error::{ModelError, model_half_widths, projected};
+use super::model_error::{ModelError, WidthParts, model_half_widths, projected};
 use super::normal_equations::{NormalEquations, covariance, hold, minimise};
 use super::problem::{Fit, FitProblem};
 use crate::set::{CaptureIndex, PerCapture};
@@ -223,34 +223,36 @@ pub fn beam_groups(problem: &FitProblem<'_>) -> Vec<Vec<CaptureIndex>> {
 }
 
 /// 95 % half-widths of the active parameters of a fit: by a bootstrap over groups of captures, never less than the
-/// noise alone gives, and wider by the error of the model.
-pub fn half_widths(problem: &FitProblem<'_>, fit: &Fit) -> Vec<f64> {
+/// noise alone gives, and wider by the error of the model. What each is made of.
+pub fn half_widths(problem: &FitProblem<'_>, fit: &Fit) -> Vec<WidthParts> {
     let slots = problem.model.slots();
-    let own = widths_with(problem, fit, &ModelError::MEASURED);
-    let least = fit
-        .active
-        .iter()
-        .map(|&s| LEAST_HALF_WIDTH * slots[s].parameter.typical);
-    own.into_iter().zip(least).map(|(w, least)| w.max(least)).collect()
+    let own = widths_with(problem, fit, &ModelError::MEASURED).into_iter();
+    own.zip(&fit.active)
+        .map(|(parts, &s)| WidthParts {
+            least: LEAST_HALF_WIDTH * slots[s].parameter.typical,
+            ..parts
+        })
+        .collect()
 }
 
 /// The same by which a claim is judged: the model may err by as much as could be.
 pub fn cautious_half_widths(problem: &FitProblem<'_>, fit: &Fit) -> Vec<f64> {
-    widths_with(problem, fit, &ModelError::CAUTIOUS)
+    let own = widths_with(problem, fit, &ModelError::CAUTIOUS).into_iter();
+    own.map(|parts| parts.half_width()).collect()
 }
 
-/// No interval is narrower than this share of a typical size on each side: gaps, which are known best, come out to 3e-4 of it (rms)
-/// in sets by a program that shares nothing with this one.
-pub const LEAST_HALF_WIDTH: f64 = 1e-3;
+/// No interval is narrower than this share of a typical size on each side: gaps, which are known best, come out to 8e-5 of it (rms)
+/// without noise.
+pub const LEAST_HALF_WIDTH: f64 = 1e-4;
 
-fn widths_with(problem: &FitProblem<'_>, fit: &Fit, error: &ModelError) -> Vec<f64> {
+fn widths_with(problem: &FitProblem<'_>, fit: &Fit, error: &ModelError) -> Vec<WidthParts> {
     let slots = problem.model.slots();
     let sampled = sampled_half_widths(problem, fit).into_iter();
     let both = sampled.zip(model_half_widths(problem, fit, error)).zip(&fit.active);
-    both.map(|((sampled, of_model), &s)| {
+    both.map(|((noise, of_model), &s)| {
         let (least, most) = slots[s].parameter.range;
         // A parameter that changes nothing here may have any value.
-        sampled.hypot(of_model).min(most - least)
+        WidthParts { noise, ..of_model }.at_most(most - least)
     })
     .collect()
 }

@@ -22,7 +22,7 @@ pub use cross_validation::{
 pub use data::{CaptureSetup, Data};
 #[cfg(test)]
 pub use model_error::ModelError;
-pub use model_error::{change_energy, projected};
+pub use model_error::{WidthParts, change_energy, projected};
 pub use normal_equations::{covariance, minimise};
 pub use nuisances::Nuisances;
 pub use null_test::null_gain;

@@ -63,7 +63,7 @@ impl Fit {
     }
 
     /// Of `values`, one for each active parameter, those of some slots.
-    pub fn pick(&self, slots: &[usize], values: &[f64]) -> Vec<f64> {
+    pub fn pick<T: Copy>(&self, slots: &[usize], values: &[T]) -> Vec<T> {
         let places = slots.iter().filter_map(|&s| self.position(s));
         places.map(|k| values[k]).collect()
     }
@@ -307,7 +307,8 @@ mod tests {
         let problem = model.problem(&data);
         let fit = problem.fit(&[0, 1], &problem.nuisance_fit());
         let sigma = (CAPTURES * information(own) * (1.0 - RHO * RHO)).sqrt().recip();
-        for (k, width) in half_widths(&problem, &fit).into_iter().enumerate() {
+        for (k, parts) in half_widths(&problem, &fit).into_iter().enumerate() {
+            let width = parts.half_width();
             let expected = SIGMAS_95 * sigma;
             assert!(
                 (width / expected - 1.0).abs() < 10.0 * TOLERANCE,

@@ -26,9 +26,12 @@ pub fn whole_pixel_shift(seen: &Array2<f32>, expected: &Array2<f32>) -> [f64; 2]
         let place = [dy.rem_euclid(rows as i64) as usize, dx.rem_euclid(cols as i64) as usize];
         correlation[place].re
     };
+    // Farther than half a window, a shift is the same as a nearer one the other way.
+    let reach = |pixels: usize| REACH.min((pixels as i64 - 1) / 2);
+    let (far_y, far_x) = (reach(rows), reach(cols));
     let mut best = (0, 0);
-    for dy in -REACH..=REACH {
-        for dx in -REACH..=REACH {
+    for dy in -far_y..=far_y {
+        for dx in -far_x..=far_x {
             if at(dy, dx) > at(best.0, best.1) {
                 best = (dy, dx);
             }
@@ -59,14 +62,24 @@ fn transformed(image: Array2<Complex32>, along_x: &dyn Fft<f32>, along_y: &dyn F
 mod tests {
     use super::*;
 
+    fn spot_in(size: (usize, usize), cx: f32, cy: f32) -> Array2<f32> {
+        Array2::from_shape_fn(size, |(y, x)| {
+            let r2 = (x as f32 - cx).powi(2) + (y as f32 - cy).powi(2);
+            2.0 + 100.0 * (-r2 / 8.0).exp()
+        })
+    }
+
+    /// Of a window that is smaller than the reach, a pixel to one side is not the rest of the window to the other.
+    #[test]
+    fn small_windows_move_by_the_nearest_shift() {
+        let spot = |cx: f32, cy: f32| spot_in((16, 20), cx, cy);
+        assert_eq!(whole_pixel_shift(&spot(9.0, 9.0), &spot(10.0, 8.0)), [1.0, -1.0]);
+        assert_eq!(whole_pixel_shift(&spot(10.0, 8.0), &spot(9.0, 9.0)), [-1.0, 1.0]);
+    }
+
     #[test]
     fn a_moved_spot_is_found() {
-        let spot = |cx: f32, cy: f32| {
-            Array2::from_shape_fn((48, 64), |(y, x)| {
-                let r2 = (x as f32 - cx).powi(2) + (y as f32 - cy).powi(2);
-                2.0 + 100.0 * (-r2 / 8.0).exp()
-            })
-        };
+        let spot = |cx: f32, cy: f32| spot_in((48, 64), cx, cy);
         // In a window that is off by (5, -3), the spot appears on the opposite side.
         assert_eq!(whole_pixel_shift(&spot(27.0, 27.0), &spot(32.0, 24.0)), [5.0, -3.0]);
         assert_eq!(whole_pixel_shift(&spot(32.2, 24.0), &spot(32.0, 24.0)), [0.0, 0.0]);

@@ -10,6 +10,7 @@ use ndarray::Array2;
 use residual::{confusable, nuisances, smooth_residual};
 
 use crate::diagnosis::{Diagnosis, FreePattern, Ranked, SetVerdict};
+use crate::fit::WidthParts;
 use crate::search::Evidence;
 use crate::session::{Session, Simulations};
 use metalith_core::Result;
@@ -102,6 +103,7 @@ fn effects(page: &mut Page, diagnosis: &Diagnosis) {
         Column::text("Effect"),
         Column::text("Value"),
         Column::text("95 % interval"),
+        Column::text("Half of it by noise alone, by the model alone"),
         Column::text("Cannot be distinguished from"),
         Column::text("Measurement that would distinguish"),
     ]);
@@ -111,6 +113,13 @@ fn effects(page: &mut Page, diagnosis: &Diagnosis) {
             Cell::code(&e.name),
             format!("{} {}", shown(&e.value), e.unit).as_str().into(),
             shown(&e.interval).as_str().into(),
+            e.interval_from
+                .iter()
+                .map(made_of)
+                .collect::<Vec<_>>()
+                .join("; ")
+                .as_str()
+                .into(),
             if e.confounded_with.is_empty() {
                 Cell::none()
             } else {
@@ -123,6 +132,10 @@ fn effects(page: &mut Page, diagnosis: &Diagnosis) {
     for remark in &diagnosis.remarks {
         page.paragraph(remark);
     }
+}
+
+fn made_of(parts: &WidthParts) -> String {
+    format!("{}, {}", sig(parts.noise, 2), sig(parts.of_model(), 2))
 }
 
 fn ladder(page: &mut Page, session: &Session<'_>, diagnosis: &Diagnosis) {

@@ -102,7 +102,7 @@ pub fn effects(
         let problem = FitProblem::new(simulator, surrogate.clone(), &data);
         let own = simulator.slots_of(slot.effect);
         let fit = problem.at(&own, theta, Nuisances::stated(&data));
-        let half = fit.pick(&[r.slot], &half_widths(&problem, &fit))[0];
+        let half = fit.pick(&[r.slot], &half_widths(&problem, &fit))[0].half_width();
         let width = |by: f64| amount(effect, (r.size + by).clamp(0.0, slot.parameter.range.1), exposed);
         let wanted = amount(effect, r.size, exposed);
         let half_interval = 0.5 * (width(half) - width(-half)).abs();

@@ -4,7 +4,7 @@ use metalith_core::{Progress, Result};
 
 use super::state::SearchState;
 use super::stepwise::{LEAST_GAIN, physical};
-use crate::fit::{Fit, Gain, HeldOutErrors, gain, half_widths, held_out, mean_error};
+use crate::fit::{Fit, Gain, HeldOutErrors, WidthParts, gain, half_widths, held_out, mean_error};
 
 /// Difference in the chi-square of the SEM widths that decides between two explanations: three sigma.
 pub const SEM_DECIDES: f64 = 9.0;
@@ -21,7 +21,7 @@ const WORTH_REFINING: f64 = 0.1;
 pub struct Alternative {
     pub effect: usize,
     pub values: Vec<f64>,
-    pub half_widths: Vec<f64>,
+    pub half_widths: Vec<WidthParts>,
 }
 
 /// Drop effects that the others have made redundant, with their runners-up.

@@ -8,7 +8,7 @@ use super::exchange::{find_exchange, much_alike};
 use super::pairs::find_pair;
 use super::state::SearchState;
 use super::stepwise::{LEAST_GAIN, RESIDUAL, Rejection, TriedEffect, step_forward};
-use crate::fit::{Fit, FitProblem, HeldOutErrors, half_widths, mean_error};
+use crate::fit::{Fit, FitProblem, HeldOutErrors, WidthParts, half_widths, mean_error};
 use crate::optics::PixelGrid;
 use crate::set::PerCapture;
 use crate::surrogate::Surrogate;
@@ -37,7 +37,7 @@ pub struct Finding {
     /// What was tried on top of each effect that was taken.
     pub later: Vec<Vec<TriedEffect>>,
     /// 95 % half-widths of the active parameters of `after`.
-    pub half_widths: Vec<f64>,
+    pub half_widths: Vec<WidthParts>,
     /// The surrogate that `after` is based on, and its correction by a full simulation.
     pub surrogate: Surrogate,
     pub correction: Option<PerCapture<PixelGrid>>,
@@ -215,7 +215,7 @@ mod tests {
         for effect in [4, 1] {
             let place = found.after.position(effect).unwrap();
             let error = found.after.theta[effect] - truth[effect];
-            assert!(error.abs() < found.half_widths[place], "{effect}: {error}");
+            assert!(error.abs() < found.half_widths[place].half_width(), "{effect}: {error}");
         }
         assert!(mean_error(&found.held_after) < 1.0 + LEAST_GAIN);
     }

@@ -143,8 +143,8 @@ fn attribute_with_defects(
         }
         // There are two estimates of one share: the interval includes both.
         if let Some(k) = found.after.position(slot) {
-            let width = &mut found.half_widths[k];
-            *width = width.max((by_mean - share).abs());
+            let least = &mut found.half_widths[k].least;
+            *least = least.max((by_mean - share).abs());
         }
         found.before = plain.before.clone();
         found.held_before.clone_from(&plain.held_before);

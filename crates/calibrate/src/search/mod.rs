@@ -22,4 +22,5 @@ pub use defect_noise::DefectNoise;
 pub use evidence::{Evidence, attribute_set};
 pub use patterns::{Grouping, Pattern};
 pub use signatures::cosines;
+pub use state::fit_of;
 pub use stepwise::{LEAST_GAIN, RESIDUAL, Rejection, TriedEffect};

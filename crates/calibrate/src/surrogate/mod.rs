@@ -48,6 +48,8 @@ pub struct Surrogate {
     curves: Vec<Curve>,
     /// Changes for a unit of each smooth term: paths (1/nm), then amplitudes and phases over width of each LED.
     smooth: Arc<Vec<SmoothChange>>,
+    /// The surrogate that smooth terms were simulated with, where this one was centred elsewhere since.
+    stated: Option<Arc<Surrogate>>,
 }
 
 /// Change of the images for a unit of a smooth term; none where it does not act.
@@ -130,6 +132,7 @@ impl Surrogate {
             base: Arc::new(base),
             curves,
             smooth: Arc::new(terms),
+            stated: None,
         })
     }
 
@@ -174,6 +177,7 @@ impl Surrogate {
         let mut images = model.images(&points, progress)?.into_iter();
         let base = images.next().expect("the first point is the base");
         let mut out = self.clone();
+        out.stated = Some(self.stated.clone().unwrap_or_else(|| Arc::new(self.clone())));
         for (s, nodes) in simulated {
             let changes: Vec<_> = images
                 .by_ref()
@@ -214,6 +218,13 @@ impl Surrogate {
         Ok(())
     }
 
+    /// About the values at which smooth terms were simulated.
+    pub fn stated(&self) -> Self {
+        self.stated
+            .as_ref()
+            .map_or_else(|| self.clone(), |stated| (**stated).clone())
+    }
+
     /// Images that no parameter changes.
     pub fn constant(base: PerCapture<PixelGrid>) -> Self {
         Self {
@@ -221,6 +232,7 @@ impl Surrogate {
             base: Arc::new(base),
             curves: Vec::new(),
             smooth: Arc::default(),
+            stated: None,
         }
     }
 

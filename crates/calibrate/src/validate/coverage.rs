@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::diagnosis::FoundEffect;
-use crate::fit::SIGMAS_95;
+use crate::fit::{SIGMAS_95, WidthParts};
 use metalith_report::sig;
 
 /// A number that was claimed, beside the true one.
@@ -19,6 +19,8 @@ pub struct ClaimedNumber {
     pub interval: [f64; 2],
     /// Error in standard deviations: half of the side of the interval that faces the truth is one.
     pub sigmas: f64,
+    /// What half of the interval is made of.
+    pub made_of: WidthParts,
 }
 
 impl ClaimedNumber {
@@ -28,9 +30,9 @@ impl ClaimedNumber {
         if numbers.len() != truth.len() {
             return Vec::new();
         }
-        let pairs = numbers.into_iter().zip(truth).enumerate();
+        let pairs = numbers.into_iter().zip(truth).zip(&found.interval_from).enumerate();
         pairs
-            .map(|(number, ((value, interval), &truth))| {
+            .map(|(number, (((value, interval), &truth), &made_of))| {
                 let side = if truth < value {
                     value - interval[0]
                 } else {
@@ -43,6 +45,7 @@ impl ClaimedNumber {
                     found: value,
                     interval,
                     sigmas: SIGMAS_95 * (value - truth) / side.max(f64::MIN_POSITIVE),
+                    made_of,
                 }
             })
             .collect()
@@ -126,8 +129,10 @@ mod tests {
     use super::*;
 
     fn found(value: serde_json::Value, interval: serde_json::Value) -> FoundEffect {
+        let numbers = value.as_array().map_or(1, Vec::len);
         FoundEffect {
             name: "tilt".into(),
+            interval_from: vec![WidthParts::default(); numbers],
             value,
             unit: "mrad".into(),
             interval,

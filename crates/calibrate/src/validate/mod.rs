@@ -2,9 +2,13 @@
 
 mod chips;
 mod coverage;
+mod journal;
+mod noiseless;
 mod page;
 mod summary;
 pub mod synthetic;
+
+use std::path::PathBuf;
 
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -21,7 +25,9 @@ use crate::session::{Session, Settings, check_effects};
 use crate::set::{CaptureIndex, MeasuredSet};
 use crate::smooth_residual::SmoothResidual;
 use chips::{AppliedEffect, SyntheticChip};
+use journal::Journal;
 use metalith_core::{Progress, Result};
+use metalith_rcwa::Orders;
 use synthetic::{Synthesizer, SyntheticImages, UnlistedEffect};
 
 /// First seed of the sets that thresholds are compared with; none of these is judged.
@@ -30,8 +36,11 @@ const THRESHOLD_SEED: u64 = 900_000;
 /// First seed of the sets that are judged.
 const JUDGED_SEED: u64 = 1000;
 
-/// Seed of the chips that are drawn at random.
+/// First seed of the chips that are drawn at random.
 const RANDOM_SEED: u64 = 15;
+
+/// Distance of the seeds of judged sets for each of [`ValidationPlan::seed`]: none meets the thresholds' or another's.
+const SEEDS_APART: u64 = 1_000_000;
 
 /// One synthetic set and its diagnosis.
 #[derive(Clone, Debug, Serialize)]
@@ -98,6 +107,16 @@ pub struct ValidationPlan {
     pub trials: Vec<String>,
     /// So many chips with one or two effects of random sizes, in the place of one for each effect, size and pair.
     pub random: u64,
+    /// Which chips are drawn at random, and which noise and bench all sets that are judged have.
+    pub seed: u32,
+    /// Sets without noise, in which the effects that are there are fitted and no others are looked for: what their values err by is
+    /// the model's own error, which intervals count with.
+    pub noiseless: bool,
+    /// File that each set is written to as soon as it is judged, one line of JSON for each: a validation takes long, and may be
+    /// stopped.
+    pub journal: Option<PathBuf>,
+    /// Diffraction orders along an axis of the cells that sets are made with; odd. Fits use 13.
+    pub orders: usize,
 }
 
 impl Default for ValidationPlan {
@@ -109,6 +128,10 @@ impl Default for ValidationPlan {
             off_list: true,
             trials: Vec::new(),
             random: 0,
+            seed: 0,
+            noiseless: false,
+            journal: None,
+            orders: synthetic::ORDERS,
         }
     }
 }
@@ -142,11 +165,13 @@ pub fn validate(
         compare_fidelities: false,
         ..settings.clone()
     };
+    // Simulations take minutes before the first of these cells is solved.
+    Orders::new(plan.orders)?;
     let session = Session::new(like, settings.clone())?;
     check_effects(&session.simulator.effects, &plan.effects)?;
     let chips = chips(&session, plan)?;
     let simulations = session.simulate(progress)?;
-    let synthesizer = Synthesizer::new(like, &settings)?;
+    let synthesizer = Synthesizer::with_orders(like, &settings, plan.orders)?;
     let wanted: Vec<Vec<(&str, &[f64])>> = chips
         .iter()
         .map(|chip| {
@@ -169,8 +194,9 @@ pub fn validate(
     }
     // The first chip is without effect.
     let thresholds = (0..plan.threshold_nulls).map(|k| (&exposed[0], &chips[0], THRESHOLD_SEED + k));
-    let nulls = (0..plan.nulls).map(|k| (&exposed[0], &chips[0], JUDGED_SEED + k));
-    let others = JUDGED_SEED + plan.nulls;
+    let judged = JUDGED_SEED + SEEDS_APART * u64::from(plan.seed);
+    let nulls = (0..plan.nulls).map(|k| (&exposed[0], &chips[0], judged + k));
+    let others = judged + plan.nulls;
     let listed = exposed.iter().zip(&chips).skip(1).zip(others..);
     let mut work: Vec<(&SyntheticImages, ValidationTrial, &[AppliedEffect])> = thresholds
         .chain(nulls)
@@ -182,18 +208,29 @@ pub fn validate(
         trial.off_list = true;
         work.push((exposed, trial, &[]));
     }
+    let journal = Journal::new(plan.journal.as_deref())?;
     progress.begin("synthetic sets diagnosed", work.len() as u64);
     // Sets are independent of one another, and the answers are in the order of the list.
     let mut trials = work
         .into_par_iter()
         .map(|(exposed, mut trial, parts)| {
-            let set = synthesizer.draw(exposed, trial.seed);
+            let set = match plan.noiseless {
+                true => synthesizer.draw_noiseless(exposed, trial.seed),
+                false => synthesizer.draw(exposed, trial.seed),
+            };
             let own = Session::new(&set, settings.clone())?;
+            if plan.noiseless {
+                trial.measure(&own, &simulations, parts, &StopOnly(progress))?;
+                journal.keep(&trial)?;
+                progress.advance(1);
+                return Ok(trial);
+            }
             let (diagnosis, evidence) = own.diagnose(&simulations, &StopOnly(progress))?;
             if trial.off_list {
                 trial.left = evidence.and_then(|e| UnexplainedResidual::new(&own, &diagnosis, &e));
             }
             trial.judge(&diagnosis, parts, &session);
+            journal.keep(&trial)?;
             progress.advance(1);
             Ok(trial)
         })
@@ -214,7 +251,11 @@ fn chips(session: &Session<'_>, plan: &ValidationPlan) -> Result<Vec<SyntheticCh
     for text in &plan.trials {
         chips.push(chips::of_text(&known, text)?);
     }
-    chips.extend(chips::at_random(&wanted, plan.random, RANDOM_SEED));
+    chips.extend(chips::at_random(
+        &wanted,
+        plan.random,
+        RANDOM_SEED + u64::from(plan.seed),
+    ));
     Ok(chips)
 }
 

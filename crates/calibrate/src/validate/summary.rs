@@ -137,7 +137,11 @@ impl Validation {
             ));
         }
         text.push('\n');
-        for t in self.trials.iter().filter(|t| t.truth != NOTHING) {
+        for t in self
+            .trials
+            .iter()
+            .filter(|t| t.truth != NOTHING || !t.numbers.is_empty())
+        {
             let inside = match t.numbers.iter().all(ClaimedNumber::is_inside) {
                 _ if t.numbers.is_empty() => "",
                 true => "inside",

@@ -58,6 +58,14 @@ impl<'a> Synthesizer<'a> {
     /// # Errors
     /// If a material is not known.
     pub fn new(like: &'a MeasuredSet, settings: &Settings) -> Result<Self> {
+        Self::with_orders(like, settings, ORDERS)
+    }
+
+    /// The same with cells solved with so many orders along an axis.
+    ///
+    /// # Errors
+    /// As [`Synthesizer::new`].
+    pub fn with_orders(like: &'a MeasuredSet, settings: &Settings, orders: usize) -> Result<Self> {
         let s = settings.sampling;
         let sampling = Sampling {
             spectrum: 0.85 * s.spectrum,
@@ -74,7 +82,7 @@ impl<'a> Synthesizer<'a> {
             (low - WIDTH_ROOM_NM, high + WIDTH_ROOM_NM),
             settings.cache.clone(),
         )
-        .with_orders(ORDERS, TAPER_ORDERS);
+        .with_orders(orders, TAPER_ORDERS);
         let effects = effects::with_declared(like, &settings.declared)?;
         let mut simulator = Simulator::new(bench, CellSource::Rigorous(Box::new(cells)), effects);
         // Fits use the mean of missing pillars; here single ones are missing.
@@ -181,6 +189,16 @@ impl<'a> Synthesizer<'a> {
 
     /// A set with registration, flux, black level and noise drawn from `seed`.
     pub fn draw(&self, exposed: &SyntheticImages, seed: u64) -> MeasuredSet {
+        self.drawn(exposed, seed, 1.0)
+    }
+
+    /// The same without noise, in captures and in widths by SEM: what a fit to it errs by is the model's own error.
+    pub fn draw_noiseless(&self, exposed: &SyntheticImages, seed: u64) -> MeasuredSet {
+        self.drawn(exposed, seed, 0.0)
+    }
+
+    /// With so many times the noise.
+    fn drawn(&self, exposed: &SyntheticImages, seed: u64, noise: f64) -> MeasuredSet {
         let like = self.simulator.bench.set();
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut set = like.clone();
@@ -208,10 +226,10 @@ impl<'a> Synthesizer<'a> {
                     Some(_) => 0.0,
                     None => camera.variance_dn2(signal, frames),
                 };
-                (black + signal + variance.sqrt() * normal(&mut rng)) as f32
+                (black + signal + noise * variance.sqrt() * normal(&mut rng)) as f32
             });
         }
-        let offset = like.sem_offset_sigma_nm * normal(&mut rng);
+        let offset = noise * like.sem_offset_sigma_nm * normal(&mut rng);
         for site in &mut set.sem {
             let Some((element, at)) = like.site_of(site) else {
                 continue;
@@ -220,7 +238,7 @@ impl<'a> Synthesizer<'a> {
                 .simulator
                 .bench
                 .bias_nm(element, at, &exposed.perturbation.geometry);
-            site.measured_nm = site.designed_nm + bias + offset + site.sigma_nm * normal(&mut rng);
+            site.measured_nm = site.designed_nm + bias + offset + noise * site.sigma_nm * normal(&mut rng);
         }
         set
     }

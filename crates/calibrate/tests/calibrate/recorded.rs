@@ -201,3 +201,35 @@ fn a_bias_is_found_behind_noisy_dark_and_flat_frames() {
         .to_string();
     assert!(error.contains("dark_frames"), "{error}");
 }
+
+/// The sensor stands behind the chip itself, without a relay: the light of a lens falls on a few of its pixels.
+#[test]
+fn a_gap_is_found_on_a_bare_sensor() {
+    const EDGE: usize = 16;
+    const GAP_UM: f64 = 15.0;
+    let folder = tempfile::tempdir().unwrap();
+    let path = small_set(folder.path());
+    let text = fs::read_to_string(&path).unwrap();
+    let text = text
+        .replace("pixel_um = 0.5", "pixel_um = 5.86")
+        .replace(&format!("rows = {PIXELS}"), &format!("rows = {EDGE}"))
+        .replace(&format!("cols = {PIXELS}"), &format!("cols = {EDGE}"))
+        .replace("scale_dn = 1.0", "scale_dn = 12.0");
+    fs::write(&path, text).unwrap();
+    for capture in &LIKE.captures {
+        let dark = Array2::from_elem((EDGE, EDGE), LIKE.camera.black_level_dn as f32);
+        write_npy(&folder.path().join(format!("{}.npy", capture.name)), &dark);
+    }
+    let like = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
+    let synthesizer = Synthesizer::new(&like, &settings()).unwrap();
+    let images = synthesizer.with_effect("gap", &[GAP_UM], &Silent).unwrap();
+    let set = synthesizer.draw(&images, 43);
+    let session = Session::new(&set, settings()).unwrap();
+    let d = session
+        .diagnose(&session.simulate(&Silent).unwrap(), &Silent)
+        .unwrap()
+        .0;
+    assert_eq!(names(&d), ["gap"], "{} {:?} {:?}", d.sentence(), d.error, d.left_out);
+    assert_eq!(d.effects[0].holds(GAP_UM), Some(true), "{}", d.sentence());
+    assert!(d.error.after.held_out < EXPLAINED, "{:?}", d.error);
+}
