@@ -86,7 +86,6 @@ pub fn compare(
         .first()
         .ok_or_else(|| Error::invalid("no photographs", "give at least one"))?;
     let ways = contender.ways();
-    let judge = Judge { perceptual };
     let mut bare = Judged::default();
     let mut found: Vec<Judged> = ways.iter().map(|_| Judged::default()).collect();
     let mut seconds: Vec<Option<f64>> = vec![Some(0.0); ways.len()];
@@ -99,7 +98,7 @@ pub fn compare(
         add(&mut frame_s, begun);
         let truth = contender.truth(photograph);
         if let Some(picture) = contender.unrestored(&frame) {
-            judge.add(&mut bare, &picture, &truth)?;
+            bare.add(&picture, &truth, perceptual)?;
         }
         let mut pictures = Vec::new();
         for (k, way) in ways.iter().enumerate() {
@@ -109,7 +108,7 @@ pub fn compare(
             let begun = cpu_seconds();
             let picture = contender.restore(&frame, k, progress)?;
             add(&mut seconds[k], begun);
-            judge.add(&mut found[k], &picture, &truth)?;
+            found[k].add(&picture, &truth, perceptual)?;
             let scores = &found[k].scores;
             let whole = &scores[scores.len() - 1][0];
             progress.note(&format!(
@@ -158,11 +157,6 @@ pub fn compare(
     })
 }
 
-/// What pictures are judged by.
-struct Judge<'a> {
-    perceptual: Option<&'a PerceptualDistance>,
-}
-
 /// Pictures of one way, judged.
 #[derive(Default)]
 struct Judged {
@@ -171,18 +165,21 @@ struct Judged {
     distances: Vec<f64>,
 }
 
-impl Judge<'_> {
-    fn add(&self, to: &mut Judged, picture: &Array3<f64>, truth: &Array3<f64>) -> Result<()> {
-        to.scores.push(scores(picture, truth)?);
-        if let Some(perceptual) = self.perceptual {
+impl Judged {
+    fn add(
+        &mut self,
+        picture: &Array3<f64>,
+        truth: &Array3<f64>,
+        perceptual: Option<&PerceptualDistance>,
+    ) -> Result<()> {
+        self.scores.push(scores(picture, truth)?);
+        if let Some(perceptual) = perceptual {
             let [picture, truth] = [picture, truth].map(|p| p.mapv(encoded));
-            to.distances.push(perceptual.between(picture.view(), truth.view())?);
+            self.distances.push(perceptual.between(picture.view(), truth.view())?);
         }
         Ok(())
     }
-}
 
-impl Judged {
     fn one_less(&self) -> Option<f64> {
         let mean = self.distances.iter().sum::<f64>() / self.distances.len() as f64;
         (!self.distances.is_empty()).then_some(1.0 - mean)
