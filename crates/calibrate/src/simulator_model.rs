@@ -71,8 +71,7 @@ impl ForwardModel for Simulator<'_> {
     }
 
     fn value_error(&self, effect: usize) -> ValueError {
-        let effect = &self.effects[effect];
-        ValueError::of(&effect.name(), effect.stage())
+        self.effects[effect].value_error()
     }
 
     fn cheap_step(&self, slot: usize) -> Option<f64> {

@@ -1,6 +1,6 @@
 //! Overlay error: the aperture is shifted against the pillars by the second exposure.
 
-use super::{Effect, Parameter, Stage};
+use super::{Effect, Parameter, Stage, ValueError};
 use metalith_made::Perturbation;
 
 /// From the pillars to their aperture along x and y. Light through the crescent that opens on the far side is
@@ -27,6 +27,10 @@ impl Effect for ApertureOffset {
     fn kinked(&self) -> bool {
         // The derivative jumps at zero: the rim covers other pillars on either side.
         true
+    }
+
+    fn value_error(&self) -> ValueError {
+        ValueError::of_value(1e-2)
     }
 
     fn apply(&self, parameters: &[f64], to: &mut Perturbation) {

@@ -1,6 +1,6 @@
 //! Every pillar is wider or narrower than drawn by the same amount.
 
-use super::{Effect, Parameter, Stage};
+use super::{Effect, Parameter, Stage, ValueError};
 use metalith_made::{DeclaredQuantity, Perturbation};
 
 /// Width added to every pillar.
@@ -29,6 +29,10 @@ impl Effect for CdBias {
 
     fn as_gradient(&self) -> Option<&'static str> {
         Some("a dose or an etch that is not the same all over the chip")
+    }
+
+    fn value_error(&self) -> ValueError {
+        ValueError::of_value(1e-3)
     }
 
     fn apply(&self, parameters: &[f64], to: &mut Perturbation) {

@@ -282,6 +282,7 @@ impl Effect for DeclaredEffect {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{ValueError, gap::Gap};
     use super::*;
 
     const SOUND: &str = r#"
@@ -324,6 +325,15 @@ start = 5.0
         effects[1].apply(&[0.1, 0.0], &mut made);
         assert_eq!(made.camera.declared[0].values["u"], 5.0);
         assert_eq!(effects[1].parameters()[1].range, (-25.0, 15.0));
+    }
+
+    /// An error that was measured belongs to an effect, not to whatever has its name in front.
+    #[test]
+    fn a_declared_effect_has_the_error_of_its_stage() {
+        let mut effect = read(SOUND).unwrap().remove(0);
+        effect.name = "gap_of_the_lid".into();
+        assert_eq!(effect.value_error(), ValueError::of_stage(effect.stage()));
+        assert_ne!(effect.value_error(), Gap.value_error());
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The camera's plane is farther from the chip than stated.
 
-use super::{Effect, Parameter, Stage};
+use super::{Effect, Parameter, Stage, ValueError};
 use metalith_made::{DeclaredQuantity, Perturbation};
 
 /// Added to every distance.
@@ -29,6 +29,10 @@ impl Effect for Gap {
 
     fn as_gradient(&self) -> Option<&'static str> {
         Some("a sensor that is tilted against the chip: um per mm are mrad")
+    }
+
+    fn value_error(&self) -> ValueError {
+        ValueError::of_value(1e-4)
     }
 
     fn apply(&self, parameters: &[f64], to: &mut Perturbation) {

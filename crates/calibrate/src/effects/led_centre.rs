@@ -1,6 +1,6 @@
 //! The centre wavelength of one LED differs from the stated one: temperature, current, or batch.
 
-use super::{Effect, Parameter, Stage};
+use super::{Effect, Parameter, Stage, ValueError};
 use metalith_made::Perturbation;
 
 /// Added to the centre of one LED.
@@ -26,6 +26,10 @@ impl Effect for LedCentre {
 
     fn parameters(&self) -> Vec<Parameter> {
         vec![Parameter::new(-12.0, 12.0, 2.0)]
+    }
+
+    fn value_error(&self) -> ValueError {
+        ValueError::of_typical(6e-3)
     }
 
     fn apply(&self, parameters: &[f64], to: &mut Perturbation) {

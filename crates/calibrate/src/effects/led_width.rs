@@ -1,6 +1,6 @@
 //! Spectra are wider or narrower than stated.
 
-use super::{Effect, Parameter, Stage};
+use super::{Effect, Parameter, Stage, ValueError};
 use crate::set::MeasuredSet;
 use metalith_made::Perturbation;
 
@@ -22,6 +22,10 @@ impl Effect for LedWidth {
 
     fn parameters(&self) -> Vec<Parameter> {
         vec![Parameter::new(-0.6, 1.5, 0.15)]
+    }
+
+    fn value_error(&self) -> ValueError {
+        ValueError::of_typical(2e-3)
     }
 
     fn apply(&self, parameters: &[f64], to: &mut Perturbation) {

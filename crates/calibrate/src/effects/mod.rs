@@ -121,6 +121,12 @@ pub trait Effect: Send + Sync {
         None
     }
 
+    /// What its values err by besides noise and the cell: as measured, or what those that were not measured of its stage are
+    /// given.
+    fn value_error(&self) -> ValueError {
+        ValueError::of_stage(self.stage())
+    }
+
     /// Set its parameters.
     fn apply(&self, parameters: &[f64], to: &mut Perturbation);
 

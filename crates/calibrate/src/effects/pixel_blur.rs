@@ -1,6 +1,6 @@
 //! The camera blurs: its relay, or charge that diffuses.
 
-use super::{Effect, Parameter, Stage};
+use super::{Effect, Parameter, Stage, ValueError};
 use crate::set::MeasuredSet;
 use metalith_made::Perturbation;
 
@@ -22,6 +22,10 @@ impl Effect for PixelBlur {
 
     fn parameters(&self) -> Vec<Parameter> {
         vec![Parameter::new(0.0, 9.0, 0.09)]
+    }
+
+    fn value_error(&self) -> ValueError {
+        ValueError::of_value(1e-4)
     }
 
     fn apply(&self, parameters: &[f64], to: &mut Perturbation) {

@@ -1,6 +1,6 @@
 //! The sensor is tilted against the chip: elements stand at unlike distances from it.
 
-use super::{Effect, Parameter, Stage};
+use super::{Effect, Parameter, Stage, ValueError};
 use crate::set::MeasuredSet;
 use metalith_made::Perturbation;
 
@@ -59,6 +59,10 @@ impl Effect for SensorTilt {
 
     fn gradient_of(&self) -> Option<&'static str> {
         Some("gap")
+    }
+
+    fn value_error(&self) -> ValueError {
+        ValueError::of_value(5e-4)
     }
 
     fn apply(&self, parameters: &[f64], to: &mut Perturbation) {

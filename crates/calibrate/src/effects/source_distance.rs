@@ -1,6 +1,6 @@
 //! The source is not at infinity: the incident wave is spherical.
 
-use super::{Effect, Parameter, Stage};
+use super::{Effect, Parameter, Stage, ValueError};
 use crate::set::MeasuredSet;
 use metalith_made::Perturbation;
 
@@ -22,6 +22,10 @@ impl Effect for SourceDistance {
 
     fn parameters(&self) -> Vec<Parameter> {
         vec![Parameter::new(0.0, 200.0, 25.0)]
+    }
+
+    fn value_error(&self) -> ValueError {
+        ValueError::of_value(2e-4)
     }
 
     fn apply(&self, parameters: &[f64], to: &mut Perturbation) {

@@ -1,6 +1,6 @@
 //! The source is larger or smaller than stated.
 
-use super::{Effect, Parameter, Stage};
+use super::{Effect, Parameter, Stage, ValueError};
 use crate::set::MeasuredSet;
 use metalith_made::Perturbation;
 
@@ -22,6 +22,10 @@ impl Effect for SourceSize {
 
     fn parameters(&self) -> Vec<Parameter> {
         vec![Parameter::new(-1.0, 6.0, 0.5)]
+    }
+
+    fn value_error(&self) -> ValueError {
+        ValueError::of_value(1e-4)
     }
 
     fn apply(&self, parameters: &[f64], to: &mut Perturbation) {

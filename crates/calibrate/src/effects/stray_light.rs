@@ -1,6 +1,6 @@
 //! A share of the light is spread uniformly: scatter in the relay.
 
-use super::{Effect, Parameter, Stage};
+use super::{Effect, Parameter, Stage, ValueError};
 use metalith_made::Perturbation;
 
 /// Share of the light of a window that is spread over it.
@@ -21,6 +21,10 @@ impl Effect for StrayLight {
 
     fn parameters(&self) -> Vec<Parameter> {
         vec![Parameter::new(0.0, 0.6, 0.02)]
+    }
+
+    fn value_error(&self) -> ValueError {
+        ValueError::of_value(8e-3)
     }
 
     fn apply(&self, parameters: &[f64], to: &mut Perturbation) {

@@ -1,6 +1,6 @@
 //! The angle of incidence differs from the stated one, by the same angle for every capture.
 
-use super::{Effect, Parameter, Stage};
+use super::{Effect, Parameter, Stage, ValueError};
 use metalith_made::Perturbation;
 
 /// Added to the angle of incidence along x and y.
@@ -21,6 +21,10 @@ impl Effect for Tilt {
 
     fn parameters(&self) -> Vec<Parameter> {
         vec![Parameter::new(-40.0, 40.0, 3.0); 2]
+    }
+
+    fn value_error(&self) -> ValueError {
+        ValueError::of_value(1e-4)
     }
 
     fn apply(&self, parameters: &[f64], to: &mut Perturbation) {

@@ -1,6 +1,6 @@
 //! Light passes the aperture without interacting with pillars.
 
-use super::{Effect, Parameter, Stage};
+use super::{Effect, Parameter, Stage, ValueError};
 use crate::set::MeasuredSet;
 use metalith_made::Perturbation;
 
@@ -23,6 +23,10 @@ impl Effect for ZeroOrder {
     fn parameters(&self) -> Vec<Parameter> {
         // In phase with the incident wave and in quadrature: the path of that light is not known.
         vec![Parameter::new(-0.6, 0.6, 0.05); 2]
+    }
+
+    fn value_error(&self) -> ValueError {
+        ValueError::of_value(2e-3)
     }
 
     fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
