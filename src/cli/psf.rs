@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use metalith::camera::Camera;
-use metalith::cell::{CellStack, FittedCell, Handedness, PointwiseCell, PublishedCell, RotatedCell, cache_folder};
+use metalith::cell::{
+    CellStack, Fidelity, FittedCell, Handedness, PointwiseCell, PublishedCell, RotatedCell, cache_folder,
+};
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::grating::{Mapping, NeighbourCell};
 use metalith::rcwa::{CellLattice, Material};
@@ -265,12 +267,6 @@ impl PsfArgs {
     fn cell(&self, found: &Extraction) -> Result<Box<dyn CellModel>> {
         let stack = self.stack(found)?;
         if let Some(pillars) = found.shape.rectangles() {
-            if !matches!(self.fidelity, FidelityArg::Rigorous) {
-                return Err(Error::invalid(
-                    "rotated rectangles by another cell than the rigorous one",
-                    "add --fidelity rigorous: no other is made for rectangles",
-                ));
-            }
             return Ok(Box::new(RotatedCell::new(stack, pillars, self.arriving.into())));
         }
         if matches!(self.fidelity, FidelityArg::Published) {
@@ -363,15 +359,8 @@ fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
             "name a cell with elements of one kind by --top, or look at what is there with --extract-only --json",
         ));
     }
-    let squares_alone = matches!(args.fidelity, FidelityArg::Published | FidelityArg::Neighbours);
-    if squares_alone && args.model.is_none() && !args.extract_only && !kind.is_square() {
-        return Err(Error::invalid(
-            format!(
-                "{}: a hexagonal lattice by a cell that is made of square ones",
-                args.layout.display()
-            ),
-            "use --fidelity rigorous or fitted",
-        ));
+    if args.model.is_none() && !args.extract_only {
+        Fidelity::from(args.fidelity).check(found.shape, kind)?;
     }
     Ok(())
 }

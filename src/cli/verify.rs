@@ -108,9 +108,11 @@ impl Judging {
     /// How a layout of this design, at `path`, will be simulated; asked before work is spent.
     ///
     /// # Errors
-    /// If it could be neither simulated nor compared with its design.
+    /// If it could be neither simulated nor compared with its design, or its pillars cannot be judged by the cell.
     pub fn simulation(&self, design: &Design, path: &Path) -> Result<Simulation> {
-        let by_site = self.model.is_some() || self.fidelity(design) == Fidelity::Neighbours;
+        let fidelity = self.fidelity(design);
+        fidelity.check(design.cell.shape, design.cell.lattice)?;
+        let by_site = self.model.is_some() || fidelity == Fidelity::Neighbours;
         Simulation::choose(design, path, self.accuracy(), by_site, self.memory_mb)
     }
 

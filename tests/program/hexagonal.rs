@@ -241,6 +241,38 @@ fn what_knows_squares_alone_refuses_it_by_line_and_column() {
 }
 
 /// A picture behind the camera for its band: most of the light is in the image. Where it lands is tested in the crate of pictures.
+/// A cell that is made of square lattices is refused where it is asked for, before anything is written; left out, the best of
+/// the others judges.
+#[test]
+fn unlike_neighbours_are_refused_before_a_layout_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let asked = changed(&folder, &[("fidelity = \"rigorous\"", "fidelity = \"neighbours\"")]);
+    let line = 1 + fs::read_to_string(&asked)
+        .unwrap()
+        .lines()
+        .position(|l| l.starts_with("fidelity"))
+        .unwrap();
+    let out = folder.path().join("out");
+    let run = |path: &std::path::Path, flags: &[&str]| {
+        let output = metalith(&[&["run"], flags, &["--out"]].concat(), &[out.as_path(), path]);
+        (
+            output.status.code(),
+            String::from_utf8_lossy(&output.stderr).into_owned(),
+        )
+    };
+    let (code, said) = run(&asked, &[]);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains(&format!("hexagonal.toml:{line}:")), "{said}");
+    let (code, said) = run(&design("hexagonal_1550"), &["--fidelity", "neighbours"]);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(
+        said.contains("a hexagonal lattice by the `neighbours` cell") && !out.exists(),
+        "{said}"
+    );
+    let silent = changed(&folder, &[("fidelity = \"rigorous\"", "")]);
+    assert_eq!(Design::read_any(&silent).unwrap().verify.fidelity, Fidelity::Rigorous);
+}
+
 #[test]
 fn a_hexagonal_lens_takes_a_picture() {
     /// Share of the light that passes the lens in the windows of the kernels; 0.996 at full size.

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Error, LatticeKind, PillarShape, Progress, Result};
 
 use crate::{BandResponse, NeighbourResponse};
 
@@ -36,6 +36,37 @@ impl Fidelity {
         match self {
             Self::Neighbours => Self::Rigorous,
             other => other,
+        }
+    }
+
+    /// Why pillars of a shape on such a lattice cannot be judged by it, and what to do instead; none if they can.
+    pub fn refusal(self, shape: PillarShape, lattice: LatticeKind) -> Option<(String, &'static str)> {
+        let square_lattices_alone = matches!(self, Self::Published | Self::Neighbours);
+        let for_rectangles = matches!(self, Self::Rigorous | Self::Calibrated);
+        if shape.rectangles().is_some() && !for_rectangles {
+            Some((
+                format!("rectangular pillars by the `{self}` cell"),
+                "ask for `rigorous`, as `fidelity` in [verify] of a design or with --fidelity: no other is made for rectangles",
+            ))
+        } else if square_lattices_alone && !lattice.is_square() {
+            Some((
+                format!("a hexagonal lattice by the `{self}` cell"),
+                "ask for `rigorous` or `fitted`, as `fidelity` in [verify] of a design or with --fidelity: this one is made of \
+                 square lattices",
+            ))
+        } else {
+            None
+        }
+    }
+
+    /// Check that pillars of a shape on such a lattice can be judged by it.
+    ///
+    /// # Errors
+    /// If they cannot.
+    pub fn check(self, shape: PillarShape, lattice: LatticeKind) -> Result<()> {
+        match self.refusal(shape, lattice) {
+            Some((what, hint)) => Err(Error::invalid(what, hint)),
+            None => Ok(()),
         }
     }
 

@@ -119,23 +119,12 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
     wanted
         .iter()
         .map(|fidelity| -> Result<Box<dyn CellModel>> {
+            fidelity.check(design.cell.shape, design.cell.lattice)?;
             if let Some(pillars) = design.cell.shape.rectangles() {
-                return match fidelity {
-                    Fidelity::Rigorous => {
-                        let arriving = design.cell.arriving.unwrap_or_default();
-                        Ok(Box::new(RotatedCell::new(design.cell_stack()?, pillars, arriving)))
-                    }
-                    other => Err(Error::invalid(
-                        format!("rectangular pillars by the `{other}` cell"),
-                        "ask for `rigorous`, in [verify] of the design or with --fidelity: no other is made for rectangles",
-                    )),
-                };
+                let arriving = design.cell.arriving.unwrap_or_default();
+                return Ok(Box::new(RotatedCell::new(design.cell_stack()?, pillars, arriving)));
             }
             match fidelity {
-                Fidelity::Published | Fidelity::Neighbours if !design.cell.lattice.is_square() => Err(Error::invalid(
-                    format!("a hexagonal lattice by the `{fidelity}` cell"),
-                    "ask for `rigorous` or `fitted`: the other is made of square lattices",
-                )),
                 Fidelity::Published => Ok(Box::new(PublishedCell::new(design.cell.pitch_nm))),
                 Fidelity::Rigorous => {
                     let stack = design.cell_stack()?;

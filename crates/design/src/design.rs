@@ -101,7 +101,7 @@ impl Design {
         let array = ArraySpec::read(&array_section, &lens, &phase, &cell, &root.sections("element"));
         let mapping = MappingSpec::read(&root.section("mapping"), &cell, &array);
         let layout = LayoutSpec::read(root, &lens, &array);
-        let verify = VerifySpec::read(&root.section("verify"));
+        let verify = VerifySpec::read(&root.section("verify"), &cell);
         check_directions(&array_section, &array, &verify);
         let optimise = OptimiseSpec::read(root.optional_section("optimise").as_ref());
         Ok(Self {

@@ -31,6 +31,8 @@ use metalith_verify::{SimulationCases, verify_layout, write_report};
 pub fn handoff(options: &HandoffOptions, progress: &dyn Progress) -> Result<Handoff> {
     let sources = Sources::read(options)?;
     fits(&sources.design, &sources.process)?;
+    let cell = &sources.design.cell;
+    judging(options, &sources).check(cell.shape, cell.lattice)?;
     let archive = archive_of(options);
     replaceable(&options.out, &archive)?;
     let new = WholeFolder::create(&options.out, &archive)?;
@@ -107,6 +109,15 @@ fn fill(
     Ok(contents.checks)
 }
 
+/// The cell of the pillars as drawn that judges, or that stands beside a chip as made: a compensated layout is right when it is
+/// made, not as it is drawn.
+fn judging(options: &HandoffOptions, sources: &Sources) -> Fidelity {
+    match &sources.model {
+        Some(_) => Fidelity::Rigorous,
+        None => options.fidelity.unwrap_or(sources.design.verify.fidelity),
+    }
+}
+
 /// Read the pillar layout back, simulate it, and put the report beside it.
 fn verification(
     files: &mut Listing,
@@ -117,11 +128,7 @@ fn verification(
     progress: &dyn Progress,
 ) -> Result<HandoffCheck> {
     let design = &sources.design;
-    // A compensated layout is right when it is made, not as it is drawn.
-    let judge = match &sources.model {
-        Some(_) => Fidelity::Rigorous,
-        None => options.fidelity.unwrap_or(design.verify.fidelity),
-    };
+    let judge = judging(options, sources);
     let mut wanted = vec![judge];
     // Polynomials in width and wavelength are of the paper's cell.
     if judge != Fidelity::Published && design.cell.is_of_the_paper() {

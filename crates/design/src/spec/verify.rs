@@ -7,6 +7,7 @@ use serde::Serialize;
 use metalith_cell::Fidelity;
 use metalith_core::document::{Limits, Section};
 
+use super::CellSpec;
 use super::lens::WAVELENGTH;
 
 /// What is simulated from the layout that was read back, and the limits it is held to.
@@ -77,7 +78,7 @@ pub struct LimitSpec {
 }
 
 impl VerifySpec {
-    pub(crate) fn read(s: &Section<'_, '_>) -> Self {
+    pub(crate) fn read(s: &Section<'_, '_>, cell: &CellSpec) -> Self {
         let wavelengths_nm = s.floats("wavelengths_nm", WAVELENGTH);
         if wavelengths_nm.is_empty() {
             s.fault(
@@ -108,16 +109,7 @@ impl VerifySpec {
         let spec = Self {
             wavelengths_um: wavelengths_nm.iter().map(|nm| nm * 1e-3).collect(),
             field_angles,
-            fidelity: s.choice(
-                "fidelity",
-                &[
-                    ("neighbours", Fidelity::Neighbours),
-                    ("rigorous", Fidelity::Rigorous),
-                    ("fitted", Fidelity::Fitted),
-                    ("published", Fidelity::Published),
-                ],
-                Some(Fidelity::Neighbours),
-            ),
+            fidelity: read_fidelity(s, cell),
             incidence: s.choice(
                 "incidence",
                 &[("normal", CellIncidence::Normal), ("as_lit", CellIncidence::AsLit)],
@@ -136,6 +128,25 @@ impl VerifySpec {
         s.finish();
         spec
     }
+}
+
+/// The cell that judges: the best that is made for such pillars if it is left out.
+fn read_fidelity(s: &Section<'_, '_>, cell: &CellSpec) -> Fidelity {
+    let best = match Fidelity::Neighbours.refusal(cell.shape, cell.lattice) {
+        None => Fidelity::Neighbours,
+        Some(_) => Fidelity::Rigorous,
+    };
+    let choices = [
+        ("neighbours", Fidelity::Neighbours),
+        ("rigorous", Fidelity::Rigorous),
+        ("fitted", Fidelity::Fitted),
+        ("published", Fidelity::Published),
+    ];
+    let fidelity = s.choice("fidelity", &choices, Some(best));
+    if let Some((what, hint)) = fidelity.refusal(cell.shape, cell.lattice) {
+        s.fault_given(&["cell.shape", "cell.lattice"], "fidelity", what, hint);
+    }
+    fidelity
 }
 
 impl LimitSpec {
