@@ -25,7 +25,7 @@ impl Effect for LedWidth {
     }
 
     fn value_error(&self) -> ValueError {
-        ValueError::of_typical(2e-3)
+        ValueError::of_typical(3e-3)
     }
 
     fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
