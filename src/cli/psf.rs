@@ -359,8 +359,11 @@ fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
             "name a cell with elements of one kind by --top, or look at what is there with --extract-only --json",
         ));
     }
-    if args.model.is_none() && !args.extract_only {
-        Fidelity::from(args.fidelity).check(found.shape, kind)?;
+    if args.model.is_none()
+        && !args.extract_only
+        && let Some((what, hint)) = Fidelity::from(args.fidelity).refusal(found.shape, kind)
+    {
+        return Err(Error::invalid(format!("{}: {what}", args.layout.display()), hint));
     }
     Ok(())
 }

@@ -240,7 +240,6 @@ fn what_knows_squares_alone_refuses_it_by_line_and_column() {
     assert!(!out.exists(), "it left something behind");
 }
 
-/// A picture behind the camera for its band: most of the light is in the image. Where it lands is tested in the crate of pictures.
 /// A cell that is made of square lattices is refused where it is asked for, before anything is written; left out, the best of
 /// the others judges.
 #[test]
@@ -273,6 +272,7 @@ fn unlike_neighbours_are_refused_before_a_layout_is_written() {
     assert_eq!(Design::read_any(&silent).unwrap().verify.fidelity, Fidelity::Rigorous);
 }
 
+/// A picture behind the camera for its band: most of the light is in the image. Where it lands is tested in the crate of pictures.
 #[test]
 fn a_hexagonal_lens_takes_a_picture() {
     /// Share of the light that passes the lens in the windows of the kernels; 0.996 at full size.
