@@ -51,8 +51,8 @@ pub struct CalibrateArgs {
     #[arg(long, value_name = "N", requires = "validate")]
     nulls: Option<u64>,
 
-    /// Validate on a synthetic set with these effects alone, sizes in typical sizes: `cd_bias=1+film_index=-0.5`. May be given
-    /// several times.
+    /// Validate on a synthetic set with these effects alone, sizes in typical sizes: `cd_bias=1+film_index=-0.5`, or each number
+    /// of an effect: `tilt=1,-0.5`. May be given several times.
     #[arg(long, value_name = "EFFECTS", requires = "validate")]
     trial: Vec<String>,
 

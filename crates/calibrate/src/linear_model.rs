@@ -12,7 +12,7 @@ use crate::effects::Parameter;
 use crate::fit::{CaptureSetup, Data, FitProblem};
 use crate::forward_model::{ForwardModel, PATH_TERMS, ParameterPoint, Slot, SmoothTerm};
 use crate::optics::{Optic, PixelGrid};
-use crate::set::PerCapture;
+use crate::set::{CaptureIndex, PerCapture};
 use crate::surrogate::Surrogate;
 
 /// Edge of the window, and of its pixels one: pixels are 1 um wide.
@@ -48,9 +48,19 @@ impl Term {
     }
 }
 
+/// What two terms change together and neither alone: the product of their parameters, on one pattern.
+#[derive(Clone, Copy)]
+pub struct Product {
+    pub terms: [usize; 2],
+    pub periods: [u32; 2],
+    /// Amplitude for parameters of one; its sign is the other in every second element.
+    pub factor: f64,
+}
+
 /// The model.
 pub struct LinearModel {
     terms: Vec<Term>,
+    products: Vec<Product>,
     slots: Vec<Slot>,
     beam: PerCapture<CaptureSetup>,
 }
@@ -78,8 +88,19 @@ impl LinearModel {
         Self {
             slots: slots.collect(),
             terms,
+            products: Vec::new(),
             beam: beam.into(),
         }
+    }
+
+    /// The first two terms are the numbers of one effect, which do not merely add.
+    #[must_use]
+    pub fn with_first_two_joined(mut self, product: Product) -> Self {
+        self.products.push(product);
+        for (s, slot) in self.slots.iter_mut().enumerate().skip(1) {
+            (slot.effect, slot.index) = (s - 1, usize::from(s == 1));
+        }
+        self
     }
 
     /// The surrogate about zero, with smooth terms.
@@ -94,7 +115,8 @@ impl LinearModel {
         let mut rng = ChaCha8Rng::seed_from_u64(noise.unwrap_or(0));
         let sigma = if noise.is_some() { SIGMA } else { 0.0 };
         let pixels = (0..self.beam.len()).map(|c| {
-            let image = self.image(&ParameterPoint::new(theta(c))).pixels([0.0; 2]);
+            let own = &self.beam[CaptureIndex::from(c)];
+            let image = self.image(&ParameterPoint::new(theta(c)), own).pixels([0.0; 2]);
             image.mapv(|v| (SCALE * f64::from(v) + sigma * normal(&mut rng)) as f32)
         });
         let signal: PerCapture<_> = pixels.collect::<Vec<_>>().into();
@@ -117,12 +139,25 @@ impl LinearModel {
         FitProblem::new(self, self.surrogate(), data)
     }
 
-    /// Image of every capture at a point.
-    pub fn image(&self, point: &ParameterPoint) -> PixelGrid {
+    /// Image of a capture at a point.
+    pub fn image(&self, point: &ParameterPoint, capture: &CaptureSetup) -> PixelGrid {
         let mut waves = vec![([1, 0], BASE_CONTRAST), ([0, 1], BASE_CONTRAST)];
         for (term, theta) in self.terms.iter().zip(&point.theta) {
             let amplitude = (term.amplitude)(*theta);
             waves.extend(term.patterns.iter().map(|(p, factor)| (*p, factor * amplitude)));
+        }
+        for Product {
+            terms: [a, b],
+            periods,
+            factor,
+        } in &self.products
+        {
+            let sign = if usize::from(capture.element) % 2 == 0 {
+                1.0
+            } else {
+                -1.0
+            };
+            waves.push((*periods, sign * factor * point.theta[*a] * point.theta[*b]));
         }
         match point.smooth {
             Some(SmoothTerm::Path(k)) => waves.push((smooth_periods(k), SMOOTH_STEP)),
@@ -191,7 +226,7 @@ pub fn beams(leds: usize, elements: usize, distances: usize) -> Vec<CaptureSetup
 
 impl ForwardModel for LinearModel {
     fn effects(&self) -> usize {
-        self.terms.len()
+        self.slots.last().map_or(0, |slot| slot.effect + 1)
     }
 
     fn slots(&self) -> &[Slot] {
@@ -211,7 +246,10 @@ impl ForwardModel for LinearModel {
     }
 
     fn images(&self, points: &[ParameterPoint], _: &dyn Progress) -> Result<Vec<PerCapture<PixelGrid>>> {
-        let images = points.iter().map(|p| vec![self.image(p); self.beam.len()].into());
+        let images = points.iter().map(|p| match self.products.is_empty() {
+            true => vec![self.image(p, &self.beam[CaptureIndex::from(0)]); self.beam.len()].into(),
+            false => self.beam.iter().map(|own| self.image(p, own)).collect(),
+        });
         Ok(images.collect())
     }
 

@@ -6,6 +6,7 @@ use metalith_core::{Progress, Result};
 use super::alternatives::{Alternative, alternatives, drop_redundant};
 use super::exchange::{find_exchange, much_alike};
 use super::pairs::find_pair;
+use super::recentred_leaders::find_beside_leader;
 use super::state::SearchState;
 use super::stepwise::{LEAST_GAIN, RESIDUAL, Rejection, TriedEffect, step_forward};
 use crate::fit::{Fit, FitProblem, HeldOutErrors, WidthParts, half_widths, mean_error};
@@ -162,7 +163,10 @@ fn add_effects(
                 break;
             }
             let pair = match history.chosen.len() + 2 <= MOST_EFFECTS {
-                true => find_pair(now, &history.chosen, full, progress)?,
+                true => match find_pair(now, &history.chosen, full, progress)? {
+                    None if full => find_beside_leader(now, &history.chosen, progress)?,
+                    pair => pair,
+                },
                 false => None,
             };
             if let Some(pair) = pair {

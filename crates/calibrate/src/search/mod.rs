@@ -9,6 +9,7 @@ mod evidence;
 mod exchange;
 mod pairs;
 mod patterns;
+mod recentred_leaders;
 mod refinement;
 mod signatures;
 mod state;

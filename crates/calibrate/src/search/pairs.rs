@@ -89,23 +89,12 @@ pub fn find_pair<'a>(
         if full {
             state.refine(progress)?;
         }
-        let both = pair.map(|effect| {
-            let mut candidate = Candidate::new(effect, score);
-            let SearchState { problem, fit, held_out } = &state;
-            candidate.judge(problem, fit.clone(), held_out.clone(), &now.held_out);
-            candidate
-        });
-        let whole = state.error() - 1.0 < LEAST_LEFT.max(MAY_LEAVE * above_noise);
-        let sound = both.iter().all(|c| c.fault(&state.problem, &now.held_out).is_none());
-        let parameters = state.fit.active.len() - now.fit.active.len();
-        let gain = now.error() - state.error();
         let is_better = best.as_ref().is_none_or(|b| state.error() < b.state.error());
-        if whole && sound && is_better && gain > null_gain(&now.problem, &now.fit, &now.held_out, parameters) {
+        if let Some(tried) = sound(now, &state, pair.map(|effect| (effect, score)))
+            && is_better
+        {
             best = Some(FoundPair {
-                tried: both.map(|c| TriedEffect {
-                    rejected: None,
-                    ..c.tried
-                }),
+                tried,
                 state,
                 // Effects that explain as much in the place of either are found as alternatives.
                 runners_up: runners_up.clone(),
@@ -113,4 +102,25 @@ pub fn find_pair<'a>(
         }
     }
     Ok(best)
+}
+
+/// Two effects as they were tried, each with its score, if both are sound and together leave next to nothing of what `now` leaves.
+pub fn sound(now: &SearchState<'_>, state: &SearchState<'_>, both: [(usize, f64); 2]) -> Option<[TriedEffect; 2]> {
+    let SearchState { problem, fit, held_out } = state;
+    let both = both.map(|(effect, score)| {
+        let mut candidate = Candidate::new(effect, score);
+        candidate.judge(problem, fit.clone(), held_out.clone(), &now.held_out);
+        candidate
+    });
+    let is_whole = state.error() - 1.0 < LEAST_LEFT.max(MAY_LEAVE * (now.error() - 1.0));
+    let is_sound = both.iter().all(|c| c.fault(problem, &now.held_out).is_none());
+    let parameters = fit.active.len() - now.fit.active.len();
+    let gain = now.error() - state.error();
+    let is_found = is_whole && is_sound && gain > null_gain(&now.problem, &now.fit, &now.held_out, parameters);
+    is_found.then(|| {
+        both.map(|c| TriedEffect {
+            rejected: None,
+            ..c.tried
+        })
+    })
 }

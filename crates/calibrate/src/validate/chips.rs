@@ -109,12 +109,31 @@ pub fn of_text(effects: &[&dyn Effect], text: &str) -> Result<SyntheticChip> {
         if parts.iter().any(|(known, _)| known == name) {
             return Err(wrong(format!("`{name}` stands twice"), "name each effect once".into()));
         }
-        let form = || "write effects and their sizes in typical sizes, as in `cd_bias=1+film_index=-0.5`".to_owned();
-        let size: f64 = match size.parse() {
-            Ok(size) if f64::is_finite(size) && size != 0.0 => size,
-            _ => return Err(wrong(format!("`{size}` is no size"), form())),
+        let form = || {
+            "write effects and their sizes in typical sizes, as in `cd_bias=1+film_index=-0.5`, or each number of an effect, as in \
+             `tilt=1,-0.5`"
+                .to_owned()
         };
-        let own = numbers(effect.parameters(), size);
+        let parse = |text: &str| match text.trim().parse() {
+            Ok(size) if f64::is_finite(size) => Ok(size),
+            _ => Err(wrong(format!("`{text}` is no size"), form())),
+        };
+        let sizes = size.split(',').map(parse).collect::<Result<Vec<f64>>>()?;
+        if sizes.iter().all(|s| *s == 0.0) {
+            return Err(wrong(format!("`{size}` is no size"), form()));
+        }
+        let parameters = effect.parameters();
+        let own = match sizes.as_slice() {
+            [size] => numbers(parameters, *size),
+            each if each.len() == parameters.len() => parameters.iter().zip(each).map(|(p, s)| s * p.typical).collect(),
+            each => {
+                let (has, stand) = (parameters.len(), each.len());
+                return Err(wrong(
+                    format!("`{name}` has {has} numbers, and {stand} stand there"),
+                    form(),
+                ));
+            }
+        };
         for (p, number) in effect.parameters().iter().zip(&own) {
             if !(p.range.0..=p.range.1).contains(number) {
                 let (low, high) = (p.range.0 / p.typical, p.range.1 / p.typical);
@@ -127,7 +146,7 @@ pub fn of_text(effects: &[&dyn Effect], text: &str) -> Result<SyntheticChip> {
                 ));
             }
         }
-        first.get_or_insert(size);
+        first.get_or_insert(sizes[0]);
         parts.push((effect.name(), own));
     }
     Ok(SyntheticChip::of(first.unwrap_or(0.0), parts))
@@ -203,7 +222,11 @@ mod tests {
                 ("tilt".to_owned(), vec![3.0, -0.6 * 3.0])
             ]
         );
+        let each = of_text(&effects, "tilt=-1, 0.5+cd_bias=1").unwrap();
+        assert_eq!((each.size, &each.parts[0].1), (-1.0, &vec![-3.0, 1.5]));
         for (text, what) in [
+            ("cd_bias=1,2", "has 1 numbers, and 2 stand there"),
+            ("tilt=0,0", "`0,0` is no size"),
             ("cd_bais=1", "no effect `cd_bais`"),
             ("cd_bias=big", "`big` is no size"),
             ("cd_bias=1+cd_bias=2", "stands twice"),

@@ -1,0 +1,103 @@
+//! Recentred leaders: an effect whose fit explains much of what is fitted and predicts nothing of what is left out.
+//!
+//! On a surrogate, numbers add. Where they do not (the two slopes of a tilted sensor far from none), the surrogate is at fault and
+//! not the effect: all is simulated anew about its fit, and one more effect is looked for on top of it.
+
+use metalith_core::{Progress, Result};
+
+use super::pairs::{FoundPair, sound};
+use super::signatures::score_effects;
+use super::state::SearchState;
+use super::stepwise::{SelectionStep, fit_with, step_forward};
+use crate::fit::Fit;
+
+/// Single effects that are fitted, by what their signatures explain.
+const FITTED: usize = 6;
+
+/// Those of them that are simulated anew.
+const FOLLOWED: usize = 2;
+
+/// Share of the chi-square above noise, of captures that are fitted, that such an effect explains at least.
+const EXPLAINS: f64 = 0.5;
+
+/// An effect that explains much of what is fitted, with one more that explains the rest; only if both together are sound.
+///
+/// # Errors
+/// If a simulation fails, or the user stopped it.
+pub fn find_beside_leader<'a>(
+    now: &SearchState<'a>,
+    chosen: &[usize],
+    progress: &dyn Progress,
+) -> Result<Option<FoundPair<'a>>> {
+    let problem = &now.problem;
+    let above_noise = |fit: &Fit| fit.chi2 - problem.pixels();
+    let leaders = score_effects(problem, &now.fit, chosen).into_iter().take(FITTED);
+    let mut leaders: Vec<(usize, f64, Fit)> = leaders
+        .filter_map(|(effect, score)| Some((effect, score, fit_with(problem, &now.fit, chosen, &[effect])?)))
+        .filter(|(_, _, fit)| above_noise(fit) < (1.0 - EXPLAINS) * above_noise(&now.fit))
+        .collect();
+    leaders.sort_by(|a, b| a.2.chi2.total_cmp(&b.2.chi2));
+    leaders.truncate(FOLLOWED);
+    let runners_up: Vec<usize> = leaders.iter().map(|l| l.0).collect();
+    for (effect, score, fit) in leaders {
+        let mut state = now.clone();
+        state.fit = fit;
+        state.recentre(progress)?;
+        state.refine(progress)?;
+        let both = [chosen, &[effect]].concat();
+        let step = step_forward(&mut state, &both, true, progress)?;
+        let SelectionStep {
+            leaders,
+            taken: Some((taken, fit, held)),
+            ..
+        } = step
+        else {
+            continue;
+        };
+        (state.fit, state.held_out) = (fit, held);
+        state.refine(progress)?;
+        let of_both = [(effect, score), (taken.effect, taken.score)];
+        if let Some(tried) = sound(now, &state, of_both) {
+            return Ok(Some(FoundPair {
+                tried,
+                state,
+                runners_up: [runners_up, leaders].concat(),
+            }));
+        }
+    }
+    Ok(None)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::attribution::attribute;
+    use super::super::pairs::find_pair;
+    use super::*;
+    use crate::linear_model::{LinearModel, Product, Term, beams};
+    use metalith_core::Silent;
+
+    /// The first number of the joined effect acts three times as strongly in one element as it would alone, and backwards in the
+    /// other: what is fitted to one predicts nothing of the other.
+    #[test]
+    fn an_effect_whose_numbers_do_not_add_is_found_with_another() {
+        let periods = [[2, 3], [5, 4], [3, 0], [0, 6]];
+        let own = Product {
+            terms: [0, 1],
+            periods: [2, 3],
+            factor: 17.0,
+        };
+        let model = LinearModel::new(periods.map(Term::linear).to_vec(), beams(2, 2, 2)).with_first_two_joined(own);
+        let truth = [0.05, 0.12, 0.0, 0.03];
+        let data = model.data(|_| truth.to_vec(), Some(3));
+        let mut state = SearchState::new(model.problem(&data), model.problem(&data).nuisance_fit());
+        let step = step_forward(&mut state, &[], true, &Silent).unwrap();
+        assert!(step.taken.is_none());
+        assert!(find_pair(&state, &[], true, &Silent).unwrap().is_none());
+        let found = attribute(model.problem(&data), true, &Silent).unwrap();
+        assert_eq!(found.chosen, [0, 2]);
+        for (k, slot) in found.after.active.iter().enumerate() {
+            let error = found.after.theta[*slot] - truth[*slot];
+            assert!(error.abs() < found.half_widths[k].half_width(), "{slot}: {error}");
+        }
+    }
+}
