@@ -2,7 +2,7 @@
 //! `cargo run --release --example shapes -- 17 25`.
 //!
 //! One line of JSON for each number of orders: all cases of [`CIRCLES`] at five diameters on both lattices, all of
-//! [`RECTANGLES`] at five angles, along the normal.
+//! [`RECTANGLES`] at five angles, and these with [`OTHER_SIZES`] at angles of [`SLOPES`], along the normal.
 
 use metalith::cell::{CellStack, Material, RotatedRectangle};
 use metalith::rcwa::{CellLattice, Orders};
@@ -32,6 +32,21 @@ const RECTANGLES: [(&str, f64, f64, f64, f64, f64); 6] = [
 /// Angles of the rectangles (degrees).
 const ANGLES: [f64; 5] = [10.0, 30.0, 45.0, 70.0, 110.0];
 
+/// Another width and length for each of [`RECTANGLES`] (nm).
+const OTHER_SIZES: [(f64, f64); 6] = [
+    (90.0, 200.0),
+    (180.0, 260.0),
+    (70.0, 280.0),
+    (120.0, 170.0),
+    (160.0, 300.0),
+    (300.0, 520.0),
+];
+
+/// Slopes of axes along which pillars repeat at the square root of 1, 2 and 5 pitches, as rise and run: there rectangles are
+/// parallel to the edges of a larger square cell, which codes without rotated shapes can solve too. The last for
+/// [`RECTANGLES`] alone.
+const SLOPES: [(u32, u32); 3] = [(0, 1), (1, 1), (1, 2)];
+
 fn stack(film: &str, pitch: f64, height: f64) -> Result<CellStack> {
     Ok(CellStack {
         film: Material::named(film)?,
@@ -53,6 +68,22 @@ fn point(stack: &CellStack, wavelength: f64, shape: &str, jones: [[Complex64; 2]
         stack.substrate.index(wavelength)?.re,
         entries.collect::<Vec<_>>().join(", ")
     ))
+}
+
+/// The Jones matrix of a rectangle of this width and length (nm).
+fn rectangle(
+    stack: &CellStack,
+    wavelength: f64,
+    (width_nm, length_nm): (f64, f64),
+    degrees: f64,
+    orders: Orders,
+) -> Result<[[Complex64; 2]; 2]> {
+    let pillar = RotatedRectangle {
+        width_nm,
+        length_nm,
+        rotation: degrees.to_radians(),
+    };
+    stack.jones(&pillar, wavelength, [0.0; 2], orders)
 }
 
 fn main() -> Result<()> {
@@ -79,16 +110,22 @@ fn main() -> Result<()> {
                 }
             }
         }
-        for (film, pitch, height, wavelength, width_nm, length_nm) in RECTANGLES {
+        for (film, pitch, height, wavelength, width, length) in RECTANGLES {
             let stack = stack(film, pitch, height)?;
             for degrees in ANGLES {
-                let pillar = RotatedRectangle {
-                    width_nm,
-                    length_nm,
-                    rotation: degrees.to_radians(),
-                };
-                let jones = stack.jones(&pillar, wavelength, [0.0; 2], orders)?;
-                let shape = format!("\"size\": [{width_nm}, {length_nm}], \"degrees\": {degrees}");
+                let jones = rectangle(&stack, wavelength, (width, length), degrees, orders)?;
+                let shape = format!("\"size\": [{width}, {length}], \"degrees\": {degrees}");
+                points.push(point(&stack, wavelength, &shape, jones)?);
+            }
+        }
+        for ((film, pitch, height, wavelength, width, length), other) in RECTANGLES.into_iter().zip(OTHER_SIZES) {
+            let stack = stack(film, pitch, height)?;
+            let of_other = SLOPES[..2].iter().map(|slope| (other, slope));
+            for ((width, length), (rise, run)) in SLOPES.iter().map(|s| ((width, length), s)).chain(of_other) {
+                let degrees = f64::from(*rise).atan2(f64::from(*run)).to_degrees();
+                let jones = rectangle(&stack, wavelength, (width, length), degrees, orders)?;
+                let shape =
+                    format!("\"size\": [{width}, {length}], \"degrees\": {degrees}, \"slope\": [{rise}, {run}]");
                 points.push(point(&stack, wavelength, &shape, jones)?);
             }
         }

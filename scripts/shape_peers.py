@@ -1,14 +1,18 @@
-"""Cells of circles, on a square and on a hexagonal lattice, and of rotated rectangles: ours beside fmmax, which solves the
-same cells by an independent code. With 17 orders an axis that takes seven CPU seconds a point; `--every 3` asks for each third.
+"""Cells of circles, on a square and on a hexagonal lattice, and of rotated rectangles: ours beside fmmax and meent, which solve the
+same cells by independent codes. With 17 orders an axis that takes seven CPU seconds a point; `--every 3` asks for each third.
 
-usage: python scripts/shape_peers.py [--shape circle hexagonal rectangle] [--ours 13 17 21 25 33] [--peer 13 17] [--formulation JONES_DIRECT] [--every 1]
-needs: pip install fmmax
+usage: python scripts/shape_peers.py [--shape circle hexagonal rectangle aligned] [--ours 13 17 21 25 33] [--peer 13 17] [--formulation JONES_DIRECT] [--every 1]
+needs: pip install fmmax meent
 
 Thirty points of each kind: silicon nitride, titanium dioxide and amorphous silicon, 455 to 1550 nm; circles of five diameters,
 rectangles at five angles. Answers are Jones matrices of the zero order, field above the pillar over arriving field at its foot;
 the distance of two is that of the entries farthest apart. All rows are held to ours with the most orders, to which both codes
 should come as orders are added; what the peer keeps of a distance is its grid, of 1600 x 1600 places that are inside or not; on a hexagonal lattice along its two vectors, with as many orders as a square
 lattice has, in a circle.
+
+`aligned` asks meent, which takes rectangles along the axes only, and takes them exactly: turned by 0, 45 or 26.57 degrees, pillars
+repeat along their own edges at the square root of 1, 2 or 5 pitches, and a larger square cell holds 1, 2 or 5 of them. Orders are for
+each pitch, in larger cells as many more.
 """
 import argparse
 import json
@@ -19,7 +23,7 @@ import time
 
 GRID = 1600
 GOAL = 0.005
-KINDS = ["circle", "hexagonal", "rectangle"]
+KINDS = ["circle", "hexagonal", "rectangle", "aligned"]
 
 
 def raster(point, inside):
@@ -79,6 +83,43 @@ def peer(point, along, formulation):
     return (leaving @ np.linalg.inv(arriving)).ravel().tolist()
 
 
+def aligned_peer(point, along):
+    import meent
+    import numpy as np
+
+    rise, run = point["slope"]
+    pillars = rise**2 + run**2
+    period = point["pitch"] * pillars**0.5
+    # The other sign of time: indices and answers are conjugated.
+    film = complex(*point["film"]).conjugate()
+
+    def parts(middle, length):
+        """Of an interval that may reach over the border of the cell: middle and length of each part."""
+        low, high = middle - length / 2, middle + length / 2
+        ends = [(low, high)]
+        if low < 0:
+            ends = [(0, high), (low + period, period)]
+        elif high > period:
+            ends = [(low, period), (0, high - period)]
+        return [((a + b) / 2, b - a) for a, b in ends]
+
+    middles = [((0.5 + rise * k / pillars) % 1 * period, (0.5 + run * k / pillars) % 1 * period) for k in range(pillars)]
+    width, length = point["size"]
+    rectangles = [["rectangle", x, y, w, l, film] for mx, my in middles for x, w in parts(mx, width) for y, l in parts(my, length)]
+    highest = round((along * pillars**0.5 - 1) / 2)
+    # Half of the light along each edge: one solution for both.
+    solver = meent.call_mee(backend=0, n_top=point["below"], n_bot=1.0, theta=0.0, phi=0.0, psi=np.pi / 4, fto=[highest, highest],
+                            period=[period, period], wavelength=point["wavelength"], thickness=[point["height"]],
+                            ucell=[[1.0, rectangles]])
+    found = solver.conv_solve().res
+    zero = lambda table: complex(table[table.shape[0] // 2, table.shape[1] // 2]) * 2**0.5
+    # Of a bare layer both are the closed form: s as it is, p a quarter of a turn ahead.
+    across, over = zero(np.asarray(found.T_p) / 1j).conjugate(), zero(np.asarray(found.T_s)).conjugate()
+    angle = np.arctan2(rise, run)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return (turn @ np.diag([across, over]) @ turn.T).ravel().tolist()
+
+
 def ours(orders):
     root = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     command = ["cargo", "run", "--release", "--quiet", "--example", "shapes", "--"]
@@ -89,22 +130,24 @@ def ours(orders):
 
 
 def compare(shape, found, options):
-    kind = lambda p: "rectangle" if "size" in p else "hexagonal" if p["hexagonal"] else "circle"
+    kind = lambda p: "aligned" if "slope" in p else "rectangle" if "size" in p else "hexagonal" if p["hexagonal"] else "circle"
     keep = [k for k, p in enumerate(next(iter(found.values()))) if kind(p) == shape][options.first :: options.every]
     points = [next(iter(found.values()))[k] for k in keep]
     rows = [(f"ours, {n}", [[complex(*t) for t in found[n][k]["jones"]] for k in keep]) for n in options.ours]
+    code = "meent" if shape == "aligned" else "fmmax"
     for along in options.peer:
         begin = time.process_time()
-        rows.append((f"fmmax, {along}", [peer(point, along, options.formulation) for point in points]))
-        print(f"fmmax with {along} x {along} orders: {time.process_time() - begin:.0f} CPU s", flush=True)
+        solve = aligned_peer if shape == "aligned" else lambda point, along: peer(point, along, options.formulation)
+        rows.append((f"{code}, {along}", [solve(point, along) for point in points]))
+        print(f"{code} with {along} x {along} orders: {time.process_time() - begin:.0f} CPU s", flush=True)
     if len(options.peer) > 1:
         # What series leave out falls as one over the square of the orders an axis, nearly: where two of them would end.
         (low, before), (high, after) = zip(options.peer[-2:], [values for _, values in rows[-2:]])
         weight = 1 / ((high / low) ** 2 - 1)
         end = [[b + weight * (b - a) for a, b in zip(*both)] for both in zip(before, after)]
-        rows.append((f"fmmax, {low} and {high} carried on", end))
+        rows.append((f"{code}, {low} and {high} carried on", end))
     reference = rows[len(options.ours) - 1]
-    title = {"circle": "circles", "hexagonal": "circles, hexagonal", "rectangle": "rectangles"}[shape] + ", orders an axis"
+    title = {"circle": "circles", "hexagonal": "circles, hexagonal", "rectangle": "rectangles", "aligned": "rectangles along a larger cell"}[shape] + ", orders an axis"
     far = lambda a, b: max(abs(x - y) for x, y in zip(a, b))
     print(f"\n{title:<34}{'rms':>9}{'median':>9}{'worst':>9}{'within':>9}   "
           f"distance from {reference[0]}; how many of {len(points)} within {GOAL}")

@@ -6,7 +6,7 @@ use metalith_core::{Progress, Result};
 use super::alternatives::{Alternative, alternatives, drop_redundant};
 use super::exchange::{find_exchange, much_alike};
 use super::pairs::find_pair;
-use super::recentred_leaders::find_beside_leader;
+use super::recentred_leaders::follow_leaders_anew;
 use super::state::SearchState;
 use super::stepwise::{LEAST_GAIN, RESIDUAL, Rejection, TriedEffect, step_forward};
 use crate::fit::{Fit, FitProblem, HeldOutErrors, WidthParts, half_widths, mean_error};
@@ -162,18 +162,18 @@ fn add_effects(
             if now.error() <= RESIDUAL {
                 break;
             }
-            let pair = match history.chosen.len() + 2 <= MOST_EFFECTS {
+            let together = match history.chosen.len() + 2 <= MOST_EFFECTS {
                 true => match find_pair(now, &history.chosen, full, progress)? {
-                    None if full => find_beside_leader(now, &history.chosen, progress)?,
+                    None if full => follow_leaders_anew(now, &history.chosen, progress)?,
                     pair => pair,
                 },
                 false => None,
             };
-            if let Some(pair) = pair {
-                for tried in &pair.tried {
-                    history.take(tried, pair.runners_up.clone(), Vec::new());
+            if let Some(found) = together {
+                for tried in &found.tried {
+                    history.take(tried, found.runners_up.clone(), Vec::new());
                 }
-                *now = pair.state;
+                *now = found.state;
             } else {
                 let (chosen, alike) = (&history.chosen, &history.alike);
                 let Some(found) = find_exchange(now, chosen, alike, full, progress)? else {

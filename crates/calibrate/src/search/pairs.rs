@@ -26,11 +26,11 @@ const MAY_LEAVE: f64 = 0.05;
 /// And the reduced chi-square per pixel that it may leave where the error is small.
 const LEAST_LEFT: f64 = 0.05;
 
-/// A pair that explains a residual.
-pub struct FoundPair<'a> {
-    pub tried: [TriedEffect; 2],
+/// Effects that explain a residual together, or one that only a surrogate about its own fit shows.
+pub struct FoundTogether<'a> {
+    pub tried: Vec<TriedEffect>,
     pub state: SearchState<'a>,
-    /// Effects of all pairs that were fitted.
+    /// All effects that were fitted.
     pub runners_up: Vec<usize>,
 }
 
@@ -44,7 +44,7 @@ pub fn find_pair<'a>(
     chosen: &[usize],
     full: bool,
     progress: &dyn Progress,
-) -> Result<Option<FoundPair<'a>>> {
+) -> Result<Option<FoundTogether<'a>>> {
     let problem = &now.problem;
     let above_noise = now.error() - 1.0;
     let mut fits = Vec::new();
@@ -67,10 +67,10 @@ pub fn find_pair<'a>(
         slots.iter().any(|&s| problem.model.is_dear_beside(&fit.theta, s))
     };
     fits.sort_by_key(|(pair, _, fit, _)| is_dear(pair, fit));
-    let mut best: Option<FoundPair<'a>> = None;
+    let mut best: Option<FoundTogether<'a>> = None;
     for (pair, score, fit, held) in fits {
-        let may_leave = |found: &FoundPair<'_>| {
-            let FoundPair { state, .. } = found;
+        let may_leave = |found: &FoundTogether<'_>| {
+            let FoundTogether { state, .. } = found;
             let of_model = change_energy(&state.problem, &state.fit) / state.problem.pixels().max(1.0);
             LEAST_GAIN + if is_dear(&pair, &fit) { of_model } else { 0.0 }
         };
@@ -90,10 +90,10 @@ pub fn find_pair<'a>(
             state.refine(progress)?;
         }
         let is_better = best.as_ref().is_none_or(|b| state.error() < b.state.error());
-        if let Some(tried) = sound(now, &state, pair.map(|effect| (effect, score)))
+        if let Some(tried) = sound(now, &state, &pair.map(|effect| (effect, score)))
             && is_better
         {
-            best = Some(FoundPair {
+            best = Some(FoundTogether {
                 tried,
                 state,
                 // Effects that explain as much in the place of either are found as alternatives.
@@ -104,23 +104,25 @@ pub fn find_pair<'a>(
     Ok(best)
 }
 
-/// Two effects as they were tried, each with its score, if both are sound and together leave next to nothing of what `now` leaves.
-pub fn sound(now: &SearchState<'_>, state: &SearchState<'_>, both: [(usize, f64); 2]) -> Option<[TriedEffect; 2]> {
+/// Effects as they were tried, each with its score, if all are sound and together leave next to nothing of what `now` leaves.
+pub fn sound(now: &SearchState<'_>, state: &SearchState<'_>, effects: &[(usize, f64)]) -> Option<Vec<TriedEffect>> {
     let SearchState { problem, fit, held_out } = state;
-    let both = both.map(|(effect, score)| {
-        let mut candidate = Candidate::new(effect, score);
+    let candidates = effects.iter().map(|(effect, score)| {
+        let mut candidate = Candidate::new(*effect, *score);
         candidate.judge(problem, fit.clone(), held_out.clone(), &now.held_out);
         candidate
     });
+    let candidates: Vec<Candidate> = candidates.collect();
     let is_whole = state.error() - 1.0 < LEAST_LEFT.max(MAY_LEAVE * (now.error() - 1.0));
-    let is_sound = both.iter().all(|c| c.fault(problem, &now.held_out).is_none());
+    let is_sound = candidates.iter().all(|c| c.fault(problem, &now.held_out).is_none());
     let parameters = fit.active.len() - now.fit.active.len();
     let gain = now.error() - state.error();
     let is_found = is_whole && is_sound && gain > null_gain(&now.problem, &now.fit, &now.held_out, parameters);
     is_found.then(|| {
-        both.map(|c| TriedEffect {
+        let tried = candidates.into_iter().map(|c| TriedEffect {
             rejected: None,
             ..c.tried
-        })
+        });
+        tried.collect()
     })
 }

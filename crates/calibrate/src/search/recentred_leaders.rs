@@ -1,14 +1,15 @@
 //! Recentred leaders: an effect whose fit explains much of what is fitted and predicts nothing of what is left out.
 //!
 //! On a surrogate, numbers add. Where they do not (the two slopes of a tilted sensor far from none), the surrogate is at fault and
-//! not the effect: all is simulated anew about its fit, and one more effect is looked for on top of it.
+//! not the effect: all is simulated anew about its fit. If it explains the residual there it is taken, and otherwise one more effect is
+//! looked for on top of it.
 
 use metalith_core::{Progress, Result};
 
-use super::pairs::{FoundPair, sound};
+use super::pairs::{FoundTogether, sound};
 use super::signatures::score_effects;
 use super::state::SearchState;
-use super::stepwise::{SelectionStep, fit_with, step_forward};
+use super::stepwise::{fit_with, step_forward};
 use crate::fit::Fit;
 
 /// Single effects that are fitted, by what their signatures explain.
@@ -20,15 +21,15 @@ const FOLLOWED: usize = 2;
 /// Share of the chi-square above noise, of captures that are fitted, that such an effect explains at least.
 const EXPLAINS: f64 = 0.5;
 
-/// An effect that explains much of what is fitted, with one more that explains the rest; only if both together are sound.
+/// An effect that explains much of what is fitted, alone or with one more that explains the rest; only if what is taken is sound.
 ///
 /// # Errors
 /// If a simulation fails, or the user stopped it.
-pub fn find_beside_leader<'a>(
+pub fn follow_leaders_anew<'a>(
     now: &SearchState<'a>,
     chosen: &[usize],
     progress: &dyn Progress,
-) -> Result<Option<FoundPair<'a>>> {
+) -> Result<Option<FoundTogether<'a>>> {
     let problem = &now.problem;
     let above_noise = |fit: &Fit| fit.chi2 - problem.pixels();
     let leaders = score_effects(problem, &now.fit, chosen).into_iter().take(FITTED);
@@ -44,24 +45,24 @@ pub fn find_beside_leader<'a>(
         state.fit = fit;
         state.recentre(progress)?;
         state.refine(progress)?;
-        let both = [chosen, &[effect]].concat();
-        let step = step_forward(&mut state, &both, true, progress)?;
-        let SelectionStep {
-            leaders,
-            taken: Some((taken, fit, held)),
-            ..
-        } = step
-        else {
-            continue;
-        };
-        (state.fit, state.held_out) = (fit, held);
-        state.refine(progress)?;
-        let of_both = [(effect, score), (taken.effect, taken.score)];
-        if let Some(tried) = sound(now, &state, of_both) {
-            return Ok(Some(FoundPair {
+        let mut taken = vec![(effect, score)];
+        let mut runners_up = runners_up.clone();
+        let alone = sound(now, &state, &taken);
+        if alone.is_none() {
+            let step = step_forward(&mut state, &[chosen, &[effect]].concat(), true, progress)?;
+            let Some((second, fit, held)) = step.taken else {
+                continue;
+            };
+            (state.fit, state.held_out) = (fit, held);
+            state.refine(progress)?;
+            taken.push((second.effect, second.score));
+            runners_up.extend(step.leaders);
+        }
+        if let Some(tried) = alone.or_else(|| sound(now, &state, &taken)) {
+            return Ok(Some(FoundTogether {
                 tried,
                 state,
-                runners_up: [runners_up, leaders].concat(),
+                runners_up,
             }));
         }
     }
@@ -78,8 +79,9 @@ mod tests {
 
     /// The first number of the joined effect acts three times as strongly in one element as it would alone, and backwards in the
     /// other: what is fitted to one predicts nothing of the other.
-    #[test]
-    fn an_effect_whose_numbers_do_not_add_is_found_with_another() {
+    /// Effects that are found. The first number of the joined effect acts three times as strongly in one element as it would alone,
+    /// and backwards in the other: what is fitted to one predicts nothing of the other.
+    fn found(truth: [f64; 4]) -> Vec<usize> {
         let periods = [[2, 3], [5, 4], [3, 0], [0, 6]];
         let own = Product {
             terms: [0, 1],
@@ -87,17 +89,21 @@ mod tests {
             factor: 17.0,
         };
         let model = LinearModel::new(periods.map(Term::linear).to_vec(), beams(2, 2, 2)).with_first_two_joined(own);
-        let truth = [0.05, 0.12, 0.0, 0.03];
         let data = model.data(|_| truth.to_vec(), Some(3));
         let mut state = SearchState::new(model.problem(&data), model.problem(&data).nuisance_fit());
-        let step = step_forward(&mut state, &[], true, &Silent).unwrap();
-        assert!(step.taken.is_none());
+        assert!(step_forward(&mut state, &[], true, &Silent).unwrap().taken.is_none());
         assert!(find_pair(&state, &[], true, &Silent).unwrap().is_none());
         let found = attribute(model.problem(&data), true, &Silent).unwrap();
-        assert_eq!(found.chosen, [0, 2]);
         for (k, slot) in found.after.active.iter().enumerate() {
             let error = found.after.theta[*slot] - truth[*slot];
             assert!(error.abs() < found.half_widths[k].half_width(), "{slot}: {error}");
         }
+        found.chosen
+    }
+
+    #[test]
+    fn an_effect_whose_numbers_do_not_add_is_found_alone_and_with_another() {
+        assert_eq!(found([0.05, 0.12, 0.0, 0.0]), [0]);
+        assert_eq!(found([0.05, 0.12, 0.0, 0.03]), [0, 2]);
     }
 }

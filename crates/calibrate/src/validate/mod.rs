@@ -47,6 +47,8 @@ const SEEDS_APART: u64 = 1_000_000;
 pub struct ValidationTrial {
     /// What differed; `nothing` for a set without effect.
     pub truth: String,
+    /// Effects with their numbers, each in the unit of its parameter.
+    pub parts: Vec<AppliedEffect>,
     /// Whether it is no known effect.
     pub off_list: bool,
     /// Whether it is two effects at once.
@@ -276,6 +278,7 @@ impl ValidationTrial {
     fn new(chip: &SyntheticChip, seed: u64) -> Self {
         Self {
             truth: chip.truth.clone(),
+            parts: chip.parts.clone(),
             off_list: false,
             pair: chip.parts.len() > 1,
             size: chip.size,
