@@ -2,7 +2,7 @@
 //! `cargo run --release --example shapes -- 17 25`.
 //!
 //! One line of JSON for each number of orders: all cases of [`CIRCLES`] at five diameters on both lattices, all of
-//! [`RECTANGLES`] at five angles, and these with [`OTHER_SIZES`] at angles of [`SLOPES`], along the normal.
+//! [`RECTANGLES`] at five angles, and these with [`OTHER_SIZES`] at angles of [`ALIGNED`], along the normal.
 
 use metalith::cell::{CellStack, Material, RotatedRectangle};
 use metalith::rcwa::{CellLattice, Orders};
@@ -42,10 +42,9 @@ const OTHER_SIZES: [(f64, f64); 6] = [
     (300.0, 520.0),
 ];
 
-/// Slopes of axes along which pillars repeat at the square root of 1, 2 and 5 pitches, as rise and run: there rectangles are
-/// parallel to the edges of a larger square cell, which codes without rotated shapes can solve too. The last for
-/// [`RECTANGLES`] alone.
-const SLOPES: [(u32, u32); 3] = [(0, 1), (1, 1), (1, 2)];
+/// Angles at which rectangles are parallel to the edges of a square cell, of one pitch or of two pillars at the root of two
+/// (degrees): codes without rotated shapes can solve these too.
+const ALIGNED: [f64; 2] = [0.0, 45.0];
 
 fn stack(film: &str, pitch: f64, height: f64) -> Result<CellStack> {
     Ok(CellStack {
@@ -120,13 +119,12 @@ fn main() -> Result<()> {
         }
         for ((film, pitch, height, wavelength, width, length), other) in RECTANGLES.into_iter().zip(OTHER_SIZES) {
             let stack = stack(film, pitch, height)?;
-            let of_other = SLOPES[..2].iter().map(|slope| (other, slope));
-            for ((width, length), (rise, run)) in SLOPES.iter().map(|s| ((width, length), s)).chain(of_other) {
-                let degrees = f64::from(*rise).atan2(f64::from(*run)).to_degrees();
-                let jones = rectangle(&stack, wavelength, (width, length), degrees, orders)?;
-                let shape =
-                    format!("\"size\": [{width}, {length}], \"degrees\": {degrees}, \"slope\": [{rise}, {run}]");
-                points.push(point(&stack, wavelength, &shape, jones)?);
+            for (width, length) in [(width, length), other] {
+                for degrees in ALIGNED {
+                    let jones = rectangle(&stack, wavelength, (width, length), degrees, orders)?;
+                    let shape = format!("\"size\": [{width}, {length}], \"degrees\": {degrees}, \"aligned\": true");
+                    points.push(point(&stack, wavelength, &shape, jones)?);
+                }
             }
         }
         println!("{{\"orders\": {along_axis}, \"points\": [{}]}}", points.join(", "));

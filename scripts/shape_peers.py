@@ -10,9 +10,9 @@ the distance of two is that of the entries farthest apart. All rows are held to 
 should come as orders are added; what the peer keeps of a distance is its grid, of 1600 x 1600 places that are inside or not; on a hexagonal lattice along its two vectors, with as many orders as a square
 lattice has, in a circle.
 
-`aligned` asks meent, which takes rectangles along the axes only, and takes them exactly: turned by 0, 45 or 26.57 degrees, pillars
-repeat along their own edges at the square root of 1, 2 or 5 pitches, and a larger square cell holds 1, 2 or 5 of them. Orders are for
-each pitch, in larger cells as many more.
+`aligned` asks meent, which takes rectangles along the axes only, and takes them exactly: twelve sizes as they are, and turned by 45
+degrees, where two of them fill a square cell along their edges whose pitch is the root of two. Orders are for each pitch of
+pillars, in the larger cell as many more.
 """
 import argparse
 import json
@@ -87,8 +87,7 @@ def aligned_peer(point, along):
     import meent
     import numpy as np
 
-    rise, run = point["slope"]
-    pillars = rise**2 + run**2
+    pillars = {0: 1, 45: 2}[point["degrees"]]
     period = point["pitch"] * pillars**0.5
     # The other sign of time: indices and answers are conjugated.
     film = complex(*point["film"]).conjugate()
@@ -103,11 +102,11 @@ def aligned_peer(point, along):
             ends = [(low, period), (0, high - period)]
         return [((a + b) / 2, b - a) for a, b in ends]
 
-    middles = [((0.5 + rise * k / pillars) % 1 * period, (0.5 + run * k / pillars) % 1 * period) for k in range(pillars)]
+    middles = [(0.5 + k / pillars) % 1 * period for k in range(pillars)]
     width, length = point["size"]
-    rectangles = [["rectangle", x, y, w, l, film] for mx, my in middles for x, w in parts(mx, width) for y, l in parts(my, length)]
+    rectangles = [["rectangle", x, y, w, l, film] for at in middles for x, w in parts(at, width) for y, l in parts(at, length)]
     highest = round((along * pillars**0.5 - 1) / 2)
-    # Half of the light along each edge: one solution for both.
+    # Half of the light along each edge: one solution for both, which no cell with mirrors converts into one another.
     solver = meent.call_mee(backend=0, n_top=point["below"], n_bot=1.0, theta=0.0, phi=0.0, psi=np.pi / 4, fto=[highest, highest],
                             period=[period, period], wavelength=point["wavelength"], thickness=[point["height"]],
                             ucell=[[1.0, rectangles]])
@@ -115,7 +114,7 @@ def aligned_peer(point, along):
     zero = lambda table: complex(table[table.shape[0] // 2, table.shape[1] // 2]) * 2**0.5
     # Of a bare layer both are the closed form: s as it is, p a quarter of a turn ahead.
     across, over = zero(np.asarray(found.T_p) / 1j).conjugate(), zero(np.asarray(found.T_s)).conjugate()
-    angle = np.arctan2(rise, run)
+    angle = np.radians(point["degrees"])
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     return (turn @ np.diag([across, over]) @ turn.T).ravel().tolist()
 
@@ -130,7 +129,7 @@ def ours(orders):
 
 
 def compare(shape, found, options):
-    kind = lambda p: "aligned" if "slope" in p else "rectangle" if "size" in p else "hexagonal" if p["hexagonal"] else "circle"
+    kind = lambda p: "aligned" if "aligned" in p else "rectangle" if "size" in p else "hexagonal" if p["hexagonal"] else "circle"
     keep = [k for k, p in enumerate(next(iter(found.values()))) if kind(p) == shape][options.first :: options.every]
     points = [next(iter(found.values()))[k] for k in keep]
     rows = [(f"ours, {n}", [[complex(*t) for t in found[n][k]["jones"]] for k in keep]) for n in options.ours]

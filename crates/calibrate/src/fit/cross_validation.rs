@@ -225,14 +225,7 @@ pub fn beam_groups(problem: &FitProblem<'_>) -> Vec<Vec<CaptureIndex>> {
 /// 95 % half-widths of the active parameters of a fit: by a bootstrap over groups of captures, never less than the
 /// noise alone gives, and wider by the error of the model. What each is made of.
 pub fn half_widths(problem: &FitProblem<'_>, fit: &Fit) -> Vec<WidthParts> {
-    let slots = problem.model.slots();
-    let own = widths_with(problem, fit, &ModelError::MEASURED).into_iter();
-    own.zip(&fit.active)
-        .map(|(parts, &s)| WidthParts {
-            least: LEAST_HALF_WIDTH * slots[s].parameter.typical,
-            ..parts
-        })
-        .collect()
+    widths_with(problem, fit, &ModelError::MEASURED)
 }
 
 /// The same by which a claim is judged: the model may err by as much as could be.
@@ -240,10 +233,6 @@ pub fn cautious_half_widths(problem: &FitProblem<'_>, fit: &Fit) -> Vec<f64> {
     let own = widths_with(problem, fit, &ModelError::CAUTIOUS).into_iter();
     own.map(|parts| parts.half_width()).collect()
 }
-
-/// No interval is narrower than this share of a typical size on each side: gaps, which are known best, come out to 8e-5 of it (rms)
-/// without noise.
-pub const LEAST_HALF_WIDTH: f64 = 1e-4;
 
 fn widths_with(problem: &FitProblem<'_>, fit: &Fit, error: &ModelError) -> Vec<WidthParts> {
     let slots = problem.model.slots();

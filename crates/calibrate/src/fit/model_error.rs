@@ -68,7 +68,7 @@ pub struct WidthParts {
     pub change: f64,
     /// What is known of values of this effect.
     pub value: f64,
-    /// No half-width is less than this.
+    /// How far another estimate of the same number is, where there is one: no half-width is less.
     pub least: f64,
 }
 
