@@ -48,7 +48,7 @@ pub struct Studio {
 
 /// Times what the operator errs by that Tikhonov's method by all elements counts. A wrong kernel errs alike at pixels next to
 /// one another, and trust in pixels that are taken to err each for itself is too high. Of 1, 2 and 3 two photographs of
-/// 800 x 800 have 20.62, 20.65 and 20.56 dB with all of the physics, and 25.19, 25.90 and 26.28 dB under the paper's
+/// 800 x 800 have 20.62, 20.65 and 20.56 dB with all of the physics, and 25.19, 25.91 and 26.28 dB under the paper's
 /// assumptions. What starts from such a picture and has a prior of its own does better with 1 (`prior` 22.33 and 22.14 dB).
 const TOGETHER: f64 = 2.0;
 
