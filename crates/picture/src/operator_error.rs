@@ -57,6 +57,15 @@ impl OperatorError {
         error
     }
 
+    /// The same errors, so many times as large.
+    #[must_use]
+    pub fn times(&self, factor: f64) -> Self {
+        Self {
+            overall: self.overall.iter().map(|e| e * factor).collect(),
+            local: self.local.iter().map(|p| p * factor as f32).collect(),
+        }
+    }
+
     /// About a pixel of a channel, as a share of the light there and of no less than the mean light of the frame.
     pub fn about(&self, channel: usize, at: (usize, usize)) -> f64 {
         let local = self.local.get(channel).map(|p| f64::from(p[at]));
@@ -83,5 +92,8 @@ mod tests {
         assert!((error.about(0, (20, 160)) - f64::from(SHARE)).abs() < 1e-6);
         assert!((error.overall[0] - f64::from(SHARE) / 2f64.sqrt()).abs() < 1e-6);
         assert_eq!(OperatorError::uniform(vec![0.3]).about(0, (7, 7)), 0.3);
+        let twice = error.times(2.0);
+        assert_eq!(twice.about(0, (20, 160)), 2.0 * error.about(0, (20, 160)));
+        assert_eq!(twice.overall[0], 2.0 * error.overall[0]);
     }
 }

@@ -46,6 +46,12 @@ pub struct Studio {
     pub prior: LearnedDenoiser,
 }
 
+/// Times what the operator errs by that Tikhonov's method by all elements counts. A wrong kernel errs alike at pixels next to
+/// one another, and trust in pixels that are taken to err each for itself is too high. Of 1, 2 and 3 two photographs of
+/// 800 x 800 have 20.62, 20.65 and 20.56 dB with all of the physics, and 25.19, 25.91 and 26.28 dB under the paper's
+/// assumptions. What starts from such a picture and has a prior of its own does better with 1 (`prior` 22.33 and 22.14 dB).
+const TOGETHER: f64 = 2.0;
+
 impl Studio {
     /// With the gain of each channel that the exposure of the camera asks for.
     pub(crate) fn exposed(mut self) -> Result<Self> {
@@ -150,7 +156,10 @@ impl Studio {
         joint: bool,
         progress: &dyn Progress,
     ) -> Result<Array3<f64>> {
-        let known = self.known(operator, error, frame)?;
+        let known = match (method, joint) {
+            (RestorationMethod::Tikhonov, true) => self.known(operator, &error.times(TOGETHER), frame)?,
+            _ => self.known(operator, error, frame)?,
+        };
         let recorded = self.recorded(operator, &known);
         let planes = match joint {
             true => restore_joint(&recorded, method, progress)?,

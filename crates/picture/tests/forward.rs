@@ -11,8 +11,8 @@ use metalith_made::SimulationCase;
 use metalith_picture::restore::SceneStatistics;
 use metalith_picture::scene::SceneImage;
 use metalith_picture::{
-    BankSpec, ChipInLight, Detail, ElementInLight, FrameOperator, KernelBank, SceneInputs, ScenePoints, SceneSpace,
-    Veil, element_views,
+    Assumed, BankSpec, ChipInLight, Detail, ElementInLight, FrameOperator, KernelBank, SceneInputs, ScenePoints,
+    SceneSpace, Veil, element_views,
 };
 use metalith_wave::{Accuracy, Scratch, Window};
 use ndarray::{Array2, Array3};
@@ -332,6 +332,51 @@ fn a_coarse_grid_of_points_sees_the_same() {
     }
 }
 
+/// One kernel for each element and channel, against the same kernel at every node.
+#[test]
+fn one_kernel_for_a_field_is_the_same_kernel_at_every_node() {
+    /// Single precision of transforms of other sizes, of the range.
+    const SINGLE: f64 = 1e-5;
+    let setup = setup(&[[450.0, 470.0], [520.0, 560.0]], 20);
+    let chip = setup.chip();
+    let bank = KernelBank::build(&chip, &setup.scene.basis, spec(24, 5), &Silent).unwrap();
+    let mut same = bank.clone();
+    for element in &mut same.distinct {
+        let middle = element.nodes[element.nodes.len() / 2];
+        element.nodes.fill(middle);
+    }
+    let veil = Veil::none(&setup.camera.sensor, 2, 3);
+    let views = element_views(&setup.design, &setup.camera);
+    let space = SceneSpace::flat(&setup.scene.view);
+    for plain in [
+        Detail::simulation(3),
+        Detail {
+            statistics: Some(SceneStatistics::colours().mixing()),
+            ..Detail::restoration(ScenePoints::OneASquare, SceneInputs::Spectra(0..3))
+        },
+    ] {
+        let fixed = Detail {
+            assumed: Assumed {
+                fixed_kernels: true,
+                ..Assumed::default()
+            },
+            ..plain.clone()
+        };
+        let frames = [(&bank, fixed), (&same, plain)].map(|(bank, detail)| {
+            let operator = FrameOperator::new(bank, &veil, &views, &setup.camera, &space, detail);
+            operator.apply(&setup.scene.planes)
+        });
+        let range = frames[1].iter().flatten().copied().fold(0.0f32, f32::max);
+        let pairs = frames[0].iter().flatten().zip(frames[1].iter().flatten());
+        let off = pairs.fold(0.0f32, |off, (a, b)| off.max((a - b).abs()));
+        println!("{off:e} of {range:e}");
+        assert!(
+            range > 0.0 && f64::from(off) < SINGLE * f64::from(range),
+            "{off} {range}"
+        );
+    }
+}
+
 #[test]
 fn the_adjoint_is_that_of_the_operator() {
     /// Single precision of sums over some ten thousand products of both signs.
@@ -349,6 +394,10 @@ fn the_adjoint_is_that_of_the_operator() {
             ..Detail::restoration(ScenePoints::OneASquare, SceneInputs::Spectra(0..3))
         },
         Detail::restoration(ScenePoints::OneAPixel, SceneInputs::Channels(0..3)),
+        Detail {
+            assumed: Assumed::paper(),
+            ..Detail::restoration(ScenePoints::OneASquare, SceneInputs::Spectra(0..3))
+        },
     ] {
         let operator = FrameOperator::new(
             &bank,

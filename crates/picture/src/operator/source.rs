@@ -78,7 +78,11 @@ impl<'a> KernelSource<'a> {
             assumed: detail.assumed,
             statistics: detail.statistics.clone(),
             spec: BankSpec {
-                nodes: steps / detail.node_step + 1,
+                // One kernel for the whole field needs no places between which it would change.
+                nodes: match detail.assumed.fixed_kernels {
+                    true => 1,
+                    false => steps / detail.node_step + 1,
+                },
                 ..bank.spec
             },
             node_step: detail.node_step,
