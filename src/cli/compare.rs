@@ -49,7 +49,8 @@ pub struct CompareArgs {
     #[arg(long)]
     separate: bool,
 
-    /// Each design also as others assume such cameras to be: `paper`, those of the array that the prototype follows.
+    /// Each design also as others assume such cameras to be: `paper`, those of the array that the prototype follows; `--rivals` also with
+    /// one wavelength a colour.
     #[arg(long, value_name = "WHOSE")]
     assume: Option<Assume>,
 

@@ -33,6 +33,16 @@ pub struct ChannelSampling {
     pub counted: f64,
 }
 
+impl ChannelSampling {
+    /// Mean wavelength of the light that the channel counts (um).
+    pub fn mean_um(&self) -> f64 {
+        let sums = self.parts.iter().fold((0.0, 0.0), |(a, b), p| {
+            (a + p.weight, b + p.weight * 0.5 * (p.nm[0] + p.nm[1]))
+        });
+        sums.1 / sums.0 * 1e-3
+    }
+}
+
 /// A narrow part of a channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChannelPart {

@@ -57,11 +57,12 @@ pub fn butterworth(tangent: f64) -> f64 {
 
 /// A camera of the same kind whose channels count one wavelength each, their mean (um), and as much of it as they counted of
 /// all light.
-pub fn without_dispersion(camera: &Camera, channels: &[ChannelSampling], channel_um: &[f64]) -> Camera {
+pub fn without_dispersion(camera: &Camera, channels: &[ChannelSampling]) -> Camera {
+    let channel_um: Vec<f64> = channels.iter().map(ChannelSampling::mean_um).collect();
     // In light of equal energy a channel counts so many photons for each nm.
     let counted: Vec<f64> = channels
         .iter()
-        .zip(channel_um)
+        .zip(&channel_um)
         .map(|(c, um)| c.parts.iter().map(|p| p.weight).sum::<f64>() / um)
         .collect();
     let most = counted.iter().copied().fold(0.0, f64::max);
@@ -175,7 +176,7 @@ impl Studio {
         kept: &KeptKernels,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let camera = without_dispersion(&self.camera, &self.channels, &self.bank.channel_um);
+        let camera = without_dispersion(&self.camera, &self.channels);
         Self::open_kept(design, layout, &camera, model, scene, kept, progress)
     }
 }
@@ -196,10 +197,10 @@ mod tests {
     fn a_camera_without_dispersion_counts_one_wavelength_a_channel() {
         let camera = Camera::three_bands(5.86);
         let all = camera.sampling([400.0, 700.0], 12.5).unwrap();
-        let narrow = without_dispersion(&camera, &all.channels, &[0.45, 0.55, 0.65]);
+        let narrow = without_dispersion(&camera, &all.channels);
         let sampling = narrow.sampling([400.0, 700.0], 12.5).unwrap();
         let counted = |c: &ChannelSampling| c.parts.iter().map(|p| p.weight).sum::<f64>();
-        for (k, nm) in [450.0, 550.0, 650.0].into_iter().enumerate() {
+        for (k, nm) in all.channels.iter().map(|c| c.mean_um() * 1e3).enumerate() {
             let parts = &sampling.channels[k].parts;
             assert!(parts.iter().all(|p| p.nm.iter().all(|v| (v - nm).abs() < 0.51)));
             // The balance of the channels stays: sums over parts 1 nm wide.

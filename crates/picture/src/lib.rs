@@ -32,7 +32,7 @@ mod studio;
 mod thumbnail;
 mod veil;
 
-pub use assumed::{Assumed, AssumedScore, worth_of_assumptions};
+pub use assumed::{Assumed, AssumedScore, without_dispersion, worth_of_assumptions};
 pub use chip::{ChipInLight, ElementInLight, element_views, sampling_of};
 pub use colour::ChannelColours;
 pub use dataset::{DatasetManifest, DatasetPair, PairWriter, write_dataset, write_dataset_manifest};

@@ -4,7 +4,7 @@ use metalith_camera::{Camera, ColourFilter, Sampling};
 use metalith_core::{Error, Progress, Result};
 use metalith_picture::scene::SceneImage;
 use metalith_picture::spectra::{SceneSpectrum, rgb_basis};
-use metalith_picture::{ChannelColours, Frame, SceneView, channel_at, expose, gains, sensitivity};
+use metalith_picture::{ChannelColours, Frame, SceneView, channel_at, expose, gains, sensitivity, without_dispersion};
 use ndarray::{Array2, Array3, Zip};
 
 use crate::contender::{Contender, Way, no_stage};
@@ -102,6 +102,18 @@ impl<T: Lensless> Contender for T {
 
 /// Wavelengths that visible light is simulated over (nm).
 const BAND_NM: [f64; 2] = [400.0, 700.0];
+
+/// A camera of the same kind whose channels count one wavelength each of the light that cameras without a lens are simulated with.
+///
+/// # Errors
+/// If a channel counts no visible light.
+pub fn of_one_wavelength(camera: &Camera) -> Result<Camera> {
+    let [low, high] = BAND_NM;
+    Ok(without_dispersion(
+        camera,
+        &camera.sampling(BAND_NM, high - low)?.channels,
+    ))
+}
 
 /// Field that a flat scene can fill.
 const WIDEST_DEG: f64 = 150.0;

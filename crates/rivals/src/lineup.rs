@@ -13,6 +13,7 @@ use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
 use crate::compare::{ComparedCamera, Comparison, compare};
+use crate::lensless::of_one_wavelength;
 use crate::stage::Stage;
 use crate::{ArrayCamera, Contender, DiffuserCam, DiffuserSpec, FlatCam, MaskSpec};
 
@@ -28,7 +29,7 @@ pub struct Lineup {
     pub methods: Vec<String>,
     /// By each element of an array alone too.
     pub separate: bool,
-    /// Each design also as the paper assumes such cameras to be.
+    /// Each design also as the paper assumes such cameras to be, and those without a lens with one wavelength a colour.
     pub paper: bool,
     /// Angle from the left to the right edge of a photograph (degrees).
     pub field_deg: f64,
@@ -143,9 +144,9 @@ impl Lineup {
         }
     }
 
-    /// Rows of the table: of each design one, or two with the assumptions of the paper, then those without a lens.
+    /// Cameras of the table: designs, then those without a lens, each once, or twice with the assumptions of the paper.
     pub fn count(&self) -> usize {
-        self.designs.len() * self.kinds() + self.lensless.len()
+        (self.designs.len() + self.lensless.len()) * self.kinds()
     }
 
     fn kinds(&self) -> usize {
@@ -233,7 +234,7 @@ impl OpenLineup<'_> {
         let kinds = self.of.kinds();
         match k.checked_sub(self.designs.len() * kinds) {
             None => self.ready_design(k / kinds, k % kinds == 1, kept, progress, then),
-            Some(k) => self.ready_lensless(k, progress, then),
+            Some(k) => self.ready_lensless(k / kinds, k % kinds == 1, progress, then),
         }
     }
 
@@ -275,25 +276,39 @@ impl OpenLineup<'_> {
         then(&ready, (&format!("{name}, paper's assumptions"), &words), &photographs)
     }
 
-    fn ready_lensless(&self, k: usize, progress: &dyn Progress, then: &mut Ready<'_>) -> Result<()> {
+    fn ready_lensless(
+        &self,
+        k: usize,
+        as_the_paper: bool,
+        progress: &dyn Progress,
+        then: &mut Ready<'_>,
+    ) -> Result<()> {
         let view = self.photographs[0].view;
-        let stage = self.stages_of(self.designs.len() + k)?.pop();
+        let (camera, stage, assumed) = match as_the_paper {
+            // Last stages were taught with all light of a channel.
+            true => (of_one_wavelength(&self.camera)?, None, ", one wavelength a colour"),
+            false => (self.camera.clone(), self.stages_of(self.designs.len() + k)?.pop(), ""),
+        };
         match &self.of.lensless[k] {
             Lensless::FlatCam(mask) => {
                 let words = format!(
-                    "a mask in place of a lens, the product of two sequences of maximum length (511 members of {} um), {} um before the sensor; Tikhonov in closed form by singular values.",
+                    "a mask in place of a lens, the product of two sequences of maximum length (511 members of {} um), {} um before the sensor{assumed}; Tikhonov in closed form by singular values.",
                     mask.feature_um, mask.distance_um
                 );
-                let ready = FlatCam::new(mask, &self.camera, view, progress)?.with_stage(stage);
-                then(&ready, ("FlatCam, ours", &words), &self.photographs)
+                let ready = FlatCam::new(mask, &camera, view, progress)?.with_stage(stage);
+                then(&ready, (&format!("FlatCam, ours{assumed}"), &words), &self.photographs)
             }
             Lensless::DiffuserCam(spec) => {
                 let words = format!(
-                    "a random smooth surface in place of a lens, numbers {} um apart, {} um before the sensor, its opening {} of the sensor along each axis; caustic by rays; total variation with the crop (ADMM).",
+                    "a random smooth surface in place of a lens, numbers {} um apart, {} um before the sensor, its opening {} of the sensor along each axis{assumed}; caustic by rays; total variation with the crop (ADMM).",
                     spec.grain_um, spec.distance_um, spec.opening
                 );
-                let ready = DiffuserCam::new(spec, &self.camera, view, progress)?.with_stage(stage);
-                then(&ready, ("DiffuserCam, ours", &words), &self.photographs)
+                let ready = DiffuserCam::new(spec, &camera, view, progress)?.with_stage(stage);
+                then(
+                    &ready,
+                    (&format!("DiffuserCam, ours{assumed}"), &words),
+                    &self.photographs,
+                )
             }
         }
     }

@@ -22,7 +22,7 @@ impl KernelBank {
         spec: BankSpec,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let channel_um = channel_um(chip);
+        let channel_um: Vec<f64> = chip.sampling.channels.iter().map(|c| c.mean_um()).collect();
         let orbits: Vec<_> = chip
             .distinct
             .iter()
@@ -73,17 +73,6 @@ impl KernelBank {
             distinct,
         })
     }
-}
-
-/// Mean wavelength of the light that each channel counts (um).
-fn channel_um(chip: &ChipInLight<'_>) -> Vec<f64> {
-    let mean = |channel: &metalith_camera::ChannelSampling| {
-        let sums = channel.parts.iter().fold((0.0, 0.0), |(a, b), p| {
-            (a + p.weight, b + p.weight * 0.5 * (p.nm[0] + p.nm[1]))
-        });
-        sums.1 / sums.0 * 1e-3
-    };
-    chip.sampling.channels.iter().map(mean).collect()
 }
 
 type Turned = (usize, metalith_design::array::Symmetry);

@@ -254,6 +254,7 @@ impl Lensless for FlatCam {
 mod tests {
     use super::*;
     use crate::contender::Contender;
+    use crate::lensless::of_one_wavelength;
     use crate::lensless::tests::small;
     use metalith_core::Silent;
     use metalith_picture::scores;
@@ -274,5 +275,18 @@ mod tests {
         let all = flat.pictures(&frame, StageKind::FlatNet, &Silent).unwrap();
         assert!(all.len() == PICTURES && all[0] == picture && all[1] != picture);
         assert!(flat.pictures(&frame, StageKind::Blending, &Silent).is_err());
+    }
+
+    /// With one wavelength a colour the shadow that the restoration knows is the one that was cast.
+    #[test]
+    fn a_mask_is_undone_better_without_dispersion() {
+        let (camera, scene) = small(48, 300, 260);
+        let psnr_db = |camera: &Camera| {
+            let flat = FlatCam::new(&MaskSpec::standard(), camera, scene.view, &Silent).unwrap();
+            let picture = flat.restore(&flat.record(&scene, 1).unwrap(), 0, &Silent).unwrap();
+            scores(&picture, &flat.truth(&scene)).unwrap()[0].psnr_linear_db
+        };
+        let (narrow, broad) = (psnr_db(&of_one_wavelength(&camera).unwrap()), psnr_db(&camera));
+        assert!(narrow > broad, "{narrow} {broad}");
     }
 }
