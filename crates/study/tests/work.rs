@@ -191,16 +191,16 @@ fn cameras_of_shards_are_those_of_one_comparison() {
         lpips: None,
     };
     let planned = plan_comparison(&lineup, &at("parts"), &Silent).unwrap();
-    assert_eq!(planned.cut().shards(), 3);
+    assert_eq!(planned.cut().shards(), 4);
     let work = Work::open(&at("parts")).unwrap();
-    work.run(&[1, 2], &Silent).unwrap();
+    work.run(&[1, 2, 3], &Silent).unwrap();
     let missing = planned.merge(&Silent).err().unwrap().to_string();
-    assert!(missing.contains("1 of 3 cameras are missing"), "{missing}");
+    assert!(missing.contains("1 of 4 cameras are missing"), "{missing}");
     work.run(&[0], &Silent).unwrap();
     let merged = planned.merge(&Silent).unwrap();
     let open = lineup.open().unwrap();
     let kept = metalith_picture::KeptKernels::only(&at("parts"));
-    let cameras = (0..3).map(|k| open.take(k, &kept, &Silent).unwrap()).collect();
+    let cameras = (0..4).map(|k| open.take(k, &kept, &Silent).unwrap()).collect();
     let direct = open.comparison(cameras);
     // Numbers of a line of JSON come back to rounding.
     let scores = |c: &Comparison| {
@@ -211,7 +211,13 @@ fn cameras_of_shards_are_those_of_one_comparison() {
     };
     assert_eq!(scores(&merged), scores(&direct));
     let names = merged.cameras.iter().map(|c| c.name.as_str()).collect::<Vec<_>>();
-    assert_eq!(names, ["small", "small, paper's assumptions", "FlatCam, ours"]);
+    let expected = [
+        "small",
+        "small, paper's assumptions",
+        "FlatCam, ours",
+        "FlatCam, ours, one wavelength a colour",
+    ];
+    assert_eq!(names, expected);
     assert!(merged.cameras.iter().all(|c| c.shown.is_some()));
     metalith_rivals::write_comparison(&merged, &at("page")).unwrap();
     let page = fs::read_to_string(at("page/compare.html")).unwrap();
