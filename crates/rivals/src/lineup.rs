@@ -284,31 +284,35 @@ impl OpenLineup<'_> {
         then: &mut Ready<'_>,
     ) -> Result<()> {
         let view = self.photographs[0].view;
-        let (camera, stage, assumed) = match as_the_paper {
+        let (camera, stage, [kind, light]) = match as_the_paper {
             // Last stages were taught with all light of a channel.
-            true => (of_one_wavelength(&self.camera)?, None, ", one wavelength a colour"),
-            false => (self.camera.clone(), self.stages_of(self.designs.len() + k)?.pop(), ""),
+            true => (
+                of_one_wavelength(&self.camera)?,
+                None,
+                [", no dispersion", ", one wavelength a colour"],
+            ),
+            false => (
+                self.camera.clone(),
+                self.stages_of(self.designs.len() + k)?.pop(),
+                [""; 2],
+            ),
         };
         match &self.of.lensless[k] {
             Lensless::FlatCam(mask) => {
                 let words = format!(
-                    "a mask in place of a lens, the product of two sequences of maximum length (511 members of {} um), {} um before the sensor{assumed}; Tikhonov in closed form by singular values.",
+                    "a mask in place of a lens, the product of two sequences of maximum length (511 members of {} um), {} um before the sensor{light}; Tikhonov in closed form by singular values.",
                     mask.feature_um, mask.distance_um
                 );
                 let ready = FlatCam::new(mask, &camera, view, progress)?.with_stage(stage);
-                then(&ready, (&format!("FlatCam, ours{assumed}"), &words), &self.photographs)
+                then(&ready, (&format!("FlatCam, ours{kind}"), &words), &self.photographs)
             }
             Lensless::DiffuserCam(spec) => {
                 let words = format!(
-                    "a random smooth surface in place of a lens, numbers {} um apart, {} um before the sensor, its opening {} of the sensor along each axis{assumed}; caustic by rays; total variation with the crop (ADMM).",
+                    "a random smooth surface in place of a lens, numbers {} um apart, {} um before the sensor, its opening {} of the sensor along each axis{light}; caustic by rays; total variation with the crop (ADMM).",
                     spec.grain_um, spec.distance_um, spec.opening
                 );
                 let ready = DiffuserCam::new(spec, &camera, view, progress)?.with_stage(stage);
-                then(
-                    &ready,
-                    (&format!("DiffuserCam, ours{assumed}"), &words),
-                    &self.photographs,
-                )
+                then(&ready, (&format!("DiffuserCam, ours{kind}"), &words), &self.photographs)
             }
         }
     }

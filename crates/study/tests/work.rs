@@ -215,7 +215,7 @@ fn cameras_of_shards_are_those_of_one_comparison() {
         "small",
         "small, paper's assumptions",
         "FlatCam, ours",
-        "FlatCam, ours, one wavelength a colour",
+        "FlatCam, ours, no dispersion",
     ];
     assert_eq!(names, expected);
     assert!(merged.cameras.iter().all(|c| c.shown.is_some()));
