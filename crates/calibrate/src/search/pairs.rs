@@ -90,9 +90,7 @@ pub fn find_pair<'a>(
             state.refine(progress)?;
         }
         let is_better = best.as_ref().is_none_or(|b| state.error() < b.state.error());
-        if let Some(tried) = sound(now, &state, &pair.map(|effect| (effect, score)))
-            && is_better
-        {
+        if is_better && let Some(tried) = sound(now, &state, &pair.map(|effect| (effect, score))) {
             best = Some(FoundTogether {
                 tried,
                 state,

@@ -77,8 +77,6 @@ mod tests {
     use crate::linear_model::{LinearModel, Product, Term, beams};
     use metalith_core::Silent;
 
-    /// The first number of the joined effect acts three times as strongly in one element as it would alone, and backwards in the
-    /// other: what is fitted to one predicts nothing of the other.
     /// Effects that are found. The first number of the joined effect acts three times as strongly in one element as it would alone,
     /// and backwards in the other: what is fitted to one predicts nothing of the other.
     fn found(truth: [f64; 4]) -> Vec<usize> {
