@@ -48,10 +48,9 @@ impl Term {
     }
 }
 
-/// What two terms change together and neither alone: the product of their parameters, on one pattern.
+/// What the first two terms change together and neither alone: the product of their parameters, on one pattern.
 #[derive(Clone, Copy)]
 pub struct Product {
-    pub terms: [usize; 2],
     pub periods: [u32; 2],
     /// Amplitude for parameters of one; its sign is the other in every second element.
     pub factor: f64,
@@ -60,7 +59,7 @@ pub struct Product {
 /// The model.
 pub struct LinearModel {
     terms: Vec<Term>,
-    products: Vec<Product>,
+    product: Option<Product>,
     slots: Vec<Slot>,
     beam: PerCapture<CaptureSetup>,
 }
@@ -88,7 +87,7 @@ impl LinearModel {
         Self {
             slots: slots.collect(),
             terms,
-            products: Vec::new(),
+            product: None,
             beam: beam.into(),
         }
     }
@@ -96,7 +95,7 @@ impl LinearModel {
     /// The first two terms are the numbers of one effect, which do not merely add.
     #[must_use]
     pub fn with_first_two_joined(mut self, product: Product) -> Self {
-        self.products.push(product);
+        self.product = Some(product);
         for (s, slot) in self.slots.iter_mut().enumerate().skip(1) {
             (slot.effect, slot.index) = (s - 1, usize::from(s == 1));
         }
@@ -146,18 +145,9 @@ impl LinearModel {
             let amplitude = (term.amplitude)(*theta);
             waves.extend(term.patterns.iter().map(|(p, factor)| (*p, factor * amplitude)));
         }
-        for Product {
-            terms: [a, b],
-            periods,
-            factor,
-        } in &self.products
-        {
-            let sign = if usize::from(capture.element) % 2 == 0 {
-                1.0
-            } else {
-                -1.0
-            };
-            waves.push((*periods, sign * factor * point.theta[*a] * point.theta[*b]));
+        if let Some(Product { periods, factor }) = self.product {
+            let sign = [1.0, -1.0][usize::from(capture.element) % 2];
+            waves.push((periods, sign * factor * point.theta[0] * point.theta[1]));
         }
         match point.smooth {
             Some(SmoothTerm::Path(k)) => waves.push((smooth_periods(k), SMOOTH_STEP)),
@@ -246,9 +236,9 @@ impl ForwardModel for LinearModel {
     }
 
     fn images(&self, points: &[ParameterPoint], _: &dyn Progress) -> Result<Vec<PerCapture<PixelGrid>>> {
-        let images = points.iter().map(|p| match self.products.is_empty() {
-            true => vec![self.image(p, &self.beam[CaptureIndex::from(0)]); self.beam.len()].into(),
-            false => self.beam.iter().map(|own| self.image(p, own)).collect(),
+        let images = points.iter().map(|p| match self.product {
+            None => vec![self.image(p, &self.beam[CaptureIndex::from(0)]); self.beam.len()].into(),
+            Some(_) => self.beam.iter().map(|own| self.image(p, own)).collect(),
         });
         Ok(images.collect())
     }

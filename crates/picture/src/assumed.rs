@@ -200,7 +200,9 @@ mod tests {
         let narrow = without_dispersion(&camera, &all.channels);
         let sampling = narrow.sampling([400.0, 700.0], 12.5).unwrap();
         let counted = |c: &ChannelSampling| c.parts.iter().map(|p| p.weight).sum::<f64>();
-        for (k, nm) in all.channels.iter().map(|c| c.mean_um() * 1e3).enumerate() {
+        for (k, middle) in [450.0, 550.0, 650.0].into_iter().enumerate() {
+            // Photons of equal energy are as many as the wavelength is long: the mean of a band of 100 nm is beyond its middle.
+            let nm = middle + 100f64.powi(2) / (12.0 * middle);
             let parts = &sampling.channels[k].parts;
             assert!(parts.iter().all(|p| p.nm.iter().all(|v| (v - nm).abs() < 0.51)));
             // The balance of the channels stays: sums over parts 1 nm wide.

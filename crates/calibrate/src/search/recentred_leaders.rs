@@ -9,13 +9,10 @@ use metalith_core::{Progress, Result};
 use super::pairs::{FoundTogether, sound};
 use super::signatures::score_effects;
 use super::state::SearchState;
-use super::stepwise::{fit_with, step_forward};
+use super::stepwise::{LEADERS, fit_with, step_forward};
 use crate::fit::Fit;
 
-/// Single effects that are fitted, by what their signatures explain.
-const FITTED: usize = 6;
-
-/// Those of them that are simulated anew.
+/// Leaders that are simulated anew.
 const FOLLOWED: usize = 2;
 
 /// Share of the chi-square above noise, of captures that are fitted, that such an effect explains at least.
@@ -32,7 +29,7 @@ pub fn follow_leaders_anew<'a>(
 ) -> Result<Option<FoundTogether<'a>>> {
     let problem = &now.problem;
     let above_noise = |fit: &Fit| fit.chi2 - problem.pixels();
-    let leaders = score_effects(problem, &now.fit, chosen).into_iter().take(FITTED);
+    let leaders = score_effects(problem, &now.fit, chosen).into_iter().take(LEADERS);
     let mut leaders: Vec<(usize, f64, Fit)> = leaders
         .filter_map(|(effect, score)| Some((effect, score, fit_with(problem, &now.fit, chosen, &[effect])?)))
         .filter(|(_, _, fit)| above_noise(fit) < (1.0 - EXPLAINS) * above_noise(&now.fit))
@@ -82,7 +79,6 @@ mod tests {
     fn found(truth: [f64; 4]) -> Vec<usize> {
         let periods = [[2, 3], [5, 4], [3, 0], [0, 6]];
         let own = Product {
-            terms: [0, 1],
             periods: [2, 3],
             factor: 17.0,
         };

@@ -10,7 +10,7 @@ use crate::fit::{
 };
 
 /// Candidates that are fitted in full at each step.
-const LEADERS: usize = 6;
+pub const LEADERS: usize = 6;
 
 /// Smaller gains of reduced chi-square per pixel are within the error of the forward model itself: two
 /// independent programs differ by 0.005 on a chip without effects.
