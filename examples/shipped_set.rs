@@ -1,7 +1,8 @@
-//! Writes `golden/session`: a small measured set of a synthetic chip whose pillars are 8 nm too narrow and whose sensor is 5 um
-//! too far, with the pillars of `designs/mini_3x3.toml` in OASIS. `cargo run --release --example shipped_set FOLDER`. With `EFFECTS.toml
-//! NAME VALUE...` the chip has an effect of that file too. With `--full-size` first it is a set of two lenses of
-//! `designs/prototype_3x3.toml` in one colour, and the sensor is 8 um too far.
+//! Writes a measured set of a synthetic chip: `cargo run --release --example shipped_set [--full-size ELEMENTS] [--seed SEED] FOLDER
+//! [EFFECTS.toml] [NAME=VALUE,VALUE...]...`. Without options it is `golden/session`: pillars of `designs/mini_3x3.toml` in OASIS, 8 nm
+//! too narrow, and the sensor 5 um too far. Effects that are named stand in place of these two; those of a file may be named as well.
+//! `--full-size` is a set of one to three lenses of `designs/prototype_3x3.toml` in one colour, its cells solved with more orders than
+//! those of a fit.
 
 use std::path::Path;
 
@@ -11,36 +12,41 @@ use metalith::layout::{LayoutFormat, convert};
 use metalith::{Layout, Silent};
 use metalith_testing::session::{full_size_set, small_set, write_npy};
 
-/// What the chip has, beside noise.
-const EFFECTS: [(&str, [f64; 1]); 2] = [("cd_bias", [-8.0]), ("gap", [5.0])];
-
-/// And a chip with lenses of 1 mm.
-const FULL_SIZE_EFFECTS: [(&str, [f64; 1]); 1] = [("gap", [8.0])];
-
-/// Elements of that set.
-const FULL_SIZE_ELEMENTS: usize = 2;
+/// What the chip has, beside noise, where nothing is named.
+const EFFECTS: [&str; 2] = ["cd_bias=-8", "gap=5"];
 
 /// Seed of noise, registration, flux and black level.
 const SEED: u64 = 7;
 
+/// Orders of the cells of full-size lenses: fewer than a fit has err by more than noise there, 0.1 um in the gap of two lenses.
+const FULL_SIZE_ORDERS: usize = 15;
+
+/// An effect and its numbers, as `NAME=VALUE,VALUE`.
+fn effect(text: &str) -> Result<(String, Vec<f64>), Box<dyn std::error::Error>> {
+    let (name, values) = text.split_once('=').ok_or("an effect is NAME=VALUE,VALUE")?;
+    let values = values.split(',').map(str::parse).collect::<Result<_, _>>()?;
+    Ok((name.into(), values))
+}
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut args = std::env::args().skip(1).peekable();
-    let full_size = args.next_if(|a| a == "--full-size").is_some();
+    let mut option = |name: &str| args.next_if(|a| a == name).and_then(|_| args.next());
+    let elements: Option<usize> = option("--full-size").map(|n| n.parse()).transpose()?;
+    let seed = option("--seed").map_or(Ok(SEED), |n| n.parse())?;
     let folder = args.next().ok_or("name the folder to write into")?;
     let folder = Path::new(&folder);
-    let made: &[(&str, [f64; 1])] = if full_size { &FULL_SIZE_EFFECTS } else { &EFFECTS };
-    let mut effects: Vec<(String, Vec<f64>)> = made.iter().map(|(name, v)| ((*name).into(), v.to_vec())).collect();
-    let declared = match args.next() {
+    let declared = match args.next_if(|a| a.ends_with(".toml")) {
         Some(file) => DeclaredEffect::read(Path::new(&file))?,
         None => Vec::new(),
     };
-    if let Some(name) = args.next() {
-        effects.push((name, args.map(|value| value.parse()).collect::<Result<_, _>>()?));
+    let mut effects = args.map(|a| effect(&a)).collect::<Result<Vec<_>, _>>()?;
+    if effects.is_empty() {
+        effects = EFFECTS.into_iter().map(effect).collect::<Result<_, _>>()?;
     }
     std::fs::create_dir_all(folder)?;
-    let description = match full_size {
-        true => full_size_set(folder, FULL_SIZE_ELEMENTS),
-        false => small_set(folder),
+    let description = match elements {
+        Some(elements) => full_size_set(folder, elements),
+        None => small_set(folder),
     };
     let [written, kept] = ["layout.gds", "layout.oas"].map(|name| folder.join(name));
     convert(&Layout::open(&written)?, LayoutFormat::of_name(&kept), &kept, &Silent)?;
@@ -53,13 +59,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         sampling: Sampling::default(),
         ..Settings::default()
     };
-    let synthesizer = Synthesizer::new(&like, &settings)?;
+    let synthesizer = match elements {
+        Some(_) => Synthesizer::with_orders(&like, &settings, FULL_SIZE_ORDERS)?,
+        None => Synthesizer::new(&like, &settings)?,
+    };
     let chip = effects
         .iter()
         .map(|(name, values)| (name.as_str(), values.as_slice()))
         .collect();
     let images = synthesizer.with_effects(&[chip], &Silent)?.remove(0);
-    let set = synthesizer.draw(&images, SEED);
+    let set = synthesizer.draw(&images, seed);
     for capture in &set.captures.raw {
         write_npy(&folder.join(format!("{}.npy", capture.name)), &capture.dn);
     }

@@ -118,7 +118,7 @@ fn set_of(folder: &Path, lenses: &Lenses, beams: &[([i64; 2], [f64; 2])]) -> Pat
     let root = crate::root();
     let design = Design::read(&root.join(lenses.design)).unwrap();
     let array = PillarArray::build(&design, &Silent).unwrap();
-    write_pillars(&design, &array, Hierarchy::Sref, &folder.join("layout.gds"), &Silent).unwrap();
+    write_pillars(&design, &array, Hierarchy::Folded, &folder.join("layout.gds"), &Silent).unwrap();
     fs::copy(root.join("golden/measured/film_nk.csv"), folder.join("film_nk.csv")).unwrap();
     let bench = bench();
     let mut text = format!(

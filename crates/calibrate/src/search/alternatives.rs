@@ -24,7 +24,8 @@ pub struct Alternative {
     pub half_widths: Vec<WidthParts>,
 }
 
-/// Drop effects that the others have made redundant, with their runners-up.
+/// Drop effects that the others have made redundant, and those whose intervals include zero since all was refined, with their
+/// runners-up.
 pub fn drop_redundant(now: &mut SearchState<'_>, chosen: &mut Vec<usize>, runners_up: &mut Vec<Vec<usize>>) {
     let mut place = 0;
     while chosen.len() > 1 && place < chosen.len() {
@@ -35,7 +36,7 @@ pub fn drop_redundant(now: &mut SearchState<'_>, chosen: &mut Vec<usize>, runner
             value: loss,
             interval: [low, _],
         } = gain(&now.problem, &held, &now.held_out);
-        if loss < LEAST_GAIN || low <= 0.0 {
+        if loss < LEAST_GAIN || low <= 0.0 || includes_zero(now, chosen[place]) {
             *chosen = rest;
             runners_up.remove(place);
             (now.fit, now.held_out) = (fit, held);
@@ -44,6 +45,14 @@ pub fn drop_redundant(now: &mut SearchState<'_>, chosen: &mut Vec<usize>, runner
             place += 1;
         }
     }
+}
+
+/// Whether the interval of each number of an effect includes zero.
+fn includes_zero(now: &SearchState<'_>, effect: usize) -> bool {
+    let slots = now.problem.model.slots_of(effect);
+    let widths = now.fit.pick(&slots, &half_widths(&now.problem, &now.fit));
+    let mut numbers = slots.iter().zip(&widths);
+    numbers.all(|(&s, width)| now.fit.theta[s].abs() <= width.half_width())
 }
 
 /// For each effect found: the others that explain as much in its place. Where one explains more, or the SEM
@@ -167,5 +176,30 @@ impl Alternative {
             values: own.iter().map(|&s| fit.theta[s]).collect(),
             half_widths: fit.pick(&own, &widths),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linear_model::{LinearModel, PHASE_PERIODS, Term, beams};
+
+    /// What an error of the cell may be: clear of noise, and predicted in every capture that is left out.
+    #[test]
+    fn an_effect_whose_interval_includes_zero_is_dropped() {
+        const TRUTH: [f64; 2] = [0.0015, 0.02];
+        let terms = vec![Term::linear(PHASE_PERIODS), Term::linear([2, 3])];
+        let model = LinearModel::new(terms, beams(2, 2, 2));
+        let data = model.data(|_| TRUTH.to_vec(), None);
+        let problem = model.problem(&data);
+        let alone = SearchState::new(problem.clone(), problem.fit(&[1], &problem.nuisance_fit()));
+        let both = problem.fit(&[0, 1], &alone.fit);
+        let mut now = SearchState::new(problem, both);
+        let Gain { value, interval } = gain(&now.problem, &alone.held_out, &now.held_out);
+        assert!(value > LEAST_GAIN && interval[0] > 0.0, "{value} {interval:?}");
+        let (mut chosen, mut runners_up) = (vec![1, 0], vec![vec![0], vec![1]]);
+        drop_redundant(&mut now, &mut chosen, &mut runners_up);
+        assert_eq!((chosen, runners_up), (vec![1], vec![vec![0]]));
+        assert_eq!(now.fit.active, [1]);
     }
 }
