@@ -2,7 +2,7 @@
 //! `cargo run --release --example shapes -- 17 25`.
 //!
 //! One line of JSON for each number of orders: all cases of [`CIRCLES`] at five diameters on both lattices, all of
-//! [`RECTANGLES`] at five angles, and these with [`OTHER_SIZES`] at angles of [`ALIGNED`], along the normal.
+//! [`RECTANGLES`] at five angles, and these with [`OTHER_SIZES`] and [`MORE_RECTANGLES`] at angles of [`ALIGNED`], along the normal.
 
 use metalith::cell::{CellStack, Material, RotatedRectangle};
 use metalith::rcwa::{CellLattice, Orders};
@@ -40,6 +40,13 @@ const OTHER_SIZES: [(f64, f64); 6] = [
     (120.0, 170.0),
     (160.0, 300.0),
     (300.0, 520.0),
+];
+
+/// And three more, as [`RECTANGLES`] has them.
+const MORE_RECTANGLES: [(&str, f64, f64, f64, f64, f64); 3] = [
+    ("sin_luke_2015", 350.0, 700.0, 0.455, 120.0, 220.0),
+    ("tio2_siefke_2016", 320.0, 600.0, 0.532, 130.0, 240.0),
+    ("a_si_pierce_1972", 750.0, 900.0, 1.550, 260.0, 360.0),
 ];
 
 /// Angles at which rectangles are parallel to the edges of a square cell, of one pitch or of two pillars at the root of two
@@ -117,14 +124,17 @@ fn main() -> Result<()> {
                 points.push(point(&stack, wavelength, &shape, jones)?);
             }
         }
-        for ((film, pitch, height, wavelength, width, length), other) in RECTANGLES.into_iter().zip(OTHER_SIZES) {
+        let both = RECTANGLES.into_iter().zip(OTHER_SIZES);
+        let both = both.flat_map(|((film, pitch, height, wavelength, width, length), (other_width, other_length))| {
+            let other = (film, pitch, height, wavelength, other_width, other_length);
+            [(film, pitch, height, wavelength, width, length), other]
+        });
+        for (film, pitch, height, wavelength, width, length) in both.chain(MORE_RECTANGLES) {
             let stack = stack(film, pitch, height)?;
-            for (width, length) in [(width, length), other] {
-                for degrees in ALIGNED {
-                    let jones = rectangle(&stack, wavelength, (width, length), degrees, orders)?;
-                    let shape = format!("\"size\": [{width}, {length}], \"degrees\": {degrees}, \"aligned\": true");
-                    points.push(point(&stack, wavelength, &shape, jones)?);
-                }
+            for degrees in ALIGNED {
+                let jones = rectangle(&stack, wavelength, (width, length), degrees, orders)?;
+                let shape = format!("\"size\": [{width}, {length}], \"degrees\": {degrees}, \"aligned\": true");
+                points.push(point(&stack, wavelength, &shape, jones)?);
             }
         }
         println!("{{\"orders\": {along_axis}, \"points\": [{}]}}", points.join(", "));

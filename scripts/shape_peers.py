@@ -10,7 +10,7 @@ the distance of two is that of the entries farthest apart. All rows are held to 
 should come as orders are added; what the peer keeps of a distance is its grid, of 1600 x 1600 places that are inside or not; on a hexagonal lattice along its two vectors, with as many orders as a square
 lattice has, in a circle.
 
-`aligned` asks meent, which takes rectangles along the axes only, and takes them exactly: twelve sizes as they are, and turned by 45
+`aligned` asks meent, which takes rectangles along the axes only, and takes them exactly: fifteen sizes as they are, and turned by 45
 degrees, where two of them fill a square cell along their edges whose pitch is the root of two. Orders are for each pitch of
 pillars, in the larger cell as many more.
 """
