@@ -125,10 +125,12 @@ fn main() -> Result<()> {
             }
         }
         let both = RECTANGLES.into_iter().zip(OTHER_SIZES);
-        let both = both.flat_map(|((film, pitch, height, wavelength, width, length), (other_width, other_length))| {
-            let other = (film, pitch, height, wavelength, other_width, other_length);
-            [(film, pitch, height, wavelength, width, length), other]
-        });
+        let both = both.flat_map(
+            |((film, pitch, height, wavelength, width, length), (other_width, other_length))| {
+                let other = (film, pitch, height, wavelength, other_width, other_length);
+                [(film, pitch, height, wavelength, width, length), other]
+            },
+        );
         for (film, pitch, height, wavelength, width, length) in both.chain(MORE_RECTANGLES) {
             let stack = stack(film, pitch, height)?;
             for degrees in ALIGNED {

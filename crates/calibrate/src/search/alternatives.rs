@@ -73,7 +73,7 @@ pub fn alternatives(
     for place in 0..chosen.len() {
         // Where a residual is left, the true effect may have been screened out early.
         let all: Vec<usize> = (0..now.problem.model.effects()).collect();
-        let runners_up = if now.error() > 1.0 + ALIKE_WITHIN {
+        let runners_up = if now.leaves_more_than(ALIKE_WITHIN) {
             Some(&all)
         } else {
             runners_up.get(place)

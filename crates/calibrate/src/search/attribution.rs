@@ -17,10 +17,10 @@ use crate::surrogate::Surrogate;
 /// Most effects that are looked for at once.
 const MOST_EFFECTS: usize = 4;
 
-/// Reduced chi-square per pixel above which the search continues about what was found: what is found in full leaves
-/// 1.002 to 1.006. A residual of 1.1 can hide an effect of its typical size, which looks small and unsure on a surrogate
+/// Reduced chi-square per pixel beyond noise above which the search continues about what was found: what is found in full leaves
+/// 0.002 to 0.006. A residual of 1.1 can hide an effect of its typical size, which looks small and unsure on a surrogate
 /// that is centred elsewhere.
-const MORE_IS_LEFT: f64 = 1.01;
+const MORE_IS_LEFT: f64 = 0.01;
 
 /// The outcome of a search.
 pub struct Finding {
@@ -186,7 +186,7 @@ fn add_effects(
             }
         }
         let awake = history.chosen.last().is_some_and(|&e| now.problem.model.dormant(e));
-        if full && (awake || now.error() > MORE_IS_LEFT) {
+        if full && (awake || now.leaves_more_than(MORE_IS_LEFT)) {
             // What other effects change depends on what was found, and so do its own dormant parameters.
             now.recentre(progress)?;
         }

@@ -5,6 +5,9 @@ use metalith_core::{Progress, Result};
 use super::stepwise::fit_with;
 use crate::fit::{Fit, FitProblem, HeldOutErrors, held_out, mean_error};
 
+/// What noise alone leaves varies so much: by this many standard deviations of the mean square of so many pixels.
+const CHANCE_SIGMAS: f64 = 2.0;
+
 /// A fit with the problem that it solves.
 #[derive(Clone)]
 pub struct SearchState<'a> {
@@ -47,6 +50,11 @@ impl<'a> SearchState<'a> {
         mean_error(&self.held_out)
     }
 
+    /// Whether more is left on captures left out than `share` of the noise, and than that noise varies by.
+    pub fn leaves_more_than(&self, share: f64) -> bool {
+        self.error() > 1.0 + share.max(CHANCE_SIGMAS * (2.0 / self.problem.pixels().max(1.0)).sqrt())
+    }
+
     /// Move to another fit.
     pub fn move_to(&mut self, fit: Fit) {
         self.held_out = held_out(&self.problem, &fit.equations, &fit);
@@ -75,5 +83,29 @@ impl<'a> SearchState<'a> {
         let fit = self.problem.refine(self.fit.clone(), progress)?;
         self.move_to(fit);
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linear_model::{LinearModel, Term, beams};
+
+    /// Sets that leave more than noise varies by: of noise alone one in forty, of an effect all.
+    #[test]
+    fn what_noise_varies_by_is_not_left_over() {
+        const SETS: u64 = 20;
+        let model = LinearModel::new(vec![Term::linear([2, 3])], beams(2, 2, 1));
+        let sets_with_more = |theta: f64| {
+            let leaves_more = |seed: &u64| {
+                let data = model.data(|_| vec![theta], Some(*seed));
+                let problem = model.problem(&data);
+                let nothing = problem.nuisance_fit();
+                SearchState::new(problem, nothing).leaves_more_than(0.0)
+            };
+            (0..SETS).filter(leaves_more).count() as u64
+        };
+        assert!(sets_with_more(0.0) <= 2, "{}", sets_with_more(0.0));
+        assert_eq!(sets_with_more(0.03), SETS);
     }
 }
