@@ -67,6 +67,12 @@ impl Fit {
         let places = slots.iter().filter_map(|&s| self.position(s));
         places.map(|k| values[k]).collect()
     }
+
+    /// Whether one of some parameters is farther from zero than its half-width; these are given for all active parameters.
+    pub fn clears_zero(&self, slots: &[usize], half_widths: &[f64]) -> bool {
+        let mut places = slots.iter().filter_map(|&s| Some((s, self.position(s)?)));
+        places.any(|(s, k)| self.theta[s].abs() > half_widths[k])
+    }
 }
 
 impl<'a> FitProblem<'a> {

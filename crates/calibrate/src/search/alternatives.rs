@@ -49,10 +49,9 @@ pub fn drop_redundant(now: &mut SearchState<'_>, chosen: &mut Vec<usize>, runner
 
 /// Whether the interval of each number of an effect includes zero.
 fn includes_zero(now: &SearchState<'_>, effect: usize) -> bool {
-    let slots = now.problem.model.slots_of(effect);
-    let widths = now.fit.pick(&slots, &half_widths(&now.problem, &now.fit));
-    let mut numbers = slots.iter().zip(&widths);
-    numbers.all(|(&s, width)| now.fit.theta[s].abs() <= width.half_width())
+    let widths = half_widths(&now.problem, &now.fit);
+    let widths: Vec<f64> = widths.iter().map(WidthParts::half_width).collect();
+    !now.fit.clears_zero(&now.problem.model.slots_of(effect), &widths)
 }
 
 /// For each effect found: the others that explain as much in its place. Where one explains more, or the SEM

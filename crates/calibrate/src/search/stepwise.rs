@@ -340,9 +340,6 @@ impl Candidate {
             return Some(Rejection::Unphysical);
         }
         let widths = cautious_half_widths(problem, fit);
-        let sure = slots
-            .iter()
-            .any(|&s| fit.position(s).is_some_and(|k| fit.theta[s].abs() > widths[k]));
-        (!sure).then_some(Rejection::Nothing)
+        (!fit.clears_zero(&slots, &widths)).then_some(Rejection::Nothing)
     }
 }
