@@ -3,15 +3,14 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use num_complex::Complex32;
 use rayon::prelude::*;
 
 use super::{Bench, FocusSeries};
 use crate::cells::PillarTable;
 use crate::set::{ElementIndex, PerCapture};
 use metalith_core::{Error, Lattice, Progress, Result};
-use metalith_made::{ArrivingLight, ClassTable, GeometryChange, LightChange, MadeElement, PathChange, spread};
-use metalith_wave::propagation::{DistancesScratch, FillRow};
+use metalith_made::{ArrivingLight, ClassTable, GeometryChange, LightChange, MadeAperture, MadeElement, PathChange, spread};
+use metalith_wave::propagation::DistancesScratch;
 use metalith_wave::{Aperture, PlaneWave};
 
 /// Memory for elements as they are made, all chips that are worked on at once together (bytes): eight chips with one lens
@@ -163,25 +162,15 @@ impl Bench<'_> {
                 .zip(elements)
                 .map(|(chip, element)| table(chip, element, self.first[group.led] + k))
                 .collect();
-            let fills: Vec<Box<FillRow<'_>>> = tables
+            let apertures: Vec<MadeAperture<'_>> = tables
                 .iter()
                 .zip(elements)
-                .map(|(table, element)| {
-                    let aperture = element.aperture(table, um);
-                    let (wx, wy) = (&wx, &wy);
-                    let fill = move |iy: usize, row: &mut [Complex32]| {
-                        aperture.fill_row(iy, row);
-                        for (to, x) in row.iter_mut().zip(wx) {
-                            *to *= x * wy[iy];
-                        }
-                    };
-                    Box::new(fill) as Box<FillRow<'_>>
-                })
+                .map(|(table, element)| element.aperture(table, um))
                 .collect();
-            let fills: Vec<&FillRow<'_>> = fills.iter().map(|f| &**f).collect();
+            let apertures: Vec<&dyn Aperture> = apertures.iter().map(|a| a as &dyn Aperture).collect();
             group
                 .plan
-                .intensities(um, &distances, &fills, &mut scratch, &mut planes);
+                .intensities(um, &distances, [&wx, &wy], &apertures, &mut scratch, &mut planes);
             for (i, planes) in planes.iter_mut().enumerate() {
                 for (d, plane) in planes.iter_mut().enumerate() {
                     let level = tables[i].scattered * scattered_to(group, lattice, distances[d], um);

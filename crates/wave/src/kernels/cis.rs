@@ -77,6 +77,15 @@ pub(crate) fn multiply(a: &mut [Complex32], b: &[Complex32]) {
     });
 }
 
+/// `a[i] *= b[i] * c`.
+pub(crate) fn multiply_by(a: &mut [Complex32], b: &[Complex32], c: Complex32) {
+    pulp::Arch::new().dispatch(|| {
+        for (a, b) in a.iter_mut().zip(b) {
+            *a = product(*a, product(*b, c));
+        }
+    });
+}
+
 /// `a[i] *= conj(b[i])`.
 pub(crate) fn multiply_conj(a: &mut [Complex32], b: &[Complex32]) {
     pulp::Arch::new().dispatch(|| {

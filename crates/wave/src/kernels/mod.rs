@@ -19,6 +19,6 @@ pub use cis::{CIS_ERROR, cis, cis_all};
 pub use fft::fft_size;
 pub use taper::{fade, sinc};
 
-pub(crate) use cis::{accumulate, cis_where, multiply, multiply_conj, multiply_to, product_sum};
+pub(crate) use cis::{accumulate, cis_where, multiply, multiply_by, multiply_conj, multiply_to, product_sum};
 pub(crate) use fft::{gather, process, scatter};
 pub(crate) use fourier::Fourier;

@@ -33,7 +33,7 @@ pub use aperture::{Aperture, PillarFunction, Pillars};
 pub use band::{Accuracy, Fade};
 pub use departure::Departure;
 pub use direct::Direct;
-pub use distances::{Distances, DistancesPlan, DistancesScratch, FillRow};
+pub use distances::{Distances, DistancesPlan, DistancesScratch};
 pub use fold::{Fold, Otf};
 pub use hankel::Hankel;
 pub use landing::{Landing, LandingGrid};

@@ -14,7 +14,7 @@ use metalith_core::Lattice;
 use num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
-use super::Fade;
+use super::{Aperture, Fade};
 use super::transfer::FadedColumn;
 use crate::kernels::fft_size;
 
@@ -67,10 +67,6 @@ pub struct DistancesScratch {
     transfer: Vec<Complex32>,
 }
 
-/// Fills a row of the lattice with what leaves the element, the incident wave included; rows are asked for in
-/// order.
-pub type FillRow<'a> = dyn Fn(usize, &mut [Complex32]) + 'a;
-
 /// Frequencies that are kept, in whole cycles a period.
 #[derive(Clone, Copy)]
 struct KeptFrequencies {
@@ -118,19 +114,21 @@ impl DistancesPlan {
     }
 
     /// |field|^2 behind some elements at each of `distances_um`, for a wavelength (um): the transfer function is
-    /// worked out once for all of them. Output, `[element][distance]`: one square of `window` x `window`.
+    /// worked out once for all of them. `wave`: what arrives along x and along y, site by site; that of a site is the
+    /// product of both. Output, `[element][distance]`: one square of `window` x `window`.
     pub fn intensities(
         &self,
         wavelength_um: f64,
         distances_um: &[f64],
-        elements: &[&FillRow<'_>],
+        wave: [&[Complex32]; 2],
+        elements: &[&dyn Aperture],
         scratch: &mut DistancesScratch,
         out: &mut [Vec<Vec<f32>>],
     ) {
         let kept = self.kept(wavelength_um, distances_um);
         self.transfer(wavelength_um, distances_um, &kept, scratch);
-        for (fill_row, out) in elements.iter().zip(out) {
-            self.transform(&kept, fill_row, scratch);
+        for (element, out) in elements.iter().zip(out) {
+            self.transform(&kept, *element, wave, scratch);
             self.propagate(distances_um.len(), &kept, scratch);
             for (d, out) in out.iter_mut().enumerate() {
                 self.square(&kept, d, scratch, out);
@@ -190,7 +188,7 @@ impl DistancesPlan {
 mod tests {
     use super::*;
     use crate::kernels::cis;
-    use crate::propagation::{Aperture, Direct, PhaseFunction, PlaneWave};
+    use crate::propagation::{Direct, PhaseFunction, PlaneWave};
 
     /// Share of the peak intensity by which samples may differ from the direct sum: what the fade lets
     /// through, in single precision.
@@ -225,13 +223,11 @@ mod tests {
         let planned = DistancesPlan::new(wanted, 4);
         let distances = [56.0, 60.0];
         let mut out = vec![vec![Vec::new(); 2]];
-        let fill = |iy: usize, row: &mut [Complex32]| {
-            lens.fill_row(iy, row);
-            for (ix, t) in row.iter_mut().enumerate() {
-                *t *= cis(wave.turns(lattice.coordinate_um(ix), lattice.coordinate_um(iy)));
-            }
-        };
-        planned.intensities(um, &distances, &[&fill], &mut DistancesScratch::default(), &mut out);
+        let sites: Vec<f64> = (0..lattice.sites()).map(|i| lattice.coordinate_um(i)).collect();
+        let along_x: Vec<Complex32> = sites.iter().map(|x| cis(wave.turns(*x, 0.0))).collect();
+        let along_y: Vec<Complex32> = sites.iter().map(|y| cis(wave.turns(0.0, *y))).collect();
+        let scratch = &mut DistancesScratch::default();
+        planned.intensities(um, &distances, [&along_x, &along_y], &[&lens], scratch, &mut out);
         let n = planned.window();
         let at = |i: usize| (i as f64 - 0.5 * (n as f64 - 1.0)) * planned.step_um();
         let mut worst = 0.0f64;

@@ -2,8 +2,9 @@
 
 use num_complex::Complex32;
 
-use super::{DistancesPlan, DistancesScratch, FillRow, KeptFrequencies};
-use crate::kernels::{gather, multiply_to, process};
+use super::{DistancesPlan, DistancesScratch, KeptFrequencies};
+use crate::kernels::{gather, multiply_by, multiply_to, process};
+use crate::propagation::Aperture;
 use crate::propagation::transfer::{FrequencyColumn, Transfer};
 
 /// Columns that go through one call of a transform: enough to fill cache lines.
@@ -45,8 +46,14 @@ impl DistancesPlan {
         }
     }
 
-    /// Forward transform of the element, cut to the kept frequencies: `spectrum[kx][ky]`.
-    pub(super) fn transform(&self, kept: &KeptFrequencies, fill_row: &FillRow<'_>, scratch: &mut DistancesScratch) {
+    /// Forward transform of what leaves the element in a wave, cut to the kept frequencies: `spectrum[kx][ky]`.
+    pub(super) fn transform(
+        &self,
+        kept: &KeptFrequencies,
+        element: &dyn Aperture,
+        [along_x, along_y]: [&[Complex32]; 2],
+        scratch: &mut DistancesScratch,
+    ) {
         let (n, m) = (self.wanted.lattice.sites(), self.sites);
         let [kx, ky] = kept.count;
         scratch.row.resize(m.max(scratch.row.len()), Complex32::ZERO);
@@ -55,7 +62,8 @@ impl DistancesPlan {
         for (iy, line) in scratch.lines.chunks_exact_mut(kx).enumerate() {
             let row = &mut scratch.row[..m];
             row.fill(Complex32::ZERO);
-            fill_row(iy, &mut row[..n]);
+            element.fill_row(iy, &mut row[..n]);
+            multiply_by(&mut row[..n], along_x, along_y[iy]);
             process(&*self.forward, row, &mut scratch.fft);
             gather(line, row, kept.first[0]);
         }
