@@ -1,8 +1,8 @@
 //! Jones matrices of cells of circles, on a square and on a hexagonal lattice, and of rotated rectangles, for `scripts/shape_peers.py`:
 //! `cargo run --release --example shapes -- 17 25`.
 //!
-//! One line of JSON for each number of orders: all cases of [`CIRCLES`] at five diameters on both lattices, all of
-//! [`RECTANGLES`] at five angles, and these with [`OTHER_SIZES`] and [`MORE_RECTANGLES`] at angles of [`ALIGNED`], along the normal.
+//! One line of JSON for each number of orders, along the normal: all cases of [`CIRCLES`] at five diameters on both lattices,
+//! [`RECTANGLES`] of one size at five angles, and of all sizes at the angles of [`ALIGNED`].
 
 use metalith::cell::{CellStack, Material, RotatedRectangle};
 use metalith::rcwa::{CellLattice, Orders};
@@ -19,35 +19,47 @@ const CIRCLES: [(&str, f64, f64, f64, f64, f64); 6] = [
     ("a_si_pierce_1972", 750.0, 900.0, 1.550, 200.0, 70.0),
 ];
 
-/// Film, pitch, height (nm), wavelength (um), width and length (nm).
-const RECTANGLES: [(&str, f64, f64, f64, f64, f64); 6] = [
-    ("sin_luke_2015", 350.0, 700.0, 0.530, 110.0, 260.0),
-    ("sin_luke_2015", 400.0, 800.0, 0.660, 140.0, 320.0),
-    ("tio2_siefke_2016", 355.0, 600.0, 0.532, 100.0, 250.0),
-    ("tio2_siefke_2016", 320.0, 600.0, 0.532, 90.0, 200.0),
-    ("a_si_pierce_1972", 450.0, 550.0, 0.940, 120.0, 260.0),
-    ("a_si_pierce_1972", 750.0, 900.0, 1.550, 200.0, 440.0),
+/// Film, pitch, height (nm), wavelength (um), widths and lengths (nm).
+type RectangleCase = (&'static str, f64, f64, f64, &'static [(f64, f64)]);
+const RECTANGLES: [RectangleCase; 7] = [
+    ("sin_luke_2015", 350.0, 700.0, 0.530, &[(110.0, 260.0), (90.0, 200.0)]),
+    ("sin_luke_2015", 400.0, 800.0, 0.660, &[(140.0, 320.0), (180.0, 260.0)]),
+    (
+        "tio2_siefke_2016",
+        355.0,
+        600.0,
+        0.532,
+        &[(100.0, 250.0), (70.0, 280.0)],
+    ),
+    (
+        "tio2_siefke_2016",
+        320.0,
+        600.0,
+        0.532,
+        &[(90.0, 200.0), (120.0, 170.0), (130.0, 240.0)],
+    ),
+    (
+        "a_si_pierce_1972",
+        450.0,
+        550.0,
+        0.940,
+        &[(120.0, 260.0), (160.0, 300.0)],
+    ),
+    (
+        "a_si_pierce_1972",
+        750.0,
+        900.0,
+        1.550,
+        &[(200.0, 440.0), (300.0, 520.0), (260.0, 360.0)],
+    ),
+    ("sin_luke_2015", 350.0, 700.0, 0.455, &[(120.0, 220.0)]),
 ];
+
+/// Of so many of [`RECTANGLES`] the first size is turned by [`ANGLES`].
+const TURNED: usize = 6;
 
 /// Angles of the rectangles (degrees).
 const ANGLES: [f64; 5] = [10.0, 30.0, 45.0, 70.0, 110.0];
-
-/// Another width and length for each of [`RECTANGLES`] (nm).
-const OTHER_SIZES: [(f64, f64); 6] = [
-    (90.0, 200.0),
-    (180.0, 260.0),
-    (70.0, 280.0),
-    (120.0, 170.0),
-    (160.0, 300.0),
-    (300.0, 520.0),
-];
-
-/// And three more, as [`RECTANGLES`] has them.
-const MORE_RECTANGLES: [(&str, f64, f64, f64, f64, f64); 3] = [
-    ("sin_luke_2015", 350.0, 700.0, 0.455, 120.0, 220.0),
-    ("tio2_siefke_2016", 320.0, 600.0, 0.532, 130.0, 240.0),
-    ("a_si_pierce_1972", 750.0, 900.0, 1.550, 260.0, 360.0),
-];
 
 /// Angles at which rectangles are parallel to the edges of a square cell, of one pitch or of two pillars at the root of two
 /// (degrees): codes without rotated shapes can solve these too.
@@ -116,27 +128,24 @@ fn main() -> Result<()> {
                 }
             }
         }
-        for (film, pitch, height, wavelength, width, length) in RECTANGLES {
+        let mut rectangles = |case: &RectangleCase, size: (f64, f64), degrees: f64, remark: &str| -> Result<()> {
+            let (film, pitch, height, wavelength, _) = *case;
             let stack = stack(film, pitch, height)?;
+            let jones = rectangle(&stack, wavelength, size, degrees, orders)?;
+            let shape = format!("\"size\": [{}, {}], \"degrees\": {degrees}{remark}", size.0, size.1);
+            points.push(point(&stack, wavelength, &shape, jones)?);
+            Ok(())
+        };
+        for case in &RECTANGLES[..TURNED] {
             for degrees in ANGLES {
-                let jones = rectangle(&stack, wavelength, (width, length), degrees, orders)?;
-                let shape = format!("\"size\": [{width}, {length}], \"degrees\": {degrees}");
-                points.push(point(&stack, wavelength, &shape, jones)?);
+                rectangles(case, case.4[0], degrees, "")?;
             }
         }
-        let both = RECTANGLES.into_iter().zip(OTHER_SIZES);
-        let both = both.flat_map(
-            |((film, pitch, height, wavelength, width, length), (other_width, other_length))| {
-                let other = (film, pitch, height, wavelength, other_width, other_length);
-                [(film, pitch, height, wavelength, width, length), other]
-            },
-        );
-        for (film, pitch, height, wavelength, width, length) in both.chain(MORE_RECTANGLES) {
-            let stack = stack(film, pitch, height)?;
-            for degrees in ALIGNED {
-                let jones = rectangle(&stack, wavelength, (width, length), degrees, orders)?;
-                let shape = format!("\"size\": [{width}, {length}], \"degrees\": {degrees}, \"aligned\": true");
-                points.push(point(&stack, wavelength, &shape, jones)?);
+        for case in &RECTANGLES {
+            for size in case.4 {
+                for degrees in ALIGNED {
+                    rectangles(case, *size, degrees, ", \"aligned\": true")?;
+                }
             }
         }
         println!("{{\"orders\": {along_axis}, \"points\": [{}]}}", points.join(", "));

@@ -9,7 +9,9 @@ use super::{Bench, FocusSeries};
 use crate::cells::PillarTable;
 use crate::set::{ElementIndex, PerCapture};
 use metalith_core::{Error, Lattice, Progress, Result};
-use metalith_made::{ArrivingLight, ClassTable, GeometryChange, LightChange, MadeAperture, MadeElement, PathChange, spread};
+use metalith_made::{
+    ArrivingLight, ClassTable, GeometryChange, LightChange, MadeAperture, MadeElement, PathChange, spread,
+};
 use metalith_wave::propagation::DistancesScratch;
 use metalith_wave::{Aperture, PlaneWave};
 

@@ -4,7 +4,9 @@
 //! They are solved by conjugate gradients, preconditioned by what `precondition` says.
 
 use metalith_core::{Error, Progress, Result};
-use ndarray::{Array2, ArrayView1, Axis, Slice};
+use ndarray::{Array2, Axis, Slice};
+use pulp::Arch;
+use rayon::prelude::*;
 
 use super::Recorded;
 use super::precondition::Preconditioner;
@@ -178,15 +180,40 @@ impl<'a> NormalSystem<'a> {
     }
 }
 
+/// Sum of products in double precision, in an order that depends on no thread and no machine.
 fn dot(a: &[Array2<f32>], b: &[Array2<f32>]) -> f64 {
-    let of_row = |(a, b): (ArrayView1<'_, f32>, ArrayView1<'_, f32>)| -> f64 {
-        a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
-    };
-    a.iter()
-        .zip(b)
-        .flat_map(|(a, b)| a.rows().into_iter().zip(b.rows()))
-        .map(of_row)
+    let of_plane = |(a, b): (&Array2<f32>, &Array2<f32>)| -> f64 {
+        let rows = a.rows().into_iter().zip(b.rows());
+        rows.map(|(a, b)| {
+            dot_of_row(
+                a.as_slice().expect("rows are whole"),
+                b.as_slice().expect("rows are whole"),
+            )
+        })
         .sum()
+    };
+    let of_planes: Vec<f64> = a.par_iter().zip(b).map(of_plane).collect();
+    of_planes.iter().sum()
+}
+
+fn dot_of_row(a: &[f32], b: &[f32]) -> f64 {
+    /// Sums beside one another, for registers.
+    const SUMS: usize = 16;
+    Arch::new().dispatch(|| {
+        let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<SUMS>(), b.as_chunks::<SUMS>());
+        let mut sums = [0.0f64; SUMS];
+        for (a, b) in a.iter().zip(b) {
+            for k in 0..SUMS {
+                sums[k] += f64::from(a[k]) * f64::from(b[k]);
+            }
+        }
+        let rest: f64 = a_rest
+            .iter()
+            .zip(b_rest)
+            .map(|(a, b)| f64::from(*a) * f64::from(*b))
+            .sum();
+        sums.iter().sum::<f64>() + rest
+    })
 }
 
 /// Slopes towards the next row and the next column; zero at the last.

@@ -14,8 +14,8 @@ use metalith_core::Lattice;
 use num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
-use super::{Aperture, Fade};
 use super::transfer::FadedColumn;
+use super::{Aperture, Fade};
 use crate::kernels::fft_size;
 
 /// Beyond what geometry needs, a period holds this for the fade (um): with it, intensities agree with the
