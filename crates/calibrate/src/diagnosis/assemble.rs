@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::pattern::untold_tilt;
+use super::pattern::{untold_colours, untold_tilt};
 use super::{CaptureError, Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePattern, LeftOut, Ranked, SetVerdict};
 use crate::effects::Effect;
 use crate::fidelity::Rung;
@@ -168,26 +168,31 @@ fn found_effects(simulator: &Simulator<'_>, finding: &Finding, verdict: SetVerdi
     effects
 }
 
-/// What captures of few elements leave open: distances of their own would do as well as a tilt of the sensor.
+/// What captures of few elements or of one colour leave open: distances of their own would do as well as a tilt of the sensor, and
+/// effects that differ by colour alone may be taken for one another.
 fn remarks(simulator: &Simulator<'_>, evidence: &Evidence, verdict: SetVerdict) -> Vec<String> {
     let (set, finding) = (simulator.bench.set(), &evidence.finding);
-    let used = set.captures.iter_enumerated().filter(|(c, _)| evidence.used[*c]);
-    let elements: BTreeSet<usize> = used.map(|(_, capture)| usize::from(capture.element)).collect();
+    if verdict == SetVerdict::Unexplained || finding.chosen.is_empty() {
+        return Vec::new();
+    }
+    let used = || set.captures.iter_enumerated().filter(|(c, _)| evidence.used[*c]);
+    let elements: BTreeSet<usize> = used().map(|(_, capture)| usize::from(capture.element)).collect();
+    let colours: BTreeSet<usize> = used().map(|(_, capture)| usize::from(capture.led)).collect();
     let is_found = |is: fn(&dyn Effect) -> bool| finding.chosen.iter().any(|&e| is(simulator.effects[e].as_ref()));
     let (gap, tilt) = (
         is_found(|e| e.name() == "gap"),
         is_found(|e| e.gradient_of() == Some("gap")),
     );
-    let is_open = match elements.len() {
+    let is_tilt_open = match elements.len() {
         1 => gap,
         2 => tilt,
         3 => tilt && gap,
         _ => false,
     };
-    let claims = verdict != SetVerdict::Unexplained;
-    (is_open && claims)
-        .then(|| untold_tilt(elements.len()))
+    let of_elements = is_tilt_open.then(|| untold_tilt(elements.len()));
+    of_elements
         .into_iter()
+        .chain((colours.len() == 1).then(untold_colours))
         .collect()
 }
 

@@ -211,6 +211,12 @@ pub(super) fn untold_tilt(elements: usize) -> String {
     untold(elements, "element", "a tilt of the sensor", "a distance of its own")
 }
 
+/// That one colour does not tell effects apart that differ by colour alone.
+pub(super) fn untold_colours() -> String {
+    let widths = untold(1, "colour", "an index or a height of the film", "a bias of widths");
+    widths + " So it is with the centre of a lamp and a gap."
+}
+
 fn label(set: &MeasuredSet, by: Grouping, c: CaptureIndex) -> String {
     let capture = &set.captures[c];
     match by {

@@ -88,6 +88,21 @@ fn a_bias_beside_a_large_gap_is_found() {
     }
 }
 
+/// Captures of one colour are read, and the answer says what they leave open.
+#[test]
+fn captures_of_one_colour_leave_something_open() {
+    let mut set = synthetic(&[("gap", &[5.0])], 25);
+    let first = set.captures.iter().next().unwrap().led;
+    set.captures = set.captures.into_iter().filter(|c| c.led == first).collect();
+    let session = Session::new(&set, with_effects(&["gap", "cd_bias"])).unwrap();
+    let d = session
+        .diagnose(&session.simulate(&Silent).unwrap(), &Silent)
+        .unwrap()
+        .0;
+    assert!(names(&d).contains(&"gap"), "{}", d.sentence());
+    assert!(d.remarks.iter().any(|r| r.contains("Of one colour")), "{:?}", d.remarks);
+}
+
 /// Two elements side by side at unlike distances from a tilted sensor.
 #[test]
 fn a_tilt_of_the_sensor_is_found() {

@@ -182,21 +182,16 @@ impl<'a> NormalSystem<'a> {
 
 /// Sum of products in double precision, in an order that depends on no thread and no machine.
 fn dot(a: &[Array2<f32>], b: &[Array2<f32>]) -> f64 {
-    let of_plane = |(a, b): (&Array2<f32>, &Array2<f32>)| -> f64 {
-        let rows = a.rows().into_iter().zip(b.rows());
-        rows.map(|(a, b)| {
-            dot_of_row(
-                a.as_slice().expect("rows are whole"),
-                b.as_slice().expect("rows are whole"),
-            )
-        })
-        .sum()
+    let of_plane = |(a, b): (&Array2<f32>, &Array2<f32>)| {
+        let [a, b] = [a.as_standard_layout(), b.as_standard_layout()];
+        let values = a.as_slice().zip(b.as_slice());
+        values.map(|(a, b)| dot_of_values(a, b)).expect("planes are whole")
     };
     let of_planes: Vec<f64> = a.par_iter().zip(b).map(of_plane).collect();
     of_planes.iter().sum()
 }
 
-fn dot_of_row(a: &[f32], b: &[f32]) -> f64 {
+fn dot_of_values(a: &[f32], b: &[f32]) -> f64 {
     /// Sums beside one another, for registers.
     const SUMS: usize = 16;
     Arch::new().dispatch(|| {
@@ -207,12 +202,8 @@ fn dot_of_row(a: &[f32], b: &[f32]) -> f64 {
                 sums[k] += f64::from(a[k]) * f64::from(b[k]);
             }
         }
-        let rest: f64 = a_rest
-            .iter()
-            .zip(b_rest)
-            .map(|(a, b)| f64::from(*a) * f64::from(*b))
-            .sum();
-        sums.iter().sum::<f64>() + rest
+        let rest = a_rest.iter().zip(b_rest).map(|(a, b)| f64::from(*a) * f64::from(*b));
+        sums.iter().sum::<f64>() + rest.sum::<f64>()
     })
 }
 
@@ -281,6 +272,16 @@ fn add_prior(to: &mut Array2<f32>, x: &Array2<f32>, terms: Terms) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn products_are_summed_in_any_layout() {
+        let value = |(i, j): (usize, usize)| ((i * 5 + j * 3) % 7) as f32;
+        let rows = Array2::from_shape_fn((7, 9), value);
+        let columns = Array2::from_shape_fn((9, 7), |(j, i)| value((i, j))).reversed_axes();
+        let sum: f64 = rows.iter().map(|v| f64::from(v * v)).sum();
+        // Sums of whole numbers.
+        assert_eq!(dot(&[rows.clone(), columns.clone()], &[columns, rows]), 2.0 * sum);
+    }
 
     #[test]
     fn slopes_have_their_adjoint() {
