@@ -21,6 +21,7 @@ mod operator;
 mod operator_error;
 mod page;
 mod png16;
+mod products;
 mod rehearsal;
 mod report;
 mod resolution;

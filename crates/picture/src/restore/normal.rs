@@ -5,13 +5,13 @@
 
 use metalith_core::{Error, Progress, Result};
 use ndarray::{Array2, Axis, Slice};
-use pulp::Arch;
 use rayon::prelude::*;
 
 use super::Recorded;
 use super::precondition::Preconditioner;
 use super::prior::SceneStatistics;
 use crate::operator::FrameOperator;
+use crate::products::sum_of_products;
 
 /// Planes of a picture.
 pub type Planes = Vec<Array2<f32>>;
@@ -185,26 +185,10 @@ fn dot(a: &[Array2<f32>], b: &[Array2<f32>]) -> f64 {
     let of_plane = |(a, b): (&Array2<f32>, &Array2<f32>)| {
         let [a, b] = [a.as_standard_layout(), b.as_standard_layout()];
         let values = a.as_slice().zip(b.as_slice());
-        values.map(|(a, b)| dot_of_values(a, b)).expect("planes are whole")
+        values.map(|(a, b)| sum_of_products(a, b)).expect("planes are whole")
     };
     let of_planes: Vec<f64> = a.par_iter().zip(b).map(of_plane).collect();
     of_planes.iter().sum()
-}
-
-fn dot_of_values(a: &[f32], b: &[f32]) -> f64 {
-    /// Sums beside one another, for registers.
-    const SUMS: usize = 16;
-    Arch::new().dispatch(|| {
-        let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<SUMS>(), b.as_chunks::<SUMS>());
-        let mut sums = [0.0f64; SUMS];
-        for (a, b) in a.iter().zip(b) {
-            for k in 0..SUMS {
-                sums[k] += f64::from(a[k]) * f64::from(b[k]);
-            }
-        }
-        let rest = a_rest.iter().zip(b_rest).map(|(a, b)| f64::from(*a) * f64::from(*b));
-        sums.iter().sum::<f64>() + rest.sum::<f64>()
-    })
 }
 
 /// Slopes towards the next row and the next column; zero at the last.

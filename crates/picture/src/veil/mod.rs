@@ -17,6 +17,8 @@ mod trace;
 use metalith_camera::Sensor;
 use pulp::Arch;
 
+use crate::products::sum_of_products;
+
 pub use shares::LightShares;
 pub use squares::{gather, lay, lift, spread};
 
@@ -78,23 +80,9 @@ impl Veil {
 
     /// The adjoint of [`Veil::apply`].
     pub fn adjoint(&self, channel: usize, basis: usize, cells: &[f64]) -> Vec<f64> {
-        // Sums beside one another, for registers.
-        const SUMS: usize = 16;
-        let sum = |row: &[f32]| {
-            Arch::new().dispatch(|| {
-                let (rows, row) = row.as_chunks::<SUMS>();
-                let (cells, rest) = cells.as_chunks::<SUMS>();
-                let mut sums = [0.0; SUMS];
-                for (row, cells) in rows.iter().zip(cells) {
-                    for k in 0..SUMS {
-                        sums[k] += f64::from(row[k]) * cells[k];
-                    }
-                }
-                let rest: f64 = row.iter().zip(rest).map(|(v, c)| f64::from(*v) * c).sum();
-                sums.iter().sum::<f64>() + rest
-            })
-        };
-        self.block(channel, basis).map(sum).collect()
+        self.block(channel, basis)
+            .map(|row| sum_of_products(row, cells))
+            .collect()
     }
 
     /// The veil of a surface whose spectrum is the sum of some of the basis, in each channel.
