@@ -147,21 +147,13 @@ impl<'a> Substitute<'a> {
     /// Whether captures left out cannot distinguish it from the best.
     fn is_as_good(&self, best: &Self) -> bool {
         let (own, best) = (&self.state, &best.state);
-        let Gain {
-            value: worse,
-            interval: [low, _],
-        } = gain(&own.problem, &own.held_out, &best.held_out);
-        (worse < LEAST_GAIN || low <= 0.0) && own.error() < best.error() + ALIKE_WITHIN
+        !best.surely_leaves_less_than(own) && own.error() < best.error() + ALIKE_WITHIN
     }
 
     fn beats(&self, best: &Self) -> bool {
-        let problem = &self.state.problem;
-        let Gain {
-            value: better,
-            interval: [low, _],
-        } = gain(problem, &best.state.held_out, &self.state.held_out);
         let by_sem = best.sem_chi2() - self.sem_chi2();
-        better >= LEAST_GAIN && low > 0.0 && by_sem > -SEM_DECIDES || self.is_as_good(best) && by_sem > SEM_DECIDES
+        self.state.surely_leaves_less_than(&best.state) && by_sem > -SEM_DECIDES
+            || self.is_as_good(best) && by_sem > SEM_DECIDES
     }
 }
 

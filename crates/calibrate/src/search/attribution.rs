@@ -5,9 +5,9 @@ use metalith_core::{Progress, Result};
 
 use super::alternatives::{Alternative, alternatives, drop_redundant};
 use super::exchange::{find_exchange, much_alike};
-use super::pairs::find_pair;
+use super::pairs::{FoundTogether, LEAST_LEFT, find_pair};
 use super::recentred_leaders::follow_leaders_anew;
-use super::state::SearchState;
+use super::state::{MORE_IS_LEFT, SearchState};
 use super::stepwise::{LEAST_GAIN, RESIDUAL, Rejection, TriedEffect, step_forward};
 use crate::fit::{Fit, FitProblem, HeldOutErrors, WidthParts, half_widths, mean_error};
 use crate::optics::PixelGrid;
@@ -16,11 +16,6 @@ use crate::surrogate::Surrogate;
 
 /// Most effects that are looked for at once.
 const MOST_EFFECTS: usize = 4;
-
-/// Reduced chi-square per pixel beyond noise above which the search continues about what was found: what is found in full leaves
-/// 0.002 to 0.006. A residual of 1.1 can hide an effect of its typical size, which looks small and unsure on a surrogate
-/// that is centred elsewhere.
-const MORE_IS_LEFT: f64 = 0.01;
 
 /// The outcome of a search.
 pub struct Finding {
@@ -93,13 +88,32 @@ impl SearchHistory {
         self.alike.push(alike);
     }
 
-    /// Take an effect in the place of one that was taken before.
-    fn replace(&mut self, place: usize, effect: usize) {
-        let removed = std::mem::replace(&mut self.chosen[place], effect);
+    /// Take effects that explain more together in the place of all that were taken before.
+    fn replace_all(&mut self, found: &FoundTogether<'_>) {
+        for place in 0..self.chosen.len() {
+            self.reject(self.chosen[place]);
+        }
+        (self.chosen, self.runners_up, self.alike) = Default::default();
+        for tried in &found.tried {
+            self.take(tried, found.runners_up.clone(), Vec::new());
+        }
+    }
+
+    /// An effect that was taken is so no longer: others explain more.
+    fn reject(&mut self, removed: usize) {
         for known in self.ranking.iter_mut().chain(self.later.iter_mut().flatten()) {
             if known.effect == removed && known.rejected.is_none() {
                 known.rejected = Some(Rejection::Second);
-            } else if known.effect == effect && known.rejected == Some(Rejection::Second) {
+            }
+        }
+    }
+
+    /// Take an effect in the place of one that was taken before.
+    fn replace(&mut self, place: usize, effect: usize) {
+        let removed = std::mem::replace(&mut self.chosen[place], effect);
+        self.reject(removed);
+        for known in self.ranking.iter_mut().chain(self.later.iter_mut().flatten()) {
+            if known.effect == effect && known.rejected == Some(Rejection::Second) {
                 known.rejected = None;
             }
         }
@@ -113,9 +127,11 @@ impl SearchHistory {
 /// If a simulation fails, or the user stopped it.
 pub fn attribute(problem: FitProblem<'_>, full: bool, progress: &dyn Progress) -> Result<Finding> {
     let nothing = problem.nuisance_fit();
-    let mut now = SearchState::new(problem, nothing);
-    let mut history = SearchHistory::start(&now);
+    let start = SearchState::new(problem, nothing);
+    let mut now = start.clone();
+    let mut history = SearchHistory::start(&start);
     add_effects(&mut now, &mut history, full, progress)?;
+    try_pairs_from_start(&start, &mut now, &mut history, full, progress)?;
     let found = history.chosen.len();
     drop_redundant(&mut now, &mut history.chosen, &mut history.runners_up);
     if full && history.chosen.len() < found {
@@ -197,6 +213,28 @@ fn add_effects(
     Ok(())
 }
 
+/// Where effects that were added one by one leave something, the first may have been the wrong one: a pair that explains all but
+/// little from the start, and surely more than they do, takes their place.
+fn try_pairs_from_start<'a>(
+    start: &SearchState<'a>,
+    now: &mut SearchState<'a>,
+    history: &mut SearchHistory,
+    full: bool,
+    progress: &dyn Progress,
+) -> Result<()> {
+    // Where nothing was found, pairs have been tried.
+    if history.chosen.is_empty() || !now.leaves_more_than(LEAST_LEFT) {
+        return Ok(());
+    }
+    if let Some(found) = find_pair(start, &[], full, progress)?
+        && found.state.surely_leaves_less_than(now)
+    {
+        history.replace_all(&found);
+        *now = found.state;
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -246,6 +284,32 @@ mod tests {
         both.extend(found.alternatives[0].iter().map(|a| a.effect));
         both.sort_unstable();
         assert_eq!(both, [0, 1]);
+    }
+
+    /// The last two effects are each much like one of the first two, and were taken for them: the pair takes their place, and
+    /// what is right is left alone.
+    #[test]
+    fn a_pair_takes_the_place_of_effects_that_leave_more() {
+        let mixed = |own: [u32; 2], other: [u32; 2]| Term {
+            patterns: vec![(own, 1.0), (other, 0.4)],
+            ..Term::linear(own)
+        };
+        let [a, b] = [[2, 3], [5, 4]];
+        let terms = vec![Term::linear(a), Term::linear(b), mixed(a, [3, 6]), mixed(b, [6, 2])];
+        let model = LinearModel::new(terms, beams(2, 2, 2));
+        let data = model.data(|_| vec![0.08, 0.04, 0.0, 0.0], Some(7));
+        let start = SearchState::new(model.problem(&data), model.problem(&data).nuisance_fit());
+        let found = |chosen: [usize; 2]| {
+            let mut now = start.clone();
+            now.move_to(now.problem.fit(&chosen, &now.fit));
+            let mut history = SearchHistory::start(&start);
+            history.chosen = chosen.to_vec();
+            try_pairs_from_start(&start, &mut now, &mut history, false, &Silent).unwrap();
+            assert!(!now.leaves_more_than(0.0), "{}", now.error());
+            history.chosen
+        };
+        assert_eq!(found([2, 3]), [0, 1]);
+        assert_eq!(found([1, 0]), [1, 0]);
     }
 
     /// One effect is taken for another that is much like it, because a third is hidden: with the third, the right one explains

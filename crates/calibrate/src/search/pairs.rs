@@ -7,7 +7,7 @@
 use metalith_core::{Progress, Result};
 
 use super::signatures::score_pairs;
-use super::state::SearchState;
+use super::state::{MORE_IS_LEFT, SearchState};
 use super::stepwise::{Candidate, LEAST_GAIN, TriedEffect, fit_with};
 use crate::fit::{Fit, change_energy, held_out, mean_error, null_gain};
 
@@ -24,7 +24,7 @@ const PROMISING: f64 = 0.25;
 const MAY_LEAVE: f64 = 0.05;
 
 /// And the reduced chi-square per pixel that it may leave where the error is small.
-const LEAST_LEFT: f64 = 0.05;
+pub const LEAST_LEFT: f64 = 0.05;
 
 /// Effects that explain a residual together, or one that only a surrogate about its own fit shows.
 pub struct FoundTogether<'a> {
@@ -88,6 +88,10 @@ pub fn find_pair<'a>(
         };
         if full {
             state.refine(progress)?;
+            if state.leaves_more_than(MORE_IS_LEFT) {
+                // What one changes beside the other: without it the fit rests where less may be left close by.
+                state.recentre_alone(progress)?;
+            }
         }
         let is_better = best.as_ref().is_none_or(|b| state.error() < b.state.error());
         if is_better && let Some(tried) = sound(now, &state, &pair.map(|effect| (effect, score))) {

@@ -2,11 +2,17 @@
 
 use metalith_core::{Progress, Result};
 
-use super::stepwise::fit_with;
-use crate::fit::{Fit, FitProblem, HeldOutErrors, held_out, mean_error};
+use super::stepwise::{LEAST_GAIN, fit_with};
+use crate::fit::{Fit, FitProblem, Gain, HeldOutErrors, gain, held_out, mean_error};
+use crate::surrogate::Surrogate;
 
 /// What noise alone leaves varies so much: by this many standard deviations of the mean square of so many pixels.
 const CHANCE_SIGMAS: f64 = 2.0;
+
+/// Reduced chi-square per pixel beyond noise above which the search continues about what was found: what is found in full leaves
+/// 0.002 to 0.006. A residual of 1.1 can hide an effect of its typical size, which looks small and unsure on a surrogate
+/// that is centred elsewhere.
+pub const MORE_IS_LEFT: f64 = 0.01;
 
 /// A fit with the problem that it solves.
 #[derive(Clone)]
@@ -55,6 +61,16 @@ impl<'a> SearchState<'a> {
         self.error() > 1.0 + share.max(CHANCE_SIGMAS * (2.0 / self.problem.pixels().max(1.0)).sqrt())
     }
 
+    /// Whether less is left on captures left out than by `other`: by more than the model errs by, and the 95 % confidence interval
+    /// excludes none.
+    pub fn surely_leaves_less_than(&self, other: &Self) -> bool {
+        let Gain {
+            value,
+            interval: [low, _],
+        } = gain(&self.problem, &other.held_out, &self.held_out);
+        value >= LEAST_GAIN && low > 0.0
+    }
+
     /// Move to another fit.
     pub fn move_to(&mut self, fit: Fit) {
         self.held_out = held_out(&self.problem, &fit.equations, &fit);
@@ -68,11 +84,28 @@ impl<'a> SearchState<'a> {
     pub fn recentre(&mut self, progress: &dyn Progress) -> Result<()> {
         let Fit { theta, active, .. } = &self.fit;
         let surrogate = &self.problem.surrogate;
-        self.problem.surrogate = surrogate.recentred(self.problem.model, theta, active, progress)?;
+        let about = surrogate.recentred(self.problem.model, theta, active, progress)?;
+        self.continue_on(about);
+        Ok(())
+    }
+
+    /// Continue about the fit with its own parameters alone simulated anew, and refine it.
+    ///
+    /// # Errors
+    /// As [`Surrogate::recentred`](crate::surrogate::Surrogate::recentred).
+    pub fn recentre_alone(&mut self, progress: &dyn Progress) -> Result<()> {
+        let Fit { theta, active, .. } = &self.fit;
+        let surrogate = &self.problem.surrogate;
+        let about = surrogate.recentred_alone(self.problem.model, theta, active, progress)?;
+        self.continue_on(about);
+        self.refine(progress)
+    }
+
+    fn continue_on(&mut self, surrogate: Surrogate) {
+        self.problem.surrogate = surrogate;
         self.problem.correction = None;
         let fit = self.problem.fit(&self.fit.active, &self.fit);
         self.move_to(fit);
-        Ok(())
     }
 
     /// Refine the fit with full simulations.

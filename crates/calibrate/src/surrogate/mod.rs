@@ -149,11 +149,38 @@ impl Surrogate {
         found: &[usize],
         progress: &dyn Progress,
     ) -> Result<Self> {
+        let is_cheap = |s: usize| !model.is_dear_beside(about, s);
+        self.recentred_with(model, about, found, &is_cheap, progress)
+    }
+
+    /// As [`Surrogate::recentred`] with nothing but the parameters in `found` simulated: what each of them changes beside the others.
+    ///
+    /// # Errors
+    /// As [`ForwardModel::images`].
+    pub fn recentred_alone(
+        &self,
+        model: &dyn ForwardModel,
+        about: &[f64],
+        found: &[usize],
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        self.recentred_with(model, about, found, &|_| false, progress)
+    }
+
+    /// With the parameters in `found`, and those of which `beside` says so, simulated anew.
+    fn recentred_with(
+        &self,
+        model: &dyn ForwardModel,
+        about: &[f64],
+        found: &[usize],
+        beside: &dyn Fn(usize) -> bool,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         let mut points = vec![ParameterPoint::new(about.to_vec())];
         let mut simulated: Vec<(usize, Vec<f64>)> = Vec::new();
         for (s, slot) in model.slots().iter().enumerate() {
             let is_found = found.contains(&s);
-            if !is_found && model.is_dear_beside(about, s) {
+            if !is_found && !beside(s) {
                 continue;
             }
             let multiples: &[f64] = match (is_found, slot.parameter.one_sided() && about[s] == 0.0) {
