@@ -222,7 +222,7 @@ fn try_pairs_from_start<'a>(
     full: bool,
     progress: &dyn Progress,
 ) -> Result<()> {
-    // Where nothing was found, pairs have been tried.
+    // Where nothing was found and a residual is left, pairs have been tried.
     if history.chosen.is_empty() || !now.leaves_more_than(LEAST_LEFT) {
         return Ok(());
     }

@@ -91,6 +91,7 @@ pub fn find_pair<'a>(
             if state.leaves_more_than(MORE_IS_LEFT) {
                 // What one changes beside the other: without it the fit rests where less may be left close by.
                 state.recentre_alone(progress)?;
+                state.refine(progress)?;
             }
         }
         let is_better = best.as_ref().is_none_or(|b| state.error() < b.state.error());

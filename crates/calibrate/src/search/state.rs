@@ -4,7 +4,7 @@ use metalith_core::{Progress, Result};
 
 use super::stepwise::{LEAST_GAIN, fit_with};
 use crate::fit::{Fit, FitProblem, Gain, HeldOutErrors, gain, held_out, mean_error};
-use crate::surrogate::Surrogate;
+use crate::surrogate::Renewed;
 
 /// What noise alone leaves varies so much: by this many standard deviations of the mean square of so many pixels.
 const CHANCE_SIGMAS: f64 = 2.0;
@@ -82,30 +82,25 @@ impl<'a> SearchState<'a> {
     /// # Errors
     /// As [`Surrogate::recentred`](crate::surrogate::Surrogate::recentred).
     pub fn recentre(&mut self, progress: &dyn Progress) -> Result<()> {
-        let Fit { theta, active, .. } = &self.fit;
-        let surrogate = &self.problem.surrogate;
-        let about = surrogate.recentred(self.problem.model, theta, active, progress)?;
-        self.continue_on(about);
-        Ok(())
+        self.recentre_with(Renewed::All, progress)
     }
 
-    /// Continue about the fit with its own parameters alone simulated anew, and refine it.
+    /// As [`SearchState::recentre`] with nothing but the parameters of the fit simulated anew.
     ///
     /// # Errors
     /// As [`Surrogate::recentred`](crate::surrogate::Surrogate::recentred).
     pub fn recentre_alone(&mut self, progress: &dyn Progress) -> Result<()> {
-        let Fit { theta, active, .. } = &self.fit;
-        let surrogate = &self.problem.surrogate;
-        let about = surrogate.recentred_alone(self.problem.model, theta, active, progress)?;
-        self.continue_on(about);
-        self.refine(progress)
+        self.recentre_with(Renewed::FoundAlone, progress)
     }
 
-    fn continue_on(&mut self, surrogate: Surrogate) {
-        self.problem.surrogate = surrogate;
+    fn recentre_with(&mut self, renewed: Renewed, progress: &dyn Progress) -> Result<()> {
+        let Fit { theta, active, .. } = &self.fit;
+        let FitProblem { model, surrogate, .. } = &self.problem;
+        self.problem.surrogate = surrogate.recentred(*model, theta, active, renewed, progress)?;
         self.problem.correction = None;
         let fit = self.problem.fit(&self.fit.active, &self.fit);
         self.move_to(fit);
+        Ok(())
     }
 
     /// Refine the fit with full simulations.

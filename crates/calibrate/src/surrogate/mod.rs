@@ -55,6 +55,15 @@ pub struct Surrogate {
 /// Change of the images for a unit of a smooth term; none where it does not act.
 type SmoothChange = PerCapture<Option<PixelGrid>>;
 
+/// What is simulated anew where a surrogate is centred elsewhere.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Renewed {
+    /// What was found, and all others beside it, because what they change depends on it; not where that is dear.
+    All,
+    /// What was found, and nothing else.
+    FoundAlone,
+}
+
 impl Surrogate {
     /// Simulate every parameter about the values `about`. With `smooth` (the LED of each capture, and the
     /// number of LEDs), the smooth terms as well.
@@ -137,8 +146,7 @@ impl Surrogate {
     }
 
     /// A surrogate about other values. Parameters in `found` are simulated anew close to these, and at no effect, so
-    /// that another may take their place. All others are simulated anew beside them, because what they change
-    /// depends on what was found; where that is dear, their changes are taken to add as before.
+    /// that another may take their place. Of all others, the changes of those that are not `renewed` are taken to add as before.
     ///
     /// # Errors
     /// As [`ForwardModel::images`].
@@ -147,40 +155,14 @@ impl Surrogate {
         model: &dyn ForwardModel,
         about: &[f64],
         found: &[usize],
-        progress: &dyn Progress,
-    ) -> Result<Self> {
-        let is_cheap = |s: usize| !model.is_dear_beside(about, s);
-        self.recentred_with(model, about, found, &is_cheap, progress)
-    }
-
-    /// As [`Surrogate::recentred`] with nothing but the parameters in `found` simulated: what each of them changes beside the others.
-    ///
-    /// # Errors
-    /// As [`ForwardModel::images`].
-    pub fn recentred_alone(
-        &self,
-        model: &dyn ForwardModel,
-        about: &[f64],
-        found: &[usize],
-        progress: &dyn Progress,
-    ) -> Result<Self> {
-        self.recentred_with(model, about, found, &|_| false, progress)
-    }
-
-    /// With the parameters in `found`, and those of which `beside` says so, simulated anew.
-    fn recentred_with(
-        &self,
-        model: &dyn ForwardModel,
-        about: &[f64],
-        found: &[usize],
-        beside: &dyn Fn(usize) -> bool,
+        renewed: Renewed,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let mut points = vec![ParameterPoint::new(about.to_vec())];
         let mut simulated: Vec<(usize, Vec<f64>)> = Vec::new();
         for (s, slot) in model.slots().iter().enumerate() {
             let is_found = found.contains(&s);
-            if !is_found && !beside(s) {
+            if !is_found && (renewed == Renewed::FoundAlone || model.is_dear_beside(about, s)) {
                 continue;
             }
             let multiples: &[f64] = match (is_found, slot.parameter.one_sided() && about[s] == 0.0) {
