@@ -50,6 +50,8 @@ struct SearchHistory {
     runners_up: Vec<Vec<usize>>,
     /// For each effect: those that gained nearly as much when it was taken.
     alike: Vec<Vec<TriedEffect>>,
+    /// Whether pairs were tried where nothing was found yet.
+    pairs_tried_from_start: bool,
 }
 
 impl SearchHistory {
@@ -64,6 +66,7 @@ impl SearchHistory {
             later: Vec::new(),
             runners_up: Vec::new(),
             alike: Vec::new(),
+            pairs_tried_from_start: false,
         }
     }
 
@@ -178,6 +181,7 @@ fn add_effects(
             if now.error() <= RESIDUAL {
                 break;
             }
+            history.pairs_tried_from_start |= history.chosen.is_empty();
             let together = match history.chosen.len() + 2 <= MOST_EFFECTS {
                 true => match find_pair(now, &history.chosen, full, progress)? {
                     None if full => follow_leaders_anew(now, &history.chosen, progress)?,
@@ -222,8 +226,8 @@ fn try_pairs_from_start<'a>(
     full: bool,
     progress: &dyn Progress,
 ) -> Result<()> {
-    // Where nothing was found and a residual is left, pairs have been tried.
-    if history.chosen.is_empty() || !now.leaves_more_than(LEAST_LEFT) {
+    // Where no pair was found from the start, or all that was found stands on it, none takes its place.
+    if history.chosen.is_empty() || history.pairs_tried_from_start || !now.leaves_more_than(LEAST_LEFT) {
         return Ok(());
     }
     if let Some(found) = find_pair(start, &[], full, progress)?
