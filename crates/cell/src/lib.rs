@@ -36,7 +36,7 @@ pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};
 pub use published::PublishedCell;
 pub use rectangle::{Handedness, RotatedRectangle};
 pub use rigorous::RigorousCell;
-pub use rotated::{ROTATED_ORDERS, RotatedCell};
+pub use rotated::{RotatedCell, Truncation};
 pub use rotation::RotationMapping;
 pub use stack::{CellStack, UniformLayer};
 pub use table::{CellTable, Origin, TableSpec};

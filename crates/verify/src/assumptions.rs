@@ -1,6 +1,6 @@
 //! What a simulation assumes, and how much each assumption weighs for the design at hand.
 
-use metalith_cell::{Fidelity, MappingError, ORDERS, ROTATED_ORDERS, RotatedCell, RotationCurve, RotationMapping};
+use metalith_cell::{Fidelity, MappingError, ORDERS, RotatedCell, RotationCurve, RotationMapping, Truncation};
 use metalith_core::{PillarShape, Rectangles, Result};
 use metalith_design::{CellIncidence, Design, Element};
 use metalith_report::{Cell, Column, Page, Table, fixed, sig};
@@ -149,20 +149,21 @@ fn polarised(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &
         ),
         "axis of each outline as it is drawn, against its rotation; each site has the pillar drawn nearest to what is asked",
     );
+    let lattice = Lattice::of(design, pillars);
     row(
         if design.mapping.rotation.is_half() {
             "The phase is twice the rotation"
         } else {
             "The phase is twice the rotation and what the lattice adds to it, by the series of [mapping]"
         },
-        match lattice_phase(design, pillars) {
-            Ok([own, half]) if own != half => format!(
+        match &lattice {
+            Ok(Lattice { own, half, .. }) if own != half => format!(
                 "off by {} rad rms, {} at most, for pillars as drawn; without the series by {} at most",
                 fixed(own.rms_rad, 4),
                 fixed(own.worst_rad, 4),
                 fixed(half.worst_rad, 4)
             ),
-            Ok([own, _]) => format!(
+            Ok(Lattice { own, .. }) => format!(
                 "off by {} rad rms, {} at most, for pillars as drawn; `metalith cells` has a series that takes it back",
                 fixed(own.rms_rad, 4),
                 fixed(own.worst_rad, 4)
@@ -171,22 +172,40 @@ fn polarised(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &
         },
         "phase of the converted light of all rotations in lattices of equals, solved rigorously at the wavelength of the mapping",
     );
+    let truncation = lattice.as_ref().ok().and_then(|l| l.truncation);
     row(
-        &format!(
-            "Cells are solved with {ROTATED_ORDERS} diffraction orders an axis, at seven rotations, the others by a Fourier series"
-        ),
-        "not known for this cell; 0.0015 rms and 0.0035 at most in t for thirty rectangles of three materials".into(),
-        "the series meets the solver between its rotations to 0.0005; geometric phases of lattices that are all rotated alike differ from twice the rotation by what the lattice adds",
+        "Cells are solved at seven rotations, the others by a Fourier series, with as many diffraction orders as they need",
+        match truncation {
+            Some(Truncation { orders, fewer, apart }) => format!(
+                "{orders} orders an axis: {} at most in t from {fewer} orders, so some 0.002 may be left",
+                sig(apart, 2)
+            ),
+            None => "not known".into(),
+        },
+        "fifteen sizes of three materials: where 17 orders are within 0.005 of 25, 25 are within 0.0018 of 41; of all others 41 are taken, within 0.0023 of 57; the series meets the solver between its rotations to 0.0005",
     );
 }
 
-/// Phase errors of the mapping of a design, and of half of the phase.
-fn lattice_phase(design: &Design, pillars: Rectangles) -> Result<[MappingError; 2]> {
-    let arriving = design.cell.arriving.unwrap_or_default();
-    let cell = RotatedCell::new(design.cell_stack()?, pillars, arriving);
-    let curve = RotationCurve::new(&cell, design.mapping.wavelength_um)?;
-    let error = |mapping: &RotationMapping| curve.error(mapping, pillars);
-    Ok([error(&design.mapping.rotation)?, error(&RotationMapping::default())?])
+/// What a lattice of pillars that are all rotated alike does, at the wavelength of the mapping.
+struct Lattice {
+    /// Phase errors of the mapping of the design, and of half of the phase.
+    own: MappingError,
+    half: MappingError,
+    truncation: Option<Truncation>,
+}
+
+impl Lattice {
+    fn of(design: &Design, pillars: Rectangles) -> Result<Self> {
+        let arriving = design.cell.arriving.unwrap_or_default();
+        let cell = RotatedCell::new(design.cell_stack()?, pillars, arriving);
+        let wavelength_um = design.mapping.wavelength_um;
+        let curve = RotationCurve::new(&cell, wavelength_um)?;
+        Ok(Self {
+            own: curve.error(&design.mapping.rotation, pillars)?,
+            half: curve.error(&RotationMapping::default(), pillars)?,
+            truncation: cell.truncation(wavelength_um)?,
+        })
+    }
 }
 
 /// Share of the light in the first order by equal neighbours over that by the neighbours that there are.
