@@ -11,6 +11,7 @@ use super::class_table::ClassTable;
 use super::declared::{CompiledTerm, DeclaredQuantity, RowPlaces, compiled};
 use super::expression::Input;
 use super::pupil::PupilTerms;
+use super::shifted_aperture::ShiftedAperture;
 use super::stitching::displace;
 use super::{ArrivingLight, GeometryChange, NODE_STEP_NM, density, zernike};
 use metalith_core::{Error, Lattice, PillarShape, Result, WidthMap};
@@ -172,7 +173,7 @@ impl MadeElement {
     pub const MOST_BYTES_PER_SITE: usize = 2 + 3 * 4 + 4;
 
     /// What a change of pillars and apertures makes of an element. Each site has the width of its pillar, biased
-    /// and by the density around it; sites that the shifted aperture covers are blocked. Light through the
+    /// and by the density around it; what the shifted aperture covers is blocked. Light through the
     /// crescent that opens on the other side meets no pillar, is not focused, and is left out.
     ///
     /// # Errors
@@ -181,11 +182,8 @@ impl MadeElement {
         let lattice = drawn.pillars.lattice;
         let n = lattice.sites();
         let steps = drawn.site_steps(geometry);
-        let [ox, oy] = geometry.aperture_offset_um;
-        let covered = |site: usize| {
-            let (x, y) = (lattice.place_um(0, site % n) - ox, lattice.place_um(1, site / n) - oy);
-            (ox != 0.0 || oy != 0.0) && x * x + y * y > drawn.aperture_radius_um.powi(2)
-        };
+        let aperture = ShiftedAperture::new(lattice, drawn.aperture_radius_um, geometry.aperture_offset_um);
+        let covered = |site: usize| aperture.as_ref().is_some_and(|a| a.passes(site) == 0.0);
         let mut known: HashMap<u64, u16> = HashMap::new();
         let (mut class, mut width_nm, mut count) = (vec![0; n * n], vec![0.0], vec![0u32]);
         let mut radius2 = 0;
@@ -214,13 +212,16 @@ impl MadeElement {
         } else {
             zernike::map(&geometry.wavefront_nm, lattice, drawn.aperture_radius_um)
         };
-        let pupil = PupilTerms::new(
+        let mut pupil = PupilTerms::new(
             geometry,
             lattice,
             drawn.aperture_radius_um,
             drawn.centre_um,
             &mut path_um,
         );
+        if let Some(aperture) = &aperture {
+            pupil.pass(|site| aperture.passes(site));
+        }
         Ok(Self {
             lattice,
             pupil,

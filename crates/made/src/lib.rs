@@ -35,6 +35,7 @@ mod model;
 mod not_applied;
 mod perturbation;
 mod pupil;
+mod shifted_aperture;
 mod stack;
 mod stitching;
 pub mod zernike;

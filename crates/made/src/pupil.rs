@@ -61,6 +61,15 @@ impl PupilTerms {
         out
     }
 
+    /// Let a share of the amplitude of each site pass, beside all terms.
+    pub fn pass(&mut self, share: impl Fn(usize) -> f64) {
+        let n = self.lattice.sites();
+        self.amplitude.resize(n * n, 0.0);
+        for (site, change) in self.amplitude.iter_mut().enumerate() {
+            *change = ((1.0 + f64::from(*change)) * share(site) - 1.0) as f32;
+        }
+    }
+
     /// Apply the terms to a row of the light that leaves the sites, at a wavelength (um). Paths that are the same at
     /// all wavelengths are not among them.
     pub fn multiply(&self, iy: usize, wavelength_um: f64, row: &mut [Complex32]) {
