@@ -16,7 +16,7 @@ use crate::fit::Fit;
 const FOLLOWED: usize = 2;
 
 /// Share of the chi-square above noise, of captures that are fitted, that such an effect explains at least.
-const EXPLAINS: f64 = 0.5;
+const EXPLAINS: f64 = 0.3;
 
 /// An effect that explains much of what is fitted, alone or with one more that explains the rest; only if what is taken is sound.
 ///
