@@ -32,17 +32,32 @@ struct RotationRule {
     mapping: RotationMapping,
     /// What the grid adds to the rotation of each number, in steps; the first stands for no pillar.
     turned: Vec<f64>,
+    /// The number over each of [`PARTS`] of a turn of phase, zero where it is not the same all over: sums of waves for millions of
+    /// sites take longer than to write them.
+    over_part: Vec<u16>,
 }
+
+/// Parts of a turn of phase whose numbers are kept: of steps of a degree one in ninety has a border.
+const PARTS: u16 = 1 << 14;
 
 impl RotationRule {
     fn new(pillars: Rectangles, arriving: Handedness, mapping: RotationMapping) -> Self {
         let in_steps = |number: u16| pillars.turned_by_grid(number) / PI * f64::from(pillars.steps);
-        Self {
+        let mut rule = Self {
             pillars,
             arriving,
             mapping,
             turned: std::iter::once(0.0).chain((1..=pillars.steps).map(in_steps)).collect(),
-        }
+            over_part: Vec::new(),
+        };
+        let borders: Vec<(f64, u16)> = (0..=PARTS)
+            .map(|k| f64::from(k) / f64::from(PARTS))
+            .map(|u| (rule.unrounded(u).round(), rule.nearest(u)))
+            .collect();
+        // Between them the same three rotations are compared, and each is the nearest over one interval.
+        let alike = |ends: &[(f64, u16)]| if ends[0] == ends[1] { ends[0].1 } else { 0 };
+        rule.over_part = borders.windows(2).map(alike).collect();
+        rule
     }
 
     fn steps(&self) -> f64 {
@@ -70,8 +85,16 @@ impl RotationRule {
         }
     }
 
-    /// The pillar whose rotation as drawn is nearest to that for a phase of `u` turns; of two the first.
+    /// The pillar whose rotation as drawn is nearest to that for a phase of `u` turns, `0 <= u < 1`; of two the first.
     fn number(&self, u: f64) -> u16 {
+        match self.over_part.get((u * f64::from(PARTS)) as usize) {
+            Some(&number) if number > 0 => number,
+            _ => self.nearest(u),
+        }
+    }
+
+    /// The same from the sums themselves.
+    fn nearest(&self, u: f64) -> u16 {
         let wanted = self.unrounded(u);
         let nearest = wanted.round();
         let mut best = (f64::INFINITY, 1);
@@ -223,6 +246,33 @@ mod tests {
         let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/mini_3x3.toml"));
         let text = std::fs::read_to_string(path).unwrap();
         Design::parse(path, &text.replacen("[layout]", &format!("{steered}\n[layout]"), 1))
+    }
+
+    /// Both hands, series that go forwards and back, and steps from a degree to a tenth of it: what is kept is what the sums give.
+    #[test]
+    fn numbers_that_are_kept_are_those_of_the_sums() {
+        for (arriving, steps) in [
+            (Handedness::Left, 180),
+            (Handedness::Right, 180),
+            (Handedness::Right, 1800),
+        ] {
+            let pillars = Rectangles {
+                width_nm: 100,
+                length_nm: 250,
+                steps,
+            };
+            let mapping = RotationMapping {
+                sines: vec![-0.1, 0.02],
+                cosines: vec![0.05],
+            };
+            let rule = RotationRule::new(pillars, arriving, mapping);
+            let kept = rule.over_part.iter().filter(|n| **n > 0).count();
+            assert!(kept > usize::from(PARTS) - 4 * usize::from(steps), "{kept}");
+            for k in 0..400_003 {
+                let u = f64::from(k) / 400_003.0;
+                assert_eq!(rule.number(u), rule.nearest(u), "{arriving:?} {steps} {u}");
+            }
+        }
     }
 
     #[test]
