@@ -109,6 +109,7 @@ impl CellStack {
 
 #[cfg(test)]
 pub(super) mod tests {
+    use metalith_core::Rectangles;
     use metalith_rcwa::{Material, circular};
 
     use super::*;
@@ -120,6 +121,13 @@ pub(super) mod tests {
     /// A quarter of a turn leaves the lattice alike: what it does to the phase is exact, but for what tells x from y in the
     /// solver, 1e-9, felt more at resonances.
     const QUARTER: f64 = 1e-6;
+
+    /// Nearly half-wave plates at 532 nm, in steps of a degree.
+    pub const PILLARS: Rectangles = Rectangles {
+        width_nm: 100,
+        length_nm: 250,
+        steps: 180,
+    };
 
     pub fn titania() -> CellStack {
         CellStack {

@@ -149,7 +149,7 @@ fn polarised(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &
         ),
         "axis of each outline as it is drawn, against its rotation; each site has the pillar drawn nearest to what is asked",
     );
-    let lattice = Lattice::of(design, pillars);
+    let lattice = EqualRotations::of(design, pillars);
     row(
         if design.mapping.rotation.is_half() {
             "The phase is twice the rotation"
@@ -157,13 +157,13 @@ fn polarised(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &
             "The phase is twice the rotation and what the lattice adds to it, by the series of [mapping]"
         },
         match &lattice {
-            Ok(Lattice { own, half, .. }) if own != half => format!(
+            Ok(EqualRotations { own, half, .. }) if own != half => format!(
                 "off by {} rad rms, {} at most, for pillars as drawn; without the series by {} at most",
                 fixed(own.rms_rad, 4),
                 fixed(own.worst_rad, 4),
                 fixed(half.worst_rad, 4)
             ),
-            Ok(Lattice { own, .. }) => format!(
+            Ok(EqualRotations { own, .. }) => format!(
                 "off by {} rad rms, {} at most, for pillars as drawn; `metalith cells` has a series that takes it back",
                 fixed(own.rms_rad, 4),
                 fixed(own.worst_rad, 4)
@@ -187,14 +187,14 @@ fn polarised(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &
 }
 
 /// What a lattice of pillars that are all rotated alike does, at the wavelength of the mapping.
-struct Lattice {
+struct EqualRotations {
     /// Phase errors of the mapping of the design, and of half of the phase.
     own: MappingError,
     half: MappingError,
     truncation: Option<Truncation>,
 }
 
-impl Lattice {
+impl EqualRotations {
     fn of(design: &Design, pillars: Rectangles) -> Result<Self> {
         let arriving = design.cell.arriving.unwrap_or_default();
         let cell = RotatedCell::new(design.cell_stack()?, pillars, arriving);

@@ -136,14 +136,8 @@ impl RotationMapping {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::rectangle::tests::titania;
+    use super::super::super::rectangle::tests::{PILLARS, titania};
     use super::*;
-
-    const PILLARS: Rectangles = Rectangles {
-        width_nm: 100,
-        length_nm: 250,
-        steps: 180,
-    };
 
     /// What is left of the phase (rad): 0.004 by the harmonics beyond the second, and rounding. Without the series it is 0.014.
     const LEFT: f64 = 0.005;

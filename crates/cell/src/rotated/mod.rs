@@ -61,8 +61,9 @@ pub struct Truncation {
 #[derive(Clone, Debug)]
 struct Solved {
     series: Series,
-    /// What more orders add to it, and how far they are from fewer; of a band neither.
+    /// What more orders add to it, where they are needed.
     finer: Option<Series>,
+    /// Of a wavelength of a band not known.
     truncation: Option<Truncation>,
 }
 
@@ -246,14 +247,8 @@ impl CellModel for RotatedCell {
 
 #[cfg(test)]
 mod tests {
-    use super::super::rectangle::tests::titania;
+    use super::super::rectangle::tests::{PILLARS, titania};
     use super::*;
-
-    const PILLARS: Rectangles = Rectangles {
-        width_nm: 100,
-        length_nm: 250,
-        steps: 180,
-    };
 
     /// Between the solved rotations, of |t| near 1.1: what the series leaves out; ten times more with five rotations.
     const BETWEEN: f64 = 5e-4;

@@ -1,7 +1,6 @@
 //! What a rotated pillar does to light, over its rotation.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
-use std::ops::Range;
 
 use num_complex::Complex64;
 
@@ -38,17 +37,16 @@ pub(super) fn samples(jones: &[[[Complex64; 2]; 2]], arriving: Handedness) -> Ve
     let rotations: Vec<f64> = solved_rotations(intervals).collect();
     let less_geometric =
         |converted: Complex64, rotation: f64| converted * Complex64::cis(-arriving.geometric_phase(rotation));
-    let upright = (0..=intervals).map(|k| {
+    let solved = (0..=intervals).map(|k| {
         let j = &jones[k];
         [less_geometric(j[to][from], rotations[k]), j[from][from]]
     });
     // A mirror turns the pillar back and one handedness into the other.
-    let between: Range<usize> = 1..intervals;
-    let mirrored = between.rev().map(|k| {
+    let mirrored = (1..intervals).rev().map(|k| {
         let j = &jones[k];
         [less_geometric(j[from][to], -rotations[k]), j[to][to]]
     });
-    upright.chain(mirrored).collect()
+    solved.chain(mirrored).collect()
 }
 
 impl Series {
