@@ -19,11 +19,17 @@ pub(super) struct DrawnOutline<'a> {
 }
 
 impl<'a> DrawnOutline<'a> {
-    pub fn new(shape: &metalith_gds::Shape<'a>, placements: &'a [Transform], unit_nm: f64) -> Self {
+    /// Of a shape whose points are these.
+    pub fn new(
+        shape: &metalith_gds::Shape<'_>,
+        points: &'a [Point],
+        placements: &'a [Transform],
+        unit_nm: f64,
+    ) -> Self {
         Self {
             layer: shape.layer,
             kind: shape.kind,
-            points: shape.points,
+            points,
             rect: shape.rect,
             placements,
             unit_nm,

@@ -13,12 +13,13 @@ use super::input::CheckInput;
 use super::polygon::twice_area;
 use super::rule::DeckRule;
 use super::work::{Allowance, Stop, Work};
+use foldhash::fast::RandomState;
 use metalith_core::text::printable_bytes;
 use metalith_core::{Error, PillarShape, Progress, Result};
 use metalith_gds::extract::{Discovered, Filler, Scale, Why};
 use metalith_gds::{
-    DrawnPillar, LayerNumber, Layout, LayoutCell, Point, Rect, Selection, Shape, Text, Transform, Visitor, circle_of,
-    pillar_of, rectangle_of, simplified,
+    DrawnPillar, LayerNumber, Layout, LayoutCell, Outline, PillarFinder, Point, Rect, Selection, Shape, Text,
+    Transform, Visitor, circle_of, rectangle_of, simplified,
 };
 
 /// Widest square that is decided by table (database units).
@@ -55,7 +56,8 @@ pub(super) fn gather<'a>(
     let mut visit = Gather {
         pillars,
         shape,
-        sound: HashSet::new(),
+        finder: PillarFinder::new(shape, unit_nm),
+        sound: HashSet::default(),
         relative: Vec::new(),
         doses,
         unit_nm,
@@ -130,8 +132,9 @@ struct Gather<'r, 'p> {
     pillars: LayerNumber,
     /// What pillars are.
     shape: PillarShape,
+    finder: PillarFinder,
     /// Outlines of pillars that are no squares, from the middle of the box around them, that no rule finds anything in.
-    sound: HashSet<Box<[Point]>>,
+    sound: HashSet<Box<[Point]>, RandomState>,
     relative: Vec<Point>,
     /// Further layers whose shapes count as if they were on that one.
     doses: &'r [LayerNumber],
@@ -170,10 +173,11 @@ impl Gather<'_, '_> {
     /// # Errors
     /// If that is too much work.
     fn show(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> Result<()> {
-        let outline = DrawnOutline::new(shape, placements, self.unit_nm);
+        let points: Vec<Point> = shape.outline.points().collect();
+        let outline = DrawnOutline::new(shape, &points, placements, self.unit_nm);
         for (rule, found) in &mut self.rules {
             if rule.rule.outlines().contains(&shape.layer) {
-                self.work.spend(shape.points.len() as u64).map_err(ended)?;
+                self.work.spend(points.len() as u64).map_err(ended)?;
                 rule.rule.outline(&outline, found);
             }
         }
@@ -188,7 +192,7 @@ impl Gather<'_, '_> {
         let (x, y) = (around.x0 + around.width() / 2, around.y0 + around.height() / 2);
         self.relative.clear();
         self.relative
-            .extend(shape.points.iter().map(|p| Point::new(p.x - x, p.y - y)));
+            .extend(shape.outline.points().map(|p| Point::new(p.x - x, p.y - y)));
         if self.sound.contains(self.relative.as_slice()) {
             return Ok(());
         }
@@ -202,7 +206,7 @@ impl Gather<'_, '_> {
     }
 
     /// A pillar that is known by its corners: where it has no site it is kept as it is drawn.
-    fn drawn_pillar(&mut self, pillar: &DrawnPillar, placement: usize, placed: &[Point]) {
+    fn drawn_pillar(&mut self, pillar: &DrawnPillar, placement: usize, placed: impl FnOnce() -> Vec<Point>) {
         if pillar.number.is_none() {
             return self.pillar(&pillar.around, placement);
         }
@@ -211,7 +215,7 @@ impl Gather<'_, '_> {
             Err(Why::OffLattice) => self.off_lattice.push(pillar.around),
             Err(_) => {}
         }
-        self.keep(self.pillars, placed);
+        self.keep(self.pillars, &placed());
     }
 
     #[inline]
@@ -293,7 +297,7 @@ impl Visitor for Gather<'_, '_> {
         {
             self.pillar_shapes += placements.len() as u64;
             if self.shape.is_square() {
-                let table = &self.passes[usize::from(turns_right(shape.points))];
+                let table = &self.passes[usize::from(turns_right(shape.outline))];
                 let known = rect.width() == rect.height() && table.get(rect.width() as usize).is_some_and(|&p| p);
                 if !known {
                     self.show(shape, placements)?;
@@ -342,7 +346,7 @@ impl Gather<'_, '_> {
         *self.counts.entry(shape.layer).or_default() += placements.len() as u64;
         if square {
             if shape.layer == self.pillars && self.shape.rectangles().is_some() {
-                self.show_once(shape, &Rect::around(shape.points), placements)?;
+                self.show_once(shape, &shape.outline.around(), placements)?;
             } else {
                 self.show(shape, placements)?;
             }
@@ -351,21 +355,26 @@ impl Gather<'_, '_> {
             }
         }
         for (k, placement) in placements.iter().enumerate() {
-            self.work.spend(shape.points.len() as u64).map_err(ended)?;
-            let placed: Vec<Point> = shape.points.iter().map(|&p| placement.apply(p)).collect();
+            self.work.spend(shape.outline.len() as u64).map_err(ended)?;
+            let placed = || shape.outline.placed(placement);
             if !square {
                 // Turned and magnified outlines are looked at where they stand: rounding may bend them.
+                let placed = placed();
                 let here = Shape {
-                    points: &placed,
+                    outline: Outline::new(&placed),
                     rect: rectangle_of(&placed),
                     circle: circle_of(&placed),
                     ..*shape
                 };
                 self.show(&here, &[Transform::IDENTITY])?;
             }
-            match pillar_of(&placed, self.shape, self.unit_nm) {
-                Some(pillar) if shape.layer == self.pillars => self.drawn_pillar(&pillar, k, &placed),
-                _ => self.keep(shape.layer, &placed),
+            let is_pillar = shape.layer == self.pillars;
+            match is_pillar
+                .then(|| self.finder.placed(shape.outline, placement))
+                .flatten()
+            {
+                Some(pillar) => self.drawn_pillar(&pillar, k, placed),
+                None => self.keep(shape.layer, &placed()),
             }
         }
         Ok(())
@@ -382,8 +391,11 @@ fn ended(stop: Stop) -> Error {
 
 /// Whether a rectangle is drawn clockwise.
 #[inline]
-fn turns_right(points: &[Point]) -> bool {
-    let (a, b, c) = (points[0], points[1], points[2]);
+fn turns_right(outline: Outline<'_>) -> bool {
+    let mut points = outline.points();
+    let (Some(a), Some(b), Some(c)) = (points.next(), points.next(), points.next()) else {
+        return false;
+    };
     let sign = |from: i64, to: i64| (to - from).signum();
     sign(a.x, b.x) * sign(b.y, c.y) - sign(a.y, b.y) * sign(b.x, c.x) < 0
 }

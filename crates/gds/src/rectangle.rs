@@ -77,6 +77,13 @@ impl TiltedRectangle {
         let corners = self.corners.map(|c| c.map(|v| v * unit_nm));
         pillars.recognised(&corners, self.slack * unit_nm)
     }
+
+    /// Whether all corners are among these (nm, from the middle), each on the nearest place of the grid.
+    pub fn has_corners(&self, drawn: &[(i64, i64)], unit_nm: f64) -> bool {
+        let on_grid = |nm: i64| (nm as f64 / unit_nm).round();
+        let is_drawn = |[x, y]: &[f64; 2]| drawn.iter().any(|(u, v)| [on_grid(*u), on_grid(*v)] == [*x, *y]);
+        self.corners.iter().all(is_drawn)
+    }
 }
 
 #[cfg(test)]

@@ -392,7 +392,7 @@ mod tests {
 
     impl Visitor for All {
         fn shape(&mut self, shape: &Shape<'_>, _placements: &[Transform]) -> metalith_core::Result<()> {
-            self.0.push((shape.layer, shape.points.to_vec(), shape.rect));
+            self.0.push((shape.layer, shape.outline.points().collect(), shape.rect));
             Ok(())
         }
     }

@@ -1,7 +1,6 @@
 //! What stands on a layer.
 
-use super::circle::circle_of;
-use super::rectangle::tilted_rectangle_of;
+use super::transform::Transform;
 use metalith_core::{LayerNumber, PillarShape};
 
 /// A place in database units.
@@ -88,8 +87,78 @@ impl Rect {
 pub enum ShapeKind {
     Boundary,
     Box,
-    /// Drawn with a pen; `points` are the outline of what it leaves.
+    /// Drawn with a pen; the outline is that of what it leaves.
     Path,
+}
+
+/// Points of an outline, in the coordinates of the cell it is drawn in. They are moved there when they are asked for: most
+/// pillars are known by the box around them, or by the copy that was looked at before.
+#[derive(Clone, Copy, Debug)]
+pub struct Outline<'a> {
+    /// As they were read.
+    pub(super) points: &'a [Point],
+    /// What takes them into the cell, exactly.
+    pub(super) at: Transform,
+}
+
+impl<'a> Outline<'a> {
+    /// Of points of the cell.
+    pub fn new(points: &'a [Point]) -> Self {
+        Self::at(points, Transform::IDENTITY)
+    }
+
+    /// Of points that are turned by quarters, mirrored and moved.
+    pub(super) fn at(points: &'a [Point], at: Transform) -> Self {
+        debug_assert!(at.is_square());
+        Self { points, at }
+    }
+
+    /// The number of points.
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// The points, in the order of the file.
+    #[inline]
+    pub fn points(self) -> impl ExactSizeIterator<Item = Point> + Clone + 'a {
+        self.points.iter().map(move |&p| self.at.apply(p))
+    }
+
+    /// The points where a placement of the cell puts them.
+    pub fn placed(self, placement: &Transform) -> Vec<Point> {
+        self.points().map(|p| placement.apply(p)).collect()
+    }
+
+    /// A number for how its points come to be turned as a placement has them, if only by quarters and mirrors.
+    #[inline]
+    pub(super) fn orientation(self, placement: &Transform) -> Option<u8> {
+        match (self.at, *placement) {
+            (Transform::Square { orientation: own, .. }, Transform::Square { orientation, .. }) => {
+                Some(8 * (own & 7) + (orientation & 7))
+            }
+            _ => None,
+        }
+    }
+
+    /// The box around the points.
+    pub fn around(self) -> Rect {
+        let around = Rect::around(self.points);
+        self.at.apply_rect(&around).unwrap_or(around)
+    }
+
+    /// The box around the points where a placement of the cell puts them.
+    pub fn around_placed(self, placement: &Transform) -> Rect {
+        if placement.is_square()
+            && let Some(around) = placement.apply_rect(&self.around())
+        {
+            return around;
+        }
+        Rect::around(&self.placed(placement))
+    }
 }
 
 /// One area on a layer, in the coordinates of the cell it is drawn in.
@@ -98,7 +167,7 @@ pub struct Shape<'a> {
     pub kind: ShapeKind,
     pub layer: LayerNumber,
     /// The outline as the file has it: the last point repeats the first where the format is kept.
-    pub points: &'a [Point],
+    pub outline: Outline<'a>,
     /// The same as an upright rectangle, if it is one, with area and with five points.
     pub rect: Option<Rect>,
     /// The square around the circle that it stands for, if it does: see [`crate::circle_of`].
@@ -109,39 +178,13 @@ pub struct Shape<'a> {
 
 impl Shape<'_> {
     /// The square around it, if it may be a pillar of this shape as it stands, by its box alone; rectangles are told by their
-    /// corners, where they are placed: see [`pillar_of`].
+    /// corners, where they are placed: see [`crate::pillar_of`].
     #[inline]
     pub fn pillar(&self, shape: PillarShape) -> Option<&Rect> {
         match shape {
             PillarShape::Square => self.rect.as_ref(),
             PillarShape::Circle => self.circle.as_ref(),
             PillarShape::Rectangle(_) => None,
-        }
-    }
-}
-
-/// An outline that may be a pillar.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct DrawnPillar {
-    /// The box around it.
-    pub around: Rect,
-    /// What tells it from others, where its width does not.
-    pub number: Option<u16>,
-}
-
-/// What an outline in any place is, if it may be a pillar of this shape; a database unit is so long (nm). It may have more
-/// vertices than it needs.
-pub fn pillar_of(points: &[Point], shape: PillarShape, unit_nm: f64) -> Option<DrawnPillar> {
-    let of_width = |around| DrawnPillar { around, number: None };
-    match shape {
-        PillarShape::Square => rectangle_of(&simplified(points)).map(of_width),
-        PillarShape::Circle => circle_of(points).map(of_width),
-        PillarShape::Rectangle(pillars) => {
-            let tilted = tilted_rectangle_of(points, unit_nm)?;
-            Some(DrawnPillar {
-                around: tilted.around,
-                number: Some(tilted.number(pillars, unit_nm)?),
-            })
         }
     }
 }

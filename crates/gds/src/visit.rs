@@ -9,7 +9,7 @@ use super::names::Recent;
 use super::oasis::Copies;
 use super::outline::outline;
 use super::place::{self, magnified};
-use super::shape::{Point, Rect, Shape, ShapeKind, Text, rectangle_of};
+use super::shape::{Outline, Point, Rect, Shape, ShapeKind, Text, rectangle_of};
 use super::transform::Transform;
 use super::tree;
 use super::walk::{Sink, SinkError, Walk};
@@ -104,7 +104,6 @@ impl Layout {
             small: &small,
             recent: Recent::new(),
             path: Vec::new(),
-            moved: Vec::new(),
             chains: Vec::new(),
         };
         for index in chosen {
@@ -216,7 +215,6 @@ struct Spread<'a, V> {
     small: &'a [Vec<InlineShape>],
     recent: Recent,
     path: Vec<Point>,
-    moved: Vec<Point>,
     chains: Vec<Transform>,
 }
 
@@ -244,16 +242,14 @@ impl<V: Visitor> Spread<'_, V> {
             let mut shape = Shape {
                 kind: kept.kind,
                 layer: kept.layer,
-                points: &kept.points,
+                outline: Outline::new(&kept.points),
                 rect: kept.rect,
                 circle: kept.circle,
                 offset,
             };
             // Rounding happens once, at the end of the chain: only exact transforms are applied here.
             if own.is_square() {
-                self.moved.clear();
-                self.moved.extend(kept.points.iter().map(|&p| own.apply(p)));
-                shape.points = &self.moved;
+                shape.outline = Outline::at(&kept.points, own);
                 shape.rect = kept.rect.and_then(|r| own.apply_rect(&r));
                 shape.circle = kept.circle.and_then(|r| own.apply_rect(&r));
                 self.visitor.shape(&shape, self.placements)?;
@@ -274,7 +270,7 @@ impl<V: Visitor> Sink for Spread<'_, V> {
         let shape = Shape {
             kind: ShapeKind::Boundary,
             layer,
-            points,
+            outline: Outline::new(points),
             rect: rectangle_of(points),
             circle: None,
             offset,
@@ -325,7 +321,7 @@ impl<V: Visitor> Sink for Spread<'_, V> {
                         layer: element.layer,
                         rect: rectangle_of(&points),
                         circle: circle_of(&points),
-                        points: &points,
+                        outline: Outline::new(&points),
                         offset: element.offset,
                     };
                     self.visitor.shape(&shape, self.placements)?;
@@ -358,26 +354,22 @@ impl<V: Visitor> Sink for Spread<'_, V> {
                 Ok(self.visitor.text(&text, self.placements)?)
             }),
             _ => {
-                let (mut points, mut moved) = (std::mem::take(&mut self.path), std::mem::take(&mut self.moved));
+                let mut points = std::mem::take(&mut self.path);
                 if let Some(kind) = outline_of(element, &mut points) {
                     let (rect, circle) = (rectangle_of(&points), circle_of(&points));
-                    moved.clone_from(&points);
                     copies.each(|by| {
-                        for (to, from) in moved.iter_mut().zip(&points) {
-                            *to = Point::new(from.x + by.x, from.y + by.y);
-                        }
                         let shape = Shape {
                             kind,
                             layer: element.layer,
                             rect: rect.map(|r| r.moved(by)),
                             circle: circle.map(|r| r.moved(by)),
-                            points: &moved,
+                            outline: Outline::at(&points, Transform::IDENTITY.moved(by)),
                             offset: element.offset,
                         };
                         self.visitor.shape(&shape, self.placements)
                     })?;
                 }
-                (self.path, self.moved) = (points, moved);
+                self.path = points;
                 Ok(())
             }
         }

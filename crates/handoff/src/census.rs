@@ -155,10 +155,10 @@ impl Visitor for Counter {
         tally.shapes += placements.len() as u64;
         let twice = match &shape.rect {
             Some(r) => 2 * i128::from(r.width()) * i128::from(r.height()),
-            None => twice_area(shape.points),
+            None => twice_area(&shape.outline.points().collect::<Vec<_>>()),
         };
         tally.twice_area += twice * placements.len() as i128;
-        let around = shape.rect.unwrap_or_else(|| Rect::around(shape.points));
+        let around = shape.rect.unwrap_or_else(|| shape.outline.around());
         self.own.entry(shape.layer).or_insert(Rect::EMPTY).unite(&around);
         Ok(())
     }

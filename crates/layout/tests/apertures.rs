@@ -119,7 +119,7 @@ struct Openings(Vec<Vec<(i64, i64)>>);
 
 impl Visitor for Openings {
     fn shape(&mut self, shape: &Shape<'_>, _placements: &[Transform]) -> metalith_core::Result<()> {
-        self.0.push(shape.points.iter().map(|p| (p.x, p.y)).collect());
+        self.0.push(shape.outline.points().map(|p| (p.x, p.y)).collect());
         Ok(())
     }
 }

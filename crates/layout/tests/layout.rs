@@ -356,7 +356,7 @@ fn corners(layout: &Layout) -> Vec<(LayerNumber, Vec<Point>)> {
     impl Visitor for Areas {
         fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> metalith_core::Result<()> {
             for placement in placements {
-                let mut corners: Vec<Point> = shape.points.iter().map(|&p| placement.apply(p)).collect();
+                let mut corners = shape.outline.placed(placement);
                 corners.sort_unstable();
                 corners.dedup();
                 self.0.push((shape.layer, corners));

@@ -189,11 +189,9 @@ struct Openings(Vec<(i64, i64, i64)>);
 
 impl Visitor for Openings {
     fn shape(&mut self, shape: &Shape<'_>, _placements: &[Transform]) -> metalith_core::Result<()> {
-        let xs = shape.points.iter().map(|p| p.x);
-        let ys = shape.points.iter().map(|p| p.y);
-        let (left, right) = (xs.clone().min().unwrap(), xs.max().unwrap());
-        let (low, high) = (ys.clone().min().unwrap(), ys.max().unwrap());
-        self.0.push(((left + right) / 2, (low + high) / 2, right - left));
+        let around = shape.outline.around();
+        self.0
+            .push(((around.x0 + around.x1) / 2, (around.y0 + around.y1) / 2, around.width()));
         Ok(())
     }
 }

@@ -77,7 +77,7 @@ struct Count(u64);
 impl Visitor for Count {
     fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> metalith_core::Result<()> {
         for placement in placements {
-            self.0 += u64::from(shape.points.iter().any(|&p| placement.apply(p).x > 0));
+            self.0 += u64::from(shape.outline.points().any(|p| placement.apply(p).x > 0));
         }
         Ok(())
     }

@@ -6,8 +6,8 @@ use super::super::work::Allowance;
 use metalith_core::{Error, PillarShape, Progress, Result};
 use metalith_gds::extract::{ElementSite, ExtractedElement, Filler, HeldWidths, Scale, Why};
 use metalith_gds::{
-    DrawnPillar, LayerNumber, Layout, LayoutCell, Point, Rect, Selection, Shape, Text, Transform, Visitor, pillar_of,
-    rectangle_of, simplified,
+    DrawnPillar, LayerNumber, Layout, LayoutCell, PillarFinder, Point, Rect, Selection, Shape, Text, Transform,
+    Visitor, rectangle_of, simplified,
 };
 
 /// Vertices that may be placed for each that may be held: most corners of rectangles are not.
@@ -100,6 +100,7 @@ impl Content {
         let mut reader = ContentReader {
             pillars,
             shape: wanted.shape,
+            finder: PillarFinder::new(wanted.shape, layout.unit_nm()),
             factor,
             unit_nm: layout.unit_nm(),
             filler: Filler::new(wanted.sites.to_vec(), Scale::of(layout)?),
@@ -137,6 +138,7 @@ impl Content {
 struct ContentReader<'s> {
     pillars: LayerNumber,
     shape: PillarShape,
+    finder: PillarFinder,
     factor: i64,
     unit_nm: f64,
     filler: Filler,
@@ -169,21 +171,16 @@ impl ContentReader<'_> {
 
     /// A rotated rectangle. Only one whose corners are those of its rotation, to the unit, is known by that alone; of two on one
     /// site the one of the larger number is.
-    fn rotated(&mut self, pillar: &DrawnPillar, number: u16, placed: &[Point], placement: usize) -> Result<()> {
-        let exact = self.corners(pillar, number);
-        let corners = simplified(placed);
-        let same = corners.len() == 5 && corners.iter().all(|p| exact.contains(p));
-        if !same {
-            return self.ring(self.pillars, &corners);
-        }
-        match self.filler.put_drawn(pillar, placement, |_| true) {
-            Ok(_) => Ok(()),
-            Err(Why::DuplicateSite) => {
+    fn rotated(&mut self, pillar: &DrawnPillar, placement: usize, corners: impl FnOnce() -> Vec<Point>) -> Result<()> {
+        let put = pillar.exact.then(|| self.filler.put_drawn(pillar, placement, |_| true));
+        match put {
+            Some(Ok(_)) => Ok(()),
+            Some(Err(Why::DuplicateSite)) => {
                 let other = self.filler.keep_larger_number(pillar, placement);
                 let corners = self.corners(pillar, other);
                 self.ring(self.pillars, &corners)
             }
-            Err(_) => self.ring(self.pillars, &corners),
+            _ => self.ring(self.pillars, &simplified(&corners())),
         }
     }
 
@@ -238,19 +235,21 @@ impl ContentReader<'_> {
         Ok(())
     }
 
-    fn outline(&mut self, layer: LayerNumber, placed: &[Point], placement: usize) -> Result<()> {
-        if layer == self.pillars
-            && let Some(pillar) = pillar_of(placed, self.shape, self.unit_nm)
+    /// A shape in one of its placements.
+    fn outline(&mut self, shape: &Shape<'_>, placement: &Transform, k: usize) -> Result<()> {
+        let placed = || shape.outline.placed(placement);
+        if shape.layer == self.pillars
+            && let Some(pillar) = self.finder.placed(shape.outline, placement)
         {
             return match pillar.number {
-                None => self.pillar(&pillar.around, placement, || placed.to_vec()),
-                Some(number) => self.rotated(&pillar, number, placed, placement),
+                None => self.pillar(&pillar.around, k, placed),
+                Some(_) => self.rotated(&pillar, k, placed),
             };
         }
-        let corners = simplified(placed);
+        let corners = simplified(&placed());
         match rectangle_of(&corners) {
-            Some(r) => self.rect(layer, &r),
-            None => self.ring(layer, &corners),
+            Some(r) => self.rect(shape.layer, &r),
+            None => self.ring(shape.layer, &corners),
         }
     }
 
@@ -299,16 +298,15 @@ impl Visitor for ContentReader<'_> {
                 }
                 for (k, placement) in placements.iter().enumerate() {
                     let placed = placement.apply_rect(rect).unwrap_or(*rect);
-                    let corners = || shape.points.iter().map(|&p| placement.apply(p)).collect();
+                    let corners = || shape.outline.placed(placement);
                     self.pillar(&placed, k, corners)?;
                 }
             }
             _ => {
                 *self.counts.entry(shape.layer).or_default() += placements.len() as u64;
-                self.placed(shape.points.len(), placements.len())?;
+                self.placed(shape.outline.len(), placements.len())?;
                 for (k, placement) in placements.iter().enumerate() {
-                    let placed: Vec<Point> = shape.points.iter().map(|&p| placement.apply(p)).collect();
-                    self.outline(shape.layer, &placed, k)?;
+                    self.outline(shape, placement, k)?;
                 }
             }
         }

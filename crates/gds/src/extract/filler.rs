@@ -251,7 +251,7 @@ impl Filler {
         if !self.scale.reaches(r) {
             return Err(Why::OutsideElements);
         }
-        let widest_nm = self.scale.nm(r.width().max(r.height()) as f64).ceil() as i64;
+        let widest_nm = self.scale.at_least_nm(r.width().max(r.height()));
         let mut guess = self.guesses[placement];
         let site = self.site(r, widest_nm, &mut guess);
         self.guesses[placement] = guess;

@@ -7,8 +7,10 @@
 mod discover;
 mod filler;
 mod held;
+mod lattices;
 mod oddity;
 mod pillars;
+mod places;
 mod plan;
 mod sites;
 mod sizes;

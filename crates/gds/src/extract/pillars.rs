@@ -6,7 +6,7 @@ use super::oddity::{Oddities, Oddity, Why};
 use super::plan::{Extraction, ExtractionPlan};
 use super::sites::Scale;
 use super::survey::Surveyor;
-use crate::{ExtractionError, LayerNumber, LayoutCell, Point, Rect, Shape, Text, Transform, Visitor, pillar_of};
+use crate::{ExtractionError, LayerNumber, LayoutCell, PillarFinder, Rect, Shape, Text, Transform, Visitor, pillar_of};
 use metalith_core::{ElementSite, PillarShape};
 
 /// Fills width maps from the shapes of a layout, and lists what is no pillar.
@@ -15,6 +15,7 @@ pub(super) struct PillarCollector {
     shape: PillarShape,
     listed: usize,
     scale: Scale,
+    finder: PillarFinder,
     filler: Filler,
     oddities: Oddities,
     surveyor: Surveyor,
@@ -28,6 +29,7 @@ impl PillarCollector {
             shape,
             listed: plan.listed,
             scale,
+            finder: PillarFinder::new(shape, scale.nm(1.0)),
             filler: Filler::new(sites, scale).holding(most),
             oddities: Oddities::default(),
             surveyor: Surveyor::default(),
@@ -70,21 +72,18 @@ impl PillarCollector {
     fn polygon(&mut self, shape: &Shape<'_>, placements: &[Transform]) {
         let unit_nm = self.scale.nm(1.0);
         for (k, placement) in placements.iter().enumerate() {
-            let placed: Vec<Point> = shape.points.iter().map(|&p| placement.apply(p)).collect();
-            let other = || {
-                PillarShape::CHOICES
-                    .iter()
-                    .any(|(_, s)| pillar_of(&placed, *s, unit_nm).is_some())
-            };
-            match pillar_of(&placed, self.shape, unit_nm) {
-                Some(pillar) => {
-                    if let Err(why) = self.filler.put_drawn(&pillar, k, |_| true) {
-                        self.odd(why, &pillar.around, shape.offset);
-                    }
+            if let Some(pillar) = self.finder.placed(shape.outline, placement) {
+                if let Err(why) = self.filler.put_drawn(&pillar, k, |_| true) {
+                    self.odd(why, &pillar.around, shape.offset);
                 }
-                None if other() => self.odd(Why::OtherShape, &Rect::around(&placed), shape.offset),
-                None => self.odd(Why::OddShape, &Rect::around(&placed), shape.offset),
+                continue;
             }
+            let placed = shape.outline.placed(placement);
+            let is_other = PillarShape::CHOICES
+                .iter()
+                .any(|(_, s)| pillar_of(&placed, *s, unit_nm).is_some());
+            let why = if is_other { Why::OtherShape } else { Why::OddShape };
+            self.odd(why, &Rect::around(&placed), shape.offset);
         }
     }
 }

@@ -26,6 +26,12 @@ impl Scale {
         value * self.num as f64 / self.den as f64
     }
 
+    /// A length in whole nanometres, rounded up.
+    #[inline]
+    pub fn at_least_nm(self, value: i64) -> i64 {
+        (value * self.num + self.den - 1).div_euclid(self.den)
+    }
+
     /// A length in whole nanometres, if it is one.
     #[inline]
     pub fn whole_nm(self, value: i64) -> Option<i64> {

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::sites::Scale;
-use crate::{Shape, TiltedRectangle, tilted_rectangle_of};
+use crate::memo::OutlineMemo;
+use crate::{Shape, tilted_rectangle_of};
 use metalith_core::Rectangles;
 
 /// Sizes that are told apart: a layout has one, and what its corners make of it.
@@ -17,28 +18,40 @@ const ALIKE_NM: i64 = 2;
 const STEPS: u16 = 180;
 
 /// Edges of the rectangles of a layout, counted.
-#[derive(Clone, Debug, Default)]
+#[derive(Default)]
 pub(super) struct Sizes {
     /// By the shorter and the longer edge, to a nanometre: how many, and the sums of both (nm).
     counted: BTreeMap<(i64, i64), (u64, [f64; 2])>,
     /// Rectangles, counted or not.
     pub rectangles: u64,
+    known: OutlineMemo<Option<[f64; 2]>>,
+}
+
+/// Rectangles of one size.
+pub(super) struct AlikeRectangles {
+    pub pillars: Rectangles,
+    /// How many there are.
+    pub count: u64,
 }
 
 impl Sizes {
-    /// The rectangle that a shape is, as drawn, if it is one and no square.
-    pub fn rectangle(shape: &Shape<'_>, scale: Scale) -> Option<TiltedRectangle> {
+    /// The shorter and the longer edge of the rectangle that a shape is, as drawn (nm), if it is one and no square.
+    pub fn edges(&mut self, shape: &Shape<'_>, scale: Scale) -> Option<[f64; 2]> {
         let unequal = shape.rect.is_none_or(|r| r.width() != r.height());
-        if !unequal || shape.circle.is_some() || shape.points.len() != 5 {
+        if !unequal || shape.circle.is_some() || shape.outline.len() != 5 {
             return None;
         }
-        tilted_rectangle_of(shape.points, scale.nm(1.0)).filter(|r| !r.is_square())
+        // Edges are as long wherever the outline stands.
+        let points = shape.outline.points;
+        self.known.of(points, 0, || {
+            let tilted = tilted_rectangle_of(points, scale.nm(1.0)).filter(|r| !r.is_square())?;
+            Some(tilted.edges.map(|e| scale.nm(e)))
+        })
     }
 
-    /// So many copies of a rectangle.
-    pub fn add(&mut self, rectangle: &TiltedRectangle, copies: u64, scale: Scale) {
+    /// So many copies of a rectangle with these edges (nm).
+    pub fn add(&mut self, edges: [f64; 2], copies: u64) {
         self.rectangles += copies;
-        let edges = rectangle.edges.map(|e| scale.nm(e));
         let key = (edges[0].round() as i64, edges[1].round() as i64);
         if self.counted.len() < MOST_SIZES || self.counted.contains_key(&key) {
             let (count, sums) = self.counted.entry(key).or_default();
@@ -48,7 +61,7 @@ impl Sizes {
     }
 
     /// The size that most have, if it is one of pillars no wider than this (nm).
-    pub fn pillars(&self, widest_nm: i64) -> Option<Rectangles> {
+    pub fn pillars(&self, widest_nm: i64) -> Option<AlikeRectangles> {
         let (&(w, l), _) = self
             .counted
             .iter()
@@ -59,10 +72,11 @@ impl Sizes {
             (n + count, [a + own[0], b + own[1]])
         });
         let [width, length] = sums.map(|sum| (sum / count as f64).round() as i64);
-        (width < length && length <= widest_nm).then_some(Rectangles {
+        let pillars = Rectangles {
             width_nm: u16::try_from(width).ok()?,
             length_nm: u16::try_from(length).ok()?,
             steps: STEPS,
-        })
+        };
+        (width < length && length <= widest_nm).then_some(AlikeRectangles { pillars, count })
     }
 }

@@ -85,7 +85,7 @@ impl Surveyor {
 
     #[inline]
     pub fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) {
-        let bounds = shape.rect.unwrap_or_else(|| Rect::around(shape.points));
+        let bounds = shape.rect.unwrap_or_else(|| shape.outline.around());
         if placements.first().is_some_and(Transform::is_square) || placements == self.placements {
             let entry = self.entry(shape.layer);
             entry.shapes += 1;

@@ -33,8 +33,7 @@ struct Flat(Vec<(LayerNumber, Vec<Point>)>);
 impl Visitor for Flat {
     fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> metalith_core::Result<()> {
         for t in placements {
-            self.0
-                .push((shape.layer, shape.points.iter().map(|&p| t.apply(p)).collect()));
+            self.0.push((shape.layer, shape.outline.placed(t)));
             if let (Some(rect), true) = (shape.rect, t.is_square()) {
                 let placed = t.apply_rect(&rect).unwrap();
                 assert_eq!(placed, around(&self.0.last().unwrap().1));

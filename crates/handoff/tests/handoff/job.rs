@@ -214,7 +214,7 @@ struct Crosses(Vec<(Place, f64)>);
 impl Visitor for Crosses {
     fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> Result<()> {
         for placement in placements {
-            let points = shape.points.iter().map(|&p| placement.apply(p));
+            let points = shape.outline.placed(placement).into_iter();
             let (mut x, mut y): (Vec<_>, Vec<_>) = points.map(|p| (p.x, p.y)).unzip();
             x.sort_unstable();
             y.sort_unstable();

@@ -55,7 +55,7 @@ struct Outlines {
 impl Visitor for Outlines {
     fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> Result<()> {
         for placement in placements {
-            let points: Vec<Point> = shape.points.iter().map(|&p| placement.apply(p)).collect();
+            let points = shape.outline.placed(placement);
             let ends = |of: fn(&Point) -> i64| {
                 let all = points.iter().map(of);
                 all.clone().min().unwrap() + all.max().unwrap()

@@ -1,0 +1,202 @@
+//! Which lattice the shapes of a group of tiles stand on.
+
+use std::collections::BTreeMap;
+
+use super::tiles::TileMap;
+use crate::{ExtractionError, Point, Rect};
+use metalith_core::{ElementSite, Lattice, LatticeKind};
+
+/// Fewer squares together are no element.
+const FEWEST: u64 = 16;
+/// One in so many tiles at least shows a row between those of its samples, where two arrays make a hexagonal lattice: all do but
+/// those that pillars reach by their rims.
+const ROWS_BETWEEN: usize = 4;
+/// All centres but one in so many at most are sites of a hexagonal lattice.
+const SHARE_OF_SITES: u64 = 4;
+/// Lattice sites for each square found: a lens fills 0.79 of its lattice.
+const SITES_PER_PILLAR: u64 = 64;
+
+/// Tiles next to one another, which may be an element.
+pub(super) struct Cluster<'a> {
+    pub tiles: &'a TileMap,
+    /// Numbers of its tiles.
+    pub members: &'a [usize],
+}
+
+impl Cluster<'_> {
+    /// Its lattice; none if it is too small to be an element.
+    pub fn element(&self) -> Result<Option<ElementSite>, ExtractionError> {
+        let squares: u64 = self.members.iter().map(|&k| self.tiles.squares(k)).sum();
+        if squares < FEWEST {
+            return Ok(None);
+        }
+        let mut steps = [BTreeMap::<i64, u64>::new(), BTreeMap::new()];
+        for &k in self.members {
+            for (axis, steps) in AXES.into_iter().zip(&mut steps) {
+                let mut places: Vec<i64> = self.tiles.samples(k).map(axis).collect();
+                places.sort_unstable();
+                places.dedup();
+                for pair in places.windows(2) {
+                    *steps.entry(pair[1] - pair[0]).or_default() += 1;
+                }
+            }
+        }
+        if let Some(element) = self.hexagonal(squares, &steps)? {
+            return Ok(Some(element));
+        }
+        let [mut steps, along_y] = steps;
+        along_y
+            .into_iter()
+            .for_each(|(step, count)| *steps.entry(step).or_default() += count);
+        let Some(step) = most_common(steps) else {
+            return Ok(None);
+        };
+        let bounds = self.bounds();
+        let (x, columns) = self.places(0, step, [bounds.x0, bounds.x1]);
+        let (y, rows) = self.places(1, step, [bounds.y0, bounds.y1]);
+        let sites = columns.max(rows);
+        dense_enough(squares, sites, &bounds, [columns, rows], step as f64 / 2.0)?;
+        let centre = |first: i64, count: i64| first - (sites - count) / 2 * step + (sites - 1) * step / 2;
+        let (twice_x, twice_y) = (centre(x, columns), centre(y, rows));
+        let bad = ExtractionError::Lattice {
+            pitch_nm: step as f64 / 2.0,
+            centre_nm: [twice_x as f64 / 2.0, twice_y as f64 / 2.0],
+        };
+        if step % 4 != 0 || twice_x % 2 != 0 || twice_y % 2 != 0 {
+            return Err(bad);
+        }
+        let Ok(lattice) = Lattice::new((step / 2) as u32, sites as usize) else {
+            return Err(bad);
+        };
+        Ok(Some(ElementSite {
+            name: String::new(),
+            centre_nm: [twice_x / 2, twice_y / 2],
+            lattice,
+        }))
+    }
+
+    /// Around all centres (half nm).
+    fn bounds(&self) -> Rect {
+        let mut bounds = Rect::EMPTY;
+        self.members.iter().for_each(|&k| bounds.unite(&self.tiles.bounds(k)));
+        bounds
+    }
+
+    /// The first place of a lattice with this step along an axis, between two ends, and the number of its places (half nm).
+    fn places(&self, axis: usize, step: i64, [from, to]: [i64; 2]) -> (i64, i64) {
+        let mut phases: BTreeMap<i64, u64> = BTreeMap::new();
+        for s in self.members.iter().flat_map(|&k| self.tiles.samples(k)) {
+            *phases.entry(AXES[axis](s).rem_euclid(step)).or_default() += 1;
+        }
+        let phase = most_common(phases).unwrap_or(0);
+        // Outermost places on the lattice: what is off it does not widen it.
+        let first = from + (phase - from).rem_euclid(step);
+        let last = to - (to - phase).rem_euclid(step);
+        (first, (last - first).max(0) / step + 1)
+    }
+
+    /// Whether enough of the last centres of its tiles are in rows between those of its samples, and shifted as those of
+    /// a hexagonal lattice with this half pitch and distance of rows (half nm).
+    fn has_rows_between(&self, half_pitch: i64, row: i64) -> bool {
+        let between = |&&k: &&usize| {
+            let (Some(first), Some(last)) = (self.tiles.samples(k).next(), self.tiles.last(k)) else {
+                return false;
+            };
+            let [x, y] = [last.x - first.x, last.y - first.y];
+            let whole = x % half_pitch == 0 && y % row == 0;
+            whole && x / half_pitch % 2 != 0 && y / row % 2 != 0
+        };
+        self.members.iter().filter(between).count() * ROWS_BETWEEN >= self.members.len()
+    }
+
+    /// Its hexagonal lattice, if most centres are a pitch or half of one apart along x, and along y as far as its
+    /// rows, or twice as far with rows between them. Samples of a tile may be of one row alone, or of every other one where two
+    /// arrays make the lattice.
+    fn hexagonal(&self, squares: u64, steps: &[BTreeMap<i64, u64>; 2]) -> Result<Option<ElementSite>, ExtractionError> {
+        let [Some(step_x), Some(step_y)] = [0, 1].map(|axis: usize| most_common(steps[axis].clone())) else {
+            return Ok(None);
+        };
+        // Half a pitch in half nanometres is a pitch in nanometres.
+        let pitches = [step_x / 2, step_x].map(|pitch| u32::try_from(pitch).unwrap_or(0));
+        let row = |pitch_nm: u32| 2 * i64::from(LatticeKind::Hexagonal.row_nm(pitch_nm));
+        let fits = |pitch: &u32| {
+            let row = row(*pitch);
+            let sound = pitch.is_multiple_of(2) && *pitch > 0;
+            sound && (step_y == row || (step_y == 2 * row && self.has_rows_between((*pitch).into(), row)))
+        };
+        let Some(pitch_nm) = pitches.into_iter().find(fits) else {
+            return Ok(None);
+        };
+        let (step_x, step_y) = (i64::from(pitch_nm), row(pitch_nm));
+        let bounds = self.bounds();
+        let (x, columns) = self.places(0, step_x, [bounds.x0, bounds.x1]);
+        let (y, rows) = self.places(1, step_y, [bounds.y0, bounds.y1]);
+        let staggered = |s: Point| ((s.x - x).div_euclid(step_x) + (s.y - y).div_euclid(step_y)).rem_euclid(2);
+        let mut parities: BTreeMap<i64, u64> = BTreeMap::new();
+        for s in self.members.iter().flat_map(|&k| self.tiles.samples(k)) {
+            *parities.entry(staggered(s)).or_default() += 1;
+        }
+        // Where as many centres are on the other places of the grid it is no lattice of such rows.
+        let most = most_common_count(&parities);
+        if SHARE_OF_SITES * most < (SHARE_OF_SITES - 1) * parities.values().sum::<u64>() {
+            return Ok(None);
+        }
+        // A site in the middle, or beside it.
+        let row = rows / 2;
+        let column = columns / 2;
+        let column = column + (column + row + most_common(parities).unwrap_or(0)).rem_euclid(2);
+        let reach = column.max(columns - 1 - column);
+        let high = row.max(rows - 1 - row);
+        let sites = 2 * reach.max((high * step_y + step_x - 1) / step_x) + 1;
+        let centre = [x + column * step_x, y + row * step_y];
+        dense_enough(squares, sites, &bounds, [columns, rows], pitch_nm.into())?;
+        let lattice = Lattice::of_kind(LatticeKind::Hexagonal, pitch_nm, sites as usize);
+        match lattice {
+            Ok(lattice) if centre.iter().all(|c| c % 2 == 0) => Ok(Some(ElementSite {
+                name: String::new(),
+                centre_nm: centre.map(|c| c / 2),
+                lattice,
+            })),
+            _ => Err(ExtractionError::Lattice {
+                pitch_nm: f64::from(pitch_nm),
+                centre_nm: centre.map(|c| c as f64 / 2.0),
+            }),
+        }
+    }
+}
+
+/// Coordinates of a place along x and along y.
+const AXES: [fn(Point) -> i64; 2] = [|s| s.x, |s| s.y];
+
+/// Nothing, if so many squares fill a lattice of so many places an axis well enough to be one.
+fn dense_enough(
+    squares: u64,
+    sites: i64,
+    bounds: &Rect,
+    [columns, rows]: [i64; 2],
+    pitch_nm: f64,
+) -> Result<(), ExtractionError> {
+    if (sites as u64).saturating_pow(2) <= squares.saturating_mul(SITES_PER_PILLAR) + (1 << 16) {
+        return Ok(());
+    }
+    Err(ExtractionError::Sparse {
+        squares,
+        at_nm: [bounds.x0 / 2, bounds.y0 / 2],
+        columns,
+        rows,
+        pitch_nm,
+    })
+}
+
+/// How often the key counted most often was.
+fn most_common_count(counts: &BTreeMap<i64, u64>) -> u64 {
+    counts.values().copied().max().unwrap_or(0)
+}
+
+/// The key counted most often, the smallest of equals.
+fn most_common(counts: BTreeMap<i64, u64>) -> Option<i64> {
+    counts
+        .into_iter()
+        .max_by_key(|&(key, count)| (count, std::cmp::Reverse(key)))
+        .map(|(key, _)| key)
+}

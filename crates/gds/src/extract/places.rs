@@ -1,0 +1,123 @@
+//! Where the shapes of one kind stand on a layout, tile by tile.
+
+use super::sites::Scale;
+use super::tiles::{MOST_TILES, TileMap};
+use crate::{Point, Rect, Transform};
+
+/// A shape as it is looked for, in half nanometres.
+pub(super) struct Centre {
+    pub at: Point,
+    /// Whether its edges are on the grid of whole nanometres if its centre is on that of half ones.
+    pub even: bool,
+}
+
+impl Centre {
+    /// That of the box around a shape, if it is near enough and on the grid.
+    #[inline]
+    pub fn of(r: &Rect, scale: Scale) -> Option<Self> {
+        if !scale.reaches(r) {
+            return None;
+        }
+        let even = r.width() % 2 == 0 && r.height() % 2 == 0;
+        let at = Point::new(scale.whole_nm(r.x0 + r.x1)?, scale.whole_nm(r.y0 + r.y1)?);
+        Some(Self { at, even })
+    }
+}
+
+/// Occupied places of a layout.
+pub(super) struct Places {
+    scale: Scale,
+    tiles: TileMap,
+    /// Of the current cell in its own coordinates, if it is placed more than once: each shape is looked at once.
+    own: TileMap,
+    /// Placements of the current cell whose shapes are in `own`.
+    placements: Vec<Transform>,
+    /// Tile that each placement of the current cell met last.
+    guesses: Vec<u32>,
+    /// There are more tiles than are held.
+    scattered: bool,
+}
+
+impl Places {
+    pub fn new(scale: Scale) -> Self {
+        Self {
+            scale,
+            tiles: TileMap::new(),
+            own: TileMap::new(),
+            placements: Vec::new(),
+            guesses: Vec::new(),
+            scattered: false,
+        }
+    }
+
+    /// The tiles, unless they are more than are held.
+    pub fn finish(mut self) -> Option<TileMap> {
+        self.place_own();
+        (!self.scattered).then_some(self.tiles)
+    }
+
+    /// A cell with these placements begins.
+    pub fn begin(&mut self, placements: &[Transform]) {
+        self.place_own();
+        self.placements.clear();
+        if self.gathers(placements) {
+            self.placements.extend_from_slice(placements);
+        }
+        self.guesses.clear();
+        self.guesses.resize(placements.len().max(1), 0);
+    }
+
+    /// A shape of the current cell; `centre` says where it is in a placement, if it is looked for.
+    #[inline]
+    pub fn add(&mut self, placements: &[Transform], mut centre: impl FnMut(&Transform) -> Option<Centre>) {
+        // A tile too many, and no more is looked for.
+        self.scattered |= self.tiles.len().max(self.own.len()) > MOST_TILES;
+        if self.scattered {
+            return;
+        }
+        // What comes with placements of its own is turned by other than quarter turns.
+        if !self.placements.is_empty() && placements[0].is_square() {
+            if let Some(centre) = centre(&Transform::IDENTITY) {
+                self.own.add(centre.at, centre.even, &mut self.guesses[0]);
+            }
+            return;
+        }
+        for (placement, guess) in placements.iter().zip(&mut self.guesses) {
+            if self.tiles.len() > MOST_TILES {
+                break;
+            }
+            if let Some(centre) = centre(placement) {
+                self.tiles.add(centre.at, centre.even, guess);
+            }
+        }
+    }
+
+    /// Whether the shapes of a cell with these placements are gathered in its own coordinates.
+    fn gathers(&self, placements: &[Transform]) -> bool {
+        let near = |t: &Transform| matches!(*t, Transform::Square { dx, dy, .. } if self.scale.reaches(&Rect::around(&[Point::new(dx, dy)])));
+        placements.len() > 1 && self.scale.den == 1 && placements.iter().all(near)
+    }
+
+    /// Put the tiles of the last cell where it is placed.
+    fn place_own(&mut self) {
+        if self.own.is_empty() {
+            return;
+        }
+        for placement in &self.placements {
+            let Transform::Square { orientation, dx, dy } = *placement else {
+                continue;
+            };
+            let twice = 2 * self.scale.num;
+            let placement = Transform::Square {
+                orientation,
+                dx: twice * dx,
+                dy: twice * dy,
+            };
+            self.scattered |= !self.tiles.place(&self.own, &placement);
+            if self.scattered {
+                break;
+            }
+        }
+        self.own.clear();
+    }
+}

@@ -1,0 +1,123 @@
+//! What has been said of an outline, remembered for its copies elsewhere.
+
+use super::shape::Point;
+
+/// Outlines that are remembered at a time, a power of two: a lens of rectangles has some hundred.
+const PLACES: usize = 1 << 12;
+
+/// Places that an outline may have, side by side.
+const WAYS: usize = 4;
+
+/// Odd numbers without pattern, which spread outlines that differ by little.
+const SPREAD: [u64; 3] = [0x9E37_79B9_7F4A_7C15, 0xC2B2_AE3D_27D4_EB4F, 0x1656_67B1_9E37_79F9];
+
+/// Corners after the first, from the first, and the orientation that the outline is asked about in.
+type Key = ([[i32; 2]; 3], u8);
+
+/// Answers about closed outlines of four corners that hold wherever these stand: each distinct outline is asked about once, but
+/// for those that others have taken the place of. Memory and time are bounded, whatever the outlines are.
+pub(super) struct OutlineMemo<T> {
+    places: Vec<Option<(Key, T)>>,
+}
+
+impl<T> Default for OutlineMemo<T> {
+    fn default() -> Self {
+        Self { places: Vec::new() }
+    }
+}
+
+impl<T: Copy> OutlineMemo<T> {
+    /// The answer about an outline in an orientation, by `ask` if it is not remembered.
+    #[inline]
+    pub fn of(&mut self, points: &[Point], orientation: u8, ask: impl FnOnce() -> T) -> T {
+        let Some(key) = key(points, orientation) else {
+            return ask();
+        };
+        if self.places.is_empty() {
+            self.places.resize(PLACES, None);
+        }
+        let start = place(&key);
+        let places = &mut self.places[start..start + WAYS];
+        let known = |place: &&Option<(Key, T)>| matches!(place, Some((known, _)) if *known == key);
+        if let Some(Some((_, answer))) = places.iter().find(known) {
+            return *answer;
+        }
+        let answer = ask();
+        let free = places.iter().position(Option::is_none).unwrap_or(0);
+        places[free] = Some((key, answer));
+        answer
+    }
+}
+
+/// An outline without its place, if it is closed and has four corners near one another.
+#[inline]
+fn key(points: &[Point], orientation: u8) -> Option<Key> {
+    let &[a, b, c, d, e] = points else { return None };
+    if a != e {
+        return None;
+    }
+    let mut corners = [[0; 2]; 3];
+    for (corner, p) in corners.iter_mut().zip([b, c, d]) {
+        *corner = [
+            i32::try_from(p.x.checked_sub(a.x)?).ok()?,
+            i32::try_from(p.y.checked_sub(a.y)?).ok()?,
+        ];
+    }
+    Some((corners, orientation))
+}
+
+/// The first place where a key may be remembered.
+#[inline]
+fn place((corners, orientation): &Key) -> usize {
+    let joined = |[x, y]: [i32; 2]| u64::from(x as u32) << 32 | u64::from(y as u32);
+    let mixed = corners
+        .iter()
+        .zip(SPREAD)
+        .fold(u64::from(*orientation), |sum, (corner, spread)| {
+            (sum ^ joined(*corner)).wrapping_mul(spread).rotate_left(29)
+        });
+    (mixed >> 32) as usize % (PLACES / WAYS) * WAYS
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outline(at: (i64, i64), corners: [(i64, i64); 4]) -> Vec<Point> {
+        let moved = |&(x, y): &(i64, i64)| Point::new(at.0 + x, at.1 + y);
+        corners.iter().chain(&corners[..1]).map(moved).collect()
+    }
+
+    #[test]
+    fn an_outline_is_asked_about_once_for_each_orientation_wherever_it_stands() {
+        let mut memo = OutlineMemo::default();
+        let rhombus = |at| outline(at, [(0, 0), (50, 10), (60, 90), (10, 80)]);
+        assert_eq!(memo.of(&rhombus((0, 0)), 0, || 1), 1);
+        assert_eq!(memo.of(&rhombus((-7_000_000, 350)), 0, || 2), 1);
+        assert_eq!(memo.of(&rhombus((0, 0)), 3, || 3), 3);
+        let other = outline((0, 0), [(0, 0), (50, 10), (60, 90), (10, 81)]);
+        assert_eq!(memo.of(&other, 0, || 4), 4);
+    }
+
+    #[test]
+    fn what_is_no_outline_of_four_corners_is_not_remembered() {
+        let mut memo = OutlineMemo::default();
+        let open = &outline((0, 0), [(0, 0), (9, 0), (9, 9), (0, 9)])[..4];
+        let far = outline((0, 0), [(i64::MIN, 0), (9, 0), (i64::MAX, 9), (0, 9)]);
+        for points in [open, &far, &[]] {
+            assert_eq!(memo.of(points, 0, || 1), 1);
+            assert_eq!(memo.of(points, 0, || 2), 2);
+        }
+    }
+
+    #[test]
+    fn more_outlines_than_places_are_each_told_from_the_others() {
+        let mut memo = OutlineMemo::default();
+        for round in 0..2 {
+            for k in 0..3 * PLACES as i64 {
+                let own = outline((k, -k), [(0, 0), (k + 1, 0), (k + 1, 9), (0, 9)]);
+                assert_eq!(memo.of(&own, 0, || k), k, "round {round}");
+            }
+        }
+    }
+}
