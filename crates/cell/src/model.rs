@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use metalith_core::{Error, LatticeKind, PillarShape, Progress, Result};
 
-use crate::{BandResponse, NeighbourResponse};
+use crate::{BandResponse, NeighbourResponse, RotatedCell};
 
 /// How truly a cell is described. Every result names the one it was made with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -165,6 +165,11 @@ pub trait CellModel: Sync {
     /// As [`CellModel::transmissions`].
     fn unconverted(&self, _wavelength_um: f64, _max_width_nm: u16) -> Result<Option<Vec<Complex64>>> {
         Ok(None)
+    }
+
+    /// The model itself, if it is that of rotated rectangles: what their rotations do can be asked of it.
+    fn rotated(&self) -> Option<&RotatedCell> {
+        None
     }
 
     /// As [`CellModel::unconverted`], for one of many wavelengths that a band is averaged over.

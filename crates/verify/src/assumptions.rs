@@ -1,12 +1,12 @@
 //! What a simulation assumes, and how much each assumption weighs for the design at hand.
 
-use metalith_cell::{Fidelity, MappingError, ORDERS, RotatedCell, RotationCurve, RotationMapping, Truncation};
-use metalith_core::{PillarShape, Rectangles, Result};
+use metalith_cell::{Fidelity, ORDERS, Truncation};
+use metalith_core::{PillarShape, Rectangles};
 use metalith_design::{CellIncidence, Design, Element};
 use metalith_report::{Cell, Column, Page, Table, fixed, sig};
 
 use super::page::span;
-use super::{OrderEfficiencies, PsfResult, Verification};
+use super::{EqualRotations, OrderEfficiencies, PsfResult, Verification};
 
 /// Share by which a cell in an infinite lattice of equal pillars overstates the first order of a blazed row at 455,
 /// 530 and 660 nm, by the turns of phase a pitch: rows of 18, 6, 3 and 2.5 pillars a turn of the shipped mapping,
@@ -149,7 +149,7 @@ fn polarised(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &
         ),
         "axis of each outline as it is drawn, against its rotation; each site has the pillar drawn nearest to what is asked",
     );
-    let lattice = EqualRotations::of(design, pillars);
+    let lattice = found.rotations;
     row(
         if design.mapping.rotation.is_half() {
             "The phase is twice the rotation"
@@ -157,25 +157,24 @@ fn polarised(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &
             "The phase is twice the rotation and what the lattice adds to it, by the series of [mapping]"
         },
         match &lattice {
-            Ok(EqualRotations { own, half, .. }) if own != half => format!(
+            Some(EqualRotations { own, half, .. }) if own != half => format!(
                 "off by {} rad rms, {} at most, for pillars as drawn; without the series by {} at most",
                 fixed(own.rms_rad, 4),
                 fixed(own.worst_rad, 4),
                 fixed(half.worst_rad, 4)
             ),
-            Ok(EqualRotations { own, .. }) => format!(
+            Some(EqualRotations { own, .. }) => format!(
                 "off by {} rad rms, {} at most, for pillars as drawn; `metalith cells` has a series that takes it back",
                 fixed(own.rms_rad, 4),
                 fixed(own.worst_rad, 4)
             ),
-            Err(why) => format!("not known: {why}"),
+            None => "not known".into(),
         },
         "phase of the converted light of all rotations in lattices of equals, solved rigorously at the wavelength of the mapping",
     );
-    let truncation = lattice.as_ref().ok().and_then(|l| l.truncation);
     row(
         "Cells are solved at seven rotations, the others by a Fourier series, with as many diffraction orders as they need",
-        match truncation {
+        match lattice.and_then(|l| l.truncation) {
             Some(Truncation { orders, fewer, apart }) => format!(
                 "{orders} orders an axis: {} at most in t from {fewer} orders, so some 0.002 may be left",
                 sig(apart, 2)
@@ -184,28 +183,6 @@ fn polarised(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &
         },
         "fifteen sizes of three materials: where 17 orders are within 0.005 of 25, 25 are within 0.0018 of 41; of all others 41 are taken, within 0.0023 of 57; the series meets the solver between its rotations to 0.0005",
     );
-}
-
-/// What a lattice of pillars that are all rotated alike does, at the wavelength of the mapping.
-struct EqualRotations {
-    /// Phase errors of the mapping of the design, and of half of the phase.
-    own: MappingError,
-    half: MappingError,
-    truncation: Option<Truncation>,
-}
-
-impl EqualRotations {
-    fn of(design: &Design, pillars: Rectangles) -> Result<Self> {
-        let arriving = design.cell.arriving.unwrap_or_default();
-        let cell = RotatedCell::new(design.cell_stack()?, pillars, arriving);
-        let wavelength_um = design.mapping.wavelength_um;
-        let curve = RotationCurve::new(&cell, wavelength_um)?;
-        Ok(Self {
-            own: curve.error(&design.mapping.rotation, pillars)?,
-            half: curve.error(&RotationMapping::default(), pillars)?,
-            truncation: cell.truncation(wavelength_um)?,
-        })
-    }
 }
 
 /// Share of the light in the first order by equal neighbours over that by the neighbours that there are.

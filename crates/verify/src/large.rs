@@ -91,6 +91,7 @@ pub fn verify_pillars(
         elements,
         foreign: extraction.oddities,
         distinct: Vec::new(),
+        rotations: None,
         not_simulated: Some(why),
         checks: Vec::new(),
     };

@@ -10,6 +10,7 @@ mod optics;
 mod page;
 mod phase;
 mod psf_metrics;
+mod rotations;
 mod single;
 mod single_white;
 mod site_orders;
@@ -42,6 +43,7 @@ pub use metalith_made::SimulationCase;
 pub use page::write_report;
 pub use phase::{PhaseError, PhaseErrors, PillarResponse};
 pub use psf_metrics::{OrderEfficiencies, PsfImages, PsfPair, PsfResult};
+pub use rotations::EqualRotations;
 pub use single::{Lighting, SinglePsf, SinglePsfReport, single_psfs, write_single_psf_report};
 pub use single_white::{SingleWhite, single_white};
 pub use white::{CameraStatement, Contrast, WhiteChannel};
@@ -115,6 +117,9 @@ pub struct Verification {
     pub elements: Vec<ElementCheck>,
     pub foreign: Oddities,
     pub distinct: Vec<DistinctElement>,
+    /// Of a design of rotated rectangles: how near their lattice is to the phase that is asked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rotations: Option<EqualRotations>,
     /// Why nothing was simulated, if nothing was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub not_simulated: Option<String>,
@@ -318,6 +323,7 @@ fn judge(
         elements,
         foreign: found.foreign,
         distinct: simulated,
+        rotations: EqualRotations::of(design, cases.judge)?,
         not_simulated: None,
         checks: Vec::new(),
     };

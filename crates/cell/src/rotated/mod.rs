@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use num_complex::Complex64;
 use rayon::prelude::*;
+use serde::Serialize;
 
 use metalith_core::{Error, Rectangles, Result};
 use metalith_rcwa::{Orders, circular};
@@ -47,7 +48,7 @@ const CHOICE: OrderChoice = OrderChoice {
 const BAND_ORDERS: usize = 9;
 
 /// How many diffraction orders a cell was solved with, and what the last of them changed.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Truncation {
     /// Orders an axis.
     pub orders: usize,
@@ -242,6 +243,10 @@ impl CellModel for RotatedCell {
 
     fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {
         self.stack.full_transmission(wavelength_um)
+    }
+
+    fn rotated(&self) -> Option<&RotatedCell> {
+        Some(self)
     }
 }
 
