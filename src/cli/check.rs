@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use metalith::drc::{self, CheckInput, Date, Deck, DrcReport, Waivers};
 use metalith::gds::ReadLimits;
-use metalith::{Error, Layout, Result, WholeFile};
+use metalith::{Error, Layout, PillarShape, Result, WholeFile};
 
 use super::compensated::CompensatedFor;
 use super::output::is_standard_output;
@@ -22,7 +22,8 @@ pub struct CheckArgs {
     /// The layout, in any hierarchy, by any tool; `-` for standard input.
     layout: PathBuf,
 
-    /// The rules; those of the program (rules/sin_pillars.toml) if left out.
+    /// The rules; if left out those of the program: rules/sin_pillars.toml, or circles.toml or rectangles.toml for a
+    /// design of these.
     #[arg(long, value_name = "RULES.toml")]
     rules: Option<PathBuf>,
 
@@ -96,9 +97,10 @@ impl CheckArgs {
 
 pub fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
     args.paths_are_apart()?;
-    let deck = args.rules.as_deref().map_or_else(|| Ok(Deck::standard()), Deck::read)?;
+    let named = args.rules.as_deref().map(Deck::read).transpose()?;
     let waivers = args.waivers.as_deref().map(Waivers::read).transpose()?;
     let mut design = args.design.as_deref().map(standard_input::design_any).transpose()?;
+    let deck = named.unwrap_or_else(|| Deck::for_shape(design.as_ref().map_or(PillarShape::Square, |d| d.cell.shape)));
     terminal.stop_on_interrupt();
     let file = InputFile::of(&args.layout)?;
     let open = |path: &Path| Layout::open_with(path, ReadLimits::default(), terminal);

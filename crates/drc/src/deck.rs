@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::context::Context;
 use super::rule::{DeckRule, Rule, Severity};
 use super::{aperture, budget, density, design, field, lattice, layers, marks, outline, spacing, tree, width};
-use metalith_core::Result;
+use metalith_core::{PillarShape, Result};
 use metalith_core::document::{Document, Limits, Section, load};
 use metalith_core::text::quoted;
 use metalith_gds::LayerNumber;
@@ -92,6 +92,20 @@ impl Deck {
     /// Never: it is tested.
     pub fn standard() -> Self {
         Self::shipped(Path::new(SHIPPED[0].0)).expect("it is the first of the list")
+    }
+
+    /// The deck that a design of pillars of this shape is checked by where no other is named: that of the paper's squares, or
+    /// what holds of every layout of circles, or of rectangles.
+    ///
+    /// # Panics
+    /// Never: it is tested.
+    pub fn for_shape(shape: PillarShape) -> Self {
+        let name = match shape {
+            PillarShape::Square => return Self::standard(),
+            PillarShape::Circle => "circles.toml",
+            PillarShape::Rectangle(_) => "rectangles.toml",
+        };
+        Self::shipped(Path::new(name)).expect("it is in the list")
     }
 
     /// The deck of the program whose file has the name at the end of `path`, if there is one.
@@ -270,6 +284,7 @@ fn parse_layer(text: &str) -> Option<LayerNumber> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use metalith_core::Rectangles;
 
     #[test]
     fn the_decks_of_the_program_are_sound() {
@@ -279,6 +294,15 @@ mod tests {
         let deck = Deck::standard();
         assert!(deck.rules().len() > 30);
         assert!(deck.rules().iter().any(|r| !r.always));
+        let rectangle = PillarShape::Rectangle(Rectangles {
+            width_nm: 90,
+            length_nm: 240,
+            steps: 180,
+        });
+        for (name, shape) in PillarShape::CHOICES.into_iter().chain([("rectangle", rectangle)]) {
+            let deck = Deck::for_shape(shape);
+            assert!(deck.rules().iter().any(|r| r.check == name), "{name}: {}", deck.name);
+        }
     }
 
     #[test]
