@@ -7,9 +7,9 @@ use std::sync::Arc;
 use super::context::Context;
 use super::rule::{DeckRule, Rule, Severity};
 use super::{aperture, budget, density, design, field, lattice, layers, marks, outline, spacing, tree, width};
-use metalith_core::{PillarShape, Result};
 use metalith_core::document::{Document, Limits, Section, load};
 use metalith_core::text::quoted;
+use metalith_core::{PillarShape, Result};
 use metalith_gds::LayerNumber;
 
 /// The decks that ship with the program, by the names of their files; the first is the standard one.
