@@ -15,6 +15,7 @@ use metalith_core::{ElementSite, PillarShape, Progress};
 const WIDEST_NM: i64 = 6000;
 /// Elements found at most.
 const MOST_ELEMENTS: usize = 4096;
+
 /// What stands on the layers of pillars of a layout.
 struct Map {
     scale: Scale,
