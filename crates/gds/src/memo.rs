@@ -11,8 +11,8 @@ const WAYS: usize = 4;
 /// Odd numbers without pattern, which spread outlines that differ by little.
 const SPREAD: [u64; 3] = [0x9E37_79B9_7F4A_7C15, 0xC2B2_AE3D_27D4_EB4F, 0x1656_67B1_9E37_79F9];
 
-/// Corners after the first, from the first, and the orientation that the outline is asked about in.
-type Key = ([[i32; 2]; 3], u8);
+/// Corners after the first, from the first, x above y; and the orientation that the outline is asked about in.
+type Key = ([u64; 3], u8);
 
 /// Answers about closed outlines of four corners that hold wherever these stand: each distinct outline is asked about once, but
 /// for those that others have taken the place of. Memory and time are bounded, whatever the outlines are.
@@ -56,25 +56,20 @@ fn key(points: &[Point], orientation: u8) -> Option<Key> {
     if a != e {
         return None;
     }
-    let mut corners = [[0; 2]; 3];
-    for (corner, p) in corners.iter_mut().zip([b, c, d]) {
-        *corner = [
-            i32::try_from(p.x.checked_sub(a.x)?).ok()?,
-            i32::try_from(p.y.checked_sub(a.y)?).ok()?,
-        ];
-    }
-    Some((corners, orientation))
+    let near = |from: i64, to: i64| i32::try_from(to.checked_sub(from)?).ok();
+    // In registers: what is written in halves and read as a whole waits for the memory.
+    let corner = |p: Point| Some(u64::from(near(a.x, p.x)? as u32) << 32 | u64::from(near(a.y, p.y)? as u32));
+    Some(([corner(b)?, corner(c)?, corner(d)?], orientation))
 }
 
 /// The first place where a key may be remembered.
 #[inline]
 fn place((corners, orientation): &Key) -> usize {
-    let joined = |[x, y]: [i32; 2]| u64::from(x as u32) << 32 | u64::from(y as u32);
     let mixed = corners
         .iter()
         .zip(SPREAD)
         .fold(u64::from(*orientation), |sum, (corner, spread)| {
-            (sum ^ joined(*corner)).wrapping_mul(spread).rotate_left(29)
+            (sum ^ corner).wrapping_mul(spread).rotate_left(29)
         });
     (mixed >> 32) as usize % (PLACES / WAYS) * WAYS
 }

@@ -149,16 +149,6 @@ impl<'a> Outline<'a> {
         let around = Rect::around(self.points);
         self.at.apply_rect(&around).unwrap_or(around)
     }
-
-    /// The box around the points where a placement of the cell puts them.
-    pub fn around_placed(self, placement: &Transform) -> Rect {
-        if placement.is_square()
-            && let Some(around) = placement.apply_rect(&self.around())
-        {
-            return around;
-        }
-        Rect::around(&self.placed(placement))
-    }
 }
 
 /// One area on a layer, in the coordinates of the cell it is drawn in.

@@ -145,9 +145,11 @@ impl Visitor for Map {
             return Ok(());
         }
         let copies = placements.len() as u64;
-        if let Some(edges) = self.sizes.edges(shape, scale) {
-            self.sizes.add(edges, copies);
-            let centre = |placement: &Transform| Centre::of(&shape.outline.around_placed(placement), scale);
+        if let Some(around) = self.sizes.count(shape, copies, scale) {
+            let centre = |placement: &Transform| match placement.is_square() {
+                true => Centre::of(&placement.apply_rect(&around)?, scale),
+                false => Centre::of(&Rect::around(&shape.outline.placed(placement)), scale),
+            };
             self.tilted.add(placements, centre);
             return Ok(());
         }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::sites::Scale;
 use crate::memo::OutlineMemo;
-use crate::{Shape, tilted_rectangle_of};
+use crate::{Point, Rect, Shape, tilted_rectangle_of};
 use metalith_core::Rectangles;
 
 /// Sizes that are told apart: a layout has one, and what its corners make of it.
@@ -20,11 +20,32 @@ const STEPS: u16 = 180;
 /// Edges of the rectangles of a layout, counted.
 #[derive(Default)]
 pub(super) struct Sizes {
-    /// By the shorter and the longer edge, to a nanometre: how many, and the sums of both (nm).
-    counted: BTreeMap<(i64, i64), (u64, [f64; 2])>,
+    /// By the shorter and the longer edge, to a nanometre: where in `counted` they are.
+    numbers: BTreeMap<(i64, i64), usize>,
+    counted: Vec<Size>,
     /// Rectangles, counted or not.
     pub rectangles: u64,
-    known: OutlineMemo<Option<[f64; 2]>>,
+    /// What outlines are, if they are rectangles and no squares.
+    known: OutlineMemo<Option<SeenRectangle>>,
+}
+
+/// Rectangles with the same edges, to a nanometre.
+#[derive(Default)]
+struct Size {
+    count: u64,
+    /// Of both edges (nm).
+    sums: [f64; 2],
+}
+
+/// A rectangle, wherever it stands.
+#[derive(Clone, Copy)]
+struct SeenRectangle {
+    /// The shorter and the longer edge, as drawn (nm).
+    edges: [f64; 2],
+    /// Where they are counted; nowhere if there are too many sizes.
+    size: Option<usize>,
+    /// The box around it, from its first corner.
+    around: Rect,
 }
 
 /// Rectangles of one size.
@@ -35,41 +56,44 @@ pub(super) struct AlikeRectangles {
 }
 
 impl Sizes {
-    /// The shorter and the longer edge of the rectangle that a shape is, as drawn (nm), if it is one and no square.
-    pub fn edges(&mut self, shape: &Shape<'_>, scale: Scale) -> Option<[f64; 2]> {
+    /// Count so many copies of a shape, if it is a rectangle and no square: the box around it, in its cell.
+    pub fn count(&mut self, shape: &Shape<'_>, copies: u64, scale: Scale) -> Option<Rect> {
         let unequal = shape.rect.is_none_or(|r| r.width() != r.height());
         if !unequal || shape.circle.is_some() || shape.outline.len() != 5 {
             return None;
         }
         // Edges are as long wherever the outline stands.
         let points = shape.outline.points;
-        self.known.of(points, 0, || {
+        let (numbers, counted) = (&mut self.numbers, &mut self.counted);
+        let seen = self.known.of(points, 0, || {
             let tilted = tilted_rectangle_of(points, scale.nm(1.0)).filter(|r| !r.is_square())?;
-            Some(tilted.edges.map(|e| scale.nm(e)))
-        })
-    }
-
-    /// So many copies of a rectangle with these edges (nm).
-    pub fn add(&mut self, edges: [f64; 2], copies: u64) {
+            let edges = tilted.edges.map(|e| scale.nm(e));
+            let key = (edges[0].round() as i64, edges[1].round() as i64);
+            if counted.len() < MOST_SIZES && !numbers.contains_key(&key) {
+                numbers.insert(key, counted.len());
+                counted.push(Size::default());
+            }
+            Some(SeenRectangle {
+                edges,
+                size: numbers.get(&key).copied(),
+                around: tilted.around.moved(Point::new(-points[0].x, -points[0].y)),
+            })
+        })?;
         self.rectangles += copies;
-        let key = (edges[0].round() as i64, edges[1].round() as i64);
-        if self.counted.len() < MOST_SIZES || self.counted.contains_key(&key) {
-            let (count, sums) = self.counted.entry(key).or_default();
-            *count += copies;
-            (0..2).for_each(|k| sums[k] += edges[k] * copies as f64);
+        if let Some(size) = seen.size.map(|k| &mut self.counted[k]) {
+            size.count += copies;
+            (0..2).for_each(|k| size.sums[k] += seen.edges[k] * copies as f64);
         }
+        shape.outline.at.apply_rect(&seen.around.moved(points[0]))
     }
 
     /// The size that most have, if it is one of pillars no wider than this (nm).
     pub fn pillars(&self, widest_nm: i64) -> Option<AlikeRectangles> {
-        let (&(w, l), _) = self
-            .counted
-            .iter()
-            .max_by_key(|(key, (count, _))| (*count, std::cmp::Reverse(**key)))?;
-        let alike = |(a, b): &(i64, i64)| (a - w).abs() <= ALIKE_NM && (b - l).abs() <= ALIKE_NM;
-        let near = self.counted.iter().filter(|(key, _)| alike(key));
-        let (count, sums) = near.fold((0, [0.0; 2]), |(n, [a, b]), (_, (count, own))| {
-            (n + count, [a + own[0], b + own[1]])
+        let sizes = || self.numbers.iter().map(|(key, k)| (*key, &self.counted[*k]));
+        let ((w, l), _) = sizes().max_by_key(|(key, size)| (size.count, std::cmp::Reverse(*key)))?;
+        let near = sizes().filter(|((a, b), _)| (a - w).abs() <= ALIKE_NM && (b - l).abs() <= ALIKE_NM);
+        let (count, sums) = near.fold((0, [0.0; 2]), |(n, [a, b]), (_, size)| {
+            (n + size.count, [a + size.sums[0], b + size.sums[1]])
         });
         let [width, length] = sums.map(|sum| (sum / count as f64).round() as i64);
         let pillars = Rectangles {
