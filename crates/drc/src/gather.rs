@@ -368,13 +368,12 @@ impl Gather<'_, '_> {
                 };
                 self.show(&here, &[Transform::IDENTITY])?;
             }
-            let is_pillar = shape.layer == self.pillars;
-            match is_pillar
-                .then(|| self.finder.placed(shape.outline, placement))
-                .flatten()
+            if shape.layer == self.pillars
+                && let Some(pillar) = self.finder.placed(shape.outline, placement)
             {
-                Some(pillar) => self.drawn_pillar(&pillar, k, placed),
-                None => self.keep(shape.layer, &placed()),
+                self.drawn_pillar(&pillar, k, placed);
+            } else {
+                self.keep(shape.layer, &placed());
             }
         }
         Ok(())

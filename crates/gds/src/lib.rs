@@ -36,7 +36,7 @@ pub use items::{CellConsumer, CellItem};
 pub use layout::{Faulty, Layout};
 pub use limits::ReadLimits;
 pub use metalith_core::LayerNumber;
-pub use pillar::{DrawnPillar, PillarFinder, pillar_of};
+pub use pillar::{DrawnPillar, PillarFinder, drawn_corners, pillar_of};
 pub use rectangle::{TiltedRectangle, tilted_rectangle_of};
 pub use shape::{Outline, Point, Rect, Shape, ShapeKind, Text};
 pub use shape::{rectangle_of, simplified};

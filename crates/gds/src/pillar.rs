@@ -35,10 +35,18 @@ pub fn pillar_of(points: &[Point], shape: PillarShape, unit_nm: f64) -> Option<D
             Some(DrawnPillar {
                 around: tilted.around,
                 number: Some(number),
-                exact: tilted.has_corners(&pillars.corners(number), unit_nm),
+                exact: tilted.has_corners(&drawn_corners(shape, number, unit_nm)),
             })
         }
     }
+}
+
+/// Corners of a pillar without curves about its middle, each on the nearest place of the grid, not closed; a database unit is so
+/// long (nm).
+pub fn drawn_corners(shape: PillarShape, number: u16, unit_nm: f64) -> Vec<Point> {
+    let unit = |nm: i64| (nm as f64 / unit_nm).round() as i64;
+    let corners = shape.corners(number, 0.0).into_iter();
+    corners.map(|(x, y)| Point::new(unit(x), unit(y))).collect()
 }
 
 /// Tells the pillars of one shape on a layout: rectangles, of which a lens has millions in some hundred rotations, are
@@ -92,14 +100,8 @@ impl PillarFinder {
 
 #[cfg(test)]
 mod tests {
+    use super::super::rectangle::tests::PILLARS;
     use super::*;
-    use metalith_core::Rectangles;
-
-    const PILLARS: Rectangles = Rectangles {
-        width_nm: 90,
-        length_nm: 240,
-        steps: 180,
-    };
 
     /// Each pillar in each orientation, twice, one time elsewhere: what is remembered is what is said without memory.
     #[test]

@@ -78,19 +78,18 @@ impl TiltedRectangle {
         pillars.recognised(&corners, self.slack * unit_nm)
     }
 
-    /// Whether all corners are among these (nm, from the middle), each on the nearest place of the grid.
-    pub fn has_corners(&self, drawn: &[(i64, i64)], unit_nm: f64) -> bool {
-        let on_grid = |nm: i64| (nm as f64 / unit_nm).round();
-        let is_drawn = |[x, y]: &[f64; 2]| drawn.iter().any(|(u, v)| [on_grid(*u), on_grid(*v)] == [*x, *y]);
+    /// Whether all corners are among these, from the middle.
+    pub fn has_corners(&self, drawn: &[Point]) -> bool {
+        let is_drawn = |corner: &[f64; 2]| drawn.iter().any(|p| [p.x as f64, p.y as f64] == *corner);
         self.corners.iter().all(is_drawn)
     }
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
-    const PILLARS: Rectangles = Rectangles {
+    pub const PILLARS: Rectangles = Rectangles {
         width_nm: 90,
         length_nm: 240,
         steps: 180,

@@ -155,7 +155,7 @@ impl Visitor for Counter {
         tally.shapes += placements.len() as u64;
         let twice = match &shape.rect {
             Some(r) => 2 * i128::from(r.width()) * i128::from(r.height()),
-            None => twice_area(&shape.outline.points().collect::<Vec<_>>()),
+            None => twice_area(shape.outline.points()),
         };
         tally.twice_area += twice * placements.len() as i128;
         let around = shape.rect.unwrap_or_else(|| shape.outline.around());
@@ -170,8 +170,8 @@ impl Visitor for Counter {
 }
 
 /// Twice the area of a polygon, whichever way it turns.
-fn twice_area(points: &[metalith_gds::Point]) -> i128 {
-    let around = points.iter().zip(points.iter().cycle().skip(1));
+fn twice_area(points: impl Iterator<Item = metalith_gds::Point> + Clone) -> i128 {
+    let around = points.clone().zip(points.cycle().skip(1));
     let signed: i128 = around
         .map(|(a, b)| i128::from(a.x) * i128::from(b.y) - i128::from(b.x) * i128::from(a.y))
         .sum();

@@ -2,12 +2,13 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use super::super::polygon::twice_area;
 use super::super::work::Allowance;
 use metalith_core::{Error, PillarShape, Progress, Result};
 use metalith_gds::extract::{ElementSite, ExtractedElement, Filler, HeldWidths, Scale, Why};
 use metalith_gds::{
     DrawnPillar, LayerNumber, Layout, LayoutCell, PillarFinder, Point, Rect, Selection, Shape, Text, Transform,
-    Visitor, rectangle_of, simplified,
+    Visitor, drawn_corners, rectangle_of, simplified,
 };
 
 /// Vertices that may be placed for each that may be held: most corners of rectangles are not.
@@ -188,10 +189,9 @@ impl ContentReader<'_> {
     fn corners(&self, pillar: &DrawnPillar, number: u16) -> Vec<Point> {
         let r = &pillar.around;
         let (x, y) = ((r.x0 + r.x1) / 2, (r.y0 + r.y1) / 2);
-        let unit = |nm: i64| (nm as f64 / self.unit_nm).round() as i64;
-        let drawn = self.shape.corners(number, 0.0);
+        let drawn = drawn_corners(self.shape, number, self.unit_nm);
         let closed = drawn.iter().chain(drawn.first());
-        closed.map(|&(dx, dy)| Point::new(x + unit(dx), y + unit(dy))).collect()
+        closed.map(|p| Point::new(x + p.x, y + p.y)).collect()
     }
 
     fn room(&mut self, count: usize) -> Result<()> {
@@ -260,7 +260,7 @@ impl ContentReader<'_> {
             .map(|p| Point::new(p.x.saturating_mul(self.factor), p.y.saturating_mul(self.factor)))
             .collect();
         ring.pop();
-        if area2(&ring) < 0 {
+        if twice_area(&ring) < 0 {
             ring.reverse();
         }
         let start = (0..ring.len()).min_by_key(|&k| ring[k]).unwrap_or(0);
@@ -269,16 +269,6 @@ impl ContentReader<'_> {
         self.outlines.entry(layer).or_default().rings.push(ring.into());
         Ok(())
     }
-}
-
-/// Twice the area of a ring, positive if counter-clockwise.
-pub(super) fn area2(ring: &[Point]) -> i128 {
-    let next = |k: usize| ring[(k + 1) % ring.len()];
-    let part = |(k, p): (usize, &Point)| {
-        let q = next(k);
-        i128::from(p.x) * i128::from(q.y) - i128::from(q.x) * i128::from(p.y)
-    };
-    ring.iter().enumerate().map(part).sum()
 }
 
 impl Visitor for ContentReader<'_> {

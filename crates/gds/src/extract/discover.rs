@@ -19,16 +19,21 @@ const MOST_ELEMENTS: usize = 4096;
 /// What stands on the layers of pillars of a layout.
 struct Map {
     scale: Scale,
-    /// Squares and circles, or the pillars that are looked for.
+    /// Squares and circles.
     pillars: Places,
     /// Rectangles at any angle, of whatever size.
     tilted: Places,
-    /// Squares and circles.
+    /// How many squares and circles.
     shapes: [u64; 2],
     /// What else may be pillars.
     sizes: Sizes,
-    /// What is looked for alone, if it is known.
-    wanted: Option<PillarFinder>,
+}
+
+/// Pillars of a known shape on those layers.
+struct Search {
+    scale: Scale,
+    finder: PillarFinder,
+    pillars: Places,
 }
 
 /// The elements of a layout from anywhere.
@@ -47,7 +52,7 @@ pub fn discover(
     scale: Scale,
     progress: &dyn Progress,
 ) -> Result<Discovered> {
-    let mut map = Map::new(scale, None);
+    let mut map = Map::new(scale);
     let selection = Selection {
         layers: Some(layers.to_vec()),
         ..from.clone()
@@ -71,9 +76,13 @@ pub fn discover(
         // All of one size: they are at their places already.
         Some(found) if found.count == map.sizes.rectangles => map.tilted,
         Some(_) => {
-            let mut map = Map::new(scale, Some(PillarFinder::new(shape, scale.nm(1.0))));
-            layout.visit(&selection, &mut map, progress)?;
-            map.pillars
+            let mut search = Search {
+                scale,
+                finder: PillarFinder::new(shape, scale.nm(1.0)),
+                pillars: Places::new(scale),
+            };
+            layout.visit(&selection, &mut search, progress)?;
+            search.pillars
         }
     };
     let Some(tiles) = places.finish() else {
@@ -106,14 +115,13 @@ pub fn discover(
 }
 
 impl Map {
-    fn new(scale: Scale, wanted: Option<PillarFinder>) -> Self {
+    fn new(scale: Scale) -> Self {
         Self {
             scale,
             pillars: Places::new(scale),
             tilted: Places::new(scale),
             shapes: [0; 2],
             sizes: Sizes::default(),
-            wanted,
         }
     }
 
@@ -123,6 +131,22 @@ impl Map {
         let centre = Centre::of(r, scale)?;
         let width = scale.whole_nm(r.width())?;
         (r.width() == r.height() && width <= WIDEST_NM).then_some(centre)
+    }
+}
+
+impl Visitor for Search {
+    fn cell(&mut self, _cell: &LayoutCell, placements: &[Transform]) -> metalith_core::Result<()> {
+        self.pillars.begin(placements);
+        Ok(())
+    }
+
+    fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> metalith_core::Result<()> {
+        let centre = |placement: &Transform| {
+            let pillar = self.finder.placed(shape.outline, placement)?;
+            Centre::of(&pillar.around, self.scale)
+        };
+        self.pillars.add(placements, centre);
+        Ok(())
     }
 }
 
@@ -136,14 +160,6 @@ impl Visitor for Map {
     #[inline]
     fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> metalith_core::Result<()> {
         let scale = self.scale;
-        if let Some(finder) = &mut self.wanted {
-            let centre = |placement: &Transform| {
-                let pillar = finder.placed(shape.outline, placement)?;
-                Centre::of(&pillar.around, scale)
-            };
-            self.pillars.add(placements, centre);
-            return Ok(());
-        }
         let copies = placements.len() as u64;
         if let Some(around) = self.sizes.count(shape, copies, scale) {
             let centre = |placement: &Transform| match placement.is_square() {
