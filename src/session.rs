@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use metalith_calibrate::{BenchFile, CapturePlan, PlanRequest, plan};
+use metalith_calibrate::{BenchFile, CapturePlan, PlanRequest, check_not_begun, plan};
 use metalith_cell::cache_folder;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::{Design, PillarArray};
@@ -17,7 +17,7 @@ const LAYOUT: &str = "layout.gds";
 /// names of the effects that it is planned for; all if empty.
 ///
 /// # Errors
-/// If elements have lenses of their own, a file cannot be read or written, the folder holds frames of a session that was begun, an effect is not known, or the
+/// If elements have lenses of their own, a file cannot be read or written, the folder holds a session that was begun, an effect is not known, or the
 /// user stopped it.
 pub fn plan_session(
     design: &Design,
@@ -28,14 +28,7 @@ pub fn plan_session(
     progress: &dyn Progress,
 ) -> Result<CapturePlan> {
     design.one_lens("a planned session")?;
-    // A session that was begun is not overwritten: its exposures and frames would no longer be those of its plan.
-    let begun = folder.join("captures");
-    if std::fs::read_dir(&begun).is_ok_and(|mut files| files.next().is_some()) {
-        return Err(Error::invalid(
-            format!("there are frames in {}", begun.display()),
-            "give another folder with --out, or move them away",
-        ));
-    }
+    check_not_begun(folder)?;
     let (layout, layout_in_set) = match layout {
         Some(file) => {
             let whole = std::fs::canonicalize(file).map_err(Error::io("find", file))?;

@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metalith::Result;
 use metalith::calibrate::{
     Calibration, DeclaredEffect, MeasuredSet, SetVerdict, Settings, ValidationPlan, calibrate, validate,
     write_validation,
 };
 use metalith::cell::cache_folder;
 use metalith::extract::GdsPillars;
+use metalith::{Error, Result};
 
 use super::{Outcome, Terminal, print_json, print_line};
 
@@ -96,6 +96,22 @@ pub fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> {
             args.sets.iter().map(|s| root.join(name(s))).collect()
         }
     };
+    if let Some(k) = (1..outs.len()).find(|&k| outs[..k].contains(&outs[k])) {
+        return Err(Error::invalid(
+            format!(
+                "{} and a set before it would be answered in {}",
+                args.sets[k].display(),
+                outs[k].display()
+            ),
+            "calibrate sets whose folders have one name by one command each, with --out",
+        ));
+    }
+    if args.validate && args.sets.len() > 1 {
+        return Err(Error::invalid(
+            "a validation of several sets",
+            "validate one at a time: synthetic sets are made like one",
+        ));
+    }
     let settings = Settings {
         cache: cache_folder(),
         // A validation makes sets with some effects, but always tries all of them.

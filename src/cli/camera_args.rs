@@ -6,7 +6,7 @@ use clap::Args;
 use metalith::camera::Camera;
 use metalith::{CalibratedModel, Design, Result};
 
-use super::standard_input;
+use super::{Terminal, standard_input};
 
 /// The chip, the camera that it is in, and the field of its scenes.
 #[derive(Args)]
@@ -40,15 +40,19 @@ pub struct CameraFiles {
 }
 
 impl CameraArgs {
-    /// Read all files.
+    /// Read all files, and say what of the model pictures leave out.
     ///
     /// # Errors
     /// If one cannot be read.
-    pub fn read(&self) -> Result<CameraFiles> {
+    pub fn read(&self, terminal: &Terminal) -> Result<CameraFiles> {
+        let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
+        for quantity in model.iter().flat_map(|m| m.perturbation.not_applied()) {
+            terminal.say(&quantity.to_string());
+        }
         Ok(CameraFiles {
             design: standard_input::design_any(&self.design)?,
             camera: Camera::read(&self.camera)?,
-            model: self.model.as_deref().map(CalibratedModel::read).transpose()?,
+            model,
         })
     }
 }

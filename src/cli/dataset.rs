@@ -71,7 +71,7 @@ fn plan(args: &DatasetArgs, images: Vec<PathBuf>, terminal: &Terminal) -> Result
 
 pub fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
-    let CameraFiles { design, camera, model } = args.with.read()?;
+    let CameraFiles { design, camera, model } = args.with.read(terminal)?;
     let images = images::of_folder(&args.images)?;
     if args.plan {
         return plan(args, images, terminal);

@@ -6,8 +6,8 @@ use clap::Args;
 use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
 use metalith::picture::scene::{BuiltIn, SceneFile, SceneImage, chart, read_depth, read_scene};
 use metalith::picture::{
-    Doubt, Frame, KeptKernels, PicturePages, PictureReport, Rehearsal, RestorationReport, ScenePower, Studio,
-    contrast_curves, scores, worth_of_assumptions, write_pages,
+    Assumption, Doubt, Frame, KeptKernels, PicturePages, PictureReport, Rehearsal, RestorationReport, ScenePower,
+    Studio, contrast_curves, scores, worth_of_assumptions, write_pages,
 };
 use metalith::{Error, Fidelity, Result};
 
@@ -118,7 +118,7 @@ impl PictureArgs {
 pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let methods: Vec<RestorationMethod> = args.method.iter().map(|m| m.parse()).collect::<Result<_>>()?;
-    let CameraFiles { design, camera, model } = args.with.read()?;
+    let CameraFiles { design, camera, model } = args.with.read(terminal)?;
     let scene = args.scene()?;
     let (page, numbers) = (args.out.join("picture.html"), args.out.join("picture.json"));
     let inputs = [&args.layout, &args.with.design, &args.with.camera].map(PathBuf::as_path);
@@ -160,6 +160,8 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         studio.design.verify.fidelity
     };
     let mut report = report(args, &studio, &scene, &frame, found, fidelity);
+    let left_out = model.iter().flat_map(|m| m.perturbation.not_applied());
+    report.assumptions.extend(left_out.map(Assumption::from));
     report.operator_error.clone_from(&error.overall);
     if let Ok(kind) = args.scene.parse::<BuiltIn>() {
         report.contrast = contrast_curves(&studio, kind, &truth, &frame, &pictures[0]);

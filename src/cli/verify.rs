@@ -148,8 +148,10 @@ impl Judging {
         if self.as_lit {
             design.verify.incidence = CellIncidence::AsLit;
         }
+        // One cell judges, in the picture too.
+        design.verify.fidelity = self.fidelity(&design);
         let design = &design;
-        let judge = self.fidelity(design);
+        let judge = design.verify.fidelity;
         let camera = self.picture.as_deref().map(Camera::read).transpose()?;
         match self.simulation(design, layout)? {
             Simulation::Whole => {}

@@ -50,7 +50,9 @@ pub use diagnosis::{
 pub use effects::{DeclaredEffect, DeclaredParameter, Effect, Parameter, Stage, all as all_effects, of_any_chip};
 pub use fidelity::Rung;
 pub use fit::WidthParts;
-pub use planning::{BenchFile, CapturePlan, Confusion, PlanRequest, PlannedCapture, PlannedEffect, SemOffer, plan};
+pub use planning::{
+    BenchFile, CapturePlan, Confusion, PlanRequest, PlannedCapture, PlannedEffect, SemOffer, check_not_begun, plan,
+};
 pub use proposal::{Proposed, propose};
 pub use run::{Calibration, calibrate};
 pub use search::Evidence;

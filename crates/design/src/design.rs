@@ -253,6 +253,17 @@ impl Design {
         let bytes = serde_json::to_vec(&decisive).expect("plain data serialises");
         hex(&Sha256::digest(&bytes))
     }
+
+    /// SHA-256 of all that decides what light does behind the layout, but for what of it is asked in `[verify]`: of
+    /// [`Design::digest`], what the tables of its materials say, and its band. In hexadecimal.
+    ///
+    /// # Errors
+    /// If a material is not known or its table cannot be read.
+    pub fn optics_digest(&self) -> Result<String> {
+        let decisive = (self.digest(), self.cell_stack()?, self.band_um()?);
+        let bytes = serde_json::to_vec(&decisive).expect("plain data serialises");
+        Ok(hex(&Sha256::digest(&bytes)))
+    }
 }
 
 /// Every element must have light to look at, at each wavelength and field angle that it is simulated for, and send it to

@@ -72,6 +72,30 @@ fn the_band_is_that_of_the_design() {
         infrared.digest(),
         "the band decides nothing of the layout"
     );
+    assert_ne!(own.optics_digest().unwrap(), infrared.optics_digest().unwrap());
+}
+
+/// A table of a material that says something else is another chip in the light, and the same layout.
+#[test]
+fn the_contents_of_a_material_decide_the_optics() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = |n: f64| {
+        let rows = format!("wavelength_nm,n,k\n380,{n},0\n720,{n},0\n");
+        std::fs::write(folder.path().join("film.csv"), rows).unwrap();
+        let text = text("mini_3x3");
+        let line = text
+            .lines()
+            .find(|l| l.starts_with("pillar_material"))
+            .unwrap()
+            .to_owned();
+        let text = text.replacen(&line, "pillar_material = \"film.csv\"", 1);
+        let design = Design::parse(&folder.path().join("own.toml"), &text).unwrap();
+        (design.digest(), design.optics_digest().unwrap())
+    };
+    let (one, other) = (table(2.0), table(2.1));
+    assert_eq!(one.0, other.0);
+    assert_ne!(one.1, other.1);
+    assert_eq!(other, table(2.1));
 }
 
 #[test]

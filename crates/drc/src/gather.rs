@@ -363,7 +363,7 @@ impl Gather<'_, '_> {
                 let here = Shape {
                     outline: Outline::new(&placed),
                     rect: rectangle_of(&placed),
-                    circle: circle_of(&placed),
+                    circle: circle_of(&placed, self.unit_nm),
                     ..*shape
                 };
                 self.show(&here, &[Transform::IDENTITY])?;

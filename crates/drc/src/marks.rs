@@ -121,7 +121,7 @@ fn pillars_near(flat: &FlatLayout<'_>, zone: &Rect, found: &mut Findings) -> Rul
         let n = e.site.lattice.sites() - 1;
         let mut lens = flat.pillar(k, 0, 0);
         lens.unite(&flat.pillar(k, n, n));
-        let margin = i64::from(e.site.lattice.pitch_nm());
+        let margin = flat.units(f64::from(e.site.lattice.pitch_nm())).ceil() as i64;
         let apart = lens.x0 - margin > zone.x1
             || lens.x1 + margin < zone.x0
             || lens.y0 - margin > zone.y1

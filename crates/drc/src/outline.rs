@@ -96,7 +96,9 @@ impl OutlineRule {
                     None => Some("not a square".into()),
                 }
             }
-            OutlineCheck::Circle => circle_of(points).is_none().then(|| "not a circle".into()),
+            OutlineCheck::Circle => circle_of(points, outline.unit_nm)
+                .is_none()
+                .then(|| "not a circle".into()),
             OutlineCheck::Rectangle => tilted_rectangle_of(points, outline.unit_nm)
                 .is_none()
                 .then(|| "not a rectangle".into()),

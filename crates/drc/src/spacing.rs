@@ -8,7 +8,7 @@ use super::pairs::{near, place};
 use super::rule::{NotRun, Rule, RuleOutcome};
 use super::tolerance::ROUNDING_NM;
 use metalith_core::document::{Limits, Section};
-use metalith_core::{LatticeKind, WidthRows};
+use metalith_core::{LatticeKind, PillarShape, WidthRows};
 use metalith_gds::LayerNumber;
 
 #[derive(Clone, Copy, PartialEq)]
@@ -62,12 +62,18 @@ impl Rule for SpacingRule {
             Distance::Gap { nm, .. } => flat.units(nm) - ROUNDING_NM,
             _ => 0.0,
         };
-        if let (Distance::Gap { nm, height_nm }, true) = (self.want, self.layer == flat.pillars)
-            && let Err(why) = on_lattices(flat, nm, height_nm, found)
-        {
-            return Err(NotRun::Failed(why));
-        }
         let want = self.want;
+        if self.layer == flat.pillars {
+            let judged = match want {
+                Distance::Gap { nm, height_nm } => on_lattices(flat, nm, |a, b, gap| {
+                    report_gap(flat, a, b, gap, height_nm, found);
+                }),
+                Distance::NoOverlap => on_lattices(flat, 0.0, |a, b, _| report_overlap(a, b, found)),
+                // No site holds two pillars.
+                Distance::NoDuplicate => Ok(()),
+            };
+            judged.map_err(NotRun::Failed)?;
+        }
         let judged = near(flat, self.layer, limit.ceil() as i64, |a, b| match want {
             Distance::Gap { height_nm, .. } => {
                 let gap = a.gap(&b);
@@ -77,7 +83,7 @@ impl Rule for SpacingRule {
             }
             Distance::NoOverlap => {
                 if !a.equals(&b) && a.overlaps(&b) {
-                    found.rect(&place(&a.bounds(), &b.bounds()), || "two shapes share area".into());
+                    report_overlap(&a, &b, found);
                 }
             }
             Distance::NoDuplicate => {
@@ -88,6 +94,10 @@ impl Rule for SpacingRule {
         });
         Ok(judged?)
     }
+}
+
+fn report_overlap(a: &Body<'_>, b: &Body<'_>, found: &mut Findings) {
+    found.rect(&place(&a.bounds(), &b.bounds()), || "two shapes share area".into());
 }
 
 fn report_gap(
@@ -115,8 +125,13 @@ const HEXAGONAL: &[(usize, isize)] = &[(0, 2), (1, 1), (1, -1)];
 /// Share of the pitch below which gaps to farther ones than these are not.
 const HEXAGONAL_REACH: f64 = 0.73;
 
-/// Gaps between pillars on one lattice.
-fn on_lattices(flat: &FlatLayout<'_>, nm: f64, height_nm: Option<f64>, found: &mut Findings) -> Result<(), String> {
+/// Hand pairs of pillars on one lattice that are less than this apart (nm) to `report`, with their gap in database units; below
+/// zero where they overlap.
+fn on_lattices(
+    flat: &FlatLayout<'_>,
+    nm: f64,
+    mut report: impl FnMut(&Body<'_>, &Body<'_>, f64),
+) -> Result<(), String> {
     for (k, e) in flat.elements.iter().enumerate() {
         let pitch = f64::from(e.site.lattice.pitch_nm());
         let lattice = e.site.lattice;
@@ -137,15 +152,15 @@ fn on_lattices(flat: &FlatLayout<'_>, nm: f64, height_nm: Option<f64>, found: &m
         }
         let steps = lattice.steps_nm().map(f64::from);
         let apart = |up: usize, right: isize| [steps[0] * right as f64, steps[1] * up as f64];
-        let nearest = neighbours
-            .iter()
-            .map(|&(up, right)| apart(up, right))
-            .map(|[x, y]| x.hypot(y))
-            .fold(f64::INFINITY, f64::min);
         let widest = flat
             .shape
             .widest_nm(e.widths.histogram().len().saturating_sub(1) as u16);
-        if nearest - widest >= nm {
+        // Between the widest there are: of rectangles, whose numbers are no widths, circles about them.
+        let least = neighbours.iter().map(|&(up, right)| match flat.shape {
+            PillarShape::Rectangle(_) => PillarShape::Circle.gap([widest; 2], apart(up, right)),
+            shape => shape.gap([widest; 2], apart(up, right)),
+        });
+        if least.fold(f64::INFINITY, f64::min) >= nm {
             continue;
         }
         let n = e.site.lattice.sites();
@@ -167,7 +182,7 @@ fn on_lattices(flat: &FlatLayout<'_>, nm: f64, height_nm: Option<f64>, found: &m
                     let gap = flat.shape.gap([own, other].map(f64::from), apart(up, right));
                     if other != 0 && gap < nm - ROUNDING_NM {
                         let (a, b) = (flat.body(k, row, column), flat.body(k, row + up, c));
-                        report_gap(flat, &a, &b, gap / flat.unit_nm, height_nm, found);
+                        report(&a, &b, gap / flat.unit_nm);
                     }
                 }
             }

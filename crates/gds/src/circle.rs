@@ -1,13 +1,9 @@
 //! Polygons that stand for circles.
 
-use super::shape::{Point, Rect};
+use super::shape::{Point, Rect, rounding};
 
 /// Fewest corners of a polygon that is taken for a circle.
 const FEWEST_CORNERS: usize = 8;
-
-/// By how much a corner may be off the circle, and the middle of a side be beyond it (database units): corners are rounded to
-/// whole units, and so is the bounding box that says where the circle is.
-const ROUNDED: f64 = 1.5;
 
 /// How far inside the circle the middle of a side may be, in parts of the radius: that of an octagon, and a little.
 const SAGITTA: f64 = 0.08;
@@ -16,9 +12,10 @@ const SAGITTA: f64 = 0.08;
 /// is gone round twice.
 const AREA: f64 = 0.15;
 
-/// The square around the circle that a closed outline stands for, if it does: all corners on one circle, so many that each
-/// side is near it.
-pub fn circle_of(points: &[Point]) -> Option<Rect> {
+/// The square around the circle that a closed outline stands for, if it does: all corners on one circle to within their rounding
+/// and that of the bounding box that says where the circle is, so many that each side is near it. A database unit is so long
+/// (nm).
+pub fn circle_of(points: &[Point], unit_nm: f64) -> Option<Rect> {
     let corners = points.len().checked_sub(1).filter(|n| *n >= FEWEST_CORNERS)?;
     if points[0] != points[corners] {
         return None;
@@ -30,7 +27,7 @@ pub fn circle_of(points: &[Point]) -> Option<Rect> {
     // All lengths doubled: the middle of the box and those of sides are then whole.
     let (cx, cy) = (around.x0 + around.x1, around.y0 + around.y1);
     let radius = around.width() as f64;
-    let slack = 2.0 * ROUNDED;
+    let slack = 2.0 * rounding(unit_nm);
     let from_middle = |x: i64, y: i64| ((x - cx) as f64).hypot((y - cy) as f64);
     let mut twice_area = 0.0;
     for side in points.windows(2) {
@@ -72,10 +69,16 @@ mod tests {
                 y1: -30 + half,
             };
             let corners = circle_corners(diameter, chord_error);
-            assert_eq!(circle_of(&closed(corners.clone())), Some(want), "{diameter}");
+            assert_eq!(circle_of(&closed(corners.clone()), 1.0), Some(want), "{diameter}");
             let clockwise = corners.into_iter().rev();
-            assert_eq!(circle_of(&closed(clockwise)), Some(want), "{diameter}");
+            assert_eq!(circle_of(&closed(clockwise), 1.0), Some(want), "{diameter}");
         }
+        // Corners on whole nanometres, written in tenths of one.
+        let fine = |(x, y): &(i64, i64)| (10 * x, 10 * y);
+        let tenths = closed(circle_corners(200, 0.25).iter().map(fine));
+        let around = Rect::around(&tenths);
+        assert_eq!(circle_of(&tenths, 0.1), Some(around));
+        assert_eq!(circle_of(&tenths, 1.0), None);
         let circle = circle_corners(200, 0.25);
         let n = circle.len();
         // An ellipse, a circle with a bite, one that is gone round twice, a star on its corners, a square of many corners.
@@ -88,10 +91,10 @@ mod tests {
         let star = (0..n).map(|k| circle[(k * (n / 2 + 1)) % n]);
         let square = (0..8).map(|k| [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)][k]);
         let square = square.map(|(x, y)| (100 * x, 100 * y));
-        assert_eq!(circle_of(&closed(ellipse)), None);
-        assert_eq!(circle_of(&closed(bitten)), None);
-        assert_eq!(circle_of(&closed(twice)), None);
-        assert_eq!(circle_of(&closed(star)), None);
-        assert_eq!(circle_of(&closed(square)), None);
+        assert_eq!(circle_of(&closed(ellipse), 1.0), None);
+        assert_eq!(circle_of(&closed(bitten), 1.0), None);
+        assert_eq!(circle_of(&closed(twice), 1.0), None);
+        assert_eq!(circle_of(&closed(star), 1.0), None);
+        assert_eq!(circle_of(&closed(square), 1.0), None);
     }
 }

@@ -114,6 +114,8 @@ pub enum LayoutError {
     ArraySize { columns: i16, rows: i16 },
     #[error("a {element} with absolute magnification or angle")]
     Absolute { element: &'static str },
+    #[error("a PATH whose width is absolute (below zero), and a reference that magnifies")]
+    AbsoluteWidth,
     #[error("a {element} with magnification {magnification:e}, angle {angle_deg}")]
     Magnification {
         element: &'static str,
@@ -285,6 +287,9 @@ impl LayoutError {
             Self::CellName { .. } | Self::ReferenceName { .. } => "give cells names of 1 to 32 characters".into(),
             Self::Absolute { .. } => {
                 "few tools agree on what this means: write the reference with relative ones".into()
+            }
+            Self::AbsoluteWidth => {
+                "few tools agree on what this means: write the path with a positive width, or the cells at their true size".into()
             }
             Self::Magnification { .. } => "magnifications from 1e-6 to 1e6 are read".into(),
             Self::Magnifications => "write the cell at its true size".into(),

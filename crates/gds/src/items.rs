@@ -86,6 +86,7 @@ impl Layout {
         let mut input = self.reopen()?;
         let mut walk = Walk::new(self.limits(), progress);
         progress.begin("reading cells again", self.bytes());
+        let mut single = 0;
         for (index, cell) in self.cells().iter().enumerate() {
             consumer.cell(index, cell)?;
             input.seek(cell)?;
@@ -95,8 +96,10 @@ impl Layout {
                 consumer,
                 recent: Recent::new(),
                 outline: Vec::new(),
+                single,
             };
             walk.cell(&mut input, &mut pass)?;
+            single = pass.single;
         }
         Ok(())
     }
@@ -108,6 +111,8 @@ struct Pass<'a, C> {
     consumer: &'a mut C,
     recent: Recent,
     outline: Vec<Point>,
+    /// Copies of arrays that were handed on one by one.
+    single: u64,
 }
 
 impl<C: CellConsumer> Pass<'_, C> {
@@ -219,6 +224,12 @@ impl<C: CellConsumer> Sink for Pass<'_, C> {
             return self.put(element, Some(&grid));
         }
         // Steps that are no whole units, or one column.
+        self.single = self.single.saturating_add(columns * rows);
+        let most = self.layout.limits().shapes_of(self.layout.bytes());
+        if self.single > most {
+            let (limit, found) = (Limit::FlatShapesOfShortFile, self.single);
+            return Err(LayoutError::Limit { limit, found, most }.into());
+        }
         for k in 0..columns * rows {
             let mut copy = element.clone();
             copy.points[0] = element.origin(k);

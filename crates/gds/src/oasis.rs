@@ -345,6 +345,10 @@ pub(super) fn scan(source: &Source, limits: &ReadLimits, progress: &dyn Progress
             }
             OasisItem::Cell(reference) => {
                 match reference {
+                    CellReference::Number(number) if number > MOST_NUMBER => {
+                        let at = cells.reader.place().offset;
+                        return Err(cells.fault(at, LayoutError::CellNumber { number }));
+                    }
                     CellReference::Number(number) => put_numbered(number, &mut name),
                     CellReference::Name(bytes) => {
                         name.clear();
@@ -362,10 +366,6 @@ pub(super) fn scan(source: &Source, limits: &ReadLimits, progress: &dyn Progress
         }
         if begun {
             let place = cells.reader.place();
-            if numbered(&name).is_some_and(|number| number > MOST_NUMBER) {
-                let number = u64::MAX;
-                return Err(cells.fault(place.offset, LayoutError::CellNumber { number }));
-            }
             let taken = tally.begin_cell(&name, place.offset, place.inner);
             settle(taken.map_err(SinkError::Here), path, place.offset)?;
             (in_cell, with_properties) = (true, true);

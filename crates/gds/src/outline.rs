@@ -22,9 +22,8 @@ pub(super) fn outline(line: &[Point], width: i64, path_type: i16, extensions: [i
         }
     }
     let half = width.unsigned_abs() as f64 / 2.0;
-    if centre.len() < 2 || half == 0.0 {
-        // A dot: nothing, or the pen's own shape where its ends reach out.
-        let p = line[0];
+    // Nothing, or the pen's own shape where its ends reach out.
+    let dot = |at: [f64; 2], out: &mut Vec<Point>| {
         let reach = if path_type == 0 || path_type == 4 { 0.0 } else { half };
         let corners = [
             [-reach, -half],
@@ -33,8 +32,10 @@ pub(super) fn outline(line: &[Point], width: i64, path_type: i16, extensions: [i
             [-reach, half],
             [-reach, -half],
         ];
-        out.extend(corners.map(|c| rounded([p.x as f64 + c[0], p.y as f64 + c[1]])));
-        return;
+        out.extend(corners.map(|c| rounded([at[0] + c[0], at[1] + c[1]])));
+    };
+    if centre.len() < 2 || half == 0.0 {
+        return dot(centre[0], out);
     }
     let direction = |a: [f64; 2], b: [f64; 2]| {
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
@@ -55,6 +56,12 @@ pub(super) fn outline(line: &[Point], width: i64, path_type: i16, extensions: [i
         centre[0][axis] -= reach[0] * start[axis];
         centre[last][axis] += reach[1] * end[axis];
     }
+    // An extension below zero may take a whole piece of the line away.
+    centre.dedup();
+    if centre.len() < 2 {
+        return dot(centre[0], out);
+    }
+    let last = centre.len() - 1;
     // One side from start to end, a cap, the other side back, a cap.
     for side in [1.0, -1.0] {
         let along: Vec<[f64; 2]> = if side > 0.0 {
@@ -149,6 +156,16 @@ mod tests {
         let area = twice.unsigned_abs() as f64 / 2.0;
         let discs = std::f64::consts::PI * 1e8;
         assert!((area - 2e9 - discs).abs() < CHORDS * discs, "{area}");
+    }
+
+    #[test]
+    fn an_end_that_is_taken_away_leaves_the_rest() {
+        let rect = |points: &[Point]| super::super::shape::rectangle_of(points).unwrap();
+        let rest = drawn(&[(1000, 1000), (1100, 1000), (1100, 1100)], 20, 4, [-100, 0]);
+        let r = rect(&rest);
+        assert_eq!((r.x0, r.y0, r.x1, r.y1), (1090, 1000, 1110, 1100));
+        let none = drawn(&[(1000, 1000), (1100, 1000)], 20, 4, [-100, 0]);
+        assert!(none.iter().all(|p| p.x == 1100), "{none:?}");
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub fn pillar_of(points: &[Point], shape: PillarShape, unit_nm: f64) -> Option<D
     };
     match shape {
         PillarShape::Square => rectangle_of(&simplified(points)).map(of_width),
-        PillarShape::Circle => circle_of(points).map(of_width),
+        PillarShape::Circle => circle_of(points, unit_nm).map(of_width),
         PillarShape::Rectangle(pillars) => {
             let tilted = tilted_rectangle_of(points, unit_nm)?;
             let number = tilted.number(pillars, unit_nm)?;

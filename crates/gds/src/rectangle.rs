@@ -1,16 +1,7 @@
 //! Outlines that stand for rectangles at any angle.
 
-use super::shape::{Point, Rect, simplified};
+use super::shape::{Point, Rect, rounding, simplified};
 use metalith_core::Rectangles;
-
-/// By how much a corner may be off the rectangle, in database units or in nanometres, whichever is more: corners are rounded to
-/// one of these grids, twice where a cell is placed at an angle.
-const ROUNDED: f64 = 1.5;
-
-/// The same in database units, of which one is so long (nm).
-fn slack(unit_nm: f64) -> f64 {
-    ROUNDED * (1.0 / unit_nm).max(1.0)
-}
 
 /// A rectangle at any angle, as its corners on the grid show it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,7 +41,7 @@ pub fn tilted_rectangle_of(points: &[Point], unit_nm: f64) -> Option<TiltedRecta
     // A parallelogram has its corners opposite one another about its middle; one with right angles equal diagonals.
     let opposite = |k: usize| (corners[k][0] + corners[k + 2][0]).hypot(corners[k][1] + corners[k + 2][1]) / 2.0;
     let reach = |k: usize| corners[k][0].hypot(corners[k][1]);
-    let slack = slack(unit_nm);
+    let slack = rounding(unit_nm);
     let is_rectangle = opposite(0).max(opposite(1)) <= slack && (reach(0) - reach(1)).abs() <= slack;
     let edges = [long.min(other), long.max(other)];
     (is_rectangle && edges[0] > 2.0 * slack).then_some(TiltedRectangle {

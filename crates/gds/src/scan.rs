@@ -133,6 +133,9 @@ pub(super) struct Tally {
     touched: Vec<u32>,
     tallies: usize,
     path: Vec<Point>,
+    /// Whether there is a path of absolute width, and a reference that magnifies: together nobody knows what they mean.
+    absolute: bool,
+    magnified: bool,
 }
 
 impl Tally {
@@ -149,6 +152,8 @@ impl Tally {
             touched: Vec::new(),
             tallies: 0,
             path: Vec::new(),
+            absolute: false,
+            magnified: false,
         }
     }
 
@@ -331,6 +336,11 @@ impl Tally {
     /// Count an element with so many copies; `reach` is left, bottom, right, top of their places from the first.
     fn add(&mut self, element: &ElementContent, copies: u64, reach: [i64; 4]) -> Result<(), LayoutError> {
         self.cells.last_mut().expect("a cell was begun").with_properties += u64::from(element.properties > 0);
+        self.absolute |= element.kind == ElementKind::Path && element.width < 0;
+        self.magnified |= element.magnification != 1.0;
+        if self.absolute && self.magnified {
+            return Err(LayoutError::AbsoluteWidth);
+        }
         if matches!(element.kind, ElementKind::Reference | ElementKind::Array) {
             let number = self.names.number(&element.name);
             let copies = element.copies().saturating_mul(copies);

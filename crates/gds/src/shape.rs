@@ -3,6 +3,15 @@
 use super::transform::Transform;
 use metalith_core::{LayerNumber, PillarShape};
 
+/// By how much a corner of a circle or a rectangle may be off its place, in database units or in nanometres, whichever is more:
+/// corners are rounded to one of these grids, twice where a cell is placed at an angle.
+const ROUNDED: f64 = 1.5;
+
+/// The same in database units, of which one is so long (nm).
+pub(super) fn rounding(unit_nm: f64) -> f64 {
+    ROUNDED * (1.0 / unit_nm).max(1.0)
+}
+
 /// A place in database units.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Point {

@@ -115,6 +115,14 @@ impl Transform {
         Some((self.apply(Point::new(r.x0, r.y0)), self.apply(Point::new(r.x1, r.y1))))
     }
 
+    /// How many times as long lengths are.
+    pub fn magnification(&self) -> f64 {
+        match self {
+            Self::Square { .. } => 1.0,
+            Self::General { matrix: m, .. } => (m[0] * m[3] - m[1] * m[2]).abs().sqrt(),
+        }
+    }
+
     /// First `inner`, then this; none if the magnification of the chain is beyond limits.
     pub fn after(&self, inner: &Self) -> Option<Self> {
         if let (

@@ -122,10 +122,13 @@ impl Layout {
         let mut walk = Walk::new(self.limits(), &Silent);
         for (index, cell) in self.cells().iter().enumerate() {
             if cell.inline && counts[index] > 0 {
-                let mut keep = Keep::default();
+                let mut keep = Keep {
+                    shapes: Vec::new(),
+                    unit_nm: self.unit_nm(),
+                };
                 input.seek(cell)?;
                 walk.cell(input, &mut keep)?;
-                small[index] = keep.0;
+                small[index] = keep.shapes;
             }
         }
         Ok(small)
@@ -143,8 +146,8 @@ struct InlineShape {
 }
 
 impl InlineShape {
-    fn new(kind: ShapeKind, layer: LayerNumber, points: Vec<Point>) -> Self {
-        let (rect, circle) = (rectangle_of(&points), circle_of(&points));
+    fn new(kind: ShapeKind, layer: LayerNumber, points: Vec<Point>, unit_nm: f64) -> Self {
+        let (rect, circle) = (rectangle_of(&points), circle_of(&points, unit_nm));
         Self {
             kind,
             layer,
@@ -155,13 +158,20 @@ impl InlineShape {
     }
 }
 
-#[derive(Default)]
-struct Keep(Vec<InlineShape>);
+struct Keep {
+    shapes: Vec<InlineShape>,
+    unit_nm: f64,
+}
+
+impl Keep {
+    fn keep(&mut self, kind: ShapeKind, layer: LayerNumber, points: Vec<Point>) {
+        self.shapes.push(InlineShape::new(kind, layer, points, self.unit_nm));
+    }
+}
 
 impl Sink for Keep {
     fn five_points(&mut self, _offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<(), SinkError> {
-        self.0
-            .push(InlineShape::new(ShapeKind::Boundary, layer, points.to_vec()));
+        self.keep(ShapeKind::Boundary, layer, points.to_vec());
         Ok(())
     }
 
@@ -172,7 +182,7 @@ impl Sink for Keep {
     fn element(&mut self, element: &ElementContent) -> Result<(), SinkError> {
         let mut points = Vec::new();
         if let Some(kind) = outline_of(element, &mut points) {
-            self.0.push(InlineShape::new(kind, element.layer, points));
+            self.keep(kind, element.layer, points);
         }
         Ok(())
     }
@@ -184,7 +194,7 @@ impl Sink for Keep {
         };
         copies.each(|by| {
             let points: Vec<Point> = points.iter().map(|p| Point::new(p.x + by.x, p.y + by.y)).collect();
-            self.0.push(InlineShape::new(kind, element.layer, points));
+            self.keep(kind, element.layer, points);
             Ok(())
         })
     }
@@ -320,7 +330,7 @@ impl<V: Visitor> Sink for Spread<'_, V> {
                         kind,
                         layer: element.layer,
                         rect: rectangle_of(&points),
-                        circle: circle_of(&points),
+                        circle: circle_of(&points, self.layout.unit_nm()),
                         outline: Outline::new(&points),
                         offset: element.offset,
                     };
@@ -356,7 +366,7 @@ impl<V: Visitor> Sink for Spread<'_, V> {
             _ => {
                 let mut points = std::mem::take(&mut self.path);
                 if let Some(kind) = outline_of(element, &mut points) {
-                    let (rect, circle) = (rectangle_of(&points), circle_of(&points));
+                    let (rect, circle) = (rectangle_of(&points), circle_of(&points, self.layout.unit_nm()));
                     copies.each(|by| {
                         let shape = Shape {
                             kind,

@@ -86,11 +86,22 @@ pub(super) fn replaceable(folder: &Path, archive: &Path) -> Result<()> {
             Err(error) => return Err(Error::io("read", path)(error)),
         }
     }
-    if !folder.exists() {
-        return Ok(());
+    let there = match folder.exists() {
+        true => Some(files_below(folder)?),
+        false => None,
+    };
+    let handed_off = there.as_ref().is_some_and(|t| t.files.contains_key(manifest::NAME));
+    if !handed_off && archive.exists() {
+        return Err(Error::invalid(
+            format!(
+                "{} is there, and no hand-off that it is the archive of",
+                archive.display()
+            ),
+            hint,
+        ));
     }
-    let there = files_below(folder)?;
-    let known = match there.files.contains_key(manifest::NAME) {
+    let Some(there) = there else { return Ok(()) };
+    let known = match handed_off {
         true => manifest::listed(folder)?,
         false => BTreeSet::new(),
     };

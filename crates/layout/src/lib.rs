@@ -198,9 +198,21 @@ pub fn write_apertures(design: &Design, path: &Path) -> Result<Written> {
     })
 }
 
-/// The design's name as a cell name, in the characters that GDSII allows.
+/// The design's name as a cell name, in the characters that GDSII allows, and none that a cell below it may have.
 fn top_cell(design: &Design) -> String {
-    design.name.replace('-', "_").to_ascii_uppercase()
+    let name = design.name.replace('-', "_").to_ascii_uppercase();
+    if is_of_a_part(&name) { name + "_TOP" } else { name }
+}
+
+/// Whether a cell of an element, of its parts or of its pillars may have this name: `E0`, `LENS0`, `LENS0_A`, `W120`, `R17`.
+fn is_of_a_part(name: &str) -> bool {
+    let lens = name.strip_prefix("LENS").map(|rest| match rest.split_once('_') {
+        Some((number, letter)) if letter.len() == 1 => number,
+        _ => rest,
+    });
+    let others = ["E", "W", "R"].into_iter().filter_map(|kind| name.strip_prefix(kind));
+    let mut numbers = lens.into_iter().chain(others);
+    numbers.any(|number| !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()))
 }
 
 /// A point of the layout. Designs are limited to 300 mm, far inside the 2.1 m of a 32-bit nanometre.

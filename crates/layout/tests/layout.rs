@@ -7,9 +7,10 @@ use std::path::Path;
 use metalith_core::{Silent, WholeFile, WidthRows};
 use metalith_design::array::ClassWidths;
 use metalith_design::{Design, Hierarchy, PillarArray};
-use metalith_gds::{LayerNumber, Layout, Point, Selection, Shape, Transform, Visitor};
+use metalith_gds::{LayerNumber, Layout, Point, ReadLimits, Selection, Shape, Transform, Visitor};
 use metalith_layout::{LayoutFormat, OasisEncoding, convert, write_apertures, write_pillars, write_pillars_as};
 use metalith_oasis::{CellReference, NameTable, OasisItem, OasisLimits, OasisReader, OasisShape};
+use metalith_testing::gds::Gds;
 use metalith_testing::{design, golden};
 use serde_json::json;
 use sha2::{Digest, Sha256};
@@ -331,6 +332,52 @@ fn converted_layouts_are_the_same_geometry() {
     }
 }
 
+/// Cells of lenses, elements and pillars have names that a design may have too.
+#[test]
+fn a_design_may_be_called_as_one_of_its_cells() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = design("mini_3x3");
+    let text = fs::read_to_string(&source).unwrap();
+    for (name, top) in [
+        ("lens0", "LENS0_TOP"),
+        ("lens-0", "LENS_0"),
+        ("lens0-a", "LENS0_A_TOP"),
+        ("e0", "E0_TOP"),
+        ("w120", "W120_TOP"),
+        ("r", "R"),
+    ] {
+        let named = text.replacen("name = \"mini_3x3\"", &format!("name = \"{name}\""), 1);
+        let design = Design::parse(&source, &named).unwrap();
+        let array = PillarArray::build(&design, &Silent).unwrap();
+        for format in [LayoutFormat::Gds, LayoutFormat::Oasis(OasisEncoding::Plain)] {
+            for (_, hierarchy) in HIERARCHIES {
+                let path = folder.path().join("pillars");
+                let written = write_pillars_as(&design, &array, hierarchy, format, &path, &Silent).unwrap();
+                let layout = Layout::open(&path).unwrap();
+                assert_eq!(written.top_cell, top);
+                assert!(layout.doubled().is_empty() && layout.tops().len() == 1, "{name}");
+            }
+        }
+    }
+}
+
+/// Steps that are no whole units are written one by one.
+#[test]
+fn an_array_of_a_billion_copies_on_one_place_is_not_converted() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut gds = Gds::library();
+    gds.cell("TOP")
+        .array("A", 32767, 32767, [0, 0, 100, 0, 0, 100])
+        .end_cell();
+    gds.cell("A").square(1, 0, 0, 10).end_cell();
+    let layout = Layout::from_bytes("array.gds", gds.end(), ReadLimits::default()).unwrap();
+    let path = folder.path().join("array.oas");
+    let format = LayoutFormat::Oasis(OasisEncoding::Plain);
+    let error = convert(&layout, format, &path, &Silent).unwrap_err().to_string();
+    assert!(error.contains("shapes"), "{error}");
+    assert!(!path.exists());
+}
+
 /// A few bytes that would become a file of any size are refused before anything is written.
 #[test]
 fn bombs_are_not_converted() {
@@ -344,7 +391,7 @@ fn bombs_are_not_converted() {
     ]
     .concat();
     let bytes = metalith_testing::oasis::around(&records);
-    let layout = Layout::from_bytes("bomb.oas", bytes, metalith_gds::ReadLimits::default()).unwrap();
+    let layout = Layout::from_bytes("bomb.oas", bytes, ReadLimits::default()).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out.gds");
     assert!(convert(&layout, LayoutFormat::Gds, &out, &Silent).is_err() && !out.exists());

@@ -1,4 +1,4 @@
-//! What a perturbation says that a simulation of single wavelengths and points cannot apply.
+//! What a perturbation says of the bench alone: a simulation of other light cannot apply it.
 
 use std::fmt;
 
@@ -18,11 +18,11 @@ pub struct NotApplied {
 
 /// Lamps of the bench are not those of the simulation.
 const SPECTRUM: &str =
-    "the PSF is of one wavelength; shifts and widths of the bench's LEDs are those of its lamps alone";
+    "shifts and widths of the bench's LEDs are those of its lamps alone, not of the light that is simulated here";
 
 /// The model file gives the source in units of the bench's own.
 const SOURCE: &str =
-    "the PSF is of a point; the size is relative to the disc of the bench's own source, which is not part of the scene";
+    "the size is relative to the disc of the bench's own source, which is no part of what is simulated here";
 
 impl fmt::Display for NotApplied {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -35,8 +35,8 @@ impl fmt::Display for NotApplied {
 }
 
 impl Perturbation {
-    /// What a PSF of one wavelength and one point of the scene leaves out, each quantity that is not zero with the
-    /// reason. Everything else of a perturbation is applied.
+    /// What a PSF of one wavelength and one point of the scene, or a picture, leaves out, each quantity that is not zero with
+    /// the reason. Everything else of a perturbation is applied.
     pub fn not_applied(&self) -> Vec<NotApplied> {
         let light = &self.light;
         let mut out = Vec::new();

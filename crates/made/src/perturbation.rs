@@ -155,15 +155,21 @@ pub struct CameraChange {
 }
 
 impl GeometryChange {
-    /// Add to the optical path over the lens (nm) by Noll's polynomial `j`, from the fifth on. Zero adds nothing.
-    pub fn add_wavefront(&mut self, j: u32, nm: f64) {
+    /// Set the optical path over the lens (nm) by Noll's polynomial `j`, from the fifth on.
+    pub fn set_wavefront(&mut self, j: u32, nm: f64) {
         let at = (j - zernike::FIRST) as usize;
         if nm != 0.0 && self.wavefront_nm.len() <= at {
             self.wavefront_nm.resize(at + 1, 0.0);
         }
         if let Some(to) = self.wavefront_nm.get_mut(at) {
-            *to += nm;
+            *to = nm;
         }
+    }
+
+    /// Add to the optical path over the lens (nm) by Noll's polynomial `j`, from the fifth on. Zero adds nothing.
+    pub fn add_wavefront(&mut self, j: u32, nm: f64) {
+        let before = self.wavefront_nm.get((j - zernike::FIRST) as usize).copied();
+        self.set_wavefront(j, before.unwrap_or(0.0) + nm);
     }
 
     /// Amplitude that passes without seeing pillars, over that which arrives.

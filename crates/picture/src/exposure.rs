@@ -18,8 +18,8 @@ pub struct Frame {
     /// Signal, of full scale, of a unit of light in each channel.
     pub gain: Vec<f64>,
     pub noise: Noise,
-    /// Largest signal that is recorded, of full scale.
-    pub full: f64,
+    /// Largest signal that is recorded, of full scale: what stands in `planes` where more than that fell.
+    pub full: f32,
     /// Pixels at full scale.
     pub saturated: usize,
 }
@@ -96,21 +96,20 @@ pub fn expose(camera: &Camera, gain: &[f64], light: &[Array2<f32>], seed: u64) -
             channel_at(filter, &names, y, x).map_or(0.0, |c| signal(c, (y, x)))
         })],
     };
-    let mut saturated = 0;
-    let planes = ideal.iter().map(|plane| {
-        noise.expose(plane, &mut random).mapv(|v| {
-            saturated += usize::from(v >= full);
-            // Below zero stays: cameras add a level and subtract it again.
-            ((v.min(full) / step).round() * step) as f32
-        })
-    });
+    // Below zero stays: cameras add a level and subtract it again.
+    let recorded = |v: f64| ((v.min(full) / step).round() * step) as f32;
+    let planes = ideal
+        .iter()
+        .map(|plane| noise.expose(plane, &mut random).mapv(recorded));
+    let planes: Vec<Array2<f32>> = planes.collect();
+    let top = recorded(full);
     Frame {
-        planes: planes.collect(),
+        saturated: planes.iter().flatten().filter(|v| **v >= top).count(),
+        planes,
         filter: sensor.filter,
         gain: gain.to_vec(),
         noise,
-        full,
-        saturated,
+        full: top,
     }
 }
 
@@ -145,8 +144,7 @@ impl Frame {
         for (channel, gain) in self.gain.iter().enumerate() {
             let plane = &self.planes[if self.filter == ColourFilter::None { channel } else { 0 }];
             let counts = |y: usize, x: usize| {
-                channel_at(self.filter, &names, y, x).is_none_or(|c| c == channel)
-                    && f64::from(plane[[y, x]]) < self.full
+                channel_at(self.filter, &names, y, x).is_none_or(|c| c == channel) && plane[[y, x]] < self.full
             };
             let known = Array2::from_shape_fn(plane.dim(), |(y, x)| f64::from(u8::from(counts(y, x))));
             let signal = &known * &plane.mapv(f64::from);
@@ -189,6 +187,28 @@ pub(crate) fn box_sums(plane: &Array2<f64>, near: usize) -> Array2<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Whole steps in single precision lie on either side of those in double precision.
+    #[test]
+    fn pixels_at_full_scale_are_not_trusted_whatever_a_step_is() {
+        let mut camera = Camera::three_bands(5.86);
+        camera.sensor.bits = 12;
+        camera.sensor.noise = SensorNoise::Electrons {
+            full_well_e: 32_000.0,
+            read_noise_e: 0.0,
+            dark_current_e_s: 0.0,
+        };
+        // The last two end at the well, between two steps and at one.
+        for gain_e in [7.7, 7.8, 7.81, 7.85, 8.0] {
+            camera.sensor.gain_e = gain_e;
+            let light = [2.0, 2.0, 0.5].map(|v| Array2::from_elem((20, 20), v));
+            let frame = expose(&camera, &[1.0; 3], &light, 3);
+            assert_eq!(frame.saturated, 800, "{gain_e}");
+            let (_, trust) = frame.light(&camera, &OperatorError::none(3));
+            assert!(trust[0].iter().chain(&trust[1]).all(|t| *t == 0.0), "{gain_e}");
+            assert!(trust[2].iter().all(|t| *t > 0.0), "{gain_e}");
+        }
+    }
 
     #[test]
     fn a_frame_has_its_mosaic_its_steps_and_its_full_scale() {

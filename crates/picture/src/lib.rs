@@ -21,7 +21,6 @@ mod operator;
 mod operator_error;
 mod page;
 mod png16;
-mod products;
 mod rehearsal;
 mod report;
 mod resolution;

@@ -247,6 +247,7 @@ impl<'a> Wanted<'a> {
         }
         let spec = BankSpec::standard(design, camera);
         let channels = sampling_of(design, camera)?.channels;
+        Veil::check_size(&camera.sensor, channels.len(), basis.len())?;
         check_view(&elements, &spec, camera, &scene.view)?;
         Ok(Self {
             design,
@@ -271,7 +272,7 @@ impl<'a> Wanted<'a> {
         let inputs = Inputs {
             solver: metalith_cell::kept::solver_of(self.design.cell.shape),
             layout,
-            design: &self.design.digest(),
+            design: &self.design.optics_digest()?,
             lens_um: [lens.radius_um(), lens.focal_length_um],
             elements: &self.elements,
             camera: &unexposed,
@@ -402,6 +403,15 @@ fn check_view(elements: &[ElementView], spec: &BankSpec, camera: &Camera, view: 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_sensor_whose_veil_cannot_be_held_is_refused() {
+        let mut sensor = Camera::three_bands(5.86).sensor;
+        assert!(Veil::check_size(&sensor, 3, 6).is_ok());
+        (sensor.rows, sensor.columns) = (100_000, 100_000);
+        let error = Veil::check_size(&sensor, 3, 3).unwrap_err().to_string();
+        assert!(error.contains("100000 x 100000"), "{error}");
+    }
 
     #[test]
     fn windows_without_an_image_are_refused() {

@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use metalith_cell::Fidelity;
+use metalith_made::NotApplied;
 
 use crate::assumed::AssumedScore;
 use crate::doubt::DoubtReport;
@@ -75,6 +76,15 @@ pub struct HomographyResidual {
 pub struct Assumption {
     pub what: String,
     pub value: String,
+}
+
+impl From<NotApplied> for Assumption {
+    fn from(quantity: NotApplied) -> Self {
+        Self {
+            what: format!("`{}` of the model", quantity.quantity),
+            value: format!("{} there, not applied: {}", quantity.value, quantity.because),
+        }
+    }
 }
 
 impl RestorationReport {

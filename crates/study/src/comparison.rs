@@ -111,8 +111,9 @@ fn key(lineup: &Lineup) -> Result<String> {
     for listed in &lineup.designs {
         let design = Design::read_any(&listed.design)?;
         let solver = metalith_cell::kept::solver_of(design.cell.shape);
-        hash.update(format!("{solver} {} ", design.digest()));
-        files.push(listed.layout.clone());
+        hash.update(format!("{solver} {} ", design.optics_digest()?));
+        // The file itself for what it verifies: by which cell, at which wavelengths.
+        files.extend([listed.design.clone(), listed.layout.clone()]);
         if let Some(camera) = &listed.camera {
             files.extend(Camera::read(camera)?.files);
         }

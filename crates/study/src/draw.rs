@@ -291,6 +291,23 @@ mod tests {
         assert!((0..3000).all(|k| draw(k)[5] >= 0.0));
     }
 
+    /// What varies is not counted from the model that all else is taken from.
+    #[test]
+    fn what_varies_takes_the_place_of_what_the_model_says() {
+        let mut drawer = drawer(2.0);
+        drawer.base.geometry.cd_bias_nm = 7.0;
+        // Coma along x, which the model has and a draw sets.
+        drawer.base.geometry.add_wavefront(8, 30.0);
+        drawer.base.geometry.add_wavefront(5, 12.0);
+        let coma = effects().into_iter().find(|e| e.name() == "coma").unwrap();
+        let mut drawn = drawer.perturbation(&Drawn {
+            amounts: vec![0.0, 1.0, -3.0, 0.0, 0.0, 0.0],
+        });
+        coma.apply(&[0.0, 2.5], &mut drawn);
+        assert_eq!(drawn.geometry.cd_bias_nm, -3.0);
+        assert_eq!(drawn.geometry.wavefront_nm, [12.0, 0.0, 0.0, 2.5]);
+    }
+
     #[test]
     fn amounts_become_a_perturbation_in_the_unit_of_their_effect() {
         let amounts = vec![5.0, 1.0, -3.0, 1.0, 2.0, 20.0];

@@ -151,11 +151,12 @@ impl PairsRequest {
         hash.update(format!(
             "{} {solver} {} {} {}",
             env!("CARGO_PKG_VERSION"),
-            design.digest(),
+            design.optics_digest()?,
             self.field_deg,
             self.seed
         ));
-        let mut files = vec![self.layout.clone()];
+        // The file itself for what it verifies: by which cell, at which wavelengths.
+        let mut files = vec![self.design.clone(), self.layout.clone()];
         files.extend(Camera::read(&self.camera)?.files);
         files.extend(self.model.clone());
         for path in files {

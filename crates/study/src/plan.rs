@@ -278,7 +278,7 @@ pub(crate) fn key(tolerance: &Tolerance, layouts: &[PathBuf]) -> Result<[u8; 32]
         let solver = solver_of(design.cell.shape);
         add("version", format!("{} {solver}", env!("CARGO_PKG_VERSION")).as_bytes());
         // A design names further files: its digest covers what they say.
-        add("design", design.digest().as_bytes());
+        add("design", design.optics_digest()?.as_bytes());
         // Nothing of [verify] varies over the grid.
         if let (0, Some(camera)) = (number, &design.verify.camera) {
             files.extend(metalith_verify::camera_files(camera)?);

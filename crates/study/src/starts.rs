@@ -179,7 +179,7 @@ fn key(path: &Path, design: &Design, starts: u64) -> Result<String> {
     hash.update(format!(
         "{} {solver} {} {starts} ",
         env!("CARGO_PKG_VERSION"),
-        design.digest()
+        design.optics_digest()?
     ));
     hash.update(file_digest(path)?);
     Ok(hex(&hash.finalize()))

@@ -180,7 +180,7 @@ impl RigorousCells {
         self.kept(change, orders as f64, || self.solve(change, orders, progress))
     }
 
-    /// A table from the cache, or computed now; `how` identifies the method in the key of the cache.
+    /// A table from the cache, or computed now; `how` is the number of orders, negative where they are few and corrected.
     fn kept(
         &self,
         change: &CellChange,
@@ -204,7 +204,7 @@ impl RigorousCells {
         let path = self
             .folder
             .as_ref()
-            .map(|f| f.join(format!("{}.cells", self.digest(&key))));
+            .map(|f| f.join(format!("{}.cells", self.digest(&key, how < 0.0))));
         let (wavelengths, count) = (self.wavelengths_nm.len(), self.count());
         let solver = kept::solver_of(self.stack.shape);
         let load = |path: &std::path::Path| {
@@ -281,11 +281,15 @@ impl RigorousCells {
         })
     }
 
-    /// The name of a table in the cache, from all of its inputs.
-    fn digest(&self, key: &[u64; 6]) -> String {
+    /// The name of a table in the cache, from all of its inputs; one that is carried over from few orders is corrected by those
+    /// of stated cells.
+    fn digest(&self, key: &[u64; 6], carried: bool) -> String {
         let mut hash = Sha256::new();
         hash.update(env!("CARGO_PKG_VERSION"));
         hash.update(serde_json::to_vec(&self.stack).expect("plain data serialises"));
+        if carried {
+            hash.update((self.fine as u64).to_le_bytes());
+        }
         let numbers = self
             .wavelengths_nm
             .iter()
@@ -349,24 +353,45 @@ mod tests {
     /// stated cell itself.
     const TOLERANCE: f64 = 0.005;
 
-    #[test]
-    fn a_change_solved_with_few_orders_is_that_with_many() {
+    fn made_up(n: f64) -> CellStack {
         let constant = |n| Material::constant(n, 0.0).unwrap();
-        let stack = CellStack {
+        CellStack {
             lattice: metalith_rcwa::CellLattice::Square,
             pitch_nm: 350.0,
             height_nm: 700.0,
             shape: metalith_core::PillarShape::Square,
             under: Vec::new(),
-            film: constant(2.02),
+            film: constant(n),
             substrate: constant(1.46),
             ambient: constant(1.0),
             taper: 0.0,
             corner_radius_nm: 0.0,
             mask_height_nm: 0.0,
             mask: constant(1.7),
+        }
+    }
+
+    /// Leaning walls are solved with few orders and corrected by upright ones, which may be of more or fewer.
+    #[test]
+    fn tables_that_are_corrected_by_others_are_kept_apart() {
+        let folder = tempfile::tempdir().unwrap();
+        let table = |fine| {
+            let kept = Some(folder.path().to_owned());
+            let cells = RigorousCells::new(made_up(2.02), vec![660.0], (118.0, 122.0), kept).with_orders(fine, 5);
+            let leaning = CellChange {
+                taper_deg: 1.0,
+                ..CellChange::default()
+            };
+            cells.table(&leaning, &Silent).unwrap().t.clone()
         };
-        let cells = RigorousCells::new(stack, vec![460.0, 531.0, 660.0], (100.0, 240.0), None);
+        let first = table(7);
+        assert_ne!(table(11), first);
+        assert_eq!(table(7), first);
+    }
+
+    #[test]
+    fn a_change_solved_with_few_orders_is_that_with_many() {
+        let cells = RigorousCells::new(made_up(2.02), vec![460.0, 531.0, 660.0], (100.0, 240.0), None);
         let stated = CellChange::default();
         for change in [
             CellChange {

@@ -63,7 +63,7 @@ impl Effect for Aberration {
 
     fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
         for (j, nm) in self.noll.iter().zip(parameters) {
-            to.geometry.add_wavefront(*j, *nm);
+            to.geometry.set_wavefront(*j, *nm);
         }
     }
 

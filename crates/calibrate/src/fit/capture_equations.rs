@@ -7,6 +7,7 @@ use super::data::Data;
 use super::nuisances::Nuisances;
 use crate::optics::{PixelGrid, Reading};
 use crate::set::CaptureIndex;
+use metalith_wave::kernels::sum_of_products;
 
 /// Inner products of the whitened columns of one capture, in this order: registration along x and y, flux of
 /// every LED, black level, further parameters, and the residual last.
@@ -20,11 +21,7 @@ impl CaptureEquations {
     /// parameters.
     pub fn new(data: &Data, c: CaptureIndex, now: &Nuisances, grid: &PixelGrid, more: &[PixelGrid]) -> Self {
         let reading = Reading::new(more.iter().chain([grid]), now.shift_um[c]);
-        let lines = [
-            reading.pixels(grid),
-            reading.pixels(&grid.slope(0)),
-            reading.pixels(&grid.slope(1)),
-        ];
+        let lines = reading.with_slopes(grid);
         let more: Vec<_> = more.iter().map(|m| reading.pixels(m)).collect();
         let residual = now.whitened(data, c, &lines[0]);
         let led = data.beam[c].led;
@@ -47,7 +44,7 @@ impl CaptureEquations {
         let mut gram = DMatrix::zeros(size, size);
         for (i, a) in columns.iter().enumerate() {
             for (j, b) in columns.iter().enumerate().take(i + 1) {
-                let dot = dot(a, b);
+                let dot = sum_of_products(a, b);
                 gram[(place[i], place[j])] = dot;
                 gram[(place[j], place[i])] = dot;
             }
@@ -89,13 +86,4 @@ impl CaptureEquations {
         let a = self.gram.view((0, 0), (2, 2)).into_owned();
         a.try_inverse().unwrap_or_else(|| DMatrix::zeros(2, 2))
     }
-}
-
-/// The inner product of two columns.
-pub fn dot(a: &[f32], b: &[f32]) -> f64 {
-    // Short partial sums in single precision, their total in double.
-    a.chunks(64)
-        .zip(b.chunks(64))
-        .map(|(a, b)| f64::from(a.iter().zip(b).map(|(x, y)| x * y).sum::<f32>()))
-        .sum()
 }

@@ -15,7 +15,6 @@ mod registration;
 
 mod widths;
 
-pub use capture_equations::dot;
 pub use cross_validation::{
     Gain, HeldOutErrors, SIGMAS_95, beam_groups, cautious_half_widths, gain, half_widths, held_out, mean_error,
 };

@@ -11,8 +11,10 @@
 //! | `information` | normal equations of each, by the simulator and the noise |
 //! | `choice` | the fewest captures |
 //! | `judgement` | what they find, and what they cannot tell apart |
+//! | `begun` | a folder whose plan is not to be overwritten |
 //! | `files`, `page` | the set folder, and the check list |
 
+mod begun;
 mod bench_file;
 mod candidates;
 mod choice;
@@ -21,12 +23,14 @@ mod information;
 mod judgement;
 mod page;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use metalith_core::{PillarReader, Progress, Result};
 use metalith_design::Design;
 use serde::Serialize;
 
+pub use begun::check_not_begun;
 pub use bench_file::{BenchFile, SemOffer};
 pub use judgement::{Confusion, PlannedEffect};
 
@@ -61,6 +65,8 @@ pub struct CapturePlan {
     pub effects: Vec<PlannedEffect>,
     /// Pairs that the captures cannot tell apart.
     pub confusions: Vec<Confusion>,
+    /// SHA-256 in hexadecimal of the files that a person fills in, as they were written.
+    pub written: BTreeMap<String, String>,
 }
 
 /// A capture to take.
@@ -161,6 +167,7 @@ pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn
         .filter(|((r, _), _)| r.beside.is_empty())
         .map(|((r, margin), reachable)| (r.clone(), margin, *reachable))
         .collect();
+    files::write_set(request.folder, design, bench, &shown, &request.layout_in_set)?;
     let plan = CapturePlan {
         folder: request.folder.to_owned(),
         page: request.folder.join("plan.html"),
@@ -168,8 +175,8 @@ pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn
         captures: shown.captures.iter().map(|c| planned(c, &shown, bench)).collect(),
         effects: judgement::effects(&simulator, &surrogate, &shown, &detections, progress)?,
         confusions: judgement::confusions(&simulator, &shown, &choice, &picked, &reachable),
+        written: begun::digests(request.folder)?,
     };
-    files::write_set(request.folder, design, bench, &shown, &request.layout_in_set)?;
     page::write_page(&plan, &shown, candidates.unseen)?;
     metalith_report::write_json(&request.folder.join("plan.json"), "plan", &plan)?;
     Ok(plan)

@@ -4,8 +4,9 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::effects::{DeclaredEffect, DeclaredParameter};
-use crate::fit::{Fit, FitProblem, dot};
+use crate::fit::{Fit, FitProblem};
 use metalith_made::{DeclaredQuantity, blur};
+use metalith_wave::kernels::sum_of_products;
 
 /// Part of a frame's edge that displacements go to: light from farther is not in the frame.
 const REACH: f64 = 0.25;
@@ -75,7 +76,7 @@ impl Frame {
         for column in columns {
             let mut own: Vec<f32> = column.iter().zip(weight).map(|(v, w)| v * w).collect();
             take_out(&mut own, &nuisances);
-            let norm = dot(&own, &own).sqrt();
+            let norm = sum_of_products(&own, &own).sqrt();
             if norm > 0.0 {
                 own.iter_mut().for_each(|v| *v = (f64::from(*v) / norm) as f32);
                 nuisances.push(own);
@@ -113,8 +114,11 @@ impl Frame {
             source.map_or(0.0, |(y, x)| self.model[[y, x]])
         });
         let column: Vec<f32> = displaced.iter().zip(&self.weight).map(|(v, w)| v * w).collect();
-        let taken: f64 = self.nuisances.iter().map(|n| dot(n, &column).powi(2)).sum();
-        [dot(&column, &self.residual), dot(&column, &column) - taken]
+        let taken: f64 = self.nuisances.iter().map(|n| sum_of_products(n, &column).powi(2)).sum();
+        [
+            sum_of_products(&column, &self.residual),
+            sum_of_products(&column, &column) - taken,
+        ]
     }
 }
 
@@ -212,7 +216,7 @@ impl Ghost {
 
 fn take_out(column: &mut [f32], basis: &[Vec<f32>]) {
     for own in basis {
-        let part = dot(own, column) as f32;
+        let part = sum_of_products(own, column) as f32;
         column.iter_mut().zip(own).for_each(|(v, o)| *v -= part * o);
     }
 }

@@ -76,13 +76,14 @@ impl MeasuredSet {
         let elements = |set: &Self| -> Vec<_> {
             set.elements
                 .iter()
-                .map(|e| (e.index, e.aperture_diameter_um, e.pillars.clone()))
+                .map(|e| (e.index, e.centre_um, e.aperture_diameter_um, e.pillars.clone()))
                 .collect()
         };
         self.stack == other.stack
             && self.divergence_rad == other.divergence_rad
             && camera(&self.camera) == camera(&other.camera)
             && self.leds == other.leds
+            && self.field_boundary_um == other.field_boundary_um
             && captures(self) == captures(other)
             && elements(self) == elements(other)
     }
@@ -188,4 +189,26 @@ pub struct Capture {
     pub dn: Array2<f32>,
     /// Variance of each pixel (DN^2), infinite where it tells nothing; none where `frames`, gain and read noise say it.
     pub noise: Option<Array2<f32>>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metalith_core::Silent;
+    use metalith_gds::extract::GdsPillars;
+
+    /// Sessions of one plan share simulations: whatever these depend on is compared.
+    #[test]
+    fn one_plan_has_one_place_of_elements_and_of_write_fields() {
+        let folder = tempfile::tempdir().unwrap();
+        metalith_testing::session::small_set(folder.path());
+        let read = || MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
+        let (set, mut brighter, mut stitched, mut moved) = (read(), read(), read(), read());
+        brighter.captures.iter_mut().for_each(|c| c.scale_dn *= 2.0);
+        assert!(set.same_plan(&brighter));
+        stitched.field_boundary_um = Some([0.0, 3.0]);
+        assert!(!set.same_plan(&stitched));
+        moved.elements.iter_mut().for_each(|e| e.centre_um[0] += 100.0);
+        assert!(!set.same_plan(&moved));
+    }
 }

@@ -153,3 +153,23 @@ fn layouts_are_compared_with_their_design_and_with_one_another() {
     let narrowed: u64 = other.elements.iter().map(|e| e.narrowed).sum();
     assert_eq!(narrowed, copies);
 }
+
+/// Squares that are narrower than the pitch, and wider than the rows are apart.
+#[test]
+fn pillars_of_neighbouring_rows_share_no_area() {
+    let squares = |width: i32| {
+        let mut gds = Gds::library();
+        gds.cell("TOP");
+        for (column, row) in (0..SIDE * SIDE).map(|k| (k % SIDE, k / SIDE)) {
+            let (x, y) = place(column, row);
+            // Two neighbours in the middle are wide.
+            let wide = [(6, 6), (6, 7)].contains(&(column, row));
+            gds.square(1, x, y, if wide { width } else { 120 });
+        }
+        gds.end_cell();
+        let report = crate::check(gds.end(), &[]);
+        let rule = report.rules.iter().find(|r| r.id == "gap.overlap").unwrap();
+        rule.violations
+    };
+    assert_eq!([squares(300), squares(310)], [0, 1]);
+}

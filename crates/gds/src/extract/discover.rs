@@ -161,7 +161,13 @@ impl Visitor for Map {
     fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> metalith_core::Result<()> {
         let scale = self.scale;
         let copies = placements.len() as u64;
-        if let Some(around) = self.sizes.count(shape, copies, scale) {
+        let around = if placements.iter().all(Transform::is_square) {
+            self.sizes.count(shape, copies, 1.0, scale)
+        } else {
+            let each = |placement: &Transform| self.sizes.count(shape, 1, placement.magnification(), scale);
+            placements.iter().map(each).fold(None, Option::or)
+        };
+        if let Some(around) = around {
             let centre = |placement: &Transform| match placement.is_square() {
                 true => Centre::of(&placement.apply_rect(&around)?, scale),
                 false => Centre::of(&Rect::around(&shape.outline.placed(placement)), scale),

@@ -157,11 +157,7 @@ impl Sites {
         let x = (square.x0 + square.x1) * self.scale.num;
         let y = (square.y0 + square.y1) * self.scale.num;
         // Half a database unit, doubled and scaled.
-        let slack = if (square.x1 - square.x0) % 2 == 0 {
-            0
-        } else {
-            self.scale.num
-        };
+        let slack = [square.x1 - square.x0, square.y1 - square.y0].map(|edge| edge % 2 * self.scale.num);
         if let Some(standing) = self.try_element(*guess, x, y, slack) {
             return standing;
         }
@@ -176,7 +172,7 @@ impl Sites {
     }
 
     #[inline]
-    fn try_element(&self, element: u32, x: i64, y: i64, slack: i64) -> Option<Standing> {
+    fn try_element(&self, element: u32, x: i64, y: i64, slack: [i64; 2]) -> Option<Standing> {
         let grid = self.grids.get(element as usize)?;
         let (column, dx) = grid.nearest(0, x);
         let (row, dy) = grid.nearest(1, y);
@@ -184,7 +180,7 @@ impl Sites {
             return None;
         }
         let is_site = !grid.staggered || (column + row) % 2 == 0;
-        Some(if dx.abs() <= slack && dy.abs() <= slack && is_site {
+        Some(if dx.abs() <= slack[0] && dy.abs() <= slack[1] && is_site {
             Standing::Site(element, row as usize, column as usize)
         } else {
             Standing::Between(element)
@@ -227,6 +223,15 @@ mod tests {
         assert_eq!(guess, 1);
         assert_eq!(sites.stand(&square(176, 175, 100), &mut guess), Standing::Between(0));
         assert_eq!(sites.stand(&square(5_000, 175, 100), &mut guess), Standing::Outside);
+        // An edge of odd length is half a unit off along its own axis alone.
+        let odd = |dx: i64, dy: i64| Rect {
+            x1: 225 + dx,
+            y1: 225 + dy,
+            ..square(175, 175, 100)
+        };
+        assert_eq!(sites.stand(&odd(1, 0), &mut guess), Standing::Site(0, 2, 2));
+        assert_eq!(sites.stand(&odd(0, 1), &mut guess), Standing::Site(0, 2, 2));
+        assert_eq!(sites.stand(&odd(2, 1), &mut guess), Standing::Between(0));
         // 101 nm about a whole centre cannot be nearer than half a unit.
         assert_eq!(sites.stand(&square(175, 175, 101), &mut guess), Standing::Site(0, 2, 2));
     }

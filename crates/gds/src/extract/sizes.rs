@@ -56,18 +56,18 @@ pub(super) struct AlikeRectangles {
 }
 
 impl Sizes {
-    /// Count so many copies of a shape, if it is a rectangle and no square: the box around it, in its cell.
-    pub fn count(&mut self, shape: &Shape<'_>, copies: u64, scale: Scale) -> Option<Rect> {
+    /// Count so many copies of a shape, each so many times as large as in its cell, if it is a rectangle and no square: the box
+    /// around it, in its cell.
+    pub fn count(&mut self, shape: &Shape<'_>, copies: u64, magnification: f64, scale: Scale) -> Option<Rect> {
         let unequal = shape.rect.is_none_or(|r| r.width() != r.height());
         if !unequal || shape.circle.is_some() || shape.outline.len() != 5 {
             return None;
         }
-        // Edges are as long wherever the outline stands.
         let points = shape.outline.points;
         let (numbers, counted) = (&mut self.numbers, &mut self.counted);
-        let seen = self.known.of(points, 0, || {
+        let mut see = || {
             let tilted = tilted_rectangle_of(points, scale.nm(1.0)).filter(|r| !r.is_square())?;
-            let edges = tilted.edges.map(|e| scale.nm(e));
+            let edges = tilted.edges.map(|e| scale.nm(e * magnification));
             let key = (edges[0].round() as i64, edges[1].round() as i64);
             if counted.len() < MOST_SIZES && !numbers.contains_key(&key) {
                 numbers.insert(key, counted.len());
@@ -78,7 +78,12 @@ impl Sizes {
                 size: numbers.get(&key).copied(),
                 around: tilted.around.moved(Point::new(-points[0].x, -points[0].y)),
             })
-        })?;
+        };
+        // Edges are as long wherever the outline stands.
+        let seen = match magnification {
+            1.0 => self.known.of(points, 0, see),
+            _ => see(),
+        }?;
         self.rectangles += copies;
         if let Some(size) = seen.size.map(|k| &mut self.counted[k]) {
             size.count += copies;

@@ -1,5 +1,7 @@
 //! Everything a layout has, in number: layers with what they hold and cover, and texts.
 
+use std::collections::HashMap;
+
 use serde::Serialize;
 
 use super::sites::Scale;
@@ -54,13 +56,35 @@ impl Extent {
     };
 }
 
+/// Extents of layers, by number.
+#[derive(Default)]
+struct Extents {
+    of: Vec<(LayerNumber, Extent)>,
+    places: HashMap<LayerNumber, usize>,
+    /// The one that was asked for last: shapes of one layer follow one another.
+    last: usize,
+}
+
+impl Extents {
+    /// That of a layer; none yet if it is new.
+    #[inline]
+    fn entry(&mut self, layer: LayerNumber) -> &mut Extent {
+        if self.of.get(self.last).is_none_or(|(l, _)| *l != layer) {
+            self.last = *self.places.entry(layer).or_insert_with(|| {
+                self.of.push((layer, Extent::NONE));
+                self.of.len() - 1
+            });
+        }
+        &mut self.of[self.last].1
+    }
+}
+
 /// Gathers a survey. Shapes are counted in the coordinates of their cell, and placed with it once.
 #[derive(Default)]
 pub(super) struct Surveyor {
-    cell: Vec<(LayerNumber, Extent)>,
-    last: usize,
+    cell: Extents,
     placements: Vec<Transform>,
-    total: Vec<(LayerNumber, Extent)>,
+    total: Extents,
     texts: Vec<TextSummary>,
 }
 
@@ -73,21 +97,10 @@ impl Surveyor {
     }
 
     #[inline]
-    fn entry(&mut self, layer: LayerNumber) -> &mut Extent {
-        if self.cell.get(self.last).is_none_or(|(l, _)| *l != layer) {
-            self.last = self.cell.iter().position(|(l, _)| *l == layer).unwrap_or_else(|| {
-                self.cell.push((layer, Extent::NONE));
-                self.cell.len() - 1
-            });
-        }
-        &mut self.cell[self.last].1
-    }
-
-    #[inline]
     pub fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) {
         let bounds = shape.rect.unwrap_or_else(|| shape.outline.around());
         if placements.first().is_some_and(Transform::is_square) || placements == self.placements {
-            let entry = self.entry(shape.layer);
+            let entry = self.cell.entry(shape.layer);
             entry.shapes += 1;
             entry.bounds.unite(&bounds);
         } else {
@@ -102,7 +115,7 @@ impl Surveyor {
     }
 
     pub fn text(&mut self, text: &Text<'_>, placements: &[Transform], scale: Scale, most: usize) {
-        self.entry(text.layer).texts += 1;
+        self.cell.entry(text.layer).texts += 1;
         for placement in placements {
             if self.texts.len() >= most {
                 break;
@@ -117,16 +130,16 @@ impl Surveyor {
     }
 
     fn flush(&mut self) {
-        for (layer, extent) in std::mem::take(&mut self.cell) {
+        for (layer, extent) in std::mem::take(&mut self.cell).of {
             add(&mut self.total, layer, &extent, &self.placements);
         }
-        self.last = 0;
     }
 
     pub fn finish(mut self, scale: Scale) -> Survey {
         self.flush();
-        self.total.sort_by_key(|(layer, _)| *layer);
-        let layers = self.total.iter().map(|(layer, e)| LayerSummary {
+        let mut total = self.total.of;
+        total.sort_by_key(|(layer, _)| *layer);
+        let layers = total.iter().map(|(layer, e)| LayerSummary {
             layer: *layer,
             shapes: e.shapes,
             texts: e.texts,
@@ -140,12 +153,8 @@ impl Surveyor {
     }
 }
 
-fn add(total: &mut Vec<(LayerNumber, Extent)>, layer: LayerNumber, extent: &Extent, placements: &[Transform]) {
-    let k = total.iter().position(|(l, _)| *l == layer).unwrap_or_else(|| {
-        total.push((layer, Extent::NONE));
-        total.len() - 1
-    });
-    let sum = &mut total[k].1;
+fn add(total: &mut Extents, layer: LayerNumber, extent: &Extent, placements: &[Transform]) {
+    let sum = total.entry(layer);
     sum.shapes += extent.shapes * placements.len() as u64;
     sum.texts += extent.texts * placements.len() as u64;
     let b = extent.bounds;

@@ -6,7 +6,7 @@ mod trees;
 
 use std::path::PathBuf;
 
-use metalith_core::{Lattice, LatticeKind, PillarShape, Silent, WidthMap};
+use metalith_core::{Lattice, LatticeKind, PillarShape, Rectangles, Silent, WidthMap};
 use metalith_gds::extract::{ElementSite, ExtractionPlan, Why, extract};
 use metalith_gds::{
     Error, LayerNumber, Layout, LayoutError, Limit, Point, ReadLimits, Rect, Selection, Shape, Transform, Visitor,
@@ -163,6 +163,53 @@ fn circles_are_pillars_where_most_are() {
     let squares = ExtractionPlan::discover(PILLARS).of_shape(PillarShape::Square);
     let read = extract(&file, &squares, &Silent).unwrap();
     assert_eq!((read.pillars, read.oddities.total()), (1, 35));
+}
+
+/// Rectangles in a cell that is drawn twice as large as it is placed.
+#[test]
+fn rectangles_of_a_magnified_cell_are_found_as_large_as_they_are() {
+    let drawn = Rectangles {
+        width_nm: 180,
+        length_nm: 480,
+        steps: 180,
+    };
+    let mut gds = Gds::library();
+    gds.cell("TOP").placed("LENS", 0, 0, false, 0.5, 0.0).end_cell();
+    gds.cell("LENS");
+    for k in 0..36 {
+        let (x, y) = (2 * (175 + 350 * (k % 6) - 1050), 2 * (175 + 350 * (k / 6) - 1050));
+        let corners = drawn.corners(1 + 5 * k as u16);
+        let closed = corners.iter().chain(corners.first());
+        let points: Vec<(i32, i32)> = closed.map(|&(dx, dy)| (x + dx as i32, y + dy as i32)).collect();
+        gds.polygon(1, &points);
+    }
+    gds.end_cell();
+    let read = extract(&layout(gds.end()), &ExtractionPlan::discover(PILLARS), &Silent).unwrap();
+    let PillarShape::Rectangle(found) = read.shape else {
+        panic!("{:?}", read.shape)
+    };
+    assert_eq!((found.width_nm, found.length_nm), (90, 240));
+    assert_eq!((read.elements.len(), read.pillars), (1, 36));
+}
+
+/// Nobody knows how wide a path of absolute width is where its cell is magnified.
+#[test]
+fn absolute_widths_and_magnified_cells_do_not_go_together() {
+    let drawn = |width: i32, magnification: f64| {
+        let mut gds = Gds::library();
+        gds.cell("TOP")
+            .placed("LINE", 0, 0, false, magnification, 90.0)
+            .end_cell();
+        gds.cell("LINE").empty(0x09).int2(0x0D, &[1]).int2(0x0E, &[0]);
+        gds.int4(0x0F, &[width])
+            .int4(0x10, &[0, 0, 1000, 0])
+            .empty(0x11)
+            .end_cell();
+        gds.end()
+    };
+    assert_eq!(boxes(&layout(drawn(-200, 1.0))), [[-100, 0, 100, 1000]]);
+    assert_eq!(boxes(&layout(drawn(200, 2.0))), [[-200, 0, 200, 2000]]);
+    assert!(fault_of(drawn(-200, 2.0)).1.contains("absolute"));
 }
 
 /// One of each oddity, and each for the right reason, at the right place.

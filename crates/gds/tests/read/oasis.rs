@@ -126,6 +126,16 @@ fn numbers_and_names_are_one() {
     assert_eq!(dangling.dangling()[0].name, "#9");
 }
 
+/// 2^56 is one more than a key of eight bytes can tell.
+#[test]
+fn numbers_beyond_the_largest_are_no_other_cell() {
+    let number = [0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x01];
+    let records = [&[13][..], &number, SQUARE].concat();
+    let read = Layout::from_bytes("test.oas", oasis::around(&records), ReadLimits::default());
+    let error = read.map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains(&(1u64 << 56).to_string()), "{error}");
+}
+
 /// Copies of squares, texts, polygons and cells stand where the lists say.
 #[test]
 fn copies_stand_where_they_are_said_to() {

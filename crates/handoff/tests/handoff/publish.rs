@@ -66,6 +66,23 @@ fn what_others_do_in_the_meantime_is_seen() {
     assert_eq!(fs::read(out.join("manifest.json")).unwrap(), first);
 }
 
+/// An archive that no hand-off put there is somebody's own.
+#[test]
+fn an_archive_of_others_stays() {
+    let parent = tempfile::tempdir().unwrap();
+    let out = parent.path().join("kit");
+    let archive = out.with_extension("zip");
+    fs::write(&archive, "theses").unwrap();
+    for folder in [false, true] {
+        if folder {
+            fs::create_dir(&out).unwrap();
+        }
+        let error = handoff(&options(&out), &Silent).unwrap_err().to_string();
+        assert!(error.contains("kit.zip"), "{error}");
+        assert_eq!(fs::read_to_string(&archive).unwrap(), "theses");
+    }
+}
+
 /// Four at once: those that do not win are told why, and what stands is whole.
 #[test]
 fn of_several_at_once_one_wins() {

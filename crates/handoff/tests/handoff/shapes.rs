@@ -90,7 +90,7 @@ fn area(points: &[Point]) -> f64 {
 fn is_drawn(outline: &[Point], row: &BTreeMap<String, String>, shape: PillarShape) -> bool {
     match shape {
         PillarShape::Square => unreachable!("other tests look at squares"),
-        PillarShape::Circle => circle_of(outline).is_some_and(|r| r.width().to_string() == row["drawn_nm"]),
+        PillarShape::Circle => circle_of(outline, 1.0).is_some_and(|r| r.width().to_string() == row["drawn_nm"]),
         PillarShape::Rectangle(_) => {
             let number = |key: &str| row[key].parse::<f64>().unwrap();
             let drawn = metalith_core::Rectangles {

@@ -4,6 +4,7 @@
 //! They are solved by conjugate gradients, preconditioned by what `precondition` says.
 
 use metalith_core::{Error, Progress, Result};
+use metalith_wave::kernels::sum_of_products;
 use ndarray::{Array2, Axis, Slice};
 use rayon::prelude::*;
 
@@ -11,7 +12,6 @@ use super::Recorded;
 use super::precondition::Preconditioner;
 use super::prior::SceneStatistics;
 use crate::operator::FrameOperator;
-use crate::products::sum_of_products;
 
 /// Planes of a picture.
 pub type Planes = Vec<Array2<f32>>;

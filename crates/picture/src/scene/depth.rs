@@ -33,13 +33,13 @@ impl SceneImage {
 /// Read a depth map: NPY `[row, column]` of millimetres, or a grey PNG of 16 bits whose values are millimetres.
 ///
 /// # Errors
-/// If the file cannot be read, holds something else, or a distance that is not positive.
+/// If the file cannot be read, holds something else, or a distance of less than a millimetre.
 pub fn read_depth(path: &Path) -> Result<Array2<f32>> {
     let bytes = read_at_most(path, LONGEST, "a depth map")?;
     let fault = |what: &str| {
         Error::invalid(
             format!("{}: {what}", path.display()),
-            "give an NPY of shape (rows, columns) or a grey PNG of 16 bits, distances in whole or broken millimetres above zero",
+            "give an NPY of shape (rows, columns) or a grey PNG of 16 bits, distances of a millimetre and more, in millimetres",
         )
     };
     let mm = if bytes.starts_with(b"\x93NUMPY") {
@@ -57,11 +57,14 @@ pub fn read_depth(path: &Path) -> Result<Array2<f32>> {
     if mm.axis_iter(Axis(2)).any(|plane| plane != first) {
         return Err(fault("it has colours"));
     }
-    if first.iter().any(|v| *v <= 0.0) {
-        return Err(fault("it holds a distance of zero"));
+    if !first.iter().all(|v| *v >= NEAREST_MM) {
+        return Err(fault("it holds a distance below a millimetre"));
     }
     Ok(first.mapv(|v| (v * 1e3) as f32))
 }
+
+/// Nearer than this no scene is in front of a chip (mm); the way to the first surface is searched in steps of its inverse.
+const NEAREST_MM: f64 = 1.0;
 
 #[cfg(test)]
 mod tests {
@@ -78,8 +81,12 @@ mod tests {
         assert_eq!((depth[[0, 0]], depth[[15, 15]]), (1e3, 256e3));
         let scene = SceneImage::of_rgb("", &ndarray::Array3::zeros((16, 17, 3)), 60.0, f64::INFINITY);
         assert!(scene.with_depth(depth).is_err());
-        write(&[0.0; 256]);
-        assert!(read_depth(&path).unwrap_err().to_string().contains("zero"));
+        for near in [0.0, -2.0, 1e-6, f64::NAN] {
+            let mut values = [500.0; 256];
+            values[17] = near;
+            write(&values);
+            assert!(read_depth(&path).is_err(), "{near}");
+        }
         std::fs::write(&path, b"\xff\xd8").unwrap();
         assert!(read_depth(&path).is_err());
     }

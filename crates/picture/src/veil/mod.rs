@@ -15,9 +15,9 @@ mod squares;
 mod trace;
 
 use metalith_camera::Sensor;
+use metalith_core::{Error, Result};
+use metalith_wave::kernels::sum_of_products;
 use pulp::Arch;
-
-use crate::products::sum_of_products;
 
 pub use shares::LightShares;
 pub use squares::{gather, lay, lift, spread};
@@ -47,7 +47,32 @@ pub fn sensor_cells(sensor: &Sensor) -> [usize; 2] {
     [sensor.rows, sensor.columns].map(|n| (n as usize).div_ceil(CELL_PIXELS))
 }
 
+/// Largest veil that is held (bytes): that of a sensor of some 70 million pixels in three colours.
+const LARGEST: u64 = 4 << 30;
+
 impl Veil {
+    /// Whether the veil of a sensor can be held.
+    ///
+    /// # Errors
+    /// If it has too many pixels.
+    pub fn check_size(sensor: &Sensor, channels: usize, bases: usize) -> Result<()> {
+        let [rows, columns] = sensor_cells(sensor).map(|n| n as u64);
+        let values = (channels * bases * SCENE_CELLS * SCENE_CELLS) as u64 * rows * columns;
+        let bytes = values * size_of::<f32>() as u64;
+        if bytes <= LARGEST {
+            return Ok(());
+        }
+        Err(Error::invalid(
+            format!(
+                "a sensor of {} x {} pixels: light beside the images would take {} MB",
+                sensor.columns,
+                sensor.rows,
+                bytes >> 20
+            ),
+            "give the part of the sensor that the array lights: `columns`, `rows` and `offset_um` of the camera",
+        ))
+    }
+
     /// No veil, for tests and for those who leave it out.
     pub fn none(sensor: &Sensor, channels: usize, bases: usize) -> Self {
         let cells = sensor_cells(sensor);

@@ -73,16 +73,21 @@ impl Veil {
                 .collect();
             let zero_orders: Vec<f64> = chosen.iter().map(|i| light.zero_order(*i)).collect();
             for element in (0..chip.elements.len()).filter(|e| chip.copies[*e].0 == distinct) {
-                let traced: Vec<Traced> = (0..SCENE_CELLS * SCENE_CELLS)
-                    .into_par_iter()
-                    .map(|cell| tracer.trace(element, cell, &departures, &zero_orders))
-                    .collect::<Result<_>>()?;
-                for (cell, one) in traced.iter().enumerate() {
-                    for (pair, total) in budget.iter_mut().enumerate() {
-                        let from = (pair * SCENE_CELLS * SCENE_CELLS + cell) * cells[0] * cells[1];
-                        let to = &mut values[from..from + cells[0] * cells[1]];
-                        to.iter_mut().zip(&one.light[pair]).for_each(|(a, b)| *a += *b as f32);
-                        total.add(&one.shares[pair], tracer.solid(cell));
+                // Row by row: the light of all squares is larger than the veil itself.
+                for row in 0..SCENE_CELLS {
+                    let squares = row * SCENE_CELLS..(row + 1) * SCENE_CELLS;
+                    let traced: Vec<Traced> = squares
+                        .clone()
+                        .into_par_iter()
+                        .map(|square| tracer.trace(element, square, &departures, &zero_orders))
+                        .collect::<Result<_>>()?;
+                    for (square, one) in squares.zip(&traced) {
+                        for (pair, total) in budget.iter_mut().enumerate() {
+                            let from = (pair * SCENE_CELLS * SCENE_CELLS + square) * cells[0] * cells[1];
+                            let to = &mut values[from..from + cells[0] * cells[1]];
+                            to.iter_mut().zip(&one.light[pair]).for_each(|(a, b)| *a += *b as f32);
+                            total.add(&one.shares[pair], tracer.solid(square));
+                        }
                     }
                 }
                 progress.advance(chosen.len() as u64);

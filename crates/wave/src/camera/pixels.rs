@@ -4,7 +4,7 @@
 //! around the window are faded out towards their border, which keeps its far side from coming in.
 
 use metalith_core::part;
-use ndarray::{Array2, ArrayView2};
+use ndarray::Array2;
 use num_complex::Complex32;
 use rustfft::FftPlanner;
 
@@ -150,9 +150,12 @@ impl PixelGrid {
 
 /// How bins become the pixels of one window at one place: worked out once for all grids of the window.
 pub struct Reading {
-    /// Cosine and sine of each bin at each pixel along x, `[kx, col]`, and y, `[row, ky]`.
-    along_x: [Array2<f32>; 2],
-    along_y: [Array2<f32>; 2],
+    /// Cosines, then sines of each bin at each pixel along x, `[kx, 2 cols]`.
+    along_x: Array2<f32>,
+    /// Cosines, then sines with their sign turned, of each bin at each pixel along y, `[row, 2 ky]`.
+    along_y: Array2<f32>,
+    /// Angular frequency of a bin (1/um).
+    omega: f32,
 }
 
 impl Reading {
@@ -165,28 +168,60 @@ impl Reading {
         let place = |i: usize, count: usize, shift: f64| {
             (i as f64 - 0.5 * (count as f64 - 1.0)) * first.pixel_um + shift + first.middle_um
         };
-        let x: Vec<f64> = (0..cols).map(|j| place(j, cols, shift_um[0]) * first.cycle).collect();
-        let y: Vec<f64> = (0..rows).map(|i| place(i, rows, shift_um[1]) * first.cycle).collect();
-        let turns = Array2::from_shape_fn((n, cols), |(k, j)| cis((k as f64 - (n / 2) as f64) * x[j]));
-        let along_x = [turns.mapv(|v| v.re), turns.mapv(|v| v.im)];
-        let turns = Array2::from_shape_fn((rows, half), |(i, k)| cis(k as f64 * y[i]));
-        let along_y = [turns.mapv(|v| v.re), turns.mapv(|v| v.im)];
-        Self { along_x, along_y }
+        let mut along_x = Array2::zeros((n, 2 * cols));
+        for (k, mut line) in along_x.rows_mut().into_iter().enumerate() {
+            for j in 0..cols {
+                let turn = cis((k as f64 - (n / 2) as f64) * place(j, cols, shift_um[0]) * first.cycle);
+                (line[j], line[cols + j]) = (turn.re, turn.im);
+            }
+        }
+        let mut along_y = Array2::zeros((rows, 2 * half));
+        for (i, mut line) in along_y.rows_mut().into_iter().enumerate() {
+            for k in 0..half {
+                let turn = cis(k as f64 * place(i, rows, shift_um[1]) * first.cycle);
+                (line[k], line[half + k]) = (turn.re, -turn.im);
+            }
+        }
+        Self {
+            along_x,
+            along_y,
+            omega: (std::f64::consts::TAU * first.cycle) as f32,
+        }
     }
 
     /// The pixels.
     pub fn pixels(&self, grid: &PixelGrid) -> Array2<f32> {
-        self.read(grid.re.view(), grid.im.view())
+        self.along_y.dot(&self.columns(grid))
     }
 
-    fn read(&self, re: ArrayView2<'_, f32>, im: ArrayView2<'_, f32>) -> Array2<f32> {
-        let (half, n) = re.dim();
-        let from = (self.along_x[0].nrows() - n) / 2;
-        let [cx, sx] = [0, 1].map(|i| part(self.along_x[i].view(), from..from + n, 0..self.along_x[i].ncols()));
-        let [cy, sy] = [0, 1].map(|i| part(self.along_y[i].view(), 0..self.along_y[i].nrows(), 0..half));
-        let real = re.dot(&cx) - im.dot(&sx);
-        let imaginary = re.dot(&sx) + im.dot(&cx);
-        cy.dot(&real) - sy.dot(&imaginary)
+    /// The pixels, and their derivatives by the shift along x and along y (1/um).
+    pub fn with_slopes(&self, grid: &PixelGrid) -> [Array2<f32>; 3] {
+        let columns = self.columns(grid);
+        // Along y a derivative turns each wave by a quarter, whatever it is along x.
+        let half = columns.nrows() / 2;
+        let turned = Array2::from_shape_fn(columns.dim(), |(k, j)| match k.checked_sub(half) {
+            None => -self.omega * k as f32 * columns[[half + k, j]],
+            Some(k) => self.omega * k as f32 * columns[[k, j]],
+        });
+        let along_x = self.pixels(&grid.slope(0));
+        [self.along_y.dot(&columns), along_x, self.along_y.dot(&turned)]
+    }
+
+    /// Waves along y at each pixel along x: real parts, then imaginary ones, `[2 ky, col]`.
+    fn columns(&self, grid: &PixelGrid) -> Array2<f32> {
+        let (own, n) = grid.re.dim();
+        let (half, cols) = (self.along_y.ncols() / 2, self.along_x.ncols() / 2);
+        let from = (self.along_x.nrows() - n) / 2;
+        let along_x = part(self.along_x.view(), from..from + n, 0..2 * cols);
+        let (re, im) = (grid.re.dot(&along_x), grid.im.dot(&along_x));
+        let mut columns = Array2::zeros((2 * half, cols));
+        for k in 0..own {
+            for j in 0..cols {
+                columns[[k, j]] = re[[k, j]] - im[[k, cols + j]];
+                columns[[half + k, j]] = re[[k, cols + j]] + im[[k, j]];
+            }
+        }
+        columns
     }
 }
 
@@ -239,6 +274,15 @@ mod tests {
         let numeric =
             (&grid.pixels([shift[0] + h, shift[1]]) - &grid.pixels([shift[0] - h, shift[1]])) / (2.0 * h as f32);
         assert!((&slope - &numeric).iter().all(|d| d.abs() < SLOPE));
+        // As the derivative of each grid has it, in a reading that is wider than the grid.
+        let wide = PixelGrid::new(&samples, step, &Optic { blur_um: 0.0, ..optic }, 40, 32);
+        let together = Reading::new([&grid, &wide], shift).with_slopes(&grid);
+        for (one, other) in together
+            .iter()
+            .zip([pixels.clone(), slope, grid.slope(1).pixels(shift)])
+        {
+            assert!((one - &other).iter().all(|d| d.abs() < SAME));
+        }
         let moved = grid.clone().moved([0.4, -0.2]).pixels([shift[0] - 0.4, shift[1] + 0.2]);
         assert!((&moved - &pixels).iter().all(|d| d.abs() < SAME));
         // A little more blur, as its term has it.

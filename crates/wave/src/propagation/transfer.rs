@@ -66,6 +66,15 @@ impl Transfer<'_> {
         });
     }
 
+    /// What the transfer function to one distance is multiplied by for one that is `step_um` farther.
+    pub fn step(&self, step_um: f64, faded: &FadedColumn, out: &mut [Complex32]) {
+        pulp::Arch::new().dispatch(|| {
+            for (out, fz) in out.iter_mut().zip(&faded.axial) {
+                *out = cis(step_um * fz);
+            }
+        });
+    }
+
     /// `out[i]` is what multiplies frequency `i` of a column on its way to `distance_um`.
     pub fn to_distance(&self, distance_um: f64, column: FrequencyColumn, faded: &FadedColumn, out: &mut [Complex32]) {
         let df = self.fade.period_um.map(|period| 1.0 / period);

@@ -65,6 +65,8 @@ pub struct DistancesScratch {
     column: FadedColumn,
     /// Transfer function to each distance, `[distance][kx][ky]`.
     transfer: Vec<Complex32>,
+    /// From one distance to the next, `[ky]`.
+    step: Vec<Complex32>,
 }
 
 /// Frequencies that are kept, in whole cycles a period.

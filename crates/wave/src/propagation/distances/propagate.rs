@@ -10,6 +10,9 @@ use crate::propagation::transfer::{FrequencyColumn, Transfer};
 /// Columns that go through one call of a transform: enough to fill cache lines.
 const LANES: usize = 8;
 
+/// Steps from one distance to the next that differ by less are equal (um): rounding.
+const EQUAL_UM: f64 = 1e-9;
+
 impl DistancesPlan {
     /// The transfer function to each distance at each kept frequency.
     pub(super) fn transfer(
@@ -33,15 +36,28 @@ impl DistancesPlan {
             cell_um: self.wanted.lattice.cell_um(),
         };
         scratch.transfer.resize(distances_um.len() * kx * ky, Complex32::ZERO);
+        scratch.step.resize(ky, Complex32::ZERO);
+        let steps: Vec<f64> = distances_um.windows(2).map(|z| z[1] - z[0]).collect();
         for k in 0..kx {
             let column = FrequencyColumn {
                 first: [kept.first[0] + k as i64, kept.first[1]],
                 count: ky,
             };
             transfer.fade(middle, column, &mut scratch.column);
-            for (d, &z) in distances_um.iter().enumerate() {
-                let out = &mut scratch.transfer[(d * kx + k) * ky..][..ky];
-                transfer.to_distance(z, column, &scratch.column, out);
+            transfer.to_distance(
+                distances_um[0],
+                column,
+                &scratch.column,
+                &mut scratch.transfer[k * ky..][..ky],
+            );
+            // From one distance to the next; equal steps, as those of a focus series are, are worked out once.
+            for (d, step) in steps.iter().enumerate() {
+                if d == 0 || (step - steps[d - 1]).abs() > EQUAL_UM {
+                    transfer.step(*step, &scratch.column, &mut scratch.step);
+                }
+                let (known, next) = scratch.transfer.split_at_mut((d + 1) * kx * ky);
+                let known = &known[(d * kx + k) * ky..][..ky];
+                multiply_to(&mut next[k * ky..][..ky], known, &scratch.step);
             }
         }
     }
@@ -61,7 +77,7 @@ impl DistancesPlan {
         scratch.lines.resize(n * kx, Complex32::ZERO);
         for (iy, line) in scratch.lines.chunks_exact_mut(kx).enumerate() {
             let row = &mut scratch.row[..m];
-            row.fill(Complex32::ZERO);
+            row[n..].fill(Complex32::ZERO);
             element.fill_row(iy, &mut row[..n]);
             multiply_by(&mut row[..n], along_x, along_y[iy]);
             process(&*self.forward, row, &mut scratch.fft);
@@ -72,7 +88,7 @@ impl DistancesPlan {
         for from in (0..kx).step_by(LANES) {
             let lanes = LANES.min(kx - from);
             let columns = &mut scratch.columns[..lanes * m];
-            columns.fill(Complex32::ZERO);
+            columns.chunks_exact_mut(m).for_each(|c| c[n..].fill(Complex32::ZERO));
             for (iy, line) in scratch.lines.chunks_exact(kx).enumerate() {
                 for (lane, value) in line[from..from + lanes].iter().enumerate() {
                     columns[lane * m + iy] = *value;
@@ -111,7 +127,8 @@ impl DistancesPlan {
                     let source = &spectrum[(from + lane) * ky..][..ky];
                     let transfer = &transfer[(d * kx + from + lane) * ky..][..ky];
                     let column = &mut columns[lane * samples..][..samples];
-                    column.fill(Complex32::ZERO);
+                    column[ky - head..start].fill(Complex32::ZERO);
+                    column[start + head..].fill(Complex32::ZERO);
                     multiply_to(&mut column[start..start + head], &source[..head], &transfer[..head]);
                     multiply_to(&mut column[..ky - head], &source[head..], &transfer[head..]);
                 }
@@ -142,7 +159,8 @@ impl DistancesPlan {
         let lines = &scratch.lines[distance * window * kx..][..window * kx];
         for (line, out) in lines.chunks_exact(kx).zip(out.chunks_exact_mut(window)) {
             let row = &mut scratch.row[..samples];
-            row.fill(Complex32::ZERO);
+            row[kx - head..start].fill(Complex32::ZERO);
+            row[start + head..].fill(Complex32::ZERO);
             row[start..start + head].copy_from_slice(&line[..head]);
             row[..kx - head].copy_from_slice(&line[head..]);
             process(&*self.inverse, row, &mut scratch.fft);
