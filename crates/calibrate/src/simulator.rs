@@ -13,8 +13,9 @@ use metalith_made::{CellChange, Perturbation, to_middle_tops};
 /// Widths that a bias may add or take (nm); cells are tabulated so far beyond the layout.
 pub const WIDTH_ROOM_NM: f64 = 36.0;
 
-/// Most chips that are sent along one path at once; of large lenses fewer, by memory.
-const TOGETHER: usize = 8;
+/// Most chips that are sent along one path at once, for which one transfer function is worked out; of large lenses fewer, by
+/// memory.
+const TOGETHER: usize = 16;
 
 /// A bench, its cells and the effects that are tried on it.
 pub struct Simulator<'a> {

@@ -49,7 +49,7 @@ impl Transfer<'_> {
         let rest = self.wavelength_um.powi(-2) - fx * fx;
         let [cx, cy] = self.centre_um;
         let Fade { full_um, zero_um, .. } = *self.fade;
-        let slope = 1.0 / (zero_um - full_um);
+        let (full, slope) = (full_um as f32, (1.0 / (zero_um - full_um)) as f32);
         // The cell of the sum over the aperture, 1 / period along each axis of that over frequencies.
         let scale = (self.cell_um[0] * df[0] * (self.cell_um[1] * df[1])) as f32;
         faded.axial.resize(column.count, 0.0);
@@ -58,10 +58,11 @@ impl Transfer<'_> {
             for (i, (axial, weight)) in faded.axial.iter_mut().zip(&mut faded.weight).enumerate() {
                 let fy = first + i as f64 * df[1];
                 let fz = (rest - fy * fy).max(GRAZING).sqrt();
-                let (sx, sy) = (distance_um * fx / fz - cx, distance_um * fy / fz - cy);
-                let share = ((sx * sx + sy * sy).sqrt() - full_um) * slope;
+                let per_cycle = distance_um / fz;
+                let (sx, sy) = (per_cycle * fx - cx, per_cycle * fy - cy);
+                let off = ((sx * sx + sy * sy) as f32).sqrt();
                 *axial = fz;
-                *weight = fade(share as f32) * scale;
+                *weight = fade((off - full) * slope) * scale;
             }
         });
     }
