@@ -10,12 +10,13 @@ first difference.
 """
 
 import pathlib
-import resource
 import subprocess
 import sys
 
 import gdstk
 import klayout.db as db
+
+from cpu_time import children
 
 HIERARCHIES = ("flat", "folded", "sref")
 ENCODINGS = ("compact", "plain", "smallest")
@@ -105,10 +106,9 @@ def run(code):
 
 
 def timed(command):
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    before = children()
     done = subprocess.run(command, check=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, done.stdout.strip()
+    return children() - before, done.stdout.strip()
 
 
 def time_oasis(name, program, files, folder):

@@ -7,10 +7,11 @@ each pillar.
 
 import pathlib
 import re
-import resource
 import shutil
 import subprocess
 import sys
+
+from cpu_time import children
 
 ROOT = pathlib.Path(__file__).parent.parent
 RUNS = 3
@@ -39,11 +40,10 @@ def cpu_s(*command):
     """Least CPU time of some runs; findings are no failure here."""
     times = []
     for _ in range(RUNS):
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        before = children()
         done = subprocess.run(command, stdout=subprocess.PIPE, text=True)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
         assert done.returncode in (0, 1), command
-        times.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+        times.append(children() - before)
     return min(times)
 
 

@@ -10,9 +10,10 @@ nbformat, ipykernel.
 """
 
 import json
-import resource
 import sys
 from pathlib import Path
+
+from cpu_time import children
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "python/examples"
 NOTEBOOKS = ["lens_in_ten_lines", "foreign_layout", "calibration"]
@@ -55,19 +56,13 @@ def notebook(name: str) -> str:
     return json.dumps(made, indent=1, ensure_ascii=False) + "\n"
 
 
-def cpu_s() -> float:
-    """CPU time of all processes that were started here and have ended."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
-
-
 def run() -> None:
     import nbformat
     from nbclient import NotebookClient
 
     total = 0.0
     for name in NOTEBOOKS:
-        before = cpu_s()
+        before = children()
         content = nbformat.read(EXAMPLES / f"{name}.ipynb", as_version=4)
         # A kernel of this environment, whatever others are registered.
         client = NotebookClient(
@@ -83,7 +78,7 @@ def run() -> None:
             for output in cell.get("outputs", []):
                 if output.output_type == "stream":
                     print("   ", output.text.rstrip().replace("\n", "\n    "))
-        took = cpu_s() - before
+        took = children() - before
         total += took
         print(f"{name}: {took:.1f} CPU s")
     print(f"all: {total:.1f} CPU s")

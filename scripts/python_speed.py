@@ -8,7 +8,6 @@ smaller number counts. FOLDER, `target/python_speed` if left out, takes what the
 """
 
 import pathlib
-import resource
 import subprocess
 import sys
 import time
@@ -16,15 +15,12 @@ from collections.abc import Callable
 
 import metalith as ml
 
+from cpu_time import children
+
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 DESIGN = ROOT / "designs/prototype_3x3.toml"
 SET = ROOT / "golden/session"
 EFFECTS = ["cd_bias", "gap", "pixel_blur", "zero_order"]
-
-
-def children() -> float:
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
 
 
 def main() -> int:

@@ -336,12 +336,13 @@ impl Tally {
     /// Count an element with so many copies; `reach` is left, bottom, right, top of their places from the first.
     fn add(&mut self, element: &ElementContent, copies: u64, reach: [i64; 4]) -> Result<(), LayoutError> {
         self.cells.last_mut().expect("a cell was begun").with_properties += u64::from(element.properties > 0);
+        let refers = matches!(element.kind, ElementKind::Reference | ElementKind::Array);
         self.absolute |= element.kind == ElementKind::Path && element.width < 0;
-        self.magnified |= element.magnification != 1.0;
+        self.magnified |= refers && element.magnification != 1.0;
         if self.absolute && self.magnified {
             return Err(LayoutError::AbsoluteWidth);
         }
-        if matches!(element.kind, ElementKind::Reference | ElementKind::Array) {
+        if refers {
             let number = self.names.number(&element.name);
             let copies = element.copies().saturating_mul(copies);
             return self.reference(number, copies, element.offset);
