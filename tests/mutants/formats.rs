@@ -292,7 +292,7 @@ fn pictures(folder: &Path) -> Vec<Format> {
             Kind::Bytes,
             vec![
                 images::png(24, 16, png::ColorType::Grayscale, png::BitDepth::Sixteen),
-                images::npy(&[16, 20], images::FLOAT),
+                images::npy(&[16, 20], images::WORD),
             ],
             read_depth,
         ),
