@@ -177,6 +177,12 @@ def psf(
     wavelengths = [float(nm) for nm in np.atleast_1d(np.asarray(wavelengths_nm, dtype=float))]
     fields = [(float(x), float(y)) for x, y in field_deg]
     if isinstance(of, Array) and of.design is not None:
+        own = (distance_um, pitch_nm, shape, arriving, pillar_height_nm, pillar, substrate)
+        if own != (None, None, "square", "left", 700.0, SILICON_NITRIDE, FUSED_SILICA):
+            raise _native.MetalithError(
+                "an array of a design knows its sensor, its pillars and its light\n"
+                "  help: leave out `distance_um`, `pitch_nm`, `shape`, `arriving` and what pillars are made of, or change the design"
+            )
         chosen = list(elements) if elements is not None else None
         found = _native.psf_of_array(
             of._native, wavelengths, fields, fidelity, fast, samples, chosen, progress

@@ -155,6 +155,12 @@ impl Studio {
                 format!("give one of shape ({}, {}, 3)", view.rows, view.columns),
             ));
         }
+        if !rgb.iter().all(|v| v.is_finite() && *v >= 0.0) {
+            return Err(Error::invalid(
+                "a scene with light that is negative or no number",
+                "give finite values from zero, white being one",
+            ));
+        }
         Ok(SceneImage::of_rgb("scene", rgb, view.field_deg, view.distance_um))
     }
 

@@ -13,6 +13,7 @@ use metalith::report::sig;
 use metalith::study::plan_starts;
 use metalith::{Design, Hierarchy, PillarArray, Result, write_pillars};
 
+use super::paths::apart;
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
 /// Find the phase of every ring that makes the lens work over the whole band, and report what was gained.
@@ -77,6 +78,7 @@ pub fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     let phase = args.phase.clone().unwrap_or_else(|| folder.join("phase.csv"));
     let kept = folder.join("checkpoint.bin");
+    apart([args.design.as_path()], &[&phase, &kept])?;
     let task = OptimiseTask::of(&design)?;
     let cells = TaskCells::of(&design, !args.no_report, cache_folder().as_deref(), terminal)?;
     let _turn = terminal.turn_at(&folder)?;

@@ -8,6 +8,7 @@ use metalith::camera::Camera;
 use metalith::cell::{
     CellStack, Fidelity, FittedCell, Handedness, PointwiseCell, PublishedCell, RotatedCell, cache_folder,
 };
+use metalith::extract::ExtractedElement;
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::grating::{Mapping, NeighbourCell};
 use metalith::rcwa::{CellLattice, Material};
@@ -346,13 +347,15 @@ fn mostly_pillars(args: &PsfArgs, found: &Extraction) -> Result<()> {
     ))
 }
 
-/// One cell is solved for all elements: their pillars stand on lattices of one kind, which the cell must know.
+/// One cell is solved for all elements: their pillars stand on lattices of one kind and pitch, which the cell must know.
 fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
     let kind = PsfArgs::lattice_kind(found);
-    if let Some(other) = found.elements.iter().find(|e| e.site.lattice.kind() != kind) {
+    let first = found.elements.first().map(|e| e.site.lattice.pitch_nm());
+    let others = |e: &&ExtractedElement| e.site.lattice.kind() != kind || Some(e.site.lattice.pitch_nm()) != first;
+    if let Some(other) = found.elements.iter().find(others) {
         return Err(Error::invalid(
             format!(
-                "{}: {} stands on another kind of lattice than the elements before it",
+                "{}: {} stands on another lattice than the elements before it",
                 args.layout.display(),
                 other.site.name
             ),

@@ -173,7 +173,7 @@ fn inputs(spec: &NeighbourTableSpec, stack: &CellStack, mappings: &[Mapping]) ->
         widths_nm: Vec<&'a [u16]>,
     }
     serde_json::to_vec(&Inputs {
-        solver: kept::SOLVER,
+        solver: kept::solver_of(stack.shape),
         version: VERSION,
         terms: NEIGHBOUR_TERMS,
         coarse: COARSE,

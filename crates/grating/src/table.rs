@@ -270,7 +270,7 @@ fn inputs(spec: &GratingTableSpec, stack: &CellStack, mapping: &Mapping) -> Vec<
         widths_nm: &'a [u16],
     }
     serde_json::to_vec(&Inputs {
-        solver: kept::SOLVER,
+        solver: kept::solver_of(stack.shape),
         coarse: COARSE,
         phases: PHASES,
         spacing: SPACING,

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use super::manifest::{self, files_below};
 use super::process::Process;
+use super::zip;
 use metalith_core::{Error, PillarShape, Result};
 use metalith_design::Design;
 
@@ -91,12 +92,10 @@ pub(super) fn replaceable(folder: &Path, archive: &Path) -> Result<()> {
         false => None,
     };
     let handed_off = there.as_ref().is_some_and(|t| t.files.contains_key(manifest::NAME));
-    if !handed_off && archive.exists() {
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    if !handed_off && archive.exists() && !zip::is_packed_here(archive, &name)? {
         return Err(Error::invalid(
-            format!(
-                "{} is there, and no hand-off that it is the archive of",
-                archive.display()
-            ),
+            format!("{} is there, and is not the archive of a hand-off", archive.display()),
             hint,
         ));
     }

@@ -34,6 +34,29 @@ struct PackedFile {
     offset: u64,
 }
 
+/// Whether an archive was packed here, with files of a folder of this name: by how its first entry begins. Others date their
+/// entries.
+///
+/// # Errors
+/// If the file cannot be read.
+pub(super) fn is_packed_here(path: &Path, folder: &str) -> Result<bool> {
+    let begin = format!("{folder}/");
+    let mut head = vec![0; LOCAL + begin.len()];
+    let mut file = File::open(path).map_err(Error::io("read", path))?;
+    match file.read_exact(&mut head) {
+        Err(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => return Ok(false),
+        read => read.map_err(Error::io("read", path))?,
+    }
+    let word = |at: usize| u16::from_le_bytes([head[at], head[at + 1]]);
+    let numbers = [word(4), word(6), word(8), word(12)];
+    Ok(head.starts_with(b"PK\x03\x04")
+        && numbers == [VERSION, FLAGS, DEFLATED, DATE]
+        && head[LOCAL..] == *begin.as_bytes())
+}
+
+/// Bytes of the head of an entry before its name.
+const LOCAL: usize = 30;
+
 /// Pack files, each given as its name in the archive and where it lies, into the archive at `path`.
 ///
 /// # Errors

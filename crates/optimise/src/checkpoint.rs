@@ -165,7 +165,16 @@ impl Checkpoint {
 
 /// Of all that decides an optimisation.
 fn digest(design: &Design) -> String {
-    let decisive = (&design.cell, &design.lens, &design.mapping, &design.optimise);
+    // What tables of materials say, as far as they can be read: the work itself says where not.
+    let (stack, band_um) = (design.cell_stack().ok(), design.band_um().ok());
+    let decisive = (
+        &design.cell,
+        &design.lens,
+        &design.mapping,
+        &design.optimise,
+        stack,
+        band_um,
+    );
     let bytes = serde_json::to_vec(&decisive).expect("plain data serialises");
     hex(&Sha256::digest(&bytes))
 }

@@ -49,7 +49,7 @@ pub use single_white::{SingleWhite, single_white};
 pub use white::{CameraStatement, Contrast, WhiteChannel};
 pub use widths::WidthCheck;
 
-/// Most elements that are simulated because their pillars are not as intended.
+/// Most elements that are simulated because their pillars are not as intended, where none may be so.
 const MOST_FAULTY: usize = 4;
 
 /// What the file is, in number.
@@ -401,12 +401,17 @@ fn compare<W>(
     array.placed.iter().zip(&extraction.elements).map(&mut check).collect()
 }
 
-/// Which elements are simulated, and for how many each stands: one of each kind, and the first of those
-/// that are not as intended; each by itself where light depends on `place`. Elements of other focal lengths are of other kinds.
+/// Which elements are simulated, and for how many each stands: one of each kind, and of those that are not as intended the
+/// first, or all where some may be so; each by itself where light depends on `place`. Elements of other focal lengths are of other kinds.
 fn distinct(design: &Design, elements: &[ElementCheck], place: bool) -> Vec<(usize, usize)> {
     let mut chosen: Vec<(usize, usize)> = Vec::new();
     // Class and focal length of each that was chosen; none of those that are not as intended.
     let mut kinds: Vec<Option<(usize, f64)>> = Vec::new();
+    let most_faulty = match design.verify.limits.wrong_widths_max {
+        0 => MOST_FAULTY,
+        // They may pass: all limits are held to each of them.
+        _ => usize::MAX,
+    };
     let mut faulty = 0;
     for (k, check) in elements.iter().enumerate() {
         let focal_length_um = design.lens_of(&check.element).focal_length_um;
@@ -421,7 +426,7 @@ fn distinct(design: &Design, elements: &[ElementCheck], place: bool) -> Vec<(usi
         if kind.is_none() {
             faulty += 1;
         }
-        if kind.is_some() || faulty <= MOST_FAULTY {
+        if kind.is_some() || faulty <= most_faulty {
             chosen.push((k, 1));
             kinds.push(kind);
         }

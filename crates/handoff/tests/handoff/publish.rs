@@ -81,6 +81,12 @@ fn an_archive_of_others_stays() {
         assert!(error.contains("kit.zip"), "{error}");
         assert_eq!(fs::read_to_string(&archive).unwrap(), "theses");
     }
+    // That of a hand-off whose folder was removed is its own.
+    fs::remove_file(&archive).unwrap();
+    handoff(&options(&out), &Silent).unwrap();
+    fs::remove_dir_all(&out).unwrap();
+    handoff(&options(&out), &Silent).unwrap();
+    assert_whole(&out);
 }
 
 /// Four at once: those that do not win are told why, and what stands is whole.
