@@ -7,7 +7,7 @@ use metalith::cell::cache_folder;
 use metalith::drc::{self, CheckInput, Date, Deck, Waivers};
 use metalith::extract::GdsPillars;
 use metalith::gds::ReadLimits;
-use metalith::{Accuracy, CalibratedModel, Layout, MadeChip, PillarArray, PillarShape, SimulationCases, cell_models};
+use metalith::{Accuracy, CalibratedModel, Layout, MadeChip, PillarArray, SimulationCases, cell_models};
 use pyo3::prelude::*;
 
 use crate::arrays::Design;
@@ -33,8 +33,9 @@ pub fn check(
 ) -> PyResult<(String, bool)> {
     let design = design.map(|d| &d.design);
     work(py, progress, |p| {
-        let of_design = || Ok(Deck::for_shape(design.map_or(PillarShape::Square, |d| d.cell.shape)));
-        let deck = rules.as_deref().map_or_else(of_design, Deck::read)?;
+        let deck = rules
+            .as_deref()
+            .map_or_else(|| Ok(Deck::for_design(design)), Deck::read)?;
         let waivers = waivers.as_deref().map(Waivers::read).transpose()?;
         let open = |path: &PathBuf| Layout::open_with(path, ReadLimits::default(), p);
         let file = open(&layout)?;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use metalith::drc::{self, CheckInput, Date, Deck, DrcReport, Waivers};
 use metalith::gds::ReadLimits;
-use metalith::{Error, Layout, PillarShape, Result, WholeFile};
+use metalith::{Error, Layout, Result, WholeFile};
 
 use super::compensated::CompensatedFor;
 use super::output::is_standard_output;
@@ -100,7 +100,7 @@ pub fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
     let named = args.rules.as_deref().map(Deck::read).transpose()?;
     let waivers = args.waivers.as_deref().map(Waivers::read).transpose()?;
     let mut design = args.design.as_deref().map(standard_input::design_any).transpose()?;
-    let deck = named.unwrap_or_else(|| Deck::for_shape(design.as_ref().map_or(PillarShape::Square, |d| d.cell.shape)));
+    let deck = named.unwrap_or_else(|| Deck::for_design(design.as_ref()));
     terminal.stop_on_interrupt();
     let file = InputFile::of(&args.layout)?;
     let open = |path: &Path| Layout::open_with(path, ReadLimits::default(), terminal);

@@ -1,6 +1,7 @@
 //! The program as a person or a build server calls it.
 
 mod broken_designs;
+mod calibrate;
 mod cells;
 mod check;
 mod compare;

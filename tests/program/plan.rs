@@ -30,31 +30,3 @@ fn faults_of_the_bench_are_named_and_frames_are_not_overwritten() {
         .code(2)
         .stderr(predicates::str::contains("there are frames in"));
 }
-
-#[test]
-fn sets_whose_answers_would_be_in_one_folder_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    for day in ["monday/lens", "tuesday/lens"] {
-        std::fs::create_dir_all(folder.path().join(day)).unwrap();
-    }
-    let calibrate = |more: &[&str]| {
-        let mut command = Command::cargo_bin("metalith").unwrap();
-        command.args([
-            "calibrate",
-            &path("monday/lens"),
-            &path("tuesday/lens"),
-            "--out",
-            &path("out"),
-        ]);
-        command.args(more).assert().code(2)
-    };
-    calibrate(&[]).stderr(predicates::str::contains("would be answered in"));
-    std::fs::rename(folder.path().join("tuesday/lens"), folder.path().join("tuesday/other")).unwrap();
-    let mut command = Command::cargo_bin("metalith").unwrap();
-    command.args(["calibrate", "--validate", &path("monday/lens"), &path("tuesday/other")]);
-    command
-        .assert()
-        .code(2)
-        .stderr(predicates::str::contains("one at a time"));
-}

@@ -10,6 +10,7 @@ use super::{aperture, budget, density, design, field, lattice, layers, marks, ou
 use metalith_core::document::{Document, Limits, Section, load};
 use metalith_core::text::quoted;
 use metalith_core::{PillarShape, Result};
+use metalith_design::Design;
 use metalith_gds::LayerNumber;
 
 /// The decks that ship with the program, by the names of their files; the first is the standard one.
@@ -106,6 +107,11 @@ impl Deck {
             PillarShape::Rectangle(_) => "rectangles.toml",
         };
         Self::shipped(Path::new(name)).expect("it is in the list")
+    }
+
+    /// The same for a design; that of squares where there is none.
+    pub fn for_design(design: Option<&Design>) -> Self {
+        Self::for_shape(design.map_or(PillarShape::Square, |d| d.cell.shape))
     }
 
     /// The deck of the program whose file has the name at the end of `path`, if there is one.

@@ -167,14 +167,16 @@ pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn
         .filter(|((r, _), _)| r.beside.is_empty())
         .map(|((r, margin), reachable)| (r.clone(), margin, *reachable))
         .collect();
+    let effects = judgement::effects(&simulator, &surrogate, &shown, &detections, progress)?;
+    let confusions = judgement::confusions(&simulator, &shown, &choice, &picked, &reachable);
     files::write_set(request.folder, design, bench, &shown, &request.layout_in_set)?;
     let plan = CapturePlan {
         folder: request.folder.to_owned(),
         page: request.folder.join("plan.html"),
         candidates: candidates.captures.len(),
         captures: shown.captures.iter().map(|c| planned(c, &shown, bench)).collect(),
-        effects: judgement::effects(&simulator, &surrogate, &shown, &detections, progress)?,
-        confusions: judgement::confusions(&simulator, &shown, &choice, &picked, &reachable),
+        effects,
+        confusions,
         written: begun::digests(request.folder)?,
     };
     page::write_page(&plan, &shown, candidates.unseen)?;

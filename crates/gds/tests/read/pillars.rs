@@ -1,0 +1,235 @@
+//! What is taken for a pillar, and where the elements are.
+
+use metalith_core::{Lattice, LatticeKind, PillarShape, Rectangles, Silent, WidthMap};
+use metalith_gds::Layout;
+use metalith_gds::extract::{ElementSite, ExtractionPlan, Why, extract};
+use metalith_testing::gds::Gds;
+
+use crate::{PILLARS, foreign_files, layout};
+
+/// The lens of `scripts/make_foreign_layouts.py`.
+fn foreign_lens() -> (ElementSite, WidthMap) {
+    let lattice = Lattice::new(350, 24).unwrap();
+    let mut widths = WidthMap::empty(lattice);
+    for ((iy, ix), w) in widths.width_nm.indexed_iter_mut() {
+        let h2 = lattice.half_radius2(ix, iy);
+        if h2 <= 24 * 24 {
+            *w = (100 + 2 * (7 * h2 % 101)) as u16;
+        }
+    }
+    let site = ElementSite {
+        name: "lens".into(),
+        centre_nm: [5000, -3000],
+        lattice,
+    };
+    (site, widths)
+}
+
+/// gdstk and KLayout, flat, referenced, mirrored, magnified, in arrays, as paths, in other units: one lens.
+#[test]
+fn files_of_other_tools_hold_the_same_lens() {
+    let (site, widths) = foreign_lens();
+    for path in foreign_files() {
+        let layout = Layout::open(&path).unwrap();
+        for plan in [
+            ExtractionPlan::given(PILLARS, vec![site.clone()]),
+            ExtractionPlan::discover(PILLARS),
+        ] {
+            let read = extract(&layout, &plan, &Silent).unwrap();
+            let name = path.display();
+            assert_eq!(read.oddities.total(), 0, "{name}: {:?}", read.oddities);
+            assert_eq!(read.elements.len(), 1, "{name}");
+            assert_eq!(read.elements[0].site.centre_nm, site.centre_nm, "{name}");
+            assert_eq!(read.elements[0].widths, widths, "{name}");
+            assert_eq!((read.pillars, read.top.as_str()), (widths.pillars(), "TOP"), "{name}");
+            let layers: Vec<_> = read
+                .survey
+                .layers
+                .iter()
+                .map(|l| (l.layer.layer, l.shapes, l.texts))
+                .collect();
+            assert_eq!(layers, [(1, widths.pillars(), 0), (2, 1, 0), (10, 0, 1)], "{name}");
+            assert_eq!(read.survey.texts[0].at_nm, [5000.0, -3000.0], "{name}");
+            assert_eq!(
+                read.survey.layers[1].bounds_nm,
+                Some([0.0, -8000.0, 10_000.0, 2000.0]),
+                "{name}"
+            );
+        }
+    }
+}
+
+/// Corners about a place as a polygon, closed.
+fn polygon_about(x: i32, y: i32, corners: &[(i64, i64)]) -> Vec<(i32, i32)> {
+    let closed = corners.iter().chain(corners.first());
+    closed.map(|&(dx, dy)| (x + dx as i32, y + dy as i32)).collect()
+}
+
+/// The polygon of a circle about a place, closed.
+fn circle_of_points(x: i32, y: i32, diameter: u32) -> Vec<(i32, i32)> {
+    polygon_about(x, y, &metalith_core::circle_corners(diameter, 0.5))
+}
+
+/// Circles of two diameters on a lattice, and one square among them.
+#[test]
+fn circles_are_pillars_where_most_are() {
+    let mut gds = Gds::library();
+    gds.cell("TOP");
+    for k in 0..36 {
+        let (x, y) = (175 + 350 * (k % 6) - 1050, 175 + 350 * (k / 6) - 1050);
+        if k == 7 {
+            gds.square(1, x, y, 200);
+        } else {
+            gds.polygon(1, &circle_of_points(x, y, if k % 2 == 0 { 200 } else { 120 }));
+        }
+    }
+    gds.end_cell();
+    let file = layout(gds.end());
+    let read = extract(&file, &ExtractionPlan::discover(PILLARS), &Silent).unwrap();
+    assert_eq!(read.shape, PillarShape::Circle);
+    assert_eq!((read.elements.len(), read.pillars), (1, 35));
+    let widths = &read.elements[0].widths.width_nm;
+    assert_eq!((widths[[0, 0]], widths[[0, 1]], widths[[1, 1]]), (200, 120, 0));
+    assert_eq!(read.oddities.listed[0].why, Why::OtherShape);
+    // Taken for squares, they are none.
+    let squares = ExtractionPlan::discover(PILLARS).of_shape(PillarShape::Square);
+    let read = extract(&file, &squares, &Silent).unwrap();
+    assert_eq!((read.pillars, read.oddities.total()), (1, 35));
+}
+
+/// Rectangles in a cell that is drawn twice as large as it is placed.
+#[test]
+fn rectangles_of_a_magnified_cell_are_found_as_large_as_they_are() {
+    let drawn = Rectangles {
+        width_nm: 180,
+        length_nm: 480,
+        steps: 180,
+    };
+    let mut gds = Gds::library();
+    gds.cell("TOP").placed("LENS", 0, 0, false, 0.5, 0.0).end_cell();
+    gds.cell("LENS");
+    for k in 0..36 {
+        let (x, y) = (2 * (175 + 350 * (k % 6) - 1050), 2 * (175 + 350 * (k / 6) - 1050));
+        gds.polygon(1, &polygon_about(x, y, &drawn.corners(1 + 5 * k as u16)));
+    }
+    gds.end_cell();
+    let read = extract(&layout(gds.end()), &ExtractionPlan::discover(PILLARS), &Silent).unwrap();
+    let PillarShape::Rectangle(found) = read.shape else {
+        panic!("{:?}", read.shape)
+    };
+    assert_eq!((found.width_nm, found.length_nm), (90, 240));
+    assert_eq!((read.elements.len(), read.pillars), (1, 36));
+}
+
+/// One of each oddity, and each for the right reason, at the right place.
+#[test]
+fn everything_that_is_not_a_pillar_is_listed() {
+    let mut gds = Gds::library();
+    gds.cell("TOP");
+    gds.square(1, 175, 175, 100).square(1, 175, 175, 120); // doubled
+    gds.square(1, 526, 175, 100); // off lattice
+    gds.rect(1, -225, 125, -125, 227); // not square
+    gds.polygon(1, &[(0, 600), (100, 600), (50, 700), (0, 600)]); // odd
+    gds.square(1, 9000, 0, 100); // outside
+    gds.square(1, -175, -175, 360); // too wide
+    let circle = circle_of_points(-525, 175, 100);
+    gds.polygon(1, &circle); // a circle among squares
+    gds.square(2, 0, 0, 100); // on another layer
+    // A square with two vertices more than it needs is one.
+    gds.polygon(
+        1,
+        &[
+            (-225, 475),
+            (-175, 475),
+            (-125, 475),
+            (-125, 575),
+            (-200, 575),
+            (-225, 575),
+            (-225, 475),
+        ],
+    );
+    gds.end_cell();
+    let site = ElementSite {
+        name: "e".into(),
+        centre_nm: [0, 0],
+        lattice: Lattice::new(350, 4).unwrap(),
+    };
+    let read = extract(&layout(gds.end()), &ExtractionPlan::given(PILLARS, vec![site]), &Silent).unwrap();
+    assert_eq!(read.oddities.by_why, [1; 7]);
+    let whys: Vec<_> = read.oddities.listed.iter().map(|o| o.why).collect();
+    assert_eq!(
+        whys,
+        [
+            Why::DuplicateSite,
+            Why::OffLattice,
+            Why::NotSquare,
+            Why::OddShape,
+            Why::OutsideElements,
+            Why::TooWide,
+            Why::OtherShape
+        ]
+    );
+    assert_eq!(read.oddities.listed[1].centre_nm, [526.0, 175.0]);
+    assert_eq!(read.oddities.listed[2].size_nm, [100.0, 102.0]);
+    assert_eq!(read.pillars, 2);
+    assert_eq!(read.elements[0].widths.width_nm[[2, 2]], 100);
+    assert_eq!(read.elements[0].widths.width_nm[[3, 1]], 100);
+}
+
+/// A hexagonal lattice as people draw one: an array of every other row, then an array of the rows between. The same rows without
+/// those between are no hexagonal lattice, and as many shapes are found as are drawn.
+#[test]
+fn two_arrays_are_one_hexagonal_lattice() {
+    let rows = |between: bool| {
+        let mut gds = Gds::library();
+        gds.cell("P").square(1, 0, 0, 300).end_cell();
+        let place = |gds: &mut Gds, x: i32, y: i32, columns: i16, rows: i16| {
+            let ends = [x + 700 * i32::from(columns), y, x, y + 1212 * i32::from(rows)];
+            gds.array("P", columns, rows, [x, y, ends[0], ends[1], ends[2], ends[3]]);
+        };
+        gds.cell("TOP");
+        place(&mut gds, -28_000, -29_088, 81, 49);
+        if between {
+            place(&mut gds, -28_350, -28_482, 82, 48);
+        }
+        gds.end_cell();
+        extract(&layout(gds.end()), &ExtractionPlan::discover(PILLARS), &Silent)
+    };
+    let found = rows(true).unwrap();
+    let [element] = &found.elements[..] else {
+        panic!("{} elements", found.elements.len())
+    };
+    assert_eq!(element.site.lattice.kind(), LatticeKind::Hexagonal);
+    assert_eq!((element.site.lattice.pitch_nm(), element.site.centre_nm), (700, [0, 0]));
+    assert_eq!(element.widths.pillars(), 81 * 49 + 82 * 48);
+    if let Ok(other) = rows(false) {
+        assert!(other.elements.iter().all(|e| e.site.lattice.is_square()));
+    }
+}
+
+/// Several lenses, found without being told, one of them a mirrored and magnified copy.
+#[test]
+fn elements_are_discovered() {
+    let read = extract(
+        &layout(metalith_testing::gds::everything()),
+        &ExtractionPlan::discover(PILLARS),
+        &Silent,
+    )
+    .unwrap();
+    let found: Vec<_> = read
+        .elements
+        .iter()
+        .map(|e| (e.site.centre_nm, e.site.lattice.pitch_nm(), e.widths.pillars()))
+        .collect();
+    assert_eq!(
+        found,
+        [
+            ([196_500, -3500], 700, 100),
+            ([1750, 1750], 350, 100),
+            // Five columns, four rows: the lattice is square, its row to spare on top.
+            ([100_700, 100_700], 350, 20),
+            ([1750, 301_750], 350, 100),
+            ([71_750, 301_750], 350, 100),
+        ]
+    );
+}

@@ -1,0 +1,20 @@
+//! `metalith calibrate`: what is refused before anything is read.
+
+use assert_cmd::Command;
+
+#[test]
+fn sets_whose_answers_would_be_in_one_folder_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let refused = |arguments: &[&str], why: &'static str| {
+        let mut command = Command::cargo_bin("metalith").unwrap();
+        let told = command.arg("calibrate").args(arguments).assert().code(2);
+        told.stderr(predicates::str::contains(why));
+    };
+    for set in ["monday/lens", "tuesday/lens", "tuesday/other"] {
+        std::fs::create_dir_all(folder.path().join(set)).unwrap();
+    }
+    let [monday, tuesday, other] = ["monday/lens", "tuesday/lens", "tuesday/other"].map(path);
+    refused(&[&monday, &tuesday, "--out", &path("out")], "would be answered in");
+    refused(&["--validate", &monday, &other], "one at a time");
+}
