@@ -22,6 +22,7 @@ mod bench;
 mod cells;
 mod diagnosis;
 mod effects;
+mod extent;
 mod fidelity;
 mod fit;
 mod forward_model;

@@ -15,6 +15,9 @@ use metalith_made::CalibratedModel;
 /// The file of the calibrated model, in the folder of the answers.
 const MODEL: &str = "model.toml";
 
+/// The file of effects that are proposed, there.
+const PROPOSAL: &str = "proposal.toml";
+
 /// The files of a calibration.
 #[derive(Clone, Debug)]
 pub struct Calibration {
@@ -77,16 +80,17 @@ fn finish(
     let _turn = FolderTurn::wait(out, progress, || {
         progress.note("waiting for another run in this folder")
     })?;
-    // This run may find none, and the model of another must not stand beside its answer.
+    // This run may find none, and those of another must not stand beside its answer.
     WholeFile::discard(&out.join(MODEL))?;
+    let file = out.join(PROPOSAL);
+    WholeFile::discard(&file)?;
     let proposed = match &evidence {
-        Some(evidence) if diagnosis.verdict.leaves_a_residual() => propose(session, evidence),
+        Some(evidence) if diagnosis.verdict.leaves_a_residual() => propose(session, evidence, progress)?,
         _ => Vec::new(),
     };
     if proposed.is_empty() {
         return write(session, simulations, diagnosis, evidence, out);
     }
-    let file = out.join("proposal.toml");
     let reasons: Vec<String> = proposed
         .iter()
         .map(|p| format!("`{}`: {}", p.effect.name, p.reason))

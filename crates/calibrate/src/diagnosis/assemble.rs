@@ -9,7 +9,7 @@ use super::pattern::{untold_colours, untold_tilt};
 use super::{CaptureError, Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePattern, LeftOut, Ranked, SetVerdict};
 use crate::effects::Effect;
 use crate::fidelity::Rung;
-use crate::fit::{Fit, HeldOutErrors, WidthParts, mean_error};
+use crate::fit::{Fit, HeldOutErrors, WidthParts, error_of_capture, mean_error};
 use crate::search::{Evidence, Finding, RESIDUAL, Rejection, TriedEffect, UnusableCapture};
 use crate::set::MeasuredSet;
 use crate::simulator::Simulator;
@@ -62,8 +62,8 @@ impl Diagnosis {
         let ranked = |tried: &Vec<TriedEffect>| tried.iter().map(|t| Ranked::new(simulator, finding, t)).collect();
         let captures = set.captures.iter_enumerated().map(|(c, capture)| CaptureError {
             capture: capture.name.clone(),
-            before: finding.held_before[c],
-            after: finding.held_after[c],
+            before: error_of_capture(&finding.held_before[c]),
+            after: error_of_capture(&finding.held_after[c]),
         });
         Self {
             set: set.title.clone(),

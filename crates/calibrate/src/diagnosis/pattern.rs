@@ -113,7 +113,7 @@ impl FreePattern {
 
     fn course_from(&self, course: &Course, by: Grouping, gradient: Option<&str>) -> PatternCourse {
         let (of, per, factor) = course_of(by);
-        let slopes = course.directions.iter().zip(&course.slopes);
+        let slopes = course.extent.directions.iter().zip(&course.slopes);
         let slopes = slopes.map(|(along, (value, sigma))| Slope {
             along: *along,
             value: factor * value,
@@ -123,7 +123,7 @@ impl FreePattern {
         PatternCourse {
             of: of.into(),
             is_linear: course.is_linear,
-            middle: course.middle,
+            middle: course.extent.middle,
             at_middle: [course.at_middle.0, course.at_middle.1],
             slopes: slopes.collect(),
             off: course.off,

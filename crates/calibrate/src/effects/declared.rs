@@ -226,6 +226,13 @@ fn parameter(s: &Section<'_, '_>, name: String) -> DeclaredParameter {
             "give the lower end first, and a start between the ends",
         );
     }
+    if prior > high - low {
+        s.fault(
+            "prior",
+            format!("a typical value of {prior} in a range from {low} to {high}"),
+            "make the range wider, or the prior smaller",
+        );
+    }
     DeclaredParameter {
         name,
         range: (low, high),
@@ -340,10 +347,16 @@ start = 5.0
     fn faults_have_a_line_and_a_column() {
         let text = SOUND
             .replace("y^2) / R^2", "q^2) / R^2")
-            .replace("stage = \"kernel\"", "stage = \"width\"");
+            .replace("stage = \"kernel\"", "stage = \"width\"")
+            .replace("prior = 0.05", "prior = 1.5");
         let error = read(&text).unwrap_err().to_string();
         // The eighth line, where `q` stands within the text.
-        for part in [":8:22", "`q` is not known", "does not act at the stage `width`"] {
+        for part in [
+            ":8:22",
+            "`q` is not known",
+            "does not act at the stage `width`",
+            "a typical value of 1.5 in a range from -0.5 to 0.5",
+        ] {
             assert!(error.contains(part), "{part} is not in:\n{error}");
         }
     }

@@ -1,7 +1,7 @@
 //! Known errors of chips and benches, one file each.
 //!
 //! An effect has a name, a unit, a range that physics allows, and sets one or two numbers of a
-//! [`Perturbation`]. Adding one touches its file and [`all`].
+//! [`Perturbation`]. Adding one touches its file and the list in this one.
 
 mod aberration;
 mod aperture_offset;

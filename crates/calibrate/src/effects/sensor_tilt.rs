@@ -1,6 +1,7 @@
 //! The sensor is tilted against the chip: elements stand at unlike distances from it.
 
 use super::{Effect, Parameter, Stage, ValueError};
+use crate::extent::Extent;
 use crate::set::MeasuredSet;
 use metalith_made::Perturbation;
 
@@ -8,35 +9,28 @@ use metalith_made::Perturbation;
 const TYPICAL_UM: f64 = 2.0;
 const MOST_UM: f64 = 60.0;
 
-/// The tilt along x and y, about the middle of all elements. Captures of elements side by side tell nothing of a tilt
-/// about the line that they are on: such an axis is left out.
+/// The tilt along x and y, about the middle of all elements, or along the one line that they are in: captures of elements side by
+/// side tell nothing of a tilt about this line.
 pub struct SensorTilt {
-    pivot_um: [f64; 2],
-    /// Axis and distance of the outermost element from the pivot along it (um).
-    axes: Vec<(usize, f64)>,
+    extent: Extent,
 }
 
 impl SensorTilt {
     /// For the elements of a set; none if all of them are in one place.
     pub fn of(set: &MeasuredSet) -> Option<Self> {
-        let ends = [0, 1].map(|axis| {
-            let along = set.elements.iter().map(|e| e.centre_um[axis]);
-            along.fold((f64::MAX, f64::MIN), |(a, b), c| (a.min(c), b.max(c)))
-        });
-        let half = ends.map(|(a, b)| 0.5 * (b - a));
-        let axes: Vec<_> = half.into_iter().enumerate().filter(|(_, h)| *h > 0.0).collect();
-        (!axes.is_empty()).then_some(Self {
-            pivot_um: ends.map(|(a, b)| 0.5 * (a + b)),
-            axes,
+        let at: Vec<[f64; 2]> = set.elements.iter().map(|e| e.centre_um).collect();
+        Some(Self {
+            extent: Extent::of(&at)?,
         })
     }
 }
 
 impl Effect for SensorTilt {
     fn name(&self) -> String {
-        match self.axes.as_slice() {
-            [(0, _)] => "sensor_tilt_x".into(),
-            [(1, _)] => "sensor_tilt_y".into(),
+        match self.extent.directions.as_slice() {
+            [[1.0, 0.0]] => "sensor_tilt_x".into(),
+            [[0.0, 1.0]] => "sensor_tilt_y".into(),
+            [_] => "sensor_tilt_along".into(),
             _ => "sensor_tilt".into(),
         }
     }
@@ -51,10 +45,8 @@ impl Effect for SensorTilt {
 
     fn parameters(&self) -> Vec<Parameter> {
         let mrad = |um: f64, half: f64| 1e3 * um / half;
-        let of = |(_, half): &(usize, f64)| {
-            Parameter::new(-mrad(MOST_UM, *half), mrad(MOST_UM, *half), mrad(TYPICAL_UM, *half))
-        };
-        self.axes.iter().map(of).collect()
+        let of = |half: &f64| Parameter::new(-mrad(MOST_UM, *half), mrad(MOST_UM, *half), mrad(TYPICAL_UM, *half));
+        self.extent.half_spans.iter().map(of).collect()
     }
 
     fn gradient_of(&self) -> Option<&'static str> {
@@ -66,13 +58,44 @@ impl Effect for SensorTilt {
     }
 
     fn apply(&self, parameters: &[f64], to: &mut Perturbation) {
-        for ((axis, _), mrad) in self.axes.iter().zip(parameters) {
-            to.path.sensor_tilt_mrad[*axis] = *mrad;
-            to.path.sensor_pivot_um = self.pivot_um;
+        to.path.sensor_pivot_um = self.extent.middle;
+        for (direction, mrad) in self.extent.directions.iter().zip(parameters) {
+            for (tilt, part) in to.path.sensor_tilt_mrad.iter_mut().zip(direction) {
+                *tilt += part * mrad;
+            }
         }
     }
 
     fn confusions(&self) -> &'static [(&'static str, &'static str)] {
         &[("gap", "captures of elements farther apart")]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Elements on a diagonal tell of the tilt along it: one number, by which each stands as far from the sensor as it should. A
+    /// millionth of a micrometre beside the line is no second direction.
+    #[test]
+    fn elements_on_an_oblique_line_have_one_tilt() {
+        /// Relative: rounding, and the place beside the line.
+        const ROUNDING: f64 = 1e-6;
+        let at = [[-150.0, -150.0], [1e-6, 0.0], [150.0, 150.0]];
+        let tilt = SensorTilt {
+            extent: Extent::of(&at).unwrap(),
+        };
+        assert_eq!(
+            (tilt.name().as_str(), tilt.parameters().len()),
+            ("sensor_tilt_along", 1)
+        );
+        let typical = tilt.parameters()[0].typical;
+        let mut made = Perturbation::default();
+        tilt.apply(&[typical], &mut made);
+        let lean = |centre: [f64; 2]| -> f64 {
+            let along = |axis: usize| 1e-3 * made.path.sensor_tilt_mrad[axis] * centre[axis];
+            along(0) + along(1)
+        };
+        assert!((lean(at[2]) / TYPICAL_UM - 1.0).abs() < ROUNDING, "{}", lean(at[2]));
     }
 }

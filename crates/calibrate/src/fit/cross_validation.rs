@@ -30,9 +30,9 @@ pub const SIGMAS_95: f64 = 2.0;
 /// Seed of all draws: every run gives the same answer.
 pub const SEED: u64 = 0x6d65_7461;
 
-/// Reduced chi-square per pixel of each capture when it was left out; none for captures that do not count, or
-/// that nothing could be learned about.
-pub type HeldOutErrors = PerCapture<Option<f64>>;
+/// Reduced chi-square per pixel of each capture when it was left out with its colour, its element and its distance; none for
+/// captures that do not count, and where nothing could be learned from the others.
+pub type HeldOutErrors = PerCapture<[Option<f64>; 3]>;
 
 /// How much lower one error is than another.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,9 +58,9 @@ fn partitions(data: &Data) -> [PerCapture<usize>; 3] {
 
 /// The error on captures left out, of a fit or of anything that has normal equations about it.
 pub fn held_out(problem: &FitProblem<'_>, equations: &NormalEquations, fit: &Fit) -> HeldOutErrors {
-    let mut sums: PerCapture<(f64, u32)> = vec![(0.0, 0); problem.used.len()].into();
+    let mut errors: HeldOutErrors = vec![[None; 3]; problem.used.len()].into();
     let whole = problem.total(equations, &fit.nuisances);
-    for partition in partitions(problem.data) {
+    for (way, partition) in partitions(problem.data).into_iter().enumerate() {
         let groups = partition.iter().max().map_or(0, |m| m + 1);
         if groups < 2 {
             continue;
@@ -73,14 +73,21 @@ pub fn held_out(problem: &FitProblem<'_>, equations: &NormalEquations, fit: &Fit
             };
             for &c in &left {
                 let chi2 = (&equations.captures[c] * &at).dot(&at);
-                sums[c].0 += chi2 / problem.data.pixels(c).max(1) as f64;
-                sums[c].1 += 1;
+                errors[c][way] = Some(chi2 / problem.data.pixels(c).max(1) as f64);
             }
         }
     }
-    sums.into_iter()
-        .map(|(sum, n)| (n > 0).then(|| sum / f64::from(n)))
-        .collect()
+    errors
+}
+
+/// The mean of what is known of one capture.
+pub fn error_of_capture(errors: &[Option<f64>; 3]) -> Option<f64> {
+    mean(errors.iter().flatten().copied())
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, n) = values.fold((0.0, 0), |(sum, n), v| (sum + v, n + 1));
+    (n > 0).then(|| sum / f64::from(n))
 }
 
 /// The coefficients of all columns that predict the captures in `left` from all others; one for the residual.
@@ -172,17 +179,16 @@ fn trained(problem: &FitProblem<'_>, fit: &Fit, train: &DMatrix<f64>) -> Vec<(us
 
 /// Mean over captures.
 pub fn mean_error(errors: &HeldOutErrors) -> f64 {
-    let known: Vec<f64> = errors.iter().flatten().copied().collect();
-    known.iter().sum::<f64>() / known.len().max(1) as f64
+    mean(errors.iter().filter_map(error_of_capture)).unwrap_or(0.0)
 }
 
-/// How much lower the error `after` is than that `before`, with a 95 % interval by a bootstrap over captures
+/// How much lower the error `after` is than that `before`, of what both predict, with a 95 % interval by a bootstrap over captures
 /// that share element, direction and colour: pixels are not independent, nor are distances of one beam.
 pub fn gain(problem: &FitProblem<'_>, before: &HeldOutErrors, after: &HeldOutErrors) -> Gain {
     let differences: Vec<(f64, f64)> = beam_groups(problem)
         .iter()
         .map(|g| {
-            let own: Vec<f64> = g.iter().filter_map(|&c| Some(before[c]? - after[c]?)).collect();
+            let own: Vec<f64> = g.iter().filter_map(|&c| difference(&before[c], &after[c])).collect();
             (own.iter().sum(), own.len() as f64)
         })
         .filter(|(_, n): &(f64, f64)| *n > 0.0)
@@ -206,6 +212,11 @@ pub fn gain(problem: &FitProblem<'_>, before: &HeldOutErrors, after: &HeldOutErr
         value,
         interval: ends_95(&mut draws),
     }
+}
+
+/// How much lower an error of one capture is in those ways of leaving it out that both fits know.
+fn difference(before: &[Option<f64>; 3], after: &[Option<f64>; 3]) -> Option<f64> {
+    mean(before.iter().zip(after).filter_map(|(b, a)| Some((*b)? - (*a)?)))
 }
 
 /// The captures of each element, direction and colour that count.
@@ -310,7 +321,7 @@ mod tests {
         assert!((fit.theta[0] / (0.5 * (a + b)) - 1.0).abs() < TOLERANCE);
         let expected = (a - b).powi(2) * information(PERIODS) / (PIXELS * PIXELS) as f64;
         for error in held_out(&problem, &fit.equations, &fit) {
-            let error = error.unwrap();
+            let error = error_of_capture(&error).unwrap();
             assert!((error / expected - 1.0).abs() < TOLERANCE, "{error} {expected}");
         }
     }
@@ -364,8 +375,9 @@ mod tests {
         let model = model(2, 1);
         let data = model.data(|_| vec![0.0], None);
         let problem = model.problem(&data);
-        let before: HeldOutErrors = vec![Some(3.0), Some(5.0)].into();
-        let after: HeldOutErrors = vec![Some(2.0), Some(1.0)].into();
+        // What only one of them predicts is not compared.
+        let before: HeldOutErrors = vec![[Some(9.0), Some(3.0), None], [None, Some(5.0), None]].into();
+        let after: HeldOutErrors = vec![[None, Some(2.0), Some(0.0)], [None, Some(1.0), None]].into();
         // Differences 1 and 4: of two draws, both are the first in a quarter of the cases.
         let gain = gain(&problem, &before, &after);
         assert_eq!(

@@ -16,7 +16,8 @@ mod registration;
 mod widths;
 
 pub use cross_validation::{
-    Gain, HeldOutErrors, SIGMAS_95, beam_groups, cautious_half_widths, gain, half_widths, held_out, mean_error,
+    Gain, HeldOutErrors, SIGMAS_95, beam_groups, cautious_half_widths, error_of_capture, gain, half_widths, held_out,
+    mean_error,
 };
 pub use data::{CaptureSetup, Data};
 #[cfg(test)]

@@ -15,10 +15,21 @@ pub struct Quadrature {
 /// Half range in standard deviations, with margin for an LED that is shifted or wider than stated.
 const REACH_SIGMAS: f64 = 3.6;
 
+/// And for one so narrow that a shift of some nanometres is much of its width: a range in standard deviations, and in nanometres
+/// beyond it.
+const REACH_OF_NARROW: (f64, f64) = (2.8, 6.0);
+
+/// At most so many standard deviations, whatever the line: work goes with their number.
+const MOST_SIGMAS: f64 = 5.2;
+
 impl Quadrature {
     /// Wavelengths not more than `step_nm` apart, within `range_nm`.
     pub fn new(led: Led, step_nm: f64, range_nm: (f64, f64)) -> Self {
-        let reach = REACH_SIGMAS * led.sigma_nm();
+        let (sigmas, beyond_nm) = REACH_OF_NARROW;
+        let sigma_nm = led.sigma_nm();
+        let reach = (REACH_SIGMAS * sigma_nm)
+            .max(sigmas * sigma_nm + beyond_nm)
+            .min(MOST_SIGMAS * sigma_nm);
         let half = (reach / step_nm).ceil();
         let step = reach / half;
         let wavelengths_nm = (0..=2 * half as usize)
@@ -40,5 +51,30 @@ impl Quadrature {
             .collect();
         let sum = raw.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         raw.iter().map(|w| w / sum).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A lamp of 6 nm that is 5 nm off: its middle is where it is said to be.
+    #[test]
+    fn a_narrow_lamp_that_is_shifted_is_not_cut() {
+        /// Error of the mean (nm): what a Gaussian has beyond 3 of its standard deviations on one side.
+        const CUT_NM: f64 = 0.02;
+        let led = Led {
+            centre_nm: 530.0,
+            fwhm_nm: 6.0,
+            channel: None,
+        };
+        let quadrature = Quadrature::new(led, 1.0, (400.0, 700.0));
+        let change = LightChange {
+            led_shift_nm: vec![5.0],
+            ..LightChange::default()
+        };
+        let weights = quadrature.weights(0, &change);
+        let mean: f64 = quadrature.wavelengths_nm.iter().zip(&weights).map(|(l, w)| l * w).sum();
+        assert!((mean - 535.0).abs() < CUT_NM, "{mean}");
     }
 }

@@ -2,7 +2,7 @@
 
 use ndarray::Array2;
 
-use crate::fit::{HeldOutErrors, beam_groups};
+use crate::fit::{HeldOutErrors, beam_groups, error_of_capture};
 use crate::search::{Evidence, Finding};
 use crate::session::{Session, Simulations};
 use metalith_report::{Axis, Chart, ImageGrid, Page, fixed, sig};
@@ -63,7 +63,7 @@ pub(super) fn captures(page: &mut Page, session: &Session<'_>, simulations: &Sim
                     .after
                     .nuisances
                     .residual(data, &problem.image(&finding.after.theta, c), c);
-                let error = |h: &HeldOutErrors| h[c].map_or_else(String::new, |e| sig(e, 3));
+                let error = |h: &HeldOutErrors| error_of_capture(&h[c]).map_or_else(String::new, |e| sig(e, 3));
                 left.image(
                     format!("before, {name}: {}", error(&finding.held_before)),
                     wide(&before),

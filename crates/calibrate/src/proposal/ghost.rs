@@ -5,11 +5,18 @@ use rayon::prelude::*;
 
 use crate::effects::{DeclaredEffect, DeclaredParameter};
 use crate::fit::{Fit, FitProblem};
+use metalith_core::{Error, Progress, Result};
 use metalith_made::{DeclaredQuantity, blur};
 use metalith_wave::kernels::sum_of_products;
 
 /// Part of a frame's edge that displacements go to: light from farther is not in the frame.
 const REACH: f64 = 0.25;
+
+/// Farthest displacement along an axis (pixels): work goes with its square times the pixels of all captures.
+const MOST_REACH: i32 = 32;
+
+/// Largest typical size of a proposed ghost's share, so that some multiples of it lie within its range.
+const MOST_TYPICAL: f64 = 0.2;
 
 /// Nearest displacement (pixels): what is nearer is a blur.
 const NEAREST: i32 = 2;
@@ -123,7 +130,10 @@ impl Frame {
 }
 
 /// The displacement whose copy removes most of the residual of a fit; none if no copy adds light.
-pub(super) fn strongest(problem: &FitProblem<'_>, fit: &Fit) -> Option<Ghost> {
+///
+/// # Errors
+/// If the user stopped it.
+pub(super) fn strongest(problem: &FitProblem<'_>, fit: &Fit, progress: &dyn Progress) -> Result<Option<Ghost>> {
     let data = problem.data;
     let frames: Vec<Frame> = data
         .captures()
@@ -135,46 +145,55 @@ pub(super) fn strongest(problem: &FitProblem<'_>, fit: &Fit) -> Option<Ghost> {
             Frame::new(pixels.mapv(|v| v * dn), &data.weight[c], &residual)
         })
         .collect();
-    let (rows, cols) = frames.first()?.model.dim();
-    let [rows, cols] = [rows, cols].map(|edge| (REACH * edge as f64) as i32);
+    let Some(first) = frames.first() else { return Ok(None) };
+    let (rows, cols) = first.model.dim();
+    let [rows, cols] = [rows, cols].map(|edge| ((REACH * edge as f64) as i32).min(MOST_REACH));
     let all = |[y, x]: [i32; 2], [rows, cols]: [i32; 2]| {
         let places = (y - rows..=y + rows).flat_map(move |dy| (x - cols..=x + cols).map(move |dx| [dx, dy]));
         places
             .filter(|at| at.iter().any(|d| d.abs() >= NEAREST))
             .collect::<Vec<_>>()
     };
-    let mut best = strongest_of(&frames, 0.0, &all([0; 2], [rows, cols]))?;
+    let Some(mut best) = strongest_of(&frames, 0.0, &all([0; 2], [rows, cols]), progress)? else {
+        return Ok(None);
+    };
     // A blurred copy is centred where the sharp one that is most like it is, or close by.
     let [x, y] = best.at;
     let around = all([y, x], [ROOM_PIXELS; 2]);
     for pixels in BLURS.into_iter().filter(|b| *b > 0.0) {
         let blurred: Vec<Frame> = frames.iter().map(|f| f.blurred(pixels)).collect();
-        match strongest_of(&blurred, pixels, &around) {
+        match strongest_of(&blurred, pixels, &around, progress)? {
             Some(ghost) if ghost.removed > best.removed => best = ghost,
             _ => break,
         }
     }
-    Some(best)
+    Ok(Some(best))
 }
 
 /// Of copies that are blurred so much (pixels) and displaced to these places, the one that removes most.
-fn strongest_of(frames: &[Frame], blur: f64, places: &[[i32; 2]]) -> Option<Ghost> {
-    let tried: Vec<Ghost> = places
+fn strongest_of(frames: &[Frame], blur: f64, places: &[[i32; 2]], progress: &dyn Progress) -> Result<Option<Ghost>> {
+    progress.begin("looking for a second image", places.len() as u64);
+    let tried: Vec<Option<Ghost>> = places
         .par_iter()
-        .filter_map(|&at| {
+        .map(|&at| {
+            if progress.stopped() {
+                return Err(Error::Interrupted);
+            }
+            progress.advance(1);
             let sum = frames
                 .iter()
                 .map(|f| f.products(at))
                 .fold([0.0; 2], |sum, one| [sum[0] + one[0], sum[1] + one[1]]);
-            (sum[0] > 0.0 && sum[1] > 0.0).then(|| Ghost {
+            Ok((sum[0] > 0.0 && sum[1] > 0.0).then(|| Ghost {
                 share: sum[0] / sum[1],
                 at,
                 blur,
                 removed: sum[0] * sum[0] / sum[1],
-            })
+            }))
         })
-        .collect();
-    tried.into_iter().max_by(|a, b| a.removed.total_cmp(&b.removed))
+        .collect::<Result<_>>()?;
+    let tried = tried.into_iter().flatten();
+    Ok(tried.max_by(|a, b| a.removed.total_cmp(&b.removed)))
 }
 
 impl Ghost {
@@ -193,7 +212,7 @@ impl Ghost {
         let share = DeclaredParameter {
             name: "a".into(),
             range: (-MOST_SHARE, MOST_SHARE),
-            prior: self.share.clamp(1e-3, MOST_SHARE),
+            prior: self.share.clamp(1e-3, MOST_TYPICAL),
             start: 0.0,
         };
         let um2 = |pixels2: f64| pixels2 * pixel_um * pixel_um;

@@ -29,11 +29,11 @@ pub(super) fn declared(simulator: &Simulator<'_>, pattern: &Pattern) -> Option<D
         return None;
     }
     let course = pattern.course(set).filter(|c| c.is_linear)?;
-    let names: &[&str] = match course.directions.as_slice() {
+    let names: &[&str] = match course.extent.directions.as_slice() {
         [_] => &["slope"],
         _ => &["slope_x", "slope_y"],
     };
-    let [x, y] = course.middle;
+    let [x, y] = course.extent.middle;
     let from = |variable: &str, middle: f64| match middle {
         0.0 => variable.to_owned(),
         _ => format!("({variable} - {middle:?})"),
@@ -45,10 +45,10 @@ pub(super) fn declared(simulator: &Simulator<'_>, pattern: &Pattern) -> Option<D
     };
     let terms: Vec<String> = names
         .iter()
-        .zip(&course.directions)
+        .zip(&course.extent.directions)
         .map(|(name, d)| format!("{name} * {}", along(d)))
         .collect();
-    let parameters = course.slopes.iter().zip(&course.half_spans).zip(names);
+    let parameters = course.slopes.iter().zip(&course.extent.half_spans).zip(names);
     let (low, high) = slot.parameter.range;
     let most = low.abs().min(high.abs());
     let factor = match unit_of_it.as_str() {

@@ -12,6 +12,7 @@ use crate::effects::DeclaredEffect;
 use crate::search::Evidence;
 use crate::session::Session;
 use crate::smooth_residual::SmoothResidual;
+use metalith_core::{Progress, Result};
 
 /// A shape is proposed if it removes this share of the chi-square above noise: less is a part of something else.
 const WORTH_PROPOSING: f64 = 0.3;
@@ -26,12 +27,15 @@ pub struct Proposed {
 
 /// Effects that may explain what a finding leaves, those that remove most first; none where nothing stands out. What has the
 /// name of an effect that was tried is left out.
-pub fn propose(session: &Session<'_>, evidence: &Evidence) -> Vec<Proposed> {
+///
+/// # Errors
+/// If the user stopped it.
+pub fn propose(session: &Session<'_>, evidence: &Evidence, progress: &dyn Progress) -> Result<Vec<Proposed>> {
     let problem = evidence.problem(&session.simulator);
     let fit = &evidence.finding.after;
     let above_noise = fit.chi2 - problem.pixels();
     let mut found = Vec::new();
-    if let Some(ghost) = ghost::strongest(&problem, fit) {
+    if let Some(ghost) = ghost::strongest(&problem, fit, progress)? {
         let effect = ghost.declared(session.set().camera.pixel_um);
         let reason = "a displaced copy of the image in every capture".to_owned();
         found.push((ghost.removed, vec![Proposed { effect, reason }]));
@@ -56,5 +60,5 @@ pub fn propose(session: &Session<'_>, evidence: &Evidence) -> Vec<Proposed> {
     found.retain(|(removed, _)| *removed > WORTH_PROPOSING * above_noise);
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     let is_new = |p: &Proposed| session.simulator.effects.iter().all(|e| e.name() != p.effect.name);
-    found.into_iter().flat_map(|(_, own)| own).filter(is_new).collect()
+    Ok(found.into_iter().flat_map(|(_, own)| own).filter(is_new).collect())
 }

@@ -3,24 +3,18 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::patterns::Grouping;
+use crate::extent::Extent;
 use crate::fit::SIGMAS_95;
 use crate::set::{CaptureIndex, MeasuredSet};
 
 /// Values are linear if none is farther off than this share of half of what they span, or than their noise says.
 const OFF_SHARE: f64 = 0.1;
 
-/// Places are in one line if none is farther off than this share of its length.
-const IN_LINE: f64 = 1e-6;
-
 /// Values that are put as linear in a place, a wavelength, a distance or an angle.
 #[derive(Clone, Debug)]
 pub struct Course {
-    /// Middle of what the groups span, in the unit of [`Grouping::coordinates`].
-    pub middle: [f64; 2],
-    /// Directions in which the groups differ: both axes, or the one line that they are in. Unit vectors.
-    pub directions: Vec<[f64; 2]>,
-    /// Half of what the groups span along each direction.
-    pub half_spans: Vec<f64>,
+    /// What the groups span, in the unit of [`Grouping::coordinates`].
+    pub extent: Extent,
     /// Slope along each direction, with its standard deviation.
     pub slopes: Vec<(f64, f64)>,
     /// Value in the middle, with its standard deviation.
@@ -50,16 +44,11 @@ impl Grouping {
 impl Course {
     /// Of values, each with its standard deviation, at these coordinates; none of a single place.
     pub fn new(at: &[[f64; 2]], values: &[(f64, f64)]) -> Option<Self> {
-        let ends = [0, 1].map(|axis| {
-            let along = at.iter().map(|p| p[axis]);
-            along.fold((f64::MAX, f64::MIN), |(a, b), c| (a.min(c), b.max(c)))
-        });
-        let middle = ends.map(|(a, b)| 0.5 * (a + b));
-        let directions = directions(at)?;
-        let along = |p: &[f64; 2], d: &[f64; 2]| (p[0] - middle[0]) * d[0] + (p[1] - middle[1]) * d[1];
+        let extent = Extent::of(at)?;
+        let directions = &extent.directions;
         let numbers = directions.len() + 1;
         let a = DMatrix::from_fn(at.len(), numbers, |i, j| {
-            directions.get(j).map_or(1.0, |d| along(&at[i], d))
+            directions.get(j).map_or(1.0, |d| extent.along(&at[i], d))
         });
         let b = DVector::from_fn(at.len(), |i, _| values[i].0);
         let solving = (a.transpose() * &a).try_inverse()? * a.transpose();
@@ -71,50 +60,14 @@ impl Course {
         let off = (&a * &x - &b).amax();
         let noise = values.iter().fold(0.0, |most: f64, v| most.max(v.1));
         Some(Self {
-            half_spans: directions
-                .iter()
-                .map(|d| at.iter().map(|p| along(p, d).abs()).fold(0.0, f64::max))
-                .collect(),
             slopes: (0..directions.len()).map(|j| (x[j], sigma(j))).collect(),
             at_middle: (x[numbers - 1], sigma(numbers - 1)),
             is_linear: off <= (SIGMAS_95 * noise).max(OFF_SHARE * 0.5 * (b.max() - b.min())),
             spare: at.len().saturating_sub(numbers),
-            middle,
-            directions,
             off,
+            extent,
         })
     }
-}
-
-/// Both axes, the one line that all places are in, or none of one place.
-fn directions(at: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
-    let first = at.first()?;
-    let apart = |p: &[f64; 2]| [p[0] - first[0], p[1] - first[1]];
-    let farthest = at.iter().map(apart).max_by(|a, b| length(a).total_cmp(&length(b)))?;
-    let whole = length(&farthest);
-    if whole == 0.0 {
-        return None;
-    }
-    // Towards +x, or +y of a line along y.
-    let sign = if farthest[0] < 0.0 || farthest[0] == 0.0 && farthest[1] < 0.0 {
-        -whole
-    } else {
-        whole
-    };
-    // No negative zero: it is shown.
-    let line = farthest.map(|c| c / sign + 0.0);
-    let is_in_line = |p: &[f64; 2]| {
-        let [x, y] = apart(p);
-        (x * line[1] - y * line[0]).abs() <= IN_LINE * whole
-    };
-    Some(match at.iter().all(is_in_line) {
-        true => vec![line],
-        false => vec![[1.0, 0.0], [0.0, 1.0]],
-    })
-}
-
-fn length(v: &[f64; 2]) -> f64 {
-    v[0].hypot(v[1])
 }
 
 #[cfg(test)]
@@ -136,7 +89,10 @@ mod tests {
         let at = [[0.0, 0.0], [400.0, 0.0], [400.0, 400.0], [0.0, 400.0]];
         let plane = |p: &[f64; 2]| 0.5 + 0.03 * (p[0] - 200.0) - 0.018 * (p[1] - 200.0);
         let found = course(&at, plane);
-        assert_eq!((found.middle, found.directions.len(), found.spare), ([200.0; 2], 2, 1));
+        assert_eq!(
+            (found.extent.middle, found.extent.directions.len(), found.spare),
+            ([200.0; 2], 2, 1)
+        );
         let [x, y] = [found.slopes[0], found.slopes[1]];
         assert!(
             (x.0 - 0.03).abs() < ROUNDING
@@ -145,7 +101,7 @@ mod tests {
         );
         // Four values at half of 400 um: sigma / (sqrt(4) 200 um).
         assert!((x.1 / (SIGMA / 400.0) - 1.0).abs() < ROUNDING, "{x:?}");
-        assert!(found.is_linear && found.half_spans == [200.0; 2]);
+        assert!(found.is_linear && found.extent.half_spans == [200.0; 2]);
         // One corner off by a tenth of what the values span: no plane.
         let bent = course(&at, |p| plane(p) + if p == &at[2] { 4.0 } else { 0.0 });
         assert!(!bent.is_linear && (bent.off - 1.0).abs() < ROUNDING, "{bent:?}");
@@ -155,8 +111,8 @@ mod tests {
     fn values_in_a_line_have_one_slope_and_two_are_always_linear() {
         let at = [[300.0, 400.0], [0.0, 0.0], [-300.0, -400.0]];
         let found = course(&at, |p| 2.0 + 0.01 * (0.6 * p[0] + 0.8 * p[1]));
-        assert_eq!((found.directions.len(), found.spare), (1, 1));
-        assert!((found.slopes[0].0 - 0.01).abs() < ROUNDING && (found.half_spans[0] - 500.0).abs() < ROUNDING);
+        assert_eq!((found.extent.directions.len(), found.spare), (1, 1));
+        assert!((found.slopes[0].0 - 0.01).abs() < ROUNDING && (found.extent.half_spans[0] - 500.0).abs() < ROUNDING);
         let two = course(&at[..2], |p| p[0]);
         assert!(two.is_linear && two.spare == 0);
         assert!(Course::new(&at[..1], &[(1.0, SIGMA)]).is_none());

@@ -113,6 +113,7 @@ fn replaced<'a>(
     state.fit.active = model.slots_of_all(set);
     if full {
         state.recentre(progress)?;
+        state.renew_others(progress)?;
         state.refine(progress)?;
     } else {
         let fit = state.problem.fit(&state.fit.active, &state.fit);

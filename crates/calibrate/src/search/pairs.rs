@@ -90,7 +90,7 @@ pub fn find_pair<'a>(
             state.refine(progress)?;
             if state.leaves_more_than(MORE_IS_LEFT) {
                 // What one changes beside the other: without it the fit rests where less may be left close by.
-                state.recentre_alone(progress)?;
+                state.recentre(progress)?;
                 state.refine(progress)?;
             }
         }

@@ -47,6 +47,7 @@ pub fn follow_leaders_anew<'a>(
         let mut runners_up = runners_up.clone();
         let alone = sound(now, &state, &taken);
         if alone.is_none() {
+            state.renew_others(progress)?;
             let step = step_forward(&mut state, &[chosen, &[effect]].concat(), true, progress)?;
             let Some((second, fit, held)) = step.taken else {
                 continue;

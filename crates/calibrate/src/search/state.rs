@@ -4,7 +4,6 @@ use metalith_core::{Progress, Result};
 
 use super::stepwise::{LEAST_GAIN, fit_with};
 use crate::fit::{Fit, FitProblem, Gain, HeldOutErrors, gain, held_out, mean_error};
-use crate::surrogate::Renewed;
 
 /// What noise alone leaves varies so much: by this many standard deviations of the mean square of so many pixels.
 const CHANCE_SIGMAS: f64 = 2.0;
@@ -77,30 +76,27 @@ impl<'a> SearchState<'a> {
         self.fit = fit;
     }
 
-    /// Continue about the fit: its parameters are simulated anew, and all others beside them.
+    /// Continue about the fit: its parameters are simulated anew.
     ///
     /// # Errors
     /// As [`Surrogate::recentred`](crate::surrogate::Surrogate::recentred).
     pub fn recentre(&mut self, progress: &dyn Progress) -> Result<()> {
-        self.recentre_with(Renewed::All, progress)
-    }
-
-    /// As [`SearchState::recentre`] with nothing but the parameters of the fit simulated anew.
-    ///
-    /// # Errors
-    /// As [`Surrogate::recentred`](crate::surrogate::Surrogate::recentred).
-    pub fn recentre_alone(&mut self, progress: &dyn Progress) -> Result<()> {
-        self.recentre_with(Renewed::FoundAlone, progress)
-    }
-
-    fn recentre_with(&mut self, renewed: Renewed, progress: &dyn Progress) -> Result<()> {
         let Fit { theta, active, .. } = &self.fit;
         let FitProblem { model, surrogate, .. } = &self.problem;
-        self.problem.surrogate = surrogate.recentred(*model, theta, active, renewed, progress)?;
+        self.problem.surrogate = surrogate.recentred(*model, theta, active, progress)?;
         self.problem.correction = None;
         let fit = self.problem.fit(&self.fit.active, &self.fit);
         self.move_to(fit);
         Ok(())
+    }
+
+    /// Simulate anew what all others change beside the fit, where the surrogate is centred on it already.
+    ///
+    /// # Errors
+    /// As [`Surrogate::renew_others`](crate::surrogate::Surrogate::renew_others).
+    pub fn renew_others(&mut self, progress: &dyn Progress) -> Result<()> {
+        let FitProblem { model, surrogate, .. } = &mut self.problem;
+        surrogate.renew_others(*model, &self.fit.active, progress)
     }
 
     /// Refine the fit with full simulations.

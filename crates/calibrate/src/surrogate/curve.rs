@@ -8,9 +8,18 @@ use crate::set::{CaptureIndex, PerCapture};
 /// Most nodes of a polynomial; if there are more, those farthest from where it is evaluated are dropped.
 const MOST_NODES: usize = 6;
 
+/// One of the two sides of a parameter is taken from the other if it errs by less than this share of the change: half of that is
+/// the error of its slope, and changes err by 1 to 3 % in any case.
+const SECOND_SIDE: f64 = 0.03;
+
+/// And if the change on the other side is another by less than this share: of one that is new, nothing was known before.
+const SAME_CHANGE: f64 = 0.3;
+
 /// Changes of all captures with one parameter.
 #[derive(Clone, Default)]
 pub struct Curve {
+    /// The value that offsets are from.
+    about: f64,
     /// Offsets from the base; zero is not among them.
     nodes: Vec<f64>,
     /// Changes from the base at each node, `by node and capture`.
@@ -20,10 +29,25 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// A polynomial through the changes at some offsets.
-    pub fn new(nodes: Vec<f64>, grids: impl IntoIterator<Item = PerCapture<PixelGrid>>, kinked: bool) -> Self {
+    /// A polynomial through the changes at some offsets from a value of the parameter.
+    pub fn new(
+        about: f64,
+        nodes: Vec<f64>,
+        grids: impl IntoIterator<Item = PerCapture<PixelGrid>>,
+        kinked: bool,
+    ) -> Self {
         let grids = grids.into_iter().map(Arc::new).collect();
-        Self { nodes, grids, kinked }
+        Self {
+            about,
+            nodes,
+            grids,
+            kinked,
+        }
+    }
+
+    /// Whether offsets are from this value.
+    pub fn is_about(&self, value: f64) -> bool {
+        self.about == value
     }
 
     /// Add an offset, near which the polynomial is evaluated from now on.
@@ -54,6 +78,29 @@ impl Curve {
             .iter()
             .zip(self.slopes(u))
             .map(move |(grids, w)| (&grids[capture], w as f32))
+    }
+
+    /// The changes at `node`, from those that `anew` has at `-node`: what is even in the offset is taken as this curve has it. None where
+    /// that may be wrong by more than [`SECOND_SIDE`]: it is taken to be so by the share by which the change at `-node` is another.
+    pub fn other_side(&self, anew: &Self, node: f64) -> Option<PerCapture<PixelGrid>> {
+        let (low, high) = self.ends();
+        if !self.is_about(anew.about) || self.kinked || anew.kinked || low > -node.abs() || high < node.abs() {
+            return None;
+        }
+        let captures = self.grids[0].keys();
+        let [mut own, mut moved, mut even] = [0.0; 3];
+        let mut changes = Vec::new();
+        for capture in captures {
+            let before = PixelGrid::combine(&self.change(-node, capture).collect::<Vec<_>>());
+            let beyond = PixelGrid::combine(&self.change(node, capture).collect::<Vec<_>>());
+            let now = PixelGrid::combine(&anew.change(-node, capture).collect::<Vec<_>>());
+            own += now.mean_square();
+            moved += PixelGrid::combine(&[(&now, 1.0), (&before, -1.0)]).mean_square();
+            even += PixelGrid::combine(&[(&before, 1.0), (&beyond, 1.0)]).mean_square();
+            changes.push(PixelGrid::combine(&[(&before, 1.0), (&beyond, 1.0), (&now, -1.0)]));
+        }
+        let is_known = (moved * even).sqrt() < SECOND_SIDE * own && moved < SAME_CHANGE.powi(2) * own;
+        is_known.then(|| changes.into())
     }
 
     /// Least and greatest simulated offset.
@@ -132,6 +179,7 @@ mod tests {
         /// Absolute, of values of a few: rounding.
         const ROUNDING: f64 = 1e-12;
         let curve = Curve {
+            about: 0.0,
             nodes: vec![-2.0, -1.0, 1.0, 2.0],
             grids: Vec::new(),
             kinked: false,
@@ -144,5 +192,52 @@ mod tests {
             assert!((value(u) - f(u)).abs() < ROUNDING && (derivative(u) - slope(u)).abs() < ROUNDING);
         }
         assert!((value(3.0) - f(2.0) - slope(2.0)).abs() < ROUNDING);
+    }
+
+    /// Changes of one capture: cosines of these periods and amplitudes.
+    fn changes(waves: &[([u32; 2], f64)]) -> PerCapture<PixelGrid> {
+        vec![crate::linear_model::image(0.0, waves)].into()
+    }
+
+    /// Through the changes u * odd + u^2 * even at offsets of -1 and 1.
+    fn both_sides(odd: f64, even: f64) -> Curve {
+        let at = |u: f64| changes(&[([2, 3], u * odd), ([5, 4], u * u * even)]);
+        Curve::new(0.0, vec![-1.0, 1.0], [at(-1.0), at(1.0)], false)
+    }
+
+    fn one_side(odd: f64, even: f64) -> Curve {
+        Curve::new(0.0, vec![-1.0], [changes(&[([2, 3], -odd), ([5, 4], even)])], false)
+    }
+
+    #[test]
+    fn the_other_side_follows_where_what_is_even_is_the_same() {
+        /// Of a mean square: single precision.
+        const ROUNDING: f64 = 1e-9;
+        let before = both_sides(0.3, 0.05);
+        let found = before.other_side(&one_side(0.32, 0.05), 1.0).unwrap();
+        let want = changes(&[([2, 3], 0.32), ([5, 4], 0.05)]);
+        let first = CaptureIndex::from(0);
+        let error = PixelGrid::combine(&[(&found[first], 1.0), (&want[first], -1.0)]);
+        assert!(error.mean_square() < ROUNDING, "{}", error.mean_square());
+    }
+
+    #[test]
+    fn the_other_side_is_not_known_of_what_changed_much_or_was_not_there() {
+        // What is even counts much, and the change is another by a fifth.
+        assert!(both_sides(0.3, 0.2).other_side(&one_side(0.36, 0.2), 1.0).is_none());
+        // The change is new, as that of a parameter which did nothing.
+        assert!(both_sides(0.0, 0.0).other_side(&one_side(0.3, 0.1), 1.0).is_none());
+        // From another value, and where the derivative jumps.
+        let elsewhere = Curve {
+            about: 0.5,
+            ..both_sides(0.3, 0.0)
+        };
+        let kinked = Curve {
+            kinked: true,
+            ..both_sides(0.3, 0.0)
+        };
+        let anew = one_side(0.3, 0.0);
+        assert!(both_sides(0.3, 0.0).other_side(&anew, 1.0).is_some());
+        assert!(elsewhere.other_side(&anew, 1.0).is_none() && kinked.other_side(&anew, 1.0).is_none());
     }
 }

@@ -5,6 +5,7 @@
 //! continues on a surrogate that is centred on what was found, with all other parameters simulated anew.
 
 mod curve;
+mod recentred;
 
 use std::sync::Arc;
 
@@ -23,16 +24,9 @@ const TWO_SIDED: [f64; 4] = [-2.5, -1.25, 1.25, 2.5];
 /// And where it can only be positive.
 const ONE_SIDED: [f64; 3] = [0.8, 1.8, 3.5];
 
-/// And about a position that a fit has come to.
-const NEAR: [f64; 4] = [-0.6, -0.3, 0.3, 0.6];
-
 /// And beside what was found, on both sides, and where it can only be positive.
 const BESIDE: [f64; 2] = [-1.25, 1.25];
 const BESIDE_ONE_SIDED: [f64; 2] = [0.8, 2.2];
-
-/// No effect is simulated by itself if no other value is nearer (typical sizes): polynomials through nodes closer
-/// together magnify rounding.
-const APART: f64 = 0.3;
 
 /// How far a fit may extrapolate, as a multiple of the simulated range.
 const EXTRAPOLATION: f64 = 1.6;
@@ -54,15 +48,6 @@ pub struct Surrogate {
 
 /// Change of the images for a unit of a smooth term; none where it does not act.
 type SmoothChange = PerCapture<Option<PixelGrid>>;
-
-/// What is simulated anew where a surrogate is centred elsewhere.
-#[derive(Clone, Copy, PartialEq)]
-pub enum Renewed {
-    /// What was found, and all others beside it, because what they change depends on it; not where that is dear.
-    All,
-    /// What was found, and nothing else.
-    FoundAlone,
-}
 
 impl Surrogate {
     /// Simulate every parameter about the values `about`. With `smooth` (the LED of each capture, and the
@@ -106,7 +91,9 @@ impl Surrogate {
         for (s, slot) in model.slots().iter().enumerate() {
             let only_positive = slot.parameter.one_sided() && about[s] == 0.0;
             let multiples = if only_positive { one_sided } else { two_sided };
-            nodes.push(add_nodes(model, about, s, multiples, &mut points));
+            let own = offsets(model, about, s, multiples);
+            points.extend(own.iter().map(|offset| point_at(about, s, *offset)));
+            nodes.push(own);
         }
         if smooth.is_some() {
             points.extend(SmoothTerm::all().map(|term| ParameterPoint::with(about, term)));
@@ -116,14 +103,15 @@ impl Surrogate {
         let curves = nodes
             .into_iter()
             .zip(model.slots())
-            .map(|(nodes, slot)| {
+            .zip(about)
+            .map(|((nodes, slot), &own)| {
                 let changes: Vec<_> = images
                     .by_ref()
                     .take(nodes.len())
                     .map(|i| change(&i, &base, 1.0))
                     .collect();
                 let kinked = model.kinked(slot.effect) && about.iter().all(|v| *v == 0.0);
-                Curve::new(nodes, changes, kinked)
+                Curve::new(own, nodes, changes, kinked)
             })
             .collect();
         let mut terms = Vec::new();
@@ -143,62 +131,6 @@ impl Surrogate {
             smooth: Arc::new(terms),
             stated: None,
         })
-    }
-
-    /// A surrogate about other values. Parameters in `found` are simulated anew close to these, and at no effect, so
-    /// that another may take their place. Of all others, the changes of those that are not `renewed` are taken to add as before.
-    ///
-    /// # Errors
-    /// As [`ForwardModel::images`].
-    pub fn recentred(
-        &self,
-        model: &dyn ForwardModel,
-        about: &[f64],
-        found: &[usize],
-        renewed: Renewed,
-        progress: &dyn Progress,
-    ) -> Result<Self> {
-        let mut points = vec![ParameterPoint::new(about.to_vec())];
-        let mut simulated: Vec<(usize, Vec<f64>)> = Vec::new();
-        for (s, slot) in model.slots().iter().enumerate() {
-            let is_found = found.contains(&s);
-            if !is_found && (renewed == Renewed::FoundAlone || model.is_dear_beside(about, s)) {
-                continue;
-            }
-            let multiples: &[f64] = match (is_found, slot.parameter.one_sided() && about[s] == 0.0) {
-                (true, _) => &NEAR,
-                (false, true) => &BESIDE_ONE_SIDED,
-                (false, false) => &BESIDE,
-            };
-            let mut nodes = add_nodes(model, about, s, multiples, &mut points);
-            if is_found
-                && nodes
-                    .iter()
-                    .all(|n| (n + about[s]).abs() > APART * slot.parameter.typical)
-            {
-                let mut theta = about.to_vec();
-                theta[s] = 0.0;
-                points.push(ParameterPoint::new(theta));
-                nodes.push(-about[s]);
-            }
-            simulated.push((s, nodes));
-        }
-        let mut images = model.images(&points, progress)?.into_iter();
-        let base = images.next().expect("the first point is the base");
-        let mut out = self.clone();
-        out.stated = Some(self.stated.clone().unwrap_or_else(|| Arc::new(self.clone())));
-        for (s, nodes) in simulated {
-            let changes: Vec<_> = images
-                .by_ref()
-                .take(nodes.len())
-                .map(|i| change(&i, &base, 1.0))
-                .collect();
-            let kinked = model.kinked(model.slots()[s].effect) && about[s] == 0.0;
-            out.curves[s] = Curve::new(nodes, changes, kinked);
-        }
-        out.about = about.to_vec();
-        out.base = Arc::new(base);
-        Ok(out)
     }
 
     /// Simulate one parameter at more values, where a fit has left the simulated range.
@@ -297,25 +229,25 @@ impl Surrogate {
     }
 }
 
-/// Offsets of one parameter from `about` within its physical range; their points are added to `points`.
-fn add_nodes(
-    model: &dyn ForwardModel,
-    about: &[f64],
-    s: usize,
-    multiples: &[f64],
-    points: &mut Vec<ParameterPoint>,
-) -> Vec<f64> {
+/// Offsets of one parameter from `about` within its physical range; its ends, if all are beyond them.
+fn offsets(model: &dyn ForwardModel, about: &[f64], s: usize, multiples: &[f64]) -> Vec<f64> {
     let Parameter { typical, range, .. } = model.slots()[s].parameter;
     let offsets = multiples.iter().map(|m| m * typical);
-    let offsets: Vec<f64> = offsets
+    let within: Vec<f64> = offsets
         .filter(|o| (range.0..=range.1).contains(&(about[s] + o)))
         .collect();
-    for offset in &offsets {
-        let mut theta = about.to_vec();
-        theta[s] += offset;
-        points.push(ParameterPoint::new(theta));
+    if !within.is_empty() {
+        return within;
     }
-    offsets
+    let ends = [range.0 - about[s], range.1 - about[s]];
+    ends.into_iter().filter(|o| *o != 0.0).collect()
+}
+
+/// The point at such an offset.
+fn point_at(about: &[f64], s: usize, offset: f64) -> ParameterPoint {
+    let mut theta = about.to_vec();
+    theta[s] += offset;
+    ParameterPoint::new(theta)
 }
 
 fn change(images: &PerCapture<PixelGrid>, base: &PerCapture<PixelGrid>, factor: f32) -> PerCapture<PixelGrid> {

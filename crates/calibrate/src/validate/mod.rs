@@ -185,9 +185,9 @@ pub fn validate(
         .collect();
     let exposed = synthesizer.with_effects(&wanted, progress)?;
     let mut odd = Vec::new();
-    if plan.off_list {
+    // Without a search nothing can be said of what is in no list.
+    if plan.off_list && !plan.noiseless {
         for (name, what) in [
-            ("astigmatism", UnlistedEffect::Astigmatism(30.0)),
             ("ghost", UnlistedEffect::Ghost(0.04, [5.0, -3.0])),
             ("anisotropy", UnlistedEffect::Anisotropy(8.0)),
         ] {

@@ -110,6 +110,17 @@ impl PixelGrid {
         }
     }
 
+    /// Mean square over the samples (Parseval's theorem), of the unit of intensity.
+    pub fn mean_square(&self) -> f64 {
+        let of_row = |ky: usize| -> f64 {
+            let bins = self.re.row(ky).into_iter().zip(self.im.row(ky));
+            bins.map(|(re, im)| f64::from(re * re + im * im)).sum()
+        };
+        // Bins of ky > 0 stand for those of -ky too, with twice their amplitude.
+        let rows = (0..self.re.nrows()).map(|ky| if ky == 0 { of_row(ky) } else { 0.5 * of_row(ky) });
+        rows.sum()
+    }
+
     /// The same seen from a window that is off by so much (x, y) (um).
     pub fn moved(mut self, [x, y]: [f64; 2]) -> Self {
         if x == 0.0 && y == 0.0 {
@@ -283,6 +294,15 @@ mod tests {
         {
             assert!((one - &other).iter().all(|d| d.abs() < SAME));
         }
+        // Of the samples at even places the square is a sum over all: the Gaussian falls to nothing at the border.
+        let clear = Optic {
+            blur_um: 0.0,
+            pixel_um: 0.0,
+            ..optic
+        };
+        let mean_square = samples.iter().map(|v| f64::from(v * v)).sum::<f64>() / (n * n) as f64;
+        let of_bins = PixelGrid::new(&samples, step, &clear, 40, 32).mean_square();
+        assert!((of_bins / mean_square - 1.0).abs() < PIXEL, "{of_bins} {mean_square}");
         let moved = grid.clone().moved([0.4, -0.2]).pixels([shift[0] - 0.4, shift[1] + 0.2]);
         assert!((&moved - &pixels).iter().all(|d| d.abs() < SAME));
         // A little more blur, as its term has it.

@@ -51,13 +51,13 @@ pub fn joined(
             frames,
         };
     }
-    if let Some(sensor) = sensor {
-        exposures.iter_mut().for_each(|e| sensor.take_out(&mut e.dn));
-    }
     let black = camera.black_level_dn;
     let masks: Vec<Array2<bool>> = exposures
-        .iter()
-        .map(|e| saturated(&e.dn, camera.saturation_dn))
+        .iter_mut()
+        .map(|e| match sensor {
+            Some(sensor) => sensor.take_out(&mut e.dn),
+            None => saturated(&e.dn, camera.saturation_dn),
+        })
         .collect();
     let mut dn = exposures[0].dn.clone();
     let mut noise = Array2::from_elem(dn.dim(), f32::INFINITY);

@@ -2,7 +2,7 @@
 
 use ndarray::Array2;
 
-use super::Channel;
+use super::{Channel, saturated};
 use crate::set::{RelayCamera, SATURATED};
 
 /// A mean frame of the sensor by itself.
@@ -89,19 +89,25 @@ struct FlatPixels {
 }
 
 impl SensorPixels {
-    /// Take both frames out of a capture: every pixel has the stated black level and the mean response after. Saturated
-    /// pixels stay saturated.
-    pub fn take_out(&self, dn: &mut Array2<f32>) {
+    /// Take both frames out of a capture: every pixel has the stated black level and the mean response after. Pixels that tell
+    /// nothing: those that were saturated or beside one that was, and dead ones with those beside them. They stay saturated.
+    pub fn take_out(&self, dn: &mut Array2<f32>) -> Array2<bool> {
         let (black, full) = (self.camera.black_level_dn as f32, self.camera.saturation_dn);
         for (at, v) in dn.indexed_iter_mut() {
-            let response = self.response(at);
-            // A dead pixel tells nothing: it is masked like a saturated one.
-            *v = if f64::from(*v) >= SATURATED * full || response <= LEAST_RESPONSE {
+            if self.response(at) <= LEAST_RESPONSE {
+                *v = full as f32;
+            }
+        }
+        // By what was recorded: pixels that see little may stand for more than the sensor counts to.
+        let masked = saturated(dn, full);
+        for (at, v) in dn.indexed_iter_mut() {
+            *v = if f64::from(*v) >= SATURATED * full {
                 full as f32
             } else {
-                black + (*v - self.dark[at]) / response
+                black + (*v - self.dark[at]) / self.response(at)
             };
         }
+        masked
     }
 
     /// Variance of a corrected pixel by the noise of its own exposure (DN^2), which shows `signal_dn` above black in the mean of
@@ -172,7 +178,9 @@ pub(super) mod tests {
         );
         let mean: f32 = (50.0 + 150.0 + 200.0 + 200.0 + 0.0 + 200.0) / 6.0;
         let mut dn = ndarray::arr2(&[[66.0, 115.0, 999.0], [140.0, 50.0, 140.0]]);
-        frames.pixels(&camera()).unwrap().take_out(&mut dn);
+        let masked = frames.pixels(&camera()).unwrap().take_out(&mut dn);
+        // All are beside the dead pixel or the full one.
+        assert!(masked.iter().all(|m| *m));
         // Single precision.
         const ROUNDING: f32 = 1e-3;
         for (at, want) in [
@@ -184,6 +192,20 @@ pub(super) mod tests {
         ] {
             assert!((dn[at] - want).abs() < ROUNDING, "{at:?}: {}", dn[at]);
         }
+    }
+
+    /// A pixel that sees half of the mean is recorded far from full, and stands for more than the sensor counts to.
+    #[test]
+    fn a_pixel_that_sees_little_is_masked_by_what_it_recorded() {
+        let frames = frames(
+            Array2::from_elem((2, 3), 40.0),
+            ndarray::arr2(&[[110.0, 180.0, 180.0], [180.0, 180.0, 180.0]]),
+            1,
+        );
+        let mut dn = Array2::from_elem((2, 3), 100.0);
+        dn[(0, 0)] = 700.0;
+        let masked = frames.pixels(&camera()).unwrap().take_out(&mut dn);
+        assert!(dn[(0, 0)] > 1000.0 && masked.iter().all(|m| !*m), "{dn}");
     }
 
     /// Even light that is not white: pixels of unlike filters are as bright as their filter, and none is a better pixel.

@@ -1,0 +1,172 @@
+//! A surrogate about what was found: what the former one says of the rest is used where it still holds.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use metalith_core::{Progress, Result};
+
+use super::curve::Curve;
+use super::{BESIDE, BESIDE_ONE_SIDED, Surrogate, change, offsets, point_at};
+use crate::forward_model::{ForwardModel, ParameterPoint};
+
+/// Multiples of the typical size at which a parameter is simulated about a position that a fit has come to.
+const NEAR: [f64; 4] = [-0.6, -0.3, 0.3, 0.6];
+
+/// No effect is simulated by itself if no other value is nearer (typical sizes): polynomials through nodes closer
+/// together magnify rounding.
+const APART: f64 = 0.3;
+
+impl Surrogate {
+    /// A surrogate about other values. Parameters in `found` are simulated anew close to these, and at no effect, so
+    /// that another may take their place. The changes of all others are taken to add as before.
+    ///
+    /// # Errors
+    /// As [`ForwardModel::images`].
+    pub fn recentred(
+        &self,
+        model: &dyn ForwardModel,
+        about: &[f64],
+        found: &[usize],
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let nodes = found.iter().map(|&s| {
+            let mut nodes = offsets(model, about, s, &NEAR);
+            let is_apart = |node: &f64| (node + about[s]).abs() > APART * model.slots()[s].parameter.typical;
+            if nodes.iter().all(is_apart) {
+                nodes.push(-about[s]);
+            }
+            nodes
+        });
+        let nodes: Vec<Vec<f64>> = nodes.collect();
+        let mut points = vec![ParameterPoint::new(about.to_vec())];
+        for (s, nodes) in found.iter().zip(&nodes) {
+            points.extend(nodes.iter().map(|node| point_at(about, *s, *node)));
+        }
+        let mut images = model.images(&points, progress)?.into_iter();
+        let base = images.next().expect("the first point is the base");
+        let mut out = self.clone();
+        out.stated = Some(self.stated.clone().unwrap_or_else(|| Arc::new(self.clone())));
+        for (&s, nodes) in found.iter().zip(nodes) {
+            let own = images.by_ref().take(nodes.len());
+            let changes: Vec<_> = own.map(|i| change(&i, &base, 1.0)).collect();
+            out.curves[s] = Curve::new(about[s], nodes, changes, is_kinked(model, about, s));
+        }
+        if let Some(stated) = &out.stated {
+            // What is no longer there changes an image as it did where it was not.
+            for (s, own) in out.curves.iter_mut().enumerate() {
+                if !own.is_about(about[s]) && stated.curves[s].is_about(about[s]) {
+                    own.clone_from(&stated.curves[s]);
+                }
+            }
+        }
+        out.about = about.to_vec();
+        out.base = Arc::new(base);
+        Ok(out)
+    }
+
+    /// Simulate anew what all parameters but those in `found` change beside these, because it depends on them; not where that is
+    /// dear. A second side is simulated where the first does not determine it.
+    ///
+    /// # Errors
+    /// As [`ForwardModel::images`].
+    pub fn renew_others(&mut self, model: &dyn ForwardModel, found: &[usize], progress: &dyn Progress) -> Result<()> {
+        let about = self.about.clone();
+        let mut first: Vec<(usize, f64)> = Vec::new();
+        let mut second: Vec<(usize, f64)> = Vec::new();
+        for (s, slot) in model.slots().iter().enumerate() {
+            if found.contains(&s) || model.is_dear_beside(&about, s) {
+                continue;
+            }
+            let only_positive = slot.parameter.one_sided() && about[s] == 0.0;
+            let nodes = offsets(
+                model,
+                &about,
+                s,
+                if only_positive { &BESIDE_ONE_SIDED } else { &BESIDE },
+            );
+            match nodes[..] {
+                [one, other] if one == -other => {
+                    first.push((s, one));
+                    second.push((s, other));
+                }
+                _ => first.extend(nodes.iter().map(|node| (s, *node))),
+            }
+        }
+        let before = self.curves.clone();
+        let renewed = first.iter().map(|(s, _)| *s).collect::<BTreeSet<_>>();
+        for s in renewed {
+            self.curves[s] = Curve::new(about[s], Vec::new(), [], is_kinked(model, &about, s));
+        }
+        self.simulate_nodes(model, &first, progress)?;
+        let mut open = Vec::new();
+        for (s, node) in second {
+            match before[s].other_side(&self.curves[s], node) {
+                Some(changes) => self.curves[s].add(node, changes),
+                None => open.push((s, node)),
+            }
+        }
+        self.simulate_nodes(model, &open, progress)
+    }
+
+    /// Add nodes to curves: the parameter, and the offset.
+    fn simulate_nodes(
+        &mut self,
+        model: &dyn ForwardModel,
+        nodes: &[(usize, f64)],
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        if nodes.is_empty() {
+            return Ok(());
+        }
+        let points: Vec<_> = nodes.iter().map(|(s, node)| point_at(&self.about, *s, *node)).collect();
+        for (images, (s, node)) in model.images(&points, progress)?.iter().zip(nodes) {
+            self.curves[*s].add(*node, change(images, &self.base, 1.0));
+        }
+        Ok(())
+    }
+}
+
+/// Whether the derivative by a parameter jumps at the base.
+fn is_kinked(model: &dyn ForwardModel, about: &[f64], s: usize) -> bool {
+    model.kinked(model.slots()[s].effect) && about[s] == 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use metalith_core::Silent;
+
+    use super::*;
+    use crate::linear_model::{LinearModel, Term, beams};
+    use crate::optics::PixelGrid;
+    use crate::set::CaptureIndex;
+
+    /// The first parameter acts by its square too. Found at 0.04, and gone again: its change is that from nothing.
+    #[test]
+    fn what_was_found_and_is_gone_changes_as_it_did_before() {
+        /// Of a mean square of 1e-3: single precision.
+        const ROUNDING: f64 = 1e-9;
+        let bent = Term {
+            amplitude: |theta| theta + 10.0 * theta * theta,
+            ..Term::linear([2, 3])
+        };
+        let model = LinearModel::new(vec![bent, Term::linear([5, 4])], beams(1, 1, 1));
+        let error = |surrogate: &Surrogate, theta: &[f64]| {
+            let own = model.image(&ParameterPoint::new(theta.to_vec()), &beams(1, 1, 1)[0]);
+            let said = surrogate.image(theta, CaptureIndex::from(0));
+            PixelGrid::combine(&[(&said, 1.0), (&own, -1.0)]).mean_square()
+        };
+        let found = model
+            .surrogate()
+            .recentred(&model, &[0.04, 0.0], &[0], &Silent)
+            .unwrap();
+        assert!(error(&found, &[0.046, 0.0]) < ROUNDING);
+        let mut other = found.recentred(&model, &[0.0, 0.02], &[1], &Silent).unwrap();
+        assert!(
+            error(&other, &[0.03, 0.02]) < ROUNDING,
+            "{}",
+            error(&other, &[0.03, 0.02])
+        );
+        other.renew_others(&model, &[1], &Silent).unwrap();
+        assert!(error(&other, &[0.02, 0.026]) < ROUNDING);
+    }
+}
