@@ -23,6 +23,9 @@ use super::standard_input::InputFile;
 use super::verify::FidelityArg;
 use super::{Outcome, Terminal, print_line};
 
+/// Wavelengths that are taken where none are named (nm).
+const USUAL_NM: [f64; 3] = [455.0, 530.0, 660.0];
+
 /// Find the elements of any GDSII layout, read their pillars, and simulate their PSFs.
 #[derive(Args)]
 #[command(
@@ -47,7 +50,7 @@ pub struct PsfArgs {
     distance_um: f64,
 
     /// Wavelength (nm); may be given several times.
-    #[arg(long = "wavelength-nm", default_values_t = [455.0, 530.0, 660.0], value_parser = between(150.0, 20_000.0))]
+    #[arg(long = "wavelength-nm", default_values_t = USUAL_NM, value_parser = between(150.0, 20_000.0))]
     wavelengths_nm: Vec<f64>,
 
     /// Angle of incidence in the x-z plane, in air (degrees).
@@ -232,7 +235,14 @@ impl PsfArgs {
             (None, FidelityArg::Published) => "published polynomials for pillars of the paper, no amplitude".into(),
             (None, FidelityArg::Fitted) => "polynomials fitted to the rigorous cell, no amplitude".into(),
             (None, FidelityArg::Neighbours) => {
-                "each pillar among its neighbours, fitted to supercells of the layout's own widths".into()
+                let white = match self.camera {
+                    Some(_) => format!(
+                        "; white light is between the wavelengths that have tables, {USUAL_NM:?} nm and those of \
+                         --wavelength-nm"
+                    ),
+                    None => String::new(),
+                };
+                format!("each pillar among its neighbours, fitted to supercells of the layout's own widths{white}")
             }
             (None, FidelityArg::Rigorous) => "rigorous coupled-wave analysis of a lattice of equal pillars".into(),
         };
@@ -275,7 +285,11 @@ impl PsfArgs {
         }
         if matches!(self.fidelity, FidelityArg::Neighbours) {
             let mapping = Mapping::of_widths(found.elements.iter().map(|e| e.widths.histogram()))?;
-            return Ok(Box::new(NeighbourCell::new(stack, vec![mapping], cache_folder())));
+            let cell = NeighbourCell::new(stack, vec![mapping], cache_folder());
+            // White light is known between wavelengths that have tables, and little beyond.
+            let of_white = USUAL_NM.iter().filter(|_| self.camera.is_some()).map(|nm| nm * 1e-3);
+            let tabulated: Vec<f64> = self.wavelengths_um().into_iter().chain(of_white).collect();
+            return Ok(Box::new(cell.tabulated_at(&tabulated)));
         }
         let mut widths = found
             .elements
@@ -285,7 +299,7 @@ impl PsfArgs {
         widths.sort_unstable();
         widths.dedup();
         if matches!(self.fidelity, FidelityArg::Fitted) {
-            let band_um = self.wavelengths_nm.iter().map(|nm| nm * 1e-3);
+            let band_um = self.wavelengths_um().into_iter();
             let (low, high) = band_um.fold((0.4, 0.7), |(a, b), um| (um.min(a), um.max(b)));
             let range = (
                 *widths.iter().find(|w| **w > 0).unwrap_or(&100),
@@ -294,6 +308,10 @@ impl PsfArgs {
             return Ok(Box::new(FittedCell::of_stack(&stack, (low, high), range)?));
         }
         Ok(Box::new(PointwiseCell::new(stack, widths)))
+    }
+
+    fn wavelengths_um(&self) -> Vec<f64> {
+        self.wavelengths_nm.iter().map(|nm| nm * 1e-3).collect()
     }
 
     /// The wedge of the elements, by the options.
@@ -314,7 +332,7 @@ impl PsfArgs {
 
     fn lighting(&self) -> Lighting {
         Lighting {
-            wavelengths_um: self.wavelengths_nm.iter().map(|nm| nm * 1e-3).collect(),
+            wavelengths_um: self.wavelengths_um(),
             incidence_sin: [self.angle_x_deg, self.angle_y_deg].map(|deg| deg.to_radians().sin()),
             cells_as_lit: self.as_lit,
             distance_um: self.distance_um,

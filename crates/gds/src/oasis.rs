@@ -232,6 +232,9 @@ fn feed<S: Sink>(
             (content.mirror, content.magnification, content.angle_deg) = (mirrored, magnification, angle_deg);
         }
         OasisShape::Polygon { points } => {
+            if let (&[a, b, c, d], None) = (points, element.repetition) {
+                return sink.five_points(offset, layer()?, &[a, b, c, d, a].map(place));
+            }
             content.begin(offset, ElementKind::Boundary);
             let corners = points.iter().chain(points.first());
             content.points.extend(corners.copied().map(place));

@@ -6,7 +6,7 @@ use std::collections::hash_map::Entry;
 use num_complex::Complex64;
 
 use metalith_cell::{BandResponse, CellModel, NeighbourResponse, ObliqueTables, POLARISATION_SHARE};
-use metalith_core::{Error, LatticeKind, Progress, Result, Wedge, WidthRows};
+use metalith_core::{Error, LatticeKind, Progress, Result, WidthRows};
 use metalith_grating::NeighbourPillars;
 use metalith_made::{SimulationCase, cell_direction};
 use metalith_wave::{Aperture, Fold, Pillars, PlaneWave, Psf, Scratch};
@@ -163,7 +163,7 @@ impl TransmissionTables {
         Ok(())
     }
 
-    /// The same for one of many wavelengths of a band (um), in light from where elements with these wedges look.
+    /// The same for one of many wavelengths of a band (um), in `light` of each wavelength (um).
     ///
     /// # Errors
     /// As [`TransmissionTables::add_neighbours`].
@@ -171,17 +171,14 @@ impl TransmissionTables {
         &mut self,
         cell: &dyn CellModel,
         wavelength_um: f64,
-        wedges: &[Wedge],
+        light: &dyn Fn(f64) -> PlaneWave,
         progress: &dyn Progress,
     ) -> Result<()> {
-        for wedge in wedges {
-            let looks = |um: f64| cell_direction(&PlaneWave::looked_at(wedge, um), self.lattice);
-            if let Entry::Vacant(place) = self.neighbours.entry(key(looks(wavelength_um))) {
-                let Some(response) = cell.among_neighbours_in_band(wavelength_um, &looks, progress)? else {
-                    return Ok(());
-                };
-                place.insert(Neighbourhood::Band(response));
-            }
+        let sines = |um: f64| cell_direction(&light(um), self.lattice);
+        if let Entry::Vacant(place) = self.neighbours.entry(key(sines(wavelength_um)))
+            && let Some(response) = cell.among_neighbours_in_band(wavelength_um, &sines, progress)?
+        {
+            place.insert(Neighbourhood::Band(response));
         }
         Ok(())
     }

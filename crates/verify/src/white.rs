@@ -225,10 +225,12 @@ impl<'a> WhiteSimulator<'a> {
         let SimulationCase::Cell(cell) = self.judge else {
             return Ok(());
         };
-        let wedges: Vec<_> = elements.iter().map(|e| e.wedge).collect();
         for colour in &mut self.colours {
             if let Some(tables) = &mut colour.tables {
-                tables.add_neighbours_in_band(cell, colour.wavelength_um, &wedges, progress)?;
+                for element in elements {
+                    let looked_at = |um: f64| PlaneWave::looked_at(&element.wedge, um);
+                    tables.add_neighbours_in_band(cell, colour.wavelength_um, &looked_at, progress)?;
+                }
             }
         }
         if self.design.verify.incidence != CellIncidence::AsLit {

@@ -168,7 +168,8 @@ impl<R: Read + Seek> Input<R> {
                 other => return Err(self.fault(OasisFault::PointListKind(other))),
             };
             at = [at[0] + step[0], at[1] + step[1]];
-            let far = at.into_iter().chain(along).map(i64::abs).max().unwrap_or(0);
+            let [x, y] = [0, 1].map(|axis| at[axis].abs().max(along[axis].abs()));
+            let far = x.max(y);
             if far > limits.farthest.saturating_mul(2) {
                 return Err(self.too_far(far.unsigned_abs(), limits));
             }
