@@ -1,6 +1,6 @@
 """The same layouts through `metalith check` and KLayout's region checks: the same shapes must be found.
 
-usage: compare_klayout_drc.py METALITH FOLDER            (every rule of both shipped decks, with the table of docs/method/check.md)
+usage: compare_klayout_drc.py METALITH FOLDER            (every rule of the decks `sin_pillars` and `sin_apertures`, with the table of docs/method/check.md)
        compare_klayout_drc.py METALITH FOLDER --time N   (CPU seconds of both on N clean pillars, the same four rules)
 
 Needs pip install klayout. METALITH is the program, target/release/metalith.

@@ -15,7 +15,7 @@
 //! | [`LensPhase`](phase::LensPhase), [`ElementPhase`](phase::ElementPhase) | [`phase`] | the radial phase of a design and the wedge of an element |
 //! | [`PillarArray`] | [`mod@array`] | phases, and the mapping from phase to width; copies are proven, not assumed |
 //! | [`write_pillars`], [`write_apertures`] | [`layout`] | the array; bytes that depend on nothing else |
-//! | [`Layout`], [`extract()`] | [`gds`], [`mod@extract`] | the bytes of any GDSII file |
+//! | [`Layout`], [`extract()`] | [`gds`], [`mod@extract`] | the bytes of any GDSII or OASIS file |
 //! | [`CellModel`] | [`cell`] | a pillar's width and a wavelength: published, fitted or rigorous |
 //! | [`Propagator`](wave::Propagator) | [`wave`] | transmissions on a lattice: folded, direct, by rings |
 //! | [`Psf`](wave::Psf) | [`wave::psf`] | a field |
@@ -25,9 +25,9 @@
 //!
 //! Beside the line stand [`optimise`], which finds the radial phase; [`drc`], [`mod@diff`] and [`handoff`], which
 //! start from layouts too; [`calibrate`], which learns from captures what the model lacks; and [`compensate`],
-//! which draws what comes out as meant on the line that was so measured. [`grating`] predicts the diffraction orders
-//! of blazed rows of pillars as supercells; no command judges by it yet. The names at the root are those that
-//! the line itself needs; each room has its own.
+//! which draws what comes out as meant on the line that was so measured. [`grating`] solves supercells of unlike
+//! pillars; layouts are judged by its cell of pillars among unlike neighbours, unless a design says otherwise or has
+//! rectangles or a hexagonal lattice. The names at the root are those that the line itself needs; each room has its own.
 //!
 //! # Conventions
 //!

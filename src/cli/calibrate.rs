@@ -16,7 +16,7 @@ use super::{Outcome, Terminal, print_json, print_line};
 /// Find the effects by which a measured set differs from its model.
 #[derive(Args)]
 #[command(
-    after_help = "Example:\n  metalith calibrate bench/session-1 --out out/session-1\n\nWrites diagnosis.json, report.html and model.toml. Exit code 1 if too few captures can be used."
+    after_help = "Example:\n  metalith calibrate bench/session-1 --out out/session-1\n\nWrites diagnosis.json, report.html and model.toml. With the verdict unexplained or data_unfit there is no model.toml, and one of an earlier run is removed. Exit code 1 if too few captures can be used."
 )]
 pub struct CalibrateArgs {
     /// Folders of sets, or their `measurement.toml`. Sessions of one plan share their simulations.
@@ -28,7 +28,8 @@ pub struct CalibrateArgs {
     #[arg(long, short, value_name = "FOLDER")]
     out: Option<PathBuf>,
 
-    /// Try these effects alone, separated by commas; all of them if left out.
+    /// Try these effects alone, separated by commas; all of them if left out. With `--validate` all are tried, and these are the
+    /// effects that the synthetic sets have.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     effects: Vec<String>,
 

@@ -39,12 +39,13 @@ pub struct CellsArgs {
     #[arg(long, value_name = "T", default_value_t = 0.01)]
     tolerance: f64,
 
-    /// Find a mapping for each steered element by its unlike neighbours as well: four tables and a search for each, three to
-    /// five CPU minutes the first time.
+    /// Find a mapping for each distinct steered element by its unlike neighbours as well. Each takes a search, and a table for
+    /// each wavelength of `compared_nm` in [mapping], of [verify] if that is left out: with four wavelengths about six CPU minutes
+    /// an element the first time.
     #[arg(long)]
     steered: bool,
 
-    /// Print `cells.json` to standard output.
+    /// Print the numbers of `cells.json` to standard output: all its fields but the first two, `report` and `metalith`.
     #[arg(long)]
     json: bool,
 }

@@ -83,7 +83,7 @@ pub struct CompareArgs {
     #[arg(long, short, default_value = "out/compare", value_name = "FOLDER")]
     out: PathBuf,
 
-    /// Print `compare.json` instead of the table.
+    /// Print the numbers of `compare.json` instead of the table: all its fields but the first two, `report` and `metalith`.
     #[arg(long)]
     json: bool,
 

@@ -1,12 +1,13 @@
 //! The array that a layout must hold: of the design, or of the design with what a process makes of it taken into account.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::compensate::{compensate, compensated_name};
-use metalith::{CalibratedModel, Design, PillarArray, Result};
+use metalith::{CalibratedModel, Design, Error, PillarArray, Result};
 
 use super::Terminal;
+use super::verify::FidelityArg;
 
 /// What a layout is compared with.
 #[derive(Args)]
@@ -34,4 +35,18 @@ impl CompensatedFor {
             }
         }
     }
+}
+
+/// Refuse a cell of the pillars as drawn for a compensated layout, which is right when it is made, not as it is drawn.
+///
+/// # Errors
+/// If both a model, named by `option`, and a cell are given.
+pub fn judged_as_made(option: &str, model: Option<&Path>, fidelity: Option<FidelityArg>) -> Result<()> {
+    if model.is_none() || fidelity.is_none() {
+        return Ok(());
+    }
+    Err(Error::invalid(
+        "`--fidelity` describes pillars as drawn, and a compensated layout is judged as it is made",
+        format!("leave out `--fidelity`, or `{option}` for the layout as designed"),
+    ))
 }

@@ -8,6 +8,7 @@ use metalith::handoff::{Handoff, HandoffOptions, HandoffVerification, handoff, v
 use metalith::report::Verdict;
 use metalith::{Accuracy, Design, Result};
 
+use super::compensated::judged_as_made;
 use super::layout::FormatArg;
 use super::verify::FidelityArg;
 use super::{Outcome, Terminal, print_line};
@@ -39,7 +40,7 @@ pub struct HandoffArgs {
     verify: Option<PathBuf>,
 
     /// Hand over the layout that is compensated for this process: the `model.toml` of `metalith calibrate`. It is judged
-    /// as the process makes it.
+    /// as the process makes it, so `--fidelity` cannot be given with it.
     #[arg(long, value_name = "MODEL")]
     compensate: Option<PathBuf>,
 
@@ -74,6 +75,7 @@ pub fn run(args: &HandoffArgs, terminal: &Terminal) -> Result<Outcome> {
 }
 
 fn make(design: &Path, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcome> {
+    judged_as_made("--compensate", args.compensate.as_deref(), args.fidelity)?;
     let out = match &args.out {
         Some(out) => out.clone(),
         None => {

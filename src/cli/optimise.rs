@@ -44,7 +44,7 @@ pub struct OptimiseArgs {
     #[arg(long)]
     no_report: bool,
 
-    /// Print `report.json` to standard output.
+    /// Print the numbers of `report.json` to standard output: all its fields but the first two, `report` and `metalith`.
     #[arg(long)]
     json: bool,
 

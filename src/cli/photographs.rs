@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, ValueEnum};
 use metalith::cell::{RigorousCell, cache_folder};
 use metalith::optimise::{Deconvolution, OptimiseTask, Start, StepLimit, blurs_of_colours, turns_of, views};
 use metalith::phase::{Interpolation, RadialPhase};
@@ -38,8 +39,18 @@ pub struct PhotographsArgs {
     phase: Vec<String>,
 
     /// The cell that images are formed with.
-    #[arg(long, value_enum, default_value = "rigorous")]
+    #[arg(long, value_parser = of_single_pillars(), default_value = "rigorous")]
     fidelity: FidelityArg,
+}
+
+/// Reads a cell by which rings can be added up one by one: any but that of pillars among unlike neighbours.
+fn of_single_pillars() -> impl TypedValueParser<Value = FidelityArg> {
+    let cells = FidelityArg::value_variants()
+        .iter()
+        .filter(|cell| !matches!(cell, FidelityArg::Neighbours))
+        .filter_map(ValueEnum::to_possible_value);
+    PossibleValuesParser::new(cells)
+        .map(|name| <FidelityArg as ValueEnum>::from_str(&name, false).expect("it is the name of a cell"))
 }
 
 pub fn run(args: &PhotographsArgs, terminal: &Terminal) -> Result<Outcome> {
@@ -53,12 +64,6 @@ pub fn run(args: &PhotographsArgs, terminal: &Terminal) -> Result<Outcome> {
         .collect::<Result<Vec<_>>>()?;
     let phases = phases(args, &task)?;
     let fidelity = Fidelity::from(args.fidelity);
-    if fidelity == Fidelity::Neighbours {
-        return Err(Error::invalid(
-            "photographs of a lens by pillars among unlike neighbours",
-            "rings are added up one by one here; use another --fidelity, and `metalith run --fidelity neighbours` for PSFs",
-        ));
-    }
     let cell: Box<dyn CellModel> = match fidelity {
         // The table, which a run of many wavelengths repays.
         Fidelity::Rigorous => {

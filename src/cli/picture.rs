@@ -78,7 +78,7 @@ pub struct PictureArgs {
     #[arg(long, short, default_value = "out/picture", value_name = "FOLDER")]
     out: PathBuf,
 
-    /// Print `picture.json` to standard output.
+    /// Print the numbers of `picture.json` to standard output: all its fields but the first two, `report` and `metalith`.
     #[arg(long)]
     json: bool,
 }

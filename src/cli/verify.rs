@@ -14,7 +14,7 @@ use metalith::{
     write_report,
 };
 
-use super::compensated::CompensatedFor;
+use super::compensated::{CompensatedFor, judged_as_made};
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
@@ -49,8 +49,8 @@ pub struct Judging {
     #[arg(long)]
     fast: bool,
 
-    /// The cell that the layout is judged by; what `fidelity` in [verify] of the design says if left out, which is
-    /// `neighbours` unless it says otherwise.
+    /// The cell that the layout is judged by; what `fidelity` in [verify] of the design says if left out. Where it says nothing,
+    /// `neighbours`; for rectangles and hexagonal lattices `rigorous`.
     #[arg(long, value_enum)]
     fidelity: Option<FidelityArg>,
 
@@ -74,7 +74,7 @@ pub struct Judging {
     #[arg(long, value_name = "CAMERA")]
     picture: Option<PathBuf>,
 
-    /// Print `report.json` to standard output.
+    /// Print the numbers of `report.json` to standard output: all its fields but the first two, `report` and `metalith`.
     #[arg(long)]
     json: bool,
 }
@@ -262,6 +262,11 @@ fn summary(found: &Verification, folder: &Path) {
 pub fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
     let mut design = standard_input::design_any(&args.design)?;
     let layout = InputFile::of(&args.layout)?;
+    judged_as_made(
+        "--compensated",
+        args.compensated.model.as_deref(),
+        args.judging.fidelity,
+    )?;
     Judging::announce(&args.judging.simulation(&design, &layout)?, terminal);
     terminal.stop_on_interrupt();
     let array = args.compensated.array(&mut design, terminal)?;
@@ -269,12 +274,6 @@ pub fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
         .out
         .clone()
         .unwrap_or_else(|| args.layout.parent().map_or_else(PathBuf::new, Path::to_owned));
-    if args.compensated.model.is_some() && args.judging.fidelity.is_some() {
-        return Err(Error::invalid(
-            "`--fidelity` describes pillars as drawn, and a compensated layout is judged as it is made",
-            "leave out `--fidelity`, or give the original design's layout without `--compensated`",
-        ));
-    }
     // A compensated layout is right when it is made, not as it is drawn.
     let judging = Judging {
         model: args.judging.model.clone().or_else(|| args.compensated.model.clone()),

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use metalith_core::file::read_at_most;
-use metalith_core::text::quoted;
+use metalith_core::text::{quoted, without_mark};
 use metalith_core::{Error, Result};
 use serde::Serialize;
 
@@ -44,7 +44,7 @@ impl Spectrum {
         };
         let bytes = read_at_most(path, LONGEST, "a curve over wavelength")?;
         let text = String::from_utf8_lossy(&bytes);
-        let mut lines = text
+        let mut lines = without_mark(&text)
             .lines()
             .enumerate()
             .map(|(i, line)| (i + 1, line.trim()))
@@ -132,7 +132,11 @@ mod tests {
             std::fs::write(&path, text).unwrap();
             Spectrum::read_csv(&path, 1.0)
         };
-        assert_eq!(read("# source\nnm, value\n500, 0.5\n510,1\n").unwrap().at(505.0), 0.75);
+        for mark in ["", "\u{feff}"] {
+            let text = format!("{mark}# source\nnm, value\n500, 0.5\n510,1\n");
+            assert_eq!(read(&text).unwrap().at(505.0), 0.75);
+        }
+        assert!(read("\u{feff}nm,value\r\n500,0.5\r\n510,1\r\n").is_ok());
         for (text, line) in [
             ("wavelength,value\n500,1\n510,1\n", Some(1)),
             ("nm,value\n500,1\n510,1.5\n", Some(3)),

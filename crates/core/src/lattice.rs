@@ -217,12 +217,17 @@ impl Lattice {
     }
 
     /// A length of which distances along both axes are whole numbers: half a pitch, or half a nanometre on a hexagonal
-    /// lattice (um).
-    pub fn unit_um(&self) -> f64 {
+    /// lattice (nm).
+    pub fn unit_nm(&self) -> f64 {
         match self.kind {
-            LatticeKind::Square => 0.5 * self.pitch_um(),
-            LatticeKind::Hexagonal => 0.5e-3,
+            LatticeKind::Square => 0.5 * f64::from(self.pitch_nm),
+            LatticeKind::Hexagonal => 0.5,
         }
+    }
+
+    /// [`Lattice::unit_nm`] (um).
+    pub fn unit_um(&self) -> f64 {
+        self.unit_nm() * 1e-3
     }
 
     /// Place number `i` of an axis in half steps from the centre: odd for an even number of places.

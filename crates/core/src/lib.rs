@@ -37,5 +37,5 @@ pub use progress::{Progress, Silent};
 pub use rectangle::Rectangles;
 pub use rows::WidthRows;
 pub use shape::PillarShape;
-pub use wedge::Wedge;
+pub use wedge::{Wedge, turned_sine};
 pub use zernike::Zernike;

@@ -69,6 +69,11 @@ pub fn printable_bytes(bytes: &[u8]) -> String {
     out
 }
 
+/// A text without the mark of its byte order (U+FEFF) that some programs write before it.
+pub fn without_mark(text: &str) -> &str {
+    text.strip_prefix('\u{FEFF}').unwrap_or(text)
+}
+
 /// Bytes as hexadecimal digits, such as those of a digest.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()

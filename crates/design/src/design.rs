@@ -271,10 +271,9 @@ impl Design {
 fn check_directions(section: &Section<'_, '_>, array: &ArraySpec, verify: &VerifySpec) {
     for element in array.elements() {
         for &wavelength_um in &verify.wavelengths_um {
-            let (x, y) = element.wedge.looks_at(wavelength_um);
             let arrives = |angle: &FieldAngle| {
-                let sine = |looks: f64, deg: f64| (looks.asin() + deg.to_radians()).sin();
-                sine(x, angle.x_deg).hypot(sine(y, angle.y_deg)) < 1.0
+                let field_rad = [angle.x_deg, angle.y_deg].map(f64::to_radians);
+                element.wedge.arriving(wavelength_um, field_rad).is_some()
             };
             if let Some(angle) = verify.field_angles.iter().find(|a| !arrives(a)) {
                 section.fault_given(
@@ -301,3 +300,23 @@ const KNOWN_TO: &str =
 
 /// Leaves room within the 32 characters of a GDSII cell name for the parts a layout adds.
 const MAX_NAME: usize = 24;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_field_angle_beyond_a_right_angle_is_refused() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../designs/mixed_lenses.toml");
+        let text = load(&path).unwrap();
+        let read = |angle: &str| {
+            let (from, to) = ("field_x_deg = [0]", format!("field_x_deg = [{angle}]"));
+            assert!(text.contains(from));
+            Design::parse(&path, &text.replacen(from, &to, 1))
+        };
+        // One of the elements looks nearly 8 degrees to this side.
+        assert!(read("-80").is_ok());
+        let error = read("-86").unwrap_err().to_string();
+        assert!(error.contains("no light"), "{error}");
+    }
+}

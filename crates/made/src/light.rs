@@ -3,7 +3,7 @@
 use num_complex::Complex32;
 
 use super::PathChange;
-use metalith_core::{Lattice, LatticeKind};
+use metalith_core::{Lattice, LatticeKind, turned_sine};
 use metalith_wave::PlaneWave;
 use metalith_wave::kernels::cis;
 
@@ -17,13 +17,14 @@ pub struct ArrivingLight {
 }
 
 impl ArrivingLight {
-    /// What a stated wave is on a path with a change: the angle in each plane of incidence is larger by the tilt.
+    /// What a stated wave is on a path with a change: the angle in each plane of incidence is larger by the tilt. Where that is
+    /// a right angle or more its sine is one: a wave along the chip, which [`Propagator`](metalith_wave::Propagator)s refuse.
     pub fn new(stated: &PlaneWave, path: &PathChange) -> Self {
         let turn = |sine: f64, mrad: f64| {
             if mrad == 0.0 {
                 sine
             } else {
-                (sine.asin() + mrad * 1e-3).sin()
+                turned_sine(sine, mrad * 1e-3).unwrap_or(1.0_f64.copysign(mrad))
             }
         };
         Self {
@@ -73,5 +74,35 @@ pub fn cell_direction(wave: &PlaneWave, lattice: LatticeKind) -> [f64; 2] {
     match lattice {
         LatticeKind::Square => [x.max(y), x.min(y)],
         LatticeKind::Hexagonal => [x, y],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tilt_beyond_a_right_angle_is_no_other_direction() {
+        /// Rounding of a sine.
+        const ROUNDING: f64 = 1e-15;
+        let stated = PlaneWave {
+            wavelength_um: 0.55,
+            sin_x: 1.2_f64.sin(),
+            sin_y: -0.3_f64.sin(),
+        };
+        let tilted = |tilt_mrad| {
+            let path = PathChange {
+                tilt_mrad,
+                ..PathChange::default()
+            };
+            let plane = ArrivingLight::new(&stated, &path).plane;
+            [plane.sin_x, plane.sin_y]
+        };
+        assert_eq!(tilted([0.0; 2]), [stated.sin_x, stated.sin_y]);
+        let [x, y] = tilted([200.0, -400.0]);
+        assert!((x - 1.4_f64.sin()).abs() < ROUNDING && (y + 0.7_f64.sin()).abs() < ROUNDING);
+        assert_eq!(tilted([700.0, 0.0])[0], 1.0);
+        let from_behind = [0.0, -1300.0];
+        assert_eq!(tilted(from_behind)[1], -1.0);
     }
 }

@@ -74,6 +74,19 @@ impl<'r> RingField<'r> {
         sum
     }
 
+    /// Bessel functions for [`RingField::at_radius`], of all rings out to `farthest_um` from the axis.
+    pub fn bessel(&self, farthest_um: f64) -> Bessel {
+        Bessel::up_to(self.largest_argument(farthest_um))
+    }
+
+    /// k r rho / Q of [`RingField::at_radius`], which grows with both radii, at the end of the outermost ring: its nodes reach
+    /// beyond the edge of the lens. The argument of the other term is at most an eighth of it.
+    fn largest_argument(&self, farthest_um: f64) -> f64 {
+        let edge_um = self.rings.len() as f64 * self.rings.lattice().pitch_um();
+        let q = (edge_um * edge_um + farthest_um * farthest_um + self.gap_um * self.gap_um).sqrt();
+        self.wavenumber * edge_um * farthest_um / q
+    }
+
     /// Field of a single site at a squared lateral distance (um^2).
     pub fn point(&self, lateral2_um2: f64) -> Complex64 {
         let r2 = lateral2_um2 + self.gap_um * self.gap_um;
@@ -139,10 +152,11 @@ mod tests {
         const TOLERANCE: f64 = 2e-5;
         /// Angles within a half turn that the brute force is averaged over, which leaves either lattice alike.
         const ANGLES: u32 = 24;
-        let (bessel, wavelength, z) = (Bessel::up_to(100.0), 0.5, 240.0);
+        let (wavelength, z) = (0.5, 240.0);
         let rings = KINDS.map(|kind| rings(kind, 100_000));
         for (rings, rho) in rings.iter().flat_map(|rings| [0.0, 1.3, 7.0].map(|rho| (rings, rho))) {
             let field = RingField::new(rings, wavelength, z);
+            let bessel = field.bessel(rho);
             let phase = |ring: usize| -TAU / 0.55 * (rings.middle_um(ring).hypot(z) - z);
             let quick = (0..rings.len())
                 .map(|k| field.at_radius(k, rho, &bessel) * Complex64::cis(phase(k)))
@@ -154,6 +168,23 @@ mod tests {
                 / f64::from(ANGLES);
             let error = (quick - exact).norm() / field.matched();
             assert!(error < TOLERANCE, "{rho} um: {error:e}");
+        }
+    }
+
+    #[test]
+    fn the_table_ends_where_the_outermost_ring_needs_it() {
+        /// Far beyond all that is asked for here.
+        const AMPLE: f64 = 2000.0;
+        let ample = Bessel::up_to(AMPLE);
+        for (diameter_nm, wavelength, z, rho) in [(100_000, 0.5, 240.0, 7.0), (100_000, 0.5, 5.0, 60.0)] {
+            let rings = rings(LatticeKind::Square, diameter_nm);
+            let field = RingField::new(&rings, wavelength, z);
+            let bessel = field.bessel(rho);
+            for ring in 0..rings.len() {
+                assert_eq!(field.at_radius(ring, rho, &bessel), field.at_radius(ring, rho, &ample));
+            }
+            // However near the lens is: sines end at one.
+            assert!(field.largest_argument(rho) < TAU / wavelength * rho);
         }
     }
 }

@@ -8,7 +8,6 @@ use super::focus::Lens;
 use super::kernel::RingField;
 use metalith_cell::CellModel;
 use metalith_core::{Result, WidthMap};
-use metalith_wave::kernels::Bessel;
 use metalith_wave::psf::{CONTRAST_LP_MM, pixel_mtf};
 use metalith_wave::{Accuracy, Fold, Pillars, PlaneWave, Psf, Scratch, Window};
 
@@ -31,10 +30,9 @@ impl OverWavelength<'_> {
     /// # Errors
     /// If the cell does not cover a wavelength.
     pub fn psf(&self, radii_um: &[f64], wavelengths_um: &[f64]) -> Result<Vec<Array2<f64>>> {
-        let edge = 0.5e-3 * f64::from(self.lens.rings.diameter_nm());
         let shortest = wavelengths_um.iter().copied().fold(f64::MAX, f64::min);
         let farthest = radii_um.iter().copied().fold(0.0, f64::max);
-        let bessel = Bessel::up_to(std::f64::consts::TAU / shortest * edge * farthest / self.lens.gap_um);
+        let bessel = RingField::new(&self.lens.rings, shortest, self.lens.gap_um).bessel(farthest);
         let columns = wavelengths_um
             .par_iter()
             .map(|&wavelength| {

@@ -4,6 +4,7 @@
 //! each plane of colour, it loses a share of the power. The shares are found on one random scene ([`crate::Rehearsal`]);
 //! times the power that scenes have there they are the expected error.
 
+use metalith_wave::kernels::{fft_size, mirrored};
 use ndarray::{Array2, Array3, Axis};
 use num_complex::Complex32;
 use rayon::prelude::*;
@@ -118,19 +119,16 @@ impl Forecast {
 /// no edges.
 fn bands(plane: &Array2<f32>) -> [[f64; BANDS.len()]; PARTS.len()] {
     let (rows, columns) = plane.dim();
-    let size = metalith_wave::kernels::fft_size(2 * rows.max(columns));
+    let size = fft_size(2 * rows.max(columns));
     let fft = SquareFft::new(size);
     let mut scratch = FftScratch::default();
     let from = [(size - rows) / 2, (size - columns) / 2];
-    let mirrored = |i: usize, from: usize, n: usize| {
-        let place = (i as i64 - from as i64).rem_euclid(2 * n as i64) as usize;
-        place.min(2 * n - 1 - place)
-    };
+    let source = |i: usize, from: usize, n: usize| mirrored(i as i64 - from as i64, n);
     let mut square = vec![0.0; size * size];
     for (iy, line) in square.chunks_exact_mut(size).enumerate() {
-        let row = plane.row(mirrored(iy, from[0], rows));
+        let row = plane.row(source(iy, from[0], rows));
         for (ix, v) in line.iter_mut().enumerate() {
-            *v = row[mirrored(ix, from[1], columns)];
+            *v = row[source(ix, from[1], columns)];
         }
     }
     let mut spectrum = vec![Complex32::ZERO; fft.entries()];

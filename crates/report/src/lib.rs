@@ -39,6 +39,7 @@
 //! ```
 
 mod axis;
+mod bitmap;
 mod chart;
 mod colour;
 mod figure;

@@ -1,6 +1,7 @@
 //! Formatting of numbers for readers: fixed rules, the same on every machine.
 
-/// `x` to a given number of significant digits: `0.01234`, `12.3`, `57,700,000`, `1.2×10⁻⁷`.
+/// `x` to a given number of significant digits: `0.01234`, `12.3`, `5.77×10⁷`, `1.2×10⁻⁷`. From 0.0001 to below ten million it
+/// is written without a power of ten, and all digits before its point are given, even if there are more: `6,411,448`.
 pub fn sig(x: f64, digits: usize) -> String {
     let digits = digits.max(1);
     if !x.is_finite() {

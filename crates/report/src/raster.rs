@@ -1,10 +1,8 @@
 //! Matrices as small PNG images, embedded as text.
 
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
-use metalith_core::part;
-use ndarray::{Array2, ArrayView2};
+use ndarray::ArrayView2;
 
+use super::bitmap::{address, reduced};
 use super::colour::ColourMap;
 
 /// Index of what has no value: transparent.
@@ -38,7 +36,7 @@ impl Shading {
 
 /// The matrix as an image, row 0 at the bottom, as `data:` address.
 pub(super) fn image(values: ArrayView2<f64>, shading: &Shading) -> String {
-    let values = reduced(values);
+    let values = reduced(values, LARGEST);
     let (rows, cols) = values.dim();
     let mut index = Vec::with_capacity(rows * cols);
     for row in values.rows().into_iter().rev() {
@@ -60,63 +58,24 @@ pub(super) fn bar(map: ColourMap) -> String {
     encode(1, index.len(), &index, map)
 }
 
-/// Averaged over whole blocks of values until it fits a page.
-fn reduced(values: ArrayView2<f64>) -> Array2<f64> {
-    let (rows, cols) = values.dim();
-    let block = rows.max(cols).div_ceil(LARGEST);
-    if block <= 1 {
-        return values.to_owned();
-    }
-    Array2::from_shape_fn((rows.div_ceil(block), cols.div_ceil(block)), |(i, j)| {
-        let part = part(
-            values,
-            i * block..rows.min((i + 1) * block),
-            j * block..cols.min((j + 1) * block),
-        );
-        let (sum, n) = part
-            .iter()
-            .filter(|x| !x.is_nan())
-            .fold((0.0, 0u32), |(sum, n), &x| (sum + x, n + 1));
-        sum / f64::from(n)
-    })
-}
-
 fn encode(width: usize, height: usize, index: &[u8], map: ColourMap) -> String {
     let mut palette: Vec<u8> = (0..EMPTY).flat_map(|i| map.rgb(f64::from(i) / SHADES)).collect();
     palette.extend([128; 3]);
     let mut opacity = vec![255; 256];
     opacity[usize::from(EMPTY)] = 0;
 
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, width.max(1) as u32, height.max(1) as u32);
-    encoder.set_color(png::ColorType::Indexed);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_palette(palette);
-    encoder.set_trns(opacity);
-    encoder.set_compression(png::Compression::High);
-    let index = if index.is_empty() { &[EMPTY] } else { index };
-    // Writing to memory fails only for a wrong size, which is ours to keep.
-    let mut writer = encoder.write_header().expect("a header fits in memory");
-    writer.write_image_data(index).expect("as many bytes as pixels");
-    writer.finish().expect("an end fits in memory");
-    format!("data:image/png;base64,{}", STANDARD.encode(bytes))
+    address((height, width), index, &[EMPTY], |encoder| {
+        encoder.set_color(png::ColorType::Indexed);
+        encoder.set_palette(palette);
+        encoder.set_trns(opacity);
+    })
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::bitmap::tests::decode;
     use super::*;
-
-    fn decode(address: &str) -> (png::OutputInfo, Vec<u8>) {
-        let bytes = STANDARD
-            .decode(address.strip_prefix("data:image/png;base64,").unwrap())
-            .unwrap();
-        let mut decoder = png::Decoder::new(std::io::Cursor::new(bytes));
-        decoder.set_transformations(png::Transformations::EXPAND);
-        let mut reader = decoder.read_info().unwrap();
-        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
-        let info = reader.next_frame(&mut pixels).unwrap();
-        (info, pixels)
-    }
+    use ndarray::Array2;
 
     #[test]
     fn a_matrix_becomes_an_image_with_its_first_row_below() {
@@ -145,7 +104,9 @@ mod tests {
         };
         let (info, _) = decode(&image(Array2::from_elem((2000, 1500), 1.0).view(), &shading));
         assert!(info.width as usize <= LARGEST && info.height as usize <= LARGEST);
-        let (info, _) = decode(&image(Array2::zeros((0, 0)).view(), &shading));
-        assert_eq!((info.width, info.height), (1, 1));
+        for empty in [(0, 0), (0, 5)] {
+            let (info, _) = decode(&image(Array2::zeros(empty).view(), &shading));
+            assert_eq!((info.width, info.height), (1, 1));
+        }
     }
 }

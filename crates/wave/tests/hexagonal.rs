@@ -214,7 +214,8 @@ fn the_adjoint_of_a_folded_field_is_one() {
     for fold in [planned, folded] {
         let scratch = &mut Scratch::default();
         let field = fold.field(&lens, &wave, scratch).unwrap().values;
-        let back = fold.adjoint(&given, &wave, scratch).unwrap();
+        // A scratch that no field has made room in: a period has more places along x than along y.
+        let back = fold.adjoint(&given, &wave, &mut Scratch::default()).unwrap();
         let (left, right) = (dot(&given, &field), dot(&back, &sites));
         assert!(
             (left - right).norm() < ROUNDING * norm(&given) * norm(&field),
@@ -409,6 +410,50 @@ fn rays_land_where_wave_optics_has_them() {
     for (iy, ix) in (0..9).map(|k| (k / 3, k % 3)) {
         let (rays, waves) = (map.power_um2[[cy + iy - 1, cx + ix - 1]], exact(iy, ix));
         assert!((rays - waves).abs() < RAYS * largest, "{iy} {ix}: {rays} {waves}");
+    }
+}
+
+/// An aperture that is not asked for rows that its lattice does not reach.
+struct WithinReach<'a>(&'a dyn Aperture);
+
+impl Aperture for WithinReach<'_> {
+    fn lattice(&self) -> Lattice {
+        self.0.lattice()
+    }
+
+    fn radius_um(&self) -> f64 {
+        self.0.radius_um()
+    }
+
+    fn fill_row(&self, iy: usize, row: &mut [Complex32]) {
+        assert!(self.lattice().reach()[1].contains(&iy), "row {iy}");
+        self.0.fill_row(iy, row);
+    }
+}
+
+#[test]
+fn rows_out_of_reach_are_not_asked_for() {
+    let (lens, wave, z) = (small([0.0; 2]), PlaneWave::normal(0.55), 50.0);
+    let within = WithinReach(&lens);
+    let grid = LandingGrid {
+        cell_um: 5.0,
+        cells: 8,
+        distance_um: z,
+    };
+    let matched = |aperture: &dyn Aperture| Matched::of(aperture, [0.0, 0.0, z], 0.55, 1.0);
+    assert_eq!(matched(&within), matched(&lens));
+    let landing = |aperture: &dyn Aperture| Landing::of(aperture, &wave, [0.0; 2], grid).unwrap().power_um2;
+    assert_eq!(landing(&within), landing(&lens));
+    let departing = |aperture: &dyn Aperture| {
+        let departure = Departure::of(aperture, 0.55, z, 4);
+        departure.landing([0.0; 2], [0.0; 2], grid).unwrap().power_um2
+    };
+    assert_eq!(departing(&within), departing(&lens));
+    let window = Window::about([0.0; 2], 0.5, 8, z);
+    let fold = Fold::plan(lens.lattice, 20.0, 0.55, window, Accuracy::Fast).unwrap();
+    let direct = Direct::plan(lens.lattice, 0.55, window).unwrap();
+    for way in [&fold as &dyn Propagator, &direct] {
+        assert!(way.field(&within, &wave, &mut Scratch::default()).is_ok());
     }
 }
 

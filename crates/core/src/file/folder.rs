@@ -72,9 +72,16 @@ impl WholeFolder {
     /// same parent. What a killed run left is finished or removed first.
     ///
     /// # Errors
-    /// If another process writes the same folder, something else than a folder lies there, or the disk refuses.
+    /// If another process writes the same folder, something else than a folder or a link to one lies there, or the disk refuses.
     pub fn create(target: &Path, archive: &Path) -> Result<Self> {
         let places = Places::of(target, archive)?;
+        // What lies there is removed in the end: it must be what an earlier run may have left.
+        if is_there(target)? && !target.is_dir() {
+            return Err(Error::invalid(
+                format!("{} is not a folder", target.display()),
+                "name a folder with --out, or remove what lies there",
+            ));
+        }
         let parent = parent(target);
         fs::create_dir_all(parent).map_err(Error::io("create the folder", parent))?;
         let lock = part::open(&places.lock, target)?;
@@ -119,10 +126,7 @@ impl Drop for WholeFolder {
             let _ = fs::remove_dir_all(&self.part);
         }
         if let Some(lock) = self.lock.take() {
-            // Removed while it is locked, or another run could hold the file whose name is taken away here, and a
-            // third one a new file of this name.
-            let _ = fs::remove_file(&self.places.lock);
-            drop(lock);
+            part::remove_own(&lock, &self.places.lock);
         }
     }
 }

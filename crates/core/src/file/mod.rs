@@ -136,10 +136,9 @@ impl Write for WholeFile {
 
 impl Drop for WholeFile {
     fn drop(&mut self) {
-        if self.out.is_some() {
-            // Not finished: what is left of an abandoned file is of no use. It is removed while it is still
-            // locked, so that it cannot be the file of another run.
-            let _ = fs::remove_file(&self.part);
+        // Not finished: what is left of an abandoned file is of no use.
+        if let Some(out) = &self.out {
+            part::remove_own(out.file(), &self.part);
         }
     }
 }

@@ -84,6 +84,15 @@ pub(super) fn is_at(file: &File, path: &Path) -> io::Result<bool> {
     }
 }
 
+/// Remove the open file at `path`, if it is still that: after it was lost, what lies there is the file of another run. Removed
+/// while it is locked, or another run could hold the file whose name is taken away here, and a third one a new file of this
+/// name. What cannot be removed is left to the next run.
+pub(super) fn remove_own(file: &File, path: &Path) {
+    if is_at(file, path).unwrap_or(false) {
+        let _ = fs::remove_file(path);
+    }
+}
+
 /// Whether two open files are one.
 pub(super) fn is_same(a: &File, b: &File) -> io::Result<bool> {
     Ok(same(&a.metadata()?, &b.metadata()?))

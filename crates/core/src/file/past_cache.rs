@@ -83,6 +83,11 @@ impl Output {
         }
     }
 
+    /// The file as far as it is written.
+    pub fn file(&self) -> &File {
+        &self.file
+    }
+
     /// Hand over what waits; the file, complete.
     pub fn finish(&mut self) -> io::Result<&File> {
         self.put(self.waiting)?;
@@ -224,13 +229,26 @@ fn fill(file: &mut File, path: &Path, place: u64, out: &mut [u8]) -> io::Result<
             Err(e) if e.kind() == ErrorKind::Interrupted => {}
             // Some file systems refuse only now, and all of them after a short read.
             Err(e) if e.kind() == ErrorKind::InvalidInput => {
-                *file = File::open(path)?;
+                *file = opened_again(file, path)?;
                 file.seek(SeekFrom::Start(place + held as u64))?;
             }
             Err(e) => return Err(e),
         }
     }
     Ok(held)
+}
+
+/// A file that was opened at `path`, for transfers through the cache.
+///
+/// # Errors
+/// If it cannot be opened, or another one lies there by now: the bytes of two files would be taken for those of one.
+fn opened_again(file: &File, path: &Path) -> io::Result<File> {
+    let again = File::open(path)?;
+    if super::part::is_same(&again, file)? {
+        Ok(again)
+    } else {
+        Err(io::Error::other("the file was replaced while it was read"))
+    }
 }
 
 #[cfg(test)]
@@ -278,6 +296,23 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// A file that was put in the place of another is not read on in its stead.
+    #[cfg(unix)]
+    #[test]
+    fn a_replaced_file_is_not_opened_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let [path, other] = ["bytes", "other"].map(|name| folder.path().join(name));
+        std::fs::write(&path, b"first").unwrap();
+        let file = File::open(&path).unwrap();
+        let mut bytes = Vec::new();
+        opened_again(&file, &path).unwrap().read_to_end(&mut bytes).unwrap();
+        assert_eq!(bytes, b"first");
+        std::fs::write(&other, b"second").unwrap();
+        std::fs::rename(&other, &path).unwrap();
+        let error = opened_again(&file, &path).unwrap_err().to_string();
+        assert!(error.contains("replaced"), "{error}");
     }
 
     /// A reader that leaps gets the block it asks for and not the one that was under way.

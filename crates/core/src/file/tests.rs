@@ -157,6 +157,32 @@ fn a_killed_process_leaves_nothing_in_the_way() {
     assert!(!part_of(&target).exists());
 }
 
+/// A run whose unfinished file was removed by hand ends with an error, and leaves that of the next run, which has begun
+/// meanwhile.
+#[test]
+fn a_run_that_lost_its_file_leaves_that_of_another_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("out");
+    for commits in [true, false] {
+        let mut first = WholeFile::create(&target).unwrap();
+        first.write_all(b"first").unwrap();
+        std::fs::remove_file(part_of(&target)).unwrap();
+        let mut second = WholeFile::create(&target).unwrap();
+        second.write_all(b"second").unwrap();
+        if commits {
+            let error = first.commit().unwrap_err().to_string();
+            assert!(error.contains("was replaced"), "{error}");
+        } else {
+            drop(first);
+        }
+        assert!(part_of(&target).exists());
+        second.commit().unwrap();
+        assert_eq!(std::fs::read(&target).unwrap(), b"second");
+        assert!(!part_of(&target).exists());
+        std::fs::remove_file(&target).unwrap();
+    }
+}
+
 /// Links, hard or soft, are refused and what they lead to is as it was.
 #[test]
 fn links_are_not_followed() {

@@ -1,14 +1,14 @@
 //! Tables of the index by wavelength, from CSV.
 
 use crate::TableError;
-use metalith_core::text::quoted;
+use metalith_core::text::{quoted, without_mark};
 
 /// Line, counted from one, and what is wrong there.
 type TableFault = (Option<usize>, TableError);
 
 /// Samples (L (um), n, k) of the text of a table, wavelengths rising.
 pub(super) fn parse(text: &str) -> Result<Vec<[f64; 3]>, TableFault> {
-    let mut lines = text
+    let mut lines = without_mark(text)
         .lines()
         .enumerate()
         .map(|(i, line)| (i + 1, line.trim()))
@@ -56,4 +56,18 @@ pub(super) fn parse(text: &str) -> Result<Vec<[f64; 3]>, TableFault> {
         return Err((None, TableError::TooFewRows));
     }
     Ok(samples)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As spreadsheets save a table.
+    #[test]
+    fn a_mark_of_the_byte_order_is_no_part_of_a_table() {
+        let plain = "wavelength_nm,n\r\n400,2\r\n410,2.1\r\n";
+        let samples = parse(plain).unwrap();
+        assert_eq!(parse(&format!("\u{feff}{plain}")).unwrap(), samples);
+        assert_eq!(parse(&format!("\u{feff}# film\r\n{plain}")).unwrap(), samples);
+    }
 }

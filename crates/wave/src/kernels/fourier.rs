@@ -10,6 +10,13 @@ use rustfft::{Fft, FftPlanner};
 
 use super::fft_size;
 
+/// The border rule: pixel of an axis of `n` pixels that stands for place `i`, which may be beyond its ends.
+pub fn mirrored(i: i64, n: usize) -> usize {
+    let n = n as i64;
+    let at = i.rem_euclid(2 * n);
+    at.min(2 * n - 1 - at) as usize
+}
+
 /// Transforms of images continued beyond their border, so that what a kernel moves across it is not the other side
 /// of the image.
 pub(crate) struct Fourier {
@@ -56,11 +63,7 @@ impl Fourier {
 
     /// Spectrum of an image, mirrored at its border as often as it takes.
     pub fn of_image(&self, image: &Array2<f64>) -> Array2<Complex64> {
-        let source = |axis: usize, i: usize| {
-            let n = self.image[axis] as i64;
-            let at = (i as i64 - self.border as i64).rem_euclid(2 * n);
-            at.min(2 * n - 1 - at) as usize
-        };
+        let source = |axis: usize, i: usize| mirrored(i as i64 - self.border as i64, self.image[axis]);
         let mut plane = Array2::from_shape_fn(self.size, |(y, x)| Complex64::from(image[[source(0, y), source(1, x)]]));
         self.run(&self.forward, &mut plane);
         plane
@@ -92,5 +95,17 @@ impl Fourier {
         let mut turned = plane.t().as_standard_layout().into_owned();
         plans[0].process(turned.as_slice_mut().expect("standard layout"));
         plane.assign(&turned.t());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn beyond_its_border_an_image_goes_on_as_its_mirror_image() {
+        let seen: Vec<usize> = (-7..8).map(|i| mirrored(i, 3)).collect();
+        assert_eq!(seen, [0, 0, 1, 2, 2, 1, 0, 0, 1, 2, 2, 1, 0, 0, 1]);
+        assert_eq!(mirrored(-4, 1), 0);
     }
 }

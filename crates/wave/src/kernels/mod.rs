@@ -19,6 +19,7 @@ mod taper;
 pub use bessel::{Bessel, jinc};
 pub use cis::{CIS_ERROR, cis, cis_all};
 pub use fft::fft_size;
+pub use fourier::mirrored;
 pub use products::sum_of_products;
 pub use taper::{fade, sinc};
 

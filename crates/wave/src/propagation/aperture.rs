@@ -1,6 +1,6 @@
 //! The transmission of an element, row by row.
 
-use metalith_core::{Lattice, LatticeKind, WidthRows};
+use metalith_core::{Lattice, WidthRows};
 use num_complex::{Complex32, Complex64};
 
 use crate::error::{Result, WaveError};
@@ -9,7 +9,8 @@ use crate::error::{Result, WaveError};
 ///
 /// Rows are asked for one at a time and in any order, so that an element never has to be held as
 /// complex numbers: 8.2 million sites of a 1 mm lens are 16 MB of widths or nothing at all. Nothing passes where the lattice
-/// has no site, nor in rows that it does not reach ([`Lattice::has`], [`Lattice::reach`]): nobody asks for those rows.
+/// has no site, nor in rows that it does not reach ([`Lattice::has`], [`Lattice::reach`]): nothing in this crate asks for those
+/// rows.
 pub trait Aperture: Sync {
     /// Where the samples are.
     fn lattice(&self) -> Lattice;
@@ -143,11 +144,7 @@ pub(super) fn sites_inside(lattice: &Lattice, radius_um: f64, iy: usize) -> std:
     if !lattice.reach()[1].contains(&iy) {
         return 0..0;
     }
-    let unit_nm = match lattice.kind() {
-        LatticeKind::Square => 0.5 * f64::from(lattice.pitch_nm()),
-        LatticeKind::Hexagonal => 0.5,
-    };
-    let radius = radius_um * 1e3 / unit_nm;
+    let radius = radius_um * 1e3 / lattice.unit_nm();
     // A radius of whole half pitches must include the sites on it, however its decimals were rounded.
     const ROUNDING: f64 = 1e-12;
     let limit = (radius * radius * (1.0 + ROUNDING)).floor() as i64;

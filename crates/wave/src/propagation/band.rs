@@ -120,10 +120,9 @@ impl FrequencyBand {
         }
         let period_um = periods_um(bins, &lattice);
         let z = window.distance_um;
-        // Bins per unit of sine; along the rim of the disc neighbouring samples are less than a bin apart.
+        // Bins per unit of sine.
         let per_sine = period_um.map(|period| period / wavelength_um);
-        let most = per_sine[0].max(per_sine[1]);
-        let samples = (8.0 * std::f64::consts::PI * zero_um / z * most).ceil() as usize + 64;
+        let samples = rim_samples(window, zero_um, per_sine[0].max(per_sine[1]));
         let rim: Vec<[i64; 2]> = (0..samples)
             .map(|i| {
                 let (sin, cos) = (std::f64::consts::TAU * i as f64 / samples as f64).sin_cos();
@@ -176,6 +175,17 @@ impl FrequencyBand {
     }
 }
 
+/// Samples along the rim of the disc of kept rays, of which neighbours are a quarter of a bin or less apart where there are
+/// `per_sine` bins per unit of sine: sines change by no more than places do over the length of a ray.
+fn rim_samples(window: &Window, zero_um: f64, per_sine: f64) -> usize {
+    let [x, y] = window.centre_um;
+    let z = window.distance_um;
+    let shortest_ray = (x.hypot(y) - zero_um).hypot(z);
+    // In whole distances: up to 60 degrees the samples are those of a rim at its foot.
+    let ray = (shortest_ray / z).floor().max(1.0) * z;
+    (8.0 * std::f64::consts::PI * zero_um / ray * per_sine).ceil() as usize + 64
+}
+
 /// Length of so many places of the grid of a lattice along each axis (um).
 fn periods_um(bins: [usize; 2], lattice: &Lattice) -> [f64; 2] {
     let steps = lattice.steps_um();
@@ -190,4 +200,52 @@ fn edge_um(window: &Window, wavelength_um: f64, reach_um: f64) -> f64 {
     let landing = x.hypot(y) + reach_um;
     let cosine = z / landing.hypot(z);
     (wavelength_um * z / cosine.powi(3)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every frequency whose ray lands within the rim is kept, however steep the rim is, and a steep rim takes no more samples
+    /// than twice those of sines that go from none to one.
+    #[test]
+    fn a_band_holds_all_rays_within_its_rim() {
+        let lattice = Lattice::new(350, 400).unwrap();
+        let (um, bins) = (0.5, [160, 180]);
+        for (z, zero, centre_um) in [
+            (100.0, 40.0, [0.0, 0.0]),
+            (10.0, 60.0, [3.0, -2.0]),
+            (5.0, 400.0, [50.0, 20.0]),
+            (20.0, 60.0, [60.0, 0.0]),
+            (30.0, 60.0, [120.0, 160.0]),
+        ] {
+            let window = Window {
+                centre_um,
+                step_um: 0.5,
+                samples: 8,
+                distance_um: z,
+            };
+            let band = FrequencyBand::new(lattice, um, &window, bins, [0.5 * zero, zero]).unwrap();
+            let per_sine = band.fade.period_um.map(|period| period / um);
+            let kept = |bin: [i64; 2]| {
+                let [column, row] = [0, 1].map(|a| usize::try_from(bin[a] - band.first[a]).unwrap_or(usize::MAX));
+                band.rows.get(column).is_some_and(|rows| rows.contains(&row))
+            };
+            let mut inside = 0;
+            let reach = per_sine.map(|most| most.ceil() as i64);
+            for (kx, ky) in (-reach[0]..=reach[0]).flat_map(|kx| (-reach[1]..=reach[1]).map(move |ky| (kx, ky))) {
+                let [x, y] = [kx as f64 / per_sine[0], ky as f64 / per_sine[1]];
+                let cosine = (1.0 - x * x - y * y).max(0.0).sqrt();
+                let away = (z * x / cosine - centre_um[0]).hypot(z * y / cosine - centre_um[1]);
+                if away < zero {
+                    inside += 1;
+                    assert!(kept([kx, ky]), "{z}, {zero}, {centre_um:?}: bin {kx}, {ky}");
+                }
+            }
+            assert!(inside > 0, "{z}, {zero}, {centre_um:?}");
+        }
+        let steep = Window::about([0.0; 2], 0.5, 8, 1.0);
+        let most = (2.0 * 8.0 * std::f64::consts::PI * 100.0) as usize + 65;
+        assert!(rim_samples(&steep, 1e6, 100.0) <= most);
+    }
 }

@@ -67,6 +67,7 @@ pub(super) fn for_tiles(
     mut visit: impl FnMut(&Tile<'_>),
 ) {
     let (n, steps) = (lattice.sites(), lattice.steps_um());
+    let [_, rows] = lattice.reach();
     let (side, hop) = (tiling.side, tiling.hop());
     let middle_um =
         |axis: usize, first: i64| lattice.place_um(axis, 0) + (first as f64 + 0.5 * (side as f64 - 1.0)) * steps[axis];
@@ -83,7 +84,10 @@ pub(super) fn for_tiles(
     for first_row in (-(hop as i64)..n as i64).step_by(hop) {
         strip.copy_within(hop * n.., 0);
         for (k, row) in strip.chunks_exact_mut(n).enumerate().skip(hop) {
-            match usize::try_from(first_row + k as i64).ok().filter(|iy| *iy < n) {
+            match usize::try_from(first_row + k as i64)
+                .ok()
+                .filter(|iy| rows.contains(iy))
+            {
                 Some(iy) => fill_row(iy, row),
                 None => row.fill(Complex32::ZERO),
             }

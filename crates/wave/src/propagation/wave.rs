@@ -47,19 +47,17 @@ impl PlaneWave {
 /// # Errors
 /// If there is no such direction: the wedge or the field is too steep.
 pub fn incident(wedge: &Wedge, wavelength_um: f64, field_rad: [f64; 2]) -> Result<PlaneWave> {
-    let (x, y) = wedge.looks_at(wavelength_um);
-    let [sin_x, sin_y] = [(x, field_rad[0]), (y, field_rad[1])].map(|(looks, field)| (looks.asin() + field).sin());
-    if sin_x.hypot(sin_y) < 1.0 {
-        return Ok(PlaneWave {
+    match wedge.arriving(wavelength_um, field_rad) {
+        Some([sin_x, sin_y]) => Ok(PlaneWave {
             wavelength_um,
             sin_x,
             sin_y,
-        });
+        }),
+        None => Err(WaveError::Incidence {
+            field_rad,
+            looks_at: wedge.looks_at(wavelength_um).into(),
+        }),
     }
-    Err(WaveError::Incidence {
-        field_rad,
-        looks_at: [x, y],
-    })
 }
 
 /// Direction sines behind the element of the light it is designed to pass: those of the wave, and what its wedge
@@ -123,5 +121,8 @@ mod tests {
         };
         assert!(landing_um(&wedge(), &steep, 2400.0).is_err());
         assert!(incident(&wedge(), 2.2, [0.0, 0.0]).is_err());
+        // At -95 degrees; its sine is that of -85.
+        let beyond = incident(&wedge(), 0.55, [-80.0_f64.to_radians(), 0.0]);
+        assert!(matches!(beyond, Err(WaveError::Incidence { .. })), "{beyond:?}");
     }
 }

@@ -12,9 +12,12 @@ impl Psf {
         self.values.sum() * self.window.step_um.powi(2)
     }
 
-    /// Energy in a square with edges along x and y (um^2).
+    /// Energy in a square with edges along x and y (um^2): in as much of it as the window holds.
     pub fn energy_in_square_um2(&self, centre_um: [f64; 2], edge_um: f64) -> f64 {
-        let weights = [0, 1].map(|axis| self.interval(axis, centre_um[axis], edge_um));
+        let weights = [0, 1].map(|axis| {
+            let (middle, length) = self.held(axis, centre_um[axis], edge_um);
+            self.interval(axis, middle, length)
+        });
         let rows = self.values.rows().into_iter().zip(&weights[1]);
         rows.map(|(row, wy)| wy * row.iter().zip(&weights[0]).map(|(v, wx)| v * wx).sum::<f64>())
             .sum()
@@ -74,6 +77,19 @@ impl Psf {
         Ok(wy.dot(&self.values).dot(&wx.t()))
     }
 
+    /// Middle and length of the part of an interval that the window holds, each sample with half a step on both sides (um):
+    /// beyond that the series through the samples goes on with copies of them.
+    fn held(&self, axis: usize, middle_um: f64, length_um: f64) -> (f64, f64) {
+        let half = 0.5 * self.window.samples as f64 * self.window.step_um;
+        let (first, last) = (self.window.centre_um[axis] - half, self.window.centre_um[axis] + half);
+        let (from, to) = (middle_um - 0.5 * length_um, middle_um + 0.5 * length_um);
+        if first <= from && to <= last {
+            return (middle_um, length_um);
+        }
+        let (from, to) = (from.max(first), to.min(last));
+        (0.5 * (from + to), (to - from).max(0.0))
+    }
+
     /// Weights of the samples of an axis in the integral over an interval (um): each term of the finite Fourier
     /// series through the samples is integrated exactly.
     fn interval(&self, axis: usize, middle_um: f64, length_um: f64) -> Vec<f64> {
@@ -126,6 +142,25 @@ mod tests {
         let circle = psf.energy_in_circle_um2(AT, 3.0);
         let want = total * (1.0 - (-4.5 / (SIGMA * SIGMA)).exp());
         assert!((circle - want).abs() < WIDER * total, "{circle} is not {want}");
+    }
+
+    #[test]
+    fn a_square_holds_nothing_from_beyond_the_window() {
+        /// What a cut Gaussian, 1e-4 of its peak at the border, leaves there of its series.
+        const RIM: f64 = 1e-3;
+        let total = std::f64::consts::TAU * SIGMA * SIGMA;
+        let psf = gaussian(SIGMA, AT);
+        for edge_um in [32.5, 100.0, 1e6] {
+            let square = psf.energy_in_square_um2(AT, edge_um);
+            assert!((square - psf.energy_um2()).abs() < BAND * total, "{edge_um}: {square}");
+        }
+        // Beside the left border, of a window from 84 to 116 um: its copy is beside the right one.
+        let beside = gaussian(SIGMA, [90.0, -40.0]);
+        let across = beside.energy_in_square_um2([116.0, -40.0], 20.0);
+        assert!(across.abs() < RIM * total, "{across}");
+        let own = beside.energy_in_square_um2([84.0, -40.0], 40.0);
+        assert!((own - total).abs() < RIM * total, "{own}");
+        assert_eq!(beside.energy_in_square_um2([150.0, -40.0], 20.0), 0.0);
     }
 
     #[test]

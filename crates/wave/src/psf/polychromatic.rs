@@ -11,6 +11,7 @@
 //! the transform of the PSF in force about its chief ray. It is exact for a PSF that does not change, whatever the
 //! number of parts.
 
+use metalith_core::part;
 use ndarray::Array2;
 use num_complex::Complex64;
 
@@ -140,6 +141,12 @@ impl Moved {
         }
     }
 
+    /// From the middle of a window to the farthest place of the chief ray, the larger of both axes (um).
+    fn reach_um(&self, window: &Window) -> f64 {
+        let along = |a: usize| (self.middle_um[a] - window.centre_um[a]).abs() + 0.5 * self.along_um[a].abs();
+        along(0).max(along(1))
+    }
+
     /// exp(-2 pi i f m) sinc(f d) at a frequency along one axis (cycles / um), places counted from `origin_um`.
     fn transfer(&self, axis: usize, cycles: f64, origin_um: f64) -> Complex64 {
         let turns = cycles * (self.middle_um[axis] - origin_um);
@@ -242,18 +249,31 @@ fn otf(samples: &[BandSample], moved: &[Moved], centre_um: [f64; 2]) -> Option<O
     })
 }
 
-/// All parts on the common window.
+/// Samples of a period on which parts that reach so far from the middle of the window are moved, without coming back into
+/// it on the other side: those of the window where their own windows lie within it, else at most those of both.
+fn period(window: &Window, own: &Window, reach_um: f64) -> usize {
+    // Rounding of the size of the window.
+    const SLACK: f64 = 1.5;
+    let room = window.half_width_um() - own.half_width_um();
+    if reach_um <= room + SLACK * own.step_um {
+        return window.samples;
+    }
+    fft_size(window.samples + ((reach_um - room) / own.step_um).ceil() as usize)
+}
+
+/// All parts on the common window, cut at its border. Parts that reach so far out that their own windows lie beside it are
+/// left out.
 fn image(samples: &[BandSample], moved: &[Moved], window: &Window) -> Array2<f64> {
-    let (own, size) = (samples[0].psf.window, window.samples);
-    let inside = |m: &&Moved| {
-        // Rounding of the size of the window.
-        const SLACK: f64 = 1.5;
-        let room = window.half_width_um() - own.half_width_um() + SLACK * own.step_um;
-        (0..2).all(|a| (m.middle_um[a] - window.centre_um[a]).abs() + 0.5 * m.along_um[a].abs() <= room)
-    };
-    let lit: Vec<&Moved> = moved.iter().filter(|m| m.weight > 0.0).filter(inside).collect();
+    let own = samples[0].psf.window;
+    let touching_um = window.half_width_um() + own.half_width_um();
+    let lit: Vec<&Moved> = moved
+        .iter()
+        .filter(|m| m.weight > 0.0 && m.reach_um(window) <= touching_um)
+        .collect();
+    let size = period(window, &own, lit.iter().map(|m| m.reach_um(window)).fold(0.0, f64::max));
     let fourier = Fourier::periodic([size; 2]);
-    let offset = (size - own.samples) / 2;
+    // First samples of the common window and of an embedded one.
+    let (first, offset) = ((size - window.samples) / 2, (size - own.samples) / 2);
     let spectrum_of = |k: usize| {
         let mut wide = Array2::zeros([size; 2]);
         for ((iy, ix), v) in samples[k].psf.values.indexed_iter() {
@@ -262,7 +282,8 @@ fn image(samples: &[BandSample], moved: &[Moved], window: &Window) -> Array2<f64
         fourier.of_image(&wide)
     };
     // Where the middle of an embedded window is, from the middle of the common one.
-    let embedded_um = (offset as f64 + 0.5 * (own.samples as f64 - size as f64)) * own.step_um;
+    let from_first = offset as f64 - first as f64;
+    let embedded_um = (from_first + 0.5 * (own.samples as f64 - window.samples as f64)) * own.step_um;
     let mut held: [Option<(usize, Array2<Complex64>)>; 2] = [None, None];
     let half = size / 2;
     let mut sum = Array2::<Complex64>::zeros((size, half + 1));
@@ -294,7 +315,8 @@ fn image(samples: &[BandSample], moved: &[Moved], window: &Window) -> Array2<f64
             sum[[(size - iy) % size, size - ix]].conj()
         }
     });
-    fourier.to_image(full)
+    let shown = first..first + window.samples;
+    part(fourier.to_image(full).view(), shown.clone(), shown).to_owned()
 }
 
 /// Make sure that the spectra of two samples are at hand, and no more of them than needed.
@@ -464,6 +486,31 @@ mod tests {
         assert!((otf.power_um2 - 1.0).abs() < ROUNDING);
         let shown = found.psf.energy_um2();
         assert!(shown > 0.3 && shown < 0.35, "1024 um of 3000 are {shown}");
+    }
+
+    /// A window no wider than those of the samples is the middle of a wider one: parts that reach beyond it are cut, and
+    /// nothing comes back on the other side.
+    #[test]
+    fn a_narrow_window_cuts_what_reaches_beyond_it() {
+        let ends = [[-30.0, 4.0], [41.0, -18.0]];
+        let samples = [sample(1.4, ends[0], 1.0), sample(1.9, ends[1], 2.0)];
+        let moved = moved(&samples, &line(40, ends, 2, |_| 1.0)).unwrap();
+        let wide = common_window(&samples[0], &moved);
+        let whole = image(&samples, &moved, &wide);
+        for less in [0, 1, 24] {
+            let narrow = Window {
+                samples: wide.samples - 2 * ((wide.samples - samples[0].psf.window.samples) / 2 - less),
+                ..wide
+            };
+            let first = (wide.samples - narrow.samples) / 2;
+            let inside = first..first + narrow.samples;
+            let cut = image(&samples, &moved, &narrow);
+            assert_eq!(cut.dim(), (narrow.samples, narrow.samples));
+            let want = part(whole.view(), inside.clone(), inside);
+            // A third of the way and more crosses the window.
+            assert!(want.sum() > 0.3 * whole.sum() && want.sum() < 0.9 * whole.sum());
+            assert!(cut.iter().zip(&want).all(|(a, b)| (a - b).abs() < ROUNDING), "{less}");
+        }
     }
 
     #[test]

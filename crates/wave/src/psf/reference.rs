@@ -27,7 +27,8 @@ impl Matched {
         let x2: Vec<f64> = (0..n).map(|i| (lattice.place_um(0, i) - px).powi(2)).collect();
         let mut row = vec![Complex32::ZERO; n];
         let (mut sum, mut sites) = (0.0, 0u64);
-        for iy in 0..n {
+        let [_, rows] = lattice.reach();
+        for iy in rows {
             aperture.fill_row(iy, &mut row);
             let rest = (lattice.place_um(1, iy) - py).powi(2) + z * z;
             let mut line = 0.0;

@@ -183,6 +183,33 @@ fn of_several_at_once_one_wins() {
 }
 
 #[test]
+fn a_file_in_the_place_of_the_folder_is_left_alone() {
+    let parent = tempfile::tempdir().unwrap();
+    let parent = parent.path();
+    fs::write(parent.join("kit"), "precious").unwrap();
+    let error = begin(parent).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("is not a folder"), "{error}");
+    assert_eq!(fs::read_to_string(parent.join("kit")).unwrap(), "precious");
+    assert_eq!(names(parent), ["kit"]);
+}
+
+/// A run whose lock was removed by hand leaves that of the next run, which has begun meanwhile.
+#[test]
+fn the_lock_of_another_run_is_left_alone() {
+    let parent = tempfile::tempdir().unwrap();
+    let parent = parent.path();
+    let first = begin(parent).unwrap();
+    fs::remove_file(&first.places.lock).unwrap();
+    let second = begin(parent).unwrap();
+    drop(first);
+    assert!(begin(parent).is_err(), "the second run still writes");
+    write(&second.folder(), &second.archive(), "second");
+    second.publish().unwrap();
+    assert_eq!(versions(parent), (Some("second".into()), Some("second".into())));
+    assert_eq!(names(parent), ["kit", "kit.zip"]);
+}
+
+#[test]
 fn what_is_given_up_leaves_nothing() {
     let parent = tempfile::tempdir().unwrap();
     let parent = parent.path();

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use super::TermForm;
 use crate::phase::RadialPhase;
 use metalith_core::file::read_at_most;
+use metalith_core::text::without_mark;
 use metalith_core::{Error, Result};
 
 /// Longest file that is read (bytes).
@@ -186,11 +187,10 @@ fn decoded(bytes: &[u8]) -> String {
     match bytes {
         [0xff, 0xfe, rest @ ..] => wide(rest, u16::from_le_bytes),
         [0xfe, 0xff, rest @ ..] => wide(rest, u16::from_be_bytes),
-        [0xef, 0xbb, 0xbf, rest @ ..] => String::from_utf8_lossy(rest).into_owned(),
         // Keywords are ASCII: of two bytes one is nothing.
         [key, 0, ..] if *key > 0 => wide(bytes, u16::from_le_bytes),
         [0, key, ..] if *key > 0 => wide(bytes, u16::from_be_bytes),
-        _ => String::from_utf8_lossy(bytes).into_owned(),
+        _ => without_mark(&String::from_utf8_lossy(bytes)).to_owned(),
     }
 }
 

@@ -84,6 +84,7 @@ impl Fold {
             ..
         } = scratch;
         spectrum.resize(self.blocks() * LANES, Complex32::ZERO);
+        columns.resize(m.max(columns.len()), Complex32::ZERO);
         let folded = &mut columns[..m];
         for r in 0..residues {
             for (block, lanes) in spectrum.chunks_exact_mut(LANES).enumerate() {
