@@ -70,6 +70,8 @@ struct Looked {
     fields_deg: Vec<(f64, f64)>,
     samples: usize,
     pixel_um: f64,
+    /// Whether light that pillars do not convert is kept from the sensor.
+    analyser: bool,
     fast: bool,
 }
 
@@ -154,7 +156,7 @@ fn simulate_together(
                 at_um: landing_um(&wedge, &wave, distance_um)?,
                 samples: light.samples,
                 pixel_um: light.pixel_um,
-                analyser: false,
+                analyser: light.analyser,
                 aperture_radius_um: None,
                 accuracy: if light.fast { Accuracy::Fast } else { Accuracy::Accurate },
             };
@@ -225,15 +227,10 @@ pub fn psf_of_array<'py>(
     })?;
     let wanted = self::fidelity(fidelity).map_err(error)?;
     let placed = &array.array.placed;
-    let chosen = elements.unwrap_or_else(|| {
-        let first = |class| {
-            placed
-                .iter()
-                .position(|p| p.class == class)
-                .expect("every class is placed")
-        };
-        (0..array.array.classes.len()).map(first).collect()
-    });
+    // Lenses with the same pillars may look at planes at other distances.
+    let looks = |k: usize| (placed[k].class, design.lens_of(&placed[k].element).focal_length_um);
+    let is_first = |k: &usize| (0..*k).all(|earlier| looks(earlier) != looks(*k));
+    let chosen = elements.unwrap_or_else(|| (0..placed.len()).filter(is_first).collect());
     if let Some(wrong) = chosen.iter().find(|k| **k >= placed.len()) {
         return Err(error(Error::invalid(
             format!("there is no element {wrong}"),
@@ -260,6 +257,7 @@ pub fn psf_of_array<'py>(
             fields_deg,
             samples: samples.unwrap_or(design.verify.window_samples),
             pixel_um: design.verify.pixel_um,
+            analyser: design.verify.analyser,
             fast,
         };
         simulate(lit.collect(), cells[0].as_ref(), &light, p)
@@ -331,6 +329,7 @@ pub fn psf_of_widths<'py>(
             fields_deg,
             samples,
             pixel_um: 5.86,
+            analyser: false,
             fast,
         };
         simulate(lit.collect(), cell.as_ref(), &light, p)

@@ -32,6 +32,8 @@ const BLACK_DN: f64 = 0.1;
 /// Effects that are not listed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum UnlistedEffect {
+    /// A bowed substrate: astigmatism along the axes (nm rms of path), where it is left out of the list.
+    Astigmatism(f64),
     /// A second image: its brightness, relative to the first, and its offset (um).
     Ghost(f64, [f64; 2]),
     /// Pillars wider along x and narrower along y (nm).
@@ -129,8 +131,12 @@ impl<'a> Synthesizer<'a> {
     /// # Errors
     /// If a cell cannot be solved.
     pub fn off_list(&self, what: UnlistedEffect, progress: &dyn Progress) -> Result<SyntheticImages> {
-        let perturbation = Perturbation::default();
+        let mut perturbation = Perturbation::default();
         match what {
+            UnlistedEffect::Astigmatism(nm) => {
+                perturbation.geometry.wavefront_nm = vec![0.0, nm];
+                self.expose(perturbation, None, progress)
+            }
             UnlistedEffect::Ghost(share, at) => self.expose(perturbation, Some((share, at)), progress),
             UnlistedEffect::Anisotropy(nm) => {
                 let tables = match &self.simulator.cells {

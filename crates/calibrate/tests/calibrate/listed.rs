@@ -128,7 +128,7 @@ fn a_tilt_of_the_sensor_is_found() {
         "{}",
         pattern.sentence()
     );
-    let proposed = propose(&session, &evidence.unwrap());
+    let proposed = propose(&session, &evidence.unwrap(), &Silent).unwrap();
     assert!(proposed.iter().all(|p| p.effect.name != "gap_gradient"), "{proposed:?}");
 }
 

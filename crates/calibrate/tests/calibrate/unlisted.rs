@@ -47,7 +47,8 @@ fn a_declared_effect_is_found_and_kept_in_the_model() {
 
 /// The effects that are proposed for what a session leaves.
 fn proposed(session: &Session<'_>, evidence: &Evidence) -> Vec<DeclaredEffect> {
-    propose(session, evidence).into_iter().map(|p| p.effect).collect()
+    let proposed = propose(session, evidence, &Silent).unwrap();
+    proposed.into_iter().map(|p| p.effect).collect()
 }
 
 /// A second image of 4 % whose spots are blurred by 0.5 um, as a lens behind the relay makes one.
