@@ -82,15 +82,13 @@ impl Surrogate {
     fn simulated(
         model: &dyn ForwardModel,
         about: &[f64],
-        [two_sided, one_sided]: [&[f64]; 2],
+        multiples: [&[f64]; 2],
         smooth: Option<(&PerCapture<LedIndex>, usize)>,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let mut points = vec![ParameterPoint::new(about.to_vec())];
         let mut nodes: Vec<Vec<f64>> = Vec::new();
-        for (s, slot) in model.slots().iter().enumerate() {
-            let only_positive = slot.parameter.one_sided() && about[s] == 0.0;
-            let multiples = if only_positive { one_sided } else { two_sided };
+        for s in 0..model.slots().len() {
             let own = offsets(model, about, s, multiples);
             points.extend(own.iter().map(|offset| point_at(about, s, *offset)));
             nodes.push(own);
@@ -229,9 +227,13 @@ impl Surrogate {
     }
 }
 
-/// Offsets of one parameter from `about` within its physical range; its ends, if all are beyond them.
-fn offsets(model: &dyn ForwardModel, about: &[f64], s: usize, multiples: &[f64]) -> Vec<f64> {
-    let Parameter { typical, range, .. } = model.slots()[s].parameter;
+/// Offsets of one parameter from `about` within its physical range; its ends, if all are beyond them. By multiples of the typical
+/// size: where it has two sides, and where it can only be positive.
+fn offsets(model: &dyn ForwardModel, about: &[f64], s: usize, [two_sided, one_sided]: [&[f64]; 2]) -> Vec<f64> {
+    let parameter = &model.slots()[s].parameter;
+    let Parameter { typical, range, .. } = *parameter;
+    let only_positive = parameter.one_sided() && about[s] == 0.0;
+    let multiples = if only_positive { one_sided } else { two_sided };
     let offsets = multiples.iter().map(|m| m * typical);
     let within: Vec<f64> = offsets
         .filter(|o| (range.0..=range.1).contains(&(about[s] + o)))

@@ -1,6 +1,5 @@
 //! A surrogate about what was found: what the former one says of the rest is used where it still holds.
 
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use metalith_core::{Progress, Result};
@@ -30,7 +29,7 @@ impl Surrogate {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let nodes = found.iter().map(|&s| {
-            let mut nodes = offsets(model, about, s, &NEAR);
+            let mut nodes = offsets(model, about, s, [&NEAR, &NEAR]);
             let is_apart = |node: &f64| (node + about[s]).abs() > APART * model.slots()[s].parameter.typical;
             if nodes.iter().all(is_apart) {
                 nodes.push(-about[s]);
@@ -73,29 +72,19 @@ impl Surrogate {
         let about = self.about.clone();
         let mut first: Vec<(usize, f64)> = Vec::new();
         let mut second: Vec<(usize, f64)> = Vec::new();
-        for (s, slot) in model.slots().iter().enumerate() {
+        let before = self.curves.clone();
+        for s in 0..model.slots().len() {
             if found.contains(&s) || model.is_dear_beside(&about, s) {
                 continue;
             }
-            let only_positive = slot.parameter.one_sided() && about[s] == 0.0;
-            let nodes = offsets(
-                model,
-                &about,
-                s,
-                if only_positive { &BESIDE_ONE_SIDED } else { &BESIDE },
-            );
-            match nodes[..] {
+            self.curves[s] = Curve::new(about[s], Vec::new(), [], is_kinked(model, &about, s));
+            match offsets(model, &about, s, [&BESIDE, &BESIDE_ONE_SIDED])[..] {
                 [one, other] if one == -other => {
                     first.push((s, one));
                     second.push((s, other));
                 }
-                _ => first.extend(nodes.iter().map(|node| (s, *node))),
+                ref nodes => first.extend(nodes.iter().map(|node| (s, *node))),
             }
-        }
-        let before = self.curves.clone();
-        let renewed = first.iter().map(|(s, _)| *s).collect::<BTreeSet<_>>();
-        for s in renewed {
-            self.curves[s] = Curve::new(about[s], Vec::new(), [], is_kinked(model, &about, s));
         }
         self.simulate_nodes(model, &first, progress)?;
         let mut open = Vec::new();
