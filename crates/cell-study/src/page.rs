@@ -7,6 +7,7 @@ use ndarray::Array2;
 use super::study::{CellStudy, MappingStudy};
 use metalith_cell::{Basis, MappingError};
 use metalith_core::{Result, WholeFile};
+use metalith_design::SteeringSteps;
 use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, Table, count, fixed, sig, write_json};
 
 /// Writes `cells.html`, `cells.json` and the mappings that are not polynomials as CSV into a folder.
@@ -52,7 +53,7 @@ fn steered_toml(study: &CellStudy) -> String {
     );
     for study in &study.steered {
         let coefficients: Vec<String> = study.coefficients.iter().map(|c| format!("{c}")).collect();
-        let (first, second) = study.steps;
+        let SteeringSteps(first, second) = study.steps;
         text += &format!(
             "\n[[mapping.steered]]\nsteps = [{first}, {second}]\ncoefficients = [{}]   # {} times the light of the common mapping\n",
             coefficients.join(", "),

@@ -31,8 +31,10 @@ pub struct TableSpec {
 /// Distance of widths outside of [`TableSpec::widths_nm`] (nm).
 const COARSE_STEP_NM: usize = 5;
 
-/// Widest band that a table may span (um).
-const WIDEST_BAND_UM: f64 = 4.0;
+/// Widest band that a table may span (um), and largest pitch (nm): as far as the wavelengths and pitches of design files reach,
+/// to the thermal infrared.
+const WIDEST_BAND_UM: f64 = 20.0;
+const LARGEST_PITCH_NM: f64 = 20_000.0;
 
 impl TableSpec {
     /// Orders, tolerance and margins in width that suit the shipped designs: 13 orders, 0.01, 20 nm.
@@ -67,12 +69,18 @@ impl TableSpec {
         if !(short > 0.0 && long > short && long - short <= WIDEST_BAND_UM) {
             return Err(Error::invalid(
                 format!("a band from {short} to {long} um"),
-                "give two rising, positive wavelengths",
+                format!("give two rising, positive wavelengths at most {WIDEST_BAND_UM} um apart"),
             ));
         }
         let (low, high) = self.widths_nm;
         let pitch = self.stack.pitch_nm;
-        if low == 0 || low > high || f64::from(high) > pitch || !(1.0..=5000.0).contains(&pitch) {
+        if !(1.0..=LARGEST_PITCH_NM).contains(&pitch) {
+            return Err(Error::invalid(
+                format!("a table of a cell with a pitch of {pitch} nm"),
+                format!("use a pitch from 1 to {LARGEST_PITCH_NM} nm"),
+            ));
+        }
+        if low == 0 || low > high || f64::from(high) > pitch {
             return Err(Error::invalid(
                 format!("pillars from {low} to {high} nm wide on a pitch of {pitch} nm"),
                 "give a range of widths above zero that fits into the pitch",
@@ -254,5 +262,29 @@ impl TableSpec {
         let lean = 2.0 * self.stack.taper.max(0.0).tan() * self.stack.height_nm;
         let nearest = self.stack.lattice.nearest_nm(self.stack.pitch_nm);
         f64::from(width_nm).min(nearest - lean).max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn spec(pitch_nm: f64, band_um: (f64, f64)) -> TableSpec {
+        let stack = CellStack::paper(pitch_nm, 8000.0).unwrap();
+        TableSpec::new(stack, band_um, (1000, 4000))
+    }
+
+    /// A design for the thermal infrared has a table; what is beyond all designs says which number it is.
+    #[test]
+    fn tables_reach_as_far_as_designs() {
+        assert!(spec(6000.0, (8.0, 13.0)).check().is_ok());
+        let said = |spec: TableSpec| match spec.check() {
+            Err(Error::Invalid { what, hint, .. }) => format!("{what}: {hint}"),
+            other => panic!("{other:?}"),
+        };
+        let wide = said(spec(6000.0, (0.2, 20.3)));
+        assert!(wide.contains("at most 20 um apart"), "{wide}");
+        let large = said(spec(20_002.0, (8.0, 13.0)));
+        assert!(large.contains("a pitch from 1 to 20000 nm"), "{large}");
     }
 }

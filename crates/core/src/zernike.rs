@@ -26,8 +26,22 @@ impl Zernike {
         Self { n, m }
     }
 
-    /// Number `j`, from one, in the order of the University of Arizona: "Zernike fringe".
+    /// Number of polynomials of the University of Arizona's set.
+    pub const FRINGE_SET: u32 = 37;
+
+    /// Number `j`, from one, of the set of the University of Arizona: "Zernike fringe". The last, 37, is the spherical
+    /// aberration of twelfth order and not what would follow in the order of the others.
+    ///
+    /// # Panics
+    /// If `j` is not from 1 to [`Zernike::FRINGE_SET`]: the set has no other.
     pub fn fringe(j: u32) -> Self {
+        assert!(
+            (1..=Self::FRINGE_SET).contains(&j),
+            "no fringe polynomial has the number {j}"
+        );
+        if j == Self::FRINGE_SET {
+            return Self { n: 12, m: 0 };
+        }
         // Groups of equal n + |m| = 2 (d - 1) end at squares; within one, frequencies fall, cosines first.
         let mut d = 1;
         while d * d < j {
@@ -101,6 +115,31 @@ mod tests {
                 assert!((p / count - want).abs() < RIM, "{} {}: {}", a + 1, b + 1, p / count);
             }
         }
+    }
+
+    /// The set ends with the polynomial that is printed as its last, behind all of n + |m| up to 10.
+    #[test]
+    fn the_last_of_the_fringe_set_is_the_printed_polynomial() {
+        // Terms up to 3150 in double precision.
+        const ROUNDING: f64 = 1e-11;
+        let printed = |r: f64| {
+            let s = r * r;
+            924.0 * s.powi(6) - 2772.0 * s.powi(5) + 3150.0 * s.powi(4) - 1680.0 * s.powi(3) + 420.0 * s.powi(2)
+                - 42.0 * s
+                + 1.0
+        };
+        for k in 0..=20 {
+            let r = f64::from(k) / 20.0;
+            let value = Zernike::fringe(37).value(0.6 * r, -0.8 * r);
+            assert!((value - printed(r)).abs() < ROUNDING, "{r}: {value}");
+        }
+        assert_eq!(Zernike::fringe(36), Zernike { n: 10, m: 0 });
+    }
+
+    #[test]
+    #[should_panic(expected = "no fringe polynomial has the number 38")]
+    fn the_fringe_set_has_no_more() {
+        Zernike::fringe(38);
     }
 
     #[test]

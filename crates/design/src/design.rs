@@ -173,6 +173,24 @@ impl Design {
         Ok(())
     }
 
+    /// Nothing, if the phase of the lens is one over the radius alone.
+    ///
+    /// # Errors
+    /// If phases over the plane are added to it, of whichever element; `who` knows none.
+    pub fn radial_phase(&self, who: &str) -> Result<()> {
+        if self.lens.terms.is_empty() {
+            return Ok(());
+        }
+        Err(Error::invalid(
+            format!(
+                "{who} knows phases over the radius alone, and {} adds {} over the plane by [[phase.term]]",
+                self.path.display(),
+                self.lens.terms.len()
+            ),
+            "leave [[phase.term]] out; what of it is round fits into `even_powers` or a `table` of [phase]",
+        ))
+    }
+
     /// Nothing, if the pillars stand on a square lattice.
     ///
     /// # Errors

@@ -120,6 +120,43 @@ fn mistakes_are_said() {
             "spacing_um = [150, 50]",
             "neighbouring lenses overlap",
         ),
+        // 1000 um across, with 2858 sites of 350 nm.
+        (
+            "prototype_3x3",
+            "spacing_um = 2420",
+            "spacing_um = 1000",
+            "neighbouring lenses overlap, or the squares about them do",
+        ),
+        (
+            "hologram",
+            "wrapped = \"yes\"",
+            "wrapped = \"yes\"\nscale = 0.5",
+            "phases that are known up to whole turns, times 0.5",
+        ),
+        (
+            "hologram",
+            "elements_m = [2] ",
+            "elements_m = [3] ",
+            "no element of this phase is (3, 0)",
+        ),
+        (
+            "hologram",
+            "elements_m = [2]              # the second element alone\nelements_n = [0]",
+            "elements_m = []\nelements_n = []",
+            "0 indices along x and 0 along y",
+        ),
+        (
+            "array_2x4",
+            "[array]",
+            "[[phase.term]]\nsource = \"hyperbola\"\nwavelength_nm = 500\nelements_m = [0]\nelements_n = [1]\n\n[array]",
+            "no element of this phase is (0, 1)",
+        ),
+        (
+            "mixed_lenses",
+            "coefficients_rad = [12.0, 12.0]",
+            "coefficients_rad = [12.0, 12.0]\nelements_m = [3]\nelements_n = [0]",
+            "no element of this phase is (3, 0)",
+        ),
         (
             "array_2x4",
             "elements = [2, 4]",
@@ -199,6 +236,98 @@ fn mistakes_are_said() {
         let error = changed(name, from, to).unwrap_err().to_string();
         assert!(error.contains(wanted), "{to}: {error}");
     }
+}
+
+fn zernike(order: &str, terms: usize) -> metalith_core::Result<Design> {
+    let coefficients = vec!["0"; terms - 1].join(", ");
+    let term = format!(
+        "[[phase.term]]\nsource = \"zernike\"\norder = \"{order}\"\ncoefficients_waves = [{coefficients}, 1]\n\n[array]"
+    );
+    changed("array_2x4", "[array]", &term)
+}
+
+#[test]
+fn the_fringe_order_has_37_polynomials() {
+    let error = zernike("fringe", 38).unwrap_err().to_string();
+    assert!(error.contains("38 coefficients of the fringe order"), "{error}");
+    assert!(zernike("standard", 38).is_ok());
+    // The last is one in the middle, and at the rim.
+    let design = zernike("fringe", 37).unwrap();
+    let last = &design.lens.terms[0];
+    for x_um in [0.0, 30.0] {
+        assert!((last.turns(x_um, 0.0) - 1.0).abs() < 1e-9, "{}", last.turns(x_um, 0.0));
+    }
+}
+
+/// A table that never jumps may be scaled by any number.
+#[test]
+fn maps_that_are_not_wrapped_are_scaled_freely() {
+    let design = changed("hologram", "wrapped = \"yes\"", "wrapped = \"no\"\nscale = 0.5").unwrap();
+    assert_eq!(design.lens.terms[0].scale, 0.5);
+    assert!(!design.lens.terms[0].is_wrapped());
+    let turned = changed("hologram", "wrapped = \"yes\"", "wrapped = \"yes\"\nscale = -1").unwrap();
+    assert!(turned.lens.terms[0].is_wrapped());
+}
+
+/// Squares of neighbours may touch: pillars on their rims are then a pitch apart, on lattices of either kind. The lens is a
+/// hundred pitches wide, and pillars of the hexagonal one stand on its rim itself.
+#[test]
+fn the_least_spacing_of_a_grid_leaves_a_pitch() {
+    for (name, pitch_um, least_um) in [("mini_3x3", 0.35, 35.0), ("hexagonal_1550", 0.7, 70.7)] {
+        let read = |spacing_um: f64| {
+            let changed = |line: &str| match line.split(' ').next() {
+                Some("elements") => "elements = [2, 2]\n".into(),
+                Some("spacing_um") => format!("spacing_um = {spacing_um}\n"),
+                Some("diameter_um") => format!("diameter_um = {}\n", 100.0 * pitch_um),
+                Some("size_um") => "size_um = [1000, 1000]\n".into(),
+                _ => format!("{line}\n"),
+            };
+            Design::parse_any(&path(name), &text(name).lines().map(changed).collect::<String>())
+        };
+        let error = read(least_um - 0.001).unwrap_err().to_string();
+        assert!(error.contains("neighbouring lenses overlap"), "{name}: {error}");
+        let design = read(least_um).unwrap();
+        let lattice = design.lattice();
+        let outermost_nm = lattice.place_nm(0, lattice.sites() - 1);
+        let between_nm = design.array.spacing_nm - 2 * outermost_nm;
+        assert_eq!(between_nm, i64::from(design.cell.pitch_nm), "{name}");
+    }
+}
+
+/// Hyperbolas among the terms, that name no focal length, have that of the element, as the phase over the radius has.
+#[test]
+fn a_focal_length_of_an_element_is_that_of_its_hyperbolas() {
+    let term = "[[phase.term]]\nsource = \"hyperbola\"\nwavelength_nm = 500\n";
+    let named = format!("{term}focal_length_um = 200\n\n{term}\n[array]");
+    let text = text("hologram");
+    let (head, rest) = text.split_once("[[phase.term]]").unwrap();
+    let text = format!("{head}{named}{}", rest.split_once("[array]").unwrap().1);
+    let text = text.replacen("x_um = 60\n", "x_um = 60\nfocal_length_um = 90\n", 1);
+    let design = Design::parse(&path("hologram"), &text).unwrap();
+    let turns = |element: usize| -> Vec<f64> {
+        let lens = design.lens_of(&design.elements()[element]);
+        lens.terms.iter().map(|term| term.turns(30.0, 0.0)).collect()
+    };
+    let hyperbola = |focal_length_um: f64| -(30f64.hypot(focal_length_um) - focal_length_um) / 0.5;
+    for (element, own_um) in [(0, 144.0), (1, 90.0)] {
+        for (found, wanted) in turns(element).into_iter().zip([200.0, own_um].map(hyperbola)) {
+            assert!((found - wanted).abs() < 1e-9, "{element}: {found} {wanted}");
+        }
+    }
+}
+
+#[test]
+fn the_shipped_designs_are_read() {
+    let folder = path("mini_3x3").with_file_name("");
+    let mut read = 0;
+    for file in std::fs::read_dir(folder).unwrap() {
+        let file = file.unwrap().path();
+        if file.extension().is_some_and(|e| e == "toml") {
+            Design::read_any(&file).unwrap();
+            read += 1;
+        }
+    }
+    assert!(read >= 15, "{read}");
 }
 
 /// The phase of the converted light of pillars as drawn is that which the mapping of the shipped design has them for, by more orders

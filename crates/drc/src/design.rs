@@ -131,10 +131,17 @@ fn steps(work: &Work<'_>, lattice: Lattice, phase: &ElementPhase<'_>) -> Result<
     all_steps(work, lattice, phase)
 }
 
+/// Whether it is more than half a turn from one site to another, by the [parts](ElementPhase::parts) of their phases: that of maps
+/// which are known up to whole turns goes the short way.
+fn is_steep(from: [f64; 2], to: [f64; 2]) -> bool {
+    let mapped = to[1] - from[1];
+    ((to[0] - from[0]) + (mapped - mapped.round())).abs() > 0.5
+}
+
 /// As [`steps`], to the neighbours of a lattice of any kind.
 fn steps_to_neighbours(work: &Work<'_>, lattice: Lattice, phase: &ElementPhase<'_>) -> Result<(u64, u64), Stop> {
     let (n, mut all, mut steep) = (lattice.sites(), 0, 0);
-    let phases = |iy: usize| -> Vec<Option<f64>> { (0..n).map(|ix| phase.turns(ix, iy)).collect() };
+    let phases = |iy: usize| -> Vec<Option<[f64; 2]>> { (0..n).map(|ix| phase.parts(ix, iy)).collect() };
     let mut own = phases(0);
     for iy in 0..n {
         work.look()?;
@@ -146,7 +153,7 @@ fn steps_to_neighbours(work: &Work<'_>, lattice: Lattice, phase: &ElementPhase<'
                 let column = ix.checked_add_signed(right as isize);
                 if let Some(Some(there)) = column.and_then(|c| row.get(c)) {
                     all += 1;
-                    steep += u64::from((here - there).abs() > 0.5);
+                    steep += u64::from(is_steep(*here, *there));
                 }
             }
         }
@@ -159,17 +166,16 @@ fn steps_to_neighbours(work: &Work<'_>, lattice: Lattice, phase: &ElementPhase<'
 fn all_steps(work: &Work<'_>, lattice: Lattice, phase: &ElementPhase<'_>) -> Result<(u64, u64), Stop> {
     let (mut all, mut steep) = (0, 0);
     // Phases of the row before; every site is computed once.
-    let mut before = vec![None; lattice.sites()];
+    let mut before: Vec<Option<[f64; 2]>> = vec![None; lattice.sites()];
     for iy in 0..lattice.sites() {
         work.look()?;
         let mut left = None;
         for (ix, below) in before.iter_mut().enumerate() {
-            let own: Option<f64> = phase.turns(ix, iy);
+            let own = phase.parts(ix, iy);
             if let Some(own) = own {
                 for other in [left, *below].into_iter().flatten() {
-                    let step: f64 = own - other;
                     all += 1;
-                    steep += u64::from(step.abs() > 0.5);
+                    steep += u64::from(is_steep(own, other));
                 }
             }
             left = own;

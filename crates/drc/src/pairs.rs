@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::body::Body;
-use super::flat::FlatLayout;
+use super::flat::{FlatLayout, Loose};
 use super::work::{Stop, Work};
 use metalith_core::WidthRows;
 use metalith_gds::{LayerNumber, Rect};
@@ -20,8 +20,8 @@ pub(super) fn place(a: &Rect, b: &Rect) -> Rect {
     Rect { x0, y0, x1, y1 }
 }
 
-/// Hand every pair on a layer whose bounding boxes are at most `reach` apart to `f`: pairs of loose shapes,
-/// and of loose shapes with pillars on lattices. Pairs of pillars on one lattice are not among them.
+/// Hand every pair on a layer whose bounding boxes are at most `reach` apart to `f`: pairs of loose shapes, of loose shapes
+/// with pillars on lattices, and of pillars of different elements. Pairs of pillars on one lattice are not among them.
 ///
 /// # Errors
 /// If the work is out of proportion to the layout, or the user stopped it.
@@ -31,7 +31,23 @@ pub(super) fn near<'s>(
     reach: i64,
     mut f: impl FnMut(Body<'s>, Body<'s>),
 ) -> Result<(), Stop> {
-    let Some(loose) = flat.loose(layer) else { return Ok(()) };
+    if let Some(loose) = flat.loose(layer) {
+        near_loose(flat, loose, layer, reach, &mut f)?;
+    }
+    if layer == flat.pillars {
+        near_elements(flat, reach, &mut f)?;
+    }
+    Ok(())
+}
+
+/// Of [`near`] the pairs with loose shapes.
+fn near_loose<'s>(
+    flat: &'s FlatLayout<'_>,
+    loose: &'s Loose,
+    layer: LayerNumber,
+    reach: i64,
+    f: &mut impl FnMut(Body<'s>, Body<'s>),
+) -> Result<(), Stop> {
     let body = |k: usize| loose.body(k);
     let bounds: Vec<[i32; 4]> = if loose.polygons.is_empty() {
         Vec::new()
@@ -50,23 +66,72 @@ pub(super) fn near<'s>(
     }
     for (k, b) in boxes.iter().enumerate() {
         let [x0, y0, x1, y1] = b.map(i64::from);
-        let grown = Rect {
-            x0: x0 - reach,
-            y0: y0 - reach,
-            x1: x1 + reach,
-            y1: y1 + reach,
-        };
+        let around = Rect { x0, y0, x1, y1 };
         for element in 0..flat.elements.len() {
-            let (rows, columns) = sites_in(flat, element, &grown);
-            let sites = (rows.end - rows.start).max(0) as u64 * (columns.end - columns.start).max(0) as u64;
-            flat.work.spend(1 + sites)?;
-            for pillar in pillars_in(flat, element, rows, columns, grown) {
+            pillars_near(flat, element, &around, reach, |pillar| {
                 flat.work.spend(body(k).effort(&pillar))?;
                 f(body(k), pillar);
-            }
+                Ok(())
+            })?;
         }
     }
     Ok(())
+}
+
+/// Of [`near`] the pairs of pillars of two elements, which stand on the rims of lenses that are near one another.
+fn near_elements<'s>(flat: &'s FlatLayout<'_>, reach: i64, f: &mut impl FnMut(Body<'s>, Body<'s>)) -> Result<(), Stop> {
+    let around: Vec<Rect> = (0..flat.elements.len()).map(|k| around_element(flat, k)).collect();
+    // Elements beyond what numbers of the format reach are compared though they may be far from one another.
+    let limited = |v: i64| v.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32;
+    let boxes: Vec<[i32; 4]> = around.iter().map(|r| [r.x0, r.y0, r.x1, r.y1].map(limited)).collect();
+    let mut pairs = Vec::new();
+    sweep(&boxes, reach, |_, _| 1, flat.work, |a, b| pairs.push((a, b)))?;
+    for (a, b) in pairs {
+        pillars_near(flat, a, &around[b], reach, |pillar| {
+            pillars_near(flat, b, &pillar.bounds(), reach, |other| {
+                flat.work.spend(pillar.effort(&other))?;
+                f(pillar, other);
+                Ok(())
+            })
+        })?;
+    }
+    Ok(())
+}
+
+/// The box around all sites of an element and pillars on them, which are at most a pitch wide (database units).
+fn around_element(flat: &FlatLayout<'_>, element: usize) -> Rect {
+    let site = &flat.elements[element].site;
+    let half = f64::from(site.lattice.pitch_nm()) / 2.0;
+    let [columns, rows] = site.lattice.reach();
+    let place = |axis: usize, i: usize| (site.centre_nm[axis] + site.lattice.place_nm(axis, i)) as f64;
+    let low = |axis: usize, i: usize| flat.units(place(axis, i) - half).floor() as i64;
+    let high = |axis: usize, end: usize| flat.units(place(axis, end - 1) + half).ceil() as i64;
+    Rect {
+        x0: low(0, columns.start),
+        y0: low(1, rows.start),
+        x1: high(0, columns.end),
+        y1: high(1, rows.end),
+    }
+}
+
+/// Hand every pillar of an element whose bounding box is at most `reach` from a rectangle to `f`.
+fn pillars_near(
+    flat: &FlatLayout<'_>,
+    element: usize,
+    to: &Rect,
+    reach: i64,
+    mut f: impl FnMut(Body<'static>) -> Result<(), Stop>,
+) -> Result<(), Stop> {
+    let grown = Rect {
+        x0: to.x0 - reach,
+        y0: to.y0 - reach,
+        x1: to.x1 + reach,
+        y1: to.y1 + reach,
+    };
+    let (rows, columns) = sites_in(flat, element, &grown);
+    let sites = (rows.end - rows.start).max(0) as u64 * (columns.end - columns.start).max(0) as u64;
+    flat.work.spend(1 + sites)?;
+    pillars_in(flat, element, rows, columns, grown).try_for_each(&mut f)
 }
 
 /// Rows and columns of the lattice of an element whose pillars could touch a rectangle.

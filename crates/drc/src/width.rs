@@ -6,7 +6,7 @@ use super::findings::Findings;
 use super::rule::Rule;
 use super::tolerance::{EQUAL_NM, ROUNDING};
 use metalith_core::document::{Limits, Section};
-use metalith_gds::{LayerNumber, tilted_rectangle_of};
+use metalith_gds::{LayerNumber, circle_of, tilted_rectangle_of};
 
 /// Limit on the smaller and the larger side of a pillar (nm).
 enum WidthLimit {
@@ -147,6 +147,9 @@ impl Rule for WidthBound {
         {
             sides = tilted.edges.map(|e| e * outline.unit_nm);
             off = tilted.edges_off() * outline.unit_nm;
+        } else if let Some(circle) = circle_of(outline.points, outline.unit_nm) {
+            // Corners of an odd number do not reach as far to both sides as the circle that they are on.
+            sides = [circle.width() as f64 * outline.unit_nm; 2];
         }
         let [a, b] = sides;
         // Without area there is no width; that has a rule of its own.

@@ -73,8 +73,9 @@ fn text() -> String {
     let text = std::fs::read_to_string(design("hologram")).unwrap();
     let (head, rest) = text.split_once("[[element]]").unwrap();
     let (_, tail) = rest.split_once("[mapping]").unwrap();
-    // The term of the second element of the shipped design is of no element here.
-    let head = head.replace("elements_m = [2]", "elements_m = [99]");
+    // Without the term of the second element of the shipped design.
+    let (lens, rest) = head.split_once("[[phase.term]]").unwrap();
+    let head = format!("{lens}[array]{}", rest.split_once("[array]").unwrap().1);
     let size = tail.lines().find(|line| line.starts_with("size_um")).unwrap();
     format!(
         "{head}{ELEMENTS}\n[mapping]{}",

@@ -52,9 +52,10 @@ impl OptimiseTask {
     /// The task that a design sets.
     ///
     /// # Errors
-    /// If its lens has no rings, or elements have lenses of their own.
+    /// If its lens has no rings or a phase over the plane, or elements have lenses of their own.
     pub fn of(design: &Design) -> Result<Self> {
         design.one_lens("the optimiser")?;
+        design.radial_phase("the optimiser")?;
         let rings = Rings::new(design.lattice(), design.lens.diameter_nm)?;
         let own_turns = turns_of(&rings, &design.lens.phase);
         let lens = Lens {

@@ -163,6 +163,14 @@ fn both_solvers_beat_what_they_begin_from_and_exchange_beats_adam() {
     assert!(reached[1] > reached[0], "{reached:?}");
 }
 
+/// Rings have one phase each: a phase over the plane would be left out.
+#[test]
+fn phases_over_the_plane_are_refused() {
+    let hologram = Design::read(&metalith_testing::design("hologram")).unwrap();
+    let error = OptimiseTask::of(&hologram).unwrap_err().to_string();
+    assert!(error.contains("phases over the radius alone"), "{error}");
+}
+
 #[test]
 fn mistakes_of_the_section_are_found_together() {
     let folder = tempfile::tempdir().unwrap();

@@ -75,8 +75,11 @@ pub enum Error {
     /// The eigenvalue problem of a layer was not solved.
     #[error("the modes of a layer were not found ({reason})")]
     NoModes { reason: String },
-    /// A mode at its very cutoff: the field is not finite.
-    #[error("the solver lost the field in this cell: it has a mode at its very cutoff")]
+    /// A diffraction order or a mode of a layer at its very cutoff: the field is not finite.
+    #[error(
+        "the solver lost the field in this cell: at this wavelength and angle the lattice just begins to diffract, or a mode of a \
+         layer to exist"
+    )]
     Cutoff,
 
     #[error("no material is called \"{}\"", metalith_core::text::quoted(name))]
@@ -117,6 +120,8 @@ pub enum TableError {
     NoWavelengths { header: String },
     #[error("no column n in \"{header}\"")]
     NoIndex { header: String },
+    #[error("nothing is known of a column \"{name}\" there, or it is there twice")]
+    UnknownColumn { name: String },
     #[error("a value is missing")]
     Missing,
     #[error("\"{text}\" is not a number")]
@@ -176,7 +181,11 @@ impl Error {
             }
             Self::Polarising => "solve for its Jones matrix instead".into(),
             Self::NoModes { .. } => "change the wavelength, the width or the number of orders a little".into(),
-            Self::Cutoff => "change the wavelength, the angle or the width by a part in a million".into(),
+            Self::Cutoff => "orders appear in a medium of index n at wavelengths below n times the pitch (of a hexagonal lattice, \
+                             n times the distance of its rows), for light along the normal; by a sine s of the angle in air, \
+                             below (n + s) times the pitch: use longer wavelengths or a smaller pitch, or change the wavelength, \
+                             the angle or the width by a part in a million where it is a mode"
+                .into(),
             Self::UnknownMaterial { known, .. } => {
                 format!(
                     "use one of {}, or the path of a .csv table of n and k",
@@ -187,7 +196,7 @@ impl Error {
             Self::OutOfRange { .. } => "choose wavelengths in that range, or another material".into(),
             Self::Io { .. } => "check the path; relative paths count from the file that names them".into(),
             Self::Table { .. } => {
-                "give columns wavelength_nm (or wavelength_um), n and, if it absorbs, k, with rising \
+                "give columns wavelength_nm (or wavelength_um), n and, if it absorbs, k, and no others, with rising \
                                    wavelengths"
                     .into()
             }

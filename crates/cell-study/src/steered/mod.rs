@@ -9,7 +9,7 @@ mod judge;
 mod sample;
 
 use std::cell::RefCell;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -17,8 +17,8 @@ use serde::Serialize;
 
 use metalith_cell::{CellStack, InversePolynomial, NeighbourResponse, simplex};
 use metalith_core::{Error, Progress, Result, Wedge};
-use metalith_design::Design;
 use metalith_design::phase::LensPhase;
+use metalith_design::{Design, Element, SteeringSteps};
 use metalith_grating::{Mapping, NeighbourTable, NeighbourTableSpec};
 
 use judge::judge;
@@ -37,8 +37,8 @@ pub struct SteeredLight {
 /// The mapping of the elements that are steered by so many steps.
 #[derive(Clone, Debug, Serialize)]
 pub struct SteeredStudy {
-    /// Steps from the centre element along the two axes, the larger first.
-    pub steps: (u32, u32),
+    /// Steps from the middle of the array along the two axes, the larger first.
+    pub steps: SteeringSteps,
     pub coefficients: Vec<f64>,
     /// At each of the wavelengths that the design compares mappings at.
     pub light: Vec<SteeredLight>,
@@ -55,7 +55,8 @@ impl SteeredStudy {
 /// Find a mapping for each distinct steered element of a design; tables of neighbours are kept in the folder `cache`.
 ///
 /// # Errors
-/// If the common mapping is a table, elements have lenses of their own, a cell cannot be solved, or the user stopped it.
+/// If the common mapping is a table, the lens has a phase over the plane, elements have lenses of their own or are placed one by
+/// one, a cell cannot be solved, or the user stopped it.
 pub fn study_steered(design: &Design, cache: Option<&Path>, progress: &dyn Progress) -> Result<Vec<SteeredStudy>> {
     if design.mapping.table.is_some() {
         return Err(Error::invalid(
@@ -63,7 +64,15 @@ pub fn study_steered(design: &Design, cache: Option<&Path>, progress: &dyn Progr
             "give `coefficients` in [mapping]",
         ));
     }
-    design.one_lens("the search for mappings of steered elements")?;
+    let who = "the search for mappings of steered elements";
+    design.one_lens(who)?;
+    design.radial_phase(who)?;
+    if !design.array.placed.is_empty() {
+        return Err(Error::invalid(
+            format!("{who} tells elements by their steps on a grid, and those of the design are placed one by one"),
+            "use `elements`, `spacing_um` and `steering_deg` of [array] in place of [[element]]",
+        ));
+    }
     let stack = design.cell_stack()?;
     let lens = LensPhase::new(design.lattice(), design.lens.diameter_nm, &design.lens.phase);
     steered(design)
@@ -72,26 +81,30 @@ pub fn study_steered(design: &Design, cache: Option<&Path>, progress: &dyn Progr
         .collect()
 }
 
-/// The wedge of each pair of steps but none, turned so that light arrives as tables have it: from +x more than from +y.
-fn steered(design: &Design) -> BTreeMap<(u32, u32), Wedge> {
-    let elements = design.elements().into_iter().map(|element| {
-        let steps = [element.index.0, element.index.1].map(i32::unsigned_abs);
+/// The wedge of each pair of steps but none, the least first, turned so that light arrives as tables have it: from +x more than
+/// from +y.
+fn steered(design: &Design) -> Vec<(SteeringSteps, Wedge)> {
+    let turned = |element: Element| {
         let sines = [element.wedge.sin_x, element.wedge.sin_y].map(f64::abs);
         let wedge = Wedge {
             sin_x: -sines[0].max(sines[1]),
             sin_y: -sines[0].min(sines[1]),
             ..element.wedge
         };
-        ((steps[0].max(steps[1]), steps[0].min(steps[1])), wedge)
-    });
-    elements.filter(|(steps, _)| *steps != (0, 0)).collect()
+        Some((SteeringSteps::of(&design.array, element.index)?, wedge))
+    };
+    let mut elements: Vec<_> = design.elements().into_iter().filter_map(turned).collect();
+    elements.retain(|(steps, _)| *steps != SteeringSteps::NONE);
+    elements.sort_by(|(a, _), (b, _)| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    elements.dedup_by_key(|(steps, _)| *steps);
+    elements
 }
 
 fn study(
     design: &Design,
     stack: &CellStack,
     lens: &LensPhase,
-    steps: (u32, u32),
+    steps: SteeringSteps,
     wedge: &Wedge,
     cache: Option<&Path>,
     progress: &dyn Progress,
@@ -219,4 +232,57 @@ const ROUNDED: f64 = 1e4;
 fn width_nm(design: &Design, polynomial: &InversePolynomial, u: f64) -> f64 {
     let (low, high) = design.cell.width_range_nm;
     (polynomial.duty(u) * f64::from(design.cell.pitch_nm)).clamp(f64::from(low), f64::from(high))
+}
+
+#[cfg(test)]
+mod tests {
+    use metalith_core::Silent;
+
+    use super::*;
+
+    fn changed(name: &str, change: impl FnOnce(String) -> String) -> Design {
+        let path = format!("{}/../../designs/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+        let text = change(std::fs::read_to_string(&path).unwrap());
+        Design::parse(Path::new(&path), &text).unwrap()
+    }
+
+    fn mini(elements: &str) -> Design {
+        changed("mini_3x3", |text| text.replacen("elements = [3, 3]", elements, 1))
+    }
+
+    fn refused(design: &Design) -> String {
+        study_steered(design, None, &Silent).unwrap_err().to_string()
+    }
+
+    /// Of an even number of columns the nearest to the middle are half a step off.
+    #[test]
+    fn elements_are_told_by_what_they_are_steered_by() {
+        let steps = |elements: &str| -> Vec<SteeringSteps> {
+            steered(&mini(elements)).into_iter().map(|(steps, _)| steps).collect()
+        };
+        assert_eq!(
+            steps("elements = [3, 3]"),
+            [SteeringSteps(1.0, 0.0), SteeringSteps(1.0, 1.0)]
+        );
+        assert_eq!(
+            steps("elements = [2, 3]"),
+            [SteeringSteps(0.5, 0.0), SteeringSteps(1.0, 0.5)]
+        );
+        for (SteeringSteps(first, second), wedge) in steered(&mini("elements = [2, 3]")) {
+            let sine = |steps: f64| (15.0 * steps).to_radians().sin();
+            assert_eq!([-wedge.sin_x, -wedge.sin_y], [sine(first), sine(second)]);
+        }
+    }
+
+    #[test]
+    fn what_the_search_does_not_know_is_refused() {
+        let said = refused(&changed("hologram", |text| text));
+        assert!(said.contains("phases over the radius alone"), "{said}");
+        let placed = |text: String| {
+            let (head, rest) = text.split_once("[[phase.term]]").unwrap();
+            format!("{head}[array]{}", rest.split_once("[array]").unwrap().1)
+        };
+        let said = refused(&changed("hologram", placed));
+        assert!(said.contains("placed one by one"), "{said}");
+    }
 }

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use super::MappingTable;
-use metalith_core::text::quoted;
+use metalith_core::text::{quoted, without_mark};
 use metalith_core::{Error, Result};
 
 /// Longest mapping that is read (bytes), and the rounding of its phases in print.
@@ -41,7 +41,7 @@ impl MappingTable {
         }
         let bytes = fs::read(path).map_err(Error::io("read", path))?;
         let text = String::from_utf8_lossy(&bytes);
-        let mut rows = text
+        let mut rows = without_mark(&text)
             .lines()
             .enumerate()
             .map(|(i, line)| (i + 1, line.trim()))
@@ -77,5 +77,20 @@ impl MappingTable {
             })
             .collect::<Result<Vec<_>>>()?;
         Ok(Self { widths_nm })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As spreadsheets save a table.
+    #[test]
+    fn a_mark_of_the_byte_order_is_no_part_of_a_mapping() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mapping.csv");
+        fs::write(&path, "\u{feff}turns,width_nm\r\n0.25,100\r\n0.75,200\r\n").unwrap();
+        let read = MappingTable::read_csv(&path, &[100, 200]).unwrap();
+        assert_eq!(read.widths_nm, [100, 200]);
     }
 }

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use rayon::prelude::*;
 
 use crate::phase::ElementPhase;
-use crate::{CellSpec, Design, MappingSpec};
+use crate::{CellSpec, Design, MappingSpec, SteeredMapping, SteeringSteps};
 use metalith_cell::{ForwardPolynomial, Handedness, InversePolynomial, MappingTable, RotationMapping};
 use metalith_core::{PillarShape, Rectangles, WidthMap};
 
@@ -127,26 +127,27 @@ impl RotationRule {
 const LAST_TURN: f64 = 0.9999;
 
 impl WidthRule {
-    /// The rule of the element of a design that is so many steps from the centre.
+    /// The rule of the element of a design with this index.
     pub fn of_element(design: &Design, index: (i32, i32)) -> Self {
         let common = Self::new(&design.cell, &design.mapping);
-        match design.mapping.steered(index) {
-            Some(steered) => Self {
-                polynomial: steered.polynomial.clone(),
-                table: None,
-                ..common
-            },
-            None => common,
-        }
+        let own = SteeringSteps::of(&design.array, index).and_then(|steps| design.mapping.steered(steps));
+        own.map_or_else(|| common.clone(), |own| common.steered(own))
     }
 
     /// The rules of all elements of a design, each once: the common one first.
     pub fn all(design: &Design) -> Vec<Self> {
-        let steered = design.mapping.steered.iter();
-        let of = |steps: (u32, u32)| Self::of_element(design, (steps.0 as i32, steps.1 as i32));
-        std::iter::once(Self::new(&design.cell, &design.mapping))
-            .chain(steered.map(|m| of(m.steps)))
-            .collect()
+        let common = Self::new(&design.cell, &design.mapping);
+        let steered = design.mapping.steered.iter().map(|own| common.steered(own));
+        std::iter::once(common.clone()).chain(steered).collect()
+    }
+
+    /// This rule with a mapping of steered elements.
+    fn steered(&self, own: &SteeredMapping) -> Self {
+        Self {
+            polynomial: own.polynomial.clone(),
+            table: None,
+            ..self.clone()
+        }
     }
 
     /// The common rule of a cell and a mapping, which elements follow that have none of their own.

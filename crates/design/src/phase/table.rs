@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use super::Interpolation;
-use metalith_core::text::quoted;
+use metalith_core::text::{quoted, without_mark};
 use metalith_core::{Error, Result, document, npy};
 
 /// Most rows of a table: a ring for each site of the largest lens that can be designed.
@@ -49,7 +49,7 @@ fn read_csv(path: &Path) -> Result<Vec<(f64, f64)>> {
         what,
         hint: "the columns are `r_um,phase_rad`; lines that begin with # are comments".into(),
     };
-    let mut lines = text
+    let mut lines = without_mark(&text)
         .lines()
         .enumerate()
         .map(|(k, line)| (k + 1, line.trim()))
@@ -139,6 +139,17 @@ mod tests {
             assert!((turns - turns.round()).abs() < ROUNDING);
         }
         assert!(phases.windows(2).all(|p| (p[1] - p[0]).abs() <= TAU / 2.0));
+    }
+
+    /// As spreadsheets save a table.
+    #[test]
+    fn a_mark_of_the_byte_order_is_no_part_of_a_table() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("phase.csv");
+        for comment in ["", "# rings\r\n"] {
+            std::fs::write(&path, format!("\u{feff}{comment}r_um,phase_rad\r\n0,1\r\n2,3\r\n")).unwrap();
+            assert_eq!(read(&path).unwrap(), (vec![0.0, 2.0], vec![1.0, 3.0]));
+        }
     }
 
     /// Rows in the middles of rings, sites on their borders: the square of a radius may round to either side.

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::lens::WAVELENGTH;
-use super::{CellSpec, LensSpec};
+use super::{CellSpec, LensSpec, term};
 use metalith_core::document::{Limits, Section};
 use metalith_core::{Lattice, Wedge};
 
@@ -88,7 +88,7 @@ impl ArraySpec {
     ) -> Self {
         let wedge_wavelength_um = s.optional_float("wedge_wavelength_nm", WAVELENGTH).unwrap_or(550.0) * 1e-3;
         let spec = if placed.is_empty() {
-            Self::read_grid(s, lens, wedge_wavelength_um)
+            Self::read_grid(s, lens, cell, wedge_wavelength_um)
         } else {
             Self {
                 wedge_wavelength_um,
@@ -96,10 +96,11 @@ impl ArraySpec {
             }
         };
         s.finish();
+        term::check_elements(&spec, lens, phase, placed);
         spec
     }
 
-    fn read_grid(s: &Section<'_, '_>, lens: &LensSpec, wedge_wavelength_um: f64) -> Self {
+    fn read_grid(s: &Section<'_, '_>, lens: &LensSpec, cell: &CellSpec, wedge_wavelength_um: f64) -> Self {
         let count = s.array::<2>("elements", Limits::new(1.0..=99.0, "elements along x and y"));
         if count.iter().any(|c| c.fract() != 0.0) {
             s.fault(
@@ -115,16 +116,15 @@ impl ArraySpec {
             [s.float("spacing_um", range); 2]
         };
         let spacing_nm = spacing_um.map(|um| whole_nm(s, "spacing_um", um));
-        let overlap = (0..2).any(|axis| count[axis] > 1.0 && spacing_nm[axis] < i64::from(lens.diameter_nm));
-        if overlap && s.has("spacing_um") {
+        let near = |side_nm: &i64| (0..2).any(|axis| count[axis] > 1.0 && spacing_nm[axis] < *side_nm);
+        if let Some(side_nm) = square_nm(lens.diameter_nm, cell).filter(near)
+            && s.has("spacing_um")
+        {
             s.fault_given(
-                &["lens.diameter_um", "array.elements"],
+                &["lens.diameter_um", "cell.pitch_nm", "array.elements"],
                 "spacing_um",
-                "neighbouring lenses overlap",
-                format!(
-                    "use at least the lens diameter, {} um",
-                    f64::from(lens.diameter_nm) * 1e-3
-                ),
+                "neighbouring lenses overlap, or the squares about them do",
+                format!("use at least {} um: the lens with its lattice", side_nm as f64 * 1e-3),
             );
         }
         let spec = Self {
@@ -204,10 +204,9 @@ impl ArraySpec {
 
     /// Elements stand on lattices of one size: their squares must not overlap, or pillars could be of either.
     fn apart(&self, lens: &LensSpec, cell: &CellSpec, sections: &[Section<'_, '_>]) {
-        let Ok(lattice) = Lattice::of_kind_covering(cell.lattice, self.largest_nm(lens), cell.pitch_nm) else {
+        let Some(side_nm) = square_nm(self.largest_nm(lens), cell) else {
             return;
         };
-        let side_nm = lattice.sites() as i64 * i64::from(lattice.steps_nm()[0]);
         for (k, s) in sections.iter().enumerate() {
             let (x, y) = self.placed[k].centre_nm;
             let near = |p: &PlacedSpec| (x - p.centre_nm.0).abs().max((y - p.centre_nm.1).abs()) < side_nm;
@@ -304,6 +303,15 @@ impl ArraySpec {
             Some(y) => format!("{} by {} um", um(self.spacing_nm), um(y)),
         })
     }
+}
+
+/// Edge of the squares that elements take whose largest lens has this diameter (nm): where two do not overlap, their pillars are
+/// a pitch apart at least. None where there is no lattice, which is a mistake of its own.
+fn square_nm(diameter_nm: u32, cell: &CellSpec) -> Option<i64> {
+    let lattice = Lattice::of_kind_covering(cell.lattice, diameter_nm, cell.pitch_nm).ok()?;
+    // From the first site of a row to the last; places of a hexagonal lattice are half a pitch apart.
+    let across_nm = (lattice.sites() as i64 - 1) * i64::from(lattice.steps_nm()[0]);
+    Some(across_nm + i64::from(lattice.pitch_nm()))
 }
 
 /// Index of each of so many elements of an axis, and its place in half steps from the middle.

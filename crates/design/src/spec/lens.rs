@@ -72,6 +72,9 @@ impl LensSpec {
         } else {
             // A hyperbola that names no focal length has that of the element; its radius of normalisation is no other.
             own.phase = read_radial(shared_phase, own.focal_length_um, shared.radius_um());
+            for (term, said) in own.terms.iter_mut().zip(shared_phase.sections("term")) {
+                term::default_focal_length(term, &said, own.focal_length_um);
+            }
             own.terms.retain(|term| term.is_of(index));
         }
         Some(own)

@@ -6,12 +6,12 @@ use serde::Serialize;
 
 use super::cell::read_band;
 use super::lens::WAVELENGTH;
-use super::{ArraySpec, CellSpec, Element};
+use super::{ArraySpec, CellSpec, SteeredMapping, SteeringSteps};
 use metalith_cell::{Basis, InversePolynomial, MappingTable, RotationMapping};
 use metalith_core::Result;
 use metalith_core::document::{Limits, Section};
 
-const COEFFICIENT: Limits = Limits::new(-100.0..=100.0, "(duty cycle over turns)");
+pub(super) const COEFFICIENT: Limits = Limits::new(-100.0..=100.0, "(duty cycle over turns)");
 
 /// How phase becomes width.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -44,16 +44,6 @@ pub struct MappingComparison {
     pub band_um: Option<(f64, f64)>,
     /// Single wavelengths that are shown (um).
     pub wavelengths_um: Vec<f64>,
-}
-
-/// The mapping of the elements that are steered by so many steps, to whichever side: their phase is steep, and what a pillar
-/// does depends on its neighbours.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct SteeredMapping {
-    /// Steps from the centre element along the two axes, the larger first.
-    pub steps: (u32, u32),
-    /// Duty cycle over phase.
-    pub polynomial: InversePolynomial,
 }
 
 impl MappingSpec {
@@ -143,10 +133,9 @@ impl MappingSpec {
         }
     }
 
-    /// The mapping of the element that is so many steps from the centre, if it has its own.
-    pub fn steered(&self, index: (i32, i32)) -> Option<&SteeredMapping> {
-        let (x, y) = (index.0.unsigned_abs(), index.1.unsigned_abs());
-        self.steered.iter().find(|m| m.steps == (x.max(y), x.min(y)))
+    /// The mapping of the elements that are so many steps from the middle of the array, if they have their own.
+    pub fn steered(&self, steps: SteeringSteps) -> Option<&SteeredMapping> {
+        self.steered.iter().find(|m| m.steps == steps)
     }
 
     /// Read the table, if there is one.
@@ -193,50 +182,8 @@ fn read_rotation(s: &Section<'_, '_>, rotated: bool) -> RotationMapping {
     }
 }
 
-impl SteeredMapping {
-    fn read(s: &Section<'_, '_>, cell: &CellSpec, array: &ArraySpec, common: &InversePolynomial) -> Self {
-        let steps = s.array::<2>("steps", Limits::new(0.0..=49.0, "steps from the centre element"));
-        let [first, second] = steps.map(|v| v as u32);
-        let steps_of = |e: &Element| (e.index.0.unsigned_abs(), e.index.1.unsigned_abs());
-        let outermost = array
-            .elements()
-            .iter()
-            .map(steps_of)
-            .fold((0, 0), |most, (m, n)| (most.0.max(m.max(n)), most.1.max(m.min(n))));
-        let is_whole = steps.iter().all(|v| v.fract() == 0.0);
-        if !is_whole || first == 0 || second > first || first > outermost.0 || second > outermost.1 {
-            s.fault_given(
-                &["array.elements"],
-                "steps",
-                format!(
-                    "no steered elements are {} and {} steps from the centre",
-                    steps[0], steps[1]
-                ),
-                "give whole steps of elements that there are, the larger first, such as [1, 0]",
-            );
-        }
-        let polynomial = InversePolynomial {
-            coefficients: s.floats("coefficients", COEFFICIENT),
-            ..common.clone()
-        };
-        if polynomial.coefficients.is_empty() && s.has("coefficients") {
-            s.fault(
-                "coefficients",
-                "a mapping of no coefficients gives no width",
-                "list those of u^0, u^1, ...",
-            );
-        }
-        check_widths(s, cell, &polynomial);
-        s.finish();
-        Self {
-            steps: (first, second),
-            polynomial,
-        }
-    }
-}
-
 /// A mapping must ask for widths that the cell allows.
-fn check_widths(s: &Section<'_, '_>, cell: &CellSpec, polynomial: &InversePolynomial) {
+pub(super) fn check_widths(s: &Section<'_, '_>, cell: &CellSpec, polynomial: &InversePolynomial) {
     if polynomial.coefficients.is_empty() {
         return;
     }

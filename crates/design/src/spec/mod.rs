@@ -7,6 +7,7 @@ mod lens;
 mod mapping;
 mod optimise;
 mod outline;
+mod steered;
 mod term;
 mod verify;
 
@@ -18,4 +19,5 @@ pub use mapping::{MappingComparison, MappingSpec};
 pub use optimise::{MeritSpec, OptimiseSpec, RobustSpec, SolverSpec, StartSpec, ViewSpec};
 pub use outline::LensOutline;
 pub(crate) use outline::OutlineRows;
+pub use steered::{SteeredMapping, SteeringSteps};
 pub use verify::{CellIncidence, FieldAngle, LimitSpec, VerifySpec};

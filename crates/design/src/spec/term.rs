@@ -1,7 +1,11 @@
 //! `[[phase.term]]`: phases over the plane of an element, added to that over the radius.
 
+use std::collections::BTreeSet;
+
 use super::lens::{COEFFICIENT, read_radial};
+use super::{ArraySpec, LensSpec};
 use crate::phase::{Interpolation, MapTable, PhaseTerm, RadialPhase, TermForm, ZernikeOrder};
+use metalith_core::Zernike;
 use metalith_core::document::{Limits, Section};
 
 /// Most polynomials of a sum.
@@ -41,15 +45,14 @@ pub(super) fn read(s: &Section<'_, '_>, focal_length_um: f64, radius_um: f64) ->
             Interpolation::read(s),
             s.choice("wrapped", &[("no", false), ("yes", true)], Some(true)),
         )),
-        TermSource::Zernike => TermForm::Zernike {
-            order: s.choice(
-                "order",
-                &[("standard", ZernikeOrder::Standard), ("fringe", ZernikeOrder::Fringe)],
-                None,
-            ),
-            coefficients: some(s, "coefficients_waves", Limits::new(-1e8..=1e8, "waves")),
-            radius_um: normalisation(s),
-        },
+        TermSource::Zernike => {
+            let (order, coefficients) = zernike(s);
+            TermForm::Zernike {
+                order,
+                coefficients,
+                radius_um: normalisation(s),
+            }
+        }
         TermSource::Polynomial => TermForm::Polynomial {
             terms: polynomial(s),
             radius_um: normalisation(s),
@@ -75,8 +78,66 @@ pub(super) fn read(s: &Section<'_, '_>, focal_length_um: f64, radius_um: f64) ->
             .unwrap_or([0.0; 2]),
         elements: elements(s),
     };
+    if let TermForm::Map(map) = &term.form
+        && map.is_wrapped()
+        && term.scale.fract() != 0.0
+    {
+        s.fault(
+            "scale",
+            format!("phases that are known up to whole turns, times {}", term.scale),
+            "multiply them by a whole number, or say `wrapped = \"no\"` of a table that never jumps by a turn",
+        );
+    }
     s.finish();
     term
+}
+
+/// A hyperbola that names no focal length has that of the element; `s` is the section that the term was read from.
+pub(super) fn default_focal_length(term: &mut PhaseTerm, s: &Section<'_, '_>, of_element_um: f64) {
+    if let TermForm::Radial(RadialPhase::Hyperbola { focal_length_um, .. }) = &mut term.form
+        && !s.has("focal_length_um")
+    {
+        *focal_length_um = of_element_um;
+    }
+}
+
+/// Terms name elements that there are: of others they would change nothing, without a word. `phase` is the section of the phase
+/// that all elements share, `placed` those of elements that are placed one by one.
+pub(super) fn check_elements(array: &ArraySpec, lens: &LensSpec, phase: &Section<'_, '_>, placed: &[Section<'_, '_>]) {
+    let check = |phase: &Section<'_, '_>, lens: &LensSpec, there: &BTreeSet<(i32, i32)>, hint: &str| {
+        for (term, s) in lens.terms.iter().zip(phase.sections("term")) {
+            if let Some((m, n)) = term.elements.iter().find(|index| !there.contains(index)) {
+                let what = format!("no element of this phase is ({m}, {n})");
+                s.fault_given(&["array.elements"], "elements_m", what, hint);
+            }
+        }
+    };
+    let all = array.elements().iter().map(|e| e.index).collect();
+    let hint = "give m and n of elements that there are, as the report of `metalith layout` names them; where their number along \
+                an axis is even, none is 0";
+    check(phase, lens, &all, hint);
+    for ((s, element), k) in placed.iter().zip(&array.placed).zip(1..) {
+        if let (Some(own), Some(lens)) = (s.optional_section("phase"), &element.lens) {
+            let hint = format!("leave `elements_m` and `elements_n` out: this phase is of element ({k}, 0) alone");
+            check(&own, lens, &BTreeSet::from([(k, 0)]), &hint);
+        }
+    }
+}
+
+/// Order and coefficients of a sum of Zernike polynomials.
+fn zernike(s: &Section<'_, '_>) -> (ZernikeOrder, Vec<f64>) {
+    let orders = [("standard", ZernikeOrder::Standard), ("fringe", ZernikeOrder::Fringe)];
+    let order = s.choice("order", &orders, None);
+    let coefficients = some(s, "coefficients_waves", Limits::new(-1e8..=1e8, "waves"));
+    let most = Zernike::FRINGE_SET as usize;
+    if order == ZernikeOrder::Fringe && (most + 1..=MOST_TERMS).contains(&coefficients.len()) {
+        s.fault(
+            "coefficients_waves",
+            format!("{} coefficients of the fringe order", coefficients.len()),
+            format!("give the first {most} of them at most, which are all there are, or use `order = \"standard\"`"),
+        );
+    }
+    (order, coefficients)
 }
 
 /// A list that is not empty and not too long.
@@ -118,12 +179,13 @@ fn elements(s: &Section<'_, '_>) -> Vec<(i32, i32)> {
     }
     let index = Limits::new(-99.0..=99.0, "");
     let [m, n] = ["elements_m", "elements_n"].map(|key| s.floats(key, index.clone()));
-    if m.len() != n.len() || m.iter().chain(&n).any(|k| k.fract() != 0.0) {
+    if m.len() != n.len() || m.is_empty() || m.iter().chain(&n).any(|k| k.fract() != 0.0) {
         s.fault(
             "elements_m",
             format!("{} indices along x and {} along y", m.len(), n.len()),
-            "give m and n of each element, as the report of `metalith layout` names them",
+            "give m and n of each element, as the report of `metalith layout` names them; leave both out for all elements",
         );
+        return Vec::new();
     }
     m.iter().zip(&n).map(|(m, n)| (*m as i32, *n as i32)).collect()
 }

@@ -62,3 +62,32 @@ fn each_rule_of_circles_finds_what_it_is_for() {
     let wider = found(all, |gds| circle(gds, (x, y), DIAMETER + 20));
     assert_eq!(wider, (vec![("gap.overlap".into(), 1)], 144));
 }
+
+/// Circles of few corners, as other programs draw them: the box around an odd number of corners is no square.
+#[test]
+fn circles_of_eleven_corners_are_circles() {
+    let corner = |k: u32| {
+        let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / 11.0).sin_cos();
+        let radius = f64::from(DIAMETER) / 2.0;
+        ((radius * cos).round() as i32, (radius * sin).round() as i32)
+    };
+    let widths = [(
+        "id = \"pillar.circle\"",
+        "id = \"pillar.width\"\ncheck = \"width_min\"\nnm = 200\n\n[[rule]]\nid = \"pillar.circle\"",
+    )];
+    let found = broken_on_lattice(
+        &deck_from("rules/circles.toml", &widths),
+        SITES,
+        |gds, column, row| {
+            let (x, y) = place(column, row);
+            let points: Vec<(i32, i32)> = (0..11)
+                .chain([0])
+                .map(corner)
+                .map(|(dx, dy)| (x + dx, y + dy))
+                .collect();
+            gds.polygon(1, &points);
+        },
+        |_| {},
+    );
+    assert_eq!(found, (vec![], 144));
+}

@@ -7,8 +7,9 @@ use metalith_design::{Design, Hierarchy, PillarArray};
 use metalith_drc::{CheckInput, Deck, DrcReport};
 use metalith_gds::Layout;
 use metalith_layout::write_pillars;
+use metalith_testing::gds::Gds;
 
-use crate::{broken, input};
+use crate::{broken, input, layout};
 
 /// A design of the size of the shipped small one, its text changed, and its flat layout.
 struct Case {
@@ -121,4 +122,66 @@ fn the_active_area_is_that_of_the_chip() {
     let tight = 2 * (reach.max().unwrap() / 1000 + 5);
     let case = Case::new(&[(&size, &format!("size_um = [{tight}, {tight}]"))]);
     assert!(broken(&case.judge()).iter().any(|f| f.0 == "layer.active_area"));
+}
+
+/// The shipped design of a name as it is written, by the rules of squares.
+fn shipped(name: &str) -> DrcReport {
+    let design = Design::read(&metalith_testing::design(name)).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("pillars.gds");
+    let array = PillarArray::build(&design, &Silent).unwrap();
+    write_pillars(&design, &array, Hierarchy::Folded, &file, &Silent).unwrap();
+    let with = CheckInput {
+        design: Some(&design),
+        ..input()
+    };
+    metalith_drc::check(&Layout::open(&file).unwrap(), &Deck::standard(), &with, &Silent).unwrap()
+}
+
+/// Phases of a hologram jump by turns from site to site, which no pillar shows: only what is steep in truth counts.
+#[test]
+fn shipped_designs_of_other_arrays_and_phases_hold() {
+    for name in ["array_2x4", "mixed_lenses", "hologram"] {
+        let report = shipped(name);
+        let worse: Vec<_> = broken(&report).into_iter().filter(|rule| *rule != NOTE).collect();
+        assert_eq!((worse, report.exit_code()), (vec![], 0), "{name}");
+    }
+    // Steps at the vortices of the hologram are steep.
+    let report = shipped("hologram");
+    let rule = report.rules.iter().find(|r| r.id == "design.phase_step").unwrap();
+    let steep = rule.facts.iter().find(|(what, _)| what.ends_with("in (2, 0)"));
+    let (_, share) = steep.unwrap();
+    assert!(*share > 0.001 && *share < 0.01, "{share}");
+}
+
+/// Pillars on the rims of neighbouring lenses, in a layout that does not keep to its design: too near, sharing area, and the same.
+#[test]
+fn pillars_of_two_elements_are_compared() {
+    let mut design = Design::read(&metalith_testing::root().join("designs/hologram.toml")).unwrap();
+    // The lattice of each has 172 sites of 350 nm: the second begins so far right of where the first ends.
+    let mut found = |apart_nm: i64, widths: [i32; 2], up_nm: i32| {
+        for (placed, x) in design.array.placed.iter_mut().zip([0, 171 * 350 + apart_nm]) {
+            placed.centre_nm = (x, 0);
+        }
+        let mut gds = Gds::library();
+        gds.cell("CHIP").rect(10, -100_000, -100_000, 160_000, 100_000);
+        let last = 171 * 175;
+        gds.square(1, last, 175, widths[0]);
+        gds.square(1, last + apart_nm as i32, 175 + up_nm, widths[1]);
+        gds.end_cell();
+        let with = CheckInput {
+            design: Some(&design),
+            ..input()
+        };
+        let report = metalith_drc::check(&layout(gds.end()), &Deck::standard(), &with, &Silent).unwrap();
+        assert_eq!(report.pillars_on_lattices, 2);
+        let of_gaps = broken(&report).into_iter().filter(|(id, _)| id.starts_with("gap."));
+        of_gaps.map(|(id, times)| (id.to_owned(), times)).collect::<Vec<_>>()
+    };
+    let broken = |id: &str| (id.to_owned(), 1);
+    assert_eq!(found(350, [300, 300], 0), []);
+    assert_eq!(found(350, [300, 340], 0), [broken("gap.min"), broken("gap.aspect")]);
+    // Diagonally, 30 nm along either axis: 42 nm.
+    assert_eq!(found(350, [320, 320], 350), [broken("gap.min"), broken("gap.aspect")]);
+    assert_eq!(found(250, [300, 240], 0), [broken("gap.overlap")]);
 }

@@ -97,6 +97,36 @@ fn circles_are_pillars_where_most_are() {
     assert_eq!((read.pillars, read.oddities.total()), (1, 35));
 }
 
+/// Regular polygons of other programs, the first corner on the x axis, stand on the sites of the circles that they are drawn for.
+#[test]
+fn circles_of_few_corners_are_on_their_sites() {
+    for corners in [8, 9, 13, 18, 31] {
+        let corner = |k: u32| {
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / f64::from(corners)).sin_cos();
+            ((100.0 * cos).round() as i64, (100.0 * sin).round() as i64)
+        };
+        let drawn: Vec<(i64, i64)> = (0..corners).map(corner).collect();
+        let mut gds = Gds::library();
+        gds.cell("TOP");
+        for k in 0..36 {
+            let (x, y) = (175 + 350 * (k % 6) - 1050, 175 + 350 * (k / 6) - 1050);
+            gds.polygon(1, &polygon_about(x, y, &drawn));
+        }
+        gds.end_cell();
+        let read = extract(&layout(gds.end()), &ExtractionPlan::discover(PILLARS), &Silent).unwrap();
+        assert_eq!(
+            (read.shape, read.pillars, read.oddities.total()),
+            (PillarShape::Circle, 36, 0),
+            "{corners}"
+        );
+        let [element] = &read.elements[..] else {
+            panic!("{corners}: {} elements", read.elements.len())
+        };
+        assert_eq!((element.site.centre_nm, element.site.lattice.pitch_nm()), ([0, 0], 350));
+        assert!(element.widths.width_nm.iter().all(|w| *w == 200), "{corners}");
+    }
+}
+
 /// Rectangles in a cell that is drawn twice as large as it is placed.
 #[test]
 fn rectangles_of_a_magnified_cell_are_found_as_large_as_they_are() {

@@ -29,6 +29,12 @@ pub(super) fn parse(text: &str) -> Result<Vec<[f64; 3]>, TableFault> {
         (Some(number), TableError::NoIndex { header })
     })?;
     let k = column("k");
+    // A column that nobody reads may be what is missing: K is no k.
+    let known = [Some(wavelength), Some(n), k];
+    if let Some(at) = (0..names.len()).find(|at| !known.contains(&Some(*at))) {
+        let name = quoted(names[at]);
+        return Err((Some(number), TableError::UnknownColumn { name }));
+    }
     let mut samples: Vec<[f64; 3]> = Vec::new();
     for (number, line) in lines {
         let cells: Vec<_> = line.split(',').map(str::trim).collect();
@@ -61,6 +67,25 @@ pub(super) fn parse(text: &str) -> Result<Vec<[f64; 3]>, TableFault> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Another name for k, a second column of wavelengths or of n, and one without a name.
+    #[test]
+    fn columns_that_nobody_reads_are_faults() {
+        for (header, name) in [
+            ("wavelength_nm,n,K", "K"),
+            ("wavelength_nm,wavelength_um,n", "wavelength_um"),
+            ("wavelength_nm,n,n", "n"),
+            ("wavelength_nm,n,", ""),
+        ] {
+            let found = parse(&format!("# film\n{header}\n400,2,0.1\n410,2.1,0.1\n"));
+            let name = name.to_owned();
+            assert_eq!(found, Err((Some(2), TableError::UnknownColumn { name })), "{header}");
+        }
+        assert_eq!(
+            parse("k,n,wavelength_um\n0.1,2,0.4\n0.2,2.1,0.5\n").unwrap()[1],
+            [0.5, 2.1, 0.2]
+        );
+    }
 
     /// As spreadsheets save a table.
     #[test]

@@ -49,6 +49,11 @@ impl MapTable {
         &self.file
     }
 
+    /// Whether its phases are known up to whole turns.
+    pub fn is_wrapped(&self) -> bool {
+        self.wrapped
+    }
+
     /// Load the table for places up to these distances along x and y (um).
     ///
     /// # Errors

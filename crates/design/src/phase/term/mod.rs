@@ -64,7 +64,7 @@ pub enum TermForm {
 pub enum ZernikeOrder {
     /// Noll's order, an rms of one over the disc.
     Standard,
-    /// The order of the University of Arizona, a largest value of one.
+    /// The order of the University of Arizona, a largest value of one: a set of [`Zernike::FRINGE_SET`].
     Fringe,
 }
 
@@ -92,6 +92,11 @@ impl PhaseTerm {
     /// Whether an element has it.
     pub fn is_of(&self, element: (i32, i32)) -> bool {
         self.elements.is_empty() || self.elements.contains(&element)
+    }
+
+    /// Whether its phase is known up to whole turns: it jumps by them between places, and nothing is seen of that behind a lens.
+    pub fn is_wrapped(&self) -> bool {
+        matches!(&self.form, TermForm::Map(map) if map.is_wrapped())
     }
 
     /// Phase at a place from the middle of the element (um), in turns, not reduced.

@@ -259,23 +259,46 @@ impl<'a> ElementPhase<'a> {
 
     /// Phase at a site (turns), not reduced; none outside the lens.
     pub fn turns(&self, ix: usize, iy: usize) -> Option<f64> {
+        let steered = self.steered(ix, iy)?;
+        if self.terms.is_empty() {
+            return Some(steered);
+        }
+        let (x_um, y_um) = self.place_of_terms(ix, iy);
+        Some(
+            self.terms
+                .iter()
+                .fold(steered, |sum, term| sum + term.turns(x_um, y_um)),
+        )
+    }
+
+    /// The same in two parts (turns) whose sum it is, but for rounding: all that is known as it is, and the sum of maps that are
+    /// known up to whole turns. From site to site the second may jump by turns that the map does not mean.
+    pub fn parts(&self, ix: usize, iy: usize) -> Option<[f64; 2]> {
+        let mut parts = [self.steered(ix, iy)?, 0.0];
+        if !self.terms.is_empty() {
+            let (x_um, y_um) = self.place_of_terms(ix, iy);
+            for term in &self.terms {
+                parts[usize::from(term.is_wrapped())] += term.turns(x_um, y_um);
+            }
+        }
+        Some(parts)
+    }
+
+    /// Phase of the lens and its wedge at a site (turns), not reduced.
+    fn steered(&self, ix: usize, iy: usize) -> Option<f64> {
         let radial = self.lens.turns(ix, iy)?;
         let (x, y) = (
             self.lens.lattice.half_index(ix) as f64,
             self.lens.lattice.half_index(iy) as f64,
         );
         // The two parts of the wedge are added first: exchanging x and y then gives the same sum.
-        let steered = radial + (x * self.step.0 + y * self.step.1);
-        if self.terms.is_empty() {
-            return Some(steered);
-        }
+        Some(radial + (x * self.step.0 + y * self.step.1))
+    }
+
+    /// Where phases over the plane are asked for at a site, from the middle of the element before it was rotated (um).
+    fn place_of_terms(&self, ix: usize, iy: usize) -> (f64, f64) {
         let lattice = self.lens.lattice;
-        let (x_um, y_um) = self.rotation.before(lattice.place_um(0, ix), lattice.place_um(1, iy));
-        Some(
-            self.terms
-                .iter()
-                .fold(steered, |sum, term| sum + term.turns(x_um, y_um)),
-        )
+        self.rotation.before(lattice.place_um(0, ix), lattice.place_um(1, iy))
     }
 
     /// Phase at a site modulo one turn, in [0, 1); none outside the lens.
@@ -309,83 +332,4 @@ impl<'a> ElementPhase<'a> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_lens_of_one_millimetre_has_the_sites_of_the_truth_data() {
-        let lattice = Lattice::covering(1_000_000, 350).unwrap();
-        let radial = RadialPhase::Hyperbola {
-            wavelength_um: 0.55,
-            focal_length_um: 2400.0,
-        };
-        let lens = LensPhase::new(lattice, 1_000_000, &radial);
-        let n = lattice.sites();
-        let inside = (0..n)
-            .flat_map(|iy| (0..n).map(move |ix| (ix, iy)))
-            .filter(|&(x, y)| lens.turns(x, y).is_some());
-        assert_eq!((n, inside.count()), (2858, 6_411_448));
-    }
-
-    /// Large lenses, whose radii are not tabulated, have the phases of small ones.
-    #[test]
-    fn a_computed_phase_is_the_tabulated_one() {
-        let radial = RadialPhase::Hyperbola {
-            wavelength_um: 0.55,
-            focal_length_um: 30.0,
-        };
-        for diameter_nm in [20_000, 20_400] {
-            let lattice = Lattice::covering(diameter_nm, 350).unwrap();
-            let table = LensPhase::new(lattice, diameter_nm, &radial);
-            let computed = LensPhase::with_entries(lattice, diameter_nm, &radial, 0);
-            assert!(matches!(computed.turns, TurnsOfRadius::Computed(_)));
-            let n = lattice.sites();
-            for (ix, iy) in (0..n * n).map(|k| (k % n, k / n)) {
-                assert_eq!(table.turns(ix, iy), computed.turns(ix, iy));
-                assert_eq!(table.holds(ix, iy), table.turns(ix, iy).is_some());
-            }
-        }
-    }
-
-    #[test]
-    fn mirrored_elements_have_mirrored_phases_to_the_last_bit() {
-        let lattice = Lattice::covering(20_000, 350).unwrap();
-        let radial = RadialPhase::Hyperbola {
-            wavelength_um: 0.55,
-            focal_length_um: 30.0,
-        };
-        let lens = LensPhase::new(lattice, 20_000, &radial);
-        let n = lattice.sites();
-        let wedge = |sin_x, sin_y| Wedge {
-            wavelength_um: 0.55,
-            sin_x,
-            sin_y,
-        };
-        let (s, t) = (0.25881904510252074, 0.49999999999999994);
-        let (a, b, c) = (wedge(s, t), wedge(-s, t), wedge(t, s));
-        let (a, b, c) = (
-            ElementPhase::new(&lens, &a),
-            ElementPhase::new(&lens, &b),
-            ElementPhase::new(&lens, &c),
-        );
-        for iy in 0..n {
-            for ix in 0..n {
-                assert_eq!(a.turns(ix, iy), b.turns(n - 1 - ix, iy));
-                assert_eq!(a.turns(ix, iy), c.turns(iy, ix));
-            }
-        }
-    }
-
-    #[test]
-    fn odd_lattices_have_a_site_in_the_centre() {
-        let lattice = Lattice::new(350, 5).unwrap();
-        let radial = RadialPhase::EvenPowers {
-            coefficients_rad: vec![1.0],
-            normalisation_um: 1.0,
-        };
-        let lens = LensPhase::new(lattice, 1_500, &radial);
-        assert_eq!(lens.turns(2, 2), Some(0.0));
-        assert!(lens.turns(3, 2).is_some());
-        assert_eq!(lens.turns(0, 0), None);
-    }
-}
+mod tests;
