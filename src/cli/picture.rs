@@ -7,7 +7,7 @@ use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
 use metalith::picture::scene::{BuiltIn, SceneFile, SceneImage, chart, read_depth, read_scene};
 use metalith::picture::{
     Assumption, Doubt, Frame, KeptKernels, PicturePages, PictureReport, Rehearsal, RestorationReport, ScenePower,
-    Studio, contrast_curves, scores, worth_of_assumptions, write_pages,
+    Studio, check_scored, contrast_curves, scores, worth_of_assumptions, write_pages,
 };
 use metalith::{Error, Fidelity, Result};
 
@@ -41,13 +41,14 @@ pub struct PictureArgs {
     #[arg(long, value_name = "FILE")]
     depth: Option<PathBuf>,
 
-    /// Wavelengths of the bands of a spectral cube (nm), separated by commas.
+    /// Wavelengths of the bands of a spectral cube (nm), separated by commas. They must hold 95 % of the light that each channel
+    /// of the camera counts.
     #[arg(long, value_delimiter = ',', value_name = "NM,NM,...")]
     wavelengths_nm: Option<Vec<f64>>,
 
-    /// Pixels an axis of a built-in scene.
-    #[arg(long, default_value_t = 800, value_parser = clap::value_parser!(u16).range(64..=4096))]
-    pixels: u16,
+    /// Pixels an axis of a built-in scene; 800 if left out.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(64..=4096))]
+    pixels: Option<u16>,
 
     /// Ways to restore: tikhonov, tv, richardson-lucy, hqs, prior (learnt from photographs); the picture of the page is that of the first.
     #[arg(long, value_delimiter = ',', default_value = "tikhonov")]
@@ -83,6 +84,9 @@ pub struct PictureArgs {
     json: bool,
 }
 
+/// Pixels an axis of a built-in scene, if nothing else is said.
+const PIXELS: u16 = 800;
+
 /// Whose assumptions are compared with the physics.
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum Assume {
@@ -98,16 +102,31 @@ impl PictureArgs {
                 "give a positive --distance-mm",
             ));
         }
-        let file = InputFile::of(self.scene.as_ref())?;
-        let scene = match self.scene.parse::<BuiltIn>() {
-            Ok(kind) => chart(kind, self.pixels.into(), self.with.field_deg, distance_um),
-            Err(_) => read_scene(&SceneFile {
-                path: file.to_owned(),
-                wavelengths_nm: self.wavelengths_nm.clone(),
-                field_deg: self.with.field_deg,
-                distance_um,
-            })?,
+        let built_in = self.scene.parse::<BuiltIn>().ok();
+        let idle = |option: &str, what: &str| {
+            Err(Error::invalid(
+                format!("{option} says nothing of `{}`: it is of {what}", self.scene),
+                format!("leave {option} out, or give another scene"),
+            ))
         };
+        let scene = match built_in {
+            Some(_) if self.wavelengths_nm.is_some() => return idle("--wavelengths-nm", "spectral cubes"),
+            None if self.pixels.is_some() => return idle("--pixels", "the built-in scenes chart, star and edge"),
+            Some(kind) => {
+                let pixels = self.pixels.unwrap_or(PIXELS);
+                chart(kind, pixels.into(), self.with.field_deg, distance_um)
+            }
+            None => {
+                let file = InputFile::of(self.scene.as_ref())?;
+                read_scene(&SceneFile {
+                    path: file.to_owned(),
+                    wavelengths_nm: self.wavelengths_nm.clone(),
+                    field_deg: self.with.field_deg,
+                    distance_um,
+                })?
+            }
+        };
+        check_scored(&scene.view)?;
         match &self.depth {
             Some(path) => scene.with_depth(read_depth(path)?),
             None => Ok(scene),
@@ -255,9 +274,50 @@ fn report(
         operator_error: Vec::new(),
         budget: studio.budget(),
         homographies: studio.homographies(),
-        assumptions: studio.assumptions(fidelity),
+        assumptions: studio.assumptions(scene, fidelity),
         contrast: Vec::new(),
         doubt: None,
         worth: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Alone {
+        #[command(flatten)]
+        picture: PictureArgs,
+    }
+
+    #[test]
+    fn scenes_and_their_options_fit_or_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let small = folder.path().join("small.png").display().to_string();
+        metalith::picture::write_picture(small.as_ref(), &ndarray::Array3::from_elem((32, 40, 3), 0.5)).unwrap();
+        let scene = |of: &[&str]| {
+            let files = [
+                "picture",
+                "layout.gds",
+                "--camera",
+                "camera.toml",
+                "--design",
+                "design.toml",
+            ];
+            let alone = Alone::try_parse_from(files.iter().chain(of)).unwrap();
+            alone.picture.scene().map(|scene| scene.view.rows)
+        };
+        assert_eq!(scene(&["star"]).unwrap(), 800);
+        assert_eq!(scene(&["edge", "--pixels", "64"]).unwrap(), 64);
+        for (of, words) in [
+            (&["star", "--wavelengths-nm", "400,500"][..], "spectral cubes"),
+            (&["scene.png", "--pixels", "64"], "built-in scenes"),
+            (&[&small], "33 pixels"),
+        ] {
+            let error = scene(of).unwrap_err().to_string();
+            assert!(error.contains(words), "{error}");
+        }
     }
 }

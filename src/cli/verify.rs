@@ -45,7 +45,7 @@ pub struct VerifyArgs {
 /// How a layout is judged.
 #[derive(Args, Clone)]
 pub struct Judging {
-    /// Simulate with errors of 1e-3 instead of 1e-5 of the peak, several times faster.
+    /// Simulate with errors of 1e-3 instead of 1e-5 of the amplitude of a perfect lens, several times faster.
     #[arg(long)]
     fast: bool,
 
@@ -195,7 +195,15 @@ impl Judging {
         };
         let found = verify(design, array, layout, &cases, self.accuracy(), terminal)?;
         let picture = match camera {
-            Some(camera) => Some(thumbnail(design, layout, &camera, model.as_ref(), terminal)?),
+            Some(camera) => match thumbnail(design, layout, &camera, model.as_ref(), terminal) {
+                Ok(figure) => Some(figure),
+                Err(Error::Interrupted) => return Err(Error::Interrupted),
+                // The report is worth more than its picture.
+                Err(why) => {
+                    terminal.say(&format!("note: there is no picture on the page: {why}"));
+                    None
+                }
+            },
             None => None,
         };
         self.report(design, array, &found, picture, folder, terminal)

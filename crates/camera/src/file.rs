@@ -6,7 +6,7 @@ use metalith_core::document::{Document, Limits, Section, load};
 use metalith_core::{Error, Result};
 use serde::Serialize;
 
-use crate::{Channel, ColourFilter, Illuminant, Led, Response, Sensor, SensorNoise, Spectrum};
+use crate::{Channel, ColourFilter, Exposure, Illuminant, Led, Response, Sensor, SensorNoise, Spectrum};
 
 /// Version of the format of camera files that this program reads.
 const SCHEMA: i64 = 1;
@@ -26,15 +26,6 @@ pub struct Camera {
     /// The files that it was read from, itself first; none for the camera that is assumed where none is named.
     #[serde(skip)]
     pub files: Vec<PathBuf>,
-}
-
-/// How much light is let in.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Exposure {
-    /// Time (s).
-    pub time_s: f64,
-    /// Signal of a white surface of the scene, of full scale.
-    pub white: f64,
 }
 
 impl Camera {
@@ -153,9 +144,9 @@ impl Draft {
         Self {
             name,
             channels,
-            sensor,
             illuminant: read_illuminant(&root.section("illuminant")),
-            exposure: read_exposure(&root.section("exposure")),
+            exposure: Exposure::read(&root.section("exposure"), &sensor_section, &sensor),
+            sensor,
         }
     }
 
@@ -225,11 +216,8 @@ fn read_sensor(s: &Section<'_, '_>) -> Sensor {
             dark_current_e_s: optional("dark_current_e_s", 0.0..=1e9, "electrons a second", 0.0),
         }
     };
-    let full = match noise {
-        SensorNoise::Electrons { full_well_e, .. } => full_well_e,
-        SensorNoise::FullScale { photon, .. } if photon > 0.0 => 1.0 / photon,
-        SensorNoise::FullScale { .. } => f64::from(bits).exp2(),
-    };
+    let steps = f64::from(bits).exp2();
+    let whole = noise.full_scale_e().map_or(1.0, |full| full / steps);
     let sensor = Sensor {
         pixel_um: positive("pixel_um", 0.1, 100.0, "um"),
         columns: s.integer("columns", 1..=100_000, "pixels") as u32,
@@ -254,7 +242,7 @@ fn read_sensor(s: &Section<'_, '_>) -> Sensor {
         ),
         bits,
         // Full scale is the whole of the well, unless the file says otherwise.
-        gain_e: optional("gain_e", 1e-6..=1e6, "electrons a step", full / f64::from(bits).exp2()),
+        gain_e: optional("gain_e", 1e-6..=1e6, "electrons a step", whole),
         noise,
     };
     s.finish();
@@ -401,17 +389,6 @@ fn read_leds(s: &Section<'_, '_>) -> Vec<Led> {
         led
     };
     sections.iter().take(MOST).map(led).collect()
-}
-
-fn read_exposure(s: &Section<'_, '_>) -> Exposure {
-    let exposure = Exposure {
-        time_s: s.float("time_ms", Limits::new(1e-3..=1e6, "ms")) * 1e-3,
-        white: s
-            .optional_float("white", Limits::new(1e-6..=1.0, "of full scale"))
-            .unwrap_or(0.9),
-    };
-    s.finish();
-    exposure
 }
 
 const WAVELENGTH: Limits = Limits {

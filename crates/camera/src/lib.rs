@@ -5,6 +5,7 @@
 //! | which keys a camera file has | `file`; the table is in `docs/guide/verify.md` |
 //! | what a sensor is, and which noise it has | `sensor` |
 //! | which light a channel counts | `channel` |
+//! | how much light is let in | `exposure` |
 //! | the light of the scene | `illuminant` |
 //! | how a person sees it | `observer` |
 //! | curves over wavelength, from CSV | `spectrum` |
@@ -14,6 +15,7 @@
 //! times its quantum efficiency.
 
 mod channel;
+mod exposure;
 mod file;
 mod illuminant;
 mod observer;
@@ -22,7 +24,8 @@ mod sensor;
 mod spectrum;
 
 pub use channel::{Channel, Response};
-pub use file::{Camera, Exposure};
+pub use exposure::Exposure;
+pub use file::Camera;
 pub use illuminant::{Illuminant, Led};
 pub use observer::observer;
 pub use sampling::{ChannelPart, ChannelSampling, Sampling};

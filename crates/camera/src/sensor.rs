@@ -56,7 +56,33 @@ pub enum SensorNoise {
     },
 }
 
+impl Sensor {
+    /// Electrons of full scale: what fills a pixel, or what noise of photons says; all steps of a sensor of which neither is known.
+    pub fn full_scale_e(&self) -> f64 {
+        let steps = f64::from(self.bits).exp2();
+        self.noise.full_scale_e().unwrap_or(self.gain_e * steps)
+    }
+
+    /// One step of the pixel value, of full scale.
+    pub fn step(&self) -> f64 {
+        self.gain_e / self.full_scale_e()
+    }
+
+    /// Largest signal that is recorded, of full scale: where the pixel values end, or the well if that is filled before.
+    pub fn largest_signal(&self) -> f64 {
+        (self.step() * (f64::from(self.bits).exp2() - 1.0)).min(1.0)
+    }
+}
+
 impl SensorNoise {
+    /// Electrons of full scale; nothing if photons make no noise, by which they could be counted.
+    pub fn full_scale_e(&self) -> Option<f64> {
+        match *self {
+            Self::Electrons { full_well_e, .. } => Some(full_well_e),
+            Self::FullScale { photon, .. } => (photon > 0.0).then(|| 1.0 / photon),
+        }
+    }
+
     /// For images between zero and full scale, exposed for so long (s). Electrons that come without light vary by the
     /// root of their number, which is taken for part of reading; their mean is subtracted by every camera.
     pub fn of_exposure(&self, time_s: f64) -> Noise {
@@ -101,5 +127,28 @@ mod tests {
             read: 1e-5,
         };
         assert_eq!(paper.of_exposure(7.0), Noise::default());
+    }
+
+    #[test]
+    fn signals_end_with_the_steps_or_with_the_well() {
+        let mut sensor = crate::Camera::three_bands(5.86).sensor;
+        sensor.bits = 8;
+        sensor.noise = SensorNoise::Electrons {
+            full_well_e: 10_000.0,
+            read_noise_e: 6.0,
+            dark_current_e_s: 0.0,
+        };
+        // Rounding of one quotient.
+        const ROUNDING: f64 = 1e-12;
+        for (gain_e, largest) in [(10.0, 0.255), (10_000.0 / 256.0, 255.0 / 256.0), (60.0, 1.0)] {
+            sensor.gain_e = gain_e;
+            assert!((sensor.largest_signal() - largest).abs() < ROUNDING, "{gain_e}");
+        }
+        sensor.noise = SensorNoise::FullScale {
+            photon: 0.0,
+            read: 1e-3,
+        };
+        assert_eq!(sensor.full_scale_e(), 60.0 * 256.0);
+        assert!((sensor.step() - 1.0 / 256.0).abs() < ROUNDING);
     }
 }

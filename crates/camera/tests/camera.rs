@@ -122,9 +122,33 @@ fn what_does_not_fit_together_is_said() {
             "source = \"leds\"\n[[illuminant.led]]\ncentre_nm = 900\nwidth_nm = 10",
             "counts none of the light",
         ),
+        // 4095 steps of one electron are 0.41 of the well.
+        ("bits = 12", "bits = 12\ngain_e = 1", "camera.toml:9:"),
     ] {
         let error = read(&PLAIN.replace(from, to)).unwrap_err().to_string();
         assert!(error.contains(what), "{what}: {error}");
         assert!(error.contains("help: "), "{error}");
+    }
+}
+
+#[test]
+fn white_beyond_the_last_step_is_a_fault_where_it_stands() {
+    let with = |gain: &str, white: &str| {
+        read(
+            &PLAIN
+                .replace("bits = 12", &format!("bits = 12\n{gain}"))
+                .replace("time_ms = 10", &format!("time_ms = 10\n{white}")),
+        )
+    };
+    // 4095 steps of one electron in a well of 10000.
+    let error = with("gain_e = 1", "white = 0.42").unwrap_err().to_string();
+    assert!(error.contains("camera.toml:17:") && error.contains("4095"), "{error}");
+    with("gain_e = 1", "white = 0.4").unwrap();
+    // Steps that are the whole of the well end one step below it.
+    with("", "white = 1").unwrap();
+    // One mistake is one fault.
+    match with("gain_e = 0", "white = 0.9") {
+        Err(Error::Text(faults)) => assert_eq!(faults.count(), 1, "{faults}"),
+        other => panic!("{other:?}"),
     }
 }

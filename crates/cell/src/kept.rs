@@ -5,6 +5,8 @@
 //! Magic, inputs or checksum that do not agree mean that the file is not what is needed; it is then made again.
 //! The inputs hold [`SOLVER`], so that nothing outlives the solver that made it.
 
+use std::fs::File;
+use std::io::{self, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
@@ -52,15 +54,18 @@ pub enum Unusable {
 /// # Panics
 /// If the inputs are longer than 4 GiB.
 pub fn seal(magic: [u8; 8], inputs: &[u8], content: &[u8]) -> Vec<u8> {
-    let length = u32::try_from(inputs.len()).expect("inputs are short");
     let mut bytes = Vec::with_capacity(magic.len() + 4 + inputs.len() + content.len() + CHECKSUM);
-    bytes.extend(magic);
-    bytes.extend(length.to_le_bytes());
-    bytes.extend(inputs);
+    bytes.extend(before_content(magic, inputs));
     bytes.extend(content);
     let digest = Sha256::digest(&bytes);
     bytes.extend(digest);
     bytes
+}
+
+/// What stands before the content.
+fn before_content(magic: [u8; 8], inputs: &[u8]) -> Vec<u8> {
+    let length = u32::try_from(inputs.len()).expect("inputs are short");
+    [&magic[..], &length.to_le_bytes(), inputs].concat()
 }
 
 /// The content of a kept file.
@@ -87,7 +92,55 @@ pub fn open<'b>(bytes: &'b [u8], magic: [u8; 8], inputs: &[u8]) -> Result<&'b [u
 /// # Errors
 /// If it cannot be written; what was there is then as it was.
 pub fn write(file: &Path, magic: [u8; 8], inputs: &[u8], content: &[u8]) -> Result<()> {
-    WholeFile::write(file, &seal(magic, inputs, content))
+    let mut kept = KeptWriter::create(file, magic, inputs)?;
+    kept.add(content)?;
+    kept.finish()
+}
+
+/// A kept file that is written piece by piece, with the bytes of [`seal`]: content of a gigabyte need not be held twice.
+pub struct KeptWriter {
+    path: PathBuf,
+    file: WholeFile,
+    /// Of all that was written.
+    digest: Sha256,
+}
+
+impl KeptWriter {
+    /// Begin a kept file; nothing replaces the old one before [`KeptWriter::finish`].
+    ///
+    /// # Errors
+    /// If it cannot be created.
+    ///
+    /// # Panics
+    /// If the inputs are longer than 4 GiB.
+    pub fn create(file: &Path, magic: [u8; 8], inputs: &[u8]) -> Result<Self> {
+        let mut kept = Self {
+            path: file.to_owned(),
+            file: WholeFile::create(file)?,
+            digest: Sha256::new(),
+        };
+        kept.add(&before_content(magic, inputs))?;
+        Ok(kept)
+    }
+
+    /// Write the next piece of the content.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn add(&mut self, bytes: &[u8]) -> Result<()> {
+        self.digest.update(bytes);
+        self.file.write_all(bytes).map_err(Error::io("write", &self.path))
+    }
+
+    /// Write the checksum and put the file in its place.
+    ///
+    /// # Errors
+    /// If it cannot be written; what was there is then as it was.
+    pub fn finish(mut self) -> Result<()> {
+        let digest = self.digest.finalize();
+        self.file.write_all(&digest).map_err(Error::io("write", &self.path))?;
+        self.file.commit()
+    }
 }
 
 /// The content kept in a file of at most `longest` bytes; none if there is no such file, a reason if it cannot be
@@ -96,15 +149,80 @@ pub fn write(file: &Path, magic: [u8; 8], inputs: &[u8], content: &[u8]) -> Resu
 /// # Errors
 /// The reason, in words.
 pub fn read(file: &Path, magic: [u8; 8], inputs: &[u8], longest: u64) -> Result<Option<Vec<u8>>, String> {
-    let bytes = match read_at_most(file, longest, "a kept result") {
+    let mut bytes = match read_at_most(file, longest, "a kept result") {
         Ok(bytes) => bytes,
         Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => return Ok(None),
         Err(Error::Io { source, .. }) => return Err(source.to_string()),
         Err(Error::Invalid { what, .. }) => return Err(what),
         Err(other) => return Err(other.to_string()),
     };
-    let content = open(&bytes, magic, inputs).map_err(|why| why.to_string())?;
-    Ok(Some(content.to_vec()))
+    let length = open(&bytes, magic, inputs).map_err(|why| why.to_string())?.len();
+    // In place: a second copy would be as long as the file.
+    bytes.truncate(bytes.len() - CHECKSUM);
+    bytes.drain(..bytes.len() - length);
+    Ok(Some(bytes))
+}
+
+/// What `decode` makes of the content kept in a file, which it reads piece by piece and whose length in bytes it is told;
+/// else as [`read`]. The checksum is known after the last piece alone: until then lengths in the content may be wrong, and
+/// `decode` must take none for more than the content has.
+///
+/// # Errors
+/// The reason, in words; also if `decode` makes nothing of it.
+pub fn read_by<T>(
+    file: &Path,
+    magic: [u8; 8],
+    inputs: &[u8],
+    longest: u64,
+    decode: impl FnOnce(&mut dyn Read, u64) -> Option<T>,
+) -> Result<Option<T>, String> {
+    let found = match std::fs::metadata(file) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        found => found.map_err(|e| e.to_string())?,
+    };
+    if !found.is_file() || found.len() > longest {
+        return Err(format!("it is no ordinary file of at most {longest} bytes"));
+    }
+    let cut_short = || Unusable::CutShort.to_string();
+    let before = before_content(magic, inputs);
+    let around = (before.len() + CHECKSUM) as u64;
+    let length = found.len().checked_sub(around).ok_or_else(cut_short)?;
+    let mut all = Digested {
+        from: BufReader::new(File::open(file).map_err(|e| e.to_string())?),
+        digest: Sha256::new(),
+    };
+    let mut there = vec![0; before.len()];
+    all.read_exact(&mut there).map_err(|e| e.to_string())?;
+    if there[..magic.len()] != magic {
+        return Err(Unusable::OtherKind.to_string());
+    }
+    if there != before {
+        return Err(Unusable::OtherInputs.to_string());
+    }
+    let mut content = Read::take(&mut all, length);
+    let decoded = decode(&mut content, length);
+    // What was not asked for counts in the checksum too.
+    io::copy(&mut content, &mut io::sink()).map_err(|e| e.to_string())?;
+    let mut stated = [0; CHECKSUM];
+    all.from.read_exact(&mut stated).map_err(|_| cut_short())?;
+    if all.digest.finalize().as_slice() != stated {
+        return Err(Unusable::Damaged.to_string());
+    }
+    decoded.map(Some).ok_or_else(|| Unusable::OtherKind.to_string())
+}
+
+/// A file whose checksum is formed while it is read.
+struct Digested {
+    from: BufReader<File>,
+    digest: Sha256,
+}
+
+impl Read for Digested {
+    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+        let count = self.from.read(to)?;
+        self.digest.update(&to[..count]);
+        Ok(count)
+    }
 }
 
 /// A small table that is kept in a folder under the name of its inputs, if there is a folder. That it cannot be read or kept
@@ -217,5 +335,42 @@ mod tests {
         let digest = Sha256::digest(&body);
         body.extend(digest);
         assert_eq!(open(&body, MAGIC, b"inputs"), Err(Unusable::OtherInputs));
+    }
+    /// What is made of the content piece by piece is of the same bytes, and of damaged ones nothing.
+    #[test]
+    fn pieces_are_the_bytes_of_the_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("kept.bin");
+        let mut kept = KeptWriter::create(&path, MAGIC, b"inputs").unwrap();
+        kept.add(b"con").unwrap();
+        kept.add(b"tent").unwrap();
+        assert!(!path.exists(), "nothing is there before the end");
+        kept.finish().unwrap();
+        let sealed = seal(MAGIC, b"inputs", b"content");
+        assert_eq!(std::fs::read(&path).unwrap(), sealed);
+        assert_eq!(
+            read(&path, MAGIC, b"inputs", 1000).unwrap().as_deref(),
+            Some(&b"content"[..])
+        );
+        let by = |inputs: &[u8], longest: u64| {
+            read_by(&path, MAGIC, inputs, longest, |content, length| {
+                // The rest is left, and still checked.
+                let mut three = [0; 3];
+                content.read_exact(&mut three).ok()?;
+                (three == *b"con").then_some(length)
+            })
+        };
+        assert_eq!(by(b"inputs", 1000), Ok(Some(7)));
+        assert!(by(b"others", 1000).is_err() && by(b"inputs", 20).is_err());
+        for at in 0..sealed.len() {
+            let mut damaged = sealed.clone();
+            damaged[at] ^= 1;
+            std::fs::write(&path, damaged).unwrap();
+            assert!(by(b"inputs", 1000).is_err(), "{at}");
+            std::fs::write(&path, &sealed[..at]).unwrap();
+            assert!(by(b"inputs", 1000).is_err(), "{at}");
+        }
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!(by(b"inputs", 1000), Ok(None));
     }
 }

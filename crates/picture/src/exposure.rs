@@ -1,6 +1,6 @@
 //! From light in the pixels to the numbers that a camera gives out.
 
-use metalith_camera::{Camera, ColourFilter, SensorNoise};
+use metalith_camera::{Camera, ColourFilter};
 use metalith_core::{Error, Result};
 use metalith_wave::camera::Noise;
 use ndarray::Array2;
@@ -78,14 +78,7 @@ pub fn expose(camera: &Camera, gain: &[f64], light: &[Array2<f32>], seed: u64) -
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let noise = camera.sensor.noise.of_exposure(camera.exposure.time_s);
     let sensor = &camera.sensor;
-    let full_e = match sensor.noise {
-        SensorNoise::Electrons { full_well_e, .. } => full_well_e,
-        SensorNoise::FullScale { photon, .. } if photon > 0.0 => 1.0 / photon,
-        SensorNoise::FullScale { .. } => sensor.gain_e * f64::from(sensor.bits).exp2(),
-    };
-    // Steps of the pixel value, and where they or the well end.
-    let step = sensor.gain_e / full_e;
-    let full = (step * (f64::from(sensor.bits).exp2() - 1.0)).min(1.0);
+    let (step, full) = (sensor.step(), sensor.largest_signal());
     let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();
     let signal = |channel: usize, i: (usize, usize)| gain[channel] * f64::from(light[channel][i]);
     let ideal: Vec<Array2<f64>> = match sensor.filter {
@@ -187,6 +180,7 @@ pub(crate) fn box_sums(plane: &Array2<f64>, near: usize) -> Array2<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use metalith_camera::SensorNoise;
 
     /// Whole steps in single precision lie on either side of those in double precision.
     #[test]

@@ -17,10 +17,11 @@ use crate::assumed::Assumed;
 use crate::kernels::{BankSpec, KernelBank};
 use crate::restore::LearnedDenoiser;
 use crate::scene::SceneImage;
+use crate::sight::{check_coverage, check_view, check_windows};
 use crate::spectra::{SceneSpectrum, rgb_basis};
 use crate::studio::Studio;
-use crate::veil::{LightShares, Veil};
-use crate::{ChannelColours, ChipInLight, ElementView, SceneView, cache, element_views, sampling_of};
+use crate::veil::Veil;
+use crate::{ChannelColours, ChipInLight, ElementView, cache, element_views, sampling_of};
 
 /// Field of an element that kernels are made for: the angle from its axis, behind it (degrees). Light that leaves more
 /// steeply is the veil's. A lens of the paper sees 60 degrees.
@@ -31,9 +32,6 @@ const NODES: usize = 17;
 const SMALL_UM: f64 = 150.0;
 /// Pixels an axis of a kernel.
 const WINDOW: usize = 64;
-/// Least share of the light that travels to the sensor in the windows of the kernels: with less there is no image.
-/// `prototype_3x3` has 40 %.
-const LEAST_IN_WINDOWS: f64 = 0.02;
 /// Folder of kernels within that of a plan.
 const KERNELS: &str = "kernels";
 
@@ -56,6 +54,8 @@ pub struct KeptKernels {
     /// Nowhere, if left out.
     folder: Option<PathBuf>,
     make: bool,
+    /// Whether the folder was asked for: what cannot be kept there is an error. That of a user only saves time.
+    asked: bool,
 }
 
 impl KeptKernels {
@@ -64,6 +64,7 @@ impl KeptKernels {
         Self {
             folder: cache_folder(),
             make: true,
+            asked: false,
         }
     }
 
@@ -72,6 +73,7 @@ impl KeptKernels {
         Self {
             folder: Some(folder.join(KERNELS)),
             make: true,
+            asked: true,
         }
     }
 
@@ -80,6 +82,18 @@ impl KeptKernels {
         Self {
             make: false,
             ..Self::made(folder)
+        }
+    }
+
+    /// Keep something by what writes it into the folder, if there is one.
+    fn keep(&self, what: &str, write: impl FnOnce(&Path) -> Result<()>, progress: &dyn Progress) -> Result<()> {
+        match self.folder.as_deref().map(write) {
+            Some(Err(error)) if !self.asked => {
+                progress.note(&format!("{what} not kept: {error}"));
+                Ok(())
+            }
+            Some(done) => done,
+            None => Ok(()),
         }
     }
 }
@@ -125,7 +139,8 @@ impl Studio {
     ///
     /// # Errors
     /// If elements have lenses of their own, the layout cannot be read, the camera does not see the chip, a scene is wider than
-    /// the array sees, or the user stopped it.
+    /// the array sees, a spectral cube has not the wavelengths that the camera counts, kernels or veil are too large, or the user
+    /// stopped it. That they cannot be kept is a note to `progress`.
     pub fn open(
         design: &Design,
         layout: &Path,
@@ -140,7 +155,8 @@ impl Studio {
     /// The same with kernels and veil that are kept elsewhere.
     ///
     /// # Errors
-    /// As [`Studio::open`]; if nothing may be made and something is not there.
+    /// As [`Studio::open`]; if nothing may be made and something is not there, or what was made cannot be kept in a folder that
+    /// was asked for.
     pub fn open_kept(
         design: &Design,
         layout: &Path,
@@ -163,6 +179,7 @@ impl Studio {
             KeptKernels {
                 folder: Some(folder),
                 make: false,
+                ..
             },
             [false, _] | [_, false],
         ) = (kept, from_cache)
@@ -193,16 +210,14 @@ impl Studio {
                     Some(bank) => bank,
                     None => {
                         let bank = wanted.bank(&chip, progress)?;
-                        if let Some(folder) = folder {
-                            cache::keep_bank(folder, &inputs, &bank)?;
-                        }
+                        let write = |folder: &Path| cache::keep_bank(folder, &inputs, &bank);
+                        kept.keep("the kernels are", write, progress)?;
                         bank
                     }
                 };
                 let veil = wanted.veil(&chip, &bank, progress)?;
-                if let Some(folder) = folder {
-                    cache::keep_veil(folder, &veil_inputs, &veil)?;
-                }
+                let write = |folder: &Path| cache::keep_veil(folder, &veil_inputs, &veil);
+                kept.keep("the veil is", write, progress)?;
                 (bank, veil)
             }
         };
@@ -248,6 +263,9 @@ impl<'a> Wanted<'a> {
         let spec = BankSpec::standard(design, camera);
         let channels = sampling_of(design, camera)?.channels;
         Veil::check_size(&camera.sensor, channels.len(), basis.len())?;
+        if primaries > 0 {
+            check_coverage(scene, &channels)?;
+        }
         check_view(&elements, &spec, camera, &scene.view)?;
         Ok(Self {
             design,
@@ -329,115 +347,45 @@ impl<'a> Wanted<'a> {
     }
 }
 
-/// Kernels must hold a part of the light that can be called an image.
-fn check_windows(veil: &Veil, bases: usize, channels: &[ChannelSampling], spec: &BankSpec) -> Result<()> {
-    for (channel, shares) in channels.iter().zip(veil.budget.chunks(bases)) {
-        let all = LightShares::sum(shares);
-        let travelling = all.in_kernels + all.veil + all.beyond;
-        if all.in_kernels < LEAST_IN_WINDOWS * travelling {
-            return Err(Error::invalid(
-                format!(
-                    "windows of {} pixels of {} um are too small for the images of a point: they hold {:.2} % of the light of channel `{}` that travels to the sensor",
-                    spec.window,
-                    spec.pixel_um,
-                    100.0 * all.in_kernels / travelling.max(f64::MIN_POSITIVE),
-                    channel.name
-                ),
-                "give a sensor with larger pixels, or a layout that images at the distance of the sensor",
-            ));
-        }
-    }
-    Ok(())
-}
-
-/// A camera must see the chip, and the array the scene.
-fn check_view(elements: &[ElementView], spec: &BankSpec, camera: &Camera, view: &SceneView) -> Result<()> {
-    if !(view.field_deg > 0.0 && view.field_deg < 175.0 && view.distance_um > 0.0) {
-        return Err(Error::invalid(
-            format!(
-                "a field of {} degrees at a distance of {} um",
-                view.field_deg, view.distance_um
-            ),
-            "give a field from 1 to 174 degrees and a positive distance",
-        ));
-    }
-    let sensor = &camera.sensor;
-    let half = [f64::from(sensor.columns), f64::from(sensor.rows)].map(|n| 0.5 * n * sensor.pixel_um);
-    // Places of the scene along its border and its middle.
-    let seen = |row: f64, column: f64| {
-        elements.iter().any(|e| {
-            let sines = e.sines(view.tangents(row, column), view.distance_um);
-            let um = e.wedge.wavelength_um;
-            e.landing_um(sines, um).is_some_and(|p| {
-                let on = |a: usize| (p[a] + e.centre_um[a] - sensor.offset_um[a]).abs() <= half[a];
-                p.iter().all(|v| v.abs() <= spec.reach_um) && on(0) && on(1)
-            })
-        })
-    };
-    let (last_row, last_column) = (view.rows as f64 - 1.0, view.columns as f64 - 1.0);
-    if !seen(0.5 * last_row, 0.5 * last_column) {
-        return Err(Error::invalid(
-            "the camera does not see the chip: the middle of the scene falls beside the sensor",
-            "check `offset_um`, `columns` and `rows` of the sensor",
-        ));
-    }
-    // Corners and the middles of the edges: sines grow less than tangents, so that either may be the farther off.
-    let (middle_row, middle_column) = (0.5 * last_row, 0.5 * last_column);
-    let border = [0.0, middle_row, last_row]
-        .into_iter()
-        .flat_map(|row| [0.0, middle_column, last_column].map(|column| (row, column)));
-    if let Some((row, column)) = border.into_iter().find(|(r, c)| !seen(*r, *c)) {
-        let [tx, ty] = view.tangents(row, column);
-        return Err(Error::invalid(
-            format!(
-                "the scene is wider than the array sees: no element sees its border at ({:.1}, {:.1}) degrees and has it on the sensor",
-                tx.atan().to_degrees(),
-                ty.atan().to_degrees()
-            ),
-            "give a smaller field of the scene",
-        ));
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::Mutex;
 
-    #[test]
-    fn a_sensor_whose_veil_cannot_be_held_is_refused() {
-        let mut sensor = Camera::three_bands(5.86).sensor;
-        assert!(Veil::check_size(&sensor, 3, 6).is_ok());
-        (sensor.rows, sensor.columns) = (100_000, 100_000);
-        let error = Veil::check_size(&sensor, 3, 3).unwrap_err().to_string();
-        assert!(error.contains("100000 x 100000"), "{error}");
+    /// Holds the notes.
+    struct Listener(Mutex<Vec<String>>);
+
+    impl Progress for Listener {
+        fn begin(&self, _what: &str, _steps: u64) {}
+
+        fn advance(&self, _steps: u64) {}
+
+        fn note(&self, text: &str) {
+            self.0.lock().unwrap().push(text.into());
+        }
     }
 
     #[test]
-    fn windows_without_an_image_are_refused() {
-        let camera = Camera::three_bands(5.86);
-        let channels = camera.sampling([400.0, 700.0], 12.5).unwrap().channels;
-        let spec = BankSpec {
-            pixel_um: 5.86,
-            window: WINDOW,
-            nodes: 3,
-            reach_um: 10.0,
-            accurate: false,
+    fn what_cannot_be_kept_for_a_user_is_a_note() {
+        let place = tempfile::tempdir().unwrap();
+        // A file stands where a folder should.
+        let file = place.path().join("file");
+        std::fs::write(&file, "").unwrap();
+        let sensor = Camera::three_bands(5.86).sensor;
+        let veil = Veil::none(&sensor, 1, 1);
+        let write = |folder: &Path| cache::keep_veil(folder, b"inputs", &veil);
+        let listener = Listener(Mutex::default());
+        let asked = KeptKernels::made(&file);
+        assert!(asked.keep("the veil is", write, &listener).is_err());
+        let of_user = KeptKernels {
+            folder: asked.folder.clone(),
+            ..KeptKernels::of_user()
         };
-        let with = |in_kernels: f64| {
-            let mut veil = Veil::none(&camera.sensor, channels.len(), 2);
-            for shares in &mut veil.budget {
-                *shares = LightShares {
-                    arrives: 1.0,
-                    in_kernels,
-                    veil: 0.5,
-                    ..LightShares::default()
-                };
-            }
-            check_windows(&veil, 2, &channels, &spec)
-        };
-        assert!(with(0.3).is_ok());
-        let error = with(0.005).unwrap_err().to_string();
-        assert!(error.contains("too small"), "{error}");
+        of_user.keep("the veil is", write, &listener).unwrap();
+        let notes = listener.0.into_inner().unwrap();
+        assert!(
+            notes.len() == 1 && notes[0].starts_with("the veil is not kept: "),
+            "{notes:?}"
+        );
     }
 }

@@ -10,7 +10,9 @@ use crate::assumed::AssumedScore;
 use crate::doubt::DoubtReport;
 use crate::resolution::ContrastCurve;
 use crate::restore::RestorationMethod;
+use crate::scene::SceneImage;
 use crate::score::ZoneScore;
+use crate::spectra::rgb_basis;
 use crate::studio::Studio;
 use crate::veil::LightShares;
 
@@ -154,8 +156,8 @@ impl Studio {
         points
     }
 
-    /// What was assumed, in words.
-    pub fn assumptions(&self, fidelity: Fidelity) -> Vec<Assumption> {
+    /// What was assumed of a scene and of everything else, in words.
+    pub fn assumptions(&self, scene: &SceneImage, fidelity: Fidelity) -> Vec<Assumption> {
         let cell = match fidelity {
             Fidelity::Neighbours => {
                 let nm: Vec<String> = self
@@ -214,10 +216,7 @@ impl Studio {
                 ),
             ),
             assumption("illuminant", self.camera.illuminant.name().to_owned()),
-            assumption(
-                "spectra of the scene",
-                "smooth reflectances of sRGB after Mallett and Yuksel (2019)".into(),
-            ),
+            assumption("spectra of the scene", spectra_of(scene)),
             assumption(
                 "exposure",
                 format!(
@@ -237,6 +236,18 @@ impl Studio {
         all.extend(polarised);
         all
     }
+}
+
+/// Where the spectra of a scene come from.
+fn spectra_of(scene: &SceneImage) -> String {
+    if scene.basis == rgb_basis() {
+        return "smooth reflectances of sRGB after Mallett and Yuksel (2019)".into();
+    }
+    format!(
+        "{} principal components of its bands; they leave out {:.2} % of its light (root mean square)",
+        scene.basis.len(),
+        100.0 * scene.left_out
+    )
 }
 
 fn fixed(value: f64) -> String {
@@ -283,6 +294,17 @@ fn homography_residual(points: &[([f64; 2], [f64; 2])]) -> Option<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn spectra_are_named_after_what_they_are() {
+        let rgb = ndarray::Array3::from_elem((20, 20, 3), 0.5);
+        let mut scene = SceneImage::of_rgb("colours", &rgb, 60.0, f64::INFINITY);
+        assert!(spectra_of(&scene).contains("Mallett"));
+        scene.basis.truncate(2);
+        scene.left_out = 0.0123;
+        let words = spectra_of(&scene);
+        assert!(words.starts_with("2 principal") && words.contains("1.23 %"), "{words}");
+    }
 
     #[test]
     fn a_homography_is_found_and_what_is_none_is_not() {

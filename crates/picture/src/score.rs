@@ -1,10 +1,15 @@
 //! How near a restored picture comes to its scene.
 
 use metalith_core::srgb::encoded;
-use metalith_core::{Result, part};
+use metalith_core::{Error, Result, part};
 use metalith_wave::restore::{psnr_db, ssim_colour};
 use ndarray::{Array3, Axis};
 use serde::{Deserialize, Serialize};
+
+use crate::SceneView;
+
+/// Least side of a scene whose pictures are scored (pixels): a third of it holds the window of the similarity, 11 pixels wide.
+const LEAST_SIDE: usize = 33;
 
 /// A part of the field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -57,6 +62,23 @@ pub struct ZoneScore {
     pub psnr_linear_db: f64,
     /// Structural similarity of sRGB values, mean over the colours.
     pub ssim: f64,
+}
+
+/// Whether pictures of a scene can be scored: asked before they are taken.
+///
+/// # Errors
+/// If it is too small for the zones of the field.
+pub fn check_scored(view: &SceneView) -> Result<()> {
+    if view.rows.min(view.columns) >= LEAST_SIDE {
+        return Ok(());
+    }
+    Err(Error::invalid(
+        format!(
+            "a scene of {} x {} pixels is too small for the similarity of its pictures, which is taken in nine parts of it",
+            view.columns, view.rows
+        ),
+        format!("give a scene of at least {LEAST_SIDE} pixels a side"),
+    ))
 }
 
 /// Scores of linear sRGB against a truth in linear sRGB, `[row, column, colour]`, in all zones.
@@ -113,5 +135,21 @@ mod tests {
         // A tenth in one of three colours of one of four corners: 0.01 / 12.
         assert!((at(Zone::Corner).psnr_linear_db + 10.0 * (0.01f64 / 12.0).log10()).abs() < 1e-9);
         assert!(at(Zone::Corner).ssim < at(Zone::Edge).ssim);
+    }
+
+    #[test]
+    fn a_scene_that_is_accepted_can_be_scored() {
+        for side in [LEAST_SIDE - 1, LEAST_SIDE, LEAST_SIDE + 1, 64] {
+            let view = SceneView {
+                rows: side,
+                columns: 80,
+                field_deg: 60.0,
+                distance_um: f64::INFINITY,
+            };
+            let truth = Array3::from_elem((side, 80, 3), 0.3);
+            let accepted = check_scored(&view);
+            assert_eq!(accepted.is_ok(), scores(&truth, &truth).is_ok(), "{side}");
+            assert_eq!(accepted.is_ok(), side >= LEAST_SIDE);
+        }
     }
 }

@@ -13,19 +13,21 @@ use crate::rehearsal::Rehearsal;
 use crate::restore::RestorationMethod;
 use crate::scene::{BuiltIn, chart};
 use crate::score::scores;
+use crate::sight::widest_field_deg;
 use crate::studio::Studio;
 
 /// Pixels an axis of the scene.
 const PIXELS: usize = 512;
-/// Angle from its left to its right edge.
-const FIELD_DEG: f64 = 80.0;
+/// Angle from its left to its right edge (degrees), or less where the array does not see as much.
+const MOST_DEG: u32 = 80;
 /// Of the noise.
 const SEED: u64 = 1;
 
-/// Scene, frame and picture of a Siemens star in the camera of a layout, by Tikhonov and all elements.
+/// Scene, frame and picture of a Siemens star in the camera of a layout, by Tikhonov and all elements. The star fills 80 degrees,
+/// or the widest field that the array sees.
 ///
 /// # Errors
-/// As [`Studio::open`] and [`Studio::restore`].
+/// As [`Studio::open`] and [`Studio::restore`]; if the camera does not see the chip.
 pub fn thumbnail(
     design: &Design,
     layout: &Path,
@@ -33,7 +35,8 @@ pub fn thumbnail(
     model: Option<&CalibratedModel>,
     progress: &dyn Progress,
 ) -> Result<Figure> {
-    let scene = chart(BuiltIn::Star, PIXELS, FIELD_DEG, f64::INFINITY);
+    let field_deg = widest_field_deg(design, camera, PIXELS, MOST_DEG)?;
+    let scene = chart(BuiltIn::Star, PIXELS, field_deg, f64::INFINITY);
     let studio = Studio::open(design, layout, camera, model, &scene, progress)?;
     let frame = studio.record(&studio.simulation(), &scene, SEED)?;
     let operator = studio.restoration();
@@ -43,7 +46,7 @@ pub fn thumbnail(
     let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();
     let whole = scores(&picture, &truth)?[0];
     Ok(pictures_side_by_side(&truth, &frame, &picture, &names).caption(format!(
-        "What `{}` takes of a Siemens star over {FIELD_DEG} degrees, far away, and what is restored from this frame: PSNR {} dB, SSIM {}. `metalith picture` says more.",
+        "What `{}` takes of a Siemens star over {field_deg} degrees, far away, and what is restored from this frame: PSNR {} dB, SSIM {}. `metalith picture` says more.",
         camera.name,
         fixed(whole.psnr_db, 1),
         fixed(whole.ssim, 2)

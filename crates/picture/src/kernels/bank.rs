@@ -2,8 +2,11 @@
 
 use std::borrow::Cow;
 
+use metalith_core::{Error, Result};
 use metalith_design::array::Symmetry;
 use serde::{Deserialize, Serialize};
+
+use crate::cache::MOST_BYTES;
 
 /// What a bank is sampled with.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -41,6 +44,29 @@ impl BankSpec {
     /// Values an axis of a kernel.
     pub fn side(&self) -> usize {
         2 * self.window
+    }
+
+    /// Whether the kernels of so many different places of elements can be held and kept, in so many channels and spectra,
+    /// made of so many wavelengths.
+    ///
+    /// # Errors
+    /// If they are too many.
+    pub fn check_size(&self, places: usize, channels: usize, bases: usize, wavelengths: usize) -> Result<()> {
+        let kernels = channels as u64 * bases as u64 * (self.side() as u64).pow(2);
+        let values = (places as u64).saturating_mul(kernels + wavelengths as u64);
+        let bytes = values.saturating_mul(size_of::<f32>() as u64);
+        if bytes <= MOST_BYTES {
+            return Ok(());
+        }
+        Err(Error::invalid(
+            format!(
+                "images of points at {places} places of elements, in {channels} channels and {bases} spectra of {} x {} pixels, would take {} MB",
+                self.window,
+                self.window,
+                bytes >> 20
+            ),
+            "give a camera with fewer channels, a scene with fewer spectra (a picture in colour has three), or an array whose elements are alike",
+        ))
     }
 }
 
@@ -165,5 +191,27 @@ impl KernelBank {
             }
         }
         sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bank_that_cannot_be_held_is_refused() {
+        let spec = BankSpec {
+            pixel_um: 5.86,
+            window: 64,
+            nodes: 17,
+            reach_um: 1386.0,
+            accurate: false,
+        };
+        // `wide_5x5` in three colours: 558 MB. Without any symmetry the 25 elements still fit, in nine spectra not.
+        let every = 25 * spec.nodes.pow(2);
+        assert!(spec.check_size(every, 3, 3, 25).is_ok());
+        let error = spec.check_size(every, 3, 9, 25).unwrap_err().to_string();
+        assert!(error.contains("7225 places") && error.contains("MB"), "{error}");
+        assert!(spec.check_size(usize::MAX, 16, 9, 100).is_err());
     }
 }

@@ -15,7 +15,7 @@ impl KernelBank {
     /// Simulate the kernels of a chip for the spectra of a scene.
     ///
     /// # Errors
-    /// If light cannot be brought to a window, or the user stopped it.
+    /// If they would be too many, light cannot be brought to a window, or the user stopped it.
     pub fn build(
         chip: &ChipInLight<'_>,
         basis: &[SceneSpectrum],
@@ -29,12 +29,11 @@ impl KernelBank {
             .map(|d| orbits(spec.nodes, &d.symmetries))
             .collect();
         let count: usize = orbits.iter().map(|(unique, _)| unique.len()).sum();
-        progress.begin(
-            "simulating kernels",
-            (count * chip.sampling.wavelengths_nm.len()) as u64,
-        );
+        let wavelengths = chip.sampling.wavelengths_nm.len();
+        spec.check_size(count, channel_um.len(), basis.len(), wavelengths)?;
+        progress.begin("simulating kernels", (count * wavelengths) as u64);
         let plan = KernelPlan::new(spec.window);
-        let all: Vec<usize> = (0..chip.sampling.wavelengths_nm.len()).collect();
+        let all: Vec<usize> = (0..wavelengths).collect();
         let mut distinct = Vec::new();
         // One element after the other: what its sites transmit at all wavelengths is held while it is at work.
         for (k, (unique, nodes)) in orbits.into_iter().enumerate() {
@@ -56,7 +55,8 @@ impl KernelBank {
                 .collect::<Result<_>>()?;
             let mut kernels = DistinctKernels {
                 nodes,
-                values: Vec::new(),
+                // At once: a list that grows has room for twice as many.
+                values: Vec::with_capacity(found.iter().map(|n| n.values.len()).sum()),
                 in_window: Vec::new(),
             };
             for node in found {

@@ -69,24 +69,31 @@ impl<'a> ElementOperator<'a> {
         Warp::new(&self.view, &self.sensor, &self.source.spec, &self.scene, um, point)
     }
 
+    /// A point of a cell, for light of so many pixels.
+    fn point(&self, shift: [f64; 2], area: f64) -> CellPoint {
+        CellPoint {
+            cell: self.source.points.cell(),
+            shift,
+            reach: self.source.reach() + self.around(),
+            area,
+            assumed: self.source.assumed,
+        }
+    }
+
+    /// Cells about the hat of a node by the middles of cells that points within them may lie in.
+    fn around(&self) -> usize {
+        usize::from(self.source.points.offsets().len() > 1)
+    }
+
     fn channel(&self, channel: usize) -> ChannelPlan {
         let cell = self.source.points.cell();
-        let middle = self.warp(
-            channel,
-            CellPoint {
-                cell,
-                shift: [0.0; 2],
-                area: (cell * cell) as f64,
-                assumed: self.source.assumed,
-            },
-        );
+        let middle = self.warp(channel, self.point([0.0; 2], (cell * cell) as f64));
         let n = self.source.spec.nodes;
         let mut nodes: Vec<NodePlan> = Vec::new();
         for i in 0..n * n {
             let node = [i / n, i % n];
             if let Some((first, shape)) = middle.support(node) {
-                // Points within a pixel lie in the hat where its middle does not.
-                let beyond = usize::from(self.source.points.offsets().len() > 1);
+                let beyond = self.around();
                 let low = first.map(|f| f.saturating_sub(beyond));
                 let high = [0, 1].map(|a| (first[a] + shape[a] + beyond).min(middle.shape[a]));
                 nodes.push(NodePlan {
@@ -149,17 +156,7 @@ impl<'a> ElementOperator<'a> {
         }
         let (cell, points) = (self.source.points.cell(), self.source.points.offsets());
         let area = (cell * cell) as f64 / points.len() as f64;
-        let warp = |shift: &[f64; 2]| {
-            self.warp(
-                channel,
-                CellPoint {
-                    cell,
-                    shift: *shift,
-                    area,
-                    assumed: self.source.assumed,
-                },
-            )
-        };
+        let warp = |shift: &[f64; 2]| self.warp(channel, self.point(*shift, area));
         points.iter().map(warp).collect()
     }
 

@@ -264,14 +264,18 @@ impl<'a> FrameOperator<'a> {
         assert_eq!(frames.len(), self.channels, "one frame for each channel");
         let shape = (self.view.rows, self.view.columns);
         let mut planes = vec![Array2::zeros(shape); self.inputs()];
-        let found: Vec<Vec<Array2<f32>>> = elements
-            .par_iter()
-            .map_init(FftScratch::default, |scratch, e| {
-                self.elements[*e].adjoint(frames, shape, self.inputs(), scratch)
-            })
-            .collect();
-        for own in found {
-            planes.iter_mut().zip(&own).for_each(|(p, o)| *p += o);
+        // Planes of a few elements are held at a time, and added in the order of elements: the sums do not depend on the threads.
+        // Twice as many as these, so that who is done with one has another.
+        for some in elements.chunks(2 * rayon::current_num_threads()) {
+            let found: Vec<Vec<Array2<f32>>> = some
+                .par_iter()
+                .map_init(FftScratch::default, |scratch, e| {
+                    self.elements[*e].adjoint(frames, shape, self.inputs(), scratch)
+                })
+                .collect();
+            for own in found {
+                planes.iter_mut().zip(&own).for_each(|(p, o)| *p += o);
+            }
         }
         planes.par_iter_mut().for_each(|p| *p = self.smoothing.adjoint(p));
         if veil {

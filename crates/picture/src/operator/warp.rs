@@ -44,6 +44,8 @@ pub struct CellPoint {
     pub cell: usize,
     /// From the middle of the cell along x and y (pixels).
     pub shift: [f64; 2],
+    /// Cells beside the sensor that count: light farther off never reaches it.
+    pub reach: usize,
     /// Pixels whose light the point stands for.
     pub area: f64,
     /// What is assumed of the brightness over the field.
@@ -63,6 +65,7 @@ impl Warp {
         let CellPoint {
             cell,
             shift,
+            reach,
             area,
             assumed,
         } = point;
@@ -87,9 +90,21 @@ impl Warp {
         // Of what a point stands for: in pixels of the scene in the middle of the field, and on the sensor (um).
         let side = area.sqrt() * pixel;
         let sides = [side / (element.focal_um * space.view.pixel()), side];
-        let first = [1, 0].map(|a| ((axis[1 - a] + low[a] / pixel) / step).floor() as i64);
-        let last = [1, 0].map(|a| ((axis[1 - a] + high[a] / pixel) / step).ceil() as i64);
-        let shape = [0, 1].map(|a| (last[a] - first[a] + 1).max(1) as usize);
+        // Cells of the field, as far as their light reaches the sensor.
+        let sizes = [sensor.rows, sensor.columns].map(|n| i64::from(n.div_ceil(cell as u32)));
+        let ends = [0, 1].map(|k| {
+            let place = |um: f64| (axis[k] + um / pixel) / step;
+            let first = place(low[1 - k]).floor() as i64;
+            let last = place(high[1 - k]).ceil() as i64;
+            [first.max(-(reach as i64)), last.min(sizes[k] - 1 + reach as i64)]
+        });
+        let beside = ends.iter().any(|[first, last]| first > last);
+        let first = ends.map(|[first, _]| first);
+        let shape = match beside {
+            // One dark cell stands for a field that is beside the sensor.
+            true => [1, 1],
+            false => ends.map(|[first, last]| (last - first + 1) as usize),
+        };
         let mut warp = Self {
             origin: first,
             shape,
@@ -98,6 +113,9 @@ impl Warp {
             flux: vec![0.0; shape[0] * shape[1]],
             size: [space.view.rows, space.view.columns],
         };
+        if beside {
+            return warp;
+        }
         for i in 0..shape[0] * shape[1] {
             let at = [i / shape[1], i % shape[1]];
             let place = [0, 1].map(|a| {
@@ -239,5 +257,73 @@ fn extent(element: &ElementView, spec: &BankSpec, channel_um: f64) -> ([f64; 2],
         ([0.0; 2], [0.0; 2])
     } else {
         (low, high)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::SceneView;
+    use metalith_camera::Camera;
+    use metalith_core::Wedge;
+
+    /// The field of an element is cut where its light does not reach the sensor, and what is left looks where it did.
+    #[test]
+    fn what_never_reaches_the_sensor_is_left_out() {
+        const REACH: usize = 5;
+        let view = SceneView {
+            rows: 40,
+            columns: 40,
+            field_deg: 60.0,
+            distance_um: f64::INFINITY,
+        };
+        let space = SceneSpace::flat(&view);
+        let spec = BankSpec {
+            pixel_um: 2.0,
+            window: 8,
+            nodes: 5,
+            reach_um: 50.0,
+            accurate: false,
+        };
+        let warp = |centre_um: [f64; 2], side: u32, cell: usize, reach: usize| {
+            let mut sensor = Camera::three_bands(2.0).sensor;
+            (sensor.columns, sensor.rows) = (side, side);
+            let element = ElementView {
+                centre_um,
+                wedge: Wedge {
+                    wavelength_um: 0.55,
+                    sin_x: 0.0,
+                    sin_y: 0.0,
+                },
+                focal_um: 100.0,
+                slope: [0.0; 2],
+            };
+            let point = CellPoint {
+                cell,
+                shift: [0.0; 2],
+                reach,
+                area: 1.0,
+                assumed: Assumed::default(),
+            };
+            Warp::new(&element, &sensor, &spec, &space, 0.55, point)
+        };
+        for (cell, size) in [(1, 51i64), (2, 26)] {
+            // Half of the field is to the right of a sensor of 51 pixels; rows are on it.
+            let [whole, cut] = [1000, REACH].map(|reach| warp([50.0, 0.0], 51, cell, reach));
+            assert_eq!(cut.origin[1], whole.origin[1]);
+            assert_eq!(cut.origin[1] + cut.shape[1] as i64, size + REACH as i64);
+            assert!(cut.shape[1] < whole.shape[1] && cut.shape[0] == whole.shape[0]);
+            for row in 0..cut.shape[0] {
+                let [a, b] = [&cut, &whole].map(|w| &w.flux[row * w.shape[1]..][..cut.shape[1]]);
+                assert_eq!(a, b);
+                let [a, b] = [&cut, &whole].map(|w| &w.nodes[row * w.shape[1]..][..cut.shape[1]]);
+                assert_eq!(a, b);
+            }
+            // Nodes that lie beyond have nothing to do.
+            assert!(whole.support([2, 4]).is_some() && cut.support([2, 4]).is_none());
+            let beside = warp([50.0, -900.0], 51, cell, REACH);
+            assert_eq!(beside.shape, [1, 1]);
+            assert!((0..25).all(|i| beside.support([i / 5, i % 5]).is_none()));
+        }
     }
 }

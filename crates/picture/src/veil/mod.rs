@@ -19,6 +19,8 @@ use metalith_core::{Error, Result};
 use metalith_wave::kernels::sum_of_products;
 use pulp::Arch;
 
+use crate::cache::MOST_BYTES;
+
 pub use shares::LightShares;
 pub use squares::{gather, lay, lift, spread};
 
@@ -47,9 +49,6 @@ pub fn sensor_cells(sensor: &Sensor) -> [usize; 2] {
     [sensor.rows, sensor.columns].map(|n| (n as usize).div_ceil(CELL_PIXELS))
 }
 
-/// Largest veil that is held (bytes): that of a sensor of some 70 million pixels in three colours.
-const LARGEST: u64 = 4 << 30;
-
 impl Veil {
     /// Whether the veil of a sensor can be held.
     ///
@@ -59,7 +58,8 @@ impl Veil {
         let [rows, columns] = sensor_cells(sensor).map(|n| n as u64);
         let values = (channels * bases * SCENE_CELLS * SCENE_CELLS) as u64 * rows * columns;
         let bytes = values * size_of::<f32>() as u64;
-        if bytes <= LARGEST {
+        // That of a sensor of some 70 million pixels in three colours.
+        if bytes <= MOST_BYTES {
             return Ok(());
         }
         Err(Error::invalid(
@@ -126,5 +126,20 @@ impl Veil {
             budget: Vec::new(),
             ..*self
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metalith_camera::Camera;
+
+    #[test]
+    fn a_sensor_whose_veil_cannot_be_held_is_refused() {
+        let mut sensor = Camera::three_bands(5.86).sensor;
+        assert!(Veil::check_size(&sensor, 3, 6).is_ok());
+        (sensor.rows, sensor.columns) = (100_000, 100_000);
+        let error = Veil::check_size(&sensor, 3, 3).unwrap_err().to_string();
+        assert!(error.contains("100000 x 100000"), "{error}");
     }
 }

@@ -4,10 +4,13 @@
 //! the power spectra of the tiles are formed once; where the light lands for a direction of arrival follows from them
 //! alone. [`Landing::of`] does the same for one direction, tile by tile; here tiles are gathered into blocks.
 
+mod block;
+
 use metalith_core::Lattice;
 use num_complex::Complex32;
 
-use super::tiles::{Leaving, Tiling, for_tiles, power_scale};
+use self::block::{Block, GROUP, Moments};
+use super::tiles::{Leaving, Tile, Tiling, for_tiles, power_scale};
 use super::{Aperture, Landing, LandingGrid};
 use crate::error::Result;
 
@@ -22,77 +25,39 @@ pub struct Departure {
     power_um2: f64,
 }
 
-/// Neighbouring tiles.
-#[derive(Clone, Debug)]
-struct Block {
-    /// Directions that most of the light leaves in.
-    strong: Vec<Bin>,
-    /// The others, [`GROUP`] x [`GROUP`] of them gathered into one.
-    weak: Vec<Bin>,
-    /// What was left out (um^2): it is taken to be spread as the rest.
-    rest_um2: f64,
-}
-
-/// The light of a block that leaves in one direction.
-#[derive(Clone, Copy, Debug)]
-struct Bin {
-    /// Bin of frequency along x times the bins an axis, and along y (cycles a tile).
-    direction: u16,
-    /// Mean place that it comes from (um): a lens sends the light of each place of a block elsewhere.
-    place_um: [f32; 2],
-    /// Edges of the rectangle about it whose moments are those of the places it comes from (um).
-    edges_um: [f32; 2],
-    power_um2: f32,
-}
-
-/// Share of the power of a block that its weak directions have.
-const WEAK: f64 = 0.06;
-/// Directions along an axis that are gathered where they are weak.
-const GROUP: usize = 4;
-/// Share of the power of a block that may be left out with its weakest groups.
-const LEFT_OUT: f64 = 2e-3;
-
 impl Departure {
     /// Of an element at one wavelength (um), its tiles gathered into `blocks` x `blocks` squares over its lattice, for a plane at
     /// about this distance from the pillar tops (um).
     pub fn of(aperture: &dyn Aperture, wavelength_um: f64, distance_um: f64, blocks: usize) -> Self {
         let lattice = aperture.lattice();
         let tiling = Tiling::at(&lattice, wavelength_um, distance_um);
-        let (side, hop) = (tiling.side, tiling.hop());
-        let (reach, blocks) = (lattice.reach(), blocks.max(1));
-        let mut spectra: Vec<Vec<Moments>> = vec![Vec::new(); blocks * blocks];
-        let steps = lattice.steps_um();
-        // Middle of a block along an axis, from which its places are counted.
-        let middle_um = |axis: usize, block: usize| {
-            let sites = (block as f64 + 0.5) * (reach[axis].len() + hop) as f64 / blocks as f64;
-            lattice.place_um(axis, 0)
-                + (reach[axis].start as f64 - hop as f64 + sites + 0.5 * side as f64) * steps[axis]
+        let grid = BlockGrid {
+            lattice,
+            tiling,
+            across: blocks.max(1),
+        };
+        // Strips of tiles come in rising rows, and blocks of rows that rise with them: sums of one row of blocks are held at a time.
+        // Those of all are a hundred megabytes.
+        let mut sums: Vec<Vec<Moments>> = vec![Vec::new(); grid.across];
+        let mut blocks = Vec::new();
+        let mut at = 0;
+        let mut finish = |row: usize, sums: &mut [Vec<Moments>]| {
+            for (column, sums) in sums.iter_mut().enumerate() {
+                blocks.extend(grid.block([column, row], sums));
+                sums.clear();
+            }
         };
         let scale = power_scale(&lattice, tiling);
-        let block_of = |axis: usize, first: i64| {
-            let (start, places) = (reach[axis].start as i64, reach[axis].len());
-            let from = (first + hop as i64 - start).max(0) as usize;
-            (from * blocks / (places + hop)).min(blocks - 1)
-        };
         let fill_row = |iy: usize, row: &mut [Complex32]| aperture.fill_row(iy, row);
         for_tiles(&lattice, tiling, fill_row, |tile| {
-            let [column, row] = [0, 1].map(|axis| block_of(axis, tile.first[axis]));
-            let sums = &mut spectra[row * blocks + column];
-            sums.resize(tiling.directions(), Moments::default());
-            let middle = [middle_um(0, column), middle_um(1, row)];
-            let place = [0, 1].map(|a| (tile.middle_um[a] - middle[a]) as f32);
-            for (to, value) in sums.iter_mut().zip(tile.spectrum) {
-                to.add(value.norm_sqr() * scale as f32, place);
+            let [column, row] = grid.block_of(tile);
+            if row != at {
+                finish(at, &mut sums);
+                at = row;
             }
+            grid.add(tile, scale, [column, row], &mut sums[column]);
         });
-        let blocks: Vec<Block> = spectra
-            .iter()
-            .enumerate()
-            .filter_map(|(k, sums)| {
-                let middle = [middle_um(0, k % blocks), middle_um(1, k / blocks)];
-                Block::of(sums, tiling, middle, steps.map(|step| hop as f64 * step))
-            })
-            .collect();
+        finish(at, &mut sums);
         Self {
             power_um2: blocks.iter().map(Block::power_um2).sum(),
             blocks,
@@ -152,6 +117,51 @@ impl Departure {
     }
 }
 
+/// How tiles fall into blocks.
+struct BlockGrid {
+    lattice: Lattice,
+    tiling: Tiling,
+    /// Blocks an axis.
+    across: usize,
+}
+
+impl BlockGrid {
+    /// Middle of a block along an axis (um), from which its places are counted.
+    fn middle_um(&self, axis: usize, block: usize) -> f64 {
+        let (hop, reach) = (self.tiling.hop(), &self.lattice.reach()[axis]);
+        let sites = (block as f64 + 0.5) * (reach.len() + hop) as f64 / self.across as f64;
+        self.lattice.place_um(axis, 0)
+            + (reach.start as f64 - hop as f64 + sites + 0.5 * self.tiling.side as f64) * self.lattice.steps_um()[axis]
+    }
+
+    /// Column and row of the block that a tile is in.
+    fn block_of(&self, tile: &Tile<'_>) -> [usize; 2] {
+        let hop = self.tiling.hop();
+        [0, 1].map(|axis| {
+            let reach = &self.lattice.reach()[axis];
+            let from = (tile.first[axis] + hop as i64 - reach.start as i64).max(0) as usize;
+            (from * self.across / (reach.len() + hop)).min(self.across - 1)
+        })
+    }
+
+    /// Add the light of a tile to the sums of its block, by column and row.
+    fn add(&self, tile: &Tile<'_>, scale: f64, [column, row]: [usize; 2], sums: &mut Vec<Moments>) {
+        sums.resize(self.tiling.directions(), Moments::default());
+        let middle = [self.middle_um(0, column), self.middle_um(1, row)];
+        let place = [0, 1].map(|a| (tile.middle_um[a] - middle[a]) as f32);
+        for (to, value) in sums.iter_mut().zip(tile.spectrum) {
+            to.add(value.norm_sqr() * scale as f32, place);
+        }
+    }
+
+    /// The block of these sums, by column and row; none of one without light.
+    fn block(&self, [column, row]: [usize; 2], sums: &[Moments]) -> Option<Block> {
+        let middle = [self.middle_um(0, column), self.middle_um(1, row)];
+        let hop_um = self.lattice.steps_um().map(|step| self.tiling.hop() as f64 * step);
+        Block::of(sums, self.tiling, middle, hop_um)
+    }
+}
+
 /// A map that rectangles of light are added to, with a border for all that lands beyond it.
 struct SpreadLight {
     grid: LandingGrid,
@@ -207,137 +217,6 @@ impl SpreadLight {
     }
 }
 
-/// Power of a direction, and where it comes from.
-#[derive(Clone, Copy, Debug, Default)]
-struct Moments {
-    power_um2: f32,
-    /// Power times place along x and y, from the middle of the block (um).
-    first: [f32; 2],
-    /// Power times the square of the place.
-    second: [f32; 2],
-}
-
-impl Moments {
-    #[inline]
-    fn add(&mut self, power_um2: f32, place_um: [f32; 2]) {
-        self.power_um2 += power_um2;
-        for (a, place) in place_um.into_iter().enumerate() {
-            self.first[a] += power_um2 * place;
-            self.second[a] += power_um2 * place * place;
-        }
-    }
-
-    fn gather(&mut self, other: &Self) {
-        self.power_um2 += other.power_um2;
-        for a in 0..2 {
-            self.first[a] += other.first[a];
-            self.second[a] += other.second[a];
-        }
-    }
-
-    /// Mean place, and the edges of a rectangle with the same second moments, of tiles that are `hop_um` wide.
-    fn places(&self, middle_um: [f64; 2], hop_um: [f64; 2]) -> [[f32; 2]; 2] {
-        let mean = self.first.map(|v| v / self.power_um2);
-        let edge = |a: usize| {
-            let variance = (self.second[a] / self.power_um2 - mean[a] * mean[a]).max(0.0);
-            (12.0 * f64::from(variance) + hop_um[a] * hop_um[a]).sqrt() as f32
-        };
-        [
-            [0, 1].map(|a| (middle_um[a] + f64::from(mean[a])) as f32),
-            [edge(0), edge(1)],
-        ]
-    }
-}
-
-impl Block {
-    /// From the power of each direction, columns first; none of a block without light.
-    fn of(sums: &[Moments], tiling: Tiling, middle_um: [f64; 2], hop_um: [f64; 2]) -> Option<Self> {
-        let power = |i: usize| sums[i].power_um2;
-        let total: f64 = (0..sums.len()).map(|i| f64::from(power(i))).sum();
-        if total <= 0.0 {
-            return None;
-        }
-        let bin = |direction: usize, sums: &Moments| {
-            let [place_um, edges_um] = sums.places(middle_um, hop_um);
-            Bin {
-                direction: direction as u16,
-                place_um,
-                edges_um,
-                power_um2: sums.power_um2,
-            }
-        };
-        let (kept, others) = strongest(total, 1.0 - WEAK, power, sums.len());
-        let strong = kept.into_iter().map(|i| bin(i, &sums[i])).collect();
-        let across = tiling.side / GROUP;
-        let mut groups = vec![Group::default(); across * across];
-        for i in others {
-            let [column, row] = [i / tiling.side, i % tiling.side].map(|k| k / GROUP);
-            groups[column * across + row].add(i, tiling, &sums[i]);
-        }
-        let all: f64 = groups.iter().map(|g| f64::from(g.sums.power_um2)).sum();
-        let share = 1.0 - LEFT_OUT * total / all.max(f64::MIN_POSITIVE);
-        let (kept, left_out) = strongest(all, share, |i| groups[i].sums.power_um2, groups.len());
-        Some(Self {
-            strong,
-            weak: kept
-                .into_iter()
-                .map(|i| bin(groups[i].direction(tiling), &groups[i].sums))
-                .collect(),
-            rest_um2: left_out.into_iter().map(|i| f64::from(groups[i].sums.power_um2)).sum(),
-        })
-    }
-
-    fn power_um2(&self) -> f64 {
-        let bins = self.strong.iter().chain(&self.weak);
-        bins.map(|b| f64::from(b.power_um2)).sum::<f64>() + self.rest_um2
-    }
-}
-
-/// Weak directions beside one another.
-#[derive(Clone, Copy, Debug, Default)]
-struct Group {
-    sums: Moments,
-    /// Power times the index of the direction along x and along y.
-    directions: [f32; 2],
-}
-
-impl Group {
-    fn add(&mut self, direction: usize, tiling: Tiling, one: &Moments) {
-        self.sums.gather(one);
-        for (sum, k) in self
-            .directions
-            .iter_mut()
-            .zip([direction / tiling.side, direction % tiling.side])
-        {
-            *sum += one.power_um2 * k as f32;
-        }
-    }
-
-    /// The direction that is nearest to the mean.
-    fn direction(&self, tiling: Tiling) -> usize {
-        let [x, y] = self.directions.map(|sum| (sum / self.sums.power_um2).round() as usize);
-        let last = tiling.side - 1;
-        x.min(last) * tiling.side + y.min(last)
-    }
-}
-
-/// The fewest of `n` that have a share of a power, and the others that have any, each in their own order.
-fn strongest(total: f64, share: f64, power: impl Fn(usize) -> f32, n: usize) -> (Vec<usize>, Vec<usize>) {
-    let mut order: Vec<usize> = (0..n).filter(|i| power(*i) > 0.0).collect();
-    order.sort_by(|a, b| power(*b).total_cmp(&power(*a)).then(a.cmp(b)));
-    let mut sum = 0.0;
-    let enough = order.iter().position(|i| {
-        let before = sum;
-        sum += f64::from(power(*i));
-        before >= share * total
-    });
-    let mut others = order.split_off(enough.unwrap_or(order.len()));
-    // Directions beside one another land beside one another.
-    order.sort_unstable();
-    others.sort_unstable();
-    (order, others)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -380,6 +259,39 @@ mod tests {
                 .map(|(a, b)| (a - b).abs())
                 .sum();
             assert!(moved < BLOCKS * all, "{sines:?}: {}", moved / all);
+        }
+    }
+    #[test]
+    fn rows_of_blocks_are_those_of_all_blocks_at_once() {
+        let (z, um) = (336.0, 0.53);
+        // Round, so that blocks in the corners are dark.
+        let lens = PhaseFunction {
+            lattice: Lattice::covering(140_000, 350).unwrap(),
+            radius_um: 70.0,
+            amplitude: 0.9,
+            phase_rad: |x: f64, y: f64| -TAU * ((x * x + y * y + z * z).sqrt() - z) / um,
+        };
+        for across in [1, 3, 8, 200] {
+            let departure = Departure::of(&lens, um, z, across);
+            let (lattice, tiling) = (departure.lattice, departure.tiling);
+            let grid = BlockGrid {
+                lattice,
+                tiling,
+                across,
+            };
+            let mut sums = vec![Vec::new(); across * across];
+            let scale = power_scale(&lattice, tiling);
+            let fill_row = |iy: usize, row: &mut [Complex32]| lens.fill_row(iy, row);
+            for_tiles(&lattice, tiling, fill_row, |tile| {
+                let [column, row] = grid.block_of(tile);
+                grid.add(tile, scale, [column, row], &mut sums[row * across + column]);
+            });
+            let blocks = sums.iter().enumerate();
+            let wanted: Vec<Block> = blocks
+                .filter_map(|(k, sums)| grid.block([k % across, k / across], sums))
+                .collect();
+            // Bit for bit: sums are the same, in the same order.
+            assert!(!wanted.is_empty() && departure.blocks == wanted, "{across}");
         }
     }
 }

@@ -1,127 +1,20 @@
 //! The operator against a direct sum over points of the scene and wavelengths, and against its adjoint.
 
-use metalith_camera::{Camera, Channel, Illuminant, Response, Sensor};
-use metalith_cell::CellModel;
+mod parts;
+mod setup;
+
 use metalith_core::Silent;
-use metalith_design::array::PillarArray;
-use metalith_design::{Design, cell_models};
-use metalith_gds::extract::Extraction;
-use metalith_layout::{read_pillars, write_pillars};
-use metalith_made::SimulationCase;
 use metalith_picture::restore::SceneStatistics;
 use metalith_picture::scene::SceneImage;
 use metalith_picture::{
-    Assumed, BankSpec, ChipInLight, Detail, ElementInLight, FrameOperator, KernelBank, SceneInputs, ScenePoints,
-    SceneSpace, Veil, element_views,
+    Assumed, Detail, ElementInLight, FrameOperator, KernelBank, SceneInputs, ScenePoints, SceneSpace, Veil,
+    element_views,
 };
 use metalith_wave::{Accuracy, Scratch, Window};
-use ndarray::{Array2, Array3};
+use ndarray::Array2;
 use rayon::prelude::*;
 
-/// The middle element, and its neighbour below and to the left.
-const MIDDLE: usize = 4;
-const BELOW: usize = 1;
-const LEFT: usize = 3;
-
-/// Pixels of 2 um an axis: the middle element and two of its neighbours.
-const ROWS: u32 = 120;
-
-fn camera(bands: &[[f64; 2]]) -> Camera {
-    let plain = Camera::three_bands(2.0);
-    Camera {
-        sensor: Sensor {
-            columns: ROWS,
-            rows: ROWS,
-            offset_um: [-75.0, -75.0],
-            ..plain.sensor
-        },
-        channels: bands
-            .iter()
-            .map(|band| Channel {
-                name: format!("{}", band[0]),
-                response: Response::Band {
-                    band_nm: *band,
-                    efficiency: 1.0,
-                },
-            })
-            .collect(),
-        illuminant: Illuminant::EqualEnergy,
-        ..plain
-    }
-}
-
-struct Setup {
-    design: Design,
-    camera: Camera,
-    extraction: Extraction,
-    cells: Vec<Box<dyn CellModel>>,
-    scene: SceneImage,
-}
-
-impl Setup {
-    fn chip(&self) -> ChipInLight<'_> {
-        let case = SimulationCase::Cell(self.cells[0].as_ref());
-        ChipInLight::new(
-            &self.design,
-            &self.extraction,
-            case,
-            &self.camera,
-            f64::INFINITY,
-            &Silent,
-        )
-        .unwrap()
-    }
-
-    fn veil(&self, chip: &ChipInLight<'_>, bank: &KernelBank) -> Veil {
-        let (sensor, scene) = (&self.camera.sensor, &self.scene);
-        Veil::build(chip, bank, &scene.basis, sensor, &scene.view, &Silent).unwrap()
-    }
-}
-
-fn setup(bands: &[[f64; 2]], size: usize) -> Setup {
-    let design = Design::read("../../designs/mini_3x3.toml".as_ref()).unwrap();
-    let array = PillarArray::build(&design, &Silent).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let layout = folder.path().join("mini.gds");
-    write_pillars(&design, &array, design.layout.hierarchy, &layout, &Silent).unwrap();
-    let extraction = read_pillars(&design, &layout, &Silent).unwrap();
-    let camera = camera(bands);
-    let cells = cell_models(&design, &[metalith_cell::Fidelity::Published]).unwrap();
-    let scene = waves(size, [0.0; 2]);
-    Setup {
-        design,
-        camera,
-        extraction,
-        cells,
-        scene,
-    }
-}
-
-/// Radians of the waves over tangents: some 40 um from crest to crest behind a lens of 144 um.
-const WAVES: [f64; 2] = [17.3, 14.8];
-
-/// Waves of three colours within four degrees of a direction (degrees), fading towards there.
-fn waves(size: usize, about_deg: [f64; 2]) -> SceneImage {
-    let empty = SceneImage::of_rgb("", &Array3::zeros((size, size, 3)), 44.0, f64::INFINITY);
-    let rgb = Array3::from_shape_fn((size, size, 3), |(y, x, c)| {
-        let t = empty.view.tangents(y as f64, x as f64);
-        let off = [0, 1].map(|a| (t[a].atan().to_degrees() - about_deg[a]) / 4.0);
-        let fade = 0.5 + 0.5 * (std::f64::consts::PI * off[0].hypot(off[1]).min(1.0)).cos();
-        let (u, v) = (WAVES[0] * t[0], WAVES[1] * t[1]);
-        fade * (0.5 + 0.4 * (u + c as f64).sin() * (v - c as f64).cos())
-    });
-    SceneImage::of_rgb("waves", &rgb, 44.0, f64::INFINITY)
-}
-
-fn spec(window: usize, nodes: usize) -> BankSpec {
-    BankSpec {
-        pixel_um: 2.0,
-        window,
-        nodes,
-        reach_um: 26.0,
-        accurate: true,
-    }
-}
+use setup::{BELOW, LEFT, MIDDLE, ROWS, Setup, setup, spec, waves};
 
 /// A plane at a place between the middles of its pixels.
 fn value(plane: &Array2<f32>, row: f64, column: f64) -> f64 {
