@@ -3,7 +3,7 @@
 
     python3 scripts/compare_denoisers.py target/release/metalith PHOTOGRAPH... [--noise 25] [--weights FILE]
 
-Each photograph in colour (files of one channel are left out) gets normal noise of the given deviation (of 255, seed 1; the program
+Each photograph (grey ones as colours that are equal) gets normal noise of the given deviation (of 255, seed 1; the program
 draws its own, numpy that of the others) and is denoised by `metalith denoise`, by total variation, by wavelets and by non-local means, each of the three
 told the true deviation, with the settings of their documentation. PSNR in dB, against the photograph, values cut to what
 a picture holds. Needs numpy, Pillow, scikit-image and PyWavelets; CPU seconds are those of the children and of this process.
@@ -33,7 +33,7 @@ def by_metalith(program: str, weights: list[str], path: Path, levels: float) -> 
 
 
 def total_variation(noisy: np.ndarray, deviation: float) -> np.ndarray:
-    # The weight that is best for the picture: more than its user could know.
+    # A weight of the deviation: near the best for most photographs.
     return restoration.denoise_tv_chambolle(noisy, weight=1.0 * deviation, channel_axis=-1)
 
 

@@ -124,6 +124,14 @@ pub struct LenslessArgs {
 }
 
 impl LenslessArgs {
+    /// Whether nobody asked for another mask or surface.
+    pub fn is_standard(&self) -> bool {
+        let (mask, surface) = (MaskSpec::standard(), DiffuserSpec::standard());
+        let own = [self.mask_distance_um, self.mask_feature_um];
+        let rough = [self.diffuser_distance_um, self.diffuser_grain_um, self.diffuser_opening];
+        own == [mask.distance_um, mask.feature_um] && rough == [surface.distance_um, surface.grain_um, surface.opening]
+    }
+
     /// A camera of this kind.
     ///
     /// # Errors

@@ -48,7 +48,7 @@ pub struct HandoffArgs {
     #[arg(long, value_enum)]
     format: Option<FormatArg>,
 
-    /// Simulate with errors of 1e-3 instead of 1e-5 of the peak, several times faster.
+    /// Simulate with errors of 1e-3 instead of 1e-5 of the amplitude of a perfect lens, several times faster.
     #[arg(long)]
     fast: bool,
 

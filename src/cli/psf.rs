@@ -98,7 +98,7 @@ pub struct PsfArgs {
     #[arg(long)]
     as_lit: bool,
 
-    /// Simulate with errors of 1e-3 instead of 1e-5 of the peak, several times faster.
+    /// Simulate with errors of 1e-3 instead of 1e-5 of the amplitude of a perfect lens, several times faster.
     #[arg(long)]
     fast: bool,
 

@@ -31,9 +31,9 @@ pub struct TrainArgs {
     /// Folder of PNG, JPEG or NPY photographs.
     folder: PathBuf,
 
-    /// File for the weights.
-    #[arg(long, short, default_value = "out/denoiser.safetensors", value_name = "FILE")]
-    out: PathBuf,
+    /// File for the weights [default: out/denoiser.safetensors, or out/KIND.safetensors for the last stage of a kind].
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
 
     /// Steps down the gradient.
     #[arg(long, default_value_t = TrainingSpec::default().steps)]
@@ -81,6 +81,13 @@ pub struct TrainArgs {
 }
 
 impl TrainArgs {
+    /// The file for the weights.
+    fn out(&self) -> PathBuf {
+        let named = || self.stage.map_or("denoiser", StageKind::name);
+        let default = || Path::new("out").join(named()).with_extension("safetensors");
+        self.out.clone().unwrap_or_else(default)
+    }
+
     /// The camera that a last stage is for.
     fn lineup(&self, kind: StageKind, photographs: Vec<PathBuf>) -> Result<Lineup> {
         let wrong = |what: &str, hint: &str| Err(Error::invalid(what, hint));
@@ -113,15 +120,15 @@ impl TrainArgs {
         kind: StageKind,
         photographs: Vec<PathBuf>,
         spec: &TrainingSpec,
-        state: &Path,
+        [out, state]: [&Path; 2],
         terminal: &Terminal,
     ) -> Result<TrainingReport> {
         let lineup = self.lineup(kind, photographs)?;
         let open = lineup.open()?;
         let kept = KeptKernels::of_user();
-        let (stacks, taught) = open.lessons(0, kind, &beside(&self.out, ".pictures"), &kept, terminal)?;
+        let (stacks, taught) = open.lessons(0, kind, &beside(out, ".pictures"), &kept, terminal)?;
         let stacks = Stacks::new(stacks, taught, spec.piece)?;
-        train_finisher(&stacks, spec, &self.out, state, terminal)
+        train_finisher(&stacks, spec, out, state, terminal)
     }
 }
 
@@ -141,10 +148,17 @@ pub fn run(args: &TrainArgs, terminal: &Terminal) -> Result<Outcome> {
         seed: args.seed,
     };
     let files = images::of_folder(&args.folder)?;
-    let state = beside(&args.out, ".state");
-    apart(files.iter().map(PathBuf::as_path), &[&args.out, &state])?;
+    let out = args.out();
+    let state = beside(&out, ".state");
+    apart(files.iter().map(PathBuf::as_path), &[&out, &state])?;
     let report = match args.stage {
-        Some(kind) => args.stage(kind, files, &spec, &state, terminal)?,
+        Some(kind) => args.stage(kind, files, &spec, [&out, &state], terminal)?,
+        None if !args.bare.is_standard() => {
+            return Err(Error::invalid(
+                "numbers of a mask or of a rough surface, and no last stage to teach",
+                "give --stage flatnet or --stage unrolled-diffuser, or leave them out",
+            ));
+        }
         None => {
             let mut pictures = Vec::new();
             for file in &files {
@@ -152,7 +166,7 @@ pub fn run(args: &TrainArgs, terminal: &Terminal) -> Result<Outcome> {
                 pictures.push((name, read_picture(file)?.mapv(|v| v as f32)));
             }
             let photographs = Photographs::new(pictures, spec.piece)?;
-            train(&photographs, &spec, &args.out, &state, terminal)?
+            train(&photographs, &spec, &out, &state, terminal)?
         }
     };
     terminal.clear();
@@ -161,7 +175,7 @@ pub fn run(args: &TrainArgs, terminal: &Terminal) -> Result<Outcome> {
     } else {
         print_line!(
             "{}: {} weights, {:.2} dB for photographs that were held out{}",
-            args.out.display(),
+            out.display(),
             report.weights,
             report.held_out_psnr_db,
             if args.stage.is_some() {

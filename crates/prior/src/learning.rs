@@ -103,8 +103,8 @@ impl TrainingSpec {
     }
 }
 
-/// Learn, go on where a state on the disk stands, and write the weights in the end. A user who stops it loses nothing:
-/// the state is written first.
+/// Learn, go on where a state on the disk stands, and write the weights in the end, in place of the state. A user who stops it
+/// loses nothing: the state is written first.
 ///
 /// # Errors
 /// If the state is of another training, files cannot be written, or the user stopped it.
@@ -124,7 +124,7 @@ pub(crate) fn learn(
     };
     progress.begin("learning", spec.steps);
     progress.advance(at.step);
-    let mut judged = f64::NAN;
+    let mut judged = None;
     while at.step < spec.steps {
         if progress.stopped() {
             at.write(state, &origin)?;
@@ -142,14 +142,17 @@ pub(crate) fn learn(
         at.loss = 0.99 * at.loss + 0.01 * if at.step == 1 { 100.0 * loss } else { loss };
         progress.advance(1);
         if at.step.is_multiple_of(LOOK) {
-            judged = lessons.held_out(Network::new(&plan, &at.weights));
+            judged = Some(lessons.held_out(Network::new(&plan, &at.weights)));
         }
         if at.step.is_multiple_of(KEEP) {
             at.write(state, &origin)?;
         }
-        progress.note(&format!("loss {:.5}, held out {judged:.2} dB", at.loss));
+        let held_out = judged.map_or_else(String::new, |db| format!(", held out {db:.2} dB"));
+        progress.note(&format!("loss {:.5}{held_out}", at.loss));
     }
     write_weights(out, &plan, &at.weights, &origin)?;
+    // What is learnt is in the weights: the next training begins anew, with whatever numbers.
+    Checkpoint::remove(state)?;
     // The weights as they are written: in half precision.
     let written: Vec<f32> = at.weights.iter().map(|w| half::f16::from_f32(*w).to_f32()).collect();
     Ok(TrainingReport {

@@ -84,7 +84,7 @@ impl PerceptualDistance {
             path: path.to_owned(),
             line: None,
             what,
-            hint: "write `lpips.LPIPS(net=\"alex\").state_dict()` of the authors' package by `safetensors.torch.save_file`".into(),
+            hint: "write `{k: v.clone() for k, v in lpips.LPIPS(net=\"alex\").state_dict().items()}` of the authors' package by `safetensors.torch.save_file`".into(),
         }
         };
         let file = SafeTensors::deserialize(&bytes).map_err(|e| fault(format!("it is no file of safetensors: {e}")))?;

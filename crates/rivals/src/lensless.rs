@@ -122,12 +122,20 @@ impl LenslessBench {
     /// For scenes of this size and field, at wavelengths at most `step_nm` apart. It still has to be given its exposure.
     ///
     /// # Errors
-    /// If a channel counts no visible light, the camera tells no three colours apart, or the scene is near.
+    /// If a channel counts no visible light, the camera tells no three colours apart, the sensor is one line of pixels, or the scene
+    /// is near.
     pub fn new(camera: &Camera, view: SceneView, step_nm: f64) -> Result<Self> {
         if !(view.field_deg > 0.0 && view.field_deg < WIDEST_DEG) {
             return Err(Error::invalid(
                 format!("a field of {} degrees", view.field_deg),
                 format!("give a field of more than 0 and less than {WIDEST_DEG} degrees"),
+            ));
+        }
+        let [rows, columns] = [camera.sensor.rows, camera.sensor.columns];
+        if rows.min(columns) < 2 {
+            return Err(Error::invalid(
+                format!("a sensor of {columns} x {rows} pixels behind a camera without a lens"),
+                "give a sensor of at least 2 x 2 pixels: each colour has its own in a square of these",
             ));
         }
         let sampling = camera.sampling(BAND_NM, step_nm)?;

@@ -1,5 +1,6 @@
 //! Learnt last stages in a lineup: which camera each was taught for, and what another is taught by.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use metalith_camera::Camera;
@@ -21,7 +22,8 @@ impl OpenLineup<'_> {
         let first = self.photographs[0].view;
         let design = |(listed, (design, camera)): (&ListedDesign, &(Design, Camera))| {
             let field_deg = listed.field_deg.unwrap_or(first.field_deg);
-            let optics = (design.digest(), hex(&file_digest(&listed.layout)?));
+            let layout = hex(&file_digest(&listed.layout)?);
+            let optics = (design.optics_digest()?, design.verify.fidelity, layout);
             let digest = camera_digest(&optics, camera, &SceneView { field_deg, ..first })?;
             Ok((digest, vec![StageKind::MultiWiener, StageKind::Blending]))
         };
@@ -36,13 +38,24 @@ impl OpenLineup<'_> {
         designs.chain(self.of.lensless.iter().map(lensless)).collect()
     }
 
-    /// Refuse weights that none of the cameras can use.
+    /// Refuse weights that none of the cameras can use, and two of one kind for one camera.
     pub(crate) fn stages_have_cameras(&self) -> Result<()> {
         if self.stages.is_empty() {
             return Ok(());
         }
         let digests = self.digests()?;
+        let mut seen = HashSet::new();
         for (stage, path) in self.stages.iter().zip(&self.of.learnt) {
+            if !seen.insert((stage.kind.name(), &stage.taught().camera)) {
+                return Err(Error::invalid(
+                    format!(
+                        "{}: a second last stage `{}` for one camera",
+                        path.display(),
+                        stage.kind.name()
+                    ),
+                    "compare them one after the other",
+                ));
+            }
             let fits = |(digest, kinds): &(String, Vec<StageKind>)| {
                 kinds.contains(&stage.kind) && *digest == stage.taught().camera
             };

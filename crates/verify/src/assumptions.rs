@@ -19,8 +19,11 @@ const BLAZED_ROWS: [(f64, [f64; 3]); 5] = [
     (0.4, [0.929, 0.540, 0.488]),
 ];
 
-/// The table of assumptions.
+/// The table of assumptions; none of a layout that was not simulated.
 pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
+    if found.not_simulated.is_some() {
+        return;
+    }
     page.section("What is assumed");
     let mut table = Table::new([
         Column::text("Assumption"),

@@ -23,7 +23,7 @@ pub(super) fn write(page: &mut Page, found: &Verification, element: &DistinctEle
     page.paragraph(format!(
         "A point of the scene in the direction in which the element looks at {} nm, by the `{}` cell.",
         exact(element.element.wedge.wavelength_um * 1e3),
-        found.fidelity.of_width_alone(),
+        found.fidelity,
     ));
     let alone: Vec<(String, &PsfResult)> = element
         .spots

@@ -28,8 +28,7 @@ impl FineGrid {
         let (rows, columns) = kernels[0][0].dim();
         let kernel = [rows, columns];
         let first = [0, 1].map(|a| (half[a] + kernel[a] / 2) as i64 - (frame[a] / 2) as i64);
-        let whole = [0, 1].map(|a| 2 * half[a] + kernel[a]);
-        let fft = SquareFft::new(fft_size(whole[0].max(whole[1])));
+        let fft = SquareFft::new(fft_size(Self::places(view, step, kernel)));
         let spectrum = |k: &Array2<f32>| transformed(&fft, k);
         Self {
             half,
@@ -42,6 +41,12 @@ impl FineGrid {
                 .collect(),
             fft,
         }
+    }
+
+    /// Places along the longer axis that hold a scene and its convolution with kernels of these rows and columns.
+    pub fn places(view: &SceneView, step: f64, kernel: [usize; 2]) -> usize {
+        let half = half_of(view, step);
+        (2 * half[0] + kernel[0]).max(2 * half[1] + kernel[1])
     }
 
     /// A plane of the scene at the places of the grid.

@@ -80,6 +80,8 @@ const MATERIAL: &str = "fused_silica_malitson_1965";
 /// strong, the one that follows from the noise first.
 const STAGE_ROUNDS: usize = 10;
 const STAGE_SLOPES: [f32; PICTURES] = [1.0, 0.25, 4.0, 0.0625, 16.0];
+/// Places along an axis of the scene and the caustic together: 256 MB a plane.
+const MOST_PLACES: usize = 8192;
 /// Of the random scene and of its noise.
 const SEED: u64 = 1;
 
@@ -99,12 +101,22 @@ impl DiffuserCam {
     /// For a surface before the sensor of a camera.
     ///
     /// # Errors
-    /// If the camera tells no colours apart, the scene is near, or no light reaches the sensor.
+    /// If the camera tells no colours apart, the scene is near, no light reaches the sensor, or scene and caustic have too many
+    /// places.
     pub fn new(spec: &DiffuserSpec, camera: &Camera, view: SceneView, progress: &dyn Progress) -> Result<Self> {
         let bench = LenslessBench::new(camera, view, STEP_NM)?;
         let pixel = camera.sensor.pixel_um;
         let opening = bench.frame().map(|n| (n as f64 * spec.opening).round() as usize);
         let surface = RoughSurface::new(spec, opening.map(|n| n as f64 * pixel));
+        let step = pixel / spec.distance_um;
+        let caustic = opening.map(|n| n + 2 * surface.border(pixel));
+        let places = FineGrid::places(&view, step, caustic);
+        if places > MOST_PLACES {
+            return Err(Error::invalid(
+                format!("a scene and a caustic of {places} places along an axis, more than {MOST_PLACES}"),
+                "bring the rough surface nearer to the sensor, make its grain finer, or give a narrower field",
+            ));
+        }
         let glass = metalith_rcwa::Material::named(MATERIAL)?;
         progress.begin("caustics", bench.sampling.wavelengths_nm.len() as u64);
         let caustics = bench
@@ -128,7 +140,6 @@ impl DiffuserCam {
         let kernels: Vec<Vec<Array2<f32>>> = (0..bench.channels())
             .map(|c| rgb_basis().iter().map(|b| mixed(&bench.weights(c, b))).collect())
             .collect();
-        let step = pixel / spec.distance_um;
         let fine = FineGrid::new(&view, step, bench.frame(), &kernels);
         let solvers = (0..bench.channels())
             .into_par_iter()

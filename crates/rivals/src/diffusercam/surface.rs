@@ -47,6 +47,11 @@ impl RoughSurface {
         }
     }
 
+    /// Pixels of this size around the opening that rays may land on.
+    pub fn border(&self, pixel_um: f64) -> usize {
+        (self.border_um / pixel_um).ceil() as usize
+    }
+
     /// Slope along y and along x at a place from the first corner of the opening (um).
     fn slope(&self, y_um: f64, x_um: f64) -> [f64; 2] {
         let (i, wy, dy) = spline(y_um / self.grain_um);
@@ -67,7 +72,7 @@ impl RoughSurface {
     /// sides, and its middle is that of the opening.
     pub fn caustic(&self, opening: [usize; 2], pixel_um: f64, bent_um: f64) -> Array2<f32> {
         let [rows, columns] = opening;
-        let border = (self.border_um / pixel_um).ceil() as usize;
+        let border = self.border(pixel_um);
         let shape = (rows + 2 * border, columns + 2 * border);
         let share = 1.0 / (rows * columns * RAYS * RAYS) as f32;
         let at = |i: usize| (i as f64 + 0.5) / RAYS as f64;
