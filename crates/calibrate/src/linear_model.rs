@@ -5,8 +5,9 @@
 //! that the statistics answer can be written down.
 
 use metalith_core::{Progress, Result, Silent};
-use rand::{Rng, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 
 use crate::effects::Parameter;
 use crate::fit::{CaptureSetup, Data, FitProblem};
@@ -248,10 +249,9 @@ impl ForwardModel for LinearModel {
     }
 }
 
-/// A draw from the normal distribution (Box and Muller).
+/// A draw from the normal distribution.
 fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    let (u, v): (f64, f64) = (1.0 - rng.random::<f64>(), rng.random());
-    (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+    StandardNormal.sample(rng)
 }
 
 /// Images of the smooth paths span as many patterns as there are terms.

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use crate::diagnosis::{Diagnosis, Proposal, SetVerdict};
-use crate::effects::{self, DeclaredEffect};
+use crate::effects::{self, DeclaredEffect, StitchedFields};
 use crate::page::write_page;
-use crate::proposal::propose;
+use crate::proposal::{boundary, propose};
 use crate::search::Evidence;
 use crate::session::{Session, Settings, Simulations, check_effects};
 use crate::set::MeasuredSet;
@@ -65,8 +65,7 @@ pub fn calibrate(
     Ok(done)
 }
 
-/// Diagnose a session with its simulations, propose effects for what is left, adopt them if that is wanted, and write the
-/// answer.
+/// Diagnose a session with its simulations, look for what the list leaves, and write the answer.
 ///
 /// # Errors
 /// As [`calibrate`].
@@ -76,7 +75,49 @@ fn finish(
     out: &Path,
     progress: &dyn Progress,
 ) -> Result<Calibration> {
-    let (mut diagnosis, evidence) = session.diagnose(simulations, progress)?;
+    let (diagnosis, evidence) = session.diagnose(simulations, progress)?;
+    if let Some(set) = with_boundary(session, &diagnosis, evidence.as_ref(), progress)? {
+        let wider = Session::new(&set, session.settings.clone())?;
+        let simulations = wider.simulate(progress)?;
+        let (wider_diagnosis, evidence) = wider.diagnose(&simulations, progress)?;
+        if wider_diagnosis.has(StitchedFields::NAMES) {
+            return conclude(&wider, &simulations, (wider_diagnosis, evidence), out, progress);
+        }
+    }
+    conclude(session, simulations, (diagnosis, evidence), out, progress)
+}
+
+/// The set with a place of a boundary of write fields, where one would explain much of what the list leaves and the lab does not say
+/// where such boundaries run.
+fn with_boundary(
+    session: &Session<'_>,
+    diagnosis: &Diagnosis,
+    evidence: Option<&Evidence>,
+    progress: &dyn Progress,
+) -> Result<Option<MeasuredSet>> {
+    let set = session.set();
+    let is_open = diagnosis.verdict.leaves_a_residual() && set.field_boundary_um.is_none();
+    let Some(evidence) = evidence.filter(|_| is_open && session.settings.only.is_empty()) else {
+        return Ok(None);
+    };
+    let place = boundary(session, evidence, progress)?;
+    Ok(place.map(|place| MeasuredSet {
+        field_boundary_um: Some(place),
+        ..set.clone()
+    }))
+}
+
+/// Propose effects for what is left, adopt them if that is wanted, and write the answer.
+///
+/// # Errors
+/// As [`calibrate`].
+fn conclude(
+    session: &Session<'_>,
+    simulations: &Simulations,
+    (mut diagnosis, evidence): (Diagnosis, Option<Evidence>),
+    out: &Path,
+    progress: &dyn Progress,
+) -> Result<Calibration> {
     let _turn = FolderTurn::wait(out, progress, || {
         progress.note("waiting for another run in this folder")
     })?;

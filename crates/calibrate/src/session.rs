@@ -69,9 +69,9 @@ pub struct Screening {
 }
 
 impl Screening {
-    /// Whether more than half of the captures cannot be used.
+    /// Whether more than half of the captures cannot be used, or one alone can: what is fitted to it has nothing to be judged by.
     pub fn is_data_unfit(&self) -> bool {
-        2 * self.unusable.len() > self.used.len()
+        2 * self.unusable.len() > self.used.len() || self.used.iter().filter(|used| **used).count() < 2
     }
 }
 

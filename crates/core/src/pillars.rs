@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::{Lattice, LayerNumber, Progress, Result, WidthMap};
+use crate::{Lattice, LayerNumber, PillarShape, Progress, Result, WidthMap};
 
 /// Where an element is and which lattice its pillars should stand on.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -16,7 +16,7 @@ pub struct ElementSite {
 
 /// What reads pillars out of a layout: crates that only need the widths take it from their caller, and know no format.
 pub trait PillarReader: Sync {
-    /// Widths of the pillars of each element, in the order given.
+    /// Widths of the pillars of each element, all of this shape, in the order given.
     ///
     /// # Errors
     /// If the layout cannot be read, an element is out of all proportion, or the user stopped it.
@@ -24,6 +24,7 @@ pub trait PillarReader: Sync {
         &self,
         layout: &Path,
         layer: LayerNumber,
+        shape: PillarShape,
         elements: &[ElementSite],
         progress: &dyn Progress,
     ) -> Result<Vec<WidthMap>>;

@@ -13,7 +13,9 @@ use rayon::prelude::*;
 pub use light::Lit;
 
 use super::optics::{Optic, PixelGrid, Quadrature};
-use super::set::{CaptureIndex, ElementIndex, LedIndex, MeasuredSet, PerCapture, PerElement, PerLed, RelayCamera};
+use super::set::{
+    Capture, CaptureIndex, ElementIndex, LedIndex, MeasuredSet, PerCapture, PerElement, PerLed, RelayCamera,
+};
 use metalith_made::{DrawnElement, GeometryChange, KernelFilter, Perturbation, veiled};
 use metalith_wave::propagation::{Distances, DistancesPlan};
 
@@ -24,7 +26,7 @@ pub struct Sampling {
     pub spectrum: f64,
     /// Largest step in wavelength (nm).
     pub step_nm: f64,
-    /// Sample spacing of the intensity (um).
+    /// Sample spacing of the intensity (um); less where a lens is so steep that its images are finer.
     pub step_um: f64,
     /// Samples around each window, for registration, blur and borders.
     pub margin: usize,
@@ -53,6 +55,17 @@ pub struct Bench<'a> {
     /// Windows move with the image when the incident light is tilted: registration is a nuisance parameter, and
     /// the intensity in a fixed window is not a polynomial of the tilt.
     pub follows: bool,
+}
+
+/// Steps, at most, over the finest period of an image: two would do.
+const OF_NYQUIST: f64 = 0.95;
+
+/// Step that the intensity of a capture is resolved by (um): light from both sides of the aperture interferes with a period of half a
+/// wavelength over the sine of its half-angle.
+fn resolved_um(set: &MeasuredSet, capture: &Capture) -> f64 {
+    let radius_um = 0.5 * set.elements[capture.element].aperture_diameter_um;
+    let sine = radius_um / radius_um.hypot(capture.distance_um);
+    OF_NYQUIST * 0.25e-3 * set.leds[capture.led].centre_nm / sine
 }
 
 /// Captures that differ only in their distance.
@@ -100,15 +113,17 @@ impl<'a> Bench<'a> {
                 radius_um: 0.5 * set.elements[c.element].aperture_diameter_um,
                 centre_um: c.window_centre_um,
                 half_width_um: 0.5 * longest * set.camera.pixel_um,
-                step_um: sampling.step_um,
+                step_um: sampling.step_um.min(resolved_um(set, c)),
             };
+            // As far as with the usual step.
+            let margin = (sampling.margin as f64 * sampling.step_um / planes.step_um).round() as usize;
             groups.push(FocusSeries {
                 element: c.element,
                 led: c.led,
                 aoi_rad: c.aoi_rad,
                 centre_um: c.window_centre_um,
                 captures: vec![i],
-                plan: DistancesPlan::new(planes, sampling.margin),
+                plan: DistancesPlan::new(planes, margin),
             });
         }
         Self {

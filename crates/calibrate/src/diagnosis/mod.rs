@@ -28,7 +28,7 @@ pub enum SetVerdict {
     Partly,
     /// There is a residual that no known effect explains.
     Unexplained,
-    /// More than half of the captures cannot be used.
+    /// More than half of the captures cannot be used, or there is one alone.
     DataUnfit,
 }
 
@@ -191,6 +191,11 @@ pub struct CaptureError {
 }
 
 impl Diagnosis {
+    /// Whether an effect of one of these names was found.
+    pub fn has(&self, names: [&str; 2]) -> bool {
+        self.effects.iter().any(|e| names.contains(&e.name.as_str()))
+    }
+
     /// Write it as `diagnosis.json`.
     ///
     /// # Errors
@@ -229,6 +234,9 @@ impl Diagnosis {
                 100.0 * self.unexplained_share
             ),
             SetVerdict::Unexplained => "unexplained: there is a residual that no known effect explains".into(),
+            SetVerdict::DataUnfit if self.left_out.is_empty() => {
+                "data unfit: one capture alone leaves nothing to judge a finding by; take others, of another colour, element or distance".into()
+            }
             SetVerdict::DataUnfit => format!("data unfit: {} captures cannot be used", self.left_out.len()),
         }
     }

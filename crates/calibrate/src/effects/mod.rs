@@ -29,6 +29,7 @@ mod value_error;
 mod zero_order;
 
 pub use declared::{DeclaredEffect, DeclaredParameter};
+pub use stitching::StitchedFields;
 pub use value_error::ValueError;
 
 use super::set::MeasuredSet;

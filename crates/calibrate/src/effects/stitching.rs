@@ -12,8 +12,8 @@ const TYPICAL_NM: f64 = 25.0;
 const REACH: f64 = 0.1;
 const TYPICAL: f64 = 0.02;
 
-/// A boundary at the same place in every lens: the displacement beyond it along x and y, and its place. Where it is not known
-/// about where boundaries run, elements do not agree on what they show, so such sets do not try it.
+/// A boundary at the same place in every lens: the displacement beyond it along x and y, and its place. Tried where it is known about
+/// where boundaries run, and where one at some place would explain much of what all others leave.
 pub struct StitchedFields {
     /// Axis that the boundary is across.
     axis: usize,
@@ -23,6 +23,9 @@ pub struct StitchedFields {
 }
 
 impl StitchedFields {
+    /// Names of such effects, by the axis that the boundary is across.
+    pub const NAMES: [&'static str; 2] = ["stitching_x", "stitching_y"];
+
     /// Boundaries across x and across y for the lenses of a set that says where they run.
     pub fn of(set: &MeasuredSet) -> impl Iterator<Item = Self> + use<> {
         let diameter_um = set.stack.lens_diameter_um;
@@ -39,7 +42,7 @@ impl StitchedFields {
 
 impl Effect for StitchedFields {
     fn name(&self) -> String {
-        ["stitching_x", "stitching_y"][self.axis].into()
+        Self::NAMES[self.axis].into()
     }
 
     fn unit(&self) -> &str {

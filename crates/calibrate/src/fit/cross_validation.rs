@@ -43,17 +43,23 @@ pub struct Gain {
     pub interval: [f64; 2],
 }
 
-/// Group number of each capture in the three ways in which captures are left out.
+/// Group number of each capture in the three ways in which captures are left out: by colour, element and distance. Where all are alike
+/// in these, each capture is a group of its own.
 fn partitions(data: &Data) -> [PerCapture<usize>; 3] {
     let mut distances: Vec<f64> = data.beam.iter().map(|b| b.distance_um).collect();
     distances.sort_by(f64::total_cmp);
     distances.dedup();
     let distance = |b: &CaptureSetup| distances.iter().position(|d| *d == b.distance_um).unwrap_or(0);
-    [
+    let mut ways: [PerCapture<usize>; 3] = [
         data.beam.iter().map(|b| b.led.into()).collect(),
         data.beam.iter().map(|b| b.element.into()).collect(),
         data.beam.iter().map(distance).collect(),
-    ]
+    ];
+    let differs = |way: &PerCapture<usize>| way.iter().min() != way.iter().max();
+    if !ways.iter().any(differs) {
+        ways[2] = (0..data.beam.len()).collect();
+    }
+    ways
 }
 
 /// The error on captures left out, of a fit or of anything that has normal equations about it.
@@ -62,7 +68,7 @@ pub fn held_out(problem: &FitProblem<'_>, equations: &NormalEquations, fit: &Fit
     let whole = problem.total(equations, &fit.nuisances);
     for (way, partition) in partitions(problem.data).into_iter().enumerate() {
         let groups = partition.iter().max().map_or(0, |m| m + 1);
-        if groups < 2 {
+        if partition.iter().min() == partition.iter().max() {
             continue;
         }
         for group in 0..groups {
@@ -219,18 +225,25 @@ fn difference(before: &[Option<f64>; 3], after: &[Option<f64>; 3]) -> Option<f64
     mean(before.iter().zip(after).filter_map(|(b, a)| Some((*b)? - (*a)?)))
 }
 
-/// The captures of each element, direction and colour that count.
+/// Least number of groups whose draws tell how sure something is.
+const LEAST_GROUPS: usize = 3;
+
+/// The captures of each element, direction and colour that count; each capture by itself where that are too few groups to draw from.
 pub fn beam_groups(problem: &FitProblem<'_>) -> Vec<Vec<CaptureIndex>> {
     let beam = &problem.data.beam;
+    let counted = || problem.data.captures().filter(|&c| problem.used[c]);
     let mut groups: Vec<Vec<CaptureIndex>> = Vec::new();
-    for c in problem.data.captures().filter(|&c| problem.used[c]) {
+    for c in counted() {
         let key = |c: CaptureIndex| (beam[c].element, beam[c].led, beam[c].aoi_rad);
         match groups.iter_mut().find(|g| key(g[0]) == key(c)) {
             Some(group) => group.push(c),
             None => groups.push(vec![c]),
         }
     }
-    groups
+    match groups.len() < LEAST_GROUPS {
+        true => counted().map(|c| vec![c]).collect(),
+        false => groups,
+    }
 }
 
 /// 95 % half-widths of the active parameters of a fit: by a bootstrap over groups of captures, never less than the

@@ -1,9 +1,9 @@
 //! What was measured, as the statistics see it: whitened frames and widths, with what the lab states of them.
 
-use ndarray::Array2;
+use ndarray::{Array2, Zip};
 use rayon::prelude::*;
 
-use crate::set::{CaptureIndex, ElementIndex, LedIndex, MeasuredSet, PerCapture, PerLed, saturated};
+use crate::set::{CaptureIndex, ElementIndex, LedIndex, MeasuredSet, PerCapture, PerLed, expected, saturated};
 
 /// How a capture was lit and where it was taken: captures are grouped by this.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,7 +49,8 @@ pub struct Data {
 
 impl Data {
     /// Frames of a set, whitened by Poisson and read noise over their frames, or by the noise that comes with them. Saturated
-    /// pixels do not count, nor do their neighbours, which the charge of a full pixel spills into.
+    /// pixels do not count, nor do their neighbours, which the charge of a full pixel spills into. A pixel of few electrons has the
+    /// noise that its neighbours expect.
     pub fn new(set: &MeasuredSet) -> Self {
         let camera = &set.camera;
         let black = camera.black_level_dn as f32;
@@ -62,13 +63,15 @@ impl Data {
                     return noise.mapv(|variance| variance.sqrt().recip());
                 }
                 let full = saturated(&c.dn, camera.saturation_dn);
-                Array2::from_shape_fn(c.dn.dim(), |at| {
-                    let v = c.dn[at];
-                    if full[at] {
-                        return 0.0;
-                    }
-                    let variance = camera.variance_dn2(f64::from(v - black), c.frames);
-                    variance.sqrt().recip() as f32
+                let signal = c.dn.mapv(|v| v - black);
+                let told = Zip::from(&signal).and(&full).map_collect(|v, full| match full {
+                    true => 0.0,
+                    false => camera.electrons(f64::from(*v), c.frames) as f32,
+                });
+                let expected = expected(&signal, &told);
+                Zip::from(&expected).and(&full).map_collect(|v, full| match full {
+                    true => 0.0,
+                    false => camera.variance_dn2(f64::from(*v), c.frames).sqrt().recip() as f32,
                 })
             })
             .collect();

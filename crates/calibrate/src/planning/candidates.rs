@@ -31,7 +31,8 @@ pub struct Candidates {
 /// All that the bench could take of a design, whose layout is at `layout`.
 ///
 /// # Errors
-/// If the layout cannot be read, an element is not in the design, or nothing can be seen of any.
+/// If the design has rectangles or a hexagonal lattice, the layout cannot be read, an element is not in the design, or nothing can be
+/// seen of any.
 pub fn candidates(
     design: &Design,
     bench: &BenchFile,
@@ -39,10 +40,17 @@ pub fn candidates(
     reader: &dyn PillarReader,
     progress: &dyn Progress,
 ) -> Result<Candidates> {
+    if design.cell.shape.rectangles().is_some() {
+        return Err(Error::invalid(
+            format!("{} is a design of rectangles", design.path.display()),
+            "plan sessions of squares or circles: sets are read of these alone",
+        ));
+    }
+    design.square_lattice("`plan`")?;
     let chosen = chosen_elements(design, bench)?;
     let sites: Vec<ElementSite> = chosen.iter().map(|e| design.site_of(e)).collect();
     let layer = design.layout.layers.pillars.number();
-    let maps = reader.pillars(layout, layer, &sites, progress)?;
+    let maps = reader.pillars(layout, layer, design.cell.shape, &sites, progress)?;
     if let Some(empty) = maps.iter().zip(&sites).find(|(map, _)| map.pillars() == 0) {
         return Err(Error::invalid(
             format!("the layout has no pillars of element {}", empty.1.name),

@@ -49,7 +49,7 @@ fn instructions(page: &mut Page, plan: &CapturePlan, set: &MeasuredSet) {
     page.section("At the bench");
     page.list([
         format!(
-            "Save each capture as the mean of its frames: raw digital numbers with the black level ({} DN) in, {} rows of {} pixels, the first row at the lowest y.",
+            "Save each capture as the mean of its frames, with its fractions, or as the stack of all: raw digital numbers with the black level ({} DN) in, {} rows of {} pixels, the first row at the lowest y.",
             exact(camera.black_level_dn), camera.rows, camera.cols
         ),
         format!(

@@ -6,6 +6,7 @@
 mod ghost;
 mod gradient;
 mod wavefront;
+mod write_fields;
 
 use crate::diagnosis::FreePattern;
 use crate::effects::DeclaredEffect;
@@ -13,6 +14,7 @@ use crate::search::Evidence;
 use crate::session::Session;
 use crate::smooth_residual::SmoothResidual;
 use metalith_core::{Progress, Result};
+pub use write_fields::boundary;
 
 /// A shape is proposed if it removes this share of the chi-square above noise: less is a part of something else.
 const WORTH_PROPOSING: f64 = 0.3;

@@ -24,4 +24,4 @@ pub use evidence::{Evidence, attribute_set};
 pub use patterns::{Grouping, Pattern};
 pub use signatures::cosines;
 pub use state::fit_of;
-pub use stepwise::{LEAST_GAIN, RESIDUAL, Rejection, TriedEffect};
+pub use stepwise::{LEAST_GAIN, Rejection, TriedEffect};

@@ -9,8 +9,8 @@ use std::path::PathBuf;
 
 use ndarray::Array2;
 
-pub(crate) use frame::saturated;
 pub use frame::{Bayer, Channel};
+pub(crate) use frame::{expected, saturated};
 pub use index::{CaptureIndex, ElementIndex, LedIndex, PerCapture, PerElement, PerLed};
 pub use sem::{COLUMNS as SEM_COLUMNS, SemSite};
 
@@ -48,12 +48,7 @@ impl MeasuredSet {
     /// The element and the lattice site of a width by SEM; none if it is on no lattice.
     pub fn site_of(&self, site: &SemSite) -> Option<(ElementIndex, usize)> {
         let (index, element) = self.elements.iter_enumerated().find(|(_, e)| e.index == site.element)?;
-        let lattice = element.pillars.lattice;
-        let along = |x_um: f64| (x_um / lattice.pitch_um() + 0.5 * (lattice.sites() as f64 - 1.0)).round();
-        let (ix, iy) = (along(site.at_um[0]), along(site.at_um[1]));
-        let inside = 0.0..lattice.sites() as f64;
-        let is_inside = inside.contains(&ix) && inside.contains(&iy);
-        is_inside.then(|| (index, iy as usize * lattice.sites() + ix as usize))
+        Some((index, element.site_at(site.at_um)?))
     }
 
     /// Pixels of a capture that its colour can be seen by: those of its filter, where the sensor has filters.
@@ -136,6 +131,12 @@ impl RelayCamera {
         let shot = signal_dn.max(0.0) / self.gain_e_per_dn;
         (shot + self.read_noise_dn.powi(2)) / f64::from(frames)
     }
+
+    /// Electrons that the mean of so many frames rests on where it shows this signal above black (DN): those of the light, and as
+    /// many as would scatter like the read noise.
+    pub fn electrons(&self, signal_dn: f64, frames: u32) -> f64 {
+        self.gain_e_per_dn.powi(2) * f64::from(frames).powi(2) * self.variance_dn2(signal_dn, frames)
+    }
 }
 
 /// A Gaussian spectrum.
@@ -167,6 +168,18 @@ pub struct MeasuredElement {
     pub aperture_diameter_um: f64,
     /// Pillars as the layout has them.
     pub pillars: WidthMap,
+}
+
+impl MeasuredElement {
+    /// The lattice site nearest to a place from the middle (um), row by row; none beyond the lattice.
+    pub fn site_at(&self, at_um: [f64; 2]) -> Option<usize> {
+        let lattice = self.pillars.lattice;
+        let along = |x_um: f64| (x_um / lattice.pitch_um() + 0.5 * (lattice.sites() as f64 - 1.0)).round();
+        let (ix, iy) = (along(at_um[0]), along(at_um[1]));
+        let inside = 0.0..lattice.sites() as f64;
+        let is_inside = inside.contains(&ix) && inside.contains(&iy);
+        is_inside.then(|| iy as usize * lattice.sites() + ix as usize)
+    }
 }
 
 /// A window of the camera's mean frame.

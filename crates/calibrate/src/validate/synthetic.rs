@@ -4,8 +4,9 @@
 use std::sync::Arc;
 
 use ndarray::Array2;
-use rand::{Rng, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 
 use crate::bench::{Bench, Lit, Sampling};
 use crate::cells::{CellSource, RigorousCells};
@@ -244,8 +245,7 @@ impl<'a> Synthesizer<'a> {
     }
 }
 
-/// A draw from the normal distribution (Box and Muller).
+/// A draw from the normal distribution.
 fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    let (u, v): (f64, f64) = (1.0 - rng.random::<f64>(), rng.random());
-    (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+    StandardNormal.sample(rng)
 }

@@ -168,7 +168,7 @@ fn a_pair_is_found_where_neither_of_the_two_helps() {
     const TOLERANCE: f64 = 0.08;
     let truth = [("cd_bias", -12.0), ("film_index", 0.06)];
     let parts = truth.each_ref().map(|(n, v)| (*n, std::slice::from_ref(v)));
-    let set = synthetic(&parts, 22);
+    let set = synthetic(&parts, 24);
     let session = Session::new(&set, with_effects(&["cd_bias", "film_index", "zero_order", "gap"])).unwrap();
     let simulations = session.simulate(&Silent).unwrap();
     let d = session.diagnose(&simulations, &Silent).unwrap().0;

@@ -98,11 +98,13 @@ impl PillarReader for GdsPillars {
         &self,
         layout: &Path,
         layer: LayerNumber,
+        shape: PillarShape,
         elements: &[ElementSite],
         progress: &dyn Progress,
     ) -> metalith_core::Result<Vec<WidthMap>> {
         let file = Layout::open(layout)?;
-        let found = extract(&file, &ExtractionPlan::given(layer, elements.to_vec()), progress)?;
+        let plan = ExtractionPlan::given(layer, elements.to_vec()).of_shape(shape);
+        let found = extract(&file, &plan, progress)?;
         Ok(found.elements.into_iter().map(|e| e.widths).collect())
     }
 }

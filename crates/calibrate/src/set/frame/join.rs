@@ -3,7 +3,7 @@
 use ndarray::Array2;
 
 use super::bayer::{Bayer, Channel};
-use super::{SensorPixels, saturated};
+use super::{SensorPixels, expected, saturated};
 use crate::set::RelayCamera;
 
 /// A mean frame of one exposure.
@@ -14,6 +14,8 @@ pub struct Exposure {
     pub scale_dn: f64,
     /// Frames that it is the mean of.
     pub frames: u32,
+    /// Variance that it was rounded with (DN^2).
+    pub rounding_dn2: f64,
 }
 
 /// A capture as it is used.
@@ -29,7 +31,8 @@ pub struct Joined {
 
 /// Join exposures of one scene: the mean of what they say of the light, each weighted by one over its variance; an
 /// exposure in which a pixel is saturated, or beside one that is, says nothing of it. Variances follow from a first mean of
-/// all exposures, not from each by itself, which would favour those that came out too dark. The noise of dark and flat frames
+/// all exposures, not from each by itself, which would favour those that came out too dark; of few electrons from that of the
+/// neighbours. The noise of dark and flat frames
 /// is common to all exposures: it has no part in the weights, and is added to the variance of the mean. With `filter`, pixels
 /// under other filters are masked.
 ///
@@ -43,7 +46,9 @@ pub fn joined(
 ) -> Joined {
     let longest = exposures.iter().max_by(|a, b| a.scale_dn.total_cmp(&b.scale_dn));
     let (scale_dn, frames) = longest.map(|e| (e.scale_dn, e.frames)).expect("at least one exposure");
-    if let ([_], None, None) = (exposures.as_slice(), sensor, filter) {
+    if let ([only], None, None) = (exposures.as_slice(), sensor, filter)
+        && only.rounding_dn2 == 0.0
+    {
         return Joined {
             dn: exposures.remove(0).dn,
             noise: None,
@@ -55,42 +60,52 @@ pub fn joined(
     let masks: Vec<Array2<bool>> = exposures
         .iter_mut()
         .map(|e| match sensor {
-            Some(sensor) => sensor.take_out(&mut e.dn),
+            Some(sensor) => sensor.take_out(&mut e.dn, filter),
             None => saturated(&e.dn, camera.saturation_dn),
         })
         .collect();
     let mut dn = exposures[0].dn.clone();
-    let mut noise = Array2::from_elem(dn.dim(), f32::INFINITY);
-    for (at, to) in dn.indexed_iter_mut() {
-        let usable = || {
-            exposures
-                .iter()
-                .zip(&masks)
-                .filter(|(_, full)| !full[at])
-                .map(|(e, _)| e)
-        };
-        let signal = |e: &Exposure| f64::from(e.dn[at]) - black;
-        let (light, weight) = usable().fold((0.0, 0.0), |(light, weight), e| {
+    let usable = |at: (usize, usize)| {
+        let told = exposures.iter().zip(&masks).filter(move |(_, full)| !full[at]);
+        told.map(|(e, _)| e)
+    };
+    let signal = |e: &Exposure, at| f64::from(e.dn[at]) - black;
+    // Light of each pixel by all exposures, and the electrons that it rests on.
+    let mut electrons = Array2::zeros(dn.dim());
+    let first = Array2::from_shape_fn(dn.dim(), |at| {
+        let (light, weight) = usable(at).fold((0.0, 0.0), |(light, weight), e| {
             let frames = f64::from(e.frames);
-            (light + frames * signal(e), weight + frames * e.scale_dn)
+            (light + frames * signal(e, at), weight + frames * e.scale_dn)
         });
         if weight == 0.0 {
+            return f32::INFINITY;
+        }
+        if filter.is_none_or(|(bayer, channel)| bayer.has(at, channel)) {
+            let own = usable(at).map(|e| camera.electrons(signal(e, at), e.frames));
+            electrons[at] = own.sum::<f64>() as f32;
+        }
+        (light / weight) as f32
+    });
+    let first = expected(&first, &electrons);
+    let mut noise = Array2::from_elem(dn.dim(), f32::INFINITY);
+    for (at, to) in dn.indexed_iter_mut() {
+        if usable(at).next().is_none() {
             // All that is known is that there is much of it.
             *to = (black
                 + scale_dn / exposures.iter().map(|e| e.scale_dn).fold(f64::MAX, f64::min) * camera.saturation_dn)
                 as f32;
             continue;
         }
-        let first = light / weight;
+        let first = f64::from(first[at]);
         let (mut sum, mut certainty, mut shared) = (0.0, 0.0, [0.0; 2]);
-        for e in usable() {
+        for e in usable(at) {
             let expected = first * e.scale_dn;
             let variance = sensor.map_or_else(
-                || camera.variance_dn2(expected, e.frames),
-                |s| s.own_variance_dn2(at, expected, e.frames),
+                || camera.variance_dn2(expected, e.frames) + e.rounding_dn2,
+                |s| s.own_variance_dn2(at, expected, e.frames, e.rounding_dn2),
             );
             let own = e.scale_dn * e.scale_dn / variance;
-            sum += own * signal(e) / e.scale_dn;
+            sum += own * signal(e, at) / e.scale_dn;
             certainty += own;
             let errors = sensor.map_or([0.0; 2], |s| s.shared_errors_dn(at, expected));
             shared = [0, 1].map(|k| shared[k] + own * errors[k] / e.scale_dn);
@@ -125,7 +140,25 @@ mod tests {
             dn: Array2::from_shape_vec((2, 3), values.to_vec()).unwrap(),
             scale_dn,
             frames,
+            rounding_dn2: 0.0,
         }
+    }
+
+    /// A mean that was rounded to whole numbers scatters by that too.
+    #[test]
+    fn rounding_is_noise() {
+        let mut rounded = exposure(1.0, 100, [140.0; 6]);
+        rounded.rounding_dn2 = 1.0 / 12.0;
+        let joined = joined(vec![rounded], None, &camera(), None);
+        // 100 e in 100 frames, read noise of 1 DN in as many, single precision.
+        let want = 1.0 + 0.01 + 1.0 / 12.0;
+        assert!(
+            joined
+                .noise
+                .unwrap()
+                .iter()
+                .all(|v| (f64::from(*v) - want).abs() < 1e-6)
+        );
     }
 
     /// Two exposures of unlike length: what is saturated in the long one comes from the short one, the rest from both,

@@ -1,12 +1,14 @@
 //! Camera frames from NPY, PNG and TIFF files, what the sensor itself adds to them, and several exposures as one.
 
 mod bayer;
+mod expected;
 mod join;
 mod png;
 mod sensor;
 mod tiff;
 
 pub use bayer::{Bayer, Channel};
+pub use expected::expected;
 pub use join::{Exposure, joined};
 pub use sensor::{SensorFrame, SensorFrames, SensorPixels};
 
@@ -20,25 +22,71 @@ use super::SATURATED;
 /// Most pixels of a stack of frames (1 GB in single precision).
 const MOST_PIXELS: u64 = 1 << 28;
 
+/// Frames of one file, each with one value for each pixel.
+struct Pages {
+    values: Vec<Vec<f32>>,
+    /// The largest number that the format holds, if it holds whole numbers alone.
+    largest: Option<f32>,
+}
+
+/// A frame as its file has it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recorded {
+    /// Mean of the pages of the file (DN).
+    pub dn: Array2<f32>,
+    /// Frames in the file.
+    pub pages: u32,
+    /// Whether the file holds whole numbers alone.
+    whole: bool,
+}
+
+impl Recorded {
+    /// Variance that rounding to whole numbers adds (DN^2) if this is the mean of so many frames: means that are stored as whole
+    /// numbers were rounded afterwards, and the read noise of the camera does not have that in it.
+    pub fn rounding_dn2(&self, frames: u32) -> f64 {
+        match self.whole && frames > self.pages {
+            true => OF_ROUNDING / f64::from(self.pages),
+            false => 0.0,
+        }
+    }
+}
+
+/// Variance of a number that is rounded to whole ones.
+const OF_ROUNDING: f64 = 1.0 / 12.0;
+
 /// Read frames of exactly `rows` x `cols` finite numbers, whose values are DN: NPY, grey PNG, or grey TIFF. NPY of three axes
 /// and TIFF of several pages are stacks: what comes back is their mean, and pixels that are saturated in any frame
-/// have `saturation_dn`, which a mean would hide. The first row of the file is row 0. What is wrong comes back in words.
-pub fn read(path: &Path, rows: usize, cols: usize, saturation_dn: f64) -> Result<Array2<f32>, String> {
+/// have `saturation_dn`, which a mean would hide. Files that end below `saturation_dn` must not be full. The first row of the file
+/// is row 0. What is wrong comes back in words.
+pub fn read(path: &Path, rows: usize, cols: usize, saturation_dn: f64) -> Result<Recorded, String> {
     let is = |endings: &[&str]| {
         let ending = path.extension().and_then(|e| e.to_str());
         ending.is_some_and(|e| endings.iter().any(|known| e.eq_ignore_ascii_case(known)))
     };
-    let frames = if is(&["png"]) {
-        vec![png::read(path, rows, cols)?]
+    let pages = if is(&["png"]) {
+        png::read(path, rows, cols)?
     } else if is(&["tif", "tiff"]) {
         tiff::read(path, rows, cols)?
     } else {
         from_npy(path, rows, cols)?
     };
-    mean(&frames, rows, cols, saturation_dn)
+    let values = || pages.values.iter().flatten();
+    if let Some(largest) = pages.largest.filter(|v| f64::from(*v) < SATURATED * saturation_dn) {
+        let full = values().filter(|v| **v >= largest).count();
+        if full > 0 {
+            return Err(format!(
+                "{full} of its pixels have {largest}, the largest number that it holds, and `saturation_dn` is {saturation_dn}"
+            ));
+        }
+    }
+    Ok(Recorded {
+        dn: mean(&pages.values, rows, cols, saturation_dn)?,
+        pages: pages.values.len() as u32,
+        whole: pages.largest.is_some(),
+    })
 }
 
-fn from_npy(path: &Path, rows: usize, cols: usize) -> Result<Vec<Vec<f32>>, String> {
+fn from_npy(path: &Path, rows: usize, cols: usize) -> Result<Pages, String> {
     let one = [rows as u64, cols as u64];
     let takes = |shape: &[u64]| {
         shape == one
@@ -49,7 +97,10 @@ fn from_npy(path: &Path, rows: usize, cols: usize) -> Result<Vec<Vec<f32>>, Stri
         other => other.to_string(),
     })?;
     let frames = array.values.chunks_exact(rows * cols);
-    Ok(frames.map(|f| f.iter().map(|&v| v as f32).collect()).collect())
+    Ok(Pages {
+        values: frames.map(|f| f.iter().map(|&v| v as f32).collect()).collect(),
+        largest: None,
+    })
 }
 
 fn mean(frames: &[Vec<f32>], rows: usize, cols: usize, saturation_dn: f64) -> Result<Array2<f32>, String> {
@@ -113,12 +164,14 @@ mod tests {
         };
         write(::png::BitDepth::Eight, &[1, 2, 3, 4, 5, 255]);
         assert_eq!(
-            read(&path, 2, 3, FULL).unwrap(),
+            read(&path, 2, 3, 255.0).unwrap().dn,
             ndarray::arr2(&[[1.0, 2.0, 3.0], [4.0, 5.0, 255.0]])
         );
+        // A file of 8 bits does not say how far its full pixels went.
+        assert!(read(&path, 2, 3, FULL).unwrap_err().contains("largest number"));
         write(::png::BitDepth::Sixteen, &[0, 1, 1, 0, 0, 3, 0, 4, 0, 5, 255, 255]);
         assert_eq!(
-            read(&path, 2, 3, FULL).unwrap(),
+            read(&path, 2, 3, FULL).unwrap().dn,
             ndarray::arr2(&[[1.0, 256.0, 3.0], [4.0, 5.0, 65535.0]])
         );
         assert!(read(&path, 3, 3, FULL).unwrap_err().contains("2 x 3"));
@@ -140,7 +193,11 @@ mod tests {
             }
         }
         let want = ndarray::arr2(&[[2.0, 3.0, 4.0], [5.0, 6.0, 600.0]]);
-        assert_eq!(read(&path, 2, 3, 600.0).unwrap(), want);
+        let stack = read(&path, 2, 3, 600.0).unwrap();
+        assert_eq!((&stack.dn, stack.pages), (&want, 2));
+        // Two frames as they were recorded have the read noise of the camera; the mean of ten more was rounded afterwards.
+        assert_eq!(stack.rounding_dn2(2), 0.0);
+        assert_eq!(stack.rounding_dn2(20), 1.0 / 24.0);
         assert!(read(&path, 3, 2, 600.0).unwrap_err().contains("2 x 3"));
         let npy = folder.path().join("a.npy");
         let mut bytes = Vec::new();
@@ -153,7 +210,7 @@ mod tests {
         writer.extend(pages.concat()).unwrap();
         writer.finish().unwrap();
         std::fs::write(&npy, bytes).unwrap();
-        assert_eq!(read(&npy, 2, 3, 600.0).unwrap(), want);
+        assert_eq!(read(&npy, 2, 3, 600.0).unwrap().dn, want);
         std::fs::write(&path, b"II*\0nothing").unwrap();
         assert!(read(&path, 2, 3, 600.0).unwrap_err().contains("no TIFF"));
     }

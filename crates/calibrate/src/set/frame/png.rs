@@ -4,10 +4,10 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-use super::other_size;
+use super::{Pages, other_size};
 
 /// The values of a grey PNG of 8 or 16 bits.
-pub fn read(path: &Path, rows: usize, cols: usize) -> Result<Vec<f32>, String> {
+pub fn read(path: &Path, rows: usize, cols: usize) -> Result<Pages, String> {
     let wrong = |e: png::DecodingError| format!("it is no PNG file that can be read: {e}");
     let file = File::open(path).map_err(|e| format!("it cannot be read: {e}"))?;
     let mut reader = png::Decoder::new(BufReader::new(file)).read_info().map_err(wrong)?;
@@ -31,8 +31,9 @@ pub fn read(path: &Path, rows: usize, cols: usize) -> Result<Vec<f32>, String> {
         return Err("its size is not that of its pixels".into());
     }
     reader.next_frame(&mut data).map_err(wrong)?;
-    Ok(data
-        .chunks_exact(bytes)
-        .map(|b| b.iter().fold(0.0, |sum, byte| 256.0 * sum + f32::from(*byte)))
-        .collect())
+    let value = |b: &[u8]| b.iter().fold(0.0, |sum, byte| 256.0 * sum + f32::from(*byte));
+    Ok(Pages {
+        values: vec![data.chunks_exact(bytes).map(value).collect()],
+        largest: Some(value(&[u8::MAX; 2][..bytes])),
+    })
 }

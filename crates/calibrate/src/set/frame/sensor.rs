@@ -1,8 +1,8 @@
 //! What the sensor itself adds to frames.
 
-use ndarray::Array2;
+use ndarray::{Array2, Zip};
 
-use super::{Channel, saturated};
+use super::{Bayer, Channel, saturated};
 use crate::set::{RelayCamera, SATURATED};
 
 /// A mean frame of the sensor by itself.
@@ -11,6 +11,15 @@ pub struct SensorFrame {
     pub dn: Array2<f32>,
     /// Frames that it is the mean of.
     pub frames: u32,
+    /// Variance that it was rounded with (DN^2).
+    pub rounding_dn2: f64,
+}
+
+impl SensorFrame {
+    /// Variance of a pixel (DN^2) that shows so much above black.
+    fn variance_dn2(&self, camera: &RelayCamera, signal_dn: f64) -> f64 {
+        camera.variance_dn2(signal_dn, self.frames) + self.rounding_dn2
+    }
 }
 
 /// Frames without light and in even light: what the sensor adds by itself.
@@ -32,15 +41,18 @@ impl SensorFrames {
             .as_ref()
             .map_or_else(|| Array2::from_elem(shape, black), |d| d.dn.clone());
         let dark_noise = self.dark.as_ref().map(|d| {
-            let variance = |v: &f32| camera.variance_dn2(f64::from(v - black), d.frames);
+            let variance = |v: &f32| d.variance_dn2(camera, f64::from(v - black));
             d.dn.map(variance)
         });
         let flat = self.flat.as_ref().map(|flat| {
             let lit = &flat.dn - &dark;
             let level = levels(&lit, camera);
+            let full = (SATURATED * camera.saturation_dn) as f32;
+            // How much brighter than that a full pixel was, nobody knows: it tells nothing.
+            let response = Zip::from(&lit).and(&level).and(&flat.dn);
             FlatPixels {
-                response: &lit / &level,
-                noise: flat.dn.map(|v| camera.variance_dn2(f64::from(v - black), flat.frames)),
+                response: response.map_collect(|lit, level, dn| if *dn < full { lit / level } else { 0.0 }),
+                noise: flat.dn.map(|v| flat.variance_dn2(camera, f64::from(v - black))),
                 level,
             }
         });
@@ -90,11 +102,15 @@ struct FlatPixels {
 
 impl SensorPixels {
     /// Take both frames out of a capture: every pixel has the stated black level and the mean response after. Pixels that tell
-    /// nothing: those that were saturated or beside one that was, and dead ones with those beside them. They stay saturated.
-    pub fn take_out(&self, dn: &mut Array2<f32>) -> Array2<bool> {
+    /// nothing: those that were saturated or beside one that was, and dead ones with those beside them. They stay saturated. With
+    /// `filter` pixels under others are not dead: light of a flat frame may be of one colour.
+    pub fn take_out(&self, dn: &mut Array2<f32>, filter: Option<(Bayer, Channel)>) -> Array2<bool> {
         let (black, full) = (self.camera.black_level_dn as f32, self.camera.saturation_dn);
+        let counts = |at| filter.is_none_or(|(bayer, channel)| bayer.has(at, channel));
         for (at, v) in dn.indexed_iter_mut() {
-            if self.response(at) <= LEAST_RESPONSE {
+            let response = self.response(at);
+            // Without light there is no response to speak of.
+            if counts(at) && (response.is_nan() || response <= LEAST_RESPONSE) {
                 *v = full as f32;
             }
         }
@@ -112,10 +128,11 @@ impl SensorPixels {
 
     /// Variance of a corrected pixel by the noise of its own exposure (DN^2), which shows `signal_dn` above black in the mean of
     /// so many frames: shot noise of all that was recorded, dark current included, and read noise, both divided by the response.
-    pub fn own_variance_dn2(&self, at: (usize, usize), signal_dn: f64, frames: u32) -> f64 {
+    /// The recorded mean was rounded with `rounding_dn2` (DN^2).
+    pub fn own_variance_dn2(&self, at: (usize, usize), signal_dn: f64, frames: u32, rounding_dn2: f64) -> f64 {
         let response = f64::from(self.response(at));
         let recorded = response * signal_dn + f64::from(self.dark[at]) - self.camera.black_level_dn;
-        self.camera.variance_dn2(recorded, frames) / (response * response)
+        (self.camera.variance_dn2(recorded, frames) + rounding_dn2) / (response * response)
     }
 
     /// By how much a corrected pixel that shows `signal_dn` is off if the dark frame, and if the flat frame, is too bright by
@@ -161,7 +178,13 @@ pub(super) mod tests {
     }
 
     fn frames(dark: Array2<f32>, flat: Array2<f32>, frames: u32) -> SensorFrames {
-        let frame = |dn| Some(SensorFrame { dn, frames });
+        let frame = |dn| {
+            Some(SensorFrame {
+                dn,
+                frames,
+                rounding_dn2: 0.0,
+            })
+        };
         SensorFrames {
             dark: frame(dark),
             flat: frame(flat),
@@ -178,7 +201,7 @@ pub(super) mod tests {
         );
         let mean: f32 = (50.0 + 150.0 + 200.0 + 200.0 + 0.0 + 200.0) / 6.0;
         let mut dn = ndarray::arr2(&[[66.0, 115.0, 999.0], [140.0, 50.0, 140.0]]);
-        let masked = frames.pixels(&camera()).unwrap().take_out(&mut dn);
+        let masked = frames.pixels(&camera()).unwrap().take_out(&mut dn, None);
         // All are beside the dead pixel or the full one.
         assert!(masked.iter().all(|m| *m));
         // Single precision.
@@ -204,8 +227,29 @@ pub(super) mod tests {
         );
         let mut dn = Array2::from_elem((2, 3), 100.0);
         dn[(0, 0)] = 700.0;
-        let masked = frames.pixels(&camera()).unwrap().take_out(&mut dn);
+        let masked = frames.pixels(&camera()).unwrap().take_out(&mut dn, None);
         assert!(dn[(0, 0)] > 1000.0 && masked.iter().all(|m| !*m), "{dn}");
+    }
+
+    /// A flat frame that was too bright somewhere tells nothing there, and dead pixels of other filters no matter.
+    #[test]
+    fn pixels_that_a_flat_frame_does_not_tell_of_are_dead() {
+        let green = (Bayer::CHOICES[0].1, Channel::Green);
+        let camera = RelayCamera {
+            bayer: Some(green.0),
+            ..camera()
+        };
+        let shape = (8, 8);
+        // Light of green alone; one green pixel is full.
+        let mut flat = Array2::from_shape_fn(shape, |at| if green.0.has(at, green.1) { 240.0 } else { 40.0 });
+        let full = (0..8).map(|x| (0, x)).find(|at| green.0.has(*at, green.1)).unwrap();
+        flat[full] = 1000.0;
+        let pixels = frames(Array2::from_elem(shape, 40.0), flat, 1).pixels(&camera).unwrap();
+        let masked = pixels.take_out(&mut Array2::from_elem(shape, 140.0), Some(green));
+        for (at, masked) in masked.indexed_iter() {
+            let near = at.0.abs_diff(full.0) <= 1 && at.1.abs_diff(full.1) <= 1;
+            assert_eq!(*masked, near, "{at:?}");
+        }
     }
 
     /// Even light that is not white: pixels of unlike filters are as bright as their filter, and none is a better pixel.
@@ -266,12 +310,12 @@ pub(super) mod tests {
             frames(dark.clone(), flat.clone(), of_sensor)
                 .pixels(&camera)
                 .unwrap()
-                .take_out(&mut dn);
+                .take_out(&mut dn, None);
             values.push(f64::from(dn[(0, 0)]) - black);
         }
         let mean = values.iter().sum::<f64>() / DRAWS as f64;
         let scatter = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / DRAWS as f64;
-        let own = expected.own_variance_dn2((0, 0), mean, of_capture);
+        let own = expected.own_variance_dn2((0, 0), mean, of_capture, 0.0);
         let [of_dark, of_flat] = expected.shared_errors_dn((0, 0), mean).map(|e| e * e);
         let stated = own + of_dark + of_flat;
         assert!((scatter / stated - 1.0).abs() < TOLERANCE, "{scatter} {stated}");

@@ -7,10 +7,10 @@ use std::path::Path;
 use tiff::ColorType;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 
-use super::{MOST_PIXELS, other_size};
+use super::{MOST_PIXELS, Pages, other_size};
 
 /// The values of each page: grey of 8 or 16 bits, or of 32 bits with a decimal point.
-pub fn read(path: &Path, rows: usize, cols: usize) -> Result<Vec<Vec<f32>>, String> {
+pub fn read(path: &Path, rows: usize, cols: usize) -> Result<Pages, String> {
     let wrong = |e: tiff::TiffError| format!("it is no TIFF file that can be read: {e}");
     let file = File::open(path).map_err(|e| format!("it cannot be read: {e}"))?;
     let mut limits = Limits::default();
@@ -18,7 +18,7 @@ pub fn read(path: &Path, rows: usize, cols: usize) -> Result<Vec<Vec<f32>>, Stri
     limits.decoding_buffer_size = 16 * rows * cols;
     limits.intermediate_buffer_size = 16 * rows * cols + (1 << 20);
     let mut decoder = Decoder::new(BufReader::new(file)).map_err(wrong)?.with_limits(limits);
-    let mut pages = Vec::new();
+    let (mut pages, mut largest) = (Vec::new(), None);
     loop {
         let (width, height) = decoder.dimensions().map_err(wrong)?;
         let size = (height as usize, width as usize);
@@ -30,8 +30,14 @@ pub fn read(path: &Path, rows: usize, cols: usize) -> Result<Vec<Vec<f32>>, Stri
             return Err(format!("its pixels are {colour:?}, not grey"));
         };
         let page: Vec<f32> = match decoder.read_image().map_err(wrong)? {
-            DecodingResult::U8(v) => v.into_iter().map(f32::from).collect(),
-            DecodingResult::U16(v) => v.into_iter().map(f32::from).collect(),
+            DecodingResult::U8(v) => {
+                largest = Some(f32::from(u8::MAX));
+                v.into_iter().map(f32::from).collect()
+            }
+            DecodingResult::U16(v) => {
+                largest = Some(f32::from(u16::MAX));
+                v.into_iter().map(f32::from).collect()
+            }
             DecodingResult::F32(v) => v,
             _ => {
                 return Err(format!(
@@ -44,7 +50,7 @@ pub fn read(path: &Path, rows: usize, cols: usize) -> Result<Vec<Vec<f32>>, Stri
         }
         pages.push(page);
         if !decoder.more_images() {
-            return Ok(pages);
+            return Ok(Pages { values: pages, largest });
         }
         if (pages.len() + 1) as u64 * (rows * cols) as u64 > MOST_PIXELS {
             return Err(format!("it has more than {} pages", pages.len()));

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use ndarray::Array2;
 
+use super::{holds_its_pages, whole};
 use crate::set::frame::{Exposure, SensorPixels};
 use crate::set::{
     Capture, ElementIndex, Led, LedIndex, MeasuredElement, PerElement, PerLed, RelayCamera, SemSite, frame, sem,
@@ -19,9 +20,7 @@ pub(super) fn captures(
 ) -> Vec<Capture> {
     let mut captures = Vec::new();
     for s in root.sections("capture") {
-        let index = s
-            .array::<2>("element", Limits::new(-1000.0..=1000.0, ""))
-            .map(|v| v as i64);
+        let index = whole(&s, "element", Limits::new(-1000.0..=1000.0, ""));
         let known = elements.iter_enumerated().find(|(_, e)| e.index == index);
         let element = known.map(|(e, _)| e).unwrap_or_else(|| {
             s.fault(
@@ -93,6 +92,7 @@ fn exposures(s: &Section<'_, '_>, camera: &RelayCamera) -> (PathBuf, Vec<Exposur
             dn: Array2::zeros((camera.rows, camera.cols)),
             scale_dn: 1.0,
             frames: 1,
+            rounding_dn2: 0.0,
         });
     }
     (name.unwrap_or_default(), all)
@@ -102,18 +102,33 @@ fn exposure(s: &Section<'_, '_>, camera: &RelayCamera) -> (PathBuf, Exposure) {
     let path = s.file("file");
     let scale_dn = s.float("scale_dn", Limits::new(f64::MIN_POSITIVE..=1e12, "DN"));
     let frames = s.integer("frames", 1..=1_000_000, "frames") as u32;
-    let dn = frame::read(&path, camera.rows, camera.cols, camera.saturation_dn).unwrap_or_else(|what| {
-        // A file that is not there has been named as such already.
-        if path.is_file() {
-            s.fault(
-                "file",
-                what,
-                "save it as NPY [rows, cols], as grey PNG or as grey TIFF, or leave the capture out",
-            );
+    let exposure = match frame::read(&path, camera.rows, camera.cols, camera.saturation_dn) {
+        Ok(recorded) => {
+            holds_its_pages(s, "frames", &recorded, frames);
+            Exposure {
+                rounding_dn2: recorded.rounding_dn2(frames),
+                dn: recorded.dn,
+                scale_dn,
+                frames,
+            }
         }
-        Array2::zeros((camera.rows, camera.cols))
-    });
-    let exposure = Exposure { dn, scale_dn, frames };
+        Err(what) => {
+            // A file that is not there has been named as such already.
+            if path.is_file() {
+                s.fault(
+                    "file",
+                    what,
+                    "save it as NPY [rows, cols], as grey PNG or as grey TIFF, or leave the capture out",
+                );
+            }
+            Exposure {
+                dn: Array2::zeros((camera.rows, camera.cols)),
+                scale_dn,
+                frames,
+                rounding_dn2: 0.0,
+            }
+        }
+    };
     (path, exposure)
 }
 
@@ -133,17 +148,47 @@ pub(super) fn widths(root: &Section<'_, '_>, elements: &PerElement<MeasuredEleme
             (Vec::new(), offset)
         }
         Ok(sites) => {
-            for site in &sites {
-                if !elements.iter().any(|e| e.index == site.element) {
-                    s.fault(
-                        "file",
-                        format!("it names element {:?}, which is not described", site.element),
-                        "add an [[element]] for it",
-                    );
-                    break;
-                }
+            // One of them, for there may be thousands of a kind.
+            if let Some((what, hint)) = sites.iter().find_map(|site| misplaced(site, elements)) {
+                s.fault("file", what, hint);
             }
             (sites, offset)
         }
     }
+}
+
+/// Largest difference of a width as designed by the table and by the layout (nm): both may be rounded.
+const ROUNDED_NM: f64 = 1.0;
+
+/// What is wrong with a width by SEM, and what to do: no such element, no pillar there, or another one by the layout.
+fn misplaced(site: &SemSite, elements: &PerElement<MeasuredElement>) -> Option<(String, &'static str)> {
+    let Some(element) = elements.iter().find(|e| e.index == site.element) else {
+        let what = format!("it names element {:?}, which is not described", site.element);
+        return Some((what, "add an [[element]] for it"));
+    };
+    // A layout that cannot be read has been named as such already.
+    if element.pillars.pillars() == 0 {
+        return None;
+    }
+    let place = format!("at {:?} um in element {:?}", site.at_um, site.element);
+    let written = element
+        .site_at(site.at_um)
+        .map_or(0, |at| element.pillars.width_nm.as_slice().map_or(0, |w| w[at]));
+    if written == 0 {
+        let what = format!("it names a pillar {place}, where the layout has none");
+        return Some((
+            what,
+            "count places from the middle of the element, or leave the line out",
+        ));
+    }
+    ((site.designed_nm - f64::from(written)).abs() > ROUNDED_NM).then(|| {
+        let what = format!(
+            "a pillar of {} nm by design {place}, of {written} nm in the layout",
+            site.designed_nm
+        );
+        (
+            what,
+            "give the width of the layout as the designed one, or the layout that was written",
+        )
+    })
 }

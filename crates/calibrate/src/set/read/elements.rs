@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::whole;
 use crate::set::{MeasuredElement, Stack};
 use metalith_core::document::{Limits, Section};
 use metalith_core::{ElementSite, Lattice, Result, WidthMap};
@@ -22,9 +23,7 @@ pub(super) fn elements(
     }
     let mut elements: Vec<MeasuredElement> = Vec::new();
     for s in &sections {
-        let index = s
-            .array::<2>("index", Limits::new(-1000.0..=1000.0, ""))
-            .map(|v| v as i64);
+        let index = whole(s, "index", Limits::new(-1000.0..=1000.0, ""));
         let centre_um = s.array("centre_um", Limits::new(-1e6..=1e6, "um"));
         let aperture_diameter_um = s.float("aperture_diameter_um", Limits::new(1.0..=2000.0, "um"));
         s.finish();

@@ -5,13 +5,14 @@ mod elements;
 
 use std::path::Path;
 
-use super::frame::{self, Bayer, Channel, SensorFrame, SensorFrames};
-use super::{Led, MeasuredSet, PerElement, PerLed, RelayCamera, Stack};
+use super::frame::{self, Bayer, Channel, Recorded, SensorFrame, SensorFrames};
+use super::{Led, MeasuredSet, PerElement, PerLed, RelayCamera, SATURATED, Stack};
 use captures::{captures, widths};
 use elements::elements;
 use metalith_cell::{CellStack, Material, UniformLayer};
 use metalith_core::document::{Document, Limits, Section, load};
 use metalith_core::{ElementSite, LayerNumber, PillarReader, PillarShape, Progress, Result};
+use ndarray::Array2;
 
 /// Version of the format that is read.
 const SCHEMA: i64 = 1;
@@ -42,7 +43,7 @@ fn sections(path: &Path, root: &Section<'_, '_>, layouts: &dyn PillarReader, pro
     let title = root.text("title");
     let layers = root.section("layout_layers");
     let layer = |key| {
-        let [layer, datatype] = layers.array(key, Limits::new(0.0..=32767.0, ""));
+        let [layer, datatype] = whole(&layers, key, Limits::new(0.0..=32767.0, ""));
         LayerNumber {
             layer: layer as u16,
             datatype: datatype as u16,
@@ -58,7 +59,7 @@ fn sections(path: &Path, root: &Section<'_, '_>, layouts: &dyn PillarReader, pro
     let leds: PerLed<_> = leds(root, camera.bayer, is_known.then_some(&stack.cell)).into();
     let layout = root.file("layout");
     let elements: PerElement<_> = {
-        let read = |sites: &[ElementSite]| layouts.pillars(&layout, pillar_layer, sites, progress);
+        let read = |sites: &[ElementSite]| layouts.pillars(&layout, pillar_layer, stack.cell.shape, sites, progress);
         elements(root, &stack, &layout, &read).into()
     };
     let captures = captures(root, &camera, frames.pixels(&camera).as_ref(), &leds, &elements);
@@ -78,6 +79,15 @@ fn sections(path: &Path, root: &Section<'_, '_>, layouts: &dyn PillarReader, pro
         sem,
         sem_offset_sigma_nm,
     }
+}
+
+/// Exactly `N` whole numbers that must be there, each within the limits.
+fn whole<const N: usize>(s: &Section<'_, '_>, key: &str, limits: Limits) -> [i64; N] {
+    let numbers: [f64; N] = s.array(key, limits);
+    if numbers.iter().any(|v| v.fract() != 0.0) {
+        s.fault(key, format!("`{key}` has a fraction"), "give whole numbers");
+    }
+    numbers.map(|v| v as i64)
 }
 
 /// Edge of a pixel in the plane of the chip's image (um): as given, or that of the sensor over the magnification of the
@@ -184,6 +194,20 @@ pub(crate) fn source(s: &Section<'_, '_>) -> f64 {
     mrad * 1e-3
 }
 
+/// Share of the pixels of a flat frame that may be saturated: hot ones.
+const MOST_FULL: f64 = 0.01;
+
+/// Fault a number of frames that is less than the file holds.
+fn holds_its_pages(s: &Section<'_, '_>, key: &str, recorded: &Recorded, frames: u32) {
+    if frames < recorded.pages {
+        s.fault(
+            key,
+            format!("{frames} frames, and the file holds {}", recorded.pages),
+            "say of how many frames the mean of the file is",
+        );
+    }
+}
+
 pub(crate) fn camera(s: &Section<'_, '_>) -> (RelayCamera, SensorFrames) {
     let positive = |key, high, unit| s.float(key, Limits::new(f64::MIN_POSITIVE..=high, unit));
     let camera = RelayCamera {
@@ -206,16 +230,44 @@ pub(crate) fn camera(s: &Section<'_, '_>) -> (RelayCamera, SensorFrames) {
             return None;
         }
         let (path, frames) = (s.file(key), s.integer(count, 1..=1_000_000, "frames") as u32);
-        let read = |path: &Path| frame::read(path, camera.rows, camera.cols, f64::INFINITY);
-        let dn = path.is_file().then(|| read(&path))?;
-        dn.map_err(|what| s.fault(key, what, "give a frame as large as the captures"))
-            .ok()
-            .map(|dn| SensorFrame { dn, frames })
+        let read = |path: &Path| frame::read(path, camera.rows, camera.cols, camera.saturation_dn);
+        let recorded = path.is_file().then(|| read(&path))?;
+        let recorded = recorded.map_err(|what| s.fault(key, what, "give a frame as large as the captures"));
+        let recorded = recorded.ok()?;
+        holds_its_pages(s, count, &recorded, frames);
+        Some(SensorFrame {
+            rounding_dn2: recorded.rounding_dn2(frames),
+            dn: recorded.dn,
+            frames,
+        })
     };
     let frames = SensorFrames {
         dark: sensor_frame("dark_frame", "dark_frames"),
         flat: sensor_frame("flat_frame", "flat_frames"),
     };
+    if let Some(flat) = &frames.flat {
+        let mean = |dn: &Array2<f32>| f64::from(dn.mean().unwrap_or(0.0));
+        let dark = frames.dark.as_ref().map_or(camera.black_level_dn, |d| mean(&d.dn));
+        if mean(&flat.dn) <= dark {
+            s.fault(
+                "flat_frame",
+                format!("its mean is {:.1} DN, and {dark:.1} DN without light", mean(&flat.dn)),
+                "give a frame in even light",
+            );
+        }
+        let full = flat
+            .dn
+            .iter()
+            .filter(|v| f64::from(**v) >= SATURATED * camera.saturation_dn);
+        let full = full.count();
+        if full as f64 > MOST_FULL * flat.dn.len() as f64 {
+            s.fault(
+                "flat_frame",
+                format!("{full} of its {} pixels are saturated", flat.dn.len()),
+                "take it in less light",
+            );
+        }
+    }
     s.finish();
     (camera, frames)
 }
@@ -229,11 +281,11 @@ pub(crate) fn leds(root: &Section<'_, '_>, bayer: Option<Bayer>, cell: Option<&C
             channel: bayer.map(|_| s.choice("channel", &Channel::CHOICES, None)),
         };
         s.finish();
-        if leds.iter().any(|l| l.centre_nm == led.centre_nm) {
+        if leds.iter().any(|l| l.name() == led.name()) {
             s.fault(
                 "centre_nm",
-                "two LEDs of one wavelength",
-                "leave one out; captures name their LED by it",
+                format!("two LEDs of {} nm", led.name()),
+                "leave one out; captures and effects name their LED by it, in whole nanometres",
             );
         }
         if let Some(cell) = cell {
