@@ -1,8 +1,8 @@
-//! Writes a measured set of a synthetic chip: `cargo run --release --example shipped_set [--full-size ELEMENTS] [--seed SEED] FOLDER
-//! [EFFECTS.toml] [NAME=VALUE,VALUE...]...`. Without options it is `golden/session`: pillars of `designs/mini_3x3.toml` in OASIS, 8 nm
+//! Writes a measured set of a synthetic chip: `cargo run --release --example shipped_set [--full-size ELEMENTS] [--seed SEED]
+//! [--boundary X,Y] FOLDER [EFFECTS.toml] [NAME=VALUE,VALUE...]...`. Without options it is `golden/session`: pillars of `designs/mini_3x3.toml` in OASIS, 8 nm
 //! too narrow, and the sensor 5 um too far. Effects that are named stand in place of these two; those of a file may be named as well.
 //! `--full-size` is a set of one to three lenses of `designs/prototype_3x3.toml` in one colour, its cells solved with more orders than
-//! those of a fit.
+//! those of a fit. With `--boundary` write fields meet there in every lens (um from its middle), which the set does not say.
 
 use std::path::Path;
 
@@ -24,8 +24,11 @@ const FULL_SIZE_ORDERS: usize = 15;
 /// An effect and its numbers, as `NAME=VALUE,VALUE`.
 fn effect(text: &str) -> Result<(String, Vec<f64>), Box<dyn std::error::Error>> {
     let (name, values) = text.split_once('=').ok_or("an effect is NAME=VALUE,VALUE")?;
-    let values = values.split(',').map(str::parse).collect::<Result<_, _>>()?;
-    Ok((name.into(), values))
+    Ok((name.into(), numbers(values)?))
+}
+
+fn numbers(text: &str) -> Result<Vec<f64>, std::num::ParseFloatError> {
+    text.split(',').map(str::parse).collect()
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -33,6 +36,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut option = |name: &str| args.next_if(|a| a == name).and_then(|_| args.next());
     let elements: Option<usize> = option("--full-size").map(|n| n.parse()).transpose()?;
     let seed = option("--seed").map_or(Ok(SEED), |n| n.parse())?;
+    let boundary = option("--boundary").map(|text| numbers(&text)).transpose()?;
     let folder = args.next().ok_or("name the folder to write into")?;
     let folder = Path::new(&folder);
     let declared = match args.next_if(|a| a.ends_with(".toml")) {
@@ -52,7 +56,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     convert(&Layout::open(&written)?, LayoutFormat::of_name(&kept), &kept, &Silent)?;
     let text = std::fs::read_to_string(&description)?;
     std::fs::write(&description, text.replace("\"layout.gds\"", "\"layout.oas\""))?;
-    let like = MeasuredSet::read(folder, &GdsPillars, &Silent)?;
+    let mut like = MeasuredSet::read(folder, &GdsPillars, &Silent)?;
+    if let Some(place) = boundary {
+        like.field_boundary_um = Some(place.try_into().map_err(|_| "a boundary is X,Y")?);
+    }
     let settings = Settings {
         only: effects.iter().map(|(name, _)| name.clone()).collect(),
         declared,

@@ -54,7 +54,7 @@ pub use fit::WidthParts;
 pub use planning::{
     BenchFile, CapturePlan, Confusion, PlanRequest, PlannedCapture, PlannedEffect, SemOffer, check_not_begun, plan,
 };
-pub use proposal::{Proposed, propose};
+pub use proposal::{Proposed, boundary_of_fields, propose};
 pub use run::{Calibration, calibrate};
 pub use search::Evidence;
 pub use session::{Screening, Session, Settings, Simulations};

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::diagnosis::{Diagnosis, Proposal, SetVerdict};
 use crate::effects::{self, DeclaredEffect, StitchedFields};
 use crate::page::write_page;
-use crate::proposal::{boundary, propose};
+use crate::proposal::{boundary_of_fields, propose};
 use crate::search::Evidence;
 use crate::session::{Session, Settings, Simulations, check_effects};
 use crate::set::MeasuredSet;
@@ -100,7 +100,7 @@ fn with_boundary(
     let Some(evidence) = evidence.filter(|_| is_open && session.settings.only.is_empty()) else {
         return Ok(None);
     };
-    let place = boundary(session, evidence, progress)?;
+    let place = boundary_of_fields(session, evidence, progress)?;
     Ok(place.map(|place| MeasuredSet {
         field_boundary_um: Some(place),
         ..set.clone()

@@ -117,19 +117,17 @@ mod tests {
         }
         let stopped = learn("c", 2, &Impatient(0.into()));
         assert!(matches!(stopped, Err(Error::Interrupted)));
-        assert!(learn("c", 2, &Silent).unwrap() == whole);
-
         let other = TrainingSpec {
             seed: 8,
             ..spec.clone()
         };
-        let refused = train(
-            &photographs,
-            &other,
-            &folder.path().join("c"),
-            &folder.path().join("c.state"),
-            &Silent,
-        );
-        assert!(refused.unwrap_err().to_string().contains("another training"));
+        let of_other = || {
+            let [out, state] = ["c", "c.state"].map(|name| folder.path().join(name));
+            train(&photographs, &other, &out, &state, &Silent)
+        };
+        // While it has not ended, nothing else may go on from there; then it is as if nothing had been.
+        assert!(of_other().unwrap_err().to_string().contains("another training"));
+        assert!(learn("c", 2, &Silent).unwrap() == whole);
+        assert!(!folder.path().join("c.state").exists() && of_other().is_ok());
     }
 }

@@ -22,8 +22,7 @@ impl OpenLineup<'_> {
         let first = self.photographs[0].view;
         let design = |(listed, (design, camera)): (&ListedDesign, &(Design, Camera))| {
             let field_deg = listed.field_deg.unwrap_or(first.field_deg);
-            let layout = hex(&file_digest(&listed.layout)?);
-            let optics = (design.optics_digest()?, design.verify.fidelity, layout);
+            let optics = (design.digest(), hex(&file_digest(&listed.layout)?));
             let digest = camera_digest(&optics, camera, &SceneView { field_deg, ..first })?;
             Ok((digest, vec![StageKind::MultiWiener, StageKind::Blending]))
         };

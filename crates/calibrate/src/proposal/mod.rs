@@ -14,7 +14,7 @@ use crate::search::Evidence;
 use crate::session::Session;
 use crate::smooth_residual::SmoothResidual;
 use metalith_core::{Progress, Result};
-pub use write_fields::boundary;
+pub use write_fields::boundary_of_fields;
 
 /// A shape is proposed if it removes this share of the chi-square above noise: less is a part of something else.
 const WORTH_PROPOSING: f64 = 0.3;

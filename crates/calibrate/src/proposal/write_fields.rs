@@ -19,7 +19,11 @@ const STEP_NM: f64 = 10.0;
 ///
 /// # Errors
 /// If the user stopped it.
-pub fn boundary(session: &Session<'_>, evidence: &Evidence, progress: &dyn Progress) -> Result<Option<[f64; 2]>> {
+pub fn boundary_of_fields(
+    session: &Session<'_>,
+    evidence: &Evidence,
+    progress: &dyn Progress,
+) -> Result<Option<[f64; 2]>> {
     let (simulator, fit) = (&session.simulator, &evidence.finding.after);
     let problem = evidence.problem(simulator);
     let diameter_um = session.set().stack.lens_diameter_um;

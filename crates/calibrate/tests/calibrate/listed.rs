@@ -1,6 +1,6 @@
 //! Effects of the list, alone and in pairs.
 
-use metalith_calibrate::{MeasuredSet, Session, SetVerdict, Synthesizer, UnlistedEffect, propose};
+use metalith_calibrate::{MeasuredSet, Session, SetVerdict, Synthesizer, UnlistedEffect, boundary_of_fields, propose};
 use metalith_core::Silent;
 
 use crate::set::{LIKE, SIMULATIONS, SYNTHESIZER, names, settings, synthetic, with_effects};
@@ -155,6 +155,48 @@ fn a_displaced_part_of_every_lens_is_found() {
     // Displacement and place trade for one another.
     assert!(
         (found[0] / BY_NM - 1.0).abs() < 0.1 && (found[2] - 8.0).abs() < 1.0,
+        "{}",
+        d.sentence()
+    );
+}
+
+/// Where nobody says where write fields meet, the boundary is looked for, and found.
+#[test]
+#[ignore = "second tier: CPU time, run by .ci/run"]
+fn a_displaced_part_is_found_where_nobody_says_where_fields_meet() {
+    /// Displacement (nm), place (um); and how far the place may be for the search to go on from it.
+    const BY_NM: f64 = 90.0;
+    const AT_UM: f64 = -6.0;
+    const REACH_UM: f64 = 6.0;
+    let mut like = LIKE.clone();
+    like.field_boundary_um = Some([AT_UM, 0.0]);
+    let synthesizer = Synthesizer::new(&like, &settings()).unwrap();
+    let images = synthesizer
+        .with_effect("stitching_x", &[BY_NM, 0.0, 0.0], &Silent)
+        .unwrap();
+    let mut set = synthesizer.draw(&images, 29);
+    set.field_boundary_um = None;
+    let others = ["coma", "gap", "tilt"];
+    let place = {
+        let session = Session::new(&set, with_effects(&others)).unwrap();
+        let simulations = session.simulate(&Silent).unwrap();
+        let (d, evidence) = session.diagnose(&simulations, &Silent).unwrap();
+        assert!(d.verdict.leaves_a_residual(), "{}", d.sentence());
+        boundary_of_fields(&session, &evidence.unwrap(), &Silent)
+            .unwrap()
+            .unwrap()
+    };
+    assert!((place[0] - AT_UM).abs() < REACH_UM, "{place:?}");
+    set.field_boundary_um = Some(place);
+    let tried = [&others[..], &["stitching_x", "stitching_y"]].concat();
+    let session = Session::new(&set, with_effects(&tried)).unwrap();
+    let simulations = session.simulate(&Silent).unwrap();
+    let d = session.diagnose(&simulations, &Silent).unwrap().0;
+    assert_eq!(names(&d), ["stitching_x"], "{} {:?}", d.sentence(), d.error);
+    let found: Vec<f64> = serde_json::from_value(d.effects[0].value.clone()).unwrap();
+    // Displacement and place trade for one another.
+    assert!(
+        (found[0] / BY_NM - 1.0).abs() < 0.1 && (found[2] - AT_UM).abs() < 1.0,
         "{}",
         d.sentence()
     );
