@@ -7,7 +7,7 @@ use metalith_core::{Error, Progress, Result, part};
 use metalith_design::Design;
 use metalith_picture::restore::RestorationMethod;
 use metalith_picture::scene::{SceneImage, read_far_scene};
-use metalith_picture::{Assumed, KeptKernels, SceneView, Studio};
+use metalith_picture::{Assumed, KeptKernels, SceneView, Studio, check_scored};
 use metalith_prior::PerceptualDistance;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
@@ -175,7 +175,7 @@ impl OpenLineup<'_> {
     /// Let camera `k` take all photographs.
     ///
     /// # Errors
-    /// If it cannot be made ready, or the user stopped it.
+    /// If photographs are too small to be scored, it cannot be made ready, or the user stopped it.
     pub fn take(&self, k: usize, kept: &KeptKernels, progress: &dyn Progress) -> Result<ComparedCamera> {
         self.take_first(k, self.photographs.len(), kept, progress)
     }
@@ -191,6 +191,7 @@ impl OpenLineup<'_> {
         kept: &KeptKernels,
         progress: &dyn Progress,
     ) -> Result<ComparedCamera> {
+        check_scored(&self.photographs[0].view)?;
         let mut found = None;
         self.ready(k, kept, progress, &mut |contender, names, all| {
             let (all, perceptual) = (&all[..photographs], self.perceptual.as_ref());

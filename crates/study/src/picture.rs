@@ -12,7 +12,8 @@ use metalith_made::{MadeChip, SimulationCase};
 use metalith_picture::restore::RestorationMethod;
 use metalith_picture::scene::{BuiltIn, SceneImage, chart, read_far_scene};
 use metalith_picture::{
-    Frame, FrameOperator, OperatorError, Rehearsal, ScenePower, Studio, Zone, ZoneScore, sampling_of, scores,
+    Frame, FrameOperator, OperatorError, Rehearsal, ScenePower, Studio, Zone, ZoneScore, check_scored, sampling_of,
+    scores,
 };
 use ndarray::Array3;
 
@@ -130,13 +131,14 @@ impl PictureBench {
     /// With the camera and the scene that are named.
     ///
     /// # Errors
-    /// If one of them cannot be read.
+    /// If one of them cannot be read, or the scene is too small to be scored.
     pub fn open(spec: &PictureSpec) -> Result<Self> {
         let far = f64::INFINITY;
         let scene = match &spec.scene {
             SceneChoice::BuiltIn(kind, pixels) => chart(*kind, *pixels, spec.field_deg, far),
             SceneChoice::File(path) => read_far_scene(path, spec.field_deg)?,
         };
+        check_scored(&scene.view)?;
         Ok(Self {
             camera: Camera::read(&spec.camera)?,
             scene,
