@@ -76,16 +76,28 @@ fn finish(
     progress: &dyn Progress,
 ) -> Result<Calibration> {
     let (diagnosis, evidence) = session.diagnose(simulations, progress)?;
-    if let Some(set) = with_boundary(session, &diagnosis, evidence.as_ref(), progress)? {
-        let wider = Session::new(&set, session.settings.clone())?;
+    let mut set = with_boundary(session, &diagnosis, evidence.as_ref(), progress)?;
+    for round in 1..=BOUNDARY_ROUNDS {
+        let Some(own) = &set else { break };
+        let wider = Session::new(own, session.settings.clone())?;
         let simulations = wider.simulate(progress)?;
-        let (wider_diagnosis, evidence) = wider.diagnose(&simulations, progress)?;
-        if wider_diagnosis.has(StitchedFields::NAMES) {
-            return conclude(&wider, &simulations, (wider_diagnosis, evidence), out, progress);
+        let found = wider.diagnose(&simulations, progress)?;
+        let Some(place) = StitchedFields::place(&found.0, own) else {
+            break;
+        };
+        if round == BOUNDARY_ROUNDS || !found.0.verdict.leaves_a_residual() {
+            return conclude(&wider, &simulations, found, out, progress);
         }
+        set = Some(MeasuredSet {
+            field_boundary_um: Some(place),
+            ..own.clone()
+        });
     }
     conclude(session, simulations, (diagnosis, evidence), out, progress)
 }
+
+/// Searches about the place of a boundary: the second about that which the first found, where much is left.
+const BOUNDARY_ROUNDS: usize = 2;
 
 /// The set with a place of a boundary of write fields, where one would explain much of what the list leaves and the lab does not say
 /// where such boundaries run.

@@ -191,11 +191,6 @@ pub struct CaptureError {
 }
 
 impl Diagnosis {
-    /// Whether an effect of one of these names was found.
-    pub fn has(&self, names: [&str; 2]) -> bool {
-        self.effects.iter().any(|e| names.contains(&e.name.as_str()))
-    }
-
     /// Write it as `diagnosis.json`.
     ///
     /// # Errors

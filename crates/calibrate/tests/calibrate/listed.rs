@@ -187,18 +187,21 @@ fn a_displaced_part_is_found_where_nobody_says_where_fields_meet() {
             .unwrap()
     };
     assert!((place[0] - AT_UM).abs() < REACH_UM, "{place:?}");
-    set.field_boundary_um = Some(place);
+    // Searched twice, as a calibration does where the first leaves much.
     let tried = [&others[..], &["stitching_x", "stitching_y"]].concat();
-    let session = Session::new(&set, with_effects(&tried)).unwrap();
-    let simulations = session.simulate(&Silent).unwrap();
-    let d = session.diagnose(&simulations, &Silent).unwrap().0;
-    assert_eq!(names(&d), ["stitching_x"], "{} {:?}", d.sentence(), d.error);
-    let found: Vec<f64> = serde_json::from_value(d.effects[0].value.clone()).unwrap();
+    let mut found = vec![0.0, 0.0, place[0]];
+    for _ in 0..2 {
+        set.field_boundary_um = Some([found[2], place[1]]);
+        let session = Session::new(&set, with_effects(&tried)).unwrap();
+        let simulations = session.simulate(&Silent).unwrap();
+        let d = session.diagnose(&simulations, &Silent).unwrap().0;
+        assert_eq!(names(&d), ["stitching_x"], "{} {:?}", d.sentence(), d.error);
+        found = serde_json::from_value(d.effects[0].value.clone()).unwrap();
+    }
     // Displacement and place trade for one another.
     assert!(
         (found[0] / BY_NM - 1.0).abs() < 0.1 && (found[2] - AT_UM).abs() < 1.0,
-        "{}",
-        d.sentence()
+        "{found:?}"
     );
 }
 
