@@ -11,8 +11,7 @@ package.
 import pathlib
 import sys
 
-from PIL import Image
-from skimage import data
+from skimage import color, data, io, transform, util
 
 NAMES = [
     "astronaut.png", "brick.png", "camera.png", "chelsea.png", "coffee.png", "coins.png",
@@ -25,11 +24,13 @@ def main(folder, pixels, *names):
     folder.mkdir(parents=True, exist_ok=True)
     known = {pathlib.Path(name).stem: name for name in NAMES}
     for name in names or known:
-        image = Image.open(package / known[name]).convert("RGB")
-        side = min(image.size)
-        left, top = ((length - side) // 2 for length in image.size)
-        square = image.crop((left, top, left + side, top + side))
-        square.resize((int(pixels), int(pixels)), Image.Resampling.LANCZOS).save(folder / f"{name}.png")
+        image = io.imread(package / known[name])
+        image = color.gray2rgb(image) if image.ndim == 2 else image[..., :3]
+        side = min(image.shape[:2])
+        top, left = ((length - side) // 2 for length in image.shape[:2])
+        square = image[top : top + side, left : left + side]
+        square = transform.resize(square, (int(pixels), int(pixels)), anti_aliasing=True)
+        io.imsave(folder / f"{name}.png", util.img_as_ubyte(square), check_contrast=False)
 
 
 if __name__ == "__main__":
