@@ -75,41 +75,65 @@ fn finish(
     out: &Path,
     progress: &dyn Progress,
 ) -> Result<Calibration> {
-    let (diagnosis, evidence) = session.diagnose(simulations, progress)?;
-    let mut set = with_boundary(session, &diagnosis, evidence.as_ref(), progress)?;
-    for round in 1..=BOUNDARY_ROUNDS {
-        let Some(own) = &set else { break };
-        let wider = Session::new(own, session.settings.clone())?;
-        let simulations = wider.simulate(progress)?;
-        let found = wider.diagnose(&simulations, progress)?;
-        let Some(place) = StitchedFields::place(&found.0, own) else {
-            break;
-        };
-        if round == BOUNDARY_ROUNDS || !found.0.verdict.leaves_a_residual() {
-            return conclude(&wider, &simulations, found, out, progress);
-        }
-        set = Some(MeasuredSet {
-            field_boundary_um: Some(place),
-            ..own.clone()
-        });
-    }
-    conclude(session, simulations, (diagnosis, evidence), out, progress)
+    let found = session.diagnose(simulations, progress)?;
+    let set = with_boundary(session, &found, progress)?;
+    about_boundary((session, simulations), found, (set, BOUNDARY_ROUNDS), out, progress)
 }
 
 /// Searches about the place of a boundary: the second about that which the first found, where much is left.
 const BOUNDARY_ROUNDS: usize = 2;
 
+/// Search a set with a place of a boundary, if there is one, at most so many times, and conclude by the last search that found
+/// a boundary; by what was found before, if none did.
+fn about_boundary(
+    (session, simulations): (&Session<'_>, &Simulations),
+    found: (Diagnosis, Option<Evidence>),
+    (set, rounds): (Option<MeasuredSet>, usize),
+    out: &Path,
+    progress: &dyn Progress,
+) -> Result<Calibration> {
+    let Some(set) = set.filter(|_| rounds > 0) else {
+        return conclude(session, simulations, found, out, progress);
+    };
+    let wider = Session::new(&set, session.settings.clone())?;
+    let wider_simulations = wider.simulate(progress)?;
+    let own = wider.diagnose(&wider_simulations, progress)?;
+    let Some(place) = boundary_found(&own.0, &set) else {
+        return conclude(session, simulations, found, out, progress);
+    };
+    let next = own.0.verdict.leaves_a_residual().then(|| MeasuredSet {
+        field_boundary_um: Some(place),
+        ..set.clone()
+    });
+    about_boundary((&wider, &wider_simulations), own, (next, rounds - 1), out, progress)
+}
+
+/// Where a diagnosis of a set found boundaries, across x and across y (um), that of the set where it found none; none if it found
+/// neither.
+fn boundary_found(diagnosis: &Diagnosis, set: &MeasuredSet) -> Option<[f64; 2]> {
+    let own = |name| {
+        let effect = diagnosis.effects.iter().find(|e| e.name == name)?;
+        Some(effect.numbers().get(StitchedFields::PLACE)?.0)
+    };
+    let found = StitchedFields::NAMES.map(own);
+    let stated = set.field_boundary_um?;
+    let is_found = found.iter().any(Option::is_some);
+    is_found.then(|| [0, 1].map(|axis| found[axis].unwrap_or(stated[axis])))
+}
+
 /// The set with a place of a boundary of write fields, where one would explain much of what the list leaves and the lab does not say
 /// where such boundaries run.
 fn with_boundary(
     session: &Session<'_>,
-    diagnosis: &Diagnosis,
-    evidence: Option<&Evidence>,
+    (diagnosis, evidence): &(Diagnosis, Option<Evidence>),
     progress: &dyn Progress,
 ) -> Result<Option<MeasuredSet>> {
     let set = session.set();
     let is_open = diagnosis.verdict.leaves_a_residual() && set.field_boundary_um.is_none();
-    let Some(evidence) = evidence.filter(|_| is_open && session.settings.only.is_empty()) else {
+    let Some(evidence) = evidence
+        .as_ref()
+        .filter(|_| is_open && session.settings.only.is_empty())
+    else {
         return Ok(None);
     };
     let place = boundary_of_fields(session, evidence, progress)?;

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest, Sha256};
 
 use metalith_core::text::hex;
-use metalith_core::{Error, PillarShape, Progress, Result, WholeFile, file::read_at_most};
+use metalith_core::{Error, PillarShape, Progress, Result, WholeFile};
 
 /// Raised whenever the solver or the sampling changes what it answers: kept results are then of no use.
 pub const SOLVER: u32 = 1;
@@ -149,18 +149,11 @@ impl KeptWriter {
 /// # Errors
 /// The reason, in words.
 pub fn read(file: &Path, magic: [u8; 8], inputs: &[u8], longest: u64) -> Result<Option<Vec<u8>>, String> {
-    let mut bytes = match read_at_most(file, longest, "a kept result") {
-        Ok(bytes) => bytes,
-        Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(Error::Io { source, .. }) => return Err(source.to_string()),
-        Err(Error::Invalid { what, .. }) => return Err(what),
-        Err(other) => return Err(other.to_string()),
-    };
-    let length = open(&bytes, magic, inputs).map_err(|why| why.to_string())?.len();
-    // In place: a second copy would be as long as the file.
-    bytes.truncate(bytes.len() - CHECKSUM);
-    bytes.drain(..bytes.len() - length);
-    Ok(Some(bytes))
+    read_by(file, magic, inputs, longest, |content, length| {
+        let mut bytes = Vec::with_capacity(length as usize);
+        content.read_to_end(&mut bytes).ok()?;
+        Some(bytes)
+    })
 }
 
 /// What `decode` makes of the content kept in a file, which it reads piece by piece and whose length in bytes it is told;

@@ -61,17 +61,6 @@ impl Checkpoint {
         WholeFile::write(path, &file)
     }
 
-    /// Remove the file of a state, if there is one.
-    ///
-    /// # Errors
-    /// If it cannot be removed.
-    pub fn remove(path: &Path) -> Result<()> {
-        match std::fs::remove_file(path) {
-            Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io("remove", path)(e)),
-            _ => Ok(()),
-        }
-    }
-
     /// The state of a file, if there is one.
     ///
     /// # Errors

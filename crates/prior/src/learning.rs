@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Error, Progress, Result, WholeFile};
 use ndarray::{Array3, Axis};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -152,7 +152,7 @@ pub(crate) fn learn(
     }
     write_weights(out, &plan, &at.weights, &origin)?;
     // What is learnt is in the weights: the next training begins anew, with whatever numbers.
-    Checkpoint::remove(state)?;
+    WholeFile::discard(state)?;
     // The weights as they are written: in half precision.
     let written: Vec<f32> = at.weights.iter().map(|w| half::f16::from_f32(*w).to_f32()).collect();
     Ok(TrainingReport {

@@ -57,14 +57,19 @@ pub struct Bench<'a> {
     pub follows: bool,
 }
 
-/// Steps, at most, over the finest period of an image: two would do.
+/// Step over the half of the finest period of an image.
 const OF_NYQUIST: f64 = 0.95;
 
-/// Step that the intensity of a capture is resolved by (um): light from both sides of the aperture interferes with a period of half a
-/// wavelength over the sine of its half-angle.
+/// Step that the intensity of an element in the colour of a capture is resolved by, at the nearest distance that it was taken at (um):
+/// light from both sides of the aperture interferes with a period of half a wavelength over the sine of its half-angle.
 fn resolved_um(set: &MeasuredSet, capture: &Capture) -> f64 {
+    let alike = set
+        .captures
+        .iter()
+        .filter(|c| (c.element, c.led) == (capture.element, capture.led));
+    let nearest_um = alike.map(|c| c.distance_um).fold(f64::INFINITY, f64::min);
     let radius_um = 0.5 * set.elements[capture.element].aperture_diameter_um;
-    let sine = radius_um / radius_um.hypot(capture.distance_um);
+    let sine = radius_um / radius_um.hypot(nearest_um);
     OF_NYQUIST * 0.25e-3 * set.leds[capture.led].centre_nm / sine
 }
 

@@ -1,16 +1,12 @@
 //! Write fields of the pillars do not meet: a part of every lens is displaced.
 
 use super::{Effect, Parameter, Stage};
-use crate::diagnosis::Diagnosis;
 use crate::set::MeasuredSet;
 use metalith_made::{Perturbation, Stitching};
 
 /// Displacements that a writer may make (nm).
 const MOST_NM: f64 = 300.0;
 const TYPICAL_NM: f64 = 25.0;
-
-/// Which of the numbers is the place.
-const PLACE: usize = 2;
 
 /// How far a boundary may be from its stated place, and a typical distance, over the diameter of a lens.
 const REACH: f64 = 0.1;
@@ -29,20 +25,8 @@ pub struct StitchedFields {
 impl StitchedFields {
     /// Names of such effects, by the axis that the boundary is across.
     pub const NAMES: [&'static str; 2] = ["stitching_x", "stitching_y"];
-
-    /// Where a diagnosis of a set found boundaries, across x and across y (um), that of the set where it found none; none if it found
-    /// neither.
-    pub fn place(diagnosis: &Diagnosis, set: &MeasuredSet) -> Option<[f64; 2]> {
-        let mut place = set.field_boundary_um?;
-        let mut is_found = false;
-        for (axis, name) in Self::NAMES.iter().enumerate() {
-            let own = diagnosis.effects.iter().find(|e| e.name == *name);
-            if let Some((found, _)) = own.and_then(|e| e.numbers().get(PLACE).copied()) {
-                (place[axis], is_found) = (found, true);
-            }
-        }
-        is_found.then_some(place)
-    }
+    /// Which of their numbers is the place of the boundary.
+    pub const PLACE: usize = 2;
 
     /// Boundaries across x and across y for the lenses of a set that says where they run.
     pub fn of(set: &MeasuredSet) -> impl Iterator<Item = Self> + use<> {

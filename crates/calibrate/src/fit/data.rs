@@ -54,21 +54,21 @@ impl Data {
     pub fn new(set: &MeasuredSet) -> Self {
         let camera = &set.camera;
         let black = camera.black_level_dn as f32;
-        let signal = set.captures.iter().map(|c| c.dn.mapv(|v| v - black)).collect();
+        let signal: PerCapture<Array2<f32>> = set.captures.iter().map(|c| c.dn.mapv(|v| v - black)).collect();
         let weight = set
             .captures
             .iter()
-            .map(|c| {
+            .zip(&signal)
+            .map(|(c, signal)| {
                 if let Some(noise) = &c.noise {
                     return noise.mapv(|variance| variance.sqrt().recip());
                 }
                 let full = saturated(&c.dn, camera.saturation_dn);
-                let signal = c.dn.mapv(|v| v - black);
-                let told = Zip::from(&signal).and(&full).map_collect(|v, full| match full {
+                let told = Zip::from(signal).and(&full).map_collect(|v, full| match full {
                     true => 0.0,
                     false => camera.electrons(f64::from(*v), c.frames) as f32,
                 });
-                let expected = expected(&signal, &told);
+                let expected = expected(signal, &told);
                 Zip::from(&expected).and(&full).map_collect(|v, full| match full {
                     true => 0.0,
                     false => camera.variance_dn2(f64::from(*v), c.frames).sqrt().recip() as f32,

@@ -125,6 +125,11 @@ pub struct RelayCamera {
 }
 
 impl RelayCamera {
+    /// Mean of a pixel from which on it was clipped in some of its frames (DN).
+    pub fn full_dn(&self) -> f64 {
+        SATURATED * self.saturation_dn
+    }
+
     /// Variance of a pixel as recorded (DN^2) in the mean of so many frames: shot noise of this signal above the black level (DN),
     /// and read noise.
     pub fn variance_dn2(&self, signal_dn: f64, frames: u32) -> f64 {

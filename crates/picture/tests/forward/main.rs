@@ -127,14 +127,7 @@ fn a_frame_is_the_direct_sum_over_points_and_wavelengths() {
     // The neighbour below looks up.
     for (element, about) in [(MIDDLE, [0.0, 0.0]), (BELOW, [0.0, 15.0])] {
         let scene = waves(SIZE, about);
-        let operator = FrameOperator::new(
-            &bank,
-            &veil,
-            &views,
-            &setup.camera,
-            &SceneSpace::flat(&scene.view),
-            Detail::simulation(3),
-        );
+        let operator = setup.simulation(&bank, &veil, &views, &scene);
         let got = operator.apply_elements(&scene.planes, &[element], false).remove(0);
         // An even number: between points the scene is straight, so that their sum is the integral.
         let want = direct_sum(&setup, &scene, &[element], 2, &nm);
@@ -172,14 +165,7 @@ fn copies_are_what_symmetry_makes_of_them() {
     let views = element_views(&setup.design, &setup.camera);
     // The neighbour below looks up.
     let scene = waves(40, [0.0, 15.0]);
-    let operator = FrameOperator::new(
-        &bank,
-        &veil,
-        &views,
-        &setup.camera,
-        &SceneSpace::flat(&scene.view),
-        Detail::simulation(3),
-    );
+    let operator = setup.simulation(&bank, &veil, &views, &scene);
     let below = operator.apply_elements(&scene.planes, &[BELOW], false).remove(0);
     let planes: Vec<Array2<f32>> = scene.planes.iter().map(|p| p.t().to_owned()).collect();
     let left = operator.apply_elements(&planes, &[LEFT], false).remove(0);

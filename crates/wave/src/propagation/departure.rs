@@ -223,19 +223,27 @@ mod tests {
     use crate::{PhaseFunction, PlaneWave};
     use std::f64::consts::TAU;
 
+    const DISTANCE_UM: f64 = 336.0;
+    const WAVELENGTH_UM: f64 = 0.53;
+
+    /// A hyperbola; round, so that blocks in the corners are dark.
+    fn lens() -> PhaseFunction<impl Fn(f64, f64) -> f64 + Sync> {
+        const Z: f64 = DISTANCE_UM;
+        PhaseFunction {
+            lattice: Lattice::covering(140_000, 350).unwrap(),
+            radius_um: 70.0,
+            amplitude: 0.9,
+            phase_rad: |x: f64, y: f64| -TAU * ((x * x + y * y + Z * Z).sqrt() - Z) / WAVELENGTH_UM,
+        }
+    }
+
     #[test]
     fn lands_where_the_map_of_one_direction_has_it() {
         /// Of all power, what lands in a neighbouring square: blocks of 18 um move a ray by up to 9 um, squares have 40 um.
         const BLOCKS: f64 = 0.2;
         /// Powers of a few hundred thousand single-precision amplitudes.
         const ROUNDING: f64 = 1e-4;
-        let (z, um) = (336.0, 0.53);
-        let lens = PhaseFunction {
-            lattice: Lattice::covering(140_000, 350).unwrap(),
-            radius_um: 70.0,
-            amplitude: 0.9,
-            phase_rad: |x: f64, y: f64| -TAU * ((x * x + y * y + z * z).sqrt() - z) / um,
-        };
+        let (z, um, lens) = (DISTANCE_UM, WAVELENGTH_UM, lens());
         let departure = Departure::of(&lens, um, z, 8);
         for sines in [[0.0, 0.0], [0.3, -0.1]] {
             let wave = PlaneWave {
@@ -261,16 +269,10 @@ mod tests {
             assert!(moved < BLOCKS * all, "{sines:?}: {}", moved / all);
         }
     }
+
     #[test]
     fn rows_of_blocks_are_those_of_all_blocks_at_once() {
-        let (z, um) = (336.0, 0.53);
-        // Round, so that blocks in the corners are dark.
-        let lens = PhaseFunction {
-            lattice: Lattice::covering(140_000, 350).unwrap(),
-            radius_um: 70.0,
-            amplitude: 0.9,
-            phase_rad: |x: f64, y: f64| -TAU * ((x * x + y * y + z * z).sqrt() - z) / um,
-        };
+        let (z, um, lens) = (DISTANCE_UM, WAVELENGTH_UM, lens());
         for across in [1, 3, 8, 200] {
             let departure = Departure::of(&lens, um, z, across);
             let (lattice, tiling) = (departure.lattice, departure.tiling);

@@ -3,7 +3,7 @@
 use ndarray::{Array2, Zip};
 
 use super::{Bayer, Channel, saturated};
-use crate::set::{RelayCamera, SATURATED};
+use crate::set::RelayCamera;
 
 /// A mean frame of the sensor by itself.
 pub struct SensorFrame {
@@ -47,7 +47,7 @@ impl SensorFrames {
         let flat = self.flat.as_ref().map(|flat| {
             let lit = &flat.dn - &dark;
             let level = levels(&lit, camera);
-            let full = (SATURATED * camera.saturation_dn) as f32;
+            let full = camera.full_dn() as f32;
             // How much brighter than that a full pixel was, nobody knows: it tells nothing.
             let response = Zip::from(&lit).and(&level).and(&flat.dn);
             FlatPixels {
@@ -117,7 +117,7 @@ impl SensorPixels {
         // By what was recorded: pixels that see little may stand for more than the sensor counts to.
         let masked = saturated(dn, full);
         for (at, v) in dn.indexed_iter_mut() {
-            *v = if f64::from(*v) >= SATURATED * full {
+            *v = if f64::from(*v) >= self.camera.full_dn() {
                 full as f32
             } else {
                 black + (*v - self.dark[at]) / self.response(at)

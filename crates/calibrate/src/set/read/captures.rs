@@ -88,47 +88,45 @@ fn exposures(s: &Section<'_, '_>, camera: &RelayCamera) -> (PathBuf, Vec<Exposur
             "no exposure",
             "add one [[capture.exposure]] for each, or give `file`",
         );
-        all.push(Exposure {
-            dn: Array2::zeros((camera.rows, camera.cols)),
-            scale_dn: 1.0,
-            frames: 1,
-            rounding_dn2: 0.0,
-        });
+        all.push(nothing(camera));
     }
     (name.unwrap_or_default(), all)
+}
+
+/// What stands in for an exposure that is missing.
+fn nothing(camera: &RelayCamera) -> Exposure {
+    Exposure {
+        dn: Array2::zeros((camera.rows, camera.cols)),
+        scale_dn: 1.0,
+        frames: 1,
+        rounding_dn2: 0.0,
+    }
 }
 
 fn exposure(s: &Section<'_, '_>, camera: &RelayCamera) -> (PathBuf, Exposure) {
     let path = s.file("file");
     let scale_dn = s.float("scale_dn", Limits::new(f64::MIN_POSITIVE..=1e12, "DN"));
     let frames = s.integer("frames", 1..=1_000_000, "frames") as u32;
-    let exposure = match frame::read(&path, camera.rows, camera.cols, camera.saturation_dn) {
-        Ok(recorded) => {
-            holds_its_pages(s, "frames", &recorded, frames);
-            Exposure {
-                rounding_dn2: recorded.rounding_dn2(frames),
-                dn: recorded.dn,
-                scale_dn,
-                frames,
-            }
+    let recorded = frame::read(&path, camera.rows, camera.cols, camera.saturation_dn).map_err(|what| {
+        // A file that is not there has been named as such already.
+        if path.is_file() {
+            s.fault(
+                "file",
+                what,
+                "save it as NPY [rows, cols], as grey PNG or as grey TIFF, or leave the capture out",
+            );
         }
-        Err(what) => {
-            // A file that is not there has been named as such already.
-            if path.is_file() {
-                s.fault(
-                    "file",
-                    what,
-                    "save it as NPY [rows, cols], as grey PNG or as grey TIFF, or leave the capture out",
-                );
-            }
-            Exposure {
-                dn: Array2::zeros((camera.rows, camera.cols)),
-                scale_dn,
-                frames,
-                rounding_dn2: 0.0,
-            }
-        }
+    });
+    let mut exposure = Exposure {
+        scale_dn,
+        frames,
+        ..nothing(camera)
     };
+    if let Ok(recorded) = recorded {
+        holds_its_pages(s, "frames", &recorded, frames);
+        exposure.rounding_dn2 = recorded.rounding_dn2(frames);
+        exposure.dn = recorded.dn;
+    }
     (path, exposure)
 }
 

@@ -6,7 +6,7 @@ mod elements;
 use std::path::Path;
 
 use super::frame::{self, Bayer, Channel, Recorded, SensorFrame, SensorFrames};
-use super::{Led, MeasuredSet, PerElement, PerLed, RelayCamera, SATURATED, Stack};
+use super::{Led, MeasuredSet, PerElement, PerLed, RelayCamera, Stack};
 use captures::{captures, widths};
 use elements::elements;
 use metalith_cell::{CellStack, Material, UniformLayer};
@@ -208,6 +208,28 @@ fn holds_its_pages(s: &Section<'_, '_>, key: &str, recorded: &Recorded, frames: 
     }
 }
 
+/// Fault a flat frame that tells nothing of the pixels: one without light, or with too much.
+fn check_flat(s: &Section<'_, '_>, camera: &RelayCamera, frames: &SensorFrames) {
+    let Some(flat) = &frames.flat else { return };
+    let mean = |dn: &Array2<f32>| f64::from(dn.mean().unwrap_or(0.0));
+    let dark = frames.dark.as_ref().map_or(camera.black_level_dn, |d| mean(&d.dn));
+    if mean(&flat.dn) <= dark {
+        s.fault(
+            "flat_frame",
+            format!("its mean is {:.1} DN, and {dark:.1} DN without light", mean(&flat.dn)),
+            "give a frame in even light",
+        );
+    }
+    let full = flat.dn.iter().filter(|v| f64::from(**v) >= camera.full_dn()).count();
+    if full as f64 > MOST_FULL * flat.dn.len() as f64 {
+        s.fault(
+            "flat_frame",
+            format!("{full} of its {} pixels are saturated", flat.dn.len()),
+            "take it in less light",
+        );
+    }
+}
+
 pub(crate) fn camera(s: &Section<'_, '_>) -> (RelayCamera, SensorFrames) {
     let positive = |key, high, unit| s.float(key, Limits::new(f64::MIN_POSITIVE..=high, unit));
     let camera = RelayCamera {
@@ -245,29 +267,7 @@ pub(crate) fn camera(s: &Section<'_, '_>) -> (RelayCamera, SensorFrames) {
         dark: sensor_frame("dark_frame", "dark_frames"),
         flat: sensor_frame("flat_frame", "flat_frames"),
     };
-    if let Some(flat) = &frames.flat {
-        let mean = |dn: &Array2<f32>| f64::from(dn.mean().unwrap_or(0.0));
-        let dark = frames.dark.as_ref().map_or(camera.black_level_dn, |d| mean(&d.dn));
-        if mean(&flat.dn) <= dark {
-            s.fault(
-                "flat_frame",
-                format!("its mean is {:.1} DN, and {dark:.1} DN without light", mean(&flat.dn)),
-                "give a frame in even light",
-            );
-        }
-        let full = flat
-            .dn
-            .iter()
-            .filter(|v| f64::from(**v) >= SATURATED * camera.saturation_dn);
-        let full = full.count();
-        if full as f64 > MOST_FULL * flat.dn.len() as f64 {
-            s.fault(
-                "flat_frame",
-                format!("{full} of its {} pixels are saturated", flat.dn.len()),
-                "take it in less light",
-            );
-        }
-    }
+    check_flat(s, &camera, &frames);
     s.finish();
     (camera, frames)
 }
