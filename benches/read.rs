@@ -34,6 +34,7 @@ fn lens(referenced: bool) -> (Vec<u8>, ElementSite) {
         name: "lens".into(),
         centre_nm: [0, 0],
         lattice,
+        within_nm: None,
     };
     (gds.end(), site)
 }

@@ -26,8 +26,8 @@
 //! Beside the line stand [`optimise`], which finds the radial phase; [`drc`], [`mod@diff`] and [`handoff`], which
 //! start from layouts too; [`calibrate`], which learns from captures what the model lacks; and [`compensate`],
 //! which draws what comes out as meant on the line that was so measured. [`grating`] solves supercells of unlike
-//! pillars; layouts are judged by its cell of pillars among unlike neighbours, unless a design says otherwise or has
-//! rectangles or a hexagonal lattice. The names at the root are those that the line itself needs; each room has its own.
+//! pillars; layouts of the cell of the paper are judged by its cell of pillars among unlike neighbours, unless a design says
+//! otherwise. The names at the root are those that the line itself needs; each room has its own.
 //!
 //! # Conventions
 //!

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use metalith_calibrate::{BenchFile, CapturePlan, PlanRequest, check_not_begun, plan};
+use metalith_calibrate::{BenchFile, CapturePlan, PlanRequest, check_not_begun, check_plannable, plan};
 use metalith_cell::cache_folder;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::{Design, PillarArray};
@@ -17,8 +17,8 @@ const LAYOUT: &str = "layout.gds";
 /// names of the effects that it is planned for; all if empty.
 ///
 /// # Errors
-/// If elements have lenses of their own, a file cannot be read or written, the folder holds a session that was begun, an effect is not known, or the
-/// user stopped it.
+/// If no session of the design can be planned, a file cannot be read or written, the folder holds a session that was begun, an effect is
+/// not known, or the user stopped it.
 pub fn plan_session(
     design: &Design,
     bench: &BenchFile,
@@ -27,7 +27,7 @@ pub fn plan_session(
     only: Vec<String>,
     progress: &dyn Progress,
 ) -> Result<CapturePlan> {
-    design.one_lens("a planned session")?;
+    check_plannable(design, bench)?;
     check_not_begun(folder)?;
     let (layout, layout_in_set) = match layout {
         Some(file) => {

@@ -46,9 +46,10 @@ class Psf:
     energy_passed: float = field(repr=False)
     """Share of all light that passes, of the same."""
     mtf_half_nyquist: tuple[float, float] = field(repr=False)
-    """MTF at 42.7 line pairs a millimetre along x and y, without the pixel."""
+    """MTF along x and y, without the pixel, at half of the finest frequency that pixels tell: 42.7 line pairs a millimetre for
+    5.86 um."""
     mtf_nyquist: tuple[float, float] = field(repr=False)
-    """MTF at 85.3 line pairs a millimetre along x and y, without the pixel."""
+    """The same at all of it: 85.3 line pairs a millimetre for 5.86 um."""
 
     def to_xarray(self) -> Any:
         """As :meth:`PsfSet.to_xarray`, of this one."""

@@ -38,7 +38,8 @@ class Studio:
     The pillars are read from the bytes of the layout. Kernels over the field are made once, which takes minutes for
     lenses of 1 mm, and kept on the disk as the program keeps them.
 
-    ``shape``: rows and columns of the scenes. ``field_deg``: angle from their left to their right edge.
+    ``shape``: rows and columns of the scenes. Pixels finer than half a pixel of the sensor are averaged to these, and truth
+    and pictures have their number. ``field_deg``: angle from their left to their right edge.
     ``distance_mm``: of their plane; far if left out. ``model``: the chip as made, by the model of a calibration.
     ``prior``: weights for the method ``prior`` that ``metalith train`` wrote; those of the program if left out."""
 

@@ -301,12 +301,11 @@ pub fn read_layout<'py>(
 ) -> PyResult<ReadLayout<'py>> {
     let layer = LayerNumber::new(layer.0, layer.1);
     let design = design.map(|d| &d.design);
-    let array = array.map(|a| &a.array);
     let found = work(py, progress, |p| {
         let layout = Layout::open_with(&path, ReadLimits::default(), p)?;
         let plan = match (design, array) {
             (Some(design), _) => extraction_plan(design),
-            (None, Some(array)) => ExtractionPlan::given(layer, sites(array)).of_shape(array.shape),
+            (None, Some(array)) => ExtractionPlan::given(layer, sites(array)).of_shape(array.array.shape),
             (None, None) => ExtractionPlan::discover(layer),
         };
         let found = extract(&layout, &ExtractionPlan { top, ..plan }, p)?;
@@ -333,13 +332,18 @@ pub fn read_layout<'py>(
 }
 
 /// Where the elements of an array are.
-fn sites(array: &PillarArray) -> Vec<ElementSite> {
+fn sites(array: &Array) -> Vec<ElementSite> {
+    if let Some(design) = &array.design {
+        return design.sites();
+    }
+    let array = &array.array;
     let placed = array.placed.iter();
     placed
         .map(|p| ElementSite {
             name: p.element.label(),
             centre_nm: [p.element.centre_nm.0, p.element.centre_nm.1],
             lattice: array.lattice,
+            within_nm: None,
         })
         .collect()
 }

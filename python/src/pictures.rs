@@ -50,7 +50,8 @@ impl Frame {
 
 #[pymethods]
 impl Studio {
-    /// Kernels and veil of a layout, made or taken from the disk.
+    /// Kernels and veil of a layout, made or taken from the disk. Scenes whose pixels are finer than half of one of the sensor are
+    /// averaged to these; truth and pictures have the size of the averaged scene then.
     #[staticmethod]
     #[pyo3(signature = (design, layout, camera, rows, columns, field_deg, distance_mm=None, model=None, prior=None, progress=None))]
     #[allow(clippy::too_many_arguments)]
@@ -148,7 +149,7 @@ impl Studio {
 
 impl Studio {
     fn scene(&self, rgb: &Array3<f64>) -> Result<SceneImage> {
-        let view = self.studio.view;
+        let view = self.studio.given;
         if rgb.dim() != (view.rows, view.columns, 3) {
             return Err(Error::invalid(
                 format!("a scene of shape {:?}", rgb.dim()),

@@ -1,6 +1,7 @@
 //! PSFs of arrays and of maps of widths.
 
 use metalith::cell::{CellStack, FittedCell, Handedness, PointwiseCell, PublishedCell, RotatedCell, cache_folder};
+use metalith::design::band_about;
 use metalith::extract::{ElementSite, ExtractedElement, Extraction};
 use metalith::grating::{Mapping, NeighbourCell};
 use metalith::verify::{Lighting, SimulationCase, SinglePsf, single_psfs};
@@ -123,6 +124,7 @@ fn simulate_together(
             name: lit.name,
             centre_nm: [0; 2],
             lattice: lit.widths.lattice,
+            within_nm: None,
         },
         widths: lit.widths,
     });
@@ -310,8 +312,7 @@ pub fn psf_of_widths<'py>(
                 Box::new(NeighbourCell::new(stack, vec![mapping], cache_folder()))
             }
             (Fidelity::Fitted, None) => {
-                let um = wavelengths_nm.iter().map(|nm| nm * 1e-3);
-                let band = um.fold((0.4, 0.7), |(a, b): (f64, f64), um| (a.min(um), b.max(um)));
+                let band = band_about(wavelengths_nm.iter().map(|nm| nm * 1e-3), stack.range_um());
                 let range = (*drawn.first().unwrap_or(&100), *drawn.last().unwrap_or(&300));
                 Box::new(FittedCell::of_stack(&stack, band, range)?)
             }

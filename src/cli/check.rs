@@ -22,8 +22,8 @@ pub struct CheckArgs {
     /// The layout, in any hierarchy, by any tool; `-` for standard input.
     layout: PathBuf,
 
-    /// The rules; if left out those of the program: rules/sin_pillars.toml, or circles.toml or rectangles.toml for a
-    /// design of these.
+    /// The rules; if left out those of the program: rules/sin_pillars.toml, or for a design of another cell squares.toml,
+    /// circles.toml or rectangles.toml.
     #[arg(long, value_name = "RULES.toml")]
     rules: Option<PathBuf>,
 

@@ -273,6 +273,7 @@ pub fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
         return Ok(Outcome::Fine);
     }
     let open = lineup.open()?;
+    open.notes().iter().for_each(|note| terminal.say(note));
     let kept = KeptKernels::of_user();
     let take = |k| open.take(k, &kept, terminal);
     let comparison = open.comparison((0..lineup.count()).map(take).collect::<Result<_>>()?);

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::Result;
 use metalith::picture::scene::read_far_scene;
-use metalith::picture::{Studio, write_dataset};
-use metalith::study::{PairsRequest, plan_pairs};
+use metalith::picture::{DatasetManifest, DatasetOrigin, Studio, check_images, write_dataset};
+use metalith::study::{PairsRequest, is_planned, plan_pairs};
+use metalith::{Error, Result};
 
 use super::camera_args::{CameraArgs, CameraFiles};
 use super::standard_input::InputFile;
@@ -14,8 +14,9 @@ use super::{Outcome, Terminal, images, print_line};
 
 /// Record the frame of every image of a folder, for learning: frames, what an ideal camera gives, and a manifest.
 ///
-/// Images are taken in the order of their names and must be of one size. The noise of each follows from its bytes and the
-/// seed. Pairs that are there are kept if they are of the same image, seed, chip and camera: a set that was stopped goes on.
+/// Images are taken in the order of their names and must be of one size; all are read before any work. The noise of each follows
+/// from its bytes and the seed. Pairs that are there undamaged are kept if they are of the same image, seed, chip and camera: a
+/// set that was stopped goes on.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  metalith dataset photographs --layout out/prototype_3x3/prototype_3x3_pillars.gds \\\n    --camera cameras/gt1930.toml --design designs/prototype_3x3.toml --out out/pairs"
@@ -76,11 +77,20 @@ pub fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     if args.plan {
         return plan(args, images, terminal);
     }
+    if is_planned(&args.out) {
+        return Err(Error::invalid(
+            format!("{} holds a plan, which is carried out in shards", args.out.display()),
+            "make them by `metalith study run FOLDER --missing`, or name another folder with --out",
+        ));
+    }
+    check_images(&images, terminal)?;
     let read = |path: &Path| read_far_scene(path, args.with.field_deg);
     let layout = InputFile::of(&args.layout)?;
+    let origin = DatasetOrigin::of(&design, &layout, &camera, args.with.model.as_deref())?;
     let studio = Studio::open(&design, &layout, &camera, model.as_ref(), &read(&images[0])?, terminal)?;
     let operator = studio.simulation();
-    let manifest = write_dataset(&studio, &operator, &images, &read, args.with.seed, &args.out, terminal)?;
+    let head = DatasetManifest::of(&studio, origin, args.with.seed);
+    let manifest = write_dataset(&studio, &operator, &images, &read, head, &args.out, terminal)?;
     terminal.clear();
     print_line!("{} pairs in {}", manifest.pairs.len(), args.out.display());
     Ok(Outcome::Fine)

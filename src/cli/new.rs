@@ -22,15 +22,67 @@ const MOST_SIDES: u32 = 190;
 /// Finer than this no writer places an edge of metal (nm).
 const FINEST_CHORD_NM: f64 = 5.0;
 
-/// What the cell of the template is made for (nm).
-const CELL_NM: std::ops::RangeInclusive<f64> = 400.0..=700.0;
+/// What the cell of silicon nitride is made for (nm).
+const VISIBLE_NM: std::ops::RangeInclusive<f64> = 400.0..=700.0;
 
-/// Designs of the repository whose cells are for longer waves, each up to a wavelength (nm).
+/// What that of amorphous silicon is (nm).
+const INFRARED_NM: std::ops::RangeInclusive<f64> = 850.0..=1600.0;
+
+/// Designs of the repository whose cells are for other long waves, each up to a wavelength (nm).
 const LONGER: [(f64, &str); 3] = [
-    (1200.0, "asi_940"),
+    (850.0, "asi_940"),
     (2000.0, "hexagonal_1550"),
     (f64::INFINITY, "silicon_10600"),
 ];
+
+/// The cell that a design begins with, and its mapping.
+struct StartCell {
+    pillars: &'static str,
+    /// The line of `shape`, where pillars are no squares.
+    shape: &'static str,
+    pitch_nm: f64,
+    height_nm: f64,
+    widths_nm: [f64; 2],
+    film: &'static str,
+    film_word: &'static str,
+    mapping_nm: f64,
+    coefficients: &'static str,
+    verify_nm: String,
+}
+
+impl StartCell {
+    /// That for a wavelength (nm).
+    fn for_nm(nm: f64) -> Self {
+        if !INFRARED_NM.contains(&nm) {
+            return Self {
+                pillars: "square",
+                shape: "",
+                pitch_nm: 350.0,
+                height_nm: 700.0,
+                widths_nm: [100.0, 300.0],
+                film: "sin_luke_2015",
+                film_word: "SiN",
+                mapping_nm: 452.0,
+                coefficients: "0.2923, 0.6809, -0.1484",
+                verify_nm: "455, 530, 660".into(),
+            };
+        }
+        // The cell of `designs/asi_940.toml`, as much larger as the wave: light sees the same, but for the index of the film.
+        let scaled = |nm_at_940: f64| nm_at_940 * nm / 940.0;
+        Self {
+            pillars: "round",
+            shape: "shape = \"circle\"              # widths are diameters\n",
+            pitch_nm: 2.0 * scaled(225.0).round(),
+            height_nm: scaled(550.0).round(),
+            widths_nm: [2.0 * scaled(50.0).floor(), 2.0 * scaled(175.0).ceil()],
+            film: "a_si_pierce_1972",
+            film_word: "a-Si",
+            mapping_nm: nm,
+            coefficients: "0.2829, 1.0687, -3.6741, 6.9390, -6.4505, 2.4704",
+            verify_nm: nm.to_string(),
+        }
+    }
+}
 
 /// Write a commented design file to start from.
 #[derive(Args)]
@@ -53,7 +105,8 @@ pub struct NewArgs {
     #[arg(long, value_name = "UM")]
     focal_length_um: Option<f64>,
 
-    /// Wavelength that the phase focuses and the wedges are made for (nm); the cell is one for 400 to 700 nm.
+    /// Wavelength that the phase focuses and the wedges are made for (nm); the cell is one of silicon nitride for 400 to 700 nm, from
+    /// 850 to 1600 nm one of amorphous silicon for that wavelength.
     #[arg(long, value_name = "NM", default_value_t = 550.0)]
     wavelength_nm: f64,
 
@@ -74,7 +127,21 @@ impl NewArgs {
         let side_angle = std::f64::consts::PI / f64::from(MOST_SIDES);
         let opening_nm = (0.5 * self.diameter_um + MARGIN_UM) * 1e3;
         let chord_nm = (0.5 * opening_nm * side_angle.powi(2)).ceil().max(FINEST_CHORD_NM);
+        let cell = StartCell::for_nm(self.wavelength_nm);
         let values = [
+            ("{pillars}", cell.pillars.to_owned()),
+            ("{shape}", cell.shape.to_owned()),
+            ("{pitch_nm}", cell.pitch_nm.to_string()),
+            ("{height_nm}", cell.height_nm.to_string()),
+            ("{width_min_nm}", cell.widths_nm[0].to_string()),
+            ("{width_max_nm}", cell.widths_nm[1].to_string()),
+            ("{film}", cell.film.to_owned()),
+            // Notes of the two materials below one another.
+            ("{after_film}", " ".repeat(32 - cell.film.len())),
+            ("{film_word}", cell.film_word.to_owned()),
+            ("{mapping_nm}", cell.mapping_nm.to_string()),
+            ("{coefficients}", cell.coefficients.to_owned()),
+            ("{verify_nm}", cell.verify_nm),
             ("{name}", name.to_owned()),
             ("{elements}", self.elements.to_string()),
             ("{diameter_um}", self.diameter_um.to_string()),
@@ -107,8 +174,16 @@ pub fn run(args: &NewArgs, terminal: &Terminal) -> Result<Outcome> {
     Design::parse(&args.design, &text)?;
     WholeFile::write(&args.design, text.as_bytes())?;
     let nm = args.wavelength_nm;
-    if !CELL_NM.contains(&nm) {
-        let longer = LONGER.iter().find(|(most_nm, _)| nm > *CELL_NM.end() && nm <= *most_nm);
+    if INFRARED_NM.contains(&nm) {
+        terminal.say(&format!(
+            "note: [cell] and [mapping] of {} are those of designs/asi_940.toml, as much larger as the wave: let `metalith cells` find \
+             the mapping of your film",
+            args.design.display(),
+        ));
+    } else if !VISIBLE_NM.contains(&nm) {
+        let longer = LONGER
+            .iter()
+            .find(|(most_nm, _)| nm > *VISIBLE_NM.end() && nm <= *most_nm);
         let like = longer.map_or(String::new(), |(_, like)| {
             format!("take those of designs/{like}.toml, or ")
         });
@@ -116,8 +191,8 @@ pub fn run(args: &NewArgs, terminal: &Terminal) -> Result<Outcome> {
             "note: [cell], [mapping] and [verify] of {} are for {} to {} nm, not for {nm} nm: {like}change them, and let `metalith \
              cells` find the mapping",
             args.design.display(),
-            CELL_NM.start(),
-            CELL_NM.end(),
+            VISIBLE_NM.start(),
+            VISIBLE_NM.end(),
         ));
     }
     print_line!("{}", args.design.display());

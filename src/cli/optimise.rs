@@ -6,8 +6,8 @@ use clap::Args;
 use metalith::cell::cache_folder;
 use metalith::layout::read_pillars;
 use metalith::optimise::{
-    Checkpoint, Deconvolution, Judged, OptimiseReport, OptimiseTask, Optimised, OverWavelength, TaskCells, lens_alone,
-    mean_and_deviation, views, wavelengths, write_phase_table,
+    BY_EQUAL_NEIGHBOURS, Checkpoint, Deconvolution, Judged, OptimiseReport, OptimiseTask, Optimised, OverWavelength,
+    TaskCells, lens_alone, mean_and_deviation, views, wavelengths, write_phase_table,
 };
 use metalith::report::sig;
 use metalith::study::plan_starts;
@@ -292,4 +292,5 @@ fn summary(findings: &OptimiseReport) {
             sig(deviation, 2)
         );
     }
+    print_line!("{BY_EQUAL_NEIGHBOURS}");
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith::{Error, Result};
+use metalith::{Error, Result, WholeFile};
 
 /// Refuse to write over an input, or two outputs into one file: asked before any work.
 ///
@@ -25,6 +25,16 @@ pub fn apart<'p>(inputs: impl IntoIterator<Item = &'p Path>, outputs: &[&Path]) 
         ));
     }
     Ok(())
+}
+
+/// Find out whether files can be written, before the work that they are for. What stands there stays, and folders are made.
+///
+/// # Errors
+/// As [`WholeFile::create`].
+pub fn writable(outputs: &[&Path]) -> Result<()> {
+    outputs
+        .iter()
+        .try_for_each(|output| WholeFile::create(output).map(drop))
 }
 
 /// What tells a file from others, whatever its path says.

@@ -1,13 +1,14 @@
 //! `metalith picture`: the picture that a layout will take.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
 use metalith::picture::scene::{BuiltIn, SceneFile, SceneImage, chart, read_depth, read_scene};
 use metalith::picture::{
-    Assumption, Doubt, Frame, KeptKernels, PicturePages, PictureReport, Rehearsal, RestorationReport, ScenePower,
-    Studio, check_scored, contrast_curves, scores, worth_of_assumptions, write_pages,
+    Assumption, Doubt, Frame, FrameFile, KeptKernels, PicturePages, PictureReport, Rehearsal, RestorationReport,
+    ScenePower, Studio, ZoneScore, check_scored, contrast_curves, picture_file, psnr_words, scores,
+    worth_of_assumptions, write_pages,
 };
 use metalith::{Error, Fidelity, Result};
 
@@ -21,7 +22,8 @@ use super::{Outcome, Terminal, print_json, print_line};
 #[command(
     after_help = "Example:\n  metalith picture out/prototype_3x3/prototype_3x3_pillars.gds --camera cameras/gt1930.toml \\\n    --design designs/prototype_3x3.toml scene.png --out out/picture\n\n\
     The scene is a PNG or JPEG in sRGB, an NPY of linear light, an NPY cube with --wavelengths-nm, or one of the built-in\n\
-    scenes chart, star and edge. Kernels are kept on the disk and used again."
+    scenes chart, star and edge; with pixels finer than half of one of the sensor it is averaged to these. Kernels are kept on the\n\
+    disk and used again."
 )]
 pub struct PictureArgs {
     /// The pillar layout; `-` for standard input.
@@ -37,7 +39,8 @@ pub struct PictureArgs {
     #[arg(long)]
     distance_mm: Option<f64>,
 
-    /// Distance of each pixel of the scene: an NPY of millimetres, or a grey PNG of 16 bits with whole millimetres.
+    /// Distance of each pixel of the scene: an NPY of millimetres, `inf` for what is far, or a grey PNG of 16 bits with whole
+    /// millimetres.
     #[arg(long, value_name = "FILE")]
     depth: Option<PathBuf>,
 
@@ -54,7 +57,7 @@ pub struct PictureArgs {
     #[arg(long, value_delimiter = ',', default_value = "tikhonov")]
     method: Vec<String>,
 
-    /// Leave the forecast out: it costs as much as a restoration.
+    /// Leave the forecast out: it costs as much as two restorations by Tikhonov.
     #[arg(long)]
     no_forecast: bool,
 
@@ -75,7 +78,8 @@ pub struct PictureArgs {
     #[arg(long, value_name = "WHOSE")]
     assume: Option<Assume>,
 
-    /// Folder for `picture.html` and `picture.json`.
+    /// Folder for `picture.html` and `picture.json`, and beside them `frame.png` and a `restored_METHOD.png` for each way to restore,
+    /// both of 16 bits.
     #[arg(long, short, default_value = "out/picture", value_name = "FOLDER")]
     out: PathBuf,
 
@@ -94,6 +98,17 @@ enum Assume {
 }
 
 impl PictureArgs {
+    /// All files that are written, the page first.
+    fn outputs(&self, methods: &[RestorationMethod]) -> Vec<PathBuf> {
+        let ways: &[bool] = if self.separate { &[true, false] } else { &[true] };
+        let pictures = methods
+            .iter()
+            .flat_map(|method| ways.iter().map(move |joint| picture_file(*method, *joint)));
+        let plain = ["picture.html", "picture.json", FrameFile::NAME].map(str::to_owned);
+        let all = plain.into_iter().chain(pictures);
+        all.map(|name| self.out.join(name)).collect()
+    }
+
     fn scene(&self) -> Result<SceneImage> {
         let distance_um = self.distance_mm.map_or(f64::INFINITY, |mm| mm * 1e3);
         if distance_um.is_nan() || distance_um <= 0.0 {
@@ -136,12 +151,20 @@ impl PictureArgs {
 
 pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
-    let methods: Vec<RestorationMethod> = args.method.iter().map(|m| m.parse()).collect::<Result<_>>()?;
+    let mut methods: Vec<RestorationMethod> = Vec::new();
+    for name in &args.method {
+        let method = name.parse()?;
+        if !methods.contains(&method) {
+            methods.push(method);
+        }
+    }
     let CameraFiles { design, camera, model } = args.with.read(terminal)?;
     let scene = args.scene()?;
-    let (page, numbers) = (args.out.join("picture.html"), args.out.join("picture.json"));
+    let outputs = args.outputs(&methods);
     let inputs = [&args.layout, &args.with.design, &args.with.camera].map(PathBuf::as_path);
-    apart(inputs.into_iter().chain([args.scene.as_ref()]), &[&page, &numbers])?;
+    let others = [Path::new(&args.scene)].into_iter().chain(args.depth.as_deref());
+    let written: Vec<&Path> = outputs.iter().map(PathBuf::as_path).collect();
+    apart(inputs.into_iter().chain(others), &written)?;
     let layout = InputFile::of(&args.layout)?;
     let prior = args.prior.as_deref().map(LearnedDenoiser::read).transpose()?;
     let mut studio = Studio::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
@@ -152,6 +175,9 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     let frame = studio.record(&simulation, &scene, args.with.seed)?;
     let truth = studio.truth(&scene);
     drop(simulation);
+    if let Some(note) = frame.saturation_note(&truth) {
+        terminal.say(&note);
+    }
     let operator = studio.restoration();
     let rehearsal = Rehearsal::new(&studio, &operator);
     let error = &rehearsal.operator_error;
@@ -208,13 +234,13 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         )?;
         report.worth = worth_of_assumptions(&studio, &narrow, &scene, args.with.seed, terminal)?;
     }
-    let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();
+    report.notes = studio.notes(&frame, &truth);
     let pages = PicturePages {
         report: &report,
         scene: &truth,
         frame: &frame,
-        restored: &pictures[0],
-        channel_names: &names,
+        restored: &pictures,
+        camera: &camera,
         doubt: doubt.as_ref(),
     };
     write_pages(&pages, &args.out)?;
@@ -223,30 +249,31 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         print_json(&report);
         return Ok(Outcome::Fine);
     }
+    let score = |whole: &ZoneScore| match frame.is_lost() {
+        true => "no score, most pixels are at full scale".to_owned(),
+        false => format!("PSNR {}, SSIM {:.3}", psnr_words(whole.psnr_db), whole.ssim),
+    };
     for restoration in &report.restorations {
-        let whole = &restoration.scores[0];
-        print_line!(
-            "{}, {}: PSNR {:.2} dB, SSIM {:.3}",
-            restoration.method,
-            if restoration.joint {
-                "joint"
-            } else {
-                "each element alone"
-            },
-            whole.psnr_db,
-            whole.ssim
-        );
+        let way = if restoration.joint {
+            "joint"
+        } else {
+            "each element alone"
+        };
+        print_line!("{}, {way}: {}", restoration.method, score(&restoration.scores[0]));
     }
     if let Some(doubt) = &report.doubt {
         print_line!(
-            "mean of {} samples: PSNR {:.2} dB, SSIM {:.3}; rank correlation of doubt and error {:.2}",
+            "mean of {} samples: {}; rank correlation of doubt and error {:.2}",
             doubt.samples,
-            doubt.scores[0].psnr_db,
-            doubt.scores[0].ssim,
+            score(&doubt.scores[0]),
             doubt.rank_correlation
         );
     }
-    print_line!("page: {}", page.display());
+    print_line!("page: {}", outputs[0].display());
+    print_line!("frame: {}", args.out.join(FrameFile::NAME).display());
+    for restoration in &report.restorations {
+        print_line!("picture: {}", args.out.join(&restoration.picture).display());
+    }
     Ok(Outcome::Fine)
 }
 
@@ -270,9 +297,13 @@ fn report(
         field_deg: args.with.field_deg,
         distance_mm: args.distance_mm,
         saturated: frame.saturated,
+        saturated_share: frame.saturated_share(),
+        notes: Vec::new(),
+        frame: FrameFile::of(&studio.camera, frame),
         restorations,
         operator_error: Vec::new(),
         budget: studio.budget(),
+        points: studio.point_images(),
         homographies: studio.homographies(),
         assumptions: studio.assumptions(scene, fidelity),
         contrast: Vec::new(),

@@ -1,25 +1,25 @@
 //! `metalith psf`: what a layout from anywhere does to light.
 
+mod light;
 mod optics;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use metalith::camera::Camera;
 use metalith::cell::{Fidelity, Handedness};
 use metalith::extract::ExtractedElement;
 use metalith::gds::{LayerNumber, ReadLimits};
-use metalith::report::{count, sig};
-use metalith::verify::{SimulationCase, SinglePsfReport, single_psfs, single_white, write_single_psf_report};
+use metalith::report::{count, exact, sig};
+use metalith::verify::{
+    STREHL_AGAINST, SimulationCase, SinglePsfReport, single_psfs, single_white, write_single_psf_report,
+};
 use metalith::{CalibratedModel, Error, Extraction, ExtractionPlan, LatticeKind, Layout, MadeChip, Result, extract};
 
+use self::light::PsfLight;
 use super::standard_input::InputFile;
 use super::verify::FidelityArg;
 use super::{Outcome, Terminal, print_line};
-
-/// Wavelengths that are taken where none are named (nm).
-const USUAL_NM: [f64; 3] = [455.0, 530.0, 660.0];
 
 /// Find the elements of any GDSII layout, read their pillars, and simulate their PSFs.
 #[derive(Args)]
@@ -44,8 +44,9 @@ pub struct PsfArgs {
     #[arg(long, default_value_t = 2400.0, value_parser = between(0.1, 1e6))]
     distance_um: f64,
 
-    /// Wavelength (nm); may be given several times.
-    #[arg(long = "wavelength-nm", default_values_t = USUAL_NM, value_parser = between(150.0, 20_000.0))]
+    /// Wavelength (nm); may be given several times. 455, 530 and 660 nm if left out; with a --camera that does not count light
+    /// from 455 to 660 nm the middle of each of its channels.
+    #[arg(long = "wavelength-nm", value_parser = between(150.0, 20_000.0))]
     wavelengths_nm: Vec<f64>,
 
     /// Angle of incidence in the x-z plane, in air (degrees).
@@ -69,7 +70,7 @@ pub struct PsfArgs {
     samples: usize,
 
     /// Height of the pillars (nm), for all cells but the published one.
-    #[arg(long, default_value_t = 700.0, value_parser = between(10.0, 10_000.0))]
+    #[arg(long, default_value_t = 700.0, value_parser = between(10.0, TALLEST_NM))]
     height_nm: f64,
 
     /// Material of the pillars: a name that a design file takes, or a CSV table of its index.
@@ -79,6 +80,30 @@ pub struct PsfArgs {
     /// Material of the substrate, likewise.
     #[arg(long, default_value = "fused_silica_malitson_1965")]
     substrate_material: String,
+
+    /// Thickness of a layer between substrate and film (nm).
+    #[arg(long, default_value_t = 0.0, value_parser = between(0.0, TALLEST_NM))]
+    spacer_nm: f64,
+
+    /// Its material.
+    #[arg(long, value_name = "MATERIAL")]
+    spacer_material: Option<String>,
+
+    /// Thickness of the film that the etch left between the pillars (nm).
+    #[arg(long, default_value_t = 0.0, value_parser = between(0.0, TALLEST_NM))]
+    residual_nm: f64,
+
+    /// Refractive index between the pillars and towards the sensor; that of air if left out.
+    #[arg(long, value_parser = between(1.0, 3.0))]
+    ambient_index: Option<f64>,
+
+    /// Material there, in place of --ambient-index.
+    #[arg(long, value_name = "MATERIAL", conflicts_with = "ambient_index")]
+    ambient_material: Option<String>,
+
+    /// Edge of a sensor pixel (um); that of the --camera if left out, without one 5.86.
+    #[arg(long, value_parser = between(0.1, 100.0))]
+    pixel_um: Option<f64>,
 
     /// The cell.
     #[arg(long, value_enum, default_value = "rigorous")]
@@ -166,6 +191,9 @@ fn layer(text: &str) -> std::result::Result<LayerNumber, String> {
     }
 }
 
+/// Tallest pillar and thickest layer (nm): those of design files.
+const TALLEST_NM: f64 = 50_000.0;
+
 /// Light that is steeper grazes the chip: no detector of an angle is that good, and cosines become zero.
 const STEEPEST_DEG: f64 = 89.0;
 
@@ -230,25 +258,31 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     let found = extract(&layout, &plan, terminal)?;
     mostly_pillars(args, &found)?;
     one_kind(args, &found)?;
-    let assumptions = args.assumptions(&found);
+    let light = match args.extract_only {
+        true => None,
+        false => Some(args.light(&found)?),
+    };
+    let assumptions = args.assumptions(&found, light.as_ref());
     let made = match &args.model {
         Some(path) => Some(MadeChip::new(&args.stack(&found)?, &CalibratedModel::read(path)?)?),
         None => None,
     };
-    let camera = args.camera.as_deref().map(Camera::read).transpose()?;
-    let simulate = |case: SimulationCase<'_>| -> Result<_> {
-        let light = args.lighting();
-        let psfs = single_psfs(&found, case, &light, terminal)?;
-        let white = match &camera {
-            Some(camera) => Some(single_white(&found, case, &light, camera, args.wedge()?, terminal)?),
+    let simulate = |case: SimulationCase<'_>, light: &PsfLight| -> Result<_> {
+        let lighting = args.lighting(light);
+        let psfs = single_psfs(&found, case, &lighting, terminal)?;
+        let white = match &light.white {
+            Some(white) => {
+                let counted = (&white.camera, &white.sampling);
+                Some(single_white(&found, case, &lighting, counted, args.wedge()?, terminal)?)
+            }
             None => None,
         };
         Ok((psfs, white))
     };
-    let (psfs, white) = match &made {
-        _ if args.extract_only => (Vec::new(), None),
-        Some(chip) => simulate(SimulationCase::Made(chip))?,
-        None => simulate(SimulationCase::Cell(args.cell(&found)?.as_ref()))?,
+    let (psfs, white) = match (&light, &made) {
+        (None, _) => (Vec::new(), None),
+        (Some(light), Some(chip)) => simulate(SimulationCase::Made(chip), light)?,
+        (Some(light), None) => simulate(SimulationCase::Cell(args.cell(&found, light)?.as_ref()), light)?,
     };
     let model = made.as_ref().map(MadeChip::statement);
     if let Some(folder) = &args.out {
@@ -312,9 +346,10 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     for quantity in model.iter().flat_map(|m| &m.not_applied) {
         print_line!("{quantity}");
     }
+    let pixel_um = exact(args.pixel_um(light.as_ref()));
     for psf in &psfs {
         print_line!(
-            "{}, {} nm: Strehl {}, {} % in a pixel of 5.86 um, peak at ({}, {}) um",
+            "{}, {} nm: Strehl {}, {} % in a pixel of {pixel_um} um, peak at ({}, {}) um",
             psf.element,
             sig(psf.wavelength_um * 1e3, 4),
             sig(psf.metrics.strehl, 3),
@@ -322,6 +357,9 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             sig(psf.metrics.peak_um[0], 5),
             sig(psf.metrics.peak_um[1], 5),
         );
+    }
+    if !psfs.is_empty() {
+        print_line!("{STREHL_AGAINST}");
     }
     for element in white.iter().flat_map(|w| &w.1) {
         for channel in &element.channels {

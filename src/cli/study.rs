@@ -256,7 +256,7 @@ fn submit(args: &SubmitArgs) -> Result<Outcome> {
 fn merge_shards(args: &MergeArgs, terminal: &Terminal) -> Result<Outcome> {
     match Work::open(&args.study)? {
         Work::Study(plan) => merge_study(&plan, args, terminal),
-        Work::Pairs(plan) => merge_pairs(&plan, args),
+        Work::Pairs(plan) => merge_pairs(&plan, args, terminal),
         Work::Comparison(plan) => merge_comparison(&plan, args, terminal),
         Work::Starts(plan) => merge_starts(&plan, args),
     }
@@ -273,9 +273,10 @@ fn without_table(args: &MergeArgs) -> Result<()> {
     }
 }
 
-fn merge_pairs(plan: &PairsPlan, args: &MergeArgs) -> Result<Outcome> {
+fn merge_pairs(plan: &PairsPlan, args: &MergeArgs, terminal: &Terminal) -> Result<Outcome> {
     without_table(args)?;
-    let manifest = plan.merge()?;
+    let manifest = plan.merge(terminal)?;
+    terminal.clear();
     print_line!("{} pairs in {}", manifest.pairs.len(), args.study.display());
     Ok(Outcome::Fine)
 }

@@ -3,7 +3,7 @@
 use std::io::IsTerminal;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -13,8 +13,13 @@ use super::output;
 
 /// Set by Ctrl-C in commands that can stop between two steps.
 static STOP: AtomicBool = AtomicBool::new(false);
+/// When that was first.
+static ASKED: OnceLock<Instant> = OnceLock::new();
 
-/// Time between two lines of progress where there is no terminal: a log of an hour has a page of them, and what is done
+/// Signals within this time are one wish to stop: a shell, `timeout` and a group of processes each send their own.
+const ONE_WISH: Duration = Duration::from_secs(1);
+
+/// Time between two lines of progress where there is no terminal: a log of an hour has a page of them, and a run that ends
 /// within it none.
 const BETWEEN_LINES: Duration = Duration::from_secs(30);
 
@@ -22,39 +27,94 @@ const BETWEEN_LINES: Duration = Duration::from_secs(30);
 pub struct Terminal {
     quiet: bool,
     bar: Mutex<Option<ProgressBar>>,
-    log: Mutex<Option<Log>>,
+    log: Mutex<Log>,
+}
+
+/// What a log is told.
+struct Log {
+    work: Option<Work>,
+    /// The last word on the state of the work, and whether a line has held it.
+    note: Option<(String, bool)>,
+    /// When the last line was written.
+    told: Instant,
 }
 
 /// Work of which a log is told.
-struct Log {
+struct Work {
     what: String,
     steps: u64,
     done: u64,
     begun: Instant,
-    told: Instant,
 }
 
 impl Log {
+    fn new(now: Instant) -> Self {
+        Self {
+            work: None,
+            note: None,
+            told: now,
+        }
+    }
+
+    fn begin(&mut self, what: &str, steps: u64, now: Instant) {
+        // Short pieces of work follow one another: what was said of the last one waits for the next line.
+        self.note = self.note.take().filter(|(_, told)| !told);
+        self.work = Some(Work {
+            what: what.to_owned(),
+            steps,
+            done: 0,
+            begun: now,
+        });
+    }
+
+    fn end(&mut self) {
+        self.work = None;
+        self.note = None;
+    }
+
     /// The line to tell, if it is time for one.
     fn advance(&mut self, steps: u64, now: Instant) -> Option<String> {
-        self.done += steps;
+        self.work.as_mut()?.done += steps;
+        self.line(now)
+    }
+
+    /// The same after a word on the state of the work; outside of any work, the word itself.
+    fn note(&mut self, text: &str, now: Instant) -> Option<String> {
+        if self.work.is_none() {
+            return Some(text.to_owned());
+        }
+        self.note = Some((text.to_owned(), false));
+        self.line(now)
+    }
+
+    fn line(&mut self, now: Instant) -> Option<String> {
+        let work = self.work.as_ref()?;
         if now.duration_since(self.told) < BETWEEN_LINES {
             return None;
         }
         self.told = now;
-        let share = (self.done as f64 / self.steps.max(1) as f64).min(1.0);
-        let seconds = now.duration_since(self.begun).as_secs_f64();
+        let share = (work.done as f64 / work.steps.max(1) as f64).min(1.0);
+        let seconds = now.duration_since(work.begun).as_secs_f64();
         let left = if share > 0.0 {
             format!(", about {:.0} s left", seconds * (1.0 - share) / share)
         } else {
             String::new()
         };
+        let note = self.note.as_mut().map_or_else(String::new, |(text, told)| {
+            *told = true;
+            format!("; {text}")
+        });
         Some(format!(
-            "{}: {:.0} % after {seconds:.0} s{left}",
-            self.what,
+            "{}: {:.0} % after {seconds:.0} s{left}{note}",
+            work.what,
             share * 100.0
         ))
     }
+}
+
+/// Whether a wish to stop ends the process at once, `since` the first one.
+fn ends_at_once(since: Duration) -> bool {
+    since >= ONE_WISH
 }
 
 impl Terminal {
@@ -63,7 +123,7 @@ impl Terminal {
         Self {
             quiet,
             bar: Mutex::new(None),
-            log: Mutex::new(None),
+            log: Mutex::new(Log::new(Instant::now())),
         }
     }
 
@@ -73,9 +133,23 @@ impl Terminal {
             return;
         }
         let tell = || output::tell(&format!("{line}\n"));
-        match &*self.bar.lock().unwrap_or_else(PoisonError::into_inner) {
+        match &*self.bar() {
             Some(bar) => bar.suspend(tell),
             None => tell(),
+        }
+    }
+
+    fn bar(&self) -> MutexGuard<'_, Option<ProgressBar>> {
+        self.bar.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn log(&self) -> MutexGuard<'_, Log> {
+        self.log.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn clear_bar(&self) {
+        if let Some(bar) = self.bar().take() {
+            bar.finish_and_clear();
         }
     }
 
@@ -89,10 +163,11 @@ impl Terminal {
         })
     }
 
-    /// Let Ctrl-C ask for a stop between two steps instead of ending the process; a second one ends it.
+    /// Let Ctrl-C ask for a stop between two steps instead of ending the process; one more, a second later or more, ends it.
     pub fn stop_on_interrupt(&self) {
         let _ = ctrlc::set_handler(|| {
-            if STOP.swap(true, Ordering::SeqCst) {
+            STOP.store(true, Ordering::SeqCst);
+            if ends_at_once(ASKED.get_or_init(Instant::now).elapsed()) {
                 std::process::exit(130);
             }
         });
@@ -100,29 +175,19 @@ impl Terminal {
 
     /// Take the progress bar off the screen.
     pub fn clear(&self) {
-        *self.log.lock().unwrap_or_else(PoisonError::into_inner) = None;
-        if let Some(bar) = self.bar.lock().unwrap_or_else(PoisonError::into_inner).take() {
-            bar.finish_and_clear();
-        }
+        self.log().end();
+        self.clear_bar();
     }
 }
 
 impl Progress for Terminal {
     fn begin(&self, what: &str, steps: u64) {
-        self.clear();
+        self.clear_bar();
         if self.quiet {
             return;
         }
         if !std::io::stderr().is_terminal() {
-            let now = Instant::now();
-            let log = Log {
-                what: what.to_owned(),
-                steps,
-                done: 0,
-                begun: now,
-                told: now,
-            };
-            *self.log.lock().unwrap_or_else(PoisonError::into_inner) = Some(log);
+            self.log().begin(what, steps, Instant::now());
             return;
         }
         let style = ProgressStyle::with_template("{msg:28} {wide_bar} {percent:>3} %  {eta:>4} left {prefix}")
@@ -130,23 +195,32 @@ impl Progress for Terminal {
         let bar = ProgressBar::new(steps.max(1))
             .with_style(style)
             .with_message(what.to_owned());
-        *self.bar.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar);
+        *self.bar() = Some(bar);
     }
 
     fn advance(&self, steps: u64) {
-        if let Some(bar) = &*self.bar.lock().unwrap_or_else(PoisonError::into_inner) {
+        if let Some(bar) = &*self.bar() {
             bar.inc(steps);
         }
-        let mut log = self.log.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(line) = log.as_mut().and_then(|log| log.advance(steps, Instant::now())) {
-            output::tell(&format!("{line}\n"));
+        let line = self.log().advance(steps, Instant::now());
+        if let Some(line) = line {
+            self.say(&line);
         }
     }
 
     fn note(&self, text: &str) {
-        if let Some(bar) = &*self.bar.lock().unwrap_or_else(PoisonError::into_inner) {
+        if let Some(bar) = &*self.bar() {
             bar.set_prefix(text.to_owned());
+            return;
         }
+        let line = self.log().note(text, Instant::now());
+        if let Some(line) = line {
+            self.say(&line);
+        }
+    }
+
+    fn warn(&self, text: &str) {
+        self.say(text);
     }
 
     fn stopped(&self) -> bool {
@@ -161,18 +235,44 @@ mod tests {
     #[test]
     fn a_log_gets_a_line_now_and_then() {
         let begun = Instant::now();
-        let mut log = Log {
-            what: "solving".into(),
-            steps: 200,
-            done: 0,
-            begun,
-            told: begun,
-        };
-        assert_eq!(log.advance(10, begun + Duration::from_secs(29)), None);
-        let line = log.advance(40, begun + Duration::from_secs(30)).unwrap();
+        let after = |seconds| begun + Duration::from_secs(seconds);
+        let mut log = Log::new(begun);
+        log.begin("solving", 200, begun);
+        assert_eq!(log.advance(10, after(29)), None);
+        let line = log.advance(40, after(30)).unwrap();
         assert_eq!(line, "solving: 25 % after 30 s, about 90 s left");
-        assert_eq!(log.advance(10, begun + Duration::from_secs(31)), None);
-        let line = log.advance(500, begun + Duration::from_secs(90)).unwrap();
+        assert_eq!(log.advance(10, after(31)), None);
+        let line = log.advance(500, after(90)).unwrap();
         assert_eq!(line, "solving: 100 % after 90 s, about 0 s left");
+    }
+
+    /// Words on the state of the work stand in its lines, and those on short work in the line that comes after it.
+    #[test]
+    fn lines_of_a_log_hold_the_last_word() {
+        let begun = Instant::now();
+        let after = |seconds| begun + Duration::from_secs(seconds);
+        let mut log = Log::new(begun);
+        assert_eq!(log.note("alone", begun).as_deref(), Some("alone"));
+        log.begin("learning", 100, begun);
+        assert_eq!(log.note("loss 3", after(1)), None);
+        assert_eq!(log.note("loss 2", after(2)), None);
+        let line = log.advance(10, after(30)).unwrap();
+        assert_eq!(line, "learning: 10 % after 30 s, about 270 s left; loss 2");
+        let line = log.advance(40, after(60)).unwrap();
+        assert_eq!(line, "learning: 50 % after 60 s, about 60 s left; loss 2");
+        log.begin("restoring", 10, after(61));
+        assert_eq!(log.note("20 dB", after(62)), None);
+        log.begin("restoring", 10, after(85));
+        let line = log.advance(5, after(95)).unwrap();
+        assert_eq!(line, "restoring: 50 % after 10 s, about 10 s left; 20 dB");
+        log.begin("restoring", 10, after(120));
+        let line = log.advance(5, after(130)).unwrap();
+        assert_eq!(line, "restoring: 50 % after 10 s, about 10 s left");
+    }
+
+    #[test]
+    fn one_press_is_one_wish() {
+        assert!(!ends_at_once(Duration::ZERO) && !ends_at_once(Duration::from_millis(900)));
+        assert!(ends_at_once(Duration::from_millis(1100)));
     }
 }

@@ -10,7 +10,7 @@ use metalith::rivals::{Lineup, StageKind};
 use metalith::{Error, Result};
 
 use super::compare::{ComparedDesign, LenslessArgs, Rival};
-use super::paths::apart;
+use super::paths::{apart, writable};
 use super::{Outcome, Terminal, images, print_json, print_line};
 
 /// Teach a network from the photographs of a folder: the one that takes noise out of pictures, or the last stage of a camera.
@@ -124,6 +124,10 @@ impl TrainArgs {
         terminal: &Terminal,
     ) -> Result<TrainingReport> {
         let lineup = self.lineup(kind, photographs)?;
+        // All are of one size, or refused when they are opened.
+        let (rows, columns, _) = read_picture(&lineup.photographs[0])?.dim();
+        let size = lineup.pixels.map_or([rows, columns], |n| [n; 2]);
+        Stacks::check(lineup.photographs.len(), size, spec.piece)?;
         let open = lineup.open()?;
         let kept = KeptKernels::of_user();
         let (stacks, taught) = open.lessons(0, kind, &beside(out, ".pictures"), &kept, terminal)?;
@@ -147,10 +151,12 @@ pub fn run(args: &TrainArgs, terminal: &Terminal) -> Result<Outcome> {
         piece: args.piece,
         seed: args.seed,
     };
+    spec.check()?;
     let files = images::of_folder(&args.folder)?;
     let out = args.out();
     let state = beside(&out, ".state");
     apart(files.iter().map(PathBuf::as_path), &[&out, &state])?;
+    writable(&[&out, &state])?;
     let report = match args.stage {
         Some(kind) => args.stage(kind, files, &spec, [&out, &state], terminal)?,
         None if !args.bare.is_standard() => {

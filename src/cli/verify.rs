@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::camera::Camera;
-use metalith::design::CellIncidence;
+use metalith::design::{CellIncidence, LatticeOrders};
 use metalith::picture::thumbnail;
 use metalith::report::{Figure, sig};
 use metalith::{
@@ -50,7 +50,7 @@ pub struct Judging {
     fast: bool,
 
     /// The cell that the layout is judged by; what `fidelity` in [verify] of the design says if left out. Where it says nothing,
-    /// `neighbours`; for rectangles and hexagonal lattices `rigorous`.
+    /// `neighbours` for the cell of the paper, else `rigorous`.
     #[arg(long, value_enum)]
     fidelity: Option<FidelityArg>,
 
@@ -242,14 +242,16 @@ fn summary(found: &Verification, folder: &Path) {
     for element in &found.distinct {
         for spot in &element.spots {
             print_line!(
-                "element {}, {}: Strehl {} ({}), {} designed",
-                element.element.label(),
-                spot.place(),
+                "{}: Strehl {} ({}), {} designed",
+                spot.label(&element.element),
                 sig(spot.judged().metrics.strehl, 3),
                 found.fidelity,
                 sig(spot.designed.metrics.strehl, 3),
             );
         }
+    }
+    for sentence in LatticeOrders::summary(&found.lattice_orders) {
+        print_line!("note: {sentence}");
     }
     for quantity in found.model.iter().flat_map(|m| &m.not_applied) {
         print_line!("{quantity}");

@@ -274,7 +274,7 @@ fn pictures(folder: &Path) -> Vec<Format> {
                 images::png(24, 16, png::ColorType::Grayscale, png::BitDepth::Eight),
                 file("tests/mutants/small.jpg"),
                 images::npy(&[16, 20, 3], images::FLOAT),
-                images::npy(&[16, 20], images::WORD),
+                images::npy(&[16, 20], images::FLOAT),
             ],
             read_picture,
         ),

@@ -305,7 +305,17 @@ fn a_hexagonal_lens_takes_a_picture() {
     );
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(0), "{said}");
+    let listed = String::from_utf8_lossy(&output.stdout);
+    for file in ["picture.html", "frame.png", "restored_tikhonov.png"] {
+        assert!(out.join(file).is_file() && listed.contains(file), "{file}: {listed}");
+    }
     let found: Value = serde_json::from_str(&fs::read_to_string(out.join("picture.json")).unwrap()).unwrap();
+    // Pixels of the scene are finer than half of those of the sensor.
+    assert!(said.contains("64 x 64 pixels is averaged to 51 x 51"), "{said}");
+    assert_eq!(
+        found["points"].as_array().unwrap().len(),
+        found["budget"].as_array().unwrap().len()
+    );
     let shares = &found["budget"][0]["shares"];
     let light = |key: &str| shares[key].as_f64().unwrap();
     let in_image = light("in_kernels") / (light("arrives") - light("not_passed"));

@@ -62,7 +62,7 @@ fn a_new_design_replaces_nothing_and_says_what_cannot_be() {
     assert!(!folder.path().join("none.toml").exists() && !folder.path().join("nan.toml").exists());
 }
 
-/// The cell of a new design is one for the visible, and whoever asks for other waves is told so.
+/// The cell of a new design is one for the visible or for the near infrared, and whoever asks for other waves is told so.
 #[test]
 fn a_new_design_for_long_waves_says_what_its_cell_is_for() {
     let folder = tempfile::tempdir().unwrap();
@@ -74,8 +74,11 @@ fn a_new_design_for_long_waves_says_what_its_cell_is_for() {
             .assert()
             .success()
     };
-    new("940").stderr(contains("designs/asi_940.toml"));
-    new("1550").stderr(contains("designs/hexagonal_1550.toml"));
+    for nm in ["850", "940", "1550"] {
+        new(nm).stderr(contains("those of designs/asi_940.toml, as much larger as the wave"));
+    }
+    new("800").stderr(contains("take those of designs/asi_940.toml"));
+    new("1700").stderr(contains("designs/hexagonal_1550.toml"));
     new("380").stderr(contains("not for 380 nm: change them"));
     let quiet = new("633");
     assert!(quiet.get_output().stderr.is_empty());

@@ -58,3 +58,41 @@ fn what_cannot_be_pictured_is_refused() {
         assert!(!Path::new(&out).exists(), "nothing is left of {arguments:?}");
     }
 }
+
+/// A layout of another array, and a scene of whole numbers: before any kernel is simulated.
+#[test]
+fn files_that_are_not_what_they_seem_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let [layouts, out] = ["layouts", "out"].map(|name| folder.path().join(name).display().to_string());
+    let metalith = |arguments: &[&str]| {
+        let mut command = Command::cargo_bin("metalith").unwrap();
+        command
+            .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")))
+            .args(arguments);
+        command
+    };
+    metalith(&["layout", DESIGN, "--out", &layouts]).assert().code(0);
+    let layout = format!("{layouts}/mini_3x3_pillars.gds");
+    let at = |design: &str, scene: &str| {
+        let mut command = metalith(&["picture", &layout, scene, "--design", design, "--field-deg", "20"]);
+        command.args(["--camera", "cameras/gt1930.toml", "--out", &out]);
+        command
+    };
+    at("designs/array_2x4.toml", "star")
+        .assert()
+        .code(2)
+        .stderr(contains("has no pillar in this layout"))
+        .stderr(contains("metalith psf"));
+    let whole = folder.path().join("whole.npy");
+    let header = "{'descr': '|u1', 'fortran_order': False, 'shape': (40, 40), }\n";
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header.as_bytes());
+    bytes.extend([128; 1600]);
+    fs::write(&whole, bytes).unwrap();
+    at(DESIGN, &whole.display().to_string())
+        .assert()
+        .code(2)
+        .stderr(contains("divide it by its white"));
+    assert!(!Path::new(&out).exists());
+}

@@ -5,10 +5,12 @@ use metalith_testing::session;
 use predicates::prelude::PredicateBooleanExt;
 
 fn plan(bench: &str, more: &[&str]) -> assert_cmd::assert::Assert {
+    plan_of("designs/mini_3x3.toml", bench, more)
+}
+
+fn plan_of(design: &str, bench: &str, more: &[&str]) -> assert_cmd::assert::Assert {
     let mut command = Command::cargo_bin("metalith").unwrap();
-    command
-        .args(["plan", "designs/mini_3x3.toml", "--bench", bench])
-        .args(more);
+    command.args(["plan", design, "--bench", bench]).args(more);
     command.assert()
 }
 
@@ -29,4 +31,22 @@ fn faults_of_the_bench_are_named_and_frames_are_not_overwritten() {
     plan(&bench, &["--out", &path("begun")])
         .code(2)
         .stderr(predicates::str::contains("there are frames in"));
+}
+
+/// A lens of 10 mm is more than a set can say; its layout of 641 million pillars is not written first.
+#[test]
+fn what_no_set_can_say_is_refused_before_a_layout_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let bench = path("bench.toml");
+    let text = format!("schema = 1\n{}\n[captures]\n", session::bench());
+    std::fs::write(&bench, &text).unwrap();
+    plan_of("designs/lens_10mm.toml", &bench, &["--out", &path("out")])
+        .code(2)
+        .stderr(predicates::str::contains("10000 um").and(predicates::str::contains("5 to 2000 um")));
+    assert!(!folder.path().join("out").exists());
+    std::fs::write(&bench, format!("{text}[wanted]\nfilm_height = 710\n")).unwrap();
+    plan(&bench, &["--out", &path("out")])
+        .code(2)
+        .stderr(predicates::str::contains("for 710 write 10"));
 }

@@ -114,6 +114,11 @@ pub trait ForwardModel: Send + Sync {
     /// rather taken to add to theirs.
     fn is_dear_beside(&self, about: &[f64], slot: usize) -> bool;
 
+    /// What the images of all captures take at one point, about (bytes).
+    fn image_bytes(&self) -> f64 {
+        0.0
+    }
+
     /// Images of all captures at each point, before registration, flux and black level.
     ///
     /// # Errors

@@ -14,11 +14,12 @@
 //! | `fit` | least squares, cross-validation, null test | `surrogate` |
 //! | `search` | which effects explain a residual | `fit` |
 //! | `proposal` | effects for what is left | `search`, `session` |
-//! | `session`, `diagnosis`, `page`, `run` | a set from its files to its answer | all above |
+//! | `session`, `diagnosis`, `boundary_search`, `page`, `run` | a set from its files to its answer | all above |
 //! | `planning` | which captures to take of a design before it is measured | all above |
 //! | `validate` | the calibration judged on synthetic sets | all above |
 
 mod bench;
+mod boundary_search;
 mod cells;
 mod diagnosis;
 mod effects;
@@ -52,9 +53,10 @@ pub use effects::{DeclaredEffect, DeclaredParameter, Effect, Parameter, Stage, a
 pub use fidelity::Rung;
 pub use fit::WidthParts;
 pub use planning::{
-    BenchFile, CapturePlan, Confusion, PlanRequest, PlannedCapture, PlannedEffect, SemOffer, check_not_begun, plan,
+    BenchFile, CapturePlan, Confusion, PlanRequest, PlannedCapture, PlannedEffect, SemOffer, check_not_begun,
+    check_plannable, plan,
 };
-pub use proposal::{Proposed, boundary_of_fields, propose};
+pub use proposal::{FieldBoundary, Proposed, boundary_of_fields, propose};
 pub use run::{Calibration, calibrate};
 pub use search::Evidence;
 pub use session::{Screening, Session, Settings, Simulations};

@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::boundary_search::search_about_boundaries;
 use crate::diagnosis::{Diagnosis, Proposal, SetVerdict};
-use crate::effects::{self, DeclaredEffect, StitchedFields};
+use crate::effects::{self, DeclaredEffect};
 use crate::page::write_page;
-use crate::proposal::{boundary_of_fields, propose};
-use crate::search::Evidence;
+use crate::proposal::{Proposed, propose};
+use crate::search::{Evidence, LEAST_GAIN};
 use crate::session::{Session, Settings, Simulations, check_effects};
 use crate::set::MeasuredSet;
 use metalith_core::{FolderTurn, PillarReader, Progress, Result, WholeFile};
@@ -59,137 +60,75 @@ pub fn calibrate(
             Some(known) => known,
             None => (place, session.simulate(progress)?),
         };
-        done.push(finish(&session, &simulations, out, progress)?);
+        let conclude = |session: &Session<'_>, simulations: &Simulations, found| {
+            conclude(session, simulations, found, out, progress)
+        };
+        done.push(search_about_boundaries(&session, &simulations, &conclude, progress)?);
         known = Some((other, simulations));
     }
     Ok(done)
 }
 
-/// Diagnose a session with its simulations, look for what the list leaves, and write the answer.
-///
-/// # Errors
-/// As [`calibrate`].
-fn finish(
-    session: &Session<'_>,
-    simulations: &Simulations,
-    out: &Path,
-    progress: &dyn Progress,
-) -> Result<Calibration> {
-    let found = session.diagnose(simulations, progress)?;
-    let set = with_boundary(session, &found, progress)?;
-    about_boundary((session, simulations), found, (set, BOUNDARY_ROUNDS), out, progress)
-}
+/// Times that what is left is looked at for effects of its own where these are adopted: a strong one hides a weak one.
+const ADOPTIONS: usize = 2;
 
-/// Searches about the place of a boundary: the second about that which the first found, where much is left.
-const BOUNDARY_ROUNDS: usize = 2;
-
-/// Search a set with a place of a boundary, if there is one, at most so many times, and conclude by the last search that found
-/// a boundary; by what was found before, if none did.
-fn about_boundary(
-    (session, simulations): (&Session<'_>, &Simulations),
-    found: (Diagnosis, Option<Evidence>),
-    (set, rounds): (Option<MeasuredSet>, usize),
-    out: &Path,
-    progress: &dyn Progress,
-) -> Result<Calibration> {
-    let Some(set) = set.filter(|_| rounds > 0) else {
-        return conclude(session, simulations, found, out, progress);
-    };
-    let wider = Session::new(&set, session.settings.clone())?;
-    let wider_simulations = wider.simulate(progress)?;
-    let own = wider.diagnose(&wider_simulations, progress)?;
-    let Some(place) = boundary_found(&own.0, &set) else {
-        return conclude(session, simulations, found, out, progress);
-    };
-    let next = own.0.verdict.leaves_a_residual().then(|| MeasuredSet {
-        field_boundary_um: Some(place),
-        ..set.clone()
-    });
-    about_boundary((&wider, &wider_simulations), own, (next, rounds - 1), out, progress)
-}
-
-/// Where a diagnosis of a set found boundaries, across x and across y (um), that of the set where it found none; none if it found
-/// neither.
-fn boundary_found(diagnosis: &Diagnosis, set: &MeasuredSet) -> Option<[f64; 2]> {
-    let own = |name| {
-        let effect = diagnosis.effects.iter().find(|e| e.name == name)?;
-        Some(effect.numbers().get(StitchedFields::PLACE)?.0)
-    };
-    let found = StitchedFields::NAMES.map(own);
-    let stated = set.field_boundary_um?;
-    let is_found = found.iter().any(Option::is_some);
-    is_found.then(|| [0, 1].map(|axis| found[axis].unwrap_or(stated[axis])))
-}
-
-/// The set with a place of a boundary of write fields, where one would explain much of what the list leaves and the lab does not say
-/// where such boundaries run.
-fn with_boundary(
-    session: &Session<'_>,
-    (diagnosis, evidence): &(Diagnosis, Option<Evidence>),
-    progress: &dyn Progress,
-) -> Result<Option<MeasuredSet>> {
-    let set = session.set();
-    let is_open = diagnosis.verdict.leaves_a_residual() && set.field_boundary_um.is_none();
-    let Some(evidence) = evidence
-        .as_ref()
-        .filter(|_| is_open && session.settings.only.is_empty())
-    else {
-        return Ok(None);
-    };
-    let place = boundary_of_fields(session, evidence, progress)?;
-    Ok(place.map(|place| MeasuredSet {
-        field_boundary_um: Some(place),
-        ..set.clone()
-    }))
-}
-
-/// Propose effects for what is left, adopt them if that is wanted, and write the answer.
+/// Propose effects for what is left, adopt them if that is wanted and explains more, and write the answer.
 ///
 /// # Errors
 /// As [`calibrate`].
 fn conclude(
     session: &Session<'_>,
     simulations: &Simulations,
-    (mut diagnosis, evidence): (Diagnosis, Option<Evidence>),
+    (mut diagnosis, mut evidence): (Diagnosis, Option<Evidence>),
     out: &Path,
     progress: &dyn Progress,
 ) -> Result<Calibration> {
     let _turn = FolderTurn::wait(out, progress, || {
-        progress.note("waiting for another run in this folder")
+        progress.warn("another run writes into this folder: waiting for it")
     })?;
     // This run may find none, and those of another must not stand beside its answer.
     WholeFile::discard(&out.join(MODEL))?;
     let file = out.join(PROPOSAL);
     WholeFile::discard(&file)?;
-    let proposed = match &evidence {
-        Some(evidence) if diagnosis.verdict.leaves_a_residual() => propose(session, evidence, progress)?,
-        _ => Vec::new(),
-    };
-    if proposed.is_empty() {
-        return write(session, simulations, diagnosis, evidence, out);
+    let mut proposed: Vec<Proposed> = Vec::new();
+    let mut adopted: Option<(Session<'_>, Simulations)> = None;
+    let without = diagnosis.error.after.held_out;
+    for _ in 0..ADOPTIONS {
+        let (session, simulations) = adopted.as_ref().map_or((session, simulations), |(a, b)| (a, b));
+        let next = match &evidence {
+            Some(evidence) if diagnosis.verdict.leaves_a_residual() => propose(session, evidence, progress)?,
+            _ => Vec::new(),
+        };
+        if next.is_empty() {
+            break;
+        }
+        let effects: Vec<DeclaredEffect> = next.iter().map(|p| p.effect.clone()).collect();
+        proposed.extend(next);
+        if !session.settings.adopt {
+            break;
+        }
+        let wider = session.adopting(effects)?;
+        let wider_simulations = wider.simulate_beyond((session, simulations), progress)?;
+        let found = wider.diagnose(&wider_simulations, progress)?;
+        if found.0.error.after.held_out > diagnosis.error.after.held_out - LEAST_GAIN {
+            break;
+        }
+        (diagnosis, evidence) = found;
+        adopted = Some((wider, wider_simulations));
     }
-    let reasons: Vec<String> = proposed
-        .iter()
-        .map(|p| format!("`{}`: {}", p.effect.name, p.reason))
-        .collect();
-    let proposed: Vec<DeclaredEffect> = proposed.into_iter().map(|p| p.effect).collect();
-    WholeFile::write(&file, DeclaredEffect::text(&proposed).as_bytes())?;
-    let mut proposal = Proposal {
-        file: file.display().to_string(),
-        effects: proposed.iter().map(|e| e.name.clone()).collect(),
-        reasons,
-        held_out_without: None,
-    };
-    if !session.settings.adopt {
-        diagnosis.proposal = Some(proposal);
-        return write(session, simulations, diagnosis, evidence, out);
+    if !proposed.is_empty() {
+        let effects: Vec<DeclaredEffect> = proposed.iter().map(|p| p.effect.clone()).collect();
+        WholeFile::write(&file, DeclaredEffect::text(&effects).as_bytes())?;
+        let reason = |p: &Proposed| format!("`{}`: {}", p.effect.name, p.reason);
+        diagnosis.proposal = Some(Proposal {
+            file: file.display().to_string(),
+            effects: effects.into_iter().map(|e| e.name).collect(),
+            reasons: proposed.iter().map(reason).collect(),
+            held_out_without: adopted.is_some().then_some(without),
+        });
     }
-    proposal.held_out_without = Some(diagnosis.error.after.held_out);
-    let wider = session.adopting(proposed)?;
-    let simulations = wider.simulate(progress)?;
-    let (mut diagnosis, evidence) = wider.diagnose(&simulations, progress)?;
-    diagnosis.proposal = Some(proposal);
-    write(&wider, &simulations, diagnosis, evidence, out)
+    let (session, simulations) = adopted.as_ref().map_or((session, simulations), |(a, b)| (a, b));
+    write(session, simulations, diagnosis, evidence, out)
 }
 
 /// Write diagnosis, report and model.

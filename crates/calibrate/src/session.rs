@@ -12,7 +12,7 @@ use crate::effects::{self, DeclaredEffect, Effect};
 use crate::fidelity::compare_fidelities;
 use crate::fit::{Data, Fit, FitProblem, WidthParts, half_widths};
 use crate::names::unknown_names;
-use crate::search::{DefectNoise, Evidence, UnusableCapture, attribute_set, fit_of, unusable_captures};
+use crate::search::{DefectNoise, EndsSearch, Evidence, UnusableCapture, attribute_set, fit_of, unusable_captures};
 use crate::set::{MeasuredSet, PerCapture};
 use crate::simulator::{Simulator, WIDTH_ROOM_NM};
 use crate::surrogate::Surrogate;
@@ -142,6 +142,29 @@ impl<'a> Session<'a> {
         Ok(Simulations { surrogate, defects })
     }
 
+    /// The same, of a session on the same bench that tries the effects of another and more: what that one simulated is not simulated
+    /// again.
+    ///
+    /// # Errors
+    /// As [`Session::simulate`].
+    pub fn simulate_beyond(
+        &self,
+        (other, known): (&Session<'_>, &Simulations),
+        progress: &dyn Progress,
+    ) -> Result<Simulations> {
+        let (own, others) = (&self.simulator, &other.simulator);
+        let number = |e: usize| others.effects.iter().position(|o| o.name() == own.effects[e].name());
+        let slots = own.slots.iter();
+        let slots: Vec<Option<usize>> = slots
+            .map(|slot| Some(others.slots_of(number(slot.effect)?)[slot.index]))
+            .collect();
+        let random = own.effects.iter().position(|e| e.random());
+        Ok(Simulations {
+            surrogate: known.surrogate.widened(own, &slots, progress)?,
+            defects: random.zip(known.defects.as_ref().map(|(_, noise)| noise.clone())),
+        })
+    }
+
     /// The set as stated, all captures counted.
     pub fn problem(&self, simulations: &Simulations) -> FitProblem<'_> {
         FitProblem::new(&self.simulator, simulations.surrogate.clone(), &self.data)
@@ -159,7 +182,7 @@ impl<'a> Session<'a> {
         Screening { used, unusable, fit }
     }
 
-    /// Attribute the residual of the captures that can be used.
+    /// Attribute the residual of the captures that can be used; `ends` may end the search before all is tried.
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
@@ -167,11 +190,12 @@ impl<'a> Session<'a> {
         &self,
         simulations: &Simulations,
         screening: &Screening,
+        ends: Option<&EndsSearch<'_>>,
         progress: &dyn Progress,
     ) -> Result<Evidence> {
         let problem = self.screened(simulations, screening);
         let defects = simulations.defects.as_ref().map(|(effect, noise)| (*effect, noise));
-        attribute_set(&problem, self.settings.refine, defects, progress)
+        attribute_set(&problem, self.settings.refine, defects, ends, progress)
     }
 
     /// The fit of these effects and of no others, without a search, and what half of a 95 % interval of each of their parameters is
@@ -201,6 +225,19 @@ impl<'a> Session<'a> {
         simulations: &Simulations,
         progress: &dyn Progress,
     ) -> Result<(Diagnosis, Option<Evidence>)> {
+        self.diagnose_unless(None, simulations, progress)
+    }
+
+    /// The same, but `ends` may end the search before all is tried.
+    ///
+    /// # Errors
+    /// As [`Session::diagnose`].
+    pub fn diagnose_unless(
+        &self,
+        ends: Option<&EndsSearch<'_>>,
+        simulations: &Simulations,
+        progress: &dyn Progress,
+    ) -> Result<(Diagnosis, Option<Evidence>)> {
         let screening = self.screen(simulations);
         if screening.is_data_unfit() {
             let error = screening.fit.chi2 / self.screened(simulations, &screening).pixels().max(1.0);
@@ -212,7 +249,7 @@ impl<'a> Session<'a> {
         } else {
             Vec::new()
         };
-        let evidence = self.attribute(simulations, &screening, progress)?;
+        let evidence = self.attribute(simulations, &screening, ends, progress)?;
         let diagnosis = Diagnosis::new(&self.simulator, &evidence, &screening.unusable, ladder);
         Ok((diagnosis, Some(evidence)))
     }

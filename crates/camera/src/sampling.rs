@@ -109,7 +109,7 @@ impl Camera {
                         "channel `{}` of the camera counts no light from {} to {} nm",
                         channel.name, range_nm[0], range_nm[1]
                     ),
-                    "use a channel or an illuminant in the range of the design's materials",
+                    "use a channel or an illuminant in that range: it is where the materials of the cell are known",
                 ));
             }
             channels.push(ChannelSampling {

@@ -291,15 +291,11 @@ fn inverse(page: &mut Page, study: &CellStudy) {
         let [rms, worst] = error.map_or_else(|| [Cell::none(), Cell::none()], error_cells);
         table.row([Cell::from(powers), degree, rms, worst, Cell::from(list.join(", "))]);
     };
-    let published = named(study, "design")
-        .and_then(|m| m.coefficients.clone())
-        .unwrap_or_default();
-    row(
-        "of the design",
-        Cell::none(),
-        Some(&study.design_round_trip),
-        &published,
-    );
+    let (design, coefficients) = match named(study, "design").and_then(|m| m.coefficients.as_deref()) {
+        Some(coefficients) => ("of the design", coefficients),
+        None => ("table of the design", &[][..]),
+    };
+    row(design, Cell::none(), Some(&study.design_round_trip), coefficients);
     for trial in &study.inverse {
         let powers = match trial.basis {
             Basis::AllPowers => "all",
@@ -333,11 +329,9 @@ fn forward(page: &mut Page, study: &CellStudy) {
         table.row([Cell::from(name.clone()), rms, worst]);
         lines.line(name, each.iter().map(|(l, e)| (l * 1e3, e.rms_rad)));
     };
-    add(
-        "published".into(),
-        &study.forward_published.0,
-        &study.forward_published.1,
-    );
+    if let Some((each, overall)) = &study.forward_published {
+        add("published".into(), each, overall);
+    }
     for (i, fit) in study.forward.iter().enumerate() {
         add(format!("degree {}", i + 2), &fit.errors, &fit.overall);
     }

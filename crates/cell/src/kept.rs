@@ -280,7 +280,7 @@ impl KeptTable {
             None => Ok(None),
         });
         found.unwrap_or_else(|why| {
-            progress.note(&format!("{} is not used: {why}", file.display()));
+            progress.warn(&format!("{} is not used: {why}", file.display()));
             None
         })
     }
@@ -290,7 +290,7 @@ impl KeptTable {
         if let Some(file) = self.file()
             && let Err(error) = write(&file, self.magic, &self.inputs, content)
         {
-            progress.note(&format!("the table of {} is not kept: {error}", self.what));
+            progress.warn(&format!("the table of {} is not kept: {error}", self.what));
         }
     }
 }

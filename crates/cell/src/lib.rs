@@ -29,7 +29,7 @@ pub use fit::{
 pub use metalith_rcwa::Material;
 pub use model::{CellModel, Fidelity, ObliqueTables, POLARISATION_SHARE, dark};
 pub use neighbour_band::{BandNode, BandResponse};
-pub use neighbours::{NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourBasis, NeighbourResponse, SiteResponse};
+pub use neighbours::{FittedNeighbours, NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourBasis, NeighbourResponse, SiteResponse};
 pub use pointwise::PointwiseCell;
 pub use pointwise::{BAND_ORDERS, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, tabulate};
 pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};
@@ -38,5 +38,5 @@ pub use rectangle::{Handedness, RotatedRectangle};
 pub use rigorous::RigorousCell;
 pub use rotated::{RotatedCell, Truncation};
 pub use rotation::RotationMapping;
-pub use stack::{CellStack, UniformLayer};
+pub use stack::{CellStack, MOST_SUBSTRATE_K, UniformLayer};
 pub use table::{CellTable, Origin, TableSpec};

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use metalith_core::{Error, LatticeKind, PillarShape, Progress, Result};
 
-use crate::{BandResponse, NeighbourResponse, RotatedCell};
+use crate::{BandResponse, FittedNeighbours, RotatedCell};
 
 /// How truly a cell is described. Every result names the one it was made with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -202,7 +202,7 @@ pub trait CellModel: Sync {
     }
 
     /// What pillars transmit among unlike neighbours, for light that arrives from the direction with these sines in air
-    /// along x and y, x >= y >= 0: one response for s and one for p. Nothing if the model takes all neighbours for
+    /// along x and y, x >= y >= 0. Nothing if the model takes all neighbours for
     /// equals; one that does not gives the answers above as a lattice of equal pillars would.
     ///
     /// # Errors
@@ -212,7 +212,7 @@ pub trait CellModel: Sync {
         _wavelength_um: f64,
         _sines: [f64; 2],
         _progress: &dyn Progress,
-    ) -> Result<Option<[NeighbourResponse; 2]>> {
+    ) -> Result<Option<FittedNeighbours>> {
         Ok(None)
     }
 

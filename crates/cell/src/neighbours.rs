@@ -137,6 +137,16 @@ pub struct NeighbourResponse {
     pub weights: Vec<Complex64>,
 }
 
+/// The sums over pairs in one light, fitted to supercells, and how far they are from others.
+#[derive(Clone, Debug)]
+pub struct FittedNeighbours {
+    /// For s and p.
+    pub responses: [NeighbourResponse; 2],
+    /// Share of the arriving light that the sums put elsewhere than supercells do that were left out of the fit: mean over their
+    /// sites, s and p.
+    pub left_out: f64,
+}
+
 /// A sum over pairs in one light.
 pub trait SiteResponse: Sync {
     /// What a pillar (nm) transmits on the mean over its neighbours.

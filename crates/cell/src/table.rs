@@ -165,14 +165,14 @@ impl CellTable {
             match cache::read(file, &inputs, &widths) {
                 Ok(Some(columns)) => return Ok((Self::assemble(spec, &widths, columns), Origin::Kept(file.clone()))),
                 Ok(None) => {}
-                Err(why) => progress.note(&format!("{} is not used: {why}", file.display())),
+                Err(why) => progress.warn(&format!("{} is not used: {why}", file.display())),
             }
         }
         let table = Self::compute(spec, progress)?;
         let kept = file.filter(|file| match cache::write(file, &inputs, &widths, &table.columns) {
             Ok(()) => true,
             Err(error) => {
-                progress.note(&format!("the cell library is not kept: {error}"));
+                progress.warn(&format!("the cell library is not kept: {error}"));
                 false
             }
         });

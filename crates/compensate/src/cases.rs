@@ -13,7 +13,7 @@ use metalith_layout::read_pillars;
 use metalith_made::{MadeChip, MadeElement};
 use metalith_verify::PsfResult;
 use metalith_wave::propagation::{incident, landing_um};
-use metalith_wave::psf::{CURVE_LP_MM, Matched, Psf};
+use metalith_wave::psf::{Matched, PixelFrequencies, Psf};
 use metalith_wave::{Accuracy, PhaseFunction, Scratch, Window};
 
 /// Chips that are compared.
@@ -85,6 +85,7 @@ fn of_element(
         .map(|(_, chip, widths)| chip.element(&chip.drawn(widths, line.aperture_radius_um).placed(element.centre_um())))
         .collect::<Result<_>>()?;
     let as_lit = design.verify.incidence == CellIncidence::AsLit;
+    let drawn = PixelFrequencies::of(design.verify.pixel_um).drawn();
     let mut scratch = Scratch::default();
     let mut cases = Vec::new();
     for colour in &line.colours {
@@ -103,7 +104,7 @@ fn of_element(
         let matched = Matched::of(&open, [chief[0], chief[1], lens.focal_length_um], um, colour.full);
         for ((pillars, chip, _), made) in chips.iter().zip(&made) {
             let view = chip.view(made, &wave, as_lit, progress)?;
-            let psf = view.psf(window, Accuracy::Accurate, &CURVE_LP_MM, &mut scratch)?;
+            let psf = view.psf(window, Accuracy::Accurate, &drawn, &mut scratch)?;
             cases.push(CompensationCase {
                 element: element.label(),
                 wavelength_um: um,

@@ -8,7 +8,8 @@ use metalith_core::{Progress, Result};
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
 use metalith_made::{CalibratedModel, NotApplied};
-use metalith_report::{Axis, Cell, Chart, Column, Figure, ImageGrid, Page, Table, count, sig, write_json};
+use metalith_report::{Axis, Cell, Chart, Column, Figure, ImageGrid, Page, Table, count, exact, sig, write_json};
+use metalith_wave::psf::PixelFrequencies;
 
 /// Decades of a PSF that are shown.
 const DECADES: f64 = 4.0;
@@ -59,7 +60,9 @@ pub fn write_compensation_report(
     for quantity in line.chip.statement().not_applied {
         page.note(quantity.to_string());
     }
-    page.section("In the middle of the field").table(table(&cases));
+    let reported = PixelFrequencies::of(design.verify.pixel_um).reported();
+    page.section("In the middle of the field")
+        .table(table(&cases, reported));
     for row in cases.chunks(CHIPS).filter_map(figures) {
         page.row(row);
     }
@@ -73,15 +76,17 @@ pub fn write_compensation_report(
     page.write(&folder.join("compensation.html"))
 }
 
-fn table(cases: &[CompensationCase]) -> Table {
+/// Contrasts are at these frequencies (line pairs a millimetre).
+fn table(cases: &[CompensationCase], reported: [f64; 2]) -> Table {
+    let [half, nyquist] = reported.map(exact);
     let mut table = Table::new([
         Column::text("Element"),
         Column::number("Wavelength", "nm"),
         Column::text("Pillars"),
         Column::number("Strehl", ""),
         Column::number("Energy in 1 pixel", "%"),
-        Column::number("MTF 42.7/mm", ""),
-        Column::number("85.3/mm", ""),
+        Column::number(format!("MTF {half}/mm"), ""),
+        Column::number(format!("{nyquist}/mm"), ""),
     ]);
     for case in cases {
         let (m, [half, nyquist]) = (&case.spot.metrics, case.spot.mtf());

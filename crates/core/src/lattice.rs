@@ -178,6 +178,31 @@ impl Lattice {
         [all, middle - rows..middle + rows + 1]
     }
 
+    /// Of these the columns and rows whose places from the centre are within two ends along x and along y, both included (nm).
+    pub fn within(&self, ends_nm: [[i64; 2]; 2]) -> [std::ops::Range<usize>; 2] {
+        let reach = self.reach();
+        [0, 1].map(|axis| {
+            let first = |is_past: &dyn Fn(i64) -> bool| {
+                let mut all = reach[axis].clone();
+                all.find(|&i| is_past(self.place_nm(axis, i)))
+                    .unwrap_or(reach[axis].end)
+            };
+            let [least, greatest] = ends_nm[axis];
+            let from = first(&|nm| nm >= least);
+            from..first(&|nm| nm > greatest).max(from)
+        })
+    }
+
+    /// What a lens that takes all of it needs along x and along y (nm): from its first place to its last, and a pitch, so that
+    /// pillars of two such lenses side by side are a pitch apart.
+    pub fn sides_nm(&self) -> [i64; 2] {
+        let reach = self.reach();
+        [0, 1].map(|axis| {
+            let place = |i| self.place_nm(axis, i);
+            place(reach[axis].end - 1) - place(reach[axis].start) + i64::from(self.pitch_nm)
+        })
+    }
+
     /// Steps along columns and rows from a site to half of its neighbours; the others are on the opposite sides.
     pub fn neighbours(&self) -> &'static [[i64; 2]] {
         match self.kind {
@@ -337,6 +362,19 @@ mod tests {
         }
         assert!(Lattice::of_kind(LatticeKind::Hexagonal, 350, 4).is_err());
         assert!(Lattice::of_kind_covering(LatticeKind::Hexagonal, 0, 350).is_err());
+    }
+
+    #[test]
+    fn columns_and_rows_within_two_ends() {
+        let lattice = Lattice::new(350, 6).unwrap();
+        // Places at 175, 525 and 875 nm to either side.
+        assert_eq!(lattice.within([[-525, 525], [-174, 2000]]), [1..5, 3..6]);
+        assert_eq!(lattice.within([[-100, 100], [900, 1000]]), [3..3, 6..6]);
+        assert_eq!(lattice.sides_nm(), [2100, 2100]);
+        let hexagonal = Lattice::of_kind_covering(LatticeKind::Hexagonal, 10_000, 1000).unwrap();
+        // Columns are 500 nm apart, rows 866 nm, five of them to either side.
+        assert_eq!(hexagonal.within([[-500, 1499], [-866, 1000]]), [9..13, 9..12]);
+        assert_eq!(hexagonal.sides_nm(), [11_000, 9660]);
     }
 
     #[test]

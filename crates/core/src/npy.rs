@@ -10,6 +10,8 @@ pub struct Array {
     /// Entries along each axis, slowest first.
     pub shape: Vec<u64>,
     pub values: Vec<f64>,
+    /// Whether the file has whole numbers, uint8 or uint16.
+    pub whole: bool,
 }
 
 /// Why a file holds no array that can be used.
@@ -62,22 +64,27 @@ pub fn read_from(mut from: impl Read, takes: impl FnOnce(&[u64]) -> bool) -> Res
     if columns_first || !takes(&shape) {
         return Err(NpyError::Shape { shape, columns_first });
     }
+    let mut whole = false;
     let values = match npy.try_data::<f64>() {
         Ok(data) => data.collect::<io::Result<Vec<f64>>>(),
         Err(npy) => match npy.try_data::<f32>() {
             Ok(data) => data.map(|v| v.map(f64::from)).collect(),
-            Err(npy) => match npy.try_data::<u16>() {
-                Ok(data) => data.map(|v| v.map(f64::from)).collect(),
-                Err(npy) => {
-                    let data = npy.try_data::<u8>().map_err(|_| NpyError::Type)?;
-                    data.map(|v| v.map(f64::from)).collect()
+            Err(npy) => {
+                whole = true;
+                match npy.try_data::<u16>() {
+                    Ok(data) => data.map(|v| v.map(f64::from)).collect(),
+                    Err(npy) => {
+                        let data = npy.try_data::<u8>().map_err(|_| NpyError::Type)?;
+                        data.map(|v| v.map(f64::from)).collect()
+                    }
                 }
-            },
+            }
         },
     };
     Ok(Array {
         shape,
         values: values.map_err(NpyError::Short)?,
+        whole,
     })
 }
 
@@ -161,6 +168,7 @@ mod tests {
         let double = PLAIN.replace("<f4", ">f8");
         let data: Vec<u8> = numbers.iter().flat_map(|&v| f64::from(v).to_be_bytes()).collect();
         assert_eq!(outcome(&file(&double, &data)).unwrap().values, numbers.map(f64::from));
+        assert!(!read.whole && outcome(&file(&PLAIN.replace("<f4", "|u1"), &[7; 4])).unwrap().whole);
         assert!(matches!(outcome(&file(PLAIN, &[0; 15])), Err(NpyError::Short(_))));
     }
 

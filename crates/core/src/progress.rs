@@ -11,6 +11,12 @@ pub trait Progress: Sync {
     /// A word on the state of the work, such as the best merit so far.
     fn note(&self, _text: &str) {}
 
+    /// Something that whoever waits should know even when the next piece of work has begun, such as a result that could not be
+    /// kept.
+    fn warn(&self, text: &str) {
+        self.note(text);
+    }
+
     /// Whether the user asked to stop; long work looks here between steps and then returns
     /// [`crate::error::Error::Interrupted`], or the best it has where that is of use.
     fn stopped(&self) -> bool {

@@ -14,10 +14,26 @@ use crate::spec::UnderSpec;
 use crate::{Design, WidthRule};
 
 /// The band of designs whose wavelengths are all visible (um): that of colour sensors.
-const VISIBLE_UM: (f64, f64) = (0.4, 0.7);
+pub const VISIBLE_UM: (f64, f64) = (0.4, 0.7);
 
 /// Share by which the band of other designs is wider than the wavelengths that they name, to either side.
 const BEYOND: f64 = 0.03;
+
+/// The band of light of which single wavelengths are named (um): the visible, if all of them are; else those and 3 % more to either
+/// side; as far as materials are known, which is `known_um`.
+pub fn band_about(named_um: impl IntoIterator<Item = f64>, known_um: (f64, f64)) -> (f64, f64) {
+    let (short, long) = named_um
+        .into_iter()
+        .fold((f64::INFINITY, 0.0), |(short, long): (f64, f64), um| {
+            (short.min(um), long.max(um))
+        });
+    let band = if short >= VISIBLE_UM.0 && long <= VISIBLE_UM.1 {
+        VISIBLE_UM
+    } else {
+        (short * (1.0 - BEYOND), long * (1.0 + BEYOND))
+    };
+    (band.0.max(known_um.0), band.1.min(known_um.1))
+}
 
 impl Design {
     /// The folder that paths in the design count from.
@@ -71,21 +87,10 @@ impl Design {
     /// If a material is not known.
     pub fn band_um(&self) -> Result<(f64, f64)> {
         let named = self.verify.wavelengths_um.iter().chain([&self.mapping.wavelength_um]);
-        let around = |band: (f64, f64)| {
-            named
-                .clone()
-                .fold(band, |(short, long), &l| (short.min(l), long.max(l)))
-        };
-        let own = around((f64::INFINITY, 0.0));
-        let is_visible = own.0 >= VISIBLE_UM.0 && own.1 <= VISIBLE_UM.1;
         let known = self.cell_stack()?.range_um();
         Ok(match self.cell.band_um {
-            Some(band) => around(band),
-            None if is_visible => (VISIBLE_UM.0.max(known.0), VISIBLE_UM.1.min(known.1)),
-            None => (
-                (own.0 * (1.0 - BEYOND)).max(known.0),
-                (own.1 * (1.0 + BEYOND)).min(known.1),
-            ),
+            Some(band) => named.fold(band, |(short, long), &l| (short.min(l), long.max(l))),
+            None => band_about(named.copied(), known),
         })
     }
 }

@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
+use metalith_cell::CellStack;
 use metalith_core::document::{Document, Section, load};
 use metalith_core::text::{hex, quoted};
 use metalith_core::{ElementSite, Error, Lattice, Result};
 
 use crate::spec::{
-    ArraySpec, CellSpec, Element, FieldAngle, LayoutSpec, LensOutline, LensSpec, MappingSpec, OptimiseSpec, VerifySpec,
+    ArraySpec, CellSpec, Element, FieldAngle, Footprint, LayoutSpec, LensOutline, LensSpec, MappingSpec, OptimiseSpec,
+    VerifySpec,
 };
 
 /// Version of the format of design files that this program reads.
@@ -97,9 +99,17 @@ impl Design {
         let cell = CellSpec::read(&root.section("cell"));
         let phase = root.section("phase");
         let lens = LensSpec::read(&root.section("lens"), &phase, &cell);
-        let array_section = root.section("array");
-        let array = ArraySpec::read(&array_section, &lens, &phase, &cell, &root.sections("element"));
-        let mapping = MappingSpec::read(&root.section("mapping"), &cell, &array);
+        let (array_section, mapping_section) = (root.section("array"), root.section("mapping"));
+        let mapping_um = MappingSpec::read_wavelength(&mapping_section, &cell);
+        let array = ArraySpec::read(
+            &array_section,
+            &lens,
+            &phase,
+            &cell,
+            mapping_um,
+            &root.sections("element"),
+        );
+        let mapping = MappingSpec::read(&mapping_section, mapping_um, &cell, &array);
         let layout = LayoutSpec::read(root, &lens, &array);
         let verify = VerifySpec::read(&root.section("verify"), &cell);
         check_directions(&array_section, &array, &verify);
@@ -120,15 +130,22 @@ impl Design {
 
     /// Read the files that the design names, after all its own mistakes are known to be none.
     fn with_files(mut self) -> Result<Self> {
-        self.lens.load()?;
+        // A map that is of elements with lenses of their own alone covers these, not the lens that the others share.
+        let indices = self.elements().into_iter().map(|e| e.index);
+        let sharing: Vec<_> = indices
+            .filter(|index| self.array.placed(*index).is_none_or(|p| p.lens.is_none()))
+            .collect();
+        self.lens.load(|term| sharing.iter().any(|index| term.is_of(*index)))?;
         for own in self.array.placed.iter_mut().filter_map(|p| p.lens.as_mut()) {
-            own.load()?;
+            own.load(|_| true)?;
         }
         self.mapping.load(&self.cell)?;
         let band_um = self.band_um()?;
         self.optimise.within(band_um);
         // Unknown materials and wavelengths that they are not known at are mistakes of the design, whoever asks first.
         let stack = self.cell_stack()?;
+        self.check_bands(&stack)?;
+        stack.check_substrate(band_um)?;
         for um in self.verify.wavelengths_um.iter().chain([&self.mapping.wavelength_um]) {
             stack.full_transmission(*um)?;
             for material in stack.materials() {
@@ -136,6 +153,36 @@ impl Design {
             }
         }
         Ok(self)
+    }
+
+    /// Nothing, if all bands that the design says are where its materials are known: else only a simulation would find out, after
+    /// the layout is written.
+    fn check_bands(&self, stack: &CellStack) -> Result<()> {
+        let bands = [
+            ("cell", self.cell.band_um),
+            ("mapping", self.mapping.comparison.band_um),
+            ("optimise", self.optimise.said_band_um()),
+        ];
+        let is_known = |um: f64| stack.materials().all(|material| material.index(um).is_ok());
+        let known_um = stack.range_um();
+        let nm = |(short, long): (f64, f64)| {
+            let [short, long] = [short, long].map(|um| (um * 1e6).round() / 1e3);
+            format!("{short} to {long} nm")
+        };
+        for (section, band_um) in bands.into_iter().filter_map(|(section, band)| Some((section, band?))) {
+            if !(is_known(band_um.0) && is_known(band_um.1)) {
+                return Err(Error::invalid(
+                    format!(
+                        "{}: `band_nm` of [{section}] is {}, and the materials of [cell] are known from {}",
+                        self.path.display(),
+                        nm(band_um),
+                        nm(known_um)
+                    ),
+                    "give a band in that range, or other materials",
+                ));
+            }
+        }
+        Ok(())
     }
 
     /// The lattice that the pillars of each element stand on: it covers the largest.
@@ -210,9 +257,8 @@ impl Design {
 
     /// The outline of an element as it stands on the chip, from its middle; none where it is a circle.
     pub fn outline_of(&self, element: &Element) -> Option<LensOutline> {
-        let rotation_deg = self.array.placed(element.index).map_or(0.0, |p| p.rotation_deg);
         let outline = self.lens_of(element).outline.as_ref()?;
-        Some(outline.rotated(rotation_deg))
+        Some(outline.rotated(self.array.rotation_deg(element.index)))
     }
 
     /// Radius of the openings in the metal around the lenses that have none of their own (um).
@@ -234,18 +280,36 @@ impl Design {
         self.array.elements()
     }
 
-    /// Where they are in a layout, in the same order.
+    /// Where they are in a layout, in the same order. All have the lattice of the largest; where these overlap, each has the part
+    /// that its own pillars stand in.
     pub fn sites(&self) -> Vec<ElementSite> {
-        self.elements().iter().map(|e| self.site_of(e)).collect()
+        let lattice = self.lattice();
+        let roomy = self.array.has_room_for(lattice.sides_nm());
+        let site = |element: Element| ElementSite {
+            name: element.label(),
+            centre_nm: [element.centre_nm.0, element.centre_nm.1],
+            lattice,
+            within_nm: if roomy { None } else { self.within_nm(&element) },
+        };
+        let mut sites: Vec<_> = self.elements().into_iter().map(site).collect();
+        ElementSite::widen(&mut sites);
+        sites
+    }
+
+    /// Outermost places of the pillars of an element, from its middle (nm).
+    fn within_nm(&self, element: &Element) -> Option<[[i64; 2]; 2]> {
+        let rotation_deg = self.array.rotation_deg(element.index);
+        Footprint::of(self.lens_of(element), rotation_deg, &self.cell).map(|footprint| footprint.ends_nm)
     }
 
     /// Where one of them is in a layout.
+    ///
+    /// # Panics
+    /// If it is no element of the design.
     pub fn site_of(&self, element: &Element) -> ElementSite {
-        ElementSite {
-            name: element.label(),
-            centre_nm: [element.centre_nm.0, element.centre_nm.1],
-            lattice: self.lattice(),
-        }
+        let mut all = self.elements().into_iter().zip(self.sites());
+        let found = all.find(|(e, _)| e.index == element.index);
+        found.expect("an element of the design").1
     }
 
     /// SHA-256 of all that decides the layout (not of what is verified): two designs with the same
@@ -282,6 +346,23 @@ impl Design {
         let bytes = serde_json::to_vec(&decisive).expect("plain data serialises");
         Ok(hex(&Sha256::digest(&bytes)))
     }
+
+    /// SHA-256 of all that decides what light is simulated to do behind the layout: of [`Design::optics_digest`] and, of
+    /// `[verify]`, the cell, its wavelengths and the analyser. In hexadecimal.
+    ///
+    /// # Errors
+    /// As [`Design::optics_digest`].
+    pub fn simulation_digest(&self) -> Result<String> {
+        let VerifySpec {
+            fidelity,
+            wavelengths_um,
+            analyser,
+            ..
+        } = &self.verify;
+        let decisive = (self.optics_digest()?, fidelity, wavelengths_um, analyser);
+        let bytes = serde_json::to_vec(&decisive).expect("plain data serialises");
+        Ok(hex(&Sha256::digest(&bytes)))
+    }
 }
 
 /// Every element must have light to look at, at each wavelength and field angle that it is simulated for, and send it to
@@ -295,7 +376,14 @@ fn check_directions(section: &Section<'_, '_>, array: &ArraySpec, verify: &Verif
             };
             if let Some(angle) = verify.field_angles.iter().find(|a| !arrives(a)) {
                 section.fault_given(
-                    &["verify.wavelengths_nm", "verify.field_x_deg", "verify.field_y_deg"],
+                    &[
+                        "verify.wavelengths_nm",
+                        "verify.field_x_deg",
+                        "verify.field_y_deg",
+                        "array.wedge_wavelength_nm",
+                        "phase.wavelength_nm",
+                        "mapping.wavelength_nm",
+                    ],
                     "steering_deg",
                     format!(
                         "element {} has no light at {:.0} nm from the field angle ({}, {}) degrees",

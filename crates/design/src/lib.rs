@@ -3,10 +3,12 @@
 pub mod array;
 mod cells;
 mod design;
+mod lattice_orders;
 pub mod phase;
 mod spec;
 
 pub use array::{PillarArray, WidthRule};
-pub use cells::{cell_models, mappings};
+pub use cells::{VISIBLE_UM, band_about, cell_models, mappings};
 pub use design::Design;
+pub use lattice_orders::{AskedLight, LatticeOrders, Medium};
 pub use spec::*;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith_cell::RotatedRectangle;
+use metalith_cell::{Fidelity, RotatedRectangle};
 use metalith_core::Silent;
 use metalith_rcwa::{Orders, circular};
 
@@ -75,6 +75,24 @@ fn the_band_is_that_of_the_design() {
     assert_ne!(own.optics_digest().unwrap(), infrared.optics_digest().unwrap());
 }
 
+/// A band beyond what the materials are known for is refused before anything is written, with what they are known for.
+#[test]
+fn a_band_beyond_the_materials_is_refused() {
+    for section in ["[cell]", "[mapping]"] {
+        let with = format!("{section}\nband_nm = [400, 1000]");
+        let error = changed("asi_940", section, &with).unwrap_err().to_string();
+        let wanted = format!("`band_nm` of {section} is 400 to 1000 nm");
+        assert!(
+            error.contains(&wanted) && error.contains("from 413.3 to 2066 nm"),
+            "{error}"
+        );
+    }
+    assert!(changed("asi_940", "[cell]", "[cell]\nband_nm = [420, 1000]").is_ok());
+    let own = "[optimise]\nband_nm = [400, 700]\n\n[verify]";
+    let error = changed("asi_940", "[verify]", own).unwrap_err().to_string();
+    assert!(error.contains("[optimise]"), "{error}");
+}
+
 /// A table of a material that says something else is another chip in the light, and the same layout.
 #[test]
 fn the_contents_of_a_material_decide_the_optics() {
@@ -96,6 +114,44 @@ fn the_contents_of_a_material_decide_the_optics() {
     assert_eq!(one.0, other.0);
     assert_ne!(one.1, other.1);
     assert_eq!(other, table(2.1));
+}
+
+/// Light arrives through the substrate: one that absorbs is a mistake of the design, at once; a trace of loss is none.
+#[test]
+fn a_substrate_that_absorbs_is_refused_when_the_design_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |k: f64, more: &str| {
+        let rows = format!("wavelength_nm,n,k\n400,1.5,{k}\n500,1.5,0\n720,1.5,0\n");
+        std::fs::write(folder.path().join("glass.csv"), rows).unwrap();
+        let text = text("array_2x4");
+        let cell = format!("[cell]\nsubstrate_material = \"glass.csv\"\n{more}");
+        Design::parse(&folder.path().join("own.toml"), &text.replacen("[cell]\n", &cell, 1))
+    };
+    assert!(read(0.0005, "").is_ok());
+    // It is verified at 530 nm, but white light has 400 nm too, unless the design says otherwise.
+    let said = read(0.02, "").unwrap_err().to_string();
+    assert!(said.contains("glass.csv has k = 0.02 at 400.0 nm"), "{said}");
+    // The mapping is for 452 nm, where there is half of it.
+    let said = read(0.02, "band_nm = [500, 600]\n").unwrap_err().to_string();
+    assert!(said.contains("at 452.0 nm"), "{said}");
+}
+
+/// Sums over pairs were compared with real rows of the cell of the paper alone.
+#[test]
+fn unlike_neighbours_judge_the_cell_of_the_paper_where_nothing_is_said() {
+    let fidelity = |name: &str, from: &str, to: &str| changed(name, from, to).unwrap().verify.fidelity;
+    let said = "fidelity = \"rigorous\"\n";
+    assert_eq!(fidelity("array_2x4", said, ""), Fidelity::Neighbours);
+    assert_eq!(fidelity("mini_3x3", "[verify]\n", "[verify]\n"), Fidelity::Neighbours);
+    assert_eq!(fidelity("asi_940", said, ""), Fidelity::Rigorous);
+    assert_eq!(
+        fidelity("asi_940", "\"rigorous\"", "\"neighbours\""),
+        Fidelity::Neighbours
+    );
+    assert_eq!(
+        fidelity("mini_3x3", "pillar_height_nm = 700", "pillar_height_nm = 650"),
+        Fidelity::Rigorous
+    );
 }
 
 #[test]
@@ -125,7 +181,7 @@ fn mistakes_are_said() {
             "prototype_3x3",
             "spacing_um = 2420",
             "spacing_um = 1000",
-            "neighbouring lenses overlap, or the squares about them do",
+            "neighbouring lenses overlap, or the boxes about their pillars do",
         ),
         (
             "hologram",

@@ -14,7 +14,7 @@ use metalith_design::Design;
 use metalith_gds::LayerNumber;
 
 /// The decks that ship with the program, by the names of their files; the first is the standard one.
-const SHIPPED: [(&str, &str); 17] = [
+const SHIPPED: [(&str, &str); 18] = [
     ("sin_pillars.toml", include_str!("../../../rules/sin_pillars.toml")),
     ("sin_apertures.toml", include_str!("../../../rules/sin_apertures.toml")),
     ("dose_matrix.toml", include_str!("../../../rules/dose_matrix.toml")),
@@ -23,6 +23,7 @@ const SHIPPED: [(&str, &str); 17] = [
         include_str!("../../../rules/test_structures.toml"),
     ),
     ("test_openings.toml", include_str!("../../../rules/test_openings.toml")),
+    ("squares.toml", include_str!("../../../rules/squares.toml")),
     ("circles.toml", include_str!("../../../rules/circles.toml")),
     ("rectangles.toml", include_str!("../../../rules/rectangles.toml")),
     ("openings.toml", include_str!("../../../rules/openings.toml")),
@@ -95,23 +96,26 @@ impl Deck {
         Self::shipped(Path::new(SHIPPED[0].0)).expect("it is the first of the list")
     }
 
-    /// The deck that a design of pillars of this shape is checked by where no other is named: that of the paper's squares, or
-    /// what holds of every layout of circles, or of rectangles.
+    /// The deck of what holds of every layout of pillars of this shape.
     ///
     /// # Panics
     /// Never: it is tested.
     pub fn for_shape(shape: PillarShape) -> Self {
         let name = match shape {
-            PillarShape::Square => return Self::standard(),
+            PillarShape::Square => "squares.toml",
             PillarShape::Circle => "circles.toml",
             PillarShape::Rectangle(_) => "rectangles.toml",
         };
         Self::shipped(Path::new(name)).expect("it is in the list")
     }
 
-    /// The same for a design; that of squares where there is none.
+    /// The deck that a design is checked by where no other is named: [`Deck::standard`] for the cell that this is of, and where
+    /// there is no design, else that of the shape of its pillars.
     pub fn for_design(design: Option<&Design>) -> Self {
-        Self::for_shape(design.map_or(PillarShape::Square, |d| d.cell.shape))
+        match design {
+            Some(design) if !design.cell.is_of_the_paper() => Self::for_shape(design.cell.shape),
+            _ => Self::standard(),
+        }
     }
 
     /// The deck of the program whose file has the name at the end of `path`, if there is one.
@@ -314,11 +318,18 @@ mod tests {
     #[test]
     fn mistakes_have_places() {
         let text = "schema = 1\nname = \"x\"\npillar_height_nm = 700\n[layers]\npillars = \"1-0\"\n\
-                    [[rule]]\nid = \"a\"\ncheck = \"gap_min\"\n[[rule]]\nid = \"a\"\ncheck = \"wings\"\n";
+                    [[rule]]\nid = \"a\"\ncheck = \"gap_min\"\n[[rule]]\nid = \"a\"\ncheck = \"wings\"\n\
+                    [[rule]]\nid = \"b\"\ncheck = \"on_lattice\"\nfrom = \"layout\"\n";
         let error = Deck::parse(Path::new("deck.toml"), text.into())
             .unwrap_err()
             .to_string();
-        for expected in ["deck.toml:5:", "lacks `nm`", "a second rule `a`", "no check `wings`"] {
+        for expected in [
+            "deck.toml:5:",
+            "lacks `nm`",
+            "a second rule `a`",
+            "no check `wings`",
+            "`from` cannot be \"layout\"",
+        ] {
             assert!(error.contains(expected), "{expected}: {error}");
         }
     }

@@ -4,8 +4,10 @@ use super::context::Context;
 use super::findings::Findings;
 use super::flat::FlatLayout;
 use super::rule::{NotRun, Rule, RuleOutcome};
-use metalith_core::WidthRows;
 use metalith_core::document::{Limits, Section};
+use metalith_core::{Lattice, WidthRows};
+use metalith_design::Design;
+use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_gds::{Point, Rect};
 
 struct FillRule {
@@ -84,6 +86,26 @@ impl Windows {
         }
     }
 
+    /// Whether any of them is full where all sites of an element have pillars.
+    fn any_within(&self, phase: &ElementPhase<'_>) -> bool {
+        let lattice = phase.lattice();
+        (0..self.fill.len()).any(|k| {
+            let place = [k % self.count[0], k / self.count[0]];
+            let [columns, rows] = [0, 1].map(|axis| {
+                let first = self.first[axis] + place[axis] * self.sites[axis];
+                first..first + self.sites[axis]
+            });
+            let full = |iy| columns.clone().all(|ix| !lattice.has(ix, iy) || phase.holds(ix, iy));
+            rows.into_iter().all(full)
+        })
+    }
+
+    /// Whether the one in the middle is within a circle about the centres of the pillars (um).
+    fn middle_within(&self, lattice: Lattice, radius_um: f64) -> bool {
+        let half = |axis: usize| 0.5 * (self.sites[axis] - 1) as f64 * lattice.steps_um()[axis];
+        !self.fill.is_empty() && half(0).hypot(half(1)) <= radius_um
+    }
+
     /// The area of window `k`.
     fn place(&self, flat: &FlatLayout<'_>, element: usize, k: usize) -> Rect {
         let site = &flat.elements[element].site;
@@ -99,6 +121,23 @@ impl Windows {
         r.include(Point::new(unit(x), unit(y)));
         r.include(Point::new(unit(x + size[0]), unit(y + size[1])));
         r
+    }
+}
+
+impl FillRule {
+    /// Whether an element would hold a full window if none of its pillars were missing: of a design by its sites, else as far
+    /// as the circle about the pillars that there are tells.
+    fn could_run(&self, flat: &FlatLayout<'_>) -> bool {
+        let lens = flat.design.map(LensPhase::of);
+        let designed = flat.design.map_or_else(Vec::new, Design::elements);
+        (0..flat.elements.len()).any(|k| {
+            let windows = Windows::of(flat, k, self.window_um);
+            let own = &flat.elements[k];
+            match (&lens, designed.get(k)) {
+                (Some(lens), Some(element)) => windows.any_within(&ElementPhase::of(lens, element)),
+                _ => windows.middle_within(own.site.lattice, own.widths.circle_um()),
+            }
+        })
     }
 }
 
@@ -150,10 +189,14 @@ impl Rule for FillRule {
             }
         }
         if windows == 0 {
-            return Err(NotRun::Skipped(format!(
-                "no element holds a full window of {} um",
-                self.window_um
-            )));
+            let window = self.window_um;
+            return Err(if self.could_run(flat) {
+                NotRun::Skipped(format!(
+                    "no element holds a full window of {window} um: pillars are missing"
+                ))
+            } else {
+                NotRun::NotApplicable(format!("no element is large enough for a window of {window} um"))
+            });
         }
         match self.want {
             FillLimit::Between(_) => found

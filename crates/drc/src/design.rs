@@ -3,29 +3,43 @@
 use super::context::Context;
 use super::findings::Findings;
 use super::flat::FlatLayout;
-use super::rule::{Needs, NotRun, Rule, RuleOutcome};
+use super::rule::{NO_DESIGN, Needs, NotRun, Rule, RuleOutcome};
 use super::work::{Stop, Work};
 
 use metalith_core::document::{Limits, Section};
 use metalith_core::{Lattice, WidthRows};
-use metalith_design::Design;
 use metalith_design::phase::{ElementPhase, LensPhase};
-use metalith_rcwa::Material;
+use metalith_design::{AskedLight, Design, Medium};
 
 enum Against {
     Count,
     Widths,
     /// Share of neighbouring sites whose phase differs by more than pi.
     PhaseStep(f64),
-    NoLatticeOrders,
+    NoLatticeOrders {
+        /// One of both; none for both.
+        medium: Option<Medium>,
+        light: AskedLight,
+    },
 }
+
+/// Media and light of `lattice_orders` as the keys have them.
+const MEDIA: [(&str, Option<Medium>); 3] = [
+    ("both", None),
+    ("ambient", Some(Medium::Ambient)),
+    ("substrate", Some(Medium::Substrate)),
+];
+const LIGHT: [(&str, AskedLight); 2] = [("all", AskedLight::All), ("middle", AskedLight::Middle)];
 
 pub(super) fn read(check: &str, s: &Section<'_, '_>, _context: &Context) -> Option<Box<dyn Rule>> {
     Some(Box::new(match check {
         "pillar_count" => Against::Count,
         "width_map" => Against::Widths,
         "phase_step" => Against::PhaseStep(s.float("max_share", Limits::new(0.0..=1.0, "of all steps"))),
-        "lattice_orders" => Against::NoLatticeOrders,
+        "lattice_orders" => Against::NoLatticeOrders {
+            medium: s.choice("medium", &MEDIA, Some(None)),
+            light: s.choice("light", &LIGHT, Some(AskedLight::All)),
+        },
         _ => return None,
     }))
 }
@@ -36,25 +50,32 @@ impl Rule for Against {
             Self::Count => "as many pillars as designed, in every element".into(),
             Self::Widths => "widths as designed, at every site".into(),
             Self::PhaseStep(share) => format!("at most {share} of the steps from pillar to pillar exceed pi"),
-            Self::NoLatticeOrders => "the lattice sends no light into oblique orders of the substrate".into(),
+            Self::NoLatticeOrders { medium, light } => format!(
+                "the lattice sends no light {}into oblique orders of {}",
+                match light {
+                    AskedLight::All => "",
+                    AskedLight::Middle => "from the middle of a field ",
+                },
+                medium.map_or("the media beside it", Medium::words)
+            ),
         }
     }
 
     fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
         let Some(design) = flat.design else {
-            return Err(NotRun::Skipped("no design was given: name it with --design".into()));
+            return Err(NotRun::Skipped(NO_DESIGN.into()));
         };
         match self {
             Self::Count | Self::Widths => self.compare(flat, found),
             Self::PhaseStep(share) => phase_step(flat, design, *share, found),
-            Self::NoLatticeOrders => lattice_orders(design, found),
+            Self::NoLatticeOrders { medium, light } => lattice_orders(design, *medium, *light, found),
         }
     }
 
     fn needs(&self) -> Needs {
         match self {
             Self::Count | Self::Widths => Needs::Array,
-            Self::PhaseStep(_) | Self::NoLatticeOrders => Needs::Numbers,
+            Self::PhaseStep(_) | Self::NoLatticeOrders { .. } => Needs::Numbers,
         }
     }
 }
@@ -210,26 +231,13 @@ fn radial_steps(work: &Work<'_>, lattice: Lattice, phase: &ElementPhase<'_>) -> 
     Ok((2 * all, 2 * steep))
 }
 
-fn lattice_orders(design: &Design, found: &mut Findings) -> RuleOutcome {
-    let folder = design.path.parent().unwrap_or_else(|| std::path::Path::new("."));
-    let substrate = match Material::resolve(&design.cell.substrate_material, folder) {
-        Ok(material) => material,
-        Err(error) => return Err(NotRun::Failed(error.to_string())),
-    };
-    // The nearest orders of a hexagonal lattice go by the distance of its rows.
-    let pitch_nm = f64::from(design.cell.lattice.row_nm(design.cell.pitch_nm));
-    for &wavelength_um in &design.verify.wavelengths_um {
-        let wavelength_nm = wavelength_um * 1e3;
-        let index = match substrate.index(wavelength_um) {
-            Ok(index) => index.re,
-            Err(error) => return Err(NotRun::Failed(error.to_string())),
-        };
-        let shortest = index * pitch_nm;
-        if wavelength_nm < shortest {
-            found.plain(&format!("{wavelength_nm:.3}"), || {
-                format!("at {wavelength_nm:.1} nm, below {shortest:.1} nm, the lattice diffracts into the substrate")
-            });
-        }
+fn lattice_orders(design: &Design, medium: Option<Medium>, light: AskedLight, found: &mut Findings) -> RuleOutcome {
+    let all = design
+        .lattice_orders(light)
+        .map_err(|error| NotRun::Failed(error.to_string()))?;
+    for orders in all.iter().filter(|o| medium.is_none_or(|m| m == o.medium)) {
+        let nm = orders.wavelength_um * 1e3;
+        found.plain(&format!("{nm:.3} {}", orders.medium.words()), || orders.words());
     }
     Ok(())
 }

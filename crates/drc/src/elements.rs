@@ -3,7 +3,7 @@
 use super::deck::Deck;
 use super::input::CheckInput;
 use super::work::Allowance;
-use metalith_core::{Error, PillarShape, Progress, Result};
+use metalith_core::{ElementSite, Error, PillarShape, Progress, Result};
 use metalith_gds::extract::{Discovered, Scale, discover};
 use metalith_gds::{LayerNumber, Layout, Selection};
 
@@ -33,7 +33,8 @@ pub(super) fn sites(
     let mut why = String::new();
     for file in std::iter::once(&layout).chain(&input.with) {
         match discover(file, selection, &deck.pillars, Scale::of(file)?, progress).map_err(Error::from) {
-            Ok(found) => {
+            Ok(mut found) => {
+                ElementSite::widen(&mut found.sites);
                 let total: u64 = found.sites.iter().map(|s| (s.lattice.sites() as u64).pow(2)).sum();
                 if total <= allowance.sites {
                     return Ok((found, String::new()));

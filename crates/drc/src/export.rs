@@ -32,7 +32,7 @@ pub fn text(report: &DrcReport) -> String {
             other => other.word().to_uppercase(),
         };
         let _ = writeln!(out, "{:28} {:>18}  {}", r.id, state, r.words);
-        if let Status::Skipped(why) | Status::Failed(why) = &r.status {
+        if let Status::Skipped(why) | Status::NotApplicable(why) | Status::Failed(why) = &r.status {
             let said = std::mem::replace(&mut reason, why) == why;
             let _ = writeln!(out, "{:28} {}", "", if said { "for the same reason" } else { why });
         }
@@ -190,7 +190,8 @@ fn categories(out: &mut String, ids: &[(Vec<&str>, &str)], depth: usize, indent:
 /// JUnit XML: each rule is a test case; a rule that did not run is an error, never a pass.
 pub fn junit(report: &DrcReport) -> String {
     let failed = |r: &&RuleReport| r.status == Status::Run && r.severity > Severity::Note && r.open() > 0;
-    let waiting = report.rules.iter().filter(|r| r.status == Status::NotInForce).count();
+    let waits = |r: &&RuleReport| matches!(r.status, Status::NotInForce | Status::NotApplicable(_));
+    let waiting = report.rules.iter().filter(waits).count();
     let mut out = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n<testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" \
          errors=\"{}\" skipped=\"{waiting}\">\n",
@@ -209,6 +210,7 @@ pub fn junit(report: &DrcReport) -> String {
             Status::Skipped(why) | Status::Failed(why) => {
                 format!("<error message=\"{}: {}\"/>", r.status.word(), escaped(why))
             }
+            Status::NotApplicable(why) => format!("<skipped message=\"{}\"/>", escaped(why)),
             Status::NotInForce => "<skipped message=\"no design was given\"/>".to_owned(),
             Status::Run if failed(&r) => {
                 let lines: Vec<String> = r

@@ -4,7 +4,7 @@ use super::body::Body;
 use super::context::Context;
 use super::findings::Findings;
 use super::flat::FlatLayout;
-use super::rule::{NotRun, Rule, RuleOutcome};
+use super::rule::{NO_DESIGN, NotRun, Rule, RuleOutcome, from_design};
 use super::tolerance::{EQUAL_NM, ROUNDING_NM};
 use metalith_core::WidthRows;
 use metalith_core::document::{Limits, Section};
@@ -14,7 +14,7 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Optio
     let nm = || Limits::new(0.001..=1e6, "nm");
     Some(match check {
         "on_lattice" => Box::new(OnLattice {
-            pitch_nm: s.float("pitch_nm", nm()),
+            pitch_nm: (!from_design(s)).then(|| s.float("pitch_nm", nm())),
         }),
         "grid" => Box::new(GridRule {
             layers: context.some_layers(s),
@@ -29,23 +29,29 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Optio
 
 /// Squares in an element are on its sites.
 struct OnLattice {
-    pitch_nm: f64,
+    /// None for that of the design.
+    pitch_nm: Option<f64>,
 }
 
 impl Rule for OnLattice {
     fn words(&self) -> String {
-        format!("pillars of an element stand on one lattice of {} nm", self.pitch_nm)
+        match self.pitch_nm {
+            Some(nm) => format!("pillars of an element stand on one lattice of {nm} nm"),
+            None => "pillars of an element stand on one lattice, of the pitch of the design".into(),
+        }
     }
 
     fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
         if flat.elements.is_empty() {
             return Err(NotRun::Skipped(flat.no_elements.clone()));
         }
+        let wanted = self.pitch_nm.or(flat.design.map(|d| f64::from(d.cell.pitch_nm)));
+        let wanted = wanted.ok_or_else(|| NotRun::Skipped(NO_DESIGN.into()))?;
         for e in &flat.elements {
             let pitch = e.site.lattice.pitch_nm();
-            if f64::from(pitch) != self.pitch_nm {
+            if f64::from(pitch) != wanted {
                 found.plain(&format!("{} {pitch}", e.site.name), || {
-                    format!("{} has a pitch of {pitch} nm, not {}", e.site.name, self.pitch_nm)
+                    format!("{} has a pitch of {pitch} nm, not {wanted}", e.site.name)
                 });
             }
         }

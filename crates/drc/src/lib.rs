@@ -122,6 +122,7 @@ fn judge(rule: &DeckRule, flat: &FlatLayout<'_>, found: &mut Findings) -> Result
     match rule.rule.judge(flat, found) {
         Ok(()) => Ok(Status::Run),
         Err(NotRun::Skipped(why)) => Ok(Status::Skipped(why)),
+        Err(NotRun::NotApplicable(why)) => Ok(Status::NotApplicable(why)),
         Err(NotRun::Failed(why)) => Ok(Status::Failed(why)),
         Err(NotRun::Interrupted) => Err(Error::Interrupted),
     }

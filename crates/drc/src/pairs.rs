@@ -98,19 +98,17 @@ fn near_elements<'s>(flat: &'s FlatLayout<'_>, reach: i64, f: &mut impl FnMut(Bo
     Ok(())
 }
 
-/// The box around all sites of an element and pillars on them, which are at most a pitch wide (database units).
+/// The box around all sites that are of an element and pillars on them, which are at most a pitch wide (database units).
 fn around_element(flat: &FlatLayout<'_>, element: usize) -> Rect {
     let site = &flat.elements[element].site;
     let half = f64::from(site.lattice.pitch_nm()) / 2.0;
-    let [columns, rows] = site.lattice.reach();
-    let place = |axis: usize, i: usize| (site.centre_nm[axis] + site.lattice.place_nm(axis, i)) as f64;
-    let low = |axis: usize, i: usize| flat.units(place(axis, i) - half).floor() as i64;
-    let high = |axis: usize, end: usize| flat.units(place(axis, end - 1) + half).ceil() as i64;
+    let reach = site.reach();
+    let [[x0, x1], [y0, y1]] = [0, 1].map(|axis| site.ends_nm(axis, &reach[axis]).map(|nm| nm as f64));
     Rect {
-        x0: low(0, columns.start),
-        y0: low(1, rows.start),
-        x1: high(0, columns.end),
-        y1: high(1, rows.end),
+        x0: flat.units(x0 - half).floor() as i64,
+        y0: flat.units(y0 - half).floor() as i64,
+        x1: flat.units(x1 + half).ceil() as i64,
+        y1: flat.units(y1 + half).ceil() as i64,
     }
 }
 

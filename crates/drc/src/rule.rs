@@ -6,6 +6,7 @@ use super::drawn::DrawnOutline;
 use super::findings::Findings;
 use super::flat::FlatLayout;
 use super::work::Stop;
+use metalith_core::document::Section;
 use metalith_gds::LayerNumber;
 
 /// How much a violation matters.
@@ -25,6 +26,8 @@ pub enum Status {
     Run,
     /// There was nothing to run it on: not clean.
     Skipped(String),
+    /// It is about something that such a layout does not have: clean.
+    NotApplicable(String),
     /// It could not be run: not clean.
     Failed(String),
     /// The deck applies it only when a design is given, and none was.
@@ -37,6 +40,7 @@ impl Status {
         match self {
             Self::Run => "run",
             Self::Skipped(_) => "skipped",
+            Self::NotApplicable(_) => "not applicable",
             Self::Failed(_) => "failed",
             Self::NotInForce => "not in force",
         }
@@ -48,6 +52,8 @@ impl Status {
 pub(super) enum NotRun {
     /// There was nothing to run it on.
     Skipped(String),
+    /// It is about something that such a layout does not have.
+    NotApplicable(String),
     /// It could not be run.
     Failed(String),
     /// The user asked to stop.
@@ -61,6 +67,14 @@ impl From<Stop> for NotRun {
             Stop::Interrupted => Self::Interrupted,
         }
     }
+}
+
+/// Why a rule that compares with a design did not run where there is none.
+pub(super) const NO_DESIGN: &str = "no design was given: name it with --design";
+
+/// Whether the limit of a rule is that of the design, by `from = "design"`, in place of a number.
+pub(super) fn from_design(s: &Section<'_, '_>) -> bool {
+    s.has("from") && s.choice("from", &[("design", true)], None)
 }
 
 /// Outcome of running a rule; its findings are collected in [`Findings`].

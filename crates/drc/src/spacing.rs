@@ -5,11 +5,13 @@ use super::context::Context;
 use super::findings::Findings;
 use super::flat::FlatLayout;
 use super::pairs::{near, place};
-use super::rule::{NotRun, Rule, RuleOutcome};
+use super::rule::{NO_DESIGN, NotRun, Rule, RuleOutcome, from_design};
 use super::tolerance::ROUNDING_NM;
 use metalith_core::document::{Limits, Section};
 use metalith_core::{LatticeKind, PillarShape, WidthRows};
+use metalith_design::Design;
 use metalith_gds::LayerNumber;
+use metalith_rcwa::CellLattice;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Distance {
@@ -18,6 +20,8 @@ enum Distance {
         nm: f64,
         height_nm: Option<f64>,
     },
+    /// The least distance that pillars of the design have, where they are widest.
+    GapOfDesign,
     NoOverlap,
     NoDuplicate,
 }
@@ -29,6 +33,7 @@ struct SpacingRule {
 
 pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Option<Box<dyn Rule>> {
     let want = match check {
+        "gap_min" if from_design(s) => Distance::GapOfDesign,
         "gap_min" => Distance::Gap {
             nm: s.float("nm", Limits::new(0.0..=1e6, "nm")),
             height_nm: None,
@@ -52,25 +57,35 @@ impl Rule for SpacingRule {
         match self.want {
             Distance::Gap { nm, height_nm: None } => format!("gaps of at least {nm} nm, in any direction"),
             Distance::Gap { nm, height_nm: Some(h) } => format!("gaps at most {:.4} times as deep as wide", h / nm),
+            Distance::GapOfDesign => "gaps as wide as the design has at least, in any direction".into(),
             Distance::NoOverlap => "no two shapes share area".into(),
             Distance::NoDuplicate => "no shape is there twice".into(),
         }
     }
 
     fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
-        let limit = match self.want {
+        let want = match (self.want, flat.design) {
+            (Distance::GapOfDesign, Some(design)) => Distance::Gap {
+                nm: least_gap_nm(design),
+                height_nm: None,
+            },
+            (Distance::GapOfDesign, None) => {
+                return Err(NotRun::Skipped(NO_DESIGN.into()));
+            }
+            (want, _) => want,
+        };
+        let limit = match want {
             Distance::Gap { nm, .. } => flat.units(nm) - ROUNDING_NM,
             _ => 0.0,
         };
-        let want = self.want;
         if self.layer == flat.pillars {
             let judged = match want {
                 Distance::Gap { nm, height_nm } => on_lattices(flat, nm, |a, b, gap| {
                     report_gap(flat, a, b, gap, height_nm, found);
                 }),
                 Distance::NoOverlap => on_lattices(flat, 0.0, |a, b, _| report_overlap(a, b, found)),
-                // No site holds two pillars.
-                Distance::NoDuplicate => Ok(()),
+                // No site holds two pillars; a gap of the design is a number by now.
+                Distance::NoDuplicate | Distance::GapOfDesign => Ok(()),
             };
             judged.map_err(NotRun::Failed)?;
         }
@@ -81,6 +96,7 @@ impl Rule for SpacingRule {
                     report_gap(flat, &a, &b, gap, height_nm, found);
                 }
             }
+            Distance::GapOfDesign => {}
             Distance::NoOverlap => {
                 if !a.equals(&b) && a.overlaps(&b) {
                     report_overlap(&a, &b, found);
@@ -94,6 +110,13 @@ impl Rule for SpacingRule {
         });
         Ok(judged?)
     }
+}
+
+/// Distance of the nearest two pillars of a design if both are as wide as they may be (nm).
+fn least_gap_nm(design: &Design) -> f64 {
+    let cell = &design.cell;
+    let nearest_nm = CellLattice::drawn(cell.lattice, cell.pitch_nm).nearest_nm(f64::from(cell.pitch_nm));
+    (nearest_nm - cell.shape.widest_nm(cell.width_range_nm.1)).max(0.0)
 }
 
 fn report_overlap(a: &Body<'_>, b: &Body<'_>, found: &mut Findings) {

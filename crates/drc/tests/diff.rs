@@ -52,6 +52,37 @@ fn hierarchies_of_one_design_are_the_same_geometry() {
     assert!(again.same_bytes && again.tree.same && again.same_geometry);
 }
 
+/// Strips side by side, nearer than they are long: each is found as an element of its own, in any order of the file.
+#[test]
+fn strips_side_by_side_are_compared_each() {
+    let path = metalith_testing::design("array_2x4");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let text = text
+        .replacen(
+            "diameter_um = 60",
+            "aperture = \"rectangle\"\naperture_um = [100, 20]",
+            1,
+        )
+        .replacen("elements = [2, 4]", "elements = [1, 4]", 1)
+        .replacen("[150, 120]", "[150, 40]", 1);
+    let design = Design::parse(&path, &text).unwrap();
+    let array = PillarArray::build(&design, &Silent).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, hierarchy| {
+        let path = folder.path().join(name);
+        write_pillars(&design, &array, hierarchy, &path, &Silent).unwrap();
+        path
+    };
+    let found = compare(
+        &file("folded.gds", Hierarchy::Folded),
+        &file("flat.gds", Hierarchy::Flat),
+    );
+    assert!(found.same_geometry);
+    let pillars: Vec<_> = array.placed.iter().map(|p| array.widths(p).pillars()).collect();
+    let compared: Vec<_> = found.elements.iter().map(|e| e.pillars).collect();
+    assert_eq!(compared, pillars.iter().map(|&n| [n, n]).collect::<Vec<_>>());
+}
+
 /// Rotated rectangles: in any hierarchy the same; one rotation, one nanometre of one corner and one pillar more are differences.
 #[test]
 fn rotated_rectangles_are_compared_by_rotation_and_to_the_nanometre() {

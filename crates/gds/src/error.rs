@@ -225,17 +225,17 @@ pub enum ExtractionError {
     Sites { elements: usize, sites: u64, most: u64 },
     #[error("no element found on layer {layers}")]
     NoElements { layers: String },
-    #[error("{groups} separate groups of squares on layer {layers}")]
+    #[error("{groups} separate groups of shapes on layer {layers}")]
     Groups { groups: usize, layers: String, most: usize },
-    #[error("small squares are spread over more than {most} places of 8 um")]
+    #[error("small shapes are spread over more than {most} places of 8 um")]
     Scattered { most: usize },
-    /// Squares that would take far more lattice sites than there are squares.
+    /// Pillars that would take far more lattice sites than there are pillars.
     #[error(
-        "{squares} squares about ({}, {}) nm spread over {columns} x {rows} sites of {pitch_nm} nm",
+        "{pillars} pillars about ({}, {}) nm spread over {columns} x {rows} sites of {pitch_nm} nm",
         at_nm[0], at_nm[1]
     )]
     Sparse {
-        squares: u64,
+        pillars: u64,
         at_nm: [i64; 2],
         columns: i64,
         rows: i64,

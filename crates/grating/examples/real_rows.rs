@@ -1,7 +1,7 @@
 //! How far equal neighbours, and the neighbours that there are, are from rows of real pillars of
 //! `designs/prototype_3x3.toml`, whose optimised phase jumps from ring to ring.
 //!
-//! Rows of 20 consecutive pillars along x and of 12 along y or the diagonal, at four radii; of the centre element in light
+//! Rows of 20 consecutive pillars along x and of 12 along y or the diagonal, at four radii, without the three at either end; of the centre element in light
 //! along the normal, and of an element that is steered by the angle asked for in light from where it looks. Prints the
 //! share of the light that each model puts elsewhere than the supercell of the row does, and of all rows together the first
 //! order by equal neighbours, neighbours and supercells. From the folder `crates/grating`: `cargo run --release --example

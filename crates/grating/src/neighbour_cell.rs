@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use num_complex::Complex64;
 
 use metalith_cell::{
-    BandNode, BandResponse, CellModel, CellStack, Fidelity, NEIGHBOURS, NeighbourResponse, ObliqueTables, PointwiseCell,
+    BandNode, BandResponse, CellModel, CellStack, Fidelity, FittedNeighbours, NEIGHBOURS, ObliqueTables, PointwiseCell,
 };
 use metalith_core::{Progress, Result};
 
@@ -110,9 +110,12 @@ impl CellModel for NeighbourCell {
         wavelength_um: f64,
         sines: [f64; 2],
         progress: &dyn Progress,
-    ) -> Result<Option<[NeighbourResponse; 2]>> {
+    ) -> Result<Option<FittedNeighbours>> {
         let table = self.table(wavelength_um, sines, progress)?;
-        Ok(Some(table.responses(self.full_transmission(wavelength_um)?)))
+        Ok(Some(FittedNeighbours {
+            responses: table.responses(self.full_transmission(wavelength_um)?),
+            left_out: table.left_out(),
+        }))
     }
 
     fn among_neighbours_in_band(

@@ -233,12 +233,17 @@ fn openings_are_as_large_as_their_lenses() {
     }
 }
 
+/// A smaller lens leaves more room: 60 um beside 40 um is 50.4 um with the lattices, beside another of 60 um 60.2 um.
 #[test]
-fn elements_whose_squares_overlap_are_refused() {
+fn elements_whose_boxes_overlap_are_refused() {
     let near = text().replace("x_um = 0\ny_um = 105", "x_um = 50\ny_um = 55");
     let said = Design::parse(&design("hologram"), &near).unwrap_err().to_string();
     assert!(
-        said.contains("this lens overlaps that of element (2, 0)") && !said.contains("(3, 0)"),
+        said.contains("this lens overlaps that of element (3, 0)") && !said.contains("(2, 0)"),
+        "{said}"
+    );
+    assert!(
+        said.contains("at least 60.2 um apart along x, or 60.2 um along y"),
         "{said}"
     );
 }

@@ -58,7 +58,8 @@ impl Deconvolution {
                     "{lengths} wavelengths in {} channels at {angles} angles",
                     views.channels
                 ),
-                "give at least two wavelengths a channel, one angle, and an even number of pixels",
+                "give at least two wavelengths a channel (a smaller `step_nm` of [optimise.views], or none), one angle, and an \
+                 even number of pixels",
             ));
         }
         let widest = usize::from(mapping.max_width_nm()) + 1;

@@ -67,7 +67,7 @@ pub use kernel::RingField;
 pub use limit::{StepLimit, largest_step, largest_step_in_layout};
 pub use mapping::{Mapping, WidthChoice, step};
 pub use objective::{Objective, Sum};
-pub use page::{OptimiseReport, mean_and_deviation};
+pub use page::{BY_EQUAL_NEIGHBOURS, OptimiseReport, mean_and_deviation};
 pub use point_image::blurs_of_colours;
 pub use problem::views;
 pub use pupil::Pupil;

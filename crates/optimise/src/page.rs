@@ -10,6 +10,11 @@ use super::mapping::step;
 use metalith_core::Result;
 use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, Table, Verdict, sig, write_json};
 
+/// What the figures of an optimisation are by, in words for people.
+pub const BY_EQUAL_NEIGHBOURS: &str = "Merit, Strehl ratios before and after and those of the layout that is read back take each pillar for one \
+     of a lattice of equal pillars. `metalith run` judges by unlike neighbours where that is the `fidelity` of [verify], as it is by \
+     default for the cell of the paper, and may give other Strehl ratios.";
+
 /// All that is reported.
 #[derive(Clone, Debug, Serialize)]
 pub struct OptimiseReport {
@@ -85,6 +90,7 @@ impl OptimiseReport {
             ]);
         }
         page.code(&self.command);
+        page.note(BY_EQUAL_NEIGHBOURS);
         page.section("Strehl ratio");
         page.paragraph(
             "On a grid of 0.5 nm between the wavelengths that were optimised on, against the same aperture \

@@ -8,7 +8,7 @@ use super::focus::Lens;
 use super::kernel::RingField;
 use metalith_cell::CellModel;
 use metalith_core::{Result, WidthMap};
-use metalith_wave::psf::{CONTRAST_LP_MM, pixel_mtf};
+use metalith_wave::psf::{PixelFrequencies, pixel_mtf};
 use metalith_wave::{Accuracy, Fold, Pillars, PlaneWave, Psf, Scratch, Window};
 
 /// Samples of the window about the focus that contrast is computed with; light outside of it counts too.
@@ -60,7 +60,7 @@ impl OverWavelength<'_> {
     }
 
     /// Contrast of all light with pixels of `pixel_um`, as for the PSFs of a layout: for each phase, one pair for each
-    /// wavelength, at [`CONTRAST_LP_MM`].
+    /// wavelength, at [`PixelFrequencies::reported`].
     ///
     /// # Errors
     /// If the cell does not cover a wavelength.
@@ -70,13 +70,14 @@ impl OverWavelength<'_> {
         let radius_um = 0.5e-3 * f64::from(rings.diameter_nm());
         let pillars: Vec<_> = self.widths_nm.iter().map(|widths| rings.width_map(widths)).collect();
         let window = Window::about([0.0; 2], lattice.pitch_um(), WINDOW_SAMPLES, focus_um);
+        let reported = PixelFrequencies::of(pixel_um).reported();
         let contrast = |scratch: &mut Scratch, &wavelength_um: &f64| {
             let table = self.cell.transmissions(wavelength_um, self.widest())?;
             let wave = PlaneWave::normal(wavelength_um);
             let fold = Fold::plan(lattice, radius_um, wavelength_um, window, Accuracy::Fast)?;
             let mut of = |pillars: &WidthMap| {
-                let psf = Psf::formed(&fold, &Pillars::new(pillars, &table)?, &wave, &CONTRAST_LP_MM, scratch)?;
-                let [half, all] = CONTRAST_LP_MM.map(|f| psf.contrast(0, f) * pixel_mtf(pixel_um, f));
+                let psf = Psf::formed(&fold, &Pillars::new(pillars, &table)?, &wave, &reported, scratch)?;
+                let [half, all] = reported.map(|f| psf.contrast(0, f) * pixel_mtf(pixel_um, f));
                 Ok((half, all))
             };
             pillars.iter().map(&mut of).collect::<Result<Vec<_>>>()

@@ -12,10 +12,12 @@ use metalith_design::array::Symmetry;
 use serde::{Deserialize, Serialize};
 
 use crate::kernels::{BankSpec, DistinctKernels, KernelBank};
+use crate::layout::PillarCount;
 use crate::veil::{LightShares, SCENE_CELLS, Veil};
 
 const BANK_MAGIC: [u8; 8] = *b"MLKERN\0\x02";
 const VEIL_MAGIC: [u8; 8] = *b"MLVEIL\0\x04";
+const PILLARS_MAGIC: [u8; 8] = *b"MLPILL\0\x01";
 /// Most bytes that the numbers of a bank or of a veil may have: both are held in memory, and refused before they are made if
 /// they would be more.
 pub const MOST_BYTES: u64 = 4 << 30;
@@ -216,6 +218,21 @@ pub fn keep_veil(folder: &Path, inputs: &[u8], veil: &Veil) -> Result<()> {
     )
 }
 
+/// What a layout was counted to have of the pillars of a design; none if that was not kept.
+pub fn kept_pillars(folder: &Path, inputs: &[u8]) -> Option<PillarCount> {
+    read(&file_of(folder, "pillars", inputs), PILLARS_MAGIC, inputs, |content| {
+        content.head()
+    })
+}
+
+/// Keep such a count.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn keep_pillars(folder: &Path, inputs: &[u8], pillars: &PillarCount) -> Result<()> {
+    write(&file_of(folder, "pillars", inputs), PILLARS_MAGIC, inputs, pillars, &[])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -282,5 +299,14 @@ mod tests {
         veil.values.pop();
         keep_veil(folder.path(), b"inputs", &veil).unwrap();
         assert!(kept_veil(folder.path(), b"inputs").is_none());
+
+        let pillars = PillarCount {
+            pillars: 7,
+            why: "3 off the lattice".into(),
+            ..PillarCount::default()
+        };
+        keep_pillars(folder.path(), b"inputs", &pillars).unwrap();
+        assert_eq!(kept_pillars(folder.path(), b"inputs"), Some(pillars));
+        assert_eq!(kept_pillars(folder.path(), b"others"), None);
     }
 }

@@ -2,8 +2,9 @@
 
 use metalith_camera::{Camera, ColourFilter};
 use metalith_core::{Error, Result};
+use metalith_report::sig;
 use metalith_wave::camera::Noise;
-use ndarray::Array2;
+use ndarray::{Array2, Array3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -126,6 +127,75 @@ impl Frame {
         ))
     }
 
+    /// Share of the pixels that are at full scale.
+    pub fn saturated_share(&self) -> f64 {
+        self.saturated as f64 / self.pixels() as f64
+    }
+
+    /// Whether most pixels are at full scale: what is restored then says nothing of the camera.
+    pub fn is_lost(&self) -> bool {
+        self.saturated_share() > 0.5
+    }
+
+    /// What is to be known of pixels at full scale, if there are more than a few; `truth` is the scene in linear sRGB.
+    pub fn saturation_note(&self, truth: &Array3<f64>) -> Option<String> {
+        /// Share that is told.
+        const TOLD: f64 = 0.01;
+        /// Light that a scene has if its white is another number than one.
+        const ABOVE_WHITE: f64 = 1.01;
+        let share = self.saturated_share();
+        let brightest = truth.iter().copied().fold(0.0, f64::max);
+        let mut words = format!(
+            "{:.1} % of the pixels are at full scale, and the restoration knows nothing of what fell on them",
+            100.0 * share
+        );
+        if brightest > ABOVE_WHITE {
+            words += &format!(
+                "; the scene has light up to {}, where white is 1: divide it by its white",
+                sig(brightest, 3)
+            );
+        }
+        if self.is_lost() {
+            words += "; the frame is lost, and no score of it says anything of the camera";
+        }
+        (share >= TOLD).then_some(words)
+    }
+
+    /// Mean over all pixels, of full scale.
+    pub fn mean_signal(&self) -> f64 {
+        let all = self.planes.iter().flatten();
+        all.map(|v| f64::from(*v)).sum::<f64>() / self.pixels() as f64
+    }
+
+    /// Number of pixels, at least one: those of all planes.
+    fn pixels(&self) -> usize {
+        self.planes.iter().map(|p| p.len()).sum::<usize>().max(1)
+    }
+
+    /// Light of each channel as it was recorded, zero where a pixel does not count it: pixels at full scale have that of full scale,
+    /// for a restoration that cannot leave pixels out.
+    pub fn recorded_light(&self, camera: &Camera) -> Vec<Array2<f32>> {
+        let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();
+        let of = |(channel, gain): (usize, &f64)| {
+            let plane = self.plane(channel);
+            Array2::from_shape_fn(plane.dim(), |(y, x)| match self.counts(channel, &names, y, x) {
+                true => (f64::from(plane[[y, x]]) / gain) as f32,
+                false => 0.0,
+            })
+        };
+        self.gain.iter().enumerate().map(of).collect()
+    }
+
+    /// What was recorded of a channel.
+    fn plane(&self, channel: usize) -> &Array2<f32> {
+        &self.planes[if self.filter == ColourFilter::None { channel } else { 0 }]
+    }
+
+    /// Whether a pixel counts a channel.
+    fn counts(&self, channel: usize, names: &[String], row: usize, column: usize) -> bool {
+        channel_at(self.filter, names, row, column).is_none_or(|c| c == channel)
+    }
+
     /// Light of each channel, and how much each pixel is to be trusted: one over the variance of its light, zero where it
     /// does not count the channel or is at full scale. To the noise comes what the operator of a restoration errs by, as
     /// a share of the light, by channel, and of no less than the mean light of the frame: light in dark places comes from
@@ -135,11 +205,9 @@ impl Frame {
         let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();
         let (mut light, mut trust) = (Vec::new(), Vec::new());
         for (channel, gain) in self.gain.iter().enumerate() {
-            let plane = &self.planes[if self.filter == ColourFilter::None { channel } else { 0 }];
-            let counts = |y: usize, x: usize| {
-                channel_at(self.filter, &names, y, x).is_none_or(|c| c == channel) && plane[[y, x]] < self.full
-            };
-            let known = Array2::from_shape_fn(plane.dim(), |(y, x)| f64::from(u8::from(counts(y, x))));
+            let plane = self.plane(channel);
+            let known = |y: usize, x: usize| self.counts(channel, &names, y, x) && plane[[y, x]] < self.full;
+            let known = Array2::from_shape_fn(plane.dim(), |(y, x)| f64::from(u8::from(known(y, x))));
             let signal = &known * &plane.mapv(f64::from);
             let (sums, numbers) = (box_sums(&signal, NEAR), box_sums(&known, NEAR));
             let overall = signal.sum() / known.sum().max(1.0);
@@ -198,7 +266,16 @@ mod tests {
             let light = [2.0, 2.0, 0.5].map(|v| Array2::from_elem((20, 20), v));
             let frame = expose(&camera, &[1.0; 3], &light, 3);
             assert_eq!(frame.saturated, 800, "{gain_e}");
-            let (_, trust) = frame.light(&camera, &OperatorError::none(3));
+            assert_eq!(frame.saturated_share(), 2.0 / 3.0);
+            let note = frame.saturation_note(&Array3::from_elem((1, 1, 3), 2.0)).unwrap();
+            for words in ["66.7 %", "light up to 2", "the frame is lost"] {
+                assert!(note.contains(words), "{note}");
+            }
+            let (light, trust) = frame.light(&camera, &OperatorError::none(3));
+            // Unknown light is none; as it was recorded it is that of full scale.
+            let recorded = frame.recorded_light(&camera);
+            assert!(light[0].iter().all(|v| *v == 0.0) && recorded[1].iter().all(|v| *v == frame.full));
+            assert!(light[2] == recorded[2]);
             assert!(trust[0].iter().chain(&trust[1]).all(|t| *t == 0.0), "{gain_e}");
             assert!(trust[2].iter().all(|t| *t > 0.0), "{gain_e}");
         }
@@ -239,6 +316,9 @@ mod tests {
         // 400 pixels with noise of 0.007: three standard errors.
         assert!((mean(1, 1) - 0.2).abs() < 1e-3 && (mean(0, 1) - 0.5).abs() < 1.2e-3);
         assert_eq!(expose(&camera, &[1.0, 1.0, 1.0], &light, 3).planes, frame.planes);
+        // A quarter, of a scene whose white is one.
+        let note = frame.saturation_note(&Array3::from_elem((1, 1, 3), 1.0)).unwrap();
+        assert!(note.starts_with("25.0 %") && note.ends_with("fell on them"), "{note}");
         let (light, trust) = frame.light(&camera, &OperatorError::none(3));
         assert!(frame.is_of([40, 40], 3).is_ok());
         for (size, channels) in [([40, 41], 3), ([40, 40], 1)] {

@@ -1,9 +1,11 @@
 //! The error of a restored picture, expected from the spectrum of its scene.
 //!
-//! A restoration by Tikhonov's method is linear in the scene but for noise: of each frequency, in each part of the field and
-//! each plane of colour, it loses a share of the power. The shares are found on one random scene ([`crate::Rehearsal`]);
-//! times the power that scenes have there they are the expected error.
+//! A restoration by Tikhonov's method is linear. Of each frequency of a scene, in each part of the field and each plane of colour,
+//! it loses a share of the power; what it makes of noise comes to that, whatever power the scene has. Both are found on one random
+//! scene ([`crate::Rehearsal`]). The shares times the power that scenes have, and the noise of as much light as they have, are the
+//! expected error.
 
+use metalith_wave::camera::Noise;
 use metalith_wave::kernels::{fft_size, mirrored};
 use ndarray::{Array2, Array3, Axis};
 use num_complex::Complex32;
@@ -30,6 +32,8 @@ const BANDS: [f64; 14] = [
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScenePower {
     parts: [Vec<[f64; BANDS.len()]>; PARTS.len()],
+    /// Mean light by part of the field.
+    light: [f64; PARTS.len()],
 }
 
 impl ScenePower {
@@ -41,6 +45,7 @@ impl ScenePower {
         let bands: Vec<[[f64; BANDS.len()]; PARTS.len()]> = independent.par_iter().map(bands).collect();
         Self {
             parts: std::array::from_fn(|part| bands.iter().map(|b| b[part]).collect()),
+            light: std::array::from_fn(|part| mean_light(picture, PARTS[part].0)),
         }
     }
 
@@ -49,6 +54,7 @@ impl ScenePower {
         let planes = SceneStatistics::colours().band_powers(&BANDS);
         Self {
             parts: std::array::from_fn(|_| planes.clone()),
+            light: [SceneStatistics::mean_light(); PARTS.len()],
         }
     }
 
@@ -64,30 +70,69 @@ impl ScenePower {
     }
 
     fn values(&self) -> impl Iterator<Item = &f64> {
-        self.parts.iter().flatten().flatten()
+        self.parts.iter().flatten().flatten().chain(&self.light)
     }
 
     fn values_mut(&mut self) -> impl Iterator<Item = &mut f64> {
-        self.parts.iter_mut().flatten().flatten()
+        self.parts.iter_mut().flatten().flatten().chain(&mut self.light)
     }
 }
 
-/// What a camera and a restoration lose of any scene.
+/// What a camera and a restoration lose of any scene, and what they make of noise.
 #[derive(Clone, Debug)]
 pub struct Forecast {
-    /// Power of the error over that of the scene.
+    /// Power of the error without noise over that of the scene.
     lost: ScenePower,
+    /// Power that noise has in the picture, by part of the field.
+    noise: [f64; PARTS.len()],
+    exposed: Exposed,
+}
+
+/// How much noise there is for how much light.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Exposed {
+    noise: Noise,
+    /// Mean signal of the frame of the random scene, of full scale.
+    signal: f64,
+    /// Mean light of the random scene by part of the field.
+    light: [f64; PARTS.len()],
+}
+
+impl Exposed {
+    /// Of the noise of a sensor, and the mean signal that a scene gave, linear sRGB `[row, column, colour]`.
+    pub fn of(noise: Noise, signal: f64, scene: &Array3<f64>) -> Self {
+        Self {
+            noise,
+            signal,
+            light: std::array::from_fn(|part| mean_light(scene, PARTS[part].0)),
+        }
+    }
+
+    /// Variance of the noise in a part of the field of a scene with this mean light, over that of the random scene.
+    fn against(&self, part: usize, light: f64) -> f64 {
+        let brighter = light / self.light[part].max(f64::MIN_POSITIVE);
+        let own = self.noise.variance(self.signal);
+        match own > 0.0 {
+            true => self.noise.variance(self.signal * brighter) / own,
+            false => 1.0,
+        }
+    }
 }
 
 impl Forecast {
-    /// From a scene and the picture that was restored of it, linear sRGB `[row, column, colour]`.
-    pub fn between(truth: &Array3<f64>, picture: &Array3<f64>) -> Self {
+    /// From a scene, the picture that was restored of it without noise, and what noise adds to that, all linear sRGB
+    /// `[row, column, colour]`.
+    pub(crate) fn between(truth: &Array3<f64>, picture: &Array3<f64>, noise: &Array3<f64>, exposed: Exposed) -> Self {
         let mut lost = ScenePower::of(&(picture - truth));
         let scene = ScenePower::of(truth);
         lost.values_mut()
             .zip(scene.values())
             .for_each(|(lost, scene)| *lost /= scene.max(f64::MIN_POSITIVE));
-        Self { lost }
+        Self {
+            lost,
+            noise: std::array::from_fn(|part| mean_over(noise, PARTS[part].0, |v| v * v)),
+            exposed,
+        }
     }
 
     /// Expected PSNR of linear light (dB) in all zones ([`Zone::ALL`]) of scenes with this power: that of the mean squared
@@ -99,7 +144,8 @@ impl Forecast {
             let plane = |((lost, power), size): ((&[f64; BANDS.len()], &[f64; BANDS.len()]), &f64)| {
                 size * lost.iter().zip(power).map(|(l, p)| l * p).sum::<f64>()
             };
-            planes.map(plane).sum::<f64>() / sizes.len() as f64
+            let noise = self.noise[part] * self.exposed.against(part, scenes.light[part]);
+            planes.map(plane).sum::<f64>() / sizes.len() as f64 + noise
         };
         let of = |zone: &Zone| {
             let parts = PARTS
@@ -113,6 +159,23 @@ impl Forecast {
         };
         Zone::ALL.iter().map(of).collect()
     }
+}
+
+/// Mean of what is made of each value of a picture over the pixels and colours of a zone.
+fn mean_over(picture: &Array3<f64>, zone: Zone, of: impl Fn(f64) -> f64) -> f64 {
+    let (rows, columns, colours) = picture.dim();
+    let (mut sum, mut count) = (0.0, 0);
+    for [y, x] in zone.rectangles(rows, columns) {
+        for (iy, ix) in y.flat_map(|iy| x.clone().map(move |ix| (iy, ix))) {
+            sum += (0..colours).map(|c| of(picture[[iy, ix, c]])).sum::<f64>();
+            count += colours;
+        }
+    }
+    sum / count.max(1) as f64
+}
+
+fn mean_light(picture: &Array3<f64>, zone: Zone) -> f64 {
+    mean_over(picture, zone, |v| v)
 }
 
 /// Mean squares of a plane by part and band. The plane is continued by its mirror images on all sides, so that its borders are
@@ -176,6 +239,15 @@ mod tests {
         Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| f64::from(planes[c][[y, x]]))
     }
 
+    /// Noise of reading alone.
+    fn exposed(scene: &Array3<f64>) -> Exposed {
+        let noise = Noise {
+            photon: 0.0,
+            read: 0.01,
+        };
+        Exposed::of(noise, 0.1, scene)
+    }
+
     #[test]
     fn power_of_all_bands_is_the_mean_square() {
         /// Products of bands are zero over the whole picture, but for mirrors that do not fit the square of its
@@ -187,7 +259,10 @@ mod tests {
         let all = Forecast {
             lost: ScenePower {
                 parts: std::array::from_fn(|_| vec![[1.0; BANDS.len()]; 3]),
+                light: [1.0; PARTS.len()],
             },
+            noise: [0.0; PARTS.len()],
+            exposed: exposed(&picture),
         };
         let scores = crate::scores(&Array3::zeros(picture.dim()), &picture).unwrap();
         for ((got, want), tolerance) in all.psnr_linear_db(&power).iter().zip(scores).zip(TOLERANCE) {
@@ -232,13 +307,53 @@ mod tests {
             })
         };
         let rehearsed = random(1, 160, 160);
-        let forecast = Forecast::between(&rehearsed, &blurred(&rehearsed));
+        let none = Array3::zeros(rehearsed.dim());
+        let forecast = Forecast::between(&rehearsed, &blurred(&rehearsed), &none, exposed(&rehearsed));
         // Twice as fine, and of another contrast.
         let fine = random(2, 320, 320);
         let other = Array3::from_shape_fn((160, 160, 3), |(y, x, c)| 0.5 * fine[[2 * y, 2 * x, c]]);
         let scores = crate::scores(&blurred(&other), &other).unwrap();
         for (got, want) in forecast.psnr_linear_db(&ScenePower::of(&other)).iter().zip(scores) {
             assert!((got - want.psnr_linear_db).abs() < DRAW_DB, "{got} {want:?}");
+        }
+        // Noise is the same whatever the scene: of a smooth one it is all of the error.
+        let deviation = 0.03;
+        let noise = Array3::from_shape_fn(rehearsed.dim(), |(y, x, c)| {
+            if (y + x + c) % 2 == 0 { deviation } else { -deviation }
+        });
+        let forecast = Forecast::between(&rehearsed, &blurred(&rehearsed), &noise, exposed(&rehearsed));
+        let smooth = Array3::from_shape_fn(rehearsed.dim(), |(y, x, _)| 0.3 + 1e-3 * (0.02 * (y + x) as f64).sin());
+        let scores = crate::scores(&(&blurred(&smooth) + &noise), &smooth).unwrap();
+        for (got, want) in forecast.psnr_linear_db(&ScenePower::of(&smooth)).iter().zip(scores) {
+            assert!((got - want.psnr_linear_db).abs() < DRAW_DB, "{got} {want:?}");
+        }
+    }
+
+    /// Photons of a brighter scene make more noise, those of reading do not.
+    #[test]
+    fn noise_follows_the_light() {
+        /// Decibels, of rounding.
+        const ROUNDING: f64 = 1e-9;
+        let dark = Array3::from_elem((60, 60, 3), 0.1);
+        let none = Array3::zeros(dark.dim());
+        let noise = none.mapv(|v: f64| v + 0.02);
+        let db = |photon: f64, read: f64, light: f64| {
+            let exposed = Exposed::of(Noise { photon, read }, 0.05, &dark);
+            let forecast = Forecast::between(&dark, &dark, &noise, exposed);
+            forecast.psnr_linear_db(&ScenePower::of(&(&dark * (light / 0.1))))
+        };
+        for (photon, read, lost) in [(1e-4, 0.0, 6.0206), (0.0, 1e-3, 0.0), (0.0, 0.0, 0.0)] {
+            let (same, brighter) = (db(photon, read, 0.1), db(photon, read, 0.4));
+            assert!(
+                same.iter().all(|db| (db + 20.0 * 0.02f64.log10()).abs() < ROUNDING),
+                "{same:?}"
+            );
+            let all = same.iter().zip(&brighter);
+            // The ratio of the light, to four places.
+            assert!(
+                all.into_iter().all(|(a, b)| (a - b - lost).abs() < 1e-4),
+                "{same:?} {brighter:?}"
+            );
         }
     }
 }

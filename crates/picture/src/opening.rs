@@ -1,5 +1,6 @@
 //! How a studio is opened: kernels and veil of a chip made, or taken from the disk.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use metalith_camera::{Camera, ChannelSampling};
@@ -15,13 +16,14 @@ use serde::Serialize;
 
 use crate::assumed::Assumed;
 use crate::kernels::{BankSpec, KernelBank};
+use crate::layout::{PillarCount, check_elements};
 use crate::restore::LearnedDenoiser;
 use crate::scene::SceneImage;
 use crate::sight::{check_coverage, check_view, check_windows};
 use crate::spectra::{SceneSpectrum, rgb_basis};
 use crate::studio::Studio;
 use crate::veil::Veil;
-use crate::{ChannelColours, ChipInLight, ElementView, cache, element_views, sampling_of};
+use crate::{ChannelColours, ChipInLight, ElementView, SceneView, cache, element_views, sampling_of};
 
 /// Field of an element that kernels are made for: the angle from its axis, behind it (degrees). Light that leaves more
 /// steeply is the veil's. A lens of the paper sees 60 degrees.
@@ -89,7 +91,7 @@ impl KeptKernels {
     fn keep(&self, what: &str, write: impl FnOnce(&Path) -> Result<()>, progress: &dyn Progress) -> Result<()> {
         match self.folder.as_deref().map(write) {
             Some(Err(error)) if !self.asked => {
-                progress.note(&format!("{what} not kept: {error}"));
+                progress.warn(&format!("{what} not kept: {error}"));
                 Ok(())
             }
             Some(done) => done,
@@ -102,7 +104,10 @@ impl KeptKernels {
 struct Wanted<'a> {
     design: &'a Design,
     camera: &'a Camera,
-    scene: &'a SceneImage,
+    /// In the pixels that it is simulated in.
+    scene: Cow<'a, SceneImage>,
+    /// As it was given.
+    given: SceneView,
     elements: Vec<ElementView>,
     channels: Vec<ChannelSampling>,
     /// Spectra of the scenes, and the primaries of the restoration among or after them.
@@ -110,6 +115,12 @@ struct Wanted<'a> {
     /// Where the primaries begin.
     primaries: usize,
     spec: BankSpec,
+}
+
+/// The view in which a camera's pictures behind a design are simulated of scenes with this one: sensor pixels look at two points along
+/// each axis, in the middle of the field, and what is finer than these would be taken for something coarse.
+pub fn simulated_view(design: &Design, camera: &Camera, view: &SceneView) -> SceneView {
+    view.no_finer(0.5 * camera.sensor.pixel_um / design.lens.focal_length_um)
 }
 
 /// What decides a bank, as text.
@@ -138,9 +149,10 @@ impl Studio {
     /// and veil are kept on the disk.
     ///
     /// # Errors
-    /// If elements have lenses of their own, the layout cannot be read, the camera does not see the chip, a scene is wider than
-    /// the array sees, a spectral cube has not the wavelengths that the camera counts, kernels or veil are too large, or the user
-    /// stopped it. That they cannot be kept is a note to `progress`.
+    /// If elements have lenses of their own, the layout cannot be read or has no pillars in one of the elements, the camera does not
+    /// see the chip, a scene is wider than the array sees, a spectral cube has not the wavelengths that the camera counts, kernels or
+    /// veil are too large, or the user stopped it. That they cannot be kept is a warning to `progress`, and so are pillars that are
+    /// not those of the design, and scenes with finer pixels than are simulated ([`simulated_view`]).
     pub fn open(
         design: &Design,
         layout: &Path,
@@ -168,8 +180,15 @@ impl Studio {
     ) -> Result<Self> {
         let wanted = Wanted::new(design, camera, scene)?;
         progress.begin("reading the layout", 1);
-        let inputs = wanted.inputs(&hex(&file_digest(layout)?), model)?;
-        let field = format!("{}x{} {}", scene.view.rows, scene.view.columns, scene.view.field_deg);
+        let digest = hex(&file_digest(layout)?);
+        let inputs = wanted.inputs(&digest, model)?;
+        let SceneView {
+            rows,
+            columns,
+            field_deg,
+            ..
+        } = wanted.scene.view;
+        let field = format!("{rows}x{columns} {field_deg}");
         let veil_inputs = [&inputs[..], field.as_bytes()].concat();
         let folder = kept.folder.as_deref();
         let bank = folder.and_then(|f| cache::kept_bank(f, &inputs));
@@ -189,10 +208,31 @@ impl Studio {
                 "plan the set again; a shard makes no kernels of its own",
             ));
         }
+        let read = || {
+            let extraction = read_pillars(design, layout, progress)?;
+            check_elements(design, &extraction).map(|()| extraction)
+        };
+        let mut extraction = None;
+        let count_inputs = format!("{digest} {}", design.digest()).into_bytes();
+        let mut pillars = folder.and_then(|f| cache::kept_pillars(f, &count_inputs));
+        if pillars.is_none() && kept.make {
+            let count = PillarCount::of(design, extraction.insert(read()?), progress)?;
+            let write = |folder: &Path| cache::keep_pillars(folder, &count_inputs, &count);
+            kept.keep("the count of the pillars is", write, progress)?;
+            pillars = Some(count);
+        }
+        let notes = pillars.as_ref().and_then(PillarCount::note);
+        notes
+            .into_iter()
+            .chain(wanted.averaging())
+            .for_each(|note| progress.warn(&note));
         let (bank, veil) = match (bank, veil) {
             (Some(bank), Some(veil)) => (bank, veil),
             (bank, _) => {
-                let extraction = read_pillars(design, layout, progress)?;
+                let extraction = match extraction {
+                    Some(extraction) => extraction,
+                    None => read()?,
+                };
                 let models;
                 let made;
                 let case = match model {
@@ -223,6 +263,7 @@ impl Studio {
         };
         Ok(Self {
             from_cache,
+            pillars,
             ..wanted.studio(bank, veil)?
         })
     }
@@ -243,6 +284,7 @@ impl Studio {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let mut wanted = Wanted::new(design, camera, scene)?;
+        check_elements(design, extraction)?;
         wanted.spec.nodes = nodes.unwrap_or(wanted.spec.nodes);
         let chip = wanted.chip(extraction, case, progress)?;
         let bank = wanted.bank(&chip, progress)?;
@@ -255,6 +297,12 @@ impl<'a> Wanted<'a> {
     fn new(design: &'a Design, camera: &'a Camera, scene: &'a SceneImage) -> Result<Self> {
         design.one_lens("the simulation of pictures")?;
         let elements = element_views(design, camera);
+        let given = scene.view;
+        let view = simulated_view(design, camera, &given);
+        let scene = match view == given {
+            true => Cow::Borrowed(scene),
+            false => Cow::Owned(scene.averaged(&view)),
+        };
         let mut basis = scene.basis.clone();
         let primaries = if basis == rgb_basis() { 0 } else { basis.len() };
         if primaries > 0 {
@@ -264,19 +312,25 @@ impl<'a> Wanted<'a> {
         let channels = sampling_of(design, camera)?.channels;
         Veil::check_size(&camera.sensor, channels.len(), basis.len())?;
         if primaries > 0 {
-            check_coverage(scene, &channels)?;
+            check_coverage(&scene, &channels)?;
         }
-        check_view(&elements, &spec, camera, &scene.view)?;
+        check_view(&elements, &spec, camera, &given)?;
         Ok(Self {
             design,
             camera,
             scene,
+            given,
             elements,
             channels,
             basis,
             primaries,
             spec,
         })
+    }
+
+    /// What is to be known of the pixels of the scene, if they are not those that were given.
+    fn averaging(&self) -> Option<String> {
+        averaging(&self.given, &self.scene.view)
     }
 
     /// What decides the kernels of a layout.
@@ -338,6 +392,8 @@ impl<'a> Wanted<'a> {
             scene_spectra: self.scene.basis.len(),
             primaries: self.primaries,
             view: self.scene.view,
+            given: self.given,
+            pillars: None,
             gain: Vec::new(),
             from_cache: [false; 2],
             assumed: Assumed::default(),
@@ -347,9 +403,22 @@ impl<'a> Wanted<'a> {
     }
 }
 
+/// In words, that scenes of a view are averaged to the larger pixels of another; none if both are the same.
+pub(crate) fn averaging(given: &SceneView, view: &SceneView) -> Option<String> {
+    let size = |v: &SceneView| format!("{} x {}", v.columns, v.rows);
+    (given != view).then(|| {
+        format!(
+            "the scene of {} pixels is averaged to {}: the pixels of the sensor tell no finer ones apart",
+            size(given),
+            size(view)
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ndarray::Array3;
     use std::sync::Mutex;
 
     /// Holds the notes.
@@ -363,6 +432,38 @@ mod tests {
         fn note(&self, text: &str) {
             self.0.lock().unwrap().push(text.into());
         }
+    }
+
+    /// Scenes that are finer than half a pixel of the sensor are averaged to that, and others stay as they are.
+    #[test]
+    fn fine_scenes_are_averaged_to_what_is_simulated() {
+        let design = Design::read("../../designs/prototype_3x3.toml".as_ref()).unwrap();
+        let camera = Camera::read("../../cameras/gt1930.toml".as_ref()).unwrap();
+        let view = |pixels: usize| SceneView {
+            rows: pixels,
+            columns: pixels,
+            field_deg: 80.0,
+            distance_um: f64::INFINITY,
+        };
+        let side = |pixels: usize| simulated_view(&design, &camera, &view(pixels)).columns;
+        // 2 tan 40 over 2.93 / 2400.
+        assert_eq!([512, 800, 1374, 1375, 4096].map(side), [512, 800, 1374, 1374, 1374]);
+        assert_eq!(averaging(&view(800), &view(800)), None);
+        let words = averaging(&view(4096), &view(1374)).unwrap();
+        assert!(
+            words.contains("4096 x 4096 pixels is averaged to 1374 x 1374"),
+            "{words}"
+        );
+        let rgb = Array3::from_shape_fn((100, 2748, 3), |(y, x, _)| f64::from(u8::from((x + y) % 2 == 0)));
+        let scene = SceneImage::of_rgb("fine", &rgb, 80.0, f64::INFINITY);
+        let wanted = Wanted::new(&design, &camera, &scene).unwrap();
+        // Each pixel is the mean of four.
+        let SceneView { rows, columns, .. } = wanted.scene.view;
+        assert_eq!((wanted.given, rows, columns), (scene.view, 50, 1374));
+        assert!(wanted.scene.planes[0].iter().all(|v| *v == 0.5) && wanted.averaging().is_some());
+        let coarse = SceneImage::of_rgb("coarse", &Array3::zeros((64, 64, 3)), 80.0, f64::INFINITY);
+        let wanted = Wanted::new(&design, &camera, &coarse).unwrap();
+        assert!(matches!(wanted.scene, Cow::Borrowed(_)) && wanted.averaging().is_none());
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use metalith_camera::ColourFilter;
+use metalith_camera::{Camera, ColourFilter};
 use metalith_core::{Result, part, srgb};
 use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, PhotoRow, Table, fixed, write_json};
 use ndarray::{Array2, Array3, Axis as Along};
@@ -10,6 +10,8 @@ use ndarray::{Array2, Array3, Axis as Along};
 use crate::assumed::AssumedScore;
 use crate::doubt::{Doubt, DoubtReport, root_mean_square};
 use crate::exposure::Frame;
+use crate::files::write_restored;
+use crate::point_image;
 use crate::report::{Assumption, PictureReport};
 use crate::resolution::ContrastCurve;
 use crate::score::Zone;
@@ -20,9 +22,9 @@ pub struct PicturePages<'a> {
     /// Linear sRGB.
     pub scene: &'a Array3<f64>,
     pub frame: &'a Frame,
-    /// The first method's picture, linear sRGB.
-    pub restored: &'a Array3<f64>,
-    pub channel_names: &'a [String],
+    /// By each way of restoring, linear sRGB, in the order of the report; the page shows the first.
+    pub restored: &'a [Array3<f64>],
+    pub camera: &'a Camera,
     /// What samples say, if any were drawn.
     pub doubt: Option<&'a Doubt>,
 }
@@ -30,11 +32,15 @@ pub struct PicturePages<'a> {
 /// Edge of a zoom (pixels of the scene).
 const ZOOM: usize = 96;
 
-/// Write `picture.html` and `picture.json` into a folder.
+/// Write `picture.html` and `picture.json` into a folder, and the frame and all pictures beside them.
 ///
 /// # Errors
 /// If they cannot be written.
 pub fn write_pages(pages: &PicturePages<'_>, folder: &Path) -> Result<()> {
+    pages.report.frame.write(pages.frame, folder)?;
+    for (restoration, picture) in pages.report.restorations.iter().zip(pages.restored) {
+        write_restored(&folder.join(&restoration.picture), picture)?;
+    }
     write_json(&folder.join("picture.json"), "picture", pages.report)?;
     page(pages).write(&folder.join("picture.html"))
 }
@@ -94,16 +100,25 @@ fn page(pages: &PicturePages<'_>) -> Page {
             report.scene, report.camera, report.layout
         ),
     );
-    let head = pictures_side_by_side(pages.scene, pages.frame, pages.restored, pages.channel_names);
+    for note in &report.notes {
+        page.note(note);
+    }
+    let names: Vec<String> = pages.camera.channels.iter().map(|c| c.name.clone()).collect();
+    let head = pictures_side_by_side(pages.scene, pages.frame, &pages.restored[0], &names);
     page.figure(head.caption(
         "The frame is what the sensor records, neighbours' light and veil included; its mosaic is shown as colours. The picture is restored from this frame alone.",
     ));
     let first = &report.restorations[0];
     let whole = &first.scores[0];
+    // Of a frame that is all white the picture is white, as the scene seems to be.
+    let score = |words: String| match pages.frame.is_lost() {
+        true => "says nothing: the frame is lost".into(),
+        false => words,
+    };
     page.facts(&[
         ("Method of the picture", first.method.clone()),
-        ("PSNR", format!("{} dB", fixed(whole.psnr_db, 1))),
-        ("SSIM", fixed(whole.ssim, 3)),
+        ("PSNR", score(format!("{} dB", fixed(whole.psnr_db, 1)))),
+        ("SSIM", score(fixed(whole.ssim, 3))),
         (
             "PSNR of linear light, forecast for natural scenes",
             format!(
@@ -124,7 +139,10 @@ fn page(pages: &PicturePages<'_>) -> Page {
                 .collect::<Vec<_>>()
                 .join(", "),
         ),
-        ("Pixels at full scale", report.saturated.to_string()),
+        (
+            "Pixels at full scale",
+            format!("{} ({} %)", report.saturated, fixed(100.0 * report.saturated_share, 1)),
+        ),
     ]);
     zooms(&mut page, pages);
     errors(&mut page, pages);
@@ -133,6 +151,7 @@ fn page(pages: &PicturePages<'_>) -> Page {
     }
     contrast(&mut page, &report.contrast);
     scores(&mut page, report);
+    point_image::section(&mut page, &report.points, pages.camera.sensor.pixel_um);
     budget(&mut page, report);
     geometry(&mut page, report);
     worth(&mut page, &report.worth);
@@ -162,13 +181,13 @@ fn zooms(page: &mut Page, pages: &PicturePages<'_>) {
         };
         let mut zoom = PhotoRow::new(name, 240.0);
         zoom.photo("scene", &cut(pages.scene))
-            .photo("picture", &cut(pages.restored));
+            .photo("picture", &cut(&pages.restored[0]));
         page.figure(zoom.caption(format!("{side} x {side} pixels of the scene.")));
     }
 }
 
 fn errors(page: &mut Page, pages: &PicturePages<'_>) {
-    let error = root_mean_square(&pages.restored.mapv(srgb::encoded), &pages.scene.mapv(srgb::encoded));
+    let error = root_mean_square(&pages.restored[0].mapv(srgb::encoded), &pages.scene.mapv(srgb::encoded));
     page.section("Errors");
     let map = map("Error of the picture", &error, "error");
     page.figure(map.caption("Root mean square over the colours, of sRGB values from 0 to 1."));

@@ -5,10 +5,10 @@ use metalith_core::{Progress, Result};
 use ndarray::Array2;
 
 use crate::exposure::{channel_at, expose};
-use crate::forecast::Forecast;
+use crate::forecast::{Exposed, Forecast};
 use crate::operator::{Detail, FrameOperator, SceneInputs};
 use crate::operator_error::OperatorError;
-use crate::restore::{RestorationMethod, SceneStatistics};
+use crate::restore::SceneStatistics;
 use crate::scene::SceneImage;
 use crate::spectra::rgb_basis;
 use crate::studio::Studio;
@@ -56,7 +56,8 @@ impl Rehearsal {
     }
 
     /// What is lost of scenes by Tikhonov and all elements: everything that the simulation knows and the restoration does
-    /// not, noise, and unfinished iterations.
+    /// not, noise, and unfinished iterations. The random scene is restored twice, with and without noise: what noise adds does not
+    /// grow with the power of a scene.
     ///
     /// # Errors
     /// If the user stopped it.
@@ -67,8 +68,10 @@ impl Rehearsal {
         progress: &dyn Progress,
     ) -> Result<Forecast> {
         let frame = expose(&studio.camera, &studio.gain, &self.light, SEED);
-        let method = RestorationMethod::Tikhonov;
-        let picture = studio.restore(restoration, &self.operator_error, &frame, method, true, progress)?;
-        Ok(Forecast::between(&studio.truth(&self.scene), &picture))
+        let error = &self.operator_error;
+        let [noisy, clean] = studio.restore_alike(restoration, error, &frame, &self.light, progress)?;
+        let truth = studio.truth(&self.scene);
+        let exposed = Exposed::of(frame.noise, frame.mean_signal(), &truth);
+        Ok(Forecast::between(&truth, &clean, &(noisy - &clean), exposed))
     }
 }

@@ -1,6 +1,7 @@
 //! What is found of a picture.
 
 use nalgebra::DMatrix;
+use ndarray::Array3;
 use serde::Serialize;
 
 use metalith_cell::Fidelity;
@@ -8,6 +9,11 @@ use metalith_made::NotApplied;
 
 use crate::assumed::AssumedScore;
 use crate::doubt::DoubtReport;
+use crate::exposure::Frame;
+use crate::files::{FrameFile, picture_file};
+use crate::layout::PillarCount;
+use crate::opening::averaging;
+use crate::point_image::PointImage;
 use crate::resolution::ContrastCurve;
 use crate::restore::RestorationMethod;
 use crate::scene::SceneImage;
@@ -27,10 +33,19 @@ pub struct PictureReport {
     /// Distance of the scene (mm); none for one that is far.
     pub distance_mm: Option<f64>,
     pub saturated: usize,
+    /// The same as a share of all pixels.
+    pub saturated_share: f64,
+    /// What is to be known before anything else: pixels that were lost, scenes and layouts that are not what they seem.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
+    /// The frame as a file.
+    pub frame: FrameFile,
     pub restorations: Vec<RestorationReport>,
     /// What the operator of the restoration errs by, by channel; see [`crate::Rehearsal::operator_error`].
     pub operator_error: Vec<f64>,
     pub budget: Vec<ChannelBudget>,
+    /// Images of a white point by each distinct element and channel.
+    pub points: Vec<PointImage>,
     pub homographies: Vec<HomographyResidual>,
     pub assumptions: Vec<Assumption>,
     /// Contrast of fine detail, for scenes that say it.
@@ -50,6 +65,8 @@ pub struct RestorationReport {
     pub method: String,
     /// By all elements at once, or each alone.
     pub joint: bool,
+    /// Name of the file of the picture, 16 bits in sRGB.
+    pub picture: String,
     pub scores: Vec<ZoneScore>,
     /// Expected PSNR of linear light in each zone (dB), of natural scenes, where there is a forecast.
     pub forecast_db: Vec<f64>,
@@ -95,6 +112,7 @@ impl RestorationReport {
         Self {
             method: method.name().to_owned(),
             joint,
+            picture: picture_file(method, joint),
             scores,
             forecast_db: Vec::new(),
             forecast_of_scene_db: Vec::new(),
@@ -103,6 +121,13 @@ impl RestorationReport {
 }
 
 impl Studio {
+    /// What is to be known of a frame before its picture is looked at; `truth` is the scene in linear sRGB.
+    pub fn notes(&self, frame: &Frame, truth: &Array3<f64>) -> Vec<String> {
+        let layout = self.pillars.as_ref().and_then(PillarCount::note);
+        let all = [frame.saturation_note(truth), layout, averaging(&self.given, &self.view)];
+        all.into_iter().flatten().collect()
+    }
+
     /// Light budget of each channel for a white scene.
     pub fn budget(&self) -> Vec<ChannelBudget> {
         let channels = self.channels.iter().zip(self.veil.budget.chunks(self.bank.bases));
@@ -234,6 +259,12 @@ impl Studio {
             ),
         ];
         all.extend(polarised);
+        all.extend(self.pillars.as_ref().map(|found| assumption("layout", found.words())));
+        let averaged = averaging(&self.given, &self.view);
+        all.extend(averaged.map(|words| {
+            let words = format!("{words}; pictures have the size of the averaged scene, and scores are against it");
+            assumption("pixels of the scene", words)
+        }));
         all
     }
 }

@@ -4,12 +4,15 @@ use metalith_core::srgb::encoded;
 use metalith_core::{Error, Result, part};
 use metalith_wave::restore::{psnr_db, ssim_colour};
 use ndarray::{Array3, Axis};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::SceneView;
 
 /// Least side of a scene whose pictures are scored (pixels): a third of it holds the window of the similarity, 11 pixels wide.
-const LEAST_SIDE: usize = 33;
+pub(crate) const LEAST_SIDE: usize = 33;
+
+/// PSNR of pictures that are equal (dB). It stands for infinity, which JSON does not know; rounding in single precision leaves 140.
+pub const MOST_DB: f64 = 200.0;
 
 /// A part of the field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -56,12 +59,38 @@ impl Zone {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ZoneScore {
     pub zone: Zone,
-    /// Peak signal to noise ratio of sRGB values (dB).
+    /// Peak signal to noise ratio of sRGB values (dB), at most [`MOST_DB`].
+    #[serde(deserialize_with = "decibels")]
     pub psnr_db: f64,
     /// The same of linear light (dB).
+    #[serde(deserialize_with = "decibels")]
     pub psnr_linear_db: f64,
     /// Structural similarity of sRGB values, mean over the colours.
     pub ssim: f64,
+}
+
+/// PSNR as it was written (dB); files had nothing in place of infinity.
+fn decibels<'de, D: Deserializer<'de>>(from: D) -> std::result::Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(from)?.map_or(MOST_DB, |db| db.min(MOST_DB)))
+}
+
+/// PSNR of a mean squared error (dB).
+fn psnr_of(error: f64) -> Result<f64> {
+    match error.is_nan() {
+        false => Ok((-10.0 * error.log10()).min(MOST_DB)),
+        true => Err(Error::invalid(
+            "a picture whose values are no numbers",
+            "look at its frame: where next to no pixel is below full scale nothing can be restored; if that is not so, report this",
+        )),
+    }
+}
+
+/// PSNR in words.
+pub fn psnr_words(db: f64) -> String {
+    match db < MOST_DB {
+        true => format!("{db:.2} dB"),
+        false => "without an error".into(),
+    }
 }
 
 /// Whether pictures of a scene can be scored: asked before they are taken.
@@ -84,7 +113,7 @@ pub fn check_scored(view: &SceneView) -> Result<()> {
 /// Scores of linear sRGB against a truth in linear sRGB, `[row, column, colour]`, in all zones.
 ///
 /// # Errors
-/// If the shapes differ, or the picture is too small for the window of the similarity.
+/// If the shapes differ, the picture is too small for the window of the similarity, or holds what is no number.
 pub fn scores(picture: &Array3<f64>, truth: &Array3<f64>) -> Result<Vec<ZoneScore>> {
     let (rows, columns, _) = truth.dim();
     let (shown, wanted) = (picture.mapv(encoded), truth.mapv(encoded));
@@ -106,8 +135,8 @@ pub fn scores(picture: &Array3<f64>, truth: &Array3<f64>) -> Result<Vec<ZoneScor
         }
         Ok(ZoneScore {
             zone,
-            psnr_db: -10.0 * error.log10(),
-            psnr_linear_db: -10.0 * linear.log10(),
+            psnr_db: psnr_of(error)?,
+            psnr_linear_db: psnr_of(linear)?,
             ssim,
         })
     };
@@ -131,10 +160,29 @@ mod tests {
         }
         let found = scores(&wrong, &truth).unwrap();
         let at = |zone: Zone| *found.iter().find(|s| s.zone == zone).unwrap();
-        assert_eq!(at(Zone::Centre).psnr_linear_db, f64::INFINITY);
+        assert_eq!(at(Zone::Centre).psnr_linear_db, MOST_DB);
         // A tenth in one of three colours of one of four corners: 0.01 / 12.
         assert!((at(Zone::Corner).psnr_linear_db + 10.0 * (0.01f64 / 12.0).log10()).abs() < 1e-9);
         assert!(at(Zone::Corner).ssim < at(Zone::Edge).ssim);
+        wrong[[3, 3, 0]] = f64::NAN;
+        let error = scores(&wrong, &truth).unwrap_err().to_string();
+        assert!(error.contains("no numbers"), "{error}");
+    }
+
+    /// Scores of equal pictures go through a file, also of one that has nothing in place of infinity.
+    #[test]
+    fn scores_come_back_from_files() {
+        let truth = Array3::from_elem((40, 40, 3), 0.3);
+        let equal = scores(&truth, &truth).unwrap();
+        let text = serde_json::to_string(&equal).unwrap();
+        assert_eq!(serde_json::from_str::<Vec<ZoneScore>>(&text).unwrap(), equal);
+        let old = text.replace("200.0", "null");
+        assert_ne!(old, text);
+        assert_eq!(serde_json::from_str::<Vec<ZoneScore>>(&old).unwrap(), equal);
+        assert_eq!(
+            (psnr_words(MOST_DB), psnr_words(21.456)),
+            ("without an error".into(), "21.46 dB".into())
+        );
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! A chip, its camera and the field of a scene: everything that pictures of it need, made once or taken from the disk.
 
+use std::borrow::Cow;
+
 use metalith_camera::{Camera, ChannelSampling};
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
@@ -9,6 +11,7 @@ use sha2::{Digest, Sha256};
 use crate::assumed::Assumed;
 use crate::exposure::{Frame, expose, gains, sensitivity};
 use crate::kernels::KernelBank;
+use crate::layout::PillarCount;
 use crate::operator::{Detail, FrameOperator, SceneInputs, ScenePoints};
 use crate::operator_error::OperatorError;
 use crate::restore::{
@@ -34,7 +37,13 @@ pub struct Studio {
     pub(crate) scene_spectra: usize,
     /// Where the primaries begin.
     pub(crate) primaries: usize,
+    /// Of scenes as they are simulated, and of the pictures that are restored.
     pub view: SceneView,
+    /// Of scenes as they are given: another one if their pixels are finer than the points that the sensor's pixels look at. Then their
+    /// means over larger ones are simulated, and are the truth that pictures are held to.
+    pub given: SceneView,
+    /// What the layout has of the pillars of its design, if it was counted.
+    pub pillars: Option<PillarCount>,
     /// Signal of a unit of light in each channel.
     pub gain: Vec<f64>,
     pub colours: ChannelColours,
@@ -83,6 +92,7 @@ impl Studio {
 
     /// The same for one scene, with the distances of its pixels if it has them.
     pub fn simulation_of(&self, scene: &SceneImage) -> FrameOperator<'_> {
+        let scene = self.simulated(scene);
         let space = match &scene.depth_um {
             Some(depth) => SceneSpace::with_depth(&self.view, depth),
             None => SceneSpace::flat(&self.view),
@@ -109,11 +119,20 @@ impl Studio {
         self.primaries..self.primaries + rgb_basis().len()
     }
 
+    /// A scene in the pixels that it is simulated in.
+    fn simulated<'s>(&self, scene: &'s SceneImage) -> Cow<'s, SceneImage> {
+        match scene.view == self.given && self.given != self.view {
+            true => Cow::Owned(scene.averaged(&self.view)),
+            false => Cow::Borrowed(scene),
+        }
+    }
+
     /// The frame that the sensor records of a scene, noise drawn from a seed.
     ///
     /// # Errors
     /// If the scene has other spectra or another field than this was opened for.
     pub fn record(&self, operator: &FrameOperator<'_>, scene: &SceneImage, seed: u64) -> Result<Frame> {
+        let scene = self.simulated(scene);
         if scene.view != self.view || scene.basis.len() != self.scene_spectra {
             return Err(Error::invalid(
                 format!(
@@ -168,6 +187,33 @@ impl Studio {
         Ok(self.picture(operator, &planes))
     }
 
+    /// Pictures by Tikhonov's method and all elements: of a frame, and of other light on the same pixels, each trusted as far as that of
+    /// the frame.
+    ///
+    /// # Errors
+    /// As [`Studio::restore`].
+    pub(crate) fn restore_alike(
+        &self,
+        operator: &FrameOperator<'_>,
+        error: &OperatorError,
+        frame: &Frame,
+        light: &[Array2<f32>],
+        progress: &dyn Progress,
+    ) -> Result<[Array3<f64>; 2]> {
+        let [recorded, trust] = self.known(operator, &error.times(TOGETHER), frame)?;
+        let restored = |light: &[Array2<f32>]| -> Result<Array3<f64>> {
+            let recorded = Recorded {
+                operator,
+                light,
+                trust: &trust,
+                prior: &self.prior,
+            };
+            let planes = restore_joint(&recorded, RestorationMethod::Tikhonov, progress)?;
+            Ok(self.picture(operator, &planes))
+        };
+        Ok([restored(&recorded)?, restored(light)?])
+    }
+
     /// Pictures that a frame may be of, one for each seed, linear sRGB `[row, column, colour]`.
     ///
     /// # Errors
@@ -207,7 +253,14 @@ impl Studio {
         frame: &Frame,
     ) -> Result<[Vec<Array2<f32>>; 2]> {
         frame.is_of(operator.frame(), self.gain.len())?;
-        Ok(frame.light(&self.camera, error).into())
+        let (light, trust) = frame.light(&self.camera, error);
+        match trust.iter().flatten().any(|t| *t > 0.0) {
+            true => Ok([light, trust]),
+            false => Err(Error::invalid(
+                "nothing is known of the scene: every pixel that counts light is at full scale",
+                "give a scene of which white is 1, or a lower `white` in [exposure] of the camera",
+            )),
+        }
     }
 
     /// Planes of a restoration in linear sRGB `[row, column, colour]`.
@@ -229,6 +282,7 @@ impl Studio {
 
     /// What a perfect camera with these channels would give of a scene: the truth that pictures are held to.
     pub fn truth(&self, scene: &SceneImage) -> Array3<f64> {
-        self.colours.rgb(&ChannelColours::ideal(&self.channels, scene))
+        self.colours
+            .rgb(&ChannelColours::ideal(&self.channels, &self.simulated(scene)))
     }
 }

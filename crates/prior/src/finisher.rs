@@ -30,6 +30,10 @@ pub struct Taught {
     pub camera: String,
     /// Pictures of a frame.
     pub pictures: usize,
+    /// Digest of what the camera's layout does to light: materials, cell, band. None for cameras without one, and in weights that
+    /// were taught before it was kept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub optics: Option<String>,
 }
 
 /// A network that was taught for one camera and one kind of pictures.
@@ -131,6 +135,7 @@ mod tests {
             kind: "test".into(),
             camera: "none".into(),
             pictures: 2,
+            optics: Some("light".into()),
         };
         Stacks::new((0..count).map(stack).collect(), taught, PIECE).unwrap()
     }
@@ -179,6 +184,15 @@ mod tests {
         assert!(error.contains("taught by 2"), "{error}");
     }
 
+    /// Weights of before say nothing of what a layout does to light; what they say is read, and written as it was.
+    #[test]
+    fn weights_of_before_can_be_read() {
+        let text = r#"{"kind":"blending","camera":"a1","pictures":10}"#;
+        let taught: Taught = serde_json::from_str(text).unwrap();
+        assert_eq!(taught.optics, None);
+        assert_eq!(serde_json::to_string(&taught).unwrap(), text);
+    }
+
     #[test]
     fn damaged_weights_and_those_of_others_are_refused() {
         let stacks = stacks(2);
@@ -192,9 +206,9 @@ mod tests {
         };
         assert!(refused(&whole[..whole.len() - 2]).contains("no file of weights"));
         assert!(refused(b"").contains("no file of weights"));
-        let text = String::from_utf8_lossy(&whole[..600]).into_owned();
         let replaced = |from: &str, to: &str| {
-            let at = text.find(from).expect("the header says so");
+            let mut places = whole[..600].windows(from.len());
+            let at = places.position(|w| w == from.as_bytes()).expect("the header says so");
             let mut bytes = whole.clone();
             bytes[at..at + to.len()].copy_from_slice(to.as_bytes());
             refused(&bytes)

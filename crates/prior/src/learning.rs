@@ -1,6 +1,7 @@
 //! Learning: examples, their gradients, one step after the other, and where it stands on the disk.
 
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use metalith_core::{Error, Progress, Result, WholeFile};
 use ndarray::{Array3, Axis};
@@ -54,6 +55,8 @@ const GROWING: f64 = 300.0;
 /// Steps between two looks at what is held out, and between two states on the disk.
 const LOOK: u64 = 500;
 const KEEP: u64 = 250;
+/// Longest time between two states: what a process that is ended loses.
+const KEEP_TIME: Duration = Duration::from_secs(60);
 /// Layers that are added to something begin with this share of their size.
 const ADDED: f32 = 0.1;
 
@@ -81,7 +84,11 @@ pub(crate) trait Lessons: Sync {
 }
 
 impl TrainingSpec {
-    fn check(&self) -> Result<()> {
+    /// Whether it can be learnt by: to be asked before what is learnt from is made.
+    ///
+    /// # Errors
+    /// If there is nothing to learn, or pieces are too small, too large or no multiple of eight.
+    pub fn check(&self) -> Result<()> {
         let fault = |what: &str, hint: &str| Err(Error::invalid(what, hint));
         if !self.piece.is_multiple_of(8) || !(32..=512).contains(&self.piece) {
             return fault(
@@ -124,7 +131,10 @@ pub(crate) fn learn(
     };
     progress.begin("learning", spec.steps);
     progress.advance(at.step);
-    let mut judged = None;
+    // What there is to judge by from the first step on, and after a stop at once.
+    let mut judged = (at.step < spec.steps).then(|| lessons.held_out(Network::new(&plan, &at.weights)));
+    progress.note(&words(&at, judged));
+    let mut kept = Instant::now();
     while at.step < spec.steps {
         if progress.stopped() {
             at.write(state, &origin)?;
@@ -144,11 +154,11 @@ pub(crate) fn learn(
         if at.step.is_multiple_of(LOOK) {
             judged = Some(lessons.held_out(Network::new(&plan, &at.weights)));
         }
-        if at.step.is_multiple_of(KEEP) {
+        if at.step.is_multiple_of(KEEP) || kept.elapsed() >= KEEP_TIME {
             at.write(state, &origin)?;
+            kept = Instant::now();
         }
-        let held_out = judged.map_or_else(String::new, |db| format!(", held out {db:.2} dB"));
-        progress.note(&format!("loss {:.5}{held_out}", at.loss));
+        progress.note(&words(&at, judged));
     }
     write_weights(out, &plan, &at.weights, &origin)?;
     // What is learnt is in the weights: the next training begins anew, with whatever numbers.
@@ -160,6 +170,13 @@ pub(crate) fn learn(
         weights: plan.weights(),
         held_out_psnr_db: lessons.held_out(Network::new(&plan, &written)),
     })
+}
+
+/// How far learning is, in words.
+fn words(at: &Checkpoint, held_out_db: Option<f64>) -> String {
+    let loss = (at.step > 0).then(|| format!("loss {:.5}", at.loss));
+    let held_out = held_out_db.map(|db| format!("held out {db:.2} dB"));
+    loss.into_iter().chain(held_out).collect::<Vec<_>>().join(", ")
 }
 
 /// Weights before anything is learnt: normal, so that features neither grow nor fade (He et al., ICCV 2015).

@@ -157,16 +157,35 @@ pub struct Stacks {
 }
 
 impl Stacks {
+    /// Whether so many photographs of these rows and columns are enough to learn pieces of them: to be asked before they are taken.
+    ///
+    /// # Errors
+    /// If there are fewer than two, or they are smaller than a piece.
+    pub fn check(photographs: usize, [rows, columns]: [usize; 2], piece: usize) -> Result<()> {
+        if photographs >= 2 && rows.min(columns) >= piece {
+            return Ok(());
+        }
+        Err(Error::invalid(
+            format!("{photographs} photographs of {columns} x {rows} pixels are too few or too small to learn from"),
+            format!("give at least two of {piece} x {piece} pixels or more, or a smaller --piece"),
+        ))
+    }
+
     /// Of what a network is taught for; every twelfth is held out.
     ///
     /// # Errors
     /// If there are fewer than two, one has another number of pictures, or is smaller than a piece.
     pub fn new(stacks: Vec<Stack>, taught: Taught, piece: usize) -> Result<Self> {
-        let fits = |s: &Stack| s.pictures() == taught.pictures && s.size().iter().all(|n| *n >= piece);
-        if stacks.len() < 2 || !stacks.iter().all(fits) {
+        let least = |axis: usize| stacks.iter().map(|s| s.size()[axis]).min().unwrap_or(0);
+        Self::check(stacks.len(), [least(0), least(1)], piece)?;
+        if let Some(other) = stacks.iter().find(|s| s.pictures() != taught.pictures) {
             return Err(Error::invalid(
-                format!("{} frames, or frames too small, to learn from", stacks.len()),
-                format!("give at least two photographs of {piece} x {piece} pixels or more"),
+                format!(
+                    "{} pictures of a frame, and {} of others",
+                    other.pictures(),
+                    taught.pictures
+                ),
+                "give as many of each frame",
             ));
         }
         let (mut learnt, mut held_out) = (Vec::new(), Vec::new());

@@ -117,6 +117,23 @@ mod tests {
         }
         let stopped = learn("c", 2, &Impatient(0.into()));
         assert!(matches!(stopped, Err(Error::Interrupted)));
+        /// Holds the words on the state of the work.
+        struct Listener(std::sync::Mutex<Vec<String>>);
+        impl Progress for Listener {
+            fn begin(&self, _: &str, _: u64) {}
+            fn advance(&self, _: u64) {}
+            fn note(&self, text: &str) {
+                self.0.lock().unwrap().push(text.into());
+            }
+        }
+        let listener = Listener(Vec::new().into());
+        learn("d", 2, &listener).unwrap();
+        let said = listener.0.into_inner().unwrap();
+        assert!(said[0].starts_with("held out") && said.len() == 5, "{said:?}");
+        assert!(
+            said[1..].iter().all(|s| s.contains("loss") && s.contains("held out")),
+            "{said:?}"
+        );
         let other = TrainingSpec {
             seed: 8,
             ..spec.clone()

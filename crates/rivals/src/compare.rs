@@ -60,8 +60,11 @@ pub struct Shown {
 pub struct Comparison {
     /// Names of the photographs.
     pub photographs: Vec<String>,
-    /// Rows and columns of each.
+    /// Rows and columns of each, as all cameras take it.
     pub size: [usize; 2],
+    /// Rows and columns that they were given in, if those are finer than a camera is simulated with: they are averaged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub averaged_from: Option<[usize; 2]>,
     /// Of the sensor and its light.
     pub camera: String,
     /// Of the noise.
@@ -97,6 +100,9 @@ pub fn compare(
         let frame = contender.record(photograph, seed)?;
         add(&mut frame_s, begun);
         let truth = contender.truth(photograph);
+        if let Some(note) = frame.saturation_note(&truth) {
+            progress.warn(&format!("{name}, {}: {note}", photograph.name));
+        }
         if let Some(picture) = contender.unrestored(&frame) {
             bare.add(&picture, &truth, perceptual)?;
         }

@@ -7,7 +7,7 @@ use metalith_core::{Error, Progress, Result, part};
 use metalith_design::Design;
 use metalith_picture::restore::RestorationMethod;
 use metalith_picture::scene::{SceneImage, read_far_scene};
-use metalith_picture::{Assumed, KeptKernels, SceneView, Studio, check_scored};
+use metalith_picture::{Assumed, KeptKernels, SceneView, Studio, check_scored, simulated_view};
 use metalith_prior::PerceptualDistance;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
@@ -78,7 +78,10 @@ pub struct OpenLineup<'a> {
     methods: Vec<RestorationMethod>,
     /// With the camera of each.
     pub(crate) designs: Vec<(Design, Camera)>,
+    /// In the pixels that all cameras are simulated in.
     pub(crate) photographs: Vec<SceneImage>,
+    /// As they were given.
+    given: SceneView,
     pub(crate) stages: Vec<Stage>,
     /// What pictures are judged by too.
     perceptual: Option<PerceptualDistance>,
@@ -122,18 +125,36 @@ impl Lineup {
             let own = listed.camera.as_deref().map(Camera::read).transpose()?;
             Ok((Design::read_any(&listed.design)?, own.unwrap_or_else(|| camera.clone())))
         };
-        let designs = self.designs.iter().map(own).collect::<Result<_>>()?;
+        let designs: Vec<(Design, Camera)> = self.designs.iter().map(own).collect::<Result<_>>()?;
+        let view = self.simulated_view(&designs, first);
+        let averaged = |photograph: SceneImage| match view == first {
+            true => photograph,
+            false => photograph.averaged(&view),
+        };
         let open = OpenLineup {
             of: self,
             camera,
             methods,
             designs,
-            photographs,
+            photographs: photographs.into_iter().map(averaged).collect(),
+            given: first,
             stages: self.learnt.iter().map(|p| Stage::read(p)).collect::<Result<_>>()?,
             perceptual: self.lpips.as_deref().map(PerceptualDistance::read).transpose()?,
         };
         open.stages_have_cameras()?;
         Ok(open)
+    }
+
+    /// The coarsest of the views that designs are simulated in: all cameras take the same photographs.
+    fn simulated_view(&self, designs: &[(Design, Camera)], given: SceneView) -> SceneView {
+        let own = self.designs.iter().zip(designs).map(|(listed, (design, camera))| {
+            let field_deg = listed.field_deg.unwrap_or(given.field_deg);
+            simulated_view(design, camera, &SceneView { field_deg, ..given })
+        });
+        own.min_by_key(|view| view.columns).map_or(given, |view| SceneView {
+            field_deg: given.field_deg,
+            ..view
+        })
     }
 
     fn photograph(&self, path: &Path) -> Result<SceneImage> {
@@ -218,6 +239,7 @@ impl OpenLineup<'_> {
         Comparison {
             photographs: self.photographs.iter().map(|p| p.name.clone()).collect(),
             size: [view.rows, view.columns],
+            averaged_from: (view != self.given).then_some([self.given.rows, self.given.columns]),
             camera: self.camera.name.clone(),
             seed: self.of.seed,
             cameras,
@@ -316,5 +338,49 @@ impl OpenLineup<'_> {
                 then(&ready, (&format!("DiffuserCam, ours{kind}"), &words), &self.photographs)
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array3;
+
+    /// Photographs that are finer than a design is simulated with are averaged, for all cameras alike, and the table says so.
+    #[test]
+    fn fine_photographs_are_averaged_for_all_cameras() {
+        let folder = tempfile::tempdir().unwrap();
+        let photograph = folder.path().join("fine.png");
+        metalith_picture::write_picture(&photograph, &Array3::from_elem((100, 1500, 3), 0.5)).unwrap();
+        let lineup = Lineup {
+            camera: "../../cameras/gt1930.toml".into(),
+            designs: vec![ListedDesign {
+                name: None,
+                design: "../../designs/prototype_3x3.toml".into(),
+                layout: folder.path().join("none.gds"),
+                camera: None,
+                field_deg: None,
+            }],
+            lensless: vec![Lensless::FlatCam(MaskSpec::standard())],
+            methods: vec!["tikhonov".into()],
+            separate: false,
+            paper: false,
+            field_deg: 80.0,
+            seed: 1,
+            photographs: vec![photograph],
+            pixels: None,
+            learnt: Vec::new(),
+            lpips: None,
+        };
+        let open = lineup.open().unwrap();
+        let found = open.comparison(Vec::new());
+        assert_eq!((found.size, found.averaged_from), ([91, 1374], Some([100, 1500])));
+        assert_eq!(open.photographs[0].planes[0].dim(), (91, 1374));
+        assert!(found.markdown().contains("1374 x 91 pixels (averaged from 1500 x 100)"));
+        let coarse = Lineup {
+            designs: Vec::new(),
+            ..lineup.clone()
+        };
+        assert_eq!(coarse.open().unwrap().comparison(Vec::new()).averaged_from, None);
     }
 }

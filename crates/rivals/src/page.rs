@@ -20,7 +20,14 @@ pub fn write_comparison(comparison: &Comparison, folder: &Path) -> Result<()> {
 fn page(comparison: &Comparison) -> Page {
     let mut page = Page::new(
         "Cameras side by side",
-        format!("{}, sensor and light of {}", comparison.counted(), comparison.camera),
+        format!(
+            "{} of {} x {} pixels{}, sensor and light of {}",
+            comparison.counted(),
+            comparison.size[1],
+            comparison.size[0],
+            comparison.averaged(),
+            comparison.camera
+        ),
     );
     let mut best = PhotoRow::new("Scene, and the picture of each camera", 220.0);
     if let Some(first) = comparison.cameras.iter().find_map(|c| c.shown.as_ref()) {

@@ -24,16 +24,25 @@ impl Comparison {
         }
     }
 
+    /// What photographs were made of, in words behind their size; nothing if they are as they were given.
+    pub(crate) fn averaged(&self) -> String {
+        let from = self.averaged_from;
+        from.map_or_else(String::new, |[rows, columns]| {
+            format!(" (averaged from {columns} x {rows})")
+        })
+    }
+
     /// The table in Markdown: a row for each camera and way; zones are separated by slashes.
     pub fn markdown(&self) -> String {
         let zones = Zone::ALL.map(Zone::name).join(" / ");
         let mut text = String::new();
         let mut line = |words: String| writeln!(text, "{words}").expect("strings take everything");
         line(format!(
-            "{} of {} x {} pixels, sensor and light `{}`, noise of seed {}. Zones: {zones}.\n",
+            "{} of {} x {} pixels{}, sensor and light `{}`, noise of seed {}. Zones: {zones}.\n",
             self.counted(),
             self.size[1],
             self.size[0],
+            self.averaged(),
             self.camera,
             self.seed
         ));

@@ -15,23 +15,50 @@ use crate::contender::no_stage;
 use crate::lineup::{Lensless, ListedDesign, OpenLineup};
 use crate::stage::{Stage, StageKind, camera_digest, encoded};
 
+/// A camera of the table that a last stage can follow.
+struct Followed {
+    /// Digest of what decides its frames: layout, sensor, light, field.
+    camera: String,
+    /// Digest of what its layout does to light, if it has one.
+    optics: Option<String>,
+    kinds: Vec<StageKind>,
+}
+
+impl Followed {
+    /// Whether a last stage was taught for it. One that does not say what the layout did to light is taken at its word.
+    fn is_of(&self, kind: StageKind, taught: &Taught) -> bool {
+        self.is_like(kind, taught) && (taught.optics.is_none() || taught.optics == self.optics)
+    }
+
+    /// The same whatever the layout does to light.
+    fn is_like(&self, kind: StageKind, taught: &Taught) -> bool {
+        self.kinds.contains(&kind) && self.camera == taught.camera
+    }
+}
+
 impl OpenLineup<'_> {
-    /// What decides the frames of each camera of the table that a last stage can follow: its digest and the kinds of stages. Cameras
-    /// with the assumptions of others have none.
-    fn digests(&self) -> Result<Vec<(String, Vec<StageKind>)>> {
+    /// The cameras of the table that a last stage can follow, in their order. Those with the assumptions of others are none.
+    fn followed(&self) -> Result<Vec<Followed>> {
         let first = self.photographs[0].view;
         let design = |(listed, (design, camera)): (&ListedDesign, &(Design, Camera))| {
             let field_deg = listed.field_deg.unwrap_or(first.field_deg);
             let optics = (design.digest(), hex(&file_digest(&listed.layout)?));
-            let digest = camera_digest(&optics, camera, &SceneView { field_deg, ..first })?;
-            Ok((digest, vec![StageKind::MultiWiener, StageKind::Blending]))
+            Ok(Followed {
+                camera: camera_digest(&optics, camera, &SceneView { field_deg, ..first })?,
+                optics: Some(design.simulation_digest()?),
+                kinds: vec![StageKind::MultiWiener, StageKind::Blending],
+            })
         };
         let lensless = |spec: &Lensless| {
             let kind = match spec {
                 Lensless::FlatCam(_) => StageKind::FlatNet,
                 Lensless::DiffuserCam(_) => StageKind::UnrolledDiffuser,
             };
-            Ok((camera_digest(spec, &self.camera, &first)?, vec![kind]))
+            Ok(Followed {
+                camera: camera_digest(spec, &self.camera, &first)?,
+                optics: None,
+                kinds: vec![kind],
+            })
         };
         let designs = self.of.designs.iter().zip(&self.designs).map(design);
         designs.chain(self.of.lensless.iter().map(lensless)).collect()
@@ -42,34 +69,44 @@ impl OpenLineup<'_> {
         if self.stages.is_empty() {
             return Ok(());
         }
-        let digests = self.digests()?;
+        let followed = self.followed()?;
         let mut seen = HashSet::new();
         for (stage, path) in self.stages.iter().zip(&self.of.learnt) {
-            if !seen.insert((stage.kind.name(), &stage.taught().camera)) {
-                return Err(Error::invalid(
-                    format!(
-                        "{}: a second last stage `{}` for one camera",
-                        path.display(),
-                        stage.kind.name()
-                    ),
+            let refused = |what: String, hint: &str| Err(Error::invalid(format!("{}: {what}", path.display()), hint));
+            let kind = stage.kind.name();
+            if !seen.insert((kind, &stage.taught().camera)) {
+                return refused(
+                    format!("a second last stage `{kind}` for one camera"),
                     "compare them one after the other",
-                ));
+                );
             }
-            let fits = |(digest, kinds): &(String, Vec<StageKind>)| {
-                kinds.contains(&stage.kind) && *digest == stage.taught().camera
+            if followed.iter().any(|f| f.is_of(stage.kind, stage.taught())) {
+                continue;
+            }
+            let why = match followed.iter().any(|f| f.is_like(stage.kind, stage.taught())) {
+                true => "for this layout with other materials, another cell, analyser or wavelengths of its design",
+                false => "for none of these cameras at this size and field of photographs",
             };
-            if !digests.iter().any(fits) {
-                return Err(Error::invalid(
-                    format!(
-                        "{}: the last stage `{}` was taught for none of these cameras at this size and field of photographs",
-                        path.display(),
-                        stage.kind.name()
-                    ),
-                    "compare the camera that it was taught for, or teach it by `metalith train --stage`",
-                ));
-            }
+            return refused(
+                format!("the last stage `{kind}` was taught {why}"),
+                "compare the camera that it was taught for, or teach it by `metalith train --stage`",
+            );
         }
         Ok(())
+    }
+
+    /// What is to be known of the last stages that are used: those of arrays whose weights do not say what the layout did to light.
+    pub fn notes(&self) -> Vec<String> {
+        let silent = |stage: &Stage| stage.kind.is_of_design() && stage.taught().optics.is_none();
+        let all = self.stages.iter().zip(&self.of.learnt);
+        all.filter(|(stage, _)| silent(stage))
+            .map(|(_, path)| {
+                format!(
+                    "{}: taught before the digest of the design's materials and cell was kept; these are taken to be as they were",
+                    path.display()
+                )
+            })
+            .collect()
     }
 
     /// The stages that were taught for camera `k`, of those without assumptions.
@@ -77,8 +114,8 @@ impl OpenLineup<'_> {
         if self.stages.is_empty() {
             return Ok(Vec::new());
         }
-        let (digest, kinds) = self.digests()?.swap_remove(k);
-        let fits = |stage: &&Stage| kinds.contains(&stage.kind) && stage.taught().camera == digest;
+        let followed = self.followed()?.swap_remove(k);
+        let fits = |stage: &&Stage| followed.is_of(stage.kind, stage.taught());
         Ok(self.stages.iter().filter(fits).cloned().collect())
     }
 
@@ -95,7 +132,7 @@ impl OpenLineup<'_> {
         kept: &KeptKernels,
         progress: &dyn Progress,
     ) -> Result<(Vec<Stack>, Taught)> {
-        let (camera, kinds) = self.digests()?.swap_remove(k);
+        let Followed { camera, optics, kinds } = self.followed()?.swap_remove(k);
         if !kinds.contains(&kind) {
             return no_stage(kind, "this camera");
         }
@@ -108,7 +145,8 @@ impl OpenLineup<'_> {
                     return Err(Error::Interrupted);
                 }
                 let seed = self.of.seed + i as u64;
-                let of = format!("{} {camera} {} {seed}", kind.name(), hex(&file_digest(path)?));
+                let light = optics.as_deref().unwrap_or_default();
+                let of = format!("{} {camera} {light} {} {seed}", kind.name(), hex(&file_digest(path)?));
                 let file = folder.join(format!("{i:06}.safetensors"));
                 let stack = match Stack::kept(&file, &of) {
                     Some(stack) => stack,
@@ -131,7 +169,35 @@ impl OpenLineup<'_> {
             kind: kind.name().into(),
             camera,
             pictures,
+            optics,
         };
         Ok((stacks, taught))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Weights are of the camera whose layout does to light what they were taught with; those that came before this was kept, such
+    /// as the shipped ones, go by the layout alone.
+    #[test]
+    fn last_stages_know_what_their_layout_does_to_light() {
+        let weights = Path::new(env!("CARGO_MANIFEST_DIR")).join("weights/multi-wiener.safetensors");
+        let shipped = Stage::read(&weights).unwrap();
+        let before = shipped.taught();
+        assert_eq!(before.optics, None);
+        let camera = Followed {
+            camera: before.camera.clone(),
+            optics: Some("nitride".into()),
+            kinds: vec![StageKind::MultiWiener],
+        };
+        let taught = |optics: &str| Taught {
+            optics: Some(optics.into()),
+            ..before.clone()
+        };
+        assert!(camera.is_of(shipped.kind, before) && camera.is_of(shipped.kind, &taught("nitride")));
+        assert!(!camera.is_of(shipped.kind, &taught("oxide")) && camera.is_like(shipped.kind, &taught("oxide")));
+        assert!(!camera.is_like(StageKind::Blending, before));
     }
 }

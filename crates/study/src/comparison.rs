@@ -140,6 +140,7 @@ fn key(lineup: &Lineup) -> Result<String> {
 pub fn plan_comparison(lineup: &Lineup, folder: &Path, progress: &dyn Progress) -> Result<ComparisonPlan> {
     let lineup = placed(lineup)?;
     let open = lineup.open()?;
+    open.notes().iter().for_each(|note| progress.warn(note));
     let key = key(&lineup)?;
     if let Some(known) = ComparisonPlan::known_in(folder, &key)? {
         return Ok(known);

@@ -323,7 +323,7 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>> {
 }
 
 /// Rising numbers as `0-3, 7, 9-12`, the first twenty ranges.
-fn ranges(numbers: &[u64]) -> String {
+pub(crate) fn ranges(numbers: &[u64]) -> String {
     let mut runs: Vec<(u64, u64)> = Vec::new();
     for n in numbers {
         match runs.last_mut() {

@@ -56,6 +56,7 @@ pub use comparison::{ComparisonPlan, plan_comparison};
 pub use cut::{Cut, Shard, Status};
 pub use designs::DesignGrid;
 pub use draw::Drawn;
+pub use manifest::is_planned;
 pub use merge::{StudyResult, merge};
 pub use page::write_page;
 pub use pairs::{PairsPlan, PairsRequest, plan_pairs};

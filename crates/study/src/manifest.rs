@@ -64,8 +64,8 @@ pub(crate) trait Manifest: Serialize + DeserializeOwned {
     }
 }
 
-/// Whether a folder holds a plan.
-pub(crate) fn is_planned(folder: &Path) -> bool {
+/// Whether a folder holds a plan, of whatever work.
+pub fn is_planned(folder: &Path) -> bool {
     folder.join(MANIFEST).is_file()
 }
 

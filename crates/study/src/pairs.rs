@@ -10,15 +10,17 @@ use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
 use metalith_made::CalibratedModel;
 use metalith_picture::scene::{SceneImage, read_far_scene};
-use metalith_picture::{DatasetManifest, DatasetPair, KeptKernels, PairWriter, Studio, write_dataset_manifest};
+use metalith_picture::{
+    DatasetManifest, DatasetOrigin, DatasetPair, KeptKernels, PairWriter, Studio, check_images, write_dataset_manifest,
+};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::cut::{Cut, parts_per_shard};
+use crate::cut::{Cut, parts_per_shard, ranges};
 use crate::manifest::{Manifest, absolute, another_plan};
 
-/// Version of the format of the manifest.
-const SCHEMA: u32 = 1;
+/// Version of the format of the manifest. Frames of version 1 have no black level.
+const SCHEMA: u32 = 2;
 /// Longest image (bytes).
 const LONGEST: u64 = 1 << 30;
 
@@ -130,15 +132,56 @@ impl PairsPlan {
     /// Write the manifest of the set when all pairs are there.
     ///
     /// # Errors
-    /// If pairs are missing or there twice, or the file cannot be written.
-    pub fn merge(&self) -> Result<DatasetManifest> {
+    /// If pairs are missing or there twice, one of their files is not what its shard wrote, all named; if the manifest cannot be
+    /// written, or the user stopped it.
+    pub fn merge(&self, progress: &dyn Progress) -> Result<DatasetManifest> {
         let pairs: Vec<DatasetPair> = self.cut().whole(&|_| None)?;
+        self.check_files(&pairs, progress)?;
         let manifest = DatasetManifest {
             pairs,
             ..self.head.clone()
         };
         write_dataset_manifest(&self.folder, &manifest)?;
         Ok(manifest)
+    }
+}
+
+impl PairsPlan {
+    /// Whether the files of all pairs have the digests that their shards state.
+    fn check_files(&self, pairs: &[DatasetPair], progress: &dyn Progress) -> Result<()> {
+        progress.begin("checking the pairs", pairs.len() as u64);
+        let is =
+            |name: &str, digest: &str| file_digest(&self.folder.join(name)).is_ok_and(|found| hex(&found) == digest);
+        let mut bad = Vec::new();
+        for (k, pair) in pairs.iter().enumerate() {
+            if progress.stopped() {
+                return Err(Error::Interrupted);
+            }
+            if !is(&pair.frame, &pair.frame_sha256) || !is(&pair.truth, &pair.truth_sha256) {
+                bad.push(k as u64);
+            }
+            progress.advance(1);
+        }
+        if bad.is_empty() {
+            return Ok(());
+        }
+        let mut shards: Vec<u64> = bad.iter().map(|k| k / self.images_per_shard).collect();
+        shards.dedup();
+        let first = self.cut().path(shards[0]);
+        Err(Error::invalid(
+            format!(
+                "files of {} of {} pairs are damaged or not there: {}",
+                bad.len(),
+                pairs.len(),
+                ranges(&bad)
+            ),
+            format!(
+                "remove the files of their shards ({}; the first is {}), then make them again by `metalith study run {} --missing`",
+                ranges(&shards),
+                first.display(),
+                self.folder.display()
+            ),
+        ))
     }
 }
 
@@ -173,6 +216,11 @@ impl PairsRequest {
         read_far_scene(image, self.field_deg)
     }
 
+    fn origin(&self) -> Result<DatasetOrigin> {
+        let (design, camera) = (Design::read_any(&self.design)?, Camera::read(&self.camera)?);
+        DatasetOrigin::of(&design, &self.layout, &camera, self.model.as_deref())
+    }
+
     fn studio(&self, kept: &KeptKernels, progress: &dyn Progress) -> Result<Studio> {
         let design = Design::read_any(&self.design)?;
         let camera = Camera::read(&self.camera)?;
@@ -191,11 +239,11 @@ impl PairsRequest {
     }
 }
 
-/// Plan a set for learning into a folder: kernels, the first pair to know its time, manifest. A folder that holds the plan
-/// of the same set keeps it.
+/// Plan a set for learning into a folder: all images read, kernels, the first pair to know its time, manifest. A folder that holds
+/// the plan of the same set keeps it.
 ///
 /// # Errors
-/// If a file cannot be used, the folder holds another plan, or the user stopped it.
+/// If files cannot be used, all images among them named, the folder holds another plan, or the user stopped it.
 pub fn plan_pairs(
     request: &PairsRequest,
     folder: &Path,
@@ -203,7 +251,7 @@ pub fn plan_pairs(
     progress: &dyn Progress,
 ) -> Result<PairsPlan> {
     let request = request.placed()?;
-    progress.begin("reading the images", request.images.len() as u64);
+    progress.begin("digests of the images", request.images.len() as u64);
     let mut digests = Vec::new();
     for image in &request.images {
         if progress.stopped() {
@@ -216,6 +264,8 @@ pub fn plan_pairs(
     if let Some(known) = PairsPlan::known_in(folder, &key)? {
         return Ok(known);
     }
+    check_images(&request.images, progress)?;
+    let origin = request.origin()?;
     let studio = request.studio(&KeptKernels::made(folder), progress)?;
     let begun = Instant::now();
     let operator = studio.simulation();
@@ -228,7 +278,7 @@ pub fn plan_pairs(
         key,
         images_per_shard: parts_per_shard(images_per_shard, seconds_per_image, digests.len() as u64),
         seconds_per_image,
-        head: DatasetManifest::of(&studio, request.seed),
+        head: DatasetManifest::of(&studio, origin, request.seed),
         request,
         digests,
         folder: folder.to_owned(),

@@ -80,10 +80,11 @@ pub(crate) fn figures(found: &Verification) -> BTreeMap<String, Option<f64>> {
             *place = value;
         }
     };
+    let reported = found.camera.as_ref().map(|c| c.frequencies().reported());
     for element in &found.distinct {
         for spot in &element.spots {
             let nm = spot.wavelength_um * 1e3;
-            let (x, y) = (spot.field.x_deg, spot.field.y_deg);
+            let (x, y) = (spot.asked().x_deg, spot.asked().y_deg);
             let at = if y == 0.0 {
                 format!("{nm:.0}nm_{x}deg")
             } else {
@@ -103,7 +104,7 @@ pub(crate) fn figures(found: &Verification) -> BTreeMap<String, Option<f64>> {
         for white in &element.white {
             for contrast in &white.contrast {
                 // Curves are sampled finely; these two are what is looked at.
-                if metalith_wave::psf::CONTRAST_LP_MM.contains(&contrast.lp_mm) {
+                if reported.is_some_and(|two| two.contains(&contrast.lp_mm)) {
                     let key = format!("white_mtf_{}lpmm_{}", contrast.lp_mm, white.channel);
                     worst(key, contrast.mtf[0].min(contrast.mtf[1]), false);
                 }

@@ -9,8 +9,8 @@ use common::{SMALL_CAMERA, tolerance};
 use metalith_core::Silent;
 use metalith_design::Design;
 use metalith_optimise::{Checkpoint, OptimiseTask, TaskCells};
-use metalith_picture::Studio;
 use metalith_picture::scene::read_far_scene;
+use metalith_picture::{DatasetManifest, DatasetOrigin, Studio, write_dataset};
 use metalith_rivals::{Comparison, Lensless, Lineup, ListedDesign, MaskSpec};
 use metalith_study::{PairsRequest, Work, plan_comparison, plan_pairs, plan_starts};
 
@@ -59,7 +59,7 @@ fn pairs_of_shards_are_those_of_one_run() {
     let run = |shards: &[u64]| Work::Pairs(work.clone()).run(shards, &Silent);
     run(&[2, 0]).unwrap();
     assert_eq!(work.cut().status().unwrap().missing, [1]);
-    let missing = work.merge().unwrap_err().to_string();
+    let missing = work.merge(&Silent).unwrap_err().to_string();
     assert!(missing.contains("2 of 5 pairs are missing"), "{missing}");
     // Shards make no kernels of their own.
     fs::rename(at("parts/kernels"), at("aside")).unwrap();
@@ -72,14 +72,58 @@ fn pairs_of_shards_are_those_of_one_run() {
     assert!(changed.contains("image_4.png has changed"), "{changed}");
     fs::write(&images[3], kept).unwrap();
     run(&[1]).unwrap();
-    work.merge().unwrap();
+    // A file that is not what its shard wrote is noticed, and made again with its shard.
+    let (damaged, right) = (at("parts/000000-000999/000002.truth.png"), work.merge(&Silent).unwrap());
+    let cut = fs::metadata(&damaged).unwrap().len() - 100;
+    fs::File::options()
+        .write(true)
+        .open(&damaged)
+        .unwrap()
+        .set_len(cut)
+        .unwrap();
+    let refused = work.merge(&Silent).unwrap_err().to_string();
+    assert!(
+        refused.contains("1 of 5 pairs") && refused.contains("000001.jsonl"),
+        "{refused}"
+    );
+    fs::remove_file(work.cut().path(1)).unwrap();
+    run(&[1]).unwrap();
+    assert_eq!(work.merge(&Silent).unwrap(), right);
+    let old = fs::read_to_string(at("parts/plan.json")).unwrap();
+    fs::create_dir(at("old")).unwrap();
+    fs::write(at("old/plan.json"), old.replacen("\"schema\": 2", "\"schema\": 1", 1)).unwrap();
+    let refused = Work::open(&at("old")).err().unwrap().to_string();
+    assert!(refused.contains("another version"), "{refused}");
+    let bad = PairsRequest {
+        images: [&images[..], &[at("camera.toml")]].concat(),
+        ..request.clone()
+    };
+    let refused = plan_pairs(&bad, &at("bad"), None, &Silent).unwrap_err().to_string();
+    assert!(refused.contains("camera.toml: it is neither PNG"), "{refused}");
+    assert!(!at("bad/kernels").exists());
 
     let scene = |path: &Path| read_far_scene(path, 50.0);
     let camera = metalith_camera::Camera::read(&at("camera.toml")).unwrap();
     let kept = metalith_picture::KeptKernels::made(&at("alone"));
     let first = scene(&images[0]).unwrap();
     let studio = Studio::open_kept(&design, &layout, &camera, None, &first, &kept, &Silent).unwrap();
-    metalith_picture::write_dataset(&studio, &studio.simulation(), &images, &scene, 3, &at("alone"), &Silent).unwrap();
+    let origin = DatasetOrigin::of(&design, &layout, &camera, None).unwrap();
+    let write = |seed| {
+        let head = DatasetManifest::of(&studio, origin.clone(), seed);
+        write_dataset(
+            &studio,
+            &studio.simulation(),
+            &images,
+            &scene,
+            head,
+            &at("alone"),
+            &Silent,
+        )
+        .unwrap()
+    };
+    let alone = write(3);
+    assert_eq!((alone.black_level, alone.white), (64, 65535));
+    assert_eq!(alone.made_from, origin);
     let names = (0..5).flat_map(|k| ["frame", "truth"].map(|n| format!("000000-000999/{k:06}.{n}.png")));
     for name in names.chain(["manifest.json".to_owned()]) {
         let [a, b] = ["parts", "alone"].map(|f| fs::read(at(f).join(&name)).unwrap());
@@ -94,22 +138,10 @@ fn pairs_of_shards_are_those_of_one_run() {
     let right = fs::read(&frame).unwrap();
     fs::copy(&other, &frame).unwrap();
     let untouched = fs::metadata(&other).unwrap().modified().unwrap();
-    let again = |seed| {
-        metalith_picture::write_dataset(
-            &studio,
-            &studio.simulation(),
-            &images,
-            &scene,
-            seed,
-            &at("alone"),
-            &Silent,
-        )
-        .unwrap()
-    };
-    again(3);
+    write(3);
     assert!(fs::read(&frame).unwrap() == right);
     assert_eq!(fs::metadata(&other).unwrap().modified().unwrap(), untouched);
-    again(4);
+    write(4);
     assert!(fs::read(&frame).unwrap() != right);
 }
 

@@ -5,7 +5,7 @@ use std::collections::hash_map::Entry;
 
 use num_complex::Complex64;
 
-use metalith_cell::{BandResponse, CellModel, NeighbourResponse, ObliqueTables, POLARISATION_SHARE};
+use metalith_cell::{BandResponse, CellModel, FittedNeighbours, ObliqueTables, POLARISATION_SHARE};
 use metalith_core::{Error, LatticeKind, Progress, Result, WidthRows};
 use metalith_grating::NeighbourPillars;
 use metalith_made::{SimulationCase, cell_direction};
@@ -72,7 +72,7 @@ pub(super) struct TransmissionTables {
 /// What pillars transmit among unlike neighbours in one light.
 enum Neighbourhood {
     /// For s and p.
-    Polarised([NeighbourResponse; 2]),
+    Polarised(FittedNeighbours),
     /// For one of many wavelengths of a band.
     Band(BandResponse),
 }
@@ -154,10 +154,10 @@ impl TransmissionTables {
         for wave in waves {
             let sines = cell_direction(wave, self.lattice);
             if let Entry::Vacant(place) = self.neighbours.entry(key(sines)) {
-                let Some(responses) = cell.among_neighbours(wave.wavelength_um, sines, progress)? else {
+                let Some(fitted) = cell.among_neighbours(wave.wavelength_um, sines, progress)? else {
                     return Ok(());
                 };
-                place.insert(Neighbourhood::Polarised(responses));
+                place.insert(Neighbourhood::Polarised(fitted));
             }
         }
         Ok(())
@@ -188,6 +188,15 @@ impl TransmissionTables {
         self.neighbours.contains_key(&key(cell_direction(lit, self.lattice)))
     }
 
+    /// Share of the light that the sums over pairs put elsewhere in this light than supercells that were left out of their fit; none
+    /// where unlike neighbours are not known by a table of their own.
+    pub fn left_out(&self, lit: &PlaneWave) -> Option<f64> {
+        match self.neighbours.get(&key(cell_direction(lit, self.lattice)))? {
+            Neighbourhood::Polarised(fitted) => Some(fitted.left_out),
+            Neighbourhood::Band(_) => None,
+        }
+    }
+
     /// An element among its own neighbours, in light for which that is known: for s and p, or one for both.
     ///
     /// # Errors
@@ -203,9 +212,9 @@ impl TransmissionTables {
         let widths = widths.held().ok_or_else(not_held)?;
         let sines = [lit.sin_x, lit.sin_y];
         Ok(Some(match known {
-            Neighbourhood::Polarised(both) => [0, 1]
+            Neighbourhood::Polarised(fitted) => [0, 1]
                 .into_iter()
-                .map(|polarisation| NeighbourPillars::polarised(widths, both, sines, polarisation))
+                .map(|polarisation| NeighbourPillars::polarised(widths, &fitted.responses, sines, polarisation))
                 .collect::<Result<_>>()?,
             Neighbourhood::Band(one) => vec![NeighbourPillars::new(widths, one, sines)?],
         }))

@@ -127,28 +127,27 @@ pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
             sense: Sense::AtLeast,
         });
     }
-    let white = |of: fn(&LimitSpec, &WhiteChannel) -> f64| {
+    let told = found.camera.as_ref().map(|c| c.frequencies().half_nyquist_lp_mm);
+    let contrast_lp_mm = limits.white_mtf_lp_mm.or(told).unwrap_or(f64::NAN);
+    let white = |of: &dyn Fn(&WhiteChannel) -> f64| {
         let mut all = Vec::new();
         for d in &found.distinct {
             for w in &d.white {
                 let place = format!("element {}, channel {}", d.element.label(), w.channel);
-                all.push((place, -of(limits, w)));
+                all.push((place, -of(w)));
             }
         }
         worst(all.into_iter())
     };
-    let whites: [White; 2] = [
-        (
-            "contrast in white light",
-            "white_mtf_min",
-            limits.white_mtf_min,
-            |l, w| w.least_contrast(l.white_mtf_lp_mm),
-        ),
+    let whites: [White<'_>; 2] = [
+        ("contrast in white light", "white_mtf_min", limits.white_mtf_min, &|w| {
+            w.least_contrast(contrast_lp_mm)
+        }),
         (
             "share of white light in a square of 2 pixels",
             "white_energy_2_pixels_min",
             limits.white_energy_2_pixels_min,
-            |_, w| w.energy_2_pixels,
+            &|w| w.energy_2_pixels,
         ),
     ];
     for (name, key, limit, reached) in whites {
@@ -201,7 +200,7 @@ fn not_simulated(limits: &LimitSpec, why: &str) -> Vec<Check> {
 }
 
 /// Name, key and limit of what is measured of a channel in white light.
-type White = (&'static str, &'static str, f64, fn(&LimitSpec, &WhiteChannel) -> f64);
+type White<'a> = (&'static str, &'static str, f64, &'a dyn Fn(&WhiteChannel) -> f64);
 
 /// Name, key and limit of what is measured of a spot.
 type Optical<'a> = (&'static str, &'static str, f64, &'a dyn Fn(&PsfPair) -> f64);

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use metalith_cell::Fidelity;
 use metalith_core::{Progress, Result, WidthRows};
-use metalith_design::Design;
 use metalith_design::array::{PillarArray, PlacedElement};
+use metalith_design::{AskedLight, Design};
 use metalith_gds::extract::{Extraction, HeldWidths, extract_folded};
 use metalith_gds::{Layout, ReadLimits};
 use metalith_layout::extraction_plan;
@@ -92,6 +92,7 @@ pub fn verify_pillars(
         foreign: extraction.oddities,
         distinct: Vec::new(),
         rotations: None,
+        lattice_orders: design.lattice_orders(AskedLight::All)?,
         not_simulated: Some(why),
         checks: Vec::new(),
     };

@@ -4,7 +4,9 @@
 mod assumptions;
 mod case;
 mod check;
+mod copies;
 mod large;
+mod media;
 mod memory;
 mod optics;
 mod page;
@@ -14,6 +16,7 @@ mod rotations;
 mod single;
 mod single_white;
 mod site_orders;
+mod steep;
 mod white;
 mod white_page;
 mod widths;
@@ -25,9 +28,9 @@ use serde::Serialize;
 
 use metalith_cell::Fidelity;
 use metalith_core::{Progress, Result, WidthRows};
-use metalith_design::array::{PillarArray, PlacedElement, WidthRule};
+use metalith_design::array::{PillarArray, PlacedElement, Symmetry, WidthRule};
 use metalith_design::phase::{ElementPhase, LensPhase};
-use metalith_design::{Design, Element};
+use metalith_design::{AskedLight, Design, Element, LatticeOrders};
 use metalith_gds::extract::{ExtractedElement, Extraction, Oddities, Survey, extract};
 use metalith_gds::{self, Layout};
 use metalith_layout::extraction_plan;
@@ -37,6 +40,7 @@ use metalith_wave::{Accuracy, PlaneWave};
 
 pub use case::SimulationCases;
 pub use check::{Check, Sense};
+pub use copies::CopyAngle;
 pub use large::{verify_in_parts, verify_pillars};
 pub use memory::Simulation;
 pub use metalith_made::SimulationCase;
@@ -44,13 +48,10 @@ pub use page::write_report;
 pub use phase::{PhaseError, PhaseErrors, PillarResponse};
 pub use psf_metrics::{OrderEfficiencies, PsfImages, PsfPair, PsfResult};
 pub use rotations::EqualRotations;
-pub use single::{Lighting, SinglePsf, SinglePsfReport, single_psfs, write_single_psf_report};
-pub use single_white::{SingleWhite, single_white};
+pub use single::{Lighting, STREHL_AGAINST, SinglePsf, SinglePsfReport, single_psfs, write_single_psf_report};
+pub use single_white::{SingleWhite, single_white, white_sampling};
 pub use white::{CameraStatement, Contrast, WhiteChannel};
 pub use widths::WidthCheck;
-
-/// Most elements that are simulated because their pillars are not as intended, where none may be so.
-const MOST_FAULTY: usize = 4;
 
 /// What the file is, in number.
 #[derive(Clone, Debug, Serialize)]
@@ -71,8 +72,11 @@ pub struct LayoutFacts {
 pub struct ElementCheck {
     pub element: Element,
     pub widths: WidthCheck,
-    /// Index into [`Verification::distinct`] of the element that it is a copy of, if it is as intended.
+    /// Index into [`Verification::distinct`] of the element that it is simulated as, itself or one that it is a copy of, if it is
+    /// as intended.
     pub copy_of: Option<usize>,
+    /// What turns that element into this one: pillars, field angles, and the places where light lands.
+    pub turned: Option<Symmetry>,
 }
 
 /// One element that differs from all before it by more than a symmetry, simulated.
@@ -86,7 +90,8 @@ pub struct DistinctElement {
     pub steepness: Steepness,
     /// Where light goes by the mapping's own account, one entry a wavelength.
     pub orders: Vec<OrderEfficiencies>,
-    /// One entry for each wavelength and field angle.
+    /// One entry for each wavelength and field angle of the design; then for each wavelength those that are asked of copies
+    /// and come from other sides than these.
     pub spots: Vec<PsfPair>,
     /// A point of the scene in white light, one entry for each channel of the camera.
     pub white: Vec<WhiteChannel>,
@@ -120,6 +125,9 @@ pub struct Verification {
     /// Of a design of rotated rectangles: how near their lattice is to the phase that is asked.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rotations: Option<EqualRotations>,
+    /// Light of the design of which the lattice of the pillars sends some into oblique orders.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub lattice_orders: Vec<LatticeOrders>,
     /// Why nothing was simulated, if nothing was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub not_simulated: Option<String>,
@@ -269,35 +277,34 @@ fn judge(
     part_bytes: Option<usize>,
     progress: &dyn Progress,
 ) -> Result<Verification> {
-    let elements = found.elements;
+    let mut elements = found.elements;
     let lens = LensPhase::of(design);
     let responses = MappingResponse::new(design, cases.judge)?;
     let mut simulator = optics::ElementSimulator::new(design, array.lattice, cases, accuracy, part_bytes)?;
-    let chosen = distinct(design, &elements, cases.judge.depends_on_place());
-    let shown = chosen.iter().map(|(k, _)| elements[*k].element).collect::<Vec<_>>();
-    simulator.add_directions(&shown, progress)?;
+    let chosen = copies::choose(design, array, &mut elements, cases.judge.depends_on_place());
+    simulator.add_directions(&chosen, progress)?;
     let mut white = white::WhiteSimulator::new(design, array.lattice, cases.judge, part_bytes)?;
     if let Some(white) = &mut white {
+        let shown: Vec<Element> = chosen.iter().map(|one| one.element).collect();
         white.add_directions(&shown, progress)?;
     }
-    progress.begin(
-        "simulating elements",
-        (chosen.len() * (simulator.psfs() + white.as_ref().map_or(0, white::WhiteSimulator::psfs))) as u64,
-    );
+    let in_white = white.as_ref().map_or(0, white::WhiteSimulator::psfs);
+    let psfs: usize = chosen.iter().map(|one| simulator.psfs(one) + in_white).sum();
+    progress.begin("simulating elements", psfs as u64);
     let mut simulated = Vec::new();
-    for (k, copies) in chosen {
-        let element = elements[k].element;
-        let widths = found.widths[k];
+    for one in chosen {
+        let element = one.element;
+        let widths = found.widths[one.index];
         let phase = ElementPhase::of(&lens, &element);
         let rule = WidthRule::of_element(design, element.index);
         let read = simulator.read(&element, widths)?;
         simulated.push(DistinctElement {
             element,
-            copies,
+            copies: one.copies,
             phase: responses.errors(&read, &phase, &rule, progress)?,
             steepness: Steepness::of(&array.lattice, |ix, iy| phase.turns(ix, iy)),
             orders: simulator.orders(&element, &phase, &rule, &read, progress)?,
-            spots: simulator.simulate(&element, &phase, &read, progress)?,
+            spots: simulator.simulate(&one, &phase, &read, progress)?,
             white: match &white {
                 Some(white) => white.simulate(&element, &phase, &read, progress)?,
                 None => Vec::new(),
@@ -324,6 +331,7 @@ fn judge(
         foreign: found.foreign,
         distinct: simulated,
         rotations: EqualRotations::of(design, cases.judge)?,
+        lattice_orders: design.lattice_orders(AskedLight::All)?,
         not_simulated: None,
         checks: Vec::new(),
     };
@@ -378,60 +386,13 @@ fn compare<W>(
     extraction: &Extraction<W>,
     widths: impl Fn(&PlacedElement, &W) -> WidthCheck,
 ) -> Vec<ElementCheck> {
-    let mut first_of_class = vec![None; array.classes.len()];
-    let mut distinct = 0;
-    let mut check = |(placed, found): (&PlacedElement, &ExtractedElement<W>)| {
-        let widths = widths(placed, &found.widths);
-        let copy_of = if widths.faults() == 0 {
-            let place = &mut first_of_class[placed.class];
-            if place.is_none() {
-                *place = Some(distinct);
-                distinct += 1;
-            }
-            *place
-        } else {
-            None
-        };
-        ElementCheck {
-            element: placed.element,
-            widths,
-            copy_of,
-        }
+    let check = |(placed, found): (&PlacedElement, &ExtractedElement<W>)| ElementCheck {
+        element: placed.element,
+        widths: widths(placed, &found.widths),
+        copy_of: None,
+        turned: None,
     };
-    array.placed.iter().zip(&extraction.elements).map(&mut check).collect()
-}
-
-/// Which elements are simulated, and for how many each stands: one of each kind, and of those that are not as intended the
-/// first, or all where some may be so; each by itself where light depends on `place`. Elements of other focal lengths are of other kinds.
-fn distinct(design: &Design, elements: &[ElementCheck], place: bool) -> Vec<(usize, usize)> {
-    let mut chosen: Vec<(usize, usize)> = Vec::new();
-    // Class and focal length of each that was chosen; none of those that are not as intended.
-    let mut kinds: Vec<Option<(usize, f64)>> = Vec::new();
-    let most_faulty = match design.verify.limits.wrong_widths_max {
-        0 => MOST_FAULTY,
-        // They may pass: all limits are held to each of them.
-        _ => usize::MAX,
-    };
-    let mut faulty = 0;
-    for (k, check) in elements.iter().enumerate() {
-        let focal_length_um = design.lens_of(&check.element).focal_length_um;
-        let kind = check.copy_of.map(|class| (class, focal_length_um));
-        let known = kinds
-            .iter()
-            .position(|known| !place && kind.is_some() && *known == kind);
-        if let Some(known) = known {
-            chosen[known].1 += 1;
-            continue;
-        }
-        if kind.is_none() {
-            faulty += 1;
-        }
-        if kind.is_some() || faulty <= most_faulty {
-            chosen.push((k, 1));
-            kinds.push(kind);
-        }
-    }
-    chosen
+    array.placed.iter().zip(&extraction.elements).map(check).collect()
 }
 
 fn facts<W>(layout: &Layout, extraction: &Extraction<W>, path: &Path) -> LayoutFacts {

@@ -5,6 +5,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::case::{SimulationCases, TransmissionTables, not_held};
+use super::copies::{AskedAngle, Chosen, CopyAngle};
 use super::psf_metrics::{OrderEfficiencies, PsfImages, PsfPair, PsfResult};
 use super::site_orders::site_shares;
 use metalith_cell::Fidelity;
@@ -16,7 +17,7 @@ use metalith_design::phase::ElementPhase;
 use metalith_design::{CellIncidence, Design, Element, FieldAngle};
 use metalith_made::{DrawnElement, MadeChip, MadeElement, MadeView, SimulationCase};
 use metalith_wave::propagation::{incident, landing_um};
-use metalith_wave::psf::{CONTRAST_LP_MM, CURVE_LP_MM};
+use metalith_wave::psf::PixelFrequencies;
 use metalith_wave::{
     Accuracy, Aperture, Fold, Matched, PhaseFunction, PhaseMap, PhaseSites, PlaneWave, Psf, Scratch, Window,
 };
@@ -103,9 +104,8 @@ impl<'a> ElementSimulator<'a> {
     ///
     /// # Errors
     /// If a cell has no answer, or the user stopped it.
-    pub fn add_directions(&mut self, elements: &[Element], progress: &dyn Progress) -> Result<()> {
-        self.add_neighbours(elements, progress)?;
-        let spec = &self.design.verify;
+    pub fn add_directions(&mut self, chosen: &[Chosen], progress: &dyn Progress) -> Result<()> {
+        self.add_neighbours(chosen, progress)?;
         let cells = self
             .cases
             .iter()
@@ -114,13 +114,16 @@ impl<'a> ElementSimulator<'a> {
         if !self.as_lit() || cells == 0 {
             return Ok(());
         }
-        let solves = elements.len() * spec.field_angles.len() * self.colours.len() * cells;
-        progress.begin("solving cells as they are lit", solves as u64);
+        let lit: Vec<(&Element, FieldAngle)> = chosen.iter().flat_map(all_angles).collect();
+        progress.begin(
+            "solving cells as they are lit",
+            (lit.len() * self.colours.len() * cells) as u64,
+        );
         for colour in &mut self.colours {
             let wavelength_um = colour.wavelength_um;
-            let waves = elements
+            let waves = lit
                 .iter()
-                .flat_map(|e| spec.field_angles.iter().map(move |a| arriving(e, wavelength_um, *a)))
+                .map(|(element, field)| arriving(element, wavelength_um, *field))
                 .collect::<Result<Vec<_>>>()?;
             for (at, case) in colour.cases.iter_mut().zip(&self.cases) {
                 if let (Some(tables), SimulationCase::Cell(cell)) = (&mut at.tables, case) {
@@ -132,15 +135,17 @@ impl<'a> ElementSimulator<'a> {
     }
 
     /// Obtain what pillars transmit among unlike neighbours, from the cells that know: in light from the middle of an
-    /// element's field, or from each of its field angles if the design asks for cells as they are lit.
-    fn add_neighbours(&mut self, elements: &[Element], progress: &dyn Progress) -> Result<()> {
-        let spec = &self.design.verify;
-        let angles: &[FieldAngle] = if self.as_lit() { &spec.field_angles } else { &[MIDDLE] };
+    /// element's field, where orders are told, and from each of its field angles if the design asks for cells as they are lit.
+    fn add_neighbours(&mut self, chosen: &[Chosen], progress: &dyn Progress) -> Result<()> {
+        let mut lit: Vec<(&Element, FieldAngle)> = chosen.iter().map(|one| (&one.element, MIDDLE)).collect();
+        if self.as_lit() {
+            lit.extend(chosen.iter().flat_map(all_angles));
+        }
         for colour in &mut self.colours {
             let wavelength_um = colour.wavelength_um;
-            let waves = elements
+            let waves = lit
                 .iter()
-                .flat_map(|e| angles.iter().map(move |a| arriving(e, wavelength_um, *a)))
+                .map(|(element, field)| arriving(element, wavelength_um, *field))
                 .collect::<Result<Vec<_>>>()?;
             for (at, case) in colour.cases.iter_mut().zip(&self.cases) {
                 if let (Some(tables), SimulationCase::Cell(cell)) = (&mut at.tables, case) {
@@ -168,8 +173,8 @@ impl<'a> ElementSimulator<'a> {
     }
 
     /// Number of wavelengths and angles of one element.
-    pub fn psfs(&self) -> usize {
-        self.colours.len() * self.design.verify.field_angles.len()
+    pub fn psfs(&self, one: &Chosen) -> usize {
+        self.colours.len() * one.angles.len()
     }
 
     fn as_lit(&self) -> bool {
@@ -228,6 +233,7 @@ impl<'a> ElementSimulator<'a> {
                         second: found.orders[2],
                         transmitted: found.transmitted,
                         unconverted: None,
+                        left_out: tables.left_out(&middle),
                     });
                     continue;
                 }
@@ -251,18 +257,19 @@ impl<'a> ElementSimulator<'a> {
         Ok(all)
     }
 
-    /// All wavelengths and field angles of one element.
+    /// All wavelengths and field angles of one element, those of the design first.
     ///
     /// # Errors
     /// If a cell cannot be solved, a direction is too steep, or the user stopped it.
     pub fn simulate(
         &self,
-        element: &Element,
+        one: &Chosen,
         phase: &ElementPhase<'_>,
         read: &ReadElement<'_>,
         progress: &dyn Progress,
     ) -> Result<Vec<PsfPair>> {
-        let angles = &self.design.verify.field_angles;
+        let element = &one.element;
+        let (own, of_copies) = one.angles.split_at(self.design.verify.field_angles.len());
         // The phase before mapping and rounding, once for all colours and angles.
         let radius_um = self.design.lens_of(element).radius_um();
         let turns = |ix, iy| phase.turns(ix, iy);
@@ -279,17 +286,17 @@ impl<'a> ElementSimulator<'a> {
             &computed
         };
         let mut tasks = Vec::new();
-        for colour in &self.colours {
-            for field in angles {
-                let wave = arriving(element, colour.wavelength_um, *field)?;
-                let views = self.views(read, &wave, progress)?;
-                tasks.push(Task {
-                    colour,
-                    field: *field,
-                    wave,
-                    views,
-                });
-            }
+        let each = |angles| self.colours.iter().flat_map(move |colour| with_each(colour, angles));
+        for (colour, (field, copy)) in each(own).chain(each(of_copies)) {
+            let wave = arriving(element, colour.wavelength_um, field)?;
+            let views = self.views(read, &wave, progress)?;
+            tasks.push(Task {
+                colour,
+                field,
+                copy,
+                wave,
+                views,
+            });
         }
         tasks
             .into_par_iter()
@@ -346,17 +353,15 @@ impl<'a> ElementSimulator<'a> {
             Some(bytes) => fold.within(bytes),
             None => fold,
         };
-        let designed = Psf::formed(&fold, designed, wave, &CURVE_LP_MM, scratch)?;
+        let frequencies = PixelFrequencies::of(spec.pixel_um);
+        let (drawn, reported) = (frequencies.drawn(), frequencies.reported());
+        let designed = Psf::formed(&fold, designed, wave, &drawn, scratch)?;
         let perfect = self.perfect(element, phase, chief, wavelength_um);
         let mut extracted = Vec::new();
         let mut judged = None;
         for (at, view) in colour.cases.iter().zip(&task.views) {
             // Curves are drawn of the case that judges alone.
-            let lp_mm: &[f64] = if judged.is_none() {
-                &CURVE_LP_MM
-            } else {
-                &CONTRAST_LP_MM
-            };
+            let lp_mm: &[f64] = if judged.is_none() { &drawn } else { &reported };
             let found = match (&at.tables, view) {
                 (_, Some(view)) => view.psf(window, self.accuracy, lp_mm, scratch)?,
                 (Some(tables), None) => tables.psf(widths, wave, &lit, &fold, lp_mm, scratch)?,
@@ -377,6 +382,7 @@ impl<'a> ElementSimulator<'a> {
         Ok(PsfPair {
             wavelength_um,
             field: *field,
+            copy: task.copy,
             incidence_sin: [wave.sin_x, wave.sin_y],
             chief_ray_um: chief,
             relabelled: fold.fade().relabelled,
@@ -392,9 +398,20 @@ impl<'a> ElementSimulator<'a> {
 struct Task<'a> {
     colour: &'a Colour,
     field: FieldAngle,
+    copy: Option<CopyAngle>,
     wave: PlaneWave,
     /// Of each case that is a made chip.
     views: Vec<Option<MadeView<'a>>>,
+}
+
+/// A wavelength with each of some field angles.
+fn with_each<'a>(colour: &'a Colour, angles: &'a [AskedAngle]) -> impl Iterator<Item = (&'a Colour, AskedAngle)> {
+    angles.iter().map(move |angle| (colour, *angle))
+}
+
+/// An element with each of its field angles.
+fn all_angles(one: &Chosen) -> impl Iterator<Item = (&Element, FieldAngle)> {
+    one.angles.iter().map(|(field, _)| (&one.element, *field))
 }
 
 /// Transmissions with the drawn width (nm) as index, for the widths that a rule draws.

@@ -4,6 +4,7 @@ use ndarray::Array2;
 use num_complex::Complex64;
 use serde::Serialize;
 
+use super::copies::CopyAngle;
 use metalith_cell::Fidelity;
 use metalith_design::array::WidthRule;
 use metalith_design::{Element, FieldAngle};
@@ -32,7 +33,7 @@ impl PsfResult {
         }
     }
 
-    /// MTF with the pixel at 42.7 and at 85.3 line pairs a millimetre, mean of x and y.
+    /// MTF with the pixel at half and at all of the finest frequency that it tells, mean of x and y.
     pub fn mtf(&self) -> [f64; 2] {
         [self.metrics.mtf_half_nyquist_pixel, self.metrics.mtf_nyquist_pixel].map(|m| 0.5 * (m[0] + m[1]))
     }
@@ -44,6 +45,10 @@ pub struct PsfPair {
     pub wavelength_um: f64,
     /// Counted from where the element looks.
     pub field: FieldAngle,
+    /// Where the design asks copies of the element alone for this light: the first of them, and its field angle. The figures are
+    /// those of the element that is simulated, turned as the copy is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub copy: Option<CopyAngle>,
     /// Direction sines of the light as it arrives at the chip.
     pub incidence_sin: [f64; 2],
     /// Where the chief ray meets the sensor, from the element's axis (um).
@@ -74,17 +79,28 @@ pub struct PsfImages {
 }
 
 impl PsfPair {
-    /// Wavelength and field angle in words.
+    /// Wavelength and field angle of the element that is simulated, in words.
     pub fn place(&self) -> String {
+        self.place_of(self.field)
+    }
+
+    /// The field angle of the design that it is for: of a copy, if the design asks copies alone for this light.
+    pub fn asked(&self) -> FieldAngle {
+        self.copy.map_or(self.field, |copy| copy.field)
+    }
+
+    /// Element, wavelength and field angle as the design asks for them, in words; `element` is that which is simulated.
+    pub fn label(&self, element: &Element) -> String {
+        let element = self.copy.as_ref().map_or(element, |copy| &copy.element);
+        format!("element {}, {}", element.label(), self.place_of(self.asked()))
+    }
+
+    fn place_of(&self, field: FieldAngle) -> String {
         let nm = self.wavelength_um * 1e3;
-        match self.field {
+        match field {
             FieldAngle { x_deg, y_deg: 0.0 } => format!("{nm:.0} nm, {x_deg}°"),
             FieldAngle { x_deg, y_deg } => format!("{nm:.0} nm, ({x_deg}, {y_deg})°"),
         }
-    }
-
-    pub(super) fn label(&self, element: &Element) -> String {
-        format!("element {}, {}", element.label(), self.place())
     }
 
     /// The metrics of the case that judges.
@@ -132,6 +148,10 @@ pub struct OrderEfficiencies {
     /// element as if there were no phase. The shares above are of the light that is converted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unconverted: Option<f64>,
+    /// Of the cell that knows unlike neighbours: share of the light that its sum over pairs puts elsewhere, in the light of this
+    /// element, than supercells that were left out of its fit. Mean over their sites and both polarisations.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left_out: Option<f64>,
 }
 
 impl OrderEfficiencies {
@@ -155,6 +175,7 @@ impl OrderEfficiencies {
             second: shares[2],
             transmitted: t.iter().map(Complex64::norm_sqr).sum::<f64>() / (full * full * t.len() as f64),
             unconverted: None,
+            left_out: None,
         }
     }
 

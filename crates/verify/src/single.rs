@@ -19,7 +19,7 @@ use metalith_core::{Error, Lattice, LatticeKind, Progress, Result, Silent, Whole
 use metalith_gds::extract::{ElementSite, Extraction};
 use metalith_made::{MadeChip, ModelStatement, SimulationCase};
 use metalith_report::{Cell, Column, ImageGrid, Page, PillarZoom, Table, count, sig, write_json};
-use metalith_wave::psf::{CONTRAST_LP_MM, Matched, Psf, PsfMetrics};
+use metalith_wave::psf::{Matched, PixelFrequencies, Psf, PsfMetrics};
 use metalith_wave::{Accuracy, Fold, Pillars, PlaneWave, Scratch, Window};
 
 /// In what light, and where on the sensor.
@@ -123,7 +123,7 @@ fn by_cell(
             }
             let (window, radius_um) = (light.window(widths.lattice), widths.circle_um());
             let fold = Fold::plan(widths.lattice, radius_um, wavelength_um, window, light.accuracy)?;
-            let psf = tables.psf(*widths, &wave, &wave, &fold, &CONTRAST_LP_MM, scratch)?;
+            let psf = tables.psf(*widths, &wave, &wave, &fold, &light.reported_lp_mm(), scratch)?;
             progress.advance(1);
             Ok(psf)
         })
@@ -163,7 +163,7 @@ fn as_made(
             let psf = view.psf(
                 light.window(view.element.lattice()),
                 light.accuracy,
-                &CONTRAST_LP_MM,
+                &light.reported_lp_mm(),
                 scratch,
             )?;
             progress.advance(1);
@@ -189,6 +189,11 @@ impl Lighting {
             sin_x: self.incidence_sin[0],
             sin_y: self.incidence_sin[1],
         }
+    }
+
+    /// Where contrast is reported (line pairs a millimetre).
+    fn reported_lp_mm(&self) -> [f64; 2] {
+        PixelFrequencies::of(self.pixel_um).reported()
     }
 
     fn window(&self, lattice: Lattice) -> Window {
@@ -220,6 +225,10 @@ pub struct SinglePsfReport<'a> {
     /// White light for a camera, if one was named.
     pub white: Option<&'a (CameraStatement, Vec<SingleWhite>)>,
 }
+
+/// What Strehl ratios of a layout without a design are against, in words for people.
+pub const STREHL_AGAINST: &str = "Strehl ratios are against the sites that hold a pillar; `run` and `verify` divide by the whole \
+     aperture, so that both differ where pillars are missing.";
 
 /// Write `report.html`, `report.json` and each PSF as an NPY array (float64, rows along +y) into a folder.
 ///
@@ -288,7 +297,7 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
         write_npy(&folder.join(format!("psf_{k}_{nm}nm.npy")), &found.psf.values)?;
     }
     page.section("PSFs");
-    page.table(table);
+    page.table(table.caption(STREHL_AGAINST));
     page.figure(images.caption("The whole window, four decades."));
     if let Some((camera, elements)) = white {
         page.section("White light, from one direction");

@@ -6,12 +6,12 @@ use serde::Serialize;
 
 use super::case::TransmissionTables;
 use super::single::{Lighting, distinct, kind_of, widest_nm};
-use super::white::{CameraStatement, Channels, Point, STEP_NM, WhiteChannel, per_light};
-use metalith_camera::Camera;
+use super::white::{CameraStatement, Channels, Point, STEP_NM, WhiteChannel, per_light, step_nm};
+use metalith_camera::{Camera, Sampling};
 use metalith_core::{Error, Progress, Result, Wedge};
 use metalith_gds::extract::Extraction;
 use metalith_made::SimulationCase;
-use metalith_wave::psf::{BandSample, CURVE_LP_MM, Matched};
+use metalith_wave::psf::{BandSample, Matched};
 use metalith_wave::{Accuracy, Fold, Pillars, Scratch, Window};
 
 /// One distinct element of a layout in white light.
@@ -22,9 +22,24 @@ pub struct SingleWhite {
     pub channels: Vec<WhiteChannel>,
 }
 
-/// Simulate every distinct element of a layout in the light of a point of the scene, for a camera. The direction is
-/// that of the [`Lighting`]; `wedge` is that of the elements, which a layout does not tell: it decides where each
-/// wavelength lands.
+/// The wavelengths that white light for a camera is simulated at, without a design: all that it counts light of, as far as cells
+/// are known, from the first to the last of `known_nm`.
+///
+/// # Errors
+/// As [`Camera::sampling`].
+pub fn white_sampling(camera: &Camera, known_nm: [f64; 2]) -> Result<Sampling> {
+    let sampling = camera.sampling(known_nm, STEP_NM)?;
+    let wavelengths_nm = &sampling.wavelengths_nm;
+    let step_nm = step_nm([wavelengths_nm[0], wavelengths_nm[wavelengths_nm.len() - 1]]);
+    if step_nm > STEP_NM {
+        return camera.sampling(known_nm, step_nm);
+    }
+    Ok(sampling)
+}
+
+/// Simulate every distinct element of a layout in the light of a point of the scene, for a camera at the wavelengths of its
+/// [`white_sampling`]. The direction is that of the [`Lighting`]; `wedge` is that of the elements, which a layout does not tell:
+/// it decides where each wavelength lands.
 ///
 /// # Errors
 /// If a cell has no answer at a wavelength of the camera, a wavelength does not reach the sensor, or the user stopped it.
@@ -32,11 +47,12 @@ pub fn single_white(
     found: &Extraction,
     case: SimulationCase<'_>,
     light: &Lighting,
-    camera: &Camera,
+    (camera, sampling): (&Camera, &Sampling),
     wedge: Wedge,
     progress: &dyn Progress,
 ) -> Result<(CameraStatement, Vec<SingleWhite>)> {
-    let sampling = camera.sampling(VISIBLE_NM, STEP_NM)?;
+    let statement = CameraStatement::of(camera, sampling);
+    let lp_mm = statement.frequencies().drawn();
     let elements = distinct(found);
     let widest = widest_nm(&elements);
     progress.begin(
@@ -91,10 +107,10 @@ pub fn single_white(
             let pitch = widths.lattice.pitch_um();
             let window = Window::about(landing, pitch, light.samples, light.distance_um);
             let psf = match (view, tables) {
-                (Some(view), _) => metalith_made::MadeView::psf(view, window, Accuracy::Fast, &CURVE_LP_MM, scratch)?,
+                (Some(view), _) => metalith_made::MadeView::psf(view, window, Accuracy::Fast, &lp_mm, scratch)?,
                 (None, Some(tables)) => {
                     let fold = Fold::plan(widths.lattice, widths.circle_um(), um, window, Accuracy::Fast)?;
-                    tables.psf(widths, &wave, &wave, &fold, &CURVE_LP_MM, scratch)?
+                    tables.psf(widths, &wave, &wave, &fold, &lp_mm, scratch)?
                 }
                 (None, None) => unreachable!("a case is a cell or a made chip"),
             };
@@ -116,7 +132,7 @@ pub fn single_white(
         let shown = Channels {
             point: point(),
             samples: &samples,
-            lp_mm: &CURVE_LP_MM,
+            lp_mm: &lp_mm,
             pixel_um: camera.sensor.pixel_um,
         };
         all.push(SingleWhite {
@@ -128,8 +144,35 @@ pub fn single_white(
                 .collect::<Result<_>>()?,
         });
     }
-    Ok((CameraStatement::of(camera, &sampling), all))
+    Ok((statement, all))
 }
 
-/// Wavelengths that cells of a layout without a design are asked for (nm).
-const VISIBLE_NM: [f64; 2] = [400.0, 700.0];
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a camera counts is simulated, whatever its band: of short-wave infrared, and of the visible between 390 and 720 nm.
+    #[test]
+    fn a_camera_is_sampled_over_its_own_light() {
+        let sampled = |name: &str, known_nm: [f64; 2]| {
+            let file = metalith_testing::root().join(format!("cameras/{name}.toml"));
+            let sampling = white_sampling(&Camera::read(&file).unwrap(), known_nm);
+            sampling.map(|s| (s.wavelengths_nm[0], *s.wavelengths_nm.last().unwrap()))
+        };
+        let (first, last) = sampled("swir", [413.3, 2066.0]).unwrap();
+        assert!(
+            first > 1500.0 && first < 1540.0 && last > 1560.0 && last < 1600.0,
+            "{first} {last}"
+        );
+        let (first, last) = sampled("gt1930", [310.0, 5504.0]).unwrap();
+        assert!(
+            first > 390.0 && first < 405.0 && last > 690.0 && last < 720.0,
+            "{first} {last}"
+        );
+        // As far as cells are known.
+        const PART_NM: f64 = 1.0;
+        assert!((sampled("gt1930", [450.0, 5504.0]).unwrap().0 - 450.0).abs() <= PART_NM);
+        let error = sampled("swir", [310.0, 760.0]).unwrap_err().to_string();
+        assert!(error.contains("from 310 to 760 nm"), "{error}");
+    }
+}

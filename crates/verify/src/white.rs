@@ -16,7 +16,7 @@ use metalith_design::phase::ElementPhase;
 use metalith_design::{CellIncidence, Design, Element};
 use metalith_made::{MadeView, SimulationCase};
 use metalith_wave::propagation;
-use metalith_wave::psf::{BandPart, BandSample, CURVE_LP_MM, band_otf, pixel_mtf, polychromatic};
+use metalith_wave::psf::{BandPart, BandSample, PixelFrequencies, band_otf, pixel_mtf, polychromatic};
 use metalith_wave::{Accuracy, Fold, PlaneWave, Psf, Scratch, Window};
 
 /// Largest distance of the wavelengths that are simulated (nm): eight intervals over a channel of 100 nm. How much
@@ -45,6 +45,11 @@ impl CameraStatement {
             pixel_um: camera.sensor.pixel_um,
             wavelengths_nm: sampling.wavelengths_nm.clone(),
         }
+    }
+
+    /// Where the contrast of its channels is told.
+    pub fn frequencies(&self) -> PixelFrequencies {
+        PixelFrequencies::of(self.pixel_um)
     }
 }
 
@@ -144,7 +149,7 @@ pub(super) fn landing_um(element: &Element, wavelength_um: f64, distance_um: f64
 }
 
 /// Distance of the wavelengths (nm): a band that is much wider than the visible has as many as that.
-fn step_nm([short, long]: [f64; 2]) -> f64 {
+pub(super) fn step_nm([short, long]: [f64; 2]) -> f64 {
     STEP_NM.max((long - short) / MOST_STEPS)
 }
 
@@ -200,8 +205,8 @@ impl<'a> WhiteSimulator<'a> {
                 tables,
             })
         };
-        let mut lp_mm = CURVE_LP_MM.to_vec();
-        lp_mm.push(design.verify.limits.white_mtf_lp_mm);
+        let mut lp_mm = PixelFrequencies::of(camera.sensor.pixel_um).drawn().to_vec();
+        lp_mm.extend(design.verify.limits.white_mtf_lp_mm);
         lp_mm.sort_by(f64::total_cmp);
         lp_mm.dedup();
         Ok(Some(Self {
@@ -216,8 +221,8 @@ impl<'a> WhiteSimulator<'a> {
         }))
     }
 
-    /// Obtain what pillars transmit among unlike neighbours, from a cell that knows, in light from where these elements look;
-    /// and solve the cells for light as it arrives, if the design asks for it.
+    /// Obtain what pillars transmit among unlike neighbours, from a cell that knows, in light from where these elements look at each
+    /// wavelength; if the design asks for light as it arrives, in that of the point, which other cells are solved for then.
     ///
     /// # Errors
     /// If a cell has no answer, or the user stopped it.
@@ -225,32 +230,34 @@ impl<'a> WhiteSimulator<'a> {
         let SimulationCase::Cell(cell) = self.judge else {
             return Ok(());
         };
+        let (design, as_lit) = (self.design, self.as_lit());
+        let lit = |element: &Element, um: f64| lit(design, element, um);
         for colour in &mut self.colours {
             if let Some(tables) = &mut colour.tables {
                 for element in elements {
-                    let looked_at = |um: f64| PlaneWave::looked_at(&element.wedge, um);
-                    tables.add_neighbours_in_band(cell, colour.wavelength_um, &looked_at, progress)?;
+                    tables.add_neighbours_in_band(cell, colour.wavelength_um, &|um| lit(element, um), progress)?;
                 }
             }
         }
-        if self.design.verify.incidence != CellIncidence::AsLit {
+        if !as_lit {
             return Ok(());
         }
         progress.begin(
             "solving cells as they are lit by white light",
             (elements.len() * self.colours.len()) as u64,
         );
-        let design = self.design;
         for colour in &mut self.colours {
-            let waves: Vec<_> = elements
-                .iter()
-                .map(|e| Point::of(e, design.lens_of(e).focal_length_um).wave(colour.wavelength_um))
-                .collect();
+            let waves = elements.iter().map(|e| lit(e, colour.wavelength_um));
             if let Some(tables) = &mut colour.tables {
-                tables.add_directions(cell, &waves, self.design.cell.most(), progress)?;
+                let waves: Vec<_> = waves.filter(|wave| !tables.knows_neighbours(wave)).collect();
+                tables.add_directions(cell, &waves, design.cell.most(), progress)?;
             }
         }
         Ok(())
+    }
+
+    fn as_lit(&self) -> bool {
+        self.design.verify.incidence == CellIncidence::AsLit
     }
 
     /// Number of PSFs of one element.
@@ -274,7 +281,7 @@ impl<'a> WhiteSimulator<'a> {
         read: &ReadElement<'_>,
         progress: &dyn Progress,
     ) -> Result<Vec<WhiteChannel>> {
-        let as_lit = self.design.verify.incidence == CellIncidence::AsLit;
+        let as_lit = self.as_lit();
         let view = |colour: &Colour| match (self.judge, &read.made[0]) {
             (SimulationCase::Made(chip), Some(made)) => {
                 let wave = self.point(element).wave(colour.wavelength_um);
@@ -331,8 +338,7 @@ impl<'a> WhiteSimulator<'a> {
                     Some(bytes) => fold.within(bytes),
                     None => fold,
                 };
-                let looks = PlaneWave::looked_at(&element.wedge, colour.wavelength_um);
-                let lit = if tables.knows_neighbours(&looks) { looks } else { wave };
+                let lit = lit(self.design, element, colour.wavelength_um);
                 tables.psf(read.widths, &wave, &lit, &fold, &self.lp_mm, scratch)?
             }
             (None, None) => unreachable!("a case is a cell or a made chip"),
@@ -348,6 +354,15 @@ impl<'a> WhiteSimulator<'a> {
 
     fn point(&self, element: &Element) -> Point {
         Point::of(element, self.design.lens_of(element).focal_length_um)
+    }
+}
+
+/// The light that cells of an element are solved for: that of the point if the design asks for it, else from where the element looks
+/// at the wavelength.
+fn lit(design: &Design, element: &Element, wavelength_um: f64) -> PlaneWave {
+    match design.verify.incidence {
+        CellIncidence::AsLit => Point::of(element, design.lens_of(element).focal_length_um).wave(wavelength_um),
+        CellIncidence::Normal => PlaneWave::looked_at(&element.wedge, wavelength_um),
     }
 }
 

@@ -47,7 +47,7 @@ pub(super) fn channels(
         camera.illuminant,
         exact(camera.pixel_um),
     ));
-    page.table(table(channels));
+    page.table(table(camera, channels));
     let mut images = ImageGrid::new("PSF of each channel", channels.len())
         .values("share of arriving light", "1/um²")
         .log(DECADES)
@@ -77,7 +77,9 @@ pub(super) fn channels(
     }));
 }
 
-fn table(channels: &[WhiteChannel]) -> Table {
+fn table(camera: &CameraStatement, channels: &[WhiteChannel]) -> Table {
+    let reported = camera.frequencies().reported();
+    let [half, nyquist] = reported.map(exact);
     let mut table = Table::new([
         Column::text("Channel"),
         Column::number("Light from 10 to 90 %", "nm"),
@@ -86,9 +88,9 @@ fn table(channels: &[WhiteChannel]) -> Table {
         Column::number("Energy in 1 pixel", "%"),
         Column::number("in 2", "%"),
         Column::number("All that passes", "%"),
-        Column::number("MTF 42.7/mm along x", ""),
+        Column::number(format!("MTF {half}/mm along x"), ""),
         Column::number("y", ""),
-        Column::number("85.3/mm along x", ""),
+        Column::number(format!("{nyquist}/mm along x"), ""),
         Column::number("y", ""),
         Column::number("Error of sampling", ""),
     ]);
@@ -97,10 +99,7 @@ fn table(channels: &[WhiteChannel]) -> Table {
             let found = white.contrast.iter().find(|c| c.lp_mm == lp_mm);
             found.map_or([f64::NAN; 2], |c| c.mtf)
         };
-        let (half, nyquist) = (
-            contrast(metalith_wave::psf::HALF_NYQUIST_LP_MM),
-            contrast(metalith_wave::psf::NYQUIST_LP_MM),
-        );
+        let [half, nyquist] = reported.map(contrast);
         let [from, _, to] = white.wavelengths_nm;
         table.row([
             Cell::from(white.channel.as_str()),

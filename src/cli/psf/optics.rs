@@ -2,14 +2,16 @@
 
 use std::path::Path;
 
-use metalith::cell::{CellStack, FittedCell, Handedness, PointwiseCell, PublishedCell, RotatedCell, cache_folder};
+use metalith::cell::{
+    CellStack, FittedCell, Handedness, PointwiseCell, PublishedCell, RotatedCell, UniformLayer, cache_folder,
+};
 use metalith::grating::{Mapping, NeighbourCell};
 use metalith::rcwa::{CellLattice, Material};
-use metalith::report::sig;
+use metalith::report::{exact, sig};
 use metalith::verify::Lighting;
 use metalith::{Accuracy, CellModel, Error, Extraction, LatticeKind, Result, Wedge};
 
-use super::{FidelityArg, PsfArgs, USUAL_NM};
+use super::{FidelityArg, PsfArgs, PsfLight};
 
 impl PsfArgs {
     fn pitch_nm(found: &Extraction) -> u32 {
@@ -25,18 +27,70 @@ impl PsfArgs {
 
     /// The cell of the layout's own lattice.
     pub(super) fn stack(&self, found: &Extraction) -> Result<CellStack> {
-        let here = Path::new("");
+        let material = |name: &str| Material::resolve(name, Path::new(""));
+        let paper = CellStack::paper(f64::from(Self::pitch_nm(found)), self.height_nm)?;
+        let film = material(&self.pillar_material)?;
+        let mut under = Vec::new();
+        if self.spacer_nm > 0.0 {
+            let name = self.spacer_material.as_ref().ok_or_else(|| {
+                Error::invalid(
+                    format!("a spacer of {} nm of no material", exact(self.spacer_nm)),
+                    "add --spacer-material: a name or the path of a CSV table",
+                )
+            })?;
+            under.push(UniformLayer {
+                material: material(name)?,
+                height_nm: self.spacer_nm,
+            });
+        }
+        if self.residual_nm > 0.0 {
+            under.push(UniformLayer {
+                material: film.clone(),
+                height_nm: self.residual_nm,
+            });
+        }
         Ok(CellStack {
             lattice: CellLattice::drawn(Self::lattice_kind(found), Self::pitch_nm(found)),
             shape: found.shape,
-            film: Material::resolve(&self.pillar_material, here)?,
-            substrate: Material::resolve(&self.substrate_material, here)?,
-            ..CellStack::paper(f64::from(Self::pitch_nm(found)), self.height_nm)?
+            film,
+            substrate: material(&self.substrate_material)?,
+            under,
+            ambient: match (&self.ambient_material, self.ambient_index) {
+                (Some(name), _) => material(name)?,
+                (None, Some(index)) => Material::constant(index, 0.0)?,
+                (None, None) => paper.ambient.clone(),
+            },
+            ..paper
         })
     }
 
-    /// What no layout says, and is taken from the options or their defaults.
-    pub(super) fn assumptions(&self, found: &Extraction) -> Vec<(&'static str, String)> {
+    /// What pillars are of, in words.
+    fn pillars(&self) -> String {
+        let mut words = format!(
+            "{} nm of {} on {}, lit from there",
+            sig(self.height_nm, 5),
+            self.pillar_material,
+            self.substrate_material
+        );
+        if let (true, Some(material)) = (self.spacer_nm > 0.0, &self.spacer_material) {
+            words += &format!(
+                "; a spacer of {} nm of {material} below the film",
+                exact(self.spacer_nm)
+            );
+        }
+        if self.residual_nm > 0.0 {
+            words += &format!("; {} nm of the film left between them", exact(self.residual_nm));
+        }
+        match (&self.ambient_material, self.ambient_index) {
+            (Some(material), _) => words += &format!("; in {material}"),
+            (None, Some(index)) => words += &format!("; in n = {}", exact(index)),
+            (None, None) => {}
+        }
+        words
+    }
+
+    /// What no layout says, and is taken from the options or their defaults. Without light nothing is simulated.
+    pub(super) fn assumptions(&self, found: &Extraction, light: Option<&PsfLight>) -> Vec<(&'static str, String)> {
         let mut all = vec![
             (
                 "pitch, as found",
@@ -49,6 +103,7 @@ impl PsfArgs {
                 "distance from pillar tops to sensor",
                 format!("{} um", sig(self.distance_um, 6)),
             ),
+            ("edge of a sensor pixel", format!("{} um", exact(self.pixel_um(light)))),
             (
                 "light arrives at",
                 format!(
@@ -64,12 +119,15 @@ impl PsfArgs {
             (None, FidelityArg::Published) => "published polynomials for pillars of the paper, no amplitude".into(),
             (None, FidelityArg::Fitted) => "polynomials fitted to the rigorous cell, no amplitude".into(),
             (None, FidelityArg::Neighbours) => {
-                let white = match self.camera {
-                    Some(_) => format!(
-                        "; white light is between the wavelengths that have tables, {USUAL_NM:?} nm and those of \
-                         --wavelength-nm"
-                    ),
-                    None => String::new(),
+                let white = match light {
+                    Some(light) if light.white.is_some() => {
+                        let tables: Vec<String> = light.tabulated_um().iter().map(|um| exact(um * 1e3)).collect();
+                        format!(
+                            "; white light is between the wavelengths that have tables, {} nm",
+                            tables.join(", ")
+                        )
+                    }
+                    _ => String::new(),
                 };
                 format!("each pillar among its neighbours, fitted to supercells of the layout's own widths{white}")
             }
@@ -92,19 +150,13 @@ impl PsfArgs {
             all.push(("rotated rectangles", rotations));
         }
         if !published {
-            let stack = format!(
-                "{} nm of {} on {}, lit from there",
-                sig(self.height_nm, 5),
-                self.pillar_material,
-                self.substrate_material
-            );
-            all.push(("pillars", stack));
+            all.push(("pillars", self.pillars()));
         }
         all
     }
 
     /// What solves it for the pillars as drawn.
-    pub(super) fn cell(&self, found: &Extraction) -> Result<Box<dyn CellModel>> {
+    pub(super) fn cell(&self, found: &Extraction, light: &PsfLight) -> Result<Box<dyn CellModel>> {
         let stack = self.stack(found)?;
         if let Some(pillars) = found.shape.rectangles() {
             return Ok(Box::new(RotatedCell::new(stack, pillars, self.arriving.into())));
@@ -115,10 +167,7 @@ impl PsfArgs {
         if matches!(self.fidelity, FidelityArg::Neighbours) {
             let mapping = Mapping::of_widths(found.elements.iter().map(|e| e.widths.histogram()))?;
             let cell = NeighbourCell::new(stack, vec![mapping], cache_folder());
-            // White light is known between wavelengths that have tables, and little beyond.
-            let of_white = USUAL_NM.iter().filter(|_| self.camera.is_some()).map(|nm| nm * 1e-3);
-            let tabulated: Vec<f64> = self.wavelengths_um().into_iter().chain(of_white).collect();
-            return Ok(Box::new(cell.tabulated_at(&tabulated)));
+            return Ok(Box::new(cell.tabulated_at(&light.tabulated_um())));
         }
         let mut widths = found
             .elements
@@ -128,19 +177,14 @@ impl PsfArgs {
         widths.sort_unstable();
         widths.dedup();
         if matches!(self.fidelity, FidelityArg::Fitted) {
-            let band_um = self.wavelengths_um().into_iter();
-            let (low, high) = band_um.fold((0.4, 0.7), |(a, b), um| (um.min(a), um.max(b)));
+            let band_um = light.band_um(stack.range_um());
             let range = (
                 *widths.iter().find(|w| **w > 0).unwrap_or(&100),
                 *widths.last().unwrap_or(&300),
             );
-            return Ok(Box::new(FittedCell::of_stack(&stack, (low, high), range)?));
+            return Ok(Box::new(FittedCell::of_stack(&stack, band_um, range)?));
         }
         Ok(Box::new(PointwiseCell::new(stack, widths)))
-    }
-
-    fn wavelengths_um(&self) -> Vec<f64> {
-        self.wavelengths_nm.iter().map(|nm| nm * 1e-3).collect()
     }
 
     /// The wedge of the elements, by the options.
@@ -159,15 +203,15 @@ impl PsfArgs {
         })
     }
 
-    pub(super) fn lighting(&self) -> Lighting {
+    pub(super) fn lighting(&self, light: &PsfLight) -> Lighting {
         Lighting {
-            wavelengths_um: self.wavelengths_um(),
+            wavelengths_um: light.wavelengths_um.clone(),
             incidence_sin: [self.angle_x_deg, self.angle_y_deg].map(|deg| deg.to_radians().sin()),
             cells_as_lit: self.as_lit,
             distance_um: self.distance_um,
             at_um: [self.at_x_um, self.at_y_um],
             samples: self.samples,
-            pixel_um: 5.86,
+            pixel_um: self.pixel_um(Some(light)),
             analyser: self.analyser,
             aperture_radius_um: self.aperture_um.map(|d| 0.5 * d),
             accuracy: if self.fast { Accuracy::Fast } else { Accuracy::Accurate },

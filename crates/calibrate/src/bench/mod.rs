@@ -28,7 +28,7 @@ pub struct Sampling {
     pub step_nm: f64,
     /// Sample spacing of the intensity (um); less where a lens is so steep that its images are finer.
     pub step_um: f64,
-    /// Samples around each window, for registration, blur and borders.
+    /// Samples around each window, for registration, blur and borders; more where pixels or windows are large.
     pub margin: usize,
 }
 
@@ -73,6 +73,16 @@ fn resolved_um(set: &MeasuredSet, capture: &Capture) -> f64 {
     OF_NYQUIST * 0.25e-3 * set.leds[capture.led].centre_nm / sine
 }
 
+/// Standard deviations of its place by which a window can be moved before its surroundings end.
+const PLACE_SIGMAS: f64 = 3.0;
+
+/// What must be known around a window that reaches so far from its middle along an axis (um), so that nothing that is faded out comes
+/// into it, wherever it is: the fade is a share of window and surroundings.
+fn margin_um(half_um: f64, camera: &RelayCamera) -> f64 {
+    let moved = PLACE_SIGMAS * camera.registration_sigma_px * camera.pixel_um;
+    (2.0 * PixelGrid::FADED * half_um + moved) / (1.0 - 2.0 * PixelGrid::FADED)
+}
+
 /// Captures that differ only in their distance.
 struct FocusSeries {
     element: ElementIndex,
@@ -112,16 +122,17 @@ impl<'a> Bench<'a> {
                 group.captures.push(i);
                 continue;
             }
-            let longest = set.camera.rows.max(set.camera.cols) as f64;
+            let half_um = 0.5 * set.camera.rows.max(set.camera.cols) as f64 * set.camera.pixel_um;
+            let usual_um = sampling.margin as f64 * sampling.step_um;
             let planes = Distances {
                 lattice: set.elements[c.element].pillars.lattice,
                 radius_um: 0.5 * set.elements[c.element].aperture_diameter_um,
                 centre_um: c.window_centre_um,
-                half_width_um: 0.5 * longest * set.camera.pixel_um,
+                half_width_um: half_um + (margin_um(half_um, &set.camera) - usual_um).max(0.0),
                 step_um: sampling.step_um.min(resolved_um(set, c)),
             };
             // As far as with the usual step.
-            let margin = (sampling.margin as f64 * sampling.step_um / planes.step_um).round() as usize;
+            let margin = (usual_um / planes.step_um).round() as usize;
             groups.push(FocusSeries {
                 element: c.element,
                 led: c.led,
@@ -152,6 +163,16 @@ impl<'a> Bench<'a> {
     /// The measured set that is simulated.
     pub fn set(&self) -> &'a MeasuredSet {
         self.set
+    }
+
+    /// What the pixel grids of all captures take, about (bytes): the bins that the light of each lens reaches.
+    pub fn grid_bytes(&self) -> f64 {
+        let of_group = |g: &FocusSeries| {
+            let first = &self.set.captures[g.captures[0]];
+            let lit = OF_NYQUIST * g.plan.step_um() / resolved_um(self.set, first);
+            g.captures.len() as f64 * PixelGrid::bytes_of(g.plan.window() as f64 * lit.min(1.0))
+        };
+        self.groups.iter().map(of_group).sum()
     }
 
     /// All wavelengths at which cells are needed (nm).
@@ -275,4 +296,41 @@ fn window_mean(intensity: &[f32], n: usize, samples_per_pixel: f64, camera: &Rel
         .map(|y| intensity[y * n..][cols.clone()].iter().sum::<f32>())
         .sum();
     f64::from(sum / (rows.len() * cols.len()) as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metalith_core::Silent;
+    use metalith_gds::extract::GdsPillars;
+
+    /// Windows of a relay are as they were; those of large pixels, and large ones, have room to be moved in.
+    #[test]
+    fn nothing_that_is_faded_out_comes_into_a_window() {
+        /// A window is a whole number of samples (um).
+        const ROUNDING_UM: f64 = 0.6;
+        let folder = tempfile::tempdir().unwrap();
+        metalith_testing::session::small_set(folder.path());
+        let mut set = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
+        let usual = Sampling::default().margin;
+        for (pixels, pixel_um, is_usual) in [
+            (48, 0.5, true),
+            (128, 0.5, true),
+            (16, 5.86, false),
+            (64, 5.86, false),
+            (512, 0.5, false),
+        ] {
+            (set.camera.rows, set.camera.cols, set.camera.pixel_um) = (pixels, pixels, pixel_um);
+            let bench = Bench::new(&set, Sampling::default());
+            let plan = &bench.groups[0].plan;
+            let (n, step) = (plan.window() as f64, plan.step_um());
+            let window_um = pixels as f64 * pixel_um;
+            let faded_um = PixelGrid::FADED * n * step;
+            let room_um = 0.5 * (n * step - window_um) - faded_um;
+            let moved_um = PLACE_SIGMAS * set.camera.registration_sigma_px * pixel_um;
+            assert!(room_um > moved_um - ROUNDING_UM, "{pixels} x {pixel_um}: {room_um}");
+            let inner = (window_um / step).ceil() as usize + 2 * usual;
+            assert_eq!(plan.window() == inner + inner % 2, is_usual, "{pixels} x {pixel_um}");
+        }
+    }
 }

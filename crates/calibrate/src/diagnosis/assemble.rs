@@ -10,22 +10,13 @@ use super::{CaptureError, Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePa
 use crate::effects::Effect;
 use crate::fidelity::Rung;
 use crate::fit::{Fit, HeldOutErrors, WidthParts, error_of_capture, mean_error};
-use crate::search::{Evidence, Finding, Rejection, TriedEffect, UnusableCapture};
+use crate::search::{EXPLAINED, Evidence, Finding, Rejection, TriedEffect, UnusableCapture, may_leave};
 use crate::set::MeasuredSet;
 use crate::simulator::Simulator;
 use crate::simulator_model::separating_measurement;
 
 /// The measure of error.
 const MEASURE: &str = "reduced chi-square per pixel";
-
-/// Nothing is left unexplained if the reduced chi-square per pixel is this, or less: chips with nothing undeclared have up to
-/// 1.01, and a weak effect, such as a half of every lens displaced by 30 nm, has little more.
-const EXPLAINED: f64 = 1.05;
-
-/// Or if this share of the error above noise is left, where the error was large, and the error that this share is relative to at
-/// most: of effects far beyond their usual size (a wall leaning by three degrees), the model's own errors leave up to 1.09.
-const LEFT: f64 = 0.02;
-const MUCH: f64 = 5.0;
 
 /// If a larger share is left, the residual is unexplained.
 const MOSTLY_LEFT: f64 = 0.4;
@@ -55,7 +46,8 @@ impl Diagnosis {
             placebo_held_out: finding.null_held_out,
         };
         let unexplained_share = unexplained_share(&error, finding);
-        let verdict = verdict(&error, finding, unexplained_share);
+        let may_be_left = may_leave(&evidence.problem(simulator), &finding.after);
+        let verdict = verdict(&error, finding, (unexplained_share, may_be_left));
         let patterns = match verdict.leaves_a_residual() {
             true => evidence.patterns(simulator),
             false => &[],
@@ -124,7 +116,7 @@ fn unexplained_share(error: &ErrorReport, finding: &Finding) -> f64 {
     ((error.after.held_out - 1.0).max(0.0) / above).clamp(0.0, 1.0)
 }
 
-fn verdict(error: &ErrorReport, finding: &Finding, unexplained_share: f64) -> SetVerdict {
+fn verdict(error: &ErrorReport, finding: &Finding, (unexplained_share, may_be_left): (f64, f64)) -> SetVerdict {
     if finding.chosen.is_empty() {
         return if error.before.held_out <= EXPLAINED {
             SetVerdict::NoResidual
@@ -132,8 +124,7 @@ fn verdict(error: &ErrorReport, finding: &Finding, unexplained_share: f64) -> Se
             SetVerdict::Unexplained
         };
     }
-    let may_be_left = 1.0 + LEFT * (error.before.held_out - 1.0).min(MUCH);
-    let fits = error.after.held_out <= EXPLAINED.max(may_be_left);
+    let fits = error.after.held_out <= may_be_left;
     let unambiguous = finding.alternatives.iter().all(Vec::is_empty);
     if !fits && unexplained_share > MOSTLY_LEFT {
         SetVerdict::Unexplained
@@ -186,8 +177,7 @@ fn remarks(simulator: &Simulator<'_>, evidence: &Evidence, verdict: SetVerdict) 
     );
     let is_tilt_open = match elements.len() {
         1 => gap,
-        2 => tilt,
-        3 => tilt && gap,
+        2 | 3 => tilt,
         _ => false,
     };
     let of_elements = is_tilt_open.then(|| untold_tilt(elements.len()));

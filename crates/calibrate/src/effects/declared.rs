@@ -7,7 +7,8 @@ use super::{Effect, Parameter, Stage};
 use crate::set::MeasuredSet;
 use metalith_core::Result;
 use metalith_core::document::{Document, Limits, Section, load};
-use metalith_made::{DeclaredQuantity, DeclaredTerm, Perturbation};
+use metalith_made::{CompiledTerm, DeclaredQuantity, DeclaredTerm, Perturbation};
+use metalith_report::sig;
 
 /// Most parameters of one effect: a step of the search fits all of them at once.
 const MOST_PARAMETERS: usize = 6;
@@ -207,10 +208,80 @@ fn declared(s: &Section<'_, '_>) -> DeclaredEffect {
         parameters,
     };
     let start = effect.parameters.iter().map(|p| (p.name.clone(), p.start)).collect();
-    if let Err(fault) = effect.term(start).compiled() {
-        s.fault_in_text(key, fault.at, fault.what, fault.hint);
+    match effect.term(start).compiled() {
+        Err(fault) => s.fault_in_text(key, fault.at, fault.what, fault.hint),
+        Ok(term) => {
+            if let Some((what, hint)) = does_something(&term) {
+                s.fault(key, what, hint);
+            }
+        }
     }
     effect
+}
+
+/// An expression that is off by this where its parameters start, in its unit, rounds; more is something that the effect does.
+const NOTHING: f64 = 1e-9;
+
+/// Values of a variable that expressions are tried at: of no symmetry, close to the middle of a lens and far from it, on every side of
+/// a chip. Variables have unlike numbers of them, so that values meet in many ways.
+fn tried(variable: &str) -> &'static [f64] {
+    match variable {
+        "x" => &[0.4, 3.7, -21.3, 64.1, -310.7],
+        "y" => &[0.0, -2.9, 17.9, 0.3, 41.3, -7.7, 205.3],
+        "R" => &[30.0, 70.0, 500.0],
+        "X" => &[0.0, 400.0, -150.0, 2420.0],
+        "Y" => &[0.0, -400.0, 150.0, 400.0, 2420.0],
+        "wavelength" => &[455.0, 530.0, 660.0, 1550.0],
+        "w" => &[90.0, 150.0, 240.0],
+        "fill" => &[0.1, 0.35, 0.6, 0.8],
+        "centre" => &[450.0, 533.0, 660.0],
+        _ => &[0.0],
+    }
+}
+
+/// Places at which an expression is tried: all ways in which five, seven, three and four values meet.
+const PLACES: usize = 420;
+
+/// What an expression does where its parameters start, and what to do about it; none where it does nothing at any place that is
+/// tried. Changes are counted from there: they would begin with a jump.
+fn does_something(term: &CompiledTerm) -> Option<(String, String)> {
+    let (nothing, example) = match term.quantity {
+        DeclaredQuantity::Spectrum => (1.0, "such as `1 + a * (wavelength - centre)`"),
+        _ => (0.0, "such as `a` times a shape"),
+    };
+    let variables = term.quantity.variables();
+    (0..PLACES).find_map(|k| {
+        let at = |variable: &str| {
+            let values = tried(variable);
+            values[k % values.len()]
+        };
+        let (x, y) = (at("x"), at("y"));
+        let values: Vec<f64> = variables
+            .iter()
+            .map(|variable| match *variable {
+                "r" => x.hypot(y),
+                "theta" => y.atan2(x),
+                other => at(other),
+            })
+            .collect();
+        let value = term.value(&values);
+        if (value - nothing).abs() <= NOTHING {
+            return None;
+        }
+        let used = variables.iter().zip(&values).filter(|(name, _)| term.uses(name));
+        let place: Vec<String> = used.map(|(name, v)| format!("{name} = {}", sig(*v, 4))).collect();
+        let at = match place.is_empty() {
+            true => String::new(),
+            false => format!(" at {}", place.join(", ")),
+        };
+        Some((
+            format!("with all parameters at their `start` the expression is {}{at}, not {nothing}", sig(value, 4)),
+            format!(
+                "an effect does nothing at the start, which is 0 where none is given: write an expression that is {nothing} there, \
+                 {example}"
+            ),
+        ))
+    })
 }
 
 /// The parameter of a section.
@@ -341,6 +412,43 @@ start = 5.0
         effect.name = "gap_of_the_lid".into();
         assert_eq!(effect.value_error(), ValueError::of_stage(effect.stage()));
         assert_ne!(effect.value_error(), Gap.value_error());
+    }
+
+    /// Changes are counted from the start of the parameters: what is there already would come with the first of them.
+    #[test]
+    fn an_effect_that_does_something_at_its_start_is_refused() {
+        let with = |stage: &str, expression: &str| {
+            let effect = "[[effect]]\nname = \"own\"\nrange = [-9.0, 9.0]\nprior = 1.0";
+            read(&format!("{effect}\nstage = \"{stage}\"\n{expression}\n"))
+        };
+        for (stage, expression, part) in [
+            ("pupil", "opd_nm = \"50 * x / R + a * y / R\"", ":6:"),
+            ("pupil", "opd_nm = \"50 * x / R + a * y / R\"", "not 0"),
+            ("spectrum", "spectrum = \"a * (wavelength - centre)\"", "not 1"),
+            (
+                "spectrum",
+                "spectrum = \"1 + (a + 0.01) * (wavelength - centre)\"",
+                "wavelength = ",
+            ),
+            (
+                "kernel",
+                "kernel = \"(a + 0.05) * exp(-((x - 5)^2 + (y + 3)^2) / 0.5)\"",
+                "not 0",
+            ),
+            ("distance", "distance_um = \"a * X + 0.01 * Y\"", "Y = "),
+            ("width", "width_nm = \"a + (fill - 0.3)\"", "fill = "),
+        ] {
+            let error = with(stage, expression).unwrap_err().to_string();
+            assert!(error.contains(part), "{part} is not in:\n{error}");
+        }
+        for (stage, expression) in [
+            ("spectrum", "spectrum = \"1 + a * (wavelength - centre) / 100\""),
+            ("pupil", "amplitude = \"cos(a * x / R) - 1\""),
+            ("width", "width_nm = \"a * w / 150\""),
+            ("distance", "distance_um = \"a * step(1 - hypot(X - 400, Y))\""),
+        ] {
+            assert!(with(stage, expression).is_ok(), "{expression}");
+        }
     }
 
     #[test]

@@ -238,11 +238,40 @@ pub fn all(set: &MeasuredSet) -> Vec<Box<dyn Effect>> {
 pub fn with_declared(set: &MeasuredSet, declared: &[DeclaredEffect]) -> Result<Vec<Box<dyn Effect>>> {
     let mut effects = all(set);
     for own in declared {
-        if effects.iter().any(|e| e.name() == own.name) {
+        // Boundaries of write fields may be tried later, on a set that does not say where they run.
+        let is_reserved = StitchedFields::NAMES.contains(&own.name.as_str());
+        if is_reserved || effects.iter().any(|e| e.name() == own.name) {
             let what = format!("there is an effect `{}` already", own.name);
             return Err(Error::invalid(what, "give the declared effect another name"));
         }
         effects.push(Box::new(own.clone()));
     }
     Ok(effects)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metalith_core::Silent;
+    use metalith_gds::extract::GdsPillars;
+
+    /// A set that does not say where write fields meet may be searched as if it did.
+    #[test]
+    fn names_of_boundaries_are_reserved() {
+        let folder = tempfile::tempdir().unwrap();
+        metalith_testing::session::small_set(folder.path());
+        let set = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
+        assert!(set.field_boundary_um.is_none());
+        let declared = |name: &str| {
+            let file = folder.path().join("effects.toml");
+            let text = "range = [-9.0, 9.0]\nprior = 1.0\nstage = \"distance\"\ndistance_um = \"a\"\n";
+            std::fs::write(&file, format!("[[effect]]\nname = \"{name}\"\n{text}")).unwrap();
+            with_declared(&set, &DeclaredEffect::read(&file).unwrap()).map(|all| all.len())
+        };
+        assert_eq!(declared("own").unwrap(), all(&set).len() + 1);
+        for name in ["stitching_x", "stitching_y", "gap"] {
+            let error = declared(name).unwrap_err().to_string();
+            assert!(error.contains(&format!("`{name}` already")), "{error}");
+        }
+    }
 }

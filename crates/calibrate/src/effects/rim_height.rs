@@ -1,5 +1,6 @@
-//! Pillars at the rim of a lens are higher or lower than in its middle: the etch is loaded by what is open around it
-//! (C. J. Mogab, J. Electrochem. Soc. 124, 1262 (1977)), so that masks and tops wear unevenly, or the film is not flat.
+//! Pillars at the rim of a lens are higher or lower than in its middle, on a flat substrate: the film is not flat, or masks and tops
+//! wear unevenly, because the etch is loaded by what is open around them (C. J. Mogab, J. Electrochem. Soc. 124, 1262 (1977)).
+//! An etch that goes deeper at the rim is another change: tops are level there, and film or a trench is left between the pillars.
 
 use super::{Effect, Parameter, Stage};
 use metalith_made::Perturbation;

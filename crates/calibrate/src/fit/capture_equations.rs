@@ -14,14 +14,18 @@ use metalith_wave::kernels::sum_of_products;
 #[derive(Clone)]
 pub struct CaptureEquations {
     gram: DMatrix<f64>,
+    /// How far further parameters make the window follow the image, for a unit of each (um).
+    follows_um: Vec<[f64; 2]>,
 }
 
 impl CaptureEquations {
     /// For a capture whose predicted image is `grid`; `more` are the derivatives of the image by further
-    /// parameters.
+    /// parameters. Where the window of a prediction follows the image, the window of the bench, which stands still, is expected to be
+    /// as much off the other way.
     pub fn new(data: &Data, c: CaptureIndex, now: &Nuisances, grid: &PixelGrid, more: &[PixelGrid]) -> Self {
         let reading = Reading::new(more.iter().chain([grid]), now.shift_um[c]);
         let lines = reading.with_slopes(grid);
+        let follows_um: Vec<[f64; 2]> = more.iter().map(PixelGrid::off_um).collect();
         let more: Vec<_> = more.iter().map(|m| reading.pixels(m)).collect();
         let residual = now.whitened(data, c, &lines[0]);
         let led = data.beam[c].led;
@@ -50,15 +54,21 @@ impl CaptureEquations {
             }
         }
         let prior = data.registration_um.powi(-2);
-        let last = size - 1;
+        let first = 2 + data.leds + 1;
         for axis in [0, 1] {
-            gram[(axis, axis)] += prior;
-            let pull = -now.shift_um[c][axis] * prior;
-            gram[(axis, last)] += pull;
-            gram[(last, axis)] += pull;
-            gram[(last, last)] += now.shift_um[c][axis].powi(2) * prior;
+            // The place of the window is known: what its derivatives are by shift and further parameters, and what it is off by.
+            let off = now.shift_um[c][axis] + grid.off_um()[axis];
+            let follows = follows_um.iter().map(|f| f[axis]).enumerate();
+            let mut parts: Vec<(usize, f64)> = vec![(axis, 1.0)];
+            parts.extend(follows.filter(|(_, f)| *f != 0.0).map(|(k, f)| (first + k, f)));
+            parts.push((size - 1, -off));
+            for &(i, a) in &parts {
+                for &(j, b) in &parts {
+                    gram[(i, j)] += a * b * prior;
+                }
+            }
         }
-        Self { gram }
+        Self { gram, follows_um }
     }
 
     /// The products after registration has been eliminated: flux, black level, further parameters, residual.
@@ -80,6 +90,16 @@ impl CaptureEquations {
         }
         let step = self.inner() * rhs;
         [step[0], step[1]]
+    }
+
+    /// How far such a step of the others makes the window follow the image (um).
+    pub fn following(&self, step: &DVector<f64>) -> [f64; 2] {
+        let first = step.len().saturating_sub(self.follows_um.len());
+        let mut out = [0.0; 2];
+        for (follows, step) in self.follows_um.iter().zip(step.iter().skip(first)) {
+            out = [out[0] + follows[0] * step, out[1] + follows[1] * step];
+        }
+        out
     }
 
     fn inner(&self) -> DMatrix<f64> {

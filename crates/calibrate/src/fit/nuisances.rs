@@ -77,9 +77,10 @@ impl Nuisances {
     pub fn advance(&mut self, data: &Data, equations: &PerCapture<CaptureEquations>, step: &DVector<f64>) {
         let most = LARGEST_SHIFT * data.registration_um;
         for (shift, capture) in self.shift_um.iter_mut().zip(equations) {
-            let by = capture.registration(step);
+            let (by, following) = (capture.registration(step), capture.following(step));
             for axis in [0, 1] {
-                shift[axis] += by[axis].clamp(-most, most);
+                // Slopes hold as far as the image moves in the window.
+                shift[axis] += (by[axis] + following[axis]).clamp(-most, most) - following[axis];
             }
         }
         for l in 0..data.leds {

@@ -77,12 +77,12 @@ fn sections(root: &Section<'_, '_>) -> BenchFile {
     root.integer("schema", SCHEMA..=SCHEMA, "");
     let divergence_rad = read::source(&root.section("source"));
     let s = root.section("camera");
-    for key in ["dark_frame", "flat_frame"] {
+    for key in ["dark_frame", "flat_frame", "dark_holds_for"] {
         if s.has(key) {
             s.fault(
                 key,
-                "a frame of the sensor is no part of a plan",
-                "add it to measurement.toml once it has been taken",
+                "frames of the sensor are no part of a plan",
+                "add them to measurement.toml once they have been taken",
             );
         }
     }
@@ -167,8 +167,17 @@ fn wanted(s: &Section<'_, '_>) -> BTreeMap<String, f64> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
+
+    /// The bench of small sessions, with these sections beside `[captures]`.
+    pub fn small_bench(more: &str) -> BenchFile {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("bench.toml");
+        let bench = metalith_testing::session::bench();
+        std::fs::write(&path, format!("schema = 1\n{bench}\n[captures]\n{more}")).unwrap();
+        BenchFile::read(&path).unwrap()
+    }
 
     #[test]
     fn every_fault_of_a_bench_is_named_at_once() {

@@ -7,6 +7,8 @@ use metalith_design::{Design, Element};
 use ndarray::Array2;
 
 use super::bench_file::{BenchFile, SemOffer};
+use super::limits::check_plannable;
+use crate::set::read::WINDOW_CENTRE_UM;
 use crate::set::{
     Capture, ElementIndex, LedIndex, MeasuredElement, MeasuredSet, PerCapture, PerElement, SemSite, Stack,
 };
@@ -24,15 +26,14 @@ const SEM_REACH: f64 = 0.97;
 pub struct Candidates {
     pub set: MeasuredSet,
     pub captures: Vec<Capture>,
-    /// Captures that were left out because no camera could see their light.
+    /// Captures that were left out because no camera could see their light, or it lands farther off than a set may say.
     pub unseen: usize,
 }
 
 /// All that the bench could take of a design, whose layout is at `layout`.
 ///
 /// # Errors
-/// If the design has rectangles or a hexagonal lattice, the layout cannot be read, an element is not in the design, or nothing can be
-/// seen of any.
+/// As [`check_plannable`]; if the layout cannot be read, or nothing can be seen of any element.
 pub fn candidates(
     design: &Design,
     bench: &BenchFile,
@@ -40,13 +41,7 @@ pub fn candidates(
     reader: &dyn PillarReader,
     progress: &dyn Progress,
 ) -> Result<Candidates> {
-    if design.cell.shape.rectangles().is_some() {
-        return Err(Error::invalid(
-            format!("{} is a design of rectangles", design.path.display()),
-            "plan sessions of squares or circles: sets are read of these alone",
-        ));
-    }
-    design.square_lattice("`plan`")?;
+    check_plannable(design, bench)?;
     let chosen = chosen_elements(design, bench)?;
     let sites: Vec<ElementSite> = chosen.iter().map(|e| design.site_of(e)).collect();
     let layer = design.layout.layers.pillars.number();
@@ -68,32 +63,68 @@ pub fn candidates(
     Ok(Candidates { set, captures, unseen })
 }
 
-/// The elements that the bench names; else the central one, the one farthest along x, and the farthest of all.
-fn chosen_elements(design: &Design, bench: &BenchFile) -> Result<Vec<Element>> {
+/// The elements that the bench names; else, of those that are round, the central one, the one farthest along x, and the farthest of
+/// all.
+///
+/// # Errors
+/// If the design has no such element, or its opening is no circle.
+pub fn chosen_elements(design: &Design, bench: &BenchFile) -> Result<Vec<Element>> {
     let all = design.elements();
-    if !bench.elements.is_empty() {
-        let of = |index: &[i64; 2]| {
-            all.iter().find(|e| index_of(e) == *index).copied().ok_or_else(|| {
-                Error::invalid(
-                    format!("the design has no element {index:?}"),
-                    "correct `elements` of the bench",
-                )
-            })
-        };
-        return bench.elements.iter().map(of).collect();
-    }
-    let picked = [
-        all.iter().min_by_key(|e| e.centre_nm.0.abs() + e.centre_nm.1.abs()),
-        all.iter().max_by_key(|e| e.centre_nm.0 - e.centre_nm.1.abs()),
-        all.iter().max_by_key(|e| e.centre_nm.0 + e.centre_nm.1),
-    ];
-    let mut out: Vec<Element> = Vec::new();
-    for e in picked.into_iter().flatten() {
-        if !out.contains(e) {
-            out.push(*e);
+    let is_round = |e: &Element| design.lens_of(e).outline.is_none();
+    let not_round = |what: String| {
+        Error::invalid(
+            what,
+            "name round elements by `elements` of the bench: captures are predicted through round openings",
+        )
+    };
+    let mut picked: Vec<Element> = Vec::new();
+    if bench.elements.is_empty() {
+        let round = || all.iter().copied().filter(is_round);
+        picked.extend(round().min_by_key(|e| e.centre_nm.0.abs() + e.centre_nm.1.abs()));
+        picked.extend(round().max_by_key(|e| e.centre_nm.0 - e.centre_nm.1.abs()));
+        picked.extend(round().max_by_key(|e| e.centre_nm.0 + e.centre_nm.1));
+        if picked.is_empty() {
+            return Err(not_round(format!("{} has no round element", design.path.display())));
         }
     }
-    Ok(out)
+    for index in &bench.elements {
+        let Some(own) = all.iter().find(|e| index_of(e) == *index) else {
+            return Err(Error::invalid(
+                format!("the design has no element {index:?}"),
+                "correct `elements` of the bench",
+            ));
+        };
+        if !is_round(own) {
+            return Err(not_round(format!("the opening of element {index:?} is a polygon")));
+        }
+        picked.push(*own);
+    }
+    Ok(without_repeats(picked))
+}
+
+/// The first of each.
+fn without_repeats<T: PartialEq>(all: Vec<T>) -> Vec<T> {
+    let mut out: Vec<T> = Vec::new();
+    for one in all {
+        if !out.contains(&one) {
+            out.push(one);
+        }
+    }
+    out
+}
+
+/// Diameter of the largest lens of a design (um): the lattices of all are as large.
+pub fn lens_diameter_um(design: &Design) -> f64 {
+    f64::from(design.array.largest_nm(&design.lens)) * 1e-3
+}
+
+/// Distances at which an element of this focal length is looked at (um), to a tenth of a micrometre.
+pub fn distances_um(bench: &BenchFile, focal_um: f64) -> Vec<f64> {
+    let all = match bench.distances_um.is_empty() {
+        true => vec![focal_um * (1.0 - DEFOCUS), focal_um, focal_um * (1.0 + DEFOCUS)],
+        false => bench.distances_um.clone(),
+    };
+    without_repeats(all.into_iter().map(|d| (d * 10.0).round() / 10.0).collect())
 }
 
 /// Index of an element as sets have it.
@@ -114,7 +145,7 @@ fn session(
         .map(|(element, pillars)| MeasuredElement {
             index: index_of(element),
             centre_um: element.centre_um(),
-            aperture_diameter_um: 2.0 * design.aperture_radius_um(),
+            aperture_diameter_um: 2.0 * design.aperture_radius_of_um(element),
             pillars,
         })
         .collect();
@@ -124,7 +155,7 @@ fn session(
         layout: layout.to_owned(),
         stack: Stack {
             cell: design.cell_stack()?,
-            lens_diameter_um: f64::from(design.lens.diameter_nm) * 1e-3,
+            lens_diameter_um: lens_diameter_um(design),
             focal_length_um: design.lens.focal_length_um,
         },
         divergence_rad: bench.divergence_rad,
@@ -139,25 +170,22 @@ fn session(
 }
 
 fn captures(design: &Design, bench: &BenchFile, set: &MeasuredSet, chosen: &[Element]) -> (Vec<Capture>, usize) {
-    let f_um = design.lens.focal_length_um;
-    let distances = if bench.distances_um.is_empty() {
-        vec![f_um * (1.0 - DEFOCUS), f_um, f_um * (1.0 + DEFOCUS)]
-    } else {
-        bench.distances_um.clone()
-    };
-    let distances: Vec<f64> = distances.into_iter().map(|d| (d * 10.0).round() / 10.0).collect();
     let most = bench.frames.last().copied().unwrap_or(1);
     let dark = Array2::zeros((bench.camera.rows, bench.camera.cols));
     let (mut out, mut unseen) = (Vec::new(), 0);
     for (e, element) in chosen.iter().enumerate() {
         let (index, wedge) = (index_of(element), element.wedge);
         let turn = [wedge.sin_x, wedge.sin_y];
+        let f_um = design.lens_of(element).focal_length_um;
+        let distances = distances_um(bench, f_um);
         for (led, lamp) in set.leds.iter().enumerate() {
-            for (a, field) in bench.fields_deg.iter().enumerate() {
+            for (a, field) in without_repeats(bench.fields_deg.clone()).into_iter().enumerate() {
                 // Where the element looks, and the field from there, to a hundredth of a degree as a person would set it.
                 let axis = turn.map(|s| -s.asin().to_degrees());
                 let aoi_deg = [0, 1].map(|k| ((axis[k] + field[k]) * 100.0).round() / 100.0);
-                let Some(centre) = landing_um(wedge, aoi_deg, lamp.centre_nm * 1e-3, f_um) else {
+                let centre = landing_um(wedge, aoi_deg, lamp.centre_nm * 1e-3, f_um);
+                let within = |c: &[f64; 2]| c.iter().all(|v| WINDOW_CENTRE_UM.range.contains(v));
+                let Some(centre) = centre.filter(within) else {
                     unseen += distances.len();
                     continue;
                 };
@@ -199,7 +227,7 @@ pub fn sem_sites(set: &MeasuredSet, offer: SemOffer) -> Vec<SemSite> {
     let mut out: Vec<SemSite> = Vec::new();
     for element in &set.elements {
         let lattice = element.pillars.lattice;
-        let radius = SEM_REACH * 0.5 * set.stack.lens_diameter_um;
+        let radius = SEM_REACH * 0.5 * set.stack.lens_diameter_um.min(element.aperture_diameter_um);
         for k in 0..each {
             let share = (k as f64 + 0.5) / each as f64;
             let (r, turn) = (radius * share.sqrt(), golden * k as f64);
@@ -227,7 +255,12 @@ fn nearest(lattice: Lattice, at_um: f64) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use super::super::bench_file::tests::small_bench;
     use super::*;
+    use metalith_core::Silent;
+    use metalith_design::PillarArray;
+    use metalith_gds::extract::GdsPillars;
+    use metalith_layout::write_pillars;
 
     #[test]
     fn light_of_the_wedge_lands_on_the_axis_and_other_colours_beside_it() {
@@ -243,5 +276,54 @@ mod tests {
         // Places are rounded to a hundredth of a micrometre.
         assert!((red[0] - 144.0 * sine / (1.0 - sine * sine).sqrt()).abs() < 0.006);
         assert_eq!(landing_um(wedge, [60.0, 0.0], 0.66, 144.0), None);
+    }
+
+    #[test]
+    fn elements_that_are_named_twice_are_taken_once() {
+        let design = Design::read(&metalith_testing::root().join("designs/mini_3x3.toml")).unwrap();
+        let bench = small_bench("elements = [0, 0, 1, 0, 0, 0]\ndistance_um = [139.0, 144.0, 139.01]\n");
+        let chosen = chosen_elements(&design, &bench).unwrap();
+        assert_eq!(chosen.iter().map(index_of).collect::<Vec<_>>(), [[0, 0], [1, 0]]);
+        assert_eq!(distances_um(&bench, 144.0), [139.0, 144.0]);
+    }
+
+    /// Round lenses of several kinds, each at its own focal length; polygons are left out, and refused where they are named.
+    #[test]
+    fn lenses_of_several_kinds_are_looked_at_each_in_its_own_focus() {
+        let folder = tempfile::tempdir().unwrap();
+        let text = std::fs::read_to_string(metalith_testing::root().join("designs/mixed_lenses.toml")).unwrap();
+        let file = folder.path().join("mixed.toml");
+        // The hexagon as the circle about it.
+        std::fs::write(&file, text.replace("aperture = \"regular\"\naperture_sides = 6\n", "")).unwrap();
+        let design = Design::read(&file).unwrap();
+        let layout = folder.path().join("layout.gds");
+        let array = PillarArray::build(&design, &Silent).unwrap();
+        write_pillars(&design, &array, design.layout.hierarchy, &layout, &Silent).unwrap();
+        let bench = small_bench("elements = [1, 0, 3, 0]\n");
+        let found = candidates(&design, &bench, &layout, &GdsPillars, &Silent).unwrap();
+        let set = &found.set;
+        assert_eq!(set.stack.lens_diameter_um, 80.0);
+        for (e, element) in set.elements.iter_enumerated() {
+            let own: Vec<f64> = found
+                .captures
+                .iter()
+                .filter(|c| c.element == e)
+                .map(|c| c.distance_um)
+                .collect();
+            let (focal_um, diameter_um) = if element.index == [3, 0] {
+                (110.0, 80.0)
+            } else {
+                (144.0, 60.0)
+            };
+            assert!(own.contains(&focal_um), "{:?}: {own:?}", element.index);
+            // Openings are larger by a margin of 2 um.
+            assert_eq!(element.aperture_diameter_um, diameter_um + 4.0);
+            assert!(element.pillars.pillars() > 0);
+        }
+        let unnamed = chosen_elements(&design, &small_bench("")).unwrap();
+        assert!(unnamed.iter().all(|e| index_of(e) != [2, 0]), "the square is left out");
+        let named = small_bench("elements = [2, 0]\n");
+        let error = chosen_elements(&design, &named).unwrap_err().to_string();
+        assert!(error.contains("[2, 0] is a polygon"), "{error}");
     }
 }

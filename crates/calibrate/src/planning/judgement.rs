@@ -22,8 +22,10 @@ pub struct PlannedEffect {
     /// With its axis or number where it has several.
     pub name: String,
     pub unit: String,
-    /// Size that is to be found, in `unit`.
+    /// Size that is to be found, in `unit`: a change from what is stated, or the distance of a source.
     pub wanted: f64,
+    /// What a calibration would report for it: of the height of the film and of widths and sizes of the light the whole.
+    pub reported: f64,
     /// Gain in reduced chi-square per pixel at this size, and what is asked for.
     pub gain: f64,
     pub needed: f64,
@@ -110,6 +112,7 @@ pub fn effects(
             name: simulator.slot_name(r.slot),
             unit: effect.unit().into(),
             wanted,
+            reported: effect.value(r.size, exposed),
             gain: margin * NEEDED,
             needed: NEEDED,
             half_interval,

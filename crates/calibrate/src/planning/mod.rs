@@ -7,7 +7,9 @@
 //! | file | holds |
 //! | --- | --- |
 //! | `bench_file` | what the bench can do and what is asked of it |
+//! | `limits` | whether a set of the design can be planned |
 //! | `candidates` | every capture that it could take |
+//! | `wanted` | what is asked of them |
 //! | `information` | normal equations of each, by the simulator and the noise |
 //! | `choice` | the fewest captures |
 //! | `judgement` | what they find, and what they cannot tell apart |
@@ -21,7 +23,9 @@ mod choice;
 mod files;
 mod information;
 mod judgement;
+mod limits;
 mod page;
+mod wanted;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -33,16 +37,18 @@ use serde::Serialize;
 pub use begun::check_not_begun;
 pub use bench_file::{BenchFile, SemOffer};
 pub use judgement::{Confusion, PlannedEffect};
+pub use limits::check_plannable;
 
 use crate::bench::{Bench, Sampling};
 use crate::effects::{self, Effect};
 use crate::session::check_effects;
 use crate::set::{LedIndex, MeasuredSet, PerCapture};
 use crate::simulator::Simulator;
-use crate::surrogate::Surrogate;
+use crate::surrogate::{Surrogate, check_calibration_fits};
 use candidates::{Candidates, sem_sites};
 use choice::{Choice, Picked, Place, Requirement};
 use information::{Information, cells_of, exposed};
+use wanted::{check_wanted, only_of_what_is_found, requirements};
 
 /// Spectra of a plan: steps in wavelength are coarser than those of a calibration, since nothing is fitted.
 const SAMPLING: Sampling = Sampling {
@@ -131,16 +137,15 @@ impl CapturePlan {
 /// Plan a session, and write its folder: `measurement.toml`, the tables that it names, `plan.html` and `plan.json`.
 ///
 /// # Errors
-/// If a name is not known, the layout cannot be read, a cell cannot be solved, a file cannot be written, or the user stopped
-/// it.
+/// As [`check_plannable`]; if a name is not known, a wanted size is beyond what physics allows, the layout cannot be read, a cell
+/// cannot be solved, a calibration of the set would not fit into memory, a file cannot be written, or the user stopped it.
 pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn Progress) -> Result<CapturePlan> {
     let (design, bench) = (request.design, request.bench);
     let candidates = candidates::candidates(design, bench, request.layout, reader, progress)?;
     let effects = |set: &MeasuredSet| wanted_effects(set, request);
     let cells = cells_of(&candidates.set, SAMPLING, request.cache.clone());
     let known = effects(&candidates.set)?;
-    let asked: Vec<String> = bench.wanted.keys().cloned().collect();
-    check_effects(&effects::all(&candidates.set), &asked)?;
+    check_wanted(&candidates.set, bench)?;
     let (information, cells) = information::information(&candidates, bench, SAMPLING, &effects, cells, progress)?;
     let choice = Choice {
         places: information.told.iter().map(|t| place(&t.capture)).collect(),
@@ -154,6 +159,7 @@ pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn
     let set = chosen_set(&candidates, bench, &information, &picked);
 
     let simulator = Simulator::new(Bench::new(&set, SAMPLING), cells, known);
+    check_calibration_fits(&simulator)?;
     let led = set.captures.iter().map(|c| c.led).collect::<PerCapture<LedIndex>>();
     let nothing = vec![0.0; simulator.slots.len()];
     let surrogate = Surrogate::beside(&simulator, &nothing, Some((&led, set.leds.len())), progress)?;
@@ -199,54 +205,6 @@ fn place(capture: &crate::set::Capture) -> Place {
         led: capture.led.into(),
         aoi_rad: capture.aoi_rad,
         distance_um: capture.distance_um,
-    }
-}
-
-/// Each parameter of each effect is to be detected, and to be told from each other effect. Parameters that change nothing
-/// by themselves are not asked for.
-fn requirements(effects: &[Box<dyn Effect>], bench: &BenchFile) -> Vec<Requirement> {
-    let mut slots: Vec<Vec<usize>> = Vec::new();
-    let mut own: Vec<(usize, usize, f64)> = Vec::new();
-    let mut next = 0;
-    for (e, effect) in effects.iter().enumerate() {
-        let parameters = effect.parameters();
-        let asked = bench.wanted.get(&effect.name());
-        for (k, p) in parameters.iter().enumerate() {
-            if k == 0 || !effect.dormant() {
-                let size = asked.map_or(p.typical, |amount| effect.parameter(*amount));
-                own.push((e, next + k, size));
-            }
-        }
-        slots.push((next..next + parameters.len()).collect());
-        next += parameters.len();
-    }
-    let detected = own.iter().map(|&(_, slot, size)| Requirement {
-        slot,
-        size,
-        beside: Vec::new(),
-    });
-    let apart = own.iter().flat_map(|&(e, slot, size)| {
-        let others = slots.iter().enumerate().filter(move |(other, _)| *other != e);
-        others.map(move |(_, beside)| Requirement {
-            slot,
-            size,
-            beside: beside.clone(),
-        })
-    });
-    detected.chain(apart).collect()
-}
-
-/// An effect that cannot be found is not to be told from others.
-fn only_of_what_is_found(choice: &Choice<'_>, reachable: &mut [bool]) {
-    let lost: Vec<usize> = choice
-        .requirements
-        .iter()
-        .zip(reachable.iter())
-        .filter(|(r, reached)| r.beside.is_empty() && !**reached)
-        .map(|(r, _)| r.slot)
-        .collect();
-    for (r, reached) in choice.requirements.iter().zip(reachable) {
-        *reached &= !lost.contains(&r.slot);
     }
 }
 

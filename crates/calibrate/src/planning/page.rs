@@ -12,6 +12,9 @@ const COLUMNS: usize = 6;
 /// Most pictures of the page: more would not be looked at.
 const MOST_PICTURES: usize = 36;
 
+/// Sizes that differ by a smaller share are the same, on the way to other units and back.
+const SAME: f64 = 1e-6;
+
 /// Write `plan.html`.
 ///
 /// # Errors
@@ -38,7 +41,7 @@ pub fn write_page(plan: &CapturePlan, set: &MeasuredSet, unseen: usize) -> Resul
     page.paragraph(format!(
         "{} captures were considered: every element, colour, angle and distance of the bench{}. Each was simulated with every effect at two sizes; what it tells is its Fisher information at the noise of the camera, with registration, flux and black level free. Captures were added one by one, each time the one that helps the worst detection most, until every effect is found and told from every other where any captures of the bench can do so; then captures that had become needless were taken out, and frames were lowered as far as they can be. Needed is twice the gain that a calibration takes for more than the error of its own model.",
         count(plan.candidates as u64),
-        if unseen > 0 { format!(" ({unseen} more leave the element too steeply)") } else { String::new() }
+        if unseen > 0 { format!(" ({unseen} more leave the element too steeply, or land too far from its axis)") } else { String::new() }
     ));
     page.paragraph("This rests on a simulation of the design as drawn, with effects one at a time and one beside another: a chip that differs by much more than the wanted sizes may need other captures.");
     page.write(&plan.page)
@@ -57,6 +60,7 @@ fn instructions(page: &mut Page, plan: &CapturePlan, set: &MeasuredSet) {
             exact(camera.registration_sigma_px), exact(camera.pixel_um)
         ),
         "Set the exposure by an opening without pillars, or without the chip, as the column “open” says. If the exposure has to be another one, correct `scale_dn` of the capture in measurement.toml by the same factor.".to_owned(),
+        "If dark frames are taken, take one for each exposure time, and name it by `dark_frame` and `dark_frames` beside `file` of the captures that were exposed so long.".to_owned(),
         format!(
             "Put the frames into `{}`, under their names. A capture that fails is left out by deleting its section in measurement.toml.",
             plan.folder.join("captures").display()
@@ -115,9 +119,13 @@ fn effects(page: &mut Page, plan: &CapturePlan) {
         Column::text("Half of the 95 % interval"),
         Column::text("Found"),
     ])
-    .caption("Gain: by how much reduced chi-square per pixel falls when the effect is fitted. The interval is that of the effect alone, the error of the model counted in.");
+    .caption("Wanted sizes are changes from what is stated; where a calibration reports the whole instead, that stands in brackets. Gain: by how much reduced chi-square per pixel falls when the effect is fitted. The interval is that of the effect alone, the error of the model counted in.");
     for e in &plan.effects {
-        let with_unit = |v: f64| format!("{} {}", sig(v, 3), e.unit);
+        let with_unit = |v: f64| format!("{} {}", sig(v, 3), e.unit).trim_end().to_owned();
+        let wanted = match (e.reported - e.wanted).abs() > SAME * e.wanted {
+            true => format!("{} (reported as {})", with_unit(e.wanted), with_unit(e.reported)),
+            false => with_unit(e.wanted),
+        };
         let words = match (e.detected, e.reachable, e.gain >= e.needed) {
             (true, _, _) => "yes".to_owned(),
             (_, _, true) => "no: its interval includes zero".to_owned(),
@@ -129,9 +137,9 @@ fn effects(page: &mut Page, plan: &CapturePlan) {
         };
         table.row([
             Cell::code(&e.name),
-            Cell::from(with_unit(e.wanted).trim_end()),
+            Cell::from(wanted.as_str()),
             Cell::sig(e.gain, 3),
-            Cell::from(with_unit(e.half_interval).trim_end()),
+            Cell::from(with_unit(e.half_interval).as_str()),
             Cell::from(words.as_str()),
         ]);
     }

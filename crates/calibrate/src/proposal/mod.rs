@@ -3,8 +3,8 @@
 //! A proposal is a guess with a place to start from. It becomes a finding only where the search takes it: fitted,
 //! cross-validated and held against all other effects like these.
 
+mod by_element;
 mod ghost;
-mod gradient;
 mod wavefront;
 mod write_fields;
 
@@ -14,10 +14,10 @@ use crate::search::Evidence;
 use crate::session::Session;
 use crate::smooth_residual::SmoothResidual;
 use metalith_core::{Progress, Result};
-pub use write_fields::boundary_of_fields;
+pub use write_fields::{FieldBoundary, boundary_of_fields};
 
 /// A shape is proposed if it removes this share of the chi-square above noise: less is a part of something else.
-const WORTH_PROPOSING: f64 = 0.3;
+pub const WORTH_PROPOSING: f64 = 0.3;
 
 /// An effect that may explain what a finding leaves.
 #[derive(Clone, Debug)]
@@ -57,7 +57,7 @@ pub fn propose(session: &Session<'_>, evidence: &Evidence, progress: &dyn Progre
             effect,
             reason: FreePattern::new(&session.simulator, pattern).sentence(),
         };
-        found.extend(gradient::declared(&session.simulator, pattern).map(|effect| (removed, vec![of(effect)])));
+        found.extend(by_element::declared(&session.simulator, pattern).map(|effect| (removed, vec![of(effect)])));
     }
     found.retain(|(removed, _)| *removed > WORTH_PROPOSING * above_noise);
     found.sort_by(|a, b| b.0.total_cmp(&a.0));

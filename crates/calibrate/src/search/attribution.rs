@@ -7,8 +7,9 @@ use super::alternatives::{Alternative, alternatives, drop_redundant};
 use super::exchange::{find_exchange, much_alike};
 use super::pairs::{FoundTogether, LEAST_LEFT, find_pair};
 use super::recentred_leaders::follow_leaders_anew;
-use super::state::{MORE_IS_LEFT, SearchState};
-use super::stepwise::{LEAST_GAIN, RESIDUAL, Rejection, TriedEffect, step_forward};
+use super::residual::may_leave;
+use super::state::{EndsSearch, MORE_IS_LEFT, SearchState};
+use super::stepwise::{LEAST_GAIN, Rejection, TriedEffect, step_forward};
 use crate::fit::{Fit, FitProblem, HeldOutErrors, WidthParts, half_widths, mean_error};
 use crate::optics::PixelGrid;
 use crate::set::PerCapture;
@@ -16,6 +17,9 @@ use crate::surrogate::Surrogate;
 
 /// Most effects that are looked for at once.
 const MOST_EFFECTS: usize = 4;
+
+/// A single effect explains what is left if it gains this share of it; else something may that is not tried.
+const MOST_OF_IT: f64 = 0.5;
 
 /// The outcome of a search.
 pub struct Finding {
@@ -37,6 +41,8 @@ pub struct Finding {
     /// The surrogate that `after` is based on, and its correction by a full simulation.
     pub surrogate: Surrogate,
     pub correction: Option<PerCapture<PixelGrid>>,
+    /// Whether it was ended before all was tried.
+    pub was_ended: bool,
 }
 
 /// The steps of a search so far.
@@ -124,24 +130,33 @@ impl SearchHistory {
 }
 
 /// Attribute the residual of a problem to effects. With `full`, what is found is refined with full simulations, and
-/// the search continues about it where a residual is left.
+/// the search continues about it where a residual is left, unless `ends` says that it need not.
 ///
 /// # Errors
 /// If a simulation fails, or the user stopped it.
-pub fn attribute(problem: FitProblem<'_>, full: bool, progress: &dyn Progress) -> Result<Finding> {
+pub fn attribute(
+    problem: FitProblem<'_>,
+    full: bool,
+    ends: Option<&EndsSearch<'_>>,
+    progress: &dyn Progress,
+) -> Result<Finding> {
     let nothing = problem.nuisance_fit();
     let start = SearchState::new(problem, nothing);
     let mut now = start.clone();
     let mut history = SearchHistory::start(&start);
-    add_effects(&mut now, &mut history, full, progress)?;
-    try_pairs_from_start(&start, &mut now, &mut history, full, progress)?;
-    let found = history.chosen.len();
-    drop_redundant(&mut now, &mut history.chosen, &mut history.runners_up);
-    if full && history.chosen.len() < found {
-        now.refine(progress)?;
-    }
-    let (runners_up, before) = (&history.runners_up, &history.held_before);
-    let alternatives = alternatives(&mut now, &mut history.chosen, runners_up, before, full, progress)?;
+    let was_ended = add_effects(&mut now, &mut history, full, ends, progress)?;
+    let alternatives = if was_ended {
+        vec![Vec::new(); history.chosen.len()]
+    } else {
+        try_pairs_from_start(&start, &mut now, &mut history, full, progress)?;
+        let found = history.chosen.len();
+        drop_redundant(&mut now, &mut history.chosen, &mut history.runners_up);
+        if full && history.chosen.len() < found {
+            now.refine(progress)?;
+        }
+        let (runners_up, before) = (&history.runners_up, &history.held_before);
+        alternatives(&mut now, &mut history.chosen, runners_up, before, full, progress)?
+    };
     let widths = half_widths(&now.problem, &now.fit);
     Ok(Finding {
         chosen: history.chosen,
@@ -156,18 +171,33 @@ pub fn attribute(problem: FitProblem<'_>, full: bool, progress: &dyn Progress) -
         half_widths: widths,
         correction: now.problem.correction,
         surrogate: now.problem.surrogate,
+        was_ended,
     })
 }
 
-/// Add single effects, and a pair where no single one helps, until nothing more is gained.
+/// Add single effects, and a pair where no single one helps, until nothing more is gained. Whether `ends` ended it.
 fn add_effects(
     now: &mut SearchState<'_>,
     history: &mut SearchHistory,
     full: bool,
+    ends: Option<&EndsSearch<'_>>,
     progress: &dyn Progress,
-) -> Result<()> {
+) -> Result<bool> {
     while history.chosen.len() < MOST_EFFECTS {
         let step = step_forward(now, &history.chosen, full, progress)?;
+        let explained = step
+            .taken
+            .as_ref()
+            .and_then(|(tried, ..)| tried.gain)
+            .map_or(0.0, |g| g.value);
+        if let Some(ends) = ends
+            && explained < MOST_OF_IT * (now.error() - 1.0)
+            && now.error() > may_leave(&now.problem, &now.fit)
+            && ends(now)?
+        {
+            history.keep(step.tried, step.null_gain);
+            return Ok(true);
+        }
         if let Some((tried, fit, held)) = step.taken {
             let alike = much_alike(&step.tried, &tried);
             history.keep(step.tried, step.null_gain);
@@ -178,7 +208,7 @@ fn add_effects(
             }
         } else {
             history.keep(step.tried, step.null_gain);
-            if now.error() <= RESIDUAL {
+            if now.error() <= may_leave(&now.problem, &now.fit) {
                 break;
             }
             history.pairs_tried_from_start |= history.chosen.is_empty();
@@ -218,7 +248,7 @@ fn add_effects(
             break;
         }
     }
-    Ok(())
+    Ok(false)
 }
 
 /// Where effects that were added one by one leave something, the first may have been the wrong one: a pair that explains all but
@@ -259,7 +289,7 @@ mod tests {
         let model = six_effects();
         let truth = [0.0, 0.006, 0.0, 0.0, -0.012, 0.0];
         let data = model.data(|_| truth.to_vec(), Some(1));
-        let found = attribute(model.problem(&data), false, &Silent).unwrap();
+        let found = attribute(model.problem(&data), false, None, &Silent).unwrap();
         assert_eq!(found.chosen, [4, 1]);
         assert!(found.alternatives.iter().all(Vec::is_empty));
         for effect in [4, 1] {
@@ -275,7 +305,7 @@ mod tests {
         let model = six_effects();
         for seed in 10..20 {
             let data = model.data(|_| vec![0.0; 6], Some(seed));
-            let found = attribute(model.problem(&data), false, &Silent).unwrap();
+            let found = attribute(model.problem(&data), false, None, &Silent).unwrap();
             assert!(found.chosen.is_empty(), "{seed}: {:?}", found.chosen);
         }
     }
@@ -286,7 +316,7 @@ mod tests {
         let twin = Term::linear([2, 3]);
         let model = LinearModel::new(vec![twin.clone(), twin, Term::linear([5, 4])], beams(2, 2, 2));
         let data = model.data(|_| vec![0.01, 0.0, 0.0], Some(3));
-        let found = attribute(model.problem(&data), false, &Silent).unwrap();
+        let found = attribute(model.problem(&data), false, None, &Silent).unwrap();
         assert_eq!(found.chosen.len(), 1);
         let mut both = vec![found.chosen[0]];
         both.extend(found.alternatives[0].iter().map(|a| a.effect));
@@ -332,7 +362,7 @@ mod tests {
         let terms = [&clear[..], &[Term::linear([2, 3]), mixed, Term::linear([5, 4])]].concat();
         let model = LinearModel::new(terms, beams(2, 2, 2));
         let data = model.data(|_| vec![0.08, 0.08, 0.04, 0.0, 0.02], Some(5));
-        let mut found = attribute(model.problem(&data), false, &Silent).unwrap();
+        let mut found = attribute(model.problem(&data), false, None, &Silent).unwrap();
         found.chosen.sort_unstable();
         assert_eq!(found.chosen, [0, 1, 2, 4]);
         assert!(mean_error(&found.held_after) < 1.0 + LEAST_GAIN);

@@ -1,8 +1,10 @@
 //! Capture screening: frames that nothing can be learned from.
 
+use ndarray::Array2;
+
+use super::window_offsets::window_offsets;
 use crate::fit::{FitProblem, Nuisances};
 use crate::set::{CaptureIndex, MeasuredSet};
-use ndarray::Array2;
 
 /// Share of pixels that are saturated or beside such past which a capture is left out; fewer are masked. What surrounds a
 /// lost peak still tells of distance, path and width; a window that is fuller was exposed for something else.
@@ -26,7 +28,7 @@ pub struct UnusableCapture {
 pub fn unusable_captures(set: &MeasuredSet, problem: &FitProblem<'_>, nuisances: &Nuisances) -> Vec<UnusableCapture> {
     let mut out = Vec::new();
     let registration = set.camera.registration_sigma_px;
-    let beyond = window_offsets(nuisances, set.camera.pixel_um);
+    let beyond = window_offsets(set, nuisances);
     for ((c, capture), beyond) in set.captures.iter_enumerated().zip(beyond) {
         let pixels = set.seeing_pixels(c);
         let lost = pixels - problem.data.pixels(c);
@@ -50,17 +52,4 @@ pub fn unusable_captures(set: &MeasuredSet, problem: &FitProblem<'_>, nuisances:
         out.push(UnusableCapture { capture: c, reason });
     }
     out
-}
-
-/// How far each window is off, along the worse axis (pixels). What all windows share is an effect of the light,
-/// and is taken out.
-fn window_offsets(nuisances: &Nuisances, pixel_um: f64) -> Vec<f64> {
-    let shifts: Vec<[f64; 2]> = nuisances.shift_um.iter().map(|s| s.map(|v| v / pixel_um)).collect();
-    let median = [0, 1].map(|axis| {
-        let mut all: Vec<f64> = shifts.iter().map(|s| s[axis]).collect();
-        all.sort_by(f64::total_cmp);
-        all[all.len() / 2]
-    });
-    let off = |s: &[f64; 2]| (s[0] - median[0]).abs().max((s[1] - median[1]).abs());
-    shifts.iter().map(off).collect()
 }

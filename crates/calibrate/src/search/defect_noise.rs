@@ -33,6 +33,7 @@ struct Speckle {
 }
 
 /// The variance of the speckle of each capture.
+#[derive(Clone)]
 pub struct DefectNoise {
     captures: PerCapture<Speckle>,
 }

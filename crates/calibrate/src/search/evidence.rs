@@ -7,7 +7,8 @@ use metalith_core::{Progress, Result};
 use super::attribution::{Finding, attribute};
 use super::defect_noise::DefectNoise;
 use super::patterns::{Pattern, patterns};
-use super::stepwise::RESIDUAL;
+use super::residual::may_leave;
+use super::state::EndsSearch;
 use crate::fit::{Data, FitProblem, mean_error};
 use crate::forward_model::ForwardModel;
 use crate::set::PerCapture;
@@ -66,8 +67,12 @@ fn problem_of<'a>(
     }
 }
 
+fn leaves_a_residual(problem: &FitProblem<'_>, finding: &Finding) -> bool {
+    mean_error(&finding.held_after) > may_leave(problem, &finding.after)
+}
+
 /// Attribute the residual of a problem. With `full`, findings are refined with full simulations. `defects` is
-/// the effect that strikes single pillars at random, with its noise.
+/// the effect that strikes single pillars at random, with its noise; `ends` may end the search before all is tried.
 ///
 /// # Errors
 /// If a simulation fails, or the user stopped it.
@@ -75,13 +80,14 @@ pub fn attribute_set(
     problem: &FitProblem<'_>,
     full: bool,
     defects: Option<(usize, &DefectNoise)>,
+    ends: Option<&EndsSearch<'_>>,
     progress: &dyn Progress,
 ) -> Result<Evidence> {
-    let plain = attribute(problem.clone(), full, progress)?;
+    let plain = attribute(problem.clone(), full, ends, progress)?;
+    let of_plain = problem_of(problem.model, problem.data, &problem.used, &plain);
+    let is_open = !plain.was_ended && leaves_a_residual(&of_plain, &plain);
     let with_noise = match defects {
-        Some((effect, noise)) if mean_error(&plain.held_after) >= RESIDUAL => {
-            attribute_with_defects(problem, full, effect, noise, &plain, progress)?
-        }
+        Some((effect, noise)) if is_open => attribute_with_defects(problem, full, effect, noise, &plain, progress)?,
         _ => None,
     };
     Ok(with_noise.unwrap_or_else(|| Evidence {
@@ -127,7 +133,7 @@ fn attribute_with_defects(
             data: &data,
             ..problem.clone()
         };
-        let mut found = attribute(with_noise, full, progress)?;
+        let mut found = attribute(with_noise, full, None, progress)?;
         // The speckle is estimated against the noise of the camera alone.
         let bare = problem_of(model, camera_noise, &problem.used, &found);
         let next = noise.share(&bare, &found.after);
@@ -138,7 +144,7 @@ fn attribute_with_defects(
         }
         let by_mean = found.after.theta[slot];
         let agree = (by_mean - share).abs() <= SHARES_AGREE * share.max(by_mean);
-        if !(found.chosen.contains(&effect) && agree && mean_error(&found.held_after) < RESIDUAL) {
+        if !(found.chosen.contains(&effect) && agree && !leaves_a_residual(&bare, &found)) {
             break;
         }
         // There are two estimates of one share: the interval includes both.

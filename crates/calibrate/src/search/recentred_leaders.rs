@@ -89,7 +89,7 @@ mod tests {
         let mut state = SearchState::new(model.problem(&data), model.problem(&data).nuisance_fit());
         assert!(step_forward(&mut state, &[], true, &Silent).unwrap().taken.is_none());
         assert!(find_pair(&state, &[], true, &Silent).unwrap().is_none());
-        let found = attribute(model.problem(&data), true, &Silent).unwrap();
+        let found = attribute(model.problem(&data), true, None, &Silent).unwrap();
         for (k, slot) in found.after.active.iter().enumerate() {
             let error = found.after.theta[*slot] - truth[*slot];
             assert!(error.abs() < found.half_widths[k].half_width(), "{slot}: {error}");

@@ -13,6 +13,10 @@ const CHANCE_SIGMAS: f64 = 2.0;
 /// that is centred elsewhere.
 pub const MORE_IS_LEFT: f64 = 0.01;
 
+/// Asked where a residual is left that no single effect explains most of: whether the search ends there, because something that is not
+/// tried explains much of it.
+pub type EndsSearch<'f> = dyn Fn(&SearchState<'_>) -> Result<bool> + 'f;
+
 /// A fit with the problem that it solves.
 #[derive(Clone)]
 pub struct SearchState<'a> {

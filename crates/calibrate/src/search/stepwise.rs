@@ -2,6 +2,7 @@
 
 use metalith_core::{Progress, Result};
 
+use super::residual::EXPLAINED;
 use super::signatures::score_effects;
 use super::state::SearchState;
 use crate::effects::Parameter;
@@ -18,9 +19,6 @@ pub const LEAST_GAIN: f64 = 0.006;
 
 /// Share of the error above noise that an effect must remove.
 const LEAST_SHARE: f64 = 0.15;
-
-/// Above this, the reduced chi-square per pixel shows a residual.
-pub const RESIDUAL: f64 = 1.1;
 
 /// A leader that leaves the simulated range is followed if it gains this share of what the best gains, while
 /// the best leaves a residual.
@@ -176,7 +174,7 @@ fn follow_leaders(state: &mut SearchState<'_>, candidates: &mut [Candidate], pro
     } = state;
     for place in 0..LEADERS.min(candidates.len()) {
         let best = candidates[0].gain();
-        let worth = if mean_error(errors_now) - best > RESIDUAL {
+        let worth = if mean_error(errors_now) - best > EXPLAINED {
             WORTH_FOLLOWING
         } else {
             WORTH_COMPARING

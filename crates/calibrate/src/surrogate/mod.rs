@@ -9,7 +9,7 @@ mod recentred;
 
 use std::sync::Arc;
 
-use metalith_core::{Progress, Result};
+use metalith_core::{Error, Progress, Result};
 use rayon::prelude::*;
 
 use crate::effects::Parameter;
@@ -27,6 +27,10 @@ const ONE_SIDED: [f64; 3] = [0.8, 1.8, 3.5];
 /// And beside what was found, on both sides, and where it can only be positive.
 const BESIDE: [f64; 2] = [-1.25, 1.25];
 const BESIDE_ONE_SIDED: [f64; 2] = [0.8, 2.2];
+
+/// Most that the images of one simulation of all parameters may take (bytes). Sets of 36 captures of 128 x 128 pixels of 0.5 um take
+/// 0.4 GB so, and 0.5 to 0.8 GB in all: a search holds images about what it finds too.
+const MOST_BYTES: f64 = 1.2e10;
 
 /// How far a fit may extrapolate, as a multiple of the simulated range.
 const EXTRAPOLATION: f64 = 1.6;
@@ -86,12 +90,11 @@ impl Surrogate {
         smooth: Option<(&PerCapture<LedIndex>, usize)>,
         progress: &dyn Progress,
     ) -> Result<Self> {
+        let nodes = nodes_of(model, about, multiples);
+        check_memory(model, &nodes, smooth.is_some())?;
         let mut points = vec![ParameterPoint::new(about.to_vec())];
-        let mut nodes: Vec<Vec<f64>> = Vec::new();
-        for s in 0..model.slots().len() {
-            let own = offsets(model, about, s, multiples);
+        for (s, own) in nodes.iter().enumerate() {
             points.extend(own.iter().map(|offset| point_at(about, s, *offset)));
-            nodes.push(own);
         }
         if smooth.is_some() {
             points.extend(SmoothTerm::all().map(|term| ParameterPoint::with(about, term)));
@@ -100,17 +103,8 @@ impl Surrogate {
         let base = images.next().expect("the first point is the base");
         let curves = nodes
             .into_iter()
-            .zip(model.slots())
-            .zip(about)
-            .map(|((nodes, slot), &own)| {
-                let changes: Vec<_> = images
-                    .by_ref()
-                    .take(nodes.len())
-                    .map(|i| change(&i, &base, 1.0))
-                    .collect();
-                let kinked = model.kinked(slot.effect) && about.iter().all(|v| *v == 0.0);
-                Curve::new(own, nodes, changes, kinked)
-            })
+            .enumerate()
+            .map(|(s, nodes)| curve(model, (about, s), nodes, &mut images, &base))
             .collect();
         let mut terms = Vec::new();
         if let Some((led, leds)) = smooth {
@@ -128,6 +122,37 @@ impl Surrogate {
             curves,
             smooth: Arc::new(terms),
             stated: None,
+        })
+    }
+
+    /// The same images for a model with more parameters, of which `known` are simulated here already, by slot. Those that are new
+    /// are simulated where the others are zero, as these must be here.
+    ///
+    /// # Errors
+    /// As [`ForwardModel::images`].
+    pub fn widened(&self, model: &dyn ForwardModel, known: &[Option<usize>], progress: &dyn Progress) -> Result<Self> {
+        debug_assert!(self.about.iter().all(|v| *v == 0.0));
+        let about = vec![0.0; known.len()];
+        let mut points = Vec::new();
+        let mut nodes = Vec::new();
+        for (s, known) in known.iter().enumerate() {
+            let own = match known {
+                Some(_) => Vec::new(),
+                None => offsets(model, &about, s, [&TWO_SIDED, &ONE_SIDED]),
+            };
+            points.extend(own.iter().map(|offset| point_at(&about, s, *offset)));
+            nodes.push(own);
+        }
+        let mut images = model.images(&points, progress)?.into_iter();
+        let curves = nodes.into_iter().zip(known).enumerate();
+        let curves = curves.map(|(s, (nodes, known))| match known {
+            Some(known) => self.curves[*known].clone(),
+            None => curve(model, (&about, s), nodes, &mut images, &self.base),
+        });
+        Ok(Self {
+            curves: curves.collect(),
+            about,
+            ..self.clone()
         })
     }
 
@@ -227,6 +252,42 @@ impl Surrogate {
     }
 }
 
+/// Refuse captures whose images a calibration could not hold, before any work is spent on them.
+///
+/// # Errors
+/// With what they would take, and what takes less.
+pub fn check_calibration_fits(model: &dyn ForwardModel) -> Result<()> {
+    let nothing = vec![0.0; model.slots().len()];
+    check_memory(model, &nodes_of(model, &nothing, [&TWO_SIDED, &ONE_SIDED]), true)
+}
+
+/// The same of images at these offsets of each parameter, and of smooth terms.
+fn check_memory(model: &dyn ForwardModel, nodes: &[Vec<f64>], smooth: bool) -> Result<()> {
+    let smooth = if smooth { SmoothTerm::all().count() } else { 0 };
+    let images = 1 + nodes.iter().map(Vec::len).sum::<usize>() + smooth;
+    let bytes = images as f64 * model.image_bytes();
+    if bytes <= MOST_BYTES {
+        return Ok(());
+    }
+    Err(Error::invalid(
+        format!(
+            "the images of these captures under {images} changes of chip and bench take about {:.0} GB of memory, and a search \
+             as much again; at most {:.0} GB are taken for them",
+            bytes * 1e-9,
+            MOST_BYTES * 1e-9
+        ),
+        "give smaller windows (`rows` and `cols` of [camera]) or fewer captures, or try fewer effects (`--effects NAMES`): memory goes \
+         with the area of a window on the sensor, whatever its pixels",
+    ))
+}
+
+/// Offsets of each parameter from `about`.
+fn nodes_of(model: &dyn ForwardModel, about: &[f64], multiples: [&[f64]; 2]) -> Vec<Vec<f64>> {
+    (0..model.slots().len())
+        .map(|s| offsets(model, about, s, multiples))
+        .collect()
+}
+
 /// Offsets of one parameter from `about` within its physical range; its ends, if all are beyond them. By multiples of the typical
 /// size: where it has two sides, and where it can only be positive.
 fn offsets(model: &dyn ForwardModel, about: &[f64], s: usize, [two_sided, one_sided]: [&[f64]; 2]) -> Vec<f64> {
@@ -243,6 +304,20 @@ fn offsets(model: &dyn ForwardModel, about: &[f64], s: usize, [two_sided, one_si
     }
     let ends = [range.0 - about[s], range.1 - about[s]];
     ends.into_iter().filter(|o| *o != 0.0).collect()
+}
+
+/// How one parameter changes the images of a base point: the next of `images` are those at its `nodes`.
+fn curve(
+    model: &dyn ForwardModel,
+    (about, s): (&[f64], usize),
+    nodes: Vec<f64>,
+    images: &mut impl Iterator<Item = PerCapture<PixelGrid>>,
+    base: &PerCapture<PixelGrid>,
+) -> Curve {
+    let own = images.take(nodes.len());
+    let changes: Vec<_> = own.map(|i| change(&i, base, 1.0)).collect();
+    let kinked = model.kinked(model.slots()[s].effect) && about.iter().all(|v| *v == 0.0);
+    Curve::new(about[s], nodes, changes, kinked)
 }
 
 /// The point at such an offset.

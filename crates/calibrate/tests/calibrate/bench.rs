@@ -118,3 +118,44 @@ fn saturated_peaks_are_masked() {
     assert_eq!(names(&d), ["gap"], "{}", d.sentence());
     assert_eq!(d.effects[0].holds(GAP_UM), Some(true), "{}", d.sentence());
 }
+
+/// Dark current of a long exposure is not that of a short one: one dark frame of both is refused, unless the lab says that it holds.
+#[test]
+fn exposures_of_unlike_time_have_dark_frames_of_their_own() {
+    /// Single precision.
+    const ROUNDING: f32 = 1e-3;
+    let folder = tempfile::tempdir().unwrap();
+    let path = small_set(folder.path());
+    let frame = |dn: f32| Array2::from_elem((PIXELS, PIXELS), dn);
+    write_npy(&folder.path().join("dark.npy"), &frame(41.0));
+    write_npy(&folder.path().join("long_dark.npy"), &frame(140.0));
+    write_npy(&folder.path().join("e0_500_z0.npy"), &frame(540.0));
+    let stated = fs::read_to_string(&path).unwrap();
+    let read = |of_camera: &str, of_exposure: &str| {
+        let text = stated
+            .replace(
+                "flux_sigma = 0.01",
+                &format!("flux_sigma = 0.01\ndark_frame = \"dark.npy\"\ndark_frames = 16\n{of_camera}"),
+            )
+            .replacen("scale_dn = 1.0\n", &format!("scale_dn = 8.0\n{of_exposure}"), 1);
+        fs::write(&path, text).unwrap();
+        MeasuredSet::read(folder.path(), &GdsPillars, &Silent)
+    };
+    let error = read("", "").unwrap_err().to_string();
+    for part in ["unlike time", "8 DN", "dark_frames", "dark_holds_for"] {
+        assert!(error.contains(part), "{part} is not in:\n{error}");
+    }
+    let own = "dark_frame = \"long_dark.npy\"\ndark_frames = 16\n";
+    for (of_camera, of_exposure, first) in [("", own, 440.0), ("dark_holds_for = \"any_exposure\"\n", "", 539.0)] {
+        let set = read(of_camera, of_exposure).unwrap();
+        let at = |capture: usize| set.captures.raw[capture].dn[[20, 21]];
+        assert!((at(0) - first).abs() < ROUNDING, "{}", at(0));
+        // The others have that of the camera: 1 DN of dark current.
+        assert!((at(1) - 39.0).abs() < ROUNDING, "{}", at(1));
+    }
+    // One that is named and not there is one fault.
+    let error = read("", "dark_frame = \"none.npy\"\ndark_frames = 16\n")
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("none.npy") && !error.contains("unlike time"), "{error}");
+}

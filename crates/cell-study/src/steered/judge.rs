@@ -28,7 +28,7 @@ pub(super) fn judge(
     let half_um = lens.lattice().sites() as f64 * lens.lattice().pitch_um() / 2.0;
     let rows = ElementRow::of_element(
         &RADII.map(|radius| radius * half_um),
-        &RealRow::DIRECTIONS,
+        &RealRow::directions([wedge.sin_x, wedge.sin_y]),
         |radius_um, direction, pillars| phase.row(radius_um, direction, pillars),
         width_nm,
     );

@@ -72,7 +72,7 @@ impl WholeFile {
     /// Begin to write the file that is to stand at `target`, creating its folder if need be.
     ///
     /// # Errors
-    /// If the folder or file cannot be created, or another process is writing the same file.
+    /// If the folder or file cannot be created, a folder stands at `target`, or another process is writing the same file.
     pub fn create(target: &Path) -> Result<Self> {
         let folder = target.parent().filter(|p| !p.as_os_str().is_empty());
         if let Some(folder) = folder {
@@ -84,6 +84,13 @@ impl WholeFile {
                 "name a file, not a folder",
             )
         })?;
+        // Found only when the file is put in its place otherwise, after all the work.
+        if target.is_dir() {
+            return Err(Error::invalid(
+                format!("{} is a folder", target.display()),
+                "name a file in it, or another file",
+            ));
+        }
         let part = target.with_file_name(format!(".{}.part", name.to_string_lossy()));
         let file = part::open(&part, target)?;
         Ok(Self {

@@ -220,4 +220,9 @@ fn pipes_and_folders_are_refused() {
     std::fs::remove_file(&part).unwrap();
     std::fs::create_dir(&part).unwrap();
     assert!(refused().contains("not an ordinary file"));
+    std::fs::remove_dir(&part).unwrap();
+    // Where the file itself is to stand, before any of it is written.
+    std::fs::create_dir(&target).unwrap();
+    assert!(refused().contains("is a folder"));
+    assert!(!part.exists());
 }

@@ -2,10 +2,11 @@
 
 use metalith_core::{Lattice, PillarShape, WidthMap};
 use ndarray::{Array2, ArrayView2, Axis};
+use serde::Serialize;
 
 /// One of the eight symmetries of the square, as GDSII writes it: mirrored about the x axis first
 /// (y to -y), then turned counter-clockwise.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub struct Symmetry {
     pub mirrored: bool,
     /// Quarter turns counter-clockwise, 0 to 3.

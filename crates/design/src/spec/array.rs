@@ -2,10 +2,14 @@
 
 use serde::Serialize;
 
+use super::footprint::{Footprint, um};
 use super::lens::WAVELENGTH;
 use super::{CellSpec, LensSpec, term};
+use metalith_core::Wedge;
 use metalith_core::document::{Limits, Section};
-use metalith_core::{Lattice, Wedge};
+
+/// Wavelength at which the wedges of the paper steer by their angles (nm).
+const PAPER_WEDGE_NM: f64 = 550.0;
 
 /// Elements of one lens, each with a wedge of its own: on a grid, or wherever each is said to be.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -78,15 +82,22 @@ impl Element {
 }
 
 impl ArraySpec {
-    /// The array; `phase` is the section of the phase that all elements share.
+    /// The array; `phase` is the section of the phase that all elements share, `mapping_um` the wavelength of the mapping.
     pub(crate) fn read(
         s: &Section<'_, '_>,
         lens: &LensSpec,
         phase: &Section<'_, '_>,
         cell: &CellSpec,
+        mapping_um: f64,
         placed: &[Section<'_, '_>],
     ) -> Self {
-        let wedge_wavelength_um = s.optional_float("wedge_wavelength_nm", WAVELENGTH).unwrap_or(550.0) * 1e-3;
+        let default_um = match cell.is_of_the_paper() {
+            true => PAPER_WEDGE_NM * 1e-3,
+            false => lens.focused_um().unwrap_or(mapping_um),
+        };
+        let wedge_wavelength_um = s
+            .optional_float("wedge_wavelength_nm", WAVELENGTH)
+            .map_or(default_um, |nm| nm * 1e-3);
         let spec = if placed.is_empty() {
             Self::read_grid(s, lens, cell, wedge_wavelength_um)
         } else {
@@ -116,15 +127,19 @@ impl ArraySpec {
             [s.float("spacing_um", range); 2]
         };
         let spacing_nm = spacing_um.map(|um| whole_nm(s, "spacing_um", um));
-        let near = |side_nm: &i64| (0..2).any(|axis| count[axis] > 1.0 && spacing_nm[axis] < *side_nm);
-        if let Some(side_nm) = square_nm(lens.diameter_nm, cell).filter(near)
+        let near = |side_nm: &[i64; 2]| (0..2).any(|axis| count[axis] > 1.0 && spacing_nm[axis] < side_nm[axis]);
+        let sides_nm = Footprint::of(lens, 0.0, cell).map(|footprint| footprint.sides_nm());
+        if let Some([x, y]) = sides_nm.filter(near)
             && s.has("spacing_um")
         {
             s.fault_given(
                 &["lens.diameter_um", "cell.pitch_nm", "array.elements"],
                 "spacing_um",
-                "neighbouring lenses overlap, or the squares about them do",
-                format!("use at least {} um: the lens with its lattice", side_nm as f64 * 1e-3),
+                "neighbouring lenses overlap, or the boxes about their pillars do",
+                match x == y {
+                    true => format!("use at least {} um: the lens with its lattice", um(x)),
+                    false => format!("use at least [{}, {}] um: the lens with its lattice", um(x), um(y)),
+                },
             );
         }
         let spec = Self {
@@ -202,31 +217,6 @@ impl ArraySpec {
         spec
     }
 
-    /// Elements stand on lattices of one size: their squares must not overlap, or pillars could be of either.
-    fn apart(&self, lens: &LensSpec, cell: &CellSpec, sections: &[Section<'_, '_>]) {
-        let Some(side_nm) = square_nm(self.largest_nm(lens), cell) else {
-            return;
-        };
-        for (k, s) in sections.iter().enumerate() {
-            let (x, y) = self.placed[k].centre_nm;
-            let near = |p: &PlacedSpec| (x - p.centre_nm.0).abs().max((y - p.centre_nm.1).abs()) < side_nm;
-            if let Some(other) = self.placed[..k].iter().position(near) {
-                s.fault_given(
-                    &["lens.diameter_um", "cell.pitch_nm"],
-                    "x_um",
-                    format!(
-                        "this lens overlaps that of element ({}, 0), or the square about it does",
-                        other + 1
-                    ),
-                    format!(
-                        "place them at least {} um apart along x or along y: the largest lens with its lattice",
-                        side_nm as f64 * 1e-3
-                    ),
-                );
-            }
-        }
-    }
-
     /// The lens of the element of an index: its own, or that all share.
     pub fn lens_of<'a>(&'a self, shared: &'a LensSpec, index: (i32, i32)) -> &'a LensSpec {
         self.placed(index).and_then(|p| p.lens.as_ref()).unwrap_or(shared)
@@ -235,6 +225,18 @@ impl ArraySpec {
     /// What an element is, if it was placed by itself.
     pub fn placed(&self, index: (i32, i32)) -> Option<&PlacedSpec> {
         self.placed.get(usize::try_from(index.0).ok()?.checked_sub(1)?)
+    }
+
+    /// What the lens of an element is rotated by (degrees).
+    pub fn rotation_deg(&self, index: (i32, i32)) -> f64 {
+        self.placed(index).map_or(0.0, |p| p.rotation_deg)
+    }
+
+    /// Whether lenses that need so much along x and along y (nm) have room beside one another, as far as a grid tells.
+    pub(crate) fn has_room_for(&self, sides_nm: [i64; 2]) -> bool {
+        let counts = [self.count.0, self.count.1];
+        let spacings_nm = [self.spacing_nm, self.spacing_y_nm.unwrap_or(self.spacing_nm)];
+        self.placed.is_empty() && (0..2).all(|axis| counts[axis] == 1 || spacings_nm[axis] >= sides_nm[axis])
     }
 
     /// Whether an element has a lens of its own, or one that is rotated.
@@ -303,15 +305,6 @@ impl ArraySpec {
             Some(y) => format!("{} by {} um", um(self.spacing_nm), um(y)),
         })
     }
-}
-
-/// Edge of the squares that elements take whose largest lens has this diameter (nm): where two do not overlap, their pillars are
-/// a pitch apart at least. None where there is no lattice, which is a mistake of its own.
-fn square_nm(diameter_nm: u32, cell: &CellSpec) -> Option<i64> {
-    let lattice = Lattice::of_kind_covering(cell.lattice, diameter_nm, cell.pitch_nm).ok()?;
-    // From the first site of a row to the last; places of a hexagonal lattice are half a pitch apart.
-    let across_nm = (lattice.sites() as i64 - 1) * i64::from(lattice.steps_nm()[0]);
-    Some(across_nm + i64::from(lattice.pitch_nm()))
 }
 
 /// Index of each of so many elements of an axis, and its place in half steps from the middle.

@@ -148,6 +148,26 @@ impl CellSpec {
             && self.under.is_empty()
     }
 
+    /// Whether it is another than that of the paper, as far as the keys of its section have no fault: what is published does not
+    /// hold of it.
+    pub(crate) fn is_known_to_be_another(&self, s: &Section<'_, '_>) -> bool {
+        let keys = [
+            "cell.pitch_nm",
+            "cell.lattice",
+            "cell.shape",
+            "cell.pillar_height_nm",
+            "cell.width_min_nm",
+            "cell.width_max_nm",
+            "cell.pillar_material",
+            "cell.substrate_material",
+            "cell.ambient_index",
+            "cell.ambient_material",
+            "cell.spacer_nm",
+            "cell.residual_nm",
+        ];
+        !self.is_of_the_paper() && s.sound(&keys)
+    }
+
     /// Whether a mapping asks only for widths that may be written, to within half a step.
     pub fn fits(&self, mapping: &InversePolynomial) -> bool {
         let (low, high) = mapping.range();

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::outline::{self, DIAMETER, LensOutline};
 use super::{CellSpec, term};
-use crate::phase::{Interpolation, PhaseTerm, RadialPhase};
+use crate::phase::{Interpolation, PhaseTerm, RadialPhase, TermForm};
 use metalith_core::document::{Limits, Section};
 use metalith_core::{Lattice, Result};
 
@@ -90,14 +90,38 @@ impl LensSpec {
         s.finish();
     }
 
-    /// Read the files that its phase names.
+    /// Read the files that its phase names, of the phases over the plane those that elements of this lens have.
     ///
     /// # Errors
     /// [`metalith_core::Error::Table`] for one that cannot be used.
-    pub(crate) fn load(&mut self) -> Result<()> {
-        let radius_um = self.radius_um();
+    pub(crate) fn load(&mut self, is_had: impl Fn(&PhaseTerm) -> bool) -> Result<()> {
+        let (radius_um, ends_um) = (self.radius_um(), self.ends_um());
         self.phase.load(radius_um)?;
-        self.terms.iter_mut().try_for_each(|term| term.load(radius_um))
+        let mut had = self.terms.iter_mut().filter(|term| is_had(term));
+        had.try_for_each(|term| term.load(radius_um, ends_um))
+    }
+
+    /// Least and greatest place of the aperture from the middle, along x and along y (um), as the phase has it: before the element
+    /// is rotated.
+    fn ends_um(&self) -> [[f64; 2]; 2] {
+        match &self.outline {
+            Some(outline) => outline.ends_nm().map(|ends| ends.map(|nm| nm as f64 / 1e3)),
+            None => [[-self.radius_um(), self.radius_um()]; 2],
+        }
+    }
+
+    /// Wavelength that its hyperbola focuses (um), of its radius or the first over the plane; none where it has no hyperbola.
+    pub fn focused_um(&self) -> Option<f64> {
+        let terms = self.terms.iter().filter_map(|term| match &term.form {
+            TermForm::Radial(radial) => Some(radial),
+            _ => None,
+        });
+        std::iter::once(&self.phase)
+            .chain(terms)
+            .find_map(|radial| match radial {
+                RadialPhase::Hyperbola { wavelength_um, .. } => Some(*wavelength_um),
+                _ => None,
+            })
     }
 
     /// Half the diameter (um).

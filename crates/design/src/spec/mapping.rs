@@ -46,12 +46,35 @@ pub struct MappingComparison {
     pub wavelengths_um: Vec<f64>,
 }
 
+/// The cell that there is a published mapping of, in words.
+const PUBLISHED_CELL: &str = "only square pillars of `sin_luke_2015`, 700 nm high, 350 nm apart, on fused silica in air have a published mapping";
+
 impl MappingSpec {
-    pub(crate) fn read(s: &Section<'_, '_>, cell: &CellSpec, array: &ArraySpec) -> Self {
+    /// The wavelength that the mapping is made for (um), which other sections go by.
+    pub(crate) fn read_wavelength(s: &Section<'_, '_>, cell: &CellSpec) -> f64 {
+        if cell.is_known_to_be_another(s) {
+            let expected = format!("the wavelength in nm that the mapping is made for; {PUBLISHED_CELL}");
+            s.must_have("wavelength_nm", &expected);
+        }
+        s.optional_float("wavelength_nm", WAVELENGTH)
+            .map_or(InversePolynomial::published().wavelength_um, |nm| nm * 1e-3)
+    }
+
+    /// The mapping, made for a wavelength (um).
+    pub(crate) fn read(s: &Section<'_, '_>, wavelength_um: f64, cell: &CellSpec, array: &ArraySpec) -> Self {
         let published = InversePolynomial::published();
-        let wavelength_um = s
-            .optional_float("wavelength_nm", WAVELENGTH)
-            .map_or(published.wavelength_um, |nm| nm * 1e-3);
+        let rotated = cell.shape.rectangles().is_some();
+        if !rotated && !s.has("table") && cell.is_known_to_be_another(s) {
+            let [least, greatest] = [cell.width_range_nm.0, cell.width_range_nm.1].map(f64::from);
+            let pitch = f64::from(cell.pitch_nm);
+            let expected = format!(
+                "those of this cell, or a `table`, as `metalith cells` finds them ({PUBLISHED_CELL}); it can begin with \
+                 `coefficients = [{:.5}, {:.5}]`, a straight line over the widths",
+                least / pitch,
+                (greatest - least) / pitch
+            );
+            s.must_have("coefficients", &expected);
+        }
         let basis = s.choice(
             "basis",
             &[("all_powers", Basis::AllPowers), ("even_powers", Basis::EvenPowers)],
@@ -66,7 +89,10 @@ impl MappingSpec {
             s.fault(
                 "coefficients",
                 "a mapping of no coefficients gives no width",
-                "list those of u^0, u^1, ..., or leave `coefficients` out for the published ones",
+                match cell.is_of_the_paper() {
+                    true => "list those of u^0, u^1, ..., or leave `coefficients` out for the published ones",
+                    false => "list those of u^0, u^1, ...",
+                },
             );
         }
         let polynomial = InversePolynomial {
@@ -74,7 +100,6 @@ impl MappingSpec {
             basis,
             coefficients,
         };
-        let rotated = cell.shape.rectangles().is_some();
         if rotated {
             for key in ["coefficients", "table", "basis", "steered"]
                 .into_iter()

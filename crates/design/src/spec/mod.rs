@@ -2,6 +2,7 @@
 
 mod array;
 mod cell;
+mod footprint;
 mod layout;
 mod lens;
 mod mapping;
@@ -13,6 +14,7 @@ mod verify;
 
 pub use array::{ArraySpec, Element, PlacedSpec};
 pub use cell::{CellSpec, UnderSpec};
+pub(crate) use footprint::Footprint;
 pub use layout::{ApertureSpec, ChipSpec, Hierarchy, Layers, LayoutLayer, LayoutSpec, MarkSpec};
 pub use lens::LensSpec;
 pub use mapping::{MappingComparison, MappingSpec};

@@ -16,9 +16,9 @@ pub struct OptimiseSpec {
     /// First and last wavelength (um): those of the design's band where the section does not say them. And their distance.
     pub band_um: (f64, f64),
     pub step_um: f64,
-    /// Whether the section says its band, and the distance.
+    /// Whether the section says its band, the distance, and that of the views.
     #[serde(skip)]
-    said: [bool; 2],
+    said: [bool; 3],
     /// Largest wrapped phase step from ring to ring (turns); 0.5 is no limit.
     pub step_limit_turns: f64,
     pub start: StartSpec,
@@ -134,6 +134,8 @@ impl OptimiseSpec {
                 (b[0] * 1e-3, b[1] * 1e-3)
             });
         let solver = SolverSpec::read(s, images);
+        let views = s.optional_section("views");
+        let says_step = |s: &Section<'_, '_>| s.has("step_nm");
         let spec = Self {
             fidelity: s.choice(
                 "cell",
@@ -146,7 +148,7 @@ impl OptimiseSpec {
             ),
             solver,
             band_um: (short, long),
-            said: ["band_nm", "step_nm"].map(|key| s.has(key)),
+            said: [s.has("band_nm"), says_step(s), views.as_ref().is_some_and(says_step)],
             step_um: s
                 .optional_float("step_nm", Limits::new(0.1..=50.0, "nm"))
                 .unwrap_or(1.0)
@@ -172,9 +174,7 @@ impl OptimiseSpec {
             seed: s.optional_integer("seed", 0..=i64::MAX, "").unwrap_or(1) as u64,
             merit,
             robust: s.optional_section("robust").map(|r| RobustSpec::read(&r)),
-            views: s
-                .optional_section("views")
-                .map_or_else(|| default.views.clone(), |v| ViewSpec::read(&v)),
+            views: views.map_or_else(|| default.views.clone(), |v| ViewSpec::read(&v)),
             memory_mb: s
                 .optional_integer("memory_mb", 16..=1 << 20, "MB")
                 .map_or(if images { 8192 } else { default.memory_mb }, |m| m as u64),
@@ -185,20 +185,31 @@ impl OptimiseSpec {
 
     /// Take the band of the design where the section does not say its own, at as many wavelengths as the visible has.
     pub(crate) fn within(&mut self, band_um: (f64, f64)) {
-        let [band, step] = self.said;
+        let [band, step, step_of_views] = self.said;
         if !band {
             self.band_um = band_um;
         }
+        // Whole picometres: whole nanometres in the visible, to the last bit.
+        let part_um = |parts: f64| ((self.band_um.1 - self.band_um.0) * 1e6 / parts).round().max(1.0) / 1e3 * 1e-3;
         if !step {
-            // Whole picometres: 1 nm in the visible, to the last bit.
-            let pm = ((self.band_um.1 - self.band_um.0) * 1e6 / STEPS).round();
-            self.step_um = pm / 1e3 * 1e-3;
+            self.step_um = part_um(STEPS);
         }
+        if !step_of_views {
+            self.views.step_um = part_um(STEPS_OF_VIEWS);
+        }
+    }
+
+    /// The band that the section says (um), if it does.
+    pub(crate) fn said_band_um(&self) -> Option<(f64, f64)> {
+        self.said[0].then_some(self.band_um)
     }
 }
 
 /// Steps of a band: one of 1 nm in the visible.
 const STEPS: f64 = 300.0;
+
+/// Steps of a band where images are expected: one of 10 nm in the visible.
+const STEPS_OF_VIEWS: f64 = 30.0;
 
 impl Default for OptimiseSpec {
     fn default() -> Self {
@@ -206,7 +217,7 @@ impl Default for OptimiseSpec {
             fidelity: Fidelity::Rigorous,
             solver: SolverSpec::EXCHANGE,
             band_um: (0.4, 0.7),
-            said: [false; 2],
+            said: [false; 3],
             step_um: 1e-3,
             step_limit_turns: 0.2,
             start: StartSpec::All,

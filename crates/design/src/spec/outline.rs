@@ -122,6 +122,14 @@ impl LensOutline {
         &self.corners_nm
     }
 
+    /// Least and greatest place along x and along y (nm).
+    pub fn ends_nm(&self) -> [[i64; 2]; 2] {
+        [0, 1].map(|axis| {
+            let places = || self.corners_nm.iter().map(|&(x, y)| [x, y][axis]);
+            [places().min().unwrap_or(0), places().max().unwrap_or(0)]
+        })
+    }
+
     /// Whether a place from the middle of the element (nm) is inside or on the rim.
     pub fn holds(&self, x: i64, y: i64) -> bool {
         is_inside(sides(&self.corners_nm), x, y)

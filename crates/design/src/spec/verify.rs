@@ -64,15 +64,15 @@ pub struct LimitSpec {
     pub strehl_ratio_min: f64,
     /// Distance of the centroids (um).
     pub centroid_shift_max_um: f64,
-    /// Largest difference of the MTF at 42.7 and 85.3 line pairs a millimetre.
+    /// Largest difference of the MTF at half and at all of the finest frequency that the pixels tell.
     pub mtf_difference_max: f64,
     /// Root mean square difference of the PSFs over that of the designed one.
     pub psf_difference_max: f64,
     /// Least contrast of a point of the scene in white light in any channel of the camera, pixel included, along the
     /// worse of x and y.
     pub white_mtf_min: f64,
-    /// Frequency that it counts at (line pairs a millimetre).
-    pub white_mtf_lp_mm: f64,
+    /// Frequency that it counts at (line pairs a millimetre), where it is not half of the finest that the pixels of the camera tell.
+    pub white_mtf_lp_mm: Option<f64>,
     /// Least share of the light of a point, of what arrives in any channel of the camera, in a square of two pixels.
     pub white_energy_2_pixels_min: f64,
 }
@@ -130,11 +130,13 @@ impl VerifySpec {
     }
 }
 
-/// The cell that judges: the best that is made for such pillars if it is left out.
+/// The cell that judges, if it is left out: unlike neighbours for the cell that they were compared with real rows of, else
+/// equal ones.
 fn read_fidelity(s: &Section<'_, '_>, cell: &CellSpec) -> Fidelity {
-    let best = match Fidelity::Neighbours.refusal(cell.shape, cell.lattice) {
-        None => Fidelity::Neighbours,
-        Some(_) => Fidelity::Rigorous,
+    let usual = if cell.is_of_the_paper() {
+        Fidelity::Neighbours
+    } else {
+        Fidelity::Rigorous
     };
     let choices = [
         ("neighbours", Fidelity::Neighbours),
@@ -142,7 +144,7 @@ fn read_fidelity(s: &Section<'_, '_>, cell: &CellSpec) -> Fidelity {
         ("fitted", Fidelity::Fitted),
         ("published", Fidelity::Published),
     ];
-    let fidelity = s.choice("fidelity", &choices, Some(best));
+    let fidelity = s.choice("fidelity", &choices, Some(usual));
     if let Some((what, hint)) = fidelity.refusal(cell.shape, cell.lattice) {
         s.fault_given(&["cell.shape", "cell.lattice"], "fidelity", what, hint);
     }
@@ -160,7 +162,7 @@ impl LimitSpec {
             mtf_difference_max: f64::MAX,
             psf_difference_max: f64::MAX,
             white_mtf_min: 0.0,
-            white_mtf_lp_mm: 42.7,
+            white_mtf_lp_mm: None,
             white_energy_2_pixels_min: 0.0,
         };
         let Some(s) = section else { return limits };
@@ -180,9 +182,8 @@ impl LimitSpec {
         let share = |key| s.optional_float(key, Limits::new(0.0..=1.0, "")).unwrap_or(0.0);
         limits.white_mtf_min = share("white_mtf_min");
         limits.white_energy_2_pixels_min = share("white_energy_2_pixels_min");
-        if let Some(lp_mm) = s.optional_float("white_mtf_lp_mm", Limits::new(1.0..=1000.0, "line pairs a millimetre")) {
-            limits.white_mtf_lp_mm = lp_mm;
-        }
+        limits.white_mtf_lp_mm =
+            s.optional_float("white_mtf_lp_mm", Limits::new(1.0..=1000.0, "line pairs a millimetre"));
         s.finish();
         limits
     }

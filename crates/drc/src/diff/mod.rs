@@ -19,7 +19,7 @@ use std::io::Read;
 
 use super::work::Allowance;
 use content::{Content, Strings, WantedPillars};
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{ElementSite, Error, Progress, Result};
 use metalith_gds::extract::{Scale, discover};
 use metalith_gds::{LayerNumber, Layout, Selection};
 
@@ -64,6 +64,7 @@ pub fn diff(a: &Layout, b: &Layout, plan: &DiffPlan, progress: &dyn Progress) ->
             Err(other) => return Err(other),
         }
     }
+    ElementSite::widen(&mut sites);
     let total: u64 = sites.iter().map(|s| (s.lattice.sites() as u64).pow(2)).sum();
     let most = Allowance::of([a, b]).sites;
     if total > most {

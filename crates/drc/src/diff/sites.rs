@@ -20,11 +20,18 @@ pub(super) fn unite(known: &mut Vec<ElementSite>, more: Vec<ElementSite>) {
     }
 }
 
-/// Outermost sites along an axis (nm).
+/// Outermost places of pillars along an axis (nm).
 fn ends(site: &ElementSite, axis: usize) -> (i64, i64) {
-    let reach = &site.lattice.reach()[axis];
-    let at = |k| site.centre_nm[axis] + site.lattice.place_nm(axis, k);
-    (at(reach.start), at(reach.end - 1))
+    let [first, last] = site.ends_nm(axis, &site.reach()[axis]);
+    (first, last)
+}
+
+/// The ends of the pillars of both from a middle (nm).
+fn within(a: &ElementSite, b: &ElementSite, middle_nm: [i64; 2]) -> [[i64; 2]; 2] {
+    [0, 1].map(|axis| {
+        let ((a0, a1), (b0, b1)) = (ends(a, axis), ends(b, axis));
+        [a0.min(b0), a1.max(b1)].map(|end| end - middle_nm[axis])
+    })
 }
 
 fn overlap(a: &ElementSite, b: &ElementSite) -> bool {
@@ -44,6 +51,7 @@ fn cover(a: &ElementSite, b: &ElementSite) -> Option<ElementSite> {
         let larger = if a.lattice.sites() < b.lattice.sites() { b } else { a };
         return (a.centre_nm == b.centre_nm).then(|| ElementSite {
             name: a.name.clone(),
+            within_nm: Some(within(a, b, a.centre_nm)),
             ..larger.clone()
         });
     }
@@ -62,9 +70,11 @@ fn cover(a: &ElementSite, b: &ElementSite) -> Option<ElementSite> {
     if half % 2 != 0 {
         return None;
     }
+    let centre_nm = first.map(|f| f + half / 2);
     Some(ElementSite {
         name: a.name.clone(),
-        centre_nm: first.map(|f| f + half / 2),
+        centre_nm,
+        within_nm: Some(within(a, b, centre_nm)),
         lattice: Lattice::new(a.lattice.pitch_nm(), sites as usize).ok()?,
     })
 }
@@ -79,6 +89,7 @@ mod tests {
             name: "e".into(),
             centre_nm: [x, x],
             lattice: Lattice::new(350, sites).unwrap(),
+            within_nm: None,
         };
         let mut known = vec![site(0, 10)];
         unite(&mut known, vec![site(175, 11), site(100_000, 4)]);

@@ -1,24 +1,43 @@
 //! Where the elements of a layout from anywhere are, and on which lattice they stand.
 
-use super::lattices::Cluster;
+use super::lattices::{Cluster, FEWEST};
 use super::places::{Centre, Places};
 use super::sites::Scale;
 use super::sizes::Sizes;
-use super::tiles::MOST_TILES;
+use super::tiles::{COARSE, FINE, MOST_TILES};
 use crate::{
     Error, ExtractionError, LayerNumber, Layout, LayoutCell, PillarFinder, Rect, Result, Selection, Shape, Transform,
     Visitor,
 };
 use metalith_core::{ElementSite, PillarShape, Progress};
 
-/// Wider shapes are pads or marks (nm).
-const WIDEST_NM: i64 = 6000;
+/// How a layout is looked at.
+#[derive(Clone, Copy)]
+struct Look {
+    /// Of the side of a tile.
+    bits: u32,
+    /// Wider shapes are pads or marks (nm).
+    widest_nm: i64,
+}
+
+/// As nearly all lenses ask for.
+const CLOSE: Look = Look {
+    bits: FINE,
+    widest_nm: 6000,
+};
+/// For wider pitches, up to the widest of a design. Marks and pads are taken for pillars then too: a second look, where the first
+/// finds no closer lattice.
+const WIDE: Look = Look {
+    bits: COARSE,
+    widest_nm: 20_000,
+};
 /// Elements found at most.
 const MOST_ELEMENTS: usize = 4096;
 
 /// What stands on the layers of pillars of a layout.
 struct Map {
     scale: Scale,
+    widest_nm: i64,
     /// Squares and circles.
     pillars: Places,
     /// Rectangles at any angle, of whatever size.
@@ -44,7 +63,8 @@ pub struct Discovered {
     pub shape: PillarShape,
 }
 
-/// Find the elements of a layout whose pillars are on these layers.
+/// Find the elements of a layout whose pillars are on these layers, each with the ends of its pillars: see
+/// [`ElementSite::widen`].
 pub fn discover(
     layout: &Layout,
     from: &Selection,
@@ -52,7 +72,6 @@ pub fn discover(
     scale: Scale,
     progress: &dyn Progress,
 ) -> Result<Discovered> {
-    let mut map = Map::new(scale);
     let selection = Selection {
         layers: Some(layers.to_vec()),
         ..from.clone()
@@ -61,42 +80,19 @@ pub fn discover(
         path: layout.path().to_owned(),
         cause,
     };
-    layout.visit(&selection, &mut map, progress)?;
-    let [squares, circles] = map.shapes;
-    let rectangles = (map.sizes.rectangles > squares + circles)
-        .then(|| map.sizes.pillars(WIDEST_NM))
-        .flatten();
-    let shape = match &rectangles {
-        Some(found) => PillarShape::Rectangle(found.pillars),
-        None if circles > squares => PillarShape::Circle,
-        None => PillarShape::Square,
-    };
-    let places = match rectangles {
-        None => map.pillars,
-        // All of one size: they are at their places already.
-        Some(found) if found.count == map.sizes.rectangles => map.tilted,
-        Some(_) => {
-            let mut search = Search {
-                scale,
-                finder: PillarFinder::new(shape, scale.nm(1.0)),
-                pillars: Places::new(scale),
-            };
-            layout.visit(&selection, &mut search, progress)?;
-            search.pillars
+    let look = |how: Look| seen(layout, &selection, scale, how, progress);
+    let close = look(CLOSE)?;
+    let Seen { mut sites, shape, .. } = if close.may_be_wider() {
+        match look(WIDE) {
+            Ok(wide) if wide.holds_a_lens() => wide,
+            // What a second look cannot tell is no fault of the layout.
+            Ok(_) | Err(Error::Extraction { .. }) => close,
+            Err(other) => return Err(other),
         }
-    };
-    let Some(tiles) = places.finish() else {
-        return Err(fail(ExtractionError::Scattered { most: MOST_TILES }));
+    } else {
+        close
     };
     let layers = || layers.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
-    let mut sites = Vec::new();
-    for members in tiles.clusters() {
-        let cluster = Cluster {
-            tiles: &tiles,
-            members: &members,
-        };
-        sites.extend(cluster.element().map_err(fail)?);
-    }
     if sites.is_empty() {
         return Err(fail(ExtractionError::NoElements { layers: layers() }));
     }
@@ -114,12 +110,81 @@ pub fn discover(
     Ok(Discovered { sites, shape })
 }
 
+/// What one look at a layout finds.
+struct Seen {
+    sites: Vec<ElementSite>,
+    shape: PillarShape,
+    /// Shapes that may be pillars by their outline, however wide.
+    shapes: u64,
+}
+
+impl Seen {
+    /// Whether a look for wider pitches may find more: nothing was found, or no lattice that is closer than such pitches are.
+    fn may_be_wider(&self) -> bool {
+        let is_wide = |site: &ElementSite| i64::from(site.lattice.pitch_nm()) > CLOSE.widest_nm;
+        self.shapes >= FEWEST && self.sites.iter().all(is_wide)
+    }
+
+    /// Whether there are elements, none of a pitch that no design has.
+    fn holds_a_lens(&self) -> bool {
+        let is_known = |site: &ElementSite| i64::from(site.lattice.pitch_nm()) <= WIDE.widest_nm;
+        !self.sites.is_empty() && self.sites.iter().all(is_known)
+    }
+}
+
+/// Look at what stands on the layers of a selection.
+fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progress: &dyn Progress) -> Result<Seen> {
+    let fail = |cause| Error::Extraction {
+        path: layout.path().to_owned(),
+        cause,
+    };
+    let mut map = Map::new(scale, how);
+    layout.visit(selection, &mut map, progress)?;
+    let [squares, circles] = map.shapes;
+    let shapes = squares + circles + map.sizes.rectangles;
+    let rectangles = (map.sizes.rectangles > squares + circles)
+        .then(|| map.sizes.pillars(how.widest_nm))
+        .flatten();
+    let shape = match &rectangles {
+        Some(found) => PillarShape::Rectangle(found.pillars),
+        None if circles > squares => PillarShape::Circle,
+        None => PillarShape::Square,
+    };
+    let places = match rectangles {
+        None => map.pillars,
+        // All of one size: they are at their places already.
+        Some(found) if found.count == map.sizes.rectangles => map.tilted,
+        Some(_) => {
+            let mut search = Search {
+                scale,
+                finder: PillarFinder::new(shape, scale.nm(1.0)),
+                pillars: Places::new(scale, how.bits),
+            };
+            layout.visit(selection, &mut search, progress)?;
+            search.pillars
+        }
+    };
+    let Some(tiles) = places.finish() else {
+        return Err(fail(ExtractionError::Scattered { most: MOST_TILES }));
+    };
+    let mut sites = Vec::new();
+    for members in tiles.clusters() {
+        let cluster = Cluster {
+            tiles: &tiles,
+            members: &members,
+        };
+        sites.extend(cluster.element().map_err(fail)?);
+    }
+    Ok(Seen { sites, shape, shapes })
+}
+
 impl Map {
-    fn new(scale: Scale) -> Self {
+    fn new(scale: Scale, how: Look) -> Self {
         Self {
             scale,
-            pillars: Places::new(scale),
-            tilted: Places::new(scale),
+            widest_nm: how.widest_nm,
+            pillars: Places::new(scale, how.bits),
+            tilted: Places::new(scale, how.bits),
             shapes: [0; 2],
             sizes: Sizes::default(),
         }
@@ -127,10 +192,10 @@ impl Map {
 
     /// The middle of the box around a shape, if it may be a pillar by that.
     #[inline]
-    fn square(r: &Rect, scale: Scale) -> Option<Centre> {
+    fn square(r: &Rect, scale: Scale, widest_nm: i64) -> Option<Centre> {
         let centre = Centre::of(r, scale)?;
         let width = scale.whole_nm(r.width())?;
-        (r.width() == r.height() && width <= WIDEST_NM).then_some(centre)
+        (r.width() == r.height() && width <= widest_nm).then_some(centre)
     }
 }
 
@@ -179,7 +244,11 @@ impl Visitor for Map {
             return Ok(());
         };
         self.shapes[usize::from(shape.rect.is_none())] += copies;
-        let centre = |placement: &Transform| placement.apply_rect(rect).and_then(|r| Self::square(&r, scale));
+        let widest_nm = self.widest_nm;
+        let centre = |placement: &Transform| {
+            let placed = placement.apply_rect(rect)?;
+            Self::square(&placed, scale, widest_nm)
+        };
         self.pillars.add(placements, centre);
         Ok(())
     }

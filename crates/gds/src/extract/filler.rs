@@ -1,4 +1,4 @@
-//! Squares onto the sites of elements.
+//! Pillars onto the sites of elements.
 
 use std::collections::HashMap;
 
@@ -10,7 +10,7 @@ use super::sites::{Scale, Sites, Standing};
 use crate::{DrawnPillar, ExtractionError, Rect, Transform};
 use metalith_core::{EighthMap, ElementSite, WidthRows};
 
-/// Puts squares on the sites of elements.
+/// Puts pillars on the sites of elements.
 ///
 /// A cell that is placed by all symmetries of the square about the middle of an element, as folded layouts have it, is
 /// put there once: of an element with no other pillars an eighth is held.
@@ -157,7 +157,7 @@ impl Filler {
         (sets.is_empty() && orbits.iter().all(whole)).then_some(orbits)
     }
 
-    /// Put a square of the current cell on its sites in all of its `placements`, if symmetry makes one of them stand for
+    /// Put a pillar of the current cell on its sites in all of its `placements`, if symmetry makes one of them stand for
     /// all; else nothing is put and they are to be put one by one.
     #[inline]
     pub fn put_orbits(&mut self, r: &Rect, placements: &[Transform], takes: impl Fn(i64) -> bool) -> bool {
@@ -181,7 +181,7 @@ impl Filler {
         true
     }
 
-    /// Site (row, column) and width (nm) of a square in the first placement of an orbit, if the others put it on all
+    /// Site (row, column) and width (nm) of a pillar in the first placement of an orbit, if the others put it on all
     /// copies of that site, all of them free.
     #[inline]
     fn site_of(&self, orbit: &Orbit, r: &Rect, placements: &[Transform]) -> Option<(usize, usize, u16)> {
@@ -207,14 +207,14 @@ impl Filler {
         Some((row, column, width_nm))
     }
 
-    /// Element, row, column and width (nm) of a square on a site.
+    /// Element, row, column and width (nm) of a pillar on a site.
     #[inline]
     fn standing(&self, r: &Rect, guess: &mut u32) -> Result<(u32, usize, usize, u16), Why> {
         if !self.scale.reaches(r) {
             return Err(Why::OutsideElements);
         }
         if r.width() != r.height() {
-            return Err(Why::NotSquare);
+            return Err(Why::UnequalSides);
         }
         let width_nm = self.scale.whole_nm(r.width()).ok_or(Why::OddShape)?;
         let (element, row, column) = self.site(r, width_nm, guess)?;
@@ -334,7 +334,7 @@ impl Filler {
         there
     }
 
-    /// Of a square and the one that is on its site already, leave the wider there; the other, as a
+    /// Of a pillar and the one that is on its site already, leave the wider there; the other, as a
     /// rectangle about the same site. Both have even widths.
     pub fn keep_wider(&mut self, r: &Rect, placement: usize) -> Rect {
         let Standing::Site(element, row, column) = self.sites.stand(r, &mut self.guesses[placement]) else {

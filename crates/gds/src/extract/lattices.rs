@@ -6,14 +6,14 @@ use super::tiles::TileMap;
 use crate::{ExtractionError, Point, Rect};
 use metalith_core::{ElementSite, Lattice, LatticeKind};
 
-/// Fewer squares together are no element.
-const FEWEST: u64 = 16;
+/// Fewer pillars together are no element.
+pub(super) const FEWEST: u64 = 16;
 /// One in so many tiles at least shows a row between those of its samples, where two arrays make a hexagonal lattice: all do but
 /// those that pillars reach by their rims.
 const ROWS_BETWEEN: usize = 4;
 /// All centres but one in so many at most are sites of a hexagonal lattice.
 const SHARE_OF_SITES: u64 = 4;
-/// Lattice sites for each square found: a lens fills 0.79 of its lattice.
+/// Lattice sites for each pillar found: a lens fills 0.79 of its lattice.
 const SITES_PER_PILLAR: u64 = 64;
 
 /// Tiles next to one another, which may be an element.
@@ -24,10 +24,10 @@ pub(super) struct Cluster<'a> {
 }
 
 impl Cluster<'_> {
-    /// Its lattice; none if it is too small to be an element.
+    /// Its lattice, and how far its pillars reach; none if it is too small to be an element.
     pub fn element(&self) -> Result<Option<ElementSite>, ExtractionError> {
-        let squares: u64 = self.members.iter().map(|&k| self.tiles.squares(k)).sum();
-        if squares < FEWEST {
+        let pillars: u64 = self.members.iter().map(|&k| self.tiles.pillars(k)).sum();
+        if pillars < FEWEST {
             return Ok(None);
         }
         let mut steps = [BTreeMap::<i64, u64>::new(), BTreeMap::new()];
@@ -41,7 +41,7 @@ impl Cluster<'_> {
                 }
             }
         }
-        if let Some(element) = self.hexagonal(squares, &steps)? {
+        if let Some(element) = self.hexagonal(pillars, &steps)? {
             return Ok(Some(element));
         }
         let [mut steps, along_y] = steps;
@@ -55,7 +55,7 @@ impl Cluster<'_> {
         let (x, columns) = self.places(0, step, [bounds.x0, bounds.x1]);
         let (y, rows) = self.places(1, step, [bounds.y0, bounds.y1]);
         let sites = columns.max(rows);
-        dense_enough(squares, sites, &bounds, [columns, rows], step as f64 / 2.0)?;
+        dense_enough(pillars, sites, &bounds, [columns, rows], step as f64 / 2.0)?;
         let centre = |first: i64, count: i64| first - (sites - count) / 2 * step + (sites - 1) * step / 2;
         let (twice_x, twice_y) = (centre(x, columns), centre(y, rows));
         let bad = ExtractionError::Lattice {
@@ -68,10 +68,13 @@ impl Cluster<'_> {
         let Ok(lattice) = Lattice::new((step / 2) as u32, sites as usize) else {
             return Err(bad);
         };
+        let ends =
+            |first: i64, count: i64, twice: i64| [first - twice, first + (count - 1) * step - twice].map(|c| c / 2);
         Ok(Some(ElementSite {
             name: String::new(),
             centre_nm: [twice_x / 2, twice_y / 2],
             lattice,
+            within_nm: Some([ends(x, columns, twice_x), ends(y, rows, twice_y)]),
         }))
     }
 
@@ -112,7 +115,7 @@ impl Cluster<'_> {
     /// Its hexagonal lattice, if most centres are a pitch or half of one apart along x, and along y as far as its
     /// rows, or twice as far with rows between them. Samples of a tile may be of one row alone, or of every other one where two
     /// arrays make the lattice.
-    fn hexagonal(&self, squares: u64, steps: &[BTreeMap<i64, u64>; 2]) -> Result<Option<ElementSite>, ExtractionError> {
+    fn hexagonal(&self, pillars: u64, steps: &[BTreeMap<i64, u64>; 2]) -> Result<Option<ElementSite>, ExtractionError> {
         let [Some(step_x), Some(step_y)] = [0, 1].map(|axis: usize| most_common(steps[axis].clone())) else {
             return Ok(None);
         };
@@ -149,13 +152,15 @@ impl Cluster<'_> {
         let high = row.max(rows - 1 - row);
         let sites = 2 * reach.max((high * step_y + step_x - 1) / step_x) + 1;
         let centre = [x + column * step_x, y + row * step_y];
-        dense_enough(squares, sites, &bounds, [columns, rows], pitch_nm.into())?;
+        let ends = |step: i64, before: i64, count: i64| [-before * step / 2, (count - 1 - before) * step / 2];
+        dense_enough(pillars, sites, &bounds, [columns, rows], pitch_nm.into())?;
         let lattice = Lattice::of_kind(LatticeKind::Hexagonal, pitch_nm, sites as usize);
         match lattice {
             Ok(lattice) if centre.iter().all(|c| c % 2 == 0) => Ok(Some(ElementSite {
                 name: String::new(),
                 centre_nm: centre.map(|c| c / 2),
                 lattice,
+                within_nm: Some([ends(step_x, column, columns), ends(step_y, row, rows)]),
             })),
             _ => Err(ExtractionError::Lattice {
                 pitch_nm: f64::from(pitch_nm),
@@ -168,19 +173,19 @@ impl Cluster<'_> {
 /// Coordinates of a place along x and along y.
 const AXES: [fn(Point) -> i64; 2] = [|s| s.x, |s| s.y];
 
-/// Nothing, if so many squares fill a lattice of so many places an axis well enough to be one.
+/// Nothing, if so many pillars fill a lattice of so many places an axis well enough to be one.
 fn dense_enough(
-    squares: u64,
+    pillars: u64,
     sites: i64,
     bounds: &Rect,
     [columns, rows]: [i64; 2],
     pitch_nm: f64,
 ) -> Result<(), ExtractionError> {
-    if (sites as u64).saturating_pow(2) <= squares.saturating_mul(SITES_PER_PILLAR) + (1 << 16) {
+    if (sites as u64).saturating_pow(2) <= pillars.saturating_mul(SITES_PER_PILLAR) + (1 << 16) {
         return Ok(());
     }
     Err(ExtractionError::Sparse {
-        squares,
+        pillars,
         at_nm: [bounds.x0 / 2, bounds.y0 / 2],
         columns,
         rows,

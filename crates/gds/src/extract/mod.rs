@@ -2,7 +2,7 @@
 //!
 //! Nothing here knows how the file was written: pillars are what stands on the pillar layer with every
 //! reference followed. Elements stand where a design says ([`Elements::Given`]), or where clusters of
-//! squares on a common lattice are found ([`Elements::Discover`]).
+//! pillars on a common lattice are found ([`Elements::Discover`]).
 
 mod discover;
 mod filler;
@@ -157,13 +157,12 @@ fn sites_of(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) -> 
             sites: sites.clone(),
             shape: PillarShape::default(),
         },
-        Elements::Discover => discover(
-            layout,
-            &plan.selection(),
-            &[plan.pillar_layer],
-            Scale::of(layout)?,
-            progress,
-        )?,
+        Elements::Discover => {
+            let scale = Scale::of(layout)?;
+            let mut found = discover(layout, &plan.selection(), &[plan.pillar_layer], scale, progress)?;
+            ElementSite::widen(&mut found.sites);
+            found
+        }
     };
     found.shape = plan.shape.unwrap_or(found.shape);
     Ok(found)

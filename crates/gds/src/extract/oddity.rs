@@ -6,16 +6,16 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Why {
-    /// A square in an element, its centre not on a site. (A square of odd width may be half a database
+    /// A pillar in an element, its centre not on a site. (One of odd width may be half a database
     /// unit off: no place of its edges on the grid is nearer.)
     OffLattice,
     /// An upright rectangle with unequal sides.
-    NotSquare,
+    UnequalSides,
     /// Neither an upright rectangle nor a circle, or not a whole number of nanometres wide.
     OddShape,
-    /// A second square on a site that has one.
+    /// A second pillar on a site that has one.
     DuplicateSite,
-    /// A square whose centre is in no element.
+    /// A pillar whose centre is in no element.
     OutsideElements,
     /// Wider than the pitch: it overlaps its neighbours' sites.
     TooWide,
@@ -27,7 +27,7 @@ impl Why {
     /// All reasons, in the order of [`Oddities::by_why`].
     pub const ALL: [Self; 7] = [
         Self::OffLattice,
-        Self::NotSquare,
+        Self::UnequalSides,
         Self::OddShape,
         Self::DuplicateSite,
         Self::OutsideElements,
@@ -39,7 +39,7 @@ impl Why {
     pub fn words(self) -> &'static str {
         match self {
             Self::OffLattice => "off the lattice",
-            Self::NotSquare => "not square",
+            Self::UnequalSides => "sides unequal",
             Self::OddShape => "no outline of a pillar",
             Self::DuplicateSite => "second pillar on its site",
             Self::OutsideElements => "outside every element",

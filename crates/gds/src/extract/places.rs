@@ -39,11 +39,12 @@ pub(super) struct Places {
 }
 
 impl Places {
-    pub fn new(scale: Scale) -> Self {
+    /// By tiles whose side is two to the power of `bits` (half nm).
+    pub fn new(scale: Scale, bits: u32) -> Self {
         Self {
             scale,
-            tiles: TileMap::new(),
-            own: TileMap::new(),
+            tiles: TileMap::new(bits),
+            own: TileMap::new(bits),
             placements: Vec::new(),
             guesses: Vec::new(),
             scattered: false,

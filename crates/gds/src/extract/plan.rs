@@ -10,8 +10,9 @@ use metalith_core::{ElementSite, PillarShape, WidthMap};
 pub enum Elements {
     /// As a design says.
     Given(Vec<ElementSite>),
-    /// Wherever clusters of squares are: pitch and phase of the lattice from their distances, its centre
-    /// from the middle of the outermost. Elements less than 8 um apart count as one.
+    /// Wherever clusters of pillars are: pitch and phase of the lattice from their distances, its centre
+    /// from the middle of the outermost. Elements less than 8 um apart count as one; where no pitch is
+    /// below 6 um, those less than 33 um apart.
     Discover,
 }
 

@@ -49,7 +49,7 @@ impl Scale {
     }
 }
 
-/// Where a square stands.
+/// Where a pillar stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Standing {
     /// On site (row, column) of an element.
@@ -81,7 +81,7 @@ impl Grid {
             first: [first(0), first(1)],
             step,
             inverse: step.map(|step| 1.0 / step as f64),
-            reach: lattice.reach().map(|reach| [reach.start as i64, reach.end as i64]),
+            reach: site.reach().map(|reach| [reach.start as i64, reach.end as i64]),
             staggered: !lattice.is_square(),
             pitch_nm: i64::from(lattice.pitch_nm()),
         }
@@ -151,13 +151,13 @@ impl Sites {
         self.grids[element as usize].pitch_nm
     }
 
-    /// Where a square stands. `guess` is the element to try first, and is set to the one found.
+    /// Where a pillar stands. `guess` is the element to try first, and is set to the one found.
     #[inline]
-    pub fn stand(&self, square: &Rect, guess: &mut u32) -> Standing {
-        let x = (square.x0 + square.x1) * self.scale.num;
-        let y = (square.y0 + square.y1) * self.scale.num;
+    pub fn stand(&self, pillar: &Rect, guess: &mut u32) -> Standing {
+        let x = (pillar.x0 + pillar.x1) * self.scale.num;
+        let y = (pillar.y0 + pillar.y1) * self.scale.num;
         // Half a database unit, doubled and scaled.
-        let slack = [square.x1 - square.x0, square.y1 - square.y0].map(|edge| edge % 2 * self.scale.num);
+        let slack = [pillar.x1 - pillar.x0, pillar.y1 - pillar.y0].map(|edge| edge % 2 * self.scale.num);
         if let Some(standing) = self.try_element(*guess, x, y, slack) {
             return standing;
         }
@@ -209,6 +209,7 @@ mod tests {
             name: String::new(),
             centre_nm: [x, 0],
             lattice,
+            within_nm: None,
         };
         let sites = Sites::new(&[site(0), site(10_000)], Scale { num: 1, den: 1 });
         let mut guess = 0;
@@ -236,6 +237,29 @@ mod tests {
         assert_eq!(sites.stand(&square(175, 175, 101), &mut guess), Standing::Site(0, 2, 2));
     }
 
+    /// Two strips one above the other, nearer than their lattices are wide and in step with one another: each pillar is of the strip
+    /// that it is in, whichever was met before.
+    #[test]
+    fn sites_of_elements_whose_lattices_overlap() {
+        let strip = |y| ElementSite {
+            name: String::new(),
+            centre_nm: [0, y],
+            lattice: Lattice::new(400, 100).unwrap(),
+            within_nm: Some([[-19_800, 19_800], [-3_800, 3_800]]),
+        };
+        let sites = Sites::new(&[strip(0), strip(8_000)], Scale { num: 1, den: 1 });
+        for before in [0, 1] {
+            let stand = |y| {
+                let mut guess = before;
+                sites.stand(&square(200, y, 100), &mut guess)
+            };
+            assert_eq!(stand(3_800), Standing::Site(0, 59, 50));
+            assert_eq!(stand(4_200), Standing::Site(1, 40, 50));
+            assert_eq!(stand(-4_200), Standing::Outside);
+            assert_eq!(stand(11_800), Standing::Site(1, 59, 50));
+        }
+    }
+
     /// Every other place of the grid of a hexagonal lattice, and rows no farther than columns.
     #[test]
     fn sites_of_a_hexagonal_lattice() {
@@ -244,6 +268,7 @@ mod tests {
             name: String::new(),
             centre_nm: [1000, 0],
             lattice,
+            within_nm: None,
         };
         let sites = Sites::new(&[site], Scale { num: 1, den: 1 });
         let mut guess = 0;
@@ -265,6 +290,7 @@ mod tests {
             name: String::new(),
             centre_nm: [0, 0],
             lattice: Lattice::new(350, 4).unwrap(),
+            within_nm: None,
         };
         let mut guess = 0;
         let fine = Sites::new(std::slice::from_ref(&site), Scale { num: 1, den: 2 });

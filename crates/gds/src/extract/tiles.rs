@@ -4,25 +4,25 @@ use std::collections::HashMap;
 
 use crate::{Point, Rect, Transform};
 
-/// Side of a tile (nm): two elements with an empty tile between them are two. Wider than any pitch, so that sparse places
-/// of a lens hold together.
-const TILE_NM: i64 = 1 << 13;
-/// The same in half nanometres, the unit of all places here.
-const TILE: i64 = 2 * TILE_NM;
+/// Side of a tile, two to this power half nanometres, the unit of all places here: 8.2 um. Two elements with an empty tile
+/// between them are two. Wider than pitches are, so that sparse places of a lens hold together.
+pub(super) const FINE: u32 = 14;
+/// The same for pitches up to 20 um: 33 um, the widest whose places are told by the numbers of [`TileMap::samples`].
+pub(super) const COARSE: u32 = 16;
 /// Tiles of a map at most: 5 x 5 lenses of 1 mm occupy 300,000, one of 10 mm 1.2 million.
 pub(super) const MOST_TILES: usize = 1 << 21;
 /// Bits of the place of a tile along an axis by which it is looked up first: 128 x 128 tiles are 1 mm.
 const LATELY: u32 = 7;
 /// Centres remembered a tile, to tell pitch and phase from.
 const SAMPLES: usize = 24;
-/// Parts of a tile along an axis that are known to be occupied or not: 1 um. Tiles of a cell that is placed between tiles
+/// Parts of a tile along an axis that are known to be occupied or not: 1 um of a fine one. Tiles of a cell that is placed between tiles
 /// occupy tiles to this accuracy.
 const PARTS: i64 = 8;
 
-/// Squares in one tile; places from the tile's corner. Small, because every square comes here.
+/// Pillars in one tile; places from the tile's corner. Small, because every pillar comes here.
 #[derive(Clone, Debug)]
 struct Tile {
-    squares: u64,
+    pillars: u64,
     /// Around all centres; beyond the tile if those of a placed cell are counted here together.
     low: (i32, i32),
     high: (i32, i32),
@@ -34,7 +34,7 @@ struct Tile {
 
 impl Tile {
     const EMPTY: Self = Self {
-        squares: 0,
+        pillars: 0,
         low: (i32::MAX, i32::MAX),
         high: (i32::MIN, i32::MIN),
         parts: 0,
@@ -48,33 +48,49 @@ impl Tile {
     }
 }
 
-/// Column and row of the tile that holds a place.
-#[inline]
-fn key_of(place: Point) -> (i64, i64) {
-    (place.x.div_euclid(TILE), place.y.div_euclid(TILE))
-}
-
-/// Centres of squares by tile.
+/// Centres of pillars by tile.
 pub(super) struct TileMap {
+    /// [`FINE`] or [`COARSE`].
+    bits: u32,
     numbers: HashMap<(i64, i64), u32>,
     tiles: Vec<((i64, i64), Tile)>,
     /// Some centres in each tile, as in the tile.
     samples: Vec<[(u16, u16); SAMPLES]>,
     /// The last centre of each tile that could have been a sample, alike: rows that are drawn after others are in no sample.
     last: Vec<(u16, u16)>,
-    /// Tiles met lately, by the low bits of their place: most squares are looked up here, without a hash.
+    /// Tiles met lately, by the low bits of their place: most pillars are looked up here, without a hash.
     lately: Vec<u32>,
 }
 
 impl TileMap {
-    pub fn new() -> Self {
+    /// Of tiles whose side is two to the power of `bits` (half nm).
+    pub fn new(bits: u32) -> Self {
         Self {
+            bits,
             numbers: HashMap::new(),
             tiles: Vec::new(),
             samples: Vec::new(),
             last: Vec::new(),
             lately: vec![0; 1 << (2 * LATELY)],
         }
+    }
+
+    /// Column and row of the tile that holds a place.
+    #[inline]
+    fn key_of(&self, place: Point) -> (i64, i64) {
+        (place.x >> self.bits, place.y >> self.bits)
+    }
+
+    /// A place from the corner of its tile.
+    #[inline]
+    fn within(&self, place: Point) -> (i64, i64) {
+        let mask = (1 << self.bits) - 1;
+        (place.x & mask, place.y & mask)
+    }
+
+    /// The corner of a tile.
+    fn corner(&self, (column, row): (i64, i64)) -> (i64, i64) {
+        (column << self.bits, row << self.bits)
     }
 
     pub fn clear(&mut self) {
@@ -93,15 +109,16 @@ impl TileMap {
         self.tiles.is_empty()
     }
 
-    /// Squares in a tile.
-    pub fn squares(&self, tile: usize) -> u64 {
-        self.tiles[tile].1.squares
+    /// Pillars in a tile.
+    pub fn pillars(&self, tile: usize) -> u64 {
+        self.tiles[tile].1.pillars
     }
 
     /// Around the centres in a tile (half nm).
     pub fn bounds(&self, tile: usize) -> Rect {
-        let ((column, row), tile) = &self.tiles[tile];
-        let place = |(x, y): (i32, i32)| (TILE * column + i64::from(x), TILE * row + i64::from(y));
+        let (key, tile) = &self.tiles[tile];
+        let corner = self.corner(*key);
+        let place = |(x, y): (i32, i32)| (corner.0 + i64::from(x), corner.1 + i64::from(y));
         let ((x0, y0), (x1, y1)) = (place(tile.low), place(tile.high));
         if tile.low.0 > tile.high.0 {
             return Rect::EMPTY;
@@ -111,23 +128,24 @@ impl TileMap {
 
     /// Centres remembered of a tile (half nm).
     pub fn samples(&self, tile: usize) -> impl Iterator<Item = Point> + '_ {
-        let ((column, row), Tile { sampled, .. }) = &self.tiles[tile];
+        let (key, Tile { sampled, .. }) = &self.tiles[tile];
+        let corner = self.corner(*key);
         self.samples[tile][..usize::from(*sampled)]
             .iter()
-            .map(move |&(x, y)| Point::new(TILE * column + i64::from(x), TILE * row + i64::from(y)))
+            .map(move |&(x, y)| Point::new(corner.0 + i64::from(x), corner.1 + i64::from(y)))
     }
 
     /// The last centre met in a tile that has samples (half nm).
     pub fn last(&self, tile: usize) -> Option<Point> {
-        let ((column, row), Tile { sampled, .. }) = &self.tiles[tile];
-        let (x, y) = self.last[tile];
-        (*sampled > 0).then(|| Point::new(TILE * column + i64::from(x), TILE * row + i64::from(y)))
+        let (key, Tile { sampled, .. }) = &self.tiles[tile];
+        let (corner, (x, y)) = (self.corner(*key), self.last[tile]);
+        (*sampled > 0).then(|| Point::new(corner.0 + i64::from(x), corner.1 + i64::from(y)))
     }
 
     /// The tile that holds a place; `guess` is the one to try first, and is set to it.
     #[inline]
     fn at(&mut self, place: Point, guess: &mut u32) -> usize {
-        let key = key_of(place);
+        let key = self.key_of(place);
         if self.tiles.get(*guess as usize).is_none_or(|(k, _)| *k != key) {
             let low = |v: i64| (v & ((1 << LATELY) - 1)) as usize;
             let lately = &mut self.lately[low(key.1) << LATELY | low(key.0)];
@@ -155,52 +173,57 @@ impl TileMap {
         self.last[tile] = (x as u16, y as u16);
     }
 
-    /// Count a square by its centre; it serves as a sample of the lattice if it is an `even` number of nm wide.
+    /// Count a pillar by its centre; it serves as a sample of the lattice if it is an `even` number of nm wide.
     #[inline]
     pub fn add(&mut self, centre: Point, even: bool, guess: &mut u32) {
         let number = self.at(centre, guess);
-        let (x, y) = (centre.x.rem_euclid(TILE), centre.y.rem_euclid(TILE));
+        let (x, y) = self.within(centre);
+        let part = |v: i64| (v * PARTS) >> self.bits;
+        let part = part(y) * PARTS + part(x);
         let tile = &mut self.tiles[number].1;
-        tile.squares += 1;
+        tile.pillars += 1;
         tile.include(x as i32, y as i32);
-        tile.parts |= 1 << (y * PARTS / TILE * PARTS + x * PARTS / TILE);
+        tile.parts |= 1 << part;
         if even {
             self.sample(number, x, y);
         }
     }
 
-    /// Add the tiles of a cell where a placement, which moves by half nanometres, puts them; whether there is room.
+    /// Add the tiles of a cell, as large as these, where a placement, which moves by half nanometres, puts them; whether there is
+    /// room.
     pub fn place(&mut self, cell: &Self, placement: &Transform) -> bool {
         let mut guess = 0;
-        for (number, ((column, row), tile)) in cell.tiles.iter().enumerate() {
+        for (number, (key, tile)) in cell.tiles.iter().enumerate() {
             let Some(bounds) = placement.apply_rect(&cell.bounds(number)) else {
                 continue;
             };
             let corners = [Point::new(bounds.x0, bounds.y0), Point::new(bounds.x1, bounds.y1)];
             let mut counted = 0;
             // What lies in one tile needs no parts.
-            if key_of(corners[0]) == key_of(corners[1]) {
+            if self.key_of(corners[0]) == self.key_of(corners[1]) {
                 counted = self.at(corners[0], &mut guess);
             } else {
-                let own = cell.bounds(number);
+                let (own, corner) = (cell.bounds(number), cell.corner(*key));
                 let middle = |k: i64, from: i64, low: i64, high: i64| {
-                    (TILE * from + (2 * k + 1) * TILE / (2 * PARTS)).clamp(low, high)
+                    (from + ((2 * k + 1) << cell.bits) / (2 * PARTS)).clamp(low, high)
                 };
                 for part in (0..PARTS * PARTS).filter(|part| tile.parts >> part & 1 == 1) {
-                    let x = middle(part % PARTS, *column, own.x0, own.x1);
-                    let y = middle(part / PARTS, *row, own.y0, own.y1);
+                    let x = middle(part % PARTS, corner.0, own.x0, own.x1);
+                    let y = middle(part / PARTS, corner.1, own.y0, own.y1);
                     counted = self.at(placement.apply(Point::new(x, y)), &mut guess);
                 }
             }
             for sample in cell.samples(number).chain(cell.last(number)) {
                 let sample = placement.apply(sample);
                 let tile = self.at(sample, &mut guess);
-                self.sample(tile, sample.x.rem_euclid(TILE), sample.y.rem_euclid(TILE));
+                let (x, y) = self.within(sample);
+                self.sample(tile, x, y);
             }
-            let ((column, row), sum) = &mut self.tiles[counted];
-            sum.squares += tile.squares;
+            let from = self.corner(self.tiles[counted].0);
+            let sum = &mut self.tiles[counted].1;
+            sum.pillars += tile.pillars;
             for corner in corners {
-                sum.include((corner.x - TILE * *column) as i32, (corner.y - TILE * *row) as i32);
+                sum.include((corner.x - from.0) as i32, (corner.y - from.1) as i32);
             }
             if self.len() > MOST_TILES {
                 return false;
@@ -240,30 +263,34 @@ impl TileMap {
 mod tests {
     use super::*;
 
-    /// Squares and bounds of each cluster.
+    /// Pillars and bounds of each cluster.
     fn found(map: &TileMap) -> Vec<(u64, Rect)> {
         let sum = |cluster: &Vec<usize>| {
             let mut bounds = Rect::EMPTY;
             cluster.iter().for_each(|&k| bounds.unite(&map.bounds(k)));
-            (cluster.iter().map(|&k| map.squares(k)).sum(), bounds)
+            (cluster.iter().map(|&k| map.pillars(k)).sum(), bounds)
         };
         let mut all: Vec<_> = map.clusters().iter().map(sum).collect();
         all.sort_unstable();
         all
     }
 
-    /// A disc of 60 um and a patch beside it, placed in all orientations and between tiles.
+    /// A disc of 60 um and a patch beside it, by tiles of either side, placed in all orientations and between tiles.
     #[test]
-    fn tiles_of_a_placed_cell_are_those_of_its_squares() {
+    fn tiles_of_a_placed_cell_are_those_of_its_pillars() {
+        [FINE, COARSE].into_iter().for_each(placed_as_its_pillars);
+    }
+
+    fn placed_as_its_pillars(bits: u32) {
         let lattice = |n: i64, at: i64| {
             (0..n * n)
                 .map(move |k| Point::new(at + 700 * (k % n), 700 * (k / n)))
                 .filter(move |p| (p.x - at - 350 * n).pow(2) + (p.y - 350 * n).pow(2) < (350 * n).pow(2))
         };
-        let squares: Vec<Point> = lattice(170, -333).chain(lattice(9, 200_001)).collect();
-        let mut cell = TileMap::new();
-        squares.iter().for_each(|&p| cell.add(p, true, &mut 0));
-        let (mut placed, mut direct) = (TileMap::new(), TileMap::new());
+        let pillars: Vec<Point> = lattice(170, -333).chain(lattice(9, 400_001)).collect();
+        let mut cell = TileMap::new(bits);
+        pillars.iter().for_each(|&p| cell.add(p, true, &mut 0));
+        let (mut placed, mut direct) = (TileMap::new(bits), TileMap::new(bits));
         for orientation in 0..8 {
             let placement = Transform::Square {
                 orientation,
@@ -271,13 +298,13 @@ mod tests {
                 dy: 77_777 * i64::from(orientation),
             };
             assert!(placed.place(&cell, &placement));
-            squares
+            pillars
                 .iter()
                 .for_each(|&p| direct.add(placement.apply(p), true, &mut 0));
         }
         assert_eq!(found(&placed), found(&direct));
         assert_eq!(found(&placed).len(), 16);
-        // Samples are where squares are.
+        // Samples are where pillars are.
         let all: std::collections::HashSet<Point> = (0..8)
             .flat_map(|orientation| {
                 let placement = Transform::Square {
@@ -285,7 +312,7 @@ mod tests {
                     dx: 1_000_000 * i64::from(orientation) + 12_345,
                     dy: 77_777 * i64::from(orientation),
                 };
-                squares.iter().map(move |&p| placement.apply(p)).collect::<Vec<_>>()
+                pillars.iter().map(move |&p| placement.apply(p)).collect::<Vec<_>>()
             })
             .collect();
         for tile in 0..placed.len() {

@@ -26,6 +26,7 @@ fn site(sites: usize) -> ElementSite {
         name: "e".into(),
         centre_nm: [CENTRE.0, CENTRE.1].map(i64::from),
         lattice: Lattice::new(350, sites).unwrap(),
+        within_nm: None,
     }
 }
 

@@ -21,6 +21,7 @@ fn foreign_lens() -> (ElementSite, WidthMap) {
         name: "lens".into(),
         centre_nm: [5000, -3000],
         lattice,
+        within_nm: None,
     };
     (site, widths)
 }
@@ -158,7 +159,7 @@ fn everything_that_is_not_a_pillar_is_listed() {
     gds.cell("TOP");
     gds.square(1, 175, 175, 100).square(1, 175, 175, 120); // doubled
     gds.square(1, 526, 175, 100); // off lattice
-    gds.rect(1, -225, 125, -125, 227); // not square
+    gds.rect(1, -225, 125, -125, 227); // sides unequal
     gds.polygon(1, &[(0, 600), (100, 600), (50, 700), (0, 600)]); // odd
     gds.square(1, 9000, 0, 100); // outside
     gds.square(1, -175, -175, 360); // too wide
@@ -183,6 +184,7 @@ fn everything_that_is_not_a_pillar_is_listed() {
         name: "e".into(),
         centre_nm: [0, 0],
         lattice: Lattice::new(350, 4).unwrap(),
+        within_nm: None,
     };
     let read = extract(&layout(gds.end()), &ExtractionPlan::given(PILLARS, vec![site]), &Silent).unwrap();
     assert_eq!(read.oddities.by_why, [1; 7]);
@@ -192,7 +194,7 @@ fn everything_that_is_not_a_pillar_is_listed() {
         [
             Why::DuplicateSite,
             Why::OffLattice,
-            Why::NotSquare,
+            Why::UnequalSides,
             Why::OddShape,
             Why::OutsideElements,
             Why::TooWide,
@@ -235,6 +237,64 @@ fn two_arrays_are_one_hexagonal_lattice() {
     if let Ok(other) = rows(false) {
         assert!(other.elements.iter().all(|e| e.site.lattice.is_square()));
     }
+}
+
+/// Pillars for long waves, as wide as designs may have them, on either lattice; pads beside a lens of close pillars are none.
+#[test]
+fn wide_pillars_are_found_and_pads_are_not() {
+    let found = |gds: &mut Gds| {
+        extract(
+            &layout(gds.end_cell().end()),
+            &ExtractionPlan::discover(PILLARS),
+            &Silent,
+        )
+    };
+    for (pitch, least, step) in [(7_000, 5_900, 20), (12_000, 3_000, 200), (20_000, 2_000, 400)] {
+        let mut gds = Gds::library();
+        gds.cell("TOP");
+        for k in 0..36 {
+            let [x, y] = [k % 6, k / 6].map(|i| pitch * i - 5 * pitch / 2);
+            gds.square(1, x, y, least + step * k);
+        }
+        let read = found(&mut gds).unwrap();
+        let [element] = &read.elements[..] else {
+            panic!("{pitch}: {} elements", read.elements.len())
+        };
+        let lattice = element.site.lattice;
+        assert_eq!((lattice.pitch_nm(), element.site.centre_nm), (pitch as u32, [0, 0]));
+        assert_eq!((read.pillars, read.oddities.total()), (36, 0), "{pitch}");
+        assert_eq!(element.widths.width_nm[[1, 2]], (least + 8 * step) as u16);
+    }
+    // Rows of a hexagonal lattice of 12 um are 10.392 um apart.
+    let mut gds = Gds::library();
+    gds.cell("TOP");
+    for row in -4..=4 {
+        for column in -4..=4 {
+            let x = 12_000 * column + if row % 2 == 0 { 0 } else { 6_000 };
+            gds.polygon(1, &circle_of_points(x, 10_392 * row, 9_000));
+        }
+    }
+    let read = found(&mut gds).unwrap();
+    let lattice = read.elements[0].site.lattice;
+    assert_eq!((lattice.kind(), lattice.pitch_nm()), (LatticeKind::Hexagonal, 12_000));
+    assert_eq!(
+        (read.elements.len(), read.pillars, read.shape),
+        (1, 81, PillarShape::Circle)
+    );
+
+    let mut gds = Gds::library();
+    gds.cell("TOP");
+    for k in 0..400 {
+        let [x, y] = [k % 20, k / 20].map(|i| 350 * i - 3_325);
+        gds.square(1, x, y, 200);
+        gds.square(1, 15_000 * (k % 20) + 20_000, 15_000 * (k / 20), 10_000);
+    }
+    let read = found(&mut gds).unwrap();
+    assert_eq!(
+        (read.elements.len(), read.pillars, read.oddities.total()),
+        (1, 400, 400)
+    );
+    assert_eq!(read.elements[0].site.lattice.pitch_nm(), 350);
 }
 
 /// Several lenses, found without being told, one of them a mirrored and magnified copy.

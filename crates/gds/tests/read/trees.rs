@@ -189,7 +189,7 @@ proptest! {
         }
         gds.end_cell();
         let layout = layout(gds.end());
-        let site = ElementSite { name: "element 1".into(), centre_nm: [x, y], lattice };
+        let site = ElementSite { name: "element 1".into(), centre_nm: [x, y], lattice, within_nm: None };
         let given = extract(&layout, &ExtractionPlan::given(PILLARS, vec![site.clone()]), &Silent).unwrap();
         let found = extract(&layout, &ExtractionPlan::discover(PILLARS), &Silent).unwrap();
         let same = |e: &Extraction| e.elements[0].widths == widths && e.oddities.total() == 0;

@@ -11,9 +11,6 @@ use num_complex::Complex64;
 /// Where rows begin, from the middle of the element (um).
 pub const RADII_UM: [f64; 4] = [60.0, 180.0, 300.0, 440.0];
 
-/// Directions away from the middle of a centre element, whose axes are all alike.
-const CENTRE: [[i32; 2]; 2] = [[1, 0], [1, 1]];
-
 /// Share of the light that models put elsewhere than the supercell of a row, mean of s and p.
 pub struct RowMisfit {
     pub radius_um: f64,
@@ -91,7 +88,7 @@ impl Prototype {
         let rule = WidthRule::new(&self.design.cell, &self.design.mapping);
         let mut rows = Vec::new();
         let mut first: [Vec<[Complex64; 2]>; 3] = Default::default();
-        let directions: &[_] = if along_normal { &CENTRE } else { &RealRow::DIRECTIONS };
+        let directions = RealRow::directions([sin_x, sin_y]);
         let lens = LensPhase::new(
             self.design.lattice(),
             self.design.lens.diameter_nm,
@@ -99,7 +96,7 @@ impl Prototype {
         );
         let phase = ElementPhase::new(&lens, &wedge);
         let turns = |radius: f64, direction: [i32; 2], pillars: usize| phase.row(radius, direction, pillars);
-        let all = ElementRow::of_element(&RADII_UM, directions, turns, |u| f64::from(rule.width_nm(u)));
+        let all = ElementRow::of_element(&RADII_UM, &directions, turns, |u| f64::from(rule.width_nm(u)));
         assert_eq!(all.len(), RADII_UM.len() * directions.len(), "rows within the lens");
         for ElementRow { radius_um, turns, row } in all {
             let direction = row.direction;

@@ -59,6 +59,11 @@ impl SceneStatistics {
         }
     }
 
+    /// Mean of the light of a scene, white being one.
+    pub fn mean_light() -> f64 {
+        MEAN.into()
+    }
+
     /// Planes of the picture (rows) from independent planes (columns).
     pub fn mixing(&self) -> DMatrix<f64> {
         let n = self.mix.len();

@@ -30,7 +30,8 @@ impl SceneImage {
     }
 }
 
-/// Read a depth map: NPY `[row, column]` of millimetres, or a grey PNG of 16 bits whose values are millimetres.
+/// Read a depth map: NPY `[row, column]` of millimetres, infinite for what is far, or a grey PNG of 16 bits whose values are
+/// millimetres.
 ///
 /// # Errors
 /// If the file cannot be read, holds something else, or a distance of less than a millimetre.
@@ -39,11 +40,11 @@ pub fn read_depth(path: &Path) -> Result<Array2<f32>> {
     let fault = |what: &str| {
         Error::invalid(
             format!("{}: {what}", path.display()),
-            "give an NPY of shape (rows, columns) or a grey PNG of 16 bits, distances of a millimetre and more, in millimetres",
+            "give an NPY of shape (rows, columns) or a grey PNG of 16 bits, distances of a millimetre and more, in millimetres; `inf` in an NPY is far away",
         )
     };
     let mm = if bytes.starts_with(b"\x93NUMPY") {
-        array(path, &bytes)?
+        array(path, &bytes)?.0
     } else if bytes.starts_with(b"\x89PNG") {
         let (values, deep) = png_values(path, &bytes)?;
         if !deep {
@@ -58,7 +59,7 @@ pub fn read_depth(path: &Path) -> Result<Array2<f32>> {
         return Err(fault("it has colours"));
     }
     if !first.iter().all(|v| *v >= NEAREST_MM) {
-        return Err(fault("it holds a distance below a millimetre"));
+        return Err(fault("it holds a distance below a millimetre, or no number"));
     }
     Ok(first.mapv(|v| (v * 1e3) as f32))
 }
@@ -81,7 +82,11 @@ mod tests {
         assert_eq!((depth[[0, 0]], depth[[15, 15]]), (1e3, 256e3));
         let scene = SceneImage::of_rgb("", &ndarray::Array3::zeros((16, 17, 3)), 60.0, f64::INFINITY);
         assert!(scene.with_depth(depth).is_err());
-        for near in [0.0, -2.0, 1e-6, f64::NAN] {
+        let mut values = [500.0; 256];
+        values[17] = f64::INFINITY;
+        write(&values);
+        assert_eq!(read_depth(&path).unwrap()[[1, 1]], f32::INFINITY);
+        for near in [0.0, -2.0, 1e-6, f64::NAN, f64::NEG_INFINITY] {
             let mut values = [500.0; 256];
             values[17] = near;
             write(&values);

@@ -6,7 +6,9 @@
 //! | scenes that need no file | `chart` |
 //! | a spectral cube as a few planes | `cube` |
 //! | how far each pixel is | `depth` |
+//! | larger pixels | `average` |
 
+mod average;
 mod chart;
 mod cube;
 mod depth;
@@ -17,6 +19,7 @@ use ndarray::{Array2, Array3};
 use crate::SceneView;
 use crate::spectra::{SceneSpectrum, linear_rgb, rgb_basis};
 
+pub use average::averaged;
 pub use chart::{BuiltIn, chart};
 pub(crate) use chart::{LEAN_DEG, SPOKES, STAR};
 pub use depth::read_depth;

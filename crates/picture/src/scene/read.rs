@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use metalith_core::file::read_at_most;
 use metalith_core::{Error, Result, npy, srgb};
-use ndarray::Array3;
+use ndarray::{Array3, Axis};
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
@@ -59,7 +59,7 @@ pub fn read_scene(file: &SceneFile) -> Result<SceneImage> {
     match (&file.wavelengths_nm, is_npy) {
         (Some(_), false) => Err(fault(path, "wavelengths are given, but this is no NPY file")),
         (Some(nm), true) => {
-            let array = array(path, &bytes)?;
+            let array = light(path, &bytes)?;
             let bands = array.dim().2;
             if nm.len() != bands || nm.len() < 2 || !nm.is_sorted_by(|a, b| a < b) || nm[0] <= 0.0 {
                 return Err(fault(
@@ -88,7 +88,7 @@ pub fn read_scene(file: &SceneFile) -> Result<SceneImage> {
         }
         (None, _) => {
             let rgb = match is_npy {
-                true => grey_or_colour(path, array(path, &bytes)?)?,
+                true => grey_or_colour(path, light(path, &bytes)?)?,
                 false => values(path, &bytes)?.mapv(srgb::linear),
             };
             Ok(SceneImage::of_rgb(&name, &rgb, file.field_deg, file.distance_um))
@@ -103,7 +103,7 @@ pub fn read_scene(file: &SceneFile) -> Result<SceneImage> {
 pub fn read_picture(path: &Path) -> Result<Array3<f64>> {
     let bytes = read_at_most(path, LONGEST, "a picture")?;
     if is_npy(&bytes) {
-        return Ok(grey_or_colour(path, array(path, &bytes)?)?.mapv(srgb::encoded));
+        return Ok(grey_or_colour(path, light(path, &bytes)?)?.mapv(srgb::encoded));
     }
     values(path, &bytes)
 }
@@ -143,17 +143,33 @@ fn check_sides(path: &Path, rows: usize, columns: usize) -> Result<()> {
     Err(fault(path, format!("it has {columns} x {rows} pixels")))
 }
 
-/// An array of two or three axes; one of two gets a third of one entry.
-pub(super) fn array(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
+/// An array of two or three axes, and whether it has whole numbers; one of two axes gets a third of one entry.
+pub(super) fn array(path: &Path, bytes: &[u8]) -> Result<(Array3<f64>, bool)> {
     let sides = |shape: &[u64]| (2..=3).contains(&shape.len()) && shape.iter().all(|n| *n <= *SIDES.end() as u64);
     let found = npy::read_from(Cursor::new(bytes), sides).map_err(|e| fault(path, e.to_string()))?;
     let shape: Vec<usize> = found.shape.iter().map(|n| *n as usize).collect();
     check_sides(path, shape[0], shape[1])?;
-    if found.values.iter().any(|v| !v.is_finite() || *v < 0.0) {
+    let bands = shape.get(2).copied().unwrap_or(1);
+    let array = Array3::from_shape_vec((shape[0], shape[1], bands), found.values);
+    Ok((array.map_err(|e| fault(path, e.to_string()))?, found.whole))
+}
+
+/// An array of linear light, white being one.
+fn light(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
+    let (array, whole) = array(path, bytes)?;
+    if whole {
+        return Err(Error::Table {
+            path: path.to_owned(),
+            line: None,
+            what: "it has whole numbers (uint8 or uint16), and linear light of which white is 1 has fractions".into(),
+            hint: "divide it by its white and save it as float32 or float64: `numpy.save(file, values / white)`; of values in sRGB make a PNG"
+                .into(),
+        });
+    }
+    if array.iter().any(|v| !v.is_finite() || *v < 0.0) {
         return Err(fault(path, "it holds light that is negative or no number"));
     }
-    let bands = shape.get(2).copied().unwrap_or(1);
-    Array3::from_shape_vec((shape[0], shape[1], bands), found.values).map_err(|e| fault(path, e.to_string()))
+    Ok(array)
 }
 
 fn grey_or_colour(path: &Path, array: Array3<f64>) -> Result<Array3<f64>> {
@@ -212,9 +228,49 @@ fn jpeg(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
     if data.len() != rows * columns * 3 {
         return Err(fault(path, "its colours are not those of a picture"));
     }
-    Ok(Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| {
+    let stored = Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| {
         f64::from(data[(y * columns + x) * 3 + c]) / 255.0
-    }))
+    });
+    Ok(upright(stored, decoder.exif().map_or(1, |exif| orientation(exif))))
+}
+
+/// How a camera was held, as EXIF numbers it from 1 to 8 (tag 274); 1, upright, if it does not say.
+fn orientation(exif: &[u8]) -> u16 {
+    const TAG: u16 = 274;
+    /// Bytes of an entry, and those before its value.
+    const ENTRY: [usize; 2] = [12, 8];
+    let little = exif.starts_with(b"II");
+    let word = |at: usize| {
+        let bytes = exif.get(at..at.checked_add(2)?)?.try_into().ok()?;
+        Some(match little {
+            true => u16::from_le_bytes(bytes),
+            false => u16::from_be_bytes(bytes),
+        })
+    };
+    let said = || {
+        let halves = [word(4)?, word(6)?].map(usize::from);
+        let first = match little {
+            true => halves[0] | halves[1] << 16,
+            false => halves[0] << 16 | halves[1],
+        };
+        let mut entries = (0..usize::from(word(first)?)).map(|k| first + 2 + k * ENTRY[0]);
+        word(entries.find(|at| word(*at) == Some(TAG))? + ENTRY[1])
+    };
+    said().filter(|o| (1..=8).contains(o)).unwrap_or(1)
+}
+
+/// A picture as it was seen by a camera that was held so.
+fn upright(mut stored: Array3<f64>, orientation: u16) -> Array3<f64> {
+    if orientation >= 5 {
+        stored.swap_axes(0, 1);
+    }
+    if matches!(orientation, 3 | 4 | 7 | 8) {
+        stored.invert_axis(Axis(0));
+    }
+    if matches!(orientation, 2 | 3 | 6 | 7) {
+        stored.invert_axis(Axis(1));
+    }
+    stored.as_standard_layout().into_owned()
 }
 
 #[cfg(test)]
@@ -243,11 +299,15 @@ pub(super) mod tests {
 
     /// An NPY file of doubles in rows; `shape` as Python writes it.
     pub fn npy_bytes(shape: &str, values: &[f64]) -> Vec<u8> {
-        let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
+        npy_of("<f8", shape, values.iter().flat_map(|v| v.to_le_bytes()))
+    }
+
+    fn npy_of(kind: &str, shape: &str, values: impl Iterator<Item = u8>) -> Vec<u8> {
+        let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}\n");
         let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
         bytes.extend((header.len() as u16).to_le_bytes());
         bytes.extend(header.as_bytes());
-        values.iter().for_each(|v| bytes.extend(v.to_le_bytes()));
+        bytes.extend(values);
         bytes
     }
 
@@ -291,6 +351,70 @@ pub(super) mod tests {
         assert!((at(550.0) - 0.5).abs() < SINGLE);
     }
 
+    /// A JPEG of a camera that was held otherwise is turned upright, whatever the order of its bytes.
+    #[test]
+    fn photographs_stand_upright() {
+        let plain = std::fs::read("../../tests/mutants/small.jpg").unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.jpg");
+        let read = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).unwrap();
+            read_picture(&path).unwrap()
+        };
+        let stored = read(&plain);
+        let (rows, columns, _) = stored.dim();
+        assert_ne!(rows, columns);
+        let held = |orientation: u8, little: bool| {
+            let entry = |tag: u16, value: u16| {
+                let words = [tag, 3, 1, value];
+                let bytes = words.map(|w| if little { w.to_le_bytes() } else { w.to_be_bytes() });
+                // The number of values has four bytes, the value two of its four.
+                let count = if little { [bytes[2], [0; 2]] } else { [[0; 2], bytes[2]] };
+                [bytes[0], bytes[1], count[0], count[1], bytes[3], [0; 2]].concat()
+            };
+            let head: &[u8] = if little {
+                b"II*\0\x08\0\0\0\x02\0"
+            } else {
+                b"MM\0*\0\0\0\x08\0\x02"
+            };
+            let exif = [
+                &b"Exif\0\0"[..],
+                head,
+                &entry(256, 7),
+                &entry(274, orientation.into()),
+                &[0; 4],
+            ]
+            .concat();
+            let length = (exif.len() as u16 + 2).to_be_bytes();
+            [&plain[..2], &[0xff, 0xe1], &length, &exif, &plain[2..]].concat()
+        };
+        assert!(read(&held(1, true)) == stored);
+        // Places of the stored picture, by row and column of what was seen.
+        let (last_row, last_column) = (rows - 1, columns - 1);
+        let at = |orientation: u8, y: usize, x: usize| match orientation {
+            2 => [y, last_column - x],
+            3 => [last_row - y, last_column - x],
+            5 => [x, y],
+            6 => [last_row - x, y],
+            _ => [x, last_column - y],
+        };
+        for orientation in [2, 3, 5, 6, 8] {
+            for little in [true, false] {
+                let turned = read(&held(orientation, little));
+                assert_eq!(turned.dim().0, if orientation < 5 { rows } else { columns });
+                for ((y, x, c), v) in turned.indexed_iter() {
+                    let [row, column] = at(orientation, y, x);
+                    assert!(*v == stored[[row, column, c]], "{orientation} {y} {x}");
+                }
+            }
+        }
+        assert!(
+            [&b"II*\0\xff\xff\xff\xff"[..], b"MM", b""]
+                .iter()
+                .all(|exif| orientation(exif) == 1)
+        );
+    }
+
     #[test]
     fn odd_files_are_refused_with_a_reason() {
         let folder = tempfile::tempdir().unwrap();
@@ -308,6 +432,18 @@ pub(super) mod tests {
             "wavelengths",
         );
         refused(&npy_bytes("(16, 16)", &[-0.1; 256]), None, "negative");
+        refused(&npy_bytes("(16, 16)", &[f64::INFINITY; 256]), None, "no number");
+        refused(
+            &npy_of("|u1", "(16, 16)", [128; 256].into_iter()),
+            None,
+            "divide it by its white",
+        );
+        refused(
+            &npy_of("<u2", "(16, 16)", [117; 512].into_iter()),
+            None,
+            "divide it by its white",
+        );
+        assert!(read_picture(&path).is_err());
         refused(&npy_bytes("(8, 16)", &[0.1; 128]), None, "pixels");
         refused(
             &png_bytes(png::ColorType::Rgba, png::BitDepth::Eight, &[7; 1024], 16),

@@ -35,6 +35,15 @@ impl Dispersion {
         }
     }
 
+    /// Wavelengths of its samples (um), rising: from one to the next n and k stay between their values there.
+    pub fn samples_um(&self) -> impl Iterator<Item = f64> + '_ {
+        let samples: &[[f64; 3]] = match self {
+            Self::Table { samples } => samples,
+            Self::Constant { .. } | Self::Sellmeier { .. } | Self::Cauchy { .. } => &[],
+        };
+        samples.iter().map(|sample| sample[0])
+    }
+
     /// Complex index n + i k at a wavelength (um) in that range.
     pub fn index(&self, wavelength_um: f64) -> Complex64 {
         let l2 = wavelength_um * wavelength_um;

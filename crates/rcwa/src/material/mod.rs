@@ -143,6 +143,18 @@ impl Material {
         self.form.range_um()
     }
 
+    /// Where it absorbs most from one wavelength to another (um), as far as it is known there: that wavelength (um) and its k.
+    pub fn most_absorbing(&self, (from_um, to_um): (f64, f64)) -> (f64, f64) {
+        let (low, high) = self.range_um();
+        let ends = [from_um, to_um].map(|um| um.max(low).min(high));
+        let between = self.form.samples_um().filter(|um| *um > ends[0] && *um < ends[1]);
+        let all = ends.into_iter().chain(between);
+        let k = |um: f64| (um, self.form.index(um).im);
+        // The first of equals.
+        all.map(k)
+            .fold((ends[0], 0.0), |most, own| if own.1 > most.1 { own } else { most })
+    }
+
     /// Complex index n + i k at a wavelength (um).
     ///
     /// # Errors
@@ -255,6 +267,28 @@ mod tests {
         ] {
             assert_eq!(table::parse(text).unwrap_err().0, line, "{text}");
         }
+    }
+
+    #[test]
+    fn most_loss_is_found_between_two_wavelengths() {
+        let text = "wavelength_um,n,k\n0.4,2,0.3\n0.5,2,0.01\n0.6,2,0.04\n0.7,2,0\n";
+        let film = Material {
+            name: "film".into(),
+            form: Dispersion::Table {
+                samples: table::parse(text).unwrap(),
+            },
+            offset: 0.0,
+        };
+        assert_eq!(film.most_absorbing((0.2, 0.9)), (0.4, 0.3));
+        assert_eq!(film.most_absorbing((0.5, 0.9)), (0.6, 0.04));
+        let (at_um, k) = film.most_absorbing((0.62, 0.65));
+        assert!(at_um == 0.62 && k > 0.03 && k < 0.04, "{k}");
+        let clear = Material::named("sin_luke_2015").unwrap();
+        assert_eq!(clear.most_absorbing((0.4, 0.7)), (0.4, 0.0));
+        assert_eq!(
+            Material::constant(1.5, 0.2).unwrap().most_absorbing((0.5, 0.6)),
+            (0.5, 0.2)
+        );
     }
 
     #[test]

@@ -74,7 +74,8 @@ pub(super) enum Sides {
 }
 
 /// Steps of the staircase that stands for a rounded corner. Four steps of equal area move |t| by less
-/// than 0.001 against eight for radii up to 40 nm; see the tests.
+/// than 0.001 against eight for radii up to 40 nm. That is not the whole error: from 24 strips four steps differ by 0.0026 in |t|
+/// and by 0.009 rad.
 const CORNER_STEPS: usize = 4;
 
 /// Steps of the staircase that stands for a quarter of a circle among unlike neighbours.

@@ -1,10 +1,14 @@
 //! Grids of places of the scene: one for each pixel of the sensor in the simulation, every second in the restoration.
 
+use metalith_picture::scene::averaged;
 use metalith_picture::{FftScratch, SceneView, SquareFft};
 use metalith_wave::kernels::fft_size;
 use ndarray::Array2;
 use num_complex::Complex32;
 use rayon::prelude::*;
+
+/// Steps of the grid over the pixels of a scene from which on these are averaged: between places some would not be looked at.
+const FINER: f64 = 1.2;
 
 /// A scene on a square grid whose step moves the caustic by one pixel, and the convolutions with it.
 pub struct FineGrid {
@@ -51,6 +55,10 @@ impl FineGrid {
 
     /// A plane of the scene at the places of the grid.
     pub fn sampled(&self, plane: &Array2<f32>, view: &SceneView) -> Array2<f32> {
+        if self.step > FINER * view.pixel() {
+            let view = view.no_finer(self.step);
+            return sampled(&averaged(plane, &view), &view, self.half, self.step);
+        }
         sampled(plane, view, self.half, self.step)
     }
 
@@ -238,4 +246,26 @@ pub fn inverse(fft: &SquareFft, spectrum: &mut [Complex32]) -> Array2<f32> {
     let mut square = vec![0.0f32; n * n];
     fft.inverse(spectrum, &mut square, fft.size(), &mut FftScratch::default());
     Array2::from_shape_vec((n, n), square).expect("as many values")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Stripes of one pixel, three and a half of which are a step: a place sees their mean, and not the stripe that it is on.
+    #[test]
+    fn scenes_that_are_finer_than_the_steps_are_averaged() {
+        /// Of half of a stripe that a box has more of one kind.
+        const UNEVEN: f32 = 0.16;
+        let view = SceneView {
+            rows: 200,
+            columns: 200,
+            field_deg: 60.0,
+            distance_um: f64::INFINITY,
+        };
+        let stripes = Array2::from_shape_fn((200, 200), |(_, x)| (x % 2) as f32);
+        let grid = FineGrid::new(&view, 0.02, [10, 10], &[vec![Array2::ones((1, 1))]]);
+        let seen = grid.sampled(&stripes, &view);
+        assert!(seen.iter().all(|v| (v - 0.5).abs() < UNEVEN), "{seen}");
+    }
 }

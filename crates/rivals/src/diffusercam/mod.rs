@@ -172,7 +172,8 @@ impl DiffuserCam {
 
     /// By descent, sent light of each channel.
     fn sent_by(&self, frame: &Frame, descents: &[Descent], progress: &dyn Progress) -> Result<Vec<Vec<Array2<f32>>>> {
-        let (light, trust) = frame.light(&self.bench.camera, &self.error);
+        let (_, trust) = frame.light(&self.bench.camera, &self.error);
+        let light = frame.recorded_light(&self.bench.camera);
         let rounds: usize = descents.iter().map(|d| d.rounds).sum();
         progress.begin("restoring by total variation", (rounds * light.len()) as u64);
         let step = 2.0 * self.bench.camera.sensor.pixel_um / self.spec.distance_um;

@@ -13,7 +13,7 @@ use metalith_camera::Camera;
 use metalith_core::{Error, Progress, Result};
 use metalith_picture::restore::SceneStatistics;
 use metalith_picture::scene::SceneImage;
-use metalith_picture::{Frame, OperatorError, SceneView};
+use metalith_picture::{Frame, SceneView};
 use ndarray::{Array2, Axis, Slice};
 use rayon::prelude::*;
 
@@ -131,7 +131,7 @@ impl FlatCam {
             .scene_of(SceneStatistics::colours().random_scene(&self.bench.view, SEED));
         let frame = self.bench.record(&self.light(&scene), SEED);
         let truth = self.bench.ideal(&scene);
-        let (light, _) = frame.light(&self.bench.camera, &OperatorError::none(self.bench.channels()));
+        let light = frame.recorded_light(&self.bench.camera);
         let ([first, last], steps) = STRENGTHS;
         let tried: Vec<f64> = (0..steps)
             .map(|k| 10f64.powf(first + (last - first) * k as f64 / (steps - 1) as f64))
@@ -170,7 +170,7 @@ impl FlatCam {
     /// By relative strength, sent light of each channel.
     fn sent_by(&self, frame: &Frame, relative: &[f64], progress: &dyn Progress) -> Vec<Vec<Array2<f32>>> {
         progress.begin("restoring", self.bench.channels() as u64);
-        let (light, _) = frame.light(&self.bench.camera, &OperatorError::none(self.bench.channels()));
+        let light = frame.recorded_light(&self.bench.camera);
         let by_channel: Vec<Vec<Array2<f32>>> = light
             .par_iter()
             .enumerate()
@@ -275,6 +275,34 @@ mod tests {
         let all = flat.pictures(&frame, StageKind::FlatNet, &Silent).unwrap();
         assert!(all.len() == PICTURES && all[0] == picture && all[1] != picture);
         assert!(flat.pictures(&frame, StageKind::Blending, &Silent).is_err());
+    }
+
+    /// Pixels at full scale count as they were recorded: zero in their place would be black holes in bright places of the frame.
+    #[test]
+    fn a_frame_that_is_too_bright_in_places_is_undone() {
+        /// A picture of a frame whose brightest tenth is at full scale, against one with zero there.
+        const GAINED_DB: f64 = 5.0;
+        let (mut camera, scene) = small(48, 300, 260);
+        let camera_of = |camera: &Camera| FlatCam::new(&MaskSpec::standard(), camera, scene.view, &Silent).unwrap();
+        let frame = camera_of(&camera).record(&scene, 1).unwrap();
+        let mut brightest: Vec<f32> = frame.planes[0].iter().copied().collect();
+        brightest.sort_by(f32::total_cmp);
+        camera.exposure.white *= f64::from(frame.full / brightest[brightest.len() * 9 / 10]);
+        let flat = camera_of(&camera);
+        let frame = flat.record(&scene, 1).unwrap();
+        assert!(
+            (0.05..0.2).contains(&frame.saturated_share()),
+            "{}",
+            frame.saturated_share()
+        );
+        let mut dark = frame.clone();
+        dark.planes[0].mapv_inplace(|v| if v < frame.full { v } else { 0.0 });
+        let [found, dark] = [frame, dark].map(|frame| {
+            let picture = flat.restore(&frame, 0, &Silent).unwrap();
+            scores(&picture, &flat.truth(&scene)).unwrap()[0].psnr_linear_db
+        });
+        println!("{found} dB, {dark} dB with zero");
+        assert!(found > dark + GAINED_DB, "{found} {dark}");
     }
 
     /// With one wavelength a colour the shadow that the restoration knows is the one that was cast.

@@ -14,28 +14,6 @@ const RADIUS_POINTS: usize = 600;
 /// The section of the design.
 pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
     page.section("What was designed");
-    let across = match design.lens.outline {
-        Some(_) => format!(" ({})", aperture(&design.lens)),
-        None => String::new(),
-    };
-    let lens = format!(
-        "{} um{across}, f = {} um",
-        exact(f64::from(design.lens.diameter_nm) * 1e-3),
-        exact(design.lens.focal_length_um),
-    );
-    let elements = match (array.placed.len(), design.array.spacing_words()) {
-        (1, _) => format!("One element of {lens}"),
-        (_, Some(apart)) => format!(
-            "{} x {} elements of {lens}, {apart} apart, steered by {}° a step",
-            design.array.count.0, design.array.count.1, design.array.steering_deg,
-        ),
-        (count, None) if design.array.has_own_lenses() => {
-            format!(
-                "{count} elements, each with a lens of its own where the table says so, placed and steered one by one,"
-            )
-        }
-        (count, None) => format!("{count} elements of {lens}, placed and steered one by one,"),
-    };
     let pillars = match design.cell.shape.rectangles() {
         None => design.cell.shape.plural().to_owned(),
         Some(pillars) => format!(
@@ -46,8 +24,8 @@ pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
         ),
     };
     page.paragraph(format!(
-        "{elements} at {} nm; pillars, {pillars}, on a {}lattice of {} nm.",
-        exact(design.array.wedge_wavelength_um * 1e3),
+        "{}; pillars, {pillars}, on a {}lattice of {} nm.",
+        elements(design),
         if array.lattice.is_square() { "" } else { "hexagonal " },
         design.cell.pitch_nm,
     ));
@@ -102,6 +80,43 @@ pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
             last.min(RADIUS_POINTS)
         )),
     ]);
+}
+
+/// The elements in words: a focal length with the wavelength that it is for, where the phase says one, and steering with that of the
+/// wedges.
+fn elements(design: &Design) -> String {
+    let at = |um: f64| format!(" at {} nm", exact(um * 1e3));
+    let across = match design.lens.outline {
+        Some(_) => format!(" ({})", aperture(&design.lens)),
+        None => String::new(),
+    };
+    let lens = format!(
+        "{} um{across}, f = {} um{}",
+        exact(f64::from(design.lens.diameter_nm) * 1e-3),
+        exact(design.lens.focal_length_um),
+        design.lens.focused_um().map_or_else(String::new, at),
+    );
+    let all = design.elements();
+    let is_steered = all.iter().any(|e| e.wedge.sin_x != 0.0 || e.wedge.sin_y != 0.0);
+    let steered = |how: String| match is_steered {
+        true => how + &at(design.array.wedge_wavelength_um),
+        false => String::new(),
+    };
+    let one_by_one = || format!("placed one by one{}", steered(", steered".into()));
+    match (all.len(), design.array.spacing_words()) {
+        (1, _) => format!("One element of {lens}{}", steered(", steered".into())),
+        (_, Some(apart)) => format!(
+            "{} x {} elements of {lens}, {apart} apart{}",
+            design.array.count.0,
+            design.array.count.1,
+            steered(format!(", steered by {}° a step", design.array.steering_deg)),
+        ),
+        (count, None) if design.array.has_own_lenses() => format!(
+            "{count} elements, each with a lens of its own where the table says so, {}",
+            one_by_one()
+        ),
+        (count, None) => format!("{count} elements of {lens}, {}", one_by_one()),
+    }
 }
 
 /// What the widths or numbers of pillars are in figures, and their axis.
@@ -226,4 +241,43 @@ fn own_lenses(design: &Design) -> Table {
         ]);
     }
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The words of a shipped design, with a part of its text replaced.
+    fn words(name: &str, from: &str, to: &str) -> String {
+        let path = metalith_testing::design(name);
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.contains(from), "{from}");
+        elements(&Design::parse(&path, &text.replacen(from, to, 1)).unwrap())
+    }
+
+    #[test]
+    fn a_focal_length_is_that_of_its_wavelength() {
+        let wedge = "wedge_wavelength_nm = 940\n";
+        let one = "One element of 100 um, f = 150 um at 940 nm";
+        for other in [wedge, "", "wedge_wavelength_nm = 1550\n"] {
+            assert_eq!(words("asi_940", wedge, other), one);
+        }
+        assert_eq!(
+            words(
+                "array_2x4",
+                "wedge_wavelength_nm = 550\n",
+                "wedge_wavelength_nm = 450\n"
+            ),
+            "2 x 4 elements of 60 um, f = 144 um at 550 nm, 150 by 120 um apart, steered by 8° a step at 450 nm"
+        );
+        // A table says no wavelength.
+        assert_eq!(
+            words("prototype_3x3", "[array]\n", "[array]\n"),
+            "3 x 3 elements of 1,000 um, f = 2,400 um, 2420 um apart, steered by 15° a step at 550 nm"
+        );
+        assert_eq!(
+            words("hologram", "[array]\n", "[array]\n"),
+            "2 elements of 60 um, f = 144 um at 532 nm, placed one by one"
+        );
+    }
 }

@@ -5,7 +5,9 @@ use ndarray::Array2;
 use crate::{DistinctElement, PsfResult, Verification, white_page};
 use metalith_cell::Fidelity;
 use metalith_core::part;
+use metalith_design::Design;
 use metalith_report::{Axis, Cell, Chart, Column, ImageGrid, Page, Table, exact, sig};
+use metalith_wave::psf::PixelFrequencies;
 
 /// Decades of a PSF that are shown: below lies what a camera's noise hides.
 const PSF_DECADES: f64 = 4.0;
@@ -13,12 +15,16 @@ const PSF_DECADES: f64 = 4.0;
 const PSF_SHOWN_UM: f64 = 60.0;
 
 /// The section of one distinct element.
-pub(super) fn write(page: &mut Page, found: &Verification, element: &DistinctElement) {
+pub(super) fn write(page: &mut Page, design: &Design, found: &Verification, element: &DistinctElement) {
     page.section(format!("Element {}", element.element.label()));
     page.paragraph(format!(
-        "Stands for {} of {} elements. Phase errors at the wavelength of the mapping: rounding {} rad rms, {} at most; mapping, by the `{}` cell, {} rad rms, {} at most. {}",
+        "Stands for {} of {} elements{}. Phase errors at the wavelength of the mapping: rounding {} rad rms, {} at most; mapping, by the `{}` cell, {} rad rms, {} at most. {}",
         element.copies,
         found.elements.len(),
+        match element.copies {
+            1 => "",
+            _ => ": figures of the others are these, with places, directions and field angles turned as the table of elements says",
+        },
         sig(element.phase.rounding.rms_rad, 3),
         sig(element.phase.rounding.largest_rad, 3),
         found.fidelity.of_width_alone(),
@@ -26,7 +32,7 @@ pub(super) fn write(page: &mut Page, found: &Verification, element: &DistinctEle
         sig(element.phase.mapping.largest_rad, 3),
         steepness(element),
     ));
-    page.table(spot_table(element));
+    page.table(spot_table(element, design.verify.pixel_um));
     let shown: Vec<_> = element
         .spots
         .iter()
@@ -124,15 +130,16 @@ fn steepness(element: &DistinctElement) -> String {
     }
 }
 
-fn spot_table(element: &DistinctElement) -> Table {
+fn spot_table(element: &DistinctElement, pixel_um: f64) -> Table {
+    let [half, nyquist] = PixelFrequencies::of(pixel_um).reported().map(exact);
     let mut table = Table::new([
         Column::text("Wavelength, field angle"),
         Column::text("Of"),
         Column::number("Strehl", ""),
         Column::number("Energy in 1 pixel", "%"),
         Column::number("in 2", "%"),
-        Column::number("MTF 42.7/mm", ""),
-        Column::number("85.3/mm", ""),
+        Column::number(format!("MTF {half}/mm"), ""),
+        Column::number(format!("{nyquist}/mm"), ""),
         Column::number("Centroid x", "um"),
         Column::number("y", "um"),
         Column::number("PSF difference", ""),
@@ -141,7 +148,10 @@ fn spot_table(element: &DistinctElement) -> Table {
         let mut row = |of: String, spot_of: &PsfResult, difference: Cell| {
             let (m, [half, nyquist]) = (&spot_of.metrics, spot_of.mtf());
             table.row([
-                Cell::from(spot.place()),
+                Cell::from(match spot.copy {
+                    None => spot.place(),
+                    Some(_) => format!("{}, which is {}", spot.place(), spot.label(&element.element)),
+                }),
                 Cell::from(of),
                 Cell::sig(m.strehl, 3),
                 Cell::fixed(m.energy_1_pixel * 100.0, 2),

@@ -12,7 +12,7 @@ use metalith_core::Result;
 use metalith_design::array::PillarArray;
 use metalith_design::{CellIncidence, Design};
 use metalith_report::{Cell, Column, Figure, Page, Table, Verdict, count, exact, sig, write_json};
-use metalith_wave::psf::HALF_NYQUIST_LP_MM;
+use metalith_wave::psf::PixelFrequencies;
 
 /// Write `report.html` and `report.json` into a folder; the page shows the picture that a camera of the chip will take, if
 /// there is one.
@@ -47,12 +47,14 @@ fn page(design: &Design, array: &PillarArray, found: &Verification, picture: Opt
         _ => format!("{failed} of {} limits do not hold.", found.checks.len()),
     };
     page.verdict(Verdict::of(failed == 0), words);
+    let half = exact(PixelFrequencies::of(design.verify.pixel_um).half_nyquist_lp_mm);
+    let contrast_at = format!("MTF at {half} lp/mm, one wavelength");
     page.facts(&[
         ("Pillars", count(found.layout.pillars)),
         ("Elements", found.elements.len().to_string()),
         ("of them distinct", found.distinct.len().to_string()),
         ("Strehl ratio, least to greatest", strehl(found)),
-        ("MTF at 42.7 lp/mm, one wavelength", contrast(found)),
+        (contrast_at.as_str(), contrast(found)),
         ("a whole channel from one direction", white_contrast(found)),
         ("File", format!("{} MB", sig(found.layout.bytes as f64 * 1e-6, 3))),
     ]);
@@ -67,7 +69,7 @@ fn page(design: &Design, array: &PillarArray, found: &Verification, picture: Opt
     let mut elements = found.distinct.iter().collect::<Vec<_>>();
     elements.sort_by_key(|e| e.element.index.0.abs() + e.element.index.1.abs());
     for element in elements {
-        element::write(&mut page, found, element);
+        element::write(&mut page, design, found, element);
     }
     method(&mut page, design, found);
     page
@@ -85,9 +87,10 @@ fn contrast(found: &Verification) -> String {
 
 /// The same in the light of each channel of the camera, along both axes.
 fn white_contrast(found: &Verification) -> String {
+    let half = found.camera.as_ref().map(|c| c.frequencies().half_nyquist_lp_mm);
     let channels = found.distinct.iter().flat_map(|d| &d.white);
     let contrasts = channels.flat_map(|channel| &channel.contrast);
-    between(contrasts.filter(|c| c.lp_mm == HALF_NYQUIST_LP_MM).flat_map(|c| c.mtf))
+    between(contrasts.filter(|c| Some(c.lp_mm) == half).flat_map(|c| c.mtf))
 }
 
 fn range(found: &Verification, of: impl Fn(&PsfResult) -> f64) -> String {
@@ -155,7 +158,7 @@ fn method(page: &mut Page, design: &Design, found: &Verification) {
         .max()
         .unwrap_or(0);
     page.paragraph(format!(
-        "Design `{}`, digest `{}`. Everything about the layout is computed from the file that was read back. Fields: the lattice of point samples, each with the area of its cell as weight, folded ({} mode), frequencies weighed by where their rays land; at most {} frequency bins had to be relabelled towards the mean ray. PSF: |E|² over that of the incident wave. Strehl: against the same aperture passing all its power in the zero order with the perfect phase for the place where the chief ray lands. MTF: the transform of the PSF over all light that the element passes, of which what lands outside of the window is a veil. Field angles count from where an element looks at each wavelength.",
+        "Design `{}`, digest `{}`. Everything about the layout is computed from the file that was read back. Fields: the lattice of point samples, each with the area of its cell as weight, folded ({} mode), frequencies weighed by where their rays land; at most {} frequency bins had to be relabelled towards the mean ray. PSF: |E|² over that of the incident wave. Strehl: against the same aperture, sites without a pillar included, passing all its power in the zero order with the perfect phase for the place where the chief ray lands. MTF: the transform of the PSF over all light that the element passes by the cell that judges, of which what lands outside of the window is a veil. Field angles count from where an element looks at each wavelength.",
         found.design, found.design_digest, found.accuracy, count(relabelled),
     ));
     page.paragraph(format!(

@@ -2,7 +2,9 @@
 
 use super::designed::{numbers, shown_number};
 use crate::Verification;
+use crate::copies::place_words;
 use metalith_design::Design;
+use metalith_design::array::Symmetry;
 use metalith_report::{Axis, Cell, Chart, Column, Page, Table, count, sig};
 
 /// Odd shapes that are listed in the page; all are in `report.json` up to its own limit.
@@ -22,17 +24,19 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
     ]);
     for check in &found.elements {
         let copy = check.copy_of.and_then(|k| found.distinct.get(k));
+        let turned = check.turned.filter(|s| *s != Symmetry::IDENTITY);
+        let turned = turned.map_or_else(String::new, |s| format!(", (x, y) at {}", place_words(s)));
         table.row([
             Cell::from(check.element.label()),
             Cell::from(count(check.widths.pillars)),
             Cell::from(count(check.widths.wrong)),
             Cell::from(count(check.widths.missing)),
             Cell::from(count(check.widths.extra)),
-            Cell::from(copy.map_or_else(|| "itself".into(), |d| d.element.label())),
+            Cell::from(copy.map_or_else(|| "itself".into(), |d| d.element.label() + &turned)),
         ]);
     }
     page.table(table.caption(format!(
-        "Every site of every element, compared with the {} that the design asks for.",
+        "Every site of every element, compared with the {} that the design asks for. An element that is simulated as another has its figures with the place (x, y) where the table says; its field angles are turned alike.",
         if rotated { "rotation" } else { "width" }
     )));
     let mut layers = Table::new([

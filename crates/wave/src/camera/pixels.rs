@@ -23,20 +23,33 @@ pub struct PixelGrid {
     middle_um: f64,
     shape: [usize; 2],
     pixel_um: f64,
+    /// How far the window followed the image (x, y) (um); of a change, what it changes of that.
+    off_um: [f64; 2],
 }
 
 /// Bins below this share of the mean are left out: together they are below any noise.
 const EMPTY: f32 = 1e-6;
 
-/// Share of the samples on each side over which the surroundings are faded out.
-const FADED: f64 = 0.06;
-
 impl PixelGrid {
+    /// Share of the samples on each side over which the surroundings are faded out.
+    pub const FADED: f64 = 0.06;
+
+    /// What a spectrum takes that has so many bins along each axis, negative frequencies among them (bytes): half of the plane, two
+    /// single-precision numbers each.
+    pub fn bytes_of(bins: f64) -> f64 {
+        0.5 * bins * bins * (2 * size_of::<f32>()) as f64
+    }
+
+    /// What this one takes (bytes).
+    pub fn bytes(&self) -> usize {
+        (self.re.len() + self.im.len()) * size_of::<f32>()
+    }
+
     /// The spectrum of `intensity` (a square of samples `step_um` apart) behind `optic`, to be read on
     /// `rows` x `cols` pixels about its middle.
     pub fn new(intensity: &[f32], step_um: f64, optic: &Optic, rows: usize, cols: usize) -> Self {
         let n = (intensity.len() as f64).sqrt().round() as usize;
-        let ramp = ((FADED * n as f64) as usize).max(2);
+        let ramp = ((Self::FADED * n as f64) as usize).max(2);
         let border: f32 = {
             let ends = (0..n).flat_map(|i| [i, (n - 1) * n + i, i * n, i * n + n - 1]);
             ends.map(|i| intensity[i]).sum::<f32>() / (4 * n) as f32
@@ -89,7 +102,13 @@ impl PixelGrid {
             middle_um: 0.5 * (n as f64 - 1.0) * step_um,
             shape: [rows, cols],
             pixel_um: optic.pixel_um,
+            off_um: [0.0; 2],
         }
+    }
+
+    /// How far the window has [moved](Self::moved) (x, y) (um); of a sum, the sum.
+    pub fn off_um(&self) -> [f64; 2] {
+        self.off_um
     }
 
     /// The sum of grids, each with its factor. They must be of the same window.
@@ -97,7 +116,13 @@ impl PixelGrid {
         let my = parts.iter().map(|(g, _)| g.re.nrows()).max().unwrap_or(0);
         let mx = parts.iter().map(|(g, _)| g.re.ncols()).max().unwrap_or(0);
         let (mut re, mut im) = (Array2::zeros((my, mx)), Array2::zeros((my, mx)));
+        let mut off_um = [0.0; 2];
         for (grid, factor) in parts {
+            let own = grid.off_um.into_iter();
+            off_um
+                .iter_mut()
+                .zip(own)
+                .for_each(|(to, v)| *to += f64::from(*factor) * v);
             let (rows, cols) = grid.re.dim();
             let from = (mx - cols) / 2;
             part(re.view_mut(), 0..rows, from..from + cols).scaled_add(*factor, &grid.re);
@@ -106,6 +131,7 @@ impl PixelGrid {
         Self {
             re,
             im,
+            off_um,
             ..*parts.first().expect("a sum has parts").0
         }
     }
@@ -126,6 +152,7 @@ impl PixelGrid {
         if x == 0.0 && y == 0.0 {
             return self;
         }
+        self.off_um = [self.off_um[0] + x, self.off_um[1] + y];
         let middle = (self.re.ncols() / 2) as f64;
         for ((ky, kx), re) in self.re.indexed_iter_mut() {
             let im = &mut self.im[[ky, kx]];
@@ -144,7 +171,13 @@ impl PixelGrid {
         let (mut re, mut im) = (self.im.clone(), self.re.clone());
         re.indexed_iter_mut().for_each(|(i, v)| *v *= -at(i));
         im.indexed_iter_mut().for_each(|(i, v)| *v *= at(i));
-        Self { re, im, ..*self }
+        let off_um = [0.0; 2];
+        Self {
+            re,
+            im,
+            off_um,
+            ..*self
+        }
     }
 
     /// What a blur changes, for a unit of its covariance between two axes (1/um^2).

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{HALF_NYQUIST_LP_MM, Matched, NYQUIST_LP_MM, Psf, pixel_mtf};
+use super::{Matched, PixelFrequencies, Psf, pixel_mtf};
 
 /// The numbers that two PSFs are compared by.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -21,9 +21,10 @@ pub struct PsfMetrics {
     pub energy_window: f64,
     /// Energy of all light that the element passes, over the same; that of the window where no more is known.
     pub energy_passed: f64,
-    /// MTF at 42.7 line pairs a millimetre along x and y, over all light that the element passes.
+    /// MTF at half of the finest frequency that the pixels tell ([`PixelFrequencies`]: 42.7 line pairs a millimetre for 5.86 um)
+    /// along x and y, over all light that the element passes.
     pub mtf_half_nyquist: [f64; 2],
-    /// MTF at 85.3 line pairs a millimetre along x and y.
+    /// MTF at all of it (85.3) along x and y.
     pub mtf_nyquist: [f64; 2],
     /// The first times the MTF of a pixel.
     pub mtf_half_nyquist_pixel: [f64; 2],
@@ -32,11 +33,13 @@ pub struct PsfMetrics {
 }
 
 impl Psf {
-    /// All numbers that are reported of a PSF.
+    /// All numbers that are reported of a PSF, for pixels with this edge (um). Contrast is over all light that passes if the PSF was
+    /// formed with the frequencies of these pixels.
     pub fn metrics(&self, matched: &Matched, pixel_um: f64) -> PsfMetrics {
         let (peak, peak_um) = self.peak();
         let mtf = |lp_mm: f64| [0, 1].map(|axis| self.contrast(axis, lp_mm));
         let passed = self.otf.as_ref().map_or_else(|| self.energy_um2(), |otf| otf.power_um2);
+        let [half, nyquist] = PixelFrequencies::of(pixel_um).reported();
         let seen = |lp_mm: f64| mtf(lp_mm).map(|m| m * pixel_mtf(pixel_um, lp_mm));
         let share = |edge_um| self.energy_in_square_um2(peak_um, edge_um) / matched.power_um2;
         PsfMetrics {
@@ -47,10 +50,10 @@ impl Psf {
             energy_2_pixels: share(2.0 * pixel_um),
             energy_window: self.energy_um2() / matched.power_um2,
             energy_passed: passed / matched.power_um2,
-            mtf_half_nyquist: mtf(HALF_NYQUIST_LP_MM),
-            mtf_nyquist: mtf(NYQUIST_LP_MM),
-            mtf_half_nyquist_pixel: seen(HALF_NYQUIST_LP_MM),
-            mtf_nyquist_pixel: seen(NYQUIST_LP_MM),
+            mtf_half_nyquist: mtf(half),
+            mtf_nyquist: mtf(nyquist),
+            mtf_half_nyquist_pixel: seen(half),
+            mtf_nyquist_pixel: seen(nyquist),
         }
     }
 }

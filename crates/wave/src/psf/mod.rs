@@ -26,7 +26,7 @@ use crate::error::Result;
 use crate::propagation::{Aperture, Field, Otf, PlaneWave, Propagator, Scratch, Window};
 
 pub use metrics::PsfMetrics;
-pub use mtf::{CONTRAST_LP_MM, CURVE_LP_MM, HALF_NYQUIST_LP_MM, NYQUIST_LP_MM, pixel_mtf};
+pub use mtf::{PixelFrequencies, pixel_mtf};
 pub use orders::order_shares;
 pub use polychromatic::{BandPart, BandSample, Polychromatic, band_otf, polychromatic};
 pub use reference::Matched;

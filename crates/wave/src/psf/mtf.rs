@@ -5,15 +5,49 @@ use num_complex::Complex64;
 use super::Psf;
 use crate::kernels::sinc;
 
-/// The finest frequency that pixels of 5.86 um can tell (line pairs a millimetre).
-pub const NYQUIST_LP_MM: f64 = 85.3;
-/// Half of it (line pairs a millimetre).
-pub const HALF_NYQUIST_LP_MM: f64 = 42.7;
+/// Where contrast is told of the light on pixels of one size. All are to three significant digits, as they are written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelFrequencies {
+    /// Edge of a pixel (um).
+    pixel_um: f64,
+    /// The finest frequency that the pixels can tell, one line pair on two of them (line pairs a millimetre).
+    pub nyquist_lp_mm: f64,
+    /// Half of it (line pairs a millimetre).
+    pub half_nyquist_lp_mm: f64,
+}
 
-/// What is asked for where contrast is reported: both of them.
-pub const CONTRAST_LP_MM: [f64; 2] = [HALF_NYQUIST_LP_MM, NYQUIST_LP_MM];
-/// What is asked for where contrast is drawn: few, since each costs two correlations of the spectrum along each axis.
-pub const CURVE_LP_MM: [f64; 6] = [5.0, 20.0, HALF_NYQUIST_LP_MM, 63.0, NYQUIST_LP_MM, 110.0];
+/// Pixels whose curves are drawn at round frequencies, and those beside the two that are reported (line pairs a millimetre).
+const ROUND_UM: f64 = 5.86;
+const ROUND_LP_MM: [f64; 4] = [5.0, 20.0, 63.0, 110.0];
+
+impl PixelFrequencies {
+    /// Of pixels with this edge (um), which is positive.
+    pub fn of(pixel_um: f64) -> Self {
+        let nyquist = 500.0 / pixel_um;
+        Self {
+            pixel_um,
+            nyquist_lp_mm: three_digits(nyquist),
+            half_nyquist_lp_mm: three_digits(0.5 * nyquist),
+        }
+    }
+
+    /// What is asked for where contrast is reported (line pairs a millimetre): half of the finest frequency, and all of it.
+    pub fn reported(&self) -> [f64; 2] {
+        [self.half_nyquist_lp_mm, self.nyquist_lp_mm]
+    }
+
+    /// What is asked for where contrast is drawn (line pairs a millimetre), rising: few, since each costs two correlations of
+    /// the spectrum along each axis.
+    pub fn drawn(&self) -> [f64; 6] {
+        let [first, second, third, last] = ROUND_LP_MM.map(|f| three_digits(f * ROUND_UM / self.pixel_um));
+        let [half, nyquist] = self.reported();
+        [first, second, half, third, nyquist, last]
+    }
+}
+
+fn three_digits(x: f64) -> f64 {
+    format!("{x:.2e}").parse().expect("a number as it was just written")
+}
 
 impl Psf {
     /// Contrast along one axis (0 is x) at a frequency (line pairs a millimetre), without the pixel: of all the light
@@ -75,7 +109,7 @@ mod tests {
     fn contrast_of_a_gaussian_is_a_gaussian() {
         let sigma = 1.4;
         let psf = gaussian(sigma, [100.3, -41.2]);
-        for f in [0.0, HALF_NYQUIST_LP_MM, NYQUIST_LP_MM, 150.0] {
+        for f in [0.0, 42.7, 85.3, 150.0] {
             let want = (-2.0 * (std::f64::consts::PI * sigma * f * 1e-3).powi(2)).exp();
             assert!((psf.mtf([f, 0.0]) - want).abs() < BAND);
             assert!((psf.mtf([0.6 * f, 0.8 * f]) - want).abs() < BAND);
@@ -85,6 +119,21 @@ mod tests {
         }
         // Displaced to higher x, the phase falls with frequency.
         assert!(psf.window_otf([10.0, 0.0]).arg() < 0.0 && psf.window_otf([0.0, 10.0]).arg() > 0.0);
+    }
+
+    #[test]
+    fn frequencies_are_those_of_the_pixel() {
+        /// Three digits are off by half a hundredth at most.
+        const THREE_DIGITS: f64 = 5e-3;
+        let known = PixelFrequencies::of(5.86);
+        assert_eq!(known.reported(), [42.7, 85.3]);
+        assert_eq!(known.drawn(), [5.0, 20.0, 42.7, 63.0, 85.3, 110.0]);
+        for pixel_um in [0.1, 0.7235, 1.4, 2.2, 12.0, 100.0] {
+            let own = PixelFrequencies::of(pixel_um);
+            assert!((pixel_mtf(pixel_um, own.nyquist_lp_mm) - std::f64::consts::FRAC_2_PI).abs() < THREE_DIGITS);
+            assert!((own.half_nyquist_lp_mm / own.nyquist_lp_mm - 0.5).abs() < THREE_DIGITS);
+            assert!(own.drawn().windows(2).all(|pair| pair[0] < pair[1]), "{own:?}");
+        }
     }
 
     #[test]

@@ -1,9 +1,11 @@
 //! Exposures of one capture as one frame, with the noise of each pixel.
 
+use std::sync::Arc;
+
 use ndarray::Array2;
 
 use super::bayer::{Bayer, Channel};
-use super::{SensorPixels, expected, saturated};
+use super::{DarkPixels, SensorPixels, expected, saturated};
 use crate::set::RelayCamera;
 
 /// A mean frame of one exposure.
@@ -16,6 +18,8 @@ pub struct Exposure {
     pub frames: u32,
     /// Variance that it was rounded with (DN^2).
     pub rounding_dn2: f64,
+    /// The sensor without light for as long, where it is not that of all exposures. One frame of several exposures is one object.
+    pub dark: Option<Arc<DarkPixels>>,
 }
 
 /// A capture as it is used.
@@ -33,7 +37,7 @@ pub struct Joined {
 /// exposure in which a pixel is saturated, or beside one that is, says nothing of it. Variances follow from a first mean of
 /// all exposures, not from each by itself, which would favour those that came out too dark; of few electrons from that of the
 /// neighbours. The noise of dark and flat frames
-/// is common to all exposures: it has no part in the weights, and is added to the variance of the mean. With `filter`, pixels
+/// is common to exposures: it has no part in the weights, and is added to the variance of the mean. With `filter`, pixels
 /// under other filters are masked.
 ///
 /// # Panics
@@ -48,6 +52,7 @@ pub fn joined(
     let (scale_dn, frames) = longest.map(|e| (e.scale_dn, e.frames)).expect("at least one exposure");
     if let ([only], None, None) = (exposures.as_slice(), sensor, filter)
         && only.rounding_dn2 == 0.0
+        && only.dark.is_none()
     {
         return Joined {
             dn: exposures.remove(0).dn,
@@ -57,10 +62,18 @@ pub fn joined(
         };
     }
     let black = camera.black_level_dn;
+    let mut darks: Vec<Arc<DarkPixels>> = Vec::new();
+    for own in exposures.iter().filter_map(|e| e.dark.as_ref()) {
+        if !darks.iter().any(|d| Arc::ptr_eq(d, own)) {
+            darks.push(Arc::clone(own));
+        }
+    }
+    let even = SensorPixels::even(camera, exposures[0].dn.dim());
+    let sensor = sensor.or((!darks.is_empty()).then_some(&even));
     let masks: Vec<Array2<bool>> = exposures
         .iter_mut()
         .map(|e| match sensor {
-            Some(sensor) => sensor.take_out(&mut e.dn, filter),
+            Some(sensor) => sensor.take_out(&mut e.dn, filter, e.dark.as_deref()),
             None => saturated(&e.dn, camera.saturation_dn),
         })
         .collect();
@@ -88,6 +101,8 @@ pub fn joined(
     });
     let first = expected(&first, &electrons);
     let mut noise = Array2::from_elem(dn.dim(), f32::INFINITY);
+    // Of the dark frame of all exposures, of the flat frame, and of the dark frames that are of some.
+    let mut shared = vec![0.0; 2 + darks.len()];
     for (at, to) in dn.indexed_iter_mut() {
         if usable(at).next().is_none() {
             // All that is known is that there is much of it.
@@ -97,18 +112,27 @@ pub fn joined(
             continue;
         }
         let first = f64::from(first[at]);
-        let (mut sum, mut certainty, mut shared) = (0.0, 0.0, [0.0; 2]);
+        let (mut sum, mut certainty) = (0.0, 0.0);
+        shared.fill(0.0);
         for e in usable(at) {
-            let expected = first * e.scale_dn;
+            let (expected, dark) = (first * e.scale_dn, e.dark.as_deref());
             let variance = sensor.map_or_else(
                 || camera.variance_dn2(expected, e.frames) + e.rounding_dn2,
-                |s| s.own_variance_dn2(at, expected, e.frames, e.rounding_dn2),
+                |s| s.own_variance_dn2(at, expected, (e.frames, e.rounding_dn2), dark),
             );
             let own = e.scale_dn * e.scale_dn / variance;
             sum += own * signal(e, at) / e.scale_dn;
             certainty += own;
-            let errors = sensor.map_or([0.0; 2], |s| s.shared_errors_dn(at, expected));
-            shared = [0, 1].map(|k| shared[k] + own * errors[k] / e.scale_dn);
+            let errors = sensor.map_or([0.0; 3], |s| s.shared_errors_dn(at, expected, dark));
+            let place = e
+                .dark
+                .as_ref()
+                .and_then(|own| darks.iter().position(|d| Arc::ptr_eq(d, own)));
+            for (k, error) in [Some(0), Some(1), place.map(|k| 2 + k)].into_iter().zip(errors) {
+                if let Some(k) = k {
+                    shared[k] += own * error / e.scale_dn;
+                }
+            }
         }
         *to = (black + scale_dn * sum / certainty) as f32;
         let of_sensor: f64 = shared.iter().map(|error| (error / certainty).powi(2)).sum();
@@ -132,6 +156,7 @@ pub fn joined(
 
 #[cfg(test)]
 mod tests {
+    use super::super::SensorFrame;
     use super::super::sensor::tests::camera;
     use super::*;
 
@@ -141,6 +166,7 @@ mod tests {
             scale_dn,
             frames,
             rounding_dn2: 0.0,
+            dark: None,
         }
     }
 
@@ -192,6 +218,58 @@ mod tests {
             noise[(0, 2)]
         );
         assert!((f64::from(joined.dn[(0, 2)]) - 340.0).abs() < 340.0 * ROUNDING);
+    }
+
+    /// A long exposure with dark current and a short one with next to none, each with its own dark frame; and one dark frame of both,
+    /// whose error they share.
+    #[test]
+    fn each_exposure_has_its_own_dark_current_taken_out() {
+        // Single precision.
+        const ROUNDING: f64 = 1e-5;
+        let camera = camera();
+        let dark = |dn: f32| {
+            let frame = SensorFrame {
+                dn: Array2::from_elem((2, 3), dn),
+                frames: 25,
+                rounding_dn2: 0.0,
+            };
+            Some(Arc::new(DarkPixels::new(&frame, &camera)))
+        };
+        let exposures = |long_dark, short_dark| {
+            let mut long = exposure(10.0, 4, [440.0; 6]);
+            let mut short = exposure(1.0, 4, [70.0; 6]);
+            (long.dark, short.dark) = (long_dark, short_dark);
+            joined(vec![long, short], None, &camera, None)
+        };
+        // 300 DN of light over 100 of dark current; 30 over none.
+        let own = exposures(dark(140.0), dark(40.0));
+        assert!(
+            own.dn.iter().all(|v| (f64::from(*v) - 340.0).abs() < 340.0 * ROUNDING),
+            "{}",
+            own.dn
+        );
+        let weights = [100.0 / (401.0 / 4.0), 1.0 / (31.0 / 4.0)];
+        let certainty = weights[0] + weights[1];
+        // Of light, by the dark frames of 25 frames each.
+        let of_dark = [
+            weights[0] / 10.0 * (101.0f64 / 25.0).sqrt(),
+            weights[1] * (1.0f64 / 25.0).sqrt(),
+        ];
+        let light = 1.0 / certainty + (of_dark[0] / certainty).powi(2) + (of_dark[1] / certainty).powi(2);
+        let noise = f64::from(own.noise.unwrap()[(0, 0)]);
+        assert!(
+            (noise / (100.0 * light) - 1.0).abs() < ROUNDING,
+            "{noise} {}",
+            100.0 * light
+        );
+        // One frame for both: its error adds up before it is squared.
+        let both = dark(40.0);
+        let shared = exposures(both.clone(), both).noise.unwrap()[(0, 0)];
+        let apart = exposures(dark(40.0), dark(40.0)).noise.unwrap()[(0, 0)];
+        assert!(
+            f64::from(shared) > f64::from(apart) * (1.0 + ROUNDING),
+            "{shared} {apart}"
+        );
     }
 
     #[test]

@@ -10,7 +10,7 @@ mod tiff;
 pub use bayer::{Bayer, Channel};
 pub use expected::expected;
 pub use join::{Exposure, joined};
-pub use sensor::{SensorFrame, SensorFrames, SensorPixels};
+pub use sensor::{DarkPixels, SensorFrame, SensorFrames, SensorPixels};
 
 use std::path::Path;
 

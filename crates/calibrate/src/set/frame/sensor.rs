@@ -22,13 +22,35 @@ impl SensorFrame {
     }
 }
 
+/// A sensor without light, for so long as one exposure takes.
+#[derive(PartialEq)]
+pub struct DarkPixels {
+    /// Black level included (DN).
+    dn: Array2<f32>,
+    /// Variance of that (DN^2).
+    noise: Array2<f64>,
+}
+
+impl DarkPixels {
+    /// What a dark frame says, and how well.
+    pub fn new(frame: &SensorFrame, camera: &RelayCamera) -> Self {
+        let variance = |v: &f32| frame.variance_dn2(camera, f64::from(v - camera.black_level_dn as f32));
+        Self {
+            noise: frame.dn.map(variance),
+            dn: frame.dn.clone(),
+        }
+    }
+}
+
 /// Frames without light and in even light: what the sensor adds by itself.
 #[derive(Default)]
 pub struct SensorFrames {
-    /// Without light, black level included.
+    /// Without light, black level included: of the exposures that have none of their own, and of the flat frame.
     pub dark: Option<SensorFrame>,
     /// In even light, dark frame included.
     pub flat: Option<SensorFrame>,
+    /// Whether the dark frame is that of exposures of any time.
+    pub dark_of_any_exposure: bool,
 }
 
 impl SensorFrames {
@@ -36,14 +58,10 @@ impl SensorFrames {
     pub fn pixels(&self, camera: &RelayCamera) -> Option<SensorPixels> {
         let shape = self.dark.as_ref().or(self.flat.as_ref())?.dn.dim();
         let black = camera.black_level_dn as f32;
-        let dark = self
-            .dark
-            .as_ref()
-            .map_or_else(|| Array2::from_elem(shape, black), |d| d.dn.clone());
-        let dark_noise = self.dark.as_ref().map(|d| {
-            let variance = |v: &f32| d.variance_dn2(camera, f64::from(v - black));
-            d.dn.map(variance)
-        });
+        let (dark, dark_noise) = match self.dark.as_ref().map(|d| DarkPixels::new(d, camera)) {
+            Some(DarkPixels { dn, noise }) => (dn, Some(noise)),
+            None => (Array2::from_elem(shape, black), None),
+        };
         let flat = self.flat.as_ref().map(|flat| {
             let lit = &flat.dn - &dark;
             let level = levels(&lit, camera);
@@ -101,10 +119,27 @@ struct FlatPixels {
 }
 
 impl SensorPixels {
+    /// A sensor that nothing is known of but its black level.
+    pub fn even(camera: &RelayCamera, shape: (usize, usize)) -> Self {
+        Self {
+            camera: *camera,
+            dark: Array2::from_elem(shape, camera.black_level_dn as f32),
+            dark_noise: None,
+            flat: None,
+        }
+    }
+
     /// Take both frames out of a capture: every pixel has the stated black level and the mean response after. Pixels that tell
     /// nothing: those that were saturated or beside one that was, and dead ones with those beside them. They stay saturated. With
-    /// `filter` pixels under others are not dead: light of a flat frame may be of one colour.
-    pub fn take_out(&self, dn: &mut Array2<f32>, filter: Option<(Bayer, Channel)>) -> Array2<bool> {
+    /// `filter` pixels under others are not dead: light of a flat frame may be of one colour. `own`: the dark frame of this exposure,
+    /// here and below, in the place of that of all.
+    pub fn take_out(
+        &self,
+        dn: &mut Array2<f32>,
+        filter: Option<(Bayer, Channel)>,
+        own: Option<&DarkPixels>,
+    ) -> Array2<bool> {
+        let dark = self.dark_of(own);
         let (black, full) = (self.camera.black_level_dn as f32, self.camera.saturation_dn);
         let counts = |at| filter.is_none_or(|(bayer, channel)| bayer.has(at, channel));
         for (at, v) in dn.indexed_iter_mut() {
@@ -120,7 +155,7 @@ impl SensorPixels {
             *v = if f64::from(*v) >= self.camera.full_dn() {
                 full as f32
             } else {
-                black + (*v - self.dark[at]) / self.response(at)
+                black + (*v - dark[at]) / self.response(at)
             };
         }
         masked
@@ -129,23 +164,37 @@ impl SensorPixels {
     /// Variance of a corrected pixel by the noise of its own exposure (DN^2), which shows `signal_dn` above black in the mean of
     /// so many frames: shot noise of all that was recorded, dark current included, and read noise, both divided by the response.
     /// The recorded mean was rounded with `rounding_dn2` (DN^2).
-    pub fn own_variance_dn2(&self, at: (usize, usize), signal_dn: f64, frames: u32, rounding_dn2: f64) -> f64 {
+    pub fn own_variance_dn2(
+        &self,
+        at: (usize, usize),
+        signal_dn: f64,
+        (frames, rounding_dn2): (u32, f64),
+        own: Option<&DarkPixels>,
+    ) -> f64 {
         let response = f64::from(self.response(at));
-        let recorded = response * signal_dn + f64::from(self.dark[at]) - self.camera.black_level_dn;
+        let recorded = response * signal_dn + f64::from(self.dark_of(own)[at]) - self.camera.black_level_dn;
         (self.camera.variance_dn2(recorded, frames) + rounding_dn2) / (response * response)
     }
 
-    /// By how much a corrected pixel that shows `signal_dn` is off if the dark frame, and if the flat frame, is too bright by
-    /// one standard deviation (DN). A dark frame that is too bright takes too much out of the capture and makes the pixel
-    /// look less sensitive; a flat frame that is too bright makes it look more so. All exposures share both.
-    pub fn shared_errors_dn(&self, at: (usize, usize), signal_dn: f64) -> [f64; 2] {
+    /// By how much a corrected pixel that shows `signal_dn` is off if the dark frame of all exposures, the flat frame, and the dark
+    /// frame of its own are too bright by one standard deviation (DN). A dark frame that is too bright takes too much out of the
+    /// capture, that of all also makes the pixel look less sensitive; a flat frame that is too bright makes it look more so. Exposures
+    /// share the first two.
+    pub fn shared_errors_dn(&self, at: (usize, usize), signal_dn: f64, own: Option<&DarkPixels>) -> [f64; 3] {
         let response = f64::from(self.response(at));
         let of_level = self.flat.as_ref().map_or(0.0, |f| signal_dn / f64::from(f.level[at]));
         let sigma = |noise: Option<&Array2<f64>>| noise.map_or(0.0, |n| n[at].sqrt());
+        let taken_out = if own.is_some() { 0.0 } else { 1.0 };
         [
-            (of_level - 1.0) / response * sigma(self.dark_noise.as_ref()),
+            (of_level - taken_out) / response * sigma(self.dark_noise.as_ref()),
             -of_level / response * sigma(self.flat.as_ref().map(|f| &f.noise)),
+            -1.0 / response * sigma(own.map(|d| &d.noise)),
         ]
+    }
+
+    /// What the pixels show without light in an exposure.
+    fn dark_of<'a>(&'a self, own: Option<&'a DarkPixels>) -> &'a Array2<f32> {
+        own.map_or(&self.dark, |d| &d.dn)
     }
 
     fn response(&self, at: (usize, usize)) -> f32 {
@@ -188,6 +237,7 @@ pub(super) mod tests {
         SensorFrames {
             dark: frame(dark),
             flat: frame(flat),
+            dark_of_any_exposure: false,
         }
     }
 
@@ -201,7 +251,7 @@ pub(super) mod tests {
         );
         let mean: f32 = (50.0 + 150.0 + 200.0 + 200.0 + 0.0 + 200.0) / 6.0;
         let mut dn = ndarray::arr2(&[[66.0, 115.0, 999.0], [140.0, 50.0, 140.0]]);
-        let masked = frames.pixels(&camera()).unwrap().take_out(&mut dn, None);
+        let masked = frames.pixels(&camera()).unwrap().take_out(&mut dn, None, None);
         // All are beside the dead pixel or the full one.
         assert!(masked.iter().all(|m| *m));
         // Single precision.
@@ -227,7 +277,7 @@ pub(super) mod tests {
         );
         let mut dn = Array2::from_elem((2, 3), 100.0);
         dn[(0, 0)] = 700.0;
-        let masked = frames.pixels(&camera()).unwrap().take_out(&mut dn, None);
+        let masked = frames.pixels(&camera()).unwrap().take_out(&mut dn, None, None);
         assert!(dn[(0, 0)] > 1000.0 && masked.iter().all(|m| !*m), "{dn}");
     }
 
@@ -245,7 +295,7 @@ pub(super) mod tests {
         let full = (0..8).map(|x| (0, x)).find(|at| green.0.has(*at, green.1)).unwrap();
         flat[full] = 1000.0;
         let pixels = frames(Array2::from_elem(shape, 40.0), flat, 1).pixels(&camera).unwrap();
-        let masked = pixels.take_out(&mut Array2::from_elem(shape, 140.0), Some(green));
+        let masked = pixels.take_out(&mut Array2::from_elem(shape, 140.0), Some(green), None);
         for (at, masked) in masked.indexed_iter() {
             let near = at.0.abs_diff(full.0) <= 1 && at.1.abs_diff(full.1) <= 1;
             assert_eq!(*masked, near, "{at:?}");
@@ -310,18 +360,52 @@ pub(super) mod tests {
             frames(dark.clone(), flat.clone(), of_sensor)
                 .pixels(&camera)
                 .unwrap()
-                .take_out(&mut dn, None);
+                .take_out(&mut dn, None, None);
             values.push(f64::from(dn[(0, 0)]) - black);
         }
         let mean = values.iter().sum::<f64>() / DRAWS as f64;
         let scatter = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / DRAWS as f64;
-        let own = expected.own_variance_dn2((0, 0), mean, of_capture, 0.0);
-        let [of_dark, of_flat] = expected.shared_errors_dn((0, 0), mean).map(|e| e * e);
+        let own = expected.own_variance_dn2((0, 0), mean, (of_capture, 0.0), None);
+        let [of_dark, of_flat, _] = expected.shared_errors_dn((0, 0), mean, None).map(|e| e * e);
         let stated = own + of_dark + of_flat;
         assert!((scatter / stated - 1.0).abs() < TOLERANCE, "{scatter} {stated}");
         // None of the three is beside the point.
         for part in [own, of_dark, of_flat] {
             assert!(part > 2.0 * TOLERANCE * stated, "{own} {of_dark} {of_flat}");
+        }
+    }
+
+    /// A dark frame of its own takes the place of that of all, which the response still rests on.
+    #[test]
+    fn an_exposure_may_have_a_dark_frame_of_its_own() {
+        const ROUNDING: f64 = 1e-5;
+        let even = |dn: f32| Array2::from_elem((2, 3), dn);
+        let pixels = frames(even(50.0), even(250.0), 4).pixels(&camera()).unwrap();
+        // 300 DN of dark current in 16 frames of a long exposure.
+        let own = SensorFrame {
+            dn: even(340.0),
+            frames: 16,
+            rounding_dn2: 0.0,
+        };
+        let own = DarkPixels::new(&own, &camera());
+        let mut dn = even(440.0);
+        pixels.take_out(&mut dn, None, Some(&own));
+        assert!(
+            dn.iter().all(|v| (f64::from(*v) - 140.0).abs() < ROUNDING * 140.0),
+            "{dn}"
+        );
+        // What is recorded has the noise of its dark current.
+        let variance = pixels.own_variance_dn2((0, 0), 100.0, (8, 0.0), Some(&own));
+        assert!((variance - (400.0 + 1.0) / 8.0).abs() < ROUNDING, "{variance}");
+        // Half of what the even light shows, over a response of one.
+        let errors = pixels.shared_errors_dn((0, 0), 100.0, Some(&own)).map(|e| e * e);
+        let want = [
+            0.25 * (10.0 + 1.0) / 4.0,
+            0.25 * (210.0 + 1.0) / 4.0,
+            (300.0 + 1.0) / 16.0,
+        ];
+        for (error, want) in errors.into_iter().zip(want) {
+            assert!((error / want - 1.0).abs() < ROUNDING, "{error} {want}");
         }
     }
 }

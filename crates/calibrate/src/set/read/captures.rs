@@ -1,11 +1,12 @@
 //! The measurements of a set: captures, and widths by SEM.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use ndarray::Array2;
 
-use super::{holds_its_pages, whole};
-use crate::set::frame::{Exposure, SensorPixels};
+use super::{DISTANCE_UM, WINDOW_CENTRE_UM, holds_its_pages, sensor_frame, whole};
+use crate::set::frame::{DarkPixels, Exposure, SensorFrames};
 use crate::set::{
     Capture, ElementIndex, Led, LedIndex, MeasuredElement, PerElement, PerLed, RelayCamera, SemSite, frame, sem,
 };
@@ -14,10 +15,12 @@ use metalith_core::document::{Limits, Section};
 pub(super) fn captures(
     root: &Section<'_, '_>,
     camera: &RelayCamera,
-    sensor: Option<&SensorPixels>,
+    frames: &SensorFrames,
     leds: &PerLed<Led>,
     elements: &PerElement<MeasuredElement>,
 ) -> Vec<Capture> {
+    let sensor = frames.pixels(camera);
+    let mut darks = DarkFrames::new(camera, frames);
     let mut captures = Vec::new();
     for s in root.sections("capture") {
         let index = whole(&s, "element", Limits::new(-1000.0..=1000.0, ""));
@@ -41,12 +44,12 @@ pub(super) fn captures(
             LedIndex::from(0)
         });
         let aoi_deg: [f64; 2] = s.array("aoi_deg", Limits::new(-80.0..=80.0, "degrees"));
-        let distance_um = s.float("distance_um", Limits::new(1.0..=100_000.0, "um"));
-        let window_centre_um = s.array("window_centre_um", Limits::new(-10_000.0..=10_000.0, "um"));
+        let distance_um = s.float("distance_um", DISTANCE_UM);
+        let window_centre_um = s.array("window_centre_um", WINDOW_CENTRE_UM);
         let filter = camera.bayer.zip(leds.get(led).and_then(|l| l.channel));
-        let (path, exposures) = exposures(&s, camera);
+        let (path, exposures) = exposures(&s, led, &mut darks);
         s.finish();
-        let joined = frame::joined(exposures, sensor, camera, filter);
+        let joined = frame::joined(exposures, sensor.as_ref(), camera, filter);
         captures.push(Capture {
             name: path
                 .file_stem()
@@ -68,16 +71,80 @@ pub(super) fn captures(
     captures
 }
 
-/// The exposures of a capture, at least one, and the file of the first: those of its `[[capture.exposure]]`, or its own.
-fn exposures(s: &Section<'_, '_>, camera: &RelayCamera) -> (PathBuf, Vec<Exposure>) {
+/// Exposures of one LED whose scales differ by more than this factor had unlike times, or unlike light: a dark current that is taken
+/// out of the other for less is wrong by a fifth of itself.
+const UNLIKE: f64 = 1.25;
+
+/// Dark frames of single exposures, and what that of the camera has served so far.
+struct DarkFrames<'a> {
+    camera: &'a RelayCamera,
+    /// Those that were read: one that several exposures name is one object.
+    known: Vec<Arc<DarkPixels>>,
+    /// Whether there is one of the camera that is of one exposure.
+    is_of_one: bool,
+    /// The scale of the first exposure of each LED that it is taken out of.
+    served: Vec<(LedIndex, f64)>,
+}
+
+impl<'a> DarkFrames<'a> {
+    fn new(camera: &'a RelayCamera, frames: &SensorFrames) -> Self {
+        Self {
+            camera,
+            known: Vec::new(),
+            is_of_one: frames.dark.is_some() && !frames.dark_of_any_exposure,
+            served: Vec::new(),
+        }
+    }
+
+    /// The dark frame that a section names, if it names one.
+    fn of(&mut self, s: &Section<'_, '_>) -> Option<Arc<DarkPixels>> {
+        let frame = sensor_frame(s, self.camera, "dark_frame", "dark_frames")?;
+        let own = DarkPixels::new(&frame, self.camera);
+        if let Some(known) = self.known.iter().find(|known| ***known == own) {
+            return Some(Arc::clone(known));
+        }
+        self.known.push(Arc::new(own));
+        self.known.last().cloned()
+    }
+
+    /// Fault an exposure of another time than one that the dark frame of the camera was taken out of already; one for all of them.
+    fn check_one_time(&mut self, s: &Section<'_, '_>, led: LedIndex, scale_dn: f64) {
+        if !self.is_of_one {
+            return;
+        }
+        let Some(&(_, first)) = self.served.iter().find(|(own, _)| *own == led) else {
+            self.served.push((led, scale_dn));
+            return;
+        };
+        let times = (scale_dn / first).max(first / scale_dn);
+        if times > UNLIKE {
+            s.fault(
+                "scale_dn",
+                format!(
+                    "the dark frame of [camera] is taken out of exposures of unlike time: this one of {scale_dn} DN, and one of {first} \
+                     DN of the same LED"
+                ),
+                "name the dark frame of each exposure by `dark_frame` and `dark_frames` beside its `file`; if dark current is next to \
+                 nothing, or the light was changed and not the time, say `dark_holds_for = \"any_exposure\"` in [camera]",
+            );
+            self.is_of_one = false;
+        }
+    }
+}
+
+/// The exposures of a capture, at least one, and the file of the first: those of its `[[capture.exposure]]`, or its own. A dark frame
+/// of the capture is that of its exposures which name none.
+fn exposures(s: &Section<'_, '_>, led: LedIndex, darks: &mut DarkFrames<'_>) -> (PathBuf, Vec<Exposure>) {
+    let (of_capture, is_named) = (darks.of(s), s.has("dark_frame"));
     if !s.has("exposure") {
-        let (path, only) = exposure(s, camera);
+        let (path, only) = exposure(s, led, (of_capture, is_named), darks);
         return (path, vec![only]);
     }
     let mut name = None;
     let mut all = Vec::new();
     for own in s.sections("exposure") {
-        let (path, exposure) = exposure(&own, camera);
+        let dark = darks.of(&own).or_else(|| of_capture.clone());
+        let (path, exposure) = exposure(&own, led, (dark, is_named || own.has("dark_frame")), darks);
         own.finish();
         name.get_or_insert(path);
         all.push(exposure);
@@ -88,7 +155,7 @@ fn exposures(s: &Section<'_, '_>, camera: &RelayCamera) -> (PathBuf, Vec<Exposur
             "no exposure",
             "add one [[capture.exposure]] for each, or give `file`",
         );
-        all.push(nothing(camera));
+        all.push(nothing(darks.camera));
     }
     (name.unwrap_or_default(), all)
 }
@@ -100,10 +167,18 @@ fn nothing(camera: &RelayCamera) -> Exposure {
         scale_dn: 1.0,
         frames: 1,
         rounding_dn2: 0.0,
+        dark: None,
     }
 }
 
-fn exposure(s: &Section<'_, '_>, camera: &RelayCamera) -> (PathBuf, Exposure) {
+/// One exposure, with the dark frame of its own, if it has one, and whether one is named, be it sound or not.
+fn exposure(
+    s: &Section<'_, '_>,
+    led: LedIndex,
+    (dark, is_named): (Option<Arc<DarkPixels>>, bool),
+    darks: &mut DarkFrames<'_>,
+) -> (PathBuf, Exposure) {
+    let camera = darks.camera;
     let path = s.file("file");
     let scale_dn = s.float("scale_dn", Limits::new(f64::MIN_POSITIVE..=1e12, "DN"));
     let frames = s.integer("frames", 1..=1_000_000, "frames") as u32;
@@ -117,9 +192,13 @@ fn exposure(s: &Section<'_, '_>, camera: &RelayCamera) -> (PathBuf, Exposure) {
             );
         }
     });
+    if !is_named {
+        darks.check_one_time(s, led, scale_dn);
+    }
     let mut exposure = Exposure {
         scale_dn,
         frames,
+        dark,
         ..nothing(camera)
     };
     if let Ok(recorded) = recorded {

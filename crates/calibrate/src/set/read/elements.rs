@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::whole;
+use super::{APERTURE_DIAMETER_UM, whole};
 use crate::set::{MeasuredElement, Stack};
 use metalith_core::document::{Limits, Section};
 use metalith_core::{ElementSite, Lattice, Result, WidthMap};
@@ -25,7 +25,7 @@ pub(super) fn elements(
     for s in &sections {
         let index = whole(s, "index", Limits::new(-1000.0..=1000.0, ""));
         let centre_um = s.array("centre_um", Limits::new(-1e6..=1e6, "um"));
-        let aperture_diameter_um = s.float("aperture_diameter_um", Limits::new(1.0..=2000.0, "um"));
+        let aperture_diameter_um = s.float("aperture_diameter_um", APERTURE_DIAMETER_UM);
         s.finish();
         if elements.iter().any(|e| e.index == index) {
             s.fault("index", format!("element {index:?} is there twice"), "leave one out");
@@ -49,6 +49,7 @@ pub(super) fn elements(
             name: format!("({}, {})", e.index[0], e.index[1]),
             centre_nm: e.centre_um.map(|c| (c * 1e3).round() as i64),
             lattice: e.pillars.lattice,
+            within_nm: None,
         })
         .collect();
     match read(&sites) {

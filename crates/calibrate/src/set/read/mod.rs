@@ -17,6 +17,16 @@ use ndarray::Array2;
 /// Version of the format that is read.
 const SCHEMA: i64 = 1;
 
+/// What a set may say of its cells and lenses, and of where captures were taken.
+pub(crate) const PITCH_NM: Limits = Limits::new(50.0..=20_000.0, "nm");
+pub(crate) const HEIGHT_NM: Limits = Limits::new(10.0..=TALLEST_NM, "nm");
+pub(crate) const AMBIENT_INDEX: Limits = Limits::new(1.0..=3.0, "");
+pub(crate) const LENS_DIAMETER_UM: Limits = Limits::new(5.0..=2000.0, "um");
+pub(crate) const FOCAL_LENGTH_UM: Limits = Limits::new(1.0..=100_000.0, "um");
+pub(crate) const APERTURE_DIAMETER_UM: Limits = Limits::new(1.0..=2000.0, "um");
+pub(crate) const DISTANCE_UM: Limits = Limits::new(1.0..=100_000.0, "um");
+pub(crate) const WINDOW_CENTRE_UM: Limits = Limits::new(-10_000.0..=10_000.0, "um");
+
 /// Half-width of the spectrum that the film's table must cover, in standard deviations: what lies outside
 /// is 1e-3 of the light.
 pub(crate) const SPECTRUM_SIGMAS: f64 = 3.2;
@@ -62,7 +72,7 @@ fn sections(path: &Path, root: &Section<'_, '_>, layouts: &dyn PillarReader, pro
         let read = |sites: &[ElementSite]| layouts.pillars(&layout, pillar_layer, stack.cell.shape, sites, progress);
         elements(root, &stack, &layout, &read).into()
     };
-    let captures = captures(root, &camera, frames.pixels(&camera).as_ref(), &leds, &elements);
+    let captures = captures(root, &camera, &frames, &leds, &elements);
     let (sem, sem_offset_sigma_nm) = widths(root, &elements);
     let field_boundary_um = field_boundary(root);
     MeasuredSet {
@@ -107,12 +117,17 @@ fn pixel_um(s: &Section<'_, '_>) -> f64 {
     positive("sensor_pixel_um", 1000.0, "um") / positive("magnification", 1000.0, "")
 }
 
+/// Limits as those of a whole number.
+fn whole_range(limits: &Limits) -> std::ops::RangeInclusive<i64> {
+    *limits.range.start() as i64..=*limits.range.end() as i64
+}
+
 /// Tallest pillar and thickest layer (nm).
 const TALLEST_NM: f64 = 50_000.0;
 
 /// The cell as stated, and whether its materials are known; a vacuum takes their place else.
 fn stack(s: &Section<'_, '_>, folder: &Path) -> (Stack, bool) {
-    let pitch_nm = s.integer("pitch_nm", 50..=20_000, "nm") as u32;
+    let pitch_nm = s.integer("pitch_nm", whole_range(&PITCH_NM), "nm") as u32;
     if !pitch_nm.is_multiple_of(2) {
         s.fault(
             "pitch_nm",
@@ -120,7 +135,7 @@ fn stack(s: &Section<'_, '_>, folder: &Path) -> (Stack, bool) {
             "use an even number",
         );
     }
-    let height_nm = s.float("pillar_height_nm", Limits::new(10.0..=TALLEST_NM, "nm"));
+    let height_nm = s.float("pillar_height_nm", HEIGHT_NM);
     s.choice("incidence", &[("substrate", ())], None);
     let vacuum = || Material::constant(1.0, 0.0).expect("index one is physical");
     let found = |key: &str, material: metalith_core::Result<Material>| {
@@ -134,7 +149,7 @@ fn stack(s: &Section<'_, '_>, folder: &Path) -> (Stack, bool) {
         None
     };
     let substrate = found("substrate", resolved(&s.text("substrate"), folder));
-    let ambient_index = s.float("ambient_index", Limits::new(1.0..=3.0, ""));
+    let ambient_index = s.float("ambient_index", AMBIENT_INDEX);
     let spacer = s.optional_text("spacer_material");
     let spacer = spacer.map(|name| found("spacer_material", resolved(&name, folder)).unwrap_or_else(vacuum));
     let layer = |key: &str, material: Option<Material>| {
@@ -152,8 +167,8 @@ fn stack(s: &Section<'_, '_>, folder: &Path) -> (Stack, bool) {
     };
     let under = [layer("spacer_nm", spacer), layer("residual_nm", film.clone())];
     let shape = s.choice("shape", &PillarShape::CHOICES, Some(PillarShape::Square));
-    let lens_diameter_um = s.float("lens_diameter_um", Limits::new(5.0..=2000.0, "um"));
-    let focal_length_um = s.float("focal_length_um", Limits::new(1.0..=100_000.0, "um"));
+    let lens_diameter_um = s.float("lens_diameter_um", LENS_DIAMETER_UM);
+    let focal_length_um = s.float("focal_length_um", FOCAL_LENGTH_UM);
     s.finish();
     let is_known = film.is_some() && substrate.is_some();
     let even = f64::from(pitch_nm + pitch_nm % 2);
@@ -230,6 +245,27 @@ fn check_flat(s: &Section<'_, '_>, camera: &RelayCamera, frames: &SensorFrames) 
     }
 }
 
+/// Whether the dark frame of a camera is that of any exposure, by what it is said to hold for.
+const DARK_HOLDS_FOR: [(&str, bool); 2] = [("its_exposure", false), ("any_exposure", true)];
+
+/// A frame of the sensor by itself, and of how many it is the mean, by the keys of both; none where it is not named.
+fn sensor_frame(s: &Section<'_, '_>, camera: &RelayCamera, key: &str, count: &str) -> Option<SensorFrame> {
+    if !s.has(key) {
+        return None;
+    }
+    let (path, frames) = (s.file(key), s.integer(count, 1..=1_000_000, "frames") as u32);
+    let read = |path: &Path| frame::read(path, camera.rows, camera.cols, camera.saturation_dn);
+    let recorded = path.is_file().then(|| read(&path))?;
+    let recorded = recorded.map_err(|what| s.fault(key, what, "give a frame as large as the captures"));
+    let recorded = recorded.ok()?;
+    holds_its_pages(s, count, &recorded, frames);
+    Some(SensorFrame {
+        rounding_dn2: recorded.rounding_dn2(frames),
+        dn: recorded.dn,
+        frames,
+    })
+}
+
 pub(crate) fn camera(s: &Section<'_, '_>) -> (RelayCamera, SensorFrames) {
     let positive = |key, high, unit| s.float(key, Limits::new(f64::MIN_POSITIVE..=high, unit));
     let camera = RelayCamera {
@@ -247,29 +283,38 @@ pub(crate) fn camera(s: &Section<'_, '_>) -> (RelayCamera, SensorFrames) {
             .unwrap_or(0.0),
         bayer: s.has("bayer").then(|| s.choice("bayer", &Bayer::CHOICES, None)),
     };
-    let sensor_frame = |key, count| {
-        if !s.has(key) {
-            return None;
-        }
-        let (path, frames) = (s.file(key), s.integer(count, 1..=1_000_000, "frames") as u32);
-        let read = |path: &Path| frame::read(path, camera.rows, camera.cols, camera.saturation_dn);
-        let recorded = path.is_file().then(|| read(&path))?;
-        let recorded = recorded.map_err(|what| s.fault(key, what, "give a frame as large as the captures"));
-        let recorded = recorded.ok()?;
-        holds_its_pages(s, count, &recorded, frames);
-        Some(SensorFrame {
-            rounding_dn2: recorded.rounding_dn2(frames),
-            dn: recorded.dn,
-            frames,
-        })
-    };
     let frames = SensorFrames {
-        dark: sensor_frame("dark_frame", "dark_frames"),
-        flat: sensor_frame("flat_frame", "flat_frames"),
+        dark: sensor_frame(s, &camera, "dark_frame", "dark_frames"),
+        flat: sensor_frame(s, &camera, "flat_frame", "flat_frames"),
+        dark_of_any_exposure: s.choice("dark_holds_for", &DARK_HOLDS_FOR, Some(false)),
     };
     check_flat(s, &camera, &frames);
     s.finish();
     (camera, frames)
+}
+
+/// What is wrong with a lamp whose spectrum reaches beyond what is known of the materials of a cell, and what to do.
+pub(crate) fn beyond_tables(led: &Led, cell: &CellStack) -> Option<(String, &'static str)> {
+    let (film, all) = (cell.film.range_um(), cell.range_um());
+    let half = SPECTRUM_SIGMAS * led.sigma_nm();
+    let (from, to) = (led.centre_nm - half, led.centre_nm + half);
+    let tables = [
+        (
+            "the film's table",
+            "measure the film over the whole spectrum, or correct centre and width of the LED",
+            film,
+        ),
+        (
+            "what is known of the other materials",
+            "give a table of the material that reaches farther",
+            all,
+        ),
+    ];
+    tables.into_iter().find_map(|(what, hint, (low, high))| {
+        let (low, high) = (low * 1e3, high * 1e3);
+        let what = format!("its spectrum from {from:.0} to {to:.0} nm is outside {what}, {low:.0} to {high:.0} nm");
+        (from < low || to > high).then_some((what, hint))
+    })
 }
 
 pub(crate) fn leds(root: &Section<'_, '_>, bayer: Option<Bayer>, cell: Option<&CellStack>) -> Vec<Led> {
@@ -288,31 +333,8 @@ pub(crate) fn leds(root: &Section<'_, '_>, bayer: Option<Bayer>, cell: Option<&C
                 "leave one out; captures and effects name their LED by it, in whole nanometres",
             );
         }
-        if let Some(cell) = cell {
-            let (film, all) = (cell.film.range_um(), cell.range_um());
-            let half = SPECTRUM_SIGMAS * led.sigma_nm();
-            let (from, to) = (led.centre_nm - half, led.centre_nm + half);
-            for (what, hint, (low, high)) in [
-                (
-                    "the film's table",
-                    "measure the film over the whole spectrum, or correct centre and width of the LED",
-                    film,
-                ),
-                (
-                    "what is known of the other materials",
-                    "give a table of the material that reaches farther",
-                    all,
-                ),
-            ] {
-                let (low, high) = (low * 1e3, high * 1e3);
-                if from < low || to > high {
-                    let what = format!(
-                        "its spectrum from {from:.0} to {to:.0} nm is outside {what}, {low:.0} to {high:.0} nm"
-                    );
-                    s.fault("centre_nm", what, hint);
-                    break;
-                }
-            }
+        if let Some((what, hint)) = cell.and_then(|cell| beyond_tables(&led, cell)) {
+            s.fault("centre_nm", what, hint);
         }
         leds.push(led);
     }

@@ -116,6 +116,14 @@ impl<'d, 't> Section<'d, 't> {
         self.table.contains_key(key)
     }
 
+    /// Record that a key is missing, if it is: one that other values of the file ask for. `expected` says what to add, and why.
+    pub fn must_have(&self, key: &str, expected: &str) {
+        if !self.has(key) {
+            self.asked.borrow_mut().insert(key.to_owned());
+            self.missing_unless_present(key, expected);
+        }
+    }
+
     /// Whether the key holds a list.
     pub fn is_list(&self, key: &str) -> bool {
         matches!(self.table.get(key).map(Spanned::get_ref), Some(DeValue::Array(_)))

@@ -14,6 +14,14 @@ use metalith_core::{Error, Result, npy};
 /// Entries of a table along an axis at most: sites of the largest lens that is held.
 const MOST: u64 = 1 << 15;
 
+/// Rounding of distances (um): a map that ends where the lens does covers it.
+const ROUNDING_UM: f64 = 1e-6;
+
+/// A distance to the nanometre (um).
+fn shown_um(um: f64) -> f64 {
+    (um * 1e3).round() / 1e3
+}
+
 /// Phase (rad) on a square grid about the middle; between its places straight lines or the nearest entry.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MapTable {
@@ -75,11 +83,12 @@ impl MapTable {
         }
         // Half a place beyond the last is still nearest to it.
         let extent = [columns, rows].map(|n| n as f64 * self.pitch_um / 2.0);
-        if extent[0] < reach_um[0] || extent[1] < reach_um[1] {
+        if (0..2).any(|axis| extent[axis] < reach_um[axis] - ROUNDING_UM) {
+            let [(to_x, to_y), (lens_x, lens_y)] = [extent, reach_um].map(|um| (shown_um(um[0]), shown_um(um[1])));
             return Err(fault(
                 format!(
-                    "{columns} by {rows} places of {} um reach to {} and {} um, the lens to {} and {} um",
-                    self.pitch_um, extent[0], extent[1], reach_um[0], reach_um[1]
+                    "{columns} by {rows} places of {} um reach to {to_x} and {to_y} um, the lens to {lens_x} and {lens_y} um",
+                    self.pitch_um
                 ),
                 "extend the table, give its pitch in um, or make the lens smaller",
             ));

@@ -69,18 +69,19 @@ pub enum ZernikeOrder {
 }
 
 impl PhaseTerm {
-    /// Read the file that it names, if it does, for a lens of this radius (um).
+    /// Read the file that it names, if it does, for a lens of this radius (um) whose aperture has these least and greatest places
+    /// from the middle along x and along y (um), before the element is rotated: phases turn with it.
     ///
     /// # Errors
-    /// If the file is not what it should be, or does not cover the lens.
-    pub fn load(&mut self, lens_radius_um: f64) -> Result<()> {
+    /// If the file is not what it should be, or does not cover the lens; a map has to cover the box about the aperture.
+    pub fn load(&mut self, lens_radius_um: f64, ends_um: [[f64; 2]; 2]) -> Result<()> {
         let reach_um = lens_radius_um + self.centre_um[0].hypot(self.centre_um[1]);
         match &mut self.form {
             TermForm::Radial(radial) => radial.load(reach_um),
-            TermForm::Map(map) => {
-                let [x, y] = self.centre_um.map(f64::abs);
-                map.load([lens_radius_um + x, lens_radius_um + y])
-            }
+            TermForm::Map(map) => map.load([0, 1].map(|axis| {
+                let far = ends_um[axis].map(|end| (end - self.centre_um[axis]).abs());
+                far[0].max(far[1])
+            })),
             TermForm::OpticStudio { file, surface } => {
                 self.form = optic_studio::read(file, *surface)?;
                 Ok(())

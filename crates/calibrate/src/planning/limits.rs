@@ -1,0 +1,96 @@
+//! Whether a session of a design can be planned: what a measured set may say is checked before any work is spent.
+
+use metalith_core::document::Limits;
+use metalith_core::{Error, Result};
+use metalith_design::Design;
+
+use super::bench_file::BenchFile;
+use super::candidates::{chosen_elements, distances_um, lens_diameter_um};
+use crate::set::read;
+
+/// Nothing, if a set of the design can be planned and read: pillars that are squares or circles on a square lattice, elements that
+/// are round, and all within what a set may say.
+///
+/// # Errors
+/// What stands against it, with the limit and what to do.
+pub fn check_plannable(design: &Design, bench: &BenchFile) -> Result<()> {
+    if design.cell.shape.rectangles().is_some() {
+        return Err(Error::invalid(
+            format!("{} is a design of rectangles", design.path.display()),
+            "plan sessions of squares or circles: sets are read of these alone",
+        ));
+    }
+    design.square_lattice("`plan`")?;
+    let cell = design.cell_stack()?;
+    let middle_um = bench.leds.iter().map(|l| l.centre_nm * 1e-3).next().unwrap_or(1.0);
+    let ambient = cell.ambient.index(middle_um)?.re;
+    let of_cell = vec![
+        ("the pitch", cell.pitch_nm, read::PITCH_NM),
+        ("the height of the pillars", cell.height_nm, read::HEIGHT_NM),
+        ("the index between the pillars", ambient, read::AMBIENT_INDEX),
+    ];
+    check(design, of_cell, "plan a session of another cell")?;
+    let diameter_um = lens_diameter_um(design);
+    let mut of_lenses = vec![("the diameter of the lenses", diameter_um, read::LENS_DIAMETER_UM)];
+    for element in &chosen_elements(design, bench)? {
+        let focal_um = design.lens_of(element).focal_length_um;
+        let opening_um = 2.0 * design.aperture_radius_of_um(element);
+        of_lenses.push(("the diameter of an opening", opening_um, read::APERTURE_DIAMETER_UM));
+        of_lenses.push(("the focal length", focal_um, read::FOCAL_LENGTH_UM));
+        let distances = distances_um(bench, focal_um).into_iter();
+        of_lenses.extend(distances.map(|d| ("the distance of a capture", d, read::DISTANCE_UM)));
+    }
+    check(
+        design,
+        of_lenses,
+        "plan a session of a design of smaller lenses with the same cell: what film and etch do is the same there",
+    )?;
+    let beyond = bench
+        .leds
+        .iter()
+        .find_map(|led| Some((led, read::beyond_tables(led, &cell)?)));
+    beyond.map_or(Ok(()), |(led, (what, hint))| {
+        Err(Error::invalid(format!("the LED of {} nm: {what}", led.name()), hint))
+    })
+}
+
+/// Refuse the first of some numbers of a design that a measured set may not say.
+fn check(design: &Design, numbers: Vec<(&str, f64, Limits)>, hint: &str) -> Result<()> {
+    let is_beyond = |(_, value, limits): &(&str, f64, Limits)| !limits.range.contains(value);
+    let Some((what, value, Limits { range, unit })) = numbers.into_iter().find(is_beyond) else {
+        return Ok(());
+    };
+    let (low, high) = range.into_inner();
+    let path = design.path.display();
+    Err(Error::invalid(
+        format!("{what} of {path} is {value} {unit}: a measured set may say {low} to {high} {unit}"),
+        hint,
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::bench_file::tests::small_bench;
+    use super::*;
+
+    fn checked(name: &str) -> Result<()> {
+        let path = metalith_testing::root().join(format!("designs/{name}.toml"));
+        let design = Design::read_any(&path).unwrap();
+        check_plannable(&design, &small_bench(""))
+    }
+
+    #[test]
+    fn what_a_set_cannot_say_is_refused_before_it_is_simulated() {
+        for (name, parts) in [
+            ("lens_10mm", ["10000 um", "5 to 2000"]),
+            ("hexagonal_1550", ["square lattices", "hexagonal"]),
+            ("geometric_phase_532", ["rectangles", "squares or circles"]),
+        ] {
+            let error = checked(name).unwrap_err().to_string();
+            for part in parts {
+                assert!(error.contains(part), "{part} is not in:\n{error}");
+            }
+        }
+        assert!(checked("mini_3x3").is_ok());
+    }
+}

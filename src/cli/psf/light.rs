@@ -1,0 +1,233 @@
+//! The light that `metalith psf` simulates: wavelengths that were asked for, and what a camera counts.
+
+use metalith::camera::{Camera, Sampling};
+use metalith::design::{VISIBLE_UM, band_about};
+use metalith::verify::white_sampling;
+use metalith::{Extraction, Result};
+
+use super::{FidelityArg, PsfArgs};
+
+/// Wavelengths that are taken where none are named (nm).
+const USUAL_NM: [f64; 3] = [455.0, 530.0, 660.0];
+
+/// Pixels where neither an option nor a camera says them (um).
+const USUAL_PIXEL_UM: f64 = 5.86;
+
+/// The light that a layout is simulated in.
+pub(super) struct PsfLight {
+    /// Wavelengths of single PSFs (um).
+    pub wavelengths_um: Vec<f64>,
+    pub white: Option<WhiteLight>,
+}
+
+/// White light for a camera.
+pub(super) struct WhiteLight {
+    pub camera: Camera,
+    /// What of it is simulated.
+    pub sampling: Sampling,
+    /// Single wavelengths that stand for its channels (um).
+    colours_um: Vec<f64>,
+}
+
+impl WhiteLight {
+    /// What a camera counts, as far as cells are known.
+    fn of(camera: Camera, known_um: (f64, f64)) -> Result<Self> {
+        let sampling = white_sampling(&camera, [known_um.0 * 1e3, known_um.1 * 1e3])?;
+        let (short, long) = ends_nm(&sampling);
+        let mut colours_nm = USUAL_NM.to_vec();
+        if !colours_nm.iter().all(|nm| (short..=long).contains(nm)) {
+            colours_nm = sampling.channels.iter().map(|c| (c.mean_um() * 1e3).round()).collect();
+        }
+        Ok(Self {
+            camera,
+            sampling,
+            colours_um: colours_nm.into_iter().map(|nm| nm * 1e-3).collect(),
+        })
+    }
+}
+
+impl PsfLight {
+    /// Wavelengths that have tables of unlike neighbours (um), rising: white light is known between them, and little beyond.
+    pub fn tabulated_um(&self) -> Vec<f64> {
+        let of_white = self.white.iter().flat_map(|white| &white.colours_um);
+        let mut all: Vec<f64> = self.wavelengths_um.iter().chain(of_white).copied().collect();
+        all.sort_by(f64::total_cmp);
+        all.dedup();
+        all
+    }
+
+    /// The band that it lies in (um), as far as materials are known.
+    pub fn band_um(&self, known_um: (f64, f64)) -> (f64, f64) {
+        let ends = self.white.iter().map(|white| ends_nm(&white.sampling));
+        let of_white = ends.flat_map(|(short, long)| [short * 1e-3, long * 1e-3]);
+        band_about(self.wavelengths_um.iter().copied().chain(of_white), known_um)
+    }
+}
+
+/// The first and the last wavelength (nm).
+fn ends_nm(sampling: &Sampling) -> (f64, f64) {
+    let all = sampling.wavelengths_nm.iter();
+    all.fold((f64::INFINITY, 0.0), |(short, long), nm| {
+        (short.min(*nm), long.max(*nm))
+    })
+}
+
+impl PsfArgs {
+    /// The light that the options ask for.
+    ///
+    /// # Errors
+    /// If the camera or a material cannot be used, or a channel counts no light at which the cell is known.
+    pub(super) fn light(&self, found: &Extraction) -> Result<PsfLight> {
+        let white = match &self.camera {
+            Some(file) => Some(WhiteLight::of(Camera::read(file)?, self.known_um(found)?)?),
+            None => None,
+        };
+        let wavelengths_um = match (self.wavelengths_nm.as_slice(), &white) {
+            ([], Some(white)) => white.colours_um.clone(),
+            ([], None) => USUAL_NM.map(|nm| nm * 1e-3).to_vec(),
+            (named, _) => named.iter().map(|nm| nm * 1e-3).collect(),
+        };
+        Ok(PsfLight { wavelengths_um, white })
+    }
+
+    /// Wavelengths that the cell is known for (um): those of its materials, of the published polynomials the visible.
+    fn known_um(&self, found: &Extraction) -> Result<(f64, f64)> {
+        if self.model.is_none() && matches!(self.fidelity, FidelityArg::Published) {
+            return Ok(VISIBLE_UM);
+        }
+        Ok(self.stack(found)?.range_um())
+    }
+
+    /// Edge of a pixel (um).
+    pub(super) fn pixel_um(&self, light: Option<&PsfLight>) -> f64 {
+        let of_camera = light.and_then(|l| l.white.as_ref()).map(|w| w.camera.sensor.pixel_um);
+        self.pixel_um.or(of_camera).unwrap_or(USUAL_PIXEL_UM)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+    use metalith::{Design, PillarShape};
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Program {
+        #[command(flatten)]
+        psf: PsfArgs,
+    }
+
+    /// The options, of a layout that is not there.
+    fn options(words: &[&str]) -> PsfArgs {
+        let words = [&["metalith", "layout.gds"][..], words].concat();
+        Program::try_parse_from(words).map_err(|e| e.to_string()).unwrap().psf
+    }
+
+    /// Of pillars of this shape on a square lattice of 350 nm.
+    fn nothing(shape: PillarShape) -> Extraction {
+        Extraction {
+            top: String::new(),
+            shape,
+            elements: Vec::new(),
+            pillars: 0,
+            oddities: Default::default(),
+            survey: Default::default(),
+        }
+    }
+
+    fn camera(name: &str) -> String {
+        let file = metalith_testing::root().join(format!("cameras/{name}.toml"));
+        file.display().to_string()
+    }
+
+    fn um(nm: &[f64]) -> Vec<f64> {
+        nm.iter().map(|nm| nm * 1e-3).collect()
+    }
+
+    const SILICON: [&str; 2] = ["--pillar-material", "a_si_pierce_1972"];
+
+    /// Wavelengths, tables and pixels are of the camera, where it does not count the usual light.
+    #[test]
+    fn light_is_that_of_the_camera() {
+        let found = nothing(PillarShape::Circle);
+        let light = |words: &[&str]| {
+            let options = options(&[&SILICON[..], words].concat());
+            let light = options.light(&found).unwrap();
+            let pixel_um = options.pixel_um(Some(&light));
+            (light, pixel_um)
+        };
+        let (infrared, pixel_um) = light(&["--camera", &camera("swir")]);
+        assert_eq!((infrared.wavelengths_um, pixel_um), (um(&[1550.0]), 5.0));
+        let (both, pixel_um) = light(&[
+            "--camera",
+            &camera("swir"),
+            "--wavelength-nm",
+            "1530",
+            "--pixel-um",
+            "3",
+        ]);
+        assert_eq!((both.tabulated_um(), pixel_um), (um(&[1530.0, 1550.0]), 3.0));
+        let (visible, pixel_um) = light(&["--camera", &camera("gt1930")]);
+        assert_eq!((visible.wavelengths_um, pixel_um), (um(&USUAL_NM), 5.86));
+        // Silicon nitride of the paper's polynomials says nothing of the infrared.
+        let published = options(&["--fidelity", "published", "--camera", &camera("swir")]);
+        assert!(published.light(&found).is_err());
+    }
+
+    /// Polynomials are fitted over the light that is asked for, within what materials are known for.
+    #[test]
+    fn the_band_is_that_of_the_light() {
+        let found = nothing(PillarShape::Circle);
+        let band = |words: &[&str]| {
+            let options = options(&[&SILICON[..], words].concat());
+            let known_um = options.stack(&found).unwrap().range_um();
+            options.light(&found).unwrap().band_um(known_um)
+        };
+        let (short, long) = band(&["--wavelength-nm", "940"]);
+        assert!(
+            short > 0.91 && short < 0.912 && long > 0.968 && long < 0.97,
+            "{short} {long}"
+        );
+        // The visible of designs, from where the film is known.
+        let (short, long) = band(&[]);
+        assert!(short > 0.413 && short < 0.414 && long == 0.7, "{short} {long}");
+        let (short, long) = band(&["--camera", &camera("swir"), "--wavelength-nm", "1550"]);
+        assert!(
+            short > 1.45 && short < 1.54 && long > 1.57 && long < 1.65,
+            "{short} {long}"
+        );
+    }
+
+    /// The options say the cell of a design by the words of its file.
+    #[test]
+    fn the_cell_is_that_of_a_design() {
+        let path = metalith_testing::design("mini_3x3");
+        let text = std::fs::read_to_string(&path).unwrap();
+        let own = "[cell]\nspacer_nm = 40\nspacer_material = \"alumina_malitson_dodge_1972\"\nresidual_nm = 25\n";
+        let text = text.replacen("[cell]\n", own, 1);
+        let text = text.replacen("ambient_index = 1.0", "ambient_index = 1.33", 1);
+        let text = text.replacen("pillar_height_nm = 700", "pillar_height_nm = 20000", 1);
+        let design = Design::parse(&path, &text).unwrap();
+        let words = [
+            "--height-nm",
+            "20000",
+            "--spacer-nm",
+            "40",
+            "--spacer-material",
+            "alumina_malitson_dodge_1972",
+            "--residual-nm",
+            "25",
+            "--ambient-index",
+            "1.33",
+        ];
+        let found = nothing(PillarShape::Square);
+        let stack = options(&words).stack(&found).unwrap();
+        assert_eq!(stack, design.cell_stack().unwrap());
+        let told = options(&words).assumptions(&found, None);
+        let (_, pillars) = told.iter().find(|(what, _)| *what == "pillars").unwrap();
+        assert!(pillars.contains("40 nm of alumina") && pillars.contains("25 nm") && pillars.contains("n = 1.33"));
+        let error = options(&["--spacer-nm", "40"]).stack(&found).unwrap_err().to_string();
+        assert!(error.contains("--spacer-material"), "{error}");
+    }
+}

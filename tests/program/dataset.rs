@@ -1,0 +1,50 @@
+//! `metalith dataset`: images and folders that cannot be used are named before any work.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+use predicates::str::contains;
+
+fn dataset(images: &Path, out: &Path, more: &[&str]) -> assert_cmd::assert::Assert {
+    Command::cargo_bin("metalith")
+        .unwrap()
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .args(["dataset", "--layout", "golden/mini_3x3/folded.gds.gz"])
+        .args(["--design", "designs/mini_3x3.toml", "--camera", "cameras/gt1930.toml"])
+        .arg(images)
+        .arg("--out")
+        .arg(out)
+        .args(more)
+        .assert()
+}
+
+#[test]
+fn bad_images_and_planned_folders_are_refused_before_any_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let (images, out) = (folder.path().join("images"), folder.path().join("out"));
+    for (name, rows) in [("a.png", 48), ("b.png", 48), ("c.png", 64)] {
+        let grey = ndarray::Array3::from_elem((rows, 64, 3), 0.5);
+        metalith::picture::write_picture(&images.join(name), &grey).unwrap();
+    }
+    fs::write(images.join("d.png"), "no picture").unwrap();
+    let ways: [&[&str]; 2] = [&[], &["--plan"]];
+    for plan in ways {
+        dataset(&images, &out, plan).code(2).stderr(
+            contains("2 of 4 images cannot be used")
+                .and(contains("c.png: it has 64 x 64 pixels, most have 64 x 48"))
+                .and(contains("d.png: it is neither")),
+        );
+        let kept = ["kernels", "plan.json", "manifest.json", "000000-000999"];
+        assert!(kept.iter().all(|name| !out.join(name).exists()));
+    }
+    for bad in ["c.png", "d.png"] {
+        fs::remove_file(images.join(bad)).unwrap();
+    }
+    fs::create_dir_all(&out).unwrap();
+    fs::write(out.join("plan.json"), "{}").unwrap();
+    dataset(&images, &out, &[])
+        .code(2)
+        .stderr(contains("holds a plan").and(contains("metalith study run")));
+}
