@@ -171,6 +171,8 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     if let Some(prior) = prior {
         studio.prior = prior;
     }
+    // Once: it is asked for again and again.
+    let scene = studio.simulated(&scene).into_owned();
     let simulation = studio.simulation_of(&scene);
     let frame = studio.record(&simulation, &scene, args.with.seed)?;
     let truth = studio.truth(&scene);

@@ -346,7 +346,9 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     for quantity in model.iter().flat_map(|m| &m.not_applied) {
         print_line!("{quantity}");
     }
-    let pixel_um = exact(args.pixel_um(light.as_ref()));
+    let pixel_um = light
+        .as_ref()
+        .map_or_else(String::new, |light| exact(args.pixel_um(light)));
     for psf in &psfs {
         print_line!(
             "{}, {} nm: Strehl {}, {} % in a pixel of {pixel_um} um, peak at ({}, {}) um",

@@ -2,7 +2,6 @@
 
 use std::io::IsTerminal;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -11,9 +10,7 @@ use metalith::{FolderTurn, Progress};
 
 use super::output;
 
-/// Set by Ctrl-C in commands that can stop between two steps.
-static STOP: AtomicBool = AtomicBool::new(false);
-/// When that was first.
+/// When Ctrl-C was first pressed in commands that can stop between two steps.
 static ASKED: OnceLock<Instant> = OnceLock::new();
 
 /// Signals within this time are one wish to stop: a shell, `timeout` and a group of processes each send their own.
@@ -166,7 +163,6 @@ impl Terminal {
     /// Let Ctrl-C ask for a stop between two steps instead of ending the process; one more, a second later or more, ends it.
     pub fn stop_on_interrupt(&self) {
         let _ = ctrlc::set_handler(|| {
-            STOP.store(true, Ordering::SeqCst);
             if ends_at_once(ASKED.get_or_init(Instant::now).elapsed()) {
                 std::process::exit(130);
             }
@@ -224,7 +220,7 @@ impl Progress for Terminal {
     }
 
     fn stopped(&self) -> bool {
-        STOP.load(Ordering::SeqCst)
+        ASKED.get().is_some()
     }
 }
 

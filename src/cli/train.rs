@@ -124,11 +124,8 @@ impl TrainArgs {
         terminal: &Terminal,
     ) -> Result<TrainingReport> {
         let lineup = self.lineup(kind, photographs)?;
-        // All are of one size, or refused when they are opened.
-        let (rows, columns, _) = read_picture(&lineup.photographs[0])?.dim();
-        let size = lineup.pixels.map_or([rows, columns], |n| [n; 2]);
-        Stacks::check(lineup.photographs.len(), size, spec.piece)?;
         let open = lineup.open()?;
+        Stacks::check(lineup.photographs.len(), open.size(), spec.piece)?;
         let kept = KeptKernels::of_user();
         let (stacks, taught) = open.lessons(0, kind, &beside(out, ".pictures"), &kept, terminal)?;
         let stacks = Stacks::new(stacks, taught, spec.piece)?;

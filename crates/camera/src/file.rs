@@ -29,6 +29,11 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// Names of the channels.
+    pub fn channel_names(&self) -> Vec<String> {
+        self.channels.iter().map(|c| c.name.clone()).collect()
+    }
+
     /// Read the camera file at `path`, and the curves that it names.
     ///
     /// # Errors

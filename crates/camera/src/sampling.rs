@@ -23,6 +23,16 @@ pub struct Sampling {
     pub channels: Vec<ChannelSampling>,
 }
 
+impl Sampling {
+    /// The first and the last wavelength (nm).
+    pub fn ends_nm(&self) -> [f64; 2] {
+        [
+            self.wavelengths_nm[0],
+            self.wavelengths_nm[self.wavelengths_nm.len() - 1],
+        ]
+    }
+}
+
 /// One channel among these wavelengths.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChannelSampling {

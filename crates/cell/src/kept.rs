@@ -219,7 +219,7 @@ impl Read for Digested {
 }
 
 /// A small table that is kept in a folder under the name of its inputs, if there is a folder. That it cannot be read or kept
-/// is said as a note, and no reason to stop.
+/// is a warning, and no reason to stop.
 #[derive(Clone, Debug)]
 pub struct KeptTable {
     name: String,

@@ -180,27 +180,31 @@ impl Lattice {
 
     /// Of these the columns and rows whose places from the centre are within two ends along x and along y, both included (nm).
     pub fn within(&self, ends_nm: [[i64; 2]; 2]) -> [std::ops::Range<usize>; 2] {
-        let reach = self.reach();
+        let (reach, steps) = (self.reach(), self.steps_nm());
         [0, 1].map(|axis| {
-            let first = |is_past: &dyn Fn(i64) -> bool| {
-                let mut all = reach[axis].clone();
-                all.find(|&i| is_past(self.place_nm(axis, i)))
-                    .unwrap_or(reach[axis].end)
-            };
+            let std::ops::Range { start, end } = reach[axis];
+            let (first, step) = (self.place_nm(axis, start), i64::from(steps[axis]));
+            // The first place at or beyond a length: so many steps, rounded up.
+            let from = |nm: i64| start + (-(first - nm).div_euclid(step)).clamp(0, (end - start) as i64) as usize;
             let [least, greatest] = ends_nm[axis];
-            let from = first(&|nm| nm >= least);
-            from..first(&|nm| nm > greatest).max(from)
+            let low = from(least);
+            low..from(greatest + 1).max(low)
+        })
+    }
+
+    /// The outermost places of these columns and rows from the centre, along x and along y (nm).
+    pub fn ends_nm(&self, reach: &[std::ops::Range<usize>; 2]) -> [[i64; 2]; 2] {
+        [0, 1].map(|axis| {
+            let std::ops::Range { start, end } = reach[axis];
+            [start, end.max(start + 1) - 1].map(|i| self.place_nm(axis, i))
         })
     }
 
     /// What a lens that takes all of it needs along x and along y (nm): from its first place to its last, and a pitch, so that
     /// pillars of two such lenses side by side are a pitch apart.
     pub fn sides_nm(&self) -> [i64; 2] {
-        let reach = self.reach();
-        [0, 1].map(|axis| {
-            let place = |i| self.place_nm(axis, i);
-            place(reach[axis].end - 1) - place(reach[axis].start) + i64::from(self.pitch_nm)
-        })
+        self.ends_nm(&self.reach())
+            .map(|[first, last]| last - first + i64::from(self.pitch_nm))
     }
 
     /// Steps along columns and rows from a site to half of its neighbours; the others are on the opposite sides.

@@ -20,6 +20,7 @@ mod shape;
 pub mod srgb;
 pub mod text;
 mod wedge;
+mod width_check;
 mod zernike;
 
 pub use circle::{CHORD_ERROR, circle_corners};
@@ -38,4 +39,5 @@ pub use rectangle::Rectangles;
 pub use rows::WidthRows;
 pub use shape::PillarShape;
 pub use wedge::{Wedge, turned_sine};
+pub use width_check::WidthCheck;
 pub use zernike::Zernike;

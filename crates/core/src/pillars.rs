@@ -25,19 +25,21 @@ impl ElementSite {
             .map_or_else(|| self.lattice.reach(), |ends| self.lattice.within(ends))
     }
 
-    /// The outermost columns or rows of these along an axis, in the layout (nm).
-    pub fn ends_nm(&self, axis: usize, reach: &Range<usize>) -> [i64; 2] {
-        [reach.start, reach.end.max(reach.start + 1) - 1].map(|i| self.centre_nm[axis] + self.lattice.place_nm(axis, i))
+    /// The outermost columns and rows of these in the layout, along x and along y (nm).
+    pub fn ends_nm(&self) -> [[i64; 2]; 2] {
+        self.in_layout(&self.reach())
+    }
+
+    /// The outermost of these columns and rows in the layout, along x and along y (nm).
+    fn in_layout(&self, reach: &[Range<usize>; 2]) -> [[i64; 2]; 2] {
+        let ends = self.lattice.ends_nm(reach);
+        [0, 1].map(|axis| ends[axis].map(|nm| self.centre_nm[axis] + nm))
     }
 
     /// Leave `within_nm` to those elements alone whose lattices, all of each, are less than a pitch from that of another: for
     /// the others it tells nothing that the lattice does not.
     pub fn widen(sites: &mut [Self]) {
-        let whole = |s: &Self| -> [[i64; 2]; 2] {
-            let reach = s.lattice.reach();
-            [0, 1].map(|axis| s.ends_nm(axis, &reach[axis]))
-        };
-        let whole: Vec<_> = sites.iter().map(whole).collect();
+        let whole: Vec<_> = sites.iter().map(|s| s.in_layout(&s.lattice.reach())).collect();
         for (k, site) in sites.iter_mut().enumerate() {
             let pitch = i64::from(site.lattice.pitch_nm());
             let near = |other: &[[i64; 2]; 2]| {
@@ -83,7 +85,7 @@ mod tests {
         // A pitch between the lattices of the first and the last, less between those of the first two.
         let mut sites = vec![strip(0, 0), strip(0, 40_399), strip(40_400, 0)];
         assert_eq!(sites[0].reach(), [0..101, 40..61]);
-        assert_eq!(sites[1].ends_nm(1, &sites[1].reach()[1]), [36_399, 44_399]);
+        assert_eq!(sites[1].ends_nm()[1], [36_399, 44_399]);
         ElementSite::widen(&mut sites);
         let kept: Vec<bool> = sites.iter().map(|s| s.within_nm.is_some()).collect();
         assert_eq!(kept, [true, true, false]);

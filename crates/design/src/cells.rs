@@ -73,11 +73,9 @@ impl Design {
     /// # Errors
     /// If a material is not known.
     pub fn table_spec(&self) -> Result<TableSpec> {
-        Ok(TableSpec::new(
-            self.cell_stack()?,
-            self.band_um()?,
-            self.cell.width_range_nm,
-        ))
+        let stack = self.cell_stack()?;
+        let band_um = self.band_of(&stack);
+        Ok(TableSpec::new(stack, band_um, self.cell.width_range_nm))
     }
 
     /// Wavelengths that the design is judged over (um), all that it names among them. Where it does not say its band: the
@@ -86,12 +84,16 @@ impl Design {
     /// # Errors
     /// If a material is not known.
     pub fn band_um(&self) -> Result<(f64, f64)> {
+        Ok(self.band_of(&self.cell_stack()?))
+    }
+
+    /// [`Design::band_um`] of a design whose [`Design::cell_stack`] was read before (um).
+    pub fn band_of(&self, stack: &CellStack) -> (f64, f64) {
         let named = self.verify.wavelengths_um.iter().chain([&self.mapping.wavelength_um]);
-        let known = self.cell_stack()?.range_um();
-        Ok(match self.cell.band_um {
+        match self.cell.band_um {
             Some(band) => named.fold(band, |(short, long), &l| (short.min(l), long.max(l))),
-            None => band_about(named.copied(), known),
-        })
+            None => band_about(named.copied(), stack.range_um()),
+        }
     }
 }
 
@@ -147,7 +149,7 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
                     let stack = design.cell_stack()?;
                     Ok(Box::new(FittedCell::of_stack(
                         &stack,
-                        design.band_um()?,
+                        design.band_of(&stack),
                         design.cell.width_range_nm,
                     )?))
                 }

@@ -140,10 +140,10 @@ impl Design {
             own.load(|_| true)?;
         }
         self.mapping.load(&self.cell)?;
-        let band_um = self.band_um()?;
-        self.optimise.within(band_um);
         // Unknown materials and wavelengths that they are not known at are mistakes of the design, whoever asks first.
         let stack = self.cell_stack()?;
+        let band_um = self.band_of(&stack);
+        self.optimise.within(band_um);
         self.check_bands(&stack)?;
         stack.check_substrate(band_um)?;
         for um in self.verify.wavelengths_um.iter().chain([&self.mapping.wavelength_um]) {
@@ -302,14 +302,17 @@ impl Design {
         Footprint::of(self.lens_of(element), rotation_deg, &self.cell).map(|footprint| footprint.ends_nm)
     }
 
-    /// Where one of them is in a layout.
+    /// Where some of them are in a layout, in the order of `chosen`.
     ///
     /// # Panics
-    /// If it is no element of the design.
-    pub fn site_of(&self, element: &Element) -> ElementSite {
-        let mut all = self.elements().into_iter().zip(self.sites());
-        let found = all.find(|(e, _)| e.index == element.index);
-        found.expect("an element of the design").1
+    /// If one is no element of the design.
+    pub fn sites_of(&self, chosen: &[Element]) -> Vec<ElementSite> {
+        let (all, sites) = (self.elements(), self.sites());
+        let site = |element: &Element| {
+            let found = all.iter().position(|e| e.index == element.index);
+            sites[found.expect("an element of the design")].clone()
+        };
+        chosen.iter().map(site).collect()
     }
 
     /// SHA-256 of all that decides the layout (not of what is verified): two designs with the same
@@ -342,7 +345,9 @@ impl Design {
     /// # Errors
     /// If a material is not known or its table cannot be read.
     pub fn optics_digest(&self) -> Result<String> {
-        let decisive = (self.digest(), self.cell_stack()?, self.band_um()?);
+        let stack = self.cell_stack()?;
+        let band_um = self.band_of(&stack);
+        let decisive = (self.digest(), stack, band_um);
         let bytes = serde_json::to_vec(&decisive).expect("plain data serialises");
         Ok(hex(&Sha256::digest(&bytes)))
     }

@@ -110,7 +110,7 @@ impl Design {
         let mut wavelengths_um = self.verify.wavelengths_um.clone();
         let mut angles = vec![FieldAngle { x_deg: 0.0, y_deg: 0.0 }];
         if asked == AskedLight::All {
-            wavelengths_um.push(self.band_um()?.0);
+            wavelengths_um.push(self.band_of(&stack).0);
             angles.extend(&self.verify.field_angles);
         }
         wavelengths_um.sort_by(f64::total_cmp);
@@ -125,6 +125,7 @@ impl Design {
             };
             for &wavelength_um in &wavelengths_um {
                 let index = material.index(wavelength_um)?.re;
+                let normal_edge_um = edge_um(index, [0.0; 2], &vectors);
                 let lit = elements.iter().flat_map(|e| angles.iter().map(move |a| (e, *a)));
                 let of_light = lit.filter_map(|(element, field)| {
                     let field_rad = [field.x_deg, field.y_deg].map(f64::to_radians);
@@ -132,7 +133,7 @@ impl Design {
                     Some(LatticeOrders {
                         medium,
                         wavelength_um,
-                        normal_edge_um: edge_um(index, [0.0; 2], &vectors),
+                        normal_edge_um,
                         edge_um: edge_um(index, incidence_sin, &vectors),
                         element: element.index,
                         field,

@@ -182,7 +182,7 @@ fn strips_stand_side_by_side_whichever_way_they_are_turned() {
     );
     let design = two(30.0, 180).unwrap();
     assert_eq!(design.sites()[1].within_nm, Some([[-49_875, 49_875], [-9_975, 9_975]]));
-    assert_eq!(design.site_of(&design.elements()[1]), design.sites()[1]);
+    assert_eq!(design.sites_of(&design.elements()[1..]), design.sites()[1..]);
     // Round lenses beside one another need no more than before, and all of their lattices are their own.
     let far = placed(&(element(-60.0, 0.0, "") + &element(60.0, 0.0, ""))).unwrap();
     assert!(far.sites().iter().all(|site| site.within_nm.is_none()));

@@ -102,8 +102,7 @@ fn near_elements<'s>(flat: &'s FlatLayout<'_>, reach: i64, f: &mut impl FnMut(Bo
 fn around_element(flat: &FlatLayout<'_>, element: usize) -> Rect {
     let site = &flat.elements[element].site;
     let half = f64::from(site.lattice.pitch_nm()) / 2.0;
-    let reach = site.reach();
-    let [[x0, x1], [y0, y1]] = [0, 1].map(|axis| site.ends_nm(axis, &reach[axis]).map(|nm| nm as f64));
+    let [[x0, x1], [y0, y1]] = site.ends_nm().map(|ends| ends.map(|nm| nm as f64));
     Rect {
         x0: flat.units(x0 - half).floor() as i64,
         y0: flat.units(y0 - half).floor() as i64,

@@ -15,13 +15,12 @@ use metalith_rcwa::CellLattice;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Distance {
-    /// Least distance (nm).
     Gap {
-        nm: f64,
+        /// Least distance (nm); none for that of pillars of the design where they are widest.
+        nm: Option<f64>,
+        /// Height of the pillars (nm), where the least distance is a part of it.
         height_nm: Option<f64>,
     },
-    /// The least distance that pillars of the design have, where they are widest.
-    GapOfDesign,
     NoOverlap,
     NoDuplicate,
 }
@@ -33,13 +32,12 @@ struct SpacingRule {
 
 pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Option<Box<dyn Rule>> {
     let want = match check {
-        "gap_min" if from_design(s) => Distance::GapOfDesign,
         "gap_min" => Distance::Gap {
-            nm: s.float("nm", Limits::new(0.0..=1e6, "nm")),
+            nm: (!from_design(s)).then(|| s.float("nm", Limits::new(0.0..=1e6, "nm"))),
             height_nm: None,
         },
         "gap_aspect_max" => Distance::Gap {
-            nm: context.height_nm / s.float("ratio", Limits::new(0.01..=1000.0, "")),
+            nm: Some(context.height_nm / s.float("ratio", Limits::new(0.01..=1000.0, ""))),
             height_nm: Some(context.height_nm),
         },
         "overlap" => Distance::NoOverlap,
@@ -55,48 +53,46 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Optio
 impl Rule for SpacingRule {
     fn words(&self) -> String {
         match self.want {
-            Distance::Gap { nm, height_nm: None } => format!("gaps of at least {nm} nm, in any direction"),
-            Distance::Gap { nm, height_nm: Some(h) } => format!("gaps at most {:.4} times as deep as wide", h / nm),
-            Distance::GapOfDesign => "gaps as wide as the design has at least, in any direction".into(),
+            Distance::Gap { nm: None, .. } => "gaps as wide as the design has at least, in any direction".into(),
+            Distance::Gap {
+                nm: Some(nm),
+                height_nm,
+            } => match height_nm {
+                None => format!("gaps of at least {nm} nm, in any direction"),
+                Some(h) => format!("gaps at most {:.4} times as deep as wide", h / nm),
+            },
             Distance::NoOverlap => "no two shapes share area".into(),
             Distance::NoDuplicate => "no shape is there twice".into(),
         }
     }
 
     fn judge(&self, flat: &FlatLayout<'_>, found: &mut Findings) -> RuleOutcome {
-        let want = match (self.want, flat.design) {
-            (Distance::GapOfDesign, Some(design)) => Distance::Gap {
-                nm: least_gap_nm(design),
-                height_nm: None,
-            },
-            (Distance::GapOfDesign, None) => {
-                return Err(NotRun::Skipped(NO_DESIGN.into()));
+        let least_nm = match self.want {
+            Distance::Gap { nm, .. } => {
+                let least_nm = nm.or_else(|| flat.design.map(least_gap_nm));
+                least_nm.ok_or_else(|| NotRun::Skipped(NO_DESIGN.into()))?
             }
-            (want, _) => want,
+            Distance::NoOverlap | Distance::NoDuplicate => 0.0,
         };
-        let limit = match want {
-            Distance::Gap { nm, .. } => flat.units(nm) - ROUNDING_NM,
-            _ => 0.0,
-        };
+        let limit = flat.units(least_nm) - ROUNDING_NM;
         if self.layer == flat.pillars {
-            let judged = match want {
-                Distance::Gap { nm, height_nm } => on_lattices(flat, nm, |a, b, gap| {
+            let judged = match self.want {
+                Distance::Gap { height_nm, .. } => on_lattices(flat, least_nm, |a, b, gap| {
                     report_gap(flat, a, b, gap, height_nm, found);
                 }),
-                Distance::NoOverlap => on_lattices(flat, 0.0, |a, b, _| report_overlap(a, b, found)),
-                // No site holds two pillars; a gap of the design is a number by now.
-                Distance::NoDuplicate | Distance::GapOfDesign => Ok(()),
+                Distance::NoOverlap => on_lattices(flat, least_nm, |a, b, _| report_overlap(a, b, found)),
+                // No site holds two pillars.
+                Distance::NoDuplicate => Ok(()),
             };
             judged.map_err(NotRun::Failed)?;
         }
-        let judged = near(flat, self.layer, limit.ceil() as i64, |a, b| match want {
+        let judged = near(flat, self.layer, limit.ceil() as i64, |a, b| match self.want {
             Distance::Gap { height_nm, .. } => {
                 let gap = a.gap(&b);
                 if gap < limit && !a.overlaps(&b) {
                     report_gap(flat, &a, &b, gap, height_nm, found);
                 }
             }
-            Distance::GapOfDesign => {}
             Distance::NoOverlap => {
                 if !a.equals(&b) && a.overlaps(&b) {
                     report_overlap(&a, &b, found);

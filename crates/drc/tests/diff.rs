@@ -31,17 +31,20 @@ fn of_chips(a: &Chip, b: &Chip) -> LayoutDiff {
     compare(&a, &b)
 }
 
+/// The layout of a design in a hierarchy, in a file of a folder.
+fn written((design, array): (&Design, &PillarArray), hierarchy: Hierarchy, folder: &Path, name: &str) -> PathBuf {
+    let path = folder.join(name);
+    write_pillars(design, array, hierarchy, &path, &Silent).unwrap();
+    path
+}
+
 #[test]
 fn hierarchies_of_one_design_are_the_same_geometry() {
     let root = metalith_testing::root();
     let design = Design::read(&root.join("designs/mini_3x3.toml")).unwrap();
     let array = PillarArray::build(&design, &Silent).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    let file = |name: &str, hierarchy| {
-        let path = folder.path().join(name);
-        write_pillars(&design, &array, hierarchy, &path, &Silent).unwrap();
-        path
-    };
+    let file = |name: &str, hierarchy| written((&design, &array), hierarchy, folder.path(), name);
     let folded = file("folded.gds", Hierarchy::Folded);
     for other in [file("sref.gds", Hierarchy::Sref), file("flat.gds", Hierarchy::Flat)] {
         let found = compare(&folded, &other);
@@ -68,11 +71,7 @@ fn strips_side_by_side_are_compared_each() {
     let design = Design::parse(&path, &text).unwrap();
     let array = PillarArray::build(&design, &Silent).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    let file = |name: &str, hierarchy| {
-        let path = folder.path().join(name);
-        write_pillars(&design, &array, hierarchy, &path, &Silent).unwrap();
-        path
-    };
+    let file = |name: &str, hierarchy| written((&design, &array), hierarchy, folder.path(), name);
     let found = compare(
         &file("folded.gds", Hierarchy::Folded),
         &file("flat.gds", Hierarchy::Flat),
@@ -81,6 +80,8 @@ fn strips_side_by_side_are_compared_each() {
     let pillars: Vec<_> = array.placed.iter().map(|p| array.widths(p).pillars()).collect();
     let compared: Vec<_> = found.elements.iter().map(|e| e.pillars).collect();
     assert_eq!(compared, pillars.iter().map(|&n| [n, n]).collect::<Vec<_>>());
+    let centres: Vec<_> = found.elements.iter().map(|e| e.centre_nm).collect();
+    assert_eq!(centres, design.sites().iter().map(|s| s.centre_nm).collect::<Vec<_>>());
 }
 
 /// Rotated rectangles: in any hierarchy the same; one rotation, one nanometre of one corner and one pillar more are differences.

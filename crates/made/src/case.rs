@@ -35,11 +35,11 @@ impl SimulationCase<'_> {
         }
     }
 
-    /// Whether what is seen of an element depends on where on the chip it stands.
-    pub fn depends_on_place(&self) -> bool {
+    /// Whether what is seen of elements that are alike by a symmetry is alike by it.
+    pub fn keeps_symmetry(&self) -> bool {
         match self {
-            Self::Cell(_) => false,
-            Self::Made(chip) => chip.perturbation().depends_on_place(),
+            Self::Cell(_) => true,
+            Self::Made(chip) => chip.perturbation().keeps_symmetry(),
         }
     }
 

@@ -257,6 +257,16 @@ impl Perturbation {
         tilted || !self.geometry.stitching.is_empty() || self.declared().next().is_some()
     }
 
+    /// Whether what is made of an element has no direction and no place of its own: elements that are alike by a symmetry are made
+    /// alike by it.
+    pub fn keeps_symmetry(&self) -> bool {
+        let (geometry, path) = (&self.geometry, &self.path);
+        geometry.aperture_offset_um == [0.0; 2]
+            && geometry.wavefront_nm.is_empty()
+            && path.tilt_mrad == [0.0; 2]
+            && !self.depends_on_place()
+    }
+
     /// Add a term to the part that it acts on.
     pub fn declare(&mut self, term: DeclaredTerm) {
         match term.quantity {

@@ -166,7 +166,8 @@ impl Checkpoint {
 /// Of all that decides an optimisation.
 fn digest(design: &Design) -> String {
     // What tables of materials say, as far as they can be read: the work itself says where not.
-    let (stack, band_um) = (design.cell_stack().ok(), design.band_um().ok());
+    let stack = design.cell_stack().ok();
+    let band_um = stack.as_ref().map(|stack| design.band_of(stack));
     let decisive = (
         &design.cell,
         &design.lens,

@@ -148,20 +148,19 @@ mod tests {
     /// Every channel has its wavelengths, however narrow the band is; in the visible they are 10 nm apart.
     #[test]
     fn views_are_as_many_in_any_band() {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/tio2_532.toml");
-        let text = std::fs::read_to_string(path).unwrap();
+        let path = metalith_testing::design("tio2_532");
+        let text = std::fs::read_to_string(&path).unwrap();
         let band = "band_nm = [515, 550]";
         assert!(text.contains(band));
         for own in [band, "band_nm = [531, 533]", "band_nm = [420, 1200]"] {
-            let design = Design::parse(path.as_ref(), &text.replacen(band, own, 1)).unwrap();
+            let design = Design::parse(&path, &text.replacen(band, own, 1)).unwrap();
             for shift in [0.0, 0.5] {
                 let found = views(&design.optimise, &design.optimise.views, shift);
                 let count = found.wavelengths_um.len();
                 assert!((30..=31).contains(&count), "{own}: {count}");
             }
         }
-        let visible = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/broadband_3x3.toml");
-        let visible = Design::read(visible.as_ref()).unwrap();
+        let visible = Design::read(&metalith_testing::design("broadband_3x3")).unwrap();
         assert_eq!(visible.optimise.views, OptimiseSpec::default().views);
     }
 }

@@ -107,7 +107,7 @@ impl<'a> ChipInLight<'a> {
             SimulationCase::Cell(_) => Perturbation::default(),
             SimulationCase::Made(chip) => chip.perturbation().clone(),
         };
-        let symmetric = keeps_symmetry(&perturbation) && elements.iter().all(|e| e.slope == [0.0; 2]);
+        let symmetric = perturbation.keeps_symmetry() && elements.iter().all(|e| e.slope == [0.0; 2]);
         let widths: Vec<&WidthMap> = extraction.elements.iter().map(|e| &e.widths).collect();
         let (chosen, copies) = distinct_of(&elements, &widths, symmetric);
         let ones = PhaseFunction {
@@ -345,15 +345,6 @@ fn among_neighbours(
         SimulationCase::Made(_) => Ok(None),
     };
     sampling.wavelengths_nm.iter().map(of).collect()
-}
-
-/// Whether what a process and a bench do has no direction of its own.
-fn keeps_symmetry(perturbation: &Perturbation) -> bool {
-    let (geometry, path) = (&perturbation.geometry, &perturbation.path);
-    geometry.aperture_offset_um == [0.0; 2]
-        && geometry.wavefront_nm.is_empty()
-        && path.tilt_mrad == [0.0; 2]
-        && !perturbation.depends_on_place()
 }
 
 /// Whether a symmetry turns the wedge of one element into that of another.

@@ -208,25 +208,32 @@ impl<'a> PairWriter<'a> {
         let name = format!("{}/{i:06}", shard(i));
         let (frame, truth) = (format!("{name}.frame.png"), format!("{name}.truth.png"));
         let (frame_file, truth_file) = (self.folder.join(&frame), self.folder.join(&truth));
-        let is_there = |file: &Path, of: &str| png16::source_of(file).is_some_and(|s| s == of);
-        if !is_there(&frame_file, &of_frame) || !is_there(&truth_file, &of_truth) {
-            let scene = read(image)?;
-            let recorded = self.studio.record(self.operator, &scene, own_seed)?;
-            let ideal = self.studio.truth(&scene).mapv(srgb::encoded);
-            WholeFile::write(&frame_file, &png16::grey(&recorded.planes, self.black, &of_frame))?;
-            WholeFile::write(&truth_file, &png16::colour(&ideal, Some(&of_truth)))?;
-        }
-        let digest = |file: &Path| {
-            let bytes = read_at_most(file, png16::LONGEST, "a picture of the set")?;
-            Ok::<_, Error>(hex(&Sha256::digest(bytes)))
+        let kept = |file: &Path, of: &str| {
+            let bytes = read_at_most(file, png16::LONGEST, "a picture of the set").ok()?;
+            png16::source_of(&bytes).is_some_and(|s| s == of).then_some(bytes)
         };
+        let pair = match (kept(&frame_file, &of_frame), kept(&truth_file, &of_truth)) {
+            (Some(frame), Some(truth)) => [frame, truth],
+            _ => {
+                let scene = read(image)?;
+                let scene = self.studio.simulated(&scene);
+                let recorded = self.studio.record(self.operator, &scene, own_seed)?;
+                let ideal = self.studio.truth(&scene).mapv(srgb::encoded);
+                let frame = png16::grey(&recorded.planes, self.black, &of_frame);
+                let truth = png16::colour(&ideal, Some(&of_truth));
+                WholeFile::write(&frame_file, &frame)?;
+                WholeFile::write(&truth_file, &truth)?;
+                [frame, truth]
+            }
+        };
+        let [frame_sha256, truth_sha256] = pair.map(|bytes| hex(&Sha256::digest(bytes)));
         Ok(DatasetPair {
             image: image
                 .file_name()
                 .map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
             image_sha256: hex(&image_digest),
-            frame_sha256: digest(&frame_file)?,
-            truth_sha256: digest(&truth_file)?,
+            frame_sha256,
+            truth_sha256,
             frame,
             truth,
         })

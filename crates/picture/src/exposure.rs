@@ -80,7 +80,7 @@ pub fn expose(camera: &Camera, gain: &[f64], light: &[Array2<f32>], seed: u64) -
     let noise = camera.sensor.noise.of_exposure(camera.exposure.time_s);
     let sensor = &camera.sensor;
     let (step, full) = (sensor.step(), sensor.largest_signal());
-    let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();
+    let names = camera.channel_names();
     let signal = |channel: usize, i: (usize, usize)| gain[channel] * f64::from(light[channel][i]);
     let ideal: Vec<Array2<f64>> = match sensor.filter {
         ColourFilter::None => (0..light.len())
@@ -175,7 +175,7 @@ impl Frame {
     /// Light of each channel as it was recorded, zero where a pixel does not count it: pixels at full scale have that of full scale,
     /// for a restoration that cannot leave pixels out.
     pub fn recorded_light(&self, camera: &Camera) -> Vec<Array2<f32>> {
-        let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();
+        let names = camera.channel_names();
         let of = |(channel, gain): (usize, &f64)| {
             let plane = self.plane(channel);
             Array2::from_shape_fn(plane.dim(), |(y, x)| match self.counts(channel, &names, y, x) {
@@ -202,7 +202,7 @@ impl Frame {
     /// bright ones. Both follow from the mean signal about a pixel: by its own, one that noise has
     /// made dark would be trusted more than its neighbours.
     pub fn light(&self, camera: &Camera, error: &OperatorError) -> (Vec<Array2<f32>>, Vec<Array2<f32>>) {
-        let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();
+        let names = camera.channel_names();
         let (mut light, mut trust) = (Vec::new(), Vec::new());
         for (channel, gain) in self.gain.iter().enumerate() {
             let plane = self.plane(channel);

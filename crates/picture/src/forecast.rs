@@ -85,6 +85,8 @@ pub struct Forecast {
     lost: ScenePower,
     /// Power that noise has in the picture, by part of the field.
     noise: [f64; PARTS.len()],
+    /// Mean light of the random scene by part of the field.
+    light: [f64; PARTS.len()],
     exposed: Exposed,
 }
 
@@ -94,23 +96,16 @@ pub(crate) struct Exposed {
     noise: Noise,
     /// Mean signal of the frame of the random scene, of full scale.
     signal: f64,
-    /// Mean light of the random scene by part of the field.
-    light: [f64; PARTS.len()],
 }
 
 impl Exposed {
-    /// Of the noise of a sensor, and the mean signal that a scene gave, linear sRGB `[row, column, colour]`.
-    pub fn of(noise: Noise, signal: f64, scene: &Array3<f64>) -> Self {
-        Self {
-            noise,
-            signal,
-            light: std::array::from_fn(|part| mean_light(scene, PARTS[part].0)),
-        }
+    /// Of the noise of a sensor, and the mean signal that a scene gave.
+    pub fn of(noise: Noise, signal: f64) -> Self {
+        Self { noise, signal }
     }
 
-    /// Variance of the noise in a part of the field of a scene with this mean light, over that of the random scene.
-    fn against(&self, part: usize, light: f64) -> f64 {
-        let brighter = light / self.light[part].max(f64::MIN_POSITIVE);
+    /// Variance of the noise of a scene that is so many times as bright, over that of the random scene.
+    fn against(&self, brighter: f64) -> f64 {
         let own = self.noise.variance(self.signal);
         match own > 0.0 {
             true => self.noise.variance(self.signal * brighter) / own,
@@ -131,6 +126,7 @@ impl Forecast {
         Self {
             lost,
             noise: std::array::from_fn(|part| mean_over(noise, PARTS[part].0, |v| v * v)),
+            light: scene.light,
             exposed,
         }
     }
@@ -144,7 +140,8 @@ impl Forecast {
             let plane = |((lost, power), size): ((&[f64; BANDS.len()], &[f64; BANDS.len()]), &f64)| {
                 size * lost.iter().zip(power).map(|(l, p)| l * p).sum::<f64>()
             };
-            let noise = self.noise[part] * self.exposed.against(part, scenes.light[part]);
+            let brighter = scenes.light[part] / self.light[part].max(f64::MIN_POSITIVE);
+            let noise = self.noise[part] * self.exposed.against(brighter);
             planes.map(plane).sum::<f64>() / sizes.len() as f64 + noise
         };
         let of = |zone: &Zone| {
@@ -240,12 +237,12 @@ mod tests {
     }
 
     /// Noise of reading alone.
-    fn exposed(scene: &Array3<f64>) -> Exposed {
+    fn exposed() -> Exposed {
         let noise = Noise {
             photon: 0.0,
             read: 0.01,
         };
-        Exposed::of(noise, 0.1, scene)
+        Exposed::of(noise, 0.1)
     }
 
     #[test]
@@ -262,7 +259,8 @@ mod tests {
                 light: [1.0; PARTS.len()],
             },
             noise: [0.0; PARTS.len()],
-            exposed: exposed(&picture),
+            light: power.light,
+            exposed: exposed(),
         };
         let scores = crate::scores(&Array3::zeros(picture.dim()), &picture).unwrap();
         for ((got, want), tolerance) in all.psnr_linear_db(&power).iter().zip(scores).zip(TOLERANCE) {
@@ -308,7 +306,7 @@ mod tests {
         };
         let rehearsed = random(1, 160, 160);
         let none = Array3::zeros(rehearsed.dim());
-        let forecast = Forecast::between(&rehearsed, &blurred(&rehearsed), &none, exposed(&rehearsed));
+        let forecast = Forecast::between(&rehearsed, &blurred(&rehearsed), &none, exposed());
         // Twice as fine, and of another contrast.
         let fine = random(2, 320, 320);
         let other = Array3::from_shape_fn((160, 160, 3), |(y, x, c)| 0.5 * fine[[2 * y, 2 * x, c]]);
@@ -321,7 +319,7 @@ mod tests {
         let noise = Array3::from_shape_fn(rehearsed.dim(), |(y, x, c)| {
             if (y + x + c) % 2 == 0 { deviation } else { -deviation }
         });
-        let forecast = Forecast::between(&rehearsed, &blurred(&rehearsed), &noise, exposed(&rehearsed));
+        let forecast = Forecast::between(&rehearsed, &blurred(&rehearsed), &noise, exposed());
         let smooth = Array3::from_shape_fn(rehearsed.dim(), |(y, x, _)| 0.3 + 1e-3 * (0.02 * (y + x) as f64).sin());
         let scores = crate::scores(&(&blurred(&smooth) + &noise), &smooth).unwrap();
         for (got, want) in forecast.psnr_linear_db(&ScenePower::of(&smooth)).iter().zip(scores) {
@@ -338,7 +336,7 @@ mod tests {
         let none = Array3::zeros(dark.dim());
         let noise = none.mapv(|v: f64| v + 0.02);
         let db = |photon: f64, read: f64, light: f64| {
-            let exposed = Exposed::of(Noise { photon, read }, 0.05, &dark);
+            let exposed = Exposed::of(Noise { photon, read }, 0.05);
             let forecast = Forecast::between(&dark, &dark, &noise, exposed);
             forecast.psnr_linear_db(&ScenePower::of(&(&dark * (light / 0.1))))
         };

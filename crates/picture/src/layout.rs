@@ -1,6 +1,6 @@
 //! Whether a layout is that of its design: asked before anything is simulated.
 
-use metalith_core::{Error, Progress, Result, WidthRows};
+use metalith_core::{Error, Progress, Result, WidthCheck};
 use metalith_design::array::PillarArray;
 use metalith_design::{Design, Element};
 use metalith_gds::extract::{Extraction, Oddities, Why};
@@ -81,21 +81,11 @@ impl PillarCount {
             why: why(&extraction.oddities),
             ..Self::default()
         };
-        let sites = array.lattice.sites();
-        let (mut room, mut other_room) = (Vec::new(), Vec::new());
         for (placed, element) in array.placed.iter().zip(&extraction.elements) {
-            let meant = array.rows(placed);
-            for iy in 0..sites {
-                let meant = meant.row(iy, 0..sites, &mut room);
-                let read = element.widths.row(iy, 0..sites, &mut other_room);
-                for pair in meant.iter().zip(read).filter(|(meant, read)| meant != read) {
-                    match pair {
-                        (_, 0) => found.missing += 1,
-                        (0, _) => found.extra += 1,
-                        _ => found.others += 1,
-                    }
-                }
-            }
+            let check = WidthCheck::compare(array.all_rows(placed).as_ref(), &element.widths);
+            found.missing += check.missing;
+            found.extra += check.extra;
+            found.others += check.wrong;
         }
         Ok(found)
     }

@@ -103,7 +103,7 @@ fn page(pages: &PicturePages<'_>) -> Page {
     for note in &report.notes {
         page.note(note);
     }
-    let names: Vec<String> = pages.camera.channels.iter().map(|c| c.name.clone()).collect();
+    let names = pages.camera.channel_names();
     let head = pictures_side_by_side(pages.scene, pages.frame, &pages.restored[0], &names);
     page.figure(head.caption(
         "The frame is what the sensor records, neighbours' light and veil included; its mosaic is shown as colours. The picture is restored from this frame alone.",

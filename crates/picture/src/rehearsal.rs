@@ -45,7 +45,7 @@ impl Rehearsal {
             true => restoration.apply(&scene.planes),
             false => restoration.apply(&crate::ChannelColours::ideal(&studio.channels, &scene)),
         };
-        let names: Vec<String> = studio.camera.channels.iter().map(|c| c.name.clone()).collect();
+        let names = studio.camera.channel_names();
         let filter = studio.camera.sensor.filter;
         let counts = |channel, (y, x)| channel_at(filter, &names, y, x).is_none_or(|c| c == channel);
         Self {
@@ -71,7 +71,7 @@ impl Rehearsal {
         let error = &self.operator_error;
         let [noisy, clean] = studio.restore_alike(restoration, error, &frame, &self.light, progress)?;
         let truth = studio.truth(&self.scene);
-        let exposed = Exposed::of(frame.noise, frame.mean_signal(), &truth);
+        let exposed = Exposed::of(frame.noise, frame.mean_signal());
         Ok(Forecast::between(&truth, &clean, &(noisy - &clean), exposed))
     }
 }

@@ -101,7 +101,7 @@ fn of_frame(studio: &Studio, channel: usize, frame: &Frame, truth: &Array2<f64>)
         return Vec::new();
     };
     let (sensor, view) = (&studio.camera.sensor, &studio.view);
-    let names: Vec<String> = studio.camera.channels.iter().map(|c| c.name.clone()).collect();
+    let names = studio.camera.channel_names();
     let plane = &frame.planes[channel.min(frame.planes.len() - 1)];
     let (rows, columns) = plane.dim();
     let mut samples = Vec::new();

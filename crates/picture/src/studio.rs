@@ -119,8 +119,8 @@ impl Studio {
         self.primaries..self.primaries + rgb_basis().len()
     }
 
-    /// A scene in the pixels that it is simulated in.
-    fn simulated<'s>(&self, scene: &'s SceneImage) -> Cow<'s, SceneImage> {
+    /// A scene in the pixels that it is simulated in: the same scene, unless its own are finer than the sensor tells.
+    pub fn simulated<'s>(&self, scene: &'s SceneImage) -> Cow<'s, SceneImage> {
         match scene.view == self.given && self.given != self.view {
             true => Cow::Owned(scene.averaged(&self.view)),
             false => Cow::Borrowed(scene),
@@ -175,11 +175,11 @@ impl Studio {
         joint: bool,
         progress: &dyn Progress,
     ) -> Result<Array3<f64>> {
-        let known = match (method, joint) {
+        let [light, trust] = match (method, joint) {
             (RestorationMethod::Tikhonov, true) => self.known(operator, &error.times(TOGETHER), frame)?,
             _ => self.known(operator, error, frame)?,
         };
-        let recorded = self.recorded(operator, &known);
+        let recorded = self.recorded(operator, &light, &trust);
         let planes = match joint {
             true => restore_joint(&recorded, method, progress)?,
             false => restore_separate(&recorded, method, progress)?,
@@ -202,12 +202,7 @@ impl Studio {
     ) -> Result<[Array3<f64>; 2]> {
         let [recorded, trust] = self.known(operator, &error.times(TOGETHER), frame)?;
         let restored = |light: &[Array2<f32>]| -> Result<Array3<f64>> {
-            let recorded = Recorded {
-                operator,
-                light,
-                trust: &trust,
-                prior: &self.prior,
-            };
+            let recorded = self.recorded(operator, light, &trust);
             let planes = restore_joint(&recorded, RestorationMethod::Tikhonov, progress)?;
             Ok(self.picture(operator, &planes))
         };
@@ -226,8 +221,8 @@ impl Studio {
         seeds: std::ops::Range<u64>,
         progress: &dyn Progress,
     ) -> Result<Vec<Array3<f64>>> {
-        let known = self.known(operator, error, frame)?;
-        let recorded = self.recorded(operator, &known);
+        let [light, trust] = self.known(operator, error, frame)?;
+        let recorded = self.recorded(operator, &light, &trust);
         let drawn = restore_samples(&recorded, seeds, progress)?;
         Ok(drawn.iter().map(|planes| self.picture(operator, planes)).collect())
     }
@@ -235,7 +230,8 @@ impl Studio {
     fn recorded<'a>(
         &'a self,
         operator: &'a FrameOperator<'a>,
-        [light, trust]: &'a [Vec<Array2<f32>>; 2],
+        light: &'a [Array2<f32>],
+        trust: &'a [Array2<f32>],
     ) -> Recorded<'a> {
         Recorded {
             operator,

@@ -43,7 +43,7 @@ pub fn thumbnail(
     let error = Rehearsal::new(&studio, &operator).operator_error;
     let picture = studio.restore(&operator, &error, &frame, RestorationMethod::Tikhonov, true, progress)?;
     let truth = studio.truth(&scene);
-    let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();
+    let names = camera.channel_names();
     let whole = scores(&picture, &truth)?[0];
     Ok(pictures_side_by_side(&truth, &frame, &picture, &names).caption(format!(
         "What `{}` takes of a Siemens star over {field_deg} degrees, far away, and what is restored from this frame: PSNR {} dB, SSIM {}. `metalith picture` says more.",

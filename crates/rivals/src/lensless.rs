@@ -243,7 +243,7 @@ impl LenslessBench {
 
     /// Names of the channels.
     pub fn channel_names(&self) -> Vec<String> {
-        self.camera.channels.iter().map(|c| c.name.clone()).collect()
+        self.camera.channel_names()
     }
 
     /// Number of channels.

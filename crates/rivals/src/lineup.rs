@@ -233,12 +233,18 @@ impl OpenLineup<'_> {
         }
     }
 
+    /// Rows and columns of all photographs, as cameras take them.
+    pub fn size(&self) -> [usize; 2] {
+        let view = self.photographs[0].view;
+        [view.rows, view.columns]
+    }
+
     /// The table of these cameras.
     pub fn comparison(&self, cameras: Vec<ComparedCamera>) -> Comparison {
         let view = self.photographs[0].view;
         Comparison {
             photographs: self.photographs.iter().map(|p| p.name.clone()).collect(),
-            size: [view.rows, view.columns],
+            size: self.size(),
             averaged_from: (view != self.given).then_some([self.given.rows, self.given.columns]),
             camera: self.camera.name.clone(),
             seed: self.of.seed,

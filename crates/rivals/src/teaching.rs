@@ -3,16 +3,14 @@
 use std::collections::HashSet;
 use std::path::Path;
 
-use metalith_camera::Camera;
 use metalith_core::file::file_digest;
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result, Silent};
-use metalith_design::Design;
 use metalith_picture::{KeptKernels, SceneView};
 use metalith_prior::{Stack, Taught};
 
 use crate::contender::no_stage;
-use crate::lineup::{Lensless, ListedDesign, OpenLineup};
+use crate::lineup::{Lensless, OpenLineup};
 use crate::stage::{Stage, StageKind, camera_digest, encoded};
 
 /// A camera of the table that a last stage can follow.
@@ -37,31 +35,30 @@ impl Followed {
 }
 
 impl OpenLineup<'_> {
-    /// The cameras of the table that a last stage can follow, in their order. Those with the assumptions of others are none.
-    fn followed(&self) -> Result<Vec<Followed>> {
+    /// What a last stage must be taught for to follow camera `k` of the table, counted without those that have the assumptions of
+    /// others: no stage follows these.
+    fn followed(&self, k: usize) -> Result<Followed> {
         let first = self.photographs[0].view;
-        let design = |(listed, (design, camera)): (&ListedDesign, &(Design, Camera))| {
-            let field_deg = listed.field_deg.unwrap_or(first.field_deg);
-            let optics = (design.digest(), hex(&file_digest(&listed.layout)?));
-            Ok(Followed {
-                camera: camera_digest(&optics, camera, &SceneView { field_deg, ..first })?,
-                optics: Some(design.simulation_digest()?),
-                kinds: vec![StageKind::MultiWiener, StageKind::Blending],
-            })
-        };
-        let lensless = |spec: &Lensless| {
+        if let Some(k) = k.checked_sub(self.designs.len()) {
+            let spec = &self.of.lensless[k];
             let kind = match spec {
                 Lensless::FlatCam(_) => StageKind::FlatNet,
                 Lensless::DiffuserCam(_) => StageKind::UnrolledDiffuser,
             };
-            Ok(Followed {
+            return Ok(Followed {
                 camera: camera_digest(spec, &self.camera, &first)?,
                 optics: None,
                 kinds: vec![kind],
-            })
-        };
-        let designs = self.of.designs.iter().zip(&self.designs).map(design);
-        designs.chain(self.of.lensless.iter().map(lensless)).collect()
+            });
+        }
+        let (listed, (design, camera)) = (&self.of.designs[k], &self.designs[k]);
+        let field_deg = listed.field_deg.unwrap_or(first.field_deg);
+        let optics = (design.digest(), hex(&file_digest(&listed.layout)?));
+        Ok(Followed {
+            camera: camera_digest(&optics, camera, &SceneView { field_deg, ..first })?,
+            optics: Some(design.simulation_digest()?),
+            kinds: vec![StageKind::MultiWiener, StageKind::Blending],
+        })
     }
 
     /// Refuse weights that none of the cameras can use, and two of one kind for one camera.
@@ -69,7 +66,8 @@ impl OpenLineup<'_> {
         if self.stages.is_empty() {
             return Ok(());
         }
-        let followed = self.followed()?;
+        let cameras = 0..self.designs.len() + self.of.lensless.len();
+        let followed: Vec<Followed> = cameras.map(|k| self.followed(k)).collect::<Result<_>>()?;
         let mut seen = HashSet::new();
         for (stage, path) in self.stages.iter().zip(&self.of.learnt) {
             let refused = |what: String, hint: &str| Err(Error::invalid(format!("{}: {what}", path.display()), hint));
@@ -114,7 +112,7 @@ impl OpenLineup<'_> {
         if self.stages.is_empty() {
             return Ok(Vec::new());
         }
-        let followed = self.followed()?.swap_remove(k);
+        let followed = self.followed(k)?;
         let fits = |stage: &&Stage| followed.is_of(stage.kind, stage.taught());
         Ok(self.stages.iter().filter(fits).cloned().collect())
     }
@@ -132,7 +130,7 @@ impl OpenLineup<'_> {
         kept: &KeptKernels,
         progress: &dyn Progress,
     ) -> Result<(Vec<Stack>, Taught)> {
-        let Followed { camera, optics, kinds } = self.followed()?.swap_remove(k);
+        let Followed { camera, optics, kinds } = self.followed(k)?;
         if !kinds.contains(&kind) {
             return no_stage(kind, "this camera");
         }

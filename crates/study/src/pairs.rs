@@ -216,11 +216,6 @@ impl PairsRequest {
         read_far_scene(image, self.field_deg)
     }
 
-    fn origin(&self) -> Result<DatasetOrigin> {
-        let (design, camera) = (Design::read_any(&self.design)?, Camera::read(&self.camera)?);
-        DatasetOrigin::of(&design, &self.layout, &camera, self.model.as_deref())
-    }
-
     fn studio(&self, kept: &KeptKernels, progress: &dyn Progress) -> Result<Studio> {
         let design = Design::read_any(&self.design)?;
         let camera = Camera::read(&self.camera)?;
@@ -265,8 +260,13 @@ pub fn plan_pairs(
         return Ok(known);
     }
     check_images(&request.images, progress)?;
-    let origin = request.origin()?;
     let studio = request.studio(&KeptKernels::made(folder), progress)?;
+    let origin = DatasetOrigin::of(
+        &studio.design,
+        &request.layout,
+        &studio.camera,
+        request.model.as_deref(),
+    )?;
     let begun = Instant::now();
     let operator = studio.simulation();
     let writer = PairWriter::new(&studio, &operator, request.seed, folder);

@@ -227,7 +227,7 @@ impl PictureBench {
             frame,
             restored,
             forecast_db,
-            channels: self.camera.channels.iter().map(|c| c.name.clone()).collect(),
+            channels: self.camera.channel_names(),
         })
     }
 }

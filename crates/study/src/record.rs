@@ -81,10 +81,11 @@ pub(crate) fn figures(found: &Verification) -> BTreeMap<String, Option<f64>> {
         }
     };
     let reported = found.camera.as_ref().map(|c| c.frequencies().reported());
-    for element in &found.distinct {
-        for spot in &element.spots {
+    for (k, element) in found.distinct.iter().enumerate() {
+        let all = element.spots.iter();
+        for (spot, field) in all.flat_map(|spot| found.asked(k, spot).into_iter().map(move |field| (spot, field))) {
             let nm = spot.wavelength_um * 1e3;
-            let (x, y) = (spot.asked().x_deg, spot.asked().y_deg);
+            let (x, y) = (field.x_deg, field.y_deg);
             let at = if y == 0.0 {
                 format!("{nm:.0}nm_{x}deg")
             } else {

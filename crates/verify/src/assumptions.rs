@@ -120,8 +120,6 @@ fn angles(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &Ver
             size
         }
     };
-    let widest_deg = design.verify.field_angles.iter().map(|a| a.x_deg.hypot(a.y_deg));
-    let widest_deg = widest_deg.fold(0.0, f64::max);
     if found.fidelity != Fidelity::Neighbours {
         row(
             "Cells are lit along the normal",
@@ -134,6 +132,8 @@ fn angles(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &Ver
         );
         return;
     }
+    let widest_deg = design.verify.field_angles.iter().map(|a| a.x_deg.hypot(a.y_deg));
+    let widest_deg = widest_deg.fold(0.0, f64::max);
     row(
         "Cells are lit from the middle of each element's field",
         if widest_deg == 0.0 {

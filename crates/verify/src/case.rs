@@ -131,7 +131,9 @@ impl TransmissionTables {
                 return Err(Error::Interrupted);
             }
             let sines = cell_direction(wave, self.lattice);
-            if sines != [0.0; 2] && !self.oblique.contains_key(&key(sines)) {
+            // Where unlike neighbours are known, equal ones are not asked for.
+            let known = self.neighbours.contains_key(&key(sines)) || self.oblique.contains_key(&key(sines));
+            if sines != [0.0; 2] && !known {
                 let tables = if self.in_band {
                     cell.oblique_in_band(wave.wavelength_um, sines, widest_nm)?
                 } else {
@@ -181,11 +183,6 @@ impl TransmissionTables {
             place.insert(Neighbourhood::Band(response));
         }
         Ok(())
-    }
-
-    /// Whether unlike neighbours are known in this light.
-    pub fn knows_neighbours(&self, lit: &PlaneWave) -> bool {
-        self.neighbours.contains_key(&key(cell_direction(lit, self.lattice)))
     }
 
     /// Share of the light that the sums over pairs put elsewhere in this light than supercells that were left out of their fit; none

@@ -60,65 +60,67 @@ impl Chosen {
         missing
     }
 
-    /// What turns it into another element, pillars and wedge, by that of several which leaves fewest field angles to be simulated
-    /// besides; none if nothing does, or the other has another lens.
-    fn turned_into(&self, design: &Design, array: &PillarArray, other: usize) -> Option<Symmetry> {
+    /// What turns it into another element, pillars and wedge, and the field angles that are then to be simulated besides: by that of
+    /// several symmetries which leaves fewest; none if nothing does, or the other has another lens.
+    fn turned_into(&self, design: &Design, array: &PillarArray, other: usize) -> Option<(Symmetry, Vec<AskedAngle>)> {
         let [from, to] = [self.index, other].map(|k| &array.placed[k]);
+        if from.class != to.class {
+            return None;
+        }
         let [own, others] = [from, to].map(|placed| design.lens_of(&placed.element));
-        if from.class != to.class || !(std::ptr::eq(own, others) || own == others) {
+        if !(std::ptr::eq(own, others) || own == others) {
             return None;
         }
         let wedge = |e: &Element| [e.wedge.sin_x, e.wedge.sin_y];
         let group = array.classes[from.class].group.members().iter();
         let all = group.map(|kept| to.symmetry.after(*kept).after(from.symmetry.inverse()));
         all.filter(|s| s.vector(wedge(&from.element)) == wedge(&to.element))
-            .min_by_key(|s| self.missing(design, &to.element, *s).len())
+            .map(|s| (s, self.missing(design, &to.element, s)))
+            .min_by_key(|(_, missing)| missing.len())
     }
 }
 
 /// Choose the elements that are simulated: one of all that are alike by a symmetry which turns their light too, and of those
-/// that are not as intended the first, or all where some may be so; each by itself where light depends on `place`. Elements are
+/// that are not as intended the first, or all where some may be so; each by itself where what is made of them is not `symmetric`. Elements are
 /// told which one they are simulated as.
-pub(super) fn choose(design: &Design, array: &PillarArray, elements: &mut [ElementCheck], place: bool) -> Vec<Chosen> {
+pub(super) fn choose(
+    design: &Design,
+    array: &PillarArray,
+    elements: &mut [ElementCheck],
+    symmetric: bool,
+) -> Vec<Chosen> {
     let most_faulty = match design.verify.limits.wrong_widths_max {
         0 => MOST_FAULTY,
         // They may pass: all limits are held to each of them.
         _ => usize::MAX,
     };
-    let (mut chosen, mut right): (Vec<Chosen>, Vec<bool>) = (Vec::new(), Vec::new());
-    let mut faulty = 0;
-    for (index, check) in elements.iter_mut().enumerate() {
-        let is_right = check.widths.faults() == 0;
-        let mut known = chosen.iter().zip(&right).enumerate();
-        let copy = known.find_map(|(k, (one, as_intended))| {
-            let comparable = is_right && *as_intended && !place;
-            comparable
-                .then(|| one.turned_into(design, array, index))
-                .flatten()
-                .map(|s| (k, s))
-        });
-        if let Some((k, symmetry)) = copy {
-            let one = &mut chosen[k];
-            let missing = one.missing(design, &check.element, symmetry);
-            one.angles.extend(missing);
-            one.copies += 1;
+    let (mut chosen, mut faulty): (Vec<Chosen>, usize) = (Vec::new(), 0);
+    for index in 0..elements.len() {
+        let is_right = elements[index].widths.faults() == 0;
+        // Those that are not as intended are nobody's copies, and nobody is theirs.
+        let right = |one: &Chosen| is_right && symmetric && elements[one.index].copy_of.is_some();
+        let mut all = chosen.iter().enumerate().filter(|(_, one)| right(one));
+        let copy = all.find_map(|(k, one)| Some((k, one.turned_into(design, array, index)?)));
+        let check = &mut elements[index];
+        if let Some((k, (symmetry, missing))) = copy {
+            chosen[k].angles.extend(missing);
+            chosen[k].copies += 1;
             (check.copy_of, check.turned) = (Some(k), Some(symmetry));
             continue;
         }
+        if is_right {
+            (check.copy_of, check.turned) = (Some(chosen.len()), Some(Symmetry::IDENTITY));
+        }
         faulty += usize::from(!is_right);
         if is_right || faulty <= most_faulty {
-            if is_right {
-                (check.copy_of, check.turned) = (Some(chosen.len()), Some(Symmetry::IDENTITY));
-            }
             chosen.push(Chosen::new(design, index, check.element));
-            right.push(is_right);
         }
     }
     chosen
 }
 
 /// A field angle after a symmetry.
-fn turned(symmetry: Symmetry, field: FieldAngle) -> FieldAngle {
+pub(super) fn turned(symmetry: Symmetry, field: FieldAngle) -> FieldAngle {
     // No negative zeros: they are shown.
     let [x_deg, y_deg] = symmetry.vector([field.x_deg, field.y_deg]).map(|deg| deg + 0.0);
     FieldAngle { x_deg, y_deg }
@@ -171,7 +173,7 @@ mod tests {
     /// simulated, turned as the element is.
     fn all_are_covered(design: &Design, array: &PillarArray) -> Vec<(usize, usize)> {
         let mut elements = checks(array, 0);
-        let chosen = choose(design, array, &mut elements, false);
+        let chosen = choose(design, array, &mut elements, true);
         for check in &elements {
             let (one, symmetry) = (&chosen[check.copy_of.unwrap()], check.turned.unwrap());
             for asked in &design.verify.field_angles {
@@ -235,7 +237,7 @@ steering_x_deg = 0.000000001
         assert_eq!(array.classes.len(), 1);
         assert_eq!(all_are_covered(&design, &array), [(2, 2), (1, 1)]);
         let mut elements = checks(&array, 0);
-        let chosen = choose(&design, &array, &mut elements, false);
+        let chosen = choose(&design, &array, &mut elements, true);
         let (own, copy) = chosen[0].angles[1];
         assert_eq!((own.x_deg, own.y_deg.abs()), (0.0, 8.0));
         let copy = copy.unwrap();
@@ -246,10 +248,10 @@ steering_x_deg = 0.000000001
     fn elements_that_are_not_as_intended_or_stand_alone_are_no_copies() {
         let (design, array) = read("mini_3x3", &[]);
         let mut elements = checks(&array, 1);
-        assert_eq!(choose(&design, &array, &mut elements, false).len(), MOST_FAULTY);
+        assert_eq!(choose(&design, &array, &mut elements, true).len(), MOST_FAULTY);
         assert!(elements.iter().all(|e| e.copy_of.is_none()));
         let mut elements = checks(&array, 0);
-        let chosen = choose(&design, &array, &mut elements, true);
+        let chosen = choose(&design, &array, &mut elements, false);
         assert!(chosen.len() == 9 && chosen.iter().all(|c| c.angles.len() == 2));
     }
 

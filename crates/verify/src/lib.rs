@@ -18,8 +18,8 @@ mod single_white;
 mod site_orders;
 mod steep;
 mod white;
+mod white_channels;
 mod white_page;
-mod widths;
 
 use std::path::Path;
 
@@ -30,7 +30,7 @@ use metalith_cell::Fidelity;
 use metalith_core::{Progress, Result, WidthRows};
 use metalith_design::array::{PillarArray, PlacedElement, Symmetry, WidthRule};
 use metalith_design::phase::{ElementPhase, LensPhase};
-use metalith_design::{AskedLight, Design, Element, LatticeOrders};
+use metalith_design::{AskedLight, Design, Element, FieldAngle, LatticeOrders};
 use metalith_gds::extract::{ExtractedElement, Extraction, Oddities, Survey, extract};
 use metalith_gds::{self, Layout};
 use metalith_layout::extraction_plan;
@@ -43,6 +43,7 @@ pub use check::{Check, Sense};
 pub use copies::CopyAngle;
 pub use large::{verify_in_parts, verify_pillars};
 pub use memory::Simulation;
+pub use metalith_core::WidthCheck;
 pub use metalith_made::SimulationCase;
 pub use page::write_report;
 pub use phase::{PhaseError, PhaseErrors, PillarResponse};
@@ -50,8 +51,8 @@ pub use psf_metrics::{OrderEfficiencies, PsfImages, PsfPair, PsfResult};
 pub use rotations::EqualRotations;
 pub use single::{Lighting, STREHL_AGAINST, SinglePsf, SinglePsfReport, single_psfs, write_single_psf_report};
 pub use single_white::{SingleWhite, single_white, white_sampling};
-pub use white::{CameraStatement, Contrast, WhiteChannel};
-pub use widths::WidthCheck;
+pub use white::CameraStatement;
+pub use white_channels::{Contrast, WhiteChannel};
 
 /// What the file is, in number.
 #[derive(Clone, Debug, Serialize)]
@@ -139,6 +140,19 @@ impl Verification {
     /// Whether all limits hold.
     pub fn passed(&self) -> bool {
         self.checks.iter().all(Check::passed)
+    }
+
+    /// The field angles of the design that a spot of distinct element `k` is for, those of its copies among them: from where these
+    /// are asked, the light of the spot is turned.
+    pub fn asked(&self, k: usize, spot: &PsfPair) -> Vec<FieldAngle> {
+        let of_design = self.distinct[k].spots.iter().filter(|s| s.copy.is_none());
+        let of_design: Vec<FieldAngle> = of_design.map(|s| s.field).collect();
+        let mut asked = vec![spot.asked()];
+        for copy in self.elements.iter().filter(|e| e.copy_of == Some(k)) {
+            let field = copy.turned.map(|symmetry| copies::turned(symmetry, spot.field));
+            asked.extend(field.filter(|f| of_design.contains(f) && !asked.contains(f)));
+        }
+        asked
     }
 }
 
@@ -281,7 +295,7 @@ fn judge(
     let lens = LensPhase::of(design);
     let responses = MappingResponse::new(design, cases.judge)?;
     let mut simulator = optics::ElementSimulator::new(design, array.lattice, cases, accuracy, part_bytes)?;
-    let chosen = copies::choose(design, array, &mut elements, cases.judge.depends_on_place());
+    let chosen = copies::choose(design, array, &mut elements, cases.judge.keeps_symmetry());
     simulator.add_directions(&chosen, progress)?;
     let mut white = white::WhiteSimulator::new(design, array.lattice, cases.judge, part_bytes)?;
     if let Some(white) = &mut white {

@@ -45,7 +45,7 @@ fn loss(design: &Design) -> Option<String> {
     let passed = (-2.0 * TAU * k * MILLIMETRE_UM / wavelength_um).exp();
     (k > 0.0).then(|| {
         format!(
-            "k of {substrate} is {} at {} nm, at other wavelengths of the band less: a millimetre of it passes {} % of that light",
+            "k of {substrate} is {} at {} nm, at other wavelengths of the band no more: a millimetre of it passes {} % of that light",
             sig(k, 2),
             fixed(wavelength_um * 1e3, 1),
             fixed(passed * 100.0, 1)

@@ -5,7 +5,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::case::{SimulationCases, TransmissionTables, not_held};
-use super::copies::{AskedAngle, Chosen, CopyAngle};
+use super::copies::{Chosen, CopyAngle};
 use super::psf_metrics::{OrderEfficiencies, PsfImages, PsfPair, PsfResult};
 use super::site_orders::site_shares;
 use metalith_cell::Fidelity;
@@ -120,11 +120,7 @@ impl<'a> ElementSimulator<'a> {
             (lit.len() * self.colours.len() * cells) as u64,
         );
         for colour in &mut self.colours {
-            let wavelength_um = colour.wavelength_um;
-            let waves = lit
-                .iter()
-                .map(|(element, field)| arriving(element, wavelength_um, *field))
-                .collect::<Result<Vec<_>>>()?;
+            let waves = all_arriving(&lit, colour.wavelength_um)?;
             for (at, case) in colour.cases.iter_mut().zip(&self.cases) {
                 if let (Some(tables), SimulationCase::Cell(cell)) = (&mut at.tables, case) {
                     tables.add_directions(*cell, &waves, widest_nm(self.design), progress)?;
@@ -142,11 +138,7 @@ impl<'a> ElementSimulator<'a> {
             lit.extend(chosen.iter().flat_map(all_angles));
         }
         for colour in &mut self.colours {
-            let wavelength_um = colour.wavelength_um;
-            let waves = lit
-                .iter()
-                .map(|(element, field)| arriving(element, wavelength_um, *field))
-                .collect::<Result<Vec<_>>>()?;
+            let waves = all_arriving(&lit, colour.wavelength_um)?;
             for (at, case) in colour.cases.iter_mut().zip(&self.cases) {
                 if let (Some(tables), SimulationCase::Cell(cell)) = (&mut at.tables, case) {
                     tables.add_neighbours(*cell, &waves, progress)?;
@@ -286,17 +278,20 @@ impl<'a> ElementSimulator<'a> {
             &computed
         };
         let mut tasks = Vec::new();
-        let each = |angles| self.colours.iter().flat_map(move |colour| with_each(colour, angles));
-        for (colour, (field, copy)) in each(own).chain(each(of_copies)) {
-            let wave = arriving(element, colour.wavelength_um, field)?;
-            let views = self.views(read, &wave, progress)?;
-            tasks.push(Task {
-                colour,
-                field,
-                copy,
-                wave,
-                views,
-            });
+        for angles in [own, of_copies] {
+            for colour in &self.colours {
+                for &(field, copy) in angles {
+                    let wave = arriving(element, colour.wavelength_um, field)?;
+                    let views = self.views(read, &wave, progress)?;
+                    tasks.push(Task {
+                        colour,
+                        field,
+                        copy,
+                        wave,
+                        views,
+                    });
+                }
+            }
         }
         tasks
             .into_par_iter()
@@ -404,9 +399,12 @@ struct Task<'a> {
     views: Vec<Option<MadeView<'a>>>,
 }
 
-/// A wavelength with each of some field angles.
-fn with_each<'a>(colour: &'a Colour, angles: &'a [AskedAngle]) -> impl Iterator<Item = (&'a Colour, AskedAngle)> {
-    angles.iter().map(move |angle| (colour, *angle))
+/// The light of some elements from some field angles.
+fn all_arriving(lit: &[(&Element, FieldAngle)], wavelength_um: f64) -> Result<Vec<PlaneWave>> {
+    let waves = lit.iter();
+    waves
+        .map(|(element, field)| arriving(element, wavelength_um, *field))
+        .collect()
 }
 
 /// An element with each of its field angles.

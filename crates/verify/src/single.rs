@@ -111,10 +111,10 @@ fn by_cell(
     let lattice = kind_of(elements);
     let mut tables = TransmissionTables::new(cell, lattice, wavelength_um, widest)?.behind_analyser(light.analyser);
     let wave = light.wave(wavelength_um);
+    tables.add_neighbours(cell, &[wave], progress)?;
     if light.cells_as_lit {
         tables.add_directions(cell, &[wave], widest, &Silent)?;
     }
-    tables.add_neighbours(cell, &[wave], progress)?;
     elements
         .par_iter()
         .map_init(Scratch::default, |scratch, (_, widths)| {

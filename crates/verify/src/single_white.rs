@@ -6,7 +6,8 @@ use serde::Serialize;
 
 use super::case::TransmissionTables;
 use super::single::{Lighting, distinct, kind_of, widest_nm};
-use super::white::{CameraStatement, Channels, Point, STEP_NM, WhiteChannel, per_light, step_nm};
+use super::white::{CameraStatement, STEP_NM, step_nm};
+use super::white_channels::{Channels, Point, WhiteChannel, per_light};
 use metalith_camera::{Camera, Sampling};
 use metalith_core::{Error, Progress, Result, Wedge};
 use metalith_gds::extract::Extraction;
@@ -29,8 +30,7 @@ pub struct SingleWhite {
 /// As [`Camera::sampling`].
 pub fn white_sampling(camera: &Camera, known_nm: [f64; 2]) -> Result<Sampling> {
     let sampling = camera.sampling(known_nm, STEP_NM)?;
-    let wavelengths_nm = &sampling.wavelengths_nm;
-    let step_nm = step_nm([wavelengths_nm[0], wavelengths_nm[wavelengths_nm.len() - 1]]);
+    let step_nm = step_nm(sampling.ends_nm());
     if step_nm > STEP_NM {
         return camera.sampling(known_nm, step_nm);
     }

@@ -3,13 +3,13 @@
 use metalith_design::{Design, Element};
 use metalith_report::fixed;
 
-/// What rows of unlike pillars of the shipped mapping show at 455, 530 and 660 nm, by the turns of their phase a pitch.
-type Rows<const N: usize> = [(f64, [f64; 3]); N];
+/// What a row of unlike pillars of the shipped mapping shows at 455, 530 and 660 nm, behind the turns of its phase a pitch.
+type Row = (f64, [f64; 3]);
 
 /// Share by which a cell in an infinite lattice of equal pillars overstates the first order of a blazed row at 455,
 /// 530 and 660 nm, by the turns of phase a pitch: rows of 18, 6, 3 and 2.5 pillars a turn of the shipped mapping,
 /// solved as supercells (`golden/truth`), mean over offsets and polarisations, light as a steered element sees it.
-const OVERSTATED: Rows<5> = [
+const OVERSTATED: [Row; 5] = [
     (0.0, [0.0, 0.0, 0.0]),
     (1.0 / 18.0, [0.011, 0.023, 0.041]),
     (1.0 / 6.0, [0.070, 0.044, 0.063]),
@@ -22,7 +22,7 @@ const OVERSTATED: Rows<5> = [
 /// 18, 9, 6, 3 and 2.5 pillars a turn by the same supercells, light along the normal, mean over offsets and polarisations, against
 /// that by the tables of `designs/prototype_3x3.toml`; see the test. Shares below zero stand as zero. As a steered element looks
 /// it is about as much, but for rows of 2.5 pillars at 455 nm, which lose 0.36 in steep orders alone.
-const NOT_COUNTED: Rows<6> = [
+const NOT_COUNTED: [Row; 6] = [
     (0.0, [0.0, 0.0, 0.0]),
     (1.0 / 18.0, [0.019, 0.000, 0.015]),
     (1.0 / 9.0, [0.019, 0.011, 0.000]),
@@ -85,20 +85,20 @@ fn percent(share: f64) -> String {
 }
 
 /// What stands before a number that is of the steepest row, where a phase is steeper.
-fn beyond<const N: usize>(rows: &Rows<N>, turns: f64) -> &'static str {
-    if turns > rows[N - 1].0 { "over " } else { "" }
+fn beyond(rows: &[Row], turns: f64) -> &'static str {
+    if turns > rows[rows.len() - 1].0 { "over " } else { "" }
 }
 
 /// Straight lines through rows; beyond the last its numbers.
-fn between<const N: usize>(rows: &Rows<N>, turns: f64) -> [f64; 3] {
-    let above = rows.partition_point(|(t, _)| *t < turns).clamp(1, N - 1);
+fn between(rows: &[Row], turns: f64) -> [f64; 3] {
+    let above = rows.partition_point(|(t, _)| *t < turns).clamp(1, rows.len() - 1);
     let ((a, low), (b, high)) = (rows[above - 1], rows[above]);
     let share = ((turns - a) / (b - a)).clamp(0.0, 1.0);
     std::array::from_fn(|i| low[i] + share * (high[i] - low[i]))
 }
 
 /// The most of any phase that is no steeper: an element has gentler places too.
-fn up_to<const N: usize>(rows: &Rows<N>, turns: f64) -> [f64; 3] {
+fn up_to(rows: &[Row], turns: f64) -> [f64; 3] {
     let gentler = rows.iter().filter(|(t, _)| *t <= turns).map(|(_, shares)| *shares);
     gentler.fold(between(rows, turns), |most, shares| {
         std::array::from_fn(|i| f64::max(most[i], shares[i]))

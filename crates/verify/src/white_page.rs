@@ -95,11 +95,7 @@ fn table(camera: &CameraStatement, channels: &[WhiteChannel]) -> Table {
         Column::number("Error of sampling", ""),
     ]);
     for white in channels {
-        let contrast = |lp_mm: f64| {
-            let found = white.contrast.iter().find(|c| c.lp_mm == lp_mm);
-            found.map_or([f64::NAN; 2], |c| c.mtf)
-        };
-        let [half, nyquist] = reported.map(contrast);
+        let [half, nyquist] = reported.map(|lp_mm| white.contrast_at(lp_mm));
         let [from, _, to] = white.wavelengths_nm;
         table.row([
             Cell::from(white.channel.as_str()),

@@ -33,7 +33,7 @@ impl WhiteLight {
     /// What a camera counts, as far as cells are known.
     fn of(camera: Camera, known_um: (f64, f64)) -> Result<Self> {
         let sampling = white_sampling(&camera, [known_um.0 * 1e3, known_um.1 * 1e3])?;
-        let (short, long) = ends_nm(&sampling);
+        let [short, long] = sampling.ends_nm();
         let mut colours_nm = USUAL_NM.to_vec();
         if !colours_nm.iter().all(|nm| (short..=long).contains(nm)) {
             colours_nm = sampling.channels.iter().map(|c| (c.mean_um() * 1e3).round()).collect();
@@ -58,18 +58,10 @@ impl PsfLight {
 
     /// The band that it lies in (um), as far as materials are known.
     pub fn band_um(&self, known_um: (f64, f64)) -> (f64, f64) {
-        let ends = self.white.iter().map(|white| ends_nm(&white.sampling));
-        let of_white = ends.flat_map(|(short, long)| [short * 1e-3, long * 1e-3]);
+        let ends_nm = self.white.iter().flat_map(|white| white.sampling.ends_nm());
+        let of_white = ends_nm.map(|nm| nm * 1e-3);
         band_about(self.wavelengths_um.iter().copied().chain(of_white), known_um)
     }
-}
-
-/// The first and the last wavelength (nm).
-fn ends_nm(sampling: &Sampling) -> (f64, f64) {
-    let all = sampling.wavelengths_nm.iter();
-    all.fold((f64::INFINITY, 0.0), |(short, long), nm| {
-        (short.min(*nm), long.max(*nm))
-    })
 }
 
 impl PsfArgs {
@@ -99,8 +91,8 @@ impl PsfArgs {
     }
 
     /// Edge of a pixel (um).
-    pub(super) fn pixel_um(&self, light: Option<&PsfLight>) -> f64 {
-        let of_camera = light.and_then(|l| l.white.as_ref()).map(|w| w.camera.sensor.pixel_um);
+    pub(super) fn pixel_um(&self, light: &PsfLight) -> f64 {
+        let of_camera = light.white.as_ref().map(|w| w.camera.sensor.pixel_um);
         self.pixel_um.or(of_camera).unwrap_or(USUAL_PIXEL_UM)
     }
 }
@@ -154,7 +146,7 @@ mod tests {
         let light = |words: &[&str]| {
             let options = options(&[&SILICON[..], words].concat());
             let light = options.light(&found).unwrap();
-            let pixel_um = options.pixel_um(Some(&light));
+            let pixel_um = options.pixel_um(&light);
             (light, pixel_um)
         };
         let (infrared, pixel_um) = light(&["--camera", &camera("swir")]);

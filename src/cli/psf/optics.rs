@@ -103,7 +103,6 @@ impl PsfArgs {
                 "distance from pillar tops to sensor",
                 format!("{} um", sig(self.distance_um, 6)),
             ),
-            ("edge of a sensor pixel", format!("{} um", exact(self.pixel_um(light)))),
             (
                 "light arrives at",
                 format!(
@@ -113,6 +112,10 @@ impl PsfArgs {
                 ),
             ),
         ];
+        if let Some(light) = light {
+            let edge = ("edge of a sensor pixel", format!("{} um", exact(self.pixel_um(light))));
+            all.insert(2, edge);
+        }
         let published = self.model.is_none() && matches!(self.fidelity, FidelityArg::Published);
         let cell = match (&self.model, self.fidelity) {
             (Some(model), _) => format!("as made, by {}", model.display()),
@@ -211,7 +214,7 @@ impl PsfArgs {
             distance_um: self.distance_um,
             at_um: [self.at_x_um, self.at_y_um],
             samples: self.samples,
-            pixel_um: self.pixel_um(Some(light)),
+            pixel_um: self.pixel_um(light),
             analyser: self.analyser,
             aperture_radius_um: self.aperture_um.map(|d| 0.5 * d),
             accuracy: if self.fast { Accuracy::Fast } else { Accuracy::Accurate },

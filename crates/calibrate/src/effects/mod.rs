@@ -28,7 +28,7 @@ mod tilt;
 mod value_error;
 mod zero_order;
 
-pub use declared::{DeclaredEffect, DeclaredParameter};
+pub use declared::{DeclaredEffect, DeclaredParameter, MOST_PARAMETERS};
 pub use stitching::StitchedFields;
 pub use value_error::ValueError;
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use metalith_core::{ElementSite, Error, Lattice, PillarReader, Progress, Result, Wedge, WidthMap};
+use metalith_core::{Error, Lattice, PillarReader, Progress, Result, Wedge, WidthMap};
 use metalith_design::{Design, Element};
 use ndarray::Array2;
 
@@ -43,7 +43,7 @@ pub fn candidates(
 ) -> Result<Candidates> {
     check_plannable(design, bench)?;
     let chosen = chosen_elements(design, bench)?;
-    let sites: Vec<ElementSite> = chosen.iter().map(|e| design.site_of(e)).collect();
+    let sites = design.sites_of(&chosen);
     let layer = design.layout.layers.pillars.number();
     let maps = reader.pillars(layout, layer, design.cell.shape, &sites, progress)?;
     if let Some(empty) = maps.iter().zip(&sites).find(|(map, _)| map.pillars() == 0) {

@@ -1,7 +1,7 @@
 //! A quantity that differs over the chip: what is free for each element, put as that of one element, as linear in their places, or as
 //! a value for each.
 
-use crate::effects::{DeclaredEffect, DeclaredParameter, Effect};
+use crate::effects::{DeclaredEffect, DeclaredParameter, Effect, MOST_PARAMETERS};
 use crate::fit::SIGMAS_95;
 use crate::search::{Grouping, Pattern};
 use crate::simulator::Simulator;
@@ -9,9 +9,6 @@ use metalith_made::DeclaredQuantity;
 
 /// Fewest elements: two values are always on a line.
 const ELEMENTS: usize = 3;
-
-/// Most elements that get a value of their own.
-const MOST_ELEMENTS: usize = 9;
 
 /// The others have nothing of what one element has if none has more than this share of it, or than its noise says.
 const NOTHING: f64 = 0.1;
@@ -38,8 +35,8 @@ struct Quantity<'a> {
 }
 
 /// The quantity of a pattern by element as an effect: of one element if the others have nothing of it, else with a slope along each
-/// direction in which elements differ if its values are linear, else with a value for each; none if no expression stands for it, or
-/// if an effect was tried that is this.
+/// direction in which elements differ if its values are linear and no effect was tried that is this, else with a value for each; none
+/// if no expression stands for it, or a declared effect cannot have so many values.
 pub(super) fn declared(simulator: &Simulator<'_>, pattern: &Pattern) -> Option<DeclaredEffect> {
     if pattern.by != Grouping::Element || pattern.groups.len() < ELEMENTS {
         return None;
@@ -83,7 +80,7 @@ impl Quantity<'_> {
     /// A value for each element.
     fn of_each(&self, simulator: &Simulator<'_>) -> Option<DeclaredEffect> {
         let groups: Vec<usize> = (0..self.pattern.groups.len()).collect();
-        (groups.len() <= MOST_ELEMENTS).then(|| self.of_elements(simulator, &groups))
+        (groups.len() <= MOST_PARAMETERS).then(|| self.of_elements(simulator, &groups))
     }
 
     /// A value for each of some elements.

@@ -7,7 +7,6 @@ use super::alternatives::{Alternative, alternatives, drop_redundant};
 use super::exchange::{find_exchange, much_alike};
 use super::pairs::{FoundTogether, LEAST_LEFT, find_pair};
 use super::recentred_leaders::follow_leaders_anew;
-use super::residual::may_leave;
 use super::state::{EndsSearch, MORE_IS_LEFT, SearchState};
 use super::stepwise::{LEAST_GAIN, Rejection, TriedEffect, step_forward};
 use crate::fit::{Fit, FitProblem, HeldOutErrors, WidthParts, half_widths, mean_error};
@@ -192,7 +191,7 @@ fn add_effects(
             .map_or(0.0, |g| g.value);
         if let Some(ends) = ends
             && explained < MOST_OF_IT * (now.error() - 1.0)
-            && now.error() > may_leave(&now.problem, &now.fit)
+            && now.leaves_a_residual()
             && ends(now)?
         {
             history.keep(step.tried, step.null_gain);
@@ -208,7 +207,7 @@ fn add_effects(
             }
         } else {
             history.keep(step.tried, step.null_gain);
-            if now.error() <= may_leave(&now.problem, &now.fit) {
+            if !now.leaves_a_residual() {
                 break;
             }
             history.pairs_tried_from_start |= history.chosen.is_empty();

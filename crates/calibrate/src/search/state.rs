@@ -2,6 +2,7 @@
 
 use metalith_core::{Progress, Result};
 
+use super::residual::may_leave;
 use super::stepwise::{LEAST_GAIN, fit_with};
 use crate::fit::{Fit, FitProblem, Gain, HeldOutErrors, gain, held_out, mean_error};
 
@@ -62,6 +63,11 @@ impl<'a> SearchState<'a> {
     /// Whether more is left on captures left out than `share` of the noise, and than that noise varies by.
     pub fn leaves_more_than(&self, share: f64) -> bool {
         self.error() > 1.0 + share.max(CHANCE_SIGMAS * (2.0 / self.problem.pixels().max(1.0)).sqrt())
+    }
+
+    /// Whether more is left than the search stops at.
+    pub fn leaves_a_residual(&self) -> bool {
+        self.error() > may_leave(&self.problem, &self.fit)
     }
 
     /// Whether less is left on captures left out than by `other`: by more than the model errs by, and the 95 % confidence interval

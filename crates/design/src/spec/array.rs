@@ -127,9 +127,18 @@ impl ArraySpec {
             [s.float("spacing_um", range); 2]
         };
         let spacing_nm = spacing_um.map(|um| whole_nm(s, "spacing_um", um));
-        let near = |side_nm: &[i64; 2]| (0..2).any(|axis| count[axis] > 1.0 && spacing_nm[axis] < side_nm[axis]);
+        let spec = Self {
+            count: (count[0] as u32, count[1] as u32),
+            spacing_nm: spacing_nm[0],
+            spacing_y_nm: (spacing_nm[1] != spacing_nm[0]).then_some(spacing_nm[1]),
+            steering_deg: s
+                .optional_float("steering_deg", Limits::new(0.0..=89.0, "degrees"))
+                .unwrap_or(0.0),
+            wedge_wavelength_um,
+            placed: Vec::new(),
+        };
         let sides_nm = Footprint::of(lens, 0.0, cell).map(|footprint| footprint.sides_nm());
-        if let Some([x, y]) = sides_nm.filter(near)
+        if let Some([x, y]) = sides_nm.filter(|sides_nm| !spec.has_room_for(*sides_nm))
             && s.has("spacing_um")
         {
             s.fault_given(
@@ -142,16 +151,6 @@ impl ArraySpec {
                 },
             );
         }
-        let spec = Self {
-            count: (count[0] as u32, count[1] as u32),
-            spacing_nm: spacing_nm[0],
-            spacing_y_nm: (spacing_nm[1] != spacing_nm[0]).then_some(spacing_nm[1]),
-            steering_deg: s
-                .optional_float("steering_deg", Limits::new(0.0..=89.0, "degrees"))
-                .unwrap_or(0.0),
-            wedge_wavelength_um,
-            placed: Vec::new(),
-        };
         let outermost = steps_from_middle(spec.count.0.max(spec.count.1))
             .next_back()
             .unwrap_or(0.0)
@@ -299,7 +298,6 @@ impl ArraySpec {
 
     /// Distance of neighbouring elements along x and y in words; nothing where they are placed one by one.
     pub fn spacing_words(&self) -> Option<String> {
-        let um = |nm: i64| nm as f64 * 1e-3;
         self.placed.is_empty().then(|| match self.spacing_y_nm {
             None => format!("{} um", um(self.spacing_nm)),
             Some(y) => format!("{} by {} um", um(self.spacing_nm), um(y)),

@@ -1,8 +1,8 @@
 //! The box that the pillars of an element stand in: what tells which elements are too near to one another.
 
 use super::{ArraySpec, CellSpec, LensSpec, PlacedSpec};
+use metalith_core::Lattice;
 use metalith_core::document::Section;
-use metalith_core::{ElementSite, Lattice};
 
 /// Outermost places of the pillars of an element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,16 +16,12 @@ impl Footprint {
     /// Of a lens whose outline is turned by so many degrees; none where there is no lattice, which is a mistake of its own.
     pub fn of(lens: &LensSpec, rotation_deg: f64, cell: &CellSpec) -> Option<Self> {
         let lattice = Lattice::of_kind_covering(cell.lattice, lens.diameter_nm, cell.pitch_nm).ok()?;
-        let outline = lens.outline.as_ref();
-        let alone = ElementSite {
-            name: String::new(),
-            centre_nm: [0; 2],
-            lattice,
-            within_nm: outline.map(|outline| outline.rotated(rotation_deg).ends_nm()),
+        let reach = match &lens.outline {
+            Some(outline) => lattice.within(outline.rotated(rotation_deg).ends_nm()),
+            None => lattice.reach(),
         };
-        let reach = alone.reach();
         Some(Self {
-            ends_nm: [0, 1].map(|axis| alone.ends_nm(axis, &reach[axis])),
+            ends_nm: lattice.ends_nm(&reach),
             pitch_nm: i64::from(lattice.pitch_nm()),
         })
     }

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::lens::WAVELENGTH;
+use crate::VISIBLE_UM;
 use metalith_cell::Fidelity;
 use metalith_core::document::{Limits, Section};
 
@@ -216,7 +217,7 @@ impl Default for OptimiseSpec {
         Self {
             fidelity: Fidelity::Rigorous,
             solver: SolverSpec::EXCHANGE,
-            band_um: (0.4, 0.7),
+            band_um: VISIBLE_UM,
             said: [false; 3],
             step_um: 1e-3,
             step_limit_turns: 0.2,

@@ -20,23 +20,19 @@ pub(super) fn unite(known: &mut Vec<ElementSite>, more: Vec<ElementSite>) {
     }
 }
 
-/// Outermost places of pillars along an axis (nm).
-fn ends(site: &ElementSite, axis: usize) -> (i64, i64) {
-    let [first, last] = site.ends_nm(axis, &site.reach()[axis]);
-    (first, last)
-}
-
 /// The ends of the pillars of both from a middle (nm).
 fn within(a: &ElementSite, b: &ElementSite, middle_nm: [i64; 2]) -> [[i64; 2]; 2] {
+    let (a, b) = (a.ends_nm(), b.ends_nm());
     [0, 1].map(|axis| {
-        let ((a0, a1), (b0, b1)) = (ends(a, axis), ends(b, axis));
+        let ([a0, a1], [b0, b1]) = (a[axis], b[axis]);
         [a0.min(b0), a1.max(b1)].map(|end| end - middle_nm[axis])
     })
 }
 
 fn overlap(a: &ElementSite, b: &ElementSite) -> bool {
+    let (a, b) = (a.ends_nm(), b.ends_nm());
     (0..2).all(|axis| {
-        let ((a0, a1), (b0, b1)) = (ends(a, axis), ends(b, axis));
+        let ([a0, a1], [b0, b1]) = (a[axis], b[axis]);
         a0 <= b1 && b0 <= a1
     })
 }
@@ -55,22 +51,19 @@ fn cover(a: &ElementSite, b: &ElementSite) -> Option<ElementSite> {
             ..larger.clone()
         });
     }
-    let mut first = [0; 2];
-    let mut sites = 0;
-    for (axis, first) in first.iter_mut().enumerate() {
-        let ((a0, a1), (b0, b1)) = (ends(a, axis), ends(b, axis));
+    let (a_ends, b_ends) = (a.ends_nm(), b.ends_nm());
+    let (mut first, mut counts) = ([0; 2], [0; 2]);
+    for axis in 0..2 {
+        let ([a0, a1], [b0, b1]) = (a_ends[axis], b_ends[axis]);
         if (a0 - b0) % pitch != 0 {
             return None;
         }
-        *first = a0.min(b0);
-        sites = sites.max((a1.max(b1) - *first) / pitch + 1);
+        first[axis] = a0.min(b0);
+        counts[axis] = (a1.max(b1) - first[axis]) / pitch + 1;
     }
-    let half = (sites - 1) * pitch;
-    // The middle of an odd number of half nanometres is none.
-    if half % 2 != 0 {
-        return None;
-    }
-    let centre_nm = first.map(|f| f + half / 2);
+    let sites = counts[0].max(counts[1]);
+    // The shorter axis is in the middle, as where elements are found. A pitch is even.
+    let centre_nm = [0, 1].map(|axis| first[axis] - (sites - counts[axis]) / 2 * pitch + (sites - 1) * (pitch / 2));
     Some(ElementSite {
         name: a.name.clone(),
         centre_nm,

@@ -125,18 +125,23 @@ fn the_active_area_is_that_of_the_chip() {
     assert!(broken(&case.judge()).iter().any(|f| f.0 == "layer.active_area"));
 }
 
+/// A design as it is written, by the rules of a deck.
+fn as_written(design: &Design, deck: &Deck) -> DrcReport {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("pillars.gds");
+    let array = PillarArray::build(design, &Silent).unwrap();
+    write_pillars(design, &array, Hierarchy::Folded, &file, &Silent).unwrap();
+    let with = CheckInput {
+        design: Some(design),
+        ..input()
+    };
+    metalith_drc::check(&Layout::open(&file).unwrap(), deck, &with, &Silent).unwrap()
+}
+
 /// The shipped design of a name as it is written, by the rules of squares.
 fn shipped(name: &str) -> DrcReport {
     let design = Design::read(&metalith_testing::design(name)).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("pillars.gds");
-    let array = PillarArray::build(&design, &Silent).unwrap();
-    write_pillars(&design, &array, Hierarchy::Folded, &file, &Silent).unwrap();
-    let with = CheckInput {
-        design: Some(&design),
-        ..input()
-    };
-    metalith_drc::check(&Layout::open(&file).unwrap(), &Deck::standard(), &with, &Silent).unwrap()
+    as_written(&design, &Deck::standard())
 }
 
 /// Phases of a hologram jump by turns from site to site, which no pillar shows: only what is steep in truth counts.
@@ -164,16 +169,7 @@ fn by_its_own_rules(name: &str, changes: &[(&str, &str)]) -> DrcReport {
         text = text.replacen(from, to, 1);
     }
     let design = Design::parse(&path, &text).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("pillars.gds");
-    let array = PillarArray::build(&design, &Silent).unwrap();
-    write_pillars(&design, &array, Hierarchy::Folded, &file, &Silent).unwrap();
-    let with = CheckInput {
-        design: Some(&design),
-        ..input()
-    };
-    let deck = Deck::for_design(Some(&design));
-    metalith_drc::check(&Layout::open(&file).unwrap(), &deck, &with, &Silent).unwrap()
+    as_written(&design, &Deck::for_design(Some(&design)))
 }
 
 fn rule<'a>(report: &'a DrcReport, id: &str) -> &'a metalith_drc::RuleReport {

@@ -1,5 +1,6 @@
 //! Where the elements of a layout from anywhere are, and on which lattice they stand.
 
+use super::failed;
 use super::lattices::{Cluster, FEWEST};
 use super::places::{Centre, Places};
 use super::sites::Scale;
@@ -76,10 +77,7 @@ pub fn discover(
         layers: Some(layers.to_vec()),
         ..from.clone()
     };
-    let fail = |cause| Error::Extraction {
-        path: layout.path().to_owned(),
-        cause,
-    };
+    let fail = failed(layout.path());
     let look = |how: Look| seen(layout, &selection, scale, how, progress);
     let close = look(CLOSE)?;
     let Seen { mut sites, shape, .. } = if close.may_be_wider() {
@@ -134,10 +132,7 @@ impl Seen {
 
 /// Look at what stands on the layers of a selection.
 fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progress: &dyn Progress) -> Result<Seen> {
-    let fail = |cause| Error::Extraction {
-        path: layout.path().to_owned(),
-        cause,
-    };
+    let fail = failed(layout.path());
     let mut map = Map::new(scale, how);
     layout.visit(selection, &mut map, progress)?;
     let [squares, circles] = map.shapes;
@@ -173,7 +168,7 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
             tiles: &tiles,
             members: &members,
         };
-        sites.extend(cluster.element().map_err(fail)?);
+        sites.extend(cluster.element().map_err(&fail)?);
     }
     Ok(Seen { sites, shape, shapes })
 }

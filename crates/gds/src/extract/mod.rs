@@ -79,14 +79,19 @@ fn fits_within(path: &Path, elements: &[ElementSite], holdings: &[Holding], most
     if sites <= most {
         return Ok(());
     }
-    Err(Error::Extraction {
+    Err(failed(path)(ExtractionError::Sites {
+        elements: elements.len(),
+        sites,
+        most,
+    }))
+}
+
+/// What is wrong with the layout at `path`, as an error.
+fn failed(path: &Path) -> impl Fn(ExtractionError) -> Error {
+    |cause| Error::Extraction {
         path: path.to_owned(),
-        cause: ExtractionError::Sites {
-            elements: elements.len(),
-            sites,
-            most,
-        },
-    })
+        cause,
+    }
 }
 
 /// Reads pillars out of GDSII files.
@@ -180,8 +185,5 @@ fn extract_from(
     let mut pillars = PillarCollector::new(plan, found.shape, found.sites, Scale::of(layout)?, most);
     layout.visit(&selection, &mut pillars, progress)?;
     let name = layout.cells()[top].name.clone();
-    pillars.finish(name).map_err(|cause| Error::Extraction {
-        path: layout.path().to_owned(),
-        cause,
-    })
+    pillars.finish(name).map_err(failed(layout.path()))
 }

@@ -143,7 +143,7 @@ impl<'a> FrameOperator<'a> {
     ) -> Self {
         let view = &space.view;
         let sensor = &camera.sensor;
-        let names: Vec<String> = camera.channels.iter().map(|c| c.name.clone()).collect();
+        let names = camera.channel_names();
         let source = KernelSource::new(bank, &detail, sensor, &names);
         // Pixels of the scene from one point to the next, in the middle of the field.
         let step = match elements.first() {

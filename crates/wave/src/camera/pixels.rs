@@ -118,11 +118,7 @@ impl PixelGrid {
         let (mut re, mut im) = (Array2::zeros((my, mx)), Array2::zeros((my, mx)));
         let mut off_um = [0.0; 2];
         for (grid, factor) in parts {
-            let own = grid.off_um.into_iter();
-            off_um
-                .iter_mut()
-                .zip(own)
-                .for_each(|(to, v)| *to += f64::from(*factor) * v);
+            off_um = [0, 1].map(|axis| off_um[axis] + f64::from(*factor) * grid.off_um[axis]);
             let (rows, cols) = grid.re.dim();
             let from = (mx - cols) / 2;
             part(re.view_mut(), 0..rows, from..from + cols).scaled_add(*factor, &grid.re);
@@ -171,11 +167,10 @@ impl PixelGrid {
         let (mut re, mut im) = (self.im.clone(), self.re.clone());
         re.indexed_iter_mut().for_each(|(i, v)| *v *= -at(i));
         im.indexed_iter_mut().for_each(|(i, v)| *v *= at(i));
-        let off_um = [0.0; 2];
         Self {
             re,
             im,
-            off_um,
+            off_um: [0.0; 2],
             ..*self
         }
     }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use metalith_core::{EighthMap, WidthRows};
+use crate::{EighthMap, WidthRows};
 
 /// How the pillars of one element differ from the intended ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -86,7 +86,7 @@ impl WidthCheck {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metalith_core::{Lattice, WidthMap};
+    use crate::{Lattice, WidthMap};
 
     #[test]
     fn every_kind_of_difference_is_counted_once() {
