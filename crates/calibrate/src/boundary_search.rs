@@ -1,7 +1,7 @@
 //! The search on a set whose lab does not say where write fields meet: about a boundary too, where one would explain what effects
 //! of the list leave.
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 
 use crate::diagnosis::Diagnosis;
 use crate::effects::StitchedFields;
@@ -9,6 +9,7 @@ use crate::proposal::{FieldBoundary, WORTH_PROPOSING, boundary_of_fields};
 use crate::search::{Evidence, SearchState};
 use crate::session::{Session, Simulations};
 use crate::set::MeasuredSet;
+use crate::surrogate::Surrogate;
 use metalith_core::{Progress, Result};
 
 /// Share of the error above noise that a boundary must remove for it to be tried before pairs of other effects are.
@@ -40,7 +41,7 @@ pub fn search_about_boundaries<T>(
     if session.set().field_boundary_um.is_some() || !session.settings.only.is_empty() {
         return conclude(session, simulations, session.diagnose(simulations, progress)?);
     }
-    let (early, asked) = (Cell::new(None), Cell::new(0));
+    let (early, asked) = (RefCell::new(None), Cell::new(0));
     let ends = |now: &SearchState<'_>| -> Result<bool> {
         asked.set(asked.get() + 1);
         if asked.get() > MOST_ASKED {
@@ -48,13 +49,16 @@ pub fn search_about_boundaries<T>(
         }
         let boundary = boundary_of_fields(session, &now.problem, &now.fit, progress)?;
         tell(&boundary, progress);
-        early.set((boundary.removes > ENDS_THE_SEARCH).then_some(boundary.at_um));
-        Ok(early.get().is_some())
+        let ends = boundary.removes > ENDS_THE_SEARCH;
+        if ends {
+            early.replace(Some((boundary.at_um, now.problem.surrogate.clone())));
+        }
+        Ok(ends)
     };
     let mut found = session.diagnose_unless(Some(&ends), simulations, progress)?;
-    if let Some(at_um) = early.get() {
+    if let Some((at_um, found_so_far)) = early.take() {
         let set = with_boundary(session.set(), at_um);
-        let (wider, simulations_there, own) = search(&set, (session, simulations), progress)?;
+        let (wider, simulations_there, own) = search(&set, (session, simulations), Some(&found_so_far), progress)?;
         if boundary_found(&own.0, &set).is_some() && !own.0.verdict.leaves_a_residual() {
             return conclude(&wider, &simulations_there, own);
         }
@@ -85,7 +89,7 @@ fn about<T>(
         return conclude(session, simulations, found);
     };
     let set = with_boundary(session.set(), at_um);
-    let (wider, simulations_there, own) = search(&set, stated, progress)?;
+    let (wider, simulations_there, own) = search(&set, stated, None, progress)?;
     let Some(place) = boundary_found(&own.0, &set) else {
         return conclude(session, simulations, found);
     };
@@ -103,14 +107,16 @@ fn tell(boundary: &FieldBoundary, progress: &dyn Progress) {
     ));
 }
 
-/// A session on a set like another, but for the boundary, its simulations and its answer.
+/// A session on a set like another, but for the boundary, its simulations and its answer; with the surrogate of a search of the other
+/// about what it found, if there is one.
 fn search<'s>(
     set: &'s MeasuredSet,
     (like, known): (&Session<'_>, &Simulations),
+    found: Option<&Surrogate>,
     progress: &dyn Progress,
 ) -> Result<(Session<'s>, Simulations, Found)> {
     let session = Session::new(set, like.settings.clone())?;
-    let simulations = session.simulate_beyond((like, known), progress)?;
+    let simulations = session.simulate_beyond((like, known), found, progress)?;
     let found = session.diagnose(&simulations, progress)?;
     Ok((session, simulations, found))
 }

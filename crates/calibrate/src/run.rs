@@ -108,7 +108,8 @@ fn conclude(
             break;
         }
         let wider = session.adopting(effects)?;
-        let wider_simulations = wider.simulate_beyond((session, simulations), progress)?;
+        let about_found = evidence.as_ref().map(|e| &e.finding.surrogate);
+        let wider_simulations = wider.simulate_beyond((session, simulations), about_found, progress)?;
         let found = wider.diagnose(&wider_simulations, progress)?;
         if found.0.error.after.held_out > diagnosis.error.after.held_out - LEAST_GAIN {
             break;

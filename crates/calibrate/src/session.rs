@@ -143,13 +143,14 @@ impl<'a> Session<'a> {
     }
 
     /// The same, of a session on the same bench that tries the effects of another and more: what that one simulated is not simulated
-    /// again.
+    /// again, nor what `found` holds, its surrogate about what it found.
     ///
     /// # Errors
     /// As [`Session::simulate`].
     pub fn simulate_beyond(
         &self,
         (other, known): (&Session<'_>, &Simulations),
+        found: Option<&Surrogate>,
         progress: &dyn Progress,
     ) -> Result<Simulations> {
         let (own, others) = (&self.simulator, &other.simulator);
@@ -159,8 +160,13 @@ impl<'a> Session<'a> {
             .map(|slot| Some(others.slots_of(number(slot.effect)?)[slot.index]))
             .collect();
         let random = own.effects.iter().position(|e| e.random());
+        let widened = known.surrogate.widened(own, &slots, progress)?;
+        let surrogate = match found {
+            Some(found) => widened.knowing(found, &slots),
+            None => widened,
+        };
         Ok(Simulations {
-            surrogate: known.surrogate.widened(own, &slots, progress)?,
+            surrogate,
             defects: random.zip(known.defects.as_ref().map(|(_, noise)| noise.clone())),
         })
     }

@@ -237,7 +237,7 @@ fn add_effects(
         let awake = history.chosen.last().is_some_and(|&e| now.problem.model.dormant(e));
         if full && (awake || now.leaves_more_than(MORE_IS_LEFT)) {
             // Between what was simulated and what was found, polynomials err; what dormant parameters change depends on the others.
-            now.recentre(progress)?;
+            now.settle(progress)?;
             if now.leaves_more_than(MORE_IS_LEFT) {
                 // What other effects change depends on what was found.
                 now.renew_others(progress)?;

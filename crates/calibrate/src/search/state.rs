@@ -14,6 +14,11 @@ const CHANCE_SIGMAS: f64 = 2.0;
 /// that is centred elsewhere.
 pub const MORE_IS_LEFT: f64 = 0.01;
 
+/// Times that a search continues about a fit, and the share of the error above noise that each may leave for the next to be worth its
+/// simulations.
+const RECENTRINGS: usize = 3;
+const WORTH_AGAIN: f64 = 0.5;
+
 /// Asked where a residual is left that no single effect explains most of: whether the search ends there, because something that is not
 /// tried explains much of it.
 pub type EndsSearch<'f> = dyn Fn(&SearchState<'_>) -> Result<bool> + 'f;
@@ -100,6 +105,22 @@ impl<'a> SearchState<'a> {
         Ok(())
     }
 
+    /// Continue about the fit, and again as long as this explains most of what was left: numbers that act in steps are not found from
+    /// afar (a boundary of write fields is between two columns of pillars).
+    ///
+    /// # Errors
+    /// As [`SearchState::recentre`].
+    pub fn settle(&mut self, progress: &dyn Progress) -> Result<()> {
+        for _ in 0..RECENTRINGS {
+            let before = self.error() - 1.0;
+            self.recentre(progress)?;
+            if !self.leaves_more_than(MORE_IS_LEFT) || self.error() - 1.0 > WORTH_AGAIN * before {
+                break;
+            }
+        }
+        Ok(())
+    }
+
     /// Simulate anew what all others change beside the fit, where the surrogate is centred on it already.
     ///
     /// # Errors
@@ -123,7 +144,33 @@ impl<'a> SearchState<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linear_model::{LinearModel, Term, beams};
+    use crate::linear_model::{LinearModel, Product, Term, beams};
+    use metalith_core::Silent;
+
+    /// Two numbers of an effect of which one acts by the other: about a fit from afar something is left, about what is found there
+    /// nothing is.
+    #[test]
+    fn numbers_that_do_not_add_are_found_in_several_turns() {
+        const TRUTH: [f64; 2] = [0.1, 0.1];
+        let own = Product {
+            periods: [2, 3],
+            factor: 17.0,
+        };
+        let terms = [[2, 3], [5, 4]].map(Term::linear).to_vec();
+        let model = LinearModel::new(terms, beams(2, 2, 2)).with_first_two_joined(own);
+        let data = model.data(|_| TRUTH.to_vec(), Some(3));
+        let problem = model.problem(&data);
+        let fit = problem.fit(&[0, 1], &problem.nuisance_fit());
+        let mut once = SearchState::new(problem, fit);
+        let mut settled = once.clone();
+        once.recentre(&Silent).unwrap();
+        assert!(once.leaves_more_than(0.5), "{}", once.error());
+        settled.settle(&Silent).unwrap();
+        assert!(!settled.leaves_more_than(MORE_IS_LEFT), "{}", settled.error());
+        for (found, truth) in settled.fit.theta.iter().zip(TRUTH) {
+            assert!((found / truth - 1.0).abs() < 2e-3, "{:?}", settled.fit.theta);
+        }
+    }
 
     /// Sets that leave more than noise varies by: of noise alone one in forty, of an effect all.
     #[test]

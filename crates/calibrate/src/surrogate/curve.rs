@@ -50,6 +50,11 @@ impl Curve {
         self.about == value
     }
 
+    /// Whether it was simulated at any offset.
+    pub fn is_simulated(&self) -> bool {
+        !self.nodes.is_empty()
+    }
+
     /// Add an offset, near which the polynomial is evaluated from now on.
     pub fn add(&mut self, node: f64, grids: PerCapture<PixelGrid>) {
         if self.nodes.len() >= MOST_NODES {

@@ -48,6 +48,10 @@ pub struct Surrogate {
     smooth: Arc<Vec<SmoothChange>>,
     /// The surrogate that smooth terms were simulated with, where this one was centred elsewhere since.
     stated: Option<Arc<Surrogate>>,
+    /// Whether all parameters that are not dear were simulated about the base point.
+    renewed: bool,
+    /// A renewed one, of another search on the same bench: what it simulated is not simulated again about the same point.
+    elsewhere: Option<Arc<Surrogate>>,
 }
 
 /// Change of the images for a unit of a smooth term; none where it does not act.
@@ -122,6 +126,8 @@ impl Surrogate {
             curves,
             smooth: Arc::new(terms),
             stated: None,
+            renewed: false,
+            elsewhere: None,
         })
     }
 
@@ -154,6 +160,25 @@ impl Surrogate {
             about,
             ..self.clone()
         })
+    }
+
+    /// The same, which knows what `other` simulated elsewhere; `known` are its parameters, by slot of this one.
+    pub fn knowing(self, other: &Self, known: &[Option<usize>]) -> Self {
+        let curves = known
+            .iter()
+            .map(|k| k.map_or_else(Curve::default, |k| other.curves[k].clone()));
+        let about = known.iter().map(|k| k.map_or(0.0, |k| other.about[k]));
+        let elsewhere = Self {
+            curves: curves.collect(),
+            about: about.collect(),
+            stated: None,
+            elsewhere: None,
+            ..other.clone()
+        };
+        Self {
+            elsewhere: other.renewed.then(|| Arc::new(elsewhere)),
+            ..self
+        }
     }
 
     /// Simulate one parameter at more values, where a fit has left the simulated range.
@@ -197,6 +222,8 @@ impl Surrogate {
             curves: Vec::new(),
             smooth: Arc::default(),
             stated: None,
+            renewed: false,
+            elsewhere: None,
         }
     }
 

@@ -59,6 +59,7 @@ impl Surrogate {
             }
         }
         out.about = about.to_vec();
+        out.renewed = false;
         out.base = Arc::new(base);
         Ok(out)
     }
@@ -73,8 +74,13 @@ impl Surrogate {
         let mut first: Vec<(usize, f64)> = Vec::new();
         let mut second: Vec<(usize, f64)> = Vec::new();
         let before = self.curves.clone();
+        let known = self.elsewhere.clone().filter(|e| e.about == about);
         for s in 0..model.slots().len() {
             if found.contains(&s) || model.is_dear_beside(&about, s) {
+                continue;
+            }
+            if let Some(known) = known.as_ref().filter(|k| k.curves[s].is_simulated()) {
+                self.curves[s].clone_from(&known.curves[s]);
                 continue;
             }
             self.curves[s] = Curve::new(about[s], Vec::new(), [], is_kinked(model, &about, s));
@@ -94,7 +100,9 @@ impl Surrogate {
                 None => open.push((s, node)),
             }
         }
-        self.simulate_nodes(model, &open, progress)
+        self.simulate_nodes(model, &open, progress)?;
+        self.renewed = true;
+        Ok(())
     }
 
     /// Add nodes to curves: the parameter, and the offset.
@@ -128,6 +136,35 @@ mod tests {
     use crate::linear_model::{LinearModel, Term, beams};
     use crate::optics::PixelGrid;
     use crate::set::CaptureIndex;
+
+    /// What another search simulated about a point is taken about this point, and no other. It was of a model in which the second
+    /// parameter acts twice as strongly, by which it is recognised.
+    #[test]
+    fn what_was_simulated_elsewhere_is_taken_about_the_same_point() {
+        const TERMS: [[u32; 2]; 2] = [[2, 3], [5, 4]];
+        let model = LinearModel::new(TERMS.map(Term::linear).to_vec(), beams(1, 1, 1));
+        let twice = Term {
+            amplitude: |theta| 2.0 * theta,
+            ..Term::linear(TERMS[1])
+        };
+        let other = LinearModel::new(vec![Term::linear(TERMS[0]), twice], beams(1, 1, 1));
+        let about = |surrogate: Surrogate, model: &LinearModel, at: f64| {
+            let mut surrogate = surrogate.recentred(model, &[at, 0.0], &[0], &Silent).unwrap();
+            surrogate.renew_others(model, &[0], &Silent).unwrap();
+            surrogate
+        };
+        let elsewhere = about(other.surrogate(), &other, 0.04);
+        let slope = |surrogate: &Surrogate, at| {
+            let slope = surrogate.slope(&[at, 0.0], 1, CaptureIndex::from(0));
+            slope.mean_square().sqrt()
+        };
+        let own = slope(&model.surrogate(), 0.0);
+        let knowing = || model.surrogate().knowing(&elsewhere, &[Some(0), Some(1)]);
+        for (at, factor) in [(0.04, 2.0), (0.05, 1.0)] {
+            let found = slope(&about(knowing(), &model, at), at) / own;
+            assert!((found - factor).abs() < 1e-3, "{at}: {found}");
+        }
+    }
 
     /// The first parameter acts by its square too. Found at 0.04, and gone again: its change is that from nothing.
     #[test]
