@@ -186,17 +186,6 @@ pub fn denoise<'py>(
             Some(path) => NetworkDenoiser::read(path)?,
             None => NetworkDenoiser::shipped()?,
         };
-        let (rows, columns, colours) = values.dim();
-        if colours != 3 || rows == 0 || columns == 0 || deviation.dim() != values.dim() {
-            return Err(Error::invalid(
-                format!(
-                    "values of shape {:?}, deviations of shape {:?}",
-                    values.dim(),
-                    deviation.dim()
-                ),
-                "give both with shape (rows, columns, 3)",
-            ));
-        }
         denoiser.denoise(&values, &deviation)
     })?;
     Ok(PyArray3::from_owned_array(py, clean))

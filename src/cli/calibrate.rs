@@ -16,7 +16,7 @@ use super::{Outcome, Terminal, print_json, print_line};
 /// Find the effects by which a measured set differs from its model.
 #[derive(Args)]
 #[command(
-    after_help = "Example:\n  metalith calibrate bench/session-1 --out out/session-1\n\nWrites diagnosis.json, report.html and model.toml. With the verdict unexplained or data_unfit there is no model.toml, and one of an earlier run is removed. Exit code 1 if too few captures can be used."
+    after_help = "Example:\n  metalith calibrate bench/session-1 --out out/session-1\n\nWrites diagnosis.json, report.html, model.toml and, where something stands out in what is left, proposal.toml; those of an earlier run are removed. With the verdict unexplained or data_unfit there is no model.toml. Exit code 1 if too few captures can be used."
 )]
 pub struct CalibrateArgs {
     /// Folders of sets, or their `measurement.toml`. Sessions of one plan share their simulations.
@@ -43,8 +43,8 @@ pub struct CalibrateArgs {
     adopt: bool,
 
     /// Validate the calibration itself instead, on synthetic sets like this one: without effects, with each
-    /// effect at three sizes, with pairs, and with effects that are not listed. Takes half an hour; writes
-    /// validation.html, validation.json and validation.txt.
+    /// effect at three sizes, with pairs, and with effects that are not listed. Takes about an hour of CPU time;
+    /// writes validation.html, validation.json, validation.txt, and validation_trials.jsonl as it goes.
     #[arg(long, alias = "proof")]
     validate: bool,
 
@@ -158,7 +158,7 @@ pub fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> {
     for done in calibrate(&args.sets, &outs, &settings, &GdsPillars, terminal)? {
         terminal.clear();
         if args.json {
-            print_line!("{}", serde_json::to_string_pretty(&done.diagnosis).unwrap_or_default());
+            print_json(&done.diagnosis);
         } else {
             describe(&done);
         }

@@ -10,6 +10,7 @@ use metalith::study::plan_comparison;
 use metalith::{Design, Error, Result};
 
 use super::paths::apart;
+use super::picture::Assume;
 use super::{Outcome, Terminal, images, output, print_json, print_line};
 
 /// Take the same photographs with several cameras, restore them in several ways, and print one table of scores.
@@ -91,12 +92,6 @@ pub struct CompareArgs {
     /// run`, `submit`, `status` and `merge` of the folder.
     #[arg(long, conflicts_with = "json")]
     plan: bool,
-}
-
-/// Whose assumptions are compared with the physics.
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum Assume {
-    Paper,
 }
 
 /// What stands before the sensor of a camera without a lens.

@@ -18,7 +18,7 @@ use super::{Outcome, Terminal, print_line};
     metalith convert from_elsewhere.oas lens.gds"
 )]
 pub struct ConvertArgs {
-    /// The layout to read; its format is told by its first bytes.
+    /// The layout to read, `-` for standard input; its format is told by its first bytes.
     from: PathBuf,
 
     /// The layout to write, in OASIS if its name ends in .oas.

@@ -9,7 +9,7 @@ use metalith::study::{PairsRequest, is_planned, plan_pairs};
 use metalith::{Error, Result};
 
 use super::camera_args::{CameraArgs, CameraFiles};
-use super::standard_input::InputFile;
+use super::standard_input::{self, InputFile};
 use super::{Outcome, Terminal, images, print_line};
 
 /// Record the frame of every image of a folder, for learning: frames, what an ideal camera gives, and a manifest.
@@ -48,6 +48,7 @@ pub struct DatasetArgs {
 
 /// The folder of a set that shards make.
 fn plan(args: &DatasetArgs, images: Vec<PathBuf>, terminal: &Terminal) -> Result<Outcome> {
+    standard_input::named([args.with.design.as_path(), &args.layout])?;
     let request = PairsRequest {
         design: args.with.design.clone(),
         layout: args.layout.clone(),

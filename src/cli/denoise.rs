@@ -72,7 +72,12 @@ pub fn run(args: &DenoiseArgs, terminal: &Terminal) -> Result<Outcome> {
         ));
     }
     if let Some(out) = &args.out {
-        apart([args.picture.as_path()], &[out])?;
+        apart(
+            [Some(args.picture.as_path()), args.weights.as_deref()]
+                .into_iter()
+                .flatten(),
+            &[out],
+        )?;
     }
     let given = read_picture(&args.picture)?;
     let denoiser = match &args.weights {

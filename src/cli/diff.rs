@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use metalith::diff::{self, DiffPlan};
 use metalith::gds::{LayerNumber, ReadLimits};
-use metalith::{Error, Layout, Result};
+use metalith::{Layout, Result};
 
+use super::psf::layer;
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_line};
 
@@ -22,8 +23,8 @@ pub struct DiffArgs {
     b: PathBuf,
 
     /// Layer that the pillars are on.
-    #[arg(long, value_name = "LAYER/DATATYPE", default_value = "1/0")]
-    layer: String,
+    #[arg(long, value_name = "LAYER/DATATYPE", default_value = "1/0", value_parser = layer)]
+    layer: LayerNumber,
 
     /// Most changes that are listed; all are counted.
     #[arg(long, value_name = "N", default_value_t = 1000)]
@@ -39,20 +40,13 @@ pub struct DiffArgs {
 }
 
 pub fn run(args: &DiffArgs, terminal: &Terminal) -> Result<Outcome> {
-    let numbers: Option<Vec<u16>> = args.layer.split('/').map(|n| n.parse().ok()).collect();
-    let Some(&[layer, datatype]) = numbers.as_deref() else {
-        return Err(Error::invalid(
-            format!("\"{}\" is not a layer", args.layer),
-            "write layer and datatype as 1/0",
-        ));
-    };
     let report: Vec<_> = args.report.as_deref().into_iter().collect();
     super::paths::apart([args.a.as_path(), &args.b], &report)?;
     terminal.stop_on_interrupt();
     let files = [InputFile::of(&args.a)?, InputFile::of(&args.b)?];
     let open = |path: &Path| Layout::open_with(path, ReadLimits::default(), terminal);
     let plan = DiffPlan {
-        pillar_layer: LayerNumber::new(layer, datatype),
+        pillar_layer: args.layer,
         listed: args.listed,
     };
     let found = diff::diff(&open(&files[0])?, &open(&files[1])?, &plan, terminal)?;

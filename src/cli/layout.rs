@@ -81,7 +81,7 @@ impl From<FormatArg> for LayoutFormat {
 enum EncodingArg {
     /// Lists of places.
     Compact,
-    /// A rectangle for each pillar, no repetitions, one layer a file: what mask tools take.
+    /// An outline for each pillar, no repetitions, one layer a file: what mask tools take.
     Plain,
     /// Whichever of lists and references is smaller, cell by cell.
     Smallest,
@@ -123,7 +123,7 @@ enum HierarchyArg {
     Folded,
     /// One reference a pillar.
     Sref,
-    /// One square a pillar.
+    /// One outline a pillar.
     Flat,
 }
 

@@ -59,6 +59,9 @@ pub struct OptimiseArgs {
 }
 
 pub fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
+    if args.plan.is_some() {
+        standard_input::named([args.design.as_path()])?;
+    }
     let design = standard_input::design_any(&args.design)?;
     terminal.stop_on_interrupt();
     let folder = args

@@ -93,7 +93,7 @@ const PIXELS: u16 = 800;
 
 /// Whose assumptions are compared with the physics.
 #[derive(Clone, Copy, clap::ValueEnum)]
-enum Assume {
+pub enum Assume {
     Paper,
 }
 

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use metalith::cell::{Fidelity, Handedness};
+use metalith::design::TALLEST_NM;
 use metalith::extract::ExtractedElement;
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::report::{count, exact, sig};
@@ -21,7 +22,7 @@ use super::standard_input::InputFile;
 use super::verify::FidelityArg;
 use super::{Outcome, Terminal, print_line};
 
-/// Find the elements of any GDSII layout, read their pillars, and simulate their PSFs.
+/// Find the elements of any layout in GDSII or OASIS, read their pillars, and simulate their PSFs.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  metalith psf lens.gds --layer 1/0 --distance-um 2400 --wavelength-nm 530 --out out/lens\n\n\
@@ -29,7 +30,7 @@ use super::{Outcome, Terminal, print_line};
     element's axis unless --at-x-um, --at-y-um do. A steered element sends light along the normal far off its axis."
 )]
 pub struct PsfArgs {
-    /// The layout, by whatever program it was written.
+    /// The layout, by whatever program it was written; `-` for standard input.
     layout: PathBuf,
 
     /// Layer and datatype of the pillars.
@@ -182,17 +183,14 @@ impl From<CircularArg> for Handedness {
     }
 }
 
-/// `1/0` as layer 1, datatype 0.
-fn layer(text: &str) -> std::result::Result<LayerNumber, String> {
+/// `1/0`, or `1`, as layer 1, datatype 0.
+pub fn layer(text: &str) -> std::result::Result<LayerNumber, String> {
     let (layer, datatype) = text.split_once('/').unwrap_or((text, "0"));
     match (layer.parse(), datatype.parse()) {
         (Ok(layer), Ok(datatype)) => Ok(LayerNumber::new(layer, datatype)),
         _ => Err("write layer and datatype as 1/0".into()),
     }
 }
-
-/// Tallest pillar and thickest layer (nm): those of design files.
-const TALLEST_NM: f64 = 50_000.0;
 
 /// Light that is steeper grazes the chip: no detector of an angle is that good, and cosines become zero.
 const STEEPEST_DEG: f64 = 89.0;

@@ -19,6 +19,20 @@ fn is_standard_input(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
+/// Refuse standard input for files of a plan: shards read them again, by their names.
+///
+/// # Errors
+/// If one of these is `-`.
+pub fn named<'p>(paths: impl IntoIterator<Item = &'p Path>) -> Result<()> {
+    match paths.into_iter().any(is_standard_input) {
+        false => Ok(()),
+        true => Err(Error::invalid(
+            "a plan of a file from standard input",
+            "name the file: shards read it again",
+        )),
+    }
+}
+
 /// Standard input, which ends where it has been read once.
 fn take() -> Result<io::StdinLock<'static>> {
     static TAKEN: AtomicBool = AtomicBool::new(false);

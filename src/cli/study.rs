@@ -6,10 +6,12 @@ use std::process::{Child, Command};
 use clap::{Args, Subcommand};
 use metalith::report::sig;
 use metalith::study::{
-    ComparisonPlan, PairsPlan, Plan, PlanSettings, Slurm, StartsPlan, Work, merge, plan, submissions, write_page,
+    ComparisonPlan, MANIFEST, PairsPlan, Plan, PlanSettings, REPORT, Slurm, StartsPlan, TableFormat, Work, merge, plan,
+    submissions, write_page,
 };
 use metalith::{Error, Progress, Result};
 
+use super::paths::apart;
 use super::{Outcome, Terminal, print_json, print_line};
 
 /// Make a chip many times with the tolerances of its process and bench: which share of the chips holds the limits, and
@@ -303,10 +305,13 @@ fn merge_starts(plan: &StartsPlan, args: &MergeArgs) -> Result<Outcome> {
 }
 
 fn merge_study(plan: &Plan, args: &MergeArgs, terminal: &Terminal) -> Result<Outcome> {
-    let result = merge(plan, args.psfs, terminal)?;
     let out = args.out.clone().unwrap_or_else(|| args.study.join("result.csv"));
-    result.write(&out)?;
     let folder = out.parent().map_or_else(PathBuf::new, std::path::Path::to_owned);
+    let [page, numbers] = REPORT.map(|name| folder.join(name));
+    apart([args.study.join(MANIFEST).as_path()], &[&out, &page, &numbers])?;
+    TableFormat::of(&out)?;
+    let result = merge(plan, args.psfs, terminal)?;
+    result.write(&out)?;
     write_page(&result, &folder)?;
     terminal.clear();
     for y in &result.yields {
@@ -321,6 +326,6 @@ fn merge_study(plan: &Plan, args: &MergeArgs, terminal: &Terminal) -> Result<Out
         );
     }
     print_line!("{}", out.display());
-    print_line!("{}", folder.join("report.html").display());
+    print_line!("{}", page.display());
     Ok(Outcome::Fine)
 }

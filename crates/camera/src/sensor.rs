@@ -68,6 +68,12 @@ impl Sensor {
         self.gain_e / self.full_scale_e()
     }
 
+    /// Row and column of a place of the chip (um), in pixels from the middle of the first; rows run along y.
+    pub fn pixel_at(&self, place_um: [f64; 2]) -> [f64; 2] {
+        [(self.rows, 1), (self.columns, 0)]
+            .map(|(n, axis)| 0.5 * (f64::from(n) - 1.0) + (place_um[axis] - self.offset_um[axis]) / self.pixel_um)
+    }
+
     /// Largest signal that is recorded, of full scale: where the pixel values end, or the well if that is filled before.
     pub fn largest_signal(&self) -> f64 {
         (self.step() * (f64::from(self.bits).exp2() - 1.0)).min(1.0)

@@ -49,6 +49,11 @@ pub fn channel_at(filter: ColourFilter, names: &[String], row: usize, column: us
     names.iter().position(|n| n == wanted)
 }
 
+/// Whether a pixel counts a channel; pixels of a sensor without a filter count all.
+pub fn counts_channel(filter: ColourFilter, names: &[String], [row, column]: [usize; 2], channel: usize) -> bool {
+    channel_at(filter, names, row, column).is_none_or(|c| c == channel)
+}
+
 /// Signal of a unit of light in each channel, so that the brightest pixel of a white scene has the signal that the camera
 /// file states.
 ///
@@ -193,7 +198,7 @@ impl Frame {
 
     /// Whether a pixel counts a channel.
     fn counts(&self, channel: usize, names: &[String], row: usize, column: usize) -> bool {
-        channel_at(self.filter, names, row, column).is_none_or(|c| c == channel)
+        counts_channel(self.filter, names, [row, column], channel)
     }
 
     /// Light of each channel, and how much each pixel is to be trusted: one over the variance of its light, zero where it

@@ -42,7 +42,7 @@ pub use chip::{ChipInLight, ElementInLight, element_views, sampling_of};
 pub use colour::ChannelColours;
 pub use dataset::{DatasetManifest, DatasetOrigin, DatasetPair, PairWriter, write_dataset, write_dataset_manifest};
 pub use doubt::{Doubt, DoubtReport};
-pub use exposure::{Frame, channel_at, expose, gains, sensitivity};
+pub use exposure::{Frame, channel_at, counts_channel, expose, gains, sensitivity};
 pub use files::{FrameFile, picture_file};
 pub use forecast::{Forecast, ScenePower};
 pub use geometry::{ElementView, SceneSpace, SceneView};

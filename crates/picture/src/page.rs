@@ -5,7 +5,7 @@ use std::path::Path;
 use metalith_camera::{Camera, ColourFilter};
 use metalith_core::{Result, part, srgb};
 use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, PhotoRow, Table, fixed, write_json};
-use ndarray::{Array2, Array3, Axis as Along};
+use ndarray::{Array2, Array3};
 
 use crate::assumed::AssumedScore;
 use crate::doubt::{Doubt, DoubtReport, root_mean_square};
@@ -169,15 +169,8 @@ fn zooms(page: &mut Page, pages: &PicturePages<'_>) {
         ("Corner", rows - side, columns - side),
     ] {
         let cut = |picture: &Array3<f64>| {
-            let planes: Vec<_> = (0..3)
-                .map(|c| {
-                    let plane = picture.index_axis(Along(2), c);
-                    part(plane, row..row + side, column..column + side).insert_axis(Along(2))
-                })
-                .collect();
-            ndarray::concatenate(Along(2), &planes)
-                .expect("planes of one shape")
-                .mapv(srgb::encoded)
+            let zoom = part(picture.view(), row..row + side, column..column + side);
+            zoom.mapv(srgb::encoded)
         };
         let mut zoom = PhotoRow::new(name, 240.0);
         zoom.photo("scene", &cut(pages.scene))

@@ -4,7 +4,7 @@
 use metalith_core::{Progress, Result};
 use ndarray::Array2;
 
-use crate::exposure::{channel_at, expose};
+use crate::exposure::{counts_channel, expose};
 use crate::forecast::{Exposed, Forecast};
 use crate::operator::{Detail, FrameOperator, SceneInputs};
 use crate::operator_error::OperatorError;
@@ -47,7 +47,7 @@ impl Rehearsal {
         };
         let names = studio.camera.channel_names();
         let filter = studio.camera.sensor.filter;
-        let counts = |channel, (y, x)| channel_at(filter, &names, y, x).is_none_or(|c| c == channel);
+        let counts = |channel, (y, x)| counts_channel(filter, &names, [y, x], channel);
         Self {
             operator_error: OperatorError::between(&light, &known, counts),
             scene,

@@ -286,7 +286,7 @@ fn fixed(value: f64) -> String {
 }
 
 /// Root mean square and largest distance of pairs of points from the best homography, fitted without the weights that its
-/// denominator brings (direct linear transformation, twice, the second time with them).
+/// denominator brings first, then twice with them (direct linear transformation).
 fn homography_residual(points: &[([f64; 2], [f64; 2])]) -> Option<(f64, f64)> {
     const LEAST: usize = 8;
     if points.len() < LEAST {

@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 use ndarray::{Array2, Array3};
 use serde::Serialize;
 
-use crate::exposure::{Frame, channel_at};
+use crate::exposure::{Frame, counts_channel};
 use crate::scene::{BuiltIn, LEAN_DEG, SPOKES, STAR};
 use crate::studio::Studio;
 
@@ -106,7 +106,7 @@ fn of_frame(studio: &Studio, channel: usize, frame: &Frame, truth: &Array2<f64>)
     let (rows, columns) = plane.dim();
     let mut samples = Vec::new();
     for ((row, column), value) in plane.indexed_iter() {
-        if channel_at(frame.filter, &names, row, column).is_some_and(|c| c != channel) {
+        if !counts_channel(frame.filter, &names, [row, column], channel) {
             continue;
         }
         let at = |i: usize, n: usize, a: usize| {

@@ -3,7 +3,7 @@
 use metalith_core::srgb::encoded;
 use metalith_core::{Error, Result, part};
 use metalith_wave::restore::{psnr_db, ssim_colour};
-use ndarray::{Array3, Axis};
+use ndarray::Array3;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::SceneView;
@@ -115,18 +115,19 @@ pub fn check_scored(view: &SceneView) -> Result<()> {
 /// # Errors
 /// If the shapes differ, the picture is too small for the window of the similarity, or holds what is no number.
 pub fn scores(picture: &Array3<f64>, truth: &Array3<f64>) -> Result<Vec<ZoneScore>> {
-    let (rows, columns, _) = truth.dim();
+    let (rows, columns, colours) = truth.dim();
+    if picture.dim() != truth.dim() || colours != 3 {
+        return Err(Error::invalid(
+            format!("pictures of shapes {:?} and {:?}", picture.dim(), truth.dim()),
+            "give two of one shape, (rows, columns, 3)",
+        ));
+    }
     let (shown, wanted) = (picture.mapv(encoded), truth.mapv(encoded));
     let score = |zone: Zone| {
         let parts = zone.rectangles(rows, columns);
         let (mut error, mut linear, mut ssim) = (0.0, 0.0, 0.0);
         for [y, x] in &parts {
-            let cut = |a: &Array3<f64>| {
-                let planes: Vec<_> = (0..3)
-                    .map(|c| part(a.index_axis(Axis(2), c), y.clone(), x.clone()).insert_axis(Axis(2)))
-                    .collect();
-                ndarray::concatenate(Axis(2), &planes).expect("planes of one shape")
-            };
+            let cut = |a: &Array3<f64>| part(a.view(), y.clone(), x.clone()).to_owned();
             let share = 1.0 / parts.len() as f64;
             let mean = |db: f64| 10f64.powf(-0.1 * db) * share;
             error += mean(psnr_db(cut(&shown).view(), cut(&wanted).view())?);

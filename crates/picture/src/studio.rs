@@ -133,7 +133,7 @@ impl Studio {
     /// If the scene has other spectra or another field than this was opened for.
     pub fn record(&self, operator: &FrameOperator<'_>, scene: &SceneImage, seed: u64) -> Result<Frame> {
         let scene = self.simulated(scene);
-        if scene.view != self.view || scene.basis.len() != self.scene_spectra {
+        if scene.view != self.view || scene.basis[..] != self.basis[..self.scene_spectra] {
             return Err(Error::invalid(
                 format!(
                     "the scene `{}` has another size, field or spectra than the first",

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use metalith_core::Result;
+use metalith_core::{Error, Result};
 use ndarray::{Array2, Array3, ArrayView2, Axis};
 
 use crate::features::Features;
@@ -75,14 +75,25 @@ impl NetworkDenoiser {
     /// same unit.
     ///
     /// # Errors
-    /// If a network of the user's own cannot take a picture of this size; the own one takes any.
+    /// If the shapes are not two of (rows, columns, 3), or a network of the user's own cannot take a picture of this size; the own one
+    /// takes any.
     pub fn denoise(&self, picture: &Array3<f32>, deviation: &Array3<f32>) -> Result<Array3<f32>> {
         let side = match &self.network {
             Kind::Own(_) => SIDE,
             #[cfg(feature = "onnx")]
             Kind::Onnx(_) => crate::onnx::SIDE,
         };
-        let (rows, columns, _) = picture.dim();
+        let (rows, columns, colours) = picture.dim();
+        if colours != COLOURS || rows == 0 || columns == 0 || deviation.dim() != picture.dim() {
+            return Err(Error::invalid(
+                format!(
+                    "values of shape {:?}, deviations of shape {:?}",
+                    picture.dim(),
+                    deviation.dim()
+                ),
+                "give both with shape (rows, columns, 3)",
+            ));
+        }
         let whole = |n: usize| n.next_multiple_of(side).max(side);
         let (picture, deviation) = (
             mirrored(picture, whole(rows), whole(columns)),
@@ -112,7 +123,7 @@ pub(crate) fn input(picture: &Array3<f32>, deviation: &Array3<f32>) -> Features 
 }
 
 /// Means over squares of 2 x 2.
-fn over_squares(plane: ArrayView2<'_, f32>) -> Array2<f32> {
+pub(crate) fn over_squares(plane: ArrayView2<'_, f32>) -> Array2<f32> {
     let (rows, columns) = plane.dim();
     Array2::from_shape_fn((rows / 2, columns / 2), |(y, x)| {
         let row = |y: usize| plane[[y, 2 * x]] + plane[[y, 2 * x + 1]];

@@ -2,12 +2,13 @@
 
 use metalith_core::text::hex;
 use metalith_core::{Error, Result};
-use ndarray::Array3;
+use ndarray::{Array3, Axis};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use sha2::{Digest, Sha256};
 
+use crate::denoiser::over_squares;
 use crate::network::COLOURS;
 
 /// Least and largest deviation of the noise, of white being one; drawn evenly in its logarithm.
@@ -20,8 +21,13 @@ const DARKENED: f64 = 0.5;
 const DARKEST: f32 = 0.4;
 /// Share of pieces whose colours are exchanged: there are few photographs.
 const EXCHANGED: f64 = 0.3;
-/// One photograph of so many is held out, and at least one.
+/// One picture of so many is held out, and at least one.
 const HELD_OUT: usize = 12;
+
+/// Whether the picture of this number is held out.
+pub(crate) fn is_held_out(number: usize) -> bool {
+    number.is_multiple_of(HELD_OUT)
+}
 
 /// Photographs to learn from, and others to be judged by.
 #[derive(Clone, Debug)]
@@ -59,7 +65,7 @@ impl Photographs {
         }
         let (mut learnt, mut held_out) = (Vec::new(), Vec::new());
         for (i, (_, picture)) in pictures.into_iter().enumerate() {
-            if i % HELD_OUT == 0 {
+            if is_held_out(i) {
                 held_out.push(picture);
                 continue;
             }
@@ -161,9 +167,8 @@ fn deviations(piece: usize, random: &mut ChaCha8Rng) -> Array3<f32> {
 
 /// Half as many pixels along each axis.
 fn halved(picture: &Array3<f32>) -> Array3<f32> {
-    let (rows, columns, colours) = picture.dim();
-    Array3::from_shape_fn((rows / 2, columns / 2, colours), |(y, x, c)| {
-        let row = |y: usize| picture[[y, 2 * x, c]] + picture[[y, 2 * x + 1, c]];
-        (row(2 * y) + row(2 * y + 1)) / 4.0
+    let planes: Vec<_> = picture.axis_iter(Axis(2)).map(over_squares).collect();
+    Array3::from_shape_fn((picture.dim().0 / 2, picture.dim().1 / 2, planes.len()), |(y, x, c)| {
+        planes[c][[y, x]]
     })
 }

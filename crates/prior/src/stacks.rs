@@ -13,6 +13,7 @@ use rand_chacha::ChaCha8Rng;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use sha2::{Digest, Sha256};
 
+use crate::examples::is_held_out;
 use crate::features::Features;
 use crate::finisher::{Finisher, STAGE, Taught};
 use crate::learning::{Lesson, Lessons, TrainingSpec, psnr_db};
@@ -23,8 +24,6 @@ use crate::squares::{cut, squares};
 const LONGEST: u64 = 4 << 30;
 /// Tensors in such a file.
 const NAMES: [&str; 2] = ["pictures", "clean"];
-/// One frame of so many is held out, and at least one.
-const HELD_OUT: usize = 12;
 
 /// The pictures of one frame and its scene, all in sRGB values, in half precision.
 #[derive(Clone, Debug, PartialEq)]
@@ -190,7 +189,7 @@ impl Stacks {
         }
         let (mut learnt, mut held_out) = (Vec::new(), Vec::new());
         for (i, stack) in stacks.into_iter().enumerate() {
-            match i % HELD_OUT == 0 {
+            match is_held_out(i) {
                 true => held_out.push(stack),
                 false => learnt.push(stack),
             }

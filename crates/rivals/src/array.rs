@@ -54,18 +54,18 @@ impl<'a> ArrayCamera<'a> {
     fn blend_and_elements(&self, recorded: &Recorded<'_>, progress: &dyn Progress) -> Result<Vec<Vec<Array2<f32>>>> {
         let shape = (self.studio.view.rows, self.studio.view.columns);
         let mut blend = Blend::new(shape, self.restoration.inputs());
-        let mut alone = Vec::new();
+        let mut alone = vec![None; self.restoration.elements()];
         restore_each(
             recorded,
             RestorationMethod::Tikhonov,
             progress,
-            &mut |picture, trust| {
+            &mut |element, picture, trust| {
                 blend.add(picture, trust);
-                alone.push((picture.clone(), trust.clone()));
+                alone[element] = Some((picture.clone(), trust.clone()));
             },
         )?;
         let blend = blend.finished();
-        for (picture, trust) in &mut alone {
+        for (picture, trust) in alone.iter_mut().flatten() {
             for ((plane, trust), blend) in picture.iter_mut().zip(trust).zip(&blend) {
                 let least = LEAST_TRUST * trust.iter().copied().fold(0.0, f32::max);
                 Zip::from(plane)
@@ -75,8 +75,11 @@ impl<'a> ArrayCamera<'a> {
             }
         }
         // Elements that see nothing of the scene have no picture of their own.
-        alone.resize(self.restoration.elements(), (blend.clone(), Vec::new()));
-        Ok([blend].into_iter().chain(alone.into_iter().map(|(p, _)| p)).collect())
+        let own = alone
+            .into_iter()
+            .map(|seen| seen.map_or_else(|| blend.clone(), |(picture, _)| picture));
+        let own: Vec<_> = own.collect();
+        Ok([blend].into_iter().chain(own).collect())
     }
 }
 
@@ -96,7 +99,7 @@ impl Contender for ArrayCamera<'_> {
     }
 
     fn channel_names(&self) -> Vec<String> {
-        self.studio.channels.iter().map(|c| c.name.clone()).collect()
+        self.studio.camera.channel_names()
     }
 
     fn record(&self, scene: &SceneImage, seed: u64) -> Result<Frame> {

@@ -1,10 +1,12 @@
 //! What cameras without a lens have in common: a sensor, light of a flat scene on its pixels, exposure, colours.
 
-use metalith_camera::{Camera, ColourFilter, Sampling};
+use metalith_camera::{Camera, Sampling};
 use metalith_core::{Error, Progress, Result};
 use metalith_picture::scene::SceneImage;
 use metalith_picture::spectra::{SceneSpectrum, rgb_basis};
-use metalith_picture::{ChannelColours, Frame, SceneView, channel_at, expose, gains, sensitivity, without_dispersion};
+use metalith_picture::{
+    ChannelColours, Frame, SceneView, counts_channel, expose, gains, sensitivity, without_dispersion,
+};
 use ndarray::{Array2, Array3, Zip};
 
 use crate::contender::{Contender, Way, no_stage};
@@ -280,10 +282,9 @@ impl LenslessBench {
         let names = self.channel_names();
         let filter = self.camera.sensor.filter;
         let all = [[0, 0], [0, 1], [1, 0], [1, 1]];
-        let counts = |p: &[usize; 2]| {
-            filter == ColourFilter::None || channel_at(filter, &names, p[0], p[1]).is_none_or(|c| c == channel)
-        };
-        all.into_iter().filter(counts).collect()
+        all.into_iter()
+            .filter(|p| counts_channel(filter, &names, *p, channel))
+            .collect()
     }
 }
 
@@ -296,6 +297,7 @@ pub fn falloff([tx, ty]: [f64; 2]) -> f64 {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use metalith_camera::ColourFilter;
     use metalith_picture::restore::SceneStatistics;
 
     /// A small camera, a scene of the statistics of photographs.

@@ -170,7 +170,8 @@ impl Lineup {
         (self.designs.len() + self.lensless.len()) * self.kinds()
     }
 
-    fn kinds(&self) -> usize {
+    /// Cameras of the table for each that is listed: with the assumptions of the paper, one more.
+    pub(crate) fn kinds(&self) -> usize {
         1 + usize::from(self.paper)
     }
 }
@@ -201,7 +202,7 @@ impl OpenLineup<'_> {
         self.take_first(k, self.photographs.len(), kept, progress)
     }
 
-    /// The same of the first so many photographs.
+    /// The same of the first so many photographs, of all if there are no more.
     ///
     /// # Errors
     /// As [`OpenLineup::take`].
@@ -215,7 +216,7 @@ impl OpenLineup<'_> {
         check_scored(&self.photographs[0].view)?;
         let mut found = None;
         self.ready(k, kept, progress, &mut |contender, names, all| {
-            let (all, perceptual) = (&all[..photographs], self.perceptual.as_ref());
+            let (all, perceptual) = (&all[..photographs.min(all.len())], self.perceptual.as_ref());
             found = Some(compare(contender, names, all, self.of.seed, perceptual, progress)?);
             Ok(())
         })?;

@@ -136,13 +136,13 @@ impl OpenLineup<'_> {
         }
         let mut stacks = Vec::new();
         let mut pictures = 0;
-        self.ready(k, kept, progress, &mut |contender, _, photographs| {
+        self.ready(k * self.of.kinds(), kept, progress, &mut |contender, _, photographs| {
             progress.begin("pictures to learn from", photographs.len() as u64);
             for (i, (scene, path)) in photographs.iter().zip(&self.of.photographs).enumerate() {
                 if progress.stopped() {
                     return Err(Error::Interrupted);
                 }
-                let seed = self.of.seed + i as u64;
+                let seed = self.of.seed.wrapping_add(i as u64);
                 let light = optics.as_deref().unwrap_or_default();
                 let of = format!("{} {camera} {light} {} {seed}", kind.name(), hex(&file_digest(path)?));
                 let file = folder.join(format!("{i:06}.safetensors"));

@@ -200,17 +200,17 @@ impl<'a> Tiles<'a> {
                 }
             }
         }
-        square.iter_mut().for_each(|v| *v /= energy);
+        // A place whose light misses the sensor has a kernel of zeros.
+        if energy > 0.0 {
+            square.iter_mut().for_each(|v| *v /= energy);
+        }
         square
     }
 }
 
 /// Row and column of an element's axis.
 fn axis(element: &ElementView, studio: &Studio) -> [f64; 2] {
-    let sensor = &studio.camera.sensor;
-    let place =
-        |n: u32, a: usize| 0.5 * (f64::from(n) - 1.0) + (element.centre_um[a] - sensor.offset_um[a]) / sensor.pixel_um;
-    [place(sensor.rows, 1), place(sensor.columns, 0)]
+    studio.camera.sensor.pixel_at(element.centre_um)
 }
 
 /// One over the spectrum of a channel of natural scenes on the pixels of the sensor, in the order of a transform.

@@ -9,7 +9,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 /// Name of the manifest within the folder.
-const MANIFEST: &str = "plan.json";
+pub const MANIFEST: &str = "plan.json";
 /// Longest manifest.
 const LONGEST: u64 = 64 << 20;
 

@@ -48,6 +48,7 @@ pub struct StudyResult {
 /// If draws are missing or there twice, all named; if a shard is of another plan; as [`Run::open`].
 pub fn merge(plan: &Plan, show: usize, progress: &dyn Progress) -> Result<StudyResult> {
     let draws = plan.cut().whole(&|d: &DrawRecord| Some(d.draw))?;
+    check_counts(plan, &draws)?;
     let run = Run::open(plan)?;
     let drawer = run.drawer();
     let count = plan.quantities.len();
@@ -88,6 +89,25 @@ pub fn merge(plan: &Plan, show: usize, progress: &dyn Progress) -> Result<StudyR
     })
 }
 
+/// Refuse draws with another number of amounts or of limits than the plan has.
+fn check_counts(plan: &Plan, draws: &[DrawRecord]) -> Result<()> {
+    let wanted = (plan.quantities.len(), plan.limits.len());
+    let other = draws.iter().find(|d| (d.amounts.len(), d.reached.len()) != wanted);
+    other.map_or(Ok(()), |d| {
+        Err(Error::invalid(
+            format!(
+                "draw {} has {} amounts and {} limits, of {} and {}",
+                d.draw,
+                d.amounts.len(),
+                d.reached.len(),
+                wanted.0,
+                wanted.1
+            ),
+            "remove the shard that holds it, and run what is missing",
+        ))
+    })
+}
+
 /// Draws by their least margin, in units of what the margin of its limit varies by.
 fn worst(plan: &Plan, draws: &[DrawRecord]) -> Vec<u64> {
     let spread = |k: usize| {
@@ -112,39 +132,23 @@ impl StudyResult {
     /// Write all draws as a table: CSV, JSON Lines, JSON, or Parquet by the ending of the name.
     ///
     /// # Errors
-    /// If the ending is another, the program was built without Parquet, or the file cannot be written.
+    /// As [`TableFormat::of`], or if the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let bytes = match path.extension().and_then(|e| e.to_str()) {
-            Some("csv") => csv(&columns(self), self.draws.len()).into_bytes(),
-            Some("jsonl") => self.lines().into_bytes(),
-            Some("json") => {
+        let bytes = match TableFormat::of(path)? {
+            TableFormat::Csv => csv(&columns(self), self.draws.len()).into_bytes(),
+            TableFormat::JsonLines => self.lines().into_bytes(),
+            TableFormat::Json => {
                 let whole = serde_json::json!({ "study": self, "draws": self.draws });
                 format!("{whole:#}\n").into_bytes()
             }
-            Some("parquet") => self.parquet()?,
-            _ => {
-                return Err(Error::invalid(
-                    format!("{}: this ending is not known", path.display()),
-                    "name a file that ends in .csv, .json, .jsonl or .parquet",
-                ));
+            #[cfg(feature = "parquet")]
+            TableFormat::Parquet => {
+                let mut bytes = Vec::new();
+                crate::parquet_file::write(&columns(self), &mut bytes)?;
+                bytes
             }
         };
         WholeFile::write(path, &bytes)
-    }
-
-    #[cfg(feature = "parquet")]
-    fn parquet(&self) -> Result<Vec<u8>> {
-        let mut bytes = Vec::new();
-        crate::parquet_file::write(&columns(self), &mut bytes)?;
-        Ok(bytes)
-    }
-
-    #[cfg(not(feature = "parquet"))]
-    fn parquet(&self) -> Result<Vec<u8>> {
-        Err(Error::invalid(
-            "this program was built without Parquet",
-            "build it with `--features parquet`, or name a file that ends in .csv, .json or .jsonl",
-        ))
     }
 
     fn lines(&self) -> String {
@@ -153,5 +157,40 @@ impl StudyResult {
             let _ = writeln!(text, "{}", serde_json::to_string(draw).expect("plain data serialises"));
         }
         text
+    }
+}
+
+/// Format of a table of draws.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TableFormat {
+    Csv,
+    JsonLines,
+    Json,
+    #[cfg(feature = "parquet")]
+    Parquet,
+}
+
+impl TableFormat {
+    /// By the ending of the name of a file.
+    ///
+    /// # Errors
+    /// If the ending is another, or the program was built without Parquet.
+    pub fn of(path: &Path) -> Result<Self> {
+        match path.extension().and_then(|e| e.to_str()) {
+            Some("csv") => Ok(Self::Csv),
+            Some("jsonl") => Ok(Self::JsonLines),
+            Some("json") => Ok(Self::Json),
+            #[cfg(feature = "parquet")]
+            Some("parquet") => Ok(Self::Parquet),
+            #[cfg(not(feature = "parquet"))]
+            Some("parquet") => Err(Error::invalid(
+                "this program was built without Parquet",
+                "build it with `--features parquet`, or name a file that ends in .csv, .json or .jsonl",
+            )),
+            _ => Err(Error::invalid(
+                format!("{}: this ending is not known", path.display()),
+                "name a file that ends in .csv, .json, .jsonl or .parquet",
+            )),
+        }
     }
 }

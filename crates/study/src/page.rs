@@ -21,13 +21,17 @@ const TRUSTED: f64 = 0.8;
 /// Limits whose shares of variance are drawn.
 const MOST_DRAWN: usize = 6;
 
-/// Write `report.html` and `report.json` into a folder.
+/// Files of the report of a study: the page, and its numbers.
+pub const REPORT: [&str; 2] = ["report.html", "report.json"];
+
+/// Write the files of [`REPORT`] into a folder.
 ///
 /// # Errors
 /// If a file cannot be written.
 pub fn write_page(result: &StudyResult, folder: &Path) -> Result<()> {
-    write_json(&folder.join("report.json"), "study", result)?;
-    page(result).write(&folder.join("report.html"))
+    let [html, json] = REPORT.map(|name| folder.join(name));
+    write_json(&json, "study", result)?;
+    page(result).write(&html)
 }
 
 fn page(result: &StudyResult) -> Page {

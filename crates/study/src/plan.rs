@@ -19,7 +19,7 @@ use sha2::{Digest, Sha256};
 
 use crate::bench::{Bench, Files, Quiet};
 use crate::cut::{Cut, parts_per_shard};
-use crate::manifest::{Manifest, absolute, is_planned};
+use crate::manifest::{Manifest, absolute, another_plan, is_planned};
 use crate::picture::SceneChoice;
 use crate::record::LimitStatement;
 use crate::tolerance::Tolerance;
@@ -145,6 +145,9 @@ pub fn plan(tolerance_path: &Path, folder: &Path, settings: PlanSettings, progre
     let known = is_planned(folder);
     let layouts = layouts(&tolerance, folder, known, progress)?;
     let paths: Vec<PathBuf> = layouts.iter().map(|l| layout_path(l, folder)).collect();
+    if known && !paths.iter().all(|path| path.exists()) {
+        return Err(another_plan(folder));
+    }
     let key = key(&tolerance, &paths)?;
     if let Some(known) = Plan::known_in(folder, &hex(&key))? {
         return Ok(known);

@@ -200,6 +200,12 @@ fn shards_are_whole_are_of_one_plan_and_are_counted() {
     assert!(foreign.contains("another plan"), "{foreign}");
     assert!(merge(&made, 0, &Silent).is_err());
     assert_eq!(made.cut().status().unwrap().unusable.len(), 1);
+    // A draw that lost its figures.
+    let (before, after) = own.split_once("\"reached\":[").unwrap();
+    let cut = format!("{before}\"reached\":[{}", &after[after.find(']').unwrap()..]);
+    fs::write(made.cut().path(1), cut).unwrap();
+    let short = merge(&made, 0, &Silent).err().unwrap().to_string();
+    assert!(short.contains("0 limits"), "{short}");
     fs::write(made.cut().path(1), own).unwrap();
     merge(&made, 0, &Silent).unwrap();
     // A design that has changed since.

@@ -284,14 +284,17 @@ fn equal_neighbours(found: &Verification) -> String {
         let same = |o: &&OrderEfficiencies| o.fidelity == fidelity && o.wavelength_um == um;
         orders.iter().find(same).map(|o| o.first)
     };
-    let each = found.distinct.iter().map(|element| {
+    let each = found.distinct.iter().filter_map(|element| {
         let orders = &element.orders;
         let own = orders.iter().filter(|o| o.fidelity == Fidelity::Neighbours);
         let ratios = own.filter_map(|o| Some(of(orders, Fidelity::Rigorous, o.wavelength_um)? / o.first));
         let ratios: Vec<String> = ratios.map(|r| fixed(r, 2)).collect();
-        format!("{} times in element {}", ratios.join(", "), element.element.label())
+        (!ratios.is_empty()).then(|| format!("{} times in element {}", ratios.join(", "), element.element.label()))
     });
     let each: Vec<String> = each.collect();
+    if each.is_empty() {
+        return "what equal neighbours would have was not simulated beside it".into();
+    }
     format!(
         "equal neighbours would have in the first order, by wavelength, {}",
         each.join("; ")

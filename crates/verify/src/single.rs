@@ -1,7 +1,6 @@
 //! PSFs of a single layout from anywhere, without a design.
 
 use std::collections::BTreeMap;
-use std::io::Write;
 use std::path::Path;
 
 use ndarray::Array2;
@@ -15,7 +14,7 @@ use super::single_white::SingleWhite;
 use super::white::CameraStatement;
 use super::white_page;
 use metalith_cell::{CellModel, Fidelity};
-use metalith_core::{Error, Lattice, LatticeKind, Progress, Result, Silent, WholeFile, WidthMap};
+use metalith_core::{Error, Lattice, LatticeKind, Progress, Result, WholeFile, WidthMap};
 use metalith_gds::extract::{ElementSite, Extraction};
 use metalith_made::{MadeChip, ModelStatement, SimulationCase};
 use metalith_report::{Cell, Column, ImageGrid, Page, PillarZoom, Table, count, sig, write_json};
@@ -113,7 +112,7 @@ fn by_cell(
     let wave = light.wave(wavelength_um);
     tables.add_neighbours(cell, &[wave], progress)?;
     if light.cells_as_lit {
-        tables.add_directions(cell, &[wave], widest, &Silent)?;
+        tables.add_directions(cell, &[wave], widest, progress)?;
     }
     elements
         .par_iter()
@@ -357,7 +356,5 @@ fn write_npy(path: &Path, values: &Array2<f64>) -> Result<()> {
         npy.finish()
     };
     fill(&mut bytes).map_err(Error::io("encode", path))?;
-    let mut file = WholeFile::create(path)?;
-    file.write_all(&bytes).map_err(Error::io("write", path))?;
-    file.commit()
+    WholeFile::write(path, &bytes)
 }

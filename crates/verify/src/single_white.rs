@@ -71,7 +71,7 @@ pub fn single_white(
             let mut tables = tables.behind_analyser(light.analyser);
             tables.add_neighbours_in_band(cell, nm * 1e-3, &|um| point().wave(um), progress)?;
             if light.cells_as_lit {
-                tables.add_directions(cell, &[point().wave(nm * 1e-3)], widest, &metalith_core::Silent)?;
+                tables.add_directions(cell, &[point().wave(nm * 1e-3)], widest, progress)?;
             }
             Ok(Some(tables))
         }

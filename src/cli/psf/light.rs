@@ -1,7 +1,7 @@
 //! The light that `metalith psf` simulates: wavelengths that were asked for, and what a camera counts.
 
 use metalith::camera::{Camera, Sampling};
-use metalith::design::{VISIBLE_UM, band_about};
+use metalith::design::{USUAL_PIXEL_UM, VISIBLE_UM, band_about};
 use metalith::verify::white_sampling;
 use metalith::{Extraction, Result};
 
@@ -9,9 +9,6 @@ use super::{FidelityArg, PsfArgs};
 
 /// Wavelengths that are taken where none are named (nm).
 const USUAL_NM: [f64; 3] = [455.0, 530.0, 660.0];
-
-/// Pixels where neither an option nor a camera says them (um).
-const USUAL_PIXEL_UM: f64 = 5.86;
 
 /// The light that a layout is simulated in.
 pub(super) struct PsfLight {

@@ -16,14 +16,14 @@ const MOST_ROWS: usize = 1 << 20;
 /// If the file cannot be read, is neither CSV with the columns `r_um, phase_rad` nor an NPY array of
 /// shape `[rows, 2]`, or holds something that is not a finite number.
 pub(super) fn read(path: &Path) -> Result<(Vec<f64>, Vec<f64>)> {
-    let rows = if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) {
-        read_npy(path)?
+    let (rows, lines) = if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) {
+        (read_npy(path)?, Vec::new())
     } else {
-        read_csv(path)?
+        read_csv(path)?.into_iter().unzip()
     };
     let fault = |row: usize, what: String| Error::Table {
         path: path.to_owned(),
-        line: Some(row + 2),
+        line: lines.get(row).copied(),
         what,
         hint: "radii ascend strictly from zero, all entries are finite".into(),
     };
@@ -41,7 +41,8 @@ pub(super) fn read(path: &Path) -> Result<(Vec<f64>, Vec<f64>)> {
     Ok(rows.into_iter().unzip())
 }
 
-fn read_csv(path: &Path) -> Result<Vec<(f64, f64)>> {
+/// Each row, and the line that it is in.
+fn read_csv(path: &Path) -> Result<Vec<((f64, f64), usize)>> {
     let text = document::load(path)?;
     let fault = |line: usize, what: String| Error::Table {
         path: path.to_owned(),
@@ -63,7 +64,7 @@ fn read_csv(path: &Path) -> Result<Vec<(f64, f64)>> {
         .map(|(at, line)| {
             let mut fields = line.split(',').map(|f| f.trim().parse::<f64>());
             match (fields.next(), fields.next(), fields.next()) {
-                (Some(Ok(r)), Some(Ok(phase)), None) => Ok((r, phase)),
+                (Some(Ok(r)), Some(Ok(phase)), None) => Ok(((r, phase), at)),
                 _ => Err(fault(at, format!("`{}` is not two numbers", quoted(line)))),
             }
         })
@@ -149,6 +150,18 @@ mod tests {
         for comment in ["", "# rings\r\n"] {
             std::fs::write(&path, format!("\u{feff}{comment}r_um,phase_rad\r\n0,1\r\n2,3\r\n")).unwrap();
             assert_eq!(read(&path).unwrap(), (vec![0.0, 2.0], vec![1.0, 3.0]));
+        }
+    }
+
+    /// Comments and empty lines count where a fault is told.
+    #[test]
+    fn a_fault_is_told_by_its_own_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("phase.csv");
+        std::fs::write(&path, "# rings\n\nr_um,phase_rad\n0,0\n# again\n0,1\n").unwrap();
+        match read(&path).unwrap_err() {
+            Error::Table { line, .. } => assert_eq!(line, Some(6)),
+            other => panic!("{other}"),
         }
     }
 

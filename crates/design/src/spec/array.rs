@@ -324,8 +324,8 @@ fn steps_from_middle(count: u32) -> impl DoubleEndedIterator<Item = f64> {
     distances.into_iter()
 }
 
-/// A length of a text (um) as whole nanometres.
-fn whole_nm(s: &Section<'_, '_>, key: &str, um: f64) -> i64 {
+/// A length of a text (um) as whole nanometres; anything between two of them is a fault.
+pub(super) fn whole_nm(s: &Section<'_, '_>, key: &str, um: f64) -> i64 {
     let nm = (um * 1e3).round() as i64;
     if (um * 1e3 - nm as f64).abs() > 1e-6 {
         s.fault(key, format!("{um} um is not whole nanometres"), "round it to 0.001 um");

@@ -62,7 +62,7 @@ const DEFAULT_FILM: &str = "sin_luke_2015";
 const DEFAULT_SUBSTRATE: &str = "fused_silica_malitson_1965";
 
 /// Tallest pillar and thickest layer (nm).
-const TALLEST_NM: f64 = 50_000.0;
+pub const TALLEST_NM: f64 = 50_000.0;
 
 impl CellSpec {
     pub(crate) fn read(s: &Section<'_, '_>) -> Self {

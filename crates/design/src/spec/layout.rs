@@ -3,6 +3,7 @@
 use chrono::NaiveDateTime;
 use serde::Serialize;
 
+use super::array::whole_nm;
 use super::{ArraySpec, Element, LensSpec};
 use metalith_core::LayerNumber;
 use metalith_core::document::{Limits, Section};
@@ -207,7 +208,7 @@ impl Layers {
 impl ApertureSpec {
     fn read(s: &Section<'_, '_>, lens: &LensSpec, array: &ArraySpec) -> Self {
         let spec = Self {
-            margin_nm: nanometres(s, "margin_um", s.float("margin_um", Limits::new(0.2..=1000.0, "um"))),
+            margin_nm: whole_nm(s, "margin_um", s.float("margin_um", Limits::new(0.2..=1000.0, "um"))),
             chord_error_nm: s.float("chord_error_nm", Limits::new(0.5..=10_000.0, "nm")),
             max_vertices: s.optional_integer("max_vertices", 16..=8191, "vertices").unwrap_or(200) as usize,
         };
@@ -269,10 +270,7 @@ impl ApertureSpec {
 impl ChipSpec {
     fn read(s: &Section<'_, '_>, lens: &LensSpec, array: &ArraySpec) -> Self {
         let size_um = s.array::<2>("size_um", Limits::new(10.0..=300_000.0, "um"));
-        let size_nm = (
-            nanometres(s, "size_um", size_um[0]),
-            nanometres(s, "size_um", size_um[1]),
-        );
+        let size_nm = (whole_nm(s, "size_um", size_um[0]), whole_nm(s, "size_um", size_um[1]));
         let elements = array.elements();
         let needed = |centre: fn(&Element) -> i64| {
             let reach = |e: &Element| 2 * centre(e).abs() + i64::from(array.lens_of(lens, e.index).diameter_nm);
@@ -306,12 +304,12 @@ impl MarkSpec {
         }
         let spec = Self {
             name: s.text("name"),
-            length_nm: nanometres(s, "length_um", s.float("length_um", Limits::new(0.1..=10_000.0, "um"))),
-            width_nm: nanometres(s, "width_um", s.float("width_um", Limits::new(0.01..=1_000.0, "um"))),
+            length_nm: whole_nm(s, "length_um", s.float("length_um", Limits::new(0.1..=10_000.0, "um"))),
+            width_nm: whole_nm(s, "width_um", s.float("width_um", Limits::new(0.01..=1_000.0, "um"))),
             centres_nm: xs
                 .iter()
                 .zip(&ys)
-                .map(|(&x, &y)| (nanometres(s, "x_um", x), nanometres(s, "y_um", y)))
+                .map(|(&x, &y)| (whole_nm(s, "x_um", x), whole_nm(s, "y_um", y)))
                 .collect(),
         };
         if spec.length_nm % 2 != 0 || spec.width_nm % 2 != 0 || spec.width_nm >= spec.length_nm {
@@ -344,12 +342,3 @@ const PLACE: Limits = Limits {
     range: -150_000.0..=150_000.0,
     unit: "um",
 };
-
-/// Micrometres in the file to nanometres of the layout; anything between two nanometres is a fault.
-fn nanometres(s: &Section<'_, '_>, key: &str, um: f64) -> i64 {
-    let nm = (um * 1e3).round();
-    if (um * 1e3 - nm).abs() > 1e-6 * nm.abs().max(1.0) {
-        s.fault(key, format!("{um} um is not whole nanometres"), "round it to 0.001 um");
-    }
-    nm as i64
-}

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::array::whole_nm;
 use super::outline::{self, DIAMETER, LensOutline};
 use super::{CellSpec, term};
 use crate::phase::{Interpolation, PhaseTerm, RadialPhase, TermForm};
@@ -139,14 +140,7 @@ const FOCAL_LENGTH: Limits = Limits {
 /// The diameter that a section says (nm).
 pub(super) fn read_diameter(s: &Section<'_, '_>, cell: &CellSpec) -> u32 {
     let diameter_um = s.float("diameter_um", DIAMETER);
-    let diameter_nm = (diameter_um * 1e3).round() as u32;
-    if (diameter_um * 1e3 - f64::from(diameter_nm)).abs() > 1e-6 {
-        s.fault(
-            "diameter_um",
-            format!("{diameter_um} um is not whole nanometres"),
-            "round it to 0.001 um",
-        );
-    }
+    let diameter_nm = whole_nm(s, "diameter_um", diameter_um) as u32;
     if Lattice::of_kind_covering(cell.lattice, diameter_nm, cell.pitch_nm).is_err() {
         s.fault_given(
             &["cell.pitch_nm"],
@@ -156,6 +150,12 @@ pub(super) fn read_diameter(s: &Section<'_, '_>, cell: &CellSpec) -> u32 {
         );
     }
     diameter_nm
+}
+
+/// The radius that powers are of (um): that of the lens, if a section says no other.
+pub(super) fn read_normalisation(s: &Section<'_, '_>, radius_um: f64) -> f64 {
+    s.optional_float("normalisation_radius_um", Limits::new(1e-3..=1e6, "um"))
+        .unwrap_or(radius_um)
 }
 
 /// The phase over the radius that a section says.
@@ -177,7 +177,7 @@ pub(super) fn read_radial(s: &Section<'_, '_>, focal_length_um: f64, radius_um: 
         PhaseSource::Hyperbola => RadialPhase::Hyperbola {
             wavelength_um: s.float("wavelength_nm", WAVELENGTH) * 1e-3,
             focal_length_um: s
-                .optional_float("focal_length_um", Limits::new(1.0..=100_000.0, "um"))
+                .optional_float("focal_length_um", FOCAL_LENGTH)
                 .unwrap_or(focal_length_um),
         },
         PhaseSource::EvenPowers => {
@@ -191,9 +191,7 @@ pub(super) fn read_radial(s: &Section<'_, '_>, focal_length_um: f64, radius_um: 
             }
             RadialPhase::EvenPowers {
                 coefficients_rad,
-                normalisation_um: s
-                    .optional_float("normalisation_radius_um", Limits::new(1e-3..=1e6, "um"))
-                    .unwrap_or(radius_um),
+                normalisation_um: read_normalisation(s, radius_um),
             }
         }
         PhaseSource::Table => RadialPhase::table(s.file("file"), Interpolation::read(s)),

@@ -13,7 +13,7 @@ mod term;
 mod verify;
 
 pub use array::{ArraySpec, Element, PlacedSpec};
-pub use cell::{CellSpec, UnderSpec};
+pub use cell::{CellSpec, TALLEST_NM, UnderSpec};
 pub(crate) use footprint::Footprint;
 pub use layout::{ApertureSpec, ChipSpec, Hierarchy, Layers, LayoutLayer, LayoutSpec, MarkSpec};
 pub use lens::LensSpec;
@@ -22,4 +22,4 @@ pub use optimise::{MeritSpec, OptimiseSpec, RobustSpec, SolverSpec, StartSpec, V
 pub use outline::LensOutline;
 pub(crate) use outline::OutlineRows;
 pub use steered::{SteeredMapping, SteeringSteps};
-pub use verify::{CellIncidence, FieldAngle, LimitSpec, VerifySpec};
+pub use verify::{CellIncidence, FieldAngle, LimitSpec, USUAL_PIXEL_UM, VerifySpec};

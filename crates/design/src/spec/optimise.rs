@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::lens::WAVELENGTH;
+use super::verify::USUAL_PIXEL_UM;
 use crate::VISIBLE_UM;
 use metalith_cell::Fidelity;
 use metalith_core::document::{Limits, Section};
@@ -229,7 +230,7 @@ impl Default for OptimiseSpec {
                 angles_deg: vec![0.0, 15.0, 30.0],
                 step_um: 0.01,
                 pixels: 160,
-                pixel_um: 5.86,
+                pixel_um: USUAL_PIXEL_UM,
                 shared_filter: 0.5,
                 drawn: 3,
             },

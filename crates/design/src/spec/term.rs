@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::lens::{COEFFICIENT, read_radial};
+use super::lens::{COEFFICIENT, read_normalisation, read_radial};
 use super::{ArraySpec, LensSpec};
 use crate::phase::{Interpolation, MapTable, PhaseTerm, RadialPhase, TermForm, ZernikeOrder};
 use metalith_core::Zernike;
@@ -33,10 +33,7 @@ pub(super) fn read(s: &Section<'_, '_>, focal_length_um: f64, radius_um: f64) ->
         ("polynomial", TermSource::Polynomial),
         ("optic_studio", TermSource::OpticStudio),
     ];
-    let normalisation = |s: &Section<'_, '_>| {
-        s.optional_float("normalisation_radius_um", Limits::new(1e-3..=1e6, "um"))
-            .unwrap_or(radius_um)
-    };
+    let normalisation = |s: &Section<'_, '_>| read_normalisation(s, radius_um);
     let form = match s.choice("source", &sources, None) {
         TermSource::Radial => TermForm::Radial(read_radial(s, focal_length_um, radius_um)),
         TermSource::Map => TermForm::Map(MapTable::new(

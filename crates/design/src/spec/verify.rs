@@ -10,6 +10,9 @@ use metalith_core::document::{Limits, Section};
 use super::CellSpec;
 use super::lens::WAVELENGTH;
 
+/// Edge of a sensor pixel where nothing says it (um): that of the camera of the paper.
+pub const USUAL_PIXEL_UM: f64 = 5.86;
+
 /// What is simulated from the layout that was read back, and the limits it is held to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct VerifySpec {
@@ -120,7 +123,7 @@ impl VerifySpec {
                 .unwrap_or(256) as usize,
             pixel_um: s
                 .optional_float("pixel_um", Limits::new(0.1..=100.0, "um"))
-                .unwrap_or(5.86),
+                .unwrap_or(USUAL_PIXEL_UM),
             analyser: s.choice("analyser", &[("none", false), ("circular", true)], Some(false)),
             camera: s.has("camera").then(|| s.file("camera")),
             limits: LimitSpec::read(s.optional_section("limits").as_ref()),

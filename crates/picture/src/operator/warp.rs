@@ -81,10 +81,7 @@ impl Warp {
         };
         let pixel = spec.pixel_um;
         // Row and column of the element's axis.
-        let axis = [
-            0.5 * (f64::from(sensor.rows) - 1.0) + (element.centre_um[1] - sensor.offset_um[1]) / pixel,
-            0.5 * (f64::from(sensor.columns) - 1.0) + (element.centre_um[0] - sensor.offset_um[0]) / pixel,
-        ];
+        let axis = sensor.pixel_at(element.centre_um);
         let (low, high) = extent(element, spec, channel_um);
         let step = cell as f64;
         // Of what a point stands for: in pixels of the scene in the middle of the field, and on the sensor (um).

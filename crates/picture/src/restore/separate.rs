@@ -48,7 +48,7 @@ impl Blend {
 pub fn restore(recorded: &Recorded<'_>, method: RestorationMethod, progress: &dyn Progress) -> Result<Planes> {
     let operator = recorded.operator;
     let mut blend = Blend::new((operator.view().rows, operator.view().columns), operator.inputs());
-    restore_each(recorded, method, progress, &mut |picture, trust| {
+    restore_each(recorded, method, progress, &mut |_, picture, trust| {
         blend.add(picture, trust)
     })?;
     Ok(blend.finished())
@@ -57,7 +57,7 @@ pub fn restore(recorded: &Recorded<'_>, method: RestorationMethod, progress: &dy
 /// What light of other elements differs from that of a grey scene, as a share of it: about the deviation of natural scenes over their mean.
 const OTHERS_UNKNOWN: f32 = 1.0;
 
-/// Restore by each element alone: `take` gets its picture and how much it is to be trusted at each place, one over the variance that
+/// Restore by each element alone: `take` gets its number, its picture and how much it is to be trusted at each place, one over the variance that
 /// noise leaves, both as planes of the operator. Elements that see nothing of the scene are left out.
 ///
 /// An element alone knows nothing of the light that others bring to its pixels. That of a grey scene with the light of the frame is
@@ -70,7 +70,7 @@ pub fn restore_each(
     recorded: &Recorded<'_>,
     method: RestorationMethod,
     progress: &dyn Progress,
-    take: &mut dyn FnMut(&Planes, &Planes),
+    take: &mut dyn FnMut(usize, &Planes, &Planes),
 ) -> Result<()> {
     let operator = recorded.operator;
     let grey = GreyLight::of(recorded);
@@ -98,7 +98,11 @@ pub fn restore_each(
             trust: &trust,
             prior: recorded.prior,
         };
-        take(&restore_by(&own, method, &[element], false, progress)?, &weight);
+        take(
+            element,
+            &restore_by(&own, method, &[element], false, progress)?,
+            &weight,
+        );
     }
     Ok(())
 }

@@ -92,6 +92,8 @@ mod tests {
             write(&values);
             assert!(read_depth(&path).is_err(), "{near}");
         }
+        std::fs::write(&path, npy_bytes("(16, 16, 0)", &[])).unwrap();
+        assert!(read_depth(&path).is_err(), "no colours");
         std::fs::write(&path, b"\xff\xd8").unwrap();
         assert!(read_depth(&path).is_err());
     }

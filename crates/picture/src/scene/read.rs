@@ -150,6 +150,9 @@ pub(super) fn array(path: &Path, bytes: &[u8]) -> Result<(Array3<f64>, bool)> {
     let shape: Vec<usize> = found.shape.iter().map(|n| *n as usize).collect();
     check_sides(path, shape[0], shape[1])?;
     let bands = shape.get(2).copied().unwrap_or(1);
+    if bands == 0 {
+        return Err(fault(path, "it has no colours"));
+    }
     let array = Array3::from_shape_vec((shape[0], shape[1], bands), found.values);
     Ok((array.map_err(|e| fault(path, e.to_string()))?, found.whole))
 }

@@ -40,12 +40,30 @@ impl MaskSpec {
         }
     }
 
+    /// Samples of a shadow over at least `reach_um`: a power of two. What goes around in the transform stays beyond the reach.
+    fn samples(&self, reach_um: f64) -> usize {
+        let count = (1.5 * reach_um * f64::from(SAMPLES) / self.feature_um).ceil() as usize;
+        count.next_power_of_two()
+    }
+
+    /// Refuse shadows that would take gigabytes.
+    ///
+    /// # Errors
+    /// With the number of samples, and what takes fewer.
+    pub fn check_reach(&self, reach_um: f64) -> Result<()> {
+        match self.samples(reach_um) {
+            count if count <= MOST_SAMPLES => Ok(()),
+            count => Err(Error::invalid(
+                format!("a shadow of {count} samples along an axis, more than {MOST_SAMPLES}"),
+                "give wider openings, a nearer mask or a narrower field",
+            )),
+        }
+    }
+
     /// The shadow along one axis at a wavelength (um), over at least `reach_um` about the middle.
     pub fn shadow(&self, wavelength_um: f64, reach_um: f64) -> Shadow {
         let step_um = self.feature_um / f64::from(SAMPLES);
-        // What goes around in the transform stays beyond the reach.
-        let count = (1.5 * reach_um / step_um).ceil() as usize;
-        let count = count.next_power_of_two();
+        let count = self.samples(reach_um);
         let sequence = maximum_length_sequence();
         let middle = 0.5 * count as f64;
         let mut field: Vec<Complex64> = (0..count)
@@ -84,6 +102,8 @@ impl MaskSpec {
     }
 }
 
+/// Most samples of a shadow: 64 MB, for each wavelength at a time.
+const MOST_SAMPLES: usize = 1 << 22;
 /// Samples of a member of a sequence.
 const SAMPLES: u32 = 40;
 /// Bits of the register that makes the sequence: 511 members.

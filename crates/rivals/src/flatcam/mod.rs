@@ -61,6 +61,8 @@ impl FlatCam {
         };
         let tangents_y = places(view.rows, |v, i| v.tangents(i, 0.0)[1]);
         let tangents_x = places(view.columns, |v, i| v.tangents(0.0, i)[0]);
+        let reach = rows.max(columns) as f64 * pixel + 2.0 * mask.distance_um * tangents_x[0].hypot(tangents_y[0]);
+        mask.check_reach(reach)?;
         progress.begin("shadows of the mask", bench.sampling.wavelengths_nm.len() as u64);
         let both = |shadow: &Shadow| {
             [
@@ -73,8 +75,6 @@ impl FlatCam {
             .wavelengths_nm
             .par_iter()
             .map(|nm| {
-                let reach =
-                    rows.max(columns) as f64 * pixel + 2.0 * mask.distance_um * tangents_x[0].hypot(tangents_y[0]);
                 let shadow = mask.shadow(nm * 1e-3, reach);
                 progress.advance(1);
                 shadow

@@ -149,7 +149,7 @@ impl Surface<'_> {
         }
         let count = self.data.first().copied().unwrap_or(0.0).max(0.0) as usize;
         let radius_um = self.data.get(1).copied().unwrap_or(0.0) * unit_um;
-        let coefficients = self.data.get(2..2 + count).unwrap_or_default();
+        let coefficients = self.data.get(2..count.saturating_add(2)).unwrap_or_default();
         if count == 0 || coefficients.len() < count || radius_um <= 0.0 {
             return Err(fault.whole(format!(
                 "surface {} has {count} coefficients over a radius of {radius_um} um, and {} are there",
