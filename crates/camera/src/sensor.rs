@@ -74,6 +74,12 @@ impl Sensor {
             .map(|(n, axis)| 0.5 * (f64::from(n) - 1.0) + (place_um[axis] - self.offset_um[axis]) / self.pixel_um)
     }
 
+    /// The place of the chip (um) before the middle of a pixel: [`Sensor::pixel_at`] backwards.
+    pub fn place_um(&self, [row, column]: [usize; 2]) -> [f64; 2] {
+        [(column, self.columns, 0), (row, self.rows, 1)]
+            .map(|(i, n, axis)| (i as f64 - 0.5 * (f64::from(n) - 1.0)) * self.pixel_um + self.offset_um[axis])
+    }
+
     /// Largest signal that is recorded, of full scale: where the pixel values end, or the well if that is filled before.
     pub fn largest_signal(&self) -> f64 {
         (self.step() * (f64::from(self.bits).exp2() - 1.0)).min(1.0)

@@ -103,16 +103,13 @@ fn of_frame(studio: &Studio, channel: usize, frame: &Frame, truth: &Array2<f64>)
     let (sensor, view) = (&studio.camera.sensor, &studio.view);
     let names = studio.camera.channel_names();
     let plane = &frame.planes[channel.min(frame.planes.len() - 1)];
-    let (rows, columns) = plane.dim();
     let mut samples = Vec::new();
     for ((row, column), value) in plane.indexed_iter() {
         if !counts_channel(frame.filter, &names, [row, column], channel) {
             continue;
         }
-        let at = |i: usize, n: usize, a: usize| {
-            (i as f64 - 0.5 * (n as f64 - 1.0)) * sensor.pixel_um + sensor.offset_um[a] - element.centre_um[a]
-        };
-        let place = [at(column, columns, 0), at(row, rows, 1)];
+        let on_chip = sensor.place_um([row, column]);
+        let place = [0, 1].map(|axis| on_chip[axis] - element.centre_um[axis]);
         let sines = element.sines_of_landing(place, studio.bank.channel_um[channel]);
         let Some(tangents) = element.tangents(sines, view.distance_um) else {
             continue;

@@ -94,7 +94,7 @@ impl NetworkDenoiser {
                 "give both with shape (rows, columns, 3)",
             ));
         }
-        let whole = |n: usize| n.next_multiple_of(side).max(side);
+        let whole = |n: usize| n.next_multiple_of(side);
         let (picture, deviation) = (
             mirrored(picture, whole(rows), whole(columns)),
             mirrored(deviation, whole(rows), whole(columns)),

@@ -75,11 +75,12 @@ impl<'a> ArrayCamera<'a> {
             }
         }
         // Elements that see nothing of the scene have no picture of their own.
-        let own = alone
-            .into_iter()
-            .map(|seen| seen.map_or_else(|| blend.clone(), |(picture, _)| picture));
-        let own: Vec<_> = own.collect();
-        Ok([blend].into_iter().chain(own).collect())
+        let mut pictures = vec![blend];
+        for seen in alone {
+            let own = seen.map_or_else(|| pictures[0].clone(), |(picture, _)| picture);
+            pictures.push(own);
+        }
+        Ok(pictures)
     }
 }
 

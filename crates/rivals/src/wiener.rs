@@ -5,7 +5,7 @@
 
 use metalith_core::{Error, Progress, Result};
 use metalith_picture::restore::{Recorded, SceneStatistics, without_veil};
-use metalith_picture::{ElementView, FftScratch, FrameOperator, SquareFft, Studio};
+use metalith_picture::{FftScratch, FrameOperator, SquareFft, Studio};
 use metalith_wave::kernels::fft_size;
 use ndarray::{Array2, Zip};
 use num_complex::Complex32;
@@ -109,7 +109,9 @@ impl<'a> Tiles<'a> {
     fn new(studio: &'a Studio, operator: &FrameOperator<'_>) -> Self {
         let spec = &studio.bank.spec;
         let [rows, columns] = operator.frame();
-        let axes: Vec<[f64; 2]> = studio.elements.iter().map(|e| axis(e, studio)).collect();
+        // Rows and columns of the axes of the elements.
+        let sensor = &studio.camera.sensor;
+        let axes: Vec<[f64; 2]> = studio.elements.iter().map(|e| sensor.pixel_at(e.centre_um)).collect();
         let reach = (spec.reach_um / spec.pixel_um).ceil() as usize;
         let fft = SquareFft::new(fft_size(2 * (reach + spec.window)));
         let half = (fft.size() / 2) as i64;
@@ -206,11 +208,6 @@ impl<'a> Tiles<'a> {
         }
         square
     }
-}
-
-/// Row and column of an element's axis.
-fn axis(element: &ElementView, studio: &Studio) -> [f64; 2] {
-    studio.camera.sensor.pixel_at(element.centre_um)
 }
 
 /// One over the spectrum of a channel of natural scenes on the pixels of the sensor, in the order of a transform.

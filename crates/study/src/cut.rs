@@ -155,11 +155,19 @@ impl Cut {
         }
     }
 
+    /// The header in the first line of a shard of this plan, or why it is none.
+    fn own_header(&self, first_line: &str) -> std::result::Result<Header, &'static str> {
+        match serde_json::from_str::<Header>(first_line) {
+            Err(_) => Err("is no shard of a plan"),
+            Ok(header) if header.plan != self.key => Err("is a part of another plan"),
+            Ok(header) => Ok(header),
+        }
+    }
+
     /// Why a file with this first line is not that shard.
     fn refusal(&self, shard: Shard, first_line: &str) -> Option<String> {
-        match serde_json::from_str::<Header>(first_line) {
-            Err(_) => Some("is no shard of a plan".into()),
-            Ok(header) if header.plan != self.key => Some("is a part of another plan".into()),
+        match self.own_header(first_line) {
+            Err(why) => Some(why.into()),
             Ok(header) if header != self.header(shard) => Some(format!(
                 "holds {}s {} to {} as shard {}, of a plan that was cut otherwise",
                 self.part,
@@ -258,13 +266,8 @@ impl Cut {
     fn read<T: DeserializeOwned>(&self, path: &Path, number: &dyn Fn(&T) -> Option<u64>) -> Result<Vec<(u64, T)>> {
         let text = fs::read_to_string(path).map_err(Error::io("read", path))?;
         let mut lines = text.lines();
-        let header: Header = lines
-            .next()
-            .and_then(|l| serde_json::from_str(l).ok())
-            .ok_or_else(|| refused(path, "is no shard of a plan"))?;
-        if header.plan != self.key {
-            return Err(refused(path, "is a part of another plan"));
-        }
+        let first_line = lines.next().unwrap_or_default();
+        let header = self.own_header(first_line).map_err(|why| refused(path, why))?;
         let mut parts = Vec::new();
         for (k, line) in lines.enumerate() {
             let part: T = serde_json::from_str(line).map_err(|e| Error::Table {

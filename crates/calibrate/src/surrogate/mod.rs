@@ -50,8 +50,16 @@ pub struct Surrogate {
     stated: Option<Arc<Surrogate>>,
     /// Whether all parameters that are not dear were simulated about the base point.
     renewed: bool,
-    /// A renewed one, of another search on the same bench: what it simulated is not simulated again about the same point.
-    elsewhere: Option<Arc<Surrogate>>,
+    /// What another search on the same bench simulated: it is not simulated again about the same point.
+    elsewhere: Option<Arc<Elsewhere>>,
+}
+
+/// Changes with each parameter about a point that another search found.
+struct Elsewhere {
+    /// Value of each parameter there, by slot.
+    about: Vec<f64>,
+    /// By slot; those of parameters that the other search did not know are not simulated.
+    curves: Vec<Curve>,
 }
 
 /// Change of the images for a unit of a smooth term; none where it does not act.
@@ -158,22 +166,21 @@ impl Surrogate {
         Ok(Self {
             curves: curves.collect(),
             about,
+            elsewhere: None,
             ..self.clone()
         })
     }
 
-    /// The same, which knows what `other` simulated elsewhere; `known` are its parameters, by slot of this one.
+    /// The same, which knows what `other` simulated about its base, if all was simulated there; `known` are its parameters, by slot of
+    /// this one.
     pub fn knowing(self, other: &Self, known: &[Option<usize>]) -> Self {
         let curves = known
             .iter()
             .map(|k| k.map_or_else(Curve::default, |k| other.curves[k].clone()));
         let about = known.iter().map(|k| k.map_or(0.0, |k| other.about[k]));
-        let elsewhere = Self {
-            curves: curves.collect(),
+        let elsewhere = Elsewhere {
             about: about.collect(),
-            stated: None,
-            elsewhere: None,
-            ..other.clone()
+            curves: curves.collect(),
         };
         Self {
             elsewhere: other.renewed.then(|| Arc::new(elsewhere)),
