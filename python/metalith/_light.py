@@ -161,7 +161,7 @@ def psf(
     distance_um: float | None = None,
     pitch_nm: int | None = None,
     shape: Shape = "square",
-    arriving: str = "left",
+    arriving: str | float = "left",
     pillar_height_nm: float = 700.0,
     pillar: str = SILICON_NITRIDE,
     substrate: str = FUSED_SILICA,
@@ -174,7 +174,9 @@ def psf(
     solved in minutes for each direction of light, then kept), ``fitted`` or
     ``published``. ``fast`` allows errors of 1e-3 instead of 1e-5 of the peak. An array of a design knows its sensor and
     its pillars; else ``distance_um`` and, for a map of widths, ``pitch_nm`` are needed, and ``shape`` where pillars are no
-    squares. Rectangles are lit by circular polarisation, ``left`` or ``right`` (``arriving``), and by ``rigorous`` alone."""
+    squares. Rectangles are solved by ``rigorous`` alone, in light that arrives ``left`` or ``right`` circularly
+    polarised, linearly along ``x`` or ``y`` or at an angle from x towards y in degrees, or ``unpolarised`` (``arriving``); an
+    array of a design is in the light that the design says. Intensities are over that of all light that arrives."""
     wavelengths = [float(nm) for nm in np.atleast_1d(np.asarray(wavelengths_nm, dtype=float))]
     fields = [(float(x), float(y)) for x, y in field_deg]
     if isinstance(of, Array) and of.design is not None:
@@ -206,7 +208,7 @@ def psf(
         fast,
         samples or 128,
         _told(shape),
-        arriving,
+        str(arriving),
         pillar_height_nm,
         pillar,
         substrate,

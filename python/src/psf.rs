@@ -1,6 +1,9 @@
 //! PSFs of arrays and of maps of widths.
 
-use metalith::cell::{CellStack, FittedCell, Handedness, PointwiseCell, PublishedCell, RotatedCell, cache_folder};
+use metalith::cell::{
+    CellStack, FittedCell, Handedness, PointwiseCell, Polarisation, PolarisedLight, PublishedCell, RotatedCell,
+    cache_folder,
+};
 use metalith::design::band_about;
 use metalith::extract::{ElementSite, ExtractedElement, Extraction};
 use metalith::grating::{Mapping, NeighbourCell};
@@ -30,12 +33,16 @@ fn fidelity(word: &str) -> Result<Fidelity> {
     }
 }
 
-/// The handedness that a word names.
-fn handedness(word: &str) -> Result<Handedness> {
-    let known = Handedness::CHOICES.iter().find(|(name, _)| *name == word);
-    known
-        .map(|(_, handedness)| *handedness)
-        .ok_or_else(|| Error::invalid(format!("there is no light of handedness `{word}`"), "use left or right"))
+/// The light that a word or an angle names, at pillars of a shape.
+fn polarisation(text: &str, shape: PillarShape) -> Result<Polarisation> {
+    let named = text.parse()?;
+    if shape.rectangles().is_none() && named != Polarisation::Circular(Handedness::default()) {
+        return Err(Error::invalid(
+            format!("light of a polarisation for {}", shape.plural()),
+            "leave out `arriving`: it counts for rectangles alone",
+        ));
+    }
+    Ok(named)
 }
 
 /// Cells that a shape does not have.
@@ -71,8 +78,8 @@ struct Looked {
     fields_deg: Vec<(f64, f64)>,
     samples: usize,
     pixel_um: f64,
-    /// Whether light that pillars do not convert is kept from the sensor.
-    analyser: bool,
+    /// Polarisation of source and detector, where pillars change it.
+    polarised: PolarisedLight,
     fast: bool,
 }
 
@@ -158,7 +165,7 @@ fn simulate_together(
                 at_um: landing_um(&wedge, &wave, distance_um)?,
                 samples: light.samples,
                 pixel_um: light.pixel_um,
-                analyser: light.analyser,
+                polarised: light.polarised,
                 aperture_radius_um: None,
                 accuracy: if light.fast { Accuracy::Fast } else { Accuracy::Accurate },
             };
@@ -259,7 +266,7 @@ pub fn psf_of_array<'py>(
             fields_deg,
             samples: samples.unwrap_or(design.verify.window_samples),
             pixel_um: design.verify.pixel_um,
-            analyser: design.verify.analyser,
+            polarised: design.verify.light(),
             fast,
         };
         simulate(lit.collect(), cells[0].as_ref(), &light, p)
@@ -291,7 +298,7 @@ pub fn psf_of_widths<'py>(
 ) -> PyResult<Vec<Bound<'py, PyDict>>> {
     let wanted = self::fidelity(fidelity).map_err(error)?;
     let shape = shape_of(shape).map_err(error)?;
-    let arriving = handedness(arriving).map_err(error)?;
+    let arriving = polarisation(arriving, shape).map_err(error)?;
     refuse(wanted, shape).map_err(error)?;
     let maps = widths
         .iter()
@@ -305,7 +312,7 @@ pub fn psf_of_widths<'py>(
     let found = work(py, progress, |p| {
         let drawn = drawn(&maps);
         let cell: Box<dyn CellModel> = match (wanted, shape.rectangles()) {
-            (_, Some(pillars)) => Box::new(RotatedCell::new(stack, pillars, arriving)),
+            (_, Some(pillars)) => Box::new(RotatedCell::new(stack, pillars, Handedness::default())),
             (Fidelity::Published, None) => Box::new(PublishedCell::new(pitch_nm)),
             (Fidelity::Neighbours, None) => {
                 let mapping = Mapping::of_widths(maps.iter().map(WidthMap::histogram))?;
@@ -330,7 +337,10 @@ pub fn psf_of_widths<'py>(
             fields_deg,
             samples,
             pixel_um: 5.86,
-            analyser: false,
+            polarised: PolarisedLight {
+                arriving: Some(arriving),
+                analyser: false,
+            },
             fast,
         };
         simulate(lit.collect(), cell.as_ref(), &light, p)

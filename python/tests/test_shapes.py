@@ -97,12 +97,12 @@ def test_psfs_of_a_file_are_those_of_its_design(tmp_path: Path, name: str) -> No
         ml.psf(layout, [532], distance_um=80.0, fidelity="published", pillar=TIO2)
 
 
-def test_light_of_the_other_handedness_is_not_focused(tmp_path: Path) -> None:
+def test_light_of_the_other_handedness_is_not_focused() -> None:
     design = ml.Design.read(ROOT / "designs/geometric_phase_532.toml")
     array = design.array()
     numbers = array.widths(0)
-    peaks = {}
-    for arriving in ("left", "right"):
+    values = {}
+    for arriving in ("left", "right", "x", "y", 30, -60.0, "unpolarised"):
         psf = ml.psf(
             numbers,
             [532],
@@ -115,6 +115,15 @@ def test_light_of_the_other_handedness_is_not_focused(tmp_path: Path) -> None:
             fast=True,
             samples=64,
         )[0]
-        peaks[arriving] = psf.values.max()
+        values[arriving] = psf.values
+    peak = values["left"].max()
     # A lens for one is a diverging lens for the other.
-    assert peaks["right"] < 1e-2 * peaks["left"]
+    assert values["right"].max() < 1e-2 * peak
+    for pair in (("left", "right"), ("x", "y"), (30, -60.0)):
+        mean = 0.5 * (values[pair[0]] + values[pair[1]])
+        # Single precision of the fields.
+        assert np.allclose(values["unpolarised"], mean, rtol=0, atol=1e-5 * peak)
+    with pytest.raises(ml.MetalithError, match="no light of polarisation `diagonal`"):
+        ml.psf(numbers, [532], shape=array.shape, arriving="diagonal", pitch_nm=design.pitch_nm, distance_um=80.0)
+    with pytest.raises(ml.MetalithError, match="light of a polarisation for squares"):
+        ml.psf(np.full((8, 8), 200, np.uint16), [532], arriving="x", pitch_nm=350, distance_um=80.0)

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use metalith::cell::{Fidelity, Handedness};
+use metalith::cell::{Fidelity, Handedness, Polarisation};
 use metalith::design::TALLEST_NM;
 use metalith::extract::ExtractedElement;
 use metalith::gds::{LayerNumber, ReadLimits};
@@ -145,13 +145,21 @@ pub struct PsfArgs {
     #[arg(long, default_value_t = 550.0, requires = "camera")]
     wedge_wavelength_nm: f64,
 
-    /// Circular polarisation of the light that arrives, where the pillars are rotated rectangles.
-    #[arg(long, value_enum, default_value_t = CircularArg::Left)]
-    arriving: CircularArg,
+    /// Polarisation of the light that arrives, where the pillars are rotated rectangles: `left` (if left out) or `right` circular,
+    /// with (x + i y) / sqrt 2 for left and a wave along +z, linear along `x` or `y` or at an angle from x towards y (degrees),
+    /// or `unpolarised`.
+    #[arg(long, value_name = "POLARISATION", allow_negative_numbers = true, value_parser = polarisation)]
+    arriving: Option<Polarisation>,
 
-    /// Leave out the light that rotated rectangles do not convert, as a circular analyser before the sensor does.
+    /// A circular analyser before the sensor, where the pillars are rotated rectangles: of light of the hand that they focus it
+    /// leaves out what they do not convert, of light of the other hand what they convert.
     #[arg(long)]
     analyser: bool,
+
+    /// Circular polarisation of the light that the layout focuses, which decides what the --analyser passes; that of --arriving if
+    /// left out.
+    #[arg(long, value_enum, requires = "analyser")]
+    focused: Option<CircularArg>,
 
     /// Only read the pillars; simulate nothing.
     #[arg(long)]
@@ -164,6 +172,11 @@ pub struct PsfArgs {
     /// Print all numbers as JSON.
     #[arg(long)]
     json: bool,
+}
+
+/// A word or an angle.
+fn polarisation(text: &str) -> std::result::Result<Polarisation, String> {
+    text.parse().map_err(|e: Error| e.to_string())
 }
 
 /// Circular polarisations.
@@ -246,6 +259,28 @@ fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
     Ok(())
 }
 
+/// Light of a polarisation is simulated where pillars change it, and an analyser for light of both hands must be told which it passes.
+fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
+    if found.shape.rectangles().is_none() && (args.arriving.is_some() || args.focused.is_some()) {
+        return Err(Error::invalid(
+            format!(
+                "{}: light of a polarisation for {}",
+                args.layout.display(),
+                found.shape.plural()
+            ),
+            "leave out --arriving and --focused: they count for rotated rectangles alone, others are simulated in light that is not \
+             polarised",
+        ));
+    }
+    if args.analyser && args.hand().is_none() {
+        return Err(Error::invalid(
+            format!("an analyser in light that arrives {}", args.arriving()),
+            "say which hand the layout focuses by --focused left or right: the analyser passes what that is converted to",
+        ));
+    }
+    Ok(())
+}
+
 pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let layout = Layout::open_with(&InputFile::of(&args.layout)?, ReadLimits::default(), terminal)?;
@@ -256,6 +291,7 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     let found = extract(&layout, &plan, terminal)?;
     mostly_pillars(args, &found)?;
     one_kind(args, &found)?;
+    known_light(args, &found)?;
     let light = match args.extract_only {
         true => None,
         false => Some(args.light(&found)?),

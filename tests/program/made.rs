@@ -119,7 +119,7 @@ impl Files {
             ..read
         };
         let light = Lighting {
-            analyser: false,
+            polarised: Default::default(),
             wavelengths_um: vec![UM],
             incidence_sin: [0.0; 2],
             cells_as_lit: self.design.verify.incidence == CellIncidence::AsLit,

@@ -14,6 +14,7 @@ mod oasis;
 mod optimise;
 mod picture;
 mod plan;
+mod polarisation;
 mod predict;
 mod run;
 mod study;

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use metalith_core::{Error, LatticeKind, PillarShape, Progress, Result};
 
-use crate::{BandResponse, FittedNeighbours, RotatedCell};
+use crate::{BandResponse, FittedNeighbours, HandTables, RotatedCell};
 
 /// How truly a cell is described. Every result names the one it was made with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -158,12 +158,12 @@ pub trait CellModel: Sync {
         self.transmissions(wavelength_um, max_width_nm)
     }
 
-    /// Of a cell that changes polarisation, and whose transmissions are of the light that it changes: the light that leaves
-    /// as it arrived, as [`CellModel::transmissions`]. It does not interfere with the other. Nothing of cells that change none.
+    /// Of a cell that changes polarisation: what it does to light of both hands. Its transmissions are of what it converts of the
+    /// light that it focuses. Nothing of cells that change none.
     ///
     /// # Errors
     /// As [`CellModel::transmissions`].
-    fn unconverted(&self, _wavelength_um: f64, _max_width_nm: u16) -> Result<Option<Vec<Complex64>>> {
+    fn hands(&self, _wavelength_um: f64, _max_width_nm: u16) -> Result<Option<HandTables>> {
         Ok(None)
     }
 
@@ -172,12 +172,12 @@ pub trait CellModel: Sync {
         None
     }
 
-    /// As [`CellModel::unconverted`], for one of many wavelengths that a band is averaged over.
+    /// As [`CellModel::hands`], for one of many wavelengths that a band is averaged over.
     ///
     /// # Errors
     /// As [`CellModel::transmissions`].
-    fn unconverted_in_band(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Option<Vec<Complex64>>> {
-        self.unconverted(wavelength_um, max_width_nm)
+    fn hands_in_band(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Option<HandTables>> {
+        self.hands(wavelength_um, max_width_nm)
     }
 
     /// The same as [`CellModel::transmissions`] for light that arrives obliquely, by polarisation. `sines` are those of

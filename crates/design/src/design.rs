@@ -353,7 +353,7 @@ impl Design {
     }
 
     /// SHA-256 of all that decides what light is simulated to do behind the layout: of [`Design::optics_digest`] and, of
-    /// `[verify]`, the cell, its wavelengths and the analyser. In hexadecimal.
+    /// `[verify]`, the cell, its wavelengths, the polarisation and the analyser. In hexadecimal.
     ///
     /// # Errors
     /// As [`Design::optics_digest`].
@@ -361,11 +361,16 @@ impl Design {
         let VerifySpec {
             fidelity,
             wavelengths_um,
+            polarisation,
             analyser,
             ..
         } = &self.verify;
         let decisive = (self.optics_digest()?, fidelity, wavelengths_um, analyser);
-        let bytes = serde_json::to_vec(&decisive).expect("plain data serialises");
+        let bytes = match polarisation {
+            None => serde_json::to_vec(&decisive),
+            Some(light) => serde_json::to_vec(&(decisive, light)),
+        };
+        let bytes = bytes.expect("plain data serialises");
         Ok(hex(&Sha256::digest(&bytes)))
     }
 }

@@ -1,7 +1,7 @@
 //! The chip before its sensor: elements as read from a layout, in light.
 
 use metalith_camera::{Camera, Sampling};
-use metalith_cell::{BandResponse, CellModel};
+use metalith_cell::{BandResponse, CellModel, PassedTable};
 use metalith_core::{Error, Progress, Result, WidthMap};
 use metalith_design::Design;
 use metalith_design::array::{Symmetry, SymmetryGroup};
@@ -38,8 +38,8 @@ pub struct ChipInLight<'a> {
     case: SimulationCase<'a>,
     /// Transmission of a cell by wavelength and width.
     by_width: Vec<Vec<Complex64>>,
-    /// Of a cell that changes polarisation, the light that it leaves as it was, unless an analyser keeps it from the sensor.
-    unconverted: Vec<Option<Vec<Complex64>>>,
+    /// Of a cell that changes polarisation, what reaches the sensor, by wavelength.
+    polarised: Vec<Option<Vec<PassedTable>>>,
     perturbation: Perturbation,
     /// Power of the light that arrives at an element, at each wavelength, in the unit of a PSF's energy (um^2).
     pub arriving_um2: Vec<f64>,
@@ -59,6 +59,8 @@ pub struct ElementInLight<'c> {
 
 struct Tables {
     classes: Vec<ClassTable>,
+    /// Of each, how often it has the phase of the element: as [`PassedTable::order`].
+    orders: Vec<i32>,
     /// As [`MadeView::share`].
     share: f64,
     gap_um: f64,
@@ -124,9 +126,9 @@ impl<'a> ChipInLight<'a> {
             SimulationCase::Made(_) => Vec::new(),
             SimulationCase::Cell(cell) => by_width(cell, &sampling, design, progress)?,
         };
-        let unconverted = match case {
-            SimulationCase::Cell(cell) if !design.verify.analyser => unconverted(cell, &sampling, design)?,
-            _ => vec![None; sampling.wavelengths_nm.len()],
+        let polarised = match case {
+            SimulationCase::Cell(cell) => polarised(cell, &sampling, design)?,
+            SimulationCase::Made(_) => vec![None; sampling.wavelengths_nm.len()],
         };
         let mut distinct = Vec::new();
         for (k, symmetries) in chosen {
@@ -150,7 +152,7 @@ impl<'a> ChipInLight<'a> {
             elements,
             case,
             by_width,
-            unconverted,
+            polarised,
             perturbation,
             open_um2,
             source_per_m: 1e6 / scene_distance_um,
@@ -187,33 +189,30 @@ impl<'a> ChipInLight<'a> {
         if let SimulationCase::Made(chip) = self.case {
             let view = chip.view_in_band(&element.made, &PlaneWave::normal(um), false, progress)?;
             return Ok(Tables {
+                orders: vec![1; view.tables.len()],
                 classes: view.tables,
                 share: view.share,
                 gap_um: view.gap_um,
                 camera: view.camera,
             });
         }
-        let classes = match &element.among_neighbours[index] {
-            Some(response) => {
+        let of = |table: &Vec<Complex64>| {
+            let pillar = |width: f64| table.get(width.round() as usize).copied().unwrap_or_default();
+            element.made.table(pillar, Complex64::ZERO)
+        };
+        let (classes, orders) = match (&element.among_neighbours[index], &self.polarised[index]) {
+            (Some(response), _) => {
                 let (x, y) = element.view.wedge.looks_at(um);
-                vec![ClassTable::of_sites(&NeighbourPillars::new(
-                    element.widths,
-                    response,
-                    [x, y],
-                )?)]
+                let pillars = NeighbourPillars::new(element.widths, response, [x, y])?;
+                (vec![ClassTable::of_sites(&pillars)], vec![1])
             }
-            None => {
-                let of = |table: &Vec<Complex64>| {
-                    let pillar = |width: f64| table.get(width.round() as usize).copied().unwrap_or_default();
-                    element.made.table(pillar, Complex64::ZERO)
-                };
-                let tables = std::iter::once(&self.by_width[index]).chain(&self.unconverted[index]);
-                tables.map(of).collect()
-            }
+            (None, Some(passed)) => passed.iter().map(|p| (of(&p.table), p.order)).unzip(),
+            (None, None) => (vec![of(&self.by_width[index])], vec![1]),
         };
         Ok(Tables {
             classes,
-            // Of converted light beside what is not, all arrives in one polarisation.
+            orders,
+            // What passes pillars that change polarisation is of all light that arrives.
             share: 1.0,
             gap_um: 0.0,
             camera: CameraChange::default(),
@@ -246,6 +245,14 @@ impl ElementInLight<'_> {
             gap_um: tables.gap_um,
             camera: tables.camera.clone(),
         }
+    }
+
+    /// How often each table of [`ElementInLight::lit`] has the phase of the element: as [`PassedTable::order`].
+    ///
+    /// # Panics
+    /// As [`ElementInLight::lit`].
+    pub fn orders(&self, wavelength: usize) -> &[i32] {
+        &self.at(wavelength).orders
     }
 
     /// Share of the light that leaves the element in the direction it came from, as one wave: the square of the mean
@@ -304,9 +311,12 @@ fn last_index(design: &Design) -> u16 {
     shape.map_or(design.cell.pitch_nm as u16, |pillars| pillars.steps)
 }
 
-/// Light that a cell leaves in the polarisation in which it arrived, of one that converts the rest.
-fn unconverted(cell: &dyn CellModel, sampling: &Sampling, design: &Design) -> Result<Vec<Option<Vec<Complex64>>>> {
-    let of = |nm: &f64| cell.unconverted_in_band(nm * 1e-3, last_index(design));
+/// What reaches the sensor of the light of a design, of a cell that changes polarisation.
+fn polarised(cell: &dyn CellModel, sampling: &Sampling, design: &Design) -> Result<Vec<Option<Vec<PassedTable>>>> {
+    let of = |nm: &f64| {
+        let hands = cell.hands_in_band(nm * 1e-3, last_index(design))?;
+        Ok(hands.map(|hands| hands.passed(design.verify.light())))
+    };
     sampling.wavelengths_nm.iter().map(of).collect()
 }
 

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use metalith_camera::{Camera, ChannelSampling};
-use metalith_cell::{Fidelity, cache_folder};
+use metalith_cell::{Fidelity, Polarisation, cache_folder};
 use metalith_core::file::file_digest;
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result};
@@ -139,6 +139,9 @@ struct Inputs<'a> {
     /// Of pillars that change polarisation, whether an analyser is before the sensor.
     #[serde(skip_serializing_if = "Option::is_none")]
     analyser: Option<bool>,
+    /// Of these, the light of the scene if it is not that which they focus.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    polarisation: Option<Polarisation>,
     basis: &'a [SceneSpectrum],
     spec: &'a BankSpec,
     scene_distance_um: f64,
@@ -352,6 +355,7 @@ impl<'a> Wanted<'a> {
             fidelity: model.map_or(self.design.verify.fidelity, |_| Fidelity::Calibrated),
             tabulated_um: &self.design.verify.wavelengths_um,
             analyser: (self.design.cell.shape.rectangles()).map(|_| self.design.verify.analyser),
+            polarisation: self.design.verify.polarisation,
             basis: &self.basis,
             spec: &self.spec,
             // JSON knows no infinity.

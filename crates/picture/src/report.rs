@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use ndarray::Array3;
 use serde::Serialize;
 
-use metalith_cell::Fidelity;
+use metalith_cell::{Fidelity, Handedness, Polarisation, PolarisedLight};
 use metalith_made::NotApplied;
 
 use crate::assumed::AssumedScore;
@@ -204,16 +204,8 @@ impl Studio {
             value,
         };
         let spec = &self.bank.spec;
-        let polarised = self.design.cell.arriving.map(|arriving| {
-            let unconverted = match self.design.verify.analyser {
-                true => "an analyser keeps what is not converted from the sensor",
-                false => "what is not converted lands as it came, in image and veil",
-            };
-            assumption(
-                "polarisation",
-                format!("all light arrives {arriving} circularly polarised, as behind a filter; {unconverted}"),
-            )
-        });
+        let polarised = (self.design.cell.arriving)
+            .map(|focused| assumption("polarisation", polarised(focused, self.design.verify.light())));
         let mut all = vec![
             assumption("cell", cell),
             assumption(
@@ -267,6 +259,25 @@ impl Studio {
         }));
         all
     }
+}
+
+/// What is assumed of the polarisation of the scene, at pillars that focus a hand.
+fn polarised(focused: Handedness, light: PolarisedLight) -> String {
+    let arriving = light.arriving_at(focused);
+    let own = arriving == Polarisation::Circular(focused);
+    let source = match own {
+        true => format!("all light arrives {arriving}, as behind a filter"),
+        false => format!("all light arrives {arriving}, and pillars focus what arrives {focused} circularly polarised"),
+    };
+    let detector = match (light.analyser, own) {
+        (true, true) => "an analyser keeps what is not converted from the sensor",
+        (false, true) => "what is not converted lands as it came, in image and veil",
+        (true, false) => {
+            "an analyser passes the hand of focused light alone, with what is not converted of the other hand"
+        }
+        (false, false) => "what is not converted lands as it came and the other hand diverges, both in image and veil",
+    };
+    format!("{source}; {detector}")
 }
 
 /// Where the spectra of a scene come from.

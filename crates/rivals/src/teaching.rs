@@ -82,7 +82,9 @@ impl OpenLineup<'_> {
                 continue;
             }
             let why = match followed.iter().any(|f| f.is_like(stage.kind, stage.taught())) {
-                true => "for this layout with other materials, another cell, analyser or wavelengths of its design",
+                true => {
+                    "for this layout with other materials, another cell, polarisation, analyser or wavelengths of its design"
+                }
                 false => "for none of these cameras at this size and field of photographs",
             };
             return refused(

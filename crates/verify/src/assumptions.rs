@@ -1,6 +1,6 @@
 //! What a simulation assumes, and how much each assumption weighs for the design at hand.
 
-use metalith_cell::{Fidelity, ORDERS, Truncation};
+use metalith_cell::{Fidelity, ORDERS, Polarisation, Truncation};
 use metalith_core::{PillarShape, Rectangles};
 use metalith_design::{CellIncidence, Design, Element};
 use metalith_report::{Cell, Column, Page, Table, exact, fixed, sig};
@@ -184,27 +184,48 @@ fn white_apart_deg(design: &Design, wavelength_um: f64) -> f64 {
 
 /// What is assumed of the polarisation of light, and what steps and grid do to the phase of rotated rectangles.
 fn polarised(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &Verification, pillars: Rectangles) {
-    let arriving = design.cell.arriving.unwrap_or_default();
-    let shares: Vec<String> = found
-        .distinct
-        .iter()
-        .flat_map(|d| &d.orders)
-        .filter_map(|o| Some(fixed(o.unconverted? * 100.0, 1)))
-        .collect();
-    row(
-        &format!(
-            "Light arrives {arriving} circularly polarised; pillars convert it to the other with twice their rotation as phase"
-        ),
-        if design.verify.analyser {
-            "a circular analyser keeps what is not converted from the sensor".into()
-        } else {
-            format!(
-                "{} % is not converted: a background, in all figures of the layout",
-                shares.join(", ")
-            )
-        },
-        "Jones matrices of both; light of the other handedness diverges, of unpolarised light that is half",
-    );
+    let focused = design.cell.arriving.unwrap_or_default();
+    let light = design.verify.light();
+    let shares = |of: fn(&OrderEfficiencies) -> Option<f64>| -> String {
+        let orders = found.distinct.iter().flat_map(|d| &d.orders);
+        let shares = orders.filter_map(|o| Some(fixed(of(o)? * 100.0, 1)));
+        shares.collect::<Vec<_>>().join(", ")
+    };
+    let arriving = light.arriving_at(focused);
+    let unconverted = shares(|o| o.unconverted);
+    if arriving == Polarisation::Circular(focused) {
+        row(
+            &format!(
+                "Light arrives {arriving}; pillars convert it to the other hand with twice their rotation as phase"
+            ),
+            if light.analyser {
+                "a circular analyser keeps what is not converted from the sensor".into()
+            } else {
+                format!("{unconverted} % is not converted: a background, in all figures of the layout")
+            },
+            "Jones matrices of both hands; light of the other hand diverges, of unpolarised light that is half: `polarisation` in [verify]",
+        );
+    } else {
+        let in_first = shares(|o| Some(o.first));
+        row(
+            &format!(
+                "Light arrives {arriving}; pillars convert each hand to the other with twice their rotation as phase, and focus what \
+                 arrives {focused} circularly polarised"
+            ),
+            if light.analyser {
+                format!(
+                    "{in_first} % is focused; a circular analyser passes the hand of focused light alone, so that what diverges does not \
+                     reach the sensor, nor what is not converted but for {unconverted} %"
+                )
+            } else {
+                format!(
+                    "{in_first} % is focused, {} % diverges and {unconverted} % is not converted, in all figures of the layout",
+                    shares(|o| o.diverging)
+                )
+            },
+            "Jones matrices of both hands; Strehl ratios and shares are of all light that arrives, and the design phase focuses all of it",
+        );
+    }
     let turned = (1..=pillars.steps)
         .map(|number| pillars.turned_by_grid(number).abs())
         .fold(0.0, f64::max);

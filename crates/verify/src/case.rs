@@ -5,7 +5,10 @@ use std::collections::hash_map::Entry;
 
 use num_complex::Complex64;
 
-use metalith_cell::{BandResponse, CellModel, FittedNeighbours, ObliqueTables, POLARISATION_SHARE};
+use metalith_cell::{
+    BandResponse, CellModel, FittedNeighbours, HandTables, ObliqueTables, POLARISATION_SHARE, PassedTable,
+    PolarisedLight,
+};
 use metalith_core::{Error, LatticeKind, Progress, Result, WidthRows};
 use metalith_grating::NeighbourPillars;
 use metalith_made::{SimulationCase, cell_direction};
@@ -56,9 +59,8 @@ impl<'a> SimulationCases<'a> {
 pub(super) struct TransmissionTables {
     /// Along the normal.
     pub normal: Vec<Complex64>,
-    /// Along the normal, what leaves in the polarisation in which it arrived, of a cell that changes it, unless an analyser keeps
-    /// it from the sensor.
-    pub unconverted: Option<Vec<Complex64>>,
+    /// Of a cell that changes polarisation, along the normal.
+    polarised: Option<Polarised>,
     /// By direction, for s and p; empty where the design asks for normal incidence, or the cell knows no angles.
     oblique: HashMap<[u64; 2], ObliqueTables>,
     /// By direction, of a cell that knows unlike neighbours.
@@ -67,6 +69,23 @@ pub(super) struct TransmissionTables {
     in_band: bool,
     /// What the pillars stand on.
     lattice: LatticeKind,
+}
+
+/// What pillars that change polarisation do to light of both hands, and what of it reaches the sensor.
+struct Polarised {
+    hands: HandTables,
+    light: PolarisedLight,
+    passed: Vec<PassedTable>,
+}
+
+impl Polarised {
+    fn of(hands: HandTables, light: PolarisedLight) -> Self {
+        Self {
+            passed: hands.passed(light),
+            hands,
+            light,
+        }
+    }
 }
 
 /// What pillars transmit among unlike neighbours in one light.
@@ -78,14 +97,21 @@ enum Neighbourhood {
 }
 
 impl TransmissionTables {
-    /// Solve a cell of pillars on such a lattice along the normal.
+    /// Solve a cell of pillars on such a lattice along the normal; `light` counts where they change polarisation.
     ///
     /// # Errors
     /// If it has no answer at this wavelength.
-    pub fn new(cell: &dyn CellModel, lattice: LatticeKind, wavelength_um: f64, widest_nm: u16) -> Result<Self> {
+    pub fn new(
+        cell: &dyn CellModel,
+        lattice: LatticeKind,
+        wavelength_um: f64,
+        widest_nm: u16,
+        light: PolarisedLight,
+    ) -> Result<Self> {
+        let hands = cell.hands(wavelength_um, widest_nm)?;
         Ok(Self {
             normal: cell.transmissions(wavelength_um, widest_nm)?,
-            unconverted: cell.unconverted(wavelength_um, widest_nm)?,
+            polarised: hands.map(|hands| Polarised::of(hands, light)),
             oblique: HashMap::new(),
             neighbours: HashMap::new(),
             in_band: false,
@@ -97,10 +123,17 @@ impl TransmissionTables {
     ///
     /// # Errors
     /// As [`TransmissionTables::new`].
-    pub fn in_band(cell: &dyn CellModel, lattice: LatticeKind, wavelength_um: f64, widest_nm: u16) -> Result<Self> {
+    pub fn in_band(
+        cell: &dyn CellModel,
+        lattice: LatticeKind,
+        wavelength_um: f64,
+        widest_nm: u16,
+        light: PolarisedLight,
+    ) -> Result<Self> {
+        let hands = cell.hands_in_band(wavelength_um, widest_nm)?;
         Ok(Self {
             normal: cell.transmissions_in_band(wavelength_um, widest_nm)?,
-            unconverted: cell.unconverted_in_band(wavelength_um, widest_nm)?,
+            polarised: hands.map(|hands| Polarised::of(hands, light)),
             oblique: HashMap::new(),
             neighbours: HashMap::new(),
             in_band: true,
@@ -108,11 +141,9 @@ impl TransmissionTables {
         })
     }
 
-    /// The same with an analyser before the sensor, or without one.
-    #[must_use]
-    pub fn behind_analyser(mut self, analyser: bool) -> Self {
-        self.unconverted = self.unconverted.filter(|_| !analyser);
-        self
+    /// Of a cell that changes polarisation, what it does to light of both hands, and the light that it is in.
+    pub fn polarised(&self) -> Option<(&HandTables, PolarisedLight)> {
+        self.polarised.as_ref().map(|p| (&p.hands, p.light))
     }
 
     /// Solve it for more directions, those that are alike by symmetry once.
@@ -218,8 +249,7 @@ impl TransmissionTables {
     }
 
     /// The PSF of pillars for a wave on a window: the mean over polarisations where cells are solved at an angle, the sum of
-    /// converted and unconverted light where cells change polarisation. `lit` is the wave that they are solved for where they
-    /// are.
+    /// all that does not interfere where cells change polarisation. `lit` is the wave that they are solved for where they are.
     ///
     /// # Errors
     /// As [`Psf::formed`].
@@ -244,9 +274,12 @@ impl TransmissionTables {
                 tables.passed().map(of).collect::<Result<_>>()?,
                 POLARISATION_SHARE,
             )),
-            None => match &self.unconverted {
+            None => match &self.polarised {
                 None => of(&self.normal),
-                Some(unconverted) => Ok(Psf::sum(vec![of(&self.normal)?, of(unconverted)?], 1.0)),
+                Some(polarised) => {
+                    let psfs = polarised.passed.iter().map(|p| of(&p.table));
+                    Ok(Psf::sum(psfs.collect::<Result<_>>()?, 1.0))
+                }
             },
         }
     }

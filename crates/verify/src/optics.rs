@@ -78,9 +78,9 @@ impl<'a> ElementSimulator<'a> {
                     tables: match case {
                         SimulationCase::Made(_) => None,
                         SimulationCase::Cell(cell) => {
-                            let widest_nm = widest_nm(design);
-                            let tables = TransmissionTables::new(*cell, lattice.kind(), wavelength_um, widest_nm)?;
-                            Some(tables.behind_analyser(design.verify.analyser))
+                            let (widest_nm, light) = (widest_nm(design), design.verify.light());
+                            let kind = lattice.kind();
+                            Some(TransmissionTables::new(*cell, kind, wavelength_um, widest_nm, light)?)
                         }
                     },
                 })
@@ -225,6 +225,7 @@ impl<'a> ElementSimulator<'a> {
                         second: found.orders[2],
                         transmitted: found.transmitted,
                         unconverted: None,
+                        diverging: None,
                         left_out: tables.left_out(&middle),
                     });
                     continue;
@@ -240,8 +241,8 @@ impl<'a> ElementSimulator<'a> {
                     (None, SimulationCase::Cell(_)) => unreachable!("every cell has its tables"),
                 };
                 let orders = OrderEfficiencies::of(rule, colour.wavelength_um, at.fidelity, at.full, table);
-                all.push(match &at.tables {
-                    Some(tables) => orders.beside(tables.unconverted.as_deref(), rule, at.full),
+                all.push(match at.tables.as_ref().and_then(TransmissionTables::polarised) {
+                    Some((hands, light)) => orders.of_light(hands, light, rule, at.full),
                     None => orders,
                 });
             }

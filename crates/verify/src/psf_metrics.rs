@@ -5,7 +5,7 @@ use num_complex::Complex64;
 use serde::Serialize;
 
 use super::copies::CopyAngle;
-use metalith_cell::Fidelity;
+use metalith_cell::{Fidelity, HandTables, PolarisedLight};
 use metalith_design::array::WidthRule;
 use metalith_design::{Element, FieldAngle};
 use metalith_wave::psf::{Matched, Psf, PsfMetrics, order_shares, pixel_mtf};
@@ -144,10 +144,13 @@ pub struct OrderEfficiencies {
     pub second: f64,
     /// Share in all orders of the mapping: the rest is reflected, absorbed or diffracted by the lattice itself.
     pub transmitted: f64,
-    /// Of pillars that change polarisation, the share that leaves in that in which it arrived and reaches the sensor: it passes the
-    /// element as if there were no phase. The shares above are of the light that is converted.
+    /// Of pillars that change polarisation, the share that leaves in the hand in which it arrived and reaches the sensor: it passes
+    /// the element as if there were no phase. The shares above are what is converted of the hand that is focused.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unconverted: Option<f64>,
+    /// Of these, where the other hand arrives too, the share that is converted of it and reaches the sensor: it diverges.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub diverging: Option<f64>,
     /// Of the cell that knows unlike neighbours: share of the light that its sum over pairs puts elsewhere, in the light of this
     /// element, than supercells that were left out of its fit. Mean over their sites and both polarisations.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -175,18 +178,31 @@ impl OrderEfficiencies {
             second: shares[2],
             transmitted: t.iter().map(Complex64::norm_sqr).sum::<f64>() / (full * full * t.len() as f64),
             unconverted: None,
+            diverging: None,
             left_out: None,
         }
     }
 
-    /// The same with the light that pillars leave in the polarisation in which it arrives, by its table.
-    pub(super) fn beside(self, unconverted: Option<&[Complex64]>, rule: &WidthRule, full: f64) -> Self {
-        let share = |table: &[Complex64]| {
+    /// The same of pillars that change polarisation, in light of which one hand or both arrive, as shares of all of it. Over a
+    /// whole turn of the phase, light that is converted of one hand does not interfere with what is not of the other.
+    pub(super) fn of_light(self, hands: &HandTables, light: PolarisedLight, rule: &WidthRule, full: f64) -> Self {
+        let power = |table: &[Complex64]| {
             let power = (0..ORDER_SAMPLES).map(|i| table[usize::from(rule.width_nm(order_phase(i)))].norm_sqr());
             power.sum::<f64>() / (full * full * ORDER_SAMPLES as f64)
         };
+        let focused = light.arriving_at(hands.focused).share(hands.focused);
+        let other = 1.0 - focused;
+        // The analyser passes the hand that the focused one is converted to.
+        let seen = if light.analyser { 0.0 } else { 1.0 };
+        let [kept_focused, kept_other] = [seen * focused, other];
+        let unconverted = kept_focused * power(&hands.unconverted[0]) + kept_other * power(&hands.unconverted[1]);
         Self {
-            unconverted: unconverted.map(share),
+            first: self.first * focused,
+            zero: self.zero * focused,
+            second: self.second * focused,
+            transmitted: self.transmitted * focused,
+            unconverted: (kept_focused + kept_other > 0.0).then_some(unconverted),
+            diverging: (seen * other > 0.0).then(|| other * power(&hands.converted[1])),
             ..self
         }
     }

@@ -13,7 +13,7 @@ use super::case::TransmissionTables;
 use super::single_white::SingleWhite;
 use super::white::CameraStatement;
 use super::white_page;
-use metalith_cell::{CellModel, Fidelity};
+use metalith_cell::{CellModel, Fidelity, PolarisedLight};
 use metalith_core::{Error, Lattice, LatticeKind, Progress, Result, WholeFile, WidthMap};
 use metalith_gds::extract::{ElementSite, Extraction};
 use metalith_made::{MadeChip, ModelStatement, SimulationCase};
@@ -38,8 +38,8 @@ pub struct Lighting {
     pub samples: usize,
     /// Edge of a sensor pixel (um).
     pub pixel_um: f64,
-    /// Whether light that leaves in the polarisation in which it arrived is kept from the sensor, where pillars change it.
-    pub analyser: bool,
+    /// Polarisation of source and detector, where pillars change it.
+    pub polarised: PolarisedLight,
     /// Radius of the openings in the metal (um); that of the circle around the pillars if none is given. It counts
     /// where a model has them off their place.
     pub aperture_radius_um: Option<f64>,
@@ -108,7 +108,7 @@ fn by_cell(
 ) -> Result<Vec<Psf>> {
     let widest = widest_nm(elements);
     let lattice = kind_of(elements);
-    let mut tables = TransmissionTables::new(cell, lattice, wavelength_um, widest)?.behind_analyser(light.analyser);
+    let mut tables = TransmissionTables::new(cell, lattice, wavelength_um, widest, light.polarised)?;
     let wave = light.wave(wavelength_um);
     tables.add_neighbours(cell, &[wave], progress)?;
     if light.cells_as_lit {

@@ -67,11 +67,11 @@ pub fn single_white(
     let tables = sampling.wavelengths_nm.iter().map(|nm| match case {
         SimulationCase::Made(_) => Ok(None),
         SimulationCase::Cell(cell) => {
-            let tables = TransmissionTables::in_band(cell, kind_of(&elements), nm * 1e-3, widest)?;
-            let mut tables = tables.behind_analyser(light.analyser);
-            tables.add_neighbours_in_band(cell, nm * 1e-3, &|um| point().wave(um), progress)?;
+            let (lattice, um) = (kind_of(&elements), nm * 1e-3);
+            let mut tables = TransmissionTables::in_band(cell, lattice, um, widest, light.polarised)?;
+            tables.add_neighbours_in_band(cell, um, &|um| point().wave(um), progress)?;
             if light.cells_as_lit {
-                tables.add_directions(cell, &[point().wave(nm * 1e-3)], widest, progress)?;
+                tables.add_directions(cell, &[point().wave(um)], widest, progress)?;
             }
             Ok(Some(tables))
         }

@@ -134,8 +134,14 @@ impl<'a> WhiteSimulator<'a> {
             let tables = match judge {
                 SimulationCase::Made(_) => None,
                 SimulationCase::Cell(cell) => {
-                    let tables = TransmissionTables::in_band(cell, lattice.kind(), wavelength_um, widest_nm)?;
-                    Some(tables.behind_analyser(design.verify.analyser))
+                    let light = design.verify.light();
+                    Some(TransmissionTables::in_band(
+                        cell,
+                        lattice.kind(),
+                        wavelength_um,
+                        widest_nm,
+                        light,
+                    )?)
                 }
             };
             Ok(Colour {

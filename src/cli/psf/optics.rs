@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use metalith::cell::{
-    CellStack, FittedCell, Handedness, PointwiseCell, PublishedCell, RotatedCell, UniformLayer, cache_folder,
+    CellStack, FittedCell, Handedness, PointwiseCell, Polarisation, PolarisedLight, PublishedCell, RotatedCell,
+    UniformLayer, cache_folder,
 };
 use metalith::grating::{Mapping, NeighbourCell};
 use metalith::rcwa::{CellLattice, Material};
@@ -138,19 +139,10 @@ impl PsfArgs {
         };
         all.push(("cell", cell));
         if let Some(pillars) = found.shape.rectangles() {
-            let arriving = Handedness::from(self.arriving);
-            let rotations = format!(
-                "{} x {} nm, read to {} degrees; light arrives {arriving} circularly polarised, {}",
-                pillars.width_nm,
-                pillars.length_nm,
-                pillars.step_deg(),
-                if self.analyser {
-                    "an analyser keeps what is not converted from the sensor"
-                } else {
-                    "what is not converted is in the figures"
-                },
-            );
+            let (size, step_deg) = ([pillars.width_nm, pillars.length_nm], pillars.step_deg());
+            let rotations = format!("{} x {} nm, read to {step_deg} degrees", size[0], size[1]);
             all.push(("rotated rectangles", rotations));
+            all.push(("polarisation", self.polarised()));
         }
         if !published {
             all.push(("pillars", self.pillars()));
@@ -158,11 +150,44 @@ impl PsfArgs {
         all
     }
 
+    /// Polarisation of the light that arrives.
+    pub(super) fn arriving(&self) -> Polarisation {
+        self.arriving.unwrap_or(Polarisation::Circular(Handedness::default()))
+    }
+
+    /// The circular polarisation that the layout focuses, if options say.
+    pub(super) fn hand(&self) -> Option<Handedness> {
+        match (self.focused, self.arriving()) {
+            (Some(focused), _) => Some(focused.into()),
+            (None, Polarisation::Circular(hand)) => Some(hand),
+            (None, _) => None,
+        }
+    }
+
+    /// Source and detector, in words.
+    fn polarised(&self) -> String {
+        let arriving = self.arriving();
+        let detector = match (self.analyser, self.hand()) {
+            (true, Some(hand)) if arriving == Polarisation::Circular(hand) => {
+                "an analyser keeps what is not converted from the sensor".into()
+            }
+            (true, Some(hand)) => {
+                format!("an analyser passes the hand that {hand} circularly polarised light is converted to")
+            }
+            _ => "all that passes is in the figures, converted or not".into(),
+        };
+        format!("light arrives {arriving}, {detector}; figures are of all of it")
+    }
+
     /// What solves it for the pillars as drawn.
     pub(super) fn cell(&self, found: &Extraction, light: &PsfLight) -> Result<Box<dyn CellModel>> {
         let stack = self.stack(found)?;
         if let Some(pillars) = found.shape.rectangles() {
-            return Ok(Box::new(RotatedCell::new(stack, pillars, self.arriving.into())));
+            return Ok(Box::new(RotatedCell::new(
+                stack,
+                pillars,
+                self.hand().unwrap_or_default(),
+            )));
         }
         if matches!(self.fidelity, FidelityArg::Published) {
             return Ok(Box::new(PublishedCell::new(stack.pitch_nm as u32)));
@@ -215,7 +240,10 @@ impl PsfArgs {
             at_um: [self.at_x_um, self.at_y_um],
             samples: self.samples,
             pixel_um: self.pixel_um(light),
-            analyser: self.analyser,
+            polarised: PolarisedLight {
+                arriving: Some(self.arriving()),
+                analyser: self.analyser,
+            },
             aperture_radius_um: self.aperture_um.map(|d| 0.5 * d),
             accuracy: if self.fast { Accuracy::Fast } else { Accuracy::Accurate },
         }

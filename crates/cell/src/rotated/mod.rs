@@ -13,7 +13,7 @@ use metalith_core::{Error, Rectangles, Result};
 use metalith_rcwa::{Orders, circular};
 
 use self::series::{Channels, Series, every, samples, solved_rotations};
-use super::{CellModel, CellStack, Fidelity, Handedness, ObliqueTables, RotatedRectangle};
+use super::{CellModel, CellStack, Fidelity, HandTables, Handedness, ObliqueTables, RotatedRectangle};
 
 /// Intervals of an eighth of a turn whose ends are solved.
 const INTERVALS: usize = 6;
@@ -192,11 +192,36 @@ impl RotatedCell {
         Ok(samples(&jones.collect::<Result<Vec<_>>>()?, self.arriving))
     }
 
-    fn table(&self, wavelength_um: f64, of_band: bool, most: u16, channel: usize) -> Result<Vec<Complex64>> {
-        let solved = self.solved(wavelength_um, of_band)?;
-        let of = |number: u16| solved.at(self.pillars.drawn_rotation(number), self.arriving)[channel];
-        Ok(std::iter::once(Complex64::ZERO).chain((1..=most).map(of)).collect())
+    /// Of converted (0) or unconverted (1) light.
+    fn table(&self, solved: &Solved, most: u16, hand: Hand, channel: usize) -> Vec<Complex64> {
+        let of = |number: u16| {
+            let rotation = self.pillars.drawn_rotation(number);
+            // A mirror turns the pillar back and one handedness into the other.
+            let seen = match hand {
+                Hand::Focused => rotation,
+                Hand::Other => -rotation,
+            };
+            solved.at(seen, self.arriving)[channel]
+        };
+        std::iter::once(Complex64::ZERO).chain((1..=most).map(of)).collect()
     }
+
+    fn both_hands(&self, wavelength_um: f64, of_band: bool, most: u16) -> Result<HandTables> {
+        let solved = self.solved(wavelength_um, of_band)?;
+        let of = |channel: usize| [Hand::Focused, Hand::Other].map(|hand| self.table(&solved, most, hand, channel));
+        Ok(HandTables {
+            focused: self.arriving,
+            converted: of(0),
+            unconverted: of(1),
+        })
+    }
+}
+
+/// Of the light that arrives.
+#[derive(Clone, Copy)]
+enum Hand {
+    Focused,
+    Other,
 }
 
 impl Solved {
@@ -219,19 +244,21 @@ impl CellModel for RotatedCell {
 
     /// Of the converted light, with the number of the rotation as index.
     fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
-        self.table(wavelength_um, false, max_width_nm, 0)
+        let solved = self.solved(wavelength_um, false)?;
+        Ok(self.table(&solved, max_width_nm, Hand::Focused, 0))
     }
 
     fn transmissions_in_band(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
-        self.table(wavelength_um, true, max_width_nm, 0)
+        let solved = self.solved(wavelength_um, true)?;
+        Ok(self.table(&solved, max_width_nm, Hand::Focused, 0))
     }
 
-    fn unconverted(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Option<Vec<Complex64>>> {
-        self.table(wavelength_um, false, max_width_nm, 1).map(Some)
+    fn hands(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Option<HandTables>> {
+        self.both_hands(wavelength_um, false, max_width_nm).map(Some)
     }
 
-    fn unconverted_in_band(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Option<Vec<Complex64>>> {
-        self.table(wavelength_um, true, max_width_nm, 1).map(Some)
+    fn hands_in_band(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Option<HandTables>> {
+        self.both_hands(wavelength_um, true, max_width_nm).map(Some)
     }
 
     fn oblique(&self, _wavelength_um: f64, _sines: [f64; 2], _max_width_nm: u16) -> Result<Option<ObliqueTables>> {
@@ -252,7 +279,10 @@ impl CellModel for RotatedCell {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::FRAC_1_SQRT_2;
+
     use super::super::rectangle::tests::{PILLARS, titania};
+    use super::super::{Polarisation, PolarisedLight};
     use super::*;
 
     /// Between the solved rotations, of |t| near 1.1: what the series leaves out; ten times more with five rotations.
@@ -300,10 +330,50 @@ mod tests {
         let cell = RotatedCell::new(titania(), PILLARS, Handedness::Left);
         let solved = cell.solved(0.532, true).unwrap();
         let converted = cell.transmissions_in_band(0.532, 180).unwrap();
-        let unconverted = cell.unconverted_in_band(0.532, 180).unwrap().unwrap();
+        let hands = cell.hands_in_band(0.532, 180).unwrap().unwrap();
         for number in [1, 37, 180] {
             let at = solved.at(PILLARS.drawn_rotation(number), Handedness::Left);
-            assert_eq!([converted[usize::from(number)], unconverted[usize::from(number)]], at);
+            let k = usize::from(number);
+            assert_eq!([converted[k], hands.unconverted[0][k]], at);
+            assert_eq!(hands.converted[0][k], converted[k]);
+        }
+    }
+
+    /// Linear and unpolarised light, which both hands make up, against the Jones matrices of the solver along x and y; so are the
+    /// amplitudes of both hands and the phases between them.
+    #[test]
+    fn both_hands_are_those_of_the_solver() {
+        let orders = Orders::new(BAND_ORDERS).unwrap();
+        let right = [Complex64::ONE, Complex64::new(0.0, -1.0)].map(|c| c * FRAC_1_SQRT_2);
+        for focused in [Handedness::Left, Handedness::Right] {
+            let cell = RotatedCell::new(titania(), PILLARS, focused);
+            let hands = cell.hands_in_band(0.532, PILLARS.steps).unwrap().unwrap();
+            for (number, deg) in [(8, 0.0_f64), (31, 90.0), (70, 20.0), (124, -55.0)] {
+                let pillar = RotatedRectangle {
+                    width_nm: 100.0,
+                    length_nm: 250.0,
+                    rotation: PILLARS.drawn_rotation(number),
+                };
+                let jones = titania().jones(&pillar, 0.532, [0.0; 2], orders).unwrap();
+                let (sin, cos) = deg.to_radians().sin_cos();
+                let leaves = [0, 1].map(|out| jones[out][0] * cos + jones[out][1] * sin);
+                let in_right = right[0].conj() * leaves[0] + right[1].conj() * leaves[1];
+                let in_left = right[0] * leaves[0] + right[1] * leaves[1];
+                let wanted = match focused {
+                    Handedness::Left => [in_right, in_left],
+                    Handedness::Right => [in_left, in_right],
+                };
+                let light = PolarisedLight {
+                    arriving: Some(Polarisation::Linear(deg)),
+                    analyser: false,
+                };
+                let passed = hands.passed(light);
+                assert_eq!(passed.len(), 2);
+                for (found, wanted) in passed.iter().zip(wanted) {
+                    let off = (found.table[usize::from(number)] - wanted).norm();
+                    assert!(off < BETWEEN, "{focused}, {number}, {deg}: {off}");
+                }
+            }
         }
     }
 

@@ -18,7 +18,7 @@ pub struct CellSpec {
     /// Cross-section of the pillars.
     #[serde(skip_serializing_if = "PillarShape::is_square")]
     pub shape: PillarShape,
-    /// Circular polarisation of the light that arrives, where the pillars are rectangles: its phase is twice their rotation.
+    /// Circular polarisation of the light that is focused, where the pillars are rectangles: its phase is twice their rotation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub arriving: Option<Handedness>,
     /// Height of the pillars (nm).

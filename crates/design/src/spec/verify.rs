@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use metalith_cell::Fidelity;
+use metalith_cell::{Fidelity, Polarisation, PolarisedLight};
 use metalith_core::document::{Limits, Section};
 
 use super::CellSpec;
@@ -28,7 +28,11 @@ pub struct VerifySpec {
     pub window_samples: usize,
     /// Edge of a sensor pixel (um).
     pub pixel_um: f64,
-    /// Whether a circular analyser before the sensor lets pass what pillars convert alone; counts where they change polarisation.
+    /// Polarisation of the light that is simulated, where pillars change it and it is not that which they focus.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub polarisation: Option<Polarisation>,
+    /// Whether a circular analyser before the sensor lets the hand pass alone that focused light is converted to; counts where
+    /// pillars change polarisation.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub analyser: bool,
     /// Camera file that the figures of white light are for; three flat bands where none is named.
@@ -124,6 +128,7 @@ impl VerifySpec {
             pixel_um: s
                 .optional_float("pixel_um", Limits::new(0.1..=100.0, "um"))
                 .unwrap_or(USUAL_PIXEL_UM),
+            polarisation: read_polarisation(s, cell),
             analyser: s.choice("analyser", &[("none", false), ("circular", true)], Some(false)),
             camera: s.has("camera").then(|| s.file("camera")),
             limits: LimitSpec::read(s.optional_section("limits").as_ref()),
@@ -131,6 +136,31 @@ impl VerifySpec {
         s.finish();
         spec
     }
+
+    /// Source and detector of light at pillars that change polarisation.
+    pub fn light(&self) -> PolarisedLight {
+        PolarisedLight {
+            arriving: self.polarisation,
+            analyser: self.analyser,
+        }
+    }
+}
+
+/// The light that is simulated, if it is not that which is focused.
+fn read_polarisation(s: &Section<'_, '_>, cell: &CellSpec) -> Option<Polarisation> {
+    const KEY: &str = "polarisation";
+    const ANGLE: Limits = Limits::new(-Polarisation::MOST_DEG..=Polarisation::MOST_DEG, "degrees");
+    let named = s.optional_choice_or_float(KEY, &Polarisation::CHOICES, ANGLE, Polarisation::Linear)?;
+    let Some(focused) = cell.arriving else {
+        s.fault_given(
+            &["cell.shape"],
+            KEY,
+            format!("light of a polarisation for {}", cell.shape.plural()),
+            "leave it out: it counts for rectangles alone, the others are simulated in light that is not polarised",
+        );
+        return None;
+    };
+    Some(named).filter(|light| *light != Polarisation::Circular(focused))
 }
 
 /// The cell that judges, if it is left out: unlike neighbours for the cell that they were compared with real rows of, else

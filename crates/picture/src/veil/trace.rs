@@ -57,18 +57,18 @@ impl Veil {
             }
             let light = chip.in_light(distinct, &chosen, progress)?;
             let distance_um = chip.distinct[distinct].view.distance_um([0.0; 2]);
-            let departures: Vec<Vec<Departure>> = chosen
+            let departures: Vec<Vec<(i32, Departure)>> = chosen
                 .par_iter()
                 .map(|i| {
                     let lit = light.lit(*i, [0.0; 2]);
                     // Where light arrives in two polarisations one stands for both: their tables differ in obliquely lit
                     // cells alone.
                     let parts = if lit.share < 1.0 { &lit.tables[..1] } else { &lit.tables };
-                    let of = |table| {
+                    let of = |(table, order): (_, &i32)| {
                         let aperture = lit.element.lit_aperture(table, &lit.light);
-                        Departure::of(&aperture, all[*i] * 1e-3, distance_um, BLOCKS)
+                        (*order, Departure::of(&aperture, all[*i] * 1e-3, distance_um, BLOCKS))
                     };
-                    parts.iter().map(of).collect()
+                    parts.iter().zip(light.orders(*i)).map(of).collect()
                 })
                 .collect();
             let zero_orders: Vec<f64> = chosen.iter().map(|i| light.zero_order(*i)).collect();
@@ -157,7 +157,13 @@ impl Tracer<'_> {
         solid_angle(self.view, row, column) * pixels
     }
 
-    fn trace(&self, element: usize, cell: usize, departures: &[Vec<Departure>], zero_orders: &[f64]) -> Result<Traced> {
+    fn trace(
+        &self,
+        element: usize,
+        cell: usize,
+        departures: &[Vec<(i32, Departure)>],
+        zero_orders: &[f64],
+    ) -> Result<Traced> {
         let pairs = self.weights.len();
         let view: &ElementView = &self.chip.elements[element];
         let [row, column] = self.middle(cell);
@@ -220,7 +226,7 @@ impl Tracer<'_> {
         element: usize,
         wavelength: usize,
         sines: [f64; 2],
-        departures: &[Departure],
+        departures: &[(i32, Departure)],
         place: Option<[f64; 2]>,
     ) -> Result<LandedLight> {
         let view = &self.chip.elements[element];
@@ -232,7 +238,13 @@ impl Tracer<'_> {
             sin_x: own[0],
             sin_y: own[1],
         };
-        let towards = leaving(&self.chip.distinct[base].view.wedge, &wave);
+        let focused = leaving(&self.chip.distinct[base].view.wedge, &wave);
+        // What is not converted goes on as it came, and what diverges goes to the other side of that.
+        let towards = |order: i32| match order {
+            1 => focused,
+            0 => own,
+            _ => [0, 1].map(|a| 2.0 * own[a] - focused[a]),
+        };
         let pixel = self.sensor.pixel_um;
         let cell_um = pixel * CELL_PIXELS as f64;
         // The middle of the sensor from this element's axis, and how far any of its corners is.
@@ -244,10 +256,10 @@ impl Tracer<'_> {
             cells: 2 * (far / cell_um).ceil() as usize + 2,
             distance_um: view.distance_um([0.0; 2]),
         };
-        let mut landing = departures[0].landing(own, towards, grid)?;
-        // What is not converted goes on as it came.
-        for departure in &departures[1..] {
-            let other = departure.landing(own, own, grid)?;
+        let (order, departure) = &departures[0];
+        let mut landing = departure.landing(own, towards(*order), grid)?;
+        for (order, departure) in &departures[1..] {
+            let other = departure.landing(own, towards(*order), grid)?;
             landing.power_um2 += &other.power_um2;
             landing.beyond_um2 += other.beyond_um2;
             landing.evanescent_um2 += other.evanescent_um2;

@@ -69,6 +69,7 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification, elem
     )));
     page.figure(chart.caption("In the middle of the field, mean of x and y."));
     let converts = element.orders.iter().any(|o| o.unconverted.is_some());
+    let diverges = element.orders.iter().any(|o| o.diverging.is_some());
     let mut columns = vec![
         Column::number("Wavelength", "nm"),
         Column::text("Cell"),
@@ -80,6 +81,9 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification, elem
     if converts {
         columns.push(Column::number("Not converted, beside it", "%"));
     }
+    if diverges {
+        columns.push(Column::number("Diverging, of the other hand", "%"));
+    }
     let mut orders = Table::new(columns);
     for entry in &element.orders {
         let mut cells = vec![
@@ -90,13 +94,9 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification, elem
             Cell::fixed(entry.second * 100.0, 1),
             Cell::fixed(entry.transmitted * 100.0, 1),
         ];
-        if converts {
-            cells.push(
-                entry
-                    .unconverted
-                    .map_or_else(Cell::none, |share| Cell::fixed(share * 100.0, 1)),
-            );
-        }
+        let share = |of: Option<f64>| of.map_or_else(Cell::none, |share| Cell::fixed(share * 100.0, 1));
+        cells.extend(converts.then(|| share(entry.unconverted)));
+        cells.extend(diverges.then(|| share(entry.diverging)));
         orders.row(cells);
     }
     let whose = if found.fidelity == Fidelity::Neighbours {
@@ -104,11 +104,15 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification, elem
     } else {
         "the mapping's own account"
     };
-    let beside = if converts {
-        " Light that is not converted passes as if there were no phase too; it is in the PSFs, beside the orders of what is converted."
-    } else {
-        ""
-    };
+    let mut beside = String::new();
+    if converts {
+        beside += " Light that is not converted passes as if there were no phase too; it is in the PSFs, beside the orders of what is \
+                   converted.";
+    }
+    if diverges {
+        beside += " Orders are of the hand that is focused, the other one diverges, and is in the PSFs too; all are shares of all light \
+                   that arrives.";
+    }
     page.table(orders.caption(format!(
         "Where light goes by {whose}: the first order is the image, the zero order passes the element as if it had no phase.{beside}",
     )));

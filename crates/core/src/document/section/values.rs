@@ -118,15 +118,21 @@ impl<'t> Section<'_, 't> {
 
     /// One of a few words; the first choice takes the place of a wrong one.
     pub fn choice<T: Copy>(&self, key: &str, choices: &[(&str, T)], default: Option<T>) -> T {
-        let words = choices.iter().map(|(w, _)| *w).collect::<Vec<_>>().join(", ");
         let Some(value) = self.get(key) else {
             return default.unwrap_or_else(|| {
+                let words = choices.iter().map(|(w, _)| *w).collect::<Vec<_>>().join(", ");
                 self.missing_unless_present(key, &format!("one of: {words}"));
                 choices[0].1
             });
         };
+        self.word(key, value, choices, "")
+    }
+
+    /// One of a few words; `or` says what else a value may be.
+    fn word<T: Copy>(&self, key: &str, value: &Spanned<DeValue<'t>>, choices: &[(&str, T)], or: &str) -> T {
+        let words = choices.iter().map(|(w, _)| *w).collect::<Vec<_>>().join(", ");
         let DeValue::String(word) = value.get_ref() else {
-            self.wrong_type(key, value, &format!("one of: {words}"));
+            self.wrong_type(key, value, &format!("one of: {words}{or}"));
             return choices[0].1;
         };
         choices.iter().find(|(w, _)| *w == word.as_ref()).map_or_else(
@@ -135,12 +141,30 @@ impl<'t> Section<'_, 't> {
                 self.document.fault(
                     value.span(),
                     format!("`{key}` cannot be \"{}\"", quoted(word)),
-                    format!("use one of: {words}{}", did_you_mean(word, choices.iter().map(|c| c.0))),
+                    format!(
+                        "use one of: {words}{or}{}",
+                        did_you_mean(word, choices.iter().map(|c| c.0))
+                    ),
                 );
                 choices[0].1
             },
             |(_, v)| *v,
         )
+    }
+
+    /// One of a few words, or a number; nothing where the key is left out.
+    pub fn optional_choice_or_float<T: Copy>(
+        &self,
+        key: &str,
+        choices: &[(&str, T)],
+        limits: Limits,
+        of_number: impl Fn(f64) -> T,
+    ) -> Option<T> {
+        let value = self.get(key)?;
+        match value.get_ref() {
+            DeValue::Integer(_) | DeValue::Float(_) => self.optional_float(key, limits).map(of_number),
+            _ => Some(self.word(key, value, choices, &format!(", or a number{}", describe(&limits)))),
+        }
     }
 
     /// A list of numbers, each within the limits; an empty one where the key is left out.
