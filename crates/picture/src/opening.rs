@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-use metalith_camera::{Camera, ChannelSampling};
+use metalith_camera::{Blend, Camera, ChannelSampling, Sampling};
 use metalith_cell::{Fidelity, Polarisation, cache_folder};
 use metalith_core::file::file_digest;
 use metalith_core::text::hex;
@@ -110,6 +110,8 @@ struct Wanted<'a> {
     given: SceneView,
     elements: Vec<ElementView>,
     channels: Vec<ChannelSampling>,
+    /// Wavelengths between which images follow a cubic (nm), in light of narrow bands.
+    cubic_nm: Option<Vec<f64>>,
     /// Spectra of the scenes, and the primaries of the restoration among or after them.
     basis: Vec<SceneSpectrum>,
     /// Where the primaries begin.
@@ -145,6 +147,9 @@ struct Inputs<'a> {
     basis: &'a [SceneSpectrum],
     spec: &'a BankSpec,
     scene_distance_um: f64,
+    /// Where light of narrow bands asks for wavelengths of its own, these (nm).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cubic_nm: Option<&'a [f64]>,
 }
 
 impl Studio {
@@ -312,7 +317,11 @@ impl<'a> Wanted<'a> {
             basis.extend_from_slice(rgb_basis());
         }
         let spec = BankSpec::standard(design, camera);
-        let channels = sampling_of(design, camera)?.channels;
+        let Sampling {
+            wavelengths_nm,
+            channels,
+            blend,
+        } = sampling_of(design, camera)?;
         Veil::check_size(&camera.sensor, channels.len(), basis.len())?;
         if primaries > 0 {
             check_coverage(&scene, &channels)?;
@@ -325,6 +334,7 @@ impl<'a> Wanted<'a> {
             given,
             elements,
             channels,
+            cubic_nm: (blend == Blend::Cubic).then_some(wavelengths_nm),
             basis,
             primaries,
             spec,
@@ -360,6 +370,7 @@ impl<'a> Wanted<'a> {
             spec: &self.spec,
             // JSON knows no infinity.
             scene_distance_um: self.scene.view.distance_um.min(f64::MAX),
+            cubic_nm: self.cubic_nm.as_deref(),
         };
         serde_json::to_vec(&inputs).map_err(|e| Error::invalid(e.to_string(), "report this"))
     }

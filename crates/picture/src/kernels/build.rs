@@ -152,7 +152,8 @@ impl Builder<'_> {
         let parts = channel.parts.iter().filter_map(|part| {
             let to = view.landing_um(sines, 0.5e-3 * (part.nm[0] + part.nm[1]))?;
             let offset = [0, 1].map(|a| (to[a] - from[a]) / self.spec.pixel_um);
-            Some(MovedPart::new(part, total, offset))
+            let blended = self.chip.sampling.blended(part.place);
+            Some(MovedPart::new(part, total, blended, offset))
         });
         parts.collect()
     }

@@ -1,9 +1,11 @@
 //! Images of a point in a channel, from those of single wavelengths.
 //!
-//! The PSF of a wavelength about its chief ray, summed over squares of a quarter of a pixel, is transformed. Between two
-//! wavelengths it is the mean of both with weights that change linearly, and moves with its chief ray, as in
-//! [`metalith_wave::psf::polychromatic`]; here the band is a sum over points 1 nm apart, which a pixel cannot tell from
-//! a line.
+//! The PSF of a wavelength about its chief ray, summed over squares of a quarter of a pixel, is transformed. Between
+//! two wavelengths it is the mean of both with weights that change linearly, and moves with its chief ray, as in
+//! [`metalith_wave::psf::polychromatic`]; in light of narrow bands it follows a cubic through four
+//! ([`metalith_camera::Blend`]). Here the band is a sum over points 1 nm apart, which a pixel cannot tell from a line.
+
+use std::ops::Range;
 
 use metalith_camera::ChannelPart;
 use num_complex::Complex32;
@@ -25,25 +27,25 @@ pub struct KernelPlan {
 pub struct PsfSpectrum(Vec<Complex32>);
 
 /// A part of a channel, as it acts in one direction.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct MovedPart {
     /// Share of the channel's light.
     pub weight: f64,
     /// Wavelength (nm).
     pub nm: f64,
-    /// Place among the wavelengths, see [`ChannelPart::place`].
-    pub place: f64,
+    /// Wavelengths whose PSFs it is a sum of, with their weights: [`metalith_camera::Sampling::blended`].
+    pub blended: Vec<(usize, f64)>,
     /// From the chief ray of the channel to that of the part (pixels).
     pub offset: [f64; 2],
 }
 
 impl MovedPart {
-    /// Of a part whose chief ray lands there.
-    pub fn new(part: &ChannelPart, total: f64, offset: [f64; 2]) -> Self {
+    /// Of a part whose chief ray lands there, made of these wavelengths.
+    pub fn new(part: &ChannelPart, total: f64, blended: Vec<(usize, f64)>, offset: [f64; 2]) -> Self {
         Self {
             weight: part.weight / total,
             nm: 0.5 * (part.nm[0] + part.nm[1]),
-            place: part.place,
+            blended,
             offset,
         }
     }
@@ -77,9 +79,9 @@ impl KernelPlan {
         PsfSpectrum(spectrum)
     }
 
-    /// Kernels of a channel for each spectrum of the scene: energy in a pixel whose middle is at
-    /// `(i - window + 1/2) / 2` pixels from the chief ray, i from 0 to 2 window - 1 along x and along y, as it counts in a
-    /// sum over points half a pixel apart; see [`PlacedPixel`].
+    /// Kernels of a channel for each spectrum of the scene: energy in a pixel whose middle is at `(i - window + 1/2) /
+    /// 2` pixels from the chief ray, i from 0 to 2 window - 1 along x and along y, as it counts in a sum over points
+    /// half a pixel apart; see [`PlacedPixel`].
     pub fn kernels(
         &self,
         spectra: &[PsfSpectrum],
@@ -89,13 +91,14 @@ impl KernelPlan {
     ) -> Vec<Vec<f32>> {
         let (size, half) = (self.fft.size(), self.fft.size() / 2 + 1);
         let mut sums = vec![vec![Complex32::ZERO; self.fft.entries()]; basis.len()];
-        let last = spectra.len() - 1;
         let weakest = WEAKEST * parts.iter().map(|p| p.weight).fold(0.0, f64::max);
         let mut mixed = vec![Complex32::ZERO; size];
         for part in parts.iter().filter(|p| p.weight > weakest && p.inside(self.window)) {
-            let low = (part.place.floor() as usize).min(last);
-            let (from, to) = (&spectra[low].0, &spectra[(low + 1).min(last)].0);
-            let upper = part.place.fract() as f32;
+            let terms: Vec<(&[Complex32], f32)> = part
+                .blended
+                .iter()
+                .map(|(i, weight)| (&spectra[*i].0[..], *weight as f32))
+                .collect();
             let turn = |axis: usize, k: usize| {
                 let signed = if 2 * k > size { k as f64 - size as f64 } else { k as f64 };
                 let turns = signed / size as f64 * part.offset[axis] * QUARTERS as f64;
@@ -107,12 +110,8 @@ impl KernelPlan {
             for kx in 0..half {
                 let x = turn(0, kx);
                 let at = kx * size..(kx + 1) * size;
-                for (m, (y, (a, b))) in mixed
-                    .iter_mut()
-                    .zip(along_y.iter().zip(from[at.clone()].iter().zip(&to[at.clone()])))
-                {
-                    *m = (a + (b - a) * upper) * (x * y);
-                }
+                blend(&terms, at.clone(), &mut mixed);
+                mixed.iter_mut().zip(&along_y).for_each(|(m, y)| *m *= x * y);
                 for (sum, weight) in sums.iter_mut().zip(&weights) {
                     for (s, m) in sum[at.clone()].iter_mut().zip(&mixed) {
                         *s += m * weight;
@@ -155,9 +154,9 @@ impl KernelPlan {
 /// Weights of quarters of pixels, along one axis, of a pixel that looks at points half a pixel apart.
 ///
 /// A frame is an integral over the scene. A sum over points takes detail that is finer than they can tell for coarse
-/// detail, unless what is summed is smooth: so each point stands for the light of half a pixel about it. What that blurs
-/// is undone by the differences of neighbouring points: of a wave of frequency f, cos^2 is left, cos^2 (1 + u / 4 + u^2 / 8)
-/// = 1 - 5 sin^6 + ... with sin, cos of pi f / 4 and u = sin^2(pi f / 2).
+/// detail, unless what is summed is smooth: so each point stands for the light of half a pixel about it. What that
+/// blurs is undone by the differences of neighbouring points: of a wave of frequency f, cos^2 is left, cos^2 (1 + u / 4
+/// + u^2 / 8) = 1 - 5 sin^6 + ... with sin, cos of pi f / 4 and u = sin^2(pi f / 2).
 struct PlacedPixel {
     taps: Vec<f32>,
     /// Quarters before the first one of the pixel itself.
@@ -198,6 +197,33 @@ fn convolved(a: &[f32], b: &[f32]) -> Vec<f32> {
     out
 }
 
+/// The weighted sum of spectra in a range of their frequencies.
+fn blend(terms: &[(&[Complex32], f32)], at: Range<usize>, out: &mut [Complex32]) {
+    let row = |k: usize| (&terms[k].0[at.clone()], terms[k].1);
+    match terms.len() {
+        2 => {
+            let ((from, _), (to, upper)) = (row(0), row(1));
+            let pairs = from.iter().zip(to);
+            out.iter_mut()
+                .zip(pairs)
+                .for_each(|(o, (a, b))| *o = a + (b - a) * upper);
+        }
+        4 => {
+            let [(a, p), (b, q), (c, r), (d, s)] = [0, 1, 2, 3].map(row);
+            let all = a.iter().zip(b).zip(c.iter().zip(d));
+            out.iter_mut()
+                .zip(all)
+                .for_each(|(o, ((a, b), (c, d)))| *o = a * p + b * q + c * r + d * s);
+        }
+        n => {
+            out.fill(Complex32::ZERO);
+            for (spectrum, weight) in (0..n).map(row) {
+                out.iter_mut().zip(spectrum).for_each(|(o, v)| *o += v * weight);
+            }
+        }
+    }
+}
+
 /// Parts with a smaller share of the strongest are left out.
 const WEAKEST: f64 = 1e-5;
 
@@ -233,7 +259,7 @@ mod tests {
         let part = |weight: f64, offset: [f64; 2]| MovedPart {
             weight,
             nm: 500.0,
-            place: 0.3,
+            blended: vec![(0, 0.7), (1, 0.3)],
             offset,
         };
         let parts = [part(0.75, [1.3, -0.4]), part(0.25, [-2.1, 0.9]), part(9.0, [20.0, 0.0])];
