@@ -8,7 +8,7 @@ that are done, and all of them.
 
 from __future__ import annotations
 
-from ._layouts import Array, Design, Layout, Rectangles, Shape, read_layout, write_layout
+from ._layouts import Array, Design, Lattice, Layout, Places, Rectangles, Shape, places, read_layout, write_layout
 from ._light import Psf, PsfSet, Transmission, cell, index, propagate, psf
 from ._native import MetalithError, __version__
 from ._pictures import Frame, Studio, denoise
@@ -24,9 +24,11 @@ __all__ = [
     "Diagnosis",
     "FoundEffect",
     "Frame",
+    "Lattice",
     "Layout",
     "Marker",
     "MetalithError",
+    "Places",
     "Psf",
     "PsfSet",
     "RankedEffect",
@@ -43,6 +45,7 @@ __all__ = [
     "check",
     "denoise",
     "index",
+    "places",
     "plan",
     "propagate",
     "psf",

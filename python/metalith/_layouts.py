@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native
-from ._types import Float64, PathLike, Progress, Widths
+from ._types import Bools, Float64, Int64, PathLike, Progress, Widths
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,34 @@ class Rectangles:
 
 Shape: TypeAlias = Union[Literal["square", "circle"], Rectangles]
 """What pillars are."""
+
+
+Lattice: TypeAlias = Literal["square", "hexagonal"]
+"""How pillars stand: on a hexagonal lattice in rows along x, each shifted by half a pitch against the next."""
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where the columns and rows of a map are, from the middle of its element."""
+
+    x_nm: Int64
+    """Of each column (nm), rising: a pitch apart on a square lattice, half a pitch on a hexagonal one."""
+    y_nm: Int64
+    """Of each row (nm), rising: a pitch apart on a square lattice, on a hexagonal one half the root of three of it, rounded to
+    whole nanometres."""
+    is_site: Bools
+    """Whether a pillar can stand there, shape ``[rows, columns]``: everywhere on a square lattice. On a hexagonal one where
+    the sum of row and column is even, in the rows that reach no farther than the columns; elsewhere maps are zero."""
+
+
+def places(sites: int, *, pitch_nm: int, lattice: Lattice = "square") -> Places:
+    """Where the columns and rows of a map of ``sites`` x ``sites`` are. A hexagonal lattice has an odd number of them, one
+    in the middle; ``2 * ceil(diameter / pitch) + 1`` hold a round lens."""
+    return Places(*_native.places(sites, pitch_nm, lattice))
+
+
+def _lattice(told: str) -> Lattice:
+    return "hexagonal" if told == "hexagonal" else "square"
 
 
 def _told(shape: Shape) -> tuple[str, int, int, int]:
@@ -95,6 +123,11 @@ class Design:
         return self._native.pitch_nm
 
     @property
+    def lattice(self) -> Lattice:
+        """How the pillars stand."""
+        return _lattice(self._native.lattice)
+
+    @property
     def pillar_height_nm(self) -> float:
         """Height of the pillars (nm)."""
         return self._native.pillar_height_nm
@@ -131,7 +164,7 @@ class Design:
             ("elements", str(len(self.elements))),
             ("diameter", f"{self.diameter_um:g} um"),
             ("focal length", f"{self.focal_length_um:g} um"),
-            ("pitch", f"{self.pitch_nm} nm"),
+            ("pitch", f"{self.pitch_nm} nm, {self.lattice} lattice"),
             ("pillar height", f"{self.pillar_height_nm:g} nm"),
             ("wavelengths", ", ".join(f"{nm:g}" for nm in self.wavelengths_nm) + " nm"),
         ]
@@ -168,9 +201,18 @@ class Array:
         return self._native.pitch_nm
 
     @property
+    def lattice(self) -> Lattice:
+        """How the pillars stand."""
+        return _lattice(self._native.lattice)
+
+    @property
     def shape(self) -> Shape:
         """What the pillars are."""
         return _shape(self._native.shape)
+
+    def places(self) -> Places:
+        """Where the columns and rows of each map of widths are, from the centre of its element."""
+        return places(self._native.sites, pitch_nm=self.pitch_nm, lattice=self.lattice)
 
     @property
     def centres_nm(self) -> list[tuple[int, int]]:
@@ -182,7 +224,8 @@ class Array:
 
     def widths(self, element: int) -> Widths:
         """Widths of the pillars of one element (nm), diameters of circles, numbers of rotations of rectangles: uint16,
-        shape ``[sites, sites]``, zero where there is none."""
+        shape ``[sites, sites]``, rows along +y, columns along +x, zero where there is none. :meth:`places` says where these
+        are: on a hexagonal lattice every other place of the grid is empty."""
         return self._native.widths(element)
 
     def rotations_deg(self, element: int) -> Float64:
@@ -213,7 +256,7 @@ class Layout:
 
     widths: list[Widths] = field(repr=False)
     """Of each element (nm), diameters of circles, numbers of rotations of rectangles: uint16, shape ``[sites, sites]``,
-    zero where there is no pillar."""
+    rows along +y, columns along +x, zero where there is no pillar. :meth:`places` says where these are."""
     names: list[str] = field(repr=False)
     """Name of each element."""
     centres_nm: list[tuple[int, int]] = field(repr=False)
@@ -228,6 +271,12 @@ class Layout:
     """Name of the cell that was read."""
     shape: Shape = "square"
     """What the pillars are."""
+    lattice: Lattice = "square"
+    """How the pillars stand."""
+
+    def places(self, element: int) -> Places:
+        """Where the columns and rows of the map of widths of one element are, from its centre."""
+        return places(len(self.widths[element]), pitch_nm=self.pitch_nm, lattice=self.lattice)
 
     def rotations_deg(self, element: int) -> Float64:
         """Rotations of the rectangles of one element (degrees), NaN where there is none."""
@@ -250,20 +299,22 @@ def read_layout(
     progress: Progress | None = None,
 ) -> Layout:
     """Read the pillars of a GDSII or OASIS file, written by any program: at the elements of ``design`` or of ``array``, or
-    wherever squares or circles stand on a lattice on ``layer`` (layer and datatype). Rectangles need one of the two."""
+    wherever squares or circles stand on a lattice on ``layer`` (layer and datatype). Rectangles need one of the two. All
+    elements stand on lattices of one kind and pitch."""
     natives = (design._native if design is not None else None, array._native if array is not None else None)
-    names, centres, pitches, widths, pillars, others, found, shape = _native.read_layout(
+    names, centres, widths, pitch_nm, lattice, pillars, others, found, shape = _native.read_layout(
         path, layer, top, *natives, progress
     )
     return Layout(
         widths=widths,
         names=names,
         centres_nm=[(c[0], c[1]) for c in centres],
-        pitch_nm=pitches[0] if pitches else 0,
+        pitch_nm=pitch_nm,
         pillars=pillars,
         other_shapes=others,
         top=found,
         shape=_shape(shape),
+        lattice=_lattice(lattice),
     )
 
 
@@ -273,6 +324,7 @@ def write_layout(
     *,
     pitch_nm: int,
     shape: Shape = "square",
+    lattice: Lattice = "square",
     centres_nm: Sequence[tuple[int, int]] | None = None,
     layer: tuple[int, int] = (1, 0),
     hierarchy: str = "folded",
@@ -282,7 +334,9 @@ def write_layout(
 
     ``widths`` is one map or several, all of one size, each a square array: of whole, even nanometres, zero where there is no
     pillar, edges of squares or diameters of circles by ``shape``; or, where ``shape`` is :class:`Rectangles`, of rotations
-    in degrees from x towards y, NaN where there is none, which are rounded to the nearest step. ``centres_nm`` are their places; one map alone stands at the origin. Maps that are copies of one another, or
+    in degrees from x towards y, NaN where there is none, which are rounded to the nearest step. ``lattice`` says how pillars
+    stand: :func:`places` has the places of a map, and on a hexagonal lattice, of circles alone, those that are sites.
+    ``centres_nm`` are the places of the maps; one map alone stands at the origin. Maps that are copies of one another, or
     symmetric, are stored once. Returns the array that was written."""
     if isinstance(widths, np.ndarray) and widths.ndim == 2:
         widths = [widths]
@@ -293,7 +347,7 @@ def write_layout(
     if centres_nm is None and len(maps) == 1:
         centres_nm = [(0, 0)]
     centres = [(int(x), int(y)) for x, y in centres_nm or []]
-    array = Array(_native.array_of_widths(maps, pitch_nm, centres, _told(shape), progress))
+    array = Array(_native.array_of_widths(maps, pitch_nm, lattice, centres, _told(shape), progress))
     array.write(path, hierarchy=hierarchy, layer=layer, progress=progress)
     return array
 

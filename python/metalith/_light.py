@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _native
 from ._figures import imported
-from ._layouts import Array, Layout, Rectangles, Shape, _told
+from ._layouts import Array, Lattice, Layout, Rectangles, Shape, _told
 from ._types import Complex64, Complex128, Float64, Progress, Widths
 
 if TYPE_CHECKING:
@@ -161,6 +161,7 @@ def psf(
     distance_um: float | None = None,
     pitch_nm: int | None = None,
     shape: Shape = "square",
+    lattice: Lattice = "square",
     arriving: str | float = "left",
     pillar_height_nm: float = 700.0,
     pillar: str = SILICON_NITRIDE,
@@ -173,25 +174,27 @@ def psf(
     normal), ``neighbours`` (each pillar among its own neighbours;
     solved in minutes for each direction of light, then kept), ``fitted`` or
     ``published``. ``fast`` allows errors of 1e-3 instead of 1e-5 of the peak. An array of a design knows its sensor and
-    its pillars; else ``distance_um`` and, for a map of widths, ``pitch_nm`` are needed, and ``shape`` where pillars are no
-    squares. Rectangles are solved by ``rigorous`` alone, in light that arrives ``left`` or ``right`` circularly
+    its pillars; else ``distance_um`` and, for a map of widths, ``pitch_nm`` are needed, ``shape`` where pillars are no
+    squares, and ``lattice`` where they stand on a hexagonal one, which ``rigorous`` and ``fitted`` alone know.
+    Rectangles are solved by ``rigorous`` alone, in light that arrives ``left`` or ``right`` circularly
     polarised, linearly along ``x`` or ``y`` or at an angle from x towards y in degrees, or ``unpolarised`` (``arriving``); an
     array of a design is in the light that the design says. Intensities are over that of all light that arrives."""
     wavelengths = [float(nm) for nm in np.atleast_1d(np.asarray(wavelengths_nm, dtype=float))]
     fields = [(float(x), float(y)) for x, y in field_deg]
     if isinstance(of, Array) and of.design is not None:
-        own = (distance_um, pitch_nm, shape, arriving, pillar_height_nm, pillar, substrate)
-        if own != (None, None, "square", "left", 700.0, SILICON_NITRIDE, FUSED_SILICA):
+        own = (distance_um, pitch_nm, shape, lattice, arriving, pillar_height_nm, pillar, substrate)
+        if own != (None, None, "square", "square", "left", 700.0, SILICON_NITRIDE, FUSED_SILICA):
             raise _native.MetalithError(
                 "an array of a design knows its sensor, its pillars and its light\n"
-                "  help: leave out `distance_um`, `pitch_nm`, `shape`, `arriving` and what pillars are made of, or change the design"
+                "  help: leave out `distance_um`, `pitch_nm`, `shape`, `lattice`, `arriving` and what pillars are made of, or change"
+                " the design"
             )
         chosen = list(elements) if elements is not None else None
         found = _native.psf_of_array(
             of._native, wavelengths, fields, fidelity, fast, samples, chosen, progress
         )
         return PsfSet([Psf(**p) for p in found])
-    maps, pitch, shape = _maps(of, pitch_nm, shape)
+    maps, pitch, lattice, shape = _maps(of, pitch_nm, lattice, shape)
     if elements is not None:
         maps = [maps[k] for k in elements]
     if distance_um is None:
@@ -201,6 +204,7 @@ def psf(
     found = _native.psf_of_widths(
         maps,
         pitch,
+        lattice,
         wavelengths,
         fields,
         distance_um,
@@ -217,14 +221,16 @@ def psf(
     return PsfSet([Psf(**p) for p in found])
 
 
-def _maps(of: Array | Layout | Widths, pitch_nm: int | None, shape: Shape) -> tuple[list[Widths], int, Shape]:
+def _maps(
+    of: Array | Layout | Widths, pitch_nm: int | None, lattice: Lattice, shape: Shape
+) -> tuple[list[Widths], int, Lattice, Shape]:
     if isinstance(of, Layout):
-        return of.widths, of.pitch_nm, of.shape
+        return of.widths, of.pitch_nm, of.lattice, of.shape
     if isinstance(of, Array):
-        return [of.widths(k) for k in range(len(of))], of.pitch_nm, of.shape
+        return [of.widths(k) for k in range(len(of))], of.pitch_nm, of.lattice, of.shape
     if pitch_nm is None:
         raise _native.MetalithError("a map of widths has no pitch\n  help: give `pitch_nm`")
-    return [shape.numbers(of) if isinstance(shape, Rectangles) else of], pitch_nm, shape
+    return [shape.numbers(of) if isinstance(shape, Rectangles) else of], pitch_nm, lattice, shape
 
 
 class Transmission(np.ndarray[Any, np.dtype[np.complex128]]):
@@ -292,19 +298,31 @@ def cell(
     wavelength_nm: npt.ArrayLike,
     *,
     pitch_nm: float = 350.0,
+    lattice: Lattice = "square",
+    shape: Literal["square", "circle"] = "square",
     pillar_height_nm: float = 700.0,
     pillar: str = SILICON_NITRIDE,
     substrate: str = FUSED_SILICA,
     orders: int = 13,
     progress: Progress | None = None,
 ) -> Transmission:
-    """Complex zero-order transmission of square pillars on a lattice of equal ones, by rigorous coupled-wave analysis,
-    for light along the normal from the substrate: complex128 of the shape of ``width_nm`` followed by that of
+    """Complex zero-order transmission of square or round pillars on a lattice of equal ones, by rigorous coupled-wave
+    analysis, for light along the normal from the substrate: complex128 of the shape of ``width_nm`` followed by that of
     ``wavelength_nm``. It is a ratio of fields, from the foot of the pillars to their tops; ``orders`` along an axis, odd.
+    Widths of circles are diameters; on a hexagonal lattice pillars are circles, and ``pitch_nm`` is a whole number.
     ``.to_xarray()`` and ``.plot()`` show it with its widths and wavelengths."""
     widths, wavelengths = np.asarray(width_nm, dtype=float), np.asarray(wavelength_nm, dtype=float)
     found = _native.cell(
-        widths.ravel(), wavelengths.ravel(), pitch_nm, pillar_height_nm, pillar, substrate, orders, progress
+        widths.ravel(),
+        wavelengths.ravel(),
+        pitch_nm,
+        lattice,
+        _told(shape),
+        pillar_height_nm,
+        pillar,
+        substrate,
+        orders,
+        progress,
     )
     t = found.reshape(widths.shape + wavelengths.shape).view(Transmission)
     t.width_nm, t.wavelength_nm = widths, wavelengths
@@ -321,6 +339,7 @@ def propagate(
     aperture: npt.ArrayLike,
     *,
     pitch_nm: int,
+    lattice: Lattice = "square",
     wavelength_nm: float,
     distance_um: float,
     at_um: tuple[float, float] = (0.0, 0.0),
@@ -333,10 +352,22 @@ def propagate(
 ) -> tuple[Complex64, Float64, Float64]:
     """The field of a plane wave behind any complex aperture: field (complex64, ``[samples, samples]``), x and y (um).
 
-    ``aperture`` is square, its samples ``pitch_nm`` apart about the axis, each a point of weight pitch squared. The window
-    is about ``at_um``, its samples ``step_um`` apart (the pitch if left out). ``direct`` takes the Rayleigh-Sommerfeld sum
+    ``aperture`` is square, its samples where :func:`places` says about the axis, each a point that weighs the area of its
+    cell: ``pitch_nm`` apart, of weight pitch squared, on a square lattice; on a hexagonal one zero where there is no site.
+    The window is about ``at_um``, its samples ``step_um`` apart (the pitch if left out). ``direct`` takes the Rayleigh-Sommerfeld sum
     over all samples instead of folded transforms: slow, and what they are tested against."""
     values = np.ascontiguousarray(aperture, dtype=np.complex128)
     return _native.propagate(
-        values, pitch_nm, wavelength_nm, distance_um, at_um, samples, step_um, incidence_deg, fast, direct, progress
+        values,
+        pitch_nm,
+        lattice,
+        wavelength_nm,
+        distance_um,
+        at_um,
+        samples,
+        step_um,
+        incidence_deg,
+        fast,
+        direct,
+        progress,
     )

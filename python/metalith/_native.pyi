@@ -6,7 +6,7 @@ from typing import Any, TypeAlias, final
 import numpy as np
 import numpy.typing as npt
 
-from ._types import Complex64, Complex128, Float64, PathLike, Progress, Widths
+from ._types import Bools, Complex64, Complex128, Float64, Int64, PathLike, Progress, Widths
 
 __version__: str
 
@@ -32,6 +32,8 @@ class Design:
     @property
     def pitch_nm(self) -> int: ...
     @property
+    def lattice(self) -> str: ...
+    @property
     def pillar_height_nm(self) -> float: ...
     @property
     def diameter_um(self) -> float: ...
@@ -49,6 +51,8 @@ class Array:
     def pillars(self) -> int: ...
     @property
     def pitch_nm(self) -> int: ...
+    @property
+    def lattice(self) -> str: ...
     @property
     def sites(self) -> int: ...
     @property
@@ -72,14 +76,16 @@ def read_layout(
     design: Design | None = None,
     array: Array | None = None,
     progress: Progress | None = None,
-) -> tuple[list[str], list[tuple[int, int]], list[int], list[Widths], int, int, str, ToldShape]: ...
+) -> tuple[list[str], list[tuple[int, int]], list[Widths], int, str, int, int, str, ToldShape]: ...
 def array_of_widths(
     widths: list[Widths],
     pitch_nm: int,
+    lattice: str,
     centres_nm: list[tuple[int, int]],
     shape: ToldShape,
     progress: Progress | None = None,
 ) -> Array: ...
+def places(sites: int, pitch_nm: int, lattice: str) -> tuple[Int64, Int64, Bools]: ...
 def rotation_numbers(rotations_deg: Float64, width_nm: int, length_nm: int, steps: int) -> Widths: ...
 def rotations_deg(numbers: Widths, width_nm: int, length_nm: int, steps: int) -> Float64: ...
 def psf_of_array(
@@ -95,6 +101,7 @@ def psf_of_array(
 def psf_of_widths(
     widths: list[Widths],
     pitch_nm: int,
+    lattice: str,
     wavelengths_nm: list[float],
     fields_deg: list[tuple[float, float]],
     distance_um: float,
@@ -111,6 +118,7 @@ def psf_of_widths(
 def propagate(
     aperture: Complex128,
     pitch_nm: int,
+    lattice: str,
     wavelength_nm: float,
     distance_um: float,
     at_um: tuple[float, float],
@@ -125,6 +133,8 @@ def cell(
     widths_nm: Float64,
     wavelengths_nm: Float64,
     pitch_nm: float,
+    lattice: str,
+    shape: ToldShape,
     height_nm: float,
     pillar: str,
     substrate: str,

@@ -18,5 +18,7 @@ Progress: TypeAlias = Callable[[str, int, int], object]
 Widths: TypeAlias = npt.NDArray[np.uint16]
 Complex64: TypeAlias = npt.NDArray[np.complex64]
 Complex128: TypeAlias = npt.NDArray[np.complex128]
+Bools: TypeAlias = npt.NDArray[np.bool_]
+Int64: TypeAlias = npt.NDArray[np.int64]
 Float64: TypeAlias = npt.NDArray[np.float64]
 Json: TypeAlias = "dict[str, Any]"

@@ -6,12 +6,14 @@ use metalith::extract::ExtractedElement;
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::layout::{FreeLayout, LayoutFormat, OasisEncoding, extraction_plan, write_free, write_pillars_as};
 use metalith::{
-    ElementSite, Error, ExtractionPlan, Hierarchy, Lattice, Layout, PillarArray, PillarShape, Wedge, WidthMap, extract,
+    ElementSite, Error, ExtractionPlan, Hierarchy, LatticeKind, Layout, PillarArray, PillarShape, Wedge, WidthMap,
+    extract,
 };
 use numpy::ndarray::Array2;
 use numpy::{PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 
+use crate::lattices::{check_places, check_shape, kind_of, lattice_of};
 use crate::shapes::{ToldShape, shape_of, told};
 use crate::work::{error, work};
 
@@ -60,6 +62,12 @@ impl Design {
     #[getter]
     fn pitch_nm(&self) -> u32 {
         self.design.cell.pitch_nm
+    }
+
+    /// How the pillars stand.
+    #[getter]
+    fn lattice(&self) -> String {
+        self.design.cell.lattice.to_string()
     }
 
     #[getter]
@@ -122,7 +130,13 @@ impl Array {
         self.array.lattice.pitch_nm()
     }
 
-    /// Sites along an axis of one element.
+    /// How the pillars stand.
+    #[getter]
+    fn lattice(&self) -> String {
+        self.array.lattice.kind().to_string()
+    }
+
+    /// Places along an axis of the map of one element.
     #[getter]
     fn sites(&self) -> usize {
         self.array.lattice.sites()
@@ -211,11 +225,12 @@ impl Array {
 
 /// An array of pillars that are given as widths, or as numbers of rotations of rectangles, one map for each element.
 #[pyfunction]
-#[pyo3(signature = (widths, pitch_nm, centres_nm, shape, progress=None))]
+#[pyo3(signature = (widths, pitch_nm, lattice, centres_nm, shape, progress=None))]
 pub fn array_of_widths(
     py: Python<'_>,
     widths: Vec<PyReadonlyArray2<'_, u16>>,
     pitch_nm: u32,
+    lattice: &str,
     centres_nm: Vec<(i64, i64)>,
     shape: ToldShape,
     progress: Option<Py<PyAny>>,
@@ -227,9 +242,10 @@ pub fn array_of_widths(
             "give one centre for each map, and at least one",
         )));
     }
+    let kind = kind_of(lattice).map_err(error)?;
     let maps: Vec<WidthMap> = widths
         .iter()
-        .map(|w| width_map(w.as_array().to_owned(), pitch_nm, shape))
+        .map(|w| width_map(w.as_array().to_owned(), pitch_nm, kind, shape))
         .collect::<metalith::Result<_>>()
         .map_err(error)?;
     drop(widths);
@@ -241,15 +257,15 @@ pub fn array_of_widths(
 }
 
 /// A map of pillars of a shape as the library has it.
-pub fn width_map(width_nm: Array2<u16>, pitch_nm: u32, shape: PillarShape) -> metalith::Result<WidthMap> {
-    let (rows, columns) = width_nm.dim();
-    if rows != columns {
-        return Err(Error::invalid(
-            format!("a map of {rows} x {columns} widths"),
-            "give a square map: pad it with zeros, which are sites without pillars",
-        ));
-    }
-    let lattice = Lattice::new(pitch_nm, rows)?;
+pub fn width_map(
+    width_nm: Array2<u16>,
+    pitch_nm: u32,
+    kind: LatticeKind,
+    shape: PillarShape,
+) -> metalith::Result<WidthMap> {
+    check_shape(kind, shape)?;
+    let lattice = lattice_of(kind, pitch_nm, width_nm.dim(), "map")?;
+    let widest_nm = kind.widest_nm(pitch_nm);
     if let Some(pillars) = shape.rectangles() {
         let longer = pillars.width_nm.max(pillars.length_nm);
         if u32::from(longer) > pitch_nm {
@@ -264,22 +280,26 @@ pub fn width_map(width_nm: Array2<u16>, pitch_nm: u32, shape: PillarShape) -> me
                 format!("numbers go from 1 to {}, the steps of half a turn", pillars.steps),
             ));
         }
-    } else if let Some(wrong) = width_nm.iter().find(|w| **w % 2 != 0 || u32::from(**w) > pitch_nm) {
+    } else if let Some(wrong) = width_nm.iter().find(|w| **w % 2 != 0 || u32::from(**w) > widest_nm) {
         return Err(Error::invalid(
             format!("a pillar {wrong} nm wide"),
-            format!("widths are even, so that edges are whole nanometres, and at most the pitch of {pitch_nm} nm"),
+            format!(
+                "widths are even, so that edges are whole nanometres, and at most the distance of neighbours, {widest_nm} nm"
+            ),
         ));
     }
+    check_places(lattice, &width_nm, |w| *w != 0)?;
     Ok(WidthMap { lattice, width_nm })
 }
 
-/// What a layout holds: names, centres (nm), pitches (nm) and widths (nm) of its elements, number of pillars, number of
-/// other shapes on the layer, top cell, shape of the pillars.
+/// What a layout holds: names, centres (nm) and widths (nm) of its elements, pitch (nm) and kind of their lattices, number of
+/// pillars, number of other shapes on the layer, top cell, shape of the pillars.
 type ReadLayout<'py> = (
     Vec<String>,
     Vec<[i64; 2]>,
-    Vec<u32>,
     Vec<Bound<'py, PyArray2<u16>>>,
+    u32,
+    String,
     u64,
     u64,
     String,
@@ -309,10 +329,14 @@ pub fn read_layout<'py>(
             (None, None) => ExtractionPlan::discover(layer),
         };
         let found = extract(&layout, &ExtractionPlan { top, ..plan }, p)?;
-        if found.elements.iter().any(|e| !e.site.lattice.is_square()) {
+        if let Some(other) = found.other_lattice() {
             return Err(metalith::Error::invalid(
-                format!("{}: pillars on a hexagonal lattice", path.display()),
-                "arrays of widths are of square lattices; `metalith check` and `diff` know this layout",
+                format!(
+                    "{}: {} stands on another lattice than the elements before it",
+                    path.display(),
+                    other.name
+                ),
+                "name a cell with elements of one kind by `top`",
             ));
         }
         Ok(found)
@@ -320,15 +344,19 @@ pub fn read_layout<'py>(
     let pillars = found.pillars;
     let others = found.oddities.total();
     let shape = told(found.shape);
-    let mut out: ReadLayout<'py> = (vec![], vec![], vec![], vec![], pillars, others, found.top, shape);
+    let lattice = found.elements.first().map(|e| e.site.lattice);
+    let (pitch_nm, kind) = lattice.map_or((0, LatticeKind::Square), |l| (l.pitch_nm(), l.kind()));
+    let (mut names, mut centres_nm, mut widths_nm) = (vec![], vec![], vec![]);
     for ExtractedElement { site, widths } in found.elements {
-        out.0.push(site.name);
-        out.1.push(site.centre_nm);
-        out.2.push(site.lattice.pitch_nm());
+        names.push(site.name);
+        centres_nm.push(site.centre_nm);
         // The memory that it was read into becomes the array's: nothing is copied.
-        out.3.push(PyArray2::from_owned_array(py, widths.width_nm));
+        widths_nm.push(PyArray2::from_owned_array(py, widths.width_nm));
     }
-    Ok(out)
+    let kind = kind.to_string();
+    Ok((
+        names, centres_nm, widths_nm, pitch_nm, kind, pillars, others, found.top, shape,
+    ))
 }
 
 /// Where the elements of an array are.

@@ -6,6 +6,7 @@
 
 mod arrays;
 mod checks;
+mod lattices;
 mod light;
 mod pictures;
 mod psf;
@@ -39,6 +40,7 @@ fn _native(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(main, m)?)?;
     m.add_function(wrap_pyfunction!(arrays::read_layout, m)?)?;
     m.add_function(wrap_pyfunction!(arrays::array_of_widths, m)?)?;
+    m.add_function(wrap_pyfunction!(lattices::places, m)?)?;
     m.add_function(wrap_pyfunction!(shapes::rotation_numbers, m)?)?;
     m.add_function(wrap_pyfunction!(shapes::rotations_deg, m)?)?;
     m.add_function(wrap_pyfunction!(psf::psf_of_array, m)?)?;

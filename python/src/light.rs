@@ -5,13 +5,15 @@ use std::path::Path;
 use metalith::cell::CellStack;
 use metalith::rcwa::{Material, Orders};
 use metalith::wave::{Aperture, Direct, Fold, PlaneWave, Propagator, Scratch, Window};
-use metalith::{Accuracy, Error, Lattice, Result};
+use metalith::{Accuracy, Error, Lattice, LatticeKind, Result};
 use ndarray::Array2;
 use num_complex::{Complex32, Complex64};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
+use crate::lattices::{check_places, kind_of, lattice_of, stack_on};
+use crate::shapes::{ToldShape, shape_of};
 use crate::work::{error, work};
 
 /// What pillars are made of, where no design says.
@@ -48,30 +50,21 @@ impl Aperture for Given {
 }
 
 impl Given {
-    fn new(values: Array2<Complex32>, pitch_nm: u32) -> Result<Self> {
-        let (rows, columns) = values.dim();
-        if rows != columns {
-            return Err(Error::invalid(
-                format!("an aperture of {rows} x {columns} samples"),
-                "give a square one: pad it with zeros",
-            ));
-        }
+    fn new(values: Array2<Complex32>, pitch_nm: u32, kind: LatticeKind) -> Result<Self> {
+        let lattice = lattice_of(kind, pitch_nm, values.dim(), "aperture")?;
         if values.iter().any(|v| !v.re.is_finite() || !v.im.is_finite()) {
             return Err(Error::invalid(
                 "an aperture with values that are no numbers",
                 "give finite values",
             ));
         }
-        let lattice = Lattice::new(pitch_nm, rows)?;
+        check_places(lattice, &values, |v| *v != Complex32::ZERO)?;
         let open = values.indexed_iter().filter(|(_, v)| **v != Complex32::ZERO);
-        let half2 = open
-            .map(|((iy, ix), _)| lattice.half_radius2(ix, iy))
-            .max()
-            .unwrap_or(0);
+        let farthest2 = open.map(|((iy, ix), _)| lattice.units2(ix, iy)).max().unwrap_or(0);
         Ok(Self {
             lattice,
             values,
-            radius_um: (half2 as f64).sqrt() * 0.5 * lattice.pitch_um(),
+            radius_um: (farthest2 as f64).sqrt() * lattice.unit_um(),
         })
     }
 }
@@ -85,13 +78,14 @@ type FieldOnGrid<'py> = (
 
 /// The field behind a complex aperture, on a window: `direct` by the Rayleigh-Sommerfeld sum over all sites, else folded.
 #[pyfunction]
-#[pyo3(signature = (aperture, pitch_nm, wavelength_nm, distance_um, at_um, samples, step_um, incidence_deg, fast, direct,
-    progress=None))]
+#[pyo3(signature = (aperture, pitch_nm, lattice, wavelength_nm, distance_um, at_um, samples, step_um, incidence_deg, fast,
+    direct, progress=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn propagate<'py>(
     py: Python<'py>,
     aperture: PyReadonlyArray2<'py, Complex64>,
     pitch_nm: u32,
+    lattice: &str,
     wavelength_nm: f64,
     distance_um: f64,
     at_um: [f64; 2],
@@ -104,7 +98,7 @@ pub fn propagate<'py>(
 ) -> PyResult<FieldOnGrid<'py>> {
     let single = aperture.as_array().mapv(|v| Complex32::new(v.re as f32, v.im as f32));
     drop(aperture);
-    let given = Given::new(single, pitch_nm).map_err(error)?;
+    let given = Given::new(single, pitch_nm, kind_of(lattice).map_err(error)?).map_err(error)?;
     let um = wavelength_nm * 1e-3;
     let window = Window::about(at_um, step_um.unwrap_or(given.lattice.pitch_um()), samples, distance_um);
     let [sin_x, sin_y] = incidence_deg.map(|deg| deg.to_radians().sin());
@@ -133,13 +127,15 @@ pub fn propagate<'py>(
 
 /// Zero-order transmission of pillars along the normal, shape `[widths, wavelengths]`.
 #[pyfunction]
-#[pyo3(signature = (widths_nm, wavelengths_nm, pitch_nm, height_nm, pillar, substrate, orders, progress=None))]
+#[pyo3(signature = (widths_nm, wavelengths_nm, pitch_nm, lattice, shape, height_nm, pillar, substrate, orders, progress=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn cell<'py>(
     py: Python<'py>,
     widths_nm: PyReadonlyArray1<'py, f64>,
     wavelengths_nm: PyReadonlyArray1<'py, f64>,
     pitch_nm: f64,
+    lattice: &str,
+    shape: ToldShape,
     height_nm: f64,
     pillar: &str,
     substrate: &str,
@@ -148,7 +144,16 @@ pub fn cell<'py>(
 ) -> PyResult<Bound<'py, PyArray2<Complex64>>> {
     let (widths, wavelengths) = (widths_nm.as_array().to_vec(), wavelengths_nm.as_array().to_vec());
     drop((widths_nm, wavelengths_nm));
-    let stack = stack(pitch_nm, height_nm, pillar, substrate).map_err(error)?;
+    let shape = shape_of(shape).map_err(error)?;
+    if shape.rectangles().is_some() {
+        return Err(error(Error::invalid(
+            "the transmission of rectangles by their width",
+            "give squares or circles: rectangles are of one size, and `metalith.psf` simulates them",
+        )));
+    }
+    let stack = stack(pitch_nm, height_nm, pillar, substrate)
+        .and_then(|stack| stack_on(stack, kind_of(lattice)?, shape))
+        .map_err(error)?;
     let orders = Orders::new(orders).map_err(|e| error(e.into()))?;
     let (rows, columns) = (widths.len(), wavelengths.len());
     let t = work(py, progress, |p| {

@@ -1,20 +1,22 @@
 //! PSFs of arrays and of maps of widths.
 
 use metalith::cell::{
-    CellStack, FittedCell, Handedness, PointwiseCell, Polarisation, PolarisedLight, PublishedCell, RotatedCell,
-    cache_folder,
+    FittedCell, Handedness, PointwiseCell, Polarisation, PolarisedLight, PublishedCell, RotatedCell, cache_folder,
 };
 use metalith::design::band_about;
 use metalith::extract::{ElementSite, ExtractedElement, Extraction};
 use metalith::grating::{Mapping, NeighbourCell};
 use metalith::verify::{Lighting, SimulationCase, SinglePsf, single_psfs};
 use metalith::wave::propagation::{incident, landing_um};
-use metalith::{Accuracy, CellModel, Error, Fidelity, PillarShape, Progress, Result, Wedge, WidthMap, cell_models};
+use metalith::{
+    Accuracy, CellModel, Error, Fidelity, LatticeKind, PillarShape, Progress, Result, Wedge, WidthMap, cell_models,
+};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{Array, no_wedge, width_map};
+use crate::lattices::{kind_of, stack_on};
 use crate::light::stack;
 use crate::shapes::{ToldShape, shape_of};
 use crate::work::{error, work};
@@ -45,21 +47,16 @@ fn polarisation(text: &str, shape: PillarShape) -> Result<Polarisation> {
     Ok(named)
 }
 
-/// Cells that a shape does not have.
-fn refuse(wanted: Fidelity, shape: PillarShape) -> Result<()> {
-    let (had, hint) = match shape {
-        PillarShape::Square => return Ok(()),
-        // Its polynomials are of squares.
-        PillarShape::Circle => (wanted != Fidelity::Published, "use rigorous, neighbours or fitted"),
-        PillarShape::Rectangle(_) => (wanted == Fidelity::Rigorous, "use rigorous"),
-    };
-    if had {
-        return Ok(());
+/// Cells that pillars of a shape on such a lattice do not have.
+fn refuse(wanted: Fidelity, shape: PillarShape, kind: LatticeKind) -> Result<()> {
+    // Its polynomials are of squares.
+    if shape == PillarShape::Circle && wanted == Fidelity::Published {
+        return Err(Error::invalid(
+            format!("{} by the `{wanted}` cell", shape.plural()),
+            "use rigorous, neighbours or fitted",
+        ));
     }
-    Err(Error::invalid(
-        format!("{} by the `{wanted}` cell", shape.plural()),
-        hint,
-    ))
+    wanted.check(shape, kind)
 }
 
 /// An element to simulate.
@@ -276,13 +273,14 @@ pub fn psf_of_array<'py>(
 
 /// PSFs of maps of widths, without a design.
 #[pyfunction]
-#[pyo3(signature = (widths, pitch_nm, wavelengths_nm, fields_deg, distance_um, fidelity, fast, samples, shape, arriving,
-    height_nm, pillar, substrate, progress=None))]
+#[pyo3(signature = (widths, pitch_nm, lattice, wavelengths_nm, fields_deg, distance_um, fidelity, fast, samples, shape,
+    arriving, height_nm, pillar, substrate, progress=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn psf_of_widths<'py>(
     py: Python<'py>,
     widths: Vec<PyReadonlyArray2<'py, u16>>,
     pitch_nm: u32,
+    lattice: &str,
     wavelengths_nm: Vec<f64>,
     fields_deg: Vec<(f64, f64)>,
     distance_um: f64,
@@ -299,16 +297,16 @@ pub fn psf_of_widths<'py>(
     let wanted = self::fidelity(fidelity).map_err(error)?;
     let shape = shape_of(shape).map_err(error)?;
     let arriving = polarisation(arriving, shape).map_err(error)?;
-    refuse(wanted, shape).map_err(error)?;
+    let kind = kind_of(lattice).map_err(error)?;
+    refuse(wanted, shape, kind).map_err(error)?;
     let maps = widths
         .iter()
-        .map(|w| width_map(w.as_array().to_owned(), pitch_nm, shape));
+        .map(|w| width_map(w.as_array().to_owned(), pitch_nm, kind, shape));
     let maps = maps.collect::<Result<Vec<_>>>().map_err(error)?;
     drop(widths);
-    let stack = CellStack {
-        shape,
-        ..stack(f64::from(pitch_nm), height_nm, pillar, substrate).map_err(error)?
-    };
+    let stack = stack(f64::from(pitch_nm), height_nm, pillar, substrate)
+        .and_then(|stack| stack_on(stack, kind, shape))
+        .map_err(error)?;
     let found = work(py, progress, |p| {
         let drawn = drawn(&maps);
         let cell: Box<dyn CellModel> = match (wanted, shape.rectangles()) {

@@ -50,7 +50,7 @@ impl CameraArgs {
             terminal.say(&quantity.to_string());
         }
         Ok(CameraFiles {
-            design: standard_input::design_any(&self.design)?,
+            design: standard_input::design(&self.design)?,
             camera: Camera::read(&self.camera)?,
             model,
         })

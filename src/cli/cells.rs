@@ -53,7 +53,7 @@ pub struct CellsArgs {
 /// Do it.
 pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
-    let design = standard_input::design_any(&args.design)?;
+    let design = standard_input::design(&args.design)?;
     if args.steered {
         design.square_lattice("--steered")?;
     }

@@ -99,7 +99,7 @@ pub fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
     args.paths_are_apart()?;
     let named = args.rules.as_deref().map(Deck::read).transpose()?;
     let waivers = args.waivers.as_deref().map(Waivers::read).transpose()?;
-    let mut design = args.design.as_deref().map(standard_input::design_any).transpose()?;
+    let mut design = args.design.as_deref().map(standard_input::design).transpose()?;
     let deck = named.unwrap_or_else(|| Deck::for_design(design.as_ref()));
     terminal.stop_on_interrupt();
     let file = InputFile::of(&args.layout)?;

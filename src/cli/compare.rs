@@ -199,7 +199,7 @@ impl ComparedDesign {
     pub fn listed(&self) -> Result<ListedDesign> {
         Ok(ListedDesign {
             name: self.name.clone(),
-            layout: self.layout(&Design::read_any(&self.design)?)?,
+            layout: self.layout(&Design::read(&self.design)?)?,
             design: self.design.clone(),
             camera: self.camera.clone(),
             field_deg: self.field_deg,

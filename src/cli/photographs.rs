@@ -54,7 +54,7 @@ fn of_single_pillars() -> impl TypedValueParser<Value = FidelityArg> {
 }
 
 pub fn run(args: &PhotographsArgs, terminal: &Terminal) -> Result<Outcome> {
-    let design = standard_input::design_any(&args.design)?;
+    let design = standard_input::design(&args.design)?;
     terminal.stop_on_interrupt();
     let task = OptimiseTask::of(&design)?;
     let images = args

@@ -9,7 +9,6 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use metalith::cell::{Fidelity, Handedness, Polarisation};
 use metalith::design::TALLEST_NM;
-use metalith::extract::ExtractedElement;
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::report::{count, exact, sig};
 use metalith::verify::{
@@ -237,22 +236,19 @@ fn mostly_pillars(args: &PsfArgs, found: &Extraction) -> Result<()> {
 
 /// One cell is solved for all elements: their pillars stand on lattices of one kind and pitch, which the cell must know.
 fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
-    let kind = PsfArgs::lattice_kind(found);
-    let first = found.elements.first().map(|e| e.site.lattice.pitch_nm());
-    let others = |e: &&ExtractedElement| e.site.lattice.kind() != kind || Some(e.site.lattice.pitch_nm()) != first;
-    if let Some(other) = found.elements.iter().find(others) {
+    if let Some(other) = found.other_lattice() {
         return Err(Error::invalid(
             format!(
                 "{}: {} stands on another lattice than the elements before it",
                 args.layout.display(),
-                other.site.name
+                other.name
             ),
             "name a cell with elements of one kind by --top, or look at what is there with --extract-only --json",
         ));
     }
     if args.model.is_none()
         && !args.extract_only
-        && let Some((what, hint)) = Fidelity::from(args.fidelity).refusal(found.shape, kind)
+        && let Some((what, hint)) = Fidelity::from(args.fidelity).refusal(found.shape, PsfArgs::lattice_kind(found))
     {
         return Err(Error::invalid(format!("{}: {what}", args.layout.display()), hint));
     }

@@ -96,18 +96,6 @@ pub fn design(path: &Path) -> Result<Design> {
     }
 }
 
-/// As [`design`], on a lattice of any kind.
-///
-/// # Errors
-/// As [`Design::read_any`]; also if standard input is no text, or too long.
-pub fn design_any(path: &Path) -> Result<Design> {
-    if is_standard_input(path) {
-        Design::parse_any(Path::new(NAME), &design_text()?)
-    } else {
-        Design::read_any(path)
-    }
-}
-
 /// The text of a design on standard input.
 fn design_text() -> Result<String> {
     let name = Path::new(NAME);

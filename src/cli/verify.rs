@@ -270,7 +270,7 @@ fn summary(found: &Verification, folder: &Path) {
 }
 
 pub fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
-    let mut design = standard_input::design_any(&args.design)?;
+    let mut design = standard_input::design(&args.design)?;
     let layout = InputFile::of(&args.layout)?;
     judged_as_made(
         "--compensated",

@@ -132,7 +132,7 @@ fn designs(folder: &Path) -> Vec<Format> {
             folder.join("mutant.toml"),
             Kind::Text,
             files("designs", "toml"),
-            Design::read_any,
+            Design::read,
         ),
         Format::new(
             "zmx",

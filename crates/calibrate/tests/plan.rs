@@ -154,3 +154,61 @@ fn what_captures_cannot_split_is_named_with_what_can() {
     assert!(pair.gain < pair.needed && !pair.captures_could);
     assert!(pair.separate_by.is_some() && !pair.sem_decides);
 }
+
+/// The plan says the lattice, the set is read on it, and what was done to the chip is found.
+#[test]
+#[ignore = "second tier: CPU time, run by .ci/run"]
+fn a_session_of_a_hexagonal_lens_is_planned_and_diagnosed() {
+    let path = metalith_testing::design("hexagonal_1550");
+    let text = fs::read_to_string(&path).unwrap();
+    let small = text
+        .replace("diameter_um = 160", "diameter_um = 30")
+        .replace("focal_length_um = 240", "focal_length_um = 45");
+    let design = Design::parse(&path, &small).unwrap();
+    let bench = small_bench()
+        .replace("[[led]]\ncentre_nm = 560\nfwhm_nm = 6.0\n", "")
+        .replace("centre_nm = 500", "centre_nm = 1550")
+        .replace("elements = [0, 0, 1, 0]", "elements = [0, 0]")
+        .replace("[139.0, 144.0, 149.0]", "[39.0, 45.0, 51.0]");
+    let folder = tempfile::tempdir().unwrap();
+    let tried = ["cd_bias", "gap"];
+    let plan = planned(folder.path(), &design, &bench, &tried);
+    assert!(plan.finds_all(), "{}", plan.sentence());
+    let said = fs::read_to_string(folder.path().join("measurement.toml")).unwrap();
+    assert!(said.contains("shape = \"circle\"\nlattice = \"hexagonal\"\n"), "{said}");
+    // Widths to measure are those of pillars, which stand on every other place.
+    let sem = fs::read_to_string(folder.path().join("cd_sem.csv")).unwrap();
+    assert_eq!(sem.lines().filter(|l| l.starts_with("0,0,")).count(), 24, "{sem}");
+    for wrong in [
+        "lattice = \"hexagonal\"\nshape = \"square\"",
+        "lattice = \"rhombic\"\nshape = \"circle\"",
+    ] {
+        let other = said.replace("shape = \"circle\"\nlattice = \"hexagonal\"", wrong);
+        fs::write(folder.path().join("measurement.toml"), other).unwrap();
+        let error = MeasuredSet::read(folder.path(), &GdsPillars, &Silent)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("lattice"), "{error}");
+    }
+    fs::write(folder.path().join("measurement.toml"), said).unwrap();
+
+    fill(folder.path(), &plan, None);
+    let like = read(folder.path());
+    let array = PillarArray::build(&design, &Silent).unwrap();
+    assert_eq!(like.elements.raw[0].pillars, *array.widths(array.central()));
+    let settings = settings(folder.path().join("cells"), &tried);
+    let synthesizer = Synthesizer::new(&like, &settings).unwrap();
+    for (name, size) in [("cd_bias", 6.0), ("gap", 2.0)] {
+        let images = synthesizer.with_effect(name, &[size], &Silent).unwrap();
+        fill(folder.path(), &plan, Some(&synthesizer.draw(&images, 41)));
+        let came_back = read(folder.path());
+        let session = Session::new(&came_back, settings.clone()).unwrap();
+        let found = session
+            .diagnose(&session.simulate(&Silent).unwrap(), &Silent)
+            .unwrap()
+            .0;
+        let names: Vec<&str> = found.effects.iter().map(|e| e.name.as_str()).collect();
+        assert_eq!(names, [name], "{}", found.sentence());
+        assert_eq!(found.effects[0].holds(size), Some(true), "{}", found.sentence());
+    }
+}

@@ -1,5 +1,7 @@
 //! The lattice that pillars stand on: square or hexagonal.
 
+use std::fmt;
+
 use ndarray::Array2;
 use serde::Serialize;
 
@@ -19,6 +21,9 @@ pub enum LatticeKind {
 }
 
 impl LatticeKind {
+    /// Name and value of each, as design files and measured sets have them.
+    pub const CHOICES: [(&'static str, Self); 2] = [("square", Self::Square), ("hexagonal", Self::Hexagonal)];
+
     /// Whether it is square.
     pub fn is_square(&self) -> bool {
         *self == Self::Square
@@ -31,6 +36,26 @@ impl LatticeKind {
             Self::Square => pitch_nm,
             Self::Hexagonal => (0.75 * f64::from(pitch_nm).powi(2)).sqrt().round() as u32,
         }
+    }
+
+    /// The widest pillar (nm): the distance of the nearest two, to an even number below. Rows of a hexagonal lattice are
+    /// rounded.
+    pub fn widest_nm(self, pitch_nm: u32) -> u32 {
+        match self {
+            Self::Square => pitch_nm,
+            Self::Hexagonal => {
+                let row_nm = f64::from(self.row_nm(pitch_nm));
+                let across_nm = (0.5 * f64::from(pitch_nm)).hypot(row_nm);
+                (across_nm.min(f64::from(pitch_nm)) as u32) & !1
+            }
+        }
+    }
+}
+
+impl fmt::Display for LatticeKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let own = Self::CHOICES.iter().find(|(_, kind)| kind == self);
+        f.pad(own.map_or("", |(name, _)| name))
     }
 }
 
@@ -164,6 +189,28 @@ impl Lattice {
     /// Whether a place of the grid is a site.
     pub fn has(&self, ix: usize, iy: usize) -> bool {
         self.is_square() || (ix + iy).is_multiple_of(2)
+    }
+
+    /// The site nearest to a place from the centre (um), column and row; none beyond the grid.
+    pub fn site_at(&self, at_um: [f64; 2]) -> Option<[usize; 2]> {
+        let steps = self.steps_um();
+        let [u, v] = [0, 1].map(|axis| at_um[axis] / steps[axis] + 0.5 * (self.sites as f64 - 1.0));
+        let nearest = match self.kind {
+            LatticeKind::Square => [u.round(), v.round()],
+            LatticeKind::Hexagonal => {
+                // Every other column of the row below, or of that above.
+                let of_row = |row: f64| {
+                    let odd = row.rem_euclid(2.0);
+                    [2.0 * (0.5 * (u - odd)).round() + odd, row]
+                };
+                let away = |[column, row]: [f64; 2]| ((u - column) * steps[0]).hypot((v - row) * steps[1]);
+                let [below, above] = [v.floor(), v.floor() + 1.0].map(of_row);
+                if away(above) < away(below) { above } else { below }
+            }
+        };
+        let inside = 0.0..self.sites as f64;
+        let is_inside = nearest.iter().all(|i| inside.contains(i));
+        is_inside.then(|| nearest.map(|i| i as usize))
     }
 
     /// Columns and rows of the grid that a lens may reach: all, but on a hexagonal lattice only as many rows as are in a square.
@@ -366,6 +413,36 @@ mod tests {
         }
         assert!(Lattice::of_kind(LatticeKind::Hexagonal, 350, 4).is_err());
         assert!(Lattice::of_kind_covering(LatticeKind::Hexagonal, 0, 350).is_err());
+    }
+
+    #[test]
+    fn the_nearest_site_is_that_of_all() {
+        // Places that are as far from two sites as rounding tells.
+        const TIE_UM: f64 = 1e-9;
+        for lattice in [
+            Lattice::new(350, 6).unwrap(),
+            Lattice::of_kind(LatticeKind::Square, 350, 7).unwrap(),
+            Lattice::of_kind(LatticeKind::Hexagonal, 700, 9).unwrap(),
+        ] {
+            let n = lattice.sites();
+            let away = |[ix, iy]: [usize; 2], [x, y]: [f64; 2]| {
+                (lattice.place_um(0, ix) - x).hypot(lattice.place_um(1, iy) - y)
+            };
+            for k in 0..400 {
+                // Within the outermost sites.
+                let [x, y] = [(k * 37) % 401, (k * 113) % 401].map(|i| (f64::from(i) / 200.0 - 1.0) * 0.8);
+                let at = [x, y];
+                let all = (0..n * n)
+                    .map(|i| [i % n, i / n])
+                    .filter(|[ix, iy]| lattice.has(*ix, *iy));
+                let least = all.map(|site| away(site, at)).fold(f64::INFINITY, f64::min);
+                let found = lattice.site_at(at).unwrap();
+                assert!(lattice.has(found[0], found[1]));
+                assert!(away(found, at) < least + TIE_UM, "{lattice:?} {at:?}: {found:?}");
+            }
+            assert_eq!(lattice.site_at([0.0, 50.0]), None);
+            assert_eq!(lattice.site_at([-50.0, 0.0]), None);
+        }
     }
 
     #[test]

@@ -38,12 +38,11 @@ pub struct Design {
 }
 
 impl Design {
-    /// Read the design file at `path`, and the files that it names: a design on a square lattice.
+    /// Read the design file at `path`, and the files that it names.
     ///
     /// # Errors
     /// [`metalith_core::Error::Text`] with every mistake of the file, each with line, column and remedy;
-    /// [`metalith_core::Error::Table`] for a phase table that cannot be used. A design on a hexagonal lattice is one: whoever
-    /// knows that reads it by [`Design::read_any`].
+    /// [`metalith_core::Error::Table`] for a phase table that cannot be used.
     pub fn read(path: &Path) -> Result<Self> {
         Self::parse(path, &load(path)?)
     }
@@ -53,38 +52,10 @@ impl Design {
     /// # Errors
     /// As [`Design::read`], but for reading the file itself.
     pub fn parse(path: &Path, text: &str) -> Result<Self> {
-        Self::document(path, text, false)
+        Document::read(path, text, |root| Self::sections(path, root))?.with_files()
     }
 
-    /// As [`Design::read`], on a lattice of any kind.
-    ///
-    /// # Errors
-    /// As [`Design::read`], but for the lattice.
-    pub fn read_any(path: &Path) -> Result<Self> {
-        Self::parse_any(path, &load(path)?)
-    }
-
-    /// As [`Design::parse`], on a lattice of any kind.
-    ///
-    /// # Errors
-    /// As [`Design::parse`], but for the lattice.
-    pub fn parse_any(path: &Path, text: &str) -> Result<Self> {
-        Self::document(path, text, true)
-    }
-
-    fn document(path: &Path, text: &str, any_lattice: bool) -> Result<Self> {
-        let design = Document::read(path, text, |root| {
-            let design = Self::sections(path, root)?;
-            if !any_lattice && !design.cell.lattice.is_square() {
-                root.section("cell")
-                    .fault("lattice", "a hexagonal lattice, which is not known here yet", KNOWN_TO);
-            }
-            Ok::<_, Error>(design)
-        })?;
-        design?.with_files()
-    }
-
-    fn sections(path: &Path, root: &Section<'_, '_>) -> Result<Self> {
+    fn sections(path: &Path, root: &Section<'_, '_>) -> Self {
         root.integer("schema", SCHEMA..=SCHEMA, "");
         let name = root.text("name");
         let legal = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
@@ -114,7 +85,7 @@ impl Design {
         let verify = VerifySpec::read(&root.section("verify"), &cell);
         check_directions(&array_section, &array, &verify);
         let optimise = OptimiseSpec::read(root.optional_section("optimise").as_ref());
-        Ok(Self {
+        Self {
             name,
             title,
             path: path.to_owned(),
@@ -125,7 +96,7 @@ impl Design {
             layout,
             verify,
             optimise,
-        })
+        }
     }
 
     /// Read the files that the design names, after all its own mistakes are known to be none.
@@ -251,7 +222,7 @@ impl Design {
                 "{who} knows square lattices alone, and {} is a design on a hexagonal one",
                 self.path.display()
             ),
-            KNOWN_TO,
+            "use a design on a square lattice",
         ))
     }
 
@@ -409,10 +380,6 @@ fn check_directions(section: &Section<'_, '_>, array: &ArraySpec, verify: &Verif
         }
     }
 }
-
-/// What a hexagonal lattice is good for.
-const KNOWN_TO: &str =
-    "use a square lattice here: `plan`, `calibrate`, `cells --steered` and Python know no other; the other commands do";
 
 /// Leaves room within the 32 characters of a GDSII cell name for the parts a layout adds.
 const MAX_NAME: usize = 24;

@@ -194,7 +194,7 @@ mod tests {
             assert!(text.contains(from), "{from}");
             text = text.replacen(from, to, 1);
         }
-        Design::parse_any(&path, &text).unwrap()
+        Design::parse(&path, &text).unwrap()
     }
 
     #[test]

@@ -19,7 +19,7 @@ fn mapped(name: &str, lines: &str) -> String {
 }
 
 fn parse(name: &str, text: &str) -> metalith_core::Result<Design> {
-    Design::parse_any(&path(name), text)
+    Design::parse(&path(name), text)
 }
 
 fn faults(name: &str, text: &str) -> Box<Faults> {

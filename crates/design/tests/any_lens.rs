@@ -338,7 +338,7 @@ fn the_least_spacing_of_a_grid_leaves_a_pitch() {
                 Some("size_um") => "size_um = [1000, 1000]\n".into(),
                 _ => format!("{line}\n"),
             };
-            Design::parse_any(&path(name), &text(name).lines().map(changed).collect::<String>())
+            Design::parse(&path(name), &text(name).lines().map(changed).collect::<String>())
         };
         let error = read(least_um - 0.001).unwrap_err().to_string();
         assert!(error.contains("neighbouring lenses overlap"), "{name}: {error}");
@@ -379,7 +379,7 @@ fn the_shipped_designs_are_read() {
     for file in std::fs::read_dir(folder).unwrap() {
         let file = file.unwrap().path();
         if file.extension().is_some_and(|e| e == "toml") {
-            Design::read_any(&file).unwrap();
+            Design::read(&file).unwrap();
             read += 1;
         }
     }

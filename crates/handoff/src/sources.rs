@@ -161,9 +161,9 @@ fn unique(taken: &BTreeSet<String>, name: &str) -> String {
 /// Read the design and the files it names. What is kept is what was read: the files are read before and after the
 /// design is, and must not change in between.
 fn read_design(path: &Path) -> Result<(Design, Vec<InputCopy>)> {
-    let named = files_of(path, &Design::read_any(path)?)?;
+    let named = files_of(path, &Design::read(path)?)?;
     let before = bytes_of(&named)?;
-    let design = Design::read_any(path)?;
+    let design = Design::read(path)?;
     let same_files = files_of(path, &design)? == named;
     for ((path, ..), bytes) in named.iter().zip(&before) {
         if !same_files || read_at_most(path, LONGEST, "an input of a hand-off")? != *bytes {

@@ -46,7 +46,7 @@ fn golden_bytes_of_the_mini_design() {
 /// What a folded layout of a design is, in number: its digest and how many pillars have each width, or of rectangles each
 /// number of a rotation.
 fn record(name: &str, folder: &Path) -> serde_json::Value {
-    let design = Design::read_any(&design(name)).unwrap();
+    let design = Design::read(&design(name)).unwrap();
     let array = PillarArray::build(&design, &Silent).unwrap();
     let path = folder.join(name);
     let written = write_pillars(&design, &array, Hierarchy::Folded, &path, &Silent).unwrap();

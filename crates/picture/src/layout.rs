@@ -146,7 +146,7 @@ mod tests {
         if let Some(um) = diameter_um {
             text = text.replacen("diameter_um = 60", &format!("diameter_um = {um}"), 1);
         }
-        Design::parse_any(path, &text).unwrap()
+        Design::parse(path, &text).unwrap()
     }
 
     /// What is read, for the small array, of the layout of an array of a design.

@@ -123,7 +123,7 @@ impl Lineup {
         }
         let own = |listed: &ListedDesign| {
             let own = listed.camera.as_deref().map(Camera::read).transpose()?;
-            Ok((Design::read_any(&listed.design)?, own.unwrap_or_else(|| camera.clone())))
+            Ok((Design::read(&listed.design)?, own.unwrap_or_else(|| camera.clone())))
         };
         let designs: Vec<(Design, Camera)> = self.designs.iter().map(own).collect::<Result<_>>()?;
         let view = self.simulated_view(&designs, first);

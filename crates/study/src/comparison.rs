@@ -109,7 +109,7 @@ fn key(lineup: &Lineup) -> Result<String> {
     hash.update(serde_json::to_vec(lineup).map_err(|e| Error::invalid(e.to_string(), "report this"))?);
     let mut files = Camera::read(&lineup.camera)?.files;
     for listed in &lineup.designs {
-        let design = Design::read_any(&listed.design)?;
+        let design = Design::read(&listed.design)?;
         let solver = metalith_cell::kept::solver_of(design.cell.shape);
         hash.update(format!("{solver} {} ", design.optics_digest()?));
         // The file itself for what it verifies: by which cell, at which wavelengths.

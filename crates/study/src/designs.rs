@@ -53,14 +53,14 @@ impl Tolerance {
     /// One of the designs, by number.
     ///
     /// # Errors
-    /// As [`Design::read_any`].
+    /// As [`Design::read`].
     pub fn design(&self, number: u64) -> Result<Design> {
         if self.design_grids.is_empty() {
-            return Design::read_any(&self.design);
+            return Design::read(&self.design);
         }
         let text = with_values(&load(&self.design)?, &self.setting(number))
             .map_err(|NoPlace { what, hint, .. }| Error::invalid(what, hint))?;
-        Design::parse_any(&self.design, &text)
+        Design::parse(&self.design, &text)
     }
 }
 
@@ -116,7 +116,7 @@ pub(crate) fn check(
     let (Ok(text), true) = (load(design), root.sound(&["design"])) else {
         return;
     };
-    if grids.iter().any(|g| g.values.is_empty()) || Design::parse_any(design, &text).is_err() {
+    if grids.iter().any(|g| g.values.is_empty()) || Design::parse(design, &text).is_err() {
         return;
     }
     let designs = count(grids);
@@ -133,7 +133,7 @@ pub(crate) fn check(
         for value in &grid.values {
             let fault = match with_values(&text, &[(&grid.key, value)]) {
                 Err(NoPlace { what, hint, .. }) => Some(("key", what, hint)),
-                Ok(text) => told(Design::parse_any(design, &text)).map(|(what, hint)| {
+                Ok(text) => told(Design::parse(design, &text)).map(|(what, hint)| {
                     let key = &grid.key;
                     (
                         "values",
@@ -162,7 +162,7 @@ pub(crate) fn check(
         let setting = setting(grids, number);
         let fault = match with_values(&text, &setting) {
             Err(NoPlace { change, what, hint }) => Some((change, what, hint)),
-            Ok(text) => told(Design::parse_any(design, &text)).map(|(what, hint)| {
+            Ok(text) => told(Design::parse(design, &text)).map(|(what, hint)| {
                 let words: Vec<String> = setting.iter().map(|(k, v)| format!("`{k} = {v}`")).collect();
                 (
                     grids.len() - 1,

@@ -188,7 +188,7 @@ impl PairsPlan {
 impl PairsRequest {
     /// SHA-256 of everything that decides the pairs.
     fn key(&self, digests: &[String]) -> Result<[u8; 32]> {
-        let design = Design::read_any(&self.design)?;
+        let design = Design::read(&self.design)?;
         let mut hash = Sha256::new();
         let solver = metalith_cell::kept::solver_of(design.cell.shape);
         hash.update(format!(
@@ -217,7 +217,7 @@ impl PairsRequest {
     }
 
     fn studio(&self, kept: &KeptKernels, progress: &dyn Progress) -> Result<Studio> {
-        let design = Design::read_any(&self.design)?;
+        let design = Design::read(&self.design)?;
         let camera = Camera::read(&self.camera)?;
         let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
         let first = self.images.first();

@@ -105,7 +105,7 @@ impl StartsPlan {
     /// # Errors
     /// If the design has changed since it was planned, tables are not there, or the user stopped it.
     pub fn run(&self, shards: &[u64], progress: &dyn Progress) -> Result<()> {
-        let design = Design::read_any(&self.design)?;
+        let design = Design::read(&self.design)?;
         if key(&self.design, &design, self.starts)? != self.key {
             return Err(another_plan(&self.folder));
         }
@@ -143,7 +143,7 @@ impl StartsPlan {
     /// If starts are missing or there twice, none has a merit, or a file cannot be written.
     pub fn merge(&self) -> Result<StartsResult> {
         let starts = self.cut().whole(&|s: &StartRecord| Some(s.start))?;
-        let design = Design::read_any(&self.design)?;
+        let design = Design::read(&self.design)?;
         let task = OptimiseTask::of(&design)?;
         let finite = starts.iter().enumerate().filter(|(_, s)| s.merit.is_finite());
         let best = finite.max_by(|(i, a), (j, b)| a.merit.total_cmp(&b.merit).then(j.cmp(i)));
@@ -197,7 +197,7 @@ pub fn plan_starts(
     progress: &dyn Progress,
 ) -> Result<StartsPlan> {
     let path = absolute(design_path)?;
-    let design = Design::read_any(&path)?;
+    let design = Design::read(&path)?;
     OptimiseTask::of(&design)?;
     let key = key(&path, &design, starts)?;
     if let Some(known) = StartsPlan::known_in(folder, &key)? {

@@ -219,6 +219,9 @@ fn single() -> Vec<Box<dyn Effect>> {
 /// All effects that are tried on a set.
 pub fn all(set: &MeasuredSet) -> Vec<Box<dyn Effect>> {
     let mut effects = single();
+    // Circles have no corners: an effect without an effect is never found.
+    let has_corners = set.stack.cell.shape.is_square();
+    effects.retain(|e| has_corners || e.name() != corner_rounding::CornerRounding.name());
     effects.extend(sensor_tilt::SensorTilt::of(set).map(|e| Box::new(e) as Box<dyn Effect>));
     effects.extend(aberrations());
     effects.extend(stitching::StitchedFields::of(set).map(|e| Box::new(e) as Box<dyn Effect>));

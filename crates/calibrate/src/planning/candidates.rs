@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use metalith_core::{Error, Lattice, PillarReader, Progress, Result, Wedge, WidthMap};
+use metalith_core::{Error, PillarReader, Progress, Result, Wedge, WidthMap};
 use metalith_design::{Design, Element};
 use ndarray::Array2;
 
@@ -155,6 +155,7 @@ fn session(
         layout: layout.to_owned(),
         stack: Stack {
             cell: design.cell_stack()?,
+            lattice: design.cell.lattice,
             lens_diameter_um: lens_diameter_um(design),
             focal_length_um: design.lens.focal_length_um,
         },
@@ -231,12 +232,14 @@ pub fn sem_sites(set: &MeasuredSet, offer: SemOffer) -> Vec<SemSite> {
         for k in 0..each {
             let share = (k as f64 + 0.5) / each as f64;
             let (r, turn) = (radius * share.sqrt(), golden * k as f64);
-            let at = [r * turn.cos(), r * turn.sin()].map(|v| nearest(lattice, v));
+            let Some(at) = lattice.site_at([r * turn.cos(), r * turn.sin()]) else {
+                continue;
+            };
             let designed = element.pillars.width_nm[[at[1], at[0]]];
             if designed > 0 && out.len() < offer.sites {
                 out.push(SemSite {
                     element: element.index,
-                    at_um: at.map(|i| lattice.coordinate_um(i)),
+                    at_um: [0, 1].map(|axis| lattice.place_um(axis, at[axis])),
                     designed_nm: f64::from(designed),
                     measured_nm: f64::from(designed),
                     sigma_nm: offer.sigma_nm,
@@ -245,12 +248,6 @@ pub fn sem_sites(set: &MeasuredSet, offer: SemOffer) -> Vec<SemSite> {
         }
     }
     out
-}
-
-/// The site nearest to a place along an axis (um).
-fn nearest(lattice: Lattice, at_um: f64) -> usize {
-    let along = at_um / lattice.pitch_um() + 0.5 * (lattice.sites() as f64 - 1.0);
-    (along.round().max(0.0) as usize).min(lattice.sites() - 1)
 }
 
 #[cfg(test)]

@@ -36,6 +36,8 @@ use serde::Serialize;
 
 pub use begun::check_not_begun;
 pub use bench_file::{BenchFile, SemOffer};
+#[cfg(test)]
+pub(crate) use candidates::candidates;
 pub use judgement::{Confusion, PlannedEffect};
 pub use limits::check_plannable;
 

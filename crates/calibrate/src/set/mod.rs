@@ -15,7 +15,7 @@ pub use index::{CaptureIndex, ElementIndex, LedIndex, PerCapture, PerElement, Pe
 pub use sem::{COLUMNS as SEM_COLUMNS, SemSite};
 
 use metalith_cell::CellStack;
-use metalith_core::WidthMap;
+use metalith_core::{LatticeKind, WidthMap};
 
 /// A mean of frames this near to saturation contains clipped frames.
 pub const SATURATED: f64 = 0.97;
@@ -88,6 +88,8 @@ impl MeasuredSet {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stack {
     pub cell: CellStack,
+    /// How the pillars stand.
+    pub lattice: LatticeKind,
     pub lens_diameter_um: f64,
     pub focal_length_um: f64,
 }
@@ -179,11 +181,7 @@ impl MeasuredElement {
     /// The lattice site nearest to a place from the middle (um), row by row; none beyond the lattice.
     pub fn site_at(&self, at_um: [f64; 2]) -> Option<usize> {
         let lattice = self.pillars.lattice;
-        let along = |x_um: f64| (x_um / lattice.pitch_um() + 0.5 * (lattice.sites() as f64 - 1.0)).round();
-        let (ix, iy) = (along(at_um[0]), along(at_um[1]));
-        let inside = 0.0..lattice.sites() as f64;
-        let is_inside = inside.contains(&ix) && inside.contains(&iy);
-        is_inside.then(|| iy as usize * lattice.sites() + ix as usize)
+        lattice.site_at(at_um).map(|[ix, iy]| iy * lattice.sites() + ix)
     }
 }
 

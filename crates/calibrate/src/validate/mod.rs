@@ -187,10 +187,11 @@ pub fn validate(
     let mut odd = Vec::new();
     // Without a search nothing can be said of what is in no list.
     if plan.off_list && !plan.noiseless {
-        for (name, what) in [
-            ("ghost", UnlistedEffect::Ghost(0.04, [5.0, -3.0])),
-            ("anisotropy", UnlistedEffect::Anisotropy(8.0)),
-        ] {
+        let ghost = ("ghost", UnlistedEffect::Ghost(0.04, [5.0, -3.0]));
+        // Sides of unequal lengths: circles have none.
+        let is_square = like.stack.cell.shape.is_square();
+        let anisotropy = is_square.then_some(("anisotropy", UnlistedEffect::Anisotropy(8.0)));
+        for (name, what) in [ghost].into_iter().chain(anisotropy) {
             odd.push((name, synthesizer.off_list(what, progress)?));
         }
     }

@@ -155,7 +155,7 @@ fn tables_that_cannot_be_are_refused() {
 /// The library of a hexagonal lattice is of that: rows are as far apart as they are written, and pillars may touch along them.
 #[test]
 fn a_hexagonal_lattice_has_a_library_of_its_own() {
-    let design = Design::read_any(&metalith_testing::design("hexagonal_1550")).unwrap();
+    let design = Design::read(&metalith_testing::design("hexagonal_1550")).unwrap();
     let stack = design.cell_stack().unwrap();
     assert_eq!(stack.lattice, CellLattice::Staggered { row_nm: 606.0 });
     let spec = TableSpec {
@@ -184,7 +184,7 @@ fn a_hexagonal_lattice_has_a_library_of_its_own() {
 /// The shipped design's mapping is that of the solver.
 #[test]
 fn the_mapping_of_the_hexagonal_design_is_that_of_its_cell() {
-    let design = Design::read_any(&metalith_testing::design("hexagonal_1550")).unwrap();
+    let design = Design::read(&metalith_testing::design("hexagonal_1550")).unwrap();
     let stack = design.cell_stack().unwrap();
     let orders = Orders::new(17).unwrap();
     let phase = |width: f64| stack.transmission(width, 1.55, orders).unwrap().arg() / std::f64::consts::TAU;

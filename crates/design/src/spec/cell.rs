@@ -75,10 +75,9 @@ impl CellSpec {
             );
         }
         // A pitch with a fault bounds nothing.
-        let kinds = [("square", LatticeKind::Square), ("hexagonal", LatticeKind::Hexagonal)];
-        let lattice = s.choice("lattice", &kinds, Some(LatticeKind::Square));
+        let lattice = s.choice("lattice", &LatticeKind::CHOICES, Some(LatticeKind::Square));
         let widest = if s.sound(&["cell.pitch_nm"]) {
-            nearest_nm(lattice, pitch_nm)
+            lattice.widest_nm(pitch_nm)
         } else {
             WIDEST_PITCH_NM
         };
@@ -180,7 +179,7 @@ impl CellSpec {
     /// The largest width (nm) or number that a pillar can have: no width is beyond the pitch.
     pub fn most(&self) -> u16 {
         match self.shape {
-            PillarShape::Square | PillarShape::Circle => nearest_nm(self.lattice, self.pitch_nm) as u16,
+            PillarShape::Square | PillarShape::Circle => self.lattice.widest_nm(self.pitch_nm) as u16,
             PillarShape::Rectangle(pillars) => pillars.steps,
         }
     }
@@ -188,18 +187,6 @@ impl CellSpec {
     /// All widths that may be written (nm), narrowest first; of rectangles all numbers.
     pub fn widths_nm(&self) -> impl Iterator<Item = u16> + use<> {
         (self.width_range_nm.0..=self.width_range_nm.1).step_by(usize::from(self.width_step_nm))
-    }
-}
-
-/// Distance of the nearest pillars, to an even number below (nm): rows of a hexagonal lattice are rounded.
-fn nearest_nm(lattice: LatticeKind, pitch_nm: u32) -> u32 {
-    match lattice {
-        LatticeKind::Square => pitch_nm,
-        LatticeKind::Hexagonal => {
-            let row_nm = f64::from(lattice.row_nm(pitch_nm));
-            let across_nm = (0.5 * f64::from(pitch_nm)).hypot(row_nm);
-            (across_nm.min(f64::from(pitch_nm)) as u32) & !1
-        }
     }
 }
 

@@ -108,7 +108,7 @@ fn design() -> Design {
     let text = text
         .replacen("[cell]\n", "[cell]\nshape = \"circle\"\nlattice = \"hexagonal\"\n", 1)
         .replacen("elements = [3, 3]", "elements = [2, 1]", 1);
-    Design::parse_any(&path, &text).unwrap()
+    Design::parse(&path, &text).unwrap()
 }
 
 /// True of these rows: at 400, 455 and 530 nm some of the light diffracts into the glass.

@@ -91,3 +91,12 @@ pub struct Extraction<W = WidthMap> {
     /// All layers and texts.
     pub survey: Survey,
 }
+
+impl<W> Extraction<W> {
+    /// The first element whose pillars stand on a lattice of another kind or pitch than those of the elements before it.
+    pub fn other_lattice(&self) -> Option<&ElementSite> {
+        let of = |e: &ExtractedElement<W>| (e.site.lattice.kind(), e.site.lattice.pitch_nm());
+        let first = of(self.elements.first()?);
+        self.elements.iter().find(|e| of(e) != first).map(|e| &e.site)
+    }
+}

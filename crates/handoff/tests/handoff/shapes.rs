@@ -107,7 +107,7 @@ fn is_drawn(outline: &[Point], row: &BTreeMap<String, String>, shape: PillarShap
 /// What the tables of a hand-off say of its pillars is found in its files; areas are those of the shapes, and times follow.
 fn tables_hold(name: &str, sites: usize, pads: usize) {
     let folder = made(name);
-    let design = Design::read_any(&design(name)).unwrap();
+    let design = Design::read(&design(name)).unwrap();
     let (shape, array) = (design.cell.shape, PillarArray::build(&design, &Silent).unwrap());
     let file = folder.join(format!("layout/{name}_pillars.gds"));
     let pillars = outlines(&file, PILLARS);

@@ -11,7 +11,8 @@ use captures::{captures, widths};
 use elements::elements;
 use metalith_cell::{CellStack, Material, UniformLayer};
 use metalith_core::document::{Document, Limits, Section, load};
-use metalith_core::{ElementSite, LayerNumber, PillarReader, PillarShape, Progress, Result};
+use metalith_core::{ElementSite, LatticeKind, LayerNumber, PillarReader, PillarShape, Progress, Result};
+use metalith_rcwa::CellLattice;
 use ndarray::Array2;
 
 /// Version of the format that is read.
@@ -167,21 +168,32 @@ fn stack(s: &Section<'_, '_>, folder: &Path) -> (Stack, bool) {
     };
     let under = [layer("spacer_nm", spacer), layer("residual_nm", film.clone())];
     let shape = s.choice("shape", &PillarShape::CHOICES, Some(PillarShape::Square));
+    let lattice = s.choice("lattice", &LatticeKind::CHOICES, Some(LatticeKind::Square));
+    if !lattice.is_square() && shape != PillarShape::Circle {
+        s.fault_given(
+            &["stack.shape"],
+            "lattice",
+            "a hexagonal lattice of pillars that are no circles",
+            "add `shape = \"circle\"`, or use the square lattice",
+        );
+    }
     let lens_diameter_um = s.float("lens_diameter_um", LENS_DIAMETER_UM);
     let focal_length_um = s.float("focal_length_um", FOCAL_LENGTH_UM);
     s.finish();
     let is_known = film.is_some() && substrate.is_some();
-    let even = f64::from(pitch_nm + pitch_nm % 2);
+    let even_nm = pitch_nm + pitch_nm % 2;
     let cell = CellStack {
+        lattice: CellLattice::drawn(lattice, even_nm),
         shape,
         film: film.unwrap_or_else(vacuum),
         substrate: substrate.unwrap_or_else(vacuum),
         under: under.into_iter().flatten().collect(),
         ambient: Material::constant(ambient_index, 0.0).unwrap_or_else(|_| vacuum()),
-        ..CellStack::paper(even, height_nm).expect("the program knows its own materials")
+        ..CellStack::paper(f64::from(even_nm), height_nm).expect("the program knows its own materials")
     };
     let stack = Stack {
         cell,
+        lattice,
         lens_diameter_um,
         focal_length_um,
     };

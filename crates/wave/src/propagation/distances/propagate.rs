@@ -6,6 +6,7 @@ use super::{DistancesPlan, DistancesScratch, KeptFrequencies};
 use crate::kernels::{gather, multiply_by, multiply_to, process};
 use crate::propagation::Aperture;
 use crate::propagation::transfer::{FrequencyColumn, Transfer};
+use crate::propagation::zoom::Zoom;
 
 /// Columns that go through one call of a transform: enough to fill cache lines.
 const LANES: usize = 8;
@@ -25,15 +26,19 @@ impl DistancesPlan {
         let [kx, ky] = kept.count;
         let least = distances_um.iter().copied().fold(f64::MAX, f64::min);
         let middle = distances_um.iter().sum::<f64>() / distances_um.len() as f64;
-        // The window's first sample; its middle lies between two.
+        let lattice = self.wanted.lattice;
+        // The window's first sample; its middle lies between two. Chirps count from the middle.
         let first_sample = -0.5 * (self.window as f64 - 1.0) * self.step_um();
-        let x0 = self.wanted.lattice.coordinate_um(0);
+        let origin = [first_sample, if lattice.is_square() { first_sample } else { 0.0 }];
+        let first_place = lattice.reach().map(|reach| reach.start);
+        let shift =
+            |axis: usize| self.wanted.centre_um[axis] + origin[axis] - lattice.place_um(axis, first_place[axis]);
         let transfer = Transfer {
             wavelength_um,
             centre_um: self.wanted.centre_um,
-            shift_um: self.wanted.centre_um.map(|c| c + first_sample - x0),
+            shift_um: [0, 1].map(shift),
             fade: &self.fade(middle, least),
-            cell_um: self.wanted.lattice.cell_um(),
+            cell_um: lattice.cell_um(),
         };
         scratch.transfer.resize(distances_um.len() * kx * ky, Complex32::ZERO);
         scratch.step.resize(ky, Complex32::ZERO);
@@ -70,19 +75,21 @@ impl DistancesPlan {
         [along_x, along_y]: [&[Complex32]; 2],
         scratch: &mut DistancesScratch,
     ) {
-        let (n, m) = (self.wanted.lattice.sites(), self.sites);
+        let (n, [m, _]) = (self.wanted.lattice.sites(), self.sites);
+        let [_, rows] = self.wanted.lattice.reach();
         let [kx, ky] = kept.count;
         scratch.row.resize(m.max(scratch.row.len()), Complex32::ZERO);
-        // Rows first; only the kept part of each goes on, as columns of length m with zeros behind the element.
-        scratch.lines.resize(n * kx, Complex32::ZERO);
-        for (iy, line) in scratch.lines.chunks_exact_mut(kx).enumerate() {
+        // Rows first; only the kept part of each goes on, as columns of a period with zeros behind the element.
+        scratch.lines.resize(rows.len() * kx, Complex32::ZERO);
+        for (iy, line) in rows.clone().zip(scratch.lines.chunks_exact_mut(kx)) {
             let row = &mut scratch.row[..m];
             row[n..].fill(Complex32::ZERO);
             element.fill_row(iy, &mut row[..n]);
             multiply_by(&mut row[..n], along_x, along_y[iy]);
-            process(&*self.forward, row, &mut scratch.fft);
+            process(&*self.forward[0], row, &mut scratch.fft);
             gather(line, row, kept.first[0]);
         }
+        let (n, [_, m]) = (rows.len(), self.sites);
         scratch.spectrum.resize(kx * ky, Complex32::ZERO);
         scratch.columns.resize(LANES * m, Complex32::ZERO);
         for from in (0..kx).step_by(LANES) {
@@ -94,7 +101,7 @@ impl DistancesPlan {
                     columns[lane * m + iy] = *value;
                 }
             }
-            process(&*self.forward, columns, &mut scratch.fft);
+            process(&*self.forward[1], columns, &mut scratch.fft);
             let spectrum = scratch.spectrum[from * ky..].chunks_exact_mut(ky);
             for (column, spectrum) in columns.chunks_exact(m).zip(spectrum) {
                 gather(spectrum, column, kept.first[1]);
@@ -102,9 +109,18 @@ impl DistancesPlan {
         }
     }
 
-    /// Multiply the spectrum with the transfer function and transform its columns back:
+    /// Multiply the spectrum with the transfer function and transform its columns back, by `along_y` where there is one:
     /// `lines[distance][row][kx]`.
-    pub(super) fn propagate(&self, distances: usize, kept: &KeptFrequencies, scratch: &mut DistancesScratch) {
+    pub(super) fn propagate(
+        &self,
+        distances: usize,
+        kept: &KeptFrequencies,
+        along_y: Option<&Zoom>,
+        scratch: &mut DistancesScratch,
+    ) {
+        if let Some(zoom) = along_y {
+            return self.propagate_by(zoom, distances, kept, scratch);
+        }
         let [kx, ky] = kept.count;
         let (samples, window) = (self.samples, self.window);
         let start = kept.first[1].rem_euclid(samples as i64) as usize;
@@ -137,6 +153,38 @@ impl DistancesPlan {
                     for (lane, to) in line[from..from + lanes].iter_mut().enumerate() {
                         *to = columns[lane * samples + iy];
                     }
+                }
+            }
+        }
+    }
+
+    /// The same by chirps.
+    fn propagate_by(&self, zoom: &Zoom, distances: usize, kept: &KeptFrequencies, scratch: &mut DistancesScratch) {
+        let [kx, ky] = kept.count;
+        let DistancesScratch {
+            row,
+            lines,
+            spectrum,
+            columns,
+            fft,
+            padded,
+            transfer,
+            ..
+        } = scratch;
+        lines.resize(distances * self.window * kx, Complex32::ZERO);
+        columns.resize(ky.max(columns.len()), Complex32::ZERO);
+        row.resize(self.window.max(row.len()), Complex32::ZERO);
+        let (column, row) = (&mut columns[..ky], &mut row[..self.window]);
+        for (lines, transfer) in lines
+            .chunks_exact_mut(self.window * kx)
+            .zip(transfer.chunks_exact(kx * ky))
+        {
+            let known = spectrum.chunks_exact(ky).zip(transfer.chunks_exact(ky));
+            for (k, (spectrum, transfer)) in known.enumerate() {
+                multiply_to(column, spectrum, transfer);
+                zoom.run(column, row, padded, fft);
+                for (line, value) in lines.chunks_exact_mut(kx).zip(row.iter()) {
+                    line[k] = *value;
                 }
             }
         }
