@@ -193,7 +193,8 @@ def test_psfs_are_those_of_the_program(array: ml.Array, tmp_path: Path) -> None:
     for fidelity in ("rigorous", "fitted"):
         out = tmp_path / fidelity
         flags = ["--distance-um", str(FOCAL_UM), "--wavelength-nm", "1550", "--height-nm", "900"]
-        flags += ["--samples", str(samples), "--pillar-material", SILICON, "--fidelity", fidelity, "--out", str(out), "--quiet"]
+        flags += ["--samples", str(samples), "--pillar-material", SILICON]
+        flags += ["--fidelity", fidelity, "--out", str(out), "--quiet"]
         program = Path(sys.executable).with_name("metalith")
         run = subprocess.run([program, "psf", tmp_path / "chip.oas", *flags], capture_output=True, text=True)
         assert run.returncode == 0, run.stderr
