@@ -17,14 +17,14 @@ fn with(name: &str, line: &str) -> String {
 }
 
 fn light(line: &str) -> PolarisedLight {
-    let design = Design::parse_any(&path("geometric_phase_532"), &with("geometric_phase_532", line)).unwrap();
+    let design = Design::parse(&path("geometric_phase_532"), &with("geometric_phase_532", line)).unwrap();
     design.verify.light()
 }
 
 /// The only fault of a design, and whether it is told at the line.
 fn fault(name: &str, line: &str) -> String {
     let text = with(name, line);
-    let Err(Error::Text(faults)) = Design::parse_any(&path(name), &text) else {
+    let Err(Error::Text(faults)) = Design::parse(&path(name), &text) else {
         panic!("{line}: no fault");
     };
     let [fault] = faults.faults() else {
@@ -87,7 +87,7 @@ fn what_is_no_polarisation_is_refused_with_its_line() {
 fn digests_tell_other_light_apart() {
     let of = |line: &str| {
         let name = "geometric_phase_532";
-        let design = Design::parse_any(&path(name), &with(name, line)).unwrap();
+        let design = Design::parse(&path(name), &with(name, line)).unwrap();
         (design.optics_digest().unwrap(), design.simulation_digest().unwrap())
     };
     let (optics, usual) = of("");
