@@ -87,6 +87,24 @@ fn settings(cache: PathBuf, only: &[&str]) -> Settings {
     }
 }
 
+/// What is done to the chip of a session comes back in its captures, and is found with its size.
+fn each_is_found(folder: &Path, plan: &CapturePlan, like: &MeasuredSet, settings: &Settings) {
+    let synthesizer = Synthesizer::new(like, settings).unwrap();
+    for (name, size) in [("cd_bias", 6.0), ("gap", 2.0)] {
+        let images = synthesizer.with_effect(name, &[size], &Silent).unwrap();
+        fill(folder, plan, Some(&synthesizer.draw(&images, 41)));
+        let came_back = read(folder);
+        let session = Session::new(&came_back, settings.clone()).unwrap();
+        let found = session
+            .diagnose(&session.simulate(&Silent).unwrap(), &Silent)
+            .unwrap()
+            .0;
+        let names: Vec<&str> = found.effects.iter().map(|e| e.name.as_str()).collect();
+        assert_eq!(names, [name], "{}", found.sentence());
+        assert_eq!(found.effects[0].holds(size), Some(true), "{}", found.sentence());
+    }
+}
+
 #[test]
 #[ignore = "second tier: CPU time, run by .ci/run"]
 fn what_is_planned_for_is_found_in_what_comes_back() {
@@ -114,21 +132,12 @@ fn what_is_planned_for_is_found_in_what_comes_back() {
     fill(folder.path(), &plan, None);
     let like = read(folder.path());
     assert!(like.sem.is_empty(), "no width has been measured yet");
-    let settings = settings(folder.path().join("cells"), &tried);
-    let synthesizer = Synthesizer::new(&like, &settings).unwrap();
-    for (name, size) in [("cd_bias", 6.0), ("gap", 2.0)] {
-        let images = synthesizer.with_effect(name, &[size], &Silent).unwrap();
-        fill(folder.path(), &plan, Some(&synthesizer.draw(&images, 41)));
-        let came_back = read(folder.path());
-        let session = Session::new(&came_back, settings.clone()).unwrap();
-        let found = session
-            .diagnose(&session.simulate(&Silent).unwrap(), &Silent)
-            .unwrap()
-            .0;
-        let names: Vec<&str> = found.effects.iter().map(|e| e.name.as_str()).collect();
-        assert_eq!(names, [name], "{}", found.sentence());
-        assert_eq!(found.effects[0].holds(size), Some(true), "{}", found.sentence());
-    }
+    each_is_found(
+        folder.path(),
+        &plan,
+        &like,
+        &settings(folder.path().join("cells"), &tried),
+    );
 }
 
 /// One distance in focus cannot tell a gap from a source that is near; three distances do.
@@ -196,19 +205,10 @@ fn a_session_of_a_hexagonal_lens_is_planned_and_diagnosed() {
     let like = read(folder.path());
     let array = PillarArray::build(&design, &Silent).unwrap();
     assert_eq!(like.elements.raw[0].pillars, *array.widths(array.central()));
-    let settings = settings(folder.path().join("cells"), &tried);
-    let synthesizer = Synthesizer::new(&like, &settings).unwrap();
-    for (name, size) in [("cd_bias", 6.0), ("gap", 2.0)] {
-        let images = synthesizer.with_effect(name, &[size], &Silent).unwrap();
-        fill(folder.path(), &plan, Some(&synthesizer.draw(&images, 41)));
-        let came_back = read(folder.path());
-        let session = Session::new(&came_back, settings.clone()).unwrap();
-        let found = session
-            .diagnose(&session.simulate(&Silent).unwrap(), &Silent)
-            .unwrap()
-            .0;
-        let names: Vec<&str> = found.effects.iter().map(|e| e.name.as_str()).collect();
-        assert_eq!(names, [name], "{}", found.sentence());
-        assert_eq!(found.effects[0].holds(size), Some(true), "{}", found.sentence());
-    }
+    each_is_found(
+        folder.path(),
+        &plan,
+        &like,
+        &settings(folder.path().join("cells"), &tried),
+    );
 }

@@ -8,7 +8,6 @@
 #[path = "../tests/prototype_rows/mod.rs"]
 mod prototype_rows;
 
-use std::f64::consts::TAU;
 use std::path::Path;
 
 use metalith_cell::{CellModel, PointwiseCell};
@@ -16,7 +15,7 @@ use metalith_grating::{Blaze, CoarseCell};
 use metalith_rcwa::SiteLattice;
 use metalith_report::{Axis, Chart};
 use num_complex::Complex64;
-use prototype_rows::Prototype;
+use prototype_rows::{Prototype, order};
 
 /// Pillars a turn of the rows, and how many places within a pillar their phase starts at.
 const ROWS: [usize; 10] = [3, 4, 5, 6, 7, 8, 9, 12, 15, 18];
@@ -50,11 +49,7 @@ fn main() {
             };
             let width = |u: f64| prototype.mapping.width_nm(u);
             let widths = blaze.widths_nm(&lattice, width);
-            let first = |sites: &[Complex64], full: f64| {
-                let back = |x: usize| Complex64::cis(-TAU * blaze.phase(x, 0));
-                let sum: Complex64 = sites.iter().enumerate().map(|(x, t)| t * back(x)).sum();
-                (sum / (pillars as f64 * full)).norm_sqr()
-            };
+            let first = |sites: &[Complex64], full: f64| (order(&blaze, sites, 1.0) / full).norm_sqr();
             let solved = blaze.solve(&coarse, width, ALONG_NORMAL).unwrap().order(1).share;
             let alone: Vec<Complex64> = widths.iter().map(|w| equal[w.round() as usize]).collect();
             let pairs = table.sites(&lattice, &widths, 1.0);

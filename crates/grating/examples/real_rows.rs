@@ -7,6 +7,7 @@
 //! order by equal neighbours, neighbours and supercells. From the folder `crates/grating`: `cargo run --release --example
 //! real_rows -- 0 15 15,15`; some minutes on one core.
 
+#[allow(dead_code, reason = "tests compare blazed rows by it")]
 #[path = "../tests/prototype_rows/mod.rs"]
 mod prototype_rows;
 

@@ -6,7 +6,6 @@ mod prototype_rows;
 mod truth_rows;
 
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
 
 use metalith_cell::Fidelity;
 use metalith_core::Silent;
@@ -14,7 +13,7 @@ use metalith_design::cell_models;
 use metalith_grating::{Blaze, CoarseCell, NeighbourTable, NeighbourTableSpec, sites_by};
 use metalith_rcwa::SiteLattice;
 use num_complex::Complex64;
-use prototype_rows::Prototype;
+use prototype_rows::{Prototype, order};
 use truth_rows::Row;
 
 /// Light that the sum over pairs puts elsewhere than the supercells of real rows, mean over the rows of one light.
@@ -135,15 +134,10 @@ fn by_pairs<'r>(rows: &[&'r Row], table: &NeighbourTable, prototype: &Prototype)
         };
         let widths = blaze.widths_nm(&lattice, |u| prototype.mapping.width_nm(u));
         let sites = &table.sites(&lattice, &widths, 1.0)[row.polarisation];
-        // The truth's phases are without that of the wedge at the middle of pillar 0.
-        let order = |m: f64| {
-            let back = |x: usize| Complex64::cis(-TAU * m * blaze.phase(x, 0));
-            sites.iter().enumerate().map(|(x, t)| t * back(x)).sum::<Complex64>() / row.cells as f64
-        };
         Found {
             truth: row,
-            first: order(1.0),
-            zero: order(0.0).norm_sqr(),
+            first: order(&blaze, sites, 1.0),
+            zero: order(&blaze, sites, 0.0).norm_sqr(),
         }
     };
     rows.iter().map(found).collect()
@@ -253,11 +247,7 @@ fn between_the_tables_blazed_rows_are_met_as_well() {
                     let width = |u: f64| prototype.mapping.width_nm(u);
                     let solved = blaze.solve(&coarse, width, looks(um)).unwrap().order(1).share;
                     let widths = blaze.widths_nm(&lattice, width);
-                    let first = |sites: &[Complex64]| {
-                        let back = |x: usize| Complex64::cis(-TAU * blaze.phase(x, 0));
-                        let sum: Complex64 = sites.iter().enumerate().map(|(x, t)| t * back(x)).sum();
-                        (sum / (*cells as f64 * full)).norm_sqr()
-                    };
+                    let first = |sites: &[Complex64]| (order(&blaze, sites, 1.0) / full).norm_sqr();
                     let alone: Vec<Complex64> = widths.iter().map(|w| equal[*w as usize]).collect();
                     let shares = [
                         0.5 * (solved[0] + solved[1]),

@@ -9,7 +9,7 @@ use metalith_core::{Progress, Result};
 use metalith_design::Design;
 use serde::Serialize;
 
-use crate::opening::KeptKernels;
+use crate::kept::KeptKernels;
 use crate::rehearsal::Rehearsal;
 use crate::restore::RestorationMethod;
 use crate::scene::SceneImage;

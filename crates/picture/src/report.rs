@@ -12,7 +12,6 @@ use crate::doubt::DoubtReport;
 use crate::exposure::Frame;
 use crate::files::{FrameFile, picture_file};
 use crate::layout::PillarCount;
-use crate::opening::averaging;
 use crate::point_image::PointImage;
 use crate::resolution::ContrastCurve;
 use crate::restore::RestorationMethod;
@@ -21,6 +20,7 @@ use crate::score::ZoneScore;
 use crate::spectra::rgb_basis;
 use crate::studio::Studio;
 use crate::veil::LightShares;
+use crate::wanted::averaging;
 
 /// Everything that the page of a picture says, in numbers.
 #[derive(Clone, Debug, Serialize)]

@@ -109,14 +109,8 @@ impl TransmissionTables {
         light: PolarisedLight,
     ) -> Result<Self> {
         let hands = cell.hands(wavelength_um, widest_nm)?;
-        Ok(Self {
-            normal: cell.transmissions(wavelength_um, widest_nm)?,
-            polarised: hands.map(|hands| Polarised::of(hands, light)),
-            oblique: HashMap::new(),
-            neighbours: HashMap::new(),
-            in_band: false,
-            lattice,
-        })
+        let normal = cell.transmissions(wavelength_um, widest_nm)?;
+        Ok(Self::along_normal(normal, hands, lattice, light))
     }
 
     /// The same for one of many wavelengths of a band.
@@ -131,14 +125,28 @@ impl TransmissionTables {
         light: PolarisedLight,
     ) -> Result<Self> {
         let hands = cell.hands_in_band(wavelength_um, widest_nm)?;
+        let normal = cell.transmissions_in_band(wavelength_um, widest_nm)?;
         Ok(Self {
-            normal: cell.transmissions_in_band(wavelength_um, widest_nm)?,
+            in_band: true,
+            ..Self::along_normal(normal, hands, lattice, light)
+        })
+    }
+
+    /// Of one wavelength, before other directions are added.
+    fn along_normal(
+        normal: Vec<Complex64>,
+        hands: Option<HandTables>,
+        lattice: LatticeKind,
+        light: PolarisedLight,
+    ) -> Self {
+        Self {
+            normal,
             polarised: hands.map(|hands| Polarised::of(hands, light)),
             oblique: HashMap::new(),
             neighbours: HashMap::new(),
-            in_band: true,
+            in_band: false,
             lattice,
-        })
+        }
     }
 
     /// Of a cell that changes polarisation, what it does to light of both hands, and the light that it is in.

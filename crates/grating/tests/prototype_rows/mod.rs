@@ -1,11 +1,13 @@
 //! Rows of real pillars of `designs/prototype_3x3.toml`, whose optimised phase jumps from ring to ring, and how far models
 //! of single sites are from the supercells of these rows.
 
+use std::f64::consts::TAU;
+
 use metalith_cell::{CellModel, PointwiseCell};
 use metalith_core::{Silent, Wedge};
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, WidthRule};
-use metalith_grating::{CoarseCell, ElementRow, Mapping, NeighbourTable, NeighbourTableSpec, RealRow};
+use metalith_grating::{Blaze, CoarseCell, ElementRow, Mapping, NeighbourTable, NeighbourTableSpec, RealRow};
 use num_complex::Complex64;
 
 /// Where rows begin, from the middle of the element (um).
@@ -38,6 +40,12 @@ impl Misfits {
         let mean = |of: fn(&RowMisfit) -> f64| self.rows.iter().map(of).sum::<f64>() / self.rows.len() as f64;
         [mean(|r| r.normal), mean(|r| r.as_lit), mean(|r| r.neighbours)]
     }
+}
+
+/// Amplitude in an order of a blazed row, of what its sites pass. Phases are without that of the wedge at the middle of pillar 0.
+pub fn order(blaze: &Blaze, sites: &[Complex64], order: f64) -> Complex64 {
+    let back = |x: usize| Complex64::cis(-TAU * order * blaze.phase(x, 0));
+    sites.iter().enumerate().map(|(x, t)| t * back(x)).sum::<Complex64>() / sites.len() as f64
 }
 
 pub struct Prototype {

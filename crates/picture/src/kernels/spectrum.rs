@@ -1,7 +1,7 @@
 //! Images of a point in a channel, from those of single wavelengths.
 //!
-//! The PSF of a wavelength about its chief ray, summed over squares of a quarter of a pixel, is transformed. Between
-//! two wavelengths it is the mean of both with weights that change linearly, and moves with its chief ray, as in
+//! The PSF of a wavelength about its chief ray, summed over squares of a quarter of a pixel, is transformed. Between two
+//! wavelengths it is the mean of both with weights that change linearly, and moves with its chief ray, as in
 //! [`metalith_wave::psf::polychromatic`]; in light of narrow bands it follows a cubic through four
 //! ([`metalith_camera::Blend`]). Here the band is a sum over points 1 nm apart, which a pixel cannot tell from a line.
 
@@ -79,9 +79,9 @@ impl KernelPlan {
         PsfSpectrum(spectrum)
     }
 
-    /// Kernels of a channel for each spectrum of the scene: energy in a pixel whose middle is at `(i - window + 1/2) /
-    /// 2` pixels from the chief ray, i from 0 to 2 window - 1 along x and along y, as it counts in a sum over points
-    /// half a pixel apart; see [`PlacedPixel`].
+    /// Kernels of a channel for each spectrum of the scene: energy in a pixel whose middle is at
+    /// `(i - window + 1/2) / 2` pixels from the chief ray, i from 0 to 2 window - 1 along x and along y, as it counts in a
+    /// sum over points half a pixel apart; see [`PlacedPixel`].
     pub fn kernels(
         &self,
         spectra: &[PsfSpectrum],
@@ -154,9 +154,9 @@ impl KernelPlan {
 /// Weights of quarters of pixels, along one axis, of a pixel that looks at points half a pixel apart.
 ///
 /// A frame is an integral over the scene. A sum over points takes detail that is finer than they can tell for coarse
-/// detail, unless what is summed is smooth: so each point stands for the light of half a pixel about it. What that
-/// blurs is undone by the differences of neighbouring points: of a wave of frequency f, cos^2 is left, cos^2 (1 + u / 4
-/// + u^2 / 8) = 1 - 5 sin^6 + ... with sin, cos of pi f / 4 and u = sin^2(pi f / 2).
+/// detail, unless what is summed is smooth: so each point stands for the light of half a pixel about it. What that blurs
+/// is undone by the differences of neighbouring points: of a wave of frequency f, cos^2 is left, cos^2 (1 + u / 4 + u^2 / 8)
+/// = 1 - 5 sin^6 + ... with sin, cos of pi f / 4 and u = sin^2(pi f / 2).
 struct PlacedPixel {
     taps: Vec<f32>,
     /// Quarters before the first one of the pixel itself.

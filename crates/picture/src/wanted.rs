@@ -1,0 +1,262 @@
+//! What scenes in a camera ask of the kernels and the veil of a chip.
+
+use std::borrow::Cow;
+
+use metalith_camera::{Blend, Camera, ChannelSampling, Sampling};
+use metalith_cell::{Fidelity, Polarisation};
+use metalith_core::{Error, Progress, Result};
+use metalith_design::Design;
+use metalith_gds::extract::Extraction;
+use metalith_made::{CalibratedModel, SimulationCase};
+use serde::Serialize;
+
+use crate::assumed::Assumed;
+use crate::kernels::{BankSpec, KernelBank};
+use crate::restore::LearnedDenoiser;
+use crate::scene::SceneImage;
+use crate::sight::{check_coverage, check_view, check_windows};
+use crate::spectra::{SceneSpectrum, rgb_basis};
+use crate::studio::Studio;
+use crate::veil::Veil;
+use crate::{ChannelColours, ChipInLight, ElementView, SceneView, element_views, sampling_of};
+
+/// Field of an element that kernels are made for: the angle from its axis, behind it (degrees). Light that leaves more
+/// steeply is the veil's. A lens of the paper sees 60 degrees.
+const FIELD_DEG: f64 = 30.0;
+/// Nodes an axis of this field.
+const NODES: usize = 17;
+/// Radius of lenses whose accurate fields cost next to nothing, and whose fast ones err by more (um).
+const SMALL_UM: f64 = 150.0;
+/// Pixels an axis of a kernel.
+const WINDOW: usize = 64;
+impl BankSpec {
+    /// For the elements of a design before a camera.
+    pub fn standard(design: &Design, camera: &Camera) -> Self {
+        Self {
+            pixel_um: camera.sensor.pixel_um,
+            window: WINDOW,
+            nodes: NODES,
+            reach_um: design.lens.focal_length_um * FIELD_DEG.to_radians().tan(),
+            accurate: design.lens.radius_um() < SMALL_UM,
+        }
+    }
+}
+
+/// What scenes in a camera ask of kernels.
+pub(crate) struct Wanted<'a> {
+    design: &'a Design,
+    camera: &'a Camera,
+    /// In the pixels that it is simulated in.
+    pub(crate) scene: Cow<'a, SceneImage>,
+    /// As it was given.
+    given: SceneView,
+    elements: Vec<ElementView>,
+    channels: Vec<ChannelSampling>,
+    /// Wavelengths between which images follow a cubic (nm), in light of narrow bands.
+    cubic_nm: Option<Vec<f64>>,
+    /// Spectra of the scenes, and the primaries of the restoration among or after them.
+    basis: Vec<SceneSpectrum>,
+    /// Where the primaries begin.
+    primaries: usize,
+    pub(crate) spec: BankSpec,
+}
+
+/// The view in which a camera's pictures behind a design are simulated of scenes with this one: sensor pixels look at two points along
+/// each axis, in the middle of the field, and what is finer than these would be taken for something coarse.
+pub fn simulated_view(design: &Design, camera: &Camera, view: &SceneView) -> SceneView {
+    view.no_finer(0.5 * camera.sensor.pixel_um / design.lens.focal_length_um)
+}
+
+/// What decides a bank, as text.
+#[derive(Serialize)]
+struct Inputs<'a> {
+    solver: u32,
+    layout: &'a str,
+    design: &'a str,
+    lens_um: [f64; 2],
+    elements: &'a [ElementView],
+    camera: &'a Camera,
+    model: &'a str,
+    /// The cell that pillars are simulated by, and the wavelengths that it has tables of unlike neighbours for.
+    fidelity: Fidelity,
+    tabulated_um: &'a [f64],
+    /// Of pillars that change polarisation, whether an analyser is before the sensor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    analyser: Option<bool>,
+    /// Of these, the light of the scene if it is not that which they focus.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    polarisation: Option<Polarisation>,
+    basis: &'a [SceneSpectrum],
+    spec: &'a BankSpec,
+    scene_distance_um: f64,
+    /// Where light of narrow bands asks for wavelengths of its own, these (nm).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cubic_nm: Option<&'a [f64]>,
+}
+
+impl<'a> Wanted<'a> {
+    pub(crate) fn new(design: &'a Design, camera: &'a Camera, scene: &'a SceneImage) -> Result<Self> {
+        design.one_lens("the simulation of pictures")?;
+        let elements = element_views(design, camera);
+        let given = scene.view;
+        let view = simulated_view(design, camera, &given);
+        let scene = match view == given {
+            true => Cow::Borrowed(scene),
+            false => Cow::Owned(scene.averaged(&view)),
+        };
+        let mut basis = scene.basis.clone();
+        let primaries = if basis == rgb_basis() { 0 } else { basis.len() };
+        if primaries > 0 {
+            basis.extend_from_slice(rgb_basis());
+        }
+        let spec = BankSpec::standard(design, camera);
+        let Sampling {
+            wavelengths_nm,
+            channels,
+            blend,
+        } = sampling_of(design, camera)?;
+        Veil::check_size(&camera.sensor, channels.len(), basis.len())?;
+        if primaries > 0 {
+            check_coverage(&scene, &channels)?;
+        }
+        check_view(&elements, &spec, camera, &given)?;
+        Ok(Self {
+            design,
+            camera,
+            scene,
+            given,
+            elements,
+            channels,
+            cubic_nm: (blend == Blend::Cubic).then_some(wavelengths_nm),
+            basis,
+            primaries,
+            spec,
+        })
+    }
+
+    /// What is to be known of the pixels of the scene, if they are not those that were given.
+    pub(crate) fn averaging(&self) -> Option<String> {
+        averaging(&self.given, &self.scene.view)
+    }
+
+    /// What decides the kernels of a layout.
+    pub(crate) fn inputs(&self, layout: &str, model: Option<&CalibratedModel>) -> Result<Vec<u8>> {
+        let lens = &self.design.lens;
+        let model_text = model.map_or_else(String::new, |m| format!("{:?}", m.perturbation));
+        let mut unexposed = self.camera.clone();
+        // What only acts after the light has landed, and the colour of the filter, do not decide kernels.
+        unexposed.name = String::new();
+        unexposed.exposure = Camera::three_bands(1.0).exposure;
+        let inputs = Inputs {
+            solver: metalith_cell::kept::solver_of(self.design.cell.shape),
+            layout,
+            design: &self.design.optics_digest()?,
+            lens_um: [lens.radius_um(), lens.focal_length_um],
+            elements: &self.elements,
+            camera: &unexposed,
+            model: &model_text,
+            fidelity: model.map_or(self.design.verify.fidelity, |_| Fidelity::Calibrated),
+            tabulated_um: &self.design.verify.wavelengths_um,
+            analyser: (self.design.cell.shape.rectangles()).map(|_| self.design.verify.analyser),
+            polarisation: self.design.verify.polarisation,
+            basis: &self.basis,
+            spec: &self.spec,
+            // JSON knows no infinity.
+            scene_distance_um: self.scene.view.distance_um.min(f64::MAX),
+            cubic_nm: self.cubic_nm.as_deref(),
+        };
+        serde_json::to_vec(&inputs).map_err(|e| Error::invalid(e.to_string(), "report this"))
+    }
+
+    pub(crate) fn chip<'c>(
+        &self,
+        extraction: &'c Extraction,
+        case: SimulationCase<'c>,
+        progress: &dyn Progress,
+    ) -> Result<ChipInLight<'c>> {
+        let distance_um = self.scene.view.distance_um;
+        ChipInLight::new(self.design, extraction, case, self.camera, distance_um, progress)
+    }
+
+    pub(crate) fn bank(&self, chip: &ChipInLight<'_>, progress: &dyn Progress) -> Result<KernelBank> {
+        KernelBank::build(chip, &self.basis, self.spec, progress)
+    }
+
+    pub(crate) fn veil(&self, chip: &ChipInLight<'_>, bank: &KernelBank, progress: &dyn Progress) -> Result<Veil> {
+        Veil::build(chip, bank, &self.basis, &self.camera.sensor, &self.scene.view, progress)
+    }
+
+    pub(crate) fn studio(self, bank: KernelBank, veil: Veil) -> Result<Studio> {
+        check_windows(&veil, bank.bases, &self.channels, &bank.spec)?;
+        let studio = Studio {
+            design: self.design.clone(),
+            camera: self.camera.clone(),
+            bank,
+            veil,
+            elements: self.elements,
+            colours: ChannelColours::of(&self.channels),
+            channels: self.channels,
+            basis: self.basis,
+            scene_spectra: self.scene.basis.len(),
+            primaries: self.primaries,
+            view: self.scene.view,
+            given: self.given,
+            pillars: None,
+            gain: Vec::new(),
+            from_cache: [false; 2],
+            assumed: Assumed::default(),
+            prior: LearnedDenoiser::shipped()?,
+        };
+        studio.exposed()
+    }
+}
+
+/// In words, that scenes of a view are averaged to the larger pixels of another; none if both are the same.
+pub(crate) fn averaging(given: &SceneView, view: &SceneView) -> Option<String> {
+    let size = |v: &SceneView| format!("{} x {}", v.columns, v.rows);
+    (given != view).then(|| {
+        format!(
+            "the scene of {} pixels is averaged to {}: the pixels of the sensor tell no finer ones apart",
+            size(given),
+            size(view)
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array3;
+
+    /// Scenes that are finer than half a pixel of the sensor are averaged to that, and others stay as they are.
+    #[test]
+    fn fine_scenes_are_averaged_to_what_is_simulated() {
+        let design = Design::read("../../designs/prototype_3x3.toml".as_ref()).unwrap();
+        let camera = Camera::read("../../cameras/gt1930.toml".as_ref()).unwrap();
+        let view = |pixels: usize| SceneView {
+            rows: pixels,
+            columns: pixels,
+            field_deg: 80.0,
+            distance_um: f64::INFINITY,
+        };
+        let side = |pixels: usize| simulated_view(&design, &camera, &view(pixels)).columns;
+        // 2 tan 40 over 2.93 / 2400.
+        assert_eq!([512, 800, 1374, 1375, 4096].map(side), [512, 800, 1374, 1374, 1374]);
+        assert_eq!(averaging(&view(800), &view(800)), None);
+        let words = averaging(&view(4096), &view(1374)).unwrap();
+        assert!(
+            words.contains("4096 x 4096 pixels is averaged to 1374 x 1374"),
+            "{words}"
+        );
+        let rgb = Array3::from_shape_fn((100, 2748, 3), |(y, x, _)| f64::from(u8::from((x + y) % 2 == 0)));
+        let scene = SceneImage::of_rgb("fine", &rgb, 80.0, f64::INFINITY);
+        let wanted = Wanted::new(&design, &camera, &scene).unwrap();
+        // Each pixel is the mean of four.
+        let SceneView { rows, columns, .. } = wanted.scene.view;
+        assert_eq!((wanted.given, rows, columns), (scene.view, 50, 1374));
+        assert!(wanted.scene.planes[0].iter().all(|v| *v == 0.5) && wanted.averaging().is_some());
+        let coarse = SceneImage::of_rgb("coarse", &Array3::zeros((64, 64, 3)), 80.0, f64::INFINITY);
+        let wanted = Wanted::new(&design, &camera, &coarse).unwrap();
+        assert!(matches!(wanted.scene, Cow::Borrowed(_)) && wanted.averaging().is_none());
+    }
+}
