@@ -329,16 +329,7 @@ pub fn read_layout<'py>(
             (None, None) => ExtractionPlan::discover(layer),
         };
         let found = extract(&layout, &ExtractionPlan { top, ..plan }, p)?;
-        if let Some(other) = found.other_lattice() {
-            return Err(metalith::Error::invalid(
-                format!(
-                    "{}: {} stands on another lattice than the elements before it",
-                    path.display(),
-                    other.name
-                ),
-                "name a cell with elements of one kind by `top`",
-            ));
-        }
+        found.check_one_lattice(&path, "name a cell with elements of one kind by `top`")?;
         Ok(found)
     })?;
     let pillars = found.pillars;

@@ -30,13 +30,13 @@ pub fn lattice_of(kind: LatticeKind, pitch_nm: u32, (rows, columns): (usize, usi
 
 /// Nothing, if pillars of such a shape can stand on a lattice of the kind.
 pub fn check_shape(kind: LatticeKind, shape: PillarShape) -> Result<()> {
-    if kind.is_square() || shape == PillarShape::Circle {
-        return Ok(());
+    match kind.refusal(shape) {
+        Some(what) => Err(Error::invalid(
+            what,
+            "say that they are circles (`shape=\"circle\"`), or use the square lattice",
+        )),
+        None => Ok(()),
     }
-    Err(Error::invalid(
-        "a hexagonal lattice of pillars that are no circles",
-        "say that they are circles (`shape=\"circle\"`), or use the square lattice",
-    ))
 }
 
 /// Whether a place of the grid is a site that light passes and a pillar can stand on.

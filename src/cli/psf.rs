@@ -236,16 +236,10 @@ fn mostly_pillars(args: &PsfArgs, found: &Extraction) -> Result<()> {
 
 /// One cell is solved for all elements: their pillars stand on lattices of one kind and pitch, which the cell must know.
 fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
-    if let Some(other) = found.other_lattice() {
-        return Err(Error::invalid(
-            format!(
-                "{}: {} stands on another lattice than the elements before it",
-                args.layout.display(),
-                other.name
-            ),
-            "name a cell with elements of one kind by --top, or look at what is there with --extract-only --json",
-        ));
-    }
+    found.check_one_lattice(
+        &args.layout,
+        "name a cell with elements of one kind by --top, or look at what is there with --extract-only --json",
+    )?;
     if args.model.is_none()
         && !args.extract_only
         && let Some((what, hint)) = Fidelity::from(args.fidelity).refusal(found.shape, PsfArgs::lattice_kind(found))

@@ -5,8 +5,8 @@ use std::fmt;
 use ndarray::Array2;
 use serde::Serialize;
 
-use crate::WidthRows;
 use crate::error::{Error, Result};
+use crate::{PillarShape, WidthRows};
 
 /// How the sites of a lattice lie.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
@@ -27,6 +27,12 @@ impl LatticeKind {
     /// Whether it is square.
     pub fn is_square(&self) -> bool {
         *self == Self::Square
+    }
+
+    /// Why pillars of a shape cannot stand on it; none if they can.
+    pub fn refusal(self, shape: PillarShape) -> Option<&'static str> {
+        let stands = self.is_square() || shape == PillarShape::Circle;
+        (!stands).then_some("a hexagonal lattice of pillars that are no circles")
     }
 
     /// Distance of two rows (nm). On a hexagonal lattice half the root of three of the pitch, rounded to whole nanometres:

@@ -26,7 +26,7 @@ impl Studio {
     /// If elements have lenses of their own, the layout cannot be read or has no pillars in one of the elements, the camera does not
     /// see the chip, a scene is wider than the array sees, a spectral cube has not the wavelengths that the camera counts, kernels or
     /// veil are too large, or the user stopped it. That they cannot be kept is a warning to `progress`, and so are pillars that are
-    /// not those of the design, and scenes with finer pixels than are simulated ([`simulated_view`]).
+    /// not those of the design, and scenes with finer pixels than are simulated ([`simulated_view`](crate::simulated_view)).
     pub fn open(
         design: &Design,
         layout: &Path,
@@ -144,7 +144,7 @@ impl Studio {
 
     /// For pillars that were read and a case that is at hand, such as one of many draws of a chip: nothing is kept on the
     /// disk. `nodes`: places an axis of the field of each element at which kernels are formed, as many as
-    /// [`BankSpec::standard`] has if left out.
+    /// [`BankSpec::standard`](crate::BankSpec::standard) has if left out.
     ///
     /// # Errors
     /// As [`Studio::open`].

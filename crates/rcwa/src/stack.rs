@@ -41,6 +41,14 @@ impl CellLattice {
         }
     }
 
+    /// The kind of lattice that it is drawn as.
+    pub fn kind(self) -> LatticeKind {
+        match self {
+            Self::Square => LatticeKind::Square,
+            Self::Staggered { .. } => LatticeKind::Hexagonal,
+        }
+    }
+
     /// Distance of two rows (nm).
     pub fn row_nm(self, pitch_nm: f64) -> f64 {
         match self {

@@ -155,7 +155,6 @@ fn session(
         layout: layout.to_owned(),
         stack: Stack {
             cell: design.cell_stack()?,
-            lattice: design.cell.lattice,
             lens_diameter_um: lens_diameter_um(design),
             focal_length_um: design.lens.focal_length_um,
         },

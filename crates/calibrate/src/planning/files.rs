@@ -88,8 +88,9 @@ fn text(
     if let Some(shape) = word(&PillarShape::CHOICES, Some(cell.shape)) {
         line("shape", quoted(shape));
     }
-    if !set.stack.lattice.is_square() {
-        line("lattice", quoted(&set.stack.lattice.to_string()));
+    let lattice = cell.lattice.kind();
+    if !lattice.is_square() {
+        line("lattice", quoted(&lattice.to_string()));
     }
     line("pillar_index", quoted("film_nk.csv"));
     line("substrate", quoted(substrate));

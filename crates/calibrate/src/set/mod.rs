@@ -15,7 +15,7 @@ pub use index::{CaptureIndex, ElementIndex, LedIndex, PerCapture, PerElement, Pe
 pub use sem::{COLUMNS as SEM_COLUMNS, SemSite};
 
 use metalith_cell::CellStack;
-use metalith_core::{LatticeKind, WidthMap};
+use metalith_core::WidthMap;
 
 /// A mean of frames this near to saturation contains clipped frames.
 pub const SATURATED: f64 = 0.97;
@@ -88,8 +88,6 @@ impl MeasuredSet {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stack {
     pub cell: CellStack,
-    /// How the pillars stand.
-    pub lattice: LatticeKind,
     pub lens_diameter_um: f64,
     pub focal_length_um: f64,
 }

@@ -94,11 +94,11 @@ impl CellSpec {
                 (PillarShape::Rectangle(pillars), (1, pillars.steps), 1)
             }
         };
-        if !lattice.is_square() && shape != PillarShape::Circle {
+        if let Some(what) = lattice.refusal(shape) {
             s.fault_given(
                 &["cell.shape"],
                 "lattice",
-                "a hexagonal lattice of pillars that are no circles",
+                what,
                 "add `shape = \"circle\"`, or use the square lattice",
             );
         }

@@ -1,9 +1,11 @@
 //! What to read out of a layout, and what was read.
 
+use std::path::Path;
+
 use super::oddity::Oddities;
 use super::survey::Survey;
 use crate::{LayerNumber, Selection};
-use metalith_core::{ElementSite, PillarShape, WidthMap};
+use metalith_core::{ElementSite, Error, PillarShape, Result, WidthMap};
 
 /// Where the elements are.
 #[derive(Clone, Debug)]
@@ -93,10 +95,22 @@ pub struct Extraction<W = WidthMap> {
 }
 
 impl<W> Extraction<W> {
-    /// The first element whose pillars stand on a lattice of another kind or pitch than those of the elements before it.
-    pub fn other_lattice(&self) -> Option<&ElementSite> {
+    /// Check that the pillars of all elements stand on lattices of one kind and pitch. `file` is what was read, `hint` what to do else.
+    ///
+    /// # Errors
+    /// With the first element that stands on another one.
+    pub fn check_one_lattice(&self, file: &Path, hint: &str) -> Result<()> {
         let of = |e: &ExtractedElement<W>| (e.site.lattice.kind(), e.site.lattice.pitch_nm());
-        let first = of(self.elements.first()?);
-        self.elements.iter().find(|e| of(e) != first).map(|e| &e.site)
+        let Some(other) = self.elements.iter().find(|e| of(e) != of(&self.elements[0])) else {
+            return Ok(());
+        };
+        Err(Error::invalid(
+            format!(
+                "{}: {} stands on another lattice than the elements before it",
+                file.display(),
+                other.site.name
+            ),
+            hint,
+        ))
     }
 }

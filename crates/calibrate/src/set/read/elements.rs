@@ -31,7 +31,7 @@ pub(super) fn elements(
             s.fault("index", format!("element {index:?} is there twice"), "leave one out");
         }
         let diameter_nm = (stack.lens_diameter_um * 1e3).round() as u32;
-        let lattice = Lattice::of_kind_covering(stack.lattice, diameter_nm, stack.cell.pitch_nm as u32)
+        let lattice = Lattice::of_kind_covering(stack.cell.lattice.kind(), diameter_nm, stack.cell.pitch_nm as u32)
             .expect("an even pitch and a positive diameter");
         elements.push(MeasuredElement {
             index,

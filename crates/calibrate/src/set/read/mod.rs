@@ -169,11 +169,11 @@ fn stack(s: &Section<'_, '_>, folder: &Path) -> (Stack, bool) {
     let under = [layer("spacer_nm", spacer), layer("residual_nm", film.clone())];
     let shape = s.choice("shape", &PillarShape::CHOICES, Some(PillarShape::Square));
     let lattice = s.choice("lattice", &LatticeKind::CHOICES, Some(LatticeKind::Square));
-    if !lattice.is_square() && shape != PillarShape::Circle {
+    if let Some(what) = lattice.refusal(shape) {
         s.fault_given(
             &["stack.shape"],
             "lattice",
-            "a hexagonal lattice of pillars that are no circles",
+            what,
             "add `shape = \"circle\"`, or use the square lattice",
         );
     }
@@ -193,7 +193,6 @@ fn stack(s: &Section<'_, '_>, folder: &Path) -> (Stack, bool) {
     };
     let stack = Stack {
         cell,
-        lattice,
         lens_diameter_um,
         focal_length_um,
     };
