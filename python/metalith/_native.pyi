@@ -110,6 +110,7 @@ def psf_of_widths(
     samples: int,
     shape: ToldShape,
     arriving: str,
+    analyser: str | None,
     height_nm: float,
     pillar: str,
     substrate: str,

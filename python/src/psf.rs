@@ -1,7 +1,8 @@
 //! PSFs of arrays and of maps of widths.
 
 use metalith::cell::{
-    FittedCell, Handedness, PointwiseCell, Polarisation, PolarisedLight, PublishedCell, RotatedCell, cache_folder,
+    Analyser, FittedCell, Handedness, PointwiseCell, Polarisation, PolarisedLight, PublishedCell, RotatedCell,
+    cache_folder,
 };
 use metalith::design::band_about;
 use metalith::extract::{ElementSite, ExtractedElement, Extraction};
@@ -35,16 +36,35 @@ fn fidelity(word: &str) -> Result<Fidelity> {
     }
 }
 
-/// The light that a word or an angle names, at pillars of a shape.
-fn polarisation(text: &str, shape: PillarShape) -> Result<Polarisation> {
-    let named = text.parse()?;
-    if shape.rectangles().is_none() && named != Polarisation::Circular(Handedness::default()) {
+/// The light that words or angles name, at pillars of a shape.
+fn polarised(arriving: &str, analyser: Option<&str>, shape: PillarShape) -> Result<PolarisedLight> {
+    let arriving: Polarisation = arriving.parse()?;
+    let analyser: Option<Analyser> = analyser.map(str::parse).transpose()?;
+    let usual = arriving == Polarisation::Circular(Handedness::default()) && analyser.is_none();
+    if shape.rectangles().is_none() && !usual {
         return Err(Error::invalid(
             format!("light of a polarisation for {}", shape.plural()),
-            "leave out `arriving`: it counts for rectangles alone",
+            "leave out `arriving` and `analyser`: they count for rectangles alone",
         ));
     }
-    Ok(named)
+    if analyser == Some(Analyser::Circular) && !matches!(arriving, Polarisation::Circular(_)) {
+        return Err(Error::invalid(
+            format!("a circular analyser in light that arrives {arriving}"),
+            "give an array of a design, which says what the pillars focus: the analyser passes what that is converted to",
+        ));
+    }
+    Ok(PolarisedLight {
+        arriving: Some(arriving),
+        analyser,
+    })
+}
+
+/// The hand that light of these is focused in.
+fn focused(light: PolarisedLight) -> Handedness {
+    match light.arriving {
+        Some(Polarisation::Circular(hand)) if light.analyser.is_some() => hand,
+        _ => Handedness::default(),
+    }
 }
 
 /// Cells that pillars of a shape on such a lattice do not have.
@@ -274,7 +294,7 @@ pub fn psf_of_array<'py>(
 /// PSFs of maps of widths, without a design.
 #[pyfunction]
 #[pyo3(signature = (widths, pitch_nm, lattice, wavelengths_nm, fields_deg, distance_um, fidelity, fast, samples, shape,
-    arriving, height_nm, pillar, substrate, progress=None))]
+    arriving, analyser, height_nm, pillar, substrate, progress=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn psf_of_widths<'py>(
     py: Python<'py>,
@@ -289,6 +309,7 @@ pub fn psf_of_widths<'py>(
     samples: usize,
     shape: ToldShape,
     arriving: &str,
+    analyser: Option<&str>,
     height_nm: f64,
     pillar: &str,
     substrate: &str,
@@ -296,7 +317,7 @@ pub fn psf_of_widths<'py>(
 ) -> PyResult<Vec<Bound<'py, PyDict>>> {
     let wanted = self::fidelity(fidelity).map_err(error)?;
     let shape = shape_of(shape).map_err(error)?;
-    let arriving = polarisation(arriving, shape).map_err(error)?;
+    let light = polarised(arriving, analyser, shape).map_err(error)?;
     let kind = kind_of(lattice).map_err(error)?;
     refuse(wanted, shape, kind).map_err(error)?;
     let maps = widths
@@ -310,7 +331,7 @@ pub fn psf_of_widths<'py>(
     let found = work(py, progress, |p| {
         let drawn = drawn(&maps);
         let cell: Box<dyn CellModel> = match (wanted, shape.rectangles()) {
-            (_, Some(pillars)) => Box::new(RotatedCell::new(stack, pillars, Handedness::default())),
+            (_, Some(pillars)) => Box::new(RotatedCell::new(stack, pillars, focused(light))),
             (Fidelity::Published, None) => Box::new(PublishedCell::new(pitch_nm)),
             (Fidelity::Neighbours, None) => {
                 let mapping = Mapping::of_widths(maps.iter().map(WidthMap::histogram))?;
@@ -335,10 +356,7 @@ pub fn psf_of_widths<'py>(
             fields_deg,
             samples,
             pixel_um: 5.86,
-            polarised: PolarisedLight {
-                arriving: Some(arriving),
-                analyser: false,
-            },
+            polarised: light,
             fast,
         };
         simulate(lit.collect(), cell.as_ref(), &light, p)

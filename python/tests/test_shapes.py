@@ -123,6 +123,36 @@ def test_light_of_the_other_handedness_is_not_focused() -> None:
         mean = 0.5 * (values[pair[0]] + values[pair[1]])
         # Single precision of the fields.
         assert np.allclose(values["unpolarised"], mean, rtol=0, atol=1e-5 * peak)
+    # Images behind crossed analysers are all of the light.
+    analysed = {}
+    for analyser in (None, "x", "y", "circular"):
+        psf = ml.psf(
+            numbers,
+            [532],
+            shape=array.shape,
+            arriving="right",
+            analyser=analyser,
+            pitch_nm=design.pitch_nm,
+            distance_um=design.focal_length_um,
+            pillar_height_nm=design.pillar_height_nm,
+            pillar=TIO2,
+            fast=True,
+            samples=64,
+        )[0]
+        analysed[analyser] = psf.values
+    assert np.allclose(analysed["x"] + analysed["y"], analysed[None], rtol=0, atol=1e-5 * peak)
+    # What is converted, without what is not.
+    assert analysed["circular"].sum() < 0.999 * analysed[None].sum()
+    with pytest.raises(ml.MetalithError, match="a circular analyser in light that arrives unpolarised"):
+        ml.psf(
+            numbers,
+            [532],
+            shape=array.shape,
+            arriving="unpolarised",
+            analyser="circular",
+            pitch_nm=design.pitch_nm,
+            distance_um=80.0,
+        )
     with pytest.raises(ml.MetalithError, match="no light of polarisation `diagonal`"):
         ml.psf(numbers, [532], shape=array.shape, arriving="diagonal", pitch_nm=design.pitch_nm, distance_um=80.0)
     with pytest.raises(ml.MetalithError, match="light of a polarisation for squares"):

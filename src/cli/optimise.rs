@@ -6,8 +6,8 @@ use clap::Args;
 use metalith::cell::cache_folder;
 use metalith::layout::read_pillars;
 use metalith::optimise::{
-    BY_EQUAL_NEIGHBOURS, Checkpoint, Deconvolution, Judged, OptimiseReport, OptimiseTask, Optimised, OverWavelength,
-    TaskCells, lens_alone, mean_and_deviation, views, wavelengths, write_phase_table,
+    Checkpoint, Deconvolution, Judged, OptimiseReport, OptimiseTask, Optimised, OverWavelength, TaskCells, lens_alone,
+    mean_and_deviation, views, wavelengths, write_phase_table,
 };
 use metalith::report::sig;
 use metalith::study::plan_starts;
@@ -163,18 +163,22 @@ fn findings(
         Ok(judged)
     };
     let (before, mut after) = (judge(&task.reference_turns)?, judge(&found.turns)?);
+    let own = match task.own_turns == task.reference_turns {
+        true => Vec::new(),
+        false => judge(&task.own_turns)?,
+    };
     let alone = lens_alone(design, phase)?;
     let array = PillarArray::build(&alone, terminal)?;
     let layout = folder.join("lens.gds");
     write_pillars(&alone, &array, Hierarchy::Folded, &layout, terminal)?;
     let read = read_pillars(&alone, &layout, terminal)?;
-    after.push(task.judge_layout(&read.elements[0].widths, cells.rigorous())?);
+    after.push(task.judge_layout(&read.elements[0].widths, cells.judge())?);
     let limits = [0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5];
     let over_limit = task.merit_over_limit(&cells.all(), &found.turns, &limits, terminal)?;
     let reference_widths = task.widths_nm(&task.reference_turns);
     let spectrum = OverWavelength {
         lens: &task.lens,
-        cell: cells.rigorous(),
+        cell: cells.judge(),
         widths_nm: &[&reference_widths, &found.widths_nm],
     };
     let band_nm = (task.spec.band_um.0 * 1e3, task.spec.band_um.1 * 1e3);
@@ -192,6 +196,7 @@ fn findings(
         merit: found.merit,
         step_limit_turns: task.limit().turns(),
         before,
+        own,
         after,
         merit_over_limit: over_limit,
         expected_psnr_db: expected_images(task, cells, &reference_widths, &found.widths_nm, terminal)?,
@@ -272,7 +277,7 @@ fn expected_images(
 }
 
 fn summary(findings: &OptimiseReport) {
-    for (name, list) in [("before", &findings.before), ("after", &findings.after)] {
+    for (name, list) in findings.phases() {
         for judged in list {
             print_line!(
                 "{name}, {} with the {} cell: Strehl {} (geometric mean), {} smallest, step {:.3} turns",
@@ -295,5 +300,5 @@ fn summary(findings: &OptimiseReport) {
             sig(deviation, 2)
         );
     }
-    print_line!("{BY_EQUAL_NEIGHBOURS}");
+    print_line!("{}", findings.neighbours());
 }

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use metalith::cell::{Fidelity, Handedness, Polarisation};
+use metalith::cell::{Analyser, Fidelity, Handedness, Polarisation};
 use metalith::design::TALLEST_NM;
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::report::{count, exact, sig};
@@ -150,13 +150,13 @@ pub struct PsfArgs {
     #[arg(long, value_name = "POLARISATION", allow_negative_numbers = true, value_parser = polarisation)]
     arriving: Option<Polarisation>,
 
-    /// A circular analyser before the sensor, where the pillars are rotated rectangles: of light of the hand that they focus it
-    /// leaves out what they do not convert, of light of the other hand what they convert.
-    #[arg(long)]
-    analyser: bool,
+    /// What is before the sensor, where the pillars are rotated rectangles: `circular`, which passes the hand that focused light is
+    /// converted to, or linear along `x` or `y` or at an angle from x towards y (degrees).
+    #[arg(long, value_name = "ANALYSER", allow_negative_numbers = true, value_parser = analyser)]
+    analyser: Option<Analyser>,
 
-    /// Circular polarisation of the light that the layout focuses, which decides what the --analyser passes; that of --arriving if
-    /// left out.
+    /// Circular polarisation of the light that the layout focuses, which decides what a circular --analyser passes; that of
+    /// --arriving if left out.
     #[arg(long, value_enum, requires = "analyser")]
     focused: Option<CircularArg>,
 
@@ -175,6 +175,11 @@ pub struct PsfArgs {
 
 /// A word or an angle.
 fn polarisation(text: &str) -> std::result::Result<Polarisation, String> {
+    text.parse().map_err(|e: Error| e.to_string())
+}
+
+/// A word or an angle.
+fn analyser(text: &str) -> std::result::Result<Analyser, String> {
     text.parse().map_err(|e: Error| e.to_string())
 }
 
@@ -251,20 +256,20 @@ fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
 
 /// Light of a polarisation is simulated where pillars change it, and an analyser for light of both hands must be told which it passes.
 fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
-    if found.shape.rectangles().is_none() && (args.arriving.is_some() || args.focused.is_some()) {
+    if found.shape.rectangles().is_none() && (args.arriving.is_some() || args.analyser.is_some()) {
         return Err(Error::invalid(
             format!(
                 "{}: light of a polarisation for {}",
                 args.layout.display(),
                 found.shape.plural()
             ),
-            "leave out --arriving and --focused: they count for rotated rectangles alone, others are simulated in light that is not \
+            "leave out --arriving and --analyser: they count for rotated rectangles alone, others are simulated in light that is not \
              polarised",
         ));
     }
-    if args.analyser && args.hand().is_none() {
+    if args.analyser == Some(Analyser::Circular) && args.hand().is_none() {
         return Err(Error::invalid(
-            format!("an analyser in light that arrives {}", args.arriving()),
+            format!("a circular analyser in light that arrives {}", args.arriving()),
             "say which hand the layout focuses by --focused left or right: the analyser passes what that is converted to",
         ));
     }

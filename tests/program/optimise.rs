@@ -7,7 +7,7 @@ use assert_cmd::Command;
 use metalith::cell::PublishedCell;
 use metalith::layout::read_pillars;
 use metalith::optimise::{Checkpoint, OptimiseTask, lens_alone};
-use metalith::{Design, Hierarchy, PillarArray, Silent, write_pillars};
+use metalith::{Design, Fidelity, Hierarchy, PillarArray, Silent, cell_models, write_pillars};
 
 const EXCHANGE: &str = "[optimise]\ncell = \"published\"\nstep_nm = 5\nchains = 3\nhot_sweeps = 12\nseed = 4\n";
 
@@ -63,6 +63,62 @@ fn the_phase_of_the_command_becomes_a_layout_that_keeps_the_limit() {
     const STEP_TURNS: f64 = 0.2 + 1e-6;
     assert!(found.largest_step_turns <= STEP_TURNS, "{}", found.largest_step_turns);
     assert!((found.geometric_mean / rings.geometric_mean - 1.0).abs() < SAME);
+}
+
+/// By unlike neighbours, whose tables come with the program: the layout focuses as the rings promise, pillar by pillar, and better
+/// than before.
+#[test]
+fn a_lens_is_optimised_among_unlike_neighbours() {
+    /// Eight radii for all sites of a ring.
+    const OF_RINGS: f64 = 1e-6;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("unlike.toml");
+    let mut text = fs::read_to_string(metalith_testing::design("broadband_3x3")).unwrap();
+    for (from, to) in [
+        ("diameter_um = 1000", "diameter_um = 40"),
+        ("focal_length_um = 2400", "focal_length_um = 96"),
+        ("source = \"table\"", "source = \"hyperbola\"\nwavelength_nm = 550"),
+        ("file = \"phases/broadband.csv\"\ninterpolation = \"nearest\"", ""),
+        ("cell = \"rigorous\"", "cell = \"neighbours\""),
+        ("band_nm = [400, 700]", "band_nm = [460, 650]"),
+        ("step_nm = 1\n", "step_nm = 10\n"),
+        ("chains = 4", "chains = 1"),
+        ("hot_sweeps = 150", "hot_sweeps = 4"),
+    ] {
+        assert!(text.contains(from), "{from}");
+        text = text.replacen(from, to, 1);
+    }
+    let phase = folder.path().join("phase.csv");
+    let optimised = |text: &str| {
+        fs::write(&path, text).unwrap();
+        let mut program = Command::cargo_bin("metalith").unwrap();
+        program.args(["optimise", "--no-report", "--quiet"]).arg(&path);
+        program.arg("--out").arg(folder.path()).arg("--phase").arg(&phase);
+        program.assert()
+    };
+    let one = text.replacen("wavelengths_nm = [455, 530, 660]", "wavelengths_nm = [530]", 1);
+    let said = optimised(&one).code(2).get_output().stderr.clone();
+    let said = String::from_utf8_lossy(&said);
+    assert!(said.contains("at one wavelength alone"), "{said}");
+    optimised(&text).success();
+    let design = Design::read(&path).unwrap();
+    let alone = lens_alone(&design, &phase).unwrap();
+    let cell = cell_models(&design, &[Fidelity::Neighbours]).unwrap().remove(0);
+    let (task, before) = (OptimiseTask::of(&alone).unwrap(), OptimiseTask::of(&design).unwrap());
+    let rings = task.judge_rings(&task.own_turns, cell.as_ref()).unwrap();
+    let array = PillarArray::build(&alone, &Silent).unwrap();
+    let found = task
+        .judge_layout(&array.widths(array.central()), cell.as_ref())
+        .unwrap();
+    assert_eq!(found.fidelity, Fidelity::Neighbours);
+    assert!((found.geometric_mean / rings.geometric_mean - 1.0).abs() < OF_RINGS);
+    let hyperbola = before.judge_rings(&before.own_turns, cell.as_ref()).unwrap();
+    assert!(
+        found.geometric_mean > 1.05 * hyperbola.geometric_mean,
+        "{} {}",
+        found.geometric_mean,
+        hyperbola.geometric_mean
+    );
 }
 
 /// Ctrl-C: the best so far is kept, exit code 3, and the same command goes on.

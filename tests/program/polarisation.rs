@@ -61,7 +61,14 @@ fn a_design_and_options_name_the_same_light() {
     let spot = &found["distinct"][0]["spots"][0]["extracted"][0][1];
 
     let layout = folder.path().join("geometric_phase_532_pillars.gds");
-    let options = ["--arriving", "unpolarised", "--analyser", "--focused", "left"];
+    let options = [
+        "--arriving",
+        "unpolarised",
+        "--analyser",
+        "circular",
+        "--focused",
+        "left",
+    ];
     let same = psf(&layout, &options).unwrap();
     for figure in ["strehl", "energy_1_pixel", "energy_passed"] {
         let [here, there] = [&same, spot].map(|of| of[figure].as_f64().unwrap());
@@ -72,7 +79,7 @@ fn a_design_and_options_name_the_same_light() {
         );
     }
 
-    let said = psf(&layout, &["--arriving", "45", "--analyser"]).unwrap_err();
+    let said = psf(&layout, &["--arriving", "45", "--analyser", "circular"]).unwrap_err();
     assert!(
         said.contains("linearly polarised at 45 degrees from x towards y") && said.contains("--focused"),
         "{said}"
@@ -80,4 +87,15 @@ fn a_design_and_options_name_the_same_light() {
     let said = psf(&layout, &["--arriving", "diagonal"]).unwrap_err();
     assert!(said.contains("no light of polarisation `diagonal`"), "{said}");
     assert!(psf(&layout, &["--focused", "left"]).is_err());
+
+    // Half of what a linear analyser passes is focused, whatever hand that is.
+    let [all, linear] = [&["--arriving", "45"][..], &["--arriving", "45", "--analyser", "-30"]]
+        .map(|options| psf(&layout, options).unwrap());
+    let passed = |of: &Value| of["energy_passed"].as_f64().unwrap();
+    assert!(
+        passed(&linear) > 0.2 && passed(&linear) < 0.8 * passed(&all),
+        "{linear} {all}"
+    );
+    let said = psf(&layout, &["--analyser", "left"]).unwrap_err();
+    assert!(said.contains("there is no analyser `left`"), "{said}");
 }

@@ -30,10 +30,12 @@ pub use fit::{
 pub use metalith_rcwa::Material;
 pub use model::{CellModel, Fidelity, ObliqueTables, POLARISATION_SHARE, dark};
 pub use neighbour_band::{BandNode, BandResponse};
-pub use neighbours::{FittedNeighbours, NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourBasis, NeighbourResponse, SiteResponse};
+pub use neighbours::{
+    FittedNeighbours, NEIGHBOUR_DEGREE, NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourBasis, NeighbourResponse, SiteResponse,
+};
 pub use pointwise::PointwiseCell;
 pub use pointwise::{BAND_ORDERS, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, tabulate};
-pub use polarisation::{HandTables, PassedTable, Polarisation, PolarisedLight};
+pub use polarisation::{Analyser, HandTables, PassedTable, Polarisation, PolarisedLight};
 pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};
 pub use published::PublishedCell;
 pub use rectangle::{Handedness, RotatedRectangle};

@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
-use crate::{CellStack, NEIGHBOURS, NeighbourResponse, SiteResponse};
+use crate::{CellStack, NEIGHBOUR_DEGREE, NEIGHBOURS, NeighbourResponse, SiteResponse};
 use metalith_core::Result;
 
 /// A wavelength that has a table, s and p as one.
@@ -67,6 +67,7 @@ impl BandNode {
 /// The response of a band at one wavelength.
 #[derive(Clone, Debug)]
 pub struct BandResponse {
+    /// At least one; all have the same terms, since the tables of a cell are for the same widths.
     parts: Vec<BandPart>,
 }
 
@@ -141,6 +142,14 @@ impl SiteResponse for BandResponse {
 
     fn pair(&self, number: usize, own_nm: f64, neighbour_nm: f64) -> Complex64 {
         self.sum(own_nm, |r| r.pair(number, own_nm, neighbour_nm))
+    }
+
+    fn pair_factors(&self, number: usize, own_nm: f64) -> [Complex64; NEIGHBOUR_DEGREE] {
+        std::array::from_fn(|b| self.sum(own_nm, |r| r.pair_factors(number, own_nm)[b]))
+    }
+
+    fn neighbour_factors(&self, neighbour_nm: f64) -> [f64; NEIGHBOUR_DEGREE] {
+        self.parts[0].response.neighbour_factors(neighbour_nm)
     }
 }
 

@@ -27,10 +27,12 @@ pub const NEIGHBOURS: [[i32; 2]; 12] = [
     [0, -2],
 ];
 
-/// Highest polynomial in the own width, of a(w) and of b_d, and in the neighbour's.
+/// Highest polynomial in the own width, of a(w) and of b_d.
 const OWN_DEGREE: usize = 12;
 const PAIR_DEGREE: usize = 6;
-const NEIGHBOUR_DEGREE: usize = 4;
+
+/// The same in the neighbour's width: what a pair adds is a sum of so many products of a function of each.
+pub const NEIGHBOUR_DEGREE: usize = 4;
 
 /// Number of terms of a(w), and of each b_d.
 const OWN_TERMS: usize = OWN_DEGREE + 1;
@@ -102,11 +104,14 @@ impl NeighbourBasis {
 
     fn pair(&self, own_nm: f64, neighbour_nm: f64) -> [f64; PAIR_TERMS] {
         let own: [f64; PAIR_DEGREE + 1] = self.chebyshev(own_nm);
-        let other: [f64; NEIGHBOUR_DEGREE + 1] = self.chebyshev(neighbour_nm);
-        std::array::from_fn(|i| {
-            let (a, b) = (i / NEIGHBOUR_DEGREE, i % NEIGHBOUR_DEGREE);
-            own[a] * (other[b + 1] - self.means[b])
-        })
+        let other = self.neighbour(neighbour_nm);
+        std::array::from_fn(|i| own[i / NEIGHBOUR_DEGREE] * other[i % NEIGHBOUR_DEGREE])
+    }
+
+    /// What the width of a neighbour counts as.
+    fn neighbour(&self, width_nm: f64) -> [f64; NEIGHBOUR_DEGREE] {
+        let all: [f64; NEIGHBOUR_DEGREE + 1] = self.chebyshev(width_nm);
+        std::array::from_fn(|b| all[b + 1] - self.means[b])
     }
 
     /// T_0 to T_(N-1) of a width over the range.
@@ -155,6 +160,13 @@ pub trait SiteResponse: Sync {
     /// What the neighbour at the offset of this number in [`NEIGHBOURS`] adds; widths in nm.
     fn pair(&self, number: usize, own_nm: f64, neighbour_nm: f64) -> Complex64;
 
+    /// What a pair adds, apart by width: [`SiteResponse::pair`] is the sum of the products of these, of the own width, with
+    /// [`SiteResponse::neighbour_factors`].
+    fn pair_factors(&self, number: usize, own_nm: f64) -> [Complex64; NEIGHBOUR_DEGREE];
+
+    /// The factors of a neighbour's width (nm); the same at all wavelengths of one cell.
+    fn neighbour_factors(&self, neighbour_nm: f64) -> [f64; NEIGHBOUR_DEGREE];
+
     /// What a pillar transmits among neighbours of these widths (nm), in the order of [`NEIGHBOURS`].
     fn among(&self, own_nm: f64, neighbours_nm: &[f64; NEIGHBOURS.len()]) -> Complex64 {
         let pairs = neighbours_nm.iter().enumerate();
@@ -174,6 +186,17 @@ impl SiteResponse for NeighbourResponse {
             &self.weights[first..first + PAIR_TERMS],
             &self.basis.pair(own_nm, neighbour_nm),
         )
+    }
+
+    fn pair_factors(&self, number: usize, own_nm: f64) -> [Complex64; NEIGHBOUR_DEGREE] {
+        let own: [f64; PAIR_DEGREE + 1] = self.basis.chebyshev(own_nm);
+        let first = OWN_TERMS + number * PAIR_TERMS;
+        let weight = |a: usize, b: usize| self.weights[first + a * NEIGHBOUR_DEGREE + b];
+        std::array::from_fn(|b| own.iter().enumerate().map(|(a, t)| weight(a, b) * t).sum())
+    }
+
+    fn neighbour_factors(&self, neighbour_nm: f64) -> [f64; NEIGHBOUR_DEGREE] {
+        self.basis.neighbour(neighbour_nm)
     }
 }
 
@@ -206,6 +229,12 @@ mod tests {
         for number in 0..NEIGHBOURS.len() {
             let mean: Complex64 = widths().map(|w| response.pair(number, 230.0, w)).sum();
             assert!(mean.norm() / 50.0 < ROUNDING, "{number}: {mean}");
+            let products = response.pair_factors(number, 170.0).into_iter();
+            let products: Complex64 = products
+                .zip(response.neighbour_factors(211.0))
+                .map(|(a, b)| a * b)
+                .sum();
+            assert!((products - response.pair(number, 170.0, 211.0)).norm() < ROUNDING);
         }
         // Beyond the range nothing changes any more: polynomials would run away.
         assert_eq!(response.own(500.0), response.own(296.08));

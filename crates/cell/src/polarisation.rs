@@ -78,22 +78,72 @@ impl FromStr for Polarisation {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        let known = Self::CHOICES.iter().find(|(name, _)| *name == text);
-        let angle = || text.parse().ok().filter(|deg: &f64| deg.abs() <= Self::MOST_DEG);
-        known
-            .map(|(_, known)| *known)
-            .or_else(|| angle().map(Self::Linear))
-            .ok_or_else(|| {
-                Error::invalid(
-                    format!("there is no light of polarisation `{text}`"),
-                    format!(
-                        "use left, right, x, y, unpolarised, or the angle of linear polarisation from x towards y, from -{0} to \
-                         {0} degrees",
-                        Self::MOST_DEG
-                    ),
-                )
-            })
+        named_or_linear(text, &Self::CHOICES, Self::Linear)
+            .ok_or_else(|| refusal(format!("there is no light of polarisation `{text}`"), &Self::CHOICES))
     }
+}
+
+/// What of the light behind the pillars passes to the sensor.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Analyser {
+    /// The hand that focused light is converted to, whatever arrives.
+    Circular,
+    /// What is polarised linearly at this angle from x towards y (degrees).
+    Linear(f64),
+}
+
+impl Analyser {
+    /// Name and value of each, as design files and options have them; other angles are numbers.
+    pub const CHOICES: [(&'static str, Self); 3] = [
+        ("circular", Self::Circular),
+        ("x", Self::Linear(0.0)),
+        ("y", Self::Linear(90.0)),
+    ];
+}
+
+/// In words, as of a thing before the sensor.
+impl fmt::Display for Analyser {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Circular => f.write_str("a circular analyser"),
+            Self::Linear(0.0) => f.write_str("a linear analyser along x"),
+            Self::Linear(90.0) => f.write_str("a linear analyser along y"),
+            Self::Linear(deg) => write!(f, "a linear analyser at {deg} degrees from x towards y"),
+        }
+    }
+}
+
+impl FromStr for Analyser {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        named_or_linear(text, &Self::CHOICES, Self::Linear)
+            .ok_or_else(|| refusal(format!("there is no analyser `{text}`"), &Self::CHOICES))
+    }
+}
+
+/// A word, or the angle of linear polarisation.
+fn named_or_linear<T: Copy>(text: &str, choices: &[(&str, T)], linear: fn(f64) -> T) -> Option<T> {
+    let known = choices.iter().find(|(name, _)| *name == text);
+    let angle = || {
+        text.parse()
+            .ok()
+            .filter(|deg: &f64| deg.abs() <= Polarisation::MOST_DEG)
+    };
+    known.map(|(_, known)| *known).or_else(|| angle().map(linear))
+}
+
+fn refusal<T>(what: String, choices: &[(&str, T)]) -> Error {
+    let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
+    Error::invalid(
+        what,
+        format!(
+            "use {}, or the angle of linear polarisation from x towards y, from -{most} to {most} degrees",
+            names.join(", "),
+            most = Polarisation::MOST_DEG
+        ),
+    )
 }
 
 /// Which light arrives at pillars that change polarisation, and which of it reaches the sensor.
@@ -101,14 +151,41 @@ impl FromStr for Polarisation {
 pub struct PolarisedLight {
     /// Of the light that arrives; where it is none, circular of the hand that the pillars focus.
     pub arriving: Option<Polarisation>,
-    /// Whether a circular analyser is before the sensor: it passes the hand that focused light is converted to, whatever arrives.
-    pub analyser: bool,
+    /// What is before the sensor, if anything.
+    pub analyser: Option<Analyser>,
 }
 
 impl PolarisedLight {
     /// The polarisation of the light that arrives at pillars that focus this hand.
     pub fn arriving_at(self, focused: Handedness) -> Polarisation {
         self.arriving.unwrap_or(Polarisation::Circular(focused))
+    }
+
+    /// Share of the energy of light that arrives which pillars focus through the analyser, if they convert all of it.
+    pub fn focused_share(self, focused: Handedness) -> f64 {
+        let passed = match self.analyser {
+            Some(Analyser::Linear(_)) => 0.5,
+            Some(Analyser::Circular) | None => 1.0,
+        };
+        passed * self.arriving_at(focused).share(focused)
+    }
+
+    /// The detector in words: what reaches the sensor beside focused light, and what does not.
+    pub fn detector(self, focused: Handedness) -> String {
+        let own = self.arriving_at(focused) == Polarisation::Circular(focused);
+        match (self.analyser, own) {
+            (None, true) => "what is not converted lands as it came".into(),
+            (None, false) => "what is not converted lands as it came, and the other hand diverges".into(),
+            (Some(analyser @ Analyser::Circular), true) => {
+                format!("{analyser} keeps what is not converted from the sensor")
+            }
+            (Some(analyser @ Analyser::Circular), false) => format!(
+                "{analyser} passes the hand of focused light alone, with what is not converted of the other hand"
+            ),
+            (Some(analyser), _) => format!(
+                "{analyser} passes half of the focused light, which interferes with what it passes of all other light"
+            ),
+        }
     }
 }
 
@@ -130,47 +207,85 @@ pub struct HandTables {
 #[derive(Clone, Debug, PartialEq)]
 pub struct PassedTable {
     pub table: Vec<Complex64>,
-    /// How often it has the phase of the element: once where focused light is in it, else not at all where it is not converted,
-    /// and minus once where it diverges.
+    /// How often it has the phase of the element: once where focused light is in it, else minus once where light is that diverges,
+    /// and not at all where all of it is not converted.
     pub order: i32,
 }
+
+/// Some of the light that leaves in one polarisation: its amplitude, what it is multiplied by, and how often that has the phase of
+/// the element.
+type Part<'a> = (Complex64, &'a [Complex64], i32);
 
 impl HandTables {
     /// What reaches the sensor of light of unit energy: energies of these add. Light of both hands that arrives with a fixed phase
     /// between them, as linear polarisation is, interferes where it leaves in one hand: what is converted of one, with what is
-    /// not of the other.
+    /// not of the other. Behind a linear analyser all of it does.
     pub fn passed(&self, light: PolarisedLight) -> Vec<PassedTable> {
-        let mut passed = Vec::new();
+        let leaving = self.leaving(light).into_iter();
+        leaving
+            .map(|parts| PassedTable {
+                order: parts
+                    .iter()
+                    .map(|part| part.2)
+                    .max_by_key(|o| (o.abs(), *o))
+                    .unwrap_or(0),
+                table: sum(&parts),
+            })
+            .collect()
+    }
+
+    /// The same of what has the phase of the element so often alone: once what is focused, not at all what is not converted, minus
+    /// once what diverges. Over whole turns of that phase these do not interfere.
+    pub fn passed_in(&self, order: i32, light: PolarisedLight) -> Vec<Vec<Complex64>> {
+        let leaving = self.leaving(light).into_iter();
+        let own = leaving.map(|parts| parts.into_iter().filter(|p| p.2 == order).collect::<Vec<_>>());
+        own.filter(|parts| !parts.is_empty()).map(|parts| sum(&parts)).collect()
+    }
+
+    /// Parts of the light that reaches the sensor: those of one list interfere, and no others.
+    fn leaving<'a>(&'a self, light: PolarisedLight) -> Vec<Vec<Part<'a>>> {
+        let mut leaving = Vec::new();
         for [left, right] in light.arriving_at(self.focused).parts() {
             let [own, other] = match self.focused {
                 Handedness::Left => [left, right],
                 Handedness::Right => [right, left],
             };
-            let [order, ends] = [i32::from(own != Complex64::ZERO), -i32::from(other != Complex64::ZERO)];
-            passed.push(PassedTable {
-                table: sum([(own, &self.converted[0]), (other, &self.unconverted[1])]),
-                order,
-            });
-            if !light.analyser {
-                passed.push(PassedTable {
-                    table: sum([(own, &self.unconverted[0]), (other, &self.converted[1])]),
-                    order: ends,
-                });
+            let there = |parts: [Part<'a>; 2]| -> Vec<Part<'a>> {
+                parts.into_iter().filter(|p| p.0 != Complex64::ZERO).collect()
+            };
+            // In the hand that focused light is converted to, and in the other.
+            let first = there([(own, &self.converted[0], 1), (other, &self.unconverted[1], 0)]);
+            let second = there([(own, &self.unconverted[0], 0), (other, &self.converted[1], -1)]);
+            match light.analyser {
+                None => leaving.extend([first, second]),
+                Some(Analyser::Circular) => leaving.push(first),
+                Some(Analyser::Linear(deg)) => {
+                    // Along the analyser the field of a hand is this times its amplitude, and the other's its conjugate.
+                    let left = Complex64::cis(deg.to_radians()) * FRAC_1_SQRT_2;
+                    let [of_first, of_second] = match self.focused {
+                        Handedness::Left => [left.conj(), left],
+                        Handedness::Right => [left, left.conj()],
+                    };
+                    let along =
+                        |parts: Vec<Part<'a>>, by: Complex64| parts.into_iter().map(move |(a, t, o)| (a * by, t, o));
+                    leaving.push(along(first, of_first).chain(along(second, of_second)).collect());
+                }
             }
         }
-        passed
+        leaving
     }
 }
 
-/// Light of two hands that leaves in one; nothing is added of a hand that does not arrive.
-fn sum(parts: [(Complex64, &Vec<Complex64>); 2]) -> Vec<Complex64> {
-    let there: Vec<_> = parts.into_iter().filter(|(a, _)| *a != Complex64::ZERO).collect();
-    let at = |k: usize| there.iter().map(|(a, t)| a * t[k]).sum();
-    (0..parts[0].1.len()).map(at).collect()
+fn sum(parts: &[Part<'_>]) -> Vec<Complex64> {
+    let length = parts.iter().map(|part| part.1.len()).max().unwrap_or(0);
+    let at = |k: usize| parts.iter().map(|(a, t, _)| a * t[k]).sum();
+    (0..length).map(at).collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::*;
     use metalith_rcwa::circular;
 
@@ -212,7 +327,7 @@ mod tests {
         Complex64::new(0.5, 0.5),
     ];
 
-    fn of(arriving: Polarisation, analyser: bool, focused: Handedness) -> f64 {
+    fn of(arriving: Polarisation, analyser: Option<Analyser>, focused: Handedness) -> f64 {
         let light = PolarisedLight {
             arriving: Some(arriving),
             analyser,
@@ -220,7 +335,7 @@ mod tests {
         energy(&tables(focused).passed(light), WEIGHTS)
     }
 
-    /// Against the Jones matrices along x and y themselves, the analyser as a projection on a circular polarisation.
+    /// Against the Jones matrices along x and y themselves, analysers as projections on a circular and on linear polarisations.
     #[test]
     fn light_of_any_polarisation_is_that_of_its_jones_vector() {
         let right = [Complex64::from(FRAC_1_SQRT_2), Complex64::new(0.0, -FRAC_1_SQRT_2)];
@@ -242,12 +357,19 @@ mod tests {
             // Of light that is left and focused, what leaves as right.
             let seen = (right[0].conj() * field[0] + right[1].conj() * field[1]).norm_sqr();
             for focused in [Handedness::Left, Handedness::Right] {
-                assert!(
-                    (of(arriving, false, focused) - all).abs() < ROUNDING * all,
-                    "{arriving}"
-                );
+                assert!((of(arriving, None, focused) - all).abs() < ROUNDING * all, "{arriving}");
+                for deg in [0.0, 90.0, 37.0, -110.0_f64] {
+                    let (sin, cos) = deg.to_radians().sin_cos();
+                    let wanted = (field[0] * cos + field[1] * sin).norm_sqr();
+                    let found = of(arriving, Some(Analyser::Linear(deg)), focused);
+                    assert!(
+                        (found - wanted).abs() < ROUNDING * all,
+                        "{arriving} {deg}: {found} {wanted}"
+                    );
+                }
             }
-            let found = [Handedness::Left, Handedness::Right].map(|focused| of(arriving, true, focused));
+            let circular = Some(Analyser::Circular);
+            let found = [Handedness::Left, Handedness::Right].map(|focused| of(arriving, circular, focused));
             assert!((found[0] - seen).abs() < ROUNDING * all, "{arriving}: {found:?} {seen}");
             assert!(
                 (found[1] - (all - seen)).abs() < ROUNDING * all,
@@ -265,7 +387,7 @@ mod tests {
         ];
         // Some light is far from the mean, or nothing would be shown.
         let mut apart: f64 = 0.0;
-        for analyser in [false, true] {
+        for analyser in [None, Some(Analyser::Circular), Some(Analyser::Linear(20.0))] {
             let wanted = of(Polarisation::Unpolarised, analyser, Handedness::Left);
             for pair in &pairs {
                 let each: Vec<f64> = pair.iter().map(|one| of(*one, analyser, Handedness::Left)).collect();
@@ -286,6 +408,46 @@ mod tests {
         assert_eq!(found, [(&tables.converted[0], 1), (&tables.unconverted[0], 0)]);
     }
 
+    /// Over whole turns of the phase of an element, the energies of focused, unconverted and diverging light are all of it.
+    #[test]
+    fn what_has_unlike_phases_adds_up_over_whole_turns() {
+        const TURNS: usize = 12;
+        for focused in [Handedness::Left, Handedness::Right] {
+            let plain = tables(focused);
+            let pillar = |of: &[Vec<Complex64>; 2], orders: [f64; 2]| {
+                let turned = |k: usize| {
+                    let each = (0..TURNS).map(|n| of[k][1] * Complex64::cis(TAU * orders[k] * n as f64 / TURNS as f64));
+                    each.collect::<Vec<_>>()
+                };
+                [turned(0), turned(1)]
+            };
+            let hands = HandTables {
+                focused,
+                converted: pillar(&plain.converted, [1.0, -1.0]),
+                unconverted: pillar(&plain.unconverted, [0.0, 0.0]),
+            };
+            let power = |tables: &[Vec<Complex64>]| tables.iter().flatten().map(Complex64::norm_sqr).sum::<f64>();
+            for (_, arriving) in Polarisation::CHOICES {
+                for analyser in [None, Some(Analyser::Circular), Some(Analyser::Linear(33.0))] {
+                    let light = PolarisedLight {
+                        arriving: Some(arriving),
+                        analyser,
+                    };
+                    let all: Vec<_> = hands.passed(light).into_iter().map(|p| p.table).collect();
+                    let parts: f64 = [1, 0, -1]
+                        .map(|order| power(&hands.passed_in(order, light)))
+                        .iter()
+                        .sum();
+                    let wanted = power(&all);
+                    assert!(
+                        (parts - wanted).abs() < ROUNDING * TURNS as f64 * (1.0 + wanted),
+                        "{arriving} {analyser:?}"
+                    );
+                }
+            }
+        }
+    }
+
     #[test]
     fn names_and_angles_are_read() {
         for (name, wanted) in Polarisation::CHOICES {
@@ -294,7 +456,16 @@ mod tests {
         assert_eq!("-30.5".parse::<Polarisation>().unwrap(), Polarisation::Linear(-30.5));
         for wrong in ["z", "", "NaN", "inf", "181"] {
             let error = wrong.parse::<Polarisation>().unwrap_err().to_string();
-            assert!(error.contains("use left, right, x, y, unpolarised"), "{error}");
+            assert!(
+                error.contains("use left, right, x, y, unpolarised, or the angle"),
+                "{error}"
+            );
+            let error = wrong.parse::<Analyser>().unwrap_err().to_string();
+            assert!(error.contains("use circular, x, y, or the angle"), "{error}");
         }
+        for (name, wanted) in Analyser::CHOICES {
+            assert_eq!(name.parse::<Analyser>().unwrap(), wanted);
+        }
+        assert_eq!("15".parse::<Analyser>().unwrap(), Analyser::Linear(15.0));
     }
 }

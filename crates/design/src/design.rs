@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use metalith_cell::CellStack;
+use metalith_cell::{Analyser, CellStack};
 use metalith_core::document::{Document, Section, load};
 use metalith_core::text::{hex, quoted};
 use metalith_core::{ElementSite, Error, Lattice, Result};
@@ -336,10 +336,13 @@ impl Design {
             analyser,
             ..
         } = &self.verify;
-        let decisive = (self.optics_digest()?, fidelity, wavelengths_um, analyser);
-        let bytes = match polarisation {
-            None => serde_json::to_vec(&decisive),
-            Some(light) => serde_json::to_vec(&(decisive, light)),
+        // Digests of designs without a linear analyser are what they were before there was one.
+        let circular = *analyser == Some(Analyser::Circular);
+        let decisive = (self.optics_digest()?, fidelity, wavelengths_um, circular);
+        let bytes = match (polarisation, analyser) {
+            (light, Some(Analyser::Linear(deg))) => serde_json::to_vec(&(decisive, light, deg)),
+            (Some(light), _) => serde_json::to_vec(&(decisive, light)),
+            (None, _) => serde_json::to_vec(&decisive),
         };
         let bytes = bytes.expect("plain data serialises");
         Ok(hex(&Sha256::digest(&bytes)))

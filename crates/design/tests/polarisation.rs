@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith_cell::{Handedness, Polarisation, PolarisedLight};
+use metalith_cell::{Analyser, Handedness, Polarisation, PolarisedLight};
 use metalith_core::Error;
 use metalith_design::Design;
 
@@ -45,7 +45,14 @@ fn words_and_angles_name_light() {
         assert_eq!(light(line).arriving, Some(Polarisation::Linear(deg)));
     }
     assert_eq!(light(""), PolarisedLight::default());
-    assert!(light("analyser = \"circular\"").analyser);
+    for (line, wanted) in [
+        ("analyser = \"none\"", None),
+        ("analyser = \"circular\"", Some(Analyser::Circular)),
+        ("analyser = \"y\"", Some(Analyser::Linear(90.0))),
+        ("analyser = 22.5", Some(Analyser::Linear(22.5))),
+    ] {
+        assert_eq!(light(line).analyser, wanted, "{line}");
+    }
 }
 
 #[test]
@@ -68,6 +75,10 @@ fn what_is_no_polarisation_is_refused_with_its_line() {
             "polarisation = nan",
             "`polarisation` cannot be NaN; it must be a number from -180 to 180 degrees",
         ),
+        (
+            "analyser = \"left\"",
+            "`analyser` cannot be \"left\"; use one of: none, circular, x, y, or a number from -180 to 180 degrees",
+        ),
     ] {
         assert_eq!(fault(name, line), what);
     }
@@ -77,6 +88,11 @@ fn what_is_no_polarisation_is_refused_with_its_line() {
         let found = fault(name, "polarisation = \"x\"");
         assert!(
             found.starts_with(&format!("light of a polarisation for {plural}; leave it out")),
+            "{found}"
+        );
+        let found = fault(name, "analyser = \"circular\"");
+        assert!(
+            found.starts_with(&format!("an analyser for {plural}; leave it out")),
             "{found}"
         );
     }
@@ -92,7 +108,9 @@ fn digests_tell_other_light_apart() {
     };
     let (optics, usual) = of("");
     assert_eq!(of("polarisation = \"left\""), (optics.clone(), usual.clone()));
-    let others = ["\"right\"", "\"x\"", "10", "\"unpolarised\""].map(|light| of(&format!("polarisation = {light}")));
+    let others = ["\"right\"", "\"x\"", "10", "\"unpolarised\""].map(|light| format!("polarisation = {light}"));
+    let analysers = ["\"circular\"", "\"x\"", "10"].map(|what| format!("analyser = {what}"));
+    let others: Vec<_> = others.iter().chain(&analysers).map(|line| of(line)).collect();
     for (k, (own, simulation)) in others.iter().enumerate() {
         assert_eq!(*own, optics);
         assert!(*simulation != usual && others[..k].iter().all(|o| o.1 != *simulation));

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use num_complex::Complex64;
 
@@ -25,6 +25,8 @@ pub struct NeighbourCell {
     tabulated_um: Vec<f64>,
     /// Share of the light that equal neighbours pass, by wavelength bit by bit: see [`NeighbourCell::passed`].
     passed: Mutex<HashMap<u64, f64>>,
+    /// Tables by wavelength and direction, bit by bit.
+    tables: Mutex<HashMap<[u64; 3], Arc<NeighbourTable>>>,
 }
 
 impl NeighbourCell {
@@ -39,6 +41,7 @@ impl NeighbourCell {
             cache,
             tabulated_um: Vec::new(),
             passed: Mutex::default(),
+            tables: Mutex::default(),
         }
     }
 
@@ -78,9 +81,23 @@ impl NeighbourCell {
         })
     }
 
-    fn table(&self, wavelength_um: f64, sines: [f64; 2], progress: &dyn Progress) -> Result<NeighbourTable> {
+    fn table(&self, wavelength_um: f64, sines: [f64; 2], progress: &dyn Progress) -> Result<Arc<NeighbourTable>> {
+        let key = [wavelength_um, sines[0], sines[1]].map(f64::to_bits);
+        let known = || self.tables.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(found) = known().get(&key) {
+            return Ok(Arc::clone(found));
+        }
         let spec = NeighbourTableSpec { wavelength_um, sines };
-        NeighbourTable::obtain(&spec, &self.stack, &self.mappings, self.cache.as_deref(), progress)
+        let cache = self.cache.as_deref();
+        let found = Arc::new(NeighbourTable::obtain(
+            &spec,
+            &self.stack,
+            &self.mappings,
+            cache,
+            progress,
+        )?);
+        known().insert(key, Arc::clone(&found));
+        Ok(found)
     }
 }
 

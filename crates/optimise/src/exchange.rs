@@ -7,6 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use super::field::{FLOOR, FieldProblem};
 use super::limit::StepLimit;
 use super::planes::Planes;
+use super::score::Fields;
 
 /// How long to exchange, and how hot to begin.
 ///
@@ -102,13 +103,14 @@ impl<'p> Exchange<'p> {
         let mut order = (0..self.problem.rings()).collect::<Vec<_>>();
         order.shuffle(&mut random);
 
-        let widths = self.widths_nm();
-        let exact = self.problem.fields(|ring| (f64::from(widths[ring]), 0.0));
+        let mut widths = self.widths_nm();
+        let exact = self.problem.fields_of_widths(&widths);
         let mut fields = Planes::zeros(self.problem.rows());
         for (i, e) in exact.iter().enumerate() {
             (fields.re[i], fields.im[i]) = (e.re as f32, e.im as f32);
         }
         let mut one_over_now = vec![0.0f32; self.problem.rows()];
+        let mut own = Planes::zeros(self.problem.rows());
         let (mut candidates, mut widths_nm, mut scores) = (Vec::new(), Vec::new(), Vec::new());
         let mut changed = false;
         for ring in order {
@@ -122,12 +124,20 @@ impl<'p> Exchange<'p> {
             for (i, now) in one_over_now.iter_mut().enumerate() {
                 *now = 1.0 / (fields.re[i] * fields.re[i] + fields.im[i] * fields.im[i] + FLOOR as f32);
             }
+            let visit = self.problem.visit(ring, &widths);
+            let visit = visit.as_ref();
             let old = self.choices[ring];
-            self.add(ring, old, -1.0, &mut fields);
-            self.problem
-                .score(ring, &fields, &one_over_now, &widths_nm, &mut scores);
+            self.problem.contribution(ring, widths[ring], visit, &mut own);
+            add(&own, -1.0, &mut fields);
+            let without = Fields {
+                without: &fields,
+                one_over_now: &one_over_now,
+            };
+            self.problem.score(ring, visit, without, &widths_nm, &mut scores);
             let new = candidates[pick(&scores, temperature, &mut random)];
-            self.add(ring, new, 1.0, &mut fields);
+            widths[ring] = self.width_of(new);
+            self.problem.contribution(ring, widths[ring], visit, &mut own);
+            add(&own, 1.0, &mut fields);
             changed |= new != old;
             self.choices[ring] = new;
         }
@@ -157,14 +167,11 @@ impl<'p> Exchange<'p> {
     fn width_of(&self, choice: usize) -> u16 {
         self.problem.mapping().choices()[choice].width_nm
     }
+}
 
-    fn add(&self, ring: usize, choice: usize, sign: f32, fields: &mut Planes) {
-        let (k_re, k_im) = self.problem.kernel_of(ring);
-        let (t_re, t_im) = self.problem.transmission_of(self.width_of(choice));
-        for i in 0..k_re.len() {
-            fields.re[i] += sign * (k_re[i] * t_re[i] - k_im[i] * t_im[i]);
-            fields.im[i] += sign * (k_re[i] * t_im[i] + k_im[i] * t_re[i]);
-        }
+fn add(part: &Planes, sign: f32, fields: &mut Planes) {
+    for (to, from) in [(&mut fields.re, &part.re), (&mut fields.im, &part.im)] {
+        to.iter_mut().zip(from).for_each(|(to, from)| *to += sign * from);
     }
 }
 

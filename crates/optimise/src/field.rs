@@ -7,7 +7,8 @@ use rayon::prelude::*;
 
 use super::mapping::Mapping;
 use super::planes::Planes;
-use metalith_cell::CellModel;
+use super::surroundings::{Surroundings, Visit};
+use metalith_cell::{CellModel, Fidelity};
 use metalith_core::{Error, Result};
 
 /// Rows are padded to whole groups of this many, so that inner loops have no ends to tidy.
@@ -65,15 +66,20 @@ pub struct FieldProblem {
     pub(super) row_weight: Vec<f32>,
     /// `[ring][row]`.
     kernel: Planes,
-    /// Transmission, `[width_nm][row]`, made width taken from the designed one.
-    table: Planes,
+    /// Transmission, `[width_nm][row]`, made width taken from the designed one; among unlike neighbours its mean over them.
+    pub(super) table: Planes,
     pub(super) mapping: Mapping,
+    /// Of each row that is no padding.
+    pub(super) wavelengths_um: Vec<Option<f64>>,
+    /// Where the neighbours of pillars are not taken for equals.
+    pub(super) surroundings: Option<Surroundings>,
 }
 
 impl FieldProblem {
     /// A merit that is the sum of `weight` times each block of rows.
     ///
-    /// `cells` are what [`Condition::cell`] counts. `memory_bytes` bounds the kernel.
+    /// `cells` are what [`Condition::cell`] counts. `memory_bytes` bounds the kernel. With the cell `neighbours` nothing passes
+    /// before [`FieldProblem::among_neighbours`].
     ///
     /// # Errors
     /// If there are no rows, the rows disagree in the number of rings, the kernel would not fit, or a cell
@@ -137,6 +143,8 @@ impl FieldProblem {
             kernel,
             table,
             mapping,
+            wavelengths_um: conditions.iter().map(|c| Some(c.as_ref()?.wavelength_um)).collect(),
+            surroundings: None,
         })
     }
 
@@ -161,6 +169,25 @@ impl FieldProblem {
     pub fn transmission_of(&self, width_nm: u16) -> (&[f32], &[f32]) {
         self.table.row(usize::from(width_nm), self.rows)
     }
+
+    /// What the width of a ring acts on beside its own transmission, while others have these widths (nm); nothing among equals.
+    pub fn visit(&self, ring: usize, widths_nm: &[u16]) -> Option<Visit> {
+        self.surroundings.as_ref().map(|s| s.visit(ring, widths_nm))
+    }
+
+    /// Fields of all rows that depend on the width of a ring, if it has this one.
+    #[inline(always)]
+    pub fn contribution(&self, ring: usize, width_nm: u16, visit: Option<&Visit>, out: &mut Planes) {
+        let (k_re, k_im) = self.kernel_of(ring);
+        let (t_re, t_im) = self.transmission_of(width_nm);
+        for i in 0..k_re.len() {
+            out.re[i] = k_re[i] * t_re[i] - k_im[i] * t_im[i];
+            out.im[i] = k_re[i] * t_im[i] + k_im[i] * t_re[i];
+        }
+        if let (Some(surroundings), Some(visit)) = (&self.surroundings, visit) {
+            surroundings.add_contribution(width_nm, visit, out);
+        }
+    }
 }
 
 /// Transmission of every whole width at every row, with the width's error taken in by interpolation.
@@ -177,6 +204,10 @@ fn transmissions(conditions: &[Option<Condition>], cells: &[&dyn CellModel], wid
                     "name one of the cells given",
                 )
             })?;
+            if cell.fidelity() == Fidelity::Neighbours {
+                // What a width alone transmits is not asked for: `among_neighbours` has the rest.
+                return Ok(vec![Complex64::ZERO; widths]);
+            }
             let margin = condition.width_bias_nm.abs().ceil() as usize + 1;
             let pure = cell.transmissions(condition.wavelength_um, (widths + margin) as u16)?;
             let column = (0..widths)

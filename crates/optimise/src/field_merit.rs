@@ -10,13 +10,25 @@ use super::planes::Planes;
 impl FieldProblem {
     /// Merit if ring `k` has pillars of `width_nm[k]`.
     pub fn merit_of_widths(&self, width_nm: &[u16]) -> f64 {
-        let fields = self.fields(|ring| (f64::from(width_nm[ring]), 0.0));
-        self.merit_of_fields(&fields)
+        self.merit_of_fields(&self.fields_of_widths(width_nm))
+    }
+
+    /// Fields of all rows with pillars of these widths, in double precision.
+    pub fn fields_of_widths(&self, width_nm: &[u16]) -> Vec<Complex64> {
+        let mut fields = self.fields(|ring| (f64::from(width_nm[ring]), 0.0));
+        if let Some(surroundings) = &self.surroundings {
+            surroundings.add_pairs(width_nm, &mut fields);
+        }
+        fields
     }
 
     /// Merit at continuous phases (turns), widths not rounded. Its gradient (1/turn) is added to
     /// `gradient`.
+    ///
+    /// # Panics
+    /// Among unlike neighbours, whose widths are whole: designs with them and a solver that needs this are refused.
     pub fn merit_of_phases(&self, turns: &[f64], gradient: Option<&mut [f64]>) -> f64 {
+        assert!(self.surroundings.is_none(), "no slopes among unlike neighbours");
         let widths = turns.iter().map(|&t| self.mapping.width_nm(t)).collect::<Vec<_>>();
         let fields = self.fields(|ring| widths[ring]);
         let merit = self.merit_of_fields(&fields);
@@ -67,7 +79,7 @@ impl FieldProblem {
     }
 
     /// Derivative of the merit by the conjugate of each field (Wirtinger).
-    fn field_gradient(&self, fields: &[Complex64]) -> Vec<Complex64> {
+    pub(super) fn field_gradient(&self, fields: &[Complex64]) -> Vec<Complex64> {
         let mut gradient = vec![Complex64::ZERO; self.rows()];
         for block in &self.blocks {
             for i in block.rows.start..block.rows.start + block.live {
@@ -93,6 +105,29 @@ impl FieldProblem {
         2.0 * sum
     }
 
+    /// [`Objective::expand`] where a ring acts on those about it.
+    fn expand_visits(&self, widths_nm: &[u16], slopes: &[Complex64], gains: &mut [f64]) {
+        let choices = self.mapping.choices();
+        let rings = gains.par_chunks_exact_mut(choices.len()).enumerate();
+        rings.for_each_init(
+            || Planes::zeros(self.rows()),
+            |own, (ring, gains)| {
+                let visit = self.visit(ring, widths_nm);
+                let mut of = |width: u16| {
+                    self.contribution(ring, width, visit.as_ref(), own);
+                    let each = slopes.iter().zip(own.re.iter().zip(&own.im));
+                    2.0 * each
+                        .map(|(g, (re, im))| g.re * f64::from(*re) + g.im * f64::from(*im))
+                        .sum::<f64>()
+                };
+                let now = of(widths_nm[ring]);
+                for (gain, choice) in gains.iter_mut().zip(choices) {
+                    *gain += of(choice.width_nm) - now;
+                }
+            },
+        );
+    }
+
     /// The two whole widths about one, and how far it is from the lower to the upper.
     #[allow(clippy::type_complexity)] // two pairs of planes
     fn bracket(&self, width_nm: f64) -> ((&[f32], &[f32]), (&[f32], &[f32]), f32) {
@@ -115,9 +150,13 @@ impl Objective for FieldProblem {
     }
 
     fn expand(&self, widths_nm: &[u16], gains: &mut [f64]) -> f64 {
-        let fields = self.fields(|ring| (f64::from(widths_nm[ring]), 0.0));
+        let fields = self.fields_of_widths(widths_nm);
         let slopes = self.field_gradient(&fields);
         let choices = self.mapping.choices();
+        if self.surroundings.is_some() {
+            self.expand_visits(widths_nm, &slopes, gains);
+            return self.merit_of_fields(&fields);
+        }
         gains
             .par_chunks_exact_mut(choices.len())
             .enumerate()

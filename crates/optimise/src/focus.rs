@@ -8,8 +8,10 @@ use rayon::prelude::*;
 
 use super::field::{Condition, FieldPoint};
 use super::kernel::RingField;
+use super::links::distance_of;
 use super::rings::Rings;
-use metalith_cell::CellModel;
+use super::unlike::{PRODUCTS, Unlike};
+use metalith_cell::{CellModel, NEIGHBOUR_DEGREE, NEIGHBOURS};
 use metalith_core::{Error, Result, WidthMap};
 
 /// A lens to optimise: its rings, and the sensor behind it.
@@ -81,29 +83,48 @@ impl Lens {
             .collect()
     }
 
+    /// The mean transmission of the sites of each ring, with pillars of `widths_nm[k]` in ring `k`.
+    ///
+    /// # Errors
+    /// If the cell does not cover the wavelength.
+    pub fn transmissions_of_rings(
+        &self,
+        widths_nm: &[u16],
+        cell: &dyn CellModel,
+        wavelength_um: f64,
+    ) -> Result<Vec<Complex64>> {
+        if let Some(unlike) = Unlike::of(cell, wavelength_um, widths_nm.iter().copied())? {
+            return Ok(unlike.of_rings(&self.rings, widths_nm));
+        }
+        let widest = widths_nm.iter().copied().max().unwrap_or(0);
+        let t = cell.transmissions(wavelength_um, widest)?;
+        Ok(widths_nm.iter().map(|w| t[usize::from(*w)]).collect())
+    }
+
     /// Strehl ratio on the axis at each wavelength, with pillars of `widths_nm[k]` in ring `k`: |E|^2
     /// against the same aperture passing all its power in the zero order with the perfect phase.
     ///
     /// # Errors
     /// If the cell does not cover a wavelength.
     pub fn strehl_of_rings(&self, widths_nm: &[u16], cell: &dyn CellModel, wavelengths_um: &[f64]) -> Result<Strehl> {
-        let widest = widths_nm.iter().copied().max().unwrap_or(0);
         let ratio = wavelengths_um
             .par_iter()
             .map(|&wavelength_um| {
-                let t = cell.transmissions(wavelength_um, widest)?;
                 let field = RingField::new(&self.rings, wavelength_um, self.gap_um);
-                let sum = (0..self.rings.len())
-                    .map(|ring| field.on_axis(ring) * t[usize::from(widths_nm[ring])])
-                    .sum::<Complex64>();
+                let sum = match Unlike::of(cell, wavelength_um, widths_nm.iter().copied())? {
+                    Some(unlike) => unlike.on_axis(&self.rings, &field, widths_nm),
+                    None => {
+                        let t = self.transmissions_of_rings(widths_nm, cell, wavelength_um)?;
+                        t.iter().enumerate().map(|(ring, t)| field.on_axis(ring) * t).sum()
+                    }
+                };
                 Ok((sum / (field.matched() * cell.full_transmission(wavelength_um)?)).norm_sqr())
             })
             .collect::<Result<Vec<_>>>()?;
         Ok(Strehl::new(wavelengths_um, ratio))
     }
 
-    /// The same from an array of pillars, such as one read back from a layout: a sum over every site,
-    /// whatever its neighbours are.
+    /// The same from an array of pillars, such as one read back from a layout: a sum over every site.
     ///
     /// # Errors
     /// If the array is on another lattice, or the cell does not cover a wavelength or width.
@@ -114,31 +135,77 @@ impl Lens {
                 "judge it with the design that it was made from",
             ));
         }
+        let drawn: Vec<u16> = (1..)
+            .zip(&widths.histogram()[1..])
+            .filter(|(_, n)| **n > 0)
+            .map(|(w, _)| w)
+            .collect();
+        let unlike = |wavelength_um: f64| Unlike::of(cell, wavelength_um, drawn.iter().copied());
+        let neighbour = match wavelengths_um.first() {
+            Some(um) => unlike(*um)?.map(|u| u.neighbour),
+            None => None,
+        };
         // Sites at one distance with one width are one term.
-        let mut terms = BTreeMap::<(i64, u16), u32>::new();
-        for ((iy, ix), &width) in widths.width_nm.indexed_iter() {
-            if width != 0 {
-                *terms.entry((widths.lattice.units2(ix, iy), width)).or_default() += 1;
+        let mut terms = BTreeMap::<(i64, u16), AlikeSites>::new();
+        for ((iy, ix), &width) in widths.width_nm.indexed_iter().filter(|(_, w)| **w != 0) {
+            let alike = terms.entry((widths.lattice.units2(ix, iy), width)).or_default();
+            alike.count += 1;
+            if let Some(neighbour) = &neighbour {
+                alike.add_neighbours(widths, [ix, iy], neighbour);
             }
         }
         let terms = terms.into_iter().collect::<Vec<_>>();
-        let widest = terms.iter().map(|t| t.0.1).max().unwrap_or(0);
+        let widest = drawn.last().copied().unwrap_or(0);
         let unit_um2 = widths.lattice.unit_um().powi(2);
         let ratio = wavelengths_um
             .par_iter()
             .map(|&wavelength_um| {
-                let t = cell.transmissions(wavelength_um, widest)?;
+                let unlike = unlike(wavelength_um)?;
+                let table = match &unlike {
+                    Some(unlike) => unlike.own.clone(),
+                    None => cell.transmissions(wavelength_um, widest)?,
+                };
                 let field = RingField::new(&self.rings, wavelength_um, self.gap_um);
-                let sum = terms
-                    .iter()
-                    .map(|&((r2, width), count)| {
-                        f64::from(count) * field.point(r2 as f64 * unit_um2) * t[usize::from(width)]
-                    })
-                    .sum::<Complex64>();
+                let of = |&((r2, width), ref alike): &((i64, u16), AlikeSites)| {
+                    let width = usize::from(width);
+                    let mut t = f64::from(alike.count) * table[width];
+                    if let Some(unlike) = &unlike {
+                        let each = unlike.factors[width].iter().zip(alike.neighbours);
+                        t += each.map(|(factor, sum)| factor * sum).sum::<Complex64>();
+                    }
+                    field.point(r2 as f64 * unit_um2) * t
+                };
+                let sum = terms.iter().map(of).sum::<Complex64>();
                 Ok((sum / (field.matched() * cell.full_transmission(wavelength_um)?)).norm_sqr())
             })
             .collect::<Result<Vec<_>>>()?;
         Ok(Strehl::new(wavelengths_um, ratio))
+    }
+}
+
+/// Sites at one distance from the axis with one width.
+#[derive(Clone, Copy, Default)]
+struct AlikeSites {
+    count: u32,
+    /// Factors of the widths of all their neighbours, as [`Unlike::factors`] has the own ones.
+    neighbours: [f64; PRODUCTS],
+}
+
+impl AlikeSites {
+    fn add_neighbours(&mut self, widths: &WidthMap, [ix, iy]: [usize; 2], factors: &[[f64; NEIGHBOUR_DEGREE]]) {
+        for offset in NEIGHBOURS {
+            let [x, y] = [(ix, offset[0]), (iy, offset[1])].map(|(at, by)| at.checked_add_signed(by as isize));
+            let width = x
+                .zip(y)
+                .and_then(|(x, y)| widths.width_nm.get((y, x)).copied())
+                .unwrap_or(0);
+            if width != 0 {
+                let to = &mut self.neighbours[distance_of(offset) * NEIGHBOUR_DEGREE..];
+                to.iter_mut()
+                    .zip(&factors[usize::from(width)])
+                    .for_each(|(to, v)| *to += v);
+            }
+        }
     }
 }
 

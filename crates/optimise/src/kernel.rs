@@ -38,6 +38,18 @@ impl<'r> RingField<'r> {
         sum
     }
 
+    /// Field on the axis of a ring for what each neighbour of its sites adds to their transmission, of one of each link of the
+    /// ring ([`super::Links::of_ring`]).
+    pub fn on_axis_by_link(&self, ring: usize) -> impl Iterator<Item = Complex64> {
+        let nodes = self.rings.nodes(ring).iter();
+        let points: Vec<_> = nodes.map(|node| self.point(node.radius_um * node.radius_um)).collect();
+        let links = self.rings.links();
+        links.all()[links.of_ring(ring)].iter().map(move |link| {
+            let each = points.iter().zip(link.weights);
+            each.map(|(point, weight)| point * weight).sum()
+        })
+    }
+
     /// Largest field on the axis: every site in phase.
     pub fn matched(&self) -> f64 {
         (0..self.rings.len())

@@ -7,13 +7,17 @@ use serde::Serialize;
 
 use super::judge::Judged;
 use super::mapping::step;
+use metalith_cell::Fidelity;
 use metalith_core::Result;
 use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, Table, Verdict, sig, write_json};
 
 /// What the figures of an optimisation are by, in words for people.
-pub const BY_EQUAL_NEIGHBOURS: &str = "Merit, Strehl ratios before and after and those of the layout that is read back take each pillar for one \
+const BY_EQUAL_NEIGHBOURS: &str = "Merit, Strehl ratios before and after and those of the layout that is read back take each pillar for one \
      of a lattice of equal pillars. `metalith run` judges by unlike neighbours where that is the `fidelity` of [verify], as it is by \
      default for the cell of the paper, and may give other Strehl ratios.";
+
+const BY_UNLIKE_NEIGHBOURS: &str = "Merit, pictures and Strehl ratios of the cell `neighbours` have each pillar among those that stand about it, as \
+     `metalith run` does by default for the cell of the paper; those of the cell `rigorous` take it for one of a lattice of equal pillars.";
 
 /// All that is reported.
 #[derive(Clone, Debug, Serialize)]
@@ -28,8 +32,11 @@ pub struct OptimiseReport {
     pub merit: f64,
     /// Limit on the step (turns).
     pub step_limit_turns: f64,
-    /// The design's own phase before, judged in each way.
+    /// What gains are counted from, judged in each way: the design's own phase, or where that is a table, a hyperbolic one.
     pub before: Vec<Judged>,
+    /// The table that the design has.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub own: Vec<Judged>,
     /// The optimised phase.
     pub after: Vec<Judged>,
     /// Geometric-mean Strehl ratio that exchange reaches for other limits (turns).
@@ -58,6 +65,25 @@ impl OptimiseReport {
         self.after
             .iter()
             .all(|j| j.largest_step_turns <= self.step_limit_turns + 1e-6)
+    }
+
+    /// All phases that were judged, with what they are called.
+    pub fn phases(&self) -> [(&'static str, &[Judged]); 3] {
+        [
+            ("before", &self.before),
+            ("table of the design", &self.own),
+            ("after", &self.after),
+        ]
+    }
+
+    /// Whether pillars were taken for equals of their neighbours, in words for people.
+    pub fn neighbours(&self) -> &'static str {
+        let unlike = self.after.iter().any(|j| j.fidelity == Fidelity::Neighbours);
+        if unlike {
+            BY_UNLIKE_NEIGHBOURS
+        } else {
+            BY_EQUAL_NEIGHBOURS
+        }
     }
 
     /// Write `report.html` and `report.json` into a folder.
@@ -90,7 +116,7 @@ impl OptimiseReport {
             ]);
         }
         page.code(&self.command);
-        page.note(BY_EQUAL_NEIGHBOURS);
+        page.note(self.neighbours());
         page.section("Strehl ratio");
         page.paragraph(
             "On a grid of 0.5 nm between the wavelengths that were optimised on, against the same aperture \
@@ -183,7 +209,7 @@ impl OptimiseReport {
             Column::number("Smallest", ""),
             Column::number("Largest step", "turns"),
         ]);
-        for (name, list) in [("before", &self.before), ("after", &self.after)] {
+        for (name, list) in self.phases() {
             for judged in list {
                 table.row([
                     Cell::from(name),
@@ -206,7 +232,8 @@ impl OptimiseReport {
             Axis::log("Strehl ratio", ""),
         );
         for (name, list) in [("before", &self.before), ("after", &self.after)] {
-            if let Some(judged) = list.iter().rev().find(|j| j.source == "rings") {
+            let rings = list.iter().filter(|j| j.source == "rings");
+            if let Some(judged) = rings.max_by_key(|j| j.fidelity) {
                 let points = judged.strehl.wavelength_um.iter().zip(&judged.strehl.ratio);
                 let floored = points.map(|(l, s)| (l * 1e3, s.max(1e-7)));
                 chart.line(format!("{name}, {} cell", judged.fidelity.name()), floored);

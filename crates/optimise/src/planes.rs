@@ -1,5 +1,7 @@
 //! Complex numbers laid out for wide registers.
 
+use num_complex::Complex64;
+
 /// Complex numbers as two planes of reals.
 #[derive(Clone, Debug, Default)]
 pub struct Planes {
@@ -13,6 +15,15 @@ impl Planes {
             re: vec![0.0; len],
             im: vec![0.0; len],
         }
+    }
+
+    pub fn row_mut(&mut self, i: usize, len: usize) -> (&mut [f32], &mut [f32]) {
+        let at = i * len..(i + 1) * len;
+        (&mut self.re[at.clone()], &mut self.im[at])
+    }
+
+    pub fn set(&mut self, i: usize, value: Complex64) {
+        (self.re[i], self.im[i]) = (value.re as f32, value.im as f32);
     }
 
     pub fn row(&self, i: usize, len: usize) -> (&[f32], &[f32]) {

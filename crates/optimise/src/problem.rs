@@ -10,7 +10,7 @@ use super::kernel::RingField;
 use super::mapping::Mapping;
 use super::robust;
 use super::views::Views;
-use metalith_cell::CellModel;
+use metalith_cell::{CellModel, Fidelity};
 use metalith_core::{Progress, Result};
 use metalith_design::{MeritSpec, OptimiseSpec, ViewSpec};
 use metalith_wave::camera::Noise;
@@ -67,7 +67,12 @@ pub fn field_problem(
     if blocks.is_empty() {
         return Ok(None);
     }
-    FieldProblem::new(blocks, cells, mapping.clone(), spec.memory_mb << 20).map(Some)
+    let memory = spec.memory_mb << 20;
+    let problem = FieldProblem::new(blocks, cells, mapping.clone(), memory)?;
+    match cells[0].fidelity() {
+        Fidelity::Neighbours => problem.among_neighbours(lens, cells[0], memory).map(Some),
+        _ => Ok(Some(problem)),
+    }
 }
 
 /// Rows whose weighted intensities sum up to the mean share of the incident power that arrives between

@@ -1,11 +1,14 @@
 //! The rings of a lens: what the phases are optimised over.
 
-use metalith_core::{Error, Result};
-use metalith_core::{Lattice, LatticeKind, WidthMap};
+use std::sync::OnceLock;
+
+use metalith_core::{Error, Lattice, LatticeKind, Result, WidthMap};
+
+use super::links::Links;
 
 /// Points at which a ring is sampled along r^2. The kernels turn by at most 1.2 rad across a ring of
 /// one pitch (400 nm, NA 0.2); Chebyshev interpolation at eight points then errs by 1e-9.
-const NODES: usize = 8;
+pub const NODES: usize = 8;
 
 /// The lattice sites of a round lens, ring by ring.
 ///
@@ -24,6 +27,8 @@ pub struct Rings {
     counts: Vec<(i64, u32)>,
     sites: Vec<u32>,
     nodes: Vec<[Node; NODES]>,
+    /// Made when they are first asked for.
+    links: OnceLock<Links>,
 }
 
 /// One radius that stands for a part of a ring.
@@ -63,6 +68,7 @@ impl Rings {
             counts: counts(lattice, diameter_nm),
             sites: Vec::new(),
             nodes: Vec::new(),
+            links: OnceLock::new(),
         };
         let (largest, _) = *rings.counts.last().expect("a lens of several pitches has sites");
         let count = rings.ring_of(largest) + 1;
@@ -122,6 +128,11 @@ impl Rings {
         map
     }
 
+    /// Which rings have pillars that stand next to one another. The lattice must be square.
+    pub fn links(&self) -> &Links {
+        self.links.get_or_init(|| Links::of(self))
+    }
+
     /// The radii that stand for a ring.
     pub fn nodes(&self, ring: usize) -> &[Node] {
         &self.nodes[ring]
@@ -150,32 +161,45 @@ impl Rings {
         &self.counts[first(ring)..first(ring + 1)]
     }
 
-    fn sample(&self, ring: usize) -> (u32, [Node; NODES]) {
+    /// Squares of the radii of [`Rings::nodes`], in the units of [`Lattice::units2`].
+    pub fn node_units2(&self, ring: usize) -> [f64; NODES] {
         let end = |k: usize| (units_of_pitch(self.lattice) * k as i64).pow(2) as f64;
         let (low, high) = (end(ring), end(ring + 1));
-        let mut at = [0.0; NODES];
-        let mut nodes = [Node::default(); NODES];
-        for (j, (at, node)) in at.iter_mut().zip(&mut nodes).enumerate() {
+        std::array::from_fn(|j| {
             let angle = std::f64::consts::PI * (j as f64 + 0.5) / NODES as f64;
-            *at = 0.5 * (low + high) + 0.5 * (high - low) * angle.cos();
-            node.radius_um = self.lattice.unit_um() * at.sqrt();
-        }
+            0.5 * (low + high) + 0.5 * (high - low) * angle.cos()
+        })
+    }
+
+    /// By how much each radius of [`Rings::nodes`] stands for a site of the ring.
+    pub fn shares_of(&self, ring: usize, units2: i64) -> [f64; NODES] {
+        lagrange(&self.node_units2(ring), units2)
+    }
+
+    fn sample(&self, ring: usize) -> (u32, [Node; NODES]) {
+        let at = self.node_units2(ring);
+        let mut nodes = at.map(|units2| Node {
+            radius_um: self.lattice.unit_um() * units2.sqrt(),
+            weight: 0.0,
+        });
         let mut sites = 0;
         for &(r2, count) in self.of_ring(ring) {
             sites += count;
-            let s = r2 as f64;
-            for (j, node) in nodes.iter_mut().enumerate() {
-                let mut lagrange = f64::from(count);
-                for (i, other) in at.iter().enumerate() {
-                    if i != j {
-                        lagrange *= (s - other) / (at[j] - other);
-                    }
-                }
-                node.weight += lagrange;
+            for (node, share) in nodes.iter_mut().zip(lagrange(&at, r2)) {
+                node.weight += f64::from(count) * share;
             }
         }
         (sites, nodes)
     }
+}
+
+/// Weights of the values at these places in the polynomial through them, at another place.
+fn lagrange(at: &[f64; NODES], units2: i64) -> [f64; NODES] {
+    let s = units2 as f64;
+    std::array::from_fn(|j| {
+        let others = at.iter().enumerate().filter(|(i, _)| *i != j);
+        others.map(|(_, other)| (s - other) / (at[j] - other)).product()
+    })
 }
 
 /// A pitch in the units of [`Lattice::units2`].

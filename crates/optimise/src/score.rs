@@ -2,35 +2,64 @@
 
 use super::field::{FLOOR, FieldProblem, MeritKind};
 use super::planes::Planes;
+use super::surroundings::Visit;
 
 impl FieldProblem {
-    /// The merit, but for a constant, with each candidate width in one ring. `without` are the fields of all
-    /// other rings, `one_over_now` the inverse intensities that logarithms count from.
-    pub fn score(&self, ring: usize, without: &Planes, one_over_now: &[f32], widths_nm: &[u16], scores: &mut [f64]) {
-        pulp::Arch::new().dispatch(|| self.score_all(ring, without, one_over_now, widths_nm, scores));
+    /// The merit, but for a constant, with each candidate width in one ring. `fields` are those without what depends on that
+    /// width, and the inverse intensities that logarithms count from.
+    pub fn score(&self, ring: usize, visit: Option<&Visit>, fields: Fields<'_>, widths_nm: &[u16], scores: &mut [f64]) {
+        pulp::Arch::new().dispatch(|| match visit {
+            None => {
+                let kernel = self.kernel_of(ring);
+                for (score, &width) in scores.iter_mut().zip(widths_nm) {
+                    *score = self.score_of(kernel, self.transmission_of(width), fields);
+                }
+            }
+            Some(_) => {
+                let one = vec![1.0; self.rows()];
+                let none = vec![0.0; self.rows()];
+                let mut own = Planes::zeros(self.rows());
+                for (score, &width) in scores.iter_mut().zip(widths_nm) {
+                    self.contribution(ring, width, visit, &mut own);
+                    *score = self.score_of((&own.re, &own.im), (&one, &none), fields);
+                }
+            }
+        });
     }
 
+    /// With a kernel times a transmission in place of what was left out.
     #[inline(always)]
-    fn score_all(&self, ring: usize, without: &Planes, one_over_now: &[f32], widths_nm: &[u16], scores: &mut [f64]) {
-        let (k_re, k_im) = self.kernel_of(ring);
-        for (score, &width) in scores.iter_mut().zip(widths_nm) {
-            let (t_re, t_im) = self.transmission_of(width);
-            *score = 0.0;
-            for block in &self.blocks {
-                let r = block.rows.clone();
-                let trial = Trial {
-                    base: (&without.re[r.clone()], &without.im[r.clone()]),
-                    kernel: (&k_re[r.clone()], &k_im[r.clone()]),
-                    transmission: (&t_re[r.clone()], &t_im[r.clone()]),
+    fn score_of(
+        &self,
+        (k_re, k_im): (&[f32], &[f32]),
+        (t_re, t_im): (&[f32], &[f32]),
+        Fields { without, one_over_now }: Fields<'_>,
+    ) -> f64 {
+        let mut score = 0.0;
+        for block in &self.blocks {
+            let r = block.rows.clone();
+            let trial = Trial {
+                base: (&without.re[r.clone()], &without.im[r.clone()]),
+                kernel: (&k_re[r.clone()], &k_im[r.clone()]),
+                transmission: (&t_re[r.clone()], &t_im[r.clone()]),
+            };
+            score += block.weight
+                * match block.kind {
+                    MeritKind::Log => trial.log_ratio(&one_over_now[r]) / block.live as f64,
+                    MeritKind::Linear => trial.weighted(&self.row_weight[r]),
                 };
-                *score += block.weight
-                    * match block.kind {
-                        MeritKind::Log => trial.log_ratio(&one_over_now[r]) / block.live as f64,
-                        MeritKind::Linear => trial.weighted(&self.row_weight[r]),
-                    };
-            }
         }
+        score
     }
+}
+
+/// Fields that a ring is tried in.
+#[derive(Clone, Copy)]
+pub struct Fields<'a> {
+    /// Without what depends on the width of the ring.
+    pub without: &'a Planes,
+    /// Inverse intensities that logarithms count from.
+    pub one_over_now: &'a [f32],
 }
 
 /// One ring's contribution added to the field of all others, a block of rows long.
@@ -120,7 +149,11 @@ mod tests {
             one_over_now[i] = 1.0 / (e.norm_sqr() + FLOOR) as f32;
         }
         let mut scores = vec![0.0; all.len()];
-        problem.score(ring, &without, &one_over_now, &all, &mut scores);
+        let fields = Fields {
+            without: &without,
+            one_over_now: &one_over_now,
+        };
+        problem.score(ring, None, fields, &all, &mut scores);
         let merits = all
             .iter()
             .map(|&w| {

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::focus::Lens;
 use super::kernel::RingField;
 use metalith_cell::CellModel;
-use metalith_core::{Result, WidthMap};
+use metalith_core::Result;
 use metalith_wave::psf::{PixelFrequencies, pixel_mtf};
 use metalith_wave::{Accuracy, Fold, Pillars, PlaneWave, Psf, Scratch, Window};
 
@@ -36,7 +36,8 @@ impl OverWavelength<'_> {
         let columns = wavelengths_um
             .par_iter()
             .map(|&wavelength| {
-                let t = self.cell.transmissions(wavelength, self.widest())?;
+                let of = |widths: &&[u16]| self.lens.transmissions_of_rings(widths, self.cell, wavelength);
+                let t = self.widths_nm.iter().map(of).collect::<Result<Vec<_>>>()?;
                 let field = RingField::new(&self.lens.rings, wavelength, self.lens.gap_um);
                 let column = radii_um
                     .iter()
@@ -44,8 +45,8 @@ impl OverWavelength<'_> {
                         let mut sums = vec![Complex64::ZERO; self.widths_nm.len()];
                         for ring in 0..self.lens.rings.len() {
                             let e = field.at_radius(ring, rho, &bessel);
-                            for (sum, widths) in sums.iter_mut().zip(self.widths_nm) {
-                                *sum += e * t[usize::from(widths[ring])];
+                            for (sum, t) in sums.iter_mut().zip(&t) {
+                                *sum += e * t[ring];
                             }
                         }
                         sums.into_iter().map(|e| e.norm_sqr()).collect::<Vec<_>>()
@@ -68,19 +69,22 @@ impl OverWavelength<'_> {
         let (rings, focus_um) = (&self.lens.rings, self.lens.gap_um);
         let lattice = rings.lattice();
         let radius_um = 0.5e-3 * f64::from(rings.diameter_nm());
-        let pillars: Vec<_> = self.widths_nm.iter().map(|widths| rings.width_map(widths)).collect();
+        // By the number of the ring, from one: sites of a ring transmit alike.
+        let numbers: Vec<u16> = (1..=rings.len() as u16).collect();
+        let pillars = rings.width_map(&numbers);
         let window = Window::about([0.0; 2], lattice.pitch_um(), WINDOW_SAMPLES, focus_um);
         let reported = PixelFrequencies::of(pixel_um).reported();
         let contrast = |scratch: &mut Scratch, &wavelength_um: &f64| {
-            let table = self.cell.transmissions(wavelength_um, self.widest())?;
             let wave = PlaneWave::normal(wavelength_um);
             let fold = Fold::plan(lattice, radius_um, wavelength_um, window, Accuracy::Fast)?;
-            let mut of = |pillars: &WidthMap| {
-                let psf = Psf::formed(&fold, &Pillars::new(pillars, &table)?, &wave, &reported, scratch)?;
+            let mut of = |widths: &&[u16]| {
+                let mut table = vec![Complex64::ZERO];
+                table.extend(self.lens.transmissions_of_rings(widths, self.cell, wavelength_um)?);
+                let psf = Psf::formed(&fold, &Pillars::new(&pillars, &table)?, &wave, &reported, scratch)?;
                 let [half, all] = reported.map(|f| psf.contrast(0, f) * pixel_mtf(pixel_um, f));
                 Ok((half, all))
             };
-            pillars.iter().map(&mut of).collect::<Result<Vec<_>>>()
+            self.widths_nm.iter().map(&mut of).collect::<Result<Vec<_>>>()
         };
         let at_wavelength = wavelengths_um
             .par_iter()
@@ -89,9 +93,5 @@ impl OverWavelength<'_> {
         Ok((0..self.widths_nm.len())
             .map(|i| at_wavelength.iter().map(|pairs| pairs[i]).collect())
             .collect())
-    }
-
-    fn widest(&self) -> u16 {
-        self.widths_nm.iter().flat_map(|w| w.iter()).copied().max().unwrap_or(0)
     }
 }

@@ -115,21 +115,19 @@ fn page(pages: &PicturePages<'_>) -> Page {
         true => "says nothing: the frame is lost".into(),
         false => words,
     };
+    let linear = fixed(whole.psnr_linear_db, 1);
+    let of_linear_light = match first.forecast_db.first() {
+        Some(forecast) => (
+            "PSNR of linear light, forecast for natural scenes",
+            format!("{linear} dB, {} dB", fixed(*forecast, 1)),
+        ),
+        None => ("PSNR of linear light", format!("{linear} dB")),
+    };
     page.facts(&[
         ("Method of the picture", first.method.clone()),
         ("PSNR", score(format!("{} dB", fixed(whole.psnr_db, 1)))),
         ("SSIM", score(fixed(whole.ssim, 3))),
-        (
-            "PSNR of linear light, forecast for natural scenes",
-            format!(
-                "{} dB, {}",
-                fixed(whole.psnr_linear_db, 1),
-                first
-                    .forecast_db
-                    .first()
-                    .map_or_else(|| "not made".into(), |f| format!("{} dB", fixed(*f, 1)))
-            ),
-        ),
+        of_linear_light,
         (
             "Light in images, of all that arrives",
             report

@@ -269,15 +269,7 @@ fn polarised(focused: Handedness, light: PolarisedLight) -> String {
         true => format!("all light arrives {arriving}, as behind a filter"),
         false => format!("all light arrives {arriving}, and pillars focus what arrives {focused} circularly polarised"),
     };
-    let detector = match (light.analyser, own) {
-        (true, true) => "an analyser keeps what is not converted from the sensor",
-        (false, true) => "what is not converted lands as it came, in image and veil",
-        (true, false) => {
-            "an analyser passes the hand of focused light alone, with what is not converted of the other hand"
-        }
-        (false, false) => "what is not converted lands as it came and the other hand diverges, both in image and veil",
-    };
-    format!("{source}; {detector}")
+    format!("{source}; {}, in image and veil", light.detector(focused))
 }
 
 /// Where the spectra of a scene come from.

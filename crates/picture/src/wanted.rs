@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use metalith_camera::{Blend, Camera, ChannelSampling, Sampling};
-use metalith_cell::{Fidelity, Polarisation};
+use metalith_cell::{Fidelity, PolarisedLight};
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
 use metalith_gds::extract::Extraction;
@@ -80,12 +80,9 @@ struct Inputs<'a> {
     /// The cell that pillars are simulated by, and the wavelengths that it has tables of unlike neighbours for.
     fidelity: Fidelity,
     tabulated_um: &'a [f64],
-    /// Of pillars that change polarisation, whether an analyser is before the sensor.
+    /// Of pillars that change polarisation, the light of the scene and what of it reaches the sensor.
     #[serde(skip_serializing_if = "Option::is_none")]
-    analyser: Option<bool>,
-    /// Of these, the light of the scene if it is not that which they focus.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    polarisation: Option<Polarisation>,
+    polarised: Option<PolarisedLight>,
     basis: &'a [SceneSpectrum],
     spec: &'a BankSpec,
     scene_distance_um: f64,
@@ -157,8 +154,7 @@ impl<'a> Wanted<'a> {
             model: &model_text,
             fidelity: model.map_or(self.design.verify.fidelity, |_| Fidelity::Calibrated),
             tabulated_um: &self.design.verify.wavelengths_um,
-            analyser: (self.design.cell.shape.rectangles()).map(|_| self.design.verify.analyser),
-            polarisation: self.design.verify.polarisation,
+            polarised: (self.design.cell.shape.rectangles()).map(|_| self.design.verify.light()),
             basis: &self.basis,
             spec: &self.spec,
             // JSON knows no infinity.

@@ -285,12 +285,13 @@ impl OpenLineup<'_> {
         let first = &photographs[0];
         let studio = Studio::open_kept(design, &listed.layout, camera, None, first, kept, progress)?;
         if !as_the_paper {
+            let elements = match design.elements().len() {
+                1 => "one element".into(),
+                n => format!("{n} elements"),
+            };
             let words = format!(
-                "the layout of `{}` behind `{}`, {} elements, pillars by the cell `{}`, veil and dispersion included.",
-                design.name,
-                camera.name,
-                design.elements().len(),
-                design.verify.fidelity
+                "the layout of `{}` behind `{}`, {elements}, pillars by the cell `{}`, veil and dispersion included.",
+                design.name, camera.name, design.verify.fidelity
             );
             let ready = ArrayCamera::new(&studio, &self.methods, self.of.separate).with_stages(self.stages_of(k)?);
             return then(&ready, (name, &words), &photographs);

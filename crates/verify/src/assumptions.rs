@@ -186,46 +186,39 @@ fn white_apart_deg(design: &Design, wavelength_um: f64) -> f64 {
 fn polarised(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &Verification, pillars: Rectangles) {
     let focused = design.cell.arriving.unwrap_or_default();
     let light = design.verify.light();
-    let shares = |of: fn(&OrderEfficiencies) -> Option<f64>| -> String {
+    let shares = |what: &str, of: fn(&OrderEfficiencies) -> Option<f64>| -> Option<String> {
         let orders = found.distinct.iter().flat_map(|d| &d.orders);
-        let shares = orders.filter_map(|o| Some(fixed(of(o)? * 100.0, 1)));
-        shares.collect::<Vec<_>>().join(", ")
+        let shares: Vec<_> = orders.filter_map(|o| Some(fixed(of(o)? * 100.0, 1))).collect();
+        (!shares.is_empty()).then(|| format!("{} % {what}", shares.join(", ")))
     };
+    let lands = [
+        shares("is focused", |o| Some(o.first)),
+        shares("diverges", |o| o.diverging),
+        shares("is not converted", |o| o.unconverted),
+    ];
     let arriving = light.arriving_at(focused);
-    let unconverted = shares(|o| o.unconverted);
-    if arriving == Polarisation::Circular(focused) {
-        row(
-            &format!(
-                "Light arrives {arriving}; pillars convert it to the other hand with twice their rotation as phase"
+    let (what, whose) = match arriving == Polarisation::Circular(focused) {
+        true => (
+            "pillars convert it to the other hand with twice their rotation as phase".into(),
+            "light of the other hand diverges, of unpolarised light that is half: `polarisation` in [verify]",
+        ),
+        false => (
+            format!(
+                "pillars convert each hand to the other with twice their rotation as phase, and focus what arrives {focused} circularly \
+                 polarised"
             ),
-            if light.analyser {
-                "a circular analyser keeps what is not converted from the sensor".into()
-            } else {
-                format!("{unconverted} % is not converted: a background, in all figures of the layout")
-            },
-            "Jones matrices of both hands; light of the other hand diverges, of unpolarised light that is half: `polarisation` in [verify]",
-        );
-    } else {
-        let in_first = shares(|o| Some(o.first));
-        row(
-            &format!(
-                "Light arrives {arriving}; pillars convert each hand to the other with twice their rotation as phase, and focus what \
-                 arrives {focused} circularly polarised"
-            ),
-            if light.analyser {
-                format!(
-                    "{in_first} % is focused; a circular analyser passes the hand of focused light alone, so that what diverges does not \
-                     reach the sensor, nor what is not converted but for {unconverted} %"
-                )
-            } else {
-                format!(
-                    "{in_first} % is focused, {} % diverges and {unconverted} % is not converted, in all figures of the layout",
-                    shares(|o| o.diverging)
-                )
-            },
-            "Jones matrices of both hands; Strehl ratios and shares are of all light that arrives, and the design phase focuses all of it",
-        );
-    }
+            "Strehl ratios and shares are of all light that arrives, and the design phase focuses all of it",
+        ),
+    };
+    row(
+        &format!("Light arrives {arriving}; {what}"),
+        format!(
+            "{}, in all figures of the layout; {}",
+            lands.into_iter().flatten().collect::<Vec<_>>().join("; "),
+            light.detector(focused)
+        ),
+        &format!("Jones matrices of both hands; {whose}"),
+    );
     let turned = (1..=pillars.steps)
         .map(|number| pillars.turned_by_grid(number).abs())
         .fold(0.0, f64::max);

@@ -145,7 +145,8 @@ pub struct OrderEfficiencies {
     /// Share in all orders of the mapping: the rest is reflected, absorbed or diffracted by the lattice itself.
     pub transmitted: f64,
     /// Of pillars that change polarisation, the share that leaves in the hand in which it arrived and reaches the sensor: it passes
-    /// the element as if there were no phase. The shares above are what is converted of the hand that is focused.
+    /// the element as if there were no phase. The shares above are what is converted of the hand that is focused, through an analyser
+    /// if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unconverted: Option<f64>,
     /// Of these, where the other hand arrives too, the share that is converted of it and reaches the sensor: it diverges.
@@ -186,23 +187,22 @@ impl OrderEfficiencies {
     /// The same of pillars that change polarisation, in light of which one hand or both arrive, as shares of all of it. Over a
     /// whole turn of the phase, light that is converted of one hand does not interfere with what is not of the other.
     pub(super) fn of_light(self, hands: &HandTables, light: PolarisedLight, rule: &WidthRule, full: f64) -> Self {
-        let power = |table: &[Complex64]| {
+        let power = |table: Vec<Complex64>| {
             let power = (0..ORDER_SAMPLES).map(|i| table[usize::from(rule.width_nm(order_phase(i)))].norm_sqr());
             power.sum::<f64>() / (full * full * ORDER_SAMPLES as f64)
         };
-        let focused = light.arriving_at(hands.focused).share(hands.focused);
-        let other = 1.0 - focused;
-        // The analyser passes the hand that the focused one is converted to.
-        let seen = if light.analyser { 0.0 } else { 1.0 };
-        let [kept_focused, kept_other] = [seen * focused, other];
-        let unconverted = kept_focused * power(&hands.unconverted[0]) + kept_other * power(&hands.unconverted[1]);
+        let passed = |order: i32| {
+            let tables = hands.passed_in(order, light);
+            (!tables.is_empty()).then(|| tables.into_iter().map(power).sum())
+        };
+        let focused = light.focused_share(hands.focused);
         Self {
             first: self.first * focused,
             zero: self.zero * focused,
             second: self.second * focused,
             transmitted: self.transmitted * focused,
-            unconverted: (kept_focused + kept_other > 0.0).then_some(unconverted),
-            diverging: (seen * other > 0.0).then(|| other * power(&hands.converted[1])),
+            unconverted: passed(0),
+            diverging: passed(-1),
             ..self
         }
     }

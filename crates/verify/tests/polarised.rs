@@ -1,6 +1,6 @@
 //! Source and detector of light at rotated rectangles, from a design to its figures.
 
-use metalith_cell::{CellModel, Fidelity, HandTables, Handedness, Polarisation, PolarisedLight};
+use metalith_cell::{Analyser, CellModel, Fidelity, HandTables, Handedness, Polarisation, PolarisedLight};
 use metalith_core::{Rectangles, Result, Silent};
 use metalith_design::{Design, Hierarchy, PillarArray, cell_models};
 use metalith_layout::{read_pillars, write_pillars};
@@ -69,7 +69,7 @@ impl CellModel for IdealPlates {
     }
 }
 
-fn of_ideal_plates(arriving: Polarisation, analyser: bool) -> SinglePsf {
+fn of_ideal_plates(arriving: Polarisation, analyser: Option<Analyser>) -> SinglePsf {
     let (design, _, folder) = lens();
     let found = read_pillars(&design, &folder.path().join("lens.gds"), &Silent).unwrap();
     let plates = IdealPlates(design.cell.shape.rectangles().unwrap());
@@ -113,7 +113,8 @@ fn half_of_linear_and_of_unpolarised_light_is_focused_by_ideal_plates() {
     /// Shares of energy and contrast, of what diverges into the pixel and of the steps of the rotation.
     const SHARE: f64 = 0.01;
     let near = |found: f64, wanted: f64| assert!((found - wanted).abs() < SHARE, "{found} {wanted}");
-    let [left, right] = [LEFT, RIGHT].map(|light| of_ideal_plates(light, false));
+    const CIRCULAR: Option<Analyser> = Some(Analyser::Circular);
+    let [left, right] = [LEFT, RIGHT].map(|light| of_ideal_plates(light, None));
     assert!(
         left.metrics.strehl > 0.95 && right.metrics.strehl < SHARE,
         "{left:?} {right:?}"
@@ -124,7 +125,7 @@ fn half_of_linear_and_of_unpolarised_light_is_focused_by_ideal_plates() {
         Polarisation::Linear(33.0),
         Polarisation::Unpolarised,
     ] {
-        let [all, passed] = [false, true].map(|analyser| of_ideal_plates(light, analyser));
+        let [all, passed] = [None, CIRCULAR].map(|analyser| of_ideal_plates(light, analyser));
         // Nothing that is not converted interferes with what is.
         assert!(from_mean(&all.psf, [&left.psf, &right.psf]) < ROUNDING, "{light}");
         near(all.metrics.strehl / left.metrics.strehl, 0.5);
@@ -139,15 +140,30 @@ fn half_of_linear_and_of_unpolarised_light_is_focused_by_ideal_plates() {
         );
         near(passed.metrics.strehl / left.metrics.strehl, 0.5);
     }
-    assert_eq!(of_ideal_plates(RIGHT, true).metrics.energy_passed, 0.0);
-    assert_eq!(of_ideal_plates(LEFT, true).psf.values, left.psf.values);
+    assert_eq!(of_ideal_plates(RIGHT, CIRCULAR).metrics.energy_passed, 0.0);
+    assert_eq!(of_ideal_plates(LEFT, CIRCULAR).psf.values, left.psf.values);
+    // Two linear analysers that are crossed have all of the light between them, and of one hand each has the same half.
+    for light in [LEFT, Polarisation::Linear(20.0)] {
+        let whole = of_ideal_plates(light, None);
+        let [along, across] = [50.0, -40.0].map(|deg| of_ideal_plates(light, Some(Analyser::Linear(deg))));
+        let sum = along.psf.values.iter().zip(&across.psf.values).map(|(a, b)| a + b);
+        let off = sum
+            .zip(&whole.psf.values)
+            .map(|(s, w)| (s - w).abs())
+            .fold(0.0, f64::max);
+        assert!(off < ROUNDING * largest(&whole.psf), "{light}: {off}");
+        near(
+            along.metrics.strehl / left.metrics.strehl,
+            0.5 * if light == LEFT { 1.0 } else { 0.5 },
+        );
+    }
 }
 
 fn judged(
     lens: &(Design, PillarArray, tempfile::TempDir),
     cell: &dyn CellModel,
     light: Option<Polarisation>,
-    analyser: bool,
+    analyser: Option<Analyser>,
 ) -> Verification {
     let (mut design, array, folder) = (lens.0.clone(), &lens.1, &lens.2);
     design.verify.polarisation = light;
@@ -169,7 +185,7 @@ fn judged(
 fn unpolarised_light_is_the_mean_of_both_hands_and_of_both_axes() {
     let lens = lens();
     let cell = cell_models(&lens.0, &[Fidelity::Rigorous]).unwrap().remove(0);
-    for analyser in [false, true] {
+    for analyser in [None, Some(Analyser::Circular), Some(Analyser::Linear(25.0))] {
         let of = |light| judged(&lens, cell.as_ref(), light, analyser);
         let figures = |found: &Verification| -> Vec<f64> {
             let one = &found.distinct[0];
@@ -203,8 +219,9 @@ fn unpolarised_light_is_the_mean_of_both_hands_and_of_both_axes() {
         }
         let [own, mean] = [of(None), mean].map(|found| found.distinct[0].orders[0].clone());
         assert!((mean.first - 0.5 * own.first).abs() < ROUNDING && own.diverging.is_none());
-        assert_eq!(mean.diverging.is_some(), !analyser);
-        assert!(mean.unconverted.is_some() && own.unconverted.is_some() != analyser);
+        let circular = analyser == Some(Analyser::Circular);
+        assert_eq!(mean.diverging.is_some(), !circular);
+        assert!(mean.unconverted.is_some() && own.unconverted.is_some() != circular);
         let all = mean.transmitted + mean.diverging.unwrap_or(0.0) + mean.unconverted.unwrap_or(0.0);
         let passed = figures(&of(Some(Polarisation::Unpolarised)))[1];
         // The pillars of the element are not spread evenly over the phase.

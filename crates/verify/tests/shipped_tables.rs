@@ -5,12 +5,13 @@ use metalith_grating::{NeighbourTable, NeighbourTableSpec};
 use metalith_made::cell_direction;
 use metalith_wave::propagation::incident;
 
-/// Also those whose mapping and directions are the prototype's.
-const DESIGNS: [&str; 5] = [
+/// Also those whose mapping and directions are the prototype's, and one that is verified at more wavelengths.
+const DESIGNS: [&str; 6] = [
     "mini_3x3",
     "prototype_3x3",
     "broadband_3x3",
     "imaging_3x3",
+    "neighbours_3x3",
     "robust_3x3",
 ];
 

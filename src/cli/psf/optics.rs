@@ -164,19 +164,21 @@ impl PsfArgs {
         }
     }
 
+    fn polarised_light(&self) -> PolarisedLight {
+        PolarisedLight {
+            arriving: Some(self.arriving()),
+            analyser: self.analyser,
+        }
+    }
+
     /// Source and detector, in words.
     fn polarised(&self) -> String {
-        let arriving = self.arriving();
-        let detector = match (self.analyser, self.hand()) {
-            (true, Some(hand)) if arriving == Polarisation::Circular(hand) => {
-                "an analyser keeps what is not converted from the sensor".into()
-            }
-            (true, Some(hand)) => {
-                format!("an analyser passes the hand that {hand} circularly polarised light is converted to")
-            }
-            _ => "all that passes is in the figures, converted or not".into(),
-        };
-        format!("light arrives {arriving}, {detector}; figures are of all of it")
+        let (arriving, light) = (self.arriving(), self.polarised_light());
+        let focused = self
+            .hand()
+            .map_or_else(String::new, |hand| format!(", {hand} is focused"));
+        let detector = light.detector(self.hand().unwrap_or_default());
+        format!("light arrives {arriving}{focused}; {detector}; figures are of all that arrives")
     }
 
     /// What solves it for the pillars as drawn.
@@ -240,10 +242,7 @@ impl PsfArgs {
             at_um: [self.at_x_um, self.at_y_um],
             samples: self.samples,
             pixel_um: self.pixel_um(light),
-            polarised: PolarisedLight {
-                arriving: Some(self.arriving()),
-                analyser: self.analyser,
-            },
+            polarised: self.polarised_light(),
             aperture_radius_um: self.aperture_um.map(|d| 0.5 * d),
             accuracy: if self.fast { Accuracy::Fast } else { Accuracy::Accurate },
         }

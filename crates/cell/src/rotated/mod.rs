@@ -365,7 +365,7 @@ mod tests {
                 };
                 let light = PolarisedLight {
                     arriving: Some(Polarisation::Linear(deg)),
-                    analyser: false,
+                    analyser: None,
                 };
                 let passed = hands.passed(light);
                 assert_eq!(passed.len(), 2);

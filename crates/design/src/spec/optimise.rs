@@ -142,6 +142,7 @@ impl OptimiseSpec {
             fidelity: s.choice(
                 "cell",
                 &[
+                    ("neighbours", Fidelity::Neighbours),
                     ("rigorous", Fidelity::Rigorous),
                     ("fitted", Fidelity::Fitted),
                     ("published", Fidelity::Published),
@@ -181,8 +182,35 @@ impl OptimiseSpec {
                 .optional_integer("memory_mb", 16..=1 << 20, "MB")
                 .map_or(if images { 8192 } else { default.memory_mb }, |m| m as u64),
         };
+        spec.check_neighbours(s);
         s.finish();
         spec
+    }
+
+    /// Unlike neighbours are known to the exchange of rings for the field on the axis, of pillars as drawn.
+    fn check_neighbours(&self, s: &Section<'_, '_>) {
+        if self.fidelity != Fidelity::Neighbours {
+            return;
+        }
+        let MeritSpec {
+            deconvolution,
+            side_lobes,
+            ..
+        } = self.merit;
+        for (wrong, what) in [
+            (matches!(self.solver, SolverSpec::Adam { .. }), "the solver `adam`"),
+            (deconvolution != 0.0, "the merit `deconvolution`"),
+            (side_lobes != 0.0, "the merit `side_lobes`"),
+            (self.robust.is_some(), "errors of fabrication"),
+        ] {
+            if wrong {
+                s.fault(
+                    "cell",
+                    format!("{what} among unlike neighbours"),
+                    "use `exchange` for `log` and `sum` without [optimise.robust], or the cell `rigorous`",
+                );
+            }
+        }
     }
 
     /// Take the band of the design where the section does not say its own, at as many wavelengths as the visible has.
@@ -360,5 +388,42 @@ impl ViewSpec {
         };
         s.finish();
         spec
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use crate::Design;
+
+    /// What the exchange of rings does not know among unlike neighbours is refused, each thing in a fault of its own.
+    #[test]
+    fn what_unlike_neighbours_are_not_known_to_is_refused() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../designs/broadband_3x3.toml");
+        let text = std::fs::read_to_string(&path).unwrap();
+        let with = |change: &dyn Fn(String) -> String| {
+            let text = text.replacen("cell = \"rigorous\"", "cell = \"neighbours\"", 1);
+            Design::parse(&path, &change(text)).map(|d| d.optimise.fidelity.name())
+        };
+        assert_eq!(with(&|text| text).unwrap(), "neighbours");
+        let merit =
+            |key: &'static str| move |text: String| text.replacen("log = 1.0", &format!("log = 1.0\n{key} = 0.1"), 1);
+        let changes: [(&dyn Fn(String) -> String, &str); 4] = [
+            (&merit("deconvolution"), "the merit `deconvolution`"),
+            (&merit("side_lobes"), "the merit `side_lobes`"),
+            (
+                &|text| text + "\n[optimise.robust]\nwidth_bias_nm = 5\n",
+                "errors of fabrication",
+            ),
+            (
+                &|text| text.replacen("solver = \"exchange\"", "solver = \"adam\"", 1),
+                "the solver `adam`",
+            ),
+        ];
+        for (change, what) in changes {
+            let error = with(change).unwrap_err().to_string();
+            assert!(error.contains(&format!("{what} among unlike neighbours")), "{error}");
+        }
     }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use metalith_cell::{Fidelity, Polarisation, PolarisedLight};
+use metalith_cell::{Analyser, Fidelity, Handedness, Polarisation, PolarisedLight};
 use metalith_core::document::{Limits, Section};
 
 use super::CellSpec;
@@ -31,10 +31,9 @@ pub struct VerifySpec {
     /// Polarisation of the light that is simulated, where pillars change it and it is not that which they focus.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub polarisation: Option<Polarisation>,
-    /// Whether a circular analyser before the sensor lets the hand pass alone that focused light is converted to; counts where
-    /// pillars change polarisation.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub analyser: bool,
+    /// What is before the sensor, if anything, where pillars change polarisation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub analyser: Option<Analyser>,
     /// Camera file that the figures of white light are for; three flat bands where none is named.
     pub camera: Option<PathBuf>,
     pub limits: LimitSpec,
@@ -129,7 +128,7 @@ impl VerifySpec {
                 .optional_float("pixel_um", Limits::new(0.1..=100.0, "um"))
                 .unwrap_or(USUAL_PIXEL_UM),
             polarisation: read_polarisation(s, cell),
-            analyser: s.choice("analyser", &[("none", false), ("circular", true)], Some(false)),
+            analyser: read_analyser(s, cell),
             camera: s.has("camera").then(|| s.file("camera")),
             limits: LimitSpec::read(s.optional_section("limits").as_ref()),
         };
@@ -146,21 +145,37 @@ impl VerifySpec {
     }
 }
 
+/// Angles of linear polarisation, of source and detector.
+const AXIS: Limits = Limits::new(-Polarisation::MOST_DEG..=Polarisation::MOST_DEG, "degrees");
+
 /// The light that is simulated, if it is not that which is focused.
 fn read_polarisation(s: &Section<'_, '_>, cell: &CellSpec) -> Option<Polarisation> {
     const KEY: &str = "polarisation";
-    const ANGLE: Limits = Limits::new(-Polarisation::MOST_DEG..=Polarisation::MOST_DEG, "degrees");
-    let named = s.optional_choice_or_float(KEY, &Polarisation::CHOICES, ANGLE, Polarisation::Linear)?;
-    let Some(focused) = cell.arriving else {
+    let named = s.optional_choice_or_float(KEY, &Polarisation::CHOICES, AXIS, Polarisation::Linear)?;
+    let focused = polarising(s, KEY, "light of a polarisation", cell)?;
+    Some(named).filter(|light| *light != Polarisation::Circular(focused))
+}
+
+/// What is before the sensor.
+fn read_analyser(s: &Section<'_, '_>, cell: &CellSpec) -> Option<Analyser> {
+    const KEY: &str = "analyser";
+    let named = Analyser::CHOICES.map(|(name, one)| (name, Some(one)));
+    let choices = [&[("none", None)], &named[..]].concat();
+    let analyser = s.optional_choice_or_float(KEY, &choices, AXIS, |deg| Some(Analyser::Linear(deg)))??;
+    polarising(s, KEY, "an analyser", cell).map(|_| analyser)
+}
+
+/// The hand that the pillars focus; a fault at what counts only for pillars that change polarisation.
+fn polarising(s: &Section<'_, '_>, key: &str, what: &str, cell: &CellSpec) -> Option<Handedness> {
+    if cell.arriving.is_none() {
         s.fault_given(
             &["cell.shape"],
-            KEY,
-            format!("light of a polarisation for {}", cell.shape.plural()),
+            key,
+            format!("{what} for {}", cell.shape.plural()),
             "leave it out: it counts for rectangles alone, the others are simulated in light that is not polarised",
         );
-        return None;
-    };
-    Some(named).filter(|light| *light != Polarisation::Circular(focused))
+    }
+    cell.arriving
 }
 
 /// The cell that judges, if it is left out: unlike neighbours for the cell that they were compared with real rows of, else
