@@ -16,5 +16,5 @@ for design in mini_3x3 prototype_3x3 neighbours_3x3; do
         --out "$work/$design"
 done
 cp "$work"/cache/neighbours-*.bin "$tables"
-# What is built in is not looked at again by itself.
+# Cargo does not see by itself that the tables have changed.
 touch crates/grating/src/shipped.rs

@@ -207,8 +207,7 @@ pub struct HandTables {
 #[derive(Clone, Debug, PartialEq)]
 pub struct PassedTable {
     pub table: Vec<Complex64>,
-    /// How often it has the phase of the element: once where focused light is in it, else minus once where light is that diverges,
-    /// and not at all where all of it is not converted.
+    /// How often it has the phase of the element: 1 if focused light is in it; else -1 if diverging light is; else 0.
     pub order: i32,
 }
 
@@ -234,12 +233,26 @@ impl HandTables {
             .collect()
     }
 
-    /// The same of what has the phase of the element so often alone: once what is focused, not at all what is not converted, minus
-    /// once what diverges. Over whole turns of that phase these do not interfere.
+    /// The same for only the light that has the phase of the element `order` times: focused light for 1, what is not converted for
+    /// 0, what diverges for -1. Over whole turns of that phase these three do not interfere.
     pub fn passed_in(&self, order: i32, light: PolarisedLight) -> Vec<Vec<Complex64>> {
         let leaving = self.leaving(light).into_iter();
         let own = leaving.map(|parts| parts.into_iter().filter(|p| p.2 == order).collect::<Vec<_>>());
         own.filter(|parts| !parts.is_empty()).map(|parts| sum(&parts)).collect()
+    }
+
+    /// The same for where light goes: behind a linear analyser the light of each order apart, since they leave in other directions
+    /// and interfere only where they meet.
+    pub fn departing(&self, light: PolarisedLight) -> Vec<PassedTable> {
+        let Some(Analyser::Linear(_)) = light.analyser else {
+            return self.passed(light);
+        };
+        let of_order = |order: i32| {
+            self.passed_in(order, light)
+                .into_iter()
+                .map(move |table| PassedTable { table, order })
+        };
+        [1, 0, -1].into_iter().flat_map(of_order).collect()
     }
 
     /// Parts of the light that reaches the sensor: those of one list interfere, and no others.

@@ -1,6 +1,6 @@
 //! The cell of a design, as true as asked for.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use metalith_cell::{
     CellModel, CellStack, Fidelity, FittedCell, PointwiseCell, PublishedCell, RotatedCell, TableSpec, UniformLayer,
@@ -137,10 +137,7 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
                     let stack = design.cell_stack()?;
                     Ok(Box::new(PointwiseCell::new(stack, design.cell.widths_nm())))
                 }
-                Fidelity::Neighbours => {
-                    let cell = NeighbourCell::new(design.cell_stack()?, mappings(design), cache_folder());
-                    Ok(Box::new(cell.tabulated_at(&design.verify.wavelengths_um)))
-                }
+                Fidelity::Neighbours => Ok(Box::new(neighbour_cell(design, cache_folder())?)),
                 Fidelity::Calibrated => Err(Error::invalid(
                     "a calibrated cell without the model it is calibrated by",
                     "read the model that `metalith calibrate` wrote and make a `MadeChip` of it",
@@ -156,6 +153,17 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
             }
         })
         .collect()
+}
+
+/// The cell of unlike neighbours, with tables at the wavelengths that the design is verified at, which are kept in the folder
+/// `cache`.
+///
+/// # Errors
+/// If the design has a shape or lattice that it is not made for, or a material is not known.
+pub fn neighbour_cell(design: &Design, cache: Option<PathBuf>) -> Result<NeighbourCell> {
+    Fidelity::Neighbours.check(design.cell.shape, design.cell.lattice)?;
+    let cell = NeighbourCell::new(design.cell_stack()?, mappings(design), cache);
+    Ok(cell.tabulated_at(&design.verify.wavelengths_um))
 }
 
 /// How often the elements of a design draw each width beside which others: one mapping for each rule.

@@ -84,7 +84,7 @@ impl Design {
         let layout = LayoutSpec::read(root, &lens, &array);
         let verify = VerifySpec::read(&root.section("verify"), &cell);
         check_directions(&array_section, &array, &verify);
-        let optimise = OptimiseSpec::read(root.optional_section("optimise").as_ref());
+        let optimise = OptimiseSpec::read(root.optional_section("optimise").as_ref(), &cell);
         Self {
             name,
             title,

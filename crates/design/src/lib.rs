@@ -8,7 +8,8 @@ pub mod phase;
 mod spec;
 
 pub use array::{PillarArray, WidthRule};
-pub use cells::{VISIBLE_UM, band_about, cell_models, mappings};
+pub use cells::{VISIBLE_UM, band_about, cell_models, mappings, neighbour_cell};
 pub use design::Design;
 pub use lattice_orders::{AskedLight, LatticeOrders, Medium};
+pub use metalith_grating::NeighbourCell;
 pub use spec::*;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use metalith_cell::{CellModel, Fidelity, RigorousCell};
 use metalith_core::{Error, Progress, Result};
-use metalith_design::{Design, cell_models};
+use metalith_design::{Design, NeighbourCell, cell_models, neighbour_cell};
 
 use crate::robust::cells_off_height;
 
@@ -31,22 +31,9 @@ impl TaskCells {
         let fidelity = design.optimise.fidelity;
         let own = match fidelity {
             Fidelity::Rigorous => rigorous()?,
+            Fidelity::Neighbours => Box::new(among_neighbours(design, cache, progress)?),
             _ => cell_models(design, &[fidelity])?.remove(0),
         };
-        if fidelity == Fidelity::Neighbours {
-            if design.verify.wavelengths_um.len() < 2 {
-                let band = [design.optimise.band_um.0, design.optimise.band_um.1].map(|um| um * 1e3);
-                return Err(Error::invalid(
-                    format!(
-                        "a table of unlike neighbours at one wavelength alone, for a band from {:.0} to {:.0} nm",
-                        band[0], band[1]
-                    ),
-                    "name more in [verify] wavelengths_nm: the others of the band are taken from these",
-                ));
-            }
-            // What has no table yet is solved here, once.
-            own.among_neighbours_in_band(design.optimise.band_um.0, &|_| [0.0; 2], progress)?;
-        }
         let judge = (report && fidelity != Fidelity::Rigorous).then(rigorous).transpose()?;
         let off_height = match &design.optimise.robust {
             Some(robust) if fidelity == Fidelity::Rigorous && robust.height > 0.0 => {
@@ -80,4 +67,35 @@ impl TaskCells {
         let off_height = self.off_height.iter().map(|c| c as &dyn CellModel);
         std::iter::once(self.own()).chain(off_height).collect()
     }
+}
+
+/// The cell of unlike neighbours, whose tables are solved here where there are none.
+fn among_neighbours(design: &Design, cache: Option<&Path>, progress: &dyn Progress) -> Result<NeighbourCell> {
+    let tables = &design.verify.wavelengths_um;
+    let ends = |all: &[f64]| {
+        all.iter()
+            .fold((f64::INFINITY, 0.0), |(a, b): (f64, f64), l| (a.min(*l), b.max(*l)))
+    };
+    let ((first, last), band) = (ends(tables), design.optimise.band_um);
+    let words = |(a, b): (f64, f64)| format!("from {:.0} to {:.0} nm", a * 1e3, b * 1e3);
+    if first >= last {
+        return Err(Error::invalid(
+            format!(
+                "a table of unlike neighbours at one wavelength alone, for a band {}",
+                words(band)
+            ),
+            "name more in [verify] wavelengths_nm: the others of the band are taken from these",
+        ));
+    }
+    if band.0 < first || band.1 > last {
+        progress.warn(&format!(
+            "unlike neighbours have tables {}, and the band is {}: beyond them the paths through pillars go on straight, unless \
+             [verify] wavelengths_nm names its ends too",
+            words((first, last)),
+            words(band)
+        ));
+    }
+    let cell = neighbour_cell(design, cache.map(Path::to_owned))?;
+    cell.among_neighbours_in_band(band.0, &|_| [0.0; 2], progress)?;
+    Ok(cell)
 }

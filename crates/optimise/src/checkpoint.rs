@@ -7,10 +7,11 @@ use sha2::{Digest, Sha256};
 
 use super::adam::Adam;
 use super::rings::Rings;
-use metalith_cell::kept;
+use metalith_cell::{Fidelity, kept};
 use metalith_core::text::hex;
 use metalith_core::{Error, Result};
 use metalith_design::Design;
+use metalith_design::array::WidthRule;
 
 /// Of the kept file.
 const MAGIC: [u8; 8] = *b"MLOPTI\0\x01";
@@ -176,7 +177,12 @@ fn digest(design: &Design) -> String {
         stack,
         band_um,
     );
-    let bytes = serde_json::to_vec(&decisive).expect("plain data serialises");
+    let mut bytes = serde_json::to_vec(&decisive).expect("plain data serialises");
+    if design.optimise.fidelity == Fidelity::Neighbours {
+        // Their tables are at these wavelengths, for the widths of all mappings that elements have.
+        let tables = (&design.verify.wavelengths_um, WidthRule::all(design).len());
+        bytes.extend(serde_json::to_vec(&tables).expect("plain data serialises"));
+    }
     hex(&Sha256::digest(&bytes))
 }
 
@@ -207,6 +213,15 @@ mod tests {
         assert!(with(&vec![0.5; rings]));
         assert!(!with(&vec![0.5; rings - 1]) && !with(&vec![0.5; rings + 1]) && !with(&[]));
         assert!(!with(&vec![f64::NAN; rings]));
+        // Tables of unlike neighbours at other wavelengths are another merit; for others they decide nothing.
+        let mut changed = design.clone();
+        changed.verify.wavelengths_um.push(0.7);
+        assert_eq!(digest(&design), digest(&changed));
+        let unlike = [design.clone(), changed].map(|mut design| {
+            design.optimise.fidelity = Fidelity::Neighbours;
+            digest(&design)
+        });
+        assert_ne!(unlike[0], unlike[1]);
         // What an earlier release kept.
         std::fs::write(&kept, serde_json::to_vec(&Checkpoint::begin(&design)).unwrap()).unwrap();
         assert!(!Checkpoint::load(&kept, &design).unwrap().begun());

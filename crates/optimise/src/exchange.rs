@@ -107,7 +107,7 @@ impl<'p> Exchange<'p> {
         let exact = self.problem.fields_of_widths(&widths);
         let mut fields = Planes::zeros(self.problem.rows());
         for (i, e) in exact.iter().enumerate() {
-            (fields.re[i], fields.im[i]) = (e.re as f32, e.im as f32);
+            fields.set(i, *e);
         }
         let mut one_over_now = vec![0.0f32; self.problem.rows()];
         let mut own = Planes::zeros(self.problem.rows());

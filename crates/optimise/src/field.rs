@@ -70,7 +70,7 @@ pub struct FieldProblem {
     pub(super) table: Planes,
     pub(super) mapping: Mapping,
     /// Of each row that is no padding.
-    pub(super) wavelengths_um: Vec<Option<f64>>,
+    pub(super) conditions: Vec<Option<Condition>>,
     /// Where the neighbours of pillars are not taken for equals.
     pub(super) surroundings: Option<Surroundings>,
 }
@@ -143,7 +143,7 @@ impl FieldProblem {
             kernel,
             table,
             mapping,
-            wavelengths_um: conditions.iter().map(|c| Some(c.as_ref()?.wavelength_um)).collect(),
+            conditions,
             surroundings: None,
         })
     }

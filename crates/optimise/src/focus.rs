@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::field::{Condition, FieldPoint};
 use super::kernel::RingField;
-use super::links::distance_of;
+use super::links::{distance_of, neighbour};
 use super::rings::Rings;
 use super::unlike::{PRODUCTS, Unlike};
 use metalith_cell::{CellModel, NEIGHBOUR_DEGREE, NEIGHBOURS};
@@ -93,12 +93,10 @@ impl Lens {
         cell: &dyn CellModel,
         wavelength_um: f64,
     ) -> Result<Vec<Complex64>> {
-        if let Some(unlike) = Unlike::of(cell, wavelength_um, widths_nm.iter().copied())? {
-            return Ok(unlike.of_rings(&self.rings, widths_nm));
+        match Unlike::of(cell, wavelength_um, widths_nm.iter().copied())? {
+            Some(unlike) => Ok(unlike.of_rings(&self.rings, widths_nm)),
+            None => among_equals(widths_nm, cell, wavelength_um),
         }
-        let widest = widths_nm.iter().copied().max().unwrap_or(0);
-        let t = cell.transmissions(wavelength_um, widest)?;
-        Ok(widths_nm.iter().map(|w| t[usize::from(*w)]).collect())
     }
 
     /// Strehl ratio on the axis at each wavelength, with pillars of `widths_nm[k]` in ring `k`: |E|^2
@@ -114,7 +112,7 @@ impl Lens {
                 let sum = match Unlike::of(cell, wavelength_um, widths_nm.iter().copied())? {
                     Some(unlike) => unlike.on_axis(&self.rings, &field, widths_nm),
                     None => {
-                        let t = self.transmissions_of_rings(widths_nm, cell, wavelength_um)?;
+                        let t = among_equals(widths_nm, cell, wavelength_um)?;
                         t.iter().enumerate().map(|(ring, t)| field.on_axis(ring) * t).sum()
                     }
                 };
@@ -183,6 +181,13 @@ impl Lens {
     }
 }
 
+/// What pillars of these widths transmit, each in a lattice of its equals.
+fn among_equals(widths_nm: &[u16], cell: &dyn CellModel, wavelength_um: f64) -> Result<Vec<Complex64>> {
+    let widest = widths_nm.iter().copied().max().unwrap_or(0);
+    let t = cell.transmissions(wavelength_um, widest)?;
+    Ok(widths_nm.iter().map(|w| t[usize::from(*w)]).collect())
+}
+
 /// Sites at one distance from the axis with one width.
 #[derive(Clone, Copy, Default)]
 struct AlikeSites {
@@ -192,13 +197,10 @@ struct AlikeSites {
 }
 
 impl AlikeSites {
-    fn add_neighbours(&mut self, widths: &WidthMap, [ix, iy]: [usize; 2], factors: &[[f64; NEIGHBOUR_DEGREE]]) {
+    fn add_neighbours(&mut self, widths: &WidthMap, site: [usize; 2], factors: &[[f64; NEIGHBOUR_DEGREE]]) {
         for offset in NEIGHBOURS {
-            let [x, y] = [(ix, offset[0]), (iy, offset[1])].map(|(at, by)| at.checked_add_signed(by as isize));
-            let width = x
-                .zip(y)
-                .and_then(|(x, y)| widths.width_nm.get((y, x)).copied())
-                .unwrap_or(0);
+            let at = neighbour(site, offset, widths.lattice.sites());
+            let width = at.map_or(0, |[x, y]| widths.width_nm[(y, x)]);
             if width != 0 {
                 let to = &mut self.neighbours[distance_of(offset) * NEIGHBOUR_DEGREE..];
                 to.iter_mut()

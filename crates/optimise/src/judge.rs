@@ -9,7 +9,7 @@ use super::limit::{largest_step, largest_step_in_layout};
 use super::robust;
 use super::run::OptimiseTask;
 use metalith_cell::{CellModel, Fidelity};
-use metalith_core::{Result, WidthMap};
+use metalith_core::{Error, Result, WidthMap};
 use metalith_design::Design;
 use metalith_design::phase::{Interpolation, RadialPhase};
 
@@ -87,7 +87,7 @@ impl OptimiseTask {
     /// draw. `cells` as in [`OptimiseTask::solve`].
     ///
     /// # Errors
-    /// If a cell does not cover the band.
+    /// If a cell does not cover the band, or knows unlike neighbours.
     pub fn judge_errors(
         &self,
         turns: &[f64],
@@ -95,6 +95,12 @@ impl OptimiseTask {
         cells: &[&dyn CellModel],
         draws: usize,
     ) -> Result<Vec<f64>> {
+        if cells.iter().any(|cell| cell.fidelity() == Fidelity::Neighbours) {
+            return Err(Error::invalid(
+                "errors of fabrication among unlike neighbours",
+                "judge them with the cell `rigorous`",
+            ));
+        }
         let widths = self.widths_nm(turns);
         let band = self.judging_wavelengths().into_iter().step_by(4).collect::<Vec<_>>();
         robust::draw(robust, draws, cells.len(), self.spec.seed ^ 0x0dd)

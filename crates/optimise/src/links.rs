@@ -48,9 +48,8 @@ impl Links {
             let Some(ring) = rings.ring_at(ix, iy) else { continue };
             let shares = rings.shares_of(ring, lattice.units2(ix, iy));
             for offset in NEIGHBOURS {
-                let [x, y] = [(ix, offset[0]), (iy, offset[1])].map(|(at, by)| at.checked_add_signed(by as isize));
-                let at = x.zip(y).filter(|(x, y)| *x < n && *y < n);
-                let Some(other) = at.and_then(|(x, y)| rings.ring_at(x, y)) else {
+                let at = neighbour([ix, iy], offset, n);
+                let Some(other) = at.and_then(|[x, y]| rings.ring_at(x, y)) else {
                     continue;
                 };
                 let distance = distance_of(offset);
@@ -97,6 +96,12 @@ impl Links {
     pub fn to_ring(&self, ring: usize) -> &[usize] {
         &self.reverse[ring]
     }
+}
+
+/// Column and row of the neighbour of a site at an offset, if they are of a lattice of so many.
+pub fn neighbour([ix, iy]: [usize; 2], [dx, dy]: [i32; 2], sites: usize) -> Option<[usize; 2]> {
+    let inside = |at: usize, by: i32| at.checked_add_signed(by as isize).filter(|at| *at < sites);
+    Some([inside(ix, dx)?, inside(iy, dy)?])
 }
 
 /// The kind of a neighbour by its distance.

@@ -16,8 +16,9 @@ const BY_EQUAL_NEIGHBOURS: &str = "Merit, Strehl ratios before and after and tho
      of a lattice of equal pillars. `metalith run` judges by unlike neighbours where that is the `fidelity` of [verify], as it is by \
      default for the cell of the paper, and may give other Strehl ratios.";
 
-const BY_UNLIKE_NEIGHBOURS: &str = "Merit, pictures and Strehl ratios of the cell `neighbours` have each pillar among those that stand about it, as \
-     `metalith run` does by default for the cell of the paper; those of the cell `rigorous` take it for one of a lattice of equal pillars.";
+const BY_UNLIKE_NEIGHBOURS: &str = "Merit and Strehl ratios of the cell `neighbours` have each pillar among those that stand about it, as \
+     `metalith run` does by default for the cell of the paper, and pictures the mean of each ring; Strehl ratios of the cell `rigorous` take \
+     it for one of a lattice of equal pillars.";
 
 /// All that is reported.
 #[derive(Clone, Debug, Serialize)]

@@ -130,6 +130,10 @@ impl Rings {
 
     /// Which rings have pillars that stand next to one another. The lattice must be square.
     pub fn links(&self) -> &Links {
+        debug_assert!(
+            self.lattice.is_square(),
+            "links are counted over quarters of a square lattice"
+        );
         self.links.get_or_init(|| Links::of(self))
     }
 

@@ -69,8 +69,8 @@ impl OverWavelength<'_> {
         let (rings, focus_um) = (&self.lens.rings, self.lens.gap_um);
         let lattice = rings.lattice();
         let radius_um = 0.5e-3 * f64::from(rings.diameter_nm());
-        // By the number of the ring, from one: sites of a ring transmit alike.
-        let numbers: Vec<u16> = (1..=rings.len() as u16).collect();
+        // By the number of the ring, from one: sites of a ring are taken to transmit alike. A map of more rings could not be held.
+        let numbers: Vec<u16> = (1..=u16::MAX).take(rings.len()).collect();
         let pillars = rings.width_map(&numbers);
         let window = Window::about([0.0; 2], lattice.pitch_um(), WINDOW_SAMPLES, focus_um);
         let reported = PixelFrequencies::of(pixel_um).reported();

@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use super::field::FieldProblem;
+use super::field::{Condition, FieldProblem};
 use super::focus::Lens;
 use super::kernel::RingField;
 use super::links::{DISTANCES, Links};
@@ -45,13 +45,15 @@ impl FieldProblem {
     /// The same merit with neighbours as they are: of rows that are all of the focus, without errors of fabrication.
     ///
     /// # Errors
-    /// If it takes more than `memory_bytes`, or the cell does not know unlike neighbours at a wavelength.
+    /// If it takes more than `memory_bytes` with the kernel of the rings, rows are of pillars that are made with errors, or the cell does
+    /// not know unlike neighbours at a wavelength.
     pub fn among_neighbours(mut self, lens: &Lens, cell: &dyn CellModel, memory_bytes: u64) -> Result<Self> {
         let widths: Vec<u16> = self.mapping.choices().iter().map(|c| c.width_nm).collect();
         let (rows, links) = (self.rows(), lens.rings.links().clone());
         let of_width = usize::from(self.mapping.max_width_nm()) + 1;
         let numbers = links.all().len() + of_width * (PRODUCTS + DISTANCES);
-        let bytes = 8 * numbers as u64 * rows as u64;
+        // In single precision, and in double precision before; and the kernel of the rings with its table.
+        let bytes = (24 * numbers + 8 * (self.rings() + of_width + 1)) as u64 * rows as u64;
         if bytes > memory_bytes {
             return Err(Error::invalid(
                 format!(
@@ -61,10 +63,17 @@ impl FieldProblem {
                 "take fewer wavelengths, or raise `memory_mb`",
             ));
         }
-        let column = |wavelength_um: &Option<f64>| -> Result<Option<(Unlike, Vec<Complex64>)>> {
-            let Some(wavelength_um) = *wavelength_um else {
+        let column = |condition: &Option<Condition>| -> Result<Option<(Unlike, Vec<Complex64>)>> {
+            let Some(condition) = *condition else {
                 return Ok(None);
             };
+            let wavelength_um = condition.wavelength_um;
+            if condition.cell != 0 || condition.width_bias_nm != 0.0 {
+                return Err(Error::invalid(
+                    "errors of fabrication among unlike neighbours",
+                    "leave out [optimise.robust], or optimise with the cell `rigorous`",
+                ));
+            }
             let unlike = Unlike::of(cell, wavelength_um, widths.iter().copied())?.ok_or_else(|| {
                 Error::invalid(
                     format!("the cell `{}` takes neighbours for equals", cell.fidelity()),
@@ -76,7 +85,7 @@ impl FieldProblem {
             let kernel = (0..lens.rings.len()).flat_map(|ring| field.on_axis_by_link(ring).map(|e| e * scale));
             Ok(Some((unlike, kernel.collect())))
         };
-        let columns: Vec<_> = self.wavelengths_um.par_iter().map(column).collect::<Result<_>>()?;
+        let columns: Vec<_> = self.conditions.par_iter().map(column).collect::<Result<_>>()?;
         let mut all = Surroundings {
             rows,
             kernel: Planes::zeros(links.all().len() * rows),

@@ -39,7 +39,7 @@ pub struct ChipInLight<'a> {
     /// Transmission of a cell by wavelength and width.
     by_width: Vec<Vec<Complex64>>,
     /// Of a cell that changes polarisation, what reaches the sensor, by wavelength.
-    polarised: Vec<Option<Vec<PassedTable>>>,
+    polarised: Vec<Option<Polarised>>,
     perturbation: Perturbation,
     /// Power of the light that arrives at an element, at each wavelength, in the unit of a PSF's energy (um^2).
     pub arriving_um2: Vec<f64>,
@@ -59,8 +59,7 @@ pub struct ElementInLight<'c> {
 
 struct Tables {
     classes: Vec<ClassTable>,
-    /// Of each, how often it has the phase of the element: as [`PassedTable::order`].
-    orders: Vec<i32>,
+    departing: Vec<(ClassTable, i32)>,
     /// As [`MadeView::share`].
     share: f64,
     gap_um: f64,
@@ -128,7 +127,7 @@ impl<'a> ChipInLight<'a> {
         };
         let polarised = match case {
             SimulationCase::Cell(cell) => polarised(cell, &sampling, design)?,
-            SimulationCase::Made(_) => vec![None; sampling.wavelengths_nm.len()],
+            SimulationCase::Made(_) => sampling.wavelengths_nm.iter().map(|_| None).collect(),
         };
         let mut distinct = Vec::new();
         for (k, symmetries) in chosen {
@@ -189,7 +188,7 @@ impl<'a> ChipInLight<'a> {
         if let SimulationCase::Made(chip) = self.case {
             let view = chip.view_in_band(&element.made, &PlaneWave::normal(um), false, progress)?;
             return Ok(Tables {
-                orders: vec![1; view.tables.len()],
+                departing: view.tables.iter().map(|table| (table.clone(), 1)).collect(),
                 classes: view.tables,
                 share: view.share,
                 gap_um: view.gap_um,
@@ -200,18 +199,43 @@ impl<'a> ChipInLight<'a> {
             let pillar = |width: f64| table.get(width.round() as usize).copied().unwrap_or_default();
             element.made.table(pillar, Complex64::ZERO)
         };
-        let (classes, orders) = match (&element.among_neighbours[index], &self.polarised[index]) {
-            (Some(response), _) => {
-                let (x, y) = element.view.wedge.looks_at(um);
-                let pillars = NeighbourPillars::new(element.widths, response, [x, y])?;
-                (vec![ClassTable::of_sites(&pillars)], vec![1])
+        let (classes, departing) = match (&element.among_neighbours[index], &self.polarised[index]) {
+            (None, Some(Polarised { passed, departing })) => {
+                // Over the pillars of one element light of unlike orders may interfere a little: all of it is what passes.
+                let counts = element.widths.histogram();
+                let power = |all: &[PassedTable]| -> f64 {
+                    let of = |table: &Vec<Complex64>| -> f64 {
+                        counts
+                            .iter()
+                            .zip(table)
+                            .skip(1)
+                            .map(|(n, t)| *n as f64 * t.norm_sqr())
+                            .sum()
+                    };
+                    all.iter().map(|p| of(&p.table)).sum()
+                };
+                let all = power(departing);
+                let scale = if all > 0.0 { (power(passed) / all).sqrt() } else { 0.0 };
+                let scaled = |p: &PassedTable| (of(&p.table.iter().map(|t| t * scale).collect()), p.order);
+                (
+                    passed.iter().map(|p| of(&p.table)).collect(),
+                    departing.iter().map(scaled).collect(),
+                )
             }
-            (None, Some(passed)) => passed.iter().map(|p| (of(&p.table), p.order)).unzip(),
-            (None, None) => (vec![of(&self.by_width[index])], vec![1]),
+            (neighbours, _) => {
+                let table = match neighbours {
+                    Some(response) => {
+                        let (x, y) = element.view.wedge.looks_at(um);
+                        ClassTable::of_sites(&NeighbourPillars::new(element.widths, response, [x, y])?)
+                    }
+                    None => of(&self.by_width[index]),
+                };
+                (vec![table.clone()], vec![(table, 1)])
+            }
         };
         Ok(Tables {
             classes,
-            orders,
+            departing,
             // What passes pillars that change polarisation is of all light that arrives.
             share: 1.0,
             gap_um: 0.0,
@@ -247,12 +271,14 @@ impl ElementInLight<'_> {
         }
     }
 
-    /// How often each table of [`ElementInLight::lit`] has the phase of the element: as [`PassedTable::order`].
+    /// Tables of light whose direction is asked for, each with how often it has the phase of the element: as those of
+    /// [`HandTables::departing`](metalith_cell::HandTables::departing) where pillars change polarisation, else those of
+    /// [`ElementInLight::lit`].
     ///
     /// # Panics
     /// As [`ElementInLight::lit`].
-    pub fn orders(&self, wavelength: usize) -> &[i32] {
-        &self.at(wavelength).orders
+    pub fn departing(&self, wavelength: usize) -> &[(ClassTable, i32)] {
+        &self.at(wavelength).departing
     }
 
     /// Share of the light that leaves the element in the direction it came from, as one wave: the square of the mean
@@ -311,11 +337,21 @@ fn last_index(design: &Design) -> u16 {
     shape.map_or(design.cell.pitch_nm as u16, |pillars| pillars.steps)
 }
 
-/// What reaches the sensor of the light of a design, of a cell that changes polarisation.
-fn polarised(cell: &dyn CellModel, sampling: &Sampling, design: &Design) -> Result<Vec<Option<Vec<PassedTable>>>> {
+/// What reaches the sensor of light whose polarisation pillars change, and the same for where it goes.
+struct Polarised {
+    passed: Vec<PassedTable>,
+    departing: Vec<PassedTable>,
+}
+
+/// Of the light of a design.
+fn polarised(cell: &dyn CellModel, sampling: &Sampling, design: &Design) -> Result<Vec<Option<Polarised>>> {
+    let light = design.verify.light();
     let of = |nm: &f64| {
         let hands = cell.hands_in_band(nm * 1e-3, last_index(design))?;
-        Ok(hands.map(|hands| hands.passed(design.verify.light())))
+        Ok(hands.map(|hands| Polarised {
+            passed: hands.passed(light),
+            departing: hands.departing(light),
+        }))
     };
     sampling.wavelengths_nm.iter().map(of).collect()
 }

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::cell::CellSpec;
 use super::lens::WAVELENGTH;
 use super::verify::USUAL_PIXEL_UM;
 use crate::VISIBLE_UM;
@@ -116,7 +117,7 @@ pub struct ViewSpec {
 
 impl OptimiseSpec {
     /// Read the section, or take the defaults where there is none.
-    pub fn read(s: Option<&Section<'_, '_>>) -> Self {
+    pub fn read(s: Option<&Section<'_, '_>>, cell: &CellSpec) -> Self {
         let Some(s) = s else { return Self::default() };
         let default = Self::default();
         let merit = s
@@ -182,15 +183,18 @@ impl OptimiseSpec {
                 .optional_integer("memory_mb", 16..=1 << 20, "MB")
                 .map_or(if images { 8192 } else { default.memory_mb }, |m| m as u64),
         };
-        spec.check_neighbours(s);
+        spec.check_neighbours(s, cell);
         s.finish();
         spec
     }
 
     /// Unlike neighbours are known to the exchange of rings for the field on the axis, of pillars as drawn.
-    fn check_neighbours(&self, s: &Section<'_, '_>) {
+    fn check_neighbours(&self, s: &Section<'_, '_>, cell: &CellSpec) {
         if self.fidelity != Fidelity::Neighbours {
             return;
+        }
+        if let Some((what, _)) = self.fidelity.refusal(cell.shape, cell.lattice) {
+            s.fault_given(&["cell.shape", "cell.lattice"], "cell", what, "use the cell `rigorous`");
         }
         let MeritSpec {
             deconvolution,
@@ -396,6 +400,19 @@ mod tests {
     use std::path::Path;
 
     use crate::Design;
+
+    /// On a lattice that no tables are made for.
+    #[test]
+    fn unlike_neighbours_on_a_hexagonal_lattice_are_refused() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../designs/hexagonal_1550.toml");
+        let text = std::fs::read_to_string(&path).unwrap();
+        let text = text.replacen("[verify]", "[optimise]\ncell = \"neighbours\"\n\n[verify]", 1);
+        let error = Design::parse(&path, &text).unwrap_err().to_string();
+        assert!(
+            error.contains("a hexagonal lattice by the `neighbours` cell"),
+            "{error}"
+        );
+    }
 
     /// What the exchange of rings does not know among unlike neighbours is refused, each thing in a fault of its own.
     #[test]

@@ -63,12 +63,13 @@ impl Veil {
                     let lit = light.lit(*i, [0.0; 2]);
                     // Where light arrives in two polarisations one stands for both: their tables differ in obliquely lit
                     // cells alone.
-                    let parts = if lit.share < 1.0 { &lit.tables[..1] } else { &lit.tables };
-                    let of = |(table, order): (_, &i32)| {
+                    let departing = light.departing(*i);
+                    let parts = if lit.share < 1.0 { &departing[..1] } else { departing };
+                    let of = |(table, order): &(_, i32)| {
                         let aperture = lit.element.lit_aperture(table, &lit.light);
                         (*order, Departure::of(&aperture, all[*i] * 1e-3, distance_um, BLOCKS))
                     };
-                    parts.iter().zip(light.orders(*i)).map(of).collect()
+                    parts.iter().map(of).collect()
                 })
                 .collect();
             let zero_orders: Vec<f64> = chosen.iter().map(|i| light.zero_order(*i)).collect();
