@@ -228,8 +228,7 @@ fn transmissions(conditions: &[Option<Condition>], cells: &[&dyn CellModel], wid
     let mut table = Planes::zeros(widths * rows);
     for (row, column) in columns.iter().enumerate() {
         for (width, t) in column.iter().enumerate() {
-            table.re[width * rows + row] = t.re as f32;
-            table.im[width * rows + row] = t.im as f32;
+            table.set(width * rows + row, *t);
         }
     }
     Ok(table)

@@ -59,7 +59,8 @@ pub struct ElementInLight<'c> {
 
 struct Tables {
     classes: Vec<ClassTable>,
-    departing: Vec<(ClassTable, i32)>,
+    /// As [`ElementInLight::departing`], where these are not `classes`, each once with the phase of the element.
+    departing: Option<Vec<(ClassTable, i32)>>,
     /// As [`MadeView::share`].
     share: f64,
     gap_um: f64,
@@ -188,7 +189,7 @@ impl<'a> ChipInLight<'a> {
         if let SimulationCase::Made(chip) = self.case {
             let view = chip.view_in_band(&element.made, &PlaneWave::normal(um), false, progress)?;
             return Ok(Tables {
-                departing: view.tables.iter().map(|table| (table.clone(), 1)).collect(),
+                departing: None,
                 classes: view.tables,
                 share: view.share,
                 gap_um: view.gap_um,
@@ -200,38 +201,19 @@ impl<'a> ChipInLight<'a> {
             element.made.table(pillar, Complex64::ZERO)
         };
         let (classes, departing) = match (&element.among_neighbours[index], &self.polarised[index]) {
-            (None, Some(Polarised { passed, departing })) => {
-                // Over the pillars of one element light of unlike orders may interfere a little: all of it is what passes.
-                let counts = element.widths.histogram();
-                let power = |all: &[PassedTable]| -> f64 {
-                    let of = |table: &Vec<Complex64>| -> f64 {
-                        counts
-                            .iter()
-                            .zip(table)
-                            .skip(1)
-                            .map(|(n, t)| *n as f64 * t.norm_sqr())
-                            .sum()
-                    };
-                    all.iter().map(|p| of(&p.table)).sum()
-                };
-                let all = power(departing);
-                let scale = if all > 0.0 { (power(passed) / all).sqrt() } else { 0.0 };
-                let scaled = |p: &PassedTable| (of(&p.table.iter().map(|t| t * scale).collect()), p.order);
+            (Some(response), _) => {
+                let (x, y) = element.view.wedge.looks_at(um);
+                let pillars = NeighbourPillars::new(element.widths, response, [x, y])?;
+                (vec![ClassTable::of_sites(&pillars)], None)
+            }
+            (None, Some(polarised)) => {
+                let departing = polarised.departing_from(element.widths).into_iter();
                 (
-                    passed.iter().map(|p| of(&p.table)).collect(),
-                    departing.iter().map(scaled).collect(),
+                    polarised.passed.iter().map(|p| of(&p.table)).collect(),
+                    Some(departing.map(|p| (of(&p.table), p.order)).collect()),
                 )
             }
-            (neighbours, _) => {
-                let table = match neighbours {
-                    Some(response) => {
-                        let (x, y) = element.view.wedge.looks_at(um);
-                        ClassTable::of_sites(&NeighbourPillars::new(element.widths, response, [x, y])?)
-                    }
-                    None => of(&self.by_width[index]),
-                };
-                (vec![table.clone()], vec![(table, 1)])
-            }
+            (None, None) => (vec![of(&self.by_width[index])], None),
         };
         Ok(Tables {
             classes,
@@ -277,8 +259,12 @@ impl ElementInLight<'_> {
     ///
     /// # Panics
     /// As [`ElementInLight::lit`].
-    pub fn departing(&self, wavelength: usize) -> &[(ClassTable, i32)] {
-        &self.at(wavelength).departing
+    pub fn departing(&self, wavelength: usize) -> Vec<(&ClassTable, i32)> {
+        let tables = self.at(wavelength);
+        match &tables.departing {
+            Some(departing) => departing.iter().map(|(table, order)| (table, *order)).collect(),
+            None => tables.classes.iter().map(|table| (table, 1)).collect(),
+        }
     }
 
     /// Share of the light that leaves the element in the direction it came from, as one wave: the square of the mean
@@ -341,6 +327,32 @@ fn last_index(design: &Design) -> u16 {
 struct Polarised {
     passed: Vec<PassedTable>,
     departing: Vec<PassedTable>,
+}
+
+impl Polarised {
+    /// Where light of these pillars goes: over one element light of unlike orders may interfere a little, and all of it is what
+    /// passes.
+    fn departing_from(&self, pillars: &WidthMap) -> Vec<PassedTable> {
+        let counts = pillars.histogram();
+        let power = |all: &[PassedTable]| -> f64 {
+            let of = |p: &PassedTable| -> f64 {
+                let each = counts.iter().zip(&p.table).skip(1);
+                each.map(|(n, t)| *n as f64 * t.norm_sqr()).sum()
+            };
+            all.iter().map(of).sum()
+        };
+        let all = power(&self.departing);
+        let scale = if all > 0.0 {
+            (power(&self.passed) / all).sqrt()
+        } else {
+            0.0
+        };
+        let scaled = |p: &PassedTable| PassedTable {
+            table: p.table.iter().map(|t| t * scale).collect(),
+            order: p.order,
+        };
+        self.departing.iter().map(scaled).collect()
+    }
 }
 
 /// Of the light of a design.

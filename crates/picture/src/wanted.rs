@@ -29,6 +29,7 @@ const NODES: usize = 17;
 const SMALL_UM: f64 = 150.0;
 /// Pixels an axis of a kernel.
 const WINDOW: usize = 64;
+
 impl BankSpec {
     /// For the elements of a design before a camera.
     pub fn standard(design: &Design, camera: &Camera) -> Self {
