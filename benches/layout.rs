@@ -21,7 +21,9 @@ fn layout(criterion: &mut Criterion) {
     let lens = LensPhase::new(array.lattice, design.lens.diameter_nm, &design.lens.phase);
     let rule = WidthRule::new(&design.cell, &design.mapping);
     let wedge = design.elements()[0].wedge;
-    group.bench_function("widths", |b| b.iter(|| rule.widths(&ElementPhase::new(&lens, &wedge))));
+    group.bench_function("widths", |b| {
+        b.iter(|| rule.widths(&ElementPhase::new(&lens, &wedge), None))
+    });
     for (name, hierarchy) in [
         ("folded", Hierarchy::Folded),
         ("sref", Hierarchy::Sref),

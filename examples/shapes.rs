@@ -1,8 +1,10 @@
 //! Jones matrices of cells of circles, on a square and on a hexagonal lattice, and of rotated rectangles, for `scripts/shape_peers.py`:
 //! `cargo run --release --example shapes -- 17 25`.
 //!
-//! One line of JSON for each number of orders, along the normal: all cases of [`CIRCLES`] at five diameters on both lattices,
-//! [`RECTANGLES`] of one size at five angles, and of all sizes at the angles of [`ALIGNED`].
+//! One line of JSON for each number of orders, along the normal, of all kinds or of those that are named (`circle`, `rectangle`,
+//! `upright`): all cases of [`CIRCLES`] at five diameters on both lattices,
+//! [`RECTANGLES`] of one size at five angles, of all sizes at the angles of [`ALIGNED`], and all of them as upright rectangles, which
+//! have a rule of their own.
 
 use metalith::cell::{CellStack, Material, RotatedRectangle};
 use metalith::rcwa::{CellLattice, Orders};
@@ -104,49 +106,83 @@ fn rectangle(
     stack.jones(&pillar, wavelength, [0.0; 2], orders)
 }
 
+/// Round pillars.
+fn circles(orders: Orders, points: &mut Vec<String>) -> Result<()> {
+    for hexagonal in [false, true] {
+        for (film, pitch, height, wavelength, first, step) in CIRCLES {
+            let stack = CellStack {
+                shape: PillarShape::Circle,
+                lattice: if hexagonal {
+                    CellLattice::hexagonal(pitch)
+                } else {
+                    CellLattice::Square
+                },
+                ..stack(film, pitch, height)?
+            };
+            for diameter in (0..5).map(|k| first + step * f64::from(k)) {
+                let t = stack.transmission(diameter, wavelength, orders)?;
+                let jones = [[t, Complex64::ZERO], [Complex64::ZERO, t]];
+                let shape = format!("\"diameter\": {diameter}, \"hexagonal\": {hexagonal}");
+                points.push(point(&stack, wavelength, &shape, jones)?);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Rotated rectangles.
+fn rectangles(orders: Orders, points: &mut Vec<String>) -> Result<()> {
+    let mut add = |case: &RectangleCase, size: (f64, f64), degrees: f64, remark: &str| -> Result<()> {
+        let (film, pitch, height, wavelength, _) = *case;
+        let stack = stack(film, pitch, height)?;
+        let jones = rectangle(&stack, wavelength, size, degrees, orders)?;
+        let shape = format!("\"size\": [{}, {}], \"degrees\": {degrees}{remark}", size.0, size.1);
+        points.push(point(&stack, wavelength, &shape, jones)?);
+        Ok(())
+    };
+    for case in &RECTANGLES[..TURNED] {
+        for degrees in ANGLES {
+            add(case, case.4[0], degrees, "")?;
+        }
+    }
+    for case in &RECTANGLES {
+        for size in case.4 {
+            for degrees in ALIGNED {
+                add(case, *size, degrees, ", \"aligned\": true")?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Upright rectangles, by the rule for sides along the axes.
+fn upright(orders: Orders, points: &mut Vec<String>) -> Result<()> {
+    for (film, pitch, height, wavelength, sizes) in RECTANGLES {
+        let stack = stack(film, pitch, height)?;
+        for &(x, y) in sizes {
+            let [along_x, along_y] = stack.birefringent([x, y], wavelength, orders)?;
+            let jones = [[along_x, Complex64::ZERO], [Complex64::ZERO, along_y]];
+            let shape = format!("\"size\": [{x}, {y}], \"degrees\": 0, \"upright\": true");
+            points.push(point(&stack, wavelength, &shape, jones)?);
+        }
+    }
+    Ok(())
+}
+
 fn main() -> Result<()> {
-    for argument in std::env::args().skip(1) {
-        let along_axis: usize = argument.parse().expect("a number of orders");
+    type Kind = (&'static str, fn(Orders, &mut Vec<String>) -> Result<()>);
+    const KINDS: [Kind; 3] = [("circle", circles), ("rectangle", rectangles), ("upright", upright)];
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let named: Vec<Kind> = KINDS
+        .into_iter()
+        .filter(|(kind, _)| arguments.iter().any(|a| a == kind))
+        .collect();
+    let kinds = if named.is_empty() { &KINDS[..] } else { &named[..] };
+    for along_axis in arguments.iter().filter_map(|a| a.parse::<usize>().ok()) {
         let orders = Orders::new(along_axis)?;
         let mut points = Vec::new();
-        for hexagonal in [false, true] {
-            for (film, pitch, height, wavelength, first, step) in CIRCLES {
-                let stack = CellStack {
-                    shape: PillarShape::Circle,
-                    lattice: if hexagonal {
-                        CellLattice::hexagonal(pitch)
-                    } else {
-                        CellLattice::Square
-                    },
-                    ..stack(film, pitch, height)?
-                };
-                for diameter in (0..5).map(|k| first + step * f64::from(k)) {
-                    let t = stack.transmission(diameter, wavelength, orders)?;
-                    let jones = [[t, Complex64::ZERO], [Complex64::ZERO, t]];
-                    let shape = format!("\"diameter\": {diameter}, \"hexagonal\": {hexagonal}");
-                    points.push(point(&stack, wavelength, &shape, jones)?);
-                }
-            }
-        }
-        let mut rectangles = |case: &RectangleCase, size: (f64, f64), degrees: f64, remark: &str| -> Result<()> {
-            let (film, pitch, height, wavelength, _) = *case;
-            let stack = stack(film, pitch, height)?;
-            let jones = rectangle(&stack, wavelength, size, degrees, orders)?;
-            let shape = format!("\"size\": [{}, {}], \"degrees\": {degrees}{remark}", size.0, size.1);
-            points.push(point(&stack, wavelength, &shape, jones)?);
-            Ok(())
-        };
-        for case in &RECTANGLES[..TURNED] {
-            for degrees in ANGLES {
-                rectangles(case, case.4[0], degrees, "")?;
-            }
-        }
-        for case in &RECTANGLES {
-            for size in case.4 {
-                for degrees in ALIGNED {
-                    rectangles(case, *size, degrees, ", \"aligned\": true")?;
-                }
-            }
+        for (_, add) in kinds {
+            add(orders, &mut points)?;
         }
         println!("{{\"orders\": {along_axis}, \"points\": [{}]}}", points.join(", "));
     }

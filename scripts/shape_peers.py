@@ -1,7 +1,7 @@
-"""Cells of circles, on a square and on a hexagonal lattice, and of rotated rectangles: ours beside fmmax and meent, which solve the
+"""Cells of circles, on a square and on a hexagonal lattice, and of rotated and upright rectangles: ours beside fmmax and meent, which solve the
 same cells by independent codes. With 17 orders an axis that takes seven CPU seconds a point; `--every 3` asks for each third.
 
-usage: python scripts/shape_peers.py [--shape circle hexagonal rectangle aligned] [--ours 13 17 21 25 33] [--peer 13 17] [--formulation JONES_DIRECT] [--every 1]
+usage: python scripts/shape_peers.py [--shape circle hexagonal rectangle aligned upright] [--ours 13 17 21 25 33] [--peer 13 17] [--formulation JONES_DIRECT] [--every 1]
 needs: pip install fmmax meent
 
 Thirty points of each kind: silicon nitride, titanium dioxide and amorphous silicon, 455 to 1550 nm; circles of five diameters,
@@ -12,7 +12,8 @@ lattice has, in a circle.
 
 `aligned` asks meent, which takes rectangles along the axes only, and takes them exactly: fifteen sizes as they are, and turned by 45
 degrees, where two of them fill a square cell along their edges whose pitch is the root of two. Orders are for each pitch of
-pillars, in the larger cell as many more.
+pillars, in the larger cell as many more. `upright` asks it for the same fifteen as they are, beside our rule for sides along the axes:
+thirty transmissions, of light along x and along y.
 """
 import argparse
 import json
@@ -23,7 +24,7 @@ import time
 
 GRID = 1600
 GOAL = 0.005
-KINDS = ["circle", "hexagonal", "rectangle", "aligned"]
+KINDS = ["circle", "hexagonal", "rectangle", "aligned", "upright"]
 
 
 def raster(point, inside):
@@ -119,24 +120,28 @@ def aligned_peer(point, along):
     return (turn @ np.diag([across, over]) @ turn.T).ravel().tolist()
 
 
-def ours(orders):
+def ours(orders, shapes):
     root = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     command = ["cargo", "run", "--release", "--quiet", "--example", "shapes", "--"]
     if program := os.environ.get("SHAPES"):
         command = [program]
-    lines = subprocess.run(command + [*map(str, orders)], cwd=root, check=True, capture_output=True, text=True).stdout
+    # A circle on either lattice is one kind of the example, rectangles at all angles another.
+    kinds = {"circle": "circle", "hexagonal": "circle", "rectangle": "rectangle", "aligned": "rectangle", "upright": "upright"}
+    asked = sorted({kinds[shape] for shape in shapes})
+    lines = subprocess.run(command + [*map(str, orders), *asked], cwd=root, check=True, capture_output=True, text=True).stdout
     return {(row := json.loads(line))["orders"]: row["points"] for line in lines.splitlines()}
 
 
 def compare(shape, found, options):
-    kind = lambda p: "aligned" if "aligned" in p else "rectangle" if "size" in p else "hexagonal" if p["hexagonal"] else "circle"
+    kind = lambda p: "upright" if "upright" in p else "aligned" if "aligned" in p else "rectangle" if "size" in p else "hexagonal" if p["hexagonal"] else "circle"
     keep = [k for k, p in enumerate(next(iter(found.values()))) if kind(p) == shape][options.first :: options.every]
     points = [next(iter(found.values()))[k] for k in keep]
     rows = [(f"ours, {n}", [[complex(*t) for t in found[n][k]["jones"]] for k in keep]) for n in options.ours]
-    code = "meent" if shape == "aligned" else "fmmax"
+    by_edges = shape in ("aligned", "upright")
+    code = "meent" if by_edges else "fmmax"
     for along in options.peer:
         begin = time.process_time()
-        solve = aligned_peer if shape == "aligned" else lambda point, along: peer(point, along, options.formulation)
+        solve = aligned_peer if by_edges else lambda point, along: peer(point, along, options.formulation)
         rows.append((f"{code}, {along}", [solve(point, along) for point in points]))
         print(f"{code} with {along} x {along} orders: {time.process_time() - begin:.0f} CPU s", flush=True)
     if len(options.peer) > 1:
@@ -146,7 +151,7 @@ def compare(shape, found, options):
         end = [[b + weight * (b - a) for a, b in zip(*both)] for both in zip(before, after)]
         rows.append((f"{code}, {low} and {high} carried on", end))
     reference = rows[len(options.ours) - 1]
-    title = {"circle": "circles", "hexagonal": "circles, hexagonal", "rectangle": "rectangles", "aligned": "rectangles along a larger cell"}[shape] + ", orders an axis"
+    title = {"circle": "circles", "hexagonal": "circles, hexagonal", "rectangle": "rectangles", "aligned": "rectangles along a larger cell", "upright": "upright rectangles"}[shape] + ", orders an axis"
     far = lambda a, b: max(abs(x - y) for x, y in zip(a, b))
     print(f"\n{title:<34}{'rms':>9}{'median':>9}{'worst':>9}{'within':>9}   "
           f"distance from {reference[0]}; how many of {len(points)} within {GOAL}")
@@ -173,7 +178,7 @@ def main():
     parser.add_argument("--points", action="store_true", help="distance of each point in each row")
     options = parser.parse_args()
     options.judged = len(options.ours) - 2 if len(options.ours) > 1 else 0
-    found = ours(options.ours)
+    found = ours(options.ours, options.shape)
     good = [compare(shape, found, options) for shape in options.shape]
     sys.exit(0 if all(good) else 1)
 

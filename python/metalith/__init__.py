@@ -8,7 +8,19 @@ that are done, and all of them.
 
 from __future__ import annotations
 
-from ._layouts import Array, Design, Lattice, Layout, Places, Rectangles, Shape, places, read_layout, write_layout
+from ._layouts import (
+    Array,
+    Design,
+    Lattice,
+    Layout,
+    Places,
+    Rectangles,
+    Shape,
+    UprightRectangles,
+    places,
+    read_layout,
+    write_layout,
+)
 from ._light import Psf, PsfSet, Transmission, cell, index, propagate, psf
 from ._native import MetalithError, __version__
 from ._pictures import Frame, Studio, denoise
@@ -38,6 +50,7 @@ __all__ = [
     "Study",
     "StudyResult",
     "Transmission",
+    "UprightRectangles",
     "Verification",
     "__version__",
     "calibrate",

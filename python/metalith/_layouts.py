@@ -39,7 +39,36 @@ class Rectangles:
         return rotations.reshape(values.shape)
 
 
-Shape: TypeAlias = Union[Literal["square", "circle"], Rectangles]
+@dataclass(frozen=True)
+class UprightRectangles:
+    """Rectangular pillars with edges along x and y, which differ by both widths: light polarised along each axis has a phase
+    of its own."""
+
+    shortest_nm: int
+    """The shortest width (nm), even."""
+    step_nm: int
+    """From one width to the next (nm), even."""
+    lengths: int
+    """How many widths there are, at most 64."""
+
+    def numbers(self, widths_x_nm: npt.ArrayLike, widths_y_nm: npt.ArrayLike) -> Widths:
+        """The numbers that stand in maps for widths along x and y (nm): 1 to ``lengths`` squared, first along x; zero where
+        both widths are."""
+        x, y = (_whole(np.asarray(widths)) for widths in (widths_x_nm, widths_y_nm))
+        if x.shape != y.shape:
+            raise _native.MetalithError(
+                f"widths along x of shape {x.shape}, along y of {y.shape}\n  help: give both for each pillar"
+            )
+        return _native.upright_numbers(x.ravel(), y.ravel(), *_told(self)[1:]).reshape(x.shape)
+
+    def widths_nm(self, numbers: npt.ArrayLike) -> tuple[Widths, Widths]:
+        """Widths along x and along y (nm); zero where there is no pillar."""
+        values = _whole(np.asarray(numbers))
+        x, y = _native.upright_widths(values.ravel(), *_told(self)[1:])
+        return x.reshape(values.shape), y.reshape(values.shape)
+
+
+Shape: TypeAlias = Union[Literal["square", "circle"], Rectangles, UprightRectangles]
 """What pillars are."""
 
 
@@ -72,9 +101,11 @@ def _lattice(told: str) -> Lattice:
 
 
 def _told(shape: Shape) -> tuple[str, int, int, int]:
-    """A shape as the native module has it: word, width and length (nm), steps."""
+    """A shape as the native module has it: a word and three numbers."""
     if isinstance(shape, Rectangles):
         return ("rectangle", shape.width_nm, shape.length_nm, shape.steps)
+    if isinstance(shape, UprightRectangles):
+        return ("upright_rectangle", shape.shortest_nm, shape.step_nm, shape.lengths)
     return (shape, 0, 0, 0)
 
 
@@ -82,6 +113,8 @@ def _shape(told: tuple[str, int, int, int]) -> Shape:
     word, width, length, steps = told
     if word == "rectangle":
         return Rectangles(width, length, steps)
+    if word == "upright_rectangle":
+        return UprightRectangles(width, length, steps)
     return "circle" if word == "circle" else "square"
 
 
@@ -223,7 +256,7 @@ class Array:
         return len(self._native.elements)
 
     def widths(self, element: int) -> Widths:
-        """Widths of the pillars of one element (nm), diameters of circles, numbers of rotations of rectangles: uint16,
+        """Widths of the pillars of one element (nm), diameters of circles, numbers of rectangles: uint16,
         shape ``[sites, sites]``, rows along +y, columns along +x, zero where there is none. :meth:`places` says where these
         are: on a hexagonal lattice every other place of the grid is empty."""
         return self._native.widths(element)
@@ -255,7 +288,7 @@ class Layout:
     """The pillars that a layout file holds."""
 
     widths: list[Widths] = field(repr=False)
-    """Of each element (nm), diameters of circles, numbers of rotations of rectangles: uint16, shape ``[sites, sites]``,
+    """Of each element (nm), diameters of circles, numbers of rectangles: uint16, shape ``[sites, sites]``,
     rows along +y, columns along +x, zero where there is no pillar. :meth:`places` says where these are."""
     names: list[str] = field(repr=False)
     """Name of each element."""
@@ -286,7 +319,8 @@ class Layout:
 def _rectangles(shape: Shape) -> Rectangles:
     if isinstance(shape, Rectangles):
         return shape
-    raise _native.MetalithError(f"{shape}s have no rotation\n  help: ask for their widths")
+    what = "upright rectangles" if isinstance(shape, UprightRectangles) else f"{shape}s"
+    raise _native.MetalithError(f"{what} have no rotation\n  help: ask for their widths")
 
 
 def read_layout(
@@ -334,7 +368,8 @@ def write_layout(
 
     ``widths`` is one map or several, all of one size, each a square array: of whole, even nanometres, zero where there is no
     pillar, edges of squares or diameters of circles by ``shape``; or, where ``shape`` is :class:`Rectangles`, of rotations
-    in degrees from x towards y, NaN where there is none, which are rounded to the nearest step. ``lattice`` says how pillars
+    in degrees from x towards y, NaN where there is none, which are rounded to the nearest step; or, where it is
+    :class:`UprightRectangles`, of its numbers. ``lattice`` says how pillars
     stand: :func:`places` has the places of a map, and on a hexagonal lattice, of circles alone, those that are sites.
     ``centres_nm`` are the places of the maps; one map alone stands at the origin. Maps that are copies of one another, or
     symmetric, are stored once. Returns the array that was written."""

@@ -162,7 +162,7 @@ def psf(
     pitch_nm: int | None = None,
     shape: Shape = "square",
     lattice: Lattice = "square",
-    arriving: str | float = "left",
+    arriving: str | float | None = None,
     analyser: str | float | None = None,
     pillar_height_nm: float = 700.0,
     pillar: str = SILICON_NITRIDE,
@@ -178,15 +178,16 @@ def psf(
     its pillars; else ``distance_um`` and, for a map of widths, ``pitch_nm`` are needed, ``shape`` where pillars are no
     squares, and ``lattice`` where they stand on a hexagonal one, which ``rigorous`` and ``fitted`` alone know.
     Rectangles are solved by ``rigorous`` alone, in light that arrives ``left`` or ``right`` circularly
-    polarised, linearly along ``x`` or ``y`` or at an angle from x towards y in degrees, or ``unpolarised`` (``arriving``).
-    ``analyser`` is what is before the sensor: ``x``, ``y`` or an angle, or ``circular``, which passes what light that arrives
-    ``left`` or ``right`` is converted to. An
+    polarised, linearly along ``x`` or ``y`` or at an angle from x towards y in degrees, or ``unpolarised`` (``arriving``);
+    left out, it is ``left`` for rotated rectangles and ``x`` for upright ones.
+    ``analyser`` is what is before the sensor: ``x``, ``y`` or an angle, or, of rotated rectangles, ``circular``, which passes
+    what light that arrives ``left`` or ``right`` is converted to. An
     array of a design is in the light that the design says. Intensities are over that of all light that arrives."""
     wavelengths = [float(nm) for nm in np.atleast_1d(np.asarray(wavelengths_nm, dtype=float))]
     fields = [(float(x), float(y)) for x, y in field_deg]
     if isinstance(of, Array) and of.design is not None:
         own = (distance_um, pitch_nm, shape, lattice, arriving, analyser, pillar_height_nm, pillar, substrate)
-        if own != (None, None, "square", "square", "left", None, 700.0, SILICON_NITRIDE, FUSED_SILICA):
+        if own != (None, None, "square", "square", None, None, 700.0, SILICON_NITRIDE, FUSED_SILICA):
             raise _native.MetalithError(
                 "an array of a design knows its sensor, its pillars and its light\n"
                 "  help: leave out `distance_um`, `pitch_nm`, `shape`, `lattice`, `arriving`, `analyser` and what pillars are made of,"
@@ -215,7 +216,7 @@ def psf(
         fast,
         samples or 128,
         _told(shape),
-        str(arriving),
+        None if arriving is None else str(arriving),
         None if analyser is None else str(analyser),
         pillar_height_nm,
         pillar,

@@ -88,6 +88,8 @@ def array_of_widths(
 def places(sites: int, pitch_nm: int, lattice: str) -> tuple[Int64, Int64, Bools]: ...
 def rotation_numbers(rotations_deg: Float64, width_nm: int, length_nm: int, steps: int) -> Widths: ...
 def rotations_deg(numbers: Widths, width_nm: int, length_nm: int, steps: int) -> Float64: ...
+def upright_numbers(widths_x: Widths, widths_y: Widths, shortest_nm: int, step_nm: int, lengths: int) -> Widths: ...
+def upright_widths(numbers: Widths, shortest_nm: int, step_nm: int, lengths: int) -> tuple[Widths, Widths]: ...
 def psf_of_array(
     array: Array,
     wavelengths_nm: list[float],
@@ -109,7 +111,7 @@ def psf_of_widths(
     fast: bool,
     samples: int,
     shape: ToldShape,
-    arriving: str,
+    arriving: str | None,
     analyser: str | None,
     height_nm: float,
     pillar: str,

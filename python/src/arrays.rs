@@ -223,7 +223,7 @@ impl Array {
     }
 }
 
-/// An array of pillars that are given as widths, or as numbers of rotations of rectangles, one map for each element.
+/// An array of pillars that are given as widths, or as numbers of rectangles, one map for each element.
 #[pyfunction]
 #[pyo3(signature = (widths, pitch_nm, lattice, centres_nm, shape, progress=None))]
 pub fn array_of_widths(
@@ -267,17 +267,20 @@ pub fn width_map(
     let lattice = lattice_of(kind, pitch_nm, width_nm.dim(), "map")?;
     let widest_nm = kind.widest_nm(pitch_nm);
     if let Some(pillars) = shape.rectangles() {
-        let longer = pillars.width_nm.max(pillars.length_nm);
+        let longer = pillars.edges_nm(pillars.last()).into_iter().max().unwrap_or(0);
         if u32::from(longer) > pitch_nm {
             return Err(Error::invalid(
                 format!("rectangles {longer} nm long at a pitch of {pitch_nm} nm"),
                 "give edges of at most the pitch",
             ));
         }
-        if let Some(wrong) = width_nm.iter().find(|n| **n > pillars.steps) {
+        if let Some(wrong) = width_nm.iter().find(|n| **n > pillars.last()) {
             return Err(Error::invalid(
-                format!("a pillar of rotation number {wrong}"),
-                format!("numbers go from 1 to {}, the steps of half a turn", pillars.steps),
+                format!("a rectangle of number {wrong}"),
+                format!(
+                    "numbers go from 1 to {}: the steps of half a turn, or the pairs of widths",
+                    pillars.last()
+                ),
             ));
         }
     } else if let Some(wrong) = width_nm.iter().find(|w| **w % 2 != 0 || u32::from(**w) > widest_nm) {

@@ -43,6 +43,8 @@ fn _native(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(lattices::places, m)?)?;
     m.add_function(wrap_pyfunction!(shapes::rotation_numbers, m)?)?;
     m.add_function(wrap_pyfunction!(shapes::rotations_deg, m)?)?;
+    m.add_function(wrap_pyfunction!(shapes::upright_numbers, m)?)?;
+    m.add_function(wrap_pyfunction!(shapes::upright_widths, m)?)?;
     m.add_function(wrap_pyfunction!(psf::psf_of_array, m)?)?;
     m.add_function(wrap_pyfunction!(psf::psf_of_widths, m)?)?;
     m.add_function(wrap_pyfunction!(light::propagate, m)?)?;

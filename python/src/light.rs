@@ -148,7 +148,7 @@ pub fn cell<'py>(
     if shape.rectangles().is_some() {
         return Err(error(Error::invalid(
             "the transmission of rectangles by their width",
-            "give squares or circles: rectangles are of one size, and `metalith.psf` simulates them",
+            "give squares or circles: rectangles are told by numbers, and `metalith.psf` simulates them",
         )));
     }
     let stack = stack(pitch_nm, height_nm, pillar, substrate)

@@ -1,8 +1,8 @@
 //! PSFs of arrays and of maps of widths.
 
 use metalith::cell::{
-    Analyser, FittedCell, Handedness, PointwiseCell, Polarisation, PolarisedLight, PublishedCell, RotatedCell,
-    cache_folder,
+    Analyser, FittedCell, Handedness, PointwiseCell, Polarisation, PolarisationAxis, PolarisedLight, PublishedCell,
+    RotatedCell, UprightCell, cache_folder,
 };
 use metalith::design::band_about;
 use metalith::extract::{ElementSite, ExtractedElement, Extraction};
@@ -10,7 +10,8 @@ use metalith::grating::{Mapping, NeighbourCell};
 use metalith::verify::{Lighting, SimulationCase, SinglePsf, single_psfs};
 use metalith::wave::propagation::{incident, landing_um};
 use metalith::{
-    Accuracy, CellModel, Error, Fidelity, LatticeKind, PillarShape, Progress, Result, Wedge, WidthMap, cell_models,
+    Accuracy, CellModel, Error, Fidelity, LatticeKind, PillarShape, Progress, Rectangles, Result, Wedge, WidthMap,
+    cell_models,
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -37,10 +38,20 @@ fn fidelity(word: &str) -> Result<Fidelity> {
 }
 
 /// The light that words or angles name, at pillars of a shape.
-fn polarised(arriving: &str, analyser: Option<&str>, shape: PillarShape) -> Result<PolarisedLight> {
-    let arriving: Polarisation = arriving.parse()?;
+fn polarised(arriving: Option<&str>, analyser: Option<&str>, shape: PillarShape) -> Result<PolarisedLight> {
+    let own = match shape.upright() {
+        Some(_) => PolarisationAxis::X.polarisation(),
+        None => Polarisation::Circular(Handedness::default()),
+    };
+    let arriving: Polarisation = arriving.map_or(Ok(own), str::parse)?;
     let analyser: Option<Analyser> = analyser.map(str::parse).transpose()?;
-    let usual = arriving == Polarisation::Circular(Handedness::default()) && analyser.is_none();
+    let usual = arriving == own && analyser.is_none();
+    if shape.upright().is_some() && analyser == Some(Analyser::Circular) {
+        return Err(Error::invalid(
+            "a circular analyser behind upright rectangles, which focus no hand",
+            "give `analyser` x, y or an angle",
+        ));
+    }
     if shape.rectangles().is_none() && !usual {
         return Err(Error::invalid(
             format!("light of a polarisation for {}", shape.plural()),
@@ -59,7 +70,7 @@ fn polarised(arriving: &str, analyser: Option<&str>, shape: PillarShape) -> Resu
     })
 }
 
-/// The hand that light of these is focused in.
+/// The hand that light of these is focused in by rotated rectangles.
 fn focused(light: PolarisedLight) -> Handedness {
     match light.arriving {
         Some(Polarisation::Circular(hand)) if light.analyser.is_some() => hand,
@@ -308,7 +319,7 @@ pub fn psf_of_widths<'py>(
     fast: bool,
     samples: usize,
     shape: ToldShape,
-    arriving: &str,
+    arriving: Option<&str>,
     analyser: Option<&str>,
     height_nm: f64,
     pillar: &str,
@@ -331,7 +342,11 @@ pub fn psf_of_widths<'py>(
     let found = work(py, progress, |p| {
         let drawn = drawn(&maps);
         let cell: Box<dyn CellModel> = match (wanted, shape.rectangles()) {
-            (_, Some(pillars)) => Box::new(RotatedCell::new(stack, pillars, focused(light))),
+            (_, Some(Rectangles::Rotated(pillars))) => Box::new(RotatedCell::new(stack, pillars, focused(light))),
+            (_, Some(Rectangles::Upright(pillars))) => {
+                let axis = light.arriving.map_or(PolarisationAxis::X, PolarisationAxis::nearest);
+                Box::new(UprightCell::new(stack, pillars, axis))
+            }
             (Fidelity::Published, None) => Box::new(PublishedCell::new(pitch_nm)),
             (Fidelity::Neighbours, None) => {
                 let mapping = Mapping::of_widths(maps.iter().map(WidthMap::histogram))?;

@@ -1,23 +1,28 @@
 //! What pillars are, between Python and the library.
 
-use metalith::{Error, PillarShape, Rectangles, Result};
+use metalith::{Error, PillarShape, Rectangles, Result, RotatedRectangles, UprightRectangles};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 
 use crate::work::error;
 
-/// Word, width and length (nm), rotations in half a turn; the numbers are of rectangles and zero of others.
+/// Word and three numbers: of rotated rectangles width and length (nm) and rotations in half a turn; of upright ones the shortest
+/// width and the step (nm) and how many widths there are; zero of others.
 pub type ToldShape = (String, u16, u16, u16);
+
+const ROTATED: &str = "rectangle";
+const UPRIGHT: &str = "upright_rectangle";
 
 /// Most rotations in half a turn.
 const MOST_STEPS: u16 = 3600;
 
 /// A shape as Python has it.
 pub fn told(shape: PillarShape) -> ToldShape {
-    let (width, length, steps) = shape
-        .rectangles()
-        .map_or((0, 0, 0), |p| (p.width_nm, p.length_nm, p.steps));
-    (shape.to_string(), width, length, steps)
+    match shape.rectangles() {
+        None => (shape.to_string(), 0, 0, 0),
+        Some(Rectangles::Rotated(p)) => (ROTATED.into(), p.width_nm, p.length_nm, p.steps),
+        Some(Rectangles::Upright(p)) => (UPRIGHT.into(), p.shortest_nm, p.step_nm, p.lengths),
+    }
 }
 
 /// A shape that Python named.
@@ -25,19 +30,91 @@ pub fn told(shape: PillarShape) -> ToldShape {
 /// # Errors
 /// If there is none of this name, or rectangles cannot be drawn.
 pub fn shape_of((word, width_nm, length_nm, steps): ToldShape) -> Result<PillarShape> {
-    if word == "rectangle" {
-        return rectangles(width_nm, length_nm, steps).map(PillarShape::Rectangle);
+    match word.as_str() {
+        ROTATED => return Ok(PillarShape::Rectangle(rectangles(width_nm, length_nm, steps)?.into())),
+        UPRIGHT => return Ok(PillarShape::Rectangle(upright(width_nm, length_nm, steps)?.into())),
+        _ => {}
     }
     let known = PillarShape::CHOICES.iter().find(|(name, _)| *name == word);
     known.map(|(_, shape)| *shape).ok_or_else(|| {
         Error::invalid(
             format!("there is no shape `{word}`"),
-            "use square, circle, or metalith.Rectangles",
+            "use square, circle, metalith.Rectangles or metalith.UprightRectangles",
         )
     })
 }
 
-fn rectangles(width_nm: u16, length_nm: u16, steps: u16) -> Result<Rectangles> {
+fn upright(shortest_nm: u16, step_nm: u16, lengths: u16) -> Result<UprightRectangles> {
+    let even = |nm: u16| nm > 0 && nm.is_multiple_of(2);
+    let most = UprightRectangles::MOST_LENGTHS;
+    if !even(shortest_nm) || !even(step_nm) || !(1..=most).contains(&lengths) {
+        return Err(Error::invalid(
+            format!("upright rectangles of {lengths} widths from {shortest_nm} nm in steps of {step_nm} nm"),
+            format!("give an even width and step, so that edges are on the 1 nm grid, and 1 to {most} widths"),
+        ));
+    }
+    Ok(UprightRectangles {
+        shortest_nm,
+        step_nm,
+        lengths,
+    })
+}
+
+/// Numbers of upright rectangles with these widths along x and y (nm), zero where both are.
+#[pyfunction]
+pub fn upright_numbers<'py>(
+    py: Python<'py>,
+    widths_x: PyReadonlyArray1<'py, u16>,
+    widths_y: PyReadonlyArray1<'py, u16>,
+    shortest_nm: u16,
+    step_nm: u16,
+    lengths: u16,
+) -> PyResult<Bound<'py, PyArray1<u16>>> {
+    let pillars = upright(shortest_nm, step_nm, lengths).map_err(error)?;
+    let pairs = widths_x
+        .as_array()
+        .to_vec()
+        .into_iter()
+        .zip(widths_y.as_array().to_vec());
+    let number = |(x, y): (u16, u16)| match (x, y) {
+        (0, 0) => Ok(0),
+        _ => pillars.number([x, y]).ok_or_else(|| {
+            Error::invalid(
+                format!("a pillar of {x} x {y} nm"),
+                format!(
+                    "widths go from {} to {} nm in steps of {} nm; zero along both axes where there is none",
+                    pillars.shortest_nm,
+                    pillars.longest_nm(),
+                    pillars.step_nm
+                ),
+            )
+        }),
+    };
+    let numbers = pairs.map(number).collect::<Result<Vec<_>>>().map_err(error)?;
+    Ok(PyArray1::from_vec(py, numbers))
+}
+
+/// Widths along x and y of numbers (nm), zero where there is no pillar.
+#[pyfunction]
+#[allow(clippy::type_complexity, reason = "two arrays of Python")]
+pub fn upright_widths<'py>(
+    py: Python<'py>,
+    numbers: PyReadonlyArray1<'py, u16>,
+    shortest_nm: u16,
+    step_nm: u16,
+    lengths: u16,
+) -> PyResult<(Bound<'py, PyArray1<u16>>, Bound<'py, PyArray1<u16>>)> {
+    let pillars = upright(shortest_nm, step_nm, lengths).map_err(error)?;
+    let numbers = numbers.as_array();
+    let along = |axis: usize| {
+        numbers
+            .iter()
+            .map(move |n| if *n == 0 { 0 } else { pillars.edges_nm(*n)[axis] })
+    };
+    Ok((PyArray1::from_iter(py, along(0)), PyArray1::from_iter(py, along(1))))
+}
+
+fn rectangles(width_nm: u16, length_nm: u16, steps: u16) -> Result<RotatedRectangles> {
     let even = |edge: u16| edge > 0 && edge.is_multiple_of(2);
     if !even(width_nm) || !even(length_nm) || width_nm >= length_nm {
         return Err(Error::invalid(
@@ -51,7 +128,7 @@ fn rectangles(width_nm: u16, length_nm: u16, steps: u16) -> Result<Rectangles> {
             format!("give 1 to {MOST_STEPS} steps"),
         ));
     }
-    Ok(Rectangles {
+    Ok(RotatedRectangles {
         width_nm,
         length_nm,
         steps,

@@ -73,7 +73,7 @@ def test_what_cannot_be_a_pillar_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "a.gds").exists()
 
 
-@pytest.mark.parametrize("name", ["tio2_532", "geometric_phase_532"])
+@pytest.mark.parametrize("name", ["tio2_532", "geometric_phase_532", "birefringent_532"])
 def test_psfs_of_a_file_are_those_of_its_design(tmp_path: Path, name: str) -> None:
     design = ml.Design.read(ROOT / f"designs/{name}.toml")
     array = design.array()
@@ -145,3 +145,60 @@ def test_light_of_the_other_handedness_is_not_focused() -> None:
         ml.psf(numbers, [532], shape=array.shape, arriving="diagonal", pitch_nm=design.pitch_nm, distance_um=80.0)
     with pytest.raises(ml.MetalithError, match="light of a polarisation for squares"):
         ml.psf(np.full((8, 8), 200, np.uint16), [532], arriving="x", pitch_nm=350, distance_um=80.0)
+
+
+UPRIGHT = ml.UprightRectangles(shortest_nm=90, step_nm=10, lengths=20)
+
+
+@pytest.mark.parametrize("name", ["a.gds", "a.oas"])
+def test_upright_rectangles_of_any_widths_become_a_layout(tmp_path: Path, name: str) -> None:
+    rng = np.random.default_rng(3)
+    x, y = 10 * rng.integers(9, 29, (2, 30, 30))
+    there = rng.random(x.shape) > 0.1
+    x, y = np.where(there, x, 0), np.where(there, y, 0)
+    numbers = UPRIGHT.numbers(x, y)
+    array = ml.write_layout(tmp_path / name, numbers, pitch_nm=350, shape=UPRIGHT)
+    assert (array.shape, array.pillars) == (UPRIGHT, there.sum())
+    layout = ml.read_layout(tmp_path / name, array=array)
+    assert (layout.shape, layout.other_shapes) == (UPRIGHT, 0)
+    for found, wanted in zip(UPRIGHT.widths_nm(layout.widths[0]), (x, y)):
+        assert np.array_equal(found, wanted)
+    # Without the array: the widths that occur.
+    found = ml.read_layout(tmp_path / name)
+    assert isinstance(found.shape, ml.UprightRectangles)
+    assert np.array_equal(found.shape.widths_nm(found.widths[0])[0], x)
+    with pytest.raises(ml.MetalithError, match="upright rectangles have no rotation"):
+        layout.rotations_deg(0)
+    with pytest.raises(ml.MetalithError, match="a pillar of 95 x 100 nm"):
+        UPRIGHT.numbers([95], [100])
+    with pytest.raises(ml.MetalithError, match="1 to 64 widths"):
+        ml.write_layout(tmp_path / name, numbers, pitch_nm=350, shape=ml.UprightRectangles(90, 10, 65))
+
+
+def test_light_along_each_axis_is_focused_to_its_own_side() -> None:
+    design = ml.Design.read(ROOT / "designs/birefringent_532.toml")
+    array = design.array()
+
+    def image(arriving: str | None, analyser: str | None = None) -> npt.NDArray[np.float64]:
+        return ml.psf(
+            array.widths(0),
+            [532],
+            shape=array.shape,
+            arriving=arriving,
+            analyser=analyser,
+            pitch_nm=design.pitch_nm,
+            distance_um=design.focal_length_um,
+            pillar_height_nm=design.pillar_height_nm,
+            pillar=TIO2,
+            fast=True,
+            samples=96,
+        )[0].values
+
+    x, y, both = image("x"), image("y"), image("unpolarised")
+    assert np.array_equal(image(None), x)
+    column = [int(np.unravel_index(np.argmax(v), v.shape)[1]) - 48 for v in (x, y)]
+    assert abs(0.35 * column[0] - 8) < 0.5 and abs(0.35 * column[1] + 8) < 0.5
+    assert np.allclose(both, 0.5 * (x + y), rtol=0, atol=1e-5 * x.max())
+    assert np.allclose(image("unpolarised", "x"), 0.5 * x, rtol=0, atol=1e-5 * x.max())
+    with pytest.raises(ml.MetalithError, match="which focus no hand"):
+        image("x", "circular")

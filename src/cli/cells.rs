@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::cell::{CellTable, MappingError, Origin, RigorousCell, cache_folder};
+use metalith::cell::{CellTable, MappingError, Origin, PolarisationAxis, RigorousCell, cache_folder};
 use metalith::cell_study::{
-    CellStudy, RotationStudy, StudyOptions, rotation_keys, study_steered, write_cell_report, write_rotation_report,
+    CellStudy, LibraryStudy, RotationStudy, StudyOptions, rotation_keys, study_steered, write_cell_report,
+    write_library_report, write_rotation_report,
 };
 use metalith::report::{fixed, sig};
-use metalith::{Design, Error, Result};
+use metalith::{Design, Error, Rectangles, Result};
 
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
@@ -53,7 +54,7 @@ pub struct CellsArgs {
 /// Do it.
 pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
-    let design = standard_input::design(&args.design)?;
+    let design = standard_input::design_without_library(&args.design)?;
     if args.steered {
         design.square_lattice("--steered")?;
     }
@@ -61,8 +62,16 @@ pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
         .out
         .clone()
         .unwrap_or_else(|| PathBuf::from("out").join(&design.name));
-    if design.cell.shape.rectangles().is_some() {
-        return rotations(args, &design, &folder, terminal);
+    match design.cell.shape.rectangles() {
+        Some(_) if args.steered => {
+            return Err(Error::invalid(
+                "mappings of steered elements for rectangles",
+                "leave out --steered: unlike neighbours are known of squares alone",
+            ));
+        }
+        Some(Rectangles::Rotated(_)) => return rotations(args, &design, &folder, terminal),
+        Some(Rectangles::Upright(_)) => return library(args, &design, &folder, terminal),
+        None => {}
     }
     let mut spec = design.table_spec()?;
     spec.orders = args.orders;
@@ -131,14 +140,8 @@ pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
     Ok(Outcome::Fine)
 }
 
-/// The study of a design of rectangles: a few cells, and no library.
+/// The study of a design of rotated rectangles: a few cells, and no library.
 fn rotations(args: &CellsArgs, design: &Design, folder: &Path, terminal: &Terminal) -> Result<Outcome> {
-    if args.steered {
-        return Err(Error::invalid(
-            "mappings of steered elements for rectangles",
-            "leave out --steered: unlike neighbours are known of squares alone",
-        ));
-    }
     let study = RotationStudy::new(design)?;
     let _turn = terminal.turn_at(folder)?;
     write_rotation_report(&study, folder)?;
@@ -165,6 +168,43 @@ fn rotations(args: &CellsArgs, design: &Design, folder: &Path, terminal: &Termin
     if let Some(fit) = study.fits.get(1) {
         print_line!("{}", rotation_keys(fit));
     }
+    print_line!("report: {}", folder.join("cells.html").display());
+    Ok(Outcome::Fine)
+}
+
+/// The study of a design of upright rectangles, and their library.
+fn library(args: &CellsArgs, design: &Design, folder: &Path, terminal: &Terminal) -> Result<Outcome> {
+    let study = LibraryStudy::new(design, terminal)?;
+    terminal.clear();
+    let _turn = terminal.turn_at(folder)?;
+    write_library_report(&study, folder)?;
+    if args.json {
+        print_json(&study);
+        return Ok(Outcome::Fine);
+    }
+    print_line!(
+        "at {} nm {} of {} sizes are the nearest to some pair of phases",
+        sig(study.wavelength_um * 1e3, 4),
+        study.library.pillars().len(),
+        study.pillars.count()
+    );
+    for (name, errors) in [
+        ("of all sizes", Some(&study.errors)),
+        ("of the design", study.design.as_ref()),
+    ] {
+        let Some(errors) = errors else { continue };
+        for axis in PolarisationAxis::ALL {
+            let k = axis.index();
+            print_line!(
+                "{name:14} light along {axis}: {} rad rms, {} at most; {} of it follows its phase, {} passes",
+                fixed(errors.phase[k].rms_rad, 3),
+                fixed(errors.phase[k].worst_rad, 2),
+                fixed(errors.first[k], 3),
+                fixed(errors.passed[k], 3)
+            );
+        }
+    }
+    print_line!("library: {}", folder.join("library.csv").display());
     print_line!("report: {}", folder.join("cells.html").display());
     Ok(Outcome::Fine)
 }

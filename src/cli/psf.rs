@@ -144,13 +144,13 @@ pub struct PsfArgs {
     #[arg(long, default_value_t = 550.0, requires = "camera")]
     wedge_wavelength_nm: f64,
 
-    /// Polarisation of the light that arrives, where the pillars are rotated rectangles: `left` (if left out) or `right` circular,
+    /// Polarisation of the light that arrives, where the pillars are rectangles: `left` (if left out, of rotated ones) or `right` circular,
     /// with (x + i y) / sqrt 2 for left and a wave along +z, linear along `x` or `y` or at an angle from x towards y (degrees),
     /// or `unpolarised`.
     #[arg(long, value_name = "POLARISATION", allow_negative_numbers = true, value_parser = polarisation)]
     arriving: Option<Polarisation>,
 
-    /// What is before the sensor, where the pillars are rotated rectangles: `circular`, which passes the hand that focused light is
+    /// What is before the sensor, where the pillars are rectangles: `circular` (of rotated ones), which passes the hand that focused light is
     /// converted to, or linear along `x` or `y` or at an angle from x towards y (degrees).
     #[arg(long, value_name = "ANALYSER", allow_negative_numbers = true, value_parser = analyser)]
     analyser: Option<Analyser>,
@@ -254,7 +254,8 @@ fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
     Ok(())
 }
 
-/// Light of a polarisation is simulated where pillars change it, and an analyser for light of both hands must be told which it passes.
+/// Light of a polarisation is simulated where pillars tell polarisations apart, and a circular analyser for light of both hands must be
+/// told which it passes.
 fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
     if found.shape.rectangles().is_none() && (args.arriving.is_some() || args.analyser.is_some()) {
         return Err(Error::invalid(
@@ -263,13 +264,25 @@ fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
                 args.layout.display(),
                 found.shape.plural()
             ),
-            "leave out --arriving and --analyser: they count for rotated rectangles alone, others are simulated in light that is not \
+            "leave out --arriving and --analyser: they count for rectangles alone, others are simulated in light that is not \
              polarised",
+        ));
+    }
+    if found.shape.upright().is_some() && (args.analyser == Some(Analyser::Circular) || args.focused.is_some()) {
+        return Err(Error::invalid(
+            format!(
+                "{}: a circular analyser or a hand for upright rectangles",
+                args.layout.display()
+            ),
+            "leave out --focused, and give --analyser x, y or an angle: upright rectangles focus no hand",
         ));
     }
     if args.analyser == Some(Analyser::Circular) && args.hand().is_none() {
         return Err(Error::invalid(
-            format!("a circular analyser in light that arrives {}", args.arriving()),
+            format!(
+                "a circular analyser in light that arrives {}",
+                args.arriving(found.shape)
+            ),
             "say which hand the layout focuses by --focused left or right: the analyser passes what that is converted to",
         ));
     }
@@ -297,7 +310,7 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
         None => None,
     };
     let simulate = |case: SimulationCase<'_>, light: &PsfLight| -> Result<_> {
-        let lighting = args.lighting(light);
+        let lighting = args.lighting(light, found.shape);
         let psfs = single_psfs(&found, case, &lighting, terminal)?;
         let white = match &light.white {
             Some(white) => {

@@ -96,6 +96,18 @@ pub fn design(path: &Path) -> Result<Design> {
     }
 }
 
+/// The same for who makes the library of its pillars, which need not be there yet.
+///
+/// # Errors
+/// As [`design`].
+pub fn design_without_library(path: &Path) -> Result<Design> {
+    if is_standard_input(path) {
+        Design::parse_without_library(Path::new(NAME), &design_text()?)
+    } else {
+        Design::read_without_library(path)
+    }
+}
+
 /// The text of a design on standard input.
 fn design_text() -> Result<String> {
     let name = Path::new(NAME);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use metalith::calibrate::{BenchFile, DeclaredEffect, MeasuredSet};
 use metalith::camera::{Camera, Spectrum};
-use metalith::cell::{MappingTable, Material};
+use metalith::cell::{MappingTable, Material, PillarLibrary};
 use metalith::drc::{Deck, Waivers};
 use metalith::gds::extract::GdsPillars;
 use metalith::handoff::{Manifest, ManifestEntry, Process, verify_handoff};
@@ -126,6 +126,12 @@ fn designs(folder: &Path) -> Vec<Format> {
     let map_design = folder.join("hologram.toml");
     let tio2 = Design::read(&design("tio2_532")).unwrap();
     let allowed: Vec<u16> = tio2.cell.widths_nm().collect();
+    let upright = Design::read(&design("birefringent_532"))
+        .unwrap()
+        .cell
+        .shape
+        .upright()
+        .unwrap();
     vec![
         Format::new(
             "design",
@@ -152,8 +158,17 @@ fn designs(folder: &Path) -> Vec<Format> {
             "phase_table",
             folder.join("mutant.csv"),
             Kind::Text,
-            files("designs/phases", "csv"),
+            ["broadband", "imaging", "neighbours", "robust"]
+                .map(|name| file(&format!("designs/phases/{name}.csv")))
+                .into(),
             |path| RadialPhase::read_table(path, Interpolation::Linear, 1.0),
+        ),
+        Format::new(
+            "library",
+            folder.join("library.csv"),
+            Kind::Text,
+            vec![file("designs/phases/birefringent_532.csv")],
+            move |path| PillarLibrary::read_csv(path, upright),
         ),
         Format::new(
             "mapping",

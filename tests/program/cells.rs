@@ -40,3 +40,41 @@ fn the_command_reports_on_a_cell_and_reuses_its_library() {
     let page = String::from_utf8_lossy(&before[0]).into_owned();
     assert!(page.contains("Widths to stay away from") && !page.contains("NaN"));
 }
+
+/// The shipped library of upright rectangles is what the command makes of its design, to the byte.
+#[test]
+fn the_library_of_upright_rectangles_is_made_of_the_design() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = metalith_testing::root();
+    // As for a new design: nothing is there yet.
+    let text = fs::read_to_string(root.join("designs/birefringent_532.toml")).unwrap();
+    let design = folder.path().join("new.toml");
+    fs::write(&design, text.replacen("phases/birefringent_532.csv", "library.csv", 1)).unwrap();
+    let run = |arguments: &[&str]| {
+        let mut command = assert_cmd::Command::cargo_bin("metalith").unwrap();
+        command
+            .arg(arguments[0])
+            .arg(&design)
+            .args(&arguments[1..])
+            .output()
+            .unwrap()
+    };
+    let before = run(&["layout"]);
+    let said = String::from_utf8_lossy(&before.stderr).into_owned();
+    assert_eq!(before.status.code(), Some(2));
+    assert!(said.contains("metalith cells DESIGN"), "{said}");
+    let out = folder.path().to_str().unwrap();
+    let made = run(&["cells", "--out", out]);
+    assert_eq!(made.status.code(), Some(0), "{}", String::from_utf8_lossy(&made.stderr));
+    let said = String::from_utf8_lossy(&made.stdout).into_owned();
+    assert!(said.contains("sizes are the nearest to some pair of phases"), "{said}");
+    let [library, shipped] = [
+        folder.path().join("library.csv"),
+        root.join("designs/phases/birefringent_532.csv"),
+    ];
+    assert!(fs::read(library).unwrap() == fs::read(shipped).unwrap());
+    let page = fs::read_to_string(folder.path().join("cells.html")).unwrap();
+    assert!(page.contains("Phases that pillars have") && !page.contains("NaN"));
+    // Now it is where the design says.
+    assert_eq!(run(&["layout", "--out", out]).status.code(), Some(0));
+}

@@ -46,10 +46,10 @@ impl RotationStudy {
     /// # Errors
     /// If the pillars are no rectangles, or the cell cannot be solved.
     pub fn new(design: &Design) -> Result<Self> {
-        let pillars = design.cell.shape.rectangles().ok_or_else(|| {
+        let pillars = design.cell.shape.rotated().ok_or_else(|| {
             Error::invalid(
                 format!("the pillars of {} are {}", design.name, design.cell.shape.plural()),
-                "this study is of rectangles",
+                "this study is of rotated rectangles",
             )
         })?;
         let arriving = design.cell.arriving.unwrap_or_default();

@@ -20,7 +20,7 @@ pub const SOLVER: u32 = 1;
 /// How often the solver has changed what it answers for circles alone.
 const SOLVER_OF_CIRCLES: u32 = 2;
 
-/// The same for rotated rectangles.
+/// The same for rectangles.
 const SOLVER_OF_RECTANGLES: u32 = 1;
 
 /// [`SOLVER`] for pillars of a shape: raised where the answers for that shape alone have changed.

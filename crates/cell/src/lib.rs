@@ -6,6 +6,7 @@ mod curve;
 mod exact;
 mod fit;
 pub mod kept;
+mod library;
 mod model;
 mod neighbour_band;
 mod neighbours;
@@ -19,6 +20,7 @@ mod rotated;
 mod rotation;
 mod stack;
 mod table;
+mod upright;
 
 pub use cache::cache_folder;
 pub use curve::{BadCell, PhaseCurve, bad_cells};
@@ -27,6 +29,7 @@ pub use fit::{
     FittedCell, ForwardFit, InverseFit, MappingError, RotationCurve, RotationFit, curves_over, fit_forward,
     fit_inverse, forward_errors, round_trip,
 };
+pub use library::{LibraryErrors, LibraryPillar, PillarLibrary};
 pub use metalith_rcwa::Material;
 pub use model::{CellModel, Fidelity, ObliqueTables, POLARISATION_SHARE, dark};
 pub use neighbour_band::{BandNode, BandResponse};
@@ -35,7 +38,10 @@ pub use neighbours::{
 };
 pub use pointwise::PointwiseCell;
 pub use pointwise::{BAND_ORDERS, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, tabulate};
-pub use polarisation::{Analyser, HandTables, PassedTable, Polarisation, PolarisedLight};
+pub use polarisation::{
+    Analyser, AxisTables, FocusedLight, HandTables, PassedTable, Polarisation, PolarisationAxis, PolarisedLight,
+    PolarisedTables,
+};
 pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};
 pub use published::PublishedCell;
 pub use rectangle::{Handedness, RotatedRectangle};
@@ -44,3 +50,4 @@ pub use rotated::{RotatedCell, Truncation};
 pub use rotation::RotationMapping;
 pub use stack::{CellStack, MOST_SUBSTRATE_K, UniformLayer};
 pub use table::{CellTable, Origin, TableSpec};
+pub use upright::{Along, UPRIGHT_ORDERS, UprightCell};

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use metalith_core::{Error, LatticeKind, PillarShape, Progress, Result};
 
-use crate::{BandResponse, FittedNeighbours, HandTables, RotatedCell};
+use crate::{BandResponse, FittedNeighbours, PolarisedTables, RotatedCell};
 
 /// How truly a cell is described. Every result names the one it was made with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -158,12 +158,12 @@ pub trait CellModel: Sync {
         self.transmissions(wavelength_um, max_width_nm)
     }
 
-    /// Of a cell that changes polarisation: what it does to light of both hands. Its transmissions are of what it converts of the
-    /// light that it focuses. Nothing of cells that change none.
+    /// Of a cell that tells polarisations apart: what it does to light of both. Its transmissions are of the light that it
+    /// focuses. Nothing of cells that tell none apart.
     ///
     /// # Errors
     /// As [`CellModel::transmissions`].
-    fn hands(&self, _wavelength_um: f64, _max_width_nm: u16) -> Result<Option<HandTables>> {
+    fn polarised(&self, _wavelength_um: f64, _max_width_nm: u16) -> Result<Option<PolarisedTables>> {
         Ok(None)
     }
 
@@ -172,12 +172,12 @@ pub trait CellModel: Sync {
         None
     }
 
-    /// As [`CellModel::hands`], for one of many wavelengths that a band is averaged over.
+    /// As [`CellModel::polarised`], for one of many wavelengths that a band is averaged over.
     ///
     /// # Errors
     /// As [`CellModel::transmissions`].
-    fn hands_in_band(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Option<HandTables>> {
-        self.hands(wavelength_um, max_width_nm)
+    fn polarised_in_band(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Option<PolarisedTables>> {
+        self.polarised(wavelength_um, max_width_nm)
     }
 
     /// The same as [`CellModel::transmissions`] for light that arrives obliquely, by polarisation. `sines` are those of

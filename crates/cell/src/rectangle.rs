@@ -72,12 +72,7 @@ impl CellStack {
                 "give both edges in nm and the angle in rad",
             ));
         }
-        if self.corner_radius_nm > 0.0 {
-            return Err(Error::invalid(
-                "rectangles with rounded corners",
-                "leave the corner radius at 0: rectangles are solved with sharp corners",
-            ));
-        }
+        self.check_sharp()?;
         self.layers_of(wavelength_um, |wider_nm| {
             let [width, length] = [width_nm, length_nm].map(|edge| (edge + wider_nm).max(0.0));
             if width <= 0.0 || length <= 0.0 {
@@ -86,6 +81,17 @@ impl CellStack {
                 Outline::rotated_rectangle(width, length, rotation)
             }
         })
+    }
+
+    /// Refuses rounded corners, which no rectangle is solved with.
+    pub(super) fn check_sharp(&self) -> Result<()> {
+        if self.corner_radius_nm > 0.0 {
+            return Err(Error::invalid(
+                "rectangles with rounded corners",
+                "leave the corner radius at 0: rectangles are solved with sharp corners",
+            ));
+        }
+        Ok(())
     }
 
     /// Jones matrix of the zero order of a rectangular pillar for light from the substrate whose direction has these sines in
@@ -107,9 +113,17 @@ impl CellStack {
     }
 }
 
+/// Why cells of rectangles are not solved in light that arrives at an angle.
+pub(super) fn oblique_refused() -> Error {
+    Error::invalid(
+        "rectangular pillars in light that arrives at an angle",
+        "leave out --as-lit, or set `incidence = \"normal\"` in [verify]: their cells are solved along the normal",
+    )
+}
+
 #[cfg(test)]
 pub(super) mod tests {
-    use metalith_core::Rectangles;
+    use metalith_core::RotatedRectangles;
     use metalith_rcwa::{Material, circular};
 
     use super::*;
@@ -123,7 +137,7 @@ pub(super) mod tests {
     const QUARTER: f64 = 1e-6;
 
     /// Nearly half-wave plates at 532 nm, in steps of a degree.
-    pub const PILLARS: Rectangles = Rectangles {
+    pub const PILLARS: RotatedRectangles = RotatedRectangles {
         width_nm: 100,
         length_nm: 250,
         steps: 180,

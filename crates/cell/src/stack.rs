@@ -82,12 +82,12 @@ impl CellStack {
     ///
     /// # Errors
     /// If the foot is wider than the pitch, the wavelength is outside the range of a material, or the pillars are rectangles,
-    /// which differ by their rotation: see [`CellStack::rectangle_layers`].
+    /// which no width tells apart: see [`CellStack::rectangle_layers`] and [`CellStack::birefringent`].
     pub fn layers(&self, width_nm: f64, wavelength_um: f64) -> Result<LayerStack> {
         if self.shape.rectangles().is_some() {
             return Err(Error::invalid(
                 "rectangular pillars, where those of a width are asked for",
-                "use squares or circles here: `optimise`, `photographs`, compensation, models of a calibration and studies know no rotated \
+                "use squares or circles here: `optimise`, `photographs`, compensation, models of a calibration and studies know no \
                  rectangles; the other commands do",
             ));
         }

@@ -35,7 +35,7 @@ pub use layer::LayerNumber;
 pub use pillars::{ElementSite, PillarReader};
 pub use plane::part;
 pub use progress::{Progress, Silent};
-pub use rectangle::Rectangles;
+pub use rectangle::{Rectangles, RotatedRectangles, UprightRectangles};
 pub use rows::WidthRows;
 pub use shape::PillarShape;
 pub use wedge::{Wedge, turned_sine};

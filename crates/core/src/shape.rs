@@ -5,10 +5,10 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::circle::circle_corners;
-use crate::rectangle::Rectangles;
+use crate::rectangle::{Rectangles, RotatedRectangles, UprightRectangles};
 
-/// The form of all pillars of a layout. One number tells a pillar from others of its form: its width, or of rectangles, which are
-/// all of one size, the number of its rotation.
+/// The form of all pillars of a layout. One number tells a pillar from others of its form: its width, or of rectangles a number that
+/// stands for a rotation or for a size.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PillarShape {
@@ -17,7 +17,7 @@ pub enum PillarShape {
     Square,
     /// A circle; its width is its diameter.
     Circle,
-    /// A rectangle; its number is that of its rotation: see [`Rectangles`].
+    /// A rectangle; its number is that of its rotation or of its size: see [`Rectangles`].
     Rectangle(Rectangles),
 }
 
@@ -43,7 +43,10 @@ impl PillarShape {
     pub fn square_nm2(self, number: u16) -> u64 {
         match self {
             Self::Square | Self::Circle => u64::from(number) * u64::from(number),
-            Self::Rectangle(pillars) => u64::from(pillars.width_nm) * u64::from(pillars.length_nm),
+            Self::Rectangle(pillars) => {
+                let [x, y] = pillars.edges_nm(number).map(u64::from);
+                x * y
+            }
         }
     }
 
@@ -57,6 +60,22 @@ impl PillarShape {
         match self {
             Self::Rectangle(pillars) => Some(pillars),
             Self::Square | Self::Circle => None,
+        }
+    }
+
+    /// The rectangles, if they are those that differ by their rotation.
+    pub fn rotated(self) -> Option<RotatedRectangles> {
+        match self {
+            Self::Rectangle(Rectangles::Rotated(pillars)) => Some(pillars),
+            _ => None,
+        }
+    }
+
+    /// The rectangles, if they are those that differ by their size.
+    pub fn upright(self) -> Option<UprightRectangles> {
+        match self {
+            Self::Rectangle(Rectangles::Upright(pillars)) => Some(pillars),
+            _ => None,
         }
     }
 
@@ -83,7 +102,7 @@ impl PillarShape {
     pub fn widest_nm(self, number: u16) -> f64 {
         match self {
             Self::Square | Self::Circle => f64::from(number),
-            Self::Rectangle(pillars) => f64::from(pillars.width_nm).hypot(f64::from(pillars.length_nm)),
+            Self::Rectangle(pillars) => pillars.longest_diagonal_nm(number),
         }
     }
 
@@ -91,7 +110,7 @@ impl PillarShape {
     pub fn words(self, number: u16) -> String {
         match self {
             Self::Square | Self::Circle => format!("{number} nm wide"),
-            Self::Rectangle(pillars) => format!("rotated by {} degrees", short_deg(pillars.rotation(number))),
+            Self::Rectangle(pillars) => pillars.words(number),
         }
     }
 
@@ -127,11 +146,6 @@ impl fmt::Display for PillarShape {
             Self::Rectangle(_) => "rectangle",
         })
     }
-}
-
-/// An angle in degrees, without the digits that steps of it do not have.
-fn short_deg(rad: f64) -> f64 {
-    (rad.to_degrees() * 1e6).round() / 1e6
 }
 
 #[cfg(test)]

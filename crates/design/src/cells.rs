@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use metalith_cell::{
     CellModel, CellStack, Fidelity, FittedCell, PointwiseCell, PublishedCell, RotatedCell, TableSpec, UniformLayer,
-    cache_folder,
+    UprightCell, cache_folder,
 };
-use metalith_core::{Error, Result};
+use metalith_core::{Error, Rectangles, Result};
 use metalith_grating::{Mapping, NeighbourCell};
 use metalith_rcwa::{CellLattice, Material};
 
@@ -127,9 +127,15 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
         .iter()
         .map(|fidelity| -> Result<Box<dyn CellModel>> {
             fidelity.check(design.cell.shape, design.cell.lattice)?;
-            if let Some(pillars) = design.cell.shape.rectangles() {
-                let arriving = design.cell.arriving.unwrap_or_default();
-                return Ok(Box::new(RotatedCell::new(design.cell_stack()?, pillars, arriving)));
+            match design.cell.shape.rectangles() {
+                Some(Rectangles::Rotated(pillars)) => {
+                    let arriving = design.cell.arriving.unwrap_or_default();
+                    return Ok(Box::new(RotatedCell::new(design.cell_stack()?, pillars, arriving)));
+                }
+                Some(Rectangles::Upright(pillars)) => {
+                    return Ok(Box::new(UprightCell::new(design.cell_stack()?, pillars, design.axis())));
+                }
+                None => {}
             }
             match fidelity {
                 Fidelity::Published => Ok(Box::new(PublishedCell::new(design.cell.pitch_nm))),

@@ -1,18 +1,19 @@
 //! The design file: everything that a person decides, read with a place for every mistake.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use metalith_cell::{Analyser, CellStack};
+use metalith_cell::{Analyser, CellStack, FocusedLight, PolarisationAxis};
 use metalith_core::document::{Document, Section, load};
 use metalith_core::text::{hex, quoted};
 use metalith_core::{ElementSite, Error, Lattice, Result};
 
 use crate::spec::{
-    ArraySpec, CellSpec, Element, FieldAngle, Footprint, LayoutSpec, LensOutline, LensSpec, MappingSpec, OptimiseSpec,
-    VerifySpec,
+    ArraySpec, CellSpec, Element, FieldAngle, Footprint, LayoutSpec, LensOutline, LensSpec, LibraryFile, MappingSpec,
+    OptimiseSpec, VerifySpec,
 };
 
 /// Version of the format of design files that this program reads.
@@ -52,10 +53,29 @@ impl Design {
     /// # Errors
     /// As [`Design::read`], but for reading the file itself.
     pub fn parse(path: &Path, text: &str) -> Result<Self> {
-        Document::read(path, text, |root| Self::sections(path, root))?.with_files()
+        Document::read(path, text, |root| Self::sections(path, root, LibraryFile::Needed))?
+            .with_files(LibraryFile::Needed)
     }
 
-    fn sections(path: &Path, root: &Section<'_, '_>) -> Self {
+    /// As [`Design::read`] and [`Design::parse_without_library`].
+    ///
+    /// # Errors
+    /// As [`Design::read`].
+    pub fn read_without_library(path: &Path) -> Result<Self> {
+        Self::parse_without_library(path, &load(path)?)
+    }
+
+    /// As [`Design::parse`], for who makes the library of its pillars: the file of that may not be there yet. Until it is, the
+    /// design has no pillars.
+    ///
+    /// # Errors
+    /// As [`Design::parse`].
+    pub fn parse_without_library(path: &Path, text: &str) -> Result<Self> {
+        Document::read(path, text, |root| Self::sections(path, root, LibraryFile::ToBeMade))?
+            .with_files(LibraryFile::ToBeMade)
+    }
+
+    fn sections(path: &Path, root: &Section<'_, '_>, library: LibraryFile) -> Self {
         root.integer("schema", SCHEMA..=SCHEMA, "");
         let name = root.text("name");
         let legal = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
@@ -80,7 +100,7 @@ impl Design {
             mapping_um,
             &root.sections("element"),
         );
-        let mapping = MappingSpec::read(&mapping_section, mapping_um, &cell, &array);
+        let mapping = MappingSpec::read(&mapping_section, mapping_um, &cell, &array, library);
         let layout = LayoutSpec::read(root, &lens, &array);
         let verify = VerifySpec::read(&root.section("verify"), &cell);
         check_directions(&array_section, &array, &verify);
@@ -100,7 +120,7 @@ impl Design {
     }
 
     /// Read the files that the design names, after all its own mistakes are known to be none.
-    fn with_files(mut self) -> Result<Self> {
+    fn with_files(mut self, library: LibraryFile) -> Result<Self> {
         // A map that is of elements with lenses of their own alone covers these, not the lens that the others share.
         let indices = self.elements().into_iter().map(|e| e.index);
         let sharing: Vec<_> = indices
@@ -110,7 +130,7 @@ impl Design {
         for own in self.array.placed.iter_mut().filter_map(|p| p.lens.as_mut()) {
             own.load(|_| true)?;
         }
-        self.mapping.load(&self.cell)?;
+        self.mapping.load(&self.cell, library)?;
         // Unknown materials and wavelengths that they are not known at are mistakes of the design, whoever asks first.
         let stack = self.cell_stack()?;
         let band_um = self.band_of(&stack);
@@ -168,6 +188,43 @@ impl Design {
         self.array.lens_of(&self.lens, element.index)
     }
 
+    /// The light that pillars give the phase of the design, if they tell polarisations apart.
+    pub fn focused(&self) -> Option<FocusedLight> {
+        self.cell.focused(self.verify.polarisation)
+    }
+
+    /// Of upright rectangles, the axis of the light that the design is verified in.
+    pub fn axis(&self) -> PolarisationAxis {
+        match self.focused() {
+            Some(FocusedLight::Linear(axis)) => axis,
+            _ => PolarisationAxis::X,
+        }
+    }
+
+    /// The design as light polarised along y sees it, if any of its lenses has another phase for that.
+    pub fn along_y(&self) -> Option<Self> {
+        let own = self.array.placed.iter().filter_map(|p| p.lens.as_ref());
+        let any = std::iter::once(&self.lens)
+            .chain(own)
+            .any(|lens| lens.along_y.is_some());
+        any.then(|| {
+            let mut seen = self.clone();
+            seen.lens = seen.lens.seen_along_y();
+            for lens in seen.array.placed.iter_mut().filter_map(|p| p.lens.as_mut()) {
+                *lens = lens.seen_along_y();
+            }
+            seen
+        })
+    }
+
+    /// The design as the light sees it that it is verified in.
+    pub fn as_verified(&self) -> Cow<'_, Self> {
+        match self.axis() {
+            PolarisationAxis::X => Cow::Borrowed(self),
+            PolarisationAxis::Y => self.along_y().map_or(Cow::Borrowed(self), Cow::Owned),
+        }
+    }
+
     /// Nothing, if all elements are of one round lens.
     ///
     /// # Errors
@@ -196,6 +253,15 @@ impl Design {
     /// # Errors
     /// If phases over the plane are added to it, of whichever element; `who` knows none.
     pub fn radial_phase(&self, who: &str) -> Result<()> {
+        if self.lens.along_y.is_some() {
+            return Err(Error::invalid(
+                format!(
+                    "{who} knows one phase for all light, and {} has another in [phase.y]",
+                    self.path.display()
+                ),
+                "leave [phase.y] out",
+            ));
+        }
         if self.lens.terms.is_empty() {
             return Ok(());
         }

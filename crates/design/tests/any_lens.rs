@@ -265,7 +265,7 @@ fn mistakes_are_said() {
             "tio2_532",
             "[mapping]  ",
             "[mapping]\nrotation_sines_deg = [0.1]\n#",
-            "the pillars are no rectangles",
+            "the pillars are no rotated rectangles",
         ),
         ("hologram", "x_um = 60", "x_um = -20", "overlaps that of element (1, 0)"),
         (
@@ -394,7 +394,7 @@ fn a_geometric_phase_is_that_of_the_mapping() {
     const GEOMETRIC: f64 = 0.01;
     const ORDERS: usize = 21;
     let design = Design::read(&path("geometric_phase_532")).unwrap();
-    let pillars = design.cell.shape.rectangles().unwrap();
+    let pillars = design.cell.shape.rotated().unwrap();
     let stack = design.cell_stack().unwrap();
     let off = [180, 17, 40, 71].map(|number| {
         let rotation = pillars.drawn_rotation(number);

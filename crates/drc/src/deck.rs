@@ -294,7 +294,7 @@ fn parse_layer(text: &str) -> Option<LayerNumber> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metalith_core::Rectangles;
+    use metalith_core::RotatedRectangles;
 
     #[test]
     fn the_decks_of_the_program_are_sound() {
@@ -304,11 +304,12 @@ mod tests {
         let deck = Deck::standard();
         assert!(deck.rules().len() > 30);
         assert!(deck.rules().iter().any(|r| !r.always));
-        let rectangle = PillarShape::Rectangle(Rectangles {
+        let rectangle = RotatedRectangles {
             width_nm: 90,
             length_nm: 240,
             steps: 180,
-        });
+        };
+        let rectangle = PillarShape::Rectangle(rectangle.into());
         for (name, shape) in PillarShape::CHOICES.into_iter().chain([("rectangle", rectangle)]) {
             let deck = Deck::for_shape(shape);
             assert!(deck.rules().iter().any(|r| r.check == name), "{name}: {}", deck.name);

@@ -6,6 +6,8 @@ use super::flat::FlatLayout;
 use super::rule::{NO_DESIGN, Needs, NotRun, Rule, RuleOutcome};
 use super::work::{Stop, Work};
 
+use std::borrow::Cow;
+
 use metalith_core::document::{Limits, Section};
 use metalith_core::{Lattice, WidthRows};
 use metalith_design::phase::{ElementPhase, LensPhase};
@@ -121,9 +123,15 @@ impl Against {
 
 fn phase_step(flat: &FlatLayout<'_>, design: &Design, most: f64, found: &mut Findings) -> RuleOutcome {
     let lattice = design.lattice();
-    let lens = LensPhase::of(design);
-    for element in design.elements() {
-        let phase = ElementPhase::of(&lens, &element);
+    // Light along x and along y may have a phase each.
+    let seen = std::iter::once(Cow::Borrowed(design)).chain(design.along_y().map(Cow::Owned));
+    let lenses: Vec<LensPhase> = seen.map(|seen| LensPhase::of(&seen)).collect();
+    for (element, lens) in design
+        .elements()
+        .into_iter()
+        .flat_map(|e| lenses.iter().map(move |lens| (e, lens)))
+    {
+        let phase = ElementPhase::of(lens, &element);
         let (steps, steep) = steps(flat.work, lattice, &phase)?;
         let share = steep as f64 / steps.max(1) as f64;
         found

@@ -149,7 +149,7 @@ impl Rule for ExposureGrid {
         if flat.elements.is_empty() {
             return Err(NotRun::Skipped(flat.no_elements.clone()));
         }
-        if flat.shape.rectangles().is_some() {
+        if flat.shape.rotated().is_some() {
             let why = "rotated rectangles have no edges along the steps of the beam".to_owned();
             return Err(NotRun::Skipped(why));
         }
@@ -178,11 +178,16 @@ impl Rule for ExposureGrid {
                 });
             }
             let histogram = e.widths.histogram();
+            let edges = |number: usize| match flat.shape.upright() {
+                Some(pillars) => pillars.edges_nm(number as u16).map(f64::from).to_vec(),
+                None => vec![number as f64],
+            };
+            let is_off = |nm: &f64| self.remainder(*nm).abs() > ROUNDING_NM;
             let off: Vec<bool> = (0..histogram.len())
-                .map(|w| w > 0 && self.remainder(w as f64).abs() > ROUNDING_NM)
+                .map(|w| w > 0 && edges(w).iter().any(is_off))
                 .collect();
             for (w, &pillars) in histogram.iter().enumerate().skip(1) {
-                count(w as f64, pillars);
+                edges(w).into_iter().for_each(|nm| count(nm, pillars));
             }
             if !off.iter().any(|&o| o) {
                 continue;
@@ -190,7 +195,7 @@ impl Rule for ExposureGrid {
             e.widths.each_pillar(|row, column, w| {
                 if off[usize::from(w)] {
                     found.rect(&flat.pillar(k, row, column), || {
-                        format!("{w} nm wide is no multiple of {} nm", self.step_nm)
+                        format!("{} is no multiple of {} nm", flat.shape.words(w), self.step_nm)
                     });
                 }
             });

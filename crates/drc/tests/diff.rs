@@ -87,7 +87,7 @@ fn strips_side_by_side_are_compared_each() {
 /// Rotated rectangles: in any hierarchy the same; one rotation, one nanometre of one corner and one pillar more are differences.
 #[test]
 fn rotated_rectangles_are_compared_by_rotation_and_to_the_nanometre() {
-    let pillars = metalith_core::Rectangles {
+    let pillars = metalith_core::RotatedRectangles {
         width_nm: 100,
         length_nm: 250,
         steps: 180,
@@ -123,6 +123,62 @@ fn rotated_rectangles_are_compared_by_rotation_and_to_the_nanometre() {
     let moved = file("moved.gds", bytes(&number, Some(42)));
     let found = compare(&plain, &moved);
     assert_eq!(found.elements[0].pillars, [100, 99], "{}", text(&found));
+    assert!(!found.same_geometry);
+}
+
+/// Upright rectangles: other edges are wider, narrower, or, of one area, rotated by a quarter turn; in nanometres of an edge.
+#[test]
+fn upright_rectangles_are_compared_by_their_edges() {
+    let pillars = metalith_core::UprightRectangles {
+        shortest_nm: 100,
+        step_nm: 10,
+        lengths: 16,
+    };
+    let bytes = |edges: &dyn Fn(usize) -> [u16; 2]| {
+        let mut gds = Gds::library();
+        gds.cell("TOP");
+        for site in 0..100_usize {
+            let (x, y) = (354 * (site % 10) as i32 - 1593, 354 * (site / 10) as i32 - 1593);
+            let number = pillars.number(edges(site)).unwrap();
+            let mut corners = pillars
+                .corners(number)
+                .map(|(dx, dy)| (x + dx as i32, y + dy as i32))
+                .to_vec();
+            corners.push(corners[0]);
+            gds.polygon(1, &corners);
+        }
+        gds.end_cell();
+        gds.end()
+    };
+    let edges = |site: usize| [100 + 10 * (site % 16) as u16, 110 + 10 * (site * 7 % 15) as u16];
+    let changed = |site: usize| match (site, edges(site)) {
+        (12, [x, y]) => [y, x],
+        (34, [x, _]) => [x, 250],
+        (56, [x, _]) => [x, 100],
+        (_, same) => same,
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let found = compare(
+        &write(folder.path(), "a.gds", bytes(&edges)),
+        &write(folder.path(), "b.gds", bytes(&changed)),
+    );
+    let one = &found.elements[0];
+    assert_eq!(
+        (one.pillars, one.rotated, one.widened, one.narrowed),
+        ([100, 100], 1, 1, 1),
+        "{}",
+        text(&found)
+    );
+    let most = [12, 34, 56].map(|site| {
+        let (a, b) = (edges(site), changed(site));
+        a[0].abs_diff(b[0]).max(a[1].abs_diff(b[1]))
+    });
+    assert_eq!(
+        one.largest_change_nm,
+        most.into_iter().max().unwrap(),
+        "{}",
+        text(&found)
+    );
     assert!(!found.same_geometry);
 }
 

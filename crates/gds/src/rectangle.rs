@@ -79,12 +79,13 @@ impl TiltedRectangle {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use metalith_core::RotatedRectangles;
 
-    pub const PILLARS: Rectangles = Rectangles {
+    pub const PILLARS: Rectangles = Rectangles::Rotated(RotatedRectangles {
         width_nm: 90,
         length_nm: 240,
         steps: 180,
-    };
+    });
 
     fn closed(corners: impl IntoIterator<Item = (i64, i64)>) -> Vec<Point> {
         let mut points: Vec<Point> = corners.into_iter().map(|(x, y)| Point::new(x + 177, y - 31)).collect();

@@ -105,6 +105,7 @@ pub(super) fn hyperbolic(design: &Design, wavelength_nm: f64) -> Design {
     let mut single = design.clone();
     single.array = design.array.alone();
     single.lens.terms.clear();
+    single.lens.along_y = None;
     single.lens.phase = RadialPhase::Hyperbola {
         wavelength_um: wavelength_nm * 1e-3,
         focal_length_um: design.lens.focal_length_um,

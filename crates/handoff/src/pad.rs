@@ -1,6 +1,6 @@
 //! Pillars of uniform pads: outline, words, and what is measured of them.
 
-use metalith_core::{PillarShape, Rectangles};
+use metalith_core::{PillarShape, Rectangles, RotatedRectangles, UprightRectangles};
 use metalith_design::Design;
 use metalith_layout::PillarForm;
 use serde::Serialize;
@@ -13,7 +13,11 @@ const DOSE_ROTATIONS_DEG: [f64; 3] = [0.0, 45.0, 90.0];
 /// Rotations of the pads of test structures of rectangles (degrees): half a turn of a rectangle is none.
 const TEST_ROTATIONS_DEG: [f64; 6] = [0.0, 30.0, 60.0, 90.0, 120.0, 150.0];
 
-/// Sizes of upright rectangles beside the nominal one, in steps of both edges.
+/// Edges of upright rectangles of the pads of a dose matrix and of test structures, as shares of the way from the shortest to the
+/// longest: small, large, thin along either axis, and in the middle.
+const SHARES: [[f64; 2]; 5] = [[0.25, 0.25], [0.25, 0.75], [0.5, 0.5], [0.75, 0.25], [0.75, 0.75]];
+
+/// Sizes of rotated rectangles beside the nominal one, without rotation, in steps of both edges.
 const SIZES: [i64; 4] = [-2, -1, 1, 2];
 
 /// Shortest edge of a rectangle of a pad (nm).
@@ -22,12 +26,12 @@ const SHORTEST: i64 = 20;
 /// What is drawn where something is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct DrawnSize {
-    /// Width, diameter, or shorter edge of a rectangle (nm).
+    /// Width, diameter, shorter edge of a rotated rectangle, or edge along x of an upright one (nm).
     pub width_nm: u16,
-    /// Longer edge of a rectangle (nm).
+    /// Longer edge of a rotated rectangle, or edge along y of an upright one (nm).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub length_nm: Option<u16>,
-    /// Direction of the shorter edge of a rectangle, from x towards y (degrees).
+    /// Direction of the shorter edge of a rotated rectangle, from x towards y (degrees).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rotation_deg: Option<f64>,
 }
@@ -46,11 +50,16 @@ impl DrawnSize {
     pub(super) fn of(shape: PillarShape, number: u16) -> Self {
         match shape {
             PillarShape::Square | PillarShape::Circle => Self::width(number),
-            PillarShape::Rectangle(pillars) => Self {
-                width_nm: pillars.width_nm,
-                length_nm: Some(pillars.length_nm),
-                rotation_deg: Some(whole_mdeg(pillars.rotation(number).to_degrees())),
-            },
+            PillarShape::Rectangle(pillars) => {
+                let [width_nm, length_nm] = pillars.edges_nm(number);
+                Self {
+                    width_nm,
+                    length_nm: Some(length_nm),
+                    rotation_deg: shape
+                        .rotated()
+                        .map(|pillars| whole_mdeg(pillars.rotation(number).to_degrees())),
+                }
+            }
         }
     }
 }
@@ -65,7 +74,8 @@ pub(super) fn measured(shape: PillarShape) -> &'static str {
     match shape {
         PillarShape::Square => "widths",
         PillarShape::Circle => "diameters",
-        PillarShape::Rectangle(_) => "widths, lengths and rotations",
+        PillarShape::Rectangle(Rectangles::Rotated(_)) => "widths, lengths and rotations",
+        PillarShape::Rectangle(Rectangles::Upright(_)) => "widths along x and y",
     }
 }
 
@@ -74,7 +84,7 @@ pub(super) fn measured(shape: PillarShape) -> &'static str {
 pub(super) struct PadPillar {
     form: PillarForm,
     number: u16,
-    /// Of rectangles whether the pad is told by its size, not by its rotation.
+    /// Of rectangles whether the pad is told by its size, not by a number.
     by_size: bool,
 }
 
@@ -89,7 +99,7 @@ impl PadPillar {
     }
 
     /// The rectangle of the design with the rotation nearest to one that is asked for (degrees).
-    fn rotated(design: &Design, pillars: Rectangles, rotation_deg: f64) -> Self {
+    fn rotated(design: &Design, pillars: RotatedRectangles, rotation_deg: f64) -> Self {
         Self {
             form: PillarForm::of(design),
             number: pillars.number(rotation_deg.to_radians()),
@@ -98,15 +108,16 @@ impl PadPillar {
     }
 
     /// An upright rectangle with both edges longer by this (nm), if it fits into its cell.
-    fn resized(design: &Design, pillars: Rectangles, by_nm: i64) -> Option<Self> {
+    fn resized(design: &Design, pillars: RotatedRectangles, by_nm: i64) -> Option<Self> {
         let edge = |nm: u16| i64::from(nm) + by_nm;
         let (width, length) = (edge(pillars.width_nm), edge(pillars.length_nm));
         let fits = width >= SHORTEST && (width as f64).hypot(length as f64) <= f64::from(design.cell.pitch_nm);
-        let shape = PillarShape::Rectangle(Rectangles {
+        let resized = RotatedRectangles {
             width_nm: u16::try_from(width).ok()?,
             length_nm: u16::try_from(length).ok()?,
             steps: pillars.steps,
-        });
+        };
+        let shape = PillarShape::Rectangle(resized.into());
         fits.then(|| Self {
             form: PillarForm::of(design).with_shape(shape),
             number: pillars.steps,
@@ -149,6 +160,7 @@ impl PadPillar {
             (Some(length), Some(deg)) => {
                 format!("{} by {length} nm, rotated by {deg} degrees", drawn.width_nm)
             }
+            (Some(length), None) => format!("{} by {length} nm", drawn.width_nm),
             _ if self.form.is_square() => format!("{} nm", drawn.width_nm),
             _ => format!("{} nm in diameter", drawn.width_nm),
         }
@@ -158,10 +170,11 @@ impl PadPillar {
 /// Pillars of the pads of a dose matrix.
 pub(super) fn dose_pads(design: &Design, process: &Process) -> Vec<PadPillar> {
     match design.cell.shape.rectangles() {
-        Some(pillars) => DOSE_ROTATIONS_DEG
+        Some(Rectangles::Rotated(pillars)) => DOSE_ROTATIONS_DEG
             .iter()
             .map(|&deg| PadPillar::rotated(design, pillars, deg))
             .collect(),
+        Some(Rectangles::Upright(pillars)) => upright_pads(design, pillars),
         None => {
             let widths = process.dose_matrix.pad_widths_nm.iter();
             widths.map(|&w| PadPillar::of_width(design, w)).collect()
@@ -169,10 +182,41 @@ pub(super) fn dose_pads(design: &Design, process: &Process) -> Vec<PadPillar> {
     }
 }
 
+/// Upright rectangles that the design chooses from, which stand for all of them.
+pub(super) fn upright_sizes(design: &Design, pillars: UprightRectangles) -> Vec<u16> {
+    let known = design.mapping.library.iter().flat_map(|library| library.pillars());
+    let known: Vec<u16> = known.map(|pillar| pillar.number).collect();
+    let span = f64::from(pillars.longest_nm() - pillars.shortest_nm);
+    let nearest = |shares: [f64; 2]| {
+        let off = |number: &u16| -> f64 {
+            let edges = pillars.edges_nm(*number).into_iter().zip(shares);
+            let off = |(nm, share): (u16, f64)| (f64::from(nm - pillars.shortest_nm) - share * span).powi(2);
+            edges.map(off).sum()
+        };
+        known.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b)))
+    };
+    let mut sizes: Vec<u16> = SHARES.into_iter().filter_map(nearest).collect();
+    sizes.sort_unstable();
+    sizes.dedup();
+    sizes
+}
+
+fn upright_pads(design: &Design, pillars: UprightRectangles) -> Vec<PadPillar> {
+    let pad = |number: u16| PadPillar {
+        form: PillarForm::of(design),
+        number,
+        by_size: true,
+    };
+    upright_sizes(design, pillars).into_iter().map(pad).collect()
+}
+
 /// Pillars of the pads of test structures: all widths in steps, from the narrowest to the widest that the design may write; of
-/// rectangles some rotations, then some sizes about that of the design.
+/// rotated rectangles some rotations, then some sizes about that of the design; of upright ones some sizes.
 pub(super) fn test_pads(design: &Design, process: &Process) -> Vec<PadPillar> {
-    if let Some(pillars) = design.cell.shape.rectangles() {
+    if let Some(pillars) = design.cell.shape.upright() {
+        return upright_pads(design, pillars);
+    }
+    if let Some(pillars) = design.cell.shape.rotated() {
         // Edges stay even numbers.
         let step = (process.tests.pad_width_step_nm / 2.0).round() as i64 * 2;
         let rotated = TEST_ROTATIONS_DEG.iter();

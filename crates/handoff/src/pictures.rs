@@ -5,6 +5,7 @@ use super::matrix::DoseBlock;
 use super::pad::PadPillar;
 use super::process::{Method, Process, Tone};
 use super::structures::Structure;
+use metalith_core::Rectangles;
 use metalith_design::Design;
 use metalith_report::{Figure, Plan, PlanLayer};
 
@@ -105,7 +106,8 @@ pub(super) fn tone(design: &Design, process: &Process) -> Figure {
     );
     // What a cut shows: from the narrowest to the widest pillar, of rectangles from edge to edge.
     let (low, high) = match design.cell.shape.rectangles() {
-        Some(pillars) => (pillars.width_nm, pillars.length_nm),
+        Some(Rectangles::Rotated(pillars)) => (pillars.width_nm, pillars.length_nm),
+        Some(Rectangles::Upright(pillars)) => (pillars.shortest_nm, pillars.longest_nm()),
         None => design.cell.width_range_nm,
     };
     let widths = [low, (low + high) / 2, high].map(|w| f64::from(w) * 1e-3);

@@ -1,9 +1,9 @@
 //! Places on the chip at which widths are to be measured, and crosses to align by.
 
-use metalith_core::{LatticeKind, PillarShape, WidthMap};
+use metalith_core::{LatticeKind, PillarShape, Rectangles, WidthMap};
 use serde::Serialize;
 
-use super::pad::{DrawnSize, legal_width, whole_mdeg};
+use super::pad::{DrawnSize, legal_width, upright_sizes, whole_mdeg};
 use super::process::Process;
 use super::structures::Structure;
 use metalith_design::Design;
@@ -44,6 +44,9 @@ pub struct MetrologySite {
     /// turn and below none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub around_deg: Range<f64>,
+    /// Most that an edge of a neighbour differs from that of the pillar by (nm), where they differ by both edges.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub around_by_nm: Option<u16>,
 }
 
 /// Places on the first and the last element of the array, and one on each structure that has a width.
@@ -65,7 +68,7 @@ pub(super) fn sites(
         let (cx, cy) = placed.element.centre_nm;
         let radius_um = design.lens_of(&placed.element).radius_um();
         for best in best_sites(&map, array.shape, radius_um, &widths, zones) {
-            let (around_nm, around_deg) = neighbours(array.shape, &best);
+            let (around_nm, around_deg, around_by_nm) = neighbours(array.shape, &best);
             let (x, y) = (map.lattice.place_nm(0, best.ix), map.lattice.place_nm(1, best.iy));
             sites.push(MetrologySite {
                 id: format!("L{:02}", sites.len() + 1),
@@ -78,6 +81,7 @@ pub(super) fn sites(
                 drawn: DrawnSize::of(array.shape, best.number),
                 around_nm,
                 around_deg,
+                around_by_nm,
             });
         }
     }
@@ -93,18 +97,23 @@ pub(super) fn sites(
             element_x_um: None,
             element_y_um: None,
             drawn,
-            around_nm: drawn.rotation_deg.is_none().then_some((drawn.width_nm, drawn.width_nm)),
+            around_nm: drawn.length_nm.is_none().then_some((drawn.width_nm, drawn.width_nm)),
             around_deg: drawn.rotation_deg.map(|deg| (deg, deg)),
+            around_by_nm: (drawn.length_nm.is_some() && drawn.rotation_deg.is_none()).then_some(0),
         });
     }
     sites
 }
 
 /// What to look for: widths in equal steps inside the range, not its ends, where few pillars are (nm); of rectangles the numbers
-/// of a few rotations.
+/// of a few rotations or sizes.
 fn targets(design: &Design) -> Vec<u16> {
-    if let Some(pillars) = design.cell.shape.rectangles() {
-        return ROTATIONS_DEG.map(|deg| pillars.number(deg.to_radians())).to_vec();
+    match design.cell.shape.rectangles() {
+        Some(Rectangles::Rotated(pillars)) => {
+            return ROTATIONS_DEG.map(|deg| pillars.number(deg.to_radians())).to_vec();
+        }
+        Some(Rectangles::Upright(pillars)) => return upright_sizes(design, pillars),
+        None => {}
     }
     let (low, high) = design.cell.width_range_nm;
     let step = f64::from(high - low) / (WIDTHS + 1) as f64;
@@ -116,34 +125,41 @@ fn targets(design: &Design) -> Vec<u16> {
 struct BestSite {
     ix: usize,
     iy: usize,
-    /// Width (nm), or number of the rotation.
+    /// Width (nm), or number of a rectangle.
     number: u16,
-    /// Least and greatest of the pillar and its neighbours, from its own: widths (nm), or steps of rotation.
+    /// Least and greatest of the pillar and its neighbours, from its own: widths or edges (nm), or steps of rotation.
     around: (i32, i32),
 }
 
-/// The neighbours of a site in nm, or in degrees.
-fn neighbours(shape: PillarShape, site: &BestSite) -> (Range<u16>, Range<f64>) {
+/// The neighbours of a site in nm, in degrees, or by how much their edges differ.
+fn neighbours(shape: PillarShape, site: &BestSite) -> (Range<u16>, Range<f64>, Option<u16>) {
     let (low, high) = site.around;
     match shape {
         PillarShape::Square | PillarShape::Circle => {
             let width = |from_own: i32| (i32::from(site.number) + from_own) as u16;
-            (Some((width(low), width(high))), None)
+            (Some((width(low), width(high))), None, None)
         }
-        PillarShape::Rectangle(pillars) => {
+        PillarShape::Rectangle(Rectangles::Upright(_)) => (None, None, Some(high.max(-low) as u16)),
+        PillarShape::Rectangle(Rectangles::Rotated(pillars)) => {
             let own = pillars.rotation(site.number).to_degrees();
             let deg = |from_own: i32| whole_mdeg(own + f64::from(from_own) * pillars.step_deg());
-            (None, Some((deg(low), deg(high))))
+            (None, Some((deg(low), deg(high))), None)
         }
     }
 }
 
-/// How far a width or number is from another; of rotations, of which the last is next to the first, the short way round.
+/// How far a width or number is from another; of rotations, of which the last is next to the first, the short way round; of upright
+/// rectangles the edge that differs more.
 fn from_own(shape: PillarShape, own: u16, other: u16) -> i32 {
     let apart = i32::from(other) - i32::from(own);
     match shape.rectangles() {
         None => apart,
-        Some(pillars) => {
+        Some(Rectangles::Upright(pillars)) => {
+            let (own, other) = (pillars.edges_nm(own), pillars.edges_nm(other));
+            let by = [0, 1].map(|axis| i32::from(other[axis]) - i32::from(own[axis]));
+            if by[1].abs() > by[0].abs() { by[1] } else { by[0] }
+        }
+        Some(Rectangles::Rotated(pillars)) => {
             let (steps, half) = (i32::from(pillars.steps), i32::from(pillars.steps / 2));
             (apart + half).rem_euclid(steps) - half
         }

@@ -12,7 +12,6 @@ use metalith_core::file::read_at_most;
 use metalith_core::text::is_printable;
 use metalith_core::{Error, Result, document};
 use metalith_design::Design;
-use metalith_design::phase::RadialPhase;
 use metalith_drc::{Deck, Waivers};
 use metalith_made::CalibratedModel;
 use metalith_rcwa::Material;
@@ -194,14 +193,16 @@ fn files_of(path: &Path, design: &Design) -> Result<Vec<Named>> {
     if let Some(table) = &design.mapping.table_file {
         files.push((table.clone(), "", "phase to width, the mapping of the design"));
     }
+    if let Some(library) = &design.mapping.library_file {
+        files.push((
+            library.clone(),
+            "",
+            "phases of upright pillars, the library of the design",
+        ));
+    }
     let own = design.array.placed.iter().filter_map(|placed| placed.lens.as_ref());
     for lens in std::iter::once(&design.lens).chain(own) {
-        if let RadialPhase::Table { file, .. } = &lens.phase {
-            files.push((file.clone(), "", "phase of the lens over its radius"));
-        }
-        for file in lens.terms.iter().filter_map(|term| term.file.as_ref()) {
-            files.push((file.clone(), "", "a phase over the plane of the lens"));
-        }
+        files.extend(lens.phase_files().map(|(file, purpose)| (file.to_owned(), "", purpose)));
     }
     if let Some(camera) = &design.verify.camera {
         for file in Camera::read(camera)?.files {

@@ -8,7 +8,7 @@ use super::pad::DrawnSize;
 use super::process::Process;
 use super::sites::{Cross, MetrologySite};
 use super::structures::Structure;
-use metalith_core::{PillarShape, Result, WholeFile};
+use metalith_core::{PillarShape, Rectangles, Result, WholeFile};
 
 /// Rows of text under a head.
 struct Csv(String);
@@ -60,7 +60,8 @@ pub(super) fn write_doses(
     let measured: &[&str] = match shape {
         PillarShape::Square => &["measured_pad_width_nm"],
         PillarShape::Circle => &["measured_pad_diameter_nm"],
-        PillarShape::Rectangle(_) => &["measured_pad_width_nm", "measured_pad_length_nm"],
+        PillarShape::Rectangle(Rectangles::Rotated(_)) => &["measured_pad_width_nm", "measured_pad_length_nm"],
+        PillarShape::Rectangle(Rectangles::Upright(_)) => &["measured_pad_x_nm", "measured_pad_y_nm"],
     };
     let mut head = vec![
         "number",
@@ -139,7 +140,13 @@ pub(super) fn write_sites(path: &Path, sites: &[MetrologySite], process: &Proces
             "measured_x_nm",
             "measured_y_nm",
         ],
-        PillarShape::Rectangle(_) => &[
+        PillarShape::Rectangle(Rectangles::Upright(_)) => &[
+            "neighbours_within_nm",
+            "expected_within_nm",
+            "measured_x_nm",
+            "measured_y_nm",
+        ],
+        PillarShape::Rectangle(Rectangles::Rotated(_)) => &[
             "neighbours_min_deg",
             "neighbours_max_deg",
             "expected_within_nm",
@@ -162,7 +169,10 @@ pub(super) fn write_sites(path: &Path, sites: &[MetrologySite], process: &Proces
             site.element_y_um.map_or_else(String::new, um),
         ];
         cells.extend(drawn_cells(shape, Some(&site.drawn)));
-        if shape.rectangles().is_some() {
+        if shape.upright().is_some() {
+            let by = site.around_by_nm.map_or_else(String::new, |nm| nm.to_string());
+            cells.extend([by, format!("{within:.1}")]);
+        } else if shape.rotated().is_some() {
             let deg = |pick: fn((f64, f64)) -> f64| site.around_deg.map_or_else(String::new, |a| pick(a).to_string());
             cells.extend([deg(|a| a.0), deg(|a| a.1), format!("{within:.1}")]);
         } else {
@@ -181,7 +191,8 @@ pub(super) fn write_sites(path: &Path, sites: &[MetrologySite], process: &Proces
 fn drawn_columns(shape: PillarShape) -> &'static [&'static str] {
     match shape {
         PillarShape::Square | PillarShape::Circle => &["drawn_nm"],
-        PillarShape::Rectangle(_) => &["drawn_width_nm", "drawn_length_nm", "drawn_rotation_deg"],
+        PillarShape::Rectangle(Rectangles::Rotated(_)) => &["drawn_width_nm", "drawn_length_nm", "drawn_rotation_deg"],
+        PillarShape::Rectangle(Rectangles::Upright(_)) => &["drawn_x_nm", "drawn_y_nm"],
     }
 }
 
@@ -192,7 +203,9 @@ fn drawn_cells(shape: PillarShape, drawn: Option<&DrawnSize>) -> Vec<String> {
     }
     let length = drawn.and_then(|d| d.length_nm).map(|nm| nm.to_string());
     let rotation = drawn.and_then(|d| d.rotation_deg).map(|deg| deg.to_string());
-    vec![width, length.unwrap_or_default(), rotation.unwrap_or_default()]
+    let mut cells = vec![width, length.unwrap_or_default()];
+    cells.extend(shape.rotated().map(|_| rotation.unwrap_or_default()));
+    cells
 }
 
 pub(super) fn write_crosses(path: &Path, crosses: &[Cross], steps: &str) -> Result<()> {

@@ -1,6 +1,6 @@
 //! The outline of one pillar of each width or rotation, as it is written.
 
-use metalith_core::{CHORD_ERROR, PillarShape};
+use metalith_core::{CHORD_ERROR, PillarShape, Rectangles};
 use metalith_design::Design;
 
 /// How pillars are drawn: their shape, and how near to a circle polygons are.
@@ -55,9 +55,15 @@ impl PillarForm {
         self.shape.reach(number)
     }
 
-    /// Name of the cell of one of these pillars: by its width, or by its rotation in steps.
+    /// Name of the cell of one of these pillars: by its width, its rotation in steps, or its widths along x and y.
     pub fn cell_name(&self, number: u16) -> String {
-        let kind = if self.shape.rectangles().is_some() { "R" } else { "W" };
-        format!("{kind}{number}")
+        match self.shape {
+            PillarShape::Square | PillarShape::Circle => format!("W{number}"),
+            PillarShape::Rectangle(Rectangles::Rotated(_)) => format!("R{number}"),
+            PillarShape::Rectangle(Rectangles::Upright(pillars)) => {
+                let [x, y] = pillars.edges_nm(number);
+                format!("W{x}X{y}")
+            }
+        }
     }
 }

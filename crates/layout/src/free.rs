@@ -36,8 +36,8 @@ pub fn write_free(
 ) -> Result<Written> {
     if free.shape.rectangles().is_some() && array.shape != free.shape {
         return Err(Error::invalid(
-            "rotated rectangles without a design",
-            "write squares or circles, or give a design with `shape = \"rectangle\"`",
+            "rectangles without a design",
+            "write squares or circles, or give a design with `shape = \"rectangle\"` or `\"upright_rectangle\"`",
         ));
     }
     let number = |n: u16| {

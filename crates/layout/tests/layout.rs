@@ -84,7 +84,7 @@ fn golden_digests_of_the_full_size_designs() {
     golden_records("full_size.json", &["prototype_3x3", "wide_5x5"]);
 }
 
-/// Circles, rotated rectangles, phases over the plane, other arrays.
+/// Circles, rotated and upright rectangles, phases over the plane, other arrays.
 #[test]
 fn golden_digests_of_the_other_designs() {
     let names = [
@@ -92,6 +92,7 @@ fn golden_digests_of_the_other_designs() {
         "hexagonal_1550",
         "tio2_532",
         "geometric_phase_532",
+        "birefringent_532",
         "silicon_10600",
         "hologram",
         "array_2x4",

@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use metalith_core::{PillarShape, Rectangles, Silent};
+use metalith_core::{PillarShape, RotatedRectangles, Silent};
 use metalith_design::{Design, Hierarchy, PillarArray};
 use metalith_gds::Layout;
 use metalith_gds::extract::{ExtractionPlan, extract};
 use metalith_layout::{LayoutFormat, OasisEncoding, convert, extraction_plan, write_pillars_as};
 use metalith_testing::design;
 
-const PILLARS: Rectangles = Rectangles {
+const PILLARS: RotatedRectangles = RotatedRectangles {
     width_nm: 100,
     length_nm: 250,
     steps: 180,
@@ -27,7 +27,7 @@ fn holds(path: &Path, design: &Design, array: &PillarArray) {
         ExtractionPlan::discover(design.layout.layers.pillars.number()),
     ] {
         let read = extract(&layout, &plan, &Silent).unwrap();
-        assert_eq!(read.shape, PillarShape::Rectangle(PILLARS), "{name}");
+        assert_eq!(read.shape, PillarShape::Rectangle(PILLARS.into()), "{name}");
         assert_eq!((read.pillars, read.oddities.total()), (array.pillars(), 0), "{name}");
         for (element, placed) in read.elements.iter().zip(&array.placed) {
             assert_eq!(element.widths.width_nm, array.widths(placed).width_nm, "{name}");

@@ -142,6 +142,8 @@ pub mod tests {
             polynomial,
             table_file: None,
             table: None,
+            library_file: None,
+            library: None,
             rotation: Default::default(),
             steered: Vec::new(),
             comparison: MappingComparison::default(),

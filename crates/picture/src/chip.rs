@@ -254,7 +254,7 @@ impl ElementInLight<'_> {
     }
 
     /// Tables of light whose direction is asked for, each with how often it has the phase of the element: as those of
-    /// [`HandTables::departing`](metalith_cell::HandTables::departing) where pillars change polarisation, else those of
+    /// [`PolarisedTables::departing`](metalith_cell::PolarisedTables::departing) where pillars tell polarisations apart, else those of
     /// [`ElementInLight::lit`].
     ///
     /// # Panics
@@ -317,13 +317,13 @@ fn distinct_of(
     (distinct, copies)
 }
 
-/// Largest index of a table of the cells of a design: a width (nm), or the number of a rotation.
+/// Largest index of a table of the cells of a design: a width (nm), or the number of a rectangle.
 fn last_index(design: &Design) -> u16 {
     let shape = design.cell.shape.rectangles();
-    shape.map_or(design.cell.pitch_nm as u16, |pillars| pillars.steps)
+    shape.map_or(design.cell.pitch_nm as u16, |pillars| pillars.last())
 }
 
-/// What reaches the sensor of light whose polarisation pillars change, and the same for where it goes.
+/// What reaches the sensor of light whose polarisations pillars tell apart, and the same for where it goes.
 struct Polarised {
     passed: Vec<PassedTable>,
     departing: Vec<PassedTable>,
@@ -359,10 +359,10 @@ impl Polarised {
 fn polarised(cell: &dyn CellModel, sampling: &Sampling, design: &Design) -> Result<Vec<Option<Polarised>>> {
     let light = design.verify.light();
     let of = |nm: &f64| {
-        let hands = cell.hands_in_band(nm * 1e-3, last_index(design))?;
-        Ok(hands.map(|hands| Polarised {
-            passed: hands.passed(light),
-            departing: hands.departing(light),
+        let tables = cell.polarised_in_band(nm * 1e-3, last_index(design))?;
+        Ok(tables.map(|tables| Polarised {
+            passed: tables.passed(light),
+            departing: tables.departing(light),
         }))
     };
     sampling.wavelengths_nm.iter().map(of).collect()

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use ndarray::Array3;
 use serde::Serialize;
 
-use metalith_cell::{Fidelity, Handedness, Polarisation, PolarisedLight};
+use metalith_cell::{Fidelity, FocusedLight, PolarisedLight};
 use metalith_made::NotApplied;
 
 use crate::assumed::AssumedScore;
@@ -204,7 +204,7 @@ impl Studio {
             value,
         };
         let spec = &self.bank.spec;
-        let polarised = (self.design.cell.arriving)
+        let polarised = (self.design.focused())
             .map(|focused| assumption("polarisation", polarised(focused, self.design.verify.light())));
         let mut all = vec![
             assumption("cell", cell),
@@ -261,13 +261,13 @@ impl Studio {
     }
 }
 
-/// What is assumed of the polarisation of the scene, at pillars that focus a hand.
-fn polarised(focused: Handedness, light: PolarisedLight) -> String {
+/// What is assumed of the polarisation of the scene, at pillars that give this light the phase of the design.
+fn polarised(focused: FocusedLight, light: PolarisedLight) -> String {
     let arriving = light.arriving_at(focused);
-    let own = arriving == Polarisation::Circular(focused);
-    let source = match own {
+    let own = focused.polarisation();
+    let source = match arriving == own {
         true => format!("all light arrives {arriving}, as behind a filter"),
-        false => format!("all light arrives {arriving}, and pillars focus what arrives {focused} circularly polarised"),
+        false => format!("all light arrives {arriving}, and pillars focus what arrives {own}"),
     };
     format!("{source}; {}, in image and veil", light.detector(focused))
 }

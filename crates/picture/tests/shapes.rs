@@ -1,7 +1,7 @@
 //! Pictures of lenses that are no squares on a square lattice: where their light goes, against what their cells pass.
 
 use metalith_camera::{Camera, Channel, Illuminant, Response, Sensor};
-use metalith_cell::{Analyser, CellModel};
+use metalith_cell::{Analyser, CellModel, PolarisedTables};
 use metalith_core::Silent;
 use metalith_design::array::PillarArray;
 use metalith_design::{Design, cell_models};
@@ -190,7 +190,10 @@ fn light_that_is_not_converted_is_in_the_veil() {
             cell.transmissions_in_band(um, most).unwrap()
         });
         let other = passed(&extraction, nm, cell.as_ref(), |um| {
-            cell.hands_in_band(um, most).unwrap().unwrap().unconverted[0].clone()
+            match cell.polarised_in_band(um, most).unwrap() {
+                Some(PolarisedTables::Hands(hands)) => hands.unconverted[0].clone(),
+                other => panic!("{other:?}"),
+            }
         });
         assert!(other > 0.1, "{other}");
         let wanted = if design.verify.analyser == Some(Analyser::Circular) {

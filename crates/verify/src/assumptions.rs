@@ -1,13 +1,13 @@
 //! What a simulation assumes, and how much each assumption weighs for the design at hand.
 
-use metalith_cell::{Fidelity, ORDERS, Polarisation, Truncation};
-use metalith_core::{PillarShape, Rectangles};
+use metalith_cell::{Fidelity, FocusedLight, ORDERS, Truncation};
+use metalith_core::{PillarShape, Rectangles, RotatedRectangles};
 use metalith_design::{CellIncidence, Design, Element};
 use metalith_report::{Cell, Column, Page, Table, exact, fixed, sig};
 
 use super::page::span;
 use super::steep::Slopes;
-use super::{EqualRotations, OrderEfficiencies, PsfResult, Verification, media};
+use super::{EqualRotations, OrderEfficiencies, PsfResult, Verification, birefringence, media};
 
 /// The table of assumptions; none of a layout that was not simulated.
 pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
@@ -69,7 +69,10 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
         angles(&mut row, design, found);
     }
     if let Some(pillars) = design.cell.shape.rectangles() {
-        polarised(&mut row, design, found, pillars);
+        match pillars {
+            Rectangles::Rotated(pillars) => polarised(&mut row, design, found, pillars),
+            Rectangles::Upright(_) => birefringence::rows(&mut row, design, found),
+        }
     } else if found.fidelity == Fidelity::Rigorous {
         row(
             &format!("Cells are solved with {ORDERS} diffraction orders an axis"),
@@ -183,8 +186,14 @@ fn white_apart_deg(design: &Design, wavelength_um: f64) -> f64 {
 }
 
 /// What is assumed of the polarisation of light, and what steps and grid do to the phase of rotated rectangles.
-fn polarised(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &Verification, pillars: Rectangles) {
-    let focused = design.cell.arriving.unwrap_or_default();
+fn polarised(
+    row: &mut impl FnMut(&str, String, &str),
+    design: &Design,
+    found: &Verification,
+    pillars: RotatedRectangles,
+) {
+    let hand = design.cell.arriving.unwrap_or_default();
+    let focused = FocusedLight::Circular(hand);
     let light = design.verify.light();
     let shares = |what: &str, of: fn(&OrderEfficiencies) -> Option<f64>| -> Option<String> {
         let orders = found.distinct.iter().flat_map(|d| &d.orders);
@@ -197,14 +206,14 @@ fn polarised(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &
         shares("is not converted", |o| o.unconverted),
     ];
     let arriving = light.arriving_at(focused);
-    let (what, whose) = match arriving == Polarisation::Circular(focused) {
+    let (what, whose) = match arriving == focused.polarisation() {
         true => (
             "pillars convert it to the other hand with twice their rotation as phase".into(),
             "light of the other hand diverges, of unpolarised light that is half: `polarisation` in [verify]",
         ),
         false => (
             format!(
-                "pillars convert each hand to the other with twice their rotation as phase, and focus what arrives {focused} circularly \
+                "pillars convert each hand to the other with twice their rotation as phase, and focus what arrives {hand} circularly \
                  polarised"
             ),
             "Strehl ratios and shares are of all light that arrives, and the design phase focuses all of it",

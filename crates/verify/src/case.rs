@@ -6,8 +6,8 @@ use std::collections::hash_map::Entry;
 use num_complex::Complex64;
 
 use metalith_cell::{
-    BandResponse, CellModel, FittedNeighbours, HandTables, ObliqueTables, POLARISATION_SHARE, PassedTable,
-    PolarisedLight,
+    BandResponse, CellModel, FittedNeighbours, ObliqueTables, POLARISATION_SHARE, PassedTable, PolarisedLight,
+    PolarisedTables,
 };
 use metalith_core::{Error, LatticeKind, Progress, Result, WidthRows};
 use metalith_grating::NeighbourPillars;
@@ -59,7 +59,7 @@ impl<'a> SimulationCases<'a> {
 pub(super) struct TransmissionTables {
     /// Along the normal.
     pub normal: Vec<Complex64>,
-    /// Of a cell that changes polarisation, along the normal.
+    /// Of a cell that tells polarisations apart, along the normal.
     polarised: Option<Polarised>,
     /// By direction, for s and p; empty where the design asks for normal incidence, or the cell knows no angles.
     oblique: HashMap<[u64; 2], ObliqueTables>,
@@ -71,18 +71,18 @@ pub(super) struct TransmissionTables {
     lattice: LatticeKind,
 }
 
-/// What pillars that change polarisation do to light of both hands, and what of it reaches the sensor.
+/// What pillars that tell polarisations apart do to light of both, and what of it reaches the sensor.
 struct Polarised {
-    hands: HandTables,
+    tables: PolarisedTables,
     light: PolarisedLight,
     passed: Vec<PassedTable>,
 }
 
 impl Polarised {
-    fn of(hands: HandTables, light: PolarisedLight) -> Self {
+    fn of(tables: PolarisedTables, light: PolarisedLight) -> Self {
         Self {
-            passed: hands.passed(light),
-            hands,
+            passed: tables.passed(light),
+            tables,
             light,
         }
     }
@@ -97,7 +97,7 @@ enum Neighbourhood {
 }
 
 impl TransmissionTables {
-    /// Solve a cell of pillars on such a lattice along the normal; `light` counts where they change polarisation.
+    /// Solve a cell of pillars on such a lattice along the normal; `light` counts where they tell polarisations apart.
     ///
     /// # Errors
     /// If it has no answer at this wavelength.
@@ -108,9 +108,9 @@ impl TransmissionTables {
         widest_nm: u16,
         light: PolarisedLight,
     ) -> Result<Self> {
-        let hands = cell.hands(wavelength_um, widest_nm)?;
+        let polarised = cell.polarised(wavelength_um, widest_nm)?;
         let normal = cell.transmissions(wavelength_um, widest_nm)?;
-        Ok(Self::along_normal(normal, hands, lattice, light))
+        Ok(Self::along_normal(normal, polarised, lattice, light))
     }
 
     /// The same for one of many wavelengths of a band.
@@ -124,24 +124,24 @@ impl TransmissionTables {
         widest_nm: u16,
         light: PolarisedLight,
     ) -> Result<Self> {
-        let hands = cell.hands_in_band(wavelength_um, widest_nm)?;
+        let polarised = cell.polarised_in_band(wavelength_um, widest_nm)?;
         let normal = cell.transmissions_in_band(wavelength_um, widest_nm)?;
         Ok(Self {
             in_band: true,
-            ..Self::along_normal(normal, hands, lattice, light)
+            ..Self::along_normal(normal, polarised, lattice, light)
         })
     }
 
     /// Of one wavelength, before other directions are added.
     fn along_normal(
         normal: Vec<Complex64>,
-        hands: Option<HandTables>,
+        polarised: Option<PolarisedTables>,
         lattice: LatticeKind,
         light: PolarisedLight,
     ) -> Self {
         Self {
             normal,
-            polarised: hands.map(|hands| Polarised::of(hands, light)),
+            polarised: polarised.map(|tables| Polarised::of(tables, light)),
             oblique: HashMap::new(),
             neighbours: HashMap::new(),
             in_band: false,
@@ -149,9 +149,9 @@ impl TransmissionTables {
         }
     }
 
-    /// Of a cell that changes polarisation, what it does to light of both hands, and the light that it is in.
-    pub fn polarised(&self) -> Option<(&HandTables, PolarisedLight)> {
-        self.polarised.as_ref().map(|p| (&p.hands, p.light))
+    /// Of a cell that tells polarisations apart, what it does to light of both, and the light that it is in.
+    pub fn polarised(&self) -> Option<(&PolarisedTables, PolarisedLight)> {
+        self.polarised.as_ref().map(|p| (&p.tables, p.light))
     }
 
     /// Solve it for more directions, those that are alike by symmetry once.
@@ -257,7 +257,7 @@ impl TransmissionTables {
     }
 
     /// The PSF of pillars for a wave on a window: the mean over polarisations where cells are solved at an angle, the sum of
-    /// all that does not interfere where cells change polarisation. `lit` is the wave that they are solved for where they are.
+    /// all that does not interfere where cells tell polarisations apart. `lit` is the wave that they are solved for where they are.
     ///
     /// # Errors
     /// As [`Psf::formed`].

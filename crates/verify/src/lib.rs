@@ -2,6 +2,7 @@
 //! and simulated.
 
 mod assumptions;
+mod birefringence;
 mod case;
 mod check;
 mod copies;
@@ -292,7 +293,7 @@ fn judge(
     progress: &dyn Progress,
 ) -> Result<Verification> {
     let mut elements = found.elements;
-    let lens = LensPhase::of(design);
+    let lens = LensPhase::of(&design.as_verified());
     let responses = MappingResponse::new(design, cases.judge)?;
     let mut simulator = optics::ElementSimulator::new(design, array.lattice, cases, accuracy, part_bytes)?;
     let chosen = copies::choose(design, array, &mut elements, cases.judge.keeps_symmetry());

@@ -90,11 +90,12 @@ fn whole_mb(design: &Design) -> f64 {
 }
 
 /// How elements are held that are read folded: of those that are round lenses and nothing else on a square
-/// lattice, an eighth.
+/// lattice, an eighth; rectangles are not symmetric.
 fn holdings(design: &Design) -> Vec<Holding> {
     let held = |element: &Element| {
         let lens = design.lens_of(element);
-        let round = lens.outline.is_none() && !lens.terms.iter().any(|term| term.is_of(element.index));
+        let turned = design.cell.shape.rectangles().is_some();
+        let round = !turned && lens.outline.is_none() && !lens.terms.iter().any(|term| term.is_of(element.index));
         match (element.wedge.sin_x, element.wedge.sin_y) {
             (0.0, 0.0) if round && design.cell.lattice.is_square() => Holding::Eighth,
             _ => Holding::Whole,

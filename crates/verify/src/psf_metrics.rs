@@ -5,7 +5,7 @@ use num_complex::Complex64;
 use serde::Serialize;
 
 use super::copies::CopyAngle;
-use metalith_cell::{Fidelity, HandTables, PolarisedLight};
+use metalith_cell::{Fidelity, PolarisedLight, PolarisedTables};
 use metalith_design::array::WidthRule;
 use metalith_design::{Element, FieldAngle};
 use metalith_wave::psf::{Matched, Psf, PsfMetrics, order_shares, pixel_mtf};
@@ -161,14 +161,14 @@ pub struct OrderEfficiencies {
 impl OrderEfficiencies {
     /// The widths that a mapping draws (nm), rising.
     pub(super) fn drawn_nm(rule: &WidthRule) -> Vec<u16> {
-        let all: std::collections::BTreeSet<u16> = (0..ORDER_SAMPLES).map(|i| rule.width_nm(order_phase(i))).collect();
+        let all: std::collections::BTreeSet<u16> = (0..ORDER_SAMPLES).map(|i| rule.sample(i, ORDER_SAMPLES)).collect();
         all.into_iter().collect()
     }
 
     /// Of a mapping, by the table of a cell at one wavelength; `full` is |t| of a cell that passes everything.
     pub(super) fn of(rule: &WidthRule, wavelength_um: f64, fidelity: Fidelity, full: f64, table: &[Complex64]) -> Self {
         let t = (0..ORDER_SAMPLES)
-            .map(|i| table[usize::from(rule.width_nm(order_phase(i)))])
+            .map(|i| table[usize::from(rule.sample(i, ORDER_SAMPLES))])
             .collect::<Vec<_>>();
         let shares = order_shares(&t, full, &[0, 1, 2]);
         Self {
@@ -184,18 +184,18 @@ impl OrderEfficiencies {
         }
     }
 
-    /// The same of pillars that change polarisation, in light of which one hand or both arrive, as shares of all of it. Over a
+    /// The same of pillars that tell polarisations apart, in light of which one or both arrive, as shares of all of it. Over a
     /// whole turn of the phase, light that is converted of one hand does not interfere with what is not of the other.
-    pub(super) fn of_light(self, hands: &HandTables, light: PolarisedLight, rule: &WidthRule, full: f64) -> Self {
+    pub(super) fn of_light(self, tables: &PolarisedTables, light: PolarisedLight, rule: &WidthRule, full: f64) -> Self {
         let power = |table: Vec<Complex64>| {
-            let power = (0..ORDER_SAMPLES).map(|i| table[usize::from(rule.width_nm(order_phase(i)))].norm_sqr());
+            let power = (0..ORDER_SAMPLES).map(|i| table[usize::from(rule.sample(i, ORDER_SAMPLES))].norm_sqr());
             power.sum::<f64>() / (full * full * ORDER_SAMPLES as f64)
         };
         let passed = |order: i32| {
-            let tables = hands.passed_in(order, light);
-            (!tables.is_empty()).then(|| tables.into_iter().map(power).sum())
+            let passed = tables.passed_in(order, light);
+            (!passed.is_empty()).then(|| passed.into_iter().map(power).sum())
         };
-        let focused = light.focused_share(hands.focused);
+        let focused = light.focused_share(tables.focused());
         Self {
             first: self.first * focused,
             zero: self.zero * focused,
@@ -206,9 +206,4 @@ impl OrderEfficiencies {
             ..self
         }
     }
-}
-
-/// Phase of a sample of a mapping (turns).
-fn order_phase(i: usize) -> f64 {
-    (i as f64 + 0.5) / ORDER_SAMPLES as f64
 }

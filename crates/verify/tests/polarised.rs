@@ -1,7 +1,9 @@
 //! Source and detector of light at rotated rectangles, from a design to its figures.
 
-use metalith_cell::{Analyser, CellModel, Fidelity, HandTables, Handedness, Polarisation, PolarisedLight};
-use metalith_core::{Rectangles, Result, Silent};
+use metalith_cell::{
+    Analyser, CellModel, Fidelity, HandTables, Handedness, Polarisation, PolarisedLight, PolarisedTables,
+};
+use metalith_core::{Result, RotatedRectangles, Silent};
 use metalith_design::{Design, Hierarchy, PillarArray, cell_models};
 use metalith_layout::{read_pillars, write_pillars};
 use metalith_testing::design;
@@ -35,7 +37,7 @@ fn lens() -> (Design, PillarArray, tempfile::TempDir) {
 }
 
 /// Half-wave plates that nothing but their rotation tells apart.
-struct IdealPlates(Rectangles);
+struct IdealPlates(RotatedRectangles);
 
 impl IdealPlates {
     fn table(&self, of: impl Fn(f64) -> Complex64) -> Vec<Complex64> {
@@ -55,13 +57,13 @@ impl CellModel for IdealPlates {
         Ok(self.table(|rotation| Complex64::cis(2.0 * rotation)))
     }
 
-    fn hands(&self, _wavelength_um: f64, _max_width_nm: u16) -> Result<Option<HandTables>> {
+    fn polarised(&self, _wavelength_um: f64, _max_width_nm: u16) -> Result<Option<PolarisedTables>> {
         let none = || self.table(|_| Complex64::ZERO);
-        Ok(Some(HandTables {
+        Ok(Some(PolarisedTables::Hands(HandTables {
             focused: Handedness::Left,
             converted: [2.0, -2.0].map(|k| self.table(|rotation| Complex64::cis(k * rotation))),
             unconverted: [none(), none()],
-        }))
+        })))
     }
 
     fn full_transmission(&self, _wavelength_um: f64) -> Result<f64> {
@@ -72,7 +74,7 @@ impl CellModel for IdealPlates {
 fn of_ideal_plates(arriving: Polarisation, analyser: Option<Analyser>) -> SinglePsf {
     let (design, _, folder) = lens();
     let found = read_pillars(&design, &folder.path().join("lens.gds"), &Silent).unwrap();
-    let plates = IdealPlates(design.cell.shape.rectangles().unwrap());
+    let plates = IdealPlates(design.cell.shape.rotated().unwrap());
     let light = Lighting {
         wavelengths_um: vec![0.532],
         incidence_sin: [0.0; 2],

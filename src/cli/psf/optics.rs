@@ -3,14 +3,14 @@
 use std::path::Path;
 
 use metalith::cell::{
-    CellStack, FittedCell, Handedness, PointwiseCell, Polarisation, PolarisedLight, PublishedCell, RotatedCell,
-    UniformLayer, cache_folder,
+    CellStack, FittedCell, FocusedLight, Handedness, PointwiseCell, Polarisation, PolarisationAxis, PolarisedLight,
+    PublishedCell, RotatedCell, UniformLayer, UprightCell, cache_folder,
 };
 use metalith::grating::{Mapping, NeighbourCell};
 use metalith::rcwa::{CellLattice, Material};
 use metalith::report::{exact, sig};
 use metalith::verify::Lighting;
-use metalith::{Accuracy, CellModel, Error, Extraction, LatticeKind, Result, Wedge};
+use metalith::{Accuracy, CellModel, Error, Extraction, LatticeKind, PillarShape, Rectangles, Result, Wedge};
 
 use super::{FidelityArg, PsfArgs, PsfLight};
 
@@ -138,58 +138,87 @@ impl PsfArgs {
             (None, FidelityArg::Rigorous) => "rigorous coupled-wave analysis of a lattice of equal pillars".into(),
         };
         all.push(("cell", cell));
-        if let Some(pillars) = found.shape.rectangles() {
-            let (size, step_deg) = ([pillars.width_nm, pillars.length_nm], pillars.step_deg());
-            let rotations = format!("{} x {} nm, read to {step_deg} degrees", size[0], size[1]);
-            all.push(("rotated rectangles", rotations));
-            all.push(("polarisation", self.polarised()));
+        match found.shape.rectangles() {
+            Some(Rectangles::Rotated(pillars)) => {
+                let (size, step_deg) = ([pillars.width_nm, pillars.length_nm], pillars.step_deg());
+                let rotations = format!("{} x {} nm, read to {step_deg} degrees", size[0], size[1]);
+                all.push(("rotated rectangles", rotations));
+            }
+            Some(Rectangles::Upright(pillars)) => {
+                let (shortest, longest) = (pillars.shortest_nm, pillars.longest_nm());
+                let sizes = format!("edges of {shortest} to {longest} nm in steps of {} nm", pillars.step_nm);
+                all.push(("upright rectangles", sizes));
+            }
+            None => {}
         }
+        all.extend(
+            found
+                .shape
+                .rectangles()
+                .map(|_| ("polarisation", self.polarised(found.shape))),
+        );
         if !published {
             all.push(("pillars", self.pillars()));
         }
         all
     }
 
-    /// Polarisation of the light that arrives.
-    pub(super) fn arriving(&self) -> Polarisation {
-        self.arriving.unwrap_or(Polarisation::Circular(Handedness::default()))
+    /// Polarisation of the light that arrives at pillars of a shape.
+    pub(super) fn arriving(&self, shape: PillarShape) -> Polarisation {
+        let usual = match shape.upright() {
+            Some(_) => PolarisationAxis::X.polarisation(),
+            None => Polarisation::Circular(Handedness::default()),
+        };
+        self.arriving.unwrap_or(usual)
+    }
+
+    /// The light that they are taken to focus.
+    fn focused(&self, shape: PillarShape) -> FocusedLight {
+        match shape.upright() {
+            Some(_) => FocusedLight::Linear(PolarisationAxis::nearest(self.arriving(shape))),
+            None => FocusedLight::Circular(self.hand().unwrap_or_default()),
+        }
     }
 
     /// The circular polarisation that the layout focuses, if options say.
     pub(super) fn hand(&self) -> Option<Handedness> {
-        match (self.focused, self.arriving()) {
+        match (self.focused, self.arriving) {
             (Some(focused), _) => Some(focused.into()),
-            (None, Polarisation::Circular(hand)) => Some(hand),
-            (None, _) => None,
+            (None, Some(Polarisation::Circular(hand))) => Some(hand),
+            (None, None) => Some(Handedness::default()),
+            (None, Some(_)) => None,
         }
     }
 
-    fn polarised_light(&self) -> PolarisedLight {
+    fn polarised_light(&self, shape: PillarShape) -> PolarisedLight {
         PolarisedLight {
-            arriving: Some(self.arriving()),
+            arriving: Some(self.arriving(shape)),
             analyser: self.analyser,
         }
     }
 
-    /// Source and detector, in words.
-    fn polarised(&self) -> String {
-        let (arriving, light) = (self.arriving(), self.polarised_light());
-        let focused = self
-            .hand()
-            .map_or_else(String::new, |hand| format!(", {hand} is focused"));
-        let detector = light.detector(self.hand().unwrap_or_default());
+    /// Source and detector at pillars of a shape, in words.
+    fn polarised(&self, shape: PillarShape) -> String {
+        let (arriving, light) = (self.arriving(shape), self.polarised_light(shape));
+        let focused = match (shape.rotated(), self.hand()) {
+            (Some(_), Some(hand)) => format!(", {hand} is focused"),
+            _ => String::new(),
+        };
+        let detector = light.detector(self.focused(shape));
         format!("light arrives {arriving}{focused}; {detector}; figures are of all that arrives")
     }
 
     /// What solves it for the pillars as drawn.
     pub(super) fn cell(&self, found: &Extraction, light: &PsfLight) -> Result<Box<dyn CellModel>> {
         let stack = self.stack(found)?;
-        if let Some(pillars) = found.shape.rectangles() {
-            return Ok(Box::new(RotatedCell::new(
-                stack,
-                pillars,
-                self.hand().unwrap_or_default(),
-            )));
+        match (found.shape.rectangles(), self.focused(found.shape)) {
+            (Some(Rectangles::Rotated(pillars)), FocusedLight::Circular(hand)) => {
+                return Ok(Box::new(RotatedCell::new(stack, pillars, hand)));
+            }
+            (Some(Rectangles::Upright(pillars)), FocusedLight::Linear(axis)) => {
+                return Ok(Box::new(UprightCell::new(stack, pillars, axis)));
+            }
+            _ => {}
         }
         if matches!(self.fidelity, FidelityArg::Published) {
             return Ok(Box::new(PublishedCell::new(stack.pitch_nm as u32)));
@@ -233,7 +262,7 @@ impl PsfArgs {
         })
     }
 
-    pub(super) fn lighting(&self, light: &PsfLight) -> Lighting {
+    pub(super) fn lighting(&self, light: &PsfLight, shape: PillarShape) -> Lighting {
         Lighting {
             wavelengths_um: light.wavelengths_um.clone(),
             incidence_sin: [self.angle_x_deg, self.angle_y_deg].map(|deg| deg.to_radians().sin()),
@@ -242,7 +271,7 @@ impl PsfArgs {
             at_um: [self.at_x_um, self.at_y_um],
             samples: self.samples,
             pixel_um: self.pixel_um(light),
-            polarised: self.polarised_light(),
+            polarised: self.polarised_light(shape),
             aperture_radius_um: self.aperture_um.map(|d| 0.5 * d),
             accuracy: if self.fast { Accuracy::Fast } else { Accuracy::Accurate },
         }

@@ -83,6 +83,7 @@ mod tests {
         for (name, parts) in [
             ("lens_10mm", ["10000 um", "5 to 2000"]),
             ("geometric_phase_532", ["rectangles", "squares or circles"]),
+            ("birefringent_532", ["rectangles", "squares or circles"]),
         ] {
             let error = checked(name).unwrap_err().to_string();
             for part in parts {

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::MappingError;
 use crate::{Handedness, RotatedCell, RotationMapping};
-use metalith_core::{Rectangles, Result};
+use metalith_core::{Result, RotatedRectangles};
 
 /// Phases over half a turn, after which what a lattice adds repeats, that a series is fitted to: four times as many as the
 /// fastest term of [`RotatedCell`] has.
@@ -113,7 +113,7 @@ impl<'a> RotationCurve<'a> {
     ///
     /// # Errors
     /// As [`RotatedCell::response`].
-    pub fn error(&self, mapping: &RotationMapping, pillars: Rectangles) -> Result<MappingError> {
+    pub fn error(&self, mapping: &RotationMapping, pillars: RotatedRectangles) -> Result<MappingError> {
         let turns = (1..=pillars.steps).map(|number| {
             let rotation = match self.cell.arriving() {
                 Handedness::Left => pillars.drawn_rotation(number),

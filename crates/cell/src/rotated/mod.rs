@@ -9,11 +9,11 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use metalith_core::{Error, Rectangles, Result};
+use metalith_core::{Result, RotatedRectangles};
 use metalith_rcwa::{Orders, circular};
 
 use self::series::{Channels, Series, every, samples, solved_rotations};
-use super::{CellModel, CellStack, Fidelity, HandTables, Handedness, ObliqueTables, RotatedRectangle};
+use super::{CellModel, CellStack, Fidelity, HandTables, Handedness, ObliqueTables, PolarisedTables, RotatedRectangle};
 
 /// Intervals of an eighth of a turn whose ends are solved.
 const INTERVALS: usize = 6;
@@ -77,7 +77,7 @@ struct Solved {
 #[derive(Debug)]
 pub struct RotatedCell {
     stack: CellStack,
-    pillars: Rectangles,
+    pillars: RotatedRectangles,
     arriving: Handedness,
     /// By wavelength, and whether it is one of a band.
     solved: Mutex<HashMap<(u64, bool), Arc<Solved>>>,
@@ -85,7 +85,7 @@ pub struct RotatedCell {
 
 impl RotatedCell {
     /// The cell of these pillars in light of this handedness.
-    pub fn new(stack: CellStack, pillars: Rectangles, arriving: Handedness) -> Self {
+    pub fn new(stack: CellStack, pillars: RotatedRectangles, arriving: Handedness) -> Self {
         Self {
             stack,
             pillars,
@@ -95,7 +95,7 @@ impl RotatedCell {
     }
 
     /// The pillars.
-    pub fn pillars(&self) -> Rectangles {
+    pub fn pillars(&self) -> RotatedRectangles {
         self.pillars
     }
 
@@ -206,14 +206,14 @@ impl RotatedCell {
         std::iter::once(Complex64::ZERO).chain((1..=most).map(of)).collect()
     }
 
-    fn both_hands(&self, wavelength_um: f64, of_band: bool, most: u16) -> Result<HandTables> {
+    fn both_hands(&self, wavelength_um: f64, of_band: bool, most: u16) -> Result<PolarisedTables> {
         let solved = self.solved(wavelength_um, of_band)?;
         let of = |channel: usize| [Hand::Focused, Hand::Other].map(|hand| self.table(&solved, most, hand, channel));
-        Ok(HandTables {
+        Ok(PolarisedTables::Hands(HandTables {
             focused: self.arriving,
             converted: of(0),
             unconverted: of(1),
-        })
+        }))
     }
 }
 
@@ -253,19 +253,16 @@ impl CellModel for RotatedCell {
         Ok(self.table(&solved, max_width_nm, Hand::Focused, 0))
     }
 
-    fn hands(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Option<HandTables>> {
+    fn polarised(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Option<PolarisedTables>> {
         self.both_hands(wavelength_um, false, max_width_nm).map(Some)
     }
 
-    fn hands_in_band(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Option<HandTables>> {
+    fn polarised_in_band(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Option<PolarisedTables>> {
         self.both_hands(wavelength_um, true, max_width_nm).map(Some)
     }
 
     fn oblique(&self, _wavelength_um: f64, _sines: [f64; 2], _max_width_nm: u16) -> Result<Option<ObliqueTables>> {
-        Err(Error::invalid(
-            "rectangular pillars in light that arrives at an angle",
-            "leave out --as-lit, or set `incidence = \"normal\"` in [verify]: their cells are solved along the normal",
-        ))
+        Err(super::rectangle::oblique_refused())
     }
 
     fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {
@@ -316,6 +313,13 @@ mod tests {
         each.into_iter().fold(0.0, f64::max)
     }
 
+    fn in_band(cell: &RotatedCell, most: u16) -> HandTables {
+        match cell.polarised_in_band(0.532, most).unwrap() {
+            Some(PolarisedTables::Hands(hands)) => hands,
+            other => panic!("{other:?}"),
+        }
+    }
+
     #[test]
     fn the_series_meets_the_solver_between_its_samples() {
         for arriving in [Handedness::Left, Handedness::Right] {
@@ -330,7 +334,7 @@ mod tests {
         let cell = RotatedCell::new(titania(), PILLARS, Handedness::Left);
         let solved = cell.solved(0.532, true).unwrap();
         let converted = cell.transmissions_in_band(0.532, 180).unwrap();
-        let hands = cell.hands_in_band(0.532, 180).unwrap().unwrap();
+        let hands = in_band(&cell, 180);
         for number in [1, 37, 180] {
             let at = solved.at(PILLARS.drawn_rotation(number), Handedness::Left);
             let k = usize::from(number);
@@ -347,7 +351,7 @@ mod tests {
         let right = [Complex64::ONE, Complex64::new(0.0, -1.0)].map(|c| c * FRAC_1_SQRT_2);
         for focused in [Handedness::Left, Handedness::Right] {
             let cell = RotatedCell::new(titania(), PILLARS, focused);
-            let hands = cell.hands_in_band(0.532, PILLARS.steps).unwrap().unwrap();
+            let hands = in_band(&cell, PILLARS.steps);
             for (number, deg) in [(8, 0.0_f64), (31, 90.0), (70, 20.0), (124, -55.0)] {
                 let pillar = RotatedRectangle {
                     width_nm: 100.0,
@@ -367,7 +371,7 @@ mod tests {
                     arriving: Some(Polarisation::Linear(deg)),
                     analyser: None,
                 };
-                let passed = hands.passed(light);
+                let passed = PolarisedTables::Hands(hands.clone()).passed(light);
                 assert_eq!(passed.len(), 2);
                 for (found, wanted) in passed.iter().zip(wanted) {
                     let off = (found.table[usize::from(number)] - wanted).norm();

@@ -15,13 +15,25 @@ use crate::phase::{ElementPhase, LensPhase};
 #[derive(Clone, Debug)]
 pub struct ComputedWidths {
     lens: Arc<LensPhase>,
+    /// That of light polarised along y, if it is another.
+    along_y: Option<Arc<LensPhase>>,
     rule: Arc<WidthRule>,
     element: Element,
 }
 
 impl ComputedWidths {
-    pub(super) fn new(lens: Arc<LensPhase>, rule: Arc<WidthRule>, element: Element) -> Self {
-        Self { lens, rule, element }
+    pub(super) fn new(
+        lens: Arc<LensPhase>,
+        along_y: Option<Arc<LensPhase>>,
+        rule: Arc<WidthRule>,
+        element: Element,
+    ) -> Self {
+        Self {
+            lens,
+            along_y,
+            rule,
+            element,
+        }
     }
 
     /// Another element of the same lens and mapping.
@@ -36,6 +48,10 @@ impl ComputedWidths {
         ElementPhase::of(&self.lens, &self.element)
     }
 
+    fn phase_along_y(&self) -> Option<ElementPhase<'_>> {
+        self.along_y.as_ref().map(|lens| ElementPhase::of(lens, &self.element))
+    }
+
     fn directions(&self) -> [f64; 2] {
         [self.element.wedge.sin_x, self.element.wedge.sin_y]
     }
@@ -46,7 +62,7 @@ impl ComputedWidths {
     /// alone.
     pub fn maps(&self, symmetry: Symmetry, to: &Self) -> bool {
         let (own, other) = (self.phase(), to.phase());
-        if !own.is_steered_alone() || !other.is_steered_alone() {
+        if !own.is_steered_alone() || !other.is_steered_alone() || self.along_y.is_some() {
             return symmetry == Symmetry::IDENTITY && self.element == to.element;
         }
         symmetry.keeps_lattice(self.lens.lattice())
@@ -82,12 +98,13 @@ impl WidthRows for ComputedWidths {
     }
 
     fn width(&self, ix: usize, iy: usize) -> u16 {
-        self.phase().wrapped(ix, iy).map_or(0, |u| self.rule.width_nm(u))
+        let along_y = self.phase_along_y();
+        self.rule.pillar(&self.phase(), along_y.as_ref(), ix, iy)
     }
 
     fn row<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16] {
-        let phase = self.phase();
-        let width = |ix, iy| phase.wrapped(ix, iy).map_or(0, |u| self.rule.width_nm(u));
+        let (phase, along_y) = (self.phase(), self.phase_along_y());
+        let width = |ix, iy| self.rule.pillar(&phase, along_y.as_ref(), ix, iy);
         self.fill(iy, columns, room, width)
     }
 

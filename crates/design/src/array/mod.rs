@@ -134,6 +134,7 @@ impl PillarArray {
     pub fn build_within(design: &Design, most_held: u64, progress: &dyn Progress) -> Result<Self> {
         let lattice = design.lattice();
         let lens = Arc::new(LensPhase::of(design));
+        let along_y = design.along_y().map(|y| Arc::new(LensPhase::of(&y)));
         let held = (lattice.sites() as u64).pow(2) <= most_held;
         let elements = design.elements();
         progress.begin("widths of the elements", elements.len() as u64);
@@ -152,9 +153,10 @@ impl PillarArray {
             array.place(
                 element,
                 if held {
-                    ClassWidths::Held(rule.widths(&ElementPhase::of(&lens, &element)))
+                    let along_y = along_y.as_ref().map(|y| ElementPhase::of(y, &element));
+                    ClassWidths::Held(rule.widths(&ElementPhase::of(&lens, &element), along_y.as_ref()))
                 } else {
-                    ClassWidths::Computed(ComputedWidths::new(lens.clone(), rule, element))
+                    ClassWidths::Computed(ComputedWidths::new(lens.clone(), along_y.clone(), rule, element))
                 },
             );
             progress.advance(1);

@@ -1,13 +1,16 @@
 //! Phase to width, site by site.
 
 use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use crate::phase::ElementPhase;
 use crate::{CellSpec, Design, MappingSpec, SteeredMapping, SteeringSteps};
-use metalith_cell::{ForwardPolynomial, Handedness, InversePolynomial, MappingTable, RotationMapping};
-use metalith_core::{PillarShape, Rectangles, WidthMap};
+use metalith_cell::{
+    ForwardPolynomial, Handedness, InversePolynomial, MappingTable, PillarLibrary, PolarisationAxis, RotationMapping,
+};
+use metalith_core::{PillarShape, RotatedRectangles, UprightRectangles, WidthMap};
 
 /// Rounds the duty cycle that a mapping asks for to a width that may be written.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,14 +22,28 @@ pub struct WidthRule {
     range_nm: (f64, f64),
     /// Published phase over width of the paper's cell, and the wavelength of the mapping (um).
     forward: Option<(ForwardPolynomial, f64)>,
-    /// Of rectangles: everything else does not count.
+    /// Of rotated rectangles: everything else does not count.
     rotation: Option<RotationRule>,
+    /// Of upright rectangles: everything else does not count.
+    pair: Option<PairRule>,
 }
+
+/// Two phases to the number of an upright rectangle.
+#[derive(Clone, Debug, PartialEq)]
+struct PairRule {
+    pillars: UprightRectangles,
+    library: Arc<PillarLibrary>,
+    /// The light whose phase is asked about where one is asked about.
+    axis: PolarisationAxis,
+}
+
+/// Turns of the other phase from one sample of a mapping to the next: the golden section, by which samples fill a turn evenly.
+const OTHER_PHASE: f64 = 0.618_033_988_749_894_9;
 
 /// Phase to the number of a rotation.
 #[derive(Clone, Debug, PartialEq)]
 struct RotationRule {
-    pillars: Rectangles,
+    pillars: RotatedRectangles,
     /// Of the light that arrives.
     arriving: Handedness,
     mapping: RotationMapping,
@@ -41,7 +58,7 @@ struct RotationRule {
 const PARTS: u16 = 1 << 14;
 
 impl RotationRule {
-    fn new(pillars: Rectangles, arriving: Handedness, mapping: RotationMapping) -> Self {
+    fn new(pillars: RotatedRectangles, arriving: Handedness, mapping: RotationMapping) -> Self {
         let in_steps = |number: u16| pillars.turned_by_grid(number) / PI * f64::from(pillars.steps);
         let mut rule = Self {
             pillars,
@@ -127,9 +144,9 @@ impl RotationRule {
 const LAST_TURN: f64 = 0.9999;
 
 impl WidthRule {
-    /// The rule of the element of a design with this index.
+    /// The rule of the element of a design with this index, asked about the light that the design is verified in.
     pub fn of_element(design: &Design, index: (i32, i32)) -> Self {
-        let common = Self::new(&design.cell, &design.mapping);
+        let common = Self::new(&design.cell, &design.mapping).along(design.axis());
         let own = SteeringSteps::of(&design.array, index).and_then(|steps| design.mapping.steered(steps));
         own.map_or_else(|| common.clone(), |own| common.steered(own))
     }
@@ -163,20 +180,44 @@ impl WidthRule {
                 .then(|| (ForwardPolynomial::published(), mapping.wavelength_um)),
             rotation: cell
                 .shape
-                .rectangles()
+                .rotated()
                 .map(|pillars| RotationRule::new(pillars, cell.arriving.unwrap_or_default(), mapping.rotation.clone())),
+            pair: cell
+                .shape
+                .upright()
+                .zip(mapping.library.as_ref())
+                .map(|(pillars, library)| PairRule {
+                    pillars,
+                    library: Arc::new(library.clone()),
+                    axis: PolarisationAxis::X,
+                }),
         }
+    }
+
+    /// The same rule, asked about the phase of light along an axis; of upright rectangles alone there is a difference.
+    #[must_use]
+    pub fn along(mut self, axis: PolarisationAxis) -> Self {
+        if let Some(pair) = &mut self.pair {
+            pair.axis = axis;
+        }
+        self
     }
 
     /// What the pillars are, as far as symmetry is asked: rectangles, or what a mirror leaves as it is.
     pub(super) fn shape(&self) -> PillarShape {
-        let rotation = self.rotation.as_ref();
-        rotation.map_or(PillarShape::Square, |rule| PillarShape::Rectangle(rule.pillars))
+        match (&self.rotation, &self.pair) {
+            (Some(rule), _) => PillarShape::Rectangle(rule.pillars.into()),
+            (None, Some(rule)) => PillarShape::Rectangle(rule.pillars.into()),
+            (None, None) => PillarShape::Square,
+        }
     }
 
-    /// Width before rounding (nm) for a phase of `u` turns, `0 <= u < 1`; of rectangles the number of the rotation, from half to
-    /// half beyond the last.
+    /// Width before rounding (nm) for a phase of `u` turns, `0 <= u < 1`; of rotated rectangles the number of the rotation, from
+    /// half to half beyond the last; of upright ones, which no width stands for, the phase itself.
     pub fn unrounded_nm(&self, u: f64) -> f64 {
+        if self.pair.is_some() {
+            return u;
+        }
         if let Some(rule) = &self.rotation {
             return rule.unrounded(u);
         }
@@ -189,6 +230,9 @@ impl WidthRule {
     /// Phase (turns) that stands for a width (nm) where what counts is the difference of two: by the published polynomial for
     /// the cell of the paper, else by the mean slope of the mapping.
     pub fn turns_of_width(&self, nm: f64) -> f64 {
+        if self.pair.is_some() {
+            return nm;
+        }
         if let Some(rule) = &self.rotation {
             return rule.turns(nm);
         }
@@ -199,8 +243,11 @@ impl WidthRule {
         nm / span_nm.abs().max(self.step_nm)
     }
 
-    /// The same of a width that is written, or of the number of a rotation as it is drawn.
+    /// The same of a width that is written, or of the number of a rectangle as it is drawn; one that is not in the library has none.
     pub fn turns_of_written(&self, width_nm: u16) -> f64 {
+        if let Some(pair) = &self.pair {
+            return pair.library.turns(width_nm, pair.axis).unwrap_or(0.0);
+        }
         match &self.rotation {
             Some(rule) => {
                 let turned = rule.turned.get(usize::from(width_nm)).copied().unwrap_or(0.0);
@@ -210,8 +257,12 @@ impl WidthRule {
         }
     }
 
-    /// Width to write (nm) for a phase of `u` turns, `0 <= u < 1`; of rectangles the number of the rotation.
+    /// Width to write (nm) for a phase of `u` turns, `0 <= u < 1`; of rectangles the number. Light along both axes has the same
+    /// phase.
     pub fn width_nm(&self, u: f64) -> u16 {
+        if let Some(pair) = &self.pair {
+            return pair.library.number([u; 2]);
+        }
         if let Some(rule) = &self.rotation {
             return rule.number(u);
         }
@@ -219,16 +270,47 @@ impl WidthRule {
         width.clamp(self.range_nm.0, self.range_nm.1) as u16
     }
 
-    /// The pillars of an element.
-    pub fn widths(&self, phase: &ElementPhase<'_>) -> WidthMap {
+    /// Width or number of a sample of the mapping, of so many whose phases are evenly spaced over a turn: see
+    /// [`WidthRule::phase_of_sample`]. Where light along the other axis has a phase of its own, it is any.
+    pub fn sample(&self, k: usize, samples: usize) -> u16 {
+        let own = Self::phase_of_sample(k, samples);
+        let Some(pair) = &self.pair else {
+            return self.width_nm(own);
+        };
+        let mut turns = [(OTHER_PHASE * (k as f64 + 0.5)).fract(); 2];
+        turns[pair.axis.index()] = own;
+        pair.library.number(turns)
+    }
+
+    /// Phase of a sample of a mapping (turns).
+    pub fn phase_of_sample(k: usize, samples: usize) -> f64 {
+        (k as f64 + 0.5) / samples as f64
+    }
+
+    /// Width or number at a site, of an element with this phase, and with this one of light along y if it is another; 0 outside of
+    /// the lens.
+    pub(super) fn pillar(
+        &self,
+        phase: &ElementPhase<'_>,
+        along_y: Option<&ElementPhase<'_>>,
+        ix: usize,
+        iy: usize,
+    ) -> u16 {
+        let Some(u) = phase.wrapped(ix, iy) else { return 0 };
+        match (&self.pair, along_y) {
+            (Some(pair), Some(y)) => y.wrapped(ix, iy).map_or(0, |v| pair.library.number([u, v])),
+            _ => self.width_nm(u),
+        }
+    }
+
+    /// The pillars of an element with this phase, and with this one of light along y if it is another.
+    pub fn widths(&self, phase: &ElementPhase<'_>, along_y: Option<&ElementPhase<'_>>) -> WidthMap {
         let mut map = WidthMap::empty(phase.lattice());
         let n = map.lattice.sites();
         let rows = map.width_nm.as_slice_mut().expect("a new array is contiguous");
         rows.par_chunks_mut(n).enumerate().for_each(|(iy, row)| {
             for (ix, width) in row.iter_mut().enumerate() {
-                if let Some(u) = phase.wrapped(ix, iy) {
-                    *width = self.width_nm(u);
-                }
+                *width = self.pillar(phase, along_y, ix, iy);
             }
         });
         map
@@ -257,7 +339,7 @@ mod tests {
             (Handedness::Right, 180),
             (Handedness::Right, 1800),
         ] {
-            let pillars = Rectangles {
+            let pillars = RotatedRectangles {
                 width_nm: 100,
                 length_nm: 250,
                 steps,
@@ -310,7 +392,7 @@ mod tests {
     /// Each phase gets the pillar whose rotation as drawn is nearest to what the mapping asks for, for both hands.
     #[test]
     fn rotations_are_those_drawn_nearest() {
-        let pillars = Rectangles {
+        let pillars = RotatedRectangles {
             width_nm: 100,
             length_nm: 250,
             steps: 180,

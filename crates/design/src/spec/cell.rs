@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use super::lens::WAVELENGTH;
-use metalith_cell::{Handedness, InversePolynomial};
+use metalith_cell::{FocusedLight, Handedness, InversePolynomial, Polarisation, PolarisationAxis};
 use metalith_core::document::{Limits, Section};
-use metalith_core::{LatticeKind, PillarShape, Rectangles};
+use metalith_core::{LatticeKind, PillarShape, RotatedRectangles, UprightRectangles};
 
 /// The unit cell: a pillar on a lattice.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -18,13 +18,14 @@ pub struct CellSpec {
     /// Cross-section of the pillars.
     #[serde(skip_serializing_if = "PillarShape::is_square")]
     pub shape: PillarShape,
-    /// Circular polarisation of the light that is focused, where the pillars are rectangles: its phase is twice their rotation.
+    /// Circular polarisation of the light that is focused, where the pillars are rotated rectangles: its phase is twice their
+    /// rotation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub arriving: Option<Handedness>,
     /// Height of the pillars (nm).
     pub pillar_height_nm: f64,
     /// Narrowest and widest pillar that may be written (nm), both multiples of the step; of rectangles the first and the last
-    /// number of a rotation.
+    /// number.
     pub width_range_nm: (u16, u16),
     /// Widths are multiples of this (nm), even, so that edges of centred squares are whole nanometres; 1 of rectangles.
     pub width_step_nm: u16,
@@ -81,17 +82,22 @@ impl CellSpec {
         } else {
             WIDEST_PITCH_NM
         };
-        let kinds = [Kind::Square, Kind::Circle, Kind::Rectangle];
-        let kinds = ["square", "circle", "rectangle"]
-            .into_iter()
-            .zip(kinds)
-            .collect::<Vec<_>>();
+        let kinds = [
+            ("square", Kind::Square),
+            ("circle", Kind::Circle),
+            ("rectangle", Kind::Rectangle),
+            ("upright_rectangle", Kind::Upright),
+        ];
         let (shape, width_range_nm, width_step_nm) = match s.choice("shape", &kinds, Some(Kind::Square)) {
             Kind::Square => with_widths(s, PillarShape::Square, widest),
             Kind::Circle => with_widths(s, PillarShape::Circle, widest),
             Kind::Rectangle => {
                 let pillars = read_rectangles(s, widest);
-                (PillarShape::Rectangle(pillars), (1, pillars.steps), 1)
+                (PillarShape::Rectangle(pillars.into()), (1, pillars.steps), 1)
+            }
+            Kind::Upright => {
+                let pillars = read_upright(s, widest);
+                (PillarShape::Rectangle(pillars.into()), (1, pillars.count()), 1)
             }
         };
         if let Some(what) = lattice.refusal(shape) {
@@ -103,7 +109,7 @@ impl CellSpec {
             );
         }
         let arriving = shape
-            .rectangles()
+            .rotated()
             .map(|_| s.choice("arriving", &Handedness::CHOICES, Some(Handedness::default())));
         // Widths and places are whole nanometres; the key is there so that a design says so.
         s.optional_integer("database_unit_nm", 1..=1, "nm, the only unit that is written");
@@ -180,7 +186,17 @@ impl CellSpec {
     pub fn most(&self) -> u16 {
         match self.shape {
             PillarShape::Square | PillarShape::Circle => self.lattice.widest_nm(self.pitch_nm) as u16,
-            PillarShape::Rectangle(pillars) => pillars.steps,
+            PillarShape::Rectangle(pillars) => pillars.last(),
+        }
+    }
+
+    /// The light that pillars give the phase of the design where they tell polarisations apart, in the light that it is verified in:
+    /// of upright rectangles that along the nearer axis.
+    pub fn focused(&self, verified: Option<Polarisation>) -> Option<FocusedLight> {
+        let axis = || verified.map_or(PolarisationAxis::X, PolarisationAxis::nearest);
+        match self.arriving {
+            Some(hand) => Some(FocusedLight::Circular(hand)),
+            None => self.shape.upright().map(|_| FocusedLight::Linear(axis())),
         }
     }
 
@@ -196,6 +212,7 @@ enum Kind {
     Square,
     Circle,
     Rectangle,
+    Upright,
 }
 
 /// A shape with its narrowest and widest pillar and the step between widths (nm).
@@ -237,8 +254,29 @@ const MOST_STEPS: f64 = 1800.0;
 /// Rounding of half a turn over a step.
 const WHOLE: f64 = 1e-6;
 
+/// Upright rectangles: the lengths that both edges may have.
+fn read_upright(s: &Section<'_, '_>, widest: u32) -> UprightRectangles {
+    let (_, (shortest_nm, longest_nm), step_nm) = with_widths(s, PillarShape::Square, widest);
+    let step_nm = step_nm.max(2);
+    let lengths = longest_nm.saturating_sub(shortest_nm) / step_nm + 1;
+    let most = UprightRectangles::MOST_LENGTHS;
+    if lengths > most {
+        s.fault_given(
+            &["cell.width_min_nm", "cell.width_max_nm"],
+            "width_step_nm",
+            format!("edges of {lengths} lengths, at most {most}"),
+            "use larger steps: pillars are chosen by both edges, of which there are as many pairs as the square of the lengths",
+        );
+    }
+    UprightRectangles {
+        shortest_nm,
+        step_nm,
+        lengths: lengths.min(most),
+    }
+}
+
 /// Rectangles: one size, and the step of their rotation.
-fn read_rectangles(s: &Section<'_, '_>, widest: u32) -> Rectangles {
+fn read_rectangles(s: &Section<'_, '_>, widest: u32) -> RotatedRectangles {
     let width_nm = s.integer("pillar_width_nm", 10..=i64::from(widest), "nm") as u16;
     let length_nm = s.integer("pillar_length_nm", 10..=i64::from(widest), "nm") as u16;
     for (key, edge) in [("pillar_width_nm", width_nm), ("pillar_length_nm", length_nm)] {
@@ -289,7 +327,7 @@ fn read_rectangles(s: &Section<'_, '_>, widest: u32) -> Rectangles {
             format!("use a step of {:.1} degrees or more that divides 90", (finest_deg * 10.0).ceil() / 10.0),
         );
     }
-    Rectangles {
+    RotatedRectangles {
         width_nm: width_nm & !1,
         length_nm: length_nm & !1,
         steps: steps as u16,

@@ -1,5 +1,7 @@
 //! `[lens]` and `[phase]`: the lens that all elements share, or that one of them has in its place.
 
+use std::path::Path;
+
 use serde::Serialize;
 
 use super::array::whole_nm;
@@ -24,6 +26,19 @@ pub struct LensSpec {
     /// Phases over the plane that are added to it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub terms: Vec<PhaseTerm>,
+    /// Of upright rectangles, the phase of light polarised along y, if it is another than that of light along x.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub along_y: Option<PhaseAlongY>,
+}
+
+/// The phase of light polarised along y, before wedge and modulo.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PhaseAlongY {
+    /// Phase over the radius.
+    pub phase: RadialPhase,
+    /// Phases over the plane that are added to it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub terms: Vec<PhaseTerm>,
 }
 
 impl LensSpec {
@@ -37,8 +52,9 @@ impl LensSpec {
             focal_length_um,
             phase: RadialPhase::Flat,
             terms: Vec::new(),
+            along_y: None,
         };
-        it.read_phase(phase);
+        it.read_phase(phase, cell);
         it
     }
 
@@ -69,26 +85,62 @@ impl LensSpec {
             ..shared.clone()
         };
         if let Some(phase) = phase {
-            own.read_phase(&phase);
+            own.read_phase(&phase, cell);
         } else {
             // A hyperbola that names no focal length has that of the element; its radius of normalisation is no other.
-            own.phase = read_radial(shared_phase, own.focal_length_um, shared.radius_um());
-            for (term, said) in own.terms.iter_mut().zip(shared_phase.sections("term")) {
-                term::default_focal_length(term, &said, own.focal_length_um);
+            let focal_length_um = own.focal_length_um;
+            let renew = |phase: &mut RadialPhase, terms: &mut Vec<PhaseTerm>, said: &Section<'_, '_>| {
+                *phase = read_radial(said, focal_length_um, shared.radius_um());
+                for (term, said) in terms.iter_mut().zip(said.sections("term")) {
+                    term::default_focal_length(term, &said, focal_length_um);
+                }
+                terms.retain(|term| term.is_of(index));
+            };
+            renew(&mut own.phase, &mut own.terms, shared_phase);
+            if let (Some(y), Some(said)) = (&mut own.along_y, shared_phase.optional_section("y")) {
+                renew(&mut y.phase, &mut y.terms, &said);
             }
-            own.terms.retain(|term| term.is_of(index));
         }
         Some(own)
     }
 
     /// The phase that a section says, of a lens with this diameter and focal length.
-    fn read_phase(&mut self, s: &Section<'_, '_>) {
+    fn read_phase(&mut self, s: &Section<'_, '_>, cell: &CellSpec) {
         let (focal_length_um, radius_um) = (self.focal_length_um, self.radius_um());
-        let terms = s.sections("term");
-        let terms = terms.iter().map(|term| term::read(term, focal_length_um, radius_um));
-        self.terms = terms.collect();
-        self.phase = read_radial(s, focal_length_um, radius_um);
+        let read = |s: &Section<'_, '_>| {
+            let terms = s.sections("term");
+            let terms = terms.iter().map(|term| term::read(term, focal_length_um, radius_um));
+            let terms = terms.collect();
+            (read_radial(s, focal_length_um, radius_um), terms)
+        };
+        (self.phase, self.terms) = read(s);
+        self.along_y = s.optional_section("y").map(|y| {
+            let (phase, terms) = read(&y);
+            y.finish();
+            PhaseAlongY { phase, terms }
+        });
+        if self.along_y.is_some() && cell.shape.upright().is_none() {
+            s.fault_given(
+                &["cell.shape"],
+                "y",
+                format!(
+                    "a phase of light polarised along y, and {} give all light one",
+                    cell.shape.plural()
+                ),
+                "leave [phase.y] out, or use `shape = \"upright_rectangle\"`",
+            );
+        }
         s.finish();
+    }
+
+    /// The lens that light along y sees.
+    #[must_use]
+    pub fn seen_along_y(&self) -> Self {
+        let mut seen = self.clone();
+        if let Some(PhaseAlongY { phase, terms }) = seen.along_y.take() {
+            (seen.phase, seen.terms) = (phase, terms);
+        }
+        seen
     }
 
     /// Read the files that its phase names, of the phases over the plane those that elements of this lens have.
@@ -97,9 +149,33 @@ impl LensSpec {
     /// [`metalith_core::Error::Table`] for one that cannot be used.
     pub(crate) fn load(&mut self, is_had: impl Fn(&PhaseTerm) -> bool) -> Result<()> {
         let (radius_um, ends_um) = (self.radius_um(), self.ends_um());
-        self.phase.load(radius_um)?;
-        let mut had = self.terms.iter_mut().filter(|term| is_had(term));
-        had.try_for_each(|term| term.load(radius_um, ends_um))
+        let load = |phase: &mut RadialPhase, terms: &mut Vec<PhaseTerm>| {
+            phase.load(radius_um)?;
+            let mut had = terms.iter_mut().filter(|term| is_had(term));
+            had.try_for_each(|term| term.load(radius_um, ends_um))
+        };
+        load(&mut self.phase, &mut self.terms)?;
+        match &mut self.along_y {
+            Some(y) => load(&mut y.phase, &mut y.terms),
+            None => Ok(()),
+        }
+    }
+
+    /// The files that its phases name, each with what it holds.
+    pub fn phase_files(&self) -> impl Iterator<Item = (&Path, &'static str)> {
+        let along_y = self.along_y.iter().map(|y| (&y.phase, &y.terms));
+        std::iter::once((&self.phase, &self.terms))
+            .chain(along_y)
+            .flat_map(|(phase, terms)| {
+                let table = match phase {
+                    RadialPhase::Table { file, .. } => Some((file.as_path(), "phase of the lens over its radius")),
+                    _ => None,
+                };
+                let terms = terms.iter().filter_map(|term| term.file.as_deref());
+                table
+                    .into_iter()
+                    .chain(terms.map(|file| (file, "a phase over the plane of the lens")))
+            })
     }
 
     /// Least and greatest place of the aperture from the middle, along x and along y (um), as the phase has it: before the element

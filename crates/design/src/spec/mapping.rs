@@ -7,11 +7,19 @@ use serde::Serialize;
 use super::cell::read_band;
 use super::lens::WAVELENGTH;
 use super::{ArraySpec, CellSpec, SteeredMapping, SteeringSteps};
-use metalith_cell::{Basis, InversePolynomial, MappingTable, RotationMapping};
+use metalith_cell::{Basis, InversePolynomial, MappingTable, PillarLibrary, RotationMapping};
 use metalith_core::Result;
 use metalith_core::document::{Limits, Section};
 
 pub(super) const COEFFICIENT: Limits = Limits::new(-100.0..=100.0, "(duty cycle over turns)");
+
+/// Whether the library of upright rectangles must be there already.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LibraryFile {
+    Needed,
+    /// For who makes it; until then a design has no pillars.
+    ToBeMade,
+}
 
 /// How phase becomes width.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -26,7 +34,13 @@ pub struct MappingSpec {
     /// What that file holds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<MappingTable>,
-    /// Of rectangles: what their rotation has beside half of the phase.
+    /// Of upright rectangles: the file of their library, such as `metalith cells` writes.
+    #[serde(skip)]
+    pub library_file: Option<PathBuf>,
+    /// What that file holds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub library: Option<PillarLibrary>,
+    /// Of rotated rectangles: what their rotation has beside half of the phase.
     #[serde(skip_serializing_if = "RotationMapping::is_half")]
     pub rotation: RotationMapping,
     /// Mappings of steered elements, where they have their own.
@@ -61,10 +75,17 @@ impl MappingSpec {
     }
 
     /// The mapping, made for a wavelength (um).
-    pub(crate) fn read(s: &Section<'_, '_>, wavelength_um: f64, cell: &CellSpec, array: &ArraySpec) -> Self {
+    pub(crate) fn read(
+        s: &Section<'_, '_>,
+        wavelength_um: f64,
+        cell: &CellSpec,
+        array: &ArraySpec,
+        library: LibraryFile,
+    ) -> Self {
         let published = InversePolynomial::published();
-        let rotated = cell.shape.rectangles().is_some();
-        if !rotated && !s.has("table") && cell.is_known_to_be_another(s) {
+        let rotated = cell.shape.rotated().is_some();
+        let upright = cell.shape.upright().is_some();
+        if !rotated && !upright && !s.has("table") && cell.is_known_to_be_another(s) {
             let [least, greatest] = [cell.width_range_nm.0, cell.width_range_nm.1].map(f64::from);
             let pitch = f64::from(cell.pitch_nm);
             let expected = format!(
@@ -112,9 +133,38 @@ impl MappingSpec {
                 );
             }
         }
+        if upright {
+            for key in ["coefficients", "table", "basis", "steered"]
+                .into_iter()
+                .filter(|key| s.has(key))
+            {
+                s.fault(
+                    key,
+                    "upright rectangles have two widths, one for the phase of light along each axis",
+                    format!("leave `{key}` out: pillars are chosen from the `library`"),
+                );
+            }
+        } else if s.has("library") {
+            s.fault_given(
+                &["cell.shape"],
+                "library",
+                format!(
+                    "a library of upright rectangles, and the pillars are {}",
+                    cell.shape.plural()
+                ),
+                "leave `library` out, or use `shape = \"upright_rectangle\"`",
+            );
+        }
+        let library_file = upright.then(|| match library {
+            LibraryFile::Needed => s.file_else(
+                "library",
+                "make it: `metalith cells DESIGN` writes `library.csv` into its folder; copy that to this name",
+            ),
+            LibraryFile::ToBeMade => s.path("library"),
+        });
         let rotation = read_rotation(s, rotated);
         // A table is held to the widths of the cell when it is read.
-        if !s.has("table") && !rotated {
+        if !s.has("table") && !rotated && !upright {
             check_widths(s, cell, &polynomial);
         }
         let table_file = s.has("table").then(|| s.file("table"));
@@ -152,6 +202,8 @@ impl MappingSpec {
             polynomial,
             table_file,
             table: None,
+            library_file,
+            library: None,
             rotation,
             steered,
             comparison,
@@ -163,11 +215,18 @@ impl MappingSpec {
         self.steered.iter().find(|m| m.steps == steps)
     }
 
-    /// Read the table, if there is one.
-    pub(crate) fn load(&mut self, cell: &CellSpec) -> Result<()> {
+    /// Read the table or the library, if there is one. A library that is to be made may be of other sizes: it is left out.
+    pub(crate) fn load(&mut self, cell: &CellSpec, library: LibraryFile) -> Result<()> {
         if let Some(file) = &self.table_file {
             let allowed: Vec<u16> = cell.widths_nm().collect();
             self.table = Some(MappingTable::read_csv(file, &allowed)?);
+        }
+        if let (Some(file), Some(pillars)) = (&self.library_file, cell.shape.upright()) {
+            let read = PillarLibrary::read_csv(file, pillars);
+            self.library = match library {
+                LibraryFile::Needed => Some(read?),
+                LibraryFile::ToBeMade => read.ok(),
+            };
         }
         Ok(())
     }
@@ -187,7 +246,7 @@ fn read_rotation(s: &Section<'_, '_>, rotated: bool) -> RotationMapping {
         if !rotated {
             s.fault(
                 key,
-                "a correction of rotations, and the pillars are no rectangles",
+                "a correction of rotations, and the pillars are no rotated rectangles",
                 format!("leave `{key}` out, or use `shape = \"rectangle\"`"),
             );
         }

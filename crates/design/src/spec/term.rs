@@ -102,7 +102,14 @@ pub(super) fn default_focal_length(term: &mut PhaseTerm, s: &Section<'_, '_>, of
 /// that all elements share, `placed` those of elements that are placed one by one.
 pub(super) fn check_elements(array: &ArraySpec, lens: &LensSpec, phase: &Section<'_, '_>, placed: &[Section<'_, '_>]) {
     let check = |phase: &Section<'_, '_>, lens: &LensSpec, there: &BTreeSet<(i32, i32)>, hint: &str| {
-        for (term, s) in lens.terms.iter().zip(phase.sections("term")) {
+        let along_y = lens.along_y.iter().zip(phase.optional_section("y"));
+        let along_y = along_y.flat_map(|(y, s)| y.terms.iter().zip(s.sections("term")));
+        let all = lens
+            .terms
+            .iter()
+            .zip(phase.sections("term"))
+            .chain(along_y.collect::<Vec<_>>());
+        for (term, s) in all {
             if let Some((m, n)) = term.elements.iter().find(|index| !there.contains(index)) {
                 let what = format!("no element of this phase is ({m}, {n})");
                 s.fault_given(&["array.elements"], "elements_m", what, hint);

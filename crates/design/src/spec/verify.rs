@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use metalith_cell::{Analyser, Fidelity, Handedness, Polarisation, PolarisedLight};
+use metalith_cell::{Analyser, Fidelity, Polarisation, PolarisedLight};
 use metalith_core::document::{Limits, Section};
 
 use super::CellSpec;
@@ -136,7 +136,7 @@ impl VerifySpec {
         spec
     }
 
-    /// Source and detector of light at pillars that change polarisation.
+    /// Source and detector of light at pillars that tell polarisations apart.
     pub fn light(&self) -> PolarisedLight {
         PolarisedLight {
             arriving: self.polarisation,
@@ -152,8 +152,9 @@ const AXIS: Limits = Limits::new(-Polarisation::MOST_DEG..=Polarisation::MOST_DE
 fn read_polarisation(s: &Section<'_, '_>, cell: &CellSpec) -> Option<Polarisation> {
     const KEY: &str = "polarisation";
     let named = s.optional_choice_or_float(KEY, &Polarisation::CHOICES, AXIS, Polarisation::Linear)?;
-    let focused = polarising(s, KEY, "light of a polarisation", cell)?;
-    Some(named).filter(|light| *light != Polarisation::Circular(focused))
+    polarising(s, KEY, "light of a polarisation", cell);
+    let usual = cell.focused(None)?.polarisation();
+    Some(named).filter(|light| *light != usual)
 }
 
 /// What is before the sensor.
@@ -162,12 +163,21 @@ fn read_analyser(s: &Section<'_, '_>, cell: &CellSpec) -> Option<Analyser> {
     let named = Analyser::CHOICES.map(|(name, one)| (name, Some(one)));
     let choices = [&[("none", None)], &named[..]].concat();
     let analyser = s.optional_choice_or_float(KEY, &choices, AXIS, |deg| Some(Analyser::Linear(deg)))??;
-    polarising(s, KEY, "an analyser", cell).map(|_| analyser)
+    polarising(s, KEY, "an analyser", cell);
+    if analyser == Analyser::Circular && cell.shape.upright().is_some() {
+        s.fault_given(
+            &["cell.shape"],
+            KEY,
+            "a circular analyser behind upright rectangles, which focus no hand",
+            "use x, y or the angle of a linear one",
+        );
+    }
+    cell.shape.rectangles().map(|_| analyser)
 }
 
-/// The hand that the pillars focus; a fault at what counts only for pillars that change polarisation.
-fn polarising(s: &Section<'_, '_>, key: &str, what: &str, cell: &CellSpec) -> Option<Handedness> {
-    if cell.arriving.is_none() {
+/// A fault at what counts only for pillars that tell polarisations apart.
+fn polarising(s: &Section<'_, '_>, key: &str, what: &str, cell: &CellSpec) {
+    if cell.shape.rectangles().is_none() {
         s.fault_given(
             &["cell.shape"],
             key,
@@ -175,7 +185,6 @@ fn polarising(s: &Section<'_, '_>, key: &str, what: &str, cell: &CellSpec) -> Op
             "leave it out: it counts for rectangles alone, the others are simulated in light that is not polarised",
         );
     }
-    cell.arriving
 }
 
 /// The cell that judges, if it is left out: unlike neighbours for the cell that they were compared with real rows of, else

@@ -148,7 +148,12 @@ fn element(
     shape: PillarShape,
     changes: &mut Changes,
 ) -> ElementDiff {
-    let rotated = shape.rectangles().is_some();
+    let rotated = shape.rotated().is_some();
+    let edges = |number: u16| {
+        shape
+            .rectangles()
+            .map_or([number; 2], |pillars| pillars.edges_nm(number))
+    };
     let lattice = a.site.lattice;
     let mut diff = ElementDiff {
         name: a.site.name.clone(),
@@ -175,20 +180,22 @@ fn element(
         let (count, what) = match (from, to) {
             (0, _) => (&mut diff.added, "added"),
             (_, 0) => (&mut diff.removed, "removed"),
-            _ if rotated => (&mut diff.rotated, "rotated"),
-            _ if to > from => (&mut diff.widened, "widened"),
+            // Upright rectangles of one area differ by a quarter turn, or nearly.
+            _ if rotated || shape.square_nm2(to) == shape.square_nm2(from) => (&mut diff.rotated, "rotated"),
+            _ if shape.square_nm2(to) > shape.square_nm2(from) => (&mut diff.widened, "widened"),
             _ => (&mut diff.narrowed, "narrowed"),
         };
         *count += 1;
         if from != 0 && to != 0 && !rotated {
-            let change = from.abs_diff(to);
+            let [a, b] = [edges(from), edges(to)];
+            let change = a[0].abs_diff(b[0]).max(a[1].abs_diff(b[1]));
             diff.largest_change_nm = diff.largest_change_nm.max(change);
             squares += u64::from(change) * u64::from(change);
         }
         let x = (a.site.centre_nm[0] + lattice.place_nm(0, column)) as f64;
         let y = (a.site.centre_nm[1] + lattice.place_nm(1, row)) as f64;
         let half = shape.widest_nm(from.max(to)) / 2.0;
-        let widths = (!rotated).then_some([from, to]);
+        let widths = shape.rectangles().is_none().then_some([from, to]);
         changes.add(what, layer, [x - half, y - half, x + half, y + half], widths);
     };
     for row in 0..n {

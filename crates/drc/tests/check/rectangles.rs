@@ -1,6 +1,6 @@
 //! The deck for rotated rectangles: a clean chip, and for each rule of theirs one that breaks it.
 
-use metalith_core::Rectangles;
+use metalith_core::{RotatedRectangles, UprightRectangles};
 use metalith_testing::gds::Gds;
 
 use crate::deck_from;
@@ -9,7 +9,7 @@ use crate::on_lattice::{broken_on_lattice, site};
 /// Sites an axis and their distance (nm).
 const SITES: i32 = 12;
 const PITCH: i32 = 354;
-const PILLARS: Rectangles = Rectangles {
+const PILLARS: RotatedRectangles = RotatedRectangles {
     width_nm: 100,
     length_nm: 250,
     steps: 180,
@@ -77,6 +77,43 @@ fn each_rule_of_rectangles_finds_what_it_is_for() {
     assert_eq!(twice, (vec![("gap.duplicate".into(), 1)], 144));
     let other = found(&[], all, |gds| pillar(gds, (x, y), 30 + all(5, 5).unwrap()));
     assert_eq!(other, (vec![("gap.overlap".into(), 1)], 144));
+}
+
+/// Upright ones of several sizes: gaps of their own edges, and what is no whole step of a beam.
+#[test]
+fn rules_see_the_edges_of_upright_rectangles() {
+    const SIZES: UprightRectangles = UprightRectangles {
+        shortest_nm: 100,
+        step_nm: 20,
+        lengths: 9,
+    };
+    let upright = |gds: &mut Gds, (x, y): (i32, i32), edges: [u16; 2]| {
+        let corners = SIZES.corners(SIZES.number(edges).unwrap());
+        let points: Vec<(i32, i32)> = corners.map(|(dx, dy)| (x + dx as i32, y + dy as i32)).to_vec();
+        gds.polygon(1, &[&points[..], &points[..1]].concat());
+    };
+    let edges = |column: i32, row: i32| match (column, row) {
+        (5, 5) | (6, 5) => [260, 100],
+        _ => [100 + 20 * (column * 5 % 7) as u16, 120 + 20 * (row * 3 % 6) as u16],
+    };
+    let found = |rules: &[(&str, &str)]| {
+        let deck = deck_from("rules/rectangles.toml", rules);
+        let draw = |gds: &mut Gds, column: i32, row: i32| upright(gds, place(column, row), edges(column, row));
+        broken_on_lattice(&deck, SITES, draw, |_| {})
+    };
+    assert_eq!(found(&[]), (vec![], 144));
+    // Those two are 354 - 260 nm apart, all others farther.
+    assert_eq!(found(&[("nm = 40", "nm = 94.5")]), (vec![("gap.min".into(), 1)], 144));
+    assert_eq!(found(&[("nm = 40", "nm = 93.5")]), (vec![], 144));
+    let beam = |step: u32| {
+        let rule = format!(
+            "[[rule]]\nid = \"beam\"\ncheck = \"exposure_grid\"\nbeam_step_nm = {step}\n\n[[rule]]\nid = \"gap.min\""
+        );
+        found(&[("[[rule]]\nid = \"gap.min\"", &rule)])
+    };
+    let (broken, _) = beam(2);
+    assert!(broken.is_empty(), "{broken:?}");
+    assert!(!beam(40).0.is_empty());
 }
 
 /// Corners on the grid are up to 0.7 nm off, edges 1.4 nm: they are judged by the best that they can be.

@@ -147,8 +147,8 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
     };
     let places = match rectangles {
         None => map.pillars,
-        // All of one size: they are at their places already.
-        Some(found) if found.count == map.sizes.rectangles => map.tilted,
+        // All of them are at their places already.
+        Some(found) if found.count == map.sizes.rectangles && (squares == 0 || shape.upright().is_none()) => map.tilted,
         Some(_) => {
             let mut search = Search {
                 scale,
@@ -222,9 +222,9 @@ impl Visitor for Map {
         let scale = self.scale;
         let copies = placements.len() as u64;
         let around = if placements.iter().all(Transform::is_square) {
-            self.sizes.count(shape, copies, 1.0, scale)
+            self.sizes.count(shape, copies, &Transform::IDENTITY, scale)
         } else {
-            let each = |placement: &Transform| self.sizes.count(shape, 1, placement.magnification(), scale);
+            let each = |placement: &Transform| self.sizes.count(shape, 1, placement, scale);
             placements.iter().map(each).fold(None, Option::or)
         };
         if let Some(around) = around {

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use super::sites::Scale;
 use crate::memo::OutlineMemo;
-use crate::{Point, Rect, Shape, tilted_rectangle_of};
-use metalith_core::Rectangles;
+use crate::{Point, Rect, Shape, Transform, tilted_rectangle_of};
+use metalith_core::{Rectangles, RotatedRectangles, UprightRectangles};
 
 /// Sizes that are told apart: a layout has one, and what its corners make of it.
 const MOST_SIZES: usize = 1 << 12;
@@ -17,6 +17,10 @@ const ALIKE_NM: i64 = 2;
 /// corners is little.
 const STEPS: u16 = 180;
 
+/// Share of upright rectangles whose sizes decide the lengths that edges may have: what is left may be marks and numerals. Rarer
+/// pillars whose edges are between those are recognised all the same.
+const PILLARS: f64 = 0.9999;
+
 /// Edges of the rectangles of a layout, counted.
 #[derive(Default)]
 pub(super) struct Sizes {
@@ -25,6 +29,8 @@ pub(super) struct Sizes {
     counted: Vec<Size>,
     /// Rectangles, counted or not.
     pub rectangles: u64,
+    /// Those of them whose edges are not along the axes.
+    tilted: u64,
     /// What outlines are, if they are rectangles and no squares.
     known: OutlineMemo<Option<SeenRectangle>>,
 }
@@ -48,17 +54,18 @@ struct SeenRectangle {
     around: Rect,
 }
 
-/// Rectangles of one size.
-pub(super) struct AlikeRectangles {
+/// Rectangles that are pillars.
+pub(super) struct FoundRectangles {
     pub pillars: Rectangles,
-    /// How many there are.
+    /// How many there are that are no squares.
     pub count: u64,
 }
 
 impl Sizes {
-    /// Count so many copies of a shape, each so many times as large as in its cell, if it is a rectangle and no square: the box
-    /// around it, in its cell.
-    pub fn count(&mut self, shape: &Shape<'_>, copies: u64, magnification: f64, scale: Scale) -> Option<Rect> {
+    /// Count so many copies of a shape, each so many times as large as in its cell and turned by quarters or not, if it is a
+    /// rectangle and no square: the box around it, in its cell.
+    pub fn count(&mut self, shape: &Shape<'_>, copies: u64, placed: &Transform, scale: Scale) -> Option<Rect> {
+        let magnification = placed.magnification();
         let unequal = shape.rect.is_none_or(|r| r.width() != r.height());
         if !unequal || shape.circle.is_some() || shape.outline.len() != 5 {
             return None;
@@ -85,6 +92,9 @@ impl Sizes {
             _ => see(),
         }?;
         self.rectangles += copies;
+        if shape.rect.is_none() || !placed.is_square() {
+            self.tilted += copies;
+        }
         if let Some(size) = seen.size.map(|k| &mut self.counted[k]) {
             size.count += copies;
             (0..2).for_each(|k| size.sums[k] += seen.edges[k] * copies as f64);
@@ -92,8 +102,54 @@ impl Sizes {
         shape.outline.at.apply_rect(&seen.around.moved(points[0]))
     }
 
-    /// The size that most have, if it is one of pillars no wider than this (nm).
-    pub fn pillars(&self, widest_nm: i64) -> Option<AlikeRectangles> {
+    /// What they are, if they are pillars no longer than this (nm): upright ones of several sizes, or those of the size that most
+    /// have, by their rotation.
+    pub fn pillars(&self, longest_nm: i64) -> Option<FoundRectangles> {
+        self.upright(longest_nm).or_else(|| self.alike(longest_nm))
+    }
+
+    /// Upright rectangles of more than one size, with edges in equal steps.
+    fn upright(&self, longest_nm: i64) -> Option<FoundRectangles> {
+        if self.tilted > 0 {
+            return None;
+        }
+        let mut sizes: Vec<_> = self
+            .numbers
+            .iter()
+            .map(|(key, k)| (*key, self.counted[*k].count))
+            .collect();
+        sizes.retain(|((_, long), _)| *long <= longest_nm);
+        sizes.sort_by_key(|(key, count)| (std::cmp::Reverse(*count), *key));
+        let enough = (PILLARS * self.rectangles as f64) as u64;
+        let mut count = 0;
+        let most = sizes.iter().take_while(|(_, n)| {
+            let is_needed = count < enough;
+            count += n;
+            is_needed
+        });
+        let most: Vec<_> = most.map(|(key, _)| *key).collect();
+        let (w, l) = *most.first()?;
+        if most
+            .iter()
+            .all(|(a, b)| (a - w).abs() <= ALIKE_NM && (b - l).abs() <= ALIKE_NM)
+        {
+            return None;
+        }
+        let lengths = || most.iter().flat_map(|(a, b)| [*a, *b]);
+        let (shortest, longest) = (lengths().min()?, lengths().max()?);
+        let step = lengths().fold(0, |step, length| common_divisor(step, length - shortest));
+        let pillars = UprightRectangles {
+            shortest_nm: u16::try_from(shortest).ok()?,
+            step_nm: u16::try_from(step).ok()?,
+            lengths: u16::try_from((longest - shortest) / step.max(1) + 1).ok()?,
+        };
+        (pillars.lengths <= UprightRectangles::MOST_LENGTHS).then_some(FoundRectangles {
+            pillars: pillars.into(),
+            count: self.rectangles,
+        })
+    }
+
+    fn alike(&self, longest_nm: i64) -> Option<FoundRectangles> {
         let sizes = || self.numbers.iter().map(|(key, k)| (*key, &self.counted[*k]));
         let ((w, l), _) = sizes().max_by_key(|(key, size)| (size.count, std::cmp::Reverse(*key)))?;
         let near = sizes().filter(|((a, b), _)| (a - w).abs() <= ALIKE_NM && (b - l).abs() <= ALIKE_NM);
@@ -101,11 +157,19 @@ impl Sizes {
             (n + size.count, [a + size.sums[0], b + size.sums[1]])
         });
         let [width, length] = sums.map(|sum| (sum / count as f64).round() as i64);
-        let pillars = Rectangles {
+        let pillars = RotatedRectangles {
             width_nm: u16::try_from(width).ok()?,
             length_nm: u16::try_from(length).ok()?,
             steps: STEPS,
         };
-        (width < length && length <= widest_nm).then_some(AlikeRectangles { pillars, count })
+        (width < length && length <= longest_nm).then_some(FoundRectangles {
+            pillars: pillars.into(),
+            count,
+        })
     }
+}
+
+/// The greatest common divisor of two lengths; that of one and of nothing is the one.
+fn common_divisor(a: i64, b: i64) -> i64 {
+    if b == 0 { a } else { common_divisor(b, a % b) }
 }

@@ -1,6 +1,6 @@
 //! What is taken for a pillar, and where the elements are.
 
-use metalith_core::{Lattice, LatticeKind, PillarShape, Rectangles, Silent, WidthMap};
+use metalith_core::{Lattice, LatticeKind, PillarShape, RotatedRectangles, Silent, WidthMap};
 use metalith_gds::Layout;
 use metalith_gds::extract::{ElementSite, ExtractionPlan, Why, extract};
 use metalith_testing::gds::Gds;
@@ -131,7 +131,7 @@ fn circles_of_few_corners_are_on_their_sites() {
 /// Rectangles in a cell that is drawn twice as large as it is placed.
 #[test]
 fn rectangles_of_a_magnified_cell_are_found_as_large_as_they_are() {
-    let drawn = Rectangles {
+    let drawn = RotatedRectangles {
         width_nm: 180,
         length_nm: 480,
         steps: 180,
@@ -145,7 +145,7 @@ fn rectangles_of_a_magnified_cell_are_found_as_large_as_they_are() {
     }
     gds.end_cell();
     let read = extract(&layout(gds.end()), &ExtractionPlan::discover(PILLARS), &Silent).unwrap();
-    let PillarShape::Rectangle(found) = read.shape else {
+    let Some(found) = read.shape.rotated() else {
         panic!("{:?}", read.shape)
     };
     assert_eq!((found.width_nm, found.length_nm), (90, 240));

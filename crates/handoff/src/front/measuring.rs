@@ -4,7 +4,7 @@ use super::SHOWN;
 use crate::contents::Contents;
 use crate::pad::measured;
 use crate::pictures;
-use metalith_core::PillarShape;
+use metalith_core::{PillarShape, Rectangles};
 use metalith_report::{Cell, Column, Page, Table};
 
 pub(super) fn tests(page: &mut Page, c: &Contents<'_>) {
@@ -44,7 +44,8 @@ pub(super) fn metrology(page: &mut Page, c: &Contents<'_>) {
             "nearly the same diameter",
             "drawn diameter, along x and along y: where they differ the beam is astigmatic,",
         ),
-        PillarShape::Rectangle(_) => ("nearly the same rotation", "drawn width and length"),
+        PillarShape::Rectangle(Rectangles::Rotated(_)) => ("nearly the same rotation", "drawn width and length"),
+        PillarShape::Rectangle(Rectangles::Upright(_)) => ("nearly the same edges", "drawn edges along x and y"),
     };
     page.paragraph(format!(
         "Sites on the lenses are those whose neighbours have {alike}, so that a miscount by one pillar changes the result little. \
@@ -60,9 +61,8 @@ pub(super) fn metrology(page: &mut Page, c: &Contents<'_>) {
         Column::number("y", "um"),
         Column::number("Drawn", "nm"),
     ];
-    if shape.rectangles().is_some() {
-        columns.extend([Column::number("by", "nm"), Column::number("Rotation", "degrees")]);
-    }
+    columns.extend(shape.rectangles().map(|_| Column::number("by", "nm")));
+    columns.extend(shape.rotated().map(|_| Column::number("Rotation", "degrees")));
     columns.push(Column::text("Neighbours"));
     let mut table = Table::new(columns);
     for s in c.documents.sites.iter().filter(|s| s.file == "pillars") {
@@ -79,7 +79,8 @@ pub(super) fn metrology(page: &mut Page, c: &Contents<'_>) {
         cells.extend(s.drawn.rotation_deg.map(|deg| Cell::fixed(deg, 1)));
         let nm = s.around_nm.map(|(low, high)| format!("{low} to {high} nm"));
         let deg = s.around_deg.map(|(low, high)| format!("{low} to {high} degrees"));
-        cells.push(nm.or(deg).unwrap_or_default().into());
+        let by = s.around_by_nm.map(|nm| format!("edges within {nm} nm"));
+        cells.push(nm.or(deg).or(by).unwrap_or_default().into());
         table.row(cells);
     }
     page.table(table);

@@ -342,11 +342,12 @@ mod tests {
 
     #[test]
     fn the_shipped_processes_are_read_and_expose_pillars() {
-        let rectangles = PillarShape::Rectangle(metalith_core::Rectangles {
+        let rectangles = metalith_core::RotatedRectangles {
             width_nm: 100,
             length_nm: 250,
             steps: 180,
-        });
+        };
+        let rectangles = PillarShape::Rectangle(rectangles.into());
         for k in 0..SHIPPED.len() {
             let process = Process::shipped(k);
             for shape in [PillarShape::Square, PillarShape::Circle, rectangles] {

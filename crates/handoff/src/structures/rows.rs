@@ -5,7 +5,7 @@ use crate::drawing::{RectNm, Sheet, nm};
 use crate::matrix::top_pad;
 use crate::pad::{DrawnSize, line_width, test_pads};
 use crate::process::Process;
-use metalith_core::{LatticeKind, PillarShape};
+use metalith_core::{LatticeKind, PillarShape, Rectangles};
 use metalith_design::Design;
 
 /// Lines of a dense CD group; odd, so that the middle one is as dense as lines get.
@@ -39,7 +39,8 @@ impl Structures {
         let sizes = match design.cell.shape {
             PillarShape::Square => "width",
             PillarShape::Circle => "diameter",
-            PillarShape::Rectangle(_) => "width, length",
+            PillarShape::Rectangle(Rectangles::Rotated(_)) => "width, length",
+            PillarShape::Rectangle(Rectangles::Upright(_)) => "widths along x and y",
         };
         // Room at the left for the dashes of the cleave line.
         let mut x = APART + side + APART;

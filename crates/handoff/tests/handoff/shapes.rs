@@ -4,9 +4,11 @@ use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_4;
 use std::path::{Path, PathBuf};
 
-use metalith_core::{LatticeKind, PillarShape, Progress, Result, Silent, WidthRows};
+use metalith_core::{LatticeKind, PillarShape, Progress, Rectangles, Result, Silent, WidthRows};
 use metalith_design::{Design, PillarArray};
-use metalith_gds::{LayerNumber, Layout, Point, Selection, Shape, Transform, Visitor, circle_of, tilted_rectangle_of};
+use metalith_gds::{
+    LayerNumber, Layout, Point, Rect, Selection, Shape, Transform, Visitor, circle_of, tilted_rectangle_of,
+};
 use metalith_handoff::{Census, HandoffOptions, handoff, verify_handoff};
 use metalith_layout::LayoutFormat;
 use metalith_wave::Accuracy;
@@ -91,15 +93,20 @@ fn is_drawn(outline: &[Point], row: &BTreeMap<String, String>, shape: PillarShap
     match shape {
         PillarShape::Square => unreachable!("other tests look at squares"),
         PillarShape::Circle => circle_of(outline, 1.0).is_some_and(|r| r.width().to_string() == row["drawn_nm"]),
-        PillarShape::Rectangle(_) => {
+        PillarShape::Rectangle(Rectangles::Upright(_)) => {
+            let number = |key: &str| row[key].parse::<i64>().unwrap();
+            let around = Rect::around(outline);
+            outline.len() == 5 && (around.width(), around.height()) == (number("drawn_x_nm"), number("drawn_y_nm"))
+        }
+        PillarShape::Rectangle(Rectangles::Rotated(_)) => {
             let number = |key: &str| row[key].parse::<f64>().unwrap();
-            let drawn = metalith_core::Rectangles {
+            let drawn = metalith_core::RotatedRectangles {
                 width_nm: number("drawn_width_nm") as u16,
                 length_nm: number("drawn_length_nm") as u16,
                 steps: 180,
             };
             let tilted = tilted_rectangle_of(outline, 1.0).unwrap();
-            tilted.number(drawn, 1.0) == Some(drawn.number(number("drawn_rotation_deg").to_radians()))
+            tilted.number(drawn.into(), 1.0) == Some(drawn.number(number("drawn_rotation_deg").to_radians()))
         }
     }
 }
@@ -134,7 +141,7 @@ fn tables_hold(name: &str, sites: usize, pads: usize) {
     let (ideal, off) = each.fold((0.0, 0.0), |(ideal, off), (w, &n)| {
         let (area_nm2, around_nm) = match shape {
             PillarShape::Rectangle(r) => {
-                let (a, b) = (f64::from(r.width_nm), f64::from(r.length_nm));
+                let [a, b] = r.edges_nm(w as u16).map(f64::from);
                 (a * b, 2.0 * (a + b))
             }
             _ => (FRAC_PI_4 * (w * w) as f64, 4.0 * FRAC_PI_4 * w as f64),
@@ -250,6 +257,12 @@ fn a_process_for_another_thickness_is_refused() {
 #[test]
 fn rotated_rectangles_are_handed_over() {
     tables_hold("geometric_phase_532", 11, 10);
+}
+
+/// Five sizes in three rings, two of which a ring has none of; five pads.
+#[test]
+fn upright_rectangles_are_handed_over() {
+    tables_hold("birefringent_532", 13, 5);
 }
 
 /// A process that has no rules for a shape says so, before anything is written.

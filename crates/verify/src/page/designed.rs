@@ -1,6 +1,6 @@
 //! What was designed: the chip, the pillars in the middle, phase and width along a radius.
 
-use metalith_core::{Lattice, WidthMap, WidthRows};
+use metalith_core::{Lattice, PillarShape, Rectangles, WidthMap, WidthRows};
 use metalith_design::array::PillarArray;
 use metalith_design::phase::{ElementPhase, LensPhase, RadialPhase};
 use metalith_design::{Design, LensSpec};
@@ -14,9 +14,15 @@ const RADIUS_POINTS: usize = 600;
 /// The section of the design.
 pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
     page.section("What was designed");
-    let pillars = match design.cell.shape.rectangles() {
-        None => design.cell.shape.plural().to_owned(),
-        Some(pillars) => format!(
+    let pillars = match design.cell.shape {
+        PillarShape::Square | PillarShape::Circle => design.cell.shape.plural().to_owned(),
+        PillarShape::Rectangle(Rectangles::Upright(pillars)) => format!(
+            "upright rectangles with edges of {} to {} nm in steps of {} nm, chosen by a phase for light along x and one for light along y",
+            pillars.shortest_nm,
+            pillars.longest_nm(),
+            pillars.step_nm
+        ),
+        PillarShape::Rectangle(Rectangles::Rotated(pillars)) => format!(
             "rectangles of {} x {} nm rotated in steps of {}° by half of the phase",
             pillars.width_nm,
             pillars.length_nm,
@@ -48,6 +54,7 @@ pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
         page.table(own_lenses(design));
     }
     let lens = LensPhase::of(design);
+    let along_y = design.along_y().map(|y| LensPhase::of(&y));
     let phase = ElementPhase::of(&lens, &centre.element);
     let n = array.lattice.sites();
     let along = |value: &dyn Fn(usize) -> Option<f64>| {
@@ -62,7 +69,14 @@ pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
         Axis::linear("phase", "turns"),
     )
     .size(420.0, 260.0);
-    turns.line("unwrapped", along(&|ix| phase.turns(ix, n / 2)));
+    match &along_y {
+        None => turns.line("unwrapped", along(&|ix| phase.turns(ix, n / 2))),
+        Some(lens) => {
+            let other = ElementPhase::of(lens, &centre.element);
+            turns.line("light along x", along(&|ix| phase.turns(ix, n / 2)));
+            turns.line("light along y", along(&|ix| other.turns(ix, n / 2)))
+        }
+    };
     let (title, axis) = numbers(design);
     let mut widths =
         Chart::new(format!("{title} along a radius"), Axis::linear("radius", "um"), axis).size(420.0, 260.0);
@@ -121,17 +135,28 @@ fn elements(design: &Design) -> String {
 
 /// What the widths or numbers of pillars are in figures, and their axis.
 pub(super) fn numbers(design: &Design) -> (&'static str, Axis) {
-    match design.cell.shape.rectangles() {
-        None => ("Width", Axis::linear("width", "nm")),
-        Some(_) => ("Rotation", Axis::linear("rotation", "°")),
+    match design.cell.shape {
+        PillarShape::Square | PillarShape::Circle => ("Width", Axis::linear("width", "nm")),
+        PillarShape::Rectangle(Rectangles::Rotated(_)) => ("Rotation", Axis::linear("rotation", "°")),
+        PillarShape::Rectangle(Rectangles::Upright(_)) => ("Width along x", Axis::linear("width along x", "nm")),
     }
 }
 
-/// The width of a pillar (nm), or its rotation (degrees).
+/// The width of a pillar (nm), that along x of an upright rectangle, or its rotation (degrees).
 pub(super) fn shown_number(design: &Design, number: u16) -> f64 {
-    match design.cell.shape.rectangles() {
-        None => f64::from(number),
-        Some(pillars) => pillars.rotation(number).to_degrees(),
+    match design.cell.shape {
+        PillarShape::Square | PillarShape::Circle => f64::from(number),
+        PillarShape::Rectangle(Rectangles::Rotated(pillars)) => pillars.rotation(number).to_degrees(),
+        PillarShape::Rectangle(Rectangles::Upright(pillars)) => f64::from(pillars.edges_nm(number)[0]),
+    }
+}
+
+/// From one of these to the next.
+pub(super) fn step(design: &Design) -> f64 {
+    match design.cell.shape {
+        PillarShape::Square | PillarShape::Circle => f64::from(design.cell.width_step_nm),
+        PillarShape::Rectangle(Rectangles::Rotated(pillars)) => pillars.step_deg(),
+        PillarShape::Rectangle(Rectangles::Upright(pillars)) => f64::from(pillars.step_nm),
     }
 }
 

@@ -1,8 +1,9 @@
 //! What was written: every site compared, the layers of the file, the widths as read back.
 
-use super::designed::{numbers, shown_number};
+use super::designed::{numbers, shown_number, step};
 use crate::Verification;
 use crate::copies::place_words;
+use metalith_core::{PillarShape, Rectangles};
 use metalith_design::Design;
 use metalith_design::array::Symmetry;
 use metalith_report::{Axis, Cell, Chart, Column, Page, Table, count, sig};
@@ -13,11 +14,15 @@ const MOST_ODDITIES: usize = 20;
 /// The section of the file.
 pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
     page.section("What was written");
-    let rotated = design.cell.shape.rectangles().is_some();
+    let told_by = match design.cell.shape {
+        PillarShape::Square | PillarShape::Circle => "width",
+        PillarShape::Rectangle(Rectangles::Rotated(_)) => "rotation",
+        PillarShape::Rectangle(Rectangles::Upright(_)) => "size",
+    };
     let mut table = Table::new([
         Column::text("Element (m, n)"),
         Column::number("Pillars", ""),
-        Column::number(if rotated { "Wrong rotation" } else { "Wrong width" }, ""),
+        Column::number(format!("Wrong {told_by}"), ""),
         Column::number("Missing", ""),
         Column::number("Extra", ""),
         Column::text("Simulated as"),
@@ -36,8 +41,7 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
         ]);
     }
     page.table(table.caption(format!(
-        "Every site of every element, compared with the {} that the design asks for. An element that is simulated as another has its figures with the place (x, y) where the table says; its field angles are turned alike.",
-        if rotated { "rotation" } else { "width" }
+        "Every site of every element, compared with the {told_by} that the design asks for. An element that is simulated as another has its figures with the place (x, y) where the table says; its field angles are turned alike."
     )));
     let mut layers = Table::new([
         Column::text("Layer"),
@@ -71,22 +75,27 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
     }
     let (title, axis) = numbers(design);
     let mut widths = Chart::new(format!("{title}s of all pillars"), axis, Axis::linear("pillars", ""));
-    let mut histogram = Vec::new();
-    for element in &found.distinct {
-        for (w, c) in element.histogram.iter().enumerate().skip(1) {
-            histogram.resize(histogram.len().max(w + 1), 0);
-            histogram[w] += c * element.copies as u64;
-        }
-    }
-    let step = match design.cell.shape.rectangles() {
-        None => f64::from(design.cell.width_step_nm),
-        Some(pillars) => pillars.step_deg(),
-    };
-    let at = |w: usize, steps: f64| shown_number(design, w as u16) + steps * step;
-    let bars = histogram.iter().enumerate().filter(|(_, c)| **c > 0);
-    widths.bars("pillars", bars.map(|(w, &c)| (at(w, -0.5), at(w, 0.5), c as f64)));
+    let half = step(design) / 2.0;
+    let bars = counts(design, found).into_iter();
+    widths.bars("pillars", bars.map(|(at, c)| (at - half, at + half, c as f64)));
     page.figure(widths.caption(format!(
         "Number of pillars of each {}, as read back.",
-        if rotated { "rotation" } else { "width" }
+        title.to_lowercase()
     )));
+}
+
+/// Numbers of pillars over what figures show of them.
+fn counts(design: &Design, found: &Verification) -> Vec<(f64, u64)> {
+    let mut counts: Vec<(f64, u64)> = Vec::new();
+    for element in &found.distinct {
+        for (w, c) in element.histogram.iter().enumerate().skip(1).filter(|(_, c)| **c > 0) {
+            let (at, c) = (shown_number(design, w as u16), c * element.copies as u64);
+            match counts.iter_mut().find(|(known, _)| *known == at) {
+                Some((_, sum)) => *sum += c,
+                None => counts.push((at, c)),
+            }
+        }
+    }
+    counts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    counts
 }

@@ -234,16 +234,21 @@ impl<'t> Section<'_, 't> {
 
     /// A path, relative ones counted from the folder of this file. The file must exist.
     pub fn file(&self, key: &str) -> PathBuf {
-        let text = self.text(key);
-        let path = self.document.folder().join(&text);
-        if !text.is_empty() && !path.is_file() {
-            self.fault(
-                key,
-                format!("there is no file {}", path.display()),
-                "relative paths count from the folder of this file",
-            );
+        self.file_else(key, "relative paths count from the folder of this file")
+    }
+
+    /// The same of a file that is made by what `hint` says.
+    pub fn file_else(&self, key: &str, hint: &str) -> PathBuf {
+        let path = self.path(key);
+        if path.as_path() != self.document.folder() && !path.is_file() {
+            self.fault(key, format!("there is no file {}", path.display()), hint);
         }
         path
+    }
+
+    /// A path, relative ones counted from the folder of this file. Nothing need be there.
+    pub fn path(&self, key: &str) -> PathBuf {
+        self.document.folder().join(self.text(key))
     }
 
     fn limited(&self, span: Range<usize>, key: &str, value: f64, limits: &Limits) -> f64 {

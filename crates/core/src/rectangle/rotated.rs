@@ -7,7 +7,7 @@ use serde::Serialize;
 /// Rectangular pillars of one size on a layout. What tells one from another is its number, from 1 to `steps`: its rotation in
 /// steps of half a turn over `steps`. Half a turn leaves a rectangle as it is, so the last number stands for no rotation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
-pub struct Rectangles {
+pub struct RotatedRectangles {
     /// The shorter edge (nm), along the direction of the rotation.
     pub width_nm: u16,
     /// The longer edge (nm), across it.
@@ -16,7 +16,7 @@ pub struct Rectangles {
     pub steps: u16,
 }
 
-impl Rectangles {
+impl RotatedRectangles {
     /// Rotation of a pillar, from x towards y (rad), from 0 up to pi.
     pub fn rotation(self, number: u16) -> f64 {
         let steps = self.steps.max(1);
@@ -56,7 +56,7 @@ impl Rectangles {
         (a.0.abs().max(b.0.abs()), a.1.abs().max(b.1.abs()))
     }
 
-    /// By how much the rounding of its corners to the grid turns a pillar (rad): its axis as drawn less [`Rectangles::rotation`].
+    /// By how much the rounding of its corners to the grid turns a pillar (rad): its axis as drawn less [`RotatedRectangles::rotation`].
     pub fn turned_by_grid(self, number: u16) -> f64 {
         let [a, b, c, _] = self.corners(number).map(|(x, y)| (x as f64, y as f64));
         let (along, across) = ((b.0 - a.0, b.1 - a.1), (c.0 - b.0, c.1 - b.1));
@@ -138,7 +138,7 @@ fn from_side(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
 mod tests {
     use super::*;
 
-    const PILLARS: Rectangles = Rectangles {
+    const PILLARS: RotatedRectangles = RotatedRectangles {
         width_nm: 100,
         length_nm: 250,
         steps: 180,
@@ -187,7 +187,7 @@ mod tests {
             corners[0][0] += 3.0;
             assert_eq!(PILLARS.recognised(&corners, 1.5), None);
         }
-        let thinner = Rectangles {
+        let thinner = RotatedRectangles {
             width_nm: 90,
             ..PILLARS
         };

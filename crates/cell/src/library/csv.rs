@@ -1,0 +1,151 @@
+//! A library as CSV.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+use super::{LibraryPillar, PillarLibrary};
+use metalith_core::text::{quoted, without_mark};
+use metalith_core::{Error, Result, UprightRectangles};
+
+/// Longest library that is read (bytes): twice that of the most pillars.
+const LONGEST_CSV: u64 = 1 << 20;
+
+const HEAD: &str = "width_x_nm,width_y_nm,turns_x,turns_y,passed_x,passed_y";
+
+/// Most of the power that a pillar passes, with room for the rounding of a solver.
+const MOST_PASSED: f64 = 1.05;
+
+impl PillarLibrary {
+    /// The library as text: edges of each pillar (nm), phases of light along x and y (turns) and the shares of both that pass.
+    pub fn to_csv(&self, pillars: UprightRectangles) -> String {
+        let row = |p: &LibraryPillar| {
+            let [x, y] = pillars.edges_nm(p.number);
+            let [turns_x, turns_y] = p.turns;
+            let [passed_x, passed_y] = p.passed;
+            format!("{x},{y},{turns_x:.5},{turns_y:.5},{passed_x:.4},{passed_y:.4}\n")
+        };
+        let rows: String = self.pillars.iter().map(row).collect();
+        format!("{HEAD}\n{rows}")
+    }
+
+    /// Reads what [`PillarLibrary::to_csv`] writes, or somebody else has measured or solved: pillars of these sizes, each once.
+    /// Lines that begin with # are comments.
+    ///
+    /// # Errors
+    /// If the file cannot be read, has no or too many rows, or a row is no such pillar, with its line.
+    pub fn read_csv(path: &Path, pillars: UprightRectangles) -> Result<Self> {
+        let fault = |line: Option<usize>, what: String| Error::Table {
+            path: path.to_owned(),
+            line,
+            what,
+            hint: format!(
+                "the columns are `{HEAD}`: edges that the design may write, phases in turns, shares of the power"
+            ),
+        };
+        let size = fs::metadata(path).map_err(Error::io("read", path))?.len();
+        if size > LONGEST_CSV {
+            return Err(fault(None, format!("{size} bytes are not a library")));
+        }
+        let bytes = fs::read(path).map_err(Error::io("read", path))?;
+        let text = String::from_utf8_lossy(&bytes);
+        let mut rows = without_mark(&text)
+            .lines()
+            .enumerate()
+            .map(|(i, line)| (i + 1, line.trim()))
+            .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+        if rows
+            .next()
+            .is_none_or(|(_, head)| head.split(',').map(str::trim).ne(HEAD.split(',')))
+        {
+            return Err(fault(Some(1), format!("the header is not `{HEAD}`")));
+        }
+        let mut seen = BTreeSet::new();
+        let read = rows.map(|(line, row)| {
+            let no_pillar = || fault(Some(line), format!("\"{}\" is not a pillar", quoted(row)));
+            let fields: Vec<f64> = row.split(',').map_while(|f| f.trim().parse().ok()).collect();
+            let [x, y, turns_x, turns_y, passed_x, passed_y] = fields[..] else {
+                return Err(no_pillar());
+            };
+            if fields.len() != row.split(',').count() || ![turns_x, turns_y].iter().all(|v| v.is_finite()) {
+                return Err(no_pillar());
+            }
+            let whole = |nm: f64| (nm.fract() == 0.0 && (0.0..=f64::from(u16::MAX)).contains(&nm)).then_some(nm as u16);
+            let number = whole(x).zip(whole(y)).and_then(|(x, y)| pillars.number([x, y]));
+            let number = number.ok_or_else(|| {
+                let [shortest, longest] = [pillars.shortest_nm, pillars.longest_nm()];
+                let what = format!(
+                    "{x} x {y} nm is no pillar of the design, whose edges are {shortest} to {longest} nm in steps of {}",
+                    pillars.step_nm
+                );
+                fault(Some(line), what)
+            })?;
+            if !seen.insert(number) {
+                return Err(fault(Some(line), format!("{x} x {y} nm stands here twice")));
+            }
+            let passed = [passed_x, passed_y];
+            if let Some(share) = passed.iter().find(|p| !(**p > 0.0 && **p <= MOST_PASSED)) {
+                return Err(fault(Some(line), format!("a share of {share} of the power passes")));
+            }
+            Ok(LibraryPillar {
+                number,
+                turns: [turns_x, turns_y],
+                passed,
+            })
+        });
+        let read = read.collect::<Result<Vec<_>>>()?;
+        if read.is_empty() {
+            return Err(fault(None, "a library without pillars".into()));
+        }
+        Self::new(read)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PILLARS: UprightRectangles = UprightRectangles {
+        shortest_nm: 100,
+        step_nm: 20,
+        lengths: 8,
+    };
+
+    fn read(text: &str) -> Result<PillarLibrary> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("library.csv");
+        fs::write(&path, text).unwrap();
+        PillarLibrary::read_csv(&path, PILLARS)
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let text = format!("{HEAD}\n100,140,0.12500,0.50000,0.9100,0.8800\n240,100,0.75000,0.00000,0.9000,0.9700\n");
+        let library = read(&format!("\u{feff}# a comment\n{text}")).unwrap();
+        assert_eq!(library.to_csv(PILLARS), text);
+        assert_eq!(library.number([0.1, 0.5]), PILLARS.number([100, 140]).unwrap());
+    }
+
+    #[test]
+    fn faults_are_told_by_their_lines() {
+        for (row, line, word) in [
+            ("100,140,0,0,1", 2, "is not a pillar"),
+            ("100,140,0,x,1,1", 2, "is not a pillar"),
+            ("100,140,0,inf,1,1", 2, "is not a pillar"),
+            ("100,140,0,0,1,1,1", 2, "is not a pillar"),
+            ("100,150,0,0,1,1", 2, "no pillar of the design"),
+            ("100,260,0,0,1,1", 2, "no pillar of the design"),
+            ("100,140,0,0,1,1\n100,140,0,0,1,1", 3, "twice"),
+            ("100,140,0,0,1,1.2", 2, "a share of 1.2"),
+            ("100,140,0,0,0,1", 2, "a share of 0"),
+        ] {
+            match read(&format!("{HEAD}\n{row}\n")) {
+                Err(Error::Table { line: at, what, .. }) => {
+                    assert!(at == Some(line) && what.contains(word), "{row}: {at:?} {what}");
+                }
+                other => panic!("{row}: {other:?}"),
+            }
+        }
+        assert!(read("a,b\n").is_err() && read(&format!("{HEAD}\n")).is_err());
+    }
+}

@@ -1,0 +1,91 @@
+//! Which light is simulated at pillars that tell polarisations apart.
+
+use serde::Serialize;
+
+use super::{Analyser, Polarisation, PolarisationAxis};
+use crate::Handedness;
+
+/// The light that pillars give the phase of the design.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FocusedLight {
+    /// Of rotated rectangles: light of this hand, which they convert to the other.
+    Circular(Handedness),
+    /// Of upright ones: light that is polarised along this axis, and stays so.
+    Linear(PolarisationAxis),
+}
+
+impl FocusedLight {
+    /// Its polarisation.
+    pub fn polarisation(self) -> Polarisation {
+        match self {
+            Self::Circular(hand) => Polarisation::Circular(hand),
+            Self::Linear(axis) => axis.polarisation(),
+        }
+    }
+}
+
+/// Which light arrives at pillars that tell polarisations apart, and which of it reaches the sensor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct PolarisedLight {
+    /// Of the light that arrives; where it is none, that which the pillars focus.
+    pub arriving: Option<Polarisation>,
+    /// What is before the sensor, if anything.
+    pub analyser: Option<Analyser>,
+}
+
+impl PolarisedLight {
+    /// The polarisation of the light that arrives at pillars that focus this light.
+    pub fn arriving_at(self, focused: FocusedLight) -> Polarisation {
+        self.arriving.unwrap_or(focused.polarisation())
+    }
+
+    /// Share of the energy of light that arrives which pillars focus through the analyser, if they pass or convert all of it.
+    pub fn focused_share(self, focused: FocusedLight) -> f64 {
+        let passed = match (self.analyser, focused) {
+            (Some(Analyser::Linear(deg)), FocusedLight::Linear(_)) => Polarisation::Linear(deg).share(focused),
+            (Some(Analyser::Linear(_)), FocusedLight::Circular(_)) => 0.5,
+            (Some(Analyser::Circular) | None, _) => 1.0,
+        };
+        passed * self.arriving_at(focused).share(focused)
+    }
+
+    /// The detector in words: what reaches the sensor beside focused light, and what does not.
+    pub fn detector(self, focused: FocusedLight) -> String {
+        let own = self.arriving_at(focused) == focused.polarisation();
+        match focused {
+            FocusedLight::Circular(_) => self.behind_converting(own),
+            FocusedLight::Linear(axis) => self.behind_upright(own, axis),
+        }
+    }
+
+    fn behind_upright(self, own: bool, axis: PolarisationAxis) -> String {
+        let other = axis.other();
+        match (self.analyser, own) {
+            (None, true) => format!("none of it is polarised along {other}"),
+            (None, false) => format!("what is polarised along {other} lands by the phase of its own"),
+            (Some(analyser), true) => format!("{analyser} is before the sensor"),
+            (Some(analyser), false) => {
+                format!(
+                    "behind {analyser} light of both polarisations interferes as far as it arrives with a fixed phase"
+                )
+            }
+        }
+    }
+
+    fn behind_converting(self, own: bool) -> String {
+        match (self.analyser, own) {
+            (None, true) => "what is not converted lands as it came".into(),
+            (None, false) => "what is not converted lands as it came, and the other hand diverges".into(),
+            (Some(analyser @ Analyser::Circular), true) => {
+                format!("{analyser} keeps what is not converted from the sensor")
+            }
+            (Some(analyser @ Analyser::Circular), false) => format!(
+                "{analyser} passes the hand of focused light alone, with what is not converted of the other hand"
+            ),
+            (Some(analyser), _) => format!(
+                "{analyser} passes half of the focused light, which interferes with what it passes of all other light"
+            ),
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! Rectangular pillars with edges along x and y, which differ by their size.
+
+use serde::Serialize;
+
+/// Upright rectangular pillars on a layout. Edges along x and along y are each one of a row of lengths in equal steps. What tells one
+/// pillar from another is its number, from 1 on: first by the edge along x, then by that along y.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+pub struct UprightRectangles {
+    /// The shortest edge (nm), even.
+    pub shortest_nm: u16,
+    /// From one length to the next (nm), even.
+    pub step_nm: u16,
+    /// How many lengths an edge may have, at most [`UprightRectangles::MOST_LENGTHS`].
+    pub lengths: u16,
+}
+
+impl UprightRectangles {
+    /// Lengths of an edge at most: 4096 pillars, which a layout may have a cell for each of.
+    pub const MOST_LENGTHS: u16 = 64;
+
+    /// How many pillars there are; the last of their numbers.
+    pub fn count(self) -> u16 {
+        self.lengths.min(Self::MOST_LENGTHS).pow(2)
+    }
+
+    /// The longest edge (nm).
+    pub fn longest_nm(self) -> u16 {
+        self.edge_nm(self.lengths.saturating_sub(1))
+    }
+
+    fn edge_nm(self, k: u16) -> u16 {
+        self.shortest_nm.saturating_add(self.step_nm.saturating_mul(k))
+    }
+
+    /// Edges of a pillar along x and along y (nm).
+    pub fn edges_nm(self, number: u16) -> [u16; 2] {
+        let (k, lengths) = (number.saturating_sub(1), self.lengths.max(1));
+        [self.edge_nm(k % lengths), self.edge_nm(k / lengths)]
+    }
+
+    /// The number of the pillar with these edges along x and along y (nm), if there is one.
+    pub fn number(self, edges_nm: [u16; 2]) -> Option<u16> {
+        let place = |nm: u16| {
+            let beyond = nm.checked_sub(self.shortest_nm)?;
+            let k = beyond / self.step_nm.max(1);
+            (beyond.is_multiple_of(self.step_nm.max(1)) && k < self.lengths).then_some(k)
+        };
+        let [x, y] = [place(edges_nm[0])?, place(edges_nm[1])?];
+        Some(1 + x + self.lengths * y)
+    }
+
+    /// Corners of a pillar about its middle (nm), counter-clockwise.
+    pub fn corners(self, number: u16) -> [(i64, i64); 4] {
+        let (x, y) = self.reach(number);
+        [(-x, -y), (x, -y), (x, y), (-x, y)]
+    }
+
+    /// How far a pillar reaches from its middle along x and y (nm).
+    pub fn reach(self, number: u16) -> (i64, i64) {
+        let [x, y] = self.edges_nm(number).map(|nm| i64::from(nm) / 2);
+        (x, y)
+    }
+
+    /// Distance of two pillars of these numbers whose centres are (dx, dy) apart (nm); negative where they overlap.
+    pub fn gap(self, numbers: [u16; 2], [dx, dy]: [f64; 2]) -> f64 {
+        let [a, b] = numbers.map(|number| self.edges_nm(number));
+        let reach = |axis: usize| 0.5 * (f64::from(a[axis]) + f64::from(b[axis]));
+        let (x, y) = (dx.abs() - reach(0), dy.abs() - reach(1));
+        if x > 0.0 && y > 0.0 { x.hypot(y) } else { x.max(y) }
+    }
+
+    /// The longest diagonal of the pillars up to a number (nm).
+    pub fn longest_diagonal_nm(self, number: u16) -> f64 {
+        let [x, y] = self.edges_nm(number);
+        // Beyond the first row of numbers all edges along x occur.
+        let x = if number > self.lengths { self.longest_nm() } else { x };
+        f64::from(x).hypot(f64::from(y))
+    }
+
+    /// The number of the pillar whose outline is this one about its middle (nm), in any order of its corners, if each is within
+    /// `slack_nm` of one of the pillar's.
+    pub fn recognised(self, corners: &[[f64; 2]; 4], slack_nm: f64) -> Option<u16> {
+        let extent = |axis: usize| {
+            let reach = corners.iter().map(|c| c[axis]);
+            reach.clone().fold(f64::NEG_INFINITY, f64::max) - reach.fold(f64::INFINITY, f64::min)
+        };
+        let step = f64::from(self.step_nm.max(1));
+        let nearest = |nm: f64| -> Option<u16> {
+            let k = ((nm - f64::from(self.shortest_nm)) / step).round();
+            (k >= 0.0 && k < f64::from(self.lengths)).then(|| self.edge_nm(k as u16))
+        };
+        let number = self.number([nearest(extent(0))?, nearest(extent(1))?])?;
+        let drawn = self.corners(number).map(|(x, y)| [x as f64, y as f64]);
+        let near = |p: &[f64; 2], q: &[f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]) <= slack_nm;
+        let each_has_one = drawn.iter().all(|q| corners.iter().any(|p| near(p, q)));
+        each_has_one.then_some(number)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PILLARS: UprightRectangles = UprightRectangles {
+        shortest_nm: 80,
+        step_nm: 20,
+        lengths: 11,
+    };
+
+    #[test]
+    fn numbers_stand_for_edges_along_x_and_then_along_y() {
+        assert_eq!((PILLARS.count(), PILLARS.longest_nm()), (121, 280));
+        assert_eq!(PILLARS.edges_nm(1), [80, 80]);
+        assert_eq!(PILLARS.edges_nm(11), [280, 80]);
+        assert_eq!(PILLARS.edges_nm(12), [80, 100]);
+        assert_eq!(PILLARS.edges_nm(121), [280, 280]);
+        for number in 1..=121 {
+            assert_eq!(PILLARS.number(PILLARS.edges_nm(number)), Some(number));
+        }
+        for edges in [[60, 80], [90, 80], [80, 300], [80, 81]] {
+            assert_eq!(PILLARS.number(edges), None, "{edges:?}");
+        }
+        assert_eq!(PILLARS.corners(12), [(-40, -50), (40, -50), (40, 50), (-40, 50)]);
+    }
+
+    #[test]
+    fn outlines_are_recognised_in_any_order_and_others_are_not() {
+        for number in [1, 5, 60, 121] {
+            let mut corners = PILLARS.corners(number).map(|(x, y)| [x as f64, y as f64]);
+            for _ in 0..4 {
+                corners.rotate_left(1);
+                assert_eq!(PILLARS.recognised(&corners, 1.5), Some(number));
+                let mut back = corners;
+                back.reverse();
+                assert_eq!(PILLARS.recognised(&back, 1.5), Some(number));
+            }
+            corners[0][0] += 3.0;
+            assert_eq!(PILLARS.recognised(&corners, 1.5), None);
+        }
+        // One that stands on a corner, and one between two sizes.
+        let tilted = [[0.0, -50.0], [50.0, 0.0], [0.0, 50.0], [-50.0, 0.0]];
+        let between = [[-45.0, -40.0], [45.0, -40.0], [45.0, 40.0], [-45.0, 40.0]];
+        assert_eq!(PILLARS.recognised(&tilted, 1.5), None);
+        assert_eq!(PILLARS.recognised(&between, 1.5), None);
+    }
+
+    #[test]
+    fn gaps_beside_one_another_between_corners_and_where_pillars_overlap() {
+        // Rounding of a few operations on lengths of hundreds.
+        const ROUNDING: f64 = 1e-12;
+        let [wide, tall] = [PILLARS.number([280, 80]).unwrap(), PILLARS.number([80, 280]).unwrap()];
+        for (numbers, apart, want) in [
+            ([wide, wide], [350.0, 0.0], 70.0),
+            ([wide, wide], [0.0, -350.0], 270.0),
+            ([wide, tall], [350.0, 0.0], 170.0),
+            ([wide, tall], [210.0, 220.0], 50.0),
+            ([tall, tall], [40.0, 0.0], -40.0),
+        ] {
+            let gap = PILLARS.gap(numbers, apart);
+            assert!((gap - want).abs() < ROUNDING, "{numbers:?} {apart:?}: {gap}");
+        }
+        assert_eq!(PILLARS.longest_diagonal_nm(11), 280f64.hypot(80.0));
+        assert_eq!(PILLARS.longest_diagonal_nm(12), 280f64.hypot(100.0));
+    }
+}

@@ -1,0 +1,185 @@
+//! Upright rectangles: what a design of two phases says, and which pillars it has.
+
+use std::path::{Path, PathBuf};
+
+use metalith_cell::{FocusedLight, Polarisation, PolarisationAxis};
+use metalith_core::{Result, Silent, WidthRows};
+use metalith_design::phase::{ElementPhase, LensPhase};
+use metalith_design::{Design, PillarArray};
+
+const NAME: &str = "birefringent_532";
+
+fn path() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../designs/{NAME}.toml"))
+}
+
+fn text() -> String {
+    std::fs::read_to_string(path()).unwrap()
+}
+
+/// The design with parts of its text replaced, each of which it has.
+fn changed(pairs: &[(&str, &str)]) -> Result<Design> {
+    let text = pairs.iter().fold(text(), |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replacen(from, to, 1)
+    });
+    Design::parse(&path(), &text)
+}
+
+/// Each site has the pillar of the library for the phase of light along x and that of light along y at that site.
+#[test]
+fn pillars_are_chosen_by_both_phases() {
+    let design = Design::read(&path()).unwrap();
+    let array = PillarArray::build(&design, &Silent).unwrap();
+    let library = design.mapping.library.as_ref().unwrap();
+    let seen = design.along_y().unwrap();
+    let lenses = [&design, &seen].map(LensPhase::of);
+    let element = array.central().element;
+    let phases = lenses.each_ref().map(|lens| ElementPhase::of(lens, &element));
+    let (map, n) = (array.widths(array.central()), array.lattice.sites());
+    let mut unlike = 0;
+    for (iy, ix) in (0..n * n).map(|k| (k / n, k % n)) {
+        let wanted = phases.each_ref().map(|phase| phase.wrapped(ix, iy));
+        let number = match wanted {
+            [Some(x), Some(y)] => library.number([x, y]),
+            _ => 0,
+        };
+        assert_eq!(map.width_nm[[iy, ix]], number, "{ix} {iy}");
+        unlike += u32::from(number > 0 && wanted[0] != wanted[1]);
+    }
+    assert!(unlike > 30_000, "{unlike}");
+    // An element that is too large to be held is made row by row, with the same pillars.
+    let computed = PillarArray::build_within(&design, 1, &Silent).unwrap();
+    let rows = computed.rows(computed.central());
+    let mut room = Vec::new();
+    for iy in 0..n {
+        assert_eq!(rows.row(iy, 0..n, &mut room), map.width_nm.row(iy).as_slice().unwrap());
+    }
+}
+
+/// Both foci are mirror images, and so are the lenses: light along y sees what light along x sees from the other side.
+#[test]
+fn the_phase_of_light_along_y_is_that_of_its_section() {
+    let design = Design::read(&path()).unwrap();
+    let seen = design.along_y().unwrap();
+    let [x, y] = [&design, &seen].map(LensPhase::of);
+    let element = design.elements()[0];
+    let (x, y) = (ElementPhase::of(&x, &element), ElementPhase::of(&y, &element));
+    let n = design.lattice().sites();
+    for ix in 0..n {
+        assert_eq!(x.turns(ix, n / 2), y.turns(n - 1 - ix, n / 2));
+    }
+    assert!(seen.along_y().is_none());
+    // Without a section of its own, light along y has the phase of light along x.
+    let from = text().find("[phase.y]").unwrap();
+    let to = text().find("[array]").unwrap();
+    let alike = Design::parse(&path(), &(text()[..from].to_owned() + &text()[to..])).unwrap();
+    assert!(alike.along_y().is_none());
+    let array = PillarArray::build(&alike, &Silent).unwrap();
+    let pillars = alike.cell.shape.upright().unwrap();
+    let counts = array.classes[0].widths.histogram();
+    let library = alike.mapping.library.as_ref().unwrap();
+    for (number, _) in counts.iter().enumerate().skip(1).filter(|(_, n)| **n > 0) {
+        let [along_x, along_y] = PolarisationAxis::ALL.map(|axis| library.turns(number as u16, axis).unwrap());
+        let apart = along_x - along_y;
+        // The largest error of the library along both axes (turns).
+        assert!(
+            (apart - apart.round()).abs() < 0.25,
+            "{:?}",
+            pillars.edges_nm(number as u16)
+        );
+    }
+}
+
+#[test]
+fn light_says_which_phase_is_judged() {
+    for (line, axis, arriving) in [
+        ("", PolarisationAxis::X, None),
+        ("polarisation = \"x\"", PolarisationAxis::X, None),
+        (
+            "polarisation = \"y\"",
+            PolarisationAxis::Y,
+            Some(Polarisation::Linear(90.0)),
+        ),
+        (
+            "polarisation = 30",
+            PolarisationAxis::X,
+            Some(Polarisation::Linear(30.0)),
+        ),
+        (
+            "polarisation = \"unpolarised\"",
+            PolarisationAxis::X,
+            Some(Polarisation::Unpolarised),
+        ),
+    ] {
+        let design = changed(&[("fidelity = \"rigorous\"", &format!("fidelity = \"rigorous\"\n{line}"))]).unwrap();
+        assert_eq!(design.focused(), Some(FocusedLight::Linear(axis)), "{line}");
+        assert_eq!(design.verify.light().arriving, arriving, "{line}");
+        let judged = design.as_verified();
+        assert_eq!(
+            judged.lens.terms[0].centre_um[0] > 0.0,
+            axis == PolarisationAxis::X,
+            "{line}"
+        );
+    }
+}
+
+#[test]
+fn what_cannot_be_is_told_with_its_place() {
+    let rigorous = "fidelity = \"rigorous\"";
+    for (from, to, wanted) in [
+        ("library = \"phases/birefringent_532.csv\"", "", "`library`"),
+        ("birefringent_532.csv", "nowhere.csv", "metalith cells DESIGN"),
+        (
+            "width_step_nm = 10",
+            "width_step_nm = 2",
+            "edges of 96 lengths, at most 64",
+        ),
+        (
+            "width_max_nm = 280",
+            "width_max_nm = 270",
+            "280 x 90 nm is no pillar of the design",
+        ),
+        ("width_max_nm = 280", "width_max_nm = 400", "width_max_nm"),
+        (
+            "[mapping] ",
+            "[mapping]\ncoefficients = [0.2, 0.5]\n#",
+            "leave `coefficients` out",
+        ),
+        (
+            rigorous,
+            "fidelity = \"published\"",
+            "rectangular pillars by the `published` cell",
+        ),
+        (
+            rigorous,
+            "fidelity = \"rigorous\"\nanalyser = \"circular\"",
+            "which focus no hand",
+        ),
+        (
+            "shape = \"upright_rectangle\"",
+            "shape = \"square\"",
+            "use `shape = \"upright_rectangle\"`",
+        ),
+    ] {
+        let error = changed(&[(from, to)]).unwrap_err().to_string();
+        assert!(error.contains(wanted), "{from}: {error}");
+    }
+    // Whoever makes the library needs none, and takes none of other sizes.
+    let missing = text().replace("birefringent_532.csv", "nowhere.csv");
+    assert!(
+        Design::parse_without_library(&path(), &missing)
+            .unwrap()
+            .mapping
+            .library
+            .is_none()
+    );
+    let other = text().replace("width_max_nm = 280", "width_max_nm = 270");
+    assert!(
+        Design::parse_without_library(&path(), &other)
+            .unwrap()
+            .mapping
+            .library
+            .is_none()
+    );
+}
