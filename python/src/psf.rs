@@ -345,7 +345,7 @@ pub fn psf_of_widths<'py>(
             (_, Some(Rectangles::Rotated(pillars))) => Box::new(RotatedCell::new(stack, pillars, focused(light))),
             (_, Some(Rectangles::Upright(pillars))) => {
                 let axis = light.arriving.map_or(PolarisationAxis::X, PolarisationAxis::nearest);
-                Box::new(UprightCell::new(stack, pillars, axis))
+                Box::new(UprightCell::new(stack, pillars, axis).kept_in(cache_folder().as_deref()))
             }
             (Fidelity::Published, None) => Box::new(PublishedCell::new(pitch_nm)),
             (Fidelity::Neighbours, None) => {

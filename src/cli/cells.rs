@@ -174,7 +174,8 @@ fn rotations(args: &CellsArgs, design: &Design, folder: &Path, terminal: &Termin
 
 /// The study of a design of upright rectangles, and their library.
 fn library(args: &CellsArgs, design: &Design, folder: &Path, terminal: &Terminal) -> Result<Outcome> {
-    let study = LibraryStudy::new(design, terminal)?;
+    let cache = args.cache.clone().or_else(cache_folder);
+    let study = LibraryStudy::new(design, cache.as_deref(), terminal)?;
     terminal.clear();
     let _turn = terminal.turn_at(folder)?;
     write_library_report(&study, folder)?;

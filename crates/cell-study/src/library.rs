@@ -31,11 +31,11 @@ pub struct LibraryStudy {
 }
 
 impl LibraryStudy {
-    /// Solve the cell of a design.
+    /// Solve the cell of a design, or read it from the folder `cache`.
     ///
     /// # Errors
     /// If the pillars are no upright rectangles, the cell cannot be solved, or the user stopped it.
-    pub fn new(design: &Design, progress: &dyn Progress) -> Result<Self> {
+    pub fn new(design: &Design, cache: Option<&Path>, progress: &dyn Progress) -> Result<Self> {
         let pillars = design.cell.shape.upright().ok_or_else(|| {
             Error::invalid(
                 format!("the pillars of {} are {}", design.name, design.cell.shape.plural()),
@@ -45,7 +45,8 @@ impl LibraryStudy {
         let wavelength_um = design.mapping.wavelength_um;
         let stack = design.cell_stack()?;
         let full = stack.full_transmission(wavelength_um)?;
-        let along = UprightCell::new(stack, pillars, PolarisationAxis::X).along(wavelength_um, progress)?;
+        let cell = UprightCell::new(stack, pillars, PolarisationAxis::X).kept_in(cache);
+        let along = cell.along(wavelength_um, progress)?;
         let library = PillarLibrary::of_cell(pillars, &along, full)?;
         let of_x = |number: u16| along[0][usize::from(number)] / full;
         Ok(Self {

@@ -133,7 +133,8 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
                     return Ok(Box::new(RotatedCell::new(design.cell_stack()?, pillars, arriving)));
                 }
                 Some(Rectangles::Upright(pillars)) => {
-                    return Ok(Box::new(UprightCell::new(design.cell_stack()?, pillars, design.axis())));
+                    let cell = UprightCell::new(design.cell_stack()?, pillars, design.axis());
+                    return Ok(Box::new(cell.kept_in(cache_folder().as_deref())));
                 }
                 None => {}
             }

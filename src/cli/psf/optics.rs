@@ -216,7 +216,8 @@ impl PsfArgs {
                 return Ok(Box::new(RotatedCell::new(stack, pillars, hand)));
             }
             (Some(Rectangles::Upright(pillars)), FocusedLight::Linear(axis)) => {
-                return Ok(Box::new(UprightCell::new(stack, pillars, axis)));
+                let cell = UprightCell::new(stack, pillars, axis);
+                return Ok(Box::new(cell.kept_in(cache_folder().as_deref())));
             }
             _ => {}
         }

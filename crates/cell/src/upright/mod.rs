@@ -1,6 +1,9 @@
 //! The rigorous cell of upright rectangular pillars of many sizes.
 
+mod kept;
+
 use std::collections::HashMap;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use num_complex::Complex64;
@@ -9,8 +12,8 @@ use rayon::prelude::*;
 use metalith_core::{Error, Progress, Result, Silent, UprightRectangles};
 use metalith_rcwa::{Incidence, Orders, Outline, Side, solve};
 
-use super::pointwise::BAND_ORDERS;
-use super::{AxisTables, CellModel, CellStack, Fidelity, ObliqueTables, PolarisationAxis, PolarisedTables};
+use crate::pointwise::BAND_ORDERS;
+use crate::{AxisTables, CellModel, CellStack, Fidelity, ObliqueTables, PolarisationAxis, PolarisedTables};
 
 /// Diffraction orders along an axis of upright rectangles: the longer edge asks for more than squares do.
 pub const UPRIGHT_ORDERS: usize = 25;
@@ -23,6 +26,8 @@ pub struct UprightCell {
     stack: CellStack,
     pillars: UprightRectangles,
     focused: PolarisationAxis,
+    /// Where what is solved for single wavelengths is kept.
+    folder: Option<PathBuf>,
     /// Along both axes, by wavelength, and whether it is one of a band.
     solved: Mutex<HashMap<(u64, bool), Arc<Along>>>,
 }
@@ -67,8 +72,16 @@ impl UprightCell {
             stack,
             pillars,
             focused,
+            folder: None,
             solved: Mutex::default(),
         }
+    }
+
+    /// The same, whose answers for single wavelengths are kept in a folder from one run to the next.
+    #[must_use]
+    pub fn kept_in(mut self, folder: Option<&Path>) -> Self {
+        self.folder = folder.map(Path::to_owned);
+        self
     }
 
     /// Transmissions of all pillars at a wavelength (um), with progress told of the pillars that are solved.
@@ -76,7 +89,20 @@ impl UprightCell {
     /// # Errors
     /// As [`CellStack::birefringent`]; also if the user stopped it.
     pub fn along(&self, wavelength_um: f64, progress: &dyn Progress) -> Result<Along> {
-        self.solve(wavelength_um, Orders::new(UPRIGHT_ORDERS)?, progress)
+        let table = kept::table(
+            self.folder.as_deref(),
+            &self.stack,
+            self.pillars,
+            wavelength_um,
+            UPRIGHT_ORDERS,
+        );
+        let decode = |content: &[u8]| kept::decode(content, usize::from(self.pillars.count()));
+        if let Some(along) = table.read(decode, progress) {
+            return Ok(along);
+        }
+        let along = self.solve(wavelength_um, Orders::new(UPRIGHT_ORDERS)?, progress)?;
+        table.write(&kept::encode(&along), progress);
+        Ok(along)
     }
 
     fn solved(&self, wavelength_um: f64, of_band: bool) -> Result<Arc<Along>> {
@@ -85,8 +111,10 @@ impl UprightCell {
         if let Some(solved) = known().get(&key) {
             return Ok(Arc::clone(solved));
         }
-        let orders = Orders::new(if of_band { BAND_ORDERS } else { UPRIGHT_ORDERS })?;
-        let solved = Arc::new(self.solve(wavelength_um, orders, &Silent)?);
+        let solved = Arc::new(match of_band {
+            true => self.solve(wavelength_um, Orders::new(BAND_ORDERS)?, &Silent)?,
+            false => self.along(wavelength_um, &Silent)?,
+        });
         known().insert(key, Arc::clone(&solved));
         Ok(solved)
     }
@@ -158,7 +186,7 @@ impl CellModel for UprightCell {
     }
 
     fn oblique(&self, _wavelength_um: f64, _sines: [f64; 2], _last: u16) -> Result<Option<ObliqueTables>> {
-        Err(super::rectangle::oblique_refused())
+        Err(crate::rectangle::oblique_refused())
     }
 
     fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {
@@ -168,9 +196,9 @@ impl CellModel for UprightCell {
 
 #[cfg(test)]
 mod tests {
-    use super::super::rectangle::tests::titania;
-    use super::super::{RotatedRectangle, dark};
     use super::*;
+    use crate::rectangle::tests::titania;
+    use crate::{RotatedRectangle, dark};
 
     const PILLARS: UprightRectangles = UprightRectangles {
         shortest_nm: 100,
@@ -239,5 +267,34 @@ mod tests {
         }
         let error = titania().birefringent([100.0, -1.0], 0.532, Orders::new(3).unwrap());
         assert!(error.unwrap_err().to_string().contains("100 x -1 nm"));
+    }
+
+    /// A table that is kept is read again, to the bit; one that is damaged or of another stack is not.
+    #[test]
+    fn what_is_solved_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let cell =
+            |stack: CellStack| UprightCell::new(stack, PILLARS, PolarisationAxis::X).kept_in(Some(folder.path()));
+        let files = || {
+            std::fs::read_dir(folder.path())
+                .unwrap()
+                .map(|f| f.unwrap().path())
+                .collect::<Vec<_>>()
+        };
+        let first = cell(titania()).along(0.532, &Silent).unwrap();
+        let [file] = &files()[..] else { panic!("{:?}", files()) };
+        let written = std::fs::metadata(file).unwrap().modified().unwrap();
+        assert_eq!(cell(titania()).along(0.532, &Silent).unwrap(), first);
+        assert_eq!(std::fs::metadata(file).unwrap().modified().unwrap(), written);
+        let mut bytes = std::fs::read(file).unwrap();
+        bytes[200] ^= 1;
+        std::fs::write(file, bytes).unwrap();
+        assert_eq!(cell(titania()).along(0.532, &Silent).unwrap(), first);
+        let lower = CellStack {
+            height_nm: 300.0,
+            ..titania()
+        };
+        assert_ne!(cell(lower).along(0.532, &Silent).unwrap(), first);
+        assert_eq!(files().len(), 2);
     }
 }
