@@ -1,12 +1,18 @@
 //! What has been said of an outline, remembered for its copies elsewhere.
 
-use super::shape::Point;
+use super::shape::{Outline, Point};
 
 /// Outlines that are remembered at a time, a power of two: a lens of rectangles has some hundred.
 const PLACES: usize = 1 << 12;
 
 /// Places that an outline may have, side by side.
 const WAYS: usize = 4;
+
+/// Outlines with numbers that are remembered: those with higher ones are told by their corners.
+const NUMBERED: usize = 1 << 12;
+
+/// Orientations that an outline may be asked about in.
+const ORIENTATIONS: usize = 8;
 
 /// Odd numbers without pattern, which spread outlines that differ by little.
 const SPREAD: [u64; 3] = [0x9E37_79B9_7F4A_7C15, 0xC2B2_AE3D_27D4_EB4F, 0x1656_67B1_9E37_79F9];
@@ -16,20 +22,40 @@ type Key = ([u64; 3], u8);
 
 /// Answers about closed outlines of four corners that hold wherever these stand: each distinct outline is asked about once, but
 /// for those that others have taken the place of. Memory and time are bounded, whatever the outlines are.
+///
+/// Outlines with numbers are of one layout.
 pub(super) struct OutlineMemo<T> {
     places: Vec<Option<(Key, T)>>,
+    /// Answers about outlines with numbers, by these and by orientation.
+    numbered: Vec<[Option<T>; ORIENTATIONS]>,
 }
 
 impl<T> Default for OutlineMemo<T> {
     fn default() -> Self {
-        Self { places: Vec::new() }
+        Self {
+            places: Vec::new(),
+            numbered: Vec::new(),
+        }
     }
 }
 
 impl<T: Copy> OutlineMemo<T> {
     /// The answer about an outline in an orientation, by `ask` if it is not remembered.
     #[inline]
-    pub fn of(&mut self, points: &[Point], orientation: u8, ask: impl FnOnce() -> T) -> T {
+    pub fn of(&mut self, outline: Outline<'_>, orientation: u8, ask: impl FnOnce() -> T) -> T {
+        let number = match outline.number {
+            Some(number) if (number as usize) < NUMBERED => number as usize,
+            _ => return self.by_corners(outline.points, orientation, ask),
+        };
+        if number >= self.numbered.len() {
+            self.numbered.resize(number + 1, [None; ORIENTATIONS]);
+        }
+        *self.numbered[number][usize::from(orientation) % ORIENTATIONS].get_or_insert_with(ask)
+    }
+
+    /// The same of one without a number.
+    #[inline]
+    fn by_corners(&mut self, points: &[Point], orientation: u8, ask: impl FnOnce() -> T) -> T {
         let Some(key) = key(points, orientation) else {
             return ask();
         };
@@ -87,11 +113,11 @@ mod tests {
     fn an_outline_is_asked_about_once_for_each_orientation_wherever_it_stands() {
         let mut memo = OutlineMemo::default();
         let rhombus = |at| outline(at, [(0, 0), (50, 10), (60, 90), (10, 80)]);
-        assert_eq!(memo.of(&rhombus((0, 0)), 0, || 1), 1);
-        assert_eq!(memo.of(&rhombus((-7_000_000, 350)), 0, || 2), 1);
-        assert_eq!(memo.of(&rhombus((0, 0)), 3, || 3), 3);
+        assert_eq!(memo.of(Outline::new(&rhombus((0, 0))), 0, || 1), 1);
+        assert_eq!(memo.of(Outline::new(&rhombus((-7_000_000, 350))), 0, || 2), 1);
+        assert_eq!(memo.of(Outline::new(&rhombus((0, 0))), 3, || 3), 3);
         let other = outline((0, 0), [(0, 0), (50, 10), (60, 90), (10, 81)]);
-        assert_eq!(memo.of(&other, 0, || 4), 4);
+        assert_eq!(memo.of(Outline::new(&other), 0, || 4), 4);
     }
 
     #[test]
@@ -100,8 +126,8 @@ mod tests {
         let open = &outline((0, 0), [(0, 0), (9, 0), (9, 9), (0, 9)])[..4];
         let far = outline((0, 0), [(i64::MIN, 0), (9, 0), (i64::MAX, 9), (0, 9)]);
         for points in [open, &far, &[]] {
-            assert_eq!(memo.of(points, 0, || 1), 1);
-            assert_eq!(memo.of(points, 0, || 2), 2);
+            assert_eq!(memo.of(Outline::new(points), 0, || 1), 1);
+            assert_eq!(memo.of(Outline::new(points), 0, || 2), 2);
         }
     }
 
@@ -111,8 +137,27 @@ mod tests {
         for round in 0..2 {
             for k in 0..3 * PLACES as i64 {
                 let own = outline((k, -k), [(0, 0), (k + 1, 0), (k + 1, 9), (0, 9)]);
-                assert_eq!(memo.of(&own, 0, || k), k, "round {round}");
+                assert_eq!(memo.of(Outline::new(&own), 0, || k), k, "round {round}");
             }
         }
+    }
+
+    #[test]
+    fn outlines_with_numbers_are_told_by_these_and_by_their_orientation() {
+        let mut memo = OutlineMemo::default();
+        let points = outline((0, 0), [(0, 0), (50, 10), (60, 90), (10, 80)]);
+        let numbered = |number| Outline::new(&points).numbered(number);
+        let far = NUMBERED as u32 + 7;
+        for number in [5, 0, NUMBERED as u32 - 1] {
+            for orientation in 0..8 {
+                let answer = u32::from(orientation) + 8 * number;
+                assert_eq!(memo.of(numbered(number), orientation, || answer), answer);
+                assert_eq!(memo.of(numbered(number), orientation, || far), answer);
+            }
+        }
+        // Beyond what is remembered by number, corners tell.
+        assert_eq!(memo.of(numbered(far), 0, || far), far);
+        assert_eq!(memo.of(numbered(far + 1), 0, || 0), far);
+        assert!(memo.numbered.len() <= NUMBERED);
     }
 }

@@ -60,7 +60,7 @@ pub struct PillarFinder {
 }
 
 impl PillarFinder {
-    /// Of a layout whose database unit is so long (nm).
+    /// Of one layout, whose database unit is so long (nm).
     pub fn new(shape: PillarShape, unit_nm: f64) -> Self {
         Self {
             shape,
@@ -93,7 +93,7 @@ impl PillarFinder {
         };
         let from_first = self
             .known
-            .of(outline.points, orientation, || ask().map(|pillar| moved(pillar, back)));
+            .of(outline, orientation, || ask().map(|pillar| moved(pillar, back)));
         from_first.map(|pillar| moved(pillar, first))
     }
 }

@@ -1,6 +1,6 @@
 //! What stands on a layer.
 
-use super::transform::Transform;
+use super::transform::{Transform, turned};
 use metalith_core::{LayerNumber, PillarShape};
 
 /// By how much a corner of a circle or a rectangle may be off its place, in database units or in nanometres, whichever is more:
@@ -20,6 +20,7 @@ pub struct Point {
 }
 
 impl Point {
+    #[inline]
     pub fn new(x: i64, y: i64) -> Self {
         Self { x, y }
     }
@@ -74,6 +75,7 @@ impl Rect {
     }
 
     /// The same, farther by a step.
+    #[inline]
     pub(super) fn moved(&self, by: Point) -> Self {
         Self {
             x0: self.x0 + by.x,
@@ -108,6 +110,8 @@ pub struct Outline<'a> {
     pub(super) points: &'a [Point],
     /// What takes them into the cell, exactly.
     pub(super) at: Transform,
+    /// The number of these points in the layout, if they are of a cell that is placed shape by shape: all copies have it.
+    pub(super) number: Option<u32>,
 }
 
 impl<'a> Outline<'a> {
@@ -119,7 +123,20 @@ impl<'a> Outline<'a> {
     /// Of points that are turned by quarters, mirrored and moved.
     pub(super) fn at(points: &'a [Point], at: Transform) -> Self {
         debug_assert!(at.is_square());
-        Self { points, at }
+        Self {
+            points,
+            at,
+            number: None,
+        }
+    }
+
+    /// The same, whose points have this number in the layout.
+    #[inline]
+    pub(super) fn numbered(self, number: u32) -> Self {
+        Self {
+            number: Some(number),
+            ..self
+        }
     }
 
     /// The number of points.
@@ -142,12 +159,12 @@ impl<'a> Outline<'a> {
         self.points().map(|p| placement.apply(p)).collect()
     }
 
-    /// A number for how its points come to be turned as a placement has them, if only by quarters and mirrors.
+    /// How its points are turned as a placement has them, as the orientation of a [`Transform`], if only by quarters and mirrors.
     #[inline]
     pub(super) fn orientation(self, placement: &Transform) -> Option<u8> {
         match (self.at, *placement) {
             (Transform::Square { orientation: own, .. }, Transform::Square { orientation, .. }) => {
-                Some(8 * (own & 7) + (orientation & 7))
+                Some(turned(orientation, own))
             }
             _ => None,
         }

@@ -135,14 +135,8 @@ impl Transform {
         ) = (*self, *inner)
         {
             let (x, y) = turn(orientation, x, y);
-            // Mirror first: turns of the inner transform change direction under a mirror of the outer.
-            let turns = if orientation & 4 == 0 {
-                (orientation & 3) + (o & 3)
-            } else {
-                (orientation & 3) + 4 - (o & 3)
-            };
             return Some(Self::Square {
-                orientation: turns % 4 + ((orientation ^ o) & 4),
+                orientation: turned(orientation, o),
                 dx: x + dx,
                 dy: y + dy,
             });
@@ -199,6 +193,18 @@ fn turn(orientation: u8, x: i64, y: i64) -> (i64, i64) {
         2 => (-x, -y),
         _ => (y, -x),
     }
+}
+
+/// The orientation of what is placed by `inner`, then by `outer`.
+#[inline]
+pub(super) fn turned(outer: u8, inner: u8) -> u8 {
+    // Mirror first: turns of the inner transform change direction under a mirror of the outer.
+    let turns = if outer & 4 == 0 {
+        (outer & 3) + (inner & 3)
+    } else {
+        (outer & 3) + 4 - (inner & 3)
+    };
+    turns % 4 + ((outer ^ inner) & 4)
 }
 
 fn held(value: f64) -> i64 {

@@ -119,15 +119,18 @@ impl Layout {
     /// Decode the cells that are placed shape by shape.
     fn inline_shapes(&self, input: &mut CellInput, counts: &[u64]) -> Result<Vec<Vec<InlineShape>>> {
         let mut small = vec![Vec::new(); self.cells().len()];
+        let mut numbered = 0;
         let mut walk = Walk::new(self.limits(), &Silent);
         for (index, cell) in self.cells().iter().enumerate() {
             if cell.inline && counts[index] > 0 {
                 let mut keep = Keep {
                     shapes: Vec::new(),
                     unit_nm: self.unit_nm(),
+                    numbered,
                 };
                 input.seek(cell)?;
                 walk.cell(input, &mut keep)?;
+                numbered = keep.numbered;
                 small[index] = keep.shapes;
             }
         }
@@ -143,10 +146,12 @@ struct InlineShape {
     points: Vec<Point>,
     rect: Option<Rect>,
     circle: Option<Rect>,
+    /// Of all such shapes of the layout.
+    number: u32,
 }
 
 impl InlineShape {
-    fn new(kind: ShapeKind, layer: LayerNumber, points: Vec<Point>, unit_nm: f64) -> Self {
+    fn new(kind: ShapeKind, layer: LayerNumber, points: Vec<Point>, unit_nm: f64, number: u32) -> Self {
         let (rect, circle) = (rectangle_of(&points), circle_of(&points, unit_nm));
         Self {
             kind,
@@ -154,6 +159,7 @@ impl InlineShape {
             points,
             rect,
             circle,
+            number,
         }
     }
 }
@@ -161,11 +167,15 @@ impl InlineShape {
 struct Keep {
     shapes: Vec<InlineShape>,
     unit_nm: f64,
+    /// The number of the next one.
+    numbered: u32,
 }
 
 impl Keep {
     fn keep(&mut self, kind: ShapeKind, layer: LayerNumber, points: Vec<Point>) {
-        self.shapes.push(InlineShape::new(kind, layer, points, self.unit_nm));
+        self.shapes
+            .push(InlineShape::new(kind, layer, points, self.unit_nm, self.numbered));
+        self.numbered += 1;
     }
 }
 
@@ -252,14 +262,14 @@ impl<V: Visitor> Spread<'_, V> {
             let mut shape = Shape {
                 kind: kept.kind,
                 layer: kept.layer,
-                outline: Outline::new(&kept.points),
+                outline: Outline::new(&kept.points).numbered(kept.number),
                 rect: kept.rect,
                 circle: kept.circle,
                 offset,
             };
             // Rounding happens once, at the end of the chain: only exact transforms are applied here.
             if own.is_square() {
-                shape.outline = Outline::at(&kept.points, own);
+                shape.outline = Outline::at(&kept.points, own).numbered(kept.number);
                 shape.rect = kept.rect.and_then(|r| own.apply_rect(&r));
                 shape.circle = kept.circle.and_then(|r| own.apply_rect(&r));
                 self.visitor.shape(&shape, self.placements)?;

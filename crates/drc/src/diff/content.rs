@@ -293,9 +293,17 @@ impl Visitor for ContentReader<'_> {
                 }
             }
             _ => {
-                *self.counts.entry(shape.layer).or_default() += placements.len() as u64;
+                let mut put = 0;
+                if shape.layer == self.pillars {
+                    self.pillar_shapes += placements.len() as u64;
+                    if self.shape.rectangles().is_some() {
+                        put = self.filler.put_copies(&mut self.finder, shape.outline, placements);
+                    }
+                } else {
+                    *self.counts.entry(shape.layer).or_default() += placements.len() as u64;
+                }
                 self.placed(shape.outline.len(), placements.len())?;
-                for (k, placement) in placements.iter().enumerate() {
+                for (k, placement) in placements.iter().enumerate().skip(put) {
                     self.outline(shape, placement, k)?;
                 }
             }

@@ -1,5 +1,7 @@
 //! Pillars onto the sites of elements.
 
+mod copies;
+
 use std::collections::HashMap;
 
 use super::MOST_SITES;
@@ -22,6 +24,8 @@ pub struct Filler {
     guesses: Vec<u32>,
     /// Placements of the current cell about the middles of elements, if all of them are.
     orbits: Vec<Orbit>,
+    /// The element about whose middle the second placement of the current cell is the first, turned by half a turn.
+    half_turn: Option<u32>,
     /// The first placement that these were found with.
     first: Transform,
     pillars: u64,
@@ -51,6 +55,7 @@ impl Filler {
             elements: sites.into_iter().map(empty).collect(),
             guesses: Vec::new(),
             orbits: Vec::new(),
+            half_turn: None,
             first: Transform::IDENTITY,
             pillars: 0,
             held: 0,
@@ -105,6 +110,7 @@ impl Filler {
         for k in 0..self.orbits.len() {
             self.hold_eighth(self.orbits[k].element);
         }
+        self.half_turn = self.half_turn_of(placements);
         self.first = placements.first().copied().unwrap_or(Transform::IDENTITY);
     }
 
@@ -247,6 +253,13 @@ impl Filler {
         let Some(number) = pillar.number else {
             return self.put(&pillar.around, placement, takes);
         };
+        let (element, row, column) = self.site_of_drawn(pillar, placement)?;
+        self.fill(element, row, column, number)
+    }
+
+    /// Element, row and column of a pillar that is told by its corners.
+    #[inline]
+    fn site_of_drawn(&mut self, pillar: &DrawnPillar, placement: usize) -> Result<(u32, usize, usize), Why> {
         let r = &pillar.around;
         if !self.scale.reaches(r) {
             return Err(Why::OutsideElements);
@@ -255,8 +268,7 @@ impl Filler {
         let mut guess = self.guesses[placement];
         let site = self.site(r, widest_nm, &mut guess);
         self.guesses[placement] = guess;
-        let (element, row, column) = site?;
-        self.fill(element, row, column, number)
+        site
     }
 
     /// Put a pillar on a free site.

@@ -29,6 +29,9 @@ impl Scale {
     /// A length in whole nanometres, rounded up.
     #[inline]
     pub fn at_least_nm(self, value: i64) -> i64 {
+        if self.den == 1 {
+            return value * self.num;
+        }
         (value * self.num + self.den - 1).div_euclid(self.den)
     }
 

@@ -88,7 +88,7 @@ impl Sizes {
         };
         // Edges are as long wherever the outline stands.
         let seen = match magnification {
-            1.0 => self.known.of(points, 0, see),
+            1.0 => self.known.of(shape.outline, 0, see),
             _ => see(),
         }?;
         self.rectangles += copies;
