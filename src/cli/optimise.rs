@@ -173,6 +173,14 @@ fn findings(
     write_pillars(&alone, &array, Hierarchy::Folded, &layout, terminal)?;
     let read = read_pillars(&alone, &layout, terminal)?;
     after.push(task.judge_layout(&read.elements[0].widths, cells.judge())?);
+    let as_verified = match cells.own().rotated() {
+        Some(cell) => {
+            let single = &design.verify.wavelengths_um;
+            let strehl = task.lens.strehl_of_layout(&read.elements[0].widths, cell, single)?;
+            single.iter().copied().zip(strehl.ratio).collect()
+        }
+        None => Vec::new(),
+    };
     let limits = [0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5];
     let over_limit = task.merit_over_limit(&cells.all(), &found.turns, &limits, terminal)?;
     let reference_widths = task.widths_nm(&task.reference_turns);
@@ -194,10 +202,12 @@ fn findings(
         command: command(args),
         start: found.start.into(),
         merit: found.merit,
+        rotation_step_deg: design.cell.shape.rotated().map(metalith::RotatedRectangles::step_deg),
         step_limit_turns: task.limit().turns(),
         before,
         own,
         after,
+        as_verified,
         merit_over_limit: over_limit,
         expected_psnr_db: expected_images(task, cells, &reference_widths, &found.widths_nm, terminal)?,
         with_errors,
@@ -288,6 +298,13 @@ fn summary(findings: &OptimiseReport) {
                 judged.largest_step_turns,
             );
         }
+    }
+    for (um, strehl) in &findings.as_verified {
+        print_line!(
+            "after, layout at {} nm, solved as for `run`: Strehl {}",
+            sig(um * 1e3, 5),
+            sig(*strehl, 3)
+        );
     }
     for (angle, before, after) in &findings.expected_psnr_db {
         print_line!("expected PSNR at {angle} degrees: {before:.2} dB before, {after:.2} dB after");

@@ -87,8 +87,8 @@ impl CellStack {
         if self.shape.rectangles().is_some() {
             return Err(Error::invalid(
                 "rectangular pillars, where those of a width are asked for",
-                "use squares or circles here: `optimise`, `photographs`, compensation, models of a calibration and studies know no \
-                 rectangles; the other commands do",
+                "use squares or circles here: `photographs`, compensation, models of a calibration and studies know no rectangles; the other \
+                 commands do",
             ));
         }
         self.layers_of(wavelength_um, |wider_nm| self.outline((width_nm + wider_nm).max(0.0)))

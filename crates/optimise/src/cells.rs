@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use metalith_cell::{CellModel, Fidelity, RigorousCell};
+use metalith_cell::{CellModel, Fidelity, RigorousCell, RotatedCell};
 use metalith_core::{Error, Progress, Result};
 use metalith_design::{Design, NeighbourCell, cell_models, neighbour_cell};
+use num_complex::Complex64;
 
 use crate::robust::cells_off_height;
 
@@ -28,6 +29,20 @@ impl TaskCells {
                 RigorousCell::obtain(&design.table_spec()?, cache, progress)?.0,
             ))
         };
+        if design.cell.shape.upright().is_some() {
+            return Err(Error::invalid(
+                "optimise and upright rectangles, which have a phase for each polarisation",
+                "use squares, circles or rotated rectangles: it finds one phase for all light",
+            ));
+        }
+        if let Some(pillars) = design.cell.shape.rotated() {
+            let arriving = design.cell.arriving.unwrap_or_default();
+            return Ok(Self {
+                own: Box::new(RotationBand(RotatedCell::new(design.cell_stack()?, pillars, arriving))),
+                judge: None,
+                off_height: Vec::new(),
+            });
+        }
         let fidelity = design.optimise.fidelity;
         let own = match fidelity {
             Fidelity::Rigorous => rigorous()?,
@@ -66,6 +81,28 @@ impl TaskCells {
     pub fn all(&self) -> Vec<&dyn CellModel> {
         let off_height = self.off_height.iter().map(|c| c as &dyn CellModel);
         std::iter::once(self.own()).chain(off_height).collect()
+    }
+}
+
+/// Rotated rectangles at the many wavelengths of a band, each solved as one of them: the light that they convert, by the number of
+/// the rotation.
+struct RotationBand(RotatedCell);
+
+impl CellModel for RotationBand {
+    fn fidelity(&self) -> Fidelity {
+        self.0.fidelity()
+    }
+
+    fn transmissions(&self, wavelength_um: f64, most: u16) -> Result<Vec<Complex64>> {
+        self.0.transmissions_in_band(wavelength_um, most)
+    }
+
+    fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {
+        self.0.full_transmission(wavelength_um)
+    }
+
+    fn rotated(&self) -> Option<&RotatedCell> {
+        Some(&self.0)
     }
 }
 

@@ -20,6 +20,10 @@ const BY_UNLIKE_NEIGHBOURS: &str = "Merit and Strehl ratios of the cell `neighbo
      `metalith run` does by default for the cell of the paper, and pictures the mean of each ring; Strehl ratios of the cell `rigorous` take \
      it for one of a lattice of equal pillars.";
 
+const BY_CONVERTED_LIGHT: &str = "Merit and figures are of the light that the rectangles convert of the hand that is focused, each taken for \
+     one of a lattice of pillars that are all rotated alike, with as many diffraction orders as one of many wavelengths takes. `metalith run` \
+     solves its wavelengths with more orders, counts what is not converted too, and simulates the `polarisation` of [verify].";
+
 /// All that is reported.
 #[derive(Clone, Debug, Serialize)]
 pub struct OptimiseReport {
@@ -31,6 +35,9 @@ pub struct OptimiseReport {
     pub start: String,
     /// Merit, as optimised.
     pub merit: f64,
+    /// Steps of the rotation (degrees), of rotated rectangles: what is told of widths is then told of rotations, by their number.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rotation_step_deg: Option<f64>,
     /// Limit on the step (turns).
     pub step_limit_turns: f64,
     /// What gains are counted from, judged in each way: the design's own phase, or where that is a table, a hyperbolic one.
@@ -40,6 +47,10 @@ pub struct OptimiseReport {
     pub own: Vec<Judged>,
     /// The optimised phase.
     pub after: Vec<Judged>,
+    /// Wavelengths of `[verify]` (um) and Strehl ratios of the layout there by the cell as it judges single wavelengths, where that
+    /// of a band is solved with fewer orders.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub as_verified: Vec<(f64, f64)>,
     /// Geometric-mean Strehl ratio that exchange reaches for other limits (turns).
     pub merit_over_limit: Vec<(f64, f64)>,
     /// Expected PSNR of restored images (dB) at each field angle (degrees), before and after.
@@ -77,8 +88,11 @@ impl OptimiseReport {
         ]
     }
 
-    /// Whether pillars were taken for equals of their neighbours, in words for people.
+    /// Whether pillars were taken for equals of their neighbours, and what counts of light that they change, in words for people.
     pub fn neighbours(&self) -> &'static str {
+        if self.rotation_step_deg.is_some() {
+            return BY_CONVERTED_LIGHT;
+        }
         let unlike = self.after.iter().any(|j| j.fidelity == Fidelity::Neighbours);
         if unlike {
             BY_UNLIKE_NEIGHBOURS
@@ -124,12 +138,25 @@ impl OptimiseReport {
              passing all its power in the zero order with the perfect phase.",
         );
         page.table(self.table());
+        if !self.as_verified.is_empty() {
+            let each = self.as_verified.iter();
+            let words: Vec<String> = each
+                .map(|(um, s)| format!("{} at {} nm", sig(*s, 3), sig(um * 1e3, 5)))
+                .collect();
+            page.paragraph(format!(
+                "The layout at single wavelengths, each solved with as many orders as for `metalith run`: {}.",
+                words.join(", ")
+            ));
+        }
         page.figure(self.strehl());
         page.section("PSF over wavelength");
         page.row(self.psfs());
         page.section("MTF over wavelength");
         page.figure(self.mtfs());
-        page.section("Phase and width");
+        page.section(match self.rotation_step_deg {
+            None => "Phase and width",
+            Some(_) => "Phase and rotation",
+        });
         page.figure(self.phase());
         page.figure(self.width());
         self.rest(&mut page);
@@ -305,13 +332,23 @@ impl OptimiseReport {
     }
 
     fn width(&self) -> metalith_report::Figure {
-        let mut chart = Chart::new(
-            "Pillar width",
-            Axis::linear("radius", "um"),
-            Axis::linear("width", "nm"),
-        );
-        chart.points("after", self.rings.iter().map(|&(r, _, _, w)| (r, f64::from(w))));
-        chart.caption("Width of the pillars of each ring.")
+        let (title, axis, each, caption) = match self.rotation_step_deg {
+            None => (
+                "Pillar width",
+                Axis::linear("width", "nm"),
+                1.0,
+                "Width of the pillars of each ring.",
+            ),
+            Some(step_deg) => (
+                "Pillar rotation",
+                Axis::linear("rotation", "deg"),
+                step_deg,
+                "Rotation of the pillars of each ring, from x towards y, before corners are rounded to the grid.",
+            ),
+        };
+        let mut chart = Chart::new(title, Axis::linear("radius", "um"), axis);
+        chart.points("after", self.rings.iter().map(|&(r, _, _, w)| (r, each * f64::from(w))));
+        chart.caption(caption)
     }
 }
 

@@ -184,6 +184,7 @@ impl OptimiseSpec {
                 .map_or(if images { 8192 } else { default.memory_mb }, |m| m as u64),
         };
         spec.check_neighbours(s, cell);
+        spec.check_rotations(s, cell);
         s.finish();
         spec
     }
@@ -214,6 +215,51 @@ impl OptimiseSpec {
                     "use `exchange` for `log` and `sum` without [optimise.robust], or the cell `rigorous`",
                 );
             }
+        }
+    }
+
+    /// Rotated rectangles have one size, and their number does not go on from the last rotation to the first as widths do: a ring
+    /// takes one of them, and no slope or error of a width is known.
+    fn check_rotations(&self, s: &Section<'_, '_>, cell: &CellSpec) {
+        if cell.shape.rectangles().is_none() {
+            return;
+        }
+        if matches!(self.fidelity, Fidelity::Fitted | Fidelity::Published) {
+            s.fault_given(
+                &["cell.shape"],
+                "cell",
+                format!("rectangular pillars by the `{}` cell", self.fidelity),
+                "use the cell `rigorous`",
+            );
+        }
+        if matches!(self.solver, SolverSpec::Adam { .. }) {
+            s.fault_given(
+                &["cell.shape"],
+                "solver",
+                "slopes of the number of a rotation, which begins anew after the last one",
+                "use `exchange`, which takes one of the rotations for each ring",
+            );
+        }
+        if self.merit.deconvolution != 0.0 {
+            s.fault_given(
+                &["cell.shape"],
+                "merit",
+                "the merit `deconvolution` of rotated rectangles: the light that they do not convert is in no image of it",
+                "give weights to `log`, `sum` or `side_lobes`",
+            );
+        }
+        if self
+            .robust
+            .as_ref()
+            .is_some_and(|r| r.width_bias_nm != 0.0 || r.height != 0.0)
+        {
+            s.fault_given(
+                &["cell.shape"],
+                "robust",
+                "errors of the width and height of rotated rectangles",
+                "set `width_bias_nm = 0` and `height_percent = 0` in [optimise.robust]: of rectangles the gap alone is drawn; `metalith \
+                 study` judges a chip by the others",
+            );
         }
     }
 
