@@ -1,8 +1,8 @@
 """CPU time of layouts, rules and differences by the shape of pillars: `cost_by_shape.py METALITH FOLDER`.
 
-Lenses of 1 mm: `designs/tio2_532.toml` as squares and as it is, of circles, and `designs/geometric_phase_532.toml`, of rotated
-rectangles. Folded by symmetry (squares and circles eightfold, rectangles twofold) and, but for circles, flat: one outline for
-each pillar.
+Lenses of 1 mm: `designs/tio2_532.toml` as squares and as it is, of circles, `designs/geometric_phase_532.toml`, of rotated
+rectangles, and `designs/birefringent_532.toml`, of upright ones. Folded by symmetry (squares and circles eightfold, rotated rectangles twofold, upright ones, whose
+lens has no symmetry, not at all) and, but for circles, flat: one outline for each pillar.
 """
 
 import pathlib
@@ -15,7 +15,7 @@ from cpu_time import children
 
 ROOT = pathlib.Path(__file__).parent.parent
 RUNS = 3
-SHAPES = {"squares": "tio2_532", "circles": "tio2_532", "rectangles": "geometric_phase_532"}
+SHAPES = {"squares": "tio2_532", "circles": "tio2_532", "rectangles": "geometric_phase_532", "upright": "birefringent_532"}
 
 
 def design_of(shape, folder):
@@ -30,7 +30,8 @@ def design_of(shape, folder):
         text = re.sub(rf"^{key} = .*", f"{key} = {value}", text, flags=re.M)
     if shape == "squares":
         text = text.replace('shape = "circle"', 'shape = "square"')
-    text = text.replace('"mappings/', f'"{ROOT}/designs/mappings/')
+    for files in ("mappings", "phases"):
+        text = text.replace(f'"{files}/', f'"{ROOT}/designs/{files}/')
     file = folder / f"{shape}.toml"
     file.write_text(text)
     return file

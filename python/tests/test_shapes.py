@@ -161,8 +161,8 @@ def test_upright_rectangles_of_any_widths_become_a_layout(tmp_path: Path, name: 
     assert (array.shape, array.pillars) == (UPRIGHT, there.sum())
     layout = ml.read_layout(tmp_path / name, array=array)
     assert (layout.shape, layout.other_shapes) == (UPRIGHT, 0)
-    for found, wanted in zip(UPRIGHT.widths_nm(layout.widths[0]), (x, y)):
-        assert np.array_equal(found, wanted)
+    for read, wanted in zip(UPRIGHT.widths_nm(layout.widths[0]), (x, y)):
+        assert np.array_equal(read, wanted)
     # Without the array: the widths that occur.
     found = ml.read_layout(tmp_path / name)
     assert isinstance(found.shape, ml.UprightRectangles)
