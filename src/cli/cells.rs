@@ -9,7 +9,7 @@ use metalith::cell_study::{
     write_library_report, write_rotation_report,
 };
 use metalith::report::{fixed, sig};
-use metalith::{Design, Error, Rectangles, Result};
+use metalith::{Design, Error, Progress, Rectangles, Result};
 
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
@@ -174,6 +174,9 @@ fn rotations(args: &CellsArgs, design: &Design, folder: &Path, terminal: &Termin
 
 /// The study of a design of upright rectangles, and their library.
 fn library(args: &CellsArgs, design: &Design, folder: &Path, terminal: &Terminal) -> Result<Outcome> {
+    if let Some(why) = &design.mapping.library_refused {
+        terminal.warn(&format!("the library that the design names is not judged: {why}"));
+    }
     let cache = args.cache.clone().or_else(cache_folder);
     let study = LibraryStudy::new(design, cache.as_deref(), terminal)?;
     terminal.clear();

@@ -173,7 +173,7 @@ fn findings(
     write_pillars(&alone, &array, Hierarchy::Folded, &layout, terminal)?;
     let read = read_pillars(&alone, &layout, terminal)?;
     after.push(task.judge_layout(&read.elements[0].widths, cells.judge())?);
-    let as_verified = match cells.own().rotated() {
+    let at_single_wavelengths = match cells.own().rotated() {
         Some(cell) => {
             let single = &design.verify.wavelengths_um;
             let strehl = task.lens.strehl_of_layout(&read.elements[0].widths, cell, single)?;
@@ -207,7 +207,7 @@ fn findings(
         before,
         own,
         after,
-        as_verified,
+        at_single_wavelengths,
         merit_over_limit: over_limit,
         expected_psnr_db: expected_images(task, cells, &reference_widths, &found.widths_nm, terminal)?,
         with_errors,
@@ -299,7 +299,7 @@ fn summary(findings: &OptimiseReport) {
             );
         }
     }
-    for (um, strehl) in &findings.as_verified {
+    for (um, strehl) in &findings.at_single_wavelengths {
         print_line!(
             "after, layout at {} nm, solved as for `run`: Strehl {}",
             sig(um * 1e3, 5),

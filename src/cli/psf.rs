@@ -144,7 +144,7 @@ pub struct PsfArgs {
     #[arg(long, default_value_t = 550.0, requires = "camera")]
     wedge_wavelength_nm: f64,
 
-    /// Polarisation of the light that arrives, where the pillars are rectangles: `left` (if left out, of rotated ones) or `right` circular,
+    /// Polarisation of the light that arrives, where the pillars are rectangles (if left out, `left` at rotated ones and `x` at upright ones): `left` or `right` circular,
     /// with (x + i y) / sqrt 2 for left and a wave along +z, linear along `x` or `y` or at an angle from x towards y (degrees),
     /// or `unpolarised`.
     #[arg(long, value_name = "POLARISATION", allow_negative_numbers = true, value_parser = polarisation)]

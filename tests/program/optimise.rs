@@ -252,7 +252,7 @@ fn a_lens_of_rotated_rectangles_is_optimised() {
         "--out",
         verified.to_str().unwrap(),
     ]);
-    let own = number(&report, &["as_verified", "0", "1"]);
+    let own = number(&report, &["at_single_wavelengths", "0", "1"]);
     let judged = number(
         &verified.join("report.json"),
         &["distinct", "0", "spots", "0", "extracted", "0", "1", "strehl"],

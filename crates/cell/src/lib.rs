@@ -46,7 +46,7 @@ pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};
 pub use published::PublishedCell;
 pub use rectangle::{Handedness, RotatedRectangle};
 pub use rigorous::RigorousCell;
-pub use rotated::{RotatedCell, Truncation};
+pub use rotated::{RotatedCell, RotationSamples, Truncation};
 pub use rotation::RotationMapping;
 pub use stack::{CellStack, MOST_SUBSTRATE_K, UniformLayer};
 pub use table::{CellTable, Origin, TableSpec};

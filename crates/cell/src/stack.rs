@@ -87,7 +87,7 @@ impl CellStack {
         if self.shape.rectangles().is_some() {
             return Err(Error::invalid(
                 "rectangular pillars, where those of a width are asked for",
-                "use squares or circles here: `photographs`, compensation, models of a calibration and studies know no rectangles; the other \
+                "use squares or circles here: `photographs`, compensation and `--model` of a calibration know no rectangles, `optimise` and `study` no upright ones; the other \
                  commands do",
             ));
         }

@@ -57,6 +57,35 @@ fn pillars_are_chosen_by_both_phases() {
     }
 }
 
+/// Two of the lens are copies, held or not; half a turn leaves a lens whose both phases are round as it is.
+#[test]
+fn equal_lenses_are_copies_however_they_are_made() {
+    let two = [
+        ("elements = [1, 1]", "elements = [2, 1]"),
+        ("size_um = [200, 200]", "size_um = [400, 200]"),
+    ];
+    let design = changed(&two).unwrap();
+    let round = text()
+        .replace("centre_um = [8, 0]", "centre_um = [0, 0]")
+        .replace("centre_um = [-8, 0]", "centre_um = [0, 0]");
+    let (head, tail) = round.split_once("[phase]").unwrap();
+    let (_, tail) = tail.split_once("[array]").unwrap();
+    let phases = "[phase]\nsource = \"hyperbola\"\nwavelength_nm = 532\n\n[phase.y]\nsource = \"hyperbola\"\nwavelength_nm = 532\nfocal_length_um = 90\n\n";
+    let round = two
+        .iter()
+        .fold(format!("{head}{phases}[array]{tail}"), |text, (from, to)| {
+            text.replacen(from, to, 1)
+        });
+    let round = Design::parse(&path(), &round).unwrap();
+    for (most_held, classes) in [(u64::MAX, 1), (1, 1)] {
+        let array = PillarArray::build_within(&round, most_held, &Silent).unwrap();
+        assert_eq!((array.placed.len(), array.classes.len()), (2, classes), "{most_held}");
+        assert_eq!(array.classes[0].group.members().len(), 2, "{most_held}");
+    }
+    // Of phases over the plane nothing is known but what is held.
+    assert_eq!(PillarArray::build(&design, &Silent).unwrap().classes.len(), 1);
+}
+
 /// Both foci are mirror images, and so are the lenses: light along y sees what light along x sees from the other side.
 #[test]
 fn the_phase_of_light_along_y_is_that_of_its_section() {

@@ -126,23 +126,27 @@ fn phase_step(flat: &FlatLayout<'_>, design: &Design, most: f64, found: &mut Fin
     // Light along x and along y may have a phase each.
     let seen = std::iter::once(Cow::Borrowed(design)).chain(design.along_y().map(Cow::Owned));
     let lenses: Vec<LensPhase> = seen.map(|seen| LensPhase::of(&seen)).collect();
-    for (element, lens) in design
+    let light = |k: usize| match (lenses.len(), k) {
+        (1, _) => "",
+        (_, 0) => " for light along x",
+        _ => " for light along y",
+    };
+    for (element, k, lens) in design
         .elements()
         .into_iter()
-        .flat_map(|e| lenses.iter().map(move |lens| (e, lens)))
+        .flat_map(|e| lenses.iter().enumerate().map(move |(k, lens)| (e, k, lens)))
     {
         let phase = ElementPhase::of(lens, &element);
         let (steps, steep) = steps(flat.work, lattice, &phase)?;
         let share = steep as f64 / steps.max(1) as f64;
-        found
-            .facts
-            .push((format!("share of steps beyond pi in {}", element.label()), share));
+        found.facts.push((
+            format!("share of steps beyond pi in {}{}", element.label(), light(k)),
+            share,
+        ));
         if share > most {
-            found.plain(&element.label(), || {
-                format!(
-                    "{share:.4} of the steps of {} exceed pi, at most {most}",
-                    element.label()
-                )
+            let name = element.label() + light(k);
+            found.plain(&name, || {
+                format!("{share:.4} of the steps of {name} exceed pi, at most {most}")
             });
         }
     }

@@ -132,7 +132,7 @@ fn upright_rectangles_are_compared_by_their_edges() {
     let pillars = metalith_core::UprightRectangles {
         shortest_nm: 100,
         step_nm: 10,
-        lengths: 16,
+        lengths: 18,
     };
     let bytes = |edges: &dyn Fn(usize) -> [u16; 2]| {
         let mut gds = Gds::library();
@@ -158,10 +158,8 @@ fn upright_rectangles_are_compared_by_their_edges() {
         (_, same) => same,
     };
     let folder = tempfile::tempdir().unwrap();
-    let found = compare(
-        &write(folder.path(), "a.gds", bytes(&edges)),
-        &write(folder.path(), "b.gds", bytes(&changed)),
-    );
+    let file = |edges: &dyn Fn(usize) -> [u16; 2], name: &str| write(folder.path(), name, bytes(edges));
+    let found = compare(&file(&edges, "a.gds"), &file(&changed, "b.gds"));
     let one = &found.elements[0];
     assert_eq!(
         (one.pillars, one.rotated, one.widened, one.narrowed),
@@ -180,6 +178,22 @@ fn upright_rectangles_are_compared_by_their_edges() {
         text(&found)
     );
     assert!(!found.same_geometry);
+    // Edges that one file alone has, either way.
+    let longer = |site: usize| edges(site).map(|nm| if nm == 250 { 270 } else { nm });
+    let count = (0..100).filter(|site| longer(*site) != edges(*site)).count() as u64;
+    let (a, b) = (file(&edges, "a.gds"), file(&longer, "longer.gds"));
+    for (from, to, wanted) in [(&a, &b, [count, 0]), (&b, &a, [0, count])] {
+        let found = compare(from, to);
+        let one = &found.elements[0];
+        let counted = [one.widened, one.narrowed];
+        assert_eq!(
+            (one.pillars, one.added, one.removed),
+            ([100, 100], 0, 0),
+            "{}",
+            text(&found)
+        );
+        assert_eq!(counted, wanted, "{}", text(&found));
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::census::Census;
 use super::dose::{Beam, Exposure, WriteTime};
 use super::fields;
 use super::process::Process;
-use metalith_core::{PillarShape, Result, WidthRows};
+use metalith_core::{PillarShape, Rectangles, Result, WidthRows};
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
 
@@ -78,7 +78,11 @@ fn snapped_square(shape: PillarShape, number: u16, beam: &Beam) -> f64 {
     let off = |nm: f64| beam.snapped_nm(nm) - nm;
     match shape {
         PillarShape::Square | PillarShape::Circle => off(f64::from(number)).powi(2),
-        PillarShape::Rectangle(pillars) => {
+        PillarShape::Rectangle(Rectangles::Upright(pillars)) => {
+            let edges = pillars.edges_nm(number).map(f64::from);
+            edges.map(|nm| off(nm).powi(2)).iter().sum::<f64>() / 2.0
+        }
+        PillarShape::Rectangle(Rectangles::Rotated(pillars)) => {
             let corners = pillars.corners(number);
             let sum: f64 = corners
                 .iter()

@@ -9,10 +9,11 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::cells::lagrange;
+use super::rectangles::SampledRectangles;
 use super::stack::{off_cutoff, perturbed, possible_width_nm};
 use super::{CellChange, SolvedWidths};
-use metalith_cell::{CellStack, kept};
-use metalith_core::{Error, Progress, Result};
+use metalith_cell::{CellStack, RotationSamples, kept};
+use metalith_core::{Error, PillarShape, Progress, Result};
 use metalith_rcwa::Orders;
 
 /// Version of the kept file.
@@ -73,7 +74,7 @@ fn change_of([height_nm, index, taper_deg, corner_rounding_nm, residual_mask_nm]
 /// What a bank covers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BankRange {
-    /// Narrowest and widest pillar as made (nm).
+    /// Narrowest and widest pillar as made (nm); of rotated rectangles the least and the most that both edges are off by.
     pub widths_nm: [f64; 2],
     /// Changes of the pillar: the least and the most of each number.
     pub changes: [CellChange; 2],
@@ -140,7 +141,7 @@ pub struct CellBank {
 struct Colour {
     /// Widths that are solved (nm), rising.
     widths_nm: Vec<f64>,
-    /// By stack and width; the last of each row is a site without pillar.
+    /// By stack, width and number of a pillar; the last of each row is a site without pillar.
     t: Vec<Complex64>,
 }
 
@@ -174,9 +175,10 @@ impl CellBank {
         progress.begin("solving the tables of cells", (colours * (stacks + 1)) as u64);
         for colour in 0..colours {
             let rows = bank.solve_rows(colour, &coarse, progress)?;
-            let added = between(&coarse, &rows);
+            let added = between(&coarse, &rows, bank.each());
             let fine = bank.solve_rows(colour, &added, &Unwatched(progress))?;
-            bank.colours.push(merged(&coarse, &rows, &added, &fine));
+            bank.colours
+                .push(merged((&coarse, &rows), (&added, &fine), bank.each()));
             progress.advance(1);
         }
         Ok(bank)
@@ -220,7 +222,8 @@ impl CellBank {
         }
         let mut rest = numbers.as_slice();
         for _ in 0..bank.range.colours.len() {
-            let colour = take(&mut rest, bank.stacks()).ok_or_else(|| unusable("numbers are missing".into()))?;
+            let colour =
+                take(&mut rest, bank.stacks() * bank.each()).ok_or_else(|| unusable("numbers are missing".into()))?;
             bank.colours.push(colour);
         }
         Ok(bank)
@@ -296,12 +299,28 @@ impl CellBank {
         let (um, orders) = self.range.colours[colour];
         let orders = Orders::new(orders)?;
         let etched = perturbed(&self.stated, &self.change(stack));
-        let at = |width: f64| {
-            let width = possible_width_nm(&etched, width);
-            off_cutoff(width, |w| etched.transmission(w, um, orders))
+        let Some(pillars) = etched.shape.rotated() else {
+            let at = |width: f64| {
+                let width = possible_width_nm(&etched, width);
+                off_cutoff(width, |w| etched.transmission(w, um, orders))
+            };
+            let widths = widths_nm.iter().map(|w| at(*w));
+            return widths.chain([etched.transmission(0.0, um, orders)]).collect();
         };
-        let widths = widths_nm.iter().map(|w| at(*w));
-        widths.chain([etched.transmission(0.0, um, orders)]).collect()
+        let edges = [pillars.width_nm, pillars.length_nm].map(f64::from);
+        let mut row = Vec::new();
+        for bias in widths_nm {
+            let solved = off_cutoff(*bias, |bias| {
+                RotationSamples::solve(&etched, edges.map(|e| e + bias), um, orders)
+            })?;
+            row.extend(solved.numbers());
+        }
+        let bare = CellStack {
+            shape: PillarShape::Square,
+            ..etched
+        };
+        row.extend(RotationSamples::of_bare(bare.transmission(0.0, um, orders)?).numbers());
+        Ok(row)
     }
 
     /// Transmissions of pillars of these widths (nm) with a change, along the normal.
@@ -315,6 +334,40 @@ impl CellBank {
         widths_nm: &[f64],
         wavelength_um: f64,
     ) -> Result<SolvedWidths> {
+        let (pillars, bare) = self.numbers(change, orders, widths_nm, wavelength_um)?;
+        Ok(SolvedWidths {
+            pillars: vec![pillars.into_iter().map(|t| t[0]).collect()],
+            bare,
+            unseen: vec![Complex64::ONE],
+            share: 1.0,
+            rim: None,
+        })
+    }
+
+    /// The same of rotated rectangles whose edges are off by so much (nm), and of a site without one.
+    ///
+    /// # Errors
+    /// As [`CellBank::transmissions`].
+    pub(super) fn rectangles(
+        &self,
+        change: &CellChange,
+        orders: usize,
+        biases_nm: &[f64],
+        wavelength_um: f64,
+    ) -> Result<SampledRectangles> {
+        let (pillars, bare) = self.numbers(change, orders, biases_nm, wavelength_um)?;
+        let samples = pillars.iter().map(|own| RotationSamples::of_numbers(own));
+        Ok((samples.collect(), RotationSamples::of_numbers(&bare)))
+    }
+
+    /// The numbers of pillars of these widths (nm), of rectangles by what their edges are off by, and of a site without pillar.
+    fn numbers(
+        &self,
+        change: &CellChange,
+        orders: usize,
+        widths_nm: &[f64],
+        wavelength_um: f64,
+    ) -> Result<(Vec<Vec<Complex64>>, Vec<Complex64>)> {
         let outside = |what: String| {
             Error::invalid(
                 format!("the tables of cells hold no {what}"),
@@ -336,25 +389,31 @@ impl CellBank {
             stride *= axis.nodes;
         }
         // One row for this pillar; widths are then taken from it.
-        let colour = &self.colours[colour];
-        let length = colour.widths_nm.len() + 1;
+        let (colour, each) = (&self.colours[colour], self.each());
+        let length = (colour.widths_nm.len() + 1) * each;
         let mut row = vec![Complex64::ZERO; length];
         for (stack, weight) in stacks {
             for (sum, t) in row.iter_mut().zip(&colour.t[stack * length..]) {
                 *sum += t * weight;
             }
         }
-        let at = |width: &f64| {
+        let at = |width: &f64| -> Result<Vec<Complex64>> {
             let weights = colour
                 .weights(*width)
                 .ok_or_else(|| outside(format!("width of {width} nm")))?;
-            Ok(weights.into_iter().map(|(k, w)| row[k] * w).sum())
+            let sum = |number: usize| weights.iter().map(|(k, w)| row[k * each + number] * w).sum();
+            Ok((0..each).map(sum).collect())
         };
-        Ok(SolvedWidths {
-            pillars: vec![widths_nm.iter().map(at).collect::<Result<_>>()?],
-            bare: vec![row[length - 1]],
-            rim: None,
-        })
+        let pillars = widths_nm.iter().map(at).collect::<Result<_>>()?;
+        Ok((pillars, row[length - each..].to_vec()))
+    }
+
+    /// Numbers of each pillar.
+    fn each(&self) -> usize {
+        match self.stated.shape.rotated() {
+            Some(_) => RotationSamples::NUMBERS,
+            None => 1,
+        }
     }
 
     /// What the numbers follow from.
@@ -369,13 +428,13 @@ impl CellBank {
     }
 }
 
-/// Widths between these where any of the rows is not smooth.
-fn between(widths_nm: &[f64], rows: &[Vec<Complex64>]) -> Vec<f64> {
+/// Widths between these where any of the rows, which have `each` numbers a width, is not smooth.
+fn between(widths_nm: &[f64], rows: &[Vec<Complex64>], each: usize) -> Vec<f64> {
     let last = widths_nm.len() - 1;
     let mut divided = vec![false; last];
-    for row in rows {
+    for (row, number) in rows.iter().flat_map(|row| (0..each).map(move |number| (row, number))) {
         for k in 2..last - 1 {
-            let [a, b, c, d, e] = [k - 2, k - 1, k, k + 1, k + 2].map(|k| row[k]);
+            let [a, b, c, d, e] = [k - 2, k - 1, k, k + 1, k + 2].map(|k| row[k * each + number]);
             if ((b + d) * (2.0 / 3.0) - (a + e) / 6.0 - c).norm() > ROUGH {
                 divided[k.saturating_sub(1 + BESIDE)..(k + 1 + BESIDE).min(last)].fill(true);
             }
@@ -388,16 +447,21 @@ fn between(widths_nm: &[f64], rows: &[Vec<Complex64>]) -> Vec<f64> {
     (0..last).filter(|k| divided[*k]).flat_map(parts).collect()
 }
 
-/// Two sets of widths of one wavelength as one.
-fn merged(coarse: &[f64], rows: &[Vec<Complex64>], added: &[f64], fine: &[Vec<Complex64>]) -> Colour {
+/// Two sets of widths of one wavelength, each with its rows, as one.
+fn merged(
+    (coarse, rows): (&[f64], &[Vec<Complex64>]),
+    (added, fine): (&[f64], &[Vec<Complex64>]),
+    each: usize,
+) -> Colour {
     let mut order: Vec<(f64, bool, usize)> = coarse.iter().enumerate().map(|(k, w)| (*w, false, k)).collect();
     order.extend(added.iter().enumerate().map(|(k, w)| (*w, true, k)));
     order.sort_by(|a, b| a.0.total_cmp(&b.0));
     let whole = rows.iter().zip(fine).flat_map(|(row, fine)| {
-        let widths = order
-            .iter()
-            .map(move |(_, is_fine, k)| if *is_fine { fine[*k] } else { row[*k] });
-        widths.chain([row[coarse.len()]])
+        let widths = order.iter().flat_map(move |(_, is_fine, k)| {
+            let from = if *is_fine { fine } else { row };
+            from[k * each..][..each].iter().copied()
+        });
+        widths.chain(row[coarse.len() * each..].iter().copied())
     });
     Colour {
         t: whole.collect(),
@@ -405,12 +469,12 @@ fn merged(coarse: &[f64], rows: &[Vec<Complex64>], added: &[f64], fine: &[Vec<Co
     }
 }
 
-/// One wavelength from the front of the numbers of a file.
-fn take(rest: &mut &[f64], stacks: usize) -> Option<Colour> {
+/// One wavelength from the front of the numbers of a file: `rows` for a width.
+fn take(rest: &mut &[f64], rows: usize) -> Option<Colour> {
     let (count, after) = rest.split_first()?;
     let count = *count as usize;
     let (widths, after) = after.split_at_checked(count)?;
-    let (t, after) = after.split_at_checked(2 * stacks.checked_mul(count + 1)?)?;
+    let (t, after) = after.split_at_checked(2 * rows.checked_mul(count + 1)?)?;
     *rest = after;
     (count >= 4).then(|| Colour {
         widths_nm: widths.to_vec(),

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::CellChange;
 use super::bank::CellBank;
 use super::stack::{off_cutoff, perturbed, possible_width_nm, to_middle_tops};
-use metalith_cell::{BAND_ORDERS, CellStack, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, dark};
+use metalith_cell::{BAND_ORDERS, CellStack, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, POLARISATION_SHARE, dark};
 use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::Orders;
 
@@ -63,8 +63,19 @@ pub struct SolvedWidths {
     pub pillars: Vec<Vec<Complex64>>,
     /// Of a site without pillar, for each table.
     pub bare: Vec<Complex64>,
+    /// Of light that passes a site as it is, for each table: what is left of it in the light of that table.
+    pub unseen: Vec<Complex64>,
+    /// Of the light that arrives, what the light of each table is a part of. What leaves by different tables does not interfere.
+    pub share: f64,
     /// The same at the rim of a lens, to the tops of the pillars in its middle; none where it is alike.
     pub rim: Option<Box<Self>>,
+}
+
+impl SolvedWidths {
+    /// Of light that is not polarised, what arrives for each of so many tables: one table is for either polarisation alike.
+    pub fn share_of(tables: usize) -> f64 {
+        if tables == 1 { 1.0 } else { POLARISATION_SHARE }
+    }
 }
 
 /// Where a width lies among the nodes.
@@ -126,6 +137,14 @@ impl RealisedCells {
             rim: rim.map(|rim| (Box::new(Self::of_bank(bank, &rim)), change.rim_height_nm)),
             ..Self::new(perturbed(bank.stated(), change), 0.0)
         }
+    }
+
+    /// That a bank has no answer.
+    pub(super) fn along_normal_alone() -> Error {
+        Error::invalid(
+            "tables of cells are for light along the normal",
+            "leave out `incidence = \"as_lit\"`",
+        )
     }
 
     /// The stack.
@@ -201,10 +220,7 @@ impl RealisedCells {
     ) -> Result<(SolvedWidths, Vec<usize>)> {
         if let Some((bank, change)) = &self.bank {
             if sines != [0.0; 2] {
-                return Err(Error::invalid(
-                    "tables of cells are for light along the normal",
-                    "leave out `incidence = \"as_lit\"`",
-                ));
+                return Err(Self::along_normal_alone());
             }
             return Ok((bank.transmissions(change, orders, widths_nm, wavelength_um)?, vec![0]));
         }
@@ -245,6 +261,8 @@ impl RealisedCells {
             .filter(|(p, t)| asked.map_or_else(|| *p < 2 || !dark(t), |asked| asked.contains(p)))
             .unzip::<_, _, Vec<_>, Vec<_>>();
         let solved = SolvedWidths {
+            unseen: vec![Complex64::ONE; columns.len()],
+            share: SolvedWidths::share_of(columns.len()),
             pillars,
             bare: columns.iter().map(|&p| known[&(place, Solve::Bare)][p]).collect(),
             rim: None,

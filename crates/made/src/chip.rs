@@ -6,12 +6,14 @@ use num_complex::Complex64;
 use serde::Serialize;
 
 use super::cells::{RealisedCells, SolvedWidths};
+use super::rectangles::{self, RotatedClasses, RotatedLight};
+use super::stack::to_middle_tops;
 use super::{
-    ArrivingLight, CalibratedModel, CameraChange, CellBank, ClassTable, DrawnElement, MadeElement, NotApplied,
-    Perturbation, cell_direction, mixed, realised_nm,
+    ArrivingLight, CalibratedModel, CameraChange, CellBank, CellChange, ClassTable, DrawnElement, MadeElement,
+    NotApplied, Perturbation, cell_direction, mixed, realised_nm,
 };
-use metalith_cell::{CellStack, POLARISATION_SHARE};
-use metalith_core::{Error, Progress, Result, WidthMap};
+use metalith_cell::{BAND_ORDERS, CellStack, ORDERS, PolarisedLight, PolarisedTables};
+use metalith_core::{Error, Progress, Result, RotatedRectangles, WidthMap};
 use metalith_wave::Psf;
 use metalith_wave::{Accuracy, Fold, PlaneWave, Propagator, Scratch, Window};
 
@@ -19,6 +21,8 @@ use metalith_wave::{Accuracy, Fold, PlaneWave, Propagator, Scratch, Window};
 pub struct MadeChip {
     model: CalibratedModel,
     cells: RealisedCells,
+    /// Of rotated rectangles, whose cells all are from this bank: which light they are in.
+    rotated: Option<(Arc<CellBank>, RotatedRectangles, RotatedLight)>,
 }
 
 /// What a report says of the model that it rests on.
@@ -60,6 +64,7 @@ impl MadeChip {
         Ok(Self {
             cells: RealisedCells::changed(stated, &perturbation.cell, perturbation.geometry.cd_bias_nm),
             model: model.clone(),
+            rotated: None,
         })
     }
 
@@ -71,6 +76,31 @@ impl MadeChip {
         let made = Self::new(bank.stated(), model)?;
         Ok(Self {
             cells: RealisedCells::of_bank(bank, &model.perturbation.cell),
+            ..made
+        })
+    }
+
+    /// The same of rotated rectangles, in this light.
+    ///
+    /// # Errors
+    /// As [`MadeChip::new`]; also if the pillars are no rectangles, or the model has a term that goes by the width of pillars.
+    pub fn of_rectangles(bank: &Arc<CellBank>, model: &CalibratedModel, light: RotatedLight) -> Result<Self> {
+        let made = Self::of_bank(bank, model)?;
+        let Some(pillars) = bank.stated().shape.rotated() else {
+            return Err(Error::invalid(
+                "light of both hands at pillars that do not change it",
+                "leave it out: it is for rotated rectangles",
+            ));
+        };
+        let geometry = &model.perturbation.geometry;
+        if !geometry.transmission.is_empty() || !geometry.transmission_phase_rad.is_empty() {
+            return Err(Error::invalid(
+                "a model with a transmission that goes by the width of pillars, of rotated rectangles",
+                "give a model without `transmission` and `transmission_phase_rad`: rectangles are all of one width",
+            ));
+        }
+        Ok(Self {
+            rotated: Some((Arc::clone(bank), pillars, light)),
             ..made
         })
     }
@@ -128,9 +158,12 @@ impl MadeChip {
         progress: &dyn Progress,
     ) -> Result<MadeView<'a>> {
         let sines = self.cell_sines(element, stated, as_lit);
-        let solved = self
-            .cells
-            .solve(element.widths_nm(), stated.wavelength_um, sines, progress)?;
+        let solved = match self.rotated_light(element, (stated.wavelength_um, ORDERS), as_lit)? {
+            Some(solved) => solved,
+            None => self
+                .cells
+                .solve(element.widths_nm(), stated.wavelength_um, sines, progress)?,
+        };
         Ok(self.viewed(element, stated, &solved))
     }
 
@@ -147,10 +180,35 @@ impl MadeChip {
         progress: &dyn Progress,
     ) -> Result<MadeView<'a>> {
         let sines = self.cell_sines(element, stated, as_lit);
-        let solved = self
-            .cells
-            .solve_in_band(element.widths_nm(), stated.wavelength_um, sines, progress)?;
+        let solved = match self.rotated_light(element, (stated.wavelength_um, BAND_ORDERS), as_lit)? {
+            Some(solved) => solved,
+            None => self
+                .cells
+                .solve_in_band(element.widths_nm(), stated.wavelength_um, sines, progress)?,
+        };
         Ok(self.viewed(element, stated, &solved))
+    }
+
+    /// What the classes of rotated rectangles transmit, at a wavelength (um) with so many orders; none of other pillars.
+    fn rotated_light(&self, element: &MadeElement, colour: (f64, usize), as_lit: bool) -> Result<Option<SolvedWidths>> {
+        let Some((bank, pillars, light)) = &self.rotated else {
+            return Ok(None);
+        };
+        if as_lit {
+            return Err(RealisedCells::along_normal_alone());
+        }
+        let classes = RotatedClasses::of(element);
+        let of = |change: &CellChange| rectangles::hands(bank, change, *pillars, classes, colour, light.focused);
+        let change = &self.perturbation().cell;
+        let mut solved = rectangles::passed(of(&change.in_the_middle())?, light.polarised);
+        if let Some(rim) = change.at_the_rim() {
+            let mut rim = rectangles::passed(of(&rim)?, light.polarised);
+            let phase = to_middle_tops(self.cells.stack(), change.rim_height_nm, colour.0)?;
+            let all = rim.pillars.iter_mut().flatten().chain(&mut rim.bare);
+            all.for_each(|t| *t *= phase);
+            solved.rim = Some(Box::new(rim));
+        }
+        Ok(Some(solved))
     }
 
     /// The direction that cells of an element are solved for.
@@ -170,6 +228,39 @@ impl MadeChip {
 }
 
 impl MadeChip {
+    /// What rotated rectangles do to light of both hands along the normal, by the number of their rotation up to `most`, missing
+    /// pillars and light that sees none mixed in, and the light that they are in; none of other pillars. `density_steps` as for
+    /// [`MadeChip::drawn_widths`].
+    ///
+    /// # Errors
+    /// As [`MadeChip::view`].
+    pub fn drawn_hands(
+        &self,
+        most: u16,
+        density_steps: i32,
+        wavelength_um: f64,
+    ) -> Result<Option<(PolarisedTables, PolarisedLight)>> {
+        let Some((bank, pillars, light)) = &self.rotated else {
+            return Ok(None);
+        };
+        let (geometry, change) = (&self.perturbation().geometry, self.perturbation().cell.in_the_middle());
+        let numbers: Vec<u16> = (0..=most).collect();
+        let width_nm = realised_nm(pillars.width_nm, geometry, density_steps);
+        let classes = RotatedClasses {
+            widths_nm: &vec![width_nm; numbers.len()],
+            numbers: &numbers,
+        };
+        let mut hands = rectangles::hands(bank, &change, *pillars, classes, (wavelength_um, ORDERS), light.focused)?;
+        for table in hands.converted.iter_mut().chain(&mut hands.unconverted) {
+            let (unseen, bare) = (table.pop().unwrap_or_default(), table.pop().unwrap_or_default());
+            for t in table.iter_mut() {
+                *t = mixed(geometry, geometry.missing_pillars, *t, bare, unseen);
+            }
+            table[0] = Complex64::ZERO;
+        }
+        Ok(Some((PolarisedTables::Hands(hands), light.polarised)))
+    }
+
     /// What pillars drawn this wide (nm) transmit along the normal where so many steps of density are added to
     /// their width (see [`super::realised_nm`]), missing pillars and light that sees none mixed in.
     ///
@@ -192,7 +283,13 @@ impl MadeChip {
         Ok(pairs
             .map(|(t, w)| {
                 let pillar = t * geometry.transmission_factor(*w);
-                mixed(geometry, geometry.missing_pillars, pillar, solved.bare[0])
+                mixed(
+                    geometry,
+                    geometry.missing_pillars,
+                    pillar,
+                    solved.bare[0],
+                    Complex64::ONE,
+                )
             })
             .collect())
     }
@@ -207,8 +304,10 @@ impl<'a> MadeView<'a> {
         solved: &SolvedWidths,
     ) -> Self {
         let tables = |solved: &SolvedWidths| -> Vec<ClassTable> {
-            let polarisations = solved.pillars.iter().zip(&solved.bare);
-            polarisations.map(|(t, bare)| element.table_of(t, *bare)).collect()
+            let polarisations = solved.pillars.iter().zip(&solved.bare).zip(&solved.unseen);
+            polarisations
+                .map(|((t, bare), unseen)| element.table_of(t, *bare, *unseen))
+                .collect()
         };
         let mut own = tables(solved);
         if let Some(rim) = &solved.rim {
@@ -217,7 +316,7 @@ impl<'a> MadeView<'a> {
         }
         Self {
             element,
-            share: if own.len() == 1 { 1.0 } else { POLARISATION_SHARE },
+            share: solved.share,
             tables: own,
             light,
             gap_um: perturbation.path.added_distance_um(element.centre_um()),

@@ -158,8 +158,10 @@ pub struct MadeElement {
     missing: f64,
     /// Class of each site, row by row; zero where light is blocked.
     class: Vec<u16>,
-    /// Width of each class (nm), zero without pillar; that of class zero is of no use.
+    /// Width of each class (nm), of rectangles the shorter edge, zero without pillar; that of class zero is of no use.
     width_nm: Vec<f64>,
+    /// Of rotated rectangles the number of the rotation of each class, else nothing.
+    number: Vec<u16>,
     /// Sites in each class.
     count: Vec<u32>,
     /// Optical path added over the lens (um); empty for none.
@@ -184,20 +186,25 @@ impl MadeElement {
         let steps = drawn.site_steps(geometry);
         let aperture = ShiftedAperture::new(lattice, drawn.aperture_radius_um, geometry.aperture_offset_um);
         let covered = |site: usize| aperture.as_ref().is_some_and(|a| a.passes(site) == 0.0);
-        let mut known: HashMap<u64, u16> = HashMap::new();
+        // Rotated rectangles are told by their rotation, and all drawn with the same edges.
+        let edge_nm = drawn.shape.rotated().map(|pillars| pillars.width_nm);
+        let mut known: HashMap<(u64, u16), u16> = HashMap::new();
         let (mut class, mut width_nm, mut count) = (vec![0; n * n], vec![0.0], vec![0u32]);
+        let mut number = Vec::from_iter(edge_nm.map(|_| 0));
         let mut radius2 = 0;
         for (site, &w) in drawn.pillars.width_nm.iter().enumerate() {
             if w == 0 || covered(site) {
                 continue;
             }
-            let width = realised_nm(w, geometry, steps.as_ref().map_or(0, |s| s[site]));
+            let width = realised_nm(edge_nm.unwrap_or(w), geometry, steps.as_ref().map_or(0, |s| s[site]));
+            let key = (width.to_bits(), edge_nm.map_or(0, |_| w));
             let next = width_nm.len();
-            let own = match known.get(&width.to_bits()) {
+            let own = match known.get(&key) {
                 Some(own) => *own,
                 None if next <= usize::from(MOST_CLASS) => {
-                    known.insert(width.to_bits(), next as u16);
+                    known.insert(key, next as u16);
                     width_nm.push(width);
+                    number.extend(edge_nm.map(|_| w));
                     count.push(0);
                     next as u16
                 }
@@ -232,6 +239,7 @@ impl MadeElement {
             missing: geometry.missing_pillars,
             class,
             width_nm,
+            number,
             count,
             path_um,
         })
@@ -243,6 +251,9 @@ impl MadeElement {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let bare = self.width_nm.len() as u16;
         self.width_nm.push(0.0);
+        if !self.number.is_empty() {
+            self.number.push(0);
+        }
         self.count.push(0);
         for class in self.class.iter_mut().filter(|c| **c > 0) {
             if rng.random::<f64>() < self.missing {
@@ -273,7 +284,12 @@ impl MadeElement {
         &self.class
     }
 
-    /// Width of each class from the first open one, number 1, on (nm).
+    /// Of rotated rectangles the number of the rotation of each class, from the first open one on; of others nothing.
+    pub fn rotations(&self) -> &[u16] {
+        self.number.get(1..).unwrap_or_default()
+    }
+
+    /// Width of each class from the first open one, number 1, on (nm); of rectangles that of the shorter edge.
     pub fn widths_nm(&self) -> &[f64] {
         &self.width_nm[1..]
     }
@@ -283,14 +299,15 @@ impl MadeElement {
     pub fn table(&self, pillar: impl Fn(f64) -> Complex64, bare: Complex64) -> ClassTable {
         let of = |width: f64| if width > 0.0 { pillar(width) } else { bare };
         let open: Vec<Complex64> = self.widths_nm().iter().map(|w| of(*w)).collect();
-        self.table_of(&open, bare)
+        self.table_of(&open, bare, Complex64::ONE)
     }
 
-    /// The same from the transmission of each class, in the order of [`MadeElement::widths_nm`].
+    /// The same from the transmission of each class, in the order of [`MadeElement::widths_nm`]; `unseen`: what the light of this table
+    /// has of light that sees no pillar.
     ///
     /// # Panics
     /// If there is not one value for each of them.
-    pub fn table_of(&self, open: &[Complex64], bare: Complex64) -> ClassTable {
+    pub fn table_of(&self, open: &[Complex64], bare: Complex64, unseen: Complex64) -> ClassTable {
         assert_eq!(open.len() + 1, self.width_nm.len(), "one value for each class");
         let (mut t, mut scattered) = (vec![Complex32::ZERO], 0.0);
         for ((pillar, width), count) in open.iter().zip(&self.width_nm[1..]).zip(&self.count[1..]) {
@@ -300,7 +317,7 @@ impl MadeElement {
                 *pillar
             };
             scattered += f64::from(*count) * (pillar - bare).norm_sqr();
-            t.push(single(mixed(&self.geometry, self.missing, pillar, bare)));
+            t.push(single(mixed(&self.geometry, self.missing, pillar, bare, unseen)));
         }
         ClassTable::of_widths(t, self.missing * (1.0 - self.missing) * scattered)
     }
@@ -324,9 +341,15 @@ impl MadeElement {
     }
 }
 
-/// What stands at a site on the mean: a pillar, or with the share `missing` none; and the light that sees neither.
-pub fn mixed(geometry: &GeometryChange, missing: f64, pillar: Complex64, bare: Complex64) -> Complex64 {
-    pillar + (bare - pillar) * missing + geometry.unstructured()
+/// What stands at a site on the mean: a pillar, or with the share `missing` none; and the light that sees neither, times `unseen`.
+pub fn mixed(
+    geometry: &GeometryChange,
+    missing: f64,
+    pillar: Complex64,
+    bare: Complex64,
+    unseen: Complex64,
+) -> Complex64 {
+    pillar + (bare - pillar) * missing + geometry.unstructured() * unseen
 }
 
 /// Classes are numbered with 16 bits, one of which is kept for sites whose pillar is removed.

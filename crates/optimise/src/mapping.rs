@@ -144,6 +144,7 @@ pub mod tests {
             table: None,
             library_file: None,
             library: None,
+            library_refused: None,
             rotation: Default::default(),
             steered: Vec::new(),
             comparison: MappingComparison::default(),

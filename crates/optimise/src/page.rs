@@ -50,7 +50,7 @@ pub struct OptimiseReport {
     /// Wavelengths of `[verify]` (um) and Strehl ratios of the layout there by the cell as it judges single wavelengths, where that
     /// of a band is solved with fewer orders.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub as_verified: Vec<(f64, f64)>,
+    pub at_single_wavelengths: Vec<(f64, f64)>,
     /// Geometric-mean Strehl ratio that exchange reaches for other limits (turns).
     pub merit_over_limit: Vec<(f64, f64)>,
     /// Expected PSNR of restored images (dB) at each field angle (degrees), before and after.
@@ -138,8 +138,8 @@ impl OptimiseReport {
              passing all its power in the zero order with the perfect phase.",
         );
         page.table(self.table());
-        if !self.as_verified.is_empty() {
-            let each = self.as_verified.iter();
+        if !self.at_single_wavelengths.is_empty() {
+            let each = self.at_single_wavelengths.iter();
             let words: Vec<String> = each
                 .map(|(um, s)| format!("{} at {} nm", sig(*s, 3), sig(um * 1e3, 5)))
                 .collect();

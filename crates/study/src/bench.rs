@@ -9,7 +9,7 @@ use metalith_core::{Error, Progress, Result};
 use metalith_design::array::PillarArray;
 use metalith_design::{CellIncidence, Design};
 use metalith_gds::{Layout, ReadLimits};
-use metalith_made::{BankRange, CalibratedModel, CellBank, CellChange, MadeChip, Perturbation};
+use metalith_made::{BankRange, CalibratedModel, CellBank, CellChange, MadeChip, Perturbation, RotatedLight};
 use metalith_verify::{ReadLayout, SimulationCases, Verification, wavelengths_um};
 
 use crate::draw::Drawer;
@@ -169,6 +169,7 @@ impl Bench {
                 "leave out `incidence = \"as_lit\"` in [verify] of the design of the study",
             ));
         }
+        check_rectangles(&design, &self.made, self.picture.is_some())?;
         let array = PillarArray::build(&design, &Quiet(progress))?;
         let path: &Path = &self.files.layouts[number as usize];
         let opened = Layout::open_with(path, ReadLimits::default(), progress)?;
@@ -184,7 +185,7 @@ impl Bench {
         let known = match &self.picture {
             Some(picture) if picture.knows_design() => {
                 let model = self.model("as designed".into(), self.drawer.base().clone());
-                let chip = MadeChip::of_bank(&bank, &model)?;
+                let chip = chip_of(&design, &bank, &model)?;
                 Some(picture.known(&design, layout.extraction(), &chip, &Quiet(progress))?)
             }
             _ => None,
@@ -214,7 +215,7 @@ impl Bench {
         let subject = self.subject(number, progress)?;
         let drawn = self.drawer.draw(self.key, k)?;
         let model = self.model(format!("draw {k}"), self.drawer.perturbation(&drawn));
-        let chip = MadeChip::of_bank(&subject.bank, &model)?;
+        let chip = chip_of(&subject.design, &subject.bank, &model)?;
         let cases = SimulationCases::judged_by(&chip);
         let accuracy = self.tolerance.accuracy;
         let found = subject
@@ -264,6 +265,44 @@ impl Bench {
     }
 }
 
+/// A chip of a design, all its cells from a bank.
+fn chip_of(design: &Design, bank: &Arc<CellBank>, model: &CalibratedModel) -> Result<MadeChip> {
+    if design.cell.shape.rotated().is_none() {
+        return MadeChip::of_bank(bank, model);
+    }
+    let light = RotatedLight {
+        focused: design.cell.arriving.unwrap_or_default(),
+        polarised: design.verify.light(),
+    };
+    MadeChip::of_rectangles(bank, model, light)
+}
+
+/// Check that rotated rectangles, if the pillars of a design are such, can be made like that.
+fn check_rectangles(design: &Design, made: &MadeRange, has_picture: bool) -> Result<()> {
+    if design.cell.shape.upright().is_some() {
+        return Err(Error::invalid(
+            "a study of upright rectangles",
+            "use squares, circles or rotated rectangles; designs of other widths and heights tell what a process does to upright ones",
+        ));
+    }
+    if design.cell.shape.rotated().is_none() {
+        return Ok(());
+    }
+    if made.changes.iter().any(|change| change.corner_rounding_nm != 0.0) {
+        return Err(Error::invalid(
+            "`corner_rounding` of rotated rectangles",
+            "leave it out of the study and of its model: rectangles are solved with sharp corners",
+        ));
+    }
+    if has_picture {
+        return Err(Error::invalid(
+            "pictures of rotated rectangles in a study",
+            "leave out [picture]; `metalith picture` takes the picture of the chip as drawn",
+        ));
+    }
+    Ok(())
+}
+
 impl MadeRange {
     /// Every draw is drawn, none is simulated.
     fn of(drawer: &Drawer, key: [u8; 32]) -> Result<Self> {
@@ -305,6 +344,11 @@ impl MadeRange {
         // The mapping's own widths are judged too, whatever was read.
         narrow = narrow.min(f64::from(design.cell.width_range_nm.0));
         wide = wide.max(f64::from(design.cell.width_range_nm.1));
+        // Rectangles are of one size, and told by numbers that are no widths.
+        let (narrow, wide) = match design.cell.shape.rotated() {
+            Some(_) => (0.0, 0.0),
+            None => (narrow, wide),
+        };
         let (single, band) = wavelengths_um(design)?;
         let single = single.into_iter().map(|um| (um, ORDERS));
         Ok(BankRange {

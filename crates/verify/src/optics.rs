@@ -230,19 +230,27 @@ impl<'a> ElementSimulator<'a> {
                     });
                     continue;
                 }
-                let made;
-                let table = match (&at.tables, case) {
-                    (Some(tables), _) => &tables.normal,
+                let (made, made_hands);
+                let polarised = at.tables.as_ref().and_then(TransmissionTables::polarised);
+                let (table, polarised) = match (&at.tables, case) {
+                    (Some(tables), _) => (&tables.normal[..], polarised),
                     (None, SimulationCase::Made(chip)) => {
                         let drawn = read.drawn.as_ref().ok_or_else(not_held)?;
-                        made = by_drawn_width(chip, rule, drawn, colour.wavelength_um, progress)?;
-                        &made
+                        let steps = drawn.mean_site_steps(&chip.perturbation().geometry);
+                        made_hands = chip.drawn_hands(self.design.cell.most(), steps, colour.wavelength_um)?;
+                        match &made_hands {
+                            Some((tables, light)) => (tables.own(), Some((tables, *light))),
+                            None => {
+                                made = by_drawn_width(chip, rule, steps, colour.wavelength_um, progress)?;
+                                (&made[..], None)
+                            }
+                        }
                     }
                     (None, SimulationCase::Cell(_)) => unreachable!("every cell has its tables"),
                 };
                 let orders = OrderEfficiencies::of(rule, colour.wavelength_um, at.fidelity, at.full, table);
-                all.push(match at.tables.as_ref().and_then(TransmissionTables::polarised) {
-                    Some((hands, light)) => orders.of_light(hands, light, rule, at.full),
+                all.push(match polarised {
+                    Some((tables, light)) => orders.of_light(tables, light, rule, at.full),
                     None => orders,
                 });
             }
@@ -417,13 +425,12 @@ fn all_angles(one: &Chosen) -> impl Iterator<Item = (&Element, FieldAngle)> {
 fn by_drawn_width(
     chip: &MadeChip,
     rule: &WidthRule,
-    drawn: &DrawnElement<'_>,
+    density_steps: i32,
     wavelength_um: f64,
     progress: &dyn Progress,
 ) -> Result<Vec<Complex64>> {
     let widths = OrderEfficiencies::drawn_nm(rule);
-    let steps = drawn.mean_site_steps(&chip.perturbation().geometry);
-    let t = chip.drawn_widths(&widths, steps, wavelength_um, progress)?;
+    let t = chip.drawn_widths(&widths, density_steps, wavelength_um, progress)?;
     let mut table = vec![Complex64::ZERO; usize::from(widths.last().copied().unwrap_or(0)) + 1];
     for (w, t) in widths.iter().zip(t) {
         table[usize::from(*w)] = t;

@@ -114,6 +114,8 @@ mod tests {
                 let element = simulator.bench.element_of(c, &perturbation).unwrap();
                 let table = published().transmissions(um, 400).unwrap();
                 let solved = SolvedWidths {
+                    unseen: vec![Complex64::ONE],
+                    share: 1.0,
                     pillars: vec![element.widths_nm().iter().map(|w| between(&table, *w)).collect()],
                     bare: vec![Complex64::ONE],
                     rim: None,

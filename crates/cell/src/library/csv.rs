@@ -11,6 +11,9 @@ use metalith_core::{Error, Result, UprightRectangles};
 /// Longest library that is read (bytes): twice that of the most pillars.
 const LONGEST_CSV: u64 = 1 << 20;
 
+/// Most turns of a phase, either way: beyond it the fraction of a turn has fewer digits than a choice needs.
+const MOST_TURNS: f64 = 1e6;
+
 const HEAD: &str = "width_x_nm,width_y_nm,turns_x,turns_y,passed_x,passed_y";
 
 /// Most of the power that a pillar passes, with room for the rounding of a solver.
@@ -67,7 +70,7 @@ impl PillarLibrary {
             let [x, y, turns_x, turns_y, passed_x, passed_y] = fields[..] else {
                 return Err(no_pillar());
             };
-            if fields.len() != row.split(',').count() || ![turns_x, turns_y].iter().all(|v| v.is_finite()) {
+            if fields.len() != row.split(',').count() || ![turns_x, turns_y].iter().all(|v| v.abs() <= MOST_TURNS) {
                 return Err(no_pillar());
             }
             let whole = |nm: f64| (nm.fract() == 0.0 && (0.0..=f64::from(u16::MAX)).contains(&nm)).then_some(nm as u16);
@@ -132,6 +135,7 @@ mod tests {
             ("100,140,0,0,1", 2, "is not a pillar"),
             ("100,140,0,x,1,1", 2, "is not a pillar"),
             ("100,140,0,inf,1,1", 2, "is not a pillar"),
+            ("100,140,1.7e308,0,1,1", 2, "is not a pillar"),
             ("100,140,0,0,1,1,1", 2, "is not a pillar"),
             ("100,150,0,0,1,1", 2, "no pillar of the design"),
             ("100,260,0,0,1,1", 2, "no pillar of the design"),

@@ -37,9 +37,9 @@ pub struct PillarLibrary {
     /// The number of the pillar over each part of a turn of both phases, that of y by the row.
     #[serde(skip)]
     over_parts: Vec<u16>,
-    /// Phases by number (turns); not a number for those that are not in it.
+    /// Phases by number (turns); none of those that are not in it.
     #[serde(skip)]
-    turns: [Vec<f64>; 2],
+    turns: [Vec<Option<f64>>; 2],
 }
 
 /// What a library leaves of two phases that are asked for, all of them alike often.
@@ -47,8 +47,8 @@ pub struct PillarLibrary {
 pub struct LibraryErrors {
     /// Phase of the pillar that is chosen against that asked for, for light along x and along y.
     pub phase: [MappingError; 2],
-    /// Share of the power that arrives which follows the phase: the first order of a blazed grating, mean over the phases of the
-    /// other light.
+    /// Share of the power that arrives which follows the phase: the square of the mean field, less its phase, over all pairs, as of the
+    /// first order of a blazed grating.
     pub first: [f64; 2],
     /// Share that passes, whatever its phase.
     pub passed: [f64; 2],
@@ -81,10 +81,10 @@ impl PillarLibrary {
         let over_parts = over_parts.collect();
         let last = pillars.iter().map(|p| usize::from(p.number)).max().unwrap_or(0);
         let turns = [0, 1].map(|axis| {
-            let mut turns = vec![f64::NAN; last + 1];
+            let mut turns = vec![None; last + 1];
             pillars
                 .iter()
-                .for_each(|p| turns[usize::from(p.number)] = p.turns[axis]);
+                .for_each(|p| turns[usize::from(p.number)] = Some(p.turns[axis]));
             turns
         });
         Ok(Self {
@@ -144,8 +144,7 @@ impl PillarLibrary {
 
     /// Phase of light along an axis at a pillar of the library (turns).
     pub fn turns(&self, number: u16, axis: PolarisationAxis) -> Option<f64> {
-        let turns = self.turns[axis.index()].get(usize::from(number))?;
-        (!turns.is_nan()).then_some(*turns)
+        *self.turns[axis.index()].get(usize::from(number))?
     }
 
     /// What it leaves, over all pairs of phases.
@@ -222,6 +221,7 @@ mod tests {
         assert_eq!(library.turns(14, PolarisationAxis::X), Some(1.0 / 12.0));
         assert_eq!(library.turns(14, PolarisationAxis::Y), Some(1.0 / 12.0));
         assert_eq!(library.turns(200, PolarisationAxis::X), None);
+        assert!(library == library.clone());
         assert!(PillarLibrary::new(Vec::new()).is_err());
     }
 

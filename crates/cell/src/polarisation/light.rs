@@ -52,7 +52,11 @@ impl PolarisedLight {
 
     /// The detector in words: what reaches the sensor beside focused light, and what does not.
     pub fn detector(self, focused: FocusedLight) -> String {
-        let own = self.arriving_at(focused) == focused.polarisation();
+        // Of linear light half a turn on it is the same.
+        let own = match self.arriving_at(focused) {
+            light @ Polarisation::Linear(_) => light.share(focused) == 1.0,
+            light => light == focused.polarisation(),
+        };
         match focused {
             FocusedLight::Circular(_) => self.behind_converting(own),
             FocusedLight::Linear(axis) => self.behind_upright(own, axis),

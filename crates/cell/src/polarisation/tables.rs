@@ -57,6 +57,15 @@ impl PolarisedTables {
         let Some(Analyser::Linear(_)) = light.analyser else {
             return self.passed(light);
         };
+        if let Self::Axes(_) = self {
+            // Each polarisation has a phase of its own.
+            let parts = self.leaving(light).into_iter().flatten();
+            let alone = parts.map(|part| PassedTable {
+                order: part.2,
+                table: sum(&[part]),
+            });
+            return alone.collect();
+        }
         let of_order = |order: i32| {
             self.passed_in(order, light)
                 .into_iter()
@@ -70,6 +79,14 @@ impl PolarisedTables {
         match self {
             Self::Hands(hands) => FocusedLight::Circular(hands.focused),
             Self::Axes(axes) => FocusedLight::Linear(axes.focused),
+        }
+    }
+
+    /// Transmissions of the light that is focused.
+    pub fn own(&self) -> &[Complex64] {
+        match self {
+            Self::Hands(hands) => &hands.converted[0],
+            Self::Axes(axes) => &axes.along[axes.focused.index()],
         }
     }
 

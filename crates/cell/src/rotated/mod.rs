@@ -1,19 +1,21 @@
 //! The rigorous cell of rectangular pillars of one size, by their rotation.
 
+mod samples;
 mod series;
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use num_complex::Complex64;
-use rayon::prelude::*;
 use serde::Serialize;
 
 use metalith_core::{Result, RotatedRectangles};
-use metalith_rcwa::{Orders, circular};
+use metalith_rcwa::Orders;
 
-use self::series::{Channels, Series, every, samples, solved_rotations};
-use super::{CellModel, CellStack, Fidelity, HandTables, Handedness, ObliqueTables, PolarisedTables, RotatedRectangle};
+pub use self::samples::RotationSamples;
+
+use self::series::{Channels, Series, every};
+use super::{CellModel, CellStack, Fidelity, HandTables, Handedness, ObliqueTables, PolarisedTables};
 
 /// Intervals of an eighth of a turn whose ends are solved.
 const INTERVALS: usize = 6;
@@ -179,17 +181,10 @@ impl RotatedCell {
 
     /// Over a quarter turn.
     fn samples(&self, intervals: usize, wavelength_um: f64, orders: usize) -> Result<Vec<Channels>> {
-        let orders = Orders::new(orders)?;
-        let rotations: Vec<f64> = solved_rotations(intervals).collect();
-        let jones = rotations.into_par_iter().map(|rotation| {
-            let pillar = RotatedRectangle {
-                width_nm: f64::from(self.pillars.width_nm),
-                length_nm: f64::from(self.pillars.length_nm),
-                rotation,
-            };
-            Ok(circular(self.stack.jones(&pillar, wavelength_um, [0.0; 2], orders)?))
-        });
-        Ok(samples(&jones.collect::<Result<Vec<_>>>()?, self.arriving))
+        let (orders, edges) = (Orders::new(orders)?, [self.pillars.width_nm, self.pillars.length_nm]);
+        let edges = edges.map(f64::from);
+        RotationSamples::over(intervals, &self.stack, edges, wavelength_um, orders, self.arriving)
+            .map(RotationSamples::channels)
     }
 
     /// Of converted (0) or unconverted (1) light.
@@ -279,8 +274,9 @@ mod tests {
     use std::f64::consts::FRAC_1_SQRT_2;
 
     use super::super::rectangle::tests::{PILLARS, titania};
-    use super::super::{Polarisation, PolarisedLight};
+    use super::super::{Polarisation, PolarisedLight, RotatedRectangle};
     use super::*;
+    use metalith_rcwa::circular;
 
     /// Between the solved rotations, of |t| near 1.1: what the series leaves out; ten times more with five rotations.
     const BETWEEN: f64 = 5e-4;

@@ -18,14 +18,38 @@ impl UprightRectangles {
     /// Lengths of an edge at most: 4096 pillars, which a layout may have a cell for each of.
     pub const MOST_LENGTHS: u16 = 64;
 
+    /// How many lengths count: at least one, and no more than numbers have room for.
+    fn counted(self) -> u16 {
+        self.lengths.clamp(1, Self::MOST_LENGTHS)
+    }
+
     /// How many pillars there are; the last of their numbers.
     pub fn count(self) -> u16 {
-        self.lengths.min(Self::MOST_LENGTHS).pow(2)
+        self.counted().pow(2)
     }
 
     /// The longest edge (nm).
     pub fn longest_nm(self) -> u16 {
-        self.edge_nm(self.lengths.saturating_sub(1))
+        self.edge_nm(self.counted() - 1)
+    }
+
+    /// Pillars whose edges may have all the lengths that occur (nm), which are those of two layouts or of what was found in one; none if these are
+    /// too many in equal steps, or odd, so that no pillar would be centred on the grid of 1 nm.
+    pub fn of_lengths(lengths_nm: impl Iterator<Item = u16> + Clone) -> Option<Self> {
+        let (shortest, longest) = (lengths_nm.clone().min()?, lengths_nm.clone().max()?);
+        let step_nm = lengths_nm.fold(0, |step, nm| common_divisor(step, nm - shortest));
+        let steps = (longest - shortest) / step_nm.max(1);
+        let even = shortest.is_multiple_of(2) && step_nm.is_multiple_of(2);
+        (even && shortest > 0 && steps < Self::MOST_LENGTHS).then_some(Self {
+            shortest_nm: shortest,
+            step_nm: step_nm.max(2),
+            lengths: steps + 1,
+        })
+    }
+
+    /// The lengths that an edge may have (nm), rising.
+    pub fn lengths_nm(self) -> impl Iterator<Item = u16> + Clone {
+        (0..self.counted()).map(move |k| self.edge_nm(k))
     }
 
     fn edge_nm(self, k: u16) -> u16 {
@@ -34,7 +58,7 @@ impl UprightRectangles {
 
     /// Edges of a pillar along x and along y (nm).
     pub fn edges_nm(self, number: u16) -> [u16; 2] {
-        let (k, lengths) = (number.saturating_sub(1), self.lengths.max(1));
+        let (k, lengths) = (number.saturating_sub(1), self.counted());
         [self.edge_nm(k % lengths), self.edge_nm(k / lengths)]
     }
 
@@ -43,10 +67,10 @@ impl UprightRectangles {
         let place = |nm: u16| {
             let beyond = nm.checked_sub(self.shortest_nm)?;
             let k = beyond / self.step_nm.max(1);
-            (beyond.is_multiple_of(self.step_nm.max(1)) && k < self.lengths).then_some(k)
+            (beyond.is_multiple_of(self.step_nm.max(1)) && k < self.counted()).then_some(k)
         };
         let [x, y] = [place(edges_nm[0])?, place(edges_nm[1])?];
-        Some(1 + x + self.lengths * y)
+        Some(1 + x + self.counted() * y)
     }
 
     /// Corners of a pillar about its middle (nm), counter-clockwise.
@@ -73,7 +97,7 @@ impl UprightRectangles {
     pub fn longest_diagonal_nm(self, number: u16) -> f64 {
         let [x, y] = self.edges_nm(number);
         // Beyond the first row of numbers all edges along x occur.
-        let x = if number > self.lengths { self.longest_nm() } else { x };
+        let x = if number > self.counted() { self.longest_nm() } else { x };
         f64::from(x).hypot(f64::from(y))
     }
 
@@ -87,7 +111,7 @@ impl UprightRectangles {
         let step = f64::from(self.step_nm.max(1));
         let nearest = |nm: f64| -> Option<u16> {
             let k = ((nm - f64::from(self.shortest_nm)) / step).round();
-            (k >= 0.0 && k < f64::from(self.lengths)).then(|| self.edge_nm(k as u16))
+            (k >= 0.0 && k < f64::from(self.counted())).then(|| self.edge_nm(k as u16))
         };
         let number = self.number([nearest(extent(0))?, nearest(extent(1))?])?;
         let drawn = self.corners(number).map(|(x, y)| [x as f64, y as f64]);
@@ -95,6 +119,11 @@ impl UprightRectangles {
         let each_has_one = drawn.iter().all(|q| corners.iter().any(|p| near(p, q)));
         each_has_one.then_some(number)
     }
+}
+
+/// The greatest common divisor of two lengths; that of one and of nothing is the one.
+fn common_divisor(a: u16, b: u16) -> u16 {
+    if b == 0 { a } else { common_divisor(b, a % b) }
 }
 
 #[cfg(test)]
@@ -121,6 +150,26 @@ mod tests {
             assert_eq!(PILLARS.number(edges), None, "{edges:?}");
         }
         assert_eq!(PILLARS.corners(12), [(-40, -50), (40, -50), (40, 50), (-40, 50)]);
+    }
+
+    #[test]
+    fn lengths_are_united_in_their_common_steps() {
+        let of = |lengths: &[u16]| UprightRectangles::of_lengths(lengths.iter().copied());
+        assert_eq!(of(&[280, 80, 100, 240]), Some(PILLARS));
+        assert_eq!(of(&[120]).map(|p| (p.count(), p.edges_nm(1))), Some((1, [120, 120])));
+        let wider = UprightRectangles { lengths: 13, ..PILLARS };
+        let both = UprightRectangles::of_lengths(PILLARS.lengths_nm().chain(wider.lengths_nm()));
+        assert_eq!(both, Some(wider));
+        for none in [&[][..], &[101, 121], &[100, 103], &[80, 82, 280], &[0, 80]] {
+            assert_eq!(of(none), None, "{none:?}");
+        }
+        let extreme = UprightRectangles {
+            shortest_nm: u16::MAX,
+            step_nm: u16::MAX,
+            lengths: u16::MAX,
+        };
+        assert_eq!((extreme.count(), extreme.edges_nm(u16::MAX)), (4096, [u16::MAX; 2]));
+        assert_eq!(extreme.number([u16::MAX; 2]), Some(1));
     }
 
     #[test]

@@ -62,12 +62,24 @@ impl ComputedWidths {
     /// alone.
     pub fn maps(&self, symmetry: Symmetry, to: &Self) -> bool {
         let (own, other) = (self.phase(), to.phase());
-        if !own.is_steered_alone() || !other.is_steered_alone() || self.along_y.is_some() {
+        let [along_y, other_along_y] = [self, to].map(Self::phase_along_y);
+        let steered_alone = |phase: &ElementPhase<'_>| phase.is_steered_alone();
+        if ![&own, &other]
+            .into_iter()
+            .chain(&along_y)
+            .chain(&other_along_y)
+            .all(steered_alone)
+        {
             return symmetry == Symmetry::IDENTITY && self.element == to.element;
         }
+        let same_along_y = match (&along_y, &other_along_y) {
+            (Some(own), Some(other)) => own.is_of_lens(other),
+            (own, other) => own.is_none() && other.is_none(),
+        };
         symmetry.keeps_lattice(self.lens.lattice())
             && Arc::ptr_eq(&self.lens, &to.lens)
             && own.is_of_lens(&other)
+            && same_along_y
             && self.rule == to.rule
             && self.element.wedge.wavelength_um == to.element.wedge.wavelength_um
             && symmetry.vector(self.directions()) == to.directions()

@@ -80,8 +80,8 @@ impl Symmetry {
         seen
     }
 
-    /// Whether it leaves every pillar of a shape as it is, about its own middle: a rotated rectangle is turned by it, but for half
-    /// a turn.
+    /// Whether it leaves every pillar of a shape as it is, about its own middle: a rectangle is turned by it, but for half a turn.
+    /// A mirror about an axis would leave upright ones too; it is not used.
     pub fn keeps(self, shape: PillarShape) -> bool {
         shape.rectangles().is_none() || (!self.mirrored && self.quarter_turns.is_multiple_of(2))
     }

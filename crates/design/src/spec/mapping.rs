@@ -40,6 +40,9 @@ pub struct MappingSpec {
     /// What that file holds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub library: Option<PillarLibrary>,
+    /// Why a library that is to be made anew was not read.
+    #[serde(skip)]
+    pub library_refused: Option<String>,
     /// Of rotated rectangles: what their rotation has beside half of the phase.
     #[serde(skip_serializing_if = "RotationMapping::is_half")]
     pub rotation: RotationMapping,
@@ -204,6 +207,7 @@ impl MappingSpec {
             table: None,
             library_file,
             library: None,
+            library_refused: None,
             rotation,
             steered,
             comparison,
@@ -223,10 +227,12 @@ impl MappingSpec {
         }
         if let (Some(file), Some(pillars)) = (&self.library_file, cell.shape.upright()) {
             let read = PillarLibrary::read_csv(file, pillars);
-            self.library = match library {
-                LibraryFile::Needed => Some(read?),
-                LibraryFile::ToBeMade => read.ok(),
-            };
+            match (read, library) {
+                (Ok(read), _) => self.library = Some(read),
+                (Err(error), LibraryFile::Needed) => return Err(error),
+                (Err(error), LibraryFile::ToBeMade) if file.exists() => self.library_refused = Some(error.to_string()),
+                (Err(_), LibraryFile::ToBeMade) => {}
+            }
         }
         Ok(())
     }

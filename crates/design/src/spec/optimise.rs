@@ -221,6 +221,15 @@ impl OptimiseSpec {
     /// Rotated rectangles have one size, and their number does not go on from the last rotation to the first as widths do: a ring
     /// takes one of them, and no slope or error of a width is known.
     fn check_rotations(&self, s: &Section<'_, '_>, cell: &CellSpec) {
+        if cell.shape.upright().is_some() {
+            s.fault_given(
+                &["cell.shape"],
+                "cell",
+                "a search for one phase, and upright rectangles have a phase for each polarisation",
+                "leave [optimise] out, or use squares, circles or rotated rectangles",
+            );
+            return;
+        }
         if cell.shape.rectangles().is_none() {
             return;
         }

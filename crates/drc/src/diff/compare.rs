@@ -142,6 +142,16 @@ fn map_over(a: &Content, b: &Content, unit_nm: f64) -> ChangeMap {
     }
 }
 
+/// Whether edges along x and y are exchanged.
+fn is_quarter_turn([a, b]: [u16; 2], to: [u16; 2]) -> bool {
+    a != b && to == [b, a]
+}
+
+/// What is wider is larger by this: by area, of equal areas by the longer edge.
+fn size([x, y]: [u16; 2]) -> (u32, u16) {
+    (u32::from(x) * u32::from(y), x.max(y))
+}
+
 fn element(
     a: &ExtractedElement<HeldWidths>,
     b: &ExtractedElement<HeldWidths>,
@@ -180,9 +190,8 @@ fn element(
         let (count, what) = match (from, to) {
             (0, _) => (&mut diff.added, "added"),
             (_, 0) => (&mut diff.removed, "removed"),
-            // Upright rectangles of one area differ by a quarter turn, or nearly.
-            _ if rotated || shape.square_nm2(to) == shape.square_nm2(from) => (&mut diff.rotated, "rotated"),
-            _ if shape.square_nm2(to) > shape.square_nm2(from) => (&mut diff.widened, "widened"),
+            _ if rotated || is_quarter_turn(edges(from), edges(to)) => (&mut diff.rotated, "rotated"),
+            _ if size(edges(to)) > size(edges(from)) => (&mut diff.widened, "widened"),
             _ => (&mut diff.narrowed, "narrowed"),
         };
         *count += 1;

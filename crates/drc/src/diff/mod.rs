@@ -19,7 +19,7 @@ use std::io::Read;
 
 use super::work::Allowance;
 use content::{Content, Strings, WantedPillars};
-use metalith_core::{ElementSite, Error, Progress, Result};
+use metalith_core::{ElementSite, Error, PillarShape, Progress, Result, UprightRectangles};
 use metalith_gds::extract::{Scale, discover};
 use metalith_gds::{LayerNumber, Layout, Selection};
 
@@ -56,7 +56,10 @@ pub fn diff(a: &Layout, b: &Layout, plan: &DiffPlan, progress: &dyn Progress) ->
     for layout in [a, b] {
         match discover(layout, &everything, &[plan.pillar_layer], Scale::of(layout)?, progress).map_err(Error::from) {
             Ok(found) => {
-                shape.get_or_insert(found.shape);
+                shape = Some(match shape {
+                    None => found.shape,
+                    Some(first) => both(first, found.shape)?,
+                });
                 sites::unite(&mut sites, found.sites);
             }
             // Without elements, all shapes are compared as outlines.
@@ -91,6 +94,32 @@ pub fn diff(a: &Layout, b: &Layout, plan: &DiffPlan, progress: &dyn Progress) ->
     report.same_bytes = identical;
     report.tree = tree::compare(a, b, plan.listed);
     Ok(report)
+}
+
+/// What the pillars of two layouts are: those of the first, of upright rectangles with the lengths of both.
+fn both(first: PillarShape, second: PillarShape) -> Result<PillarShape> {
+    let (Some(a), Some(b)) = (first.upright(), second.upright()) else {
+        return Ok(first);
+    };
+    let united = UprightRectangles::of_lengths(a.lengths_nm().chain(b.lengths_nm()));
+    let united = united.ok_or_else(|| {
+        Error::invalid(
+            format!(
+                "upright rectangles with edges of {} to {} nm in steps of {} nm, and of {} to {} nm in steps of {} nm",
+                a.shortest_nm,
+                a.longest_nm(),
+                a.step_nm,
+                b.shortest_nm,
+                b.longest_nm(),
+                b.step_nm
+            ),
+            format!(
+                "compare layouts whose edges have at most {} lengths together, in equal steps",
+                UprightRectangles::MOST_LENGTHS
+            ),
+        )
+    })?;
+    Ok(PillarShape::Rectangle(united.into()))
 }
 
 fn gcd(a: i64, b: i64) -> i64 {

@@ -113,7 +113,16 @@ fn rules_see_the_edges_of_upright_rectangles() {
     };
     let (broken, _) = beam(2);
     assert!(broken.is_empty(), "{broken:?}");
-    assert!(!beam(40).0.is_empty());
+    // Every pillar with an edge along x or along y that is no multiple, beside the pitch, which is none.
+    let off = |nm: u16| !nm.is_multiple_of(40);
+    let sites = (0..SITES).flat_map(|row| (0..SITES).map(move |column| edges(column, row)));
+    let [either, along_x] =
+        [1, 0].map(|last| sites.clone().filter(|e| e[..=last].iter().any(|nm| off(*nm))).count() as u64);
+    let [(rule, count)] = &beam(40).0[..] else {
+        panic!("{:?}", beam(40))
+    };
+    assert_eq!((rule.as_str(), *count), ("beam", either + 1));
+    assert!(either > along_x);
 }
 
 /// Corners on the grid are up to 0.7 nm off, edges 1.4 nm: they are judged by the best that they can be.

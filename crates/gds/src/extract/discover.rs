@@ -10,7 +10,7 @@ use crate::{
     Error, ExtractionError, LayerNumber, Layout, LayoutCell, PillarFinder, Rect, Result, Selection, Shape, Transform,
     Visitor,
 };
-use metalith_core::{ElementSite, PillarShape, Progress};
+use metalith_core::{ElementSite, PillarShape, Progress, Rectangles};
 
 /// How a layout is looked at.
 #[derive(Clone, Copy)]
@@ -32,6 +32,8 @@ const WIDE: Look = Look {
     bits: COARSE,
     widest_nm: 20_000,
 };
+/// Squares for one upright rectangle, at most, of a layout whose pillars are such.
+const FEWEST_AMONG: u64 = 4;
 /// Elements found at most.
 const MOST_ELEMENTS: usize = 4096;
 
@@ -137,9 +139,13 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
     layout.visit(selection, &mut map, progress)?;
     let [squares, circles] = map.shapes;
     let shapes = squares + circles + map.sizes.rectangles;
-    let rectangles = (map.sizes.rectangles > squares + circles)
+    let mostly = map.sizes.rectangles > squares + circles;
+    // Squares are upright rectangles too, where others of several sizes stand among them.
+    let among = circles == 0 && FEWEST_AMONG * map.sizes.rectangles > squares;
+    let rectangles = (mostly || among)
         .then(|| map.sizes.pillars(how.widest_nm))
-        .flatten();
+        .flatten()
+        .filter(|found| mostly || matches!(found.pillars, Rectangles::Upright(_)));
     let shape = match &rectangles {
         Some(found) => PillarShape::Rectangle(found.pillars),
         None if circles > squares => PillarShape::Circle,
@@ -239,6 +245,12 @@ impl Visitor for Map {
             return Ok(());
         };
         self.shapes[usize::from(shape.rect.is_none())] += copies;
+        if shape.rect.is_some()
+            && rect.width() == rect.height()
+            && let Some(width_nm) = scale.whole_nm(rect.width())
+        {
+            self.sizes.count_squares(width_nm, copies);
+        }
         let widest_nm = self.widest_nm;
         let centre = |placement: &Transform| {
             let placed = placement.apply_rect(rect)?;

@@ -17,6 +17,9 @@ const ALIKE_NM: i64 = 2;
 /// corners is little.
 const STEPS: u16 = 180;
 
+/// Widths of squares that are counted: those beyond are no pillars (nm).
+const MOST_WIDTHS: usize = 1 << 15;
+
 /// Share of upright rectangles whose sizes decide the lengths that edges may have: what is left may be marks and numerals. Rarer
 /// pillars whose edges are between those are recognised all the same.
 const PILLARS: f64 = 0.9999;
@@ -31,6 +34,8 @@ pub(super) struct Sizes {
     pub rectangles: u64,
     /// Those of them whose edges are not along the axes.
     tilted: u64,
+    /// Squares by their width (nm).
+    squares: Vec<u64>,
     /// What outlines are, if they are rectangles and no squares.
     known: OutlineMemo<Option<SeenRectangle>>,
 }
@@ -108,45 +113,50 @@ impl Sizes {
         self.upright(longest_nm).or_else(|| self.alike(longest_nm))
     }
 
-    /// Upright rectangles of more than one size, with edges in equal steps.
+    /// Upright rectangles of more than one size, with edges in equal steps; squares among them are such too.
     fn upright(&self, longest_nm: i64) -> Option<FoundRectangles> {
-        if self.tilted > 0 {
+        let few = ((1.0 - PILLARS) * self.rectangles as f64).max(1.0);
+        if self.tilted as f64 > few {
             return None;
         }
-        let mut sizes: Vec<_> = self
-            .numbers
-            .iter()
-            .map(|(key, k)| (*key, self.counted[*k].count))
-            .collect();
-        sizes.retain(|((_, long), _)| *long <= longest_nm);
-        sizes.sort_by_key(|(key, count)| (std::cmp::Reverse(*count), *key));
-        let enough = (PILLARS * self.rectangles as f64) as u64;
+        let unequal = self.numbers.iter().map(|(key, k)| (*key, self.counted[*k].count));
+        let mut unequal: Vec<_> = unequal.filter(|((_, long), _)| *long <= longest_nm).collect();
+        unequal.sort_by_key(|(key, count)| (std::cmp::Reverse(*count), *key));
+        let enough = self.rectangles as f64 - few;
         let mut count = 0;
-        let most = sizes.iter().take_while(|(_, n)| {
-            let is_needed = count < enough;
+        let most = unequal.iter().take_while(|(_, n)| {
+            let is_needed = (count as f64) < enough;
             count += n;
             is_needed
         });
-        let most: Vec<_> = most.map(|(key, _)| *key).collect();
-        let (w, l) = *most.first()?;
-        if most
-            .iter()
-            .all(|(a, b)| (a - w).abs() <= ALIKE_NM && (b - l).abs() <= ALIKE_NM)
-        {
+        let most: Vec<_> = most.copied().collect();
+        let (w, l) = most.first()?.0;
+        let alike = |(a, b): (i64, i64)| (a - w).abs() <= ALIKE_NM && (b - l).abs() <= ALIKE_NM;
+        if most.iter().all(|(key, _)| alike(*key)) {
             return None;
         }
-        let lengths = || most.iter().flat_map(|(a, b)| [*a, *b]);
-        let (shortest, longest) = (lengths().min()?, lengths().max()?);
-        let step = lengths().fold(0, |step, length| common_divisor(step, length - shortest));
-        let pillars = UprightRectangles {
-            shortest_nm: u16::try_from(shortest).ok()?,
-            step_nm: u16::try_from(step).ok()?,
-            lengths: u16::try_from((longest - shortest) / step.max(1) + 1).ok()?,
-        };
-        (pillars.lengths <= UprightRectangles::MOST_LENGTHS).then_some(FoundRectangles {
-            pillars: pillars.into(),
-            count: self.rectangles,
+        let squares = self.squares.iter().enumerate().filter(|(_, n)| **n as f64 > few);
+        let edges = most.iter().flat_map(|((a, b), _)| [*a, *b]);
+        let lengths: Option<Vec<u16>> = edges
+            .chain(squares.map(|(nm, _)| nm as i64))
+            .map(|nm| u16::try_from(nm).ok())
+            .collect();
+        Some(FoundRectangles {
+            pillars: UprightRectangles::of_lengths(lengths?.into_iter())?.into(),
+            count: most.iter().map(|(_, n)| n).sum(),
         })
+    }
+
+    /// Count so many squares of a width (nm).
+    #[inline]
+    pub fn count_squares(&mut self, width_nm: i64, copies: u64) {
+        let Ok(width) = usize::try_from(width_nm) else { return };
+        if width < MOST_WIDTHS {
+            if width >= self.squares.len() {
+                self.squares.resize(width + 1, 0);
+            }
+            self.squares[width] += copies;
+        }
     }
 
     fn alike(&self, longest_nm: i64) -> Option<FoundRectangles> {
@@ -167,9 +177,4 @@ impl Sizes {
             count,
         })
     }
-}
-
-/// The greatest common divisor of two lengths; that of one and of nothing is the one.
-fn common_divisor(a: i64, b: i64) -> i64 {
-    if b == 0 { a } else { common_divisor(b, a % b) }
 }

@@ -152,6 +152,56 @@ fn rectangles_of_a_magnified_cell_are_found_as_large_as_they_are() {
     assert_eq!((read.elements.len(), read.pillars), (1, 36));
 }
 
+/// Upright rectangles of several sizes: found though a mark stands at an angle, and though most are squares; odd edges, which no grid of
+/// 1 nm centres, and what is more than 64 lengths are not taken for such.
+#[test]
+fn upright_rectangles_are_found_among_squares_and_marks() {
+    let found = |edges: &dyn Fn(i32) -> [i32; 2], tilted: bool| {
+        let mut gds = Gds::library();
+        gds.cell("TOP");
+        for k in 0..400 {
+            let (x, y) = (175 + 350 * (k % 20) - 3500, 175 + 350 * (k / 20) - 3500);
+            let [a, b] = edges(k);
+            gds.rect(1, x - a / 2, y - b / 2, x - a / 2 + a, y - b / 2 + b);
+        }
+        if tilted {
+            gds.polygon(1, &[(9000, 0), (9300, 300), (9100, 500), (8800, 200), (9000, 0)]);
+        }
+        gds.end_cell();
+        extract(&layout(gds.end()), &ExtractionPlan::discover(PILLARS), &Silent)
+    };
+    let several = |k: i32| [100 + 20 * (k % 7), 100 + 20 * (k * 3 % 8)];
+    let read = found(&several, false).unwrap();
+    let pillars = read.shape.upright().unwrap();
+    assert_eq!((pillars.shortest_nm, pillars.step_nm, pillars.lengths), (100, 20, 8));
+    assert_eq!((read.pillars, read.oddities.total()), (400, 0));
+    let map = &read.elements[0].widths;
+    for k in 0..400_usize {
+        let edges = pillars.edges_nm(map.width_nm[[k / 20, k % 20]]).map(i32::from);
+        assert_eq!(edges, several(k as i32), "{k}");
+    }
+    let read = found(&several, true).unwrap();
+    assert_eq!(
+        (read.shape.upright(), read.pillars, read.oddities.total()),
+        (Some(pillars), 400, 1)
+    );
+    // Three squares for one that is none, of a width that no other has.
+    let squares = |k: i32| if k % 4 == 0 { several(k / 4 + 1) } else { [260, 260] };
+    let read = found(&squares, false).unwrap();
+    assert!(
+        read.shape.upright().is_some_and(|p| p.number([260, 260]).is_some()),
+        "{:?}",
+        read.shape
+    );
+    assert_eq!((read.pillars, read.oddities.total()), (400, 0));
+    for edges in [
+        &(|k: i32| [101 + 20 * (k % 7), 101]) as &dyn Fn(i32) -> [i32; 2],
+        &|k: i32| [80 + 2 * (k % 100), 90],
+    ] {
+        assert!(found(edges, false).is_err());
+    }
+}
+
 /// One of each oddity, and each for the right reason, at the right place.
 #[test]
 fn everything_that_is_not_a_pillar_is_listed() {

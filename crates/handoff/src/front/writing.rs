@@ -4,7 +4,7 @@ use crate::contents::Contents;
 use crate::dose::{DOSE_FORMULA, FORMULA, duration};
 use crate::pad::{dose_pads, measured};
 use crate::{job, pictures};
-use metalith_core::PillarShape;
+use metalith_core::{PillarShape, Rectangles};
 use metalith_report::{Cell, Column, Page, Table, fixed};
 
 pub(super) fn doses(page: &mut Page, c: &Contents<'_>) {
@@ -51,7 +51,10 @@ pub(super) fn write_time(page: &mut Page, c: &Contents<'_>) {
     let (snapped, changed) = match shape {
         PillarShape::Square => ("a width that is no multiple of it", "rms change of width"),
         PillarShape::Circle => ("a diameter that is no multiple of it", "rms change of diameter"),
-        PillarShape::Rectangle(_) => ("a corner that is on no multiple of it", "rms shift of corners"),
+        PillarShape::Rectangle(Rectangles::Upright(_)) => ("a width that is no multiple of it", "rms change of width"),
+        PillarShape::Rectangle(Rectangles::Rotated(_)) => {
+            ("a corner that is on no multiple of it", "rms shift of corners")
+        }
     };
     page.code(format!("{FORMULA}\n{DOSE_FORMULA}"));
     page.paragraph(format!(

@@ -239,8 +239,9 @@ impl<'t> Section<'_, 't> {
 
     /// The same of a file that is made by what `hint` says.
     pub fn file_else(&self, key: &str, hint: &str) -> PathBuf {
-        let path = self.path(key);
-        if path.as_path() != self.document.folder() && !path.is_file() {
+        let text = self.text(key);
+        let path = self.document.folder().join(&text);
+        if !text.is_empty() && !path.is_file() {
             self.fault(key, format!("there is no file {}", path.display()), hint);
         }
         path
