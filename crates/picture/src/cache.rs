@@ -16,7 +16,7 @@ use crate::layout::PillarCount;
 use crate::veil::{LightShares, SCENE_CELLS, Veil};
 
 const BANK_MAGIC: [u8; 8] = *b"MLKERN\0\x02";
-const VEIL_MAGIC: [u8; 8] = *b"MLVEIL\0\x04";
+const VEIL_MAGIC: [u8; 8] = *b"MLVEIL\0\x05";
 const PILLARS_MAGIC: [u8; 8] = *b"MLPILL\0\x01";
 /// Most bytes that the numbers of a bank or of a veil may have: both are held in memory, and refused before they are made if
 /// they would be more.

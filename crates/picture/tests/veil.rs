@@ -12,10 +12,10 @@ const CELL_UM: f64 = 93.76;
 /// Distances of the squares from where the image is, along x and along the diagonal: beyond the window of a kernel, which has half
 /// an edge of 188 um, up to the neighbouring element's place (squares).
 const STEPS: [i32; 5] = [3, 4, 6, 9, 14];
-/// Of the light of all these squares together, and root mean square over them in parts of their mean. The targets are 0.02 and
-/// 0.1; measured 0.002 to 0.028 and 0.03 to 0.099: 0.02, 0.019, 0.002 ahead, 0.021, 0.028, 0.012 steered.
-const TOTAL: f64 = 0.03;
-const MAP: f64 = 0.1;
+/// Sines along x that light leaves with beyond where it is meant to go, and for each what the light of all these squares may err
+/// by together, and root mean square over them in parts of their mean. Along the axis it is 0.015 and 0.051 at most. At 24
+/// degrees 0.03 and 0.15: light of a tile that leaves obliquely is bent too little on its way.
+const DIRECTIONS: [(f64, f64, f64); 2] = [(0.0, 0.02, 0.1), (0.4, 0.035, 0.2)];
 /// As the veil of pictures has them.
 const BLOCKS: usize = 20;
 
@@ -34,58 +34,59 @@ fn the_veil_of_an_element_is_that_of_its_field() {
         for um in [0.455, 0.53, 0.66] {
             let table = cells[0].transmissions(um, design.cell.pitch_nm as u16).unwrap();
             let pillars = Pillars::new(widths.as_ref(), &table).unwrap();
-            let wave = PlaneWave::looked_at(&elements[k].wedge, um);
-            let sines = [wave.sin_x, wave.sin_y];
-            let grid = LandingGrid {
-                cell_um: CELL_UM,
-                cells: 33,
-                distance_um: focal_um,
-            };
-            let towards = leaving(&elements[k].wedge, &wave);
-            let map = Departure::of(&pillars, um, focal_um, BLOCKS)
-                .landing(sines, towards, grid)
-                .unwrap();
-            let mut scratch = Scratch::default();
-            let (mut traced, mut wanted) = (Vec::new(), Vec::new());
-            for [dx, dy] in STEPS
-                .iter()
-                .flat_map(|s| [[*s, 0], [-s, 0], [0, *s], [0, -s], [*s, *s], [-s, *s]])
-            {
-                let at = [dx, dy].map(|d| f64::from(d) * CELL_UM);
-                let samples = (CELL_UM / 0.33).round() as usize;
-                let window = Window {
-                    centre_um: at,
-                    step_um: CELL_UM / samples as f64,
-                    samples,
+            let departure = Departure::of(&pillars, um, focal_um, BLOCKS);
+            for (beyond, most_of_total, most_of_map) in DIRECTIONS {
+                let mut wave = PlaneWave::looked_at(&elements[k].wedge, um);
+                wave.sin_x += beyond;
+                let grid = LandingGrid {
+                    cell_um: CELL_UM,
+                    cells: 55,
                     distance_um: focal_um,
                 };
-                let fold = Fold::plan(
-                    design.lattice(),
-                    design.lens.radius_um(),
-                    um,
-                    window,
-                    Accuracy::Accurate,
-                )
-                .unwrap();
-                let psf = Psf::formed(&fold, &pillars, &wave, &[], &mut scratch).unwrap();
-                wanted.push(psf.values.sum() * window.step_um.powi(2));
-                let [row, column] = [dy, dx].map(|d| (16 + d) as usize);
-                traced.push(map.power_um2[[row, column]]);
+                let towards = leaving(&elements[k].wedge, &wave);
+                let map = departure.landing([wave.sin_x, wave.sin_y], towards, grid).unwrap();
+                let tangent = beyond / (1.0 - beyond * beyond).sqrt();
+                let image = (focal_um * tangent / CELL_UM).round() as i32;
+                let (mut traced, mut wanted) = (Vec::new(), Vec::new());
+                for [dx, dy] in STEPS
+                    .iter()
+                    .flat_map(|s| [[*s, 0], [-s, 0], [0, *s], [0, -s], [*s, *s], [-s, *s]])
+                {
+                    let square = [image + dx, dy];
+                    let [column, row] = square.map(|d| (27 + d) as usize);
+                    traced.push(map.power_um2[[row, column]]);
+                    wanted.push(power_of_field(
+                        &design,
+                        &pillars,
+                        &wave,
+                        square.map(|d| f64::from(d) * CELL_UM),
+                    ));
+                }
+                let [sum_traced, sum] = [&traced, &wanted].map(|v| v.iter().sum::<f64>());
+                let mean = sum / wanted.len() as f64;
+                let pairs = traced.iter().zip(&wanted);
+                let squares: f64 = pairs.map(|(a, b): (&f64, &f64)| (a - b).powi(2)).sum();
+                let rms = (squares / wanted.len() as f64).sqrt() / mean;
+                let total = sum_traced / sum - 1.0;
+                println!("{index:?} {um} {beyond}: total {total:+.4}, map {rms:.3}");
+                assert!(total.abs() < most_of_total, "{index:?} {um} {beyond}: {total}");
+                assert!(rms < most_of_map, "{index:?} {um} {beyond}: {rms}");
             }
-            let [sum_traced, sum] = [&traced, &wanted].map(|v| v.iter().sum::<f64>());
-            let mean = sum / wanted.len() as f64;
-            let squares: f64 = traced
-                .iter()
-                .zip(&wanted)
-                .map(|(a, b): (&f64, &f64)| (a - b).powi(2))
-                .sum();
-            let rms = (squares / wanted.len() as f64).sqrt() / mean;
-            println!("{index:?} {um}: total {:+.4}, map {rms:.3}", sum_traced / sum - 1.0);
-            assert!(
-                (sum_traced / sum - 1.0).abs() < TOTAL,
-                "{index:?} {um}: {sum_traced} {sum}"
-            );
-            assert!(rms < MAP, "{index:?} {um}: {rms}");
         }
     }
+}
+
+/// What the field brings to a square about a place (um^2).
+fn power_of_field(design: &Design, pillars: &Pillars<'_>, wave: &PlaneWave, centre_um: [f64; 2]) -> f64 {
+    let samples = (CELL_UM / 0.33).round() as usize;
+    let window = Window {
+        centre_um,
+        step_um: CELL_UM / samples as f64,
+        samples,
+        distance_um: design.lens.focal_length_um,
+    };
+    let (radius, um) = (design.lens.radius_um(), wave.wavelength_um);
+    let fold = Fold::plan(design.lattice(), radius, um, window, Accuracy::Accurate).unwrap();
+    let psf = Psf::formed(&fold, pillars, wave, &[], &mut Scratch::default()).unwrap();
+    psf.values.sum() * window.step_um.powi(2)
 }

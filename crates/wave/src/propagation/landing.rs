@@ -1,10 +1,10 @@
 //! Where all the light of an element lands on the sensor's plane, coarsely: its veil as well as its image.
 //!
 //! The aperture is cut into overlapping tiles whose squared windows add up to one everywhere, so that no power is
-//! lost or counted twice. The spectrum of a tile says how much power leaves it in which direction, and each part
-//! goes to the plane as a ray from the middle of the tile. Phases between tiles are left out: what interferes over
-//! less than the size of a tile and its diffraction is not resolved. That is sqrt(wavelength * distance) at best,
-//! 35 um for a lens of 2.4 mm focal length, and for what is finer there is [`Fold`](crate::Fold).
+//! lost or counted twice. A tile is bent towards the plane before it is transformed: its spectrum then says how much power
+//! it sends where, as rays from its middle. Phases between tiles are left out: what light is blurred by is wavelength * distance
+//! over the edge of a tile, 7 um for a lens of 2.4 mm focal length, and more where light leaves obliquely. For what is finer
+//! there is [`Fold`](crate::Fold).
 
 use metalith_core::Lattice;
 use ndarray::Array2;
