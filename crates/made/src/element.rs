@@ -302,6 +302,17 @@ impl MadeElement {
         self.table_of(&open, bare, Complex64::ONE)
     }
 
+    /// The same of a table that is looked up by what is drawn: by the nearest width (nm), or by the number of a rectangle.
+    pub fn table_by_number(&self, table: &[Complex64], bare: Complex64) -> ClassTable {
+        let at = |k: usize| table.get(k).copied().unwrap_or_default();
+        if self.rotations().is_empty() {
+            return self.table(|width| at(width.round() as usize), bare);
+        }
+        // Rotated ones have one width.
+        let open: Vec<Complex64> = self.rotations().iter().map(|number| at(usize::from(*number))).collect();
+        self.table_of(&open, bare, Complex64::ONE)
+    }
+
     /// The same from the transmission of each class, in the order of [`MadeElement::widths_nm`]; `unseen`: what the light of this table
     /// has of light that sees no pillar.
     ///

@@ -196,10 +196,7 @@ impl<'a> ChipInLight<'a> {
                 camera: view.camera,
             });
         }
-        let of = |table: &Vec<Complex64>| {
-            let pillar = |width: f64| table.get(width.round() as usize).copied().unwrap_or_default();
-            element.made.table(pillar, Complex64::ZERO)
-        };
+        let of = |table: &Vec<Complex64>| element.made.table_by_number(table, Complex64::ZERO);
         let (classes, departing) = match (&element.among_neighbours[index], &self.polarised[index]) {
             (Some(response), _) => {
                 let (x, y) = element.view.wedge.looks_at(um);
