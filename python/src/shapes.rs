@@ -44,8 +44,12 @@ pub fn shape_of((word, width_nm, length_nm, steps): ToldShape) -> Result<PillarS
     })
 }
 
+/// Whether an edge so long has its ends on the grid of 1 nm about its middle.
+fn even(nm: u16) -> bool {
+    nm > 0 && nm.is_multiple_of(2)
+}
+
 fn upright(shortest_nm: u16, step_nm: u16, lengths: u16) -> Result<UprightRectangles> {
-    let even = |nm: u16| nm > 0 && nm.is_multiple_of(2);
     let most = UprightRectangles::MOST_LENGTHS;
     if !even(shortest_nm) || !even(step_nm) || !(1..=most).contains(&lengths) {
         return Err(Error::invalid(
@@ -115,7 +119,6 @@ pub fn upright_widths<'py>(
 }
 
 fn rectangles(width_nm: u16, length_nm: u16, steps: u16) -> Result<RotatedRectangles> {
-    let even = |edge: u16| edge > 0 && edge.is_multiple_of(2);
     if !even(width_nm) || !even(length_nm) || width_nm >= length_nm {
         return Err(Error::invalid(
             format!("rectangles of {width_nm} x {length_nm} nm"),

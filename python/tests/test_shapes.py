@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -98,26 +99,36 @@ def test_psfs_of_a_file_are_those_of_its_design(tmp_path: Path, name: str) -> No
         ml.psf(layout, [532], distance_um=80.0, fidelity="published", pillar=TIO2)
 
 
+def image_of(
+    design: ml.Design,
+    numbers: npt.NDArray[np.uint16],
+    shape: ml.Shape,
+    samples: int,
+    arriving: str | float | None,
+    analyser: str | None = None,
+) -> npt.NDArray[np.float64]:
+    """The PSF of a lens of titanium dioxide at 532 nm, of pillars that only a map of numbers says."""
+    return ml.psf(
+        numbers,
+        [532],
+        shape=shape,
+        arriving=arriving,
+        analyser=analyser,
+        pitch_nm=design.pitch_nm,
+        distance_um=design.focal_length_um,
+        pillar_height_nm=design.pillar_height_nm,
+        pillar=TIO2,
+        fast=True,
+        samples=samples,
+    )[0].values
+
+
 def test_light_of_the_other_handedness_is_not_focused() -> None:
     design = ml.Design.read(ROOT / "designs/geometric_phase_532.toml")
     array = design.array()
     numbers = array.widths(0)
 
-    def image(arriving: str | float, analyser: str | None = None) -> npt.NDArray[np.float64]:
-        return ml.psf(
-            numbers,
-            [532],
-            shape=array.shape,
-            arriving=arriving,
-            analyser=analyser,
-            pitch_nm=design.pitch_nm,
-            distance_um=design.focal_length_um,
-            pillar_height_nm=design.pillar_height_nm,
-            pillar=TIO2,
-            fast=True,
-            samples=64,
-        )[0].values
-
+    image = partial(image_of, design, numbers, array.shape, 64)
     values = {arriving: image(arriving) for arriving in ("left", "right", "x", "y", 30, -60.0, "unpolarised")}
     peak = values["left"].max()
     # A lens for one is a diverging lens for the other.
@@ -179,21 +190,7 @@ def test_light_along_each_axis_is_focused_to_its_own_side() -> None:
     design = ml.Design.read(ROOT / "designs/birefringent_532.toml")
     array = design.array()
 
-    def image(arriving: str | None, analyser: str | None = None) -> npt.NDArray[np.float64]:
-        return ml.psf(
-            array.widths(0),
-            [532],
-            shape=array.shape,
-            arriving=arriving,
-            analyser=analyser,
-            pitch_nm=design.pitch_nm,
-            distance_um=design.focal_length_um,
-            pillar_height_nm=design.pillar_height_nm,
-            pillar=TIO2,
-            fast=True,
-            samples=96,
-        )[0].values
-
+    image = partial(image_of, design, array.widths(0), array.shape, 96)
     x, y, both = image("x"), image("y"), image("unpolarised")
     assert np.array_equal(image(None), x)
     column = [int(np.unravel_index(np.argmax(v), v.shape)[1]) - 48 for v in (x, y)]

@@ -189,7 +189,7 @@ fn library(args: &CellsArgs, design: &Design, folder: &Path, terminal: &Terminal
     print_line!(
         "at {} nm {} of {} sizes are the nearest to some pair of phases",
         sig(study.wavelength_um * 1e3, 4),
-        study.library.pillars().len(),
+        study.nearest.pillars().len(),
         study.pillars.count()
     );
     for (name, errors) in [

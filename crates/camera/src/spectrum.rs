@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use metalith_core::file::read_at_most;
-use metalith_core::text::{quoted, without_mark};
+use metalith_core::text::{quoted, table_rows};
 use metalith_core::{Error, Result};
 use serde::Serialize;
 
@@ -44,11 +44,7 @@ impl Spectrum {
         };
         let bytes = read_at_most(path, LONGEST, "a curve over wavelength")?;
         let text = String::from_utf8_lossy(&bytes);
-        let mut lines = without_mark(&text)
-            .lines()
-            .enumerate()
-            .map(|(i, line)| (i + 1, line.trim()))
-            .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+        let mut lines = table_rows(&text);
         match lines.next() {
             Some((_, header)) if header.split(',').map(str::trim).eq(["nm", "value"]) => {}
             Some((line, other)) => {

@@ -23,7 +23,8 @@ pub struct LibraryStudy {
     pub turns_x: Vec<f64>,
     pub passed_x: Vec<f64>,
     /// Of all sizes, those that are the nearest to any pair of phases.
-    pub library: PillarLibrary,
+    #[serde(rename = "library")]
+    pub nearest: PillarLibrary,
     pub errors: LibraryErrors,
     /// What the library of the design leaves, if it has one already.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -58,8 +59,8 @@ impl LibraryStudy {
                 .collect(),
             passed_x: (1..=pillars.count()).map(|n| of_x(n).norm_sqr()).collect(),
             errors: library.errors(),
-            library,
-            design: design.mapping.library.as_ref().map(PillarLibrary::errors),
+            nearest: library,
+            design: design.mapping.pillar_library.as_ref().map(PillarLibrary::errors),
         })
     }
 }
@@ -71,7 +72,7 @@ impl LibraryStudy {
 pub fn write_library_report(study: &LibraryStudy, folder: &Path) -> Result<()> {
     page(study).write(&folder.join("cells.html"))?;
     write_json(&folder.join("cells.json"), "cells", study)?;
-    let csv = study.library.to_csv(study.pillars);
+    let csv = study.nearest.to_csv(study.pillars);
     WholeFile::write(&folder.join("library.csv"), csv.as_bytes())
 }
 
@@ -109,7 +110,7 @@ fn page(study: &LibraryStudy) -> Page {
         "{} of {} sizes are the nearest to some pair of phases. A site has the pillar whose fields along x and y, phase and amplitude, \
          are nearest to those of both phases without loss. Both phases are counted from constants, which no image shows, that leave the \
          least.",
-        study.library.pillars().len(),
+        study.nearest.pillars().len(),
         study.pillars.count()
     ));
     let mut phases = Chart::new(
@@ -120,7 +121,7 @@ fn page(study: &LibraryStudy) -> Page {
     .size(420.0, 330.0);
     phases.points(
         "library",
-        study.library.pillars().iter().map(|p| (p.turns[0], p.turns[1])),
+        study.nearest.pillars().iter().map(|p| (p.turns[0], p.turns[1])),
     );
     let mut table = Table::new([
         Column::text("Library"),

@@ -74,6 +74,15 @@ pub fn without_mark(text: &str) -> &str {
     text.strip_prefix('\u{FEFF}').unwrap_or(text)
 }
 
+/// Lines of a table of text with their numbers, counted from one: without empty ones, comments, which begin with #, and the mark of
+/// [`without_mark`].
+pub fn table_rows(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let lines = without_mark(text).lines().enumerate();
+    lines
+        .map(|(k, line)| (k + 1, line.trim()))
+        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+}
+
 /// Bytes as hexadecimal digits, such as those of a digest.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()

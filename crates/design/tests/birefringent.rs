@@ -31,7 +31,7 @@ fn changed(pairs: &[(&str, &str)]) -> Result<Design> {
 fn pillars_are_chosen_by_both_phases() {
     let design = Design::read(&path()).unwrap();
     let array = PillarArray::build(&design, &Silent).unwrap();
-    let library = design.mapping.library.as_ref().unwrap();
+    let library = design.mapping.pillar_library.as_ref().unwrap();
     let seen = design.along_y().unwrap();
     let lenses = [&design, &seen].map(LensPhase::of);
     let element = array.central().element;
@@ -107,7 +107,7 @@ fn the_phase_of_light_along_y_is_that_of_its_section() {
     let array = PillarArray::build(&alike, &Silent).unwrap();
     let pillars = alike.cell.shape.upright().unwrap();
     let counts = array.classes[0].widths.histogram();
-    let library = alike.mapping.library.as_ref().unwrap();
+    let library = alike.mapping.pillar_library.as_ref().unwrap();
     for (number, _) in counts.iter().enumerate().skip(1).filter(|(_, n)| **n > 0) {
         let [along_x, along_y] = PolarisationAxis::ALL.map(|axis| library.turns(number as u16, axis).unwrap());
         let apart = along_x - along_y;
@@ -200,7 +200,7 @@ fn what_cannot_be_is_told_with_its_place() {
         Design::parse_without_library(&path(), &missing)
             .unwrap()
             .mapping
-            .library
+            .pillar_library
             .is_none()
     );
     let other = text().replace("width_max_nm = 280", "width_max_nm = 270");
@@ -208,7 +208,7 @@ fn what_cannot_be_is_told_with_its_place() {
         Design::parse_without_library(&path(), &other)
             .unwrap()
             .mapping
-            .library
+            .pillar_library
             .is_none()
     );
 }

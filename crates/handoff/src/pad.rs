@@ -184,7 +184,11 @@ pub(super) fn dose_pads(design: &Design, process: &Process) -> Vec<PadPillar> {
 
 /// Upright rectangles that the design chooses from, which stand for all of them.
 pub(super) fn upright_sizes(design: &Design, pillars: UprightRectangles) -> Vec<u16> {
-    let known = design.mapping.library.iter().flat_map(|library| library.pillars());
+    let known = design
+        .mapping
+        .pillar_library
+        .iter()
+        .flat_map(|library| library.pillars());
     let known: Vec<u16> = known.map(|pillar| pillar.number).collect();
     let span = f64::from(pillars.longest_nm() - pillars.shortest_nm);
     let nearest = |shares: [f64; 2]| {

@@ -143,7 +143,7 @@ pub mod tests {
             table_file: None,
             table: None,
             library_file: None,
-            library: None,
+            pillar_library: None,
             library_refused: None,
             rotation: Default::default(),
             steered: Vec::new(),

@@ -25,7 +25,7 @@ pub(super) fn rows(row: &mut impl FnMut(&str, String, &str), design: &Design, fo
         ),
         "Jones matrices along both axes, which turn no polarisation; `polarisation` in [verify] says which light arrives",
     );
-    if let Some(library) = &design.mapping.library {
+    if let Some(library) = &design.mapping.pillar_library {
         let errors = library.errors();
         let [x, y] = errors.phase;
         row(

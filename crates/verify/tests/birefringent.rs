@@ -65,7 +65,7 @@ type Lens = (Design, PillarArray, tempfile::TempDir);
 
 fn image((design, _, folder): &Lens, arriving: Polarisation, analyser: Option<Analyser>) -> SinglePsf {
     let found = read_pillars(design, &folder.path().join("lens.gds"), &Silent).unwrap();
-    let cell = IdealRetarders(design.mapping.library.clone().unwrap());
+    let cell = IdealRetarders(design.mapping.pillar_library.clone().unwrap());
     let light = Lighting {
         wavelengths_um: vec![WAVELENGTH_UM],
         incidence_sin: [0.0; 2],
@@ -96,7 +96,7 @@ fn each_polarisation_is_focused_to_its_own_side() {
     /// Samples are a pitch apart (um).
     const SAMPLED: f64 = 0.35;
     let lens = lens();
-    let library = lens.0.mapping.library.as_ref().unwrap();
+    let library = lens.0.mapping.pillar_library.as_ref().unwrap();
     let errors = library.errors();
     let [x, y] = [0.0, 90.0].map(|deg| image(&lens, Polarisation::Linear(deg), None));
     for (found, side, axis) in [(&x, 8.0, 0), (&y, -8.0, 1)] {
@@ -160,7 +160,7 @@ fn each_polarisation_is_judged_by_its_own_phase() {
     const FOLLOWS: f64 = 0.03;
     let lens = lens();
     let [x, y] = [None, Some(Polarisation::Linear(90.0))].map(|light| judged(&lens, light));
-    let first = lens.0.mapping.library.as_ref().unwrap().errors().first;
+    let first = lens.0.mapping.pillar_library.as_ref().unwrap().errors().first;
     for (found, axis) in [(&x, 0), (&y, 1)] {
         let failed: Vec<_> = found.checks.iter().filter(|check| !check.passed()).collect();
         assert!(failed.is_empty(), "{failed:?}");

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use super::MappingTable;
-use metalith_core::text::{quoted, without_mark};
+use metalith_core::text::{quoted, table_rows};
 use metalith_core::{Error, Result};
 
 /// Longest mapping that is read (bytes), and the rounding of its phases in print.
@@ -41,11 +41,7 @@ impl MappingTable {
         }
         let bytes = fs::read(path).map_err(Error::io("read", path))?;
         let text = String::from_utf8_lossy(&bytes);
-        let mut rows = without_mark(&text)
-            .lines()
-            .enumerate()
-            .map(|(i, line)| (i + 1, line.trim()))
-            .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+        let mut rows = table_rows(&text);
         if rows.next().is_none_or(|(_, header)| header != "turns,width_nm") {
             return Err(fault(Some(1), "the header is not `turns,width_nm`".into()));
         }

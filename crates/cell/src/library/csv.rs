@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use super::{LibraryPillar, PillarLibrary};
-use metalith_core::text::{quoted, without_mark};
+use metalith_core::text::{quoted, table_rows};
 use metalith_core::{Error, Result, UprightRectangles};
 
 /// Longest library that is read (bytes): twice that of the most pillars.
@@ -52,11 +52,7 @@ impl PillarLibrary {
         }
         let bytes = fs::read(path).map_err(Error::io("read", path))?;
         let text = String::from_utf8_lossy(&bytes);
-        let mut rows = without_mark(&text)
-            .lines()
-            .enumerate()
-            .map(|(i, line)| (i + 1, line.trim()))
-            .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+        let mut rows = table_rows(&text);
         if rows
             .next()
             .is_none_or(|(_, head)| head.split(',').map(str::trim).ne(HEAD.split(',')))

@@ -32,7 +32,7 @@ pub struct WidthRule {
 #[derive(Clone, Debug, PartialEq)]
 struct PairRule {
     pillars: UprightRectangles,
-    library: Arc<PillarLibrary>,
+    choice: Arc<PillarLibrary>,
     /// The light whose phase is asked about where one is asked about.
     axis: PolarisationAxis,
 }
@@ -185,10 +185,10 @@ impl WidthRule {
             pair: cell
                 .shape
                 .upright()
-                .zip(mapping.library.as_ref())
+                .zip(mapping.pillar_library.as_ref())
                 .map(|(pillars, library)| PairRule {
                     pillars,
-                    library: Arc::new(library.clone()),
+                    choice: Arc::new(library.clone()),
                     axis: PolarisationAxis::X,
                 }),
         }
@@ -246,7 +246,7 @@ impl WidthRule {
     /// The same of a width that is written, or of the number of a rectangle as it is drawn; one that is not in the library has none.
     pub fn turns_of_written(&self, width_nm: u16) -> f64 {
         if let Some(pair) = &self.pair {
-            return pair.library.turns(width_nm, pair.axis).unwrap_or(0.0);
+            return pair.choice.turns(width_nm, pair.axis).unwrap_or(0.0);
         }
         match &self.rotation {
             Some(rule) => {
@@ -261,7 +261,7 @@ impl WidthRule {
     /// phase.
     pub fn width_nm(&self, u: f64) -> u16 {
         if let Some(pair) = &self.pair {
-            return pair.library.number([u; 2]);
+            return pair.choice.number([u; 2]);
         }
         if let Some(rule) = &self.rotation {
             return rule.number(u);
@@ -279,7 +279,7 @@ impl WidthRule {
         };
         let mut turns = [(OTHER_PHASE * (k as f64 + 0.5)).fract(); 2];
         turns[pair.axis.index()] = own;
-        pair.library.number(turns)
+        pair.choice.number(turns)
     }
 
     /// Phase of a sample of a mapping (turns).
@@ -298,7 +298,7 @@ impl WidthRule {
     ) -> u16 {
         let Some(u) = phase.wrapped(ix, iy) else { return 0 };
         match (&self.pair, along_y) {
-            (Some(pair), Some(y)) => y.wrapped(ix, iy).map_or(0, |v| pair.library.number([u, v])),
+            (Some(pair), Some(y)) => y.wrapped(ix, iy).map_or(0, |v| pair.choice.number([u, v])),
             _ => self.width_nm(u),
         }
     }

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use super::Interpolation;
-use metalith_core::text::{quoted, without_mark};
+use metalith_core::text::{quoted, table_rows};
 use metalith_core::{Error, Result, document, npy};
 
 /// Most rows of a table: a ring for each site of the largest lens that can be designed.
@@ -50,11 +50,7 @@ fn read_csv(path: &Path) -> Result<Vec<((f64, f64), usize)>> {
         what,
         hint: "the columns are `r_um,phase_rad`; lines that begin with # are comments".into(),
     };
-    let mut lines = without_mark(&text)
-        .lines()
-        .enumerate()
-        .map(|(k, line)| (k + 1, line.trim()))
-        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+    let mut lines = table_rows(&text);
     let (at, head) = lines.next().ok_or_else(|| fault(1, "the file is empty".into()))?;
     if head.split(',').map(str::trim).ne(["r_um", "phase_rad"]) {
         return Err(fault(at, format!("the columns are `{}`", quoted(head))));

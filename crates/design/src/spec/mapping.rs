@@ -38,8 +38,8 @@ pub struct MappingSpec {
     #[serde(skip)]
     pub library_file: Option<PathBuf>,
     /// What that file holds.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub library: Option<PillarLibrary>,
+    #[serde(rename = "library", skip_serializing_if = "Option::is_none")]
+    pub pillar_library: Option<PillarLibrary>,
     /// Why a library that is to be made anew was not read.
     #[serde(skip)]
     pub library_refused: Option<String>,
@@ -124,29 +124,25 @@ impl MappingSpec {
             basis,
             coefficients,
         };
-        if rotated {
+        let refuse_all = |why: &str, instead: &str| {
             for key in ["coefficients", "table", "basis", "steered"]
                 .into_iter()
                 .filter(|key| s.has(key))
             {
-                s.fault(
-                    key,
-                    "rectangles have no widths to map to: the phase is twice their rotation",
-                    format!("leave `{key}` out, or use squares or circles; `rotation_sines_deg` and `rotation_cosines_deg` correct it"),
-                );
+                s.fault(key, why, format!("leave `{key}` out{instead}"));
             }
+        };
+        if rotated {
+            refuse_all(
+                "rectangles have no widths to map to: the phase is twice their rotation",
+                ", or use squares or circles; `rotation_sines_deg` and `rotation_cosines_deg` correct it",
+            );
         }
         if upright {
-            for key in ["coefficients", "table", "basis", "steered"]
-                .into_iter()
-                .filter(|key| s.has(key))
-            {
-                s.fault(
-                    key,
-                    "upright rectangles have two widths, one for the phase of light along each axis",
-                    format!("leave `{key}` out: pillars are chosen from the `library`"),
-                );
-            }
+            refuse_all(
+                "upright rectangles have two widths, one for the phase of light along each axis",
+                ": pillars are chosen from the `library`",
+            );
         } else if s.has("library") {
             s.fault_given(
                 &["cell.shape"],
@@ -206,7 +202,7 @@ impl MappingSpec {
             table_file,
             table: None,
             library_file,
-            library: None,
+            pillar_library: None,
             library_refused: None,
             rotation,
             steered,
@@ -228,7 +224,7 @@ impl MappingSpec {
         if let (Some(file), Some(pillars)) = (&self.library_file, cell.shape.upright()) {
             let read = PillarLibrary::read_csv(file, pillars);
             match (read, library) {
-                (Ok(read), _) => self.library = Some(read),
+                (Ok(read), _) => self.pillar_library = Some(read),
                 (Err(error), LibraryFile::Needed) => return Err(error),
                 (Err(error), LibraryFile::ToBeMade) if file.exists() => self.library_refused = Some(error.to_string()),
                 (Err(_), LibraryFile::ToBeMade) => {}

@@ -1,18 +1,14 @@
 //! Tables of the index by wavelength, from CSV.
 
 use crate::TableError;
-use metalith_core::text::{quoted, without_mark};
+use metalith_core::text::{quoted, table_rows};
 
 /// Line, counted from one, and what is wrong there.
 type TableFault = (Option<usize>, TableError);
 
 /// Samples (L (um), n, k) of the text of a table, wavelengths rising.
 pub(super) fn parse(text: &str) -> Result<Vec<[f64; 3]>, TableFault> {
-    let mut lines = without_mark(text)
-        .lines()
-        .enumerate()
-        .map(|(i, line)| (i + 1, line.trim()))
-        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+    let mut lines = table_rows(text);
     let (number, header) = lines.next().ok_or((None, TableError::Empty))?;
     let names: Vec<_> = header.split(',').map(str::trim).collect();
     let column = |name: &str| names.iter().position(|n| *n == name);

@@ -3,12 +3,14 @@
 //! A study judges thousands of chips whose pillars differ a little. To solve the cells of each anew costs more than its
 //! light does; a bank solves them on a grid, and chips take from it by cubic interpolation along every axis.
 
+mod grid;
+
 use std::path::Path;
 
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::cells::lagrange;
+use self::grid::{Axis, Colour};
 use super::rectangles::SampledRectangles;
 use super::stack::{off_cutoff, perturbed, possible_width_nm};
 use super::{CellChange, SolvedWidths};
@@ -40,9 +42,6 @@ const BEYOND: usize = 2;
 /// Largest distance of the nodes of height (nm), index, taper (deg), corners and mask (nm), in the order of
 /// [`quantities`]: a twentieth of a turn or so.
 const STACK_STEPS: [f64; QUANTITIES] = [5.0, 0.02, 0.75, 10.0, 5.0];
-
-/// Nodes of an axis at the least: a cubic takes four.
-const FEWEST: usize = 4;
 
 /// Stacks that are solved at the most. At some 15 CPU s each that is an hour and a half.
 const MOST_STACKS: usize = 400;
@@ -82,51 +81,6 @@ pub struct BankRange {
     pub colours: Vec<(f64, usize)>,
 }
 
-/// Nodes of one quantity of the pillar: one if it does not vary.
-#[derive(Clone, Debug, PartialEq)]
-struct Axis {
-    first: f64,
-    step: f64,
-    nodes: usize,
-}
-
-impl Axis {
-    fn over(low: f64, high: f64, most_step: f64) -> Self {
-        if high <= low {
-            return Self {
-                first: low,
-                step: 1.0,
-                nodes: 1,
-            };
-        }
-        let nodes = (((high - low) / most_step).ceil() as usize + 1).max(FEWEST);
-        Self {
-            first: low,
-            step: (high - low) / (nodes - 1) as f64,
-            nodes,
-        }
-    }
-
-    fn node(&self, k: usize) -> f64 {
-        self.first + k as f64 * self.step
-    }
-
-    /// Nodes and weights for a value; none if it is outside.
-    fn weights(&self, value: f64) -> Option<Vec<(usize, f64)>> {
-        let x = (value - self.first) / self.step;
-        // Rounding of sums and products at the ends.
-        const SLACK: f64 = 1e-6;
-        if !(-SLACK..=(self.nodes - 1) as f64 + SLACK).contains(&x) {
-            return None;
-        }
-        if self.nodes == 1 {
-            return Some(vec![(0, 1.0)]);
-        }
-        let i = (x.floor().max(0.0) as usize).clamp(1, self.nodes - 3);
-        Some((i - 1..i + 3).zip(lagrange(x - i as f64)).collect())
-    }
-}
-
 /// Transmissions along the normal, on a grid.
 pub struct CellBank {
     stated: CellStack,
@@ -134,33 +88,6 @@ pub struct CellBank {
     widths: Axis,
     axes: [Axis; QUANTITIES],
     colours: Vec<Colour>,
-}
-
-/// One wavelength of a bank.
-#[derive(Debug, PartialEq)]
-struct Colour {
-    /// Widths that are solved (nm), rising.
-    widths_nm: Vec<f64>,
-    /// By stack, width and number of a pillar; the last of each row is a site without pillar.
-    t: Vec<Complex64>,
-}
-
-impl Colour {
-    /// Weights of four widths for any between them; none outside.
-    fn weights(&self, width_nm: f64) -> Option<[(usize, f64); 4]> {
-        let (first, last) = (self.widths_nm.first()?, self.widths_nm.last()?);
-        if !(*first..=*last).contains(&width_nm) {
-            return None;
-        }
-        let above = self.widths_nm.partition_point(|w| *w <= width_nm);
-        let from = above.clamp(2, self.widths_nm.len() - 2) - 2;
-        let at = |k: usize| self.widths_nm[from + k];
-        // Lagrange's polynomial through four points at any distances.
-        Some(std::array::from_fn(|k| {
-            let others = (0..4).filter(|j| *j != k);
-            (from + k, others.map(|j| (width_nm - at(j)) / (at(k) - at(j))).product())
-        }))
-    }
 }
 
 impl CellBank {

@@ -1,0 +1,141 @@
+//! What a search does not know of a cell, each thing with its place.
+
+use super::{MeritSpec, OptimiseSpec, SolverSpec};
+use crate::spec::CellSpec;
+use metalith_cell::Fidelity;
+use metalith_core::document::Section;
+
+impl OptimiseSpec {
+    /// Unlike neighbours are known to the exchange of rings for the field on the axis, of pillars as drawn.
+    pub(super) fn check_neighbours(&self, s: &Section<'_, '_>, cell: &CellSpec) {
+        if self.fidelity != Fidelity::Neighbours {
+            return;
+        }
+        if let Some((what, _)) = self.fidelity.refusal(cell.shape, cell.lattice) {
+            s.fault_given(&["cell.shape", "cell.lattice"], "cell", what, "use the cell `rigorous`");
+        }
+        let MeritSpec {
+            deconvolution,
+            side_lobes,
+            ..
+        } = self.merit;
+        for (wrong, what) in [
+            (matches!(self.solver, SolverSpec::Adam { .. }), "the solver `adam`"),
+            (deconvolution != 0.0, "the merit `deconvolution`"),
+            (side_lobes != 0.0, "the merit `side_lobes`"),
+            (self.robust.is_some(), "errors of fabrication"),
+        ] {
+            if wrong {
+                s.fault(
+                    "cell",
+                    format!("{what} among unlike neighbours"),
+                    "use `exchange` for `log` and `sum` without [optimise.robust], or the cell `rigorous`",
+                );
+            }
+        }
+    }
+
+    /// Rotated rectangles have one size, and their number does not go on from the last rotation to the first as widths do: a ring
+    /// takes one of them, and no slope or error of a width is known.
+    pub(super) fn check_rotations(&self, s: &Section<'_, '_>, cell: &CellSpec) {
+        if cell.shape.upright().is_some() {
+            s.fault_given(
+                &["cell.shape"],
+                "cell",
+                "a search for one phase, and upright rectangles have a phase for each polarisation",
+                "leave [optimise] out, or use squares, circles or rotated rectangles",
+            );
+            return;
+        }
+        if cell.shape.rectangles().is_none() {
+            return;
+        }
+        if matches!(self.fidelity, Fidelity::Fitted | Fidelity::Published) {
+            s.fault_given(
+                &["cell.shape"],
+                "cell",
+                format!("rectangular pillars by the `{}` cell", self.fidelity),
+                "use the cell `rigorous`",
+            );
+        }
+        if matches!(self.solver, SolverSpec::Adam { .. }) {
+            s.fault_given(
+                &["cell.shape"],
+                "solver",
+                "slopes of the number of a rotation, which begins anew after the last one",
+                "use `exchange`, which takes one of the rotations for each ring",
+            );
+        }
+        if self.merit.deconvolution != 0.0 {
+            s.fault_given(
+                &["cell.shape"],
+                "merit",
+                "the merit `deconvolution` of rotated rectangles: the light that they do not convert is in no image of it",
+                "give weights to `log`, `sum` or `side_lobes`",
+            );
+        }
+        if self
+            .robust
+            .as_ref()
+            .is_some_and(|r| r.width_bias_nm != 0.0 || r.height != 0.0)
+        {
+            s.fault_given(
+                &["cell.shape"],
+                "robust",
+                "errors of the width and height of rotated rectangles",
+                "set `width_bias_nm = 0` and `height_percent = 0` in [optimise.robust]: of rectangles the gap alone is drawn; `metalith \
+                 study` judges a chip by the others",
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use crate::Design;
+
+    /// On a lattice that no tables are made for.
+    #[test]
+    fn unlike_neighbours_on_a_hexagonal_lattice_are_refused() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../designs/hexagonal_1550.toml");
+        let text = std::fs::read_to_string(&path).unwrap();
+        let text = text.replacen("[verify]", "[optimise]\ncell = \"neighbours\"\n\n[verify]", 1);
+        let error = Design::parse(&path, &text).unwrap_err().to_string();
+        assert!(
+            error.contains("a hexagonal lattice by the `neighbours` cell"),
+            "{error}"
+        );
+    }
+
+    /// What the exchange of rings does not know among unlike neighbours is refused, each thing in a fault of its own.
+    #[test]
+    fn what_unlike_neighbours_are_not_known_to_is_refused() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../designs/broadband_3x3.toml");
+        let text = std::fs::read_to_string(&path).unwrap();
+        let with = |change: &dyn Fn(String) -> String| {
+            let text = text.replacen("cell = \"rigorous\"", "cell = \"neighbours\"", 1);
+            Design::parse(&path, &change(text)).map(|d| d.optimise.fidelity.name())
+        };
+        assert_eq!(with(&|text| text).unwrap(), "neighbours");
+        let merit =
+            |key: &'static str| move |text: String| text.replacen("log = 1.0", &format!("log = 1.0\n{key} = 0.1"), 1);
+        let changes: [(&dyn Fn(String) -> String, &str); 4] = [
+            (&merit("deconvolution"), "the merit `deconvolution`"),
+            (&merit("side_lobes"), "the merit `side_lobes`"),
+            (
+                &|text| text + "\n[optimise.robust]\nwidth_bias_nm = 5\n",
+                "errors of fabrication",
+            ),
+            (
+                &|text| text.replacen("solver = \"exchange\"", "solver = \"adam\"", 1),
+                "the solver `adam`",
+            ),
+        ];
+        for (change, what) in changes {
+            let error = with(change).unwrap_err().to_string();
+            assert!(error.contains(&format!("{what} among unlike neighbours")), "{error}");
+        }
+    }
+}
