@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use metalith_core::text::quoted;
+use metalith_core::text::{quoted, table_rows};
 use metalith_core::{Error, Result, document};
 
 /// The width of one pillar by scanning electron microscope.
@@ -61,13 +61,9 @@ pub fn read(path: &Path) -> Result<Vec<SemSite>> {
         .collect()
 }
 
-/// Lines of a CSV file behind its header, with their numbers; empty lines and comments are left out.
+/// Lines of a CSV file behind its header, with their numbers.
 fn rows<'t>(text: &'t str, columns: &str) -> Result<Vec<(usize, &'t str)>, (usize, String)> {
-    let mut lines = text
-        .lines()
-        .enumerate()
-        .map(|(k, line)| (k + 1, line.trim()))
-        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+    let mut lines = table_rows(text);
     match lines.next() {
         None => Err((1, "the file is empty".into())),
         Some((at, head)) if head.split(',').map(str::trim).ne(columns.split(',')) => {
@@ -84,4 +80,26 @@ fn numbers<const N: usize>(line: &str) -> Option<[f64; N]> {
         .map(|f| f.trim().parse::<f64>().ok().filter(|v| v.is_finite()))
         .collect::<Option<_>>()?;
     fields.try_into().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_that_a_spreadsheet_saved_is_read() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let line = "0,1,2.5,-3.25,150,148.5,0.8";
+        // A mark of byte order, ends of lines of another system, a comment, and a site that nobody has measured yet.
+        let text = format!("\u{FEFF}{COLUMNS}\r\n# first day\r\n{line}\r\n0,1,2.5,-3.25,150,,\r\n");
+        std::fs::write(file.path(), text).unwrap();
+        let site = SemSite {
+            element: [0, 1],
+            at_um: [2.5, -3.25],
+            designed_nm: 150.0,
+            measured_nm: 148.5,
+            sigma_nm: 0.8,
+        };
+        assert_eq!(read(file.path()).unwrap(), [site]);
+    }
 }

@@ -36,6 +36,7 @@ pub use prior::{SceneStatistics, squared_frequencies};
 pub use separate::{Blend, restore_each, without_veil};
 pub use slope::SlopeDenoiser;
 pub use splitting::{Denoiser, Schedule};
+pub use total_variation::ExponentialSlopes;
 
 /// How a picture is restored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -10,21 +10,38 @@ use super::tikhonov;
 /// Rounds, and steps of conjugate gradients in each.
 const ROUNDS: usize = 6;
 const STEPS: usize = 2;
-/// Root mean square slope of the grey plane of the statistics of scenes along one axis, and so of the others: photographs
-/// have 0.075.
-const EXPECTED_SLOPE: f64 = 0.075;
-/// Slopes are split with a penalty of so many times that of normal slopes: the threshold is then a fifth of what is
-/// expected.
-const PENALTY: f64 = 5.0;
+/// Of the grey plane of the statistics of scenes along one axis, and so of the others: photographs have 0.075.
+const SLOPES: ExponentialSlopes = ExponentialSlopes { expected: 0.075 };
+
+/// Slopes that follow an exponential law, split off from a picture.
+#[derive(Clone, Copy, Debug)]
+pub struct ExponentialSlopes {
+    /// Root mean square along one axis, from one place to the next.
+    pub expected: f64,
+}
+
+impl ExponentialSlopes {
+    /// Penalty over that of normal slopes: the threshold is then a fifth of what is expected.
+    const PENALTY: f64 = 5.0;
+
+    /// Penalty of squared slopes, over the weight of values with this variance.
+    pub fn penalty(&self, variance: f64) -> f64 {
+        Self::PENALTY * variance / self.expected.powi(2)
+    }
+
+    /// Slopes shrink by so much: the price of a slope, at the mean square of a normal law, over its penalty.
+    pub fn threshold(&self) -> f64 {
+        std::f64::consts::SQRT_2 * self.expected / Self::PENALTY
+    }
+}
 
 pub fn restore(system: &NormalSystem<'_>, progress: &dyn Progress) -> Result<Planes> {
     let terms = Terms {
-        slopes: PENALTY / (EXPECTED_SLOPE.powi(2) * system.scale),
+        slopes: SLOPES.penalty(1.0) / system.scale,
         bends: 0.0,
         identity: 0.0,
     };
-    // An exponential law with the same mean square: the price of a slope over its penalty.
-    let threshold = (std::f64::consts::SQRT_2 * EXPECTED_SLOPE / PENALTY) as f32;
+    let threshold = SLOPES.threshold() as f32;
     let mut x = tikhonov::restore(system, progress)?;
     progress.begin("restoring by total variation", (ROUNDS * STEPS) as u64);
     let zero = || Array2::<f32>::zeros(system.shape());

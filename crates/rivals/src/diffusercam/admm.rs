@@ -4,7 +4,7 @@
 
 use metalith_core::{Error, Progress, Result, part};
 use metalith_picture::SquareFft;
-use metalith_picture::restore::squared_frequencies;
+use metalith_picture::restore::{ExponentialSlopes, squared_frequencies};
 use ndarray::{Array2, Zip};
 use num_complex::Complex32;
 
@@ -27,11 +27,9 @@ impl Descent {
     };
 }
 
-/// Root mean square slope that is expected of a channel from one place to the next: photographs have 0.043 between
-/// neighbouring pixels of 576, and twice as much between every second.
-const EXPECTED_SLOPE: f64 = 0.075;
-/// The penalty of slopes over that of normal ones: the threshold is then a fifth of what is expected.
-const PENALTY: f64 = 5.0;
+/// Of a channel from one place to the next: photographs have 0.043 between neighbouring pixels of 576, and twice as much
+/// between every second.
+const SLOPES: ExponentialSlopes = ExponentialSlopes { expected: 0.075 };
 /// The penalty of what the sensor would have seen beyond its border, over the weight of what it has seen.
 const CROP: f64 = 1.0;
 /// The penalty of light beyond the scene and below zero, over that of slopes.
@@ -94,9 +92,9 @@ impl Deconvolution {
         let n = self.grid.size;
         let [rows, columns] = self.grid.data;
         let [scene_rows, scene_columns] = self.grid.scene();
-        let by_noise = (PENALTY * variance / EXPECTED_SLOPE.powi(2)).max(LEAST_SLOPES) as f32;
+        let by_noise = SLOPES.penalty(variance).max(LEAST_SLOPES) as f32;
         let slope_weight = descent.slopes * by_noise;
-        let threshold = (std::f64::consts::SQRT_2 * EXPECTED_SLOPE / PENALTY) as f32;
+        let threshold = SLOPES.threshold() as f32;
         let (crop, border) = (CROP as f32, BORDER as f32 * slope_weight);
         let zero = || Array2::<f32>::zeros((n, n));
         let (mut scene, mut image) = (zero(), zero());
