@@ -59,11 +59,6 @@ impl SceneStatistics {
         }
     }
 
-    /// Mean of the light of a scene, white being one.
-    pub fn mean_light() -> f64 {
-        MEAN.into()
-    }
-
     /// Planes of the picture (rows) from independent planes (columns).
     pub fn mixing(&self) -> DMatrix<f64> {
         let n = self.mix.len();
@@ -110,6 +105,7 @@ impl SceneStatistics {
 
     /// Expected mean square of each independent plane in bands of frequency that end at these, the first from zero (cycles a
     /// pixel); the first band holds the mean of the light.
+    #[cfg(test)]
     pub fn band_powers<const N: usize>(&self, ends: &[f64; N]) -> Vec<[f64; N]> {
         /// Fine enough for the first band to hold some frequencies.
         const SIZE: usize = 1024;
