@@ -78,7 +78,7 @@ impl Forecast {
         }
     }
 
-    /// Expected PSNR of linear light (dB) in all zones ([`Zone::ALL`]) of scenes with this power: that of the mean squared
+    /// Expected PSNR of linear light (dB) in all zones ([`crate::Zone::ALL`]) of scenes with this power: that of the mean squared
     /// error.
     pub fn psnr_linear_db(&self, scenes: &ScenePower) -> Vec<f64> {
         let noise = |cell: usize| {
