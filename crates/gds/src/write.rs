@@ -3,6 +3,9 @@
 use crate::LayerNumber;
 use crate::fast::BOUNDARY_BYTES;
 
+/// Where the points of a BOUNDARY without optional record begin.
+const POINTS: usize = 20;
+
 /// A square on one layer: a BOUNDARY with five points and no optional record.
 #[derive(Clone, Copy, Debug)]
 pub struct SquareRecord([u8; BOUNDARY_BYTES]);
@@ -32,7 +35,7 @@ impl SquareRecord {
         let (left, low, right, high) = (x - half, y - half, x + half, y + half);
         let corners = [left, low, right, low, right, high, left, high, left, low];
         let mut record = self.0;
-        for (bytes, corner) in record[20..60].chunks_exact_mut(4).zip(corners) {
+        for (bytes, corner) in record[POINTS..60].chunks_exact_mut(4).zip(corners) {
             bytes.copy_from_slice(&corner.to_be_bytes());
         }
         out.extend_from_slice(&record);
@@ -42,7 +45,7 @@ impl SquareRecord {
 /// A polygon on one layer: a BOUNDARY without optional record.
 #[derive(Clone, Debug)]
 pub struct PolygonRecord {
-    head: Vec<u8>,
+    record: Vec<u8>,
     /// Closed, about the place that it is written at.
     corners: Vec<[i32; 2]>,
 }
@@ -55,21 +58,26 @@ impl PolygonRecord {
     pub fn on(layer: LayerNumber, corners: &[[i32; 2]]) -> Self {
         assert!(corners.len() <= 8190, "a polygon of {} corners", corners.len());
         let closed: Vec<[i32; 2]> = corners.iter().chain(corners.first()).copied().collect();
-        let mut head = SquareRecord::on(layer).0[..16].to_vec();
-        head.extend(((4 + 8 * closed.len()) as u16).to_be_bytes());
-        head.extend([0x10, 3]);
-        Self { head, corners: closed }
+        let mut record = SquareRecord::on(layer).0[..POINTS - 4].to_vec();
+        record.extend(((4 + 8 * closed.len()) as u16).to_be_bytes());
+        record.extend([0x10, 3]);
+        record.resize(POINTS + 8 * closed.len(), 0);
+        record.extend([0, 4, 0x11, 0]);
+        Self {
+            record,
+            corners: closed,
+        }
     }
 
     /// Append the polygon about a place in database units.
     #[inline]
     pub fn append(&self, out: &mut Vec<u8>, x: i32, y: i32) {
-        out.extend_from_slice(&self.head);
-        for [dx, dy] in &self.corners {
-            out.extend((x + dx).to_be_bytes());
-            out.extend((y + dy).to_be_bytes());
+        let start = out.len() + POINTS;
+        out.extend_from_slice(&self.record);
+        for (bytes, [dx, dy]) in out[start..].chunks_exact_mut(8).zip(&self.corners) {
+            bytes[..4].copy_from_slice(&(x + dx).to_be_bytes());
+            bytes[4..].copy_from_slice(&(y + dy).to_be_bytes());
         }
-        out.extend([0, 4, 0x11, 0]);
     }
 }
 

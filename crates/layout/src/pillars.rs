@@ -1,6 +1,6 @@
 //! Millions of pillars into a file, block by block.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::io::Write;
 use std::ops::Range;
 use std::path::Path;
@@ -46,10 +46,32 @@ struct PlacedPillar {
 /// What is written for a pillar.
 enum Template {
     Square(SquareRecord),
-    /// By width.
-    Polygons(BTreeMap<u16, PolygonRecord>),
-    /// By width, to cells of one outline.
-    References(BTreeMap<u16, ReferenceRecord>),
+    Polygons(ByWidth<PolygonRecord>),
+    /// To cells of one outline.
+    References(ByWidth<ReferenceRecord>),
+}
+
+/// Records of the widths that there are: every pillar is looked up here.
+struct ByWidth<T>(Vec<Option<T>>);
+
+impl<T> FromIterator<(u16, T)> for ByWidth<T> {
+    fn from_iter<I: IntoIterator<Item = (u16, T)>>(records: I) -> Self {
+        let mut by_width = Vec::new();
+        for (width, record) in records {
+            let place = usize::from(width);
+            by_width.resize_with(by_width.len().max(place + 1), || None);
+            by_width[place] = Some(record);
+        }
+        Self(by_width)
+    }
+}
+
+impl<T> ByWidth<T> {
+    #[inline]
+    fn of(&self, width: u16) -> &T {
+        let record = self.0.get(usize::from(width)).and_then(Option::as_ref);
+        record.expect("records were made of all widths of the array")
+    }
 }
 
 impl Template {
@@ -74,8 +96,8 @@ impl Template {
         let PlacedPillar { x, y, width } = *pillar;
         match self {
             Self::Square(square) => square.append(out, x, y, width),
-            Self::Polygons(polygons) => polygons[&width].append(out, x, y),
-            Self::References(cells) => cells[&width].append(out, x, y),
+            Self::Polygons(polygons) => polygons.of(width).append(out, x, y),
+            Self::References(cells) => cells.of(width).append(out, x, y),
         }
     }
 }
@@ -149,17 +171,17 @@ impl<'a> PillarWriter<'a> {
     }
 
     /// Write a cell for each width that there is.
-    fn width_cells(&mut self, array: &PillarArray) -> Result<BTreeMap<u16, ReferenceRecord>> {
-        let mut cells = BTreeMap::new();
+    fn width_cells(&mut self, array: &PillarArray) -> Result<ByWidth<ReferenceRecord>> {
+        let mut cells = Vec::new();
         for width in widths_of(array) {
             let name = self.form.cell_name(width);
             let outline = polygon(self.layer, &self.form.corners(width));
             let (begin, end) = self.frame.cell(&name, vec![outline])?;
             self.put(&begin)?;
             self.put(&end)?;
-            cells.insert(width, ReferenceRecord::to(&name));
+            cells.push((width, ReferenceRecord::to(&name)));
         }
-        Ok(cells)
+        Ok(cells.into_iter().collect())
     }
 
     /// Write a cell for each width and one reference a pillar, each element a cell of its own.
