@@ -71,7 +71,15 @@ pub fn verify(
         let array = PillarArray::build(design, p)?;
         let model = model.as_deref().map(CalibratedModel::read).transpose()?;
         let made = match &model {
-            Some(model) => Some(MadeChip::new(&design.cell_stack()?, model)?),
+            Some(model) => {
+                let light = design.verify.light();
+                Some(MadeChip::in_light(
+                    &design.cell_stack()?,
+                    model,
+                    design.focused(),
+                    light,
+                )?)
+            }
             None => None,
         };
         let cells = match &made {

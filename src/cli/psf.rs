@@ -306,7 +306,7 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     };
     let assumptions = args.assumptions(&found, light.as_ref());
     let made = match &args.model {
-        Some(path) => Some(MadeChip::new(&args.stack(&found)?, &CalibratedModel::read(path)?)?),
+        Some(path) => Some(args.made(&found, &CalibratedModel::read(path)?)?),
         None => None,
     };
     let simulate = |case: SimulationCase<'_>, light: &PsfLight| -> Result<_> {

@@ -175,7 +175,15 @@ impl Judging {
         }
         let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
         let made = match &model {
-            Some(model) => Some(MadeChip::new(&design.cell_stack()?, model)?),
+            Some(model) => {
+                let light = design.verify.light();
+                Some(MadeChip::in_light(
+                    &design.cell_stack()?,
+                    model,
+                    design.focused(),
+                    light,
+                )?)
+            }
             None => None,
         };
         // A made chip judges, and cells of the pillars as drawn stand beside it.

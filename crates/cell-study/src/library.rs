@@ -60,7 +60,7 @@ impl LibraryStudy {
             passed_x: (1..=pillars.count()).map(|n| of_x(n).norm_sqr()).collect(),
             errors: library.errors(),
             nearest: library,
-            design: design.mapping.pillar_library.as_ref().map(PillarLibrary::errors),
+            design: design.mapping.pillar_library.as_deref().map(PillarLibrary::errors),
         })
     }
 }

@@ -1,19 +1,20 @@
 //! The chip as made: a stated cell and a perturbation, for any layout and light.
 
+use std::cell::RefCell;
 use std::sync::Arc;
 
 use num_complex::Complex64;
 use serde::Serialize;
 
 use super::cells::{RealisedCells, SolvedWidths};
-use super::rectangles::{self, RotatedClasses, RotatedLight};
+use super::rectangles::{MadeRectangles, RectangleColour};
 use super::stack::to_middle_tops;
 use super::{
     ArrivingLight, CalibratedModel, CameraChange, CellBank, CellChange, ClassTable, DrawnElement, MadeElement,
-    NotApplied, Perturbation, cell_direction, mixed, realised_nm,
+    NotApplied, Perturbation, RectangleClass, cell_direction, mixed, realised_nm,
 };
-use metalith_cell::{BAND_ORDERS, CellStack, ORDERS, PolarisedLight, PolarisedTables};
-use metalith_core::{Error, Progress, Result, RotatedRectangles, WidthMap};
+use metalith_cell::{CellStack, FocusedLight, PassedTable, PolarisedLight, PolarisedTables};
+use metalith_core::{Error, Progress, Result, WidthMap};
 use metalith_wave::Psf;
 use metalith_wave::{Accuracy, Fold, PlaneWave, Propagator, Scratch, Window};
 
@@ -21,8 +22,8 @@ use metalith_wave::{Accuracy, Fold, PlaneWave, Propagator, Scratch, Window};
 pub struct MadeChip {
     model: CalibratedModel,
     cells: RealisedCells,
-    /// Of rotated rectangles, whose cells all are from this bank: which light they are in.
-    rotated: Option<(Arc<CellBank>, RotatedRectangles, RotatedLight)>,
+    /// Of rectangles, what stands for the cells.
+    rectangles: Option<MadeRectangles>,
 }
 
 /// What a report says of the model that it rests on.
@@ -64,45 +65,36 @@ impl MadeChip {
         Ok(Self {
             cells: RealisedCells::changed(stated, &perturbation.cell, perturbation.geometry.cd_bias_nm),
             model: model.clone(),
-            rotated: None,
+            rectangles: None,
+        })
+    }
+
+    /// The same of pillars that tell polarisations apart, if they focus some light, in the light of a source and before a detector.
+    ///
+    /// # Errors
+    /// As [`MadeChip::new`]; also if the pillars are no rectangles that focus this, or the model has what rectangles have no meaning for.
+    pub fn in_light(
+        stated: &CellStack,
+        model: &CalibratedModel,
+        focused: Option<FocusedLight>,
+        light: PolarisedLight,
+    ) -> Result<Self> {
+        let made = Self::new(stated, model)?;
+        let rectangles = focused.map(|focused| MadeRectangles::new(stated, model, focused, light));
+        Ok(Self {
+            rectangles: rectangles.transpose()?,
+            ..made
         })
     }
 
     /// The same with all cells from a bank of the stated pillar: nothing is solved.
-    ///
-    /// # Errors
-    /// As [`MadeChip::new`].
-    pub fn of_bank(bank: &Arc<CellBank>, model: &CalibratedModel) -> Result<Self> {
-        let made = Self::new(bank.stated(), model)?;
-        Ok(Self {
-            cells: RealisedCells::of_bank(bank, &model.perturbation.cell),
-            ..made
-        })
-    }
-
-    /// The same of rotated rectangles, in this light.
-    ///
-    /// # Errors
-    /// As [`MadeChip::new`]; also if the pillars are no rectangles, or the model has a term that goes by the width of pillars.
-    pub fn of_rectangles(bank: &Arc<CellBank>, model: &CalibratedModel, light: RotatedLight) -> Result<Self> {
-        let made = Self::of_bank(bank, model)?;
-        let Some(pillars) = bank.stated().shape.rotated() else {
-            return Err(Error::invalid(
-                "light of both hands at pillars that do not change it",
-                "leave it out: it is for rotated rectangles",
-            ));
-        };
-        let geometry = &model.perturbation.geometry;
-        if !geometry.transmission.is_empty() || !geometry.transmission_phase_rad.is_empty() {
-            return Err(Error::invalid(
-                "a model with a transmission that goes by the width of pillars, of rotated rectangles",
-                "give a model without `transmission` and `transmission_phase_rad`: rectangles are all of one width",
-            ));
+    #[must_use]
+    pub fn from_bank(self, bank: &Arc<CellBank>) -> Self {
+        Self {
+            cells: RealisedCells::of_bank(bank, &self.model.perturbation.cell),
+            rectangles: self.rectangles.map(|rectangles| rectangles.of_bank(bank)),
+            ..self
         }
-        Ok(Self {
-            rotated: Some((Arc::clone(bank), pillars, light)),
-            ..made
-        })
     }
 
     /// The perturbation.
@@ -158,7 +150,8 @@ impl MadeChip {
         progress: &dyn Progress,
     ) -> Result<MadeView<'a>> {
         let sines = self.cell_sines(element, stated, as_lit);
-        let solved = match self.rotated_light(element, (stated.wavelength_um, ORDERS), as_lit)? {
+        let colour = RectangleColour::Single(stated.wavelength_um);
+        let solved = match self.passed(element, colour, as_lit, progress)? {
             Some(solved) => solved,
             None => self
                 .cells
@@ -180,7 +173,8 @@ impl MadeChip {
         progress: &dyn Progress,
     ) -> Result<MadeView<'a>> {
         let sines = self.cell_sines(element, stated, as_lit);
-        let solved = match self.rotated_light(element, (stated.wavelength_um, BAND_ORDERS), as_lit)? {
+        let colour = RectangleColour::OfBand(stated.wavelength_um);
+        let solved = match self.passed(element, colour, as_lit, progress)? {
             Some(solved) => solved,
             None => self
                 .cells
@@ -189,26 +183,47 @@ impl MadeChip {
         Ok(self.viewed(element, stated, &solved))
     }
 
-    /// What the classes of rotated rectangles transmit, at a wavelength (um) with so many orders; none of other pillars.
-    fn rotated_light(&self, element: &MadeElement, colour: (f64, usize), as_lit: bool) -> Result<Option<SolvedWidths>> {
-        let Some((bank, pillars, light)) = &self.rotated else {
+    /// What reaches the sensor behind the classes of rectangles; none of other pillars.
+    fn passed(
+        &self,
+        element: &MadeElement,
+        colour: RectangleColour,
+        as_lit: bool,
+        progress: &dyn Progress,
+    ) -> Result<Option<SolvedWidths>> {
+        let Some(rectangles) = &self.rectangles else {
             return Ok(None);
         };
         if as_lit {
             return Err(RealisedCells::along_normal_alone());
         }
-        let classes = RotatedClasses::of(element);
-        let of = |change: &CellChange| rectangles::hands(bank, change, *pillars, classes, colour, light.focused);
+        let passed = |tables: &PolarisedTables| tables.passed(rectangles.polarised);
+        self.through(rectangles, element, colour, &passed, progress).map(Some)
+    }
+
+    /// What `leaving` takes of the light behind the classes of rectangles.
+    fn through(
+        &self,
+        rectangles: &MadeRectangles,
+        element: &MadeElement,
+        colour: RectangleColour,
+        leaving: &dyn Fn(&PolarisedTables) -> Vec<PassedTable>,
+        progress: &dyn Progress,
+    ) -> Result<SolvedWidths> {
+        let of = |change: &CellChange| -> Result<SolvedWidths> {
+            let tables = rectangles.tables(change, element.rectangles(), colour, progress)?;
+            Ok(MadeRectangles::solved(leaving(&tables)))
+        };
         let change = &self.perturbation().cell;
-        let mut solved = rectangles::passed(of(&change.in_the_middle())?, light.polarised);
+        let mut solved = of(&change.in_the_middle())?;
         if let Some(rim) = change.at_the_rim() {
-            let mut rim = rectangles::passed(of(&rim)?, light.polarised);
-            let phase = to_middle_tops(self.cells.stack(), change.rim_height_nm, colour.0)?;
+            let mut rim = of(&rim)?;
+            let phase = to_middle_tops(self.cells.stack(), change.rim_height_nm, colour.um())?;
             let all = rim.pillars.iter_mut().flatten().chain(&mut rim.bare);
             all.for_each(|t| *t *= phase);
             solved.rim = Some(Box::new(rim));
         }
-        Ok(Some(solved))
+        Ok(solved)
     }
 
     /// The direction that cells of an element are solved for.
@@ -228,37 +243,92 @@ impl MadeChip {
 }
 
 impl MadeChip {
-    /// What rotated rectangles do to light of both hands along the normal, by the number of their rotation up to `most`, missing
+    /// What each class of rectangles transmits along the normal of light whose direction is asked for, for one of many wavelengths of a
+    /// band, each table with how often it has the phase of the element: as [`PolarisedTables::departing`]. None of other pillars.
+    ///
+    /// # Errors
+    /// As [`MadeChip::view`].
+    pub fn departing_in_band(
+        &self,
+        element: &MadeElement,
+        wavelength_um: f64,
+        progress: &dyn Progress,
+    ) -> Result<Option<Vec<(ClassTable, i32)>>> {
+        let Some(rectangles) = &self.rectangles else {
+            return Ok(None);
+        };
+        let orders = RefCell::new(Vec::new());
+        let departing = |tables: &PolarisedTables| {
+            let departing = tables.departing(rectangles.polarised);
+            *orders.borrow_mut() = departing.iter().map(|p| p.order).collect();
+            departing
+        };
+        let colour = RectangleColour::OfBand(wavelength_um);
+        let solved = self.through(rectangles, element, colour, &departing, progress)?;
+        let view = self.viewed(element, &PlaneWave::normal(wavelength_um), &solved);
+        Ok(Some(view.tables.into_iter().zip(orders.into_inner()).collect()))
+    }
+
+    /// What each class of an element transmits along the normal of the light that has the phase of the design, in whatever light the
+    /// chip is simulated.
+    ///
+    /// # Errors
+    /// As [`MadeChip::view`].
+    pub fn focused_table(
+        &self,
+        element: &MadeElement,
+        wavelength_um: f64,
+        progress: &dyn Progress,
+    ) -> Result<ClassTable> {
+        let stated = PlaneWave::normal(wavelength_um);
+        let view = match &self.rectangles {
+            None => self.view(element, &stated, false, progress)?,
+            Some(rectangles) => {
+                let colour = RectangleColour::Single(wavelength_um);
+                let focused = |tables: &PolarisedTables| tables.passed(PolarisedLight::default());
+                let solved = self.through(rectangles, element, colour, &focused, progress)?;
+                self.viewed(element, &stated, &solved)
+            }
+        };
+        let mut tables = view.tables.into_iter();
+        Ok(tables.next().expect("light that is focused passes"))
+    }
+
+    /// What rectangles with these numbers do to light of both polarisations along the normal, by their number, missing
     /// pillars and light that sees none mixed in, and the light that they are in; none of other pillars. `density_steps` as for
     /// [`MadeChip::drawn_widths`].
     ///
     /// # Errors
     /// As [`MadeChip::view`].
-    pub fn drawn_hands(
+    pub fn drawn_rectangles(
         &self,
-        most: u16,
+        numbers: &[u16],
         density_steps: i32,
         wavelength_um: f64,
+        progress: &dyn Progress,
     ) -> Result<Option<(PolarisedTables, PolarisedLight)>> {
-        let Some((bank, pillars, light)) = &self.rotated else {
+        let Some(rectangles) = &self.rectangles else {
             return Ok(None);
         };
         let (geometry, change) = (&self.perturbation().geometry, self.perturbation().cell.in_the_middle());
-        let numbers: Vec<u16> = (0..=most).collect();
-        let width_nm = realised_nm(pillars.width_nm, geometry, density_steps);
-        let classes = RotatedClasses {
-            widths_nm: &vec![width_nm; numbers.len()],
-            numbers: &numbers,
-        };
-        let mut hands = rectangles::hands(bank, &change, *pillars, classes, (wavelength_um, ORDERS), light.focused)?;
-        for table in hands.converted.iter_mut().chain(&mut hands.unconverted) {
-            let (unseen, bare) = (table.pop().unwrap_or_default(), table.pop().unwrap_or_default());
-            for t in table.iter_mut() {
-                *t = mixed(geometry, geometry.missing_pillars, *t, bare, unseen);
-            }
-            table[0] = Complex64::ZERO;
+        let bias_nm = realised_nm(0, geometry, density_steps);
+        let last = numbers.iter().copied().max().unwrap_or(0);
+        let mut classes = vec![RectangleClass::WITHOUT_PILLAR; usize::from(last) + 1];
+        for &number in numbers {
+            classes[usize::from(number)] = RectangleClass { number, bias_nm };
         }
-        Ok(Some((PolarisedTables::Hands(hands), light.polarised)))
+        let colour = RectangleColour::Single(wavelength_um);
+        let mut tables = rectangles.tables(&change, &classes, colour, progress)?;
+        for table in tables.all_mut() {
+            let (unseen, bare) = (table.pop().unwrap_or_default(), table.pop().unwrap_or_default());
+            for (t, class) in table.iter_mut().zip(&classes) {
+                *t = match class.number {
+                    0 => Complex64::ZERO,
+                    _ => mixed(geometry, geometry.missing_pillars, *t, bare, unseen),
+                };
+            }
+        }
+        Ok(Some((tables, rectangles.polarised)))
     }
 
     /// What pillars drawn this wide (nm) transmit along the normal where so many steps of density are added to

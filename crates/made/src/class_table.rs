@@ -81,6 +81,21 @@ impl ClassTable {
             .sum()
     }
 
+    /// Power that all these sites pass together, in the middle of the lens: |t|^2 summed over them.
+    pub fn power(&self, by_width: &[u16]) -> f64 {
+        let each = self.classes(by_width).iter();
+        each.map(|class| f64::from(self.t[usize::from(*class)].norm_sqr()))
+            .sum()
+    }
+
+    /// The same sites with all light multiplied by this.
+    #[must_use]
+    pub fn scaled(mut self, by: f32) -> Self {
+        self.t.iter_mut().for_each(|t| *t *= by);
+        self.scattered *= f64::from(by * by);
+        self
+    }
+
     /// Say what the same sites transmit at the rim of the lens; between it and the middle, the logarithm of the
     /// transmission goes with the square of the radius.
     pub fn set_rim(&mut self, rim: &Self) {

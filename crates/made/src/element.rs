@@ -13,7 +13,7 @@ use super::expression::Input;
 use super::pupil::PupilTerms;
 use super::shifted_aperture::ShiftedAperture;
 use super::stitching::displace;
-use super::{ArrivingLight, GeometryChange, NODE_STEP_NM, density, zernike};
+use super::{ArrivingLight, GeometryChange, NODE_STEP_NM, RectangleClass, density, zernike};
 use metalith_core::{Error, Lattice, PillarShape, Result, WidthMap};
 use metalith_wave::Aperture;
 use metalith_wave::kernels::cis;
@@ -158,10 +158,10 @@ pub struct MadeElement {
     missing: f64,
     /// Class of each site, row by row; zero where light is blocked.
     class: Vec<u16>,
-    /// Width of each class (nm), of rectangles the shorter edge, zero without pillar; that of class zero is of no use.
+    /// Width of each class (nm), of rectangles what their edges are off by, zero without pillar; that of class zero is of no use.
     width_nm: Vec<f64>,
-    /// Of rotated rectangles the number of the rotation of each class, else nothing.
-    number: Vec<u16>,
+    /// Of rectangles each class, that of class zero of no use; else nothing.
+    rectangle: Vec<RectangleClass>,
     /// Sites in each class.
     count: Vec<u32>,
     /// Optical path added over the lens (um); empty for none.
@@ -186,25 +186,31 @@ impl MadeElement {
         let steps = drawn.site_steps(geometry);
         let aperture = ShiftedAperture::new(lattice, drawn.aperture_radius_um, geometry.aperture_offset_um);
         let covered = |site: usize| aperture.as_ref().is_some_and(|a| a.passes(site) == 0.0);
-        // Rotated rectangles are told by their rotation, and all drawn with the same edges.
-        let edge_nm = drawn.shape.rotated().map(|pillars| pillars.width_nm);
+        // Rectangles are told by their number, and both edges are off by the same.
+        let rectangles = drawn.shape.rectangles().is_some();
+        let without = RectangleClass::WITHOUT_PILLAR;
         let mut known: HashMap<(u64, u16), u16> = HashMap::new();
         let (mut class, mut width_nm, mut count) = (vec![0; n * n], vec![0.0], vec![0u32]);
-        let mut number = Vec::from_iter(edge_nm.map(|_| 0));
+        let mut rectangle = Vec::from_iter(rectangles.then_some(without));
         let mut radius2 = 0;
         for (site, &w) in drawn.pillars.width_nm.iter().enumerate() {
             if w == 0 || covered(site) {
                 continue;
             }
-            let width = realised_nm(edge_nm.unwrap_or(w), geometry, steps.as_ref().map_or(0, |s| s[site]));
-            let key = (width.to_bits(), edge_nm.map_or(0, |_| w));
+            let drawn_nm = if rectangles { 0 } else { w };
+            let width = realised_nm(drawn_nm, geometry, steps.as_ref().map_or(0, |s| s[site]));
+            let key = (width.to_bits(), w - drawn_nm);
             let next = width_nm.len();
             let own = match known.get(&key) {
                 Some(own) => *own,
                 None if next <= usize::from(MOST_CLASS) => {
                     known.insert(key, next as u16);
                     width_nm.push(width);
-                    number.extend(edge_nm.map(|_| w));
+                    let own = RectangleClass {
+                        number: w,
+                        bias_nm: width,
+                    };
+                    rectangle.extend(rectangles.then_some(own));
                     count.push(0);
                     next as u16
                 }
@@ -239,7 +245,7 @@ impl MadeElement {
             missing: geometry.missing_pillars,
             class,
             width_nm,
-            number,
+            rectangle,
             count,
             path_um,
         })
@@ -251,8 +257,8 @@ impl MadeElement {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let bare = self.width_nm.len() as u16;
         self.width_nm.push(0.0);
-        if !self.number.is_empty() {
-            self.number.push(0);
+        if !self.rectangle.is_empty() {
+            self.rectangle.push(RectangleClass::WITHOUT_PILLAR);
         }
         self.count.push(0);
         for class in self.class.iter_mut().filter(|c| **c > 0) {
@@ -284,12 +290,12 @@ impl MadeElement {
         &self.class
     }
 
-    /// Of rotated rectangles the number of the rotation of each class, from the first open one on; of others nothing.
-    pub fn rotations(&self) -> &[u16] {
-        self.number.get(1..).unwrap_or_default()
+    /// Of rectangles each class, from the first open one on; of others nothing.
+    pub fn rectangles(&self) -> &[RectangleClass] {
+        self.rectangle.get(1..).unwrap_or_default()
     }
 
-    /// Width of each class from the first open one, number 1, on (nm); of rectangles that of the shorter edge.
+    /// Width of each class from the first open one, number 1, on (nm); of rectangles what their edges are off by.
     pub fn widths_nm(&self) -> &[f64] {
         &self.width_nm[1..]
     }
@@ -305,11 +311,15 @@ impl MadeElement {
     /// The same of a table that is looked up by what is drawn: by the nearest width (nm), or by the number of a rectangle.
     pub fn table_by_number(&self, table: &[Complex64], bare: Complex64) -> ClassTable {
         let at = |k: usize| table.get(k).copied().unwrap_or_default();
-        if self.rotations().is_empty() {
+        if self.rectangles().is_empty() {
             return self.table(|width| at(width.round() as usize), bare);
         }
-        // Rotated ones have one width.
-        let open: Vec<Complex64> = self.rotations().iter().map(|number| at(usize::from(*number))).collect();
+        // Missing pillars are in no table that is looked up so.
+        let open: Vec<Complex64> = self
+            .rectangles()
+            .iter()
+            .map(|own| at(usize::from(own.number)))
+            .collect();
         self.table_of(&open, bare, Complex64::ONE)
     }
 
@@ -322,7 +332,8 @@ impl MadeElement {
         assert_eq!(open.len() + 1, self.width_nm.len(), "one value for each class");
         let (mut t, mut scattered) = (vec![Complex32::ZERO], 0.0);
         for ((pillar, width), count) in open.iter().zip(&self.width_nm[1..]).zip(&self.count[1..]) {
-            let pillar = if *width > 0.0 {
+            // Of rectangles no transmission goes by a width.
+            let pillar = if *width > 0.0 && self.rectangle.is_empty() {
                 pillar * self.geometry.transmission_factor(*width)
             } else {
                 *pillar

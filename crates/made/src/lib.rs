@@ -54,6 +54,6 @@ pub use light::{ArrivingLight, cell_direction};
 pub use model::CalibratedModel;
 pub use not_applied::NotApplied;
 pub use perturbation::{CameraChange, CellChange, GeometryChange, LightChange, PathChange, Perturbation, legendre};
-pub use rectangles::RotatedLight;
+pub use rectangles::{RectangleClass, bank_orders};
 pub use stack::{off_cutoff, perturbed, possible_width_nm, to_middle_tops};
 pub use stitching::Stitching;

@@ -188,8 +188,9 @@ impl<'a> ChipInLight<'a> {
         let um = self.sampling.wavelengths_nm[index] * 1e-3;
         if let SimulationCase::Made(chip) = self.case {
             let view = chip.view_in_band(&element.made, &PlaneWave::normal(um), false, progress)?;
+            let departing = chip.departing_in_band(&element.made, um, progress)?;
             return Ok(Tables {
-                departing: None,
+                departing: departing.map(|departing| scaled_to(&view.tables, departing, element.made.classes())),
                 classes: view.tables,
                 share: view.share,
                 gap_um: view.gap_um,
@@ -318,6 +319,15 @@ fn distinct_of(
 fn last_index(design: &Design) -> u16 {
     let shape = design.cell.shape.rectangles();
     shape.map_or(design.cell.pitch_nm as u16, |pillars| pillars.last())
+}
+
+/// Where light of an element as made goes, with the power of what passes: as [`Polarised::departing_from`].
+fn scaled_to(passed: &[ClassTable], departing: Vec<(ClassTable, i32)>, classes: &[u16]) -> Vec<(ClassTable, i32)> {
+    let all: f64 = departing.iter().map(|(table, _)| table.power(classes)).sum();
+    let passes: f64 = passed.iter().map(|table| table.power(classes)).sum();
+    let scale = if all > 0.0 { (passes / all).sqrt() as f32 } else { 0.0 };
+    let scaled = departing.into_iter().map(|(table, order)| (table.scaled(scale), order));
+    scaled.collect()
 }
 
 /// What reaches the sensor of light whose polarisations pillars tell apart, and the same for where it goes.

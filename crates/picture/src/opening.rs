@@ -111,7 +111,8 @@ impl Studio {
                 let made;
                 let case = match model {
                     Some(model) => {
-                        made = MadeChip::new(&design.cell_stack()?, model)?;
+                        let light = design.verify.light();
+                        made = MadeChip::in_light(&design.cell_stack()?, model, design.focused(), light)?;
                         SimulationCase::Made(&made)
                     }
                     None => {

@@ -1,5 +1,6 @@
 //! What draws are judged with: the designs, their layouts as read back, and tables of cells.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -9,7 +10,7 @@ use metalith_core::{Error, Progress, Result};
 use metalith_design::array::PillarArray;
 use metalith_design::{CellIncidence, Design};
 use metalith_gds::{Layout, ReadLimits};
-use metalith_made::{BankRange, CalibratedModel, CellBank, CellChange, MadeChip, Perturbation, RotatedLight};
+use metalith_made::{BankRange, CalibratedModel, CellBank, CellChange, MadeChip, Perturbation, bank_orders};
 use metalith_verify::{ReadLayout, SimulationCases, Verification, wavelengths_um};
 
 use crate::draw::Drawer;
@@ -18,9 +19,6 @@ use crate::picture::{KnownChip, PictureBench, TakenPicture};
 use crate::plan::{Plan, key};
 use crate::record::{DrawRecord, LimitStatement, figures, finite};
 use crate::tolerance::Tolerance;
-
-/// Orders of cells at single wavelengths.
-const ORDERS: usize = metalith_cell::ORDERS;
 
 /// Hears that the user wants to stop, and shows nothing: one draw is a step of something else.
 pub(crate) struct Quiet<'a>(pub &'a dyn Progress);
@@ -267,36 +265,24 @@ impl Bench {
 
 /// A chip of a design, all its cells from a bank.
 fn chip_of(design: &Design, bank: &Arc<CellBank>, model: &CalibratedModel) -> Result<MadeChip> {
-    if design.cell.shape.rotated().is_none() {
-        return MadeChip::of_bank(bank, model);
-    }
-    let light = RotatedLight {
-        focused: design.cell.arriving.unwrap_or_default(),
-        polarised: design.verify.light(),
-    };
-    MadeChip::of_rectangles(bank, model, light)
+    let chip = MadeChip::in_light(bank.stated(), model, design.focused(), design.verify.light())?;
+    Ok(chip.from_bank(bank))
 }
 
-/// Check that rotated rectangles, if the pillars of a design are such, can be made like that.
+/// Check that rectangles, if the pillars of a design are such, can be made like that.
 fn check_rectangles(design: &Design, made: &MadeRange, has_picture: bool) -> Result<()> {
-    if design.cell.shape.upright().is_some() {
-        return Err(Error::invalid(
-            "a study of upright rectangles",
-            "use squares, circles or rotated rectangles; designs of other widths and heights tell what a process does to upright ones",
-        ));
-    }
-    if design.cell.shape.rotated().is_none() {
+    if design.cell.shape.rectangles().is_none() {
         return Ok(());
     }
     if made.changes.iter().any(|change| change.corner_rounding_nm != 0.0) {
         return Err(Error::invalid(
-            "`corner_rounding` of rotated rectangles",
+            "`corner_rounding` of rectangles",
             "leave it out of the study and of its model: rectangles are solved with sharp corners",
         ));
     }
     if has_picture {
         return Err(Error::invalid(
-            "pictures of rotated rectangles in a study",
+            "pictures of rectangles in a study",
             "leave out [picture]; `metalith picture` takes the picture of the chip as drawn",
         ));
     }
@@ -334,25 +320,36 @@ impl MadeRange {
     /// alike then have the same tables.
     fn range(&self, design: &Design, layout: &ReadLayout) -> Result<BankRange> {
         let histograms = layout.extraction().elements.iter().map(|e| e.widths.histogram());
-        let (mut narrow, mut wide) = (f64::MAX, 0.0_f64);
+        let mut drawn: BTreeSet<u16> = BTreeSet::new();
         for histogram in histograms {
-            for (width, _) in histogram.iter().enumerate().skip(1).filter(|(_, n)| **n > 0) {
-                narrow = narrow.min(width as f64);
-                wide = wide.max(width as f64);
-            }
+            let there = histogram.iter().zip(0..).skip(1).filter(|(n, _)| **n > 0);
+            drawn.extend(there.map(|(_, width)| width));
         }
-        // The mapping's own widths are judged too, whatever was read.
-        narrow = narrow.min(f64::from(design.cell.width_range_nm.0));
-        wide = wide.max(f64::from(design.cell.width_range_nm.1));
-        // Rectangles are of one size, and told by numbers that are no widths.
-        let (narrow, wide) = match design.cell.shape.rotated() {
+        // The mapping's own are judged too, whatever was read.
+        let library = design
+            .mapping
+            .pillar_library
+            .iter()
+            .flat_map(|library| library.pillars());
+        drawn.extend(library.map(|pillar| pillar.number));
+        let (least, most) = design.cell.width_range_nm;
+        // Rectangles are told by numbers that are no widths.
+        let (narrow, wide) = match design.cell.shape.rectangles() {
             Some(_) => (0.0, 0.0),
-            None => (narrow, wide),
+            None => (
+                f64::from(drawn.first().map_or(least, |w| least.min(*w))),
+                f64::from(drawn.last().map_or(most, |w| most.max(*w))),
+            ),
+        };
+        let numbers = match design.cell.shape.upright() {
+            Some(_) => drawn.into_iter().collect(),
+            None => Vec::new(),
         };
         let (single, band) = wavelengths_um(design)?;
-        let single = single.into_iter().map(|um| (um, ORDERS));
+        let single = single.into_iter().map(|um| (um, bank_orders(design.cell.shape)));
         Ok(BankRange {
             widths_nm: [narrow + self.bias_nm[0], wide + self.bias_nm[1]],
+            numbers,
             changes: self.changes,
             colours: single.chain(band.into_iter().map(|um| (um, BAND_ORDERS))).collect(),
         })

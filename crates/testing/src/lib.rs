@@ -5,6 +5,7 @@ mod golden;
 pub mod lens;
 pub mod mutate;
 pub mod oasis;
+pub mod rectangles;
 #[cfg(feature = "session")]
 pub mod session;
 

@@ -36,8 +36,8 @@ use metalith_gds::extract::{ExtractedElement, Extraction, Oddities, Survey, extr
 use metalith_gds::{self, Layout};
 use metalith_layout::extraction_plan;
 use metalith_made::{MadeChip, ModelStatement};
+use metalith_wave::Accuracy;
 use metalith_wave::propagation::Steepness;
-use metalith_wave::{Accuracy, PlaneWave};
 
 pub use case::SimulationCases;
 pub use check::{Check, Sense};
@@ -384,9 +384,9 @@ impl<'a> MappingResponse<'a> {
         };
         match (self, &read.made[0]) {
             (Self::Made(um, chip), Some(made)) => {
-                let view = chip.view(made, &PlaneWave::normal(*um), false, progress)?;
                 let single = |t: &Complex32| Complex64::new(f64::from(t.re), f64::from(t.im));
-                let table: Vec<_> = view.tables[0].t.iter().map(single).collect();
+                let focused = chip.focused_table(made, *um, progress)?;
+                let table: Vec<_> = focused.t.iter().map(single).collect();
                 let classes = made.classes();
                 Ok(errors(&table, &|site, _| usize::from(classes[site])))
             }

@@ -65,7 +65,7 @@ type Lens = (Design, PillarArray, tempfile::TempDir);
 
 fn image((design, _, folder): &Lens, arriving: Polarisation, analyser: Option<Analyser>) -> SinglePsf {
     let found = read_pillars(design, &folder.path().join("lens.gds"), &Silent).unwrap();
-    let cell = IdealRetarders(design.mapping.pillar_library.clone().unwrap());
+    let cell = IdealRetarders(PillarLibrary::clone(design.mapping.pillar_library.as_ref().unwrap()));
     let light = Lighting {
         wavelengths_um: vec![WAVELENGTH_UM],
         incidence_sin: [0.0; 2],

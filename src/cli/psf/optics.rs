@@ -10,7 +10,10 @@ use metalith::grating::{Mapping, NeighbourCell};
 use metalith::rcwa::{CellLattice, Material};
 use metalith::report::{exact, sig};
 use metalith::verify::Lighting;
-use metalith::{Accuracy, CellModel, Error, Extraction, LatticeKind, PillarShape, Rectangles, Result, Wedge};
+use metalith::{
+    Accuracy, CalibratedModel, CellModel, Error, Extraction, LatticeKind, MadeChip, PillarShape, Rectangles, Result,
+    Wedge,
+};
 
 use super::{FidelityArg, PsfArgs, PsfLight};
 
@@ -206,6 +209,13 @@ impl PsfArgs {
         };
         let detector = light.detector(self.focused(shape));
         format!("light arrives {arriving}{focused}; {detector}; figures are of all that arrives")
+    }
+
+    /// The chip as a measured process makes it.
+    pub(super) fn made(&self, found: &Extraction, model: &CalibratedModel) -> Result<MadeChip> {
+        let shape = found.shape;
+        let focused = shape.rectangles().map(|_| self.focused(shape));
+        MadeChip::in_light(&self.stack(found)?, model, focused, self.polarised_light(shape))
     }
 
     /// What solves it for the pillars as drawn.

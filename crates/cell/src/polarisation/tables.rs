@@ -90,6 +90,14 @@ impl PolarisedTables {
         }
     }
 
+    /// All tables, to be changed.
+    pub fn all_mut(&mut self) -> Vec<&mut Vec<Complex64>> {
+        match self {
+            Self::Hands(hands) => hands.converted.iter_mut().chain(&mut hands.unconverted).collect(),
+            Self::Axes(axes) => axes.along.iter_mut().collect(),
+        }
+    }
+
     /// Parts of the light that reaches the sensor: those of one list interfere, and no others.
     fn leaving(&self, light: PolarisedLight) -> Vec<Vec<Part<'_>>> {
         match self {

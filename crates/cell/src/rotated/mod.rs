@@ -146,36 +146,8 @@ impl RotatedCell {
 
     /// With as many orders as this cell needs.
     fn solve(&self, wavelength_um: f64, choice: OrderChoice) -> Result<Solved> {
-        let own = self.samples(INTERVALS, wavelength_um, choice.usual)?;
-        let compared = |orders: usize| -> Result<(Vec<Channels>, f64)> {
-            let other = self.samples(COMPARED_INTERVALS, wavelength_um, orders)?;
-            let pairs = other.iter().zip(every(COMPARED_INTERVALS, &own));
-            let changes: Vec<Channels> = pairs.map(|(a, b)| [a[0] - b[0], a[1] - b[1]]).collect();
-            let apart = changes.iter().flatten().map(|d| d.norm()).fold(0.0, f64::max);
-            Ok((changes, apart))
-        };
-        let series = Series::of(&own);
-        let (_, apart) = compared(choice.fewer)?;
-        if apart <= choice.close {
-            return Ok(Solved {
-                series,
-                finer: None,
-                truncation: Some(Truncation {
-                    orders: choice.usual,
-                    fewer: choice.fewer,
-                    apart,
-                }),
-            });
-        }
-        let (changes, apart) = compared(choice.more)?;
-        Ok(Solved {
-            series,
-            finer: Some(Series::of(&changes)),
-            truncation: Some(Truncation {
-                orders: choice.more,
-                fewer: choice.usual,
-                apart,
-            }),
+        Solved::converged(choice, |intervals, orders| {
+            self.samples(intervals, wavelength_um, orders)
         })
     }
 
@@ -220,13 +192,54 @@ enum Hand {
 }
 
 impl Solved {
-    /// Converted and unconverted light at a rotation (rad).
-    fn at(&self, rotation: f64, arriving: Handedness) -> Channels {
+    /// With as many orders as are needed, from what `samples` has over a quarter turn of so many intervals with so many orders.
+    fn converged(choice: OrderChoice, samples: impl Fn(usize, usize) -> Result<Vec<Channels>>) -> Result<Self> {
+        let own = samples(INTERVALS, choice.usual)?;
+        let compared = |orders: usize| -> Result<(Vec<Channels>, f64)> {
+            let other = samples(COMPARED_INTERVALS, orders)?;
+            let pairs = other.iter().zip(every(COMPARED_INTERVALS, &own));
+            let changes: Vec<Channels> = pairs.map(|(a, b)| [a[0] - b[0], a[1] - b[1]]).collect();
+            let apart = changes.iter().flatten().map(|d| d.norm()).fold(0.0, f64::max);
+            Ok((changes, apart))
+        };
+        let series = Series::of(&own);
+        let (_, apart) = compared(choice.fewer)?;
+        if apart <= choice.close {
+            return Ok(Solved {
+                series,
+                finer: None,
+                truncation: Some(Truncation {
+                    orders: choice.usual,
+                    fewer: choice.fewer,
+                    apart,
+                }),
+            });
+        }
+        let (changes, apart) = compared(choice.more)?;
+        Ok(Solved {
+            series,
+            finer: Some(Series::of(&changes)),
+            truncation: Some(Truncation {
+                orders: choice.more,
+                fewer: choice.usual,
+                apart,
+            }),
+        })
+    }
+
+    /// Converted light less its geometric phase, and unconverted light, at a rotation (rad).
+    fn channels(&self, rotation: f64) -> Channels {
         let mut sum = self.series.at(rotation);
         if let Some(finer) = &self.finer {
             let more = finer.at(rotation);
             sum = [sum[0] + more[0], sum[1] + more[1]];
         }
+        sum
+    }
+
+    /// Converted and unconverted light at a rotation (rad).
+    fn at(&self, rotation: f64, arriving: Handedness) -> Channels {
+        let sum = self.channels(rotation);
         let geometric = Complex64::cis(arriving.geometric_phase(rotation));
         [sum[0] * geometric, sum[1]]
     }

@@ -1,13 +1,15 @@
 //! A rectangle of any edges at the rotations that are solved: numbers that tables can be interpolated from.
 
+use std::f64::consts::FRAC_PI_2;
+
 use num_complex::Complex64;
 use rayon::prelude::*;
 
 use metalith_core::{Result, RotatedRectangles};
 use metalith_rcwa::{Orders, circular};
 
-use super::INTERVALS;
 use super::series::{Channels, Series, samples, solved_rotations};
+use super::{CHOICE, INTERVALS, Solved};
 use crate::{CellStack, HandTables, Handedness, RotatedRectangle};
 
 /// What a rectangle does to light that arrives left circularly polarised, at rotations evenly over a quarter turn. What it does at any
@@ -37,6 +39,20 @@ impl RotationSamples {
             orders,
             Handedness::Left,
         )
+    }
+
+    /// The same with as many orders as [`RotatedCell`](super::RotatedCell) takes at single wavelengths.
+    ///
+    /// # Errors
+    /// As [`CellStack::jones`].
+    pub fn converged(stack: &CellStack, edges_nm: [f64; 2], wavelength_um: f64) -> Result<Self> {
+        let solved = Solved::converged(CHOICE, |intervals, orders| {
+            let orders = Orders::new(orders)?;
+            Self::over(intervals, stack, edges_nm, wavelength_um, orders, Handedness::Left).map(Self::channels)
+        })?;
+        let samples = Self::NUMBERS / 2;
+        let rotation = |k: usize| FRAC_PI_2 * k as f64 / samples as f64;
+        Ok(Self((0..samples).map(|k| solved.channels(rotation(k))).collect()))
     }
 
     /// The same for light of a hand that arrives, with so many intervals of an eighth of a turn.
@@ -109,7 +125,8 @@ impl RotationSamples {
 #[cfg(test)]
 mod tests {
     use super::super::super::rectangle::tests::{PILLARS, titania};
-    use super::super::{BAND_ORDERS, RotatedCell};
+    use super::super::BAND_ORDERS;
+    use super::super::RotatedCell;
     use super::*;
     use crate::{CellModel, PolarisedTables};
 

@@ -19,8 +19,6 @@ use crate::{AxisTables, CellModel, CellStack, Fidelity, ObliqueTables, Polarisat
 pub const UPRIGHT_ORDERS: usize = 25;
 
 /// What upright rectangular pillars do to light along x and along y, in infinite lattices of pillars of one size.
-///
-/// A pillar that is exchanged with its mirror image about the diagonal exchanges x and y, so that half of the sizes are solved.
 #[derive(Debug)]
 pub struct UprightCell {
     stack: CellStack,
@@ -63,6 +61,37 @@ impl CellStack {
         let jones = solve(&layers, &Incidence::normal(wavelength_um, Side::Below), orders)?.jones;
         Ok([jones[0][0], jones[1][1]])
     }
+}
+
+/// Transmissions of light along x and along y of pillars with these edges along x and y (nm), in their order. A pillar that is exchanged
+/// with its mirror image about the diagonal exchanges x and y, so that `solve` is asked for one of the two.
+///
+/// # Errors
+/// Those of `solve`; also if the user stopped it.
+pub fn birefringent_pillars(
+    edges_nm: &[[f64; 2]],
+    solve: impl Fn([f64; 2]) -> Result<[Complex64; 2]> + Sync,
+    progress: &dyn Progress,
+) -> Result<Vec<[Complex64; 2]>> {
+    let wide = |[x, y]: [f64; 2]| if x >= y { [x, y] } else { [y, x] };
+    let key = |edges: [f64; 2]| wide(edges).map(f64::to_bits);
+    let mut distinct: Vec<[f64; 2]> = edges_nm.iter().copied().map(wide).collect();
+    distinct.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    distinct.dedup();
+    progress.begin("cells of upright rectangles", distinct.len() as u64);
+    let solved = distinct.par_iter().map(|&edges| {
+        if progress.stopped() {
+            return Err(Error::Interrupted);
+        }
+        progress.advance(1);
+        Ok((key(edges), solve(edges)?))
+    });
+    let solved = solved.collect::<Result<HashMap<_, _>>>()?;
+    let of = |edges: &[f64; 2]| {
+        let [x, y] = solved[&key(*edges)];
+        if edges[0] >= edges[1] { [x, y] } else { [y, x] }
+    };
+    Ok(edges_nm.iter().map(of).collect())
 }
 
 impl UprightCell {
@@ -120,31 +149,15 @@ impl UprightCell {
     }
 
     fn solve(&self, wavelength_um: f64, orders: Orders, progress: &dyn Progress) -> Result<Along> {
-        let edges_of = |number: u16| self.pillars.edges_nm(number);
-        let is_wide = |number: &u16| edges_of(*number)[0] >= edges_of(*number)[1];
-        let wide: Vec<u16> = (1..=self.pillars.count()).filter(is_wide).collect();
-        progress.begin("cells of upright rectangles", wide.len() as u64);
-        let solved = wide.par_iter().map(|&number| {
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
-            progress.advance(1);
-            let edges_nm = edges_of(number).map(f64::from);
-            self.stack.birefringent(edges_nm, wavelength_um, orders)
-        });
-        let solved = solved.collect::<Result<Vec<_>>>()?;
-        let mut along = [0, 1].map(|_| vec![Complex64::ZERO; usize::from(self.pillars.count()) + 1]);
-        for (number, [x, y]) in wide.into_iter().zip(solved) {
-            let [edge_x, edge_y] = edges_of(number);
-            let mirrored = self
-                .pillars
-                .number([edge_y, edge_x])
-                .expect("both edges have the same lengths");
-            for (number, t) in [(number, [x, y]), (mirrored, [y, x])] {
-                (along[0][usize::from(number)], along[1][usize::from(number)]) = (t[0], t[1]);
-            }
-        }
-        Ok(along)
+        let edges_nm: Vec<[f64; 2]> = (1..=self.pillars.count())
+            .map(|number| self.pillars.edges_nm(number).map(f64::from))
+            .collect();
+        let one = |edges_nm| self.stack.birefringent(edges_nm, wavelength_um, orders);
+        let solved = birefringent_pillars(&edges_nm, one, progress)?;
+        Ok([0, 1].map(|axis| {
+            let of_axis = solved.iter().map(|t| t[axis]);
+            std::iter::once(Complex64::ZERO).chain(of_axis).collect()
+        }))
     }
 
     /// Of light along one axis, up to a number.

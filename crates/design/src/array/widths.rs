@@ -188,7 +188,7 @@ impl WidthRule {
                 .zip(mapping.pillar_library.as_ref())
                 .map(|(pillars, library)| PairRule {
                     pillars,
-                    choice: Arc::new(library.clone()),
+                    choice: Arc::clone(library),
                     axis: PolarisationAxis::X,
                 }),
         }

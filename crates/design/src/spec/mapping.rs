@@ -1,8 +1,9 @@
 //! `[mapping]`: from phase to width.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::cell::read_band;
 use super::lens::WAVELENGTH;
@@ -38,8 +39,12 @@ pub struct MappingSpec {
     #[serde(skip)]
     pub library_file: Option<PathBuf>,
     /// What that file holds.
-    #[serde(rename = "library", skip_serializing_if = "Option::is_none")]
-    pub pillar_library: Option<PillarLibrary>,
+    #[serde(
+        rename = "library",
+        serialize_with = "library_itself",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub pillar_library: Option<Arc<PillarLibrary>>,
     /// Why a library that is to be made anew was not read.
     #[serde(skip)]
     pub library_refused: Option<String>,
@@ -224,7 +229,7 @@ impl MappingSpec {
         if let (Some(file), Some(pillars)) = (&self.library_file, cell.shape.upright()) {
             let read = PillarLibrary::read_csv(file, pillars);
             match (read, library) {
-                (Ok(read), _) => self.pillar_library = Some(read),
+                (Ok(read), _) => self.pillar_library = Some(Arc::new(read)),
                 (Err(error), LibraryFile::Needed) => return Err(error),
                 (Err(error), LibraryFile::ToBeMade) if file.exists() => self.library_refused = Some(error.to_string()),
                 (Err(_), LibraryFile::ToBeMade) => {}
@@ -232,6 +237,11 @@ impl MappingSpec {
         }
         Ok(())
     }
+}
+
+/// A library as it is, whoever shares it.
+fn library_itself<S: Serializer>(library: &Option<Arc<PillarLibrary>>, to: S) -> std::result::Result<S::Ok, S::Error> {
+    library.as_deref().serialize(to)
 }
 
 /// Largest coefficient of a correction of rotations (degrees): what a lattice adds is some degrees at most.

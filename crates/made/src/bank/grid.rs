@@ -9,7 +9,7 @@ const FEWEST: usize = 4;
 
 /// Nodes of one quantity of the pillar: one if it does not vary.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Axis {
+pub(crate) struct Axis {
     pub first: f64,
     pub step: f64,
     pub nodes: usize,

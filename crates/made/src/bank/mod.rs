@@ -10,12 +10,13 @@ use std::path::Path;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use self::grid::{Axis, Colour};
-use super::rectangles::SampledRectangles;
+pub(crate) use self::grid::Axis;
+use self::grid::Colour;
+use super::rectangles::{RowOrders, RowsOfBiases, bare_row, row_length, solve_row};
 use super::stack::{off_cutoff, perturbed, possible_width_nm};
 use super::{CellChange, SolvedWidths};
-use metalith_cell::{CellStack, RotationSamples, kept};
-use metalith_core::{Error, PillarShape, Progress, Result};
+use metalith_cell::{CellStack, kept};
+use metalith_core::{Error, Progress, Rectangles, Result};
 use metalith_rcwa::Orders;
 
 /// Version of the kept file.
@@ -46,6 +47,9 @@ const STACK_STEPS: [f64; QUANTITIES] = [5.0, 0.02, 0.75, 10.0, 5.0];
 /// Stacks that are solved at the most. At some 15 CPU s each that is an hour and a half.
 const MOST_STACKS: usize = 400;
 
+/// Upright rectangles that are solved at the most, before widths between: at some 0.08 CPU s each that is an hour and a half.
+const MOST_UPRIGHT: usize = 70_000;
+
 const QUANTITIES: usize = 5;
 
 /// The quantities of a pillar that may vary: height (nm), index, taper (deg), corner rounding (nm), mask (nm).
@@ -73,8 +77,10 @@ fn change_of([height_nm, index, taper_deg, corner_rounding_nm, residual_mask_nm]
 /// What a bank covers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BankRange {
-    /// Narrowest and widest pillar as made (nm); of rotated rectangles the least and the most that both edges are off by.
+    /// Narrowest and widest pillar as made (nm); of rectangles the least and the most that both edges are off by.
     pub widths_nm: [f64; 2],
+    /// Of upright rectangles the numbers of the pillars that it holds, rising; of others nothing.
+    pub numbers: Vec<u16>,
     /// Changes of the pillar: the least and the most of each number.
     pub changes: [CellChange; 2],
     /// Wavelength (um) and orders along an axis.
@@ -102,7 +108,7 @@ impl CellBank {
         progress.begin("solving the tables of cells", (colours * (stacks + 1)) as u64);
         for colour in 0..colours {
             let rows = bank.solve_rows(colour, &coarse, progress)?;
-            let added = between(&coarse, &rows, bank.each());
+            let added = between(&coarse, &rows, bank.each(), bank.alike());
             let fine = bank.solve_rows(colour, &added, &Unwatched(progress))?;
             bank.colours
                 .push(merged((&coarse, &rows), (&added, &fine), bank.each()));
@@ -119,7 +125,7 @@ impl CellBank {
                 if progress.stopped() {
                     return Err(Error::Interrupted);
                 }
-                let row = self.solve_row(colour, stack, widths_nm);
+                let row = self.solve_row(colour, stack, widths_nm, &Unwatched(progress));
                 progress.advance(1);
                 row
             })
@@ -199,6 +205,16 @@ impl CellBank {
             axes,
             colours: Vec::new(),
         };
+        let upright = bank.stated.shape.upright().is_some();
+        let pillars = bank.stacks() * bank.widths.nodes * bank.range.numbers.len();
+        if upright && pillars > MOST_UPRIGHT {
+            return Err(Error::invalid(
+                format!("{pillars} upright rectangles would have to be solved for every wavelength"),
+                format!(
+                    "vary fewer of bias, height, index, taper and mask at once, or less: at most {MOST_UPRIGHT} are solved"
+                ),
+            ));
+        }
         if bank.stacks() > MOST_STACKS {
             return Err(Error::invalid(
                 format!(
@@ -222,11 +238,17 @@ impl CellBank {
         }))
     }
 
-    fn solve_row(&self, colour: usize, stack: usize, widths_nm: &[f64]) -> Result<Vec<Complex64>> {
+    fn solve_row(
+        &self,
+        colour: usize,
+        stack: usize,
+        widths_nm: &[f64],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Complex64>> {
         let (um, orders) = self.range.colours[colour];
-        let orders = Orders::new(orders)?;
         let etched = perturbed(&self.stated, &self.change(stack));
-        let Some(pillars) = etched.shape.rotated() else {
+        let Some(pillars) = self.stated.shape.rectangles() else {
+            let orders = Orders::new(orders)?;
             let at = |width: f64| {
                 let width = possible_width_nm(&etched, width);
                 off_cutoff(width, |w| etched.transmission(w, um, orders))
@@ -234,19 +256,12 @@ impl CellBank {
             let widths = widths_nm.iter().map(|w| at(*w));
             return widths.chain([etched.transmission(0.0, um, orders)]).collect();
         };
-        let edges = [pillars.width_nm, pillars.length_nm].map(f64::from);
+        let (numbers, orders) = (&self.range.numbers, RowOrders::Given(orders));
         let mut row = Vec::new();
         for bias in widths_nm {
-            let solved = off_cutoff(*bias, |bias| {
-                RotationSamples::solve(&etched, edges.map(|e| e + bias), um, orders)
-            })?;
-            row.extend(solved.numbers());
+            row.extend(solve_row(&etched, pillars, numbers, *bias, um, orders, progress)?);
         }
-        let bare = CellStack {
-            shape: PillarShape::Square,
-            ..etched
-        };
-        row.extend(RotationSamples::of_bare(bare.transmission(0.0, um, orders)?).numbers());
+        row.extend(bare_row(&etched, pillars, numbers.len(), um)?);
         Ok(row)
     }
 
@@ -271,20 +286,37 @@ impl CellBank {
         })
     }
 
-    /// The same of rotated rectangles whose edges are off by so much (nm), and of a site without one.
+    /// A row of rectangles for each of these biases (nm), and one for a site without; of upright ones for these numbers.
     ///
     /// # Errors
     /// As [`CellBank::transmissions`].
     pub(super) fn rectangles(
         &self,
         change: &CellChange,
-        orders: usize,
+        (wavelength_um, orders): (f64, usize),
         biases_nm: &[f64],
-        wavelength_um: f64,
-    ) -> Result<SampledRectangles> {
-        let (pillars, bare) = self.numbers(change, orders, biases_nm, wavelength_um)?;
-        let samples = pillars.iter().map(|own| RotationSamples::of_numbers(own));
-        Ok((samples.collect(), RotationSamples::of_numbers(&bare)))
+        numbers: &[u16],
+    ) -> Result<RowsOfBiases> {
+        let (mut rows, bare) = self.numbers(change, orders, biases_nm, wavelength_um)?;
+        if let Some(pillars) = self.stated.shape.upright() {
+            let place = |number: &u16| {
+                let place = self.range.numbers.binary_search(number);
+                let [x, y] = pillars.edges_nm(*number);
+                place.map_err(|_| Self::outside(format!("pillar of {x} x {y} nm")))
+            };
+            let places: Vec<usize> = numbers.iter().map(place).collect::<Result<_>>()?;
+            for row in &mut rows {
+                *row = places.iter().flat_map(|k| [row[2 * k], row[2 * k + 1]]).collect();
+            }
+        }
+        Ok((rows, bare))
+    }
+
+    fn outside(what: String) -> Error {
+        Error::invalid(
+            format!("the tables of cells hold no {what}"),
+            "plan the study again; a shard makes no tables of its own",
+        )
     }
 
     /// The numbers of pillars of these widths (nm), of rectangles by what their edges are off by, and of a site without pillar.
@@ -295,12 +327,7 @@ impl CellBank {
         widths_nm: &[f64],
         wavelength_um: f64,
     ) -> Result<(Vec<Vec<Complex64>>, Vec<Complex64>)> {
-        let outside = |what: String| {
-            Error::invalid(
-                format!("the tables of cells hold no {what}"),
-                "plan the study again; a shard makes no tables of its own",
-            )
-        };
+        let outside = Self::outside;
         let colour = self.range.colours.iter().position(|c| *c == (wavelength_um, orders));
         let colour = colour.ok_or_else(|| outside(format!("wavelength of {} nm", wavelength_um * 1e3)))?;
         let mut stacks = vec![(0, 1.0)];
@@ -337,9 +364,16 @@ impl CellBank {
 
     /// Numbers of each pillar.
     fn each(&self) -> usize {
-        match self.stated.shape.rotated() {
-            Some(_) => RotationSamples::NUMBERS,
-            None => 1,
+        let pillars = self.stated.shape.rectangles();
+        pillars.map_or(1, |pillars| row_length(pillars, self.range.numbers.len()))
+    }
+
+    /// Numbers of a pillar that are judged together: of upright rectangles those of all, because a resonance is of one size among
+    /// hundreds, and what it does to the light of an element is what it does to the sum over all.
+    fn alike(&self) -> usize {
+        match self.stated.shape.rectangles() {
+            Some(Rectangles::Upright(_)) => self.each().max(1),
+            _ => 1,
         }
     }
 
@@ -355,14 +389,21 @@ impl CellBank {
     }
 }
 
-/// Widths between these where any of the rows, which have `each` numbers a width, is not smooth.
-fn between(widths_nm: &[f64], rows: &[Vec<Complex64>], each: usize) -> Vec<f64> {
+/// Widths between these where any of the rows, which have `each` numbers a width, is not smooth, rms over each `alike` of them.
+fn between(widths_nm: &[f64], rows: &[Vec<Complex64>], each: usize, alike: usize) -> Vec<f64> {
     let last = widths_nm.len() - 1;
     let mut divided = vec![false; last];
-    for (row, number) in rows.iter().flat_map(|row| (0..each).map(move |number| (row, number))) {
+    for (row, first) in rows
+        .iter()
+        .flat_map(|row| (0..each).step_by(alike).map(move |first| (row, first)))
+    {
         for k in 2..last - 1 {
-            let [a, b, c, d, e] = [k - 2, k - 1, k, k + 1, k + 2].map(|k| row[k * each + number]);
-            if ((b + d) * (2.0 / 3.0) - (a + e) / 6.0 - c).norm() > ROUGH {
+            let off = |number: usize| {
+                let [a, b, c, d, e] = [k - 2, k - 1, k, k + 1, k + 2].map(|k| row[k * each + number]);
+                ((b + d) * (2.0 / 3.0) - (a + e) / 6.0 - c).norm_sqr()
+            };
+            let mean = (first..first + alike).map(off).sum::<f64>() / alike as f64;
+            if mean.sqrt() > ROUGH {
                 divided[k.saturating_sub(1 + BESIDE)..(k + 1 + BESIDE).min(last)].fill(true);
             }
         }
@@ -423,46 +464,4 @@ impl Progress for Unwatched<'_> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::RealisedCells;
-    use metalith_cell::BAND_ORDERS;
-    use metalith_core::Silent;
-
-    /// Rms error over widths and pillars: what cubics leave of the resonances, of transmissions of modulus one.
-    const RMS: f64 = 0.01;
-
-    fn bank() -> CellBank {
-        let stated = CellStack::paper(350.0, 700.0).unwrap();
-        let least = change_of([-6.0, 0.0, 0.0, 0.0, 0.0]);
-        let most = change_of([6.0, 0.0, 0.0, 0.0, 0.0]);
-        let range = BankRange {
-            widths_nm: [150.0, 200.0],
-            changes: [least, most],
-            colours: vec![(0.53, BAND_ORDERS)],
-        };
-        CellBank::solve(&stated, range, &Silent).unwrap()
-    }
-
-    #[test]
-    fn pillars_between_the_nodes_are_those_solved_exactly_and_none_beyond_them_is_there() {
-        let bank = bank();
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("cells.bank");
-        bank.write(&path).unwrap();
-        let back = CellBank::read(&path, bank.stated(), bank.range.clone()).unwrap();
-        assert_eq!(back.colours, bank.colours);
-        let change = change_of([1.3, 0.0, 0.0, 0.0, 0.0]);
-        let widths: Vec<f64> = (0..24).map(|k| 150.4 + 2.0 * f64::from(k)).collect();
-        let table = bank.transmissions(&change, BAND_ORDERS, &widths, 0.53).unwrap();
-        let exact = RealisedCells::new(perturbed(bank.stated(), &change), 0.4);
-        let exact = exact.solve_in_band(&widths, 0.53, [0.0; 2], &Silent).unwrap();
-        let pairs = table.pillars[0].iter().zip(&exact.pillars[0]);
-        let rms = (pairs.map(|(a, b)| (a - b).norm_sqr()).sum::<f64>() / widths.len() as f64).sqrt();
-        assert!(rms < RMS, "rms {rms}");
-        let higher = change_of([7.0, 0.0, 0.0, 0.0, 0.0]);
-        assert!(bank.transmissions(&higher, BAND_ORDERS, &widths, 0.53).is_err());
-        assert!(bank.transmissions(&change, BAND_ORDERS, &[260.0], 0.53).is_err());
-        assert!(bank.transmissions(&change, BAND_ORDERS, &widths, 0.6).is_err());
-    }
-}
+mod tests;

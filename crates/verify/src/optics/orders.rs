@@ -50,15 +50,17 @@ impl ElementSimulator<'_> {
                     });
                     continue;
                 }
-                let (made, made_hands);
+                let (made, made_rectangles);
                 let polarised = at.tables.as_ref().and_then(TransmissionTables::polarised);
                 let (table, polarised) = match (&at.tables, case) {
                     (Some(tables), _) => (&tables.normal[..], polarised),
                     (None, SimulationCase::Made(chip)) => {
                         let drawn = read.drawn.as_ref().ok_or_else(not_held)?;
                         let steps = drawn.mean_site_steps(&chip.perturbation().geometry);
-                        made_hands = chip.drawn_hands(self.design.cell.most(), steps, colour.wavelength_um)?;
-                        match &made_hands {
+                        let numbers = OrderEfficiencies::drawn_nm(rule);
+                        let um = colour.wavelength_um;
+                        made_rectangles = chip.drawn_rectangles(&numbers, steps, um, progress)?;
+                        match &made_rectangles {
                             Some((tables, light)) => (tables.own(), Some((tables, *light))),
                             None => {
                                 made = by_drawn_width(chip, rule, steps, colour.wavelength_um, progress)?;
