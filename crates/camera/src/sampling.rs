@@ -48,6 +48,12 @@ impl Blend {
     }
 }
 
+/// Lagrange's weight of the value at `i` in the polynomial through those at 0, 1, 2, ... of so many, at a place `u`.
+pub fn lagrange(i: usize, count: usize, u: f64) -> f64 {
+    let others = (0..count).filter(|j| *j != i);
+    others.map(|j| (u - j as f64) / (i as f64 - j as f64)).product()
+}
+
 impl Sampling {
     /// Wavelengths, by their indices, that an image at a place among them ([`ChannelPart::place`]) is a weighted sum
     /// of, with their weights. They are equally far apart; where too few are, next to a gap, they are fewer.
@@ -66,11 +72,7 @@ impl Sampling {
         // As many on one side as on the other, unless they end there.
         let start = (low + 1).saturating_sub(count / 2).clamp(first, end + 1 - count);
         let u = place - start as f64;
-        let weight = |i: usize| -> f64 {
-            let others = (0..count).filter(|j| *j != i);
-            others.map(|j| (u - j as f64) / (i as f64 - j as f64)).product()
-        };
-        (0..count).map(|i| (start + i, weight(i))).collect()
+        (0..count).map(|i| (start + i, lagrange(i, count, u))).collect()
     }
 
     /// The first and the last wavelength (nm).

@@ -16,6 +16,7 @@ use crate::scene::SceneImage;
 use crate::score::{ZoneScore, scores};
 use crate::studio::Studio;
 use crate::veil::Veil;
+use crate::wanted::Wanted;
 
 /// What is assumed of the way from a scene to the frame, instead of what is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -177,7 +178,8 @@ impl Studio {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let camera = without_dispersion(&self.camera, &self.channels);
-        Self::open_kept(design, layout, &camera, model, scene, kept, progress)
+        let wanted = Wanted::new(design, &camera, scene)?.for_wide_bands();
+        Self::open_wanted(wanted, design, layout, model, kept, progress)
     }
 }
 

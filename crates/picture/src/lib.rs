@@ -52,7 +52,7 @@ pub use image_check::check_images;
 pub use kept::KeptKernels;
 pub use kernels::{BankSpec, KernelBank};
 pub use layout::PillarCount;
-pub use operator::{Detail, FftScratch, FrameOperator, SceneInputs, ScenePoints, SquareFft};
+pub use operator::{BetweenNodes, Detail, FftScratch, FrameOperator, SceneInputs, ScenePoints, SquareFft};
 pub use operator_error::OperatorError;
 pub use page::{PicturePages, pictures_side_by_side, shown, write_pages};
 pub use png16::write_picture;

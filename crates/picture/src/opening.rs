@@ -52,7 +52,25 @@ impl Studio {
         kept: &KeptKernels,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let wanted = Wanted::new(design, camera, scene)?;
+        Self::open_wanted(
+            Wanted::new(design, camera, scene)?,
+            design,
+            layout,
+            model,
+            kept,
+            progress,
+        )
+    }
+
+    /// For what was said to be wanted of a design.
+    pub(crate) fn open_wanted(
+        wanted: Wanted<'_>,
+        design: &Design,
+        layout: &Path,
+        model: Option<&CalibratedModel>,
+        kept: &KeptKernels,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         progress.begin("reading the layout", 1);
         let digest = hex(&file_digest(layout)?);
         let inputs = wanted.inputs(&digest, model)?;
@@ -144,8 +162,8 @@ impl Studio {
     }
 
     /// For pillars that were read and a case that is at hand, such as one of many draws of a chip: nothing is kept on the
-    /// disk. `nodes`: places an axis of the field of each element at which kernels are formed, as many as
-    /// [`BankSpec::standard`](crate::BankSpec::standard) has if left out.
+    /// disk. `nodes`: places an axis of the field of each element at which kernels are formed, as many as for [`Studio::open`]
+    /// if left out.
     ///
     /// # Errors
     /// As [`Studio::open`].
@@ -160,7 +178,9 @@ impl Studio {
     ) -> Result<Self> {
         let mut wanted = Wanted::new(design, camera, scene)?;
         check_elements(design, extraction)?;
-        wanted.spec.nodes = nodes.unwrap_or(wanted.spec.nodes);
+        if let Some(nodes) = nodes {
+            wanted = wanted.with_nodes(nodes);
+        }
         let chip = wanted.chip(extraction, case, progress)?;
         let bank = wanted.bank(&chip, progress)?;
         let veil = wanted.veil(&chip, &bank, progress)?;

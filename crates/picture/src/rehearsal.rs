@@ -37,7 +37,7 @@ impl Rehearsal {
         };
         let simulation = studio.operator(Detail {
             inputs: SceneInputs::Spectra(studio.primaries()),
-            ..Detail::simulation(0)
+            ..studio.finest()
         });
         let light = simulation.apply(&scene.planes);
         drop(simulation);

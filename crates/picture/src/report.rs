@@ -12,6 +12,7 @@ use crate::doubt::DoubtReport;
 use crate::exposure::Frame;
 use crate::files::{FrameFile, picture_file};
 use crate::layout::PillarCount;
+use crate::operator::BetweenNodes;
 use crate::point_image::PointImage;
 use crate::resolution::ContrastCurve;
 use crate::restore::RestorationMethod;
@@ -211,10 +212,15 @@ impl Studio {
             assumption(
                 "field of the kernels",
                 format!(
-                    "{} degrees from the axis of each element, at {} x {} places; between them kernels are blended; steeper light is traced as rays",
+                    "{} degrees from the axis of each element, at {} x {} places; between them kernels are blended{}; steeper light is traced as rays",
                     fixed((spec.reach_um / self.design.lens.focal_length_um).atan().to_degrees()),
                     spec.nodes,
-                    spec.nodes
+                    spec.nodes,
+                    match self.between {
+                        BetweenNodes::Linear => "",
+                        BetweenNodes::Sixfold =>
+                            " by polynomials through six along each axis, as light of narrow bands asks for",
+                    }
                 ),
             ),
             assumption(
@@ -243,7 +249,10 @@ impl Studio {
             ),
             assumption(
                 "restoration",
-                "knows the kernels of three primaries at half of the places, one point of the scene for four pixels, and none of its spectra".into(),
+                format!(
+                    "knows the kernels of three primaries at {} of the places, one point of the scene for four pixels, and none of its spectra",
+                    if self.restored_step > 2 { "a quarter" } else { "half" }
+                ),
             ),
             assumption(
                 "metal",

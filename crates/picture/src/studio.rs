@@ -12,7 +12,7 @@ use crate::assumed::Assumed;
 use crate::exposure::{Frame, expose, gains, sensitivity};
 use crate::kernels::KernelBank;
 use crate::layout::PillarCount;
-use crate::operator::{Detail, FrameOperator, SceneInputs, ScenePoints};
+use crate::operator::{BetweenNodes, Detail, FrameOperator, SceneInputs, ScenePoints};
 use crate::operator_error::OperatorError;
 use crate::restore::{
     LearnedDenoiser, Recorded, RestorationMethod, SceneStatistics, restore_joint, restore_samples, restore_separate,
@@ -28,6 +28,10 @@ pub struct Studio {
     pub design: Design,
     pub camera: Camera,
     pub bank: KernelBank,
+    /// Which kernels of the bank are in force between its nodes, as scenes are simulated.
+    pub between: BetweenNodes,
+    /// Every how many-th of these nodes a restoration knows.
+    pub(crate) restored_step: usize,
     pub veil: Veil,
     pub elements: Vec<ElementView>,
     pub channels: Vec<ChannelSampling>,
@@ -85,9 +89,17 @@ impl Studio {
         FrameOperator::new(&self.bank, &self.veil, &self.elements, &self.camera, space, detail)
     }
 
+    /// Of scenes as finely as they are known.
+    pub(crate) fn finest(&self) -> Detail {
+        Detail {
+            between: self.between,
+            ..Detail::simulation(self.scene_spectra)
+        }
+    }
+
     /// The way from flat scenes to frames, as finely as it is known: what is taken for the truth.
     pub fn simulation(&self) -> FrameOperator<'_> {
-        self.operator(Detail::simulation(self.scene_spectra))
+        self.operator(self.finest())
     }
 
     /// The same for one scene, with the distances of its pixels if it has them.
@@ -97,7 +109,7 @@ impl Studio {
             Some(depth) => SceneSpace::with_depth(&self.view, depth),
             None => SceneSpace::flat(&self.view),
         };
-        self.operator_in(&space, Detail::simulation(self.scene_spectra))
+        self.operator_in(&space, self.finest())
     }
 
     /// What a restoration knows of the same way: to it, colours of a scene are sums of three primaries. A camera that
@@ -109,6 +121,7 @@ impl Studio {
             false => SceneInputs::Channels(primaries),
         };
         self.operator(Detail {
+            node_step: self.restored_step,
             statistics: self.colours.has_colours().then(|| SceneStatistics::colours().mixing()),
             ..Detail::restoration(ScenePoints::OneASquare, inputs)
         })
@@ -159,6 +172,9 @@ impl Studio {
             "{:?} {:?} {:?} {:?} {:?}",
             self.bank.elements, self.elements, self.view, self.gain, self.assumed
         ));
+        if self.between != BetweenNodes::Linear {
+            hasher.update(format!("{:?}", self.between));
+        }
         hasher.finalize().into()
     }
 

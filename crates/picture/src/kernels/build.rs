@@ -12,6 +12,16 @@ use crate::operator::FftScratch;
 use crate::spectra::SceneSpectrum;
 
 impl KernelBank {
+    /// Whether the kernels of a chip can be held, for so many spectra of a scene.
+    ///
+    /// # Errors
+    /// As [`BankSpec::check_size`].
+    pub fn check_size(chip: &ChipInLight<'_>, bases: usize, spec: &BankSpec) -> Result<()> {
+        let sampling = &chip.sampling;
+        let places = count(&orbits_of(chip, spec));
+        spec.check_size(places, sampling.channels.len(), bases, sampling.wavelengths_nm.len())
+    }
+
     /// Simulate the kernels of a chip for the spectra of a scene.
     ///
     /// # Errors
@@ -23,14 +33,10 @@ impl KernelBank {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let channel_um: Vec<f64> = chip.sampling.channels.iter().map(|c| c.mean_um()).collect();
-        let orbits: Vec<_> = chip
-            .distinct
-            .iter()
-            .map(|d| orbits(spec.nodes, &d.symmetries))
-            .collect();
-        let count: usize = orbits.iter().map(|(unique, _)| unique.len()).sum();
+        let orbits = orbits_of(chip, &spec);
+        let count = count(&orbits);
         let wavelengths = chip.sampling.wavelengths_nm.len();
-        spec.check_size(count, channel_um.len(), basis.len(), wavelengths)?;
+        Self::check_size(chip, basis.len(), &spec)?;
         progress.begin("simulating kernels", (count * wavelengths) as u64);
         let plan = KernelPlan::new(spec.window);
         let all: Vec<usize> = (0..wavelengths).collect();
@@ -78,7 +84,19 @@ impl KernelBank {
 type Turned = (usize, metalith_design::array::Symmetry);
 
 /// Nodes that no symmetry turns into one another, and for each node which of them it is, and turned how.
-fn orbits(n: usize, symmetries: &[metalith_design::array::Symmetry]) -> (Vec<[usize; 2]>, Vec<Turned>) {
+type Orbits = (Vec<[usize; 2]>, Vec<Turned>);
+
+/// Of each distinct element.
+fn orbits_of(chip: &ChipInLight<'_>, spec: &BankSpec) -> Vec<Orbits> {
+    let of_each = chip.distinct.iter();
+    of_each.map(|d| orbits(spec.nodes, &d.symmetries)).collect()
+}
+
+fn count(orbits: &[Orbits]) -> usize {
+    orbits.iter().map(|(unique, _)| unique.len()).sum()
+}
+
+fn orbits(n: usize, symmetries: &[metalith_design::array::Symmetry]) -> Orbits {
     let last = n as i64 - 1;
     let mut unique = Vec::new();
     let mut nodes: Vec<Option<Turned>> = vec![None; n * n];

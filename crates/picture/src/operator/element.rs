@@ -8,9 +8,10 @@ use metalith_wave::kernels::fft_size;
 use ndarray::Array2;
 use num_complex::Complex32;
 
+use super::between::BetweenNodes;
 use super::mixed::MixedKernels;
 use super::source::KernelSource;
-use super::warp::{CellPoint, Warp, hat};
+use super::warp::{CellPoint, Warp};
 use super::{FftScratch, SquareFft};
 use crate::ElementView;
 use crate::geometry::SceneSpace;
@@ -33,15 +34,15 @@ pub(super) struct ChannelPlan {
     pub nodes: Vec<NodePlan>,
 }
 
-/// One node of a channel: the rectangle of its hat, and what is kept of it if the light has one point a cell.
+/// One node of a channel: the rectangle in which it has weight, and what is kept of it if the light has one point a cell.
 pub(super) struct NodePlan {
     node: [usize; 2],
     pub first: [usize; 2],
     pub shape: [usize; 2],
     /// By phase and light, see [`MixedKernels`].
     kernels: MixedKernels,
-    /// Weights over its rectangle.
-    hats: Vec<f32>,
+    /// Over its rectangle.
+    weights: Vec<f32>,
 }
 
 impl<'a> ElementOperator<'a> {
@@ -80,7 +81,7 @@ impl<'a> ElementOperator<'a> {
         }
     }
 
-    /// Cells about the hat of a node by the middles of cells that points within them may lie in.
+    /// Cells about the rectangle of a node by the middles of cells that points within them may lie in.
     fn around(&self) -> usize {
         usize::from(self.source.points.offsets().len() > 1)
     }
@@ -88,11 +89,11 @@ impl<'a> ElementOperator<'a> {
     fn channel(&self, channel: usize) -> ChannelPlan {
         let cell = self.source.points.cell();
         let middle = self.warp(channel, self.point([0.0; 2], (cell * cell) as f64));
-        let n = self.source.spec.nodes;
+        let (between, n) = (self.source.between, self.source.spec.nodes);
         let mut nodes: Vec<NodePlan> = Vec::new();
-        for i in 0..n * n {
+        for (i, support) in middle.supports(between, n).into_iter().enumerate() {
             let node = [i / n, i % n];
-            if let Some((first, shape)) = middle.support(node) {
+            if let Some((first, shape)) = support {
                 let beyond = self.around();
                 let low = first.map(|f| f.saturating_sub(beyond));
                 let high = [0, 1].map(|a| (first[a] + shape[a] + beyond).min(middle.shape[a]));
@@ -101,7 +102,7 @@ impl<'a> ElementOperator<'a> {
                     first: low,
                     shape: [high[0] - low[0], high[1] - low[1]],
                     kernels: MixedKernels::default(),
-                    hats: Vec::new(),
+                    weights: Vec::new(),
                 });
             }
         }
@@ -120,7 +121,7 @@ impl<'a> ElementOperator<'a> {
                     }
                 }
                 node.kernels = MixedKernels::new(spectra, inputs, fft.size(), self.source.statistics.as_ref());
-                node.hats = node.hats_of(&middle);
+                node.weights = node.weights_of(&middle, between, n);
             }
             warps.push(middle);
         }
@@ -227,17 +228,17 @@ pub(super) struct Light {
 
 impl NodePlan {
     /// Weights over its rectangle for light of a warp: those that are kept, or made now.
-    pub fn hats(&self, warp: &Warp) -> Cow<'_, [f32]> {
-        match self.hats.is_empty() {
-            true => Cow::Owned(self.hats_of(warp)),
-            false => Cow::Borrowed(&self.hats),
+    pub fn weights(&self, warp: &Warp, source: &KernelSource<'_>) -> Cow<'_, [f32]> {
+        match self.weights.is_empty() {
+            true => Cow::Owned(self.weights_of(warp, source.between, source.spec.nodes)),
+            false => Cow::Borrowed(&self.weights),
         }
     }
 
-    fn hats_of(&self, warp: &Warp) -> Vec<f32> {
+    fn weights_of(&self, warp: &Warp, between: BetweenNodes, n: usize) -> Vec<f32> {
         let row = |y: usize| &warp.nodes[(self.first[0] + y) * warp.shape[1] + self.first[1]..][..self.shape[1]];
         let places = (0..self.shape[0]).flat_map(row);
-        places.map(|place| hat(*place, self.node)).collect()
+        places.map(|place| between.weight(*place, self.node, n)).collect()
     }
 }
 

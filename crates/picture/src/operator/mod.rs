@@ -1,12 +1,13 @@
 //! From a scene to the frame, and the adjoint: both matrix-free, for whole frames.
 //!
-//! Each element samples the scene on the pixels of its sub-image. Each node of its kernels takes its share of that, by a
-//! hat over the field, and spreads it by its kernel, through transforms of small squares. Sub-images add up where they
+//! Each element samples the scene on the pixels of its sub-image. Each node of its kernels takes its share of that, by
+//! weights over the field, and spreads it by its kernel, through transforms of small squares. Sub-images add up where they
 //! overlap; light that no kernel holds is laid over the frame by the veil.
 //!
 //! | question | file |
 //! | --- | --- |
 //! | which place of the scene a pixel looks at | `warp` |
+//! | which kernels are in force between nodes | `between` |
 //! | kernels on the pixels of a grid | `source` |
 //! | an element: its warps, kernels of its nodes as spectra | `element` |
 //! | light through an element, and back | `pass` |
@@ -16,6 +17,7 @@
 //! | a scene without what its grid cannot hold | `smooth` |
 //! | transforms | `fft2` |
 
+mod between;
 mod element;
 mod fft2;
 mod loops;
@@ -39,6 +41,7 @@ use crate::kernels::KernelBank;
 use crate::veil::{self, Veil};
 use crate::{ElementView, SceneSpace, SceneView};
 
+pub use between::BetweenNodes;
 use element::ElementOperator;
 pub use fft2::{FftScratch, SquareFft};
 use smooth::Smoothing;
@@ -88,6 +91,8 @@ pub struct Detail {
     pub points: ScenePoints,
     /// Every how many-th node of the bank along each axis is used; it divides the steps between the nodes.
     pub node_step: usize,
+    /// Which kernels are in force between these nodes.
+    pub between: BetweenNodes,
     pub inputs: SceneInputs,
     pub assumed: Assumed,
     /// How the inputs vary with one another: planes (rows) from independent ones (columns). With it kept kernels are as few
@@ -101,6 +106,7 @@ impl Detail {
         Self {
             points: ScenePoints::FourAPixel,
             node_step: 1,
+            between: BetweenNodes::Linear,
             inputs: SceneInputs::Spectra(0..spectra),
             assumed: Assumed::default(),
             statistics: None,
@@ -112,6 +118,7 @@ impl Detail {
         Self {
             points,
             node_step: 2,
+            between: BetweenNodes::Linear,
             inputs,
             assumed: Assumed::default(),
             statistics: None,

@@ -1,5 +1,7 @@
 //! Light through one element, from planes of the scene to its sub-images, and back.
 
+use std::borrow::Cow;
+
 use ndarray::Array2;
 use num_complex::Complex32;
 
@@ -43,6 +45,7 @@ impl ElementOperator<'_> {
             let mut sums = vec![vec![Complex32::ZERO; entries]; phases.len()];
             for node in &plan.nodes {
                 let [cut, spread] = rectangles(node, warps[0].shape[1], reach);
+                let mut weights: Vec<Option<Cow<'_, [f32]>>> = vec![None; warps.len()];
                 let mut lit = false;
                 for (k, light) in self.lights(node, inputs.len(), warps.len()).iter().enumerate() {
                     let own = sampled[light.point].iter().zip(&light.weights);
@@ -55,7 +58,9 @@ impl ElementOperator<'_> {
                         sums.iter_mut().for_each(|s| s.fill(Complex32::ZERO));
                         lit = true;
                     }
-                    cut.cut(&own, &node.hats(&warps[light.point]), &mut square, size);
+                    let point = light.point;
+                    let weights = weights[point].get_or_insert_with(|| node.weights(&warps[point], &self.source));
+                    cut.cut(&own, weights, &mut square, size);
                     plan.fft.forward(&mut square, node.shape[0], &mut spectrum, scratch);
                     for (phase, sum) in sums.iter_mut().enumerate() {
                         let kernel = self.kernel(channel, plan, node, (k, warps.len()), phase, scratch);
@@ -117,10 +122,10 @@ impl ElementOperator<'_> {
                         multiply_conj_add(&mut product, spectrum, &kernel);
                     }
                     plan.fft.inverse(&mut product, &mut square, node.shape[0], scratch);
-                    let hats = node.hats(&warps[light.point]);
+                    let over = node.weights(&warps[light.point], &self.source);
                     let own = gathered[light.point].iter_mut().zip(&light.weights);
                     for (to, weight) in own.filter(|(_, weight)| **weight != 0.0) {
-                        cut.paste(&square, size, *weight, &hats, to);
+                        cut.paste(&square, size, *weight, &over, to);
                     }
                 }
             }

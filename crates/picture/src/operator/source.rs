@@ -9,7 +9,7 @@ use std::ops::Range;
 use metalith_camera::{ColourFilter, Sensor};
 use nalgebra::DMatrix;
 
-use super::{Detail, SceneInputs, ScenePoints};
+use super::{BetweenNodes, Detail, SceneInputs, ScenePoints};
 use crate::assumed::Assumed;
 use crate::exposure::channel_at;
 use crate::kernels::{BankSpec, KernelBank, TurnedKernel};
@@ -25,6 +25,7 @@ pub struct KernelSource<'a> {
     pub statistics: Option<DMatrix<f64>>,
     /// That of the bank, with the nodes that are used.
     pub spec: BankSpec,
+    pub between: BetweenNodes,
     node_step: usize,
     /// Pixels of a cell that each channel counts, row and column.
     phases: Vec<Vec<[usize; 2]>>,
@@ -85,6 +86,7 @@ impl<'a> KernelSource<'a> {
                 },
                 ..bank.spec
             },
+            between: detail.between,
             node_step: detail.node_step,
             phases: (0..bank.channel_um.len()).map(counted).collect(),
         }

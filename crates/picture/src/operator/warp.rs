@@ -3,6 +3,7 @@
 use metalith_camera::Sensor;
 use ndarray::Array2;
 
+use super::between::BetweenNodes;
 use super::sub_image::PixelGrid;
 use crate::ElementView;
 use crate::assumed::{Assumed, butterworth};
@@ -191,19 +192,27 @@ impl Warp {
         }
     }
 
-    /// The rectangle of the sub-image in which the hat of a node is not zero: first row and column, rows and columns.
-    pub fn support(&self, node: [usize; 2]) -> Option<([usize; 2], [usize; 2])> {
-        let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
-        for (i, place) in self.nodes.iter().enumerate() {
-            if self.flux[i] > 0.0 && (0..2).all(|a| (place[a] - node[a] as f32).abs() < 1.0) {
-                let at = [i / self.shape[1], i % self.shape[1]];
-                for a in 0..2 {
-                    low[a] = low[a].min(at[a]);
-                    high[a] = high[a].max(at[a]);
+    /// For each of `n` by `n` nodes, row by row, the rectangle of the sub-image in which its weights are not zero: first row and
+    /// column, rows and columns.
+    pub fn supports(&self, between: BetweenNodes, n: usize) -> Vec<Option<([usize; 2], [usize; 2])>> {
+        let mut ends = vec![([usize::MAX; 2], [0; 2]); n * n];
+        for (i, place) in self.nodes.iter().enumerate().filter(|(i, _)| self.flux[*i] > 0.0) {
+            let at = [i / self.shape[1], i % self.shape[1]];
+            let [rows, columns] = place.map(|p| between.nodes_about(p, n));
+            for node in rows.flat_map(|row| columns.clone().map(move |column| [row, column])) {
+                if between.weight(*place, node, n) != 0.0 {
+                    let (low, high) = &mut ends[node[0] * n + node[1]];
+                    for a in 0..2 {
+                        low[a] = low[a].min(at[a]);
+                        high[a] = high[a].max(at[a]);
+                    }
                 }
             }
         }
-        (low[0] != usize::MAX).then(|| (low, [high[0] - low[0] + 1, high[1] - low[1] + 1]))
+        let rectangle = |(low, high): &([usize; 2], [usize; 2])| {
+            (low[0] != usize::MAX).then(|| (*low, [high[0] - low[0] + 1, high[1] - low[1] + 1]))
+        };
+        ends.iter().map(rectangle).collect()
     }
 }
 
@@ -219,12 +228,6 @@ impl Look {
             share: [0, 1].map(|a| (place[a] - low[a] as f64) as f32),
         }
     }
-}
-
-/// Weight of a node at a place among the nodes: one at its own, zero at the next.
-pub fn hat(place: [f32; 2], node: [usize; 2]) -> f32 {
-    let axis = |a: usize| (1.0 - (place[a] - node[a] as f32).abs()).max(0.0);
-    axis(0) * axis(1)
 }
 
 /// Least and greatest place on the sensor, from the element's axis (um), of the field of the kernels in a channel's light.
@@ -317,10 +320,11 @@ mod tests {
                 assert_eq!(a, b);
             }
             // Nodes that lie beyond have nothing to do.
-            assert!(whole.support([2, 4]).is_some() && cut.support([2, 4]).is_none());
+            let supports = |warp: &Warp| warp.supports(BetweenNodes::Linear, 5);
+            assert!(supports(&whole)[14].is_some() && supports(&cut)[14].is_none());
             let beside = warp([50.0, -900.0], 51, cell, REACH);
             assert_eq!(beside.shape, [1, 1]);
-            assert!((0..25).all(|i| beside.support([i / 5, i % 5]).is_none()));
+            assert!(supports(&beside).iter().all(Option::is_none));
         }
     }
 }

@@ -7,8 +7,8 @@ use metalith_core::Silent;
 use metalith_picture::restore::SceneStatistics;
 use metalith_picture::scene::SceneImage;
 use metalith_picture::{
-    Assumed, Detail, ElementInLight, FrameOperator, KernelBank, SceneInputs, ScenePoints, SceneSpace, Veil,
-    element_views,
+    Assumed, BetweenNodes, Detail, ElementInLight, FrameOperator, KernelBank, SceneInputs, ScenePoints, SceneSpace,
+    Veil, element_views,
 };
 use metalith_wave::{Accuracy, Scratch, Window};
 use ndarray::Array2;
@@ -165,15 +165,22 @@ fn copies_are_what_symmetry_makes_of_them() {
     let views = element_views(&setup.design, &setup.camera);
     // The neighbour below looks up.
     let scene = waves(40, [0.0, 15.0]);
-    let operator = setup.simulation(&bank, &veil, &views, &scene);
-    let below = operator.apply_elements(&scene.planes, &[BELOW], false).remove(0);
     let planes: Vec<Array2<f32>> = scene.planes.iter().map(|p| p.t().to_owned()).collect();
-    let left = operator.apply_elements(&planes, &[LEFT], false).remove(0);
-    let range = f64::from(below.iter().copied().fold(0.0, f32::max));
-    assert!(range > 0.0);
-    let turned = left.t();
-    let off = turned.iter().zip(&below).map(|(a, b)| f64::from((a - b).abs()));
-    assert!(off.fold(0.0, f64::max) < SINGLE * range);
+    for between in [BetweenNodes::Linear, BetweenNodes::Sixfold] {
+        let detail = Detail {
+            between,
+            ..Detail::simulation(3)
+        };
+        let space = SceneSpace::flat(&scene.view);
+        let operator = FrameOperator::new(&bank, &veil, &views, &setup.camera, &space, detail);
+        let below = operator.apply_elements(&scene.planes, &[BELOW], false).remove(0);
+        let left = operator.apply_elements(&planes, &[LEFT], false).remove(0);
+        let range = f64::from(below.iter().copied().fold(0.0, f32::max));
+        assert!(range > 0.0);
+        let turned = left.t();
+        let off = turned.iter().zip(&below).map(|(a, b)| f64::from((a - b).abs()));
+        assert!(off.fold(0.0, f64::max) < SINGLE * range, "{between:?}");
+    }
 }
 
 /// One point for four pixels, as a restoration samples a scene, against four points for each.
@@ -211,6 +218,14 @@ fn a_coarse_grid_of_points_sees_the_same() {
     }
 }
 
+/// The simulation in light of narrow bands.
+fn sixfold() -> Detail {
+    Detail {
+        between: BetweenNodes::Sixfold,
+        ..Detail::simulation(3)
+    }
+}
+
 /// One kernel for each element and channel, against the same kernel at every node.
 #[test]
 fn one_kernel_for_a_field_is_the_same_kernel_at_every_node() {
@@ -229,6 +244,7 @@ fn one_kernel_for_a_field_is_the_same_kernel_at_every_node() {
     let space = SceneSpace::flat(&setup.scene.view);
     for plain in [
         Detail::simulation(3),
+        sixfold(),
         Detail {
             statistics: Some(SceneStatistics::colours().mixing()),
             ..Detail::restoration(ScenePoints::OneASquare, SceneInputs::Spectra(0..3))
@@ -262,11 +278,13 @@ fn the_adjoint_is_that_of_the_operator() {
     const ADJOINT: f64 = 1e-6;
     let setup = setup(&[[450.0, 470.0], [520.0, 560.0]], 20);
     let chip = setup.chip();
-    let bank = KernelBank::build(&chip, &setup.scene.basis, spec(24, 5), &Silent).unwrap();
+    let [bank, finer] =
+        [5, 9].map(|nodes| KernelBank::build(&chip, &setup.scene.basis, spec(24, nodes), &Silent).unwrap());
     let veil = setup.veil(&chip, &bank);
     let views = element_views(&setup.design, &setup.camera);
     for detail in [
         Detail::simulation(3),
+        sixfold(),
         Detail::restoration(ScenePoints::OneASquare, SceneInputs::Spectra(0..3)),
         Detail {
             statistics: Some(SceneStatistics::colours().mixing()),
@@ -279,7 +297,11 @@ fn the_adjoint_is_that_of_the_operator() {
         },
     ] {
         let operator = FrameOperator::new(
-            &bank,
+            if detail.between == BetweenNodes::Sixfold {
+                &finer
+            } else {
+                &bank
+            },
             &veil,
             &views,
             &setup.camera,

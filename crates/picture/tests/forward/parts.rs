@@ -7,6 +7,7 @@ use metalith_picture::{Detail, FrameOperator, KernelBank, SceneInputs, ScenePoin
 use ndarray::Array2;
 
 use crate::setup::{ROWS, Setup, setup, spec};
+use crate::sixfold;
 
 /// First row and column of the part, and how many of each. The image behind the middle element is at rows and columns 84 to 110,
 /// and kernels reach 12 pixels: some of it is in the part, some reaches it, some does not, and its neighbours are beside it.
@@ -26,10 +27,11 @@ fn part_of(camera: &Camera) -> Camera {
     part
 }
 
-fn details() -> [Detail; 3] {
+fn details() -> [Detail; 4] {
     let restoration = |points| Detail::restoration(points, SceneInputs::Spectra(0..3));
     [
         Detail::simulation(3),
+        sixfold(),
         restoration(ScenePoints::OneAPixel),
         Detail {
             statistics: Some(SceneStatistics::colours().mixing()),
