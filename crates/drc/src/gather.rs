@@ -18,12 +18,14 @@ use metalith_core::text::printable_bytes;
 use metalith_core::{Error, PillarShape, Progress, Result};
 use metalith_gds::extract::{Discovered, Filler, Scale, Why};
 use metalith_gds::{
-    DrawnPillar, LayerNumber, Layout, LayoutCell, Outline, PillarFinder, Point, Rect, Selection, Shape, Text,
-    Transform, Visitor, circle_of, rectangle_of, simplified,
+    DrawnPillar, LayerNumber, Layout, LayoutCell, Outline, OutlineMemo, PillarFinder, Point, Rect, Selection, Shape,
+    Text, Transform, Visitor, circle_of, rectangle_of, simplified,
 };
 
 /// Widest square that is decided by table (database units).
 const TABLE: usize = 4096;
+/// Points of a closed outline of four corners.
+const CLOSED: usize = 5;
 /// Bytes of a text that reports show.
 const LONGEST_TEXT: usize = 512;
 const TOO_FAR: &str = "shapes farther than 2^31 database units from the origin";
@@ -57,7 +59,8 @@ pub(super) fn gather<'a>(
         pillars,
         shape,
         finder: PillarFinder::new(shape, unit_nm),
-        sound: HashSet::default(),
+        sound: OutlineMemo::default(),
+        sound_rings: HashSet::default(),
         relative: Vec::new(),
         doses,
         unit_nm,
@@ -79,6 +82,9 @@ pub(super) fn gather<'a>(
     };
     let mut unread = None;
     for file in std::iter::once(&layout).chain(&input.with) {
+        // Outlines that are told by their number are of one file.
+        visit.finder = PillarFinder::new(shape, unit_nm);
+        visit.sound = OutlineMemo::default();
         match file.visit(&selection, &mut visit, progress).map_err(Error::from) {
             Err(error @ Error::Layout { .. }) => unread = Some(error.to_string()),
             Err(Error::Invalid { what, .. }) => unread = Some(what),
@@ -133,8 +139,10 @@ struct Gather<'r, 'p> {
     /// What pillars are.
     shape: PillarShape,
     finder: PillarFinder,
-    /// Outlines of pillars that are no squares, from the middle of the box around them, that no rule finds anything in.
-    sound: HashSet<Box<[Point]>, RandomState>,
+    /// Whether no rule finds anything in outlines of pillars that are no squares.
+    sound: OutlineMemo<bool>,
+    /// The same of those with more corners, from the middle of the box around them: all of these are sound.
+    sound_rings: HashSet<Box<[Point]>, RandomState>,
     relative: Vec<Point>,
     /// Further layers whose shapes count as if they were on that one.
     doses: &'r [LayerNumber],
@@ -184,23 +192,53 @@ impl Gather<'_, '_> {
         Ok(())
     }
 
-    /// As [`Gather::show`], of an outline that is the same wherever it stands: it is looked at once.
+    /// As [`Gather::show`]; whether no rule found anything.
     ///
     /// # Errors
     /// If that is too much work.
-    fn show_once(&mut self, shape: &Shape<'_>, around: &Rect, placements: &[Transform]) -> Result<()> {
+    fn passes(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> Result<bool> {
+        let total = |rules: &[(&DeckRule, &mut Findings)]| rules.iter().map(|(_, found)| found.total).sum::<u64>();
+        let before = total(&self.rules);
+        self.show(shape, placements)?;
+        Ok(total(&self.rules) == before)
+    }
+
+    /// As [`Gather::show`], of a rectangle that is the same wherever it stands: a sound one is looked at once.
+    ///
+    /// # Errors
+    /// If that is too much work.
+    #[inline]
+    fn show_rectangle(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> Result<()> {
+        let mut memo = std::mem::take(&mut self.sound);
+        let mut shown = None;
+        let is_sound = memo.placed(shape.outline, &Transform::IDENTITY, || {
+            let passes = self.passes(shape, placements);
+            let is_sound = matches!(passes, Ok(true));
+            shown = Some(passes);
+            is_sound
+        });
+        self.sound = memo;
+        match shown {
+            Some(passes) => passes.map(|_| ()),
+            None if is_sound => Ok(()),
+            None => self.show(shape, placements),
+        }
+    }
+
+    /// The same of an outline of any number of corners.
+    ///
+    /// # Errors
+    /// If that is too much work.
+    fn show_ring(&mut self, shape: &Shape<'_>, around: &Rect, placements: &[Transform]) -> Result<()> {
         let (x, y) = (around.x0 + around.width() / 2, around.y0 + around.height() / 2);
         self.relative.clear();
         self.relative
             .extend(shape.outline.points().map(|p| Point::new(p.x - x, p.y - y)));
-        if self.sound.contains(self.relative.as_slice()) {
-            return Ok(());
-        }
-        let total = |rules: &[(&DeckRule, &mut Findings)]| rules.iter().map(|(_, found)| found.total).sum::<u64>();
-        let before = total(&self.rules);
-        self.show(shape, placements)?;
-        if total(&self.rules) == before && self.sound.len() < TABLE {
-            self.sound.insert(self.relative.as_slice().into());
+        if !self.sound_rings.contains(self.relative.as_slice())
+            && self.passes(shape, placements)?
+            && self.sound_rings.len() < TABLE
+        {
+            self.sound_rings.insert(self.relative.as_slice().into());
         }
         Ok(())
     }
@@ -303,7 +341,7 @@ impl Visitor for Gather<'_, '_> {
                     self.show(shape, placements)?;
                 }
             } else {
-                self.show_once(shape, rect, placements)?;
+                self.show_ring(shape, rect, placements)?;
             }
             if self.filler.put_orbits(rect, placements, |width| width % 2 == 0) {
                 return Ok(());
@@ -343,18 +381,29 @@ impl Gather<'_, '_> {
     /// # Errors
     /// If that is too much work.
     fn other(&mut self, shape: &Shape<'_>, placements: &[Transform], square: bool) -> Result<()> {
-        *self.counts.entry(shape.layer).or_default() += placements.len() as u64;
+        let is_drawn_pillar = shape.layer == self.pillars && self.shape.rectangles().is_some();
+        if is_drawn_pillar {
+            self.pillar_shapes += placements.len() as u64;
+        } else {
+            *self.counts.entry(shape.layer).or_default() += placements.len() as u64;
+        }
+        let mut put = 0;
         if square {
-            if shape.layer == self.pillars && self.shape.rectangles().is_some() {
-                self.show_once(shape, &shape.outline.around(), placements)?;
-            } else {
-                self.show(shape, placements)?;
+            match is_drawn_pillar {
+                false => self.show(shape, placements)?,
+                true if shape.outline.len() == CLOSED => self.show_rectangle(shape, placements)?,
+                true => self.show_ring(shape, &shape.outline.around(), placements)?,
             }
             if self.incomplete.is_some() {
                 return Ok(());
             }
+            if is_drawn_pillar {
+                put = self.filler.put_copies(&mut self.finder, shape.outline, placements);
+                let steps = (put as u64).saturating_mul(shape.outline.len() as u64);
+                self.work.spend(steps).map_err(ended)?;
+            }
         }
-        for (k, placement) in placements.iter().enumerate() {
+        for (k, placement) in placements.iter().enumerate().skip(put) {
             self.work.spend(shape.outline.len() as u64).map_err(ended)?;
             let placed = || shape.outline.placed(placement);
             if !square {

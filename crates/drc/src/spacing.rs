@@ -149,6 +149,37 @@ const HEXAGONAL: &[(usize, isize)] = &[(0, 2), (1, 1), (1, -1)];
 /// Share of the pitch below which gaps to farther ones than these are not.
 const HEXAGONAL_REACH: f64 = 0.73;
 
+/// Pairs of widths or numbers that are remembered for each step to a neighbour: of 1024 that there are, which rectangles of 32 lengths
+/// have.
+const MOST_PAIRS: usize = 1 << 20;
+
+/// Whether pillars of two widths or numbers are too near one another, a step apart: a lens has millions of pairs of some hundred.
+struct KnownPairs {
+    /// From the first width or number to that of the second; none are remembered if they are too many.
+    row: usize,
+    near: Vec<Option<bool>>,
+}
+
+impl KnownPairs {
+    /// Of widths or numbers below this one.
+    fn below(row: usize) -> Self {
+        let pairs = if row <= MOST_PAIRS / row.max(1) { row * row } else { 0 };
+        Self {
+            row,
+            near: vec![None; pairs],
+        }
+    }
+
+    /// The answer about a pair, by `ask` if it is not remembered.
+    #[inline]
+    fn are_near(&mut self, [own, other]: [u16; 2], ask: impl FnOnce() -> bool) -> bool {
+        match self.near.get_mut(usize::from(own) * self.row + usize::from(other)) {
+            Some(known) => *known.get_or_insert_with(ask),
+            None => ask(),
+        }
+    }
+}
+
 /// Hand pairs of pillars on one lattice that are less than this apart (nm) to `report`, with their gap in database units; below
 /// zero where they overlap.
 fn on_lattices(
@@ -176,9 +207,8 @@ fn on_lattices(
         }
         let steps = lattice.steps_nm().map(f64::from);
         let apart = |up: usize, right: isize| [steps[0] * right as f64, steps[1] * up as f64];
-        let widest = flat
-            .shape
-            .widest_nm(e.widths.histogram().len().saturating_sub(1) as u16);
+        let widths = e.widths.histogram().len();
+        let widest = flat.shape.widest_nm(widths.saturating_sub(1) as u16);
         // Between the widest there are: of rectangles, whose numbers are no widths, circles about them.
         let least = neighbours.iter().map(|&(up, right)| match flat.shape {
             PillarShape::Rectangle(_) => PillarShape::Circle.gap([widest; 2], apart(up, right)),
@@ -188,6 +218,7 @@ fn on_lattices(
             continue;
         }
         let n = e.site.lattice.sites();
+        let mut known: Vec<KnownPairs> = neighbours.iter().map(|_| KnownPairs::below(widths)).collect();
         // This row and the one above it.
         let mut room = Vec::new();
         let mut lines = [Vec::new(), e.widths.row(0, 0..n, &mut room).to_vec()];
@@ -198,13 +229,14 @@ fn on_lattices(
                 lines[1].extend_from_slice(e.widths.row(row + 1, 0..n, &mut room));
             }
             for (column, &own) in lines[0].iter().enumerate().filter(|(_, w)| **w != 0) {
-                for &(up, right) in neighbours {
+                for (&(up, right), known) in neighbours.iter().zip(&mut known) {
                     let Some(c) = column.checked_add_signed(right) else {
                         continue;
                     };
                     let Some(&other) = lines[up].get(c) else { continue };
-                    let gap = flat.shape.gap([own, other].map(f64::from), apart(up, right));
-                    if other != 0 && gap < nm - ROUNDING_NM {
+                    let gap = || flat.shape.gap([own, other].map(f64::from), apart(up, right));
+                    if other != 0 && known.are_near([own, other], || gap() < nm - ROUNDING_NM) {
+                        let gap = gap();
                         let (a, b) = (flat.body(k, row, column), flat.body(k, row + up, c));
                         report(&a, &b, gap / flat.unit_nm);
                     }

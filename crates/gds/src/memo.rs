@@ -1,6 +1,7 @@
 //! What has been said of an outline, remembered for its copies elsewhere.
 
 use super::shape::{Outline, Point};
+use super::transform::Transform;
 
 /// Outlines that are remembered at a time, a power of two: a lens of rectangles has some hundred.
 const PLACES: usize = 1 << 12;
@@ -24,7 +25,7 @@ type Key = ([u64; 3], u8);
 /// for those that others have taken the place of. Memory and time are bounded, whatever the outlines are.
 ///
 /// Outlines with numbers are of one layout.
-pub(super) struct OutlineMemo<T> {
+pub struct OutlineMemo<T> {
     places: Vec<Option<(Key, T)>>,
     /// Answers about outlines with numbers, by these and by orientation.
     numbered: Vec<[Option<T>; ORIENTATIONS]>,
@@ -40,9 +41,19 @@ impl<T> Default for OutlineMemo<T> {
 }
 
 impl<T: Copy> OutlineMemo<T> {
+    /// The answer about an outline as a placement turns it, by `ask` if it is not remembered; what is turned by other than quarters
+    /// is rounded where it stands, and asked about each time.
+    #[inline]
+    pub fn placed(&mut self, outline: Outline<'_>, placement: &Transform, ask: impl FnOnce() -> T) -> T {
+        match outline.orientation(placement) {
+            Some(orientation) => self.of(outline, orientation, ask),
+            None => ask(),
+        }
+    }
+
     /// The answer about an outline in an orientation, by `ask` if it is not remembered.
     #[inline]
-    pub fn of(&mut self, outline: Outline<'_>, orientation: u8, ask: impl FnOnce() -> T) -> T {
+    pub(super) fn of(&mut self, outline: Outline<'_>, orientation: u8, ask: impl FnOnce() -> T) -> T {
         let number = match outline.number {
             Some(number) if (number as usize) < NUMBERED => number as usize,
             _ => return self.by_corners(outline.points, orientation, ask),
