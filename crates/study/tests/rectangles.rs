@@ -86,7 +86,7 @@ const VARIED: &str =
 
 /// A bias is that of both edges, and a height that of the film: such chips are those drawn so. Half of unpolarised light is focused.
 #[test]
-#[ignore = "second tier: CPU time, run by .ci/run"]
+#[ignore = "second tier: two minutes of CPU time, in scripts/slow_tests.sh"]
 fn made_rectangles_are_those_that_are_drawn_so() {
     /// Of 17 orders an axis for 25 or 41, and of corners that round to the grid otherwise: 3e-4 at 532 nm.
     const AS_DRAWN: f64 = 2e-3;
@@ -162,7 +162,7 @@ fn alike(as_made: &Verification, drawn: &Verification, within: f64) {
 
 /// A chip that is made as drawn is judged as by the cell, in light of either polarisation, of both, and behind an analyser.
 #[test]
-#[ignore = "second tier: CPU time, run by .ci/run"]
+#[ignore = "second tier: two minutes of CPU time, in scripts/slow_tests.sh"]
 fn a_chip_without_faults_is_that_of_the_cell() {
     for light in [
         "\"x\"",
@@ -180,7 +180,7 @@ fn a_chip_without_faults_is_that_of_the_cell() {
 
 /// One that is wider, narrower, higher or lower is that of a design that is drawn so.
 #[test]
-#[ignore = "second tier: CPU time, run by .ci/run"]
+#[ignore = "second tier: two minutes of CPU time, in scripts/slow_tests.sh"]
 fn a_chip_that_is_wider_or_lower_is_that_which_is_drawn_so() {
     for light in ["\"x\"", "\"y\""] {
         for (bias, higher) in [(4, 0), (-4, 10), (0, -10)] {
@@ -198,7 +198,7 @@ fn a_chip_that_is_wider_or_lower_is_that_which_is_drawn_so() {
 
 /// What a model has besides, of light that sees no pillar and of pillars that are gone, counts along both axes.
 #[test]
-#[ignore = "second tier: CPU time, run by .ci/run"]
+#[ignore = "second tier: two minutes of CPU time, in scripts/slow_tests.sh"]
 fn light_that_sees_no_pillar_and_missing_ones_lower_what_is_focused() {
     let small = upright().in_light("\"unpolarised\"");
     let perfect = strehl(&judged(&small, made(0.0, 0.0)));
