@@ -1,10 +1,11 @@
 //! The deck for rotated rectangles: a clean chip, and for each rule of theirs one that breaks it.
 
-use metalith_core::{RotatedRectangles, UprightRectangles};
+use metalith_core::{RotatedRectangles, Silent, UprightRectangles};
+use metalith_drc::CheckInput;
 use metalith_testing::gds::Gds;
 
-use crate::deck_from;
 use crate::on_lattice::{broken_on_lattice, site};
+use crate::{broken, deck_from, input, layout};
 
 /// Sites an axis and their distance (nm).
 const SITES: i32 = 12;
@@ -141,4 +142,36 @@ fn edges_of_rotated_rectangles_have_their_widths() {
         let (broken, _) = found(&[("[[rule]]\nid = \"gap.min\"", &added)], all, |_| {});
         assert_eq!(broken.is_empty(), holds, "{check} {nm}: {broken:?}");
     }
+}
+
+/// Small cells are told by their place in their own file: what a further file has at the place of a sound pillar is looked at.
+#[test]
+fn cells_of_a_further_file_are_not_those_of_the_first() {
+    let file = |outline: &[(i32, i32)], rows: std::ops::Range<i32>| {
+        let mut gds = Gds::library();
+        let closed = [outline, &outline[..1]].concat();
+        gds.cell("P").polygon(1, &closed).end_cell();
+        gds.cell("TOP");
+        for (column, row) in rows.flat_map(|row| (0..SITES).map(move |column| (column, row))) {
+            let (x, y) = place(column, row);
+            gds.sref("P", x, y);
+        }
+        gds.end_cell();
+        layout(gds.end())
+    };
+    let pillar = PILLARS.corners(30).map(|(x, y)| (x as i32, y as i32));
+    let trapezoid = [(-100, -50), (100, -50), (60, 50), (-60, 50)];
+    let deck = deck_from("rules/rectangles.toml", &[]);
+    let found = |further: &[(i32, i32)]| {
+        let further = file(further, SITES / 2..SITES);
+        let with = CheckInput {
+            with: vec![&further],
+            ..input()
+        };
+        let report = metalith_drc::check(&file(&pillar, 0..SITES / 2), &deck, &with, &Silent).unwrap();
+        let of = |id: &str| broken(&report).iter().find(|(rule, _)| *rule == id).map(|(_, n)| *n);
+        of("pillar.rectangle")
+    };
+    assert_eq!(found(&pillar), None);
+    assert!(found(&trapezoid).is_some());
 }
