@@ -4,15 +4,15 @@
 //! cargo run --release --example photographs -- DESIGN LAYOUT CAMERA FOLDER FIELD_DEG tikhonov,hqs [separate]
 //! ```
 //!
-//! Takes every PNG and JPEG of a folder, which must be of one size. PSNR is that of the mean squared error over the
+//! Takes every image of a folder; they must be of one size. PSNR is that of the mean squared error over the
 //! photographs, SSIM the mean. The row `frame` is the frame itself, its pixels laid where they look and divided by those of a
 //! white scene. The forecasts are made without any picture, for the spectra of these photographs and for those of natural scenes.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use metalith::camera::Camera;
 use metalith::picture::restore::RestorationMethod;
-use metalith::picture::scene::{SceneFile, read_scene};
+use metalith::picture::scene::{images_in, read_far_scene};
 use metalith::picture::{Rehearsal, ScenePower, Studio, Zone, ZoneScore, scores};
 use metalith::{Design, Error, Result, Silent};
 
@@ -35,15 +35,8 @@ fn main() -> Result<()> {
     let separate = more.iter().any(|a| a == "separate");
     let design = Design::read(design.as_ref())?;
     let camera = Camera::read(camera.as_ref())?;
-    let photographs = images(folder.as_ref())?;
-    let read = |path: &PathBuf| {
-        read_scene(&SceneFile {
-            path: path.clone(),
-            wavelengths_nm: None,
-            field_deg,
-            distance_um: f64::INFINITY,
-        })
-    };
+    let photographs = images_in(folder.as_ref())?;
+    let read = |path: &PathBuf| read_far_scene(path, field_deg);
     let studio = Studio::open(
         &design,
         layout.as_ref(),
@@ -120,23 +113,5 @@ impl Row {
             format!("{:.digits$}", back(sum / self.found.len() as f64))
         };
         (0..Zone::ALL.len()).map(zone).collect::<Vec<_>>().join(", ")
-    }
-}
-
-/// Pictures of a folder by name.
-fn images(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder).map_err(Error::io("read", folder))?;
-    let known = |path: &PathBuf| {
-        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        extension.is_some_and(|e| ["png", "jpg", "jpeg"].contains(&e.as_str()))
-    };
-    let mut images: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(known).collect();
-    images.sort();
-    match images.is_empty() {
-        true => Err(Error::invalid(
-            format!("{} holds no PNG or JPEG", folder.display()),
-            "give a folder of photographs",
-        )),
-        false => Ok(images),
     }
 }

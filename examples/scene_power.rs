@@ -4,37 +4,28 @@
 //! cargo run --release --example scene_power -- FOLDER
 //! ```
 //!
-//! Takes every PNG and JPEG of a folder. Prints, for each zone, the mean light and the powers of each plane.
+//! Takes every image of a folder. Prints, for each zone, the mean light and the powers of each plane.
 
 use std::path::PathBuf;
 
 use metalith::picture::ScenePower;
-use metalith::picture::scene::{SceneFile, read_scene};
+use metalith::picture::scene::{images_in, read_far_scene};
 use metalith::{Error, Result};
 use ndarray::Array3;
+
+/// Power is by pixels: the field does not matter.
+const FIELD_DEG: f64 = 80.0;
 
 fn main() -> Result<()> {
     let folder = std::env::args_os().nth(1).map(PathBuf::from);
     let folder = folder.ok_or_else(|| Error::invalid("no folder", "give a folder of photographs"))?;
-    let files = std::fs::read_dir(&folder).map_err(Error::io("read", &folder))?;
-    let mut paths: Vec<PathBuf> = files.filter_map(|file| Some(file.ok()?.path())).collect();
-    paths.retain(|p| {
-        p.extension()
-            .is_some_and(|e| ["png", "jpg", "jpeg"].iter().any(|k| e.eq_ignore_ascii_case(k)))
-    });
-    paths.sort();
     let power = |path: &PathBuf| {
-        let scene = read_scene(&SceneFile {
-            path: path.clone(),
-            wavelengths_nm: None,
-            field_deg: 80.0,
-            distance_um: f64::INFINITY,
-        })?;
+        let scene = read_far_scene(path, FIELD_DEG)?;
         let size = (scene.view.rows, scene.view.columns, 3);
         let picture = Array3::from_shape_fn(size, |(y, x, c)| f64::from(scene.planes[c][[y, x]]));
         Ok(ScenePower::of(&picture))
     };
-    let all = paths.iter().map(power).collect::<Result<Vec<_>>>()?;
+    let all = images_in(&folder)?.iter().map(power).collect::<Result<Vec<_>>>()?;
     let mean = ScenePower::mean(&all).ok_or_else(|| Error::invalid("no photographs", "give a folder that has some"))?;
     for (zone, light, planes) in mean.by_zone() {
         println!("{}: light {light:.4}", zone.name());

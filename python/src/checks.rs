@@ -70,18 +70,8 @@ pub fn verify(
     work(py, progress, |p| {
         let array = PillarArray::build(design, p)?;
         let model = model.as_deref().map(CalibratedModel::read).transpose()?;
-        let made = match &model {
-            Some(model) => {
-                let light = design.verify.light();
-                Some(MadeChip::in_light(
-                    &design.cell_stack()?,
-                    model,
-                    design.focused(),
-                    light,
-                )?)
-            }
-            None => None,
-        };
+        let chip = |model| MadeChip::in_light(&design.lit_stack()?, model);
+        let made = model.as_ref().map(chip).transpose()?;
         let cells = match &made {
             None => cell_models(design, &[design.verify.fidelity])?,
             Some(_) => Vec::new(),

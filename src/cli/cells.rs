@@ -174,7 +174,7 @@ fn rotations(args: &CellsArgs, design: &Design, folder: &Path, terminal: &Termin
 
 /// The study of a design of upright rectangles, and their library.
 fn library(args: &CellsArgs, design: &Design, folder: &Path, terminal: &Terminal) -> Result<Outcome> {
-    if let Some(why) = &design.mapping.library_refused {
+    if let Some(why) = &design.mapping.pillar_library_refused {
         terminal.warn(&format!("the library that the design names is not judged: {why}"));
     }
     let cache = args.cache.clone().or_else(cache_folder);

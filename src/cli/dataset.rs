@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use metalith::picture::scene::images_in;
 use metalith::picture::scene::read_far_scene;
 use metalith::picture::{DatasetManifest, DatasetOrigin, Studio, check_images, write_dataset};
 use metalith::study::{PairsRequest, is_planned, plan_pairs};
@@ -10,7 +11,7 @@ use metalith::{Error, Result};
 
 use super::camera_args::{CameraArgs, CameraFiles};
 use super::standard_input::{self, InputFile};
-use super::{Outcome, Terminal, images, print_line};
+use super::{Outcome, Terminal, print_line};
 
 /// Record the frame of every image of a folder, for learning: frames, what an ideal camera gives, and a manifest.
 ///
@@ -74,7 +75,7 @@ fn plan(args: &DatasetArgs, images: Vec<PathBuf>, terminal: &Terminal) -> Result
 pub fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let CameraFiles { design, camera, model } = args.with.read(terminal)?;
-    let images = images::of_folder(&args.images)?;
+    let images = images_in(&args.images)?;
     if args.plan {
         return plan(args, images, terminal);
     }

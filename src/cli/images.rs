@@ -1,39 +1,19 @@
 //! Images that are given as files, or as a folder of them.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use metalith::{Error, Result};
+use metalith::Result;
+use metalith::picture::scene::images_in;
 
-/// PNG, JPEG and NPY images of a folder, by name.
+/// Several files, and the images of folders, in the order in which they are given.
 ///
 /// # Errors
-/// If it cannot be read, or holds none.
-pub fn of_folder(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder).map_err(Error::io("read", folder))?;
-    let known = |path: &PathBuf| {
-        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        extension.is_some_and(|e| ["png", "jpg", "jpeg", "npy"].contains(&e.as_str()))
-    };
-    let mut images: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(known).collect();
-    images.sort();
-    if images.is_empty() {
-        return Err(Error::invalid(
-            format!("{} holds no image", folder.display()),
-            "give a folder of PNG, JPEG or NPY files",
-        ));
-    }
-    Ok(images)
-}
-
-/// The same of several files and folders, in the order in which they are given.
-///
-/// # Errors
-/// As [`of_folder`].
+/// As [`images_in`].
 pub fn of_all(given: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut all = Vec::new();
     for path in given {
         match path.is_dir() {
-            true => all.extend(of_folder(path)?),
+            true => all.extend(images_in(path)?),
             false => all.push(path.clone()),
         }
     }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::picture::KeptKernels;
+use metalith::picture::scene::images_in;
 use metalith::picture::scene::read_picture;
 use metalith::prior::{Photographs, Stacks, TrainingReport, TrainingSpec, train, train_finisher};
 use metalith::rivals::{Lineup, StageKind};
@@ -11,7 +12,7 @@ use metalith::{Error, Result};
 
 use super::compare::{ComparedDesign, LenslessArgs, Rival};
 use super::paths::{apart, writable};
-use super::{Outcome, Terminal, images, print_json, print_line};
+use super::{Outcome, Terminal, print_json, print_line};
 
 /// Teach a network from the photographs of a folder: the one that takes noise out of pictures, or the last stage of a camera.
 ///
@@ -149,7 +150,7 @@ pub fn run(args: &TrainArgs, terminal: &Terminal) -> Result<Outcome> {
         seed: args.seed,
     };
     spec.check()?;
-    let files = images::of_folder(&args.folder)?;
+    let files = images_in(&args.folder)?;
     let out = args.out();
     let state = beside(&out, ".state");
     apart(files.iter().map(PathBuf::as_path), &[&out, &state])?;

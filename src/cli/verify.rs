@@ -174,18 +174,8 @@ impl Judging {
             }
         }
         let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
-        let made = match &model {
-            Some(model) => {
-                let light = design.verify.light();
-                Some(MadeChip::in_light(
-                    &design.cell_stack()?,
-                    model,
-                    design.focused(),
-                    light,
-                )?)
-            }
-            None => None,
-        };
+        let chip = |model| MadeChip::in_light(&design.lit_stack()?, model);
+        let made = model.as_ref().map(chip).transpose()?;
         // A made chip judges, and cells of the pillars as drawn stand beside it.
         let judge = if made.is_some() { Fidelity::Rigorous } else { judge };
         // Polynomials in width and wavelength are of the paper's cell: of another they would only confuse.

@@ -39,8 +39,8 @@ pub use neighbours::{
 pub use pointwise::PointwiseCell;
 pub use pointwise::{BAND_ORDERS, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, tabulate};
 pub use polarisation::{
-    Analyser, AxisTables, FocusedLight, HandTables, PassedTable, Polarisation, PolarisationAxis, PolarisedLight,
-    PolarisedTables,
+    Analyser, AxisTables, FocusedLight, HandTables, LitStack, PassedTable, Polarisation, PolarisationAxis,
+    PolarisedLight, PolarisedTables,
 };
 pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};
 pub use published::PublishedCell;

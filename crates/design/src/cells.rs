@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use metalith_cell::{
-    CellModel, CellStack, Fidelity, FittedCell, PointwiseCell, PublishedCell, RotatedCell, TableSpec, UniformLayer,
-    UprightCell, cache_folder,
+    CellModel, CellStack, Fidelity, FittedCell, LitStack, PointwiseCell, PublishedCell, RotatedCell, TableSpec,
+    UniformLayer, UprightCell, cache_folder,
 };
 use metalith_core::{Error, Rectangles, Result};
 use metalith_grating::{Mapping, NeighbourCell};
@@ -39,6 +39,18 @@ impl Design {
     /// The folder that paths in the design count from.
     pub fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(Path::new(""))
+    }
+
+    /// The same pillars in the light that the design is verified in.
+    ///
+    /// # Errors
+    /// As [`Design::cell_stack`].
+    pub fn lit_stack(&self) -> Result<LitStack> {
+        Ok(LitStack {
+            stack: self.cell_stack()?,
+            focused: self.focused(),
+            polarised: self.verify.light(),
+        })
     }
 
     /// The cell that the design asks for: upright walls, sharp corners, no mask.

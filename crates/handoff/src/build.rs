@@ -135,12 +135,8 @@ fn verification(
         wanted.push(Fidelity::Published);
     }
     let models = cell_models(design, &wanted)?;
-    let stack = design.cell_stack()?;
-    let made = sources
-        .model
-        .as_ref()
-        .map(|model| MadeChip::new(&stack, model))
-        .transpose()?;
+    let chip = |model| MadeChip::in_light(&design.lit_stack()?, model);
+    let made = sources.model.as_ref().map(chip).transpose()?;
     let cases = match &made {
         Some(chip) => SimulationCases::judged_by(chip).with_cells(&models),
         None => SimulationCases::of_cells(&models)?,

@@ -193,7 +193,7 @@ fn files_of(path: &Path, design: &Design) -> Result<Vec<Named>> {
     if let Some(table) = &design.mapping.table_file {
         files.push((table.clone(), "", "phase to width, the mapping of the design"));
     }
-    if let Some(library) = &design.mapping.library_file {
+    if let Some(library) = &design.mapping.pillar_library_file {
         files.push((
             library.clone(),
             "",

@@ -13,7 +13,7 @@ use super::{
     ArrivingLight, CalibratedModel, CameraChange, CellBank, CellChange, ClassTable, DrawnElement, MadeElement,
     NotApplied, Perturbation, RectangleClass, cell_direction, mixed, realised_nm,
 };
-use metalith_cell::{CellStack, FocusedLight, PassedTable, PolarisedLight, PolarisedTables};
+use metalith_cell::{CellStack, LitStack, PassedTable, PolarisedLight, PolarisedTables};
 use metalith_core::{Error, Progress, Result, WidthMap};
 use metalith_wave::Psf;
 use metalith_wave::{Accuracy, Fold, PlaneWave, Propagator, Scratch, Window};
@@ -69,18 +69,14 @@ impl MadeChip {
         })
     }
 
-    /// The same of pillars that tell polarisations apart, if they focus some light, in the light of a source and before a detector.
+    /// The same of pillars in their light, also of those that tell polarisations apart.
     ///
     /// # Errors
     /// As [`MadeChip::new`]; also if the pillars are no rectangles that focus this, or the model has what rectangles have no meaning for.
-    pub fn in_light(
-        stated: &CellStack,
-        model: &CalibratedModel,
-        focused: Option<FocusedLight>,
-        light: PolarisedLight,
-    ) -> Result<Self> {
-        let made = Self::new(stated, model)?;
-        let rectangles = focused.map(|focused| MadeRectangles::new(stated, model, focused, light));
+    pub fn in_light(stated: &LitStack, model: &CalibratedModel) -> Result<Self> {
+        let made = Self::new(&stated.stack, model)?;
+        let of = |focused| MadeRectangles::new(&stated.stack, model, focused, stated.polarised);
+        let rectangles = stated.focused.map(of);
         Ok(Self {
             rectangles: rectangles.transpose()?,
             ..made

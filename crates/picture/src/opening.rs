@@ -129,8 +129,7 @@ impl Studio {
                 let made;
                 let case = match model {
                     Some(model) => {
-                        let light = design.verify.light();
-                        made = MadeChip::in_light(&design.cell_stack()?, model, design.focused(), light)?;
+                        made = MadeChip::in_light(&design.lit_stack()?, model)?;
                         SimulationCase::Made(&made)
                     }
                     None => {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use metalith_cell::{BAND_ORDERS, CellStack};
+use metalith_cell::{BAND_ORDERS, CellStack, LitStack};
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::array::PillarArray;
@@ -265,8 +265,12 @@ impl Bench {
 
 /// A chip of a design, all its cells from a bank.
 fn chip_of(design: &Design, bank: &Arc<CellBank>, model: &CalibratedModel) -> Result<MadeChip> {
-    let chip = MadeChip::in_light(bank.stated(), model, design.focused(), design.verify.light())?;
-    Ok(chip.from_bank(bank))
+    let stated = LitStack {
+        stack: bank.stated().clone(),
+        focused: design.focused(),
+        polarised: design.verify.light(),
+    };
+    Ok(MadeChip::in_light(&stated, model)?.from_bank(bank))
 }
 
 /// Check that rectangles, if the pillars of a design are such, can be made like that.

@@ -48,8 +48,7 @@ fn judged(small: &Small, model: Option<Perturbation>) -> Verification {
     let models = cell_models(&design, &[design.verify.fidelity]).unwrap();
     let chip = model.map(|perturbation| {
         let model = CalibratedModel::new("set".into(), "found".into(), perturbation);
-        let (focused, light) = (design.focused(), design.verify.light());
-        MadeChip::in_light(&design.cell_stack().unwrap(), &model, focused, light).unwrap()
+        MadeChip::in_light(&design.lit_stack().unwrap(), &model).unwrap()
     });
     let cases = match &chip {
         Some(chip) => SimulationCases::judged_by(chip),

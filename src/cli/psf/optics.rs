@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use metalith::cell::{
-    CellStack, FittedCell, FocusedLight, Handedness, PointwiseCell, Polarisation, PolarisationAxis, PolarisedLight,
-    PublishedCell, RotatedCell, UniformLayer, UprightCell, cache_folder,
+    CellStack, FittedCell, FocusedLight, Handedness, LitStack, PointwiseCell, Polarisation, PolarisationAxis,
+    PolarisedLight, PublishedCell, RotatedCell, UniformLayer, UprightCell, cache_folder,
 };
 use metalith::grating::{Mapping, NeighbourCell};
 use metalith::rcwa::{CellLattice, Material};
@@ -214,8 +214,12 @@ impl PsfArgs {
     /// The chip as a measured process makes it.
     pub(super) fn made(&self, found: &Extraction, model: &CalibratedModel) -> Result<MadeChip> {
         let shape = found.shape;
-        let focused = shape.rectangles().map(|_| self.focused(shape));
-        MadeChip::in_light(&self.stack(found)?, model, focused, self.polarised_light(shape))
+        let stated = LitStack {
+            stack: self.stack(found)?,
+            focused: shape.rectangles().map(|_| self.focused(shape)),
+            polarised: self.polarised_light(shape),
+        };
+        MadeChip::in_light(&stated, model)
     }
 
     /// What solves it for the pillars as drawn.

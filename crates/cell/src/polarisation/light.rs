@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::{Analyser, Polarisation, PolarisationAxis};
-use crate::Handedness;
+use crate::{CellStack, Handedness};
 
 /// The light that pillars give the phase of the design.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -32,6 +32,16 @@ pub struct PolarisedLight {
     pub arriving: Option<Polarisation>,
     /// What is before the sensor, if anything.
     pub analyser: Option<Analyser>,
+}
+
+/// Pillars, and the light that they are in.
+#[derive(Clone, Debug)]
+pub struct LitStack {
+    pub stack: CellStack,
+    /// The light that has the phase of a design behind them, if they tell polarisations apart.
+    pub focused: Option<FocusedLight>,
+    /// Which light arrives, and what of it reaches the sensor, of such pillars.
+    pub polarised: PolarisedLight,
 }
 
 impl PolarisedLight {

@@ -16,7 +16,7 @@ use metalith_core::{Error, Result};
 
 pub use axes::{AxisTables, PolarisationAxis};
 pub use hands::HandTables;
-pub use light::{FocusedLight, PolarisedLight};
+pub use light::{FocusedLight, LitStack, PolarisedLight};
 pub use tables::{PassedTable, PolarisedTables};
 
 use super::Handedness;

@@ -37,7 +37,7 @@ pub struct MappingSpec {
     pub table: Option<MappingTable>,
     /// Of upright rectangles: the file of their library, such as `metalith cells` writes.
     #[serde(skip)]
-    pub library_file: Option<PathBuf>,
+    pub pillar_library_file: Option<PathBuf>,
     /// What that file holds.
     #[serde(
         rename = "library",
@@ -47,7 +47,7 @@ pub struct MappingSpec {
     pub pillar_library: Option<Arc<PillarLibrary>>,
     /// Why a library that is to be made anew was not read.
     #[serde(skip)]
-    pub library_refused: Option<String>,
+    pub pillar_library_refused: Option<String>,
     /// Of rotated rectangles: what their rotation has beside half of the phase.
     #[serde(skip_serializing_if = "RotationMapping::is_half")]
     pub rotation: RotationMapping,
@@ -159,7 +159,7 @@ impl MappingSpec {
                 "leave `library` out, or use `shape = \"upright_rectangle\"`",
             );
         }
-        let library_file = upright.then(|| match library {
+        let pillar_library_file = upright.then(|| match library {
             LibraryFile::Needed => s.file_else(
                 "library",
                 "make it: `metalith cells DESIGN` writes `library.csv` into its folder; copy that to this name",
@@ -206,9 +206,9 @@ impl MappingSpec {
             polynomial,
             table_file,
             table: None,
-            library_file,
+            pillar_library_file,
             pillar_library: None,
-            library_refused: None,
+            pillar_library_refused: None,
             rotation,
             steered,
             comparison,
@@ -226,12 +226,14 @@ impl MappingSpec {
             let allowed: Vec<u16> = cell.widths_nm().collect();
             self.table = Some(MappingTable::read_csv(file, &allowed)?);
         }
-        if let (Some(file), Some(pillars)) = (&self.library_file, cell.shape.upright()) {
+        if let (Some(file), Some(pillars)) = (&self.pillar_library_file, cell.shape.upright()) {
             let read = PillarLibrary::read_csv(file, pillars);
             match (read, library) {
                 (Ok(read), _) => self.pillar_library = Some(Arc::new(read)),
                 (Err(error), LibraryFile::Needed) => return Err(error),
-                (Err(error), LibraryFile::ToBeMade) if file.exists() => self.library_refused = Some(error.to_string()),
+                (Err(error), LibraryFile::ToBeMade) if file.exists() => {
+                    self.pillar_library_refused = Some(error.to_string())
+                }
                 (Err(_), LibraryFile::ToBeMade) => {}
             }
         }

@@ -136,13 +136,12 @@ impl MadeRectangles {
         colour: RectangleColour,
         progress: &dyn Progress,
     ) -> Result<PolarisedTables> {
-        let mut places: BTreeMap<(bool, u64), Vec<usize>> = BTreeMap::new();
+        let mut places: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
         for (class, RectangleClass { bias_nm, .. }) in classes.iter().enumerate().filter(|(_, c)| c.number > 0) {
-            let key = (bias_nm.is_sign_positive(), bias_nm.to_bits());
-            places.entry(key).or_default().push(class);
+            places.entry(bias_nm.to_bits()).or_default().push(class);
         }
         let (keys, members): (Vec<_>, Vec<Vec<usize>>) = places.into_iter().unzip();
-        let biases: Vec<f64> = keys.into_iter().map(|(_, bits)| f64::from_bits(bits)).collect();
+        let biases: Vec<f64> = keys.into_iter().map(f64::from_bits).collect();
         let mut numbers: Vec<u16> = classes.iter().map(|c| c.number).filter(|n| *n > 0).collect();
         numbers.sort_unstable();
         numbers.dedup();

@@ -36,7 +36,7 @@ impl KernelBank {
         let orbits = orbits_of(chip, &spec);
         let count = count(&orbits);
         let wavelengths = chip.sampling.wavelengths_nm.len();
-        Self::check_size(chip, basis.len(), &spec)?;
+        spec.check_size(count, channel_um.len(), basis.len(), wavelengths)?;
         progress.begin("simulating kernels", (count * wavelengths) as u64);
         let plan = KernelPlan::new(spec.window);
         let all: Vec<usize> = (0..wavelengths).collect();

@@ -12,6 +12,7 @@ mod average;
 mod chart;
 mod cube;
 mod depth;
+mod folder;
 mod read;
 
 use ndarray::{Array2, Array3};
@@ -23,6 +24,7 @@ pub use average::averaged;
 pub use chart::{BuiltIn, chart};
 pub(crate) use chart::{LEAN_DEG, SPOKES, STAR};
 pub use depth::read_depth;
+pub use folder::images_in;
 pub use read::{SceneFile, read_far_scene, read_picture, read_scene};
 
 /// A scene: planes of light, each with the spectrum of its reflectance.
