@@ -1,8 +1,8 @@
 """CPU time of layouts, rules and differences by the shape of pillars: `cost_by_shape.py METALITH FOLDER`.
 
 Lenses of 1 mm: `designs/tio2_532.toml` as squares and as it is, of circles, `designs/geometric_phase_532.toml`, of rotated
-rectangles, and `designs/birefringent_532.toml`, of upright ones. Folded by symmetry (squares and circles eightfold, rotated rectangles twofold, upright ones, whose
-lens has no symmetry, not at all) and, but for circles, flat: one outline for each pillar.
+rectangles, and `designs/birefringent_532.toml`, of upright ones. Folded by symmetry (squares and circles eightfold, rectangles twofold), as one cell for each
+size and rotation, and, but for circles, flat: one outline for each pillar.
 """
 
 import pathlib
@@ -51,7 +51,7 @@ def cpu_s(*command):
 def main(metalith, folder):
     folder.mkdir(parents=True, exist_ok=True)
     print(f"{'us a pillar':24}{'layout':>8}{'diff':>8}{'check':>8}")
-    for hierarchy in ("folded", "flat"):
+    for hierarchy in ("folded", "sref", "flat"):
         for shape in SHAPES:
             if hierarchy == "flat" and shape == "circles":
                 continue

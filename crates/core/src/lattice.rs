@@ -169,6 +169,7 @@ impl Lattice {
     }
 
     /// Distance of the places of the grid along x and along y (nm).
+    #[inline]
     pub fn steps_nm(&self) -> [u32; 2] {
         match self.kind {
             LatticeKind::Square => [self.pitch_nm; 2],
@@ -269,6 +270,7 @@ impl Lattice {
     }
 
     /// Place of column (axis 0) or row (axis 1) number `i` from the centre (nm).
+    #[inline]
     pub fn place_nm(&self, axis: usize, i: usize) -> i64 {
         let step = i64::from(self.steps_nm()[axis]);
         match self.kind {
@@ -279,6 +281,7 @@ impl Lattice {
     }
 
     /// Place of column (axis 0) or row (axis 1) number `i` from the centre (um).
+    #[inline]
     pub fn place_um(&self, axis: usize, i: usize) -> f64 {
         self.place_nm(axis, i) as f64 * 1e-3
     }
@@ -300,6 +303,7 @@ impl Lattice {
 
     /// A length of which distances along both axes are whole numbers: half a pitch, or half a nanometre on a hexagonal
     /// lattice (nm).
+    #[inline]
     pub fn unit_nm(&self) -> f64 {
         match self.kind {
             LatticeKind::Square => 0.5 * f64::from(self.pitch_nm),
@@ -308,11 +312,13 @@ impl Lattice {
     }
 
     /// [`Lattice::unit_nm`] (um).
+    #[inline]
     pub fn unit_um(&self) -> f64 {
         self.unit_nm() * 1e-3
     }
 
     /// Place number `i` of an axis in half steps from the centre: odd for an even number of places.
+    #[inline]
     pub fn half_index(&self, i: usize) -> i64 {
         2 * i as i64 - (self.sites as i64 - 1)
     }
@@ -330,6 +336,7 @@ impl Lattice {
 
     /// Square of a site's distance from the centre of a square lattice, in half pitches: exact, so that sites related by
     /// symmetry agree to the last bit in everything computed from it.
+    #[inline]
     pub fn half_radius2(&self, ix: usize, iy: usize) -> i64 {
         let (x, y) = (self.half_index(ix), self.half_index(iy));
         x * x + y * y

@@ -57,7 +57,7 @@ fn pillars_are_chosen_by_both_phases() {
     }
 }
 
-/// Two of the lens are copies, held or not; half a turn leaves a lens whose both phases are round as it is.
+/// Two of the lens are copies, held or not; half a turn and mirrors about both axes leave a lens whose both phases are round as it is.
 #[test]
 fn equal_lenses_are_copies_however_they_are_made() {
     let two = [
@@ -80,10 +80,20 @@ fn equal_lenses_are_copies_however_they_are_made() {
     for (most_held, classes) in [(u64::MAX, 1), (1, 1)] {
         let array = PillarArray::build_within(&round, most_held, &Silent).unwrap();
         assert_eq!((array.placed.len(), array.classes.len()), (2, classes), "{most_held}");
-        assert_eq!(array.classes[0].group.members().len(), 2, "{most_held}");
+        assert_eq!(array.classes[0].group.members().len(), 4, "{most_held}");
     }
     // Of phases over the plane nothing is known but what is held.
-    assert_eq!(PillarArray::build(&design, &Silent).unwrap().classes.len(), 1);
+    let array = PillarArray::build(&design, &Silent).unwrap();
+    assert_eq!(array.classes.len(), 1);
+    // Both foci are on the x axis, and a mirror about it leaves each pillar.
+    let of_lens = array.classes[0].group.members();
+    assert_eq!(
+        of_lens
+            .iter()
+            .map(|s| (s.mirrored, s.quarter_turns))
+            .collect::<Vec<_>>(),
+        [(false, 0), (true, 0)]
+    );
 }
 
 /// Both foci are mirror images, and so are the lenses: light along y sees what light along x sees from the other side.

@@ -18,8 +18,8 @@ use metalith_core::text::printable_bytes;
 use metalith_core::{Error, PillarShape, Progress, Result};
 use metalith_gds::extract::{Discovered, Filler, Scale, Why};
 use metalith_gds::{
-    DrawnPillar, LayerNumber, Layout, LayoutCell, Outline, OutlineMemo, PillarFinder, Point, Rect, Selection, Shape,
-    Text, Transform, Visitor, circle_of, rectangle_of, simplified,
+    BoxMemo, DrawnPillar, LayerNumber, Layout, LayoutCell, Outline, OutlineMemo, PillarFinder, Point, Rect, Selection,
+    Shape, Text, Transform, Visitor, circle_of, rectangle_of, simplified,
 };
 
 /// Widest square that is decided by table (database units).
@@ -60,6 +60,7 @@ pub(super) fn gather<'a>(
         shape,
         finder: PillarFinder::new(shape, unit_nm),
         sound: OutlineMemo::default(),
+        sound_boxes: Default::default(),
         sound_rings: HashSet::default(),
         relative: Vec::new(),
         doses,
@@ -85,6 +86,7 @@ pub(super) fn gather<'a>(
         // Outlines that are told by their number are of one file.
         visit.finder = PillarFinder::new(shape, unit_nm);
         visit.sound = OutlineMemo::default();
+        visit.sound_boxes = Default::default();
         match file.visit(&selection, &mut visit, progress).map_err(Error::from) {
             Err(error @ Error::Layout { .. }) => unread = Some(error.to_string()),
             Err(Error::Invalid { what, .. }) => unread = Some(what),
@@ -141,6 +143,8 @@ struct Gather<'r, 'p> {
     finder: PillarFinder,
     /// Whether no rule finds anything in outlines of pillars that are no squares.
     sound: OutlineMemo<bool>,
+    /// Such as are upright boxes, drawn counter-clockwise and clockwise: all of these are sound.
+    sound_boxes: [BoxMemo<()>; 2],
     /// The same of those with more corners, from the middle of the box around them: all of these are sound.
     sound_rings: HashSet<Box<[Point]>, RandomState>,
     relative: Vec<Point>,
@@ -209,6 +213,13 @@ impl Gather<'_, '_> {
     /// If that is too much work.
     #[inline]
     fn show_rectangle(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> Result<()> {
+        if let Some(rect) = &shape.rect {
+            let direction = usize::from(turns_right(shape.outline));
+            if self.sound_boxes[direction].get(rect).is_none() && self.passes(shape, placements)? {
+                self.sound_boxes[direction].remember(rect, ());
+            }
+            return Ok(());
+        }
         let mut memo = std::mem::take(&mut self.sound);
         let mut shown = None;
         let is_sound = memo.placed(shape.outline, &Transform::IDENTITY, || {
@@ -398,7 +409,7 @@ impl Gather<'_, '_> {
                 return Ok(());
             }
             if is_drawn_pillar {
-                put = self.filler.put_copies(&mut self.finder, shape.outline, placements);
+                put = self.filler.put_copies(&mut self.finder, shape, placements);
                 let steps = (put as u64).saturating_mul(shape.outline.len() as u64);
                 self.work.spend(steps).map_err(ended)?;
             }
@@ -418,7 +429,7 @@ impl Gather<'_, '_> {
                 self.show(&here, &[Transform::IDENTITY])?;
             }
             if shape.layer == self.pillars
-                && let Some(pillar) = self.finder.placed(shape.outline, placement)
+                && let Some(pillar) = self.finder.placed(shape, placement)
             {
                 self.drawn_pillar(&pillar, k, placed);
             } else {

@@ -35,7 +35,7 @@ pub use error::{Error, ExtractionError, LayoutError, Limit, Result};
 pub use items::{CellConsumer, CellItem};
 pub use layout::{Faulty, Layout};
 pub use limits::ReadLimits;
-pub use memo::OutlineMemo;
+pub use memo::{BoxMemo, OutlineMemo};
 pub use metalith_core::LayerNumber;
 pub use pillar::{DrawnPillar, PillarFinder, drawn_corners, pillar_of};
 pub use rectangle::{TiltedRectangle, tilted_rectangle_of};

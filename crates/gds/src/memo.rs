@@ -1,6 +1,6 @@
 //! What has been said of an outline, remembered for its copies elsewhere.
 
-use super::shape::{Outline, Point};
+use super::shape::{Outline, Point, Rect};
 use super::transform::Transform;
 
 /// Outlines that are remembered at a time, a power of two: a lens of rectangles has some hundred.
@@ -8,6 +8,12 @@ const PLACES: usize = 1 << 12;
 
 /// Places that an outline may have, side by side.
 const WAYS: usize = 4;
+
+/// Sets of [`WAYS`] upright boxes that are remembered at a time, a power of two: a lens of these has some hundred sizes.
+const BOX_SETS: usize = 1 << 8;
+
+/// Bits of an edge of such a box; longer ones are asked about each time.
+const EDGE_BITS: u32 = 31;
 
 /// Outlines with numbers that are remembered: those with higher ones are told by their corners.
 const NUMBERED: usize = 1 << 12;
@@ -86,6 +92,70 @@ impl<T: Copy> OutlineMemo<T> {
     }
 }
 
+/// Answers about upright boxes that hold wherever these stand, by their edges. Memory and time are bounded, whatever the boxes are.
+pub struct BoxMemo<T> {
+    /// In sets of [`WAYS`], zero where there is none: apart from the answers, so that a set is read at once.
+    keys: Vec<u64>,
+    answers: Vec<Option<T>>,
+}
+
+impl<T> Default for BoxMemo<T> {
+    fn default() -> Self {
+        Self {
+            keys: Vec::new(),
+            answers: Vec::new(),
+        }
+    }
+}
+
+impl<T: Copy> BoxMemo<T> {
+    /// The answer about a box, by `ask` if it is not remembered.
+    #[inline]
+    pub fn of(&mut self, r: &Rect, ask: impl FnOnce() -> T) -> T {
+        if let Some(answer) = self.get(r) {
+            return answer;
+        }
+        let answer = ask();
+        self.remember(r, answer);
+        answer
+    }
+
+    /// The answer about a box that is remembered.
+    #[inline]
+    pub fn get(&self, r: &Rect) -> Option<T> {
+        let key = Self::key(r)?;
+        let start = Self::set(key);
+        let set = self.keys.get(start..start + WAYS)?;
+        self.answers[start + set.iter().position(|known| *known == key)?]
+    }
+
+    /// Remember the answer about a box that none is remembered of.
+    pub fn remember(&mut self, r: &Rect, answer: T) {
+        let Some(key) = Self::key(r) else { return };
+        if self.keys.is_empty() {
+            self.keys.resize(BOX_SETS * WAYS, 0);
+            self.answers.resize(BOX_SETS * WAYS, None);
+        }
+        let start = Self::set(key);
+        let free = self.keys[start..start + WAYS].iter().position(|known| *known == 0);
+        let place = start + free.unwrap_or(0);
+        self.keys[place] = key;
+        self.answers[place] = Some(answer);
+    }
+
+    /// Both edges; none of long ones and of boxes without area.
+    #[inline]
+    fn key(r: &Rect) -> Option<u64> {
+        let (width, height) = (r.width() as u64, r.height() as u64);
+        (width > 0 && (width | height) >> EDGE_BITS == 0).then_some(width << EDGE_BITS | height)
+    }
+
+    #[inline]
+    fn set(key: u64) -> usize {
+        (key.wrapping_mul(SPREAD[0]) >> 32) as usize % BOX_SETS * WAYS
+    }
+}
+
 /// An outline without its place, if it is closed and has four corners near one another.
 #[inline]
 fn key(points: &[Point], orientation: u8) -> Option<Key> {
@@ -129,6 +199,34 @@ mod tests {
         assert_eq!(memo.of(Outline::new(&rhombus((0, 0))), 3, || 3), 3);
         let other = outline((0, 0), [(0, 0), (50, 10), (60, 90), (10, 81)]);
         assert_eq!(memo.of(Outline::new(&other), 0, || 4), 4);
+    }
+
+    #[test]
+    fn boxes_are_asked_about_once_for_each_pair_of_edges_and_long_ones_each_time() {
+        let mut memo = BoxMemo::default();
+        let of_edges = |x: i64, width: i64, height: i64| Rect {
+            x0: x,
+            y0: -x,
+            x1: x + width,
+            y1: height - x,
+        };
+        let sizes = [(50, 90), (90, 50), (50, 91), (51, 90)];
+        for (answer, (width, height)) in sizes.into_iter().enumerate() {
+            assert_eq!(memo.of(&of_edges(7, width, height), || answer), answer);
+        }
+        for (answer, (width, height)) in sizes.into_iter().enumerate() {
+            assert_eq!(memo.of(&of_edges(-900, width, height), || usize::MAX), answer);
+        }
+        for (width, height) in [(1 << 40, 90), (90, 1 << 31), (0, 90)] {
+            assert_eq!(memo.of(&of_edges(0, width, height), || 1), 1);
+            assert_eq!(memo.of(&of_edges(0, width, height), || 2), 2);
+        }
+        // More sizes than places.
+        for round in 0..2 {
+            for k in 1..4 * (BOX_SETS * WAYS) as i64 {
+                assert_eq!(memo.of(&of_edges(0, k, 7), || k as usize), k as usize, "round {round}");
+            }
+        }
     }
 
     #[test]

@@ -1,9 +1,9 @@
 //! Outlines that stand for pillars.
 
 use super::circle::circle_of;
-use super::memo::OutlineMemo;
+use super::memo::{BoxMemo, OutlineMemo};
 use super::rectangle::tilted_rectangle_of;
-use super::shape::{Outline, Point, Rect, rectangle_of, simplified};
+use super::shape::{Outline, Point, Rect, Shape, rectangle_of, simplified};
 use super::transform::Transform;
 use metalith_core::PillarShape;
 
@@ -56,6 +56,8 @@ pub struct PillarFinder {
     unit_nm: f64,
     /// Of outlines as they are placed; boxes from the first corner.
     known: OutlineMemo<Option<DrawnPillar>>,
+    /// Of upright boxes.
+    boxes: BoxMemo<Option<DrawnPillar>>,
     placed: Vec<Point>,
 }
 
@@ -66,13 +68,34 @@ impl PillarFinder {
             shape,
             unit_nm,
             known: OutlineMemo::default(),
+            boxes: BoxMemo::default(),
             placed: Vec::new(),
         }
     }
 
-    /// As [`pillar_of`], of an outline where it is placed.
+    /// Whether pillars, all with edges along axes or all rectangles, have the same corners in an orientation that leaves an upright
+    /// box as it is: half a turn does so to every rectangle, a mirror about an axis to upright ones.
+    pub(super) fn keeps(&self, orientation: u8) -> bool {
+        self.shape.upright().is_some() || (self.shape.rectangles().is_some() && orientation & 4 == 0)
+    }
+
+    /// As [`pillar_of`], of a shape where it is placed.
     #[inline]
-    pub fn placed(&mut self, outline: Outline<'_>, placement: &Transform) -> Option<DrawnPillar> {
+    pub fn placed(&mut self, shape: &Shape<'_>, placement: &Transform) -> Option<DrawnPillar> {
+        match shape.rect {
+            // Upright pillars are boxes, told by their edges.
+            Some(rect) if self.shape.upright().is_some() && placement.is_square() => {
+                let around = placement.apply_rect(&rect)?;
+                let (shape, unit_nm) = (self.shape, self.unit_nm);
+                let told = self.boxes.of(&around, || pillar_of(&around.outline(), shape, unit_nm));
+                told.map(|pillar| DrawnPillar { around, ..pillar })
+            }
+            _ => self.drawn(shape.outline, placement),
+        }
+    }
+
+    #[inline]
+    fn drawn(&mut self, outline: Outline<'_>, placement: &Transform) -> Option<DrawnPillar> {
         let (shape, unit_nm, buffer) = (self.shape, self.unit_nm, &mut self.placed);
         let mut ask = || {
             buffer.clear();
@@ -101,13 +124,31 @@ impl PillarFinder {
 #[cfg(test)]
 mod tests {
     use super::super::rectangle::tests::PILLARS;
+    use super::super::shape::ShapeKind;
     use super::*;
+    use metalith_core::{LayerNumber, UprightRectangles};
+
+    /// A closed outline, as the reader of a layout gives it.
+    fn shape(points: &[Point]) -> Shape<'_> {
+        Shape {
+            kind: ShapeKind::Boundary,
+            layer: LayerNumber::new(1, 0),
+            outline: Outline::new(points),
+            rect: rectangle_of(points),
+            circle: None,
+            offset: 0,
+        }
+    }
+
+    fn square(orientation: u8, dx: i64, dy: i64) -> Transform {
+        Transform::Square { orientation, dx, dy }
+    }
 
     /// Each pillar in each orientation, twice, one time elsewhere: what is remembered is what is said without memory.
     #[test]
     fn what_is_remembered_is_what_is_said_of_the_outline_where_it_is_placed() {
-        let shape = PillarShape::Rectangle(PILLARS);
-        let mut finder = PillarFinder::new(shape, 1.0);
+        let rotated = PillarShape::Rectangle(PILLARS);
+        let mut finder = PillarFinder::new(rotated, 1.0);
         for number in 1..=180 {
             let corners = PILLARS.corners(number);
             for off in [0, 1] {
@@ -115,14 +156,10 @@ mod tests {
                 points[2].x += off;
                 points.push(points[0]);
                 for k in 0..16 {
-                    let placement = Transform::Square {
-                        orientation: k & 7,
-                        dx: 1000 * i64::from(k),
-                        dy: -350,
-                    };
+                    let placement = square(k & 7, 1000 * i64::from(k), -350);
                     let placed: Vec<Point> = points.iter().map(|&p| placement.apply(p)).collect();
-                    let want = pillar_of(&placed, shape, 1.0);
-                    assert_eq!(finder.placed(Outline::new(&points), &placement), want);
+                    let want = pillar_of(&placed, rotated, 1.0);
+                    assert_eq!(finder.placed(&shape(&points), &placement), want);
                     assert!(want.is_some_and(|w| w.exact == (off == 0)), "{number} {k}: {want:?}");
                 }
             }
@@ -135,8 +172,38 @@ mod tests {
         let upright: Vec<Point> = [(-45, -120), (45, -120), (45, 120), (-45, 120), (-45, -120)]
             .map(|(x, y)| Point::new(x, y))
             .into();
-        let found = finder.placed(Outline::new(&upright), &tilted).unwrap();
+        let found = finder.placed(&shape(&upright), &tilted).unwrap();
         // The rotation of 36.87 degrees, to the nearest of 180.
         assert_eq!(found.number, Some(37));
+    }
+
+    /// Each size in each orientation, twice, one unit longer too: boxes are told by their edges as placed, and by nothing else.
+    #[test]
+    fn upright_pillars_are_told_by_their_edges_in_every_orientation() {
+        let pillars = UprightRectangles::of_lengths([90, 100, 150, 200].into_iter()).unwrap();
+        let upright = PillarShape::Rectangle(pillars.into());
+        let mut finder = PillarFinder::new(upright, 1.0);
+        let mut found = 0;
+        for (number, off) in (1..=pillars.count()).flat_map(|number| [(number, 0), (number, 1)]) {
+            let [w, h] = pillars.edges_nm(number).map(i64::from);
+            let around = Rect {
+                x0: 31 - w / 2,
+                y0: -77 - h / 2,
+                x1: 31 + w / 2 + off,
+                y1: -77 + h / 2,
+            };
+            for k in 0..16 {
+                let placement = square(k & 7, 1000 * i64::from(k), -350);
+                let placed: Vec<Point> = around.outline().iter().map(|&p| placement.apply(p)).collect();
+                let want = pillar_of(&placed, upright, 1.0);
+                assert_eq!(
+                    finder.placed(&shape(&around.outline()), &placement),
+                    want,
+                    "{w} x {h}, {off}"
+                );
+                found += usize::from(want.is_some_and(|w| w.exact));
+            }
+        }
+        assert_eq!(found, 16 * usize::from(pillars.count()));
     }
 }

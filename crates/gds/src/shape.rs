@@ -85,6 +85,19 @@ impl Rect {
         }
     }
 
+    /// Its corners, counter-clockwise, the last the first again.
+    pub(super) fn outline(&self) -> [Point; 5] {
+        let corner = Point::new;
+        let first = corner(self.x0, self.y0);
+        [
+            first,
+            corner(self.x1, self.y0),
+            corner(self.x1, self.y1),
+            corner(self.x0, self.y1),
+            first,
+        ]
+    }
+
     /// The smallest rectangle around points.
     pub fn around(points: &[Point]) -> Self {
         let mut rect = Self::EMPTY;

@@ -4,7 +4,7 @@ use metalith_camera::{Camera, Sampling};
 use metalith_cell::{BandResponse, CellModel, PassedTable};
 use metalith_core::{Error, Progress, Result, WidthMap};
 use metalith_design::Design;
-use metalith_design::array::{Symmetry, SymmetryGroup};
+use metalith_design::array::Symmetry;
 use metalith_gds::extract::Extraction;
 use metalith_grating::NeighbourPillars;
 use metalith_made::{
@@ -111,7 +111,10 @@ impl<'a> ChipInLight<'a> {
         };
         let symmetric = perturbation.keeps_symmetry() && elements.iter().all(|e| e.slope == [0.0; 2]);
         let widths: Vec<&WidthMap> = extraction.elements.iter().map(|e| &e.widths).collect();
-        let (chosen, copies) = distinct_of(&elements, &widths, symmetric);
+        let symmetries = Symmetry::ALL
+            .into_iter()
+            .filter(|s| symmetric && s.keeps(design.cell.shape));
+        let (chosen, copies) = distinct_of(&elements, &widths, &symmetries.collect::<Vec<_>>());
         let ones = PhaseFunction {
             lattice: design.lattice(),
             radius_um: design.lens.radius_um(),
@@ -287,29 +290,28 @@ impl ElementInLight<'_> {
     }
 }
 
-/// Distinct elements with the symmetries that leave each as it is; and for each element the distinct one that it is a copy
-/// of, and how turned.
+/// Distinct elements with those of these symmetries that leave each as it is; and for each element the distinct one that it is a
+/// copy of, and how turned.
 #[allow(clippy::type_complexity, reason = "both halves are taken apart at once")]
 fn distinct_of(
     elements: &[ElementView],
     widths: &[&WidthMap],
-    symmetric: bool,
+    symmetries: &[Symmetry],
 ) -> (Vec<(usize, Vec<Symmetry>)>, Vec<(usize, Symmetry)>) {
-    let turns = if symmetric { &Symmetry::ALL[..] } else { &[] };
+    let turns = |t: Symmetry, from: usize, to: usize| {
+        same_wedge(t, &elements[from], &elements[to]) && t.maps(widths[from], widths[to])
+    };
     let (mut distinct, mut copies): (Vec<(usize, Vec<Symmetry>)>, Vec<_>) = (Vec::new(), Vec::new());
-    for (k, view) in elements.iter().enumerate() {
+    for k in 0..elements.len() {
         let copy = distinct.iter().enumerate().find_map(|(base, (of, _))| {
-            let is = |t: &&Symmetry| same_wedge(**t, &elements[*of], view) && t.maps(widths[*of], widths[k]);
-            Some((base, *turns.iter().find(is)?))
+            let turned = symmetries.iter().find(|t| turns(**t, *of, k));
+            Some((base, *turned?))
         });
         copies.push(copy.unwrap_or((distinct.len(), Symmetry::IDENTITY)));
         if copy.is_none() {
-            let group = match symmetric {
-                true => SymmetryGroup::of(widths[k]),
-                false => SymmetryGroup::trivial(),
-            };
-            let own = group.members().iter().copied().filter(|t| same_wedge(*t, view, view));
-            distinct.push((k, own.collect()));
+            let others = symmetries.iter().copied().filter(|t| *t != Symmetry::IDENTITY);
+            let own = others.filter(|t| turns(*t, k, k));
+            distinct.push((k, std::iter::once(Symmetry::IDENTITY).chain(own).collect()));
         }
     }
     (distinct, copies)

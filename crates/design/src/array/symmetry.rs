@@ -80,10 +80,11 @@ impl Symmetry {
         seen
     }
 
-    /// Whether it leaves every pillar of a shape as it is, about its own middle: a rectangle is turned by it, but for half a turn.
-    /// A mirror about an axis would leave upright ones too; it is not used.
+    /// Whether it leaves every pillar of a shape as it is, about its own middle: a rectangle is left by half a turn, an upright one by a
+    /// mirror about an axis too.
     pub fn keeps(self, shape: PillarShape) -> bool {
-        shape.rectangles().is_none() || (!self.mirrored && self.quarter_turns.is_multiple_of(2))
+        let is_along_axes = self.quarter_turns.is_multiple_of(2);
+        shape.rectangles().is_none() || (is_along_axes && (!self.mirrored || shape.upright().is_some()))
     }
 
     /// Whether it takes a lattice into itself: a hexagonal one has the symmetries of a rectangle.

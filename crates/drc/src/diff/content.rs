@@ -239,7 +239,7 @@ impl ContentReader<'_> {
     fn outline(&mut self, shape: &Shape<'_>, placement: &Transform, k: usize) -> Result<()> {
         let placed = || shape.outline.placed(placement);
         if shape.layer == self.pillars
-            && let Some(pillar) = self.finder.placed(shape.outline, placement)
+            && let Some(pillar) = self.finder.placed(shape, placement)
         {
             return match pillar.number {
                 None => self.pillar(&pillar.around, k, placed),
@@ -297,7 +297,7 @@ impl Visitor for ContentReader<'_> {
                 if shape.layer == self.pillars {
                     self.pillar_shapes += placements.len() as u64;
                     if self.shape.rectangles().is_some() {
-                        put = self.filler.put_copies(&mut self.finder, shape.outline, placements);
+                        put = self.filler.put_copies(&mut self.finder, shape, placements);
                     }
                 } else {
                     *self.counts.entry(shape.layer).or_default() += placements.len() as u64;

@@ -154,7 +154,10 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
     let places = match rectangles {
         None => map.pillars,
         // All of them are at their places already.
-        Some(found) if found.count == map.sizes.rectangles && (squares == 0 || shape.upright().is_none()) => map.tilted,
+        Some(found) if map.sizes.all_are(&found, squares) => match found.pillars {
+            Rectangles::Rotated(_) => map.tilted,
+            Rectangles::Upright(_) => map.tilted.united(map.pillars),
+        },
         Some(_) => {
             let mut search = Search {
                 scale,
@@ -208,7 +211,7 @@ impl Visitor for Search {
 
     fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> metalith_core::Result<()> {
         let centre = |placement: &Transform| {
-            let pillar = self.finder.placed(shape.outline, placement)?;
+            let pillar = self.finder.placed(shape, placement)?;
             Centre::of(&pillar.around, self.scale)
         };
         self.pillars.add(placements, centre);

@@ -4,6 +4,8 @@ mod copies;
 
 use std::collections::HashMap;
 
+use copies::Images;
+
 use super::MOST_SITES;
 use super::held::HeldWidths;
 use super::oddity::Why;
@@ -24,8 +26,8 @@ pub struct Filler {
     guesses: Vec<u32>,
     /// Placements of the current cell about the middles of elements, if all of them are.
     orbits: Vec<Orbit>,
-    /// The element about whose middle the second placement of the current cell is the first, turned by half a turn.
-    half_turn: Option<u32>,
+    /// How the placements of the current cell are images of the first one, if they are.
+    images: Option<Images>,
     /// The first placement that these were found with.
     first: Transform,
     pillars: u64,
@@ -55,7 +57,7 @@ impl Filler {
             elements: sites.into_iter().map(empty).collect(),
             guesses: Vec::new(),
             orbits: Vec::new(),
-            half_turn: None,
+            images: None,
             first: Transform::IDENTITY,
             pillars: 0,
             held: 0,
@@ -110,7 +112,7 @@ impl Filler {
         for k in 0..self.orbits.len() {
             self.hold_eighth(self.orbits[k].element);
         }
-        self.half_turn = self.half_turn_of(placements);
+        self.images = self.images_of(placements);
         self.first = placements.first().copied().unwrap_or(Transform::IDENTITY);
     }
 

@@ -72,7 +72,7 @@ impl PillarCollector {
     fn polygon(&mut self, shape: &Shape<'_>, placements: &[Transform]) {
         let unit_nm = self.scale.nm(1.0);
         for (k, placement) in placements.iter().enumerate() {
-            if let Some(pillar) = self.finder.placed(shape.outline, placement) {
+            if let Some(pillar) = self.finder.placed(shape, placement) {
                 if let Err(why) = self.filler.put_drawn(&pillar, k, |_| true) {
                     self.odd(why, &pillar.around, shape.offset);
                 }

@@ -57,6 +57,15 @@ impl Places {
         (!self.scattered).then_some(self.tiles)
     }
 
+    /// These places and those of other shapes.
+    #[must_use]
+    pub fn united(mut self, mut others: Self) -> Self {
+        self.place_own();
+        others.place_own();
+        self.scattered |= others.scattered || !self.tiles.unite(&others.tiles);
+        self
+    }
+
     /// A cell with these placements begins.
     pub fn begin(&mut self, placements: &[Transform]) {
         self.place_own();

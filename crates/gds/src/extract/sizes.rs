@@ -1,9 +1,9 @@
 //! Which rectangles are the pillars of a layout from anywhere.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::sites::Scale;
-use crate::memo::OutlineMemo;
+use crate::memo::{BoxMemo, OutlineMemo};
 use crate::{Point, Rect, Shape, Transform, tilted_rectangle_of};
 use metalith_core::{Rectangles, RotatedRectangles, UprightRectangles};
 
@@ -36,8 +36,9 @@ pub(super) struct Sizes {
     tilted: u64,
     /// Squares by their width (nm).
     squares: Vec<u64>,
-    /// What outlines are, if they are rectangles and no squares.
+    /// What outlines are, if they are rectangles and no squares, and upright boxes.
     known: OutlineMemo<Option<SeenRectangle>>,
+    boxes: BoxMemo<Option<SeenRectangle>>,
 }
 
 /// Rectangles with the same edges, to a nanometre.
@@ -92,8 +93,9 @@ impl Sizes {
             })
         };
         // Edges are as long wherever the outline stands.
-        let seen = match magnification {
-            1.0 => self.known.of(shape.outline, 0, see),
+        let seen = match (magnification, &shape.rect) {
+            (1.0, Some(rect)) => self.boxes.of(rect, see),
+            (1.0, None) => self.known.of(shape.outline, 0, see),
             _ => see(),
         }?;
         self.rectangles += copies;
@@ -104,13 +106,32 @@ impl Sizes {
             size.count += copies;
             (0..2).for_each(|k| size.sums[k] += seen.edges[k] * copies as f64);
         }
-        shape.outline.at.apply_rect(&seen.around.moved(points[0]))
+        match shape.rect {
+            Some(rect) => Some(rect),
+            None => shape.outline.at.apply_rect(&seen.around.moved(points[0])),
+        }
     }
 
     /// What they are, if they are pillars no longer than this (nm): upright ones of several sizes, or those of the size that most
     /// have, by their rotation.
     pub fn pillars(&self, longest_nm: i64) -> Option<FoundRectangles> {
         self.upright(longest_nm).or_else(|| self.alike(longest_nm))
+    }
+
+    /// Whether all rectangles are these pillars, and, where squares are such too, all of so many squares.
+    pub fn all_are(&self, found: &FoundRectangles, squares: u64) -> bool {
+        let Rectangles::Upright(pillars) = found.pillars else {
+            return found.count == self.rectangles;
+        };
+        let lengths: BTreeSet<i64> = pillars.lengths_nm().map(i64::from).collect();
+        let sizes = self
+            .numbers
+            .iter()
+            .filter(|((a, b), _)| lengths.contains(a) && lengths.contains(b));
+        let squared = lengths.iter().filter_map(|nm| self.squares.get(*nm as usize));
+        self.tilted == 0
+            && sizes.map(|(_, k)| self.counted[*k].count).sum::<u64>() == self.rectangles
+            && squared.sum::<u64>() == squares
     }
 
     /// Upright rectangles of more than one size, with edges in equal steps; squares among them are such too.

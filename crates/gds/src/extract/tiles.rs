@@ -232,6 +232,41 @@ impl TileMap {
         true
     }
 
+    /// Take in the tiles of a map of other shapes, as large as these; whether there is room.
+    pub fn unite(&mut self, other: &Self) -> bool {
+        let mut guess = 0;
+        for (number, (key, tile)) in other.tiles.iter().enumerate() {
+            let (x, y) = other.corner(*key);
+            let own = self.at(Point::new(x, y), &mut guess);
+            let sum = &mut self.tiles[own].1;
+            sum.pillars += tile.pillars;
+            sum.parts |= tile.parts;
+            if tile.low.0 <= tile.high.0 {
+                sum.include(tile.low.0, tile.low.1);
+                sum.include(tile.high.0, tile.high.1);
+            }
+            // In turn: where each kind stands on places of its own, both tell the pitch.
+            let (mine, theirs) = (self.samples[own], other.samples[number]);
+            let counts = [sum.sampled, tile.sampled].map(usize::from);
+            let in_turn =
+                (0..SAMPLES).flat_map(|k| [(k < counts[0]).then(|| mine[k]), (k < counts[1]).then(|| theirs[k])]);
+            let last = if counts[1] > 0 {
+                other.last[number]
+            } else {
+                self.last[own]
+            };
+            sum.sampled = 0;
+            for (x, y) in in_turn.flatten() {
+                self.sample(own, i64::from(x), i64::from(y));
+            }
+            self.last[own] = last;
+            if self.len() > MOST_TILES {
+                return false;
+            }
+        }
+        true
+    }
+
     /// Tiles that touch, corners included.
     pub fn clusters(&self) -> Vec<Vec<usize>> {
         let mut seen = vec![false; self.tiles.len()];
@@ -279,6 +314,32 @@ mod tests {
     #[test]
     fn tiles_of_a_placed_cell_are_those_of_its_pillars() {
         [FINE, COARSE].into_iter().for_each(placed_as_its_pillars);
+    }
+
+    /// A disc whose pillars are of two kinds, in turn or by halves: tiles of each, united, are those of all.
+    #[test]
+    fn tiles_of_two_kinds_are_those_of_all() {
+        let places = (0..200 * 200).map(|k: i64| Point::new(700 * (k % 200), 700 * (k / 200)));
+        let disc: Vec<Point> = places
+            .filter(|p| (p.x - 70_000).pow(2) + (p.y - 70_000).pow(2) < 70_000_i64.pow(2))
+            .collect();
+        let in_turn: &dyn Fn(&Point) -> bool = &|p| (p.x + p.y) / 700 % 2 == 0;
+        let by_halves: &dyn Fn(&Point) -> bool = &|p| p.x < 50_000;
+        for is_first in [in_turn, by_halves] {
+            let [mut first, mut second, mut all] = [(); 3].map(|()| TileMap::new(FINE));
+            for &place in &disc {
+                let kind = if is_first(&place) { &mut first } else { &mut second };
+                kind.add(place, true, &mut 0);
+                all.add(place, true, &mut 0);
+            }
+            assert!(first.unite(&second));
+            assert_eq!(found(&first), found(&all));
+            for tile in 0..first.len() {
+                let samples: Vec<Point> = first.samples(tile).collect();
+                assert!(samples.iter().all(|p| disc.contains(p)));
+                assert_eq!(samples.len() as u64, first.pillars(tile).min(SAMPLES as u64));
+            }
+        }
     }
 
     fn placed_as_its_pillars(bits: u32) {

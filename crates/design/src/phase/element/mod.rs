@@ -142,7 +142,8 @@ impl LensPhase {
         } else {
             ((limit - offset) >> stride_log2) + 1
         };
-        let turns = if entries > most || !lattice.is_square() {
+        // Zeros are not looked up in a table that is larger than caches are.
+        let turns = if entries > most || !lattice.is_square() || *radial == RadialPhase::Flat {
             TurnsOfRadius::Computed(radial.clone())
         } else {
             let at = |k: i64| radial.turns(radius2_um2(lattice, (k << stride_log2) + offset));
@@ -186,7 +187,16 @@ impl LensPhase {
     }
 }
 
+/// The largest whole number that is not above a phase of less than 2^53 turns: by a conversion, since rounding is a call, and this
+/// is done for each pillar.
+#[inline]
+fn floor(turns: f64) -> f64 {
+    let cut = turns as i64 as f64;
+    if cut > turns { cut - 1.0 } else { cut }
+}
+
 /// Squared radius (um^2) of one of [`Lattice::units2`].
+#[inline]
 fn radius2_um2(lattice: Lattice, r2: i64) -> f64 {
     r2 as f64 * lattice.unit_um() * lattice.unit_um()
 }
@@ -304,7 +314,7 @@ impl<'a> ElementPhase<'a> {
     /// Phase at a site modulo one turn, in [0, 1); none outside the lens.
     pub fn wrapped(&self, ix: usize, iy: usize) -> Option<f64> {
         self.turns(ix, iy).map(|turns| {
-            let u = turns - turns.floor();
+            let u = turns - floor(turns);
             // A tiny negative phase rounds up to one whole turn.
             if u < 1.0 { u } else { 0.0 }
         })
