@@ -307,12 +307,18 @@ impl WidthRule {
     pub fn widths(&self, phase: &ElementPhase<'_>, along_y: Option<&ElementPhase<'_>>) -> WidthMap {
         let mut map = WidthMap::empty(phase.lattice());
         let n = map.lattice.sites();
-        let rows = map.width_nm.as_slice_mut().expect("a new array is contiguous");
+        let is_mirrored = phase.is_mirrored() && along_y.is_none_or(ElementPhase::is_mirrored);
+        let computed = if is_mirrored { n.div_ceil(2) } else { n };
+        let sites = map.width_nm.as_slice_mut().expect("a new array is contiguous");
+        let (rows, mirrored) = sites.split_at_mut(computed * n);
         rows.par_chunks_mut(n).enumerate().for_each(|(iy, row)| {
             for (ix, width) in row.iter_mut().enumerate() {
                 *width = self.pillar(phase, along_y, ix, iy);
             }
         });
+        for (row, from) in mirrored.chunks_mut(n).rev().zip(rows.chunks(n)) {
+            row.copy_from_slice(from);
+        }
         map
     }
 }

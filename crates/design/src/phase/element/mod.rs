@@ -257,6 +257,12 @@ impl<'a> ElementPhase<'a> {
         self.terms.is_empty() && self.lens.outline.is_none()
     }
 
+    /// Whether sites on both sides of the x axis have the same phase, to the last bit. Not every such phase is known to be one.
+    pub fn is_mirrored(&self) -> bool {
+        let is_round = self.lens.outline.is_none() && self.rotation == Rotation::NONE;
+        is_round && self.step.1 == 0.0 && self.terms.iter().all(|term| term.is_mirrored())
+    }
+
     /// Whether another element is of the same lens.
     pub fn is_of_lens(&self, other: &ElementPhase<'_>) -> bool {
         std::ptr::eq(self.lens, other.lens)

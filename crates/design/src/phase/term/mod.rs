@@ -100,6 +100,11 @@ impl PhaseTerm {
         matches!(&self.form, TermForm::Map(map) if map.is_wrapped())
     }
 
+    /// Whether places on both sides of the x axis have the same phase, to the last bit.
+    pub fn is_mirrored(&self) -> bool {
+        matches!(self.form, TermForm::Radial(_)) && self.centre_um[1] == 0.0
+    }
+
     /// Phase at a place from the middle of the element (um), in turns, not reduced.
     pub fn turns(&self, x_um: f64, y_um: f64) -> f64 {
         let (x, y) = (x_um - self.centre_um[0], y_um - self.centre_um[1]);
