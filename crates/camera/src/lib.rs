@@ -28,6 +28,6 @@ pub use exposure::Exposure;
 pub use file::Camera;
 pub use illuminant::{Illuminant, Led};
 pub use observer::observer;
-pub use sampling::{Blend, ChannelPart, ChannelSampling, Sampling, lagrange};
+pub use sampling::{Blend, ChannelPart, ChannelSampling, Sampling, WavelengthSteps, lagrange};
 pub use sensor::{ColourFilter, Sensor, SensorNoise};
 pub use spectrum::Spectrum;

@@ -188,6 +188,14 @@ impl Design {
         self.array.lens_of(&self.lens, element.index)
     }
 
+    /// Radius and focal length of the lens of each element (um).
+    pub fn lens_sizes_um(&self) -> impl Iterator<Item = [f64; 2]> {
+        self.elements().into_iter().map(|element| {
+            let lens = self.lens_of(&element);
+            [lens.radius_um(), lens.focal_length_um]
+        })
+    }
+
     /// The light that pillars give the phase of the design, if they tell polarisations apart.
     pub fn focused(&self) -> Option<FocusedLight> {
         self.cell.focused(self.verify.polarisation)

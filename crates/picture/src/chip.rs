@@ -1,6 +1,6 @@
 //! The chip before its sensor: elements as read from a layout, in light.
 
-use metalith_camera::{Camera, Sampling};
+use metalith_camera::{Camera, Sampling, WavelengthSteps};
 use metalith_cell::{BandResponse, CellModel, PassedTable};
 use metalith_core::{Error, Progress, Result, WidthMap};
 use metalith_design::Design;
@@ -87,7 +87,8 @@ pub fn element_views(design: &Design, camera: &Camera) -> Vec<ElementView> {
 /// If a channel counts no light at which the design's materials are known.
 pub fn sampling_of(design: &Design, camera: &Camera) -> Result<Sampling> {
     let (low, high) = design.band_um()?;
-    camera.sampling([low * 1e3, high * 1e3], STEP_NM)
+    let steps = WavelengthSteps::from(STEP_NM).behind(design.lens_sizes_um(), camera.sensor.pixel_um);
+    camera.sampling([low * 1e3, high * 1e3], steps)
 }
 
 impl<'a> ChipInLight<'a> {

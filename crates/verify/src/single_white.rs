@@ -8,7 +8,7 @@ use super::case::TransmissionTables;
 use super::single::{Lighting, distinct, kind_of, widest_nm};
 use super::white::{CameraStatement, STEP_NM, step_nm};
 use super::white_channels::{Channels, Point, WhiteChannel, per_light};
-use metalith_camera::{Camera, Sampling};
+use metalith_camera::{Camera, Sampling, WavelengthSteps};
 use metalith_core::{Error, Progress, Result, Wedge};
 use metalith_gds::extract::Extraction;
 use metalith_made::SimulationCase;
@@ -24,15 +24,16 @@ pub struct SingleWhite {
 }
 
 /// The wavelengths that white light for a camera is simulated at, without a design: all that it counts light of, as far as cells
-/// are known, from the first to the last of `known_nm`.
+/// are known, from the first to the last of `known_nm`, behind lenses of these radii and focal lengths (um).
 ///
 /// # Errors
 /// As [`Camera::sampling`].
-pub fn white_sampling(camera: &Camera, known_nm: [f64; 2]) -> Result<Sampling> {
-    let sampling = camera.sampling(known_nm, STEP_NM)?;
-    let step_nm = step_nm(sampling.ends_nm());
-    if step_nm > STEP_NM {
-        return camera.sampling(known_nm, step_nm);
+pub fn white_sampling(camera: &Camera, known_nm: [f64; 2], lenses_um: &[[f64; 2]]) -> Result<Sampling> {
+    let steps = |most_nm: f64| WavelengthSteps::from(most_nm).behind(lenses_um.iter().copied(), camera.sensor.pixel_um);
+    let sampling = camera.sampling(known_nm, steps(STEP_NM))?;
+    let most_nm = step_nm(sampling.ends_nm());
+    if most_nm > STEP_NM {
+        return camera.sampling(known_nm, steps(most_nm));
     }
     Ok(sampling)
 }
@@ -156,7 +157,7 @@ mod tests {
     fn a_camera_is_sampled_over_its_own_light() {
         let sampled = |name: &str, known_nm: [f64; 2]| {
             let file = metalith_testing::root().join(format!("cameras/{name}.toml"));
-            let sampling = white_sampling(&Camera::read(&file).unwrap(), known_nm);
+            let sampling = white_sampling(&Camera::read(&file).unwrap(), known_nm, &[]);
             sampling.map(|s| (s.wavelengths_nm[0], *s.wavelengths_nm.last().unwrap()))
         };
         let (first, last) = sampled("swir", [413.3, 2066.0]).unwrap();

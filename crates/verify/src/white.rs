@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::case::TransmissionTables;
 use super::optics::{ReadElement, open_matched};
 use super::white_channels::{Channels, Point, WhiteChannel, per_light};
-use metalith_camera::{Camera, Sampling};
+use metalith_camera::{Camera, Sampling, WavelengthSteps};
 use metalith_core::{Error, Lattice, Progress, Result};
 use metalith_design::phase::ElementPhase;
 use metalith_design::{CellIncidence, Design, Element};
@@ -60,13 +60,16 @@ impl CameraStatement {
 pub(super) fn camera_of(design: &Design) -> Result<Option<(Camera, Sampling)>> {
     let (short, long) = design.band_um()?;
     let range_nm = [short * 1e3, long * 1e3];
+    let steps = |camera: &Camera| {
+        WavelengthSteps::from(step_nm(range_nm)).behind(design.lens_sizes_um(), camera.sensor.pixel_um)
+    };
     if let Some(file) = &design.verify.camera {
         let camera = Camera::read(file)?;
-        let sampling = camera.sampling(range_nm, step_nm(range_nm))?;
+        let sampling = camera.sampling(range_nm, steps(&camera))?;
         return Ok(Some((camera, sampling)));
     }
     let camera = Camera::assumed(design.verify.pixel_um, range_nm);
-    let sampling = camera.sampling(range_nm, step_nm(range_nm)).ok();
+    let sampling = camera.sampling(range_nm, steps(&camera)).ok();
     Ok(sampling.map(|sampling| (camera, sampling)))
 }
 

@@ -27,9 +27,9 @@ pub(super) struct WhiteLight {
 }
 
 impl WhiteLight {
-    /// What a camera counts, as far as cells are known.
-    fn of(camera: Camera, known_um: (f64, f64)) -> Result<Self> {
-        let sampling = white_sampling(&camera, [known_um.0 * 1e3, known_um.1 * 1e3])?;
+    /// What a camera counts behind lenses of these radii and focal lengths (um), as far as cells are known.
+    fn of(camera: Camera, known_um: (f64, f64), lenses_um: &[[f64; 2]]) -> Result<Self> {
+        let sampling = white_sampling(&camera, [known_um.0 * 1e3, known_um.1 * 1e3], lenses_um)?;
         let [short, long] = sampling.ends_nm();
         let mut colours_nm = USUAL_NM.to_vec();
         if !colours_nm.iter().all(|nm| (short..=long).contains(nm)) {
@@ -67,8 +67,13 @@ impl PsfArgs {
     /// # Errors
     /// If the camera or a material cannot be used, or a channel counts no light at which the cell is known.
     pub(super) fn light(&self, found: &Extraction) -> Result<PsfLight> {
+        let lenses_um = found.elements.iter().map(|e| {
+            let [x, y] = e.site.lattice.sides_nm();
+            [0.5e-3 * x.max(y) as f64, self.distance_um]
+        });
+        let lenses_um: Vec<[f64; 2]> = lenses_um.collect();
         let white = match &self.camera {
-            Some(file) => Some(WhiteLight::of(Camera::read(file)?, self.known_um(found)?)?),
+            Some(file) => Some(WhiteLight::of(Camera::read(file)?, self.known_um(found)?, &lenses_um)?),
             None => None,
         };
         let wavelengths_um = match (self.wavelengths_nm.as_slice(), &white) {
