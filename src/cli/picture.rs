@@ -21,8 +21,8 @@ use super::{Outcome, Terminal, print_json, print_line};
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  metalith picture out/prototype_3x3/prototype_3x3_pillars.gds --camera cameras/gt1930.toml \\\n    --design designs/prototype_3x3.toml scene.png --out out/picture\n\n\
-    The scene is a PNG or JPEG in sRGB, an NPY of linear light, an NPY cube with --wavelengths-nm, or one of the built-in\n\
-    scenes chart, star and edge; with pixels finer than half of one of the sensor it is averaged to these. Kernels are kept on the\n\
+    The scene is a PNG or JPEG in sRGB, an NPY of linear light, an NPY cube with --wavelengths-nm, or one of the built-in \
+    scenes chart, star and edge; with pixels finer than half of one of the sensor it is averaged to these. Kernels are kept on the \
     disk and used again."
 )]
 pub struct PictureArgs {
