@@ -183,6 +183,10 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     let operator = studio.restoration();
     let rehearsal = Rehearsal::new(&studio, &operator);
     let error = &rehearsal.operator_error;
+    let limited = error.note(&camera.channel_names());
+    if let Some(note) = &limited {
+        terminal.say(note);
+    }
     let mut pictures = Vec::new();
     let mut found = Vec::new();
     for method in methods {
@@ -237,6 +241,7 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         report.worth = worth_of_assumptions(&studio, &narrow, &scene, args.with.seed, terminal)?;
     }
     report.notes = studio.notes(&frame, &truth);
+    report.notes.extend(limited);
     let pages = PicturePages {
         report: &report,
         scene: &truth,
