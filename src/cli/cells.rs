@@ -8,7 +8,7 @@ use metalith::cell_study::{
     CellStudy, LibraryStudy, RotationStudy, StudyOptions, rotation_keys, study_steered, write_cell_report,
     write_library_report, write_rotation_report,
 };
-use metalith::report::{fixed, sig};
+use metalith::report::{counted, fixed, sig};
 use metalith::{Design, Error, Progress, Rectangles, Result};
 
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
@@ -163,7 +163,7 @@ fn rotations(args: &CellsArgs, design: &Design, folder: &Path, terminal: &Termin
     line("half of the phase", study.half);
     line("design", study.design);
     for fit in &study.fits {
-        line(&format!("{} terms", fit.mapping.sines.len()), fit.error);
+        line(&counted(fit.mapping.sines.len(), "term"), fit.error);
     }
     if let Some(fit) = study.fits.get(1) {
         print_line!("{}", rotation_keys(fit));

@@ -20,8 +20,8 @@ use super::{Outcome, Terminal, images, output, print_json, print_line};
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  metalith compare photographs --camera cameras/gt1930.toml --field-deg 80 \\\n    --design log=designs/prototype_3x3.toml --design designs/robust_3x3.toml:robust.gds \\\n    --rivals flatcam,diffusercam --method tikhonov,tv --separate --assume paper --out out/compare\n\n\
-    Without `:LAYOUT` the layout of a design is looked for where `metalith layout` and `metalith run` write it. A design with a\n\
-    camera of its own, such as one behind a relay, has it and its field behind the layout:\n\
+    Without `:LAYOUT` the layout of a design is looked for where `metalith layout` and `metalith run` write it. A design with a \
+    camera of its own, such as one behind a relay, has it and its field behind the layout:\n  \
     --design nano=designs/neural_nano_optics.toml::cameras/gt1930_relay.toml:28.9"
 )]
 pub struct CompareArgs {

@@ -6,7 +6,7 @@ use clap::Args;
 use metalith::CalibratedModel;
 use metalith::compensate::{compensate, compensated_name, write_compensation_report};
 use metalith::layout::{LayoutFormat, OasisEncoding, Written, write_apertures_as, write_pillars_as};
-use metalith::report::{count, sig};
+use metalith::report::{count, counted, sig};
 use metalith::{Design, Hierarchy, PillarArray, Result, write_layer_properties};
 
 use super::{Outcome, Terminal, print_line, standard_input};
@@ -211,9 +211,9 @@ pub fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
             written.properties.display()
         );
         print_line!(
-            "{} pillars in {} elements, {} of them distinct",
+            "{} pillars in {}, {} of them distinct",
             array.pillars(),
-            array.placed.len(),
+            counted(array.placed.len(), "element"),
             array.classes.len()
         );
         if let Some((_, _, compensated)) = &compensation {

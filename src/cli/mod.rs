@@ -235,3 +235,27 @@ impl Diagnostic for Headline<'_> {
         self.0.related()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::Arguments;
+
+    /// A terminal breaks lines where it ends: a sentence that holds breaks of its own is broken twice.
+    #[test]
+    fn sentences_below_a_help_are_not_broken() {
+        let commands = Arguments::command();
+        for command in commands.get_subcommands() {
+            let below = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+            // Examples are indented.
+            for line in below.lines().filter(|l| !l.is_empty() && !l.starts_with(' ')) {
+                assert!(
+                    line.ends_with(['.', ':']),
+                    "{}: `{line}` does not end with a sentence",
+                    command.get_name()
+                );
+            }
+        }
+    }
+}

@@ -21,8 +21,8 @@ use super::{Outcome, Terminal, print_json, print_line};
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  metalith picture out/prototype_3x3/prototype_3x3_pillars.gds --camera cameras/gt1930.toml \\\n    --design designs/prototype_3x3.toml scene.png --out out/picture\n\n\
-    The scene is a PNG or JPEG in sRGB, an NPY of linear light, an NPY cube with --wavelengths-nm, or one of the built-in\n\
-    scenes chart, star and edge; with pixels finer than half of one of the sensor it is averaged to these. Kernels are kept on the\n\
+    The scene is a PNG or JPEG in sRGB, an NPY of linear light, an NPY cube with --wavelengths-nm, or one of the built-in \
+    scenes chart, star and edge; with pixels finer than half of one of the sensor it is averaged to these. Kernels are kept on the \
     disk and used again."
 )]
 pub struct PictureArgs {
@@ -183,6 +183,10 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     let operator = studio.restoration();
     let rehearsal = Rehearsal::new(&studio, &operator);
     let error = &rehearsal.operator_error;
+    let limited = error.note(&camera.channel_names());
+    if let Some(note) = &limited {
+        terminal.say(note);
+    }
     let mut pictures = Vec::new();
     let mut found = Vec::new();
     for method in methods {
@@ -237,6 +241,7 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         report.worth = worth_of_assumptions(&studio, &narrow, &scene, args.with.seed, terminal)?;
     }
     report.notes = studio.notes(&frame, &truth);
+    report.notes.extend(limited);
     let pages = PicturePages {
         report: &report,
         scene: &truth,

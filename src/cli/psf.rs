@@ -25,7 +25,7 @@ use super::{Outcome, Terminal, print_line};
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  metalith psf lens.gds --layer 1/0 --distance-um 2400 --wavelength-nm 530 --out out/lens\n\n\
-    Light comes along the chip's normal unless --angle-x-deg, --angle-y-deg say otherwise; the window is about the\n\
+    Light comes along the chip's normal unless --angle-x-deg, --angle-y-deg say otherwise; the window is about the \
     element's axis unless --at-x-um, --at-y-um do. A steered element sends light along the normal far off its axis."
 )]
 pub struct PsfArgs {

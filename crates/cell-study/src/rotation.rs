@@ -8,7 +8,7 @@ use serde::Serialize;
 use metalith_cell::{MappingError, RotatedCell, RotationCurve, RotationFit, RotationMapping};
 use metalith_core::{Error, Result};
 use metalith_design::Design;
-use metalith_report::{Axis, Cell, Chart, Column, Page, Table, fixed, sig, write_json};
+use metalith_report::{Axis, Cell, Chart, Column, Page, Table, counted, fixed, sig, write_json};
 
 /// Terms that mappings are fitted with; designs take no more.
 const TERMS: [usize; 4] = [1, 2, 3, 4];
@@ -152,12 +152,12 @@ pub fn write_rotation_report(study: &RotationStudy, folder: &Path) -> Result<()>
     row("half of the phase".into(), &study.half);
     row("of the design".into(), &study.design);
     for fit in &study.fits {
-        row(format!("{} terms", fit.mapping.sines.len()), &fit.error);
+        row(counted(fit.mapping.sines.len(), "term"), &fit.error);
     }
     page.table(table);
     for fit in &study.fits {
         page.details(
-            format!("{} terms, as a design takes them", fit.mapping.sines.len()),
+            format!("{}, as a design takes them", counted(fit.mapping.sines.len(), "term")),
             |inner| {
                 inner.code(rotation_keys(fit));
             },

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use metalith_core::text::{is_printable, printable};
-use metalith_report::exact;
+use metalith_report::{counted, exact};
 use serde_json::json;
 
 use super::report::{DrcReport, RuleReport};
@@ -15,10 +15,10 @@ pub fn text(report: &DrcReport) -> String {
     let mut out = String::new();
     let _ = writeln!(
         out,
-        "{}: {} shapes, {} elements, {} pillars on their lattices\ndeck: {}\n",
+        "{}: {} shapes, {}, {} pillars on their lattices\ndeck: {}\n",
         printable(&report.layout),
         report.shapes,
-        report.elements,
+        counted(report.elements, "element"),
         report.pillars_on_lattices,
         report.deck
     );

@@ -10,7 +10,7 @@ use super::cells::{RealisedCells, SolvedWidths};
 use super::rectangles::{MadeRectangles, RectangleColour};
 use super::stack::to_middle_tops;
 use super::{
-    ArrivingLight, CalibratedModel, CameraChange, CellBank, CellChange, ClassTable, DrawnElement, MadeElement,
+    Applied, ArrivingLight, CalibratedModel, CameraChange, CellBank, CellChange, ClassTable, DrawnElement, MadeElement,
     NotApplied, Perturbation, RectangleClass, cell_direction, mixed, realised_nm,
 };
 use metalith_cell::{CellStack, LitStack, PassedTable, PolarisedLight, PolarisedTables};
@@ -33,6 +33,8 @@ pub struct ModelStatement {
     pub set: String,
     /// What was found there.
     pub finding: String,
+    /// What it changes of what is stated.
+    pub applied: Vec<Applied>,
     /// What the model says that was not simulated, each with the reason.
     pub not_applied: Vec<NotApplied>,
 }
@@ -108,6 +110,7 @@ impl MadeChip {
         ModelStatement {
             set: self.model.set.clone(),
             finding: self.model.finding.clone(),
+            applied: self.perturbation().applied(),
             not_applied: self.perturbation().not_applied(),
         }
     }

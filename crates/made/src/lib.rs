@@ -52,7 +52,7 @@ pub use density::{RANGE_UM, fill};
 pub use element::{BIAS_STEP_NM, DrawnElement, MadeAperture, MadeElement, mixed, realised_nm};
 pub use light::{ArrivingLight, cell_direction};
 pub use model::CalibratedModel;
-pub use not_applied::NotApplied;
+pub use not_applied::{Applied, NotApplied};
 pub use perturbation::{CameraChange, CellChange, GeometryChange, LightChange, PathChange, Perturbation, legendre};
 pub use rectangles::{RectangleClass, bank_orders};
 pub use stack::{off_cutoff, perturbed, possible_width_nm, to_middle_tops};

@@ -1,4 +1,5 @@
-//! What a perturbation says of the bench alone: a simulation of other light cannot apply it.
+//! What of a perturbation a simulation applies, and what it says of the bench alone: a simulation of other light cannot apply
+//! that.
 
 use std::fmt;
 
@@ -14,6 +15,15 @@ pub struct NotApplied {
     /// Its value there.
     pub value: String,
     pub because: &'static str,
+}
+
+/// A quantity of a model file that is applied.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Applied {
+    /// Its key in the model file.
+    pub quantity: String,
+    /// Its value there, to five digits.
+    pub value: String,
 }
 
 /// Lamps of the bench are not those of the simulation.
@@ -34,7 +44,48 @@ impl fmt::Display for NotApplied {
     }
 }
 
+impl fmt::Display for Applied {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "`{}` = {}", self.quantity, self.value)
+    }
+}
+
+/// A value of a model file for people.
+fn words(value: &toml::Value) -> String {
+    let list = |values: &[toml::Value]| values.iter().map(words).collect::<Vec<_>>().join(", ");
+    match value {
+        toml::Value::Float(v) => format!("{v:.4e}").parse().unwrap_or(*v).to_string(),
+        toml::Value::String(text) => text.clone(),
+        toml::Value::Array(values) => format!("[{}]", list(values)),
+        toml::Value::Table(table) => {
+            let each = table.iter().map(|(key, value)| format!("{key} {}", words(value)));
+            each.collect::<Vec<_>>().join(", ")
+        }
+        other => other.to_string(),
+    }
+}
+
 impl Perturbation {
+    /// What a simulation applies: all that the model file has otherwise than a chip and a bench as stated, by its keys, less what
+    /// is [not applied](Self::not_applied).
+    pub fn applied(&self) -> Vec<Applied> {
+        let table = |p: &Self| toml::Table::try_from(p).expect("plain data serialises");
+        let (own, stated) = (table(self), table(&Self::default()));
+        let left_out = self.not_applied();
+        let mut all = Vec::new();
+        for (part, values) in &own {
+            for (key, value) in values.as_table().into_iter().flatten() {
+                let quantity = format!("{part}.{key}");
+                let is_stated = stated.get(part).and_then(|p| p.get(key)) == Some(value);
+                if !is_stated && left_out.iter().all(|n| n.quantity != quantity) {
+                    let value = words(value);
+                    all.push(Applied { quantity, value });
+                }
+            }
+        }
+        all
+    }
+
     /// What a PSF of one wavelength and one point of the scene, or a picture, leaves out, each quantity that is not zero with
     /// the reason. Everything else of a perturbation is applied.
     pub fn not_applied(&self) -> Vec<NotApplied> {
@@ -91,6 +142,25 @@ mod tests {
         assert!(
             text[0].starts_with("not applied: `light.led_shift_nm` = [0.0, 0.0, 1.5], because "),
             "{text:?}"
+        );
+    }
+
+    #[test]
+    fn what_is_applied_is_named_with_its_value() {
+        let mut p = Perturbation::default();
+        assert_eq!(p.applied(), []);
+        p.path.gap_um = 2.0;
+        p.path.tilt_mrad = [0.0, -1.25];
+        p.geometry.cd_bias_nm = -8.123_456;
+        p.light.source_size = 0.5;
+        let text: Vec<String> = p.applied().iter().map(ToString::to_string).collect();
+        assert_eq!(
+            text,
+            [
+                "`geometry.cd_bias_nm` = -8.1235",
+                "`path.gap_um` = 2",
+                "`path.tilt_mrad` = [0, -1.25]"
+            ]
         );
     }
 }

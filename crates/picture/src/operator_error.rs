@@ -13,6 +13,11 @@ pub struct OperatorError {
     local: Vec<Array2<f32>>,
 }
 
+/// Share of the light above which the error of an operator is told beside a picture. The arrays that it is made for have 1 %, which is
+/// the shot noise of ten thousand electrons. Three times that is ten times the variance: it hides more than the noise of a
+/// pixel that is well exposed, and a restoration is no longer limited by its frame.
+const TOLD: f64 = 0.03;
+
 /// Pixels on both sides over which an error is taken about a pixel: the scene that it is found with is random, and fewer
 /// would show how it happened to be.
 const ABOUT: usize = 24;
@@ -66,6 +71,16 @@ impl OperatorError {
         }
     }
 
+    /// What to say of a restoration that this limits, with the worst of its channels of these names; nothing where it does not.
+    pub fn note(&self, channels: &[String]) -> Option<String> {
+        let worst = self.overall.iter().zip(channels).max_by(|a, b| a.0.total_cmp(b.0));
+        let (error, channel) = worst.filter(|(error, _)| **error > TOLD)?;
+        Some(format!(
+            "the restoration is limited by its operator, which errs by {:.1} % of the light of a pixel in channel `{channel}`: the picture says less than the chip could give. With more pixels behind each element, or a larger --field-deg, it errs by less",
+            100.0 * error
+        ))
+    }
+
     /// About a pixel of a channel, as a share of the light there and of no less than the mean light of the frame.
     pub fn about(&self, channel: usize, at: (usize, usize)) -> f64 {
         let local = self.local.get(channel).map(|p| f64::from(p[at]));
@@ -76,6 +91,14 @@ impl OperatorError {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_error_that_limits_a_picture_is_told() {
+        let names = ["red".to_owned(), "green".to_owned()];
+        assert_eq!(OperatorError::uniform(vec![0.01, 0.012]).note(&names), None);
+        let note = OperatorError::uniform(vec![0.01, 0.095]).note(&names).unwrap();
+        assert!(note.contains("errs by 9.5 %") && note.contains("`green`"), "{note}");
+    }
 
     #[test]
     fn an_error_is_stated_where_it_is() {

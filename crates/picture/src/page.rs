@@ -251,8 +251,14 @@ fn scores(page: &mut Page, report: &PictureReport) {
         .iter()
         .map(|e| format!("{} %", fixed(100.0 * e, 2)))
         .collect();
+    let forecasts = match report.restorations.iter().any(|r| !r.forecast_db.is_empty()) {
+        true => {
+            "The forecasts are made on a random scene, which says what share of the detail of each size is lost where: one is for the mean over photographs (GB82), the other for the detail that this scene has in each zone. Whole photographs differ from that mean by some 3 dB. "
+        }
+        false => "",
+    };
     page.table(table.caption(format!(
-        "The forecasts are made on a random scene, which says what share of the detail of each size is lost where: one is for the mean over photographs (GB82), the other for the detail that this scene has in each zone. Whole photographs differ from that mean by some 3 dB. The restoration knows less than the simulation: on the random scene its operator errs by {} of the light of a pixel (root mean square), channel by channel, which is taken for noise.",
+        "{forecasts}The restoration knows less than the simulation: on a random scene its operator errs by {} of the light of a pixel (root mean square), channel by channel, which is taken for noise.",
         errors.join(", ")
     )));
 }

@@ -1,5 +1,6 @@
 //! Axes: from values to places in a drawing, and ticks at numbers that people like.
 
+use super::figure::text_width;
 use super::number::{fixed, power_of_ten, sig};
 
 /// Quantity, unit and scale along one side of a chart.
@@ -201,6 +202,17 @@ impl Fitted {
             small: Vec::new(),
             title: self.title(scale),
         }
+    }
+
+    /// How far from the left edge of a drawing a chart may begin whose axis this is, so that labels and title beside it do not
+    /// touch.
+    pub fn left(&self) -> f64 {
+        /// Enough for five digits.
+        const USUAL: f64 = 66.0;
+        /// Of the title, and of the ticks between labels and chart.
+        const BESIDE: f64 = 30.0;
+        let widths = self.ticks().labelled.into_iter().map(|(_, label)| text_width(&label));
+        widths.fold(USUAL, |left, width| left.max(width + BESIDE))
     }
 
     fn title(&self, scale: i32) -> String {

@@ -4,7 +4,7 @@ use svg::node::element::{Circle, Group, Path};
 
 use super::axis::{Axis, Fitted};
 use super::colour::SERIES;
-use super::figure::{Anchor, Figure, Frame, clipped, line, rectangle, strokes, text};
+use super::figure::{Anchor, Figure, Frame, clipped, line, rectangle, strokes, text, text_width};
 use super::number::short;
 
 /// Series drawn over two axes.
@@ -192,11 +192,6 @@ impl Chart {
     }
 }
 
-/// Names are measured by their letters: fonts differ, and a little air does no harm.
-fn text_width(name: &str) -> f64 {
-    6.9 * name.chars().count() as f64
-}
-
 fn legend_width(name: &str) -> f64 {
     44.0 + text_width(name)
 }
@@ -211,12 +206,15 @@ impl From<Chart> for Figure {
         } else {
             14.0
         };
-        let frame = Frame {
+        let mut frame = Frame {
             left: 66.0,
             top: 12.0 + 19.0 * rows.len() as f64,
             right: width - right,
             bottom: height - 44.0,
         };
+        // Legends begin where charts with usual labels do.
+        let legend = frame.left;
+        frame.left = chart.fit(&frame).1.left();
         let (x, y) = chart.fit(&frame);
         let mut data = clipped(frame.left, frame.top, frame.width(), frame.height());
         // Areas lie below lines, lines below points.
@@ -227,7 +225,7 @@ impl From<Chart> for Figure {
         }
         let mut drawing = Group::new().add(frame.axes(&x, &y, true)).add(data);
         for (row, series) in rows.iter().enumerate() {
-            let mut left = frame.left;
+            let mut left = legend;
             for &i in series {
                 let at = 12.0 + 19.0 * row as f64;
                 drawing = drawing.add(swatch(chart.series[i].kind, i % SERIES, left, at));

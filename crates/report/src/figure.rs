@@ -212,6 +212,11 @@ impl Frame {
     }
 }
 
+/// Width of a text in a drawing, measured by its letters: fonts differ, and a little air does no harm.
+pub(super) fn text_width(name: &str) -> f64 {
+    6.9 * name.chars().count() as f64
+}
+
 /// A bar of round length: `x` is its left end, `y` its middle, `longest` the room it has in the drawing.
 /// Classes: `ink` on paper, `over` on images.
 pub(super) fn scale_bar(x: f64, y: f64, longest: f64, um_per_unit: f64, class: &str) -> Group {

@@ -5,7 +5,7 @@ use svg::node::element::{Circle, Group};
 
 use super::axis::{Axis, Fitted};
 use super::colour::ColourMap;
-use super::figure::{Anchor, Figure, Frame, clipped, line, picture, rectangle, strokes, text};
+use super::figure::{Anchor, Figure, Frame, clipped, line, picture, rectangle, strokes, text, text_width};
 use super::number::short;
 use super::raster::{self, Shading};
 
@@ -136,6 +136,26 @@ pub(super) fn shading<'a>(
     (axis.range(low, high), shading)
 }
 
+/// What a title beside a colour bar may be longer than it: drawings have so much room above and below it.
+const BESIDE_BAR: f64 = 20.0;
+/// From one line of a title to the next.
+const LINE: f64 = 14.0;
+
+/// A title in as many lines as it takes for each to be no longer than the room that there is; a word is never broken.
+fn in_lines(title: &str, room: f64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in title.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if text_width(line) + text_width(" ") + text_width(word) <= room => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
 /// A colour bar with ticks to its right.
 pub(super) fn colour_bar(frame: &Frame, axis: &Axis, name: &str, unit: &str, map: ColourMap) -> (Group, String) {
     let fitted = axis.fit([], frame.bottom, frame.top, false);
@@ -160,14 +180,18 @@ pub(super) fn colour_bar(frame: &Frame, axis: &Axis, name: &str, unit: &str, map
         "" => name.to_owned(),
         unit => format!("{name} [{unit}]"),
     };
-    let (x, middle) = (frame.right + 67.0, (frame.top + frame.bottom) / 2.0);
-    let group = group
-        .add(rectangle(frame.left, frame.top, frame.width(), frame.height(), "frame"))
-        .add(
-            text(x, middle, Anchor::Middle, title.as_str())
+    let lines = in_lines(&title, frame.height() + BESIDE_BAR);
+    let middle = (frame.top + frame.bottom) / 2.0;
+    let outline = rectangle(frame.left, frame.top, frame.width(), frame.height(), "frame");
+    let group = lines.iter().enumerate().fold(group.add(outline), |group, (i, words)| {
+        // Several lines stand about the place of a single one.
+        let x = frame.right + 67.0 + LINE * (i as f64 - (lines.len() - 1) as f64 / 2.0);
+        group.add(
+            text(x, middle, Anchor::Middle, words.as_str())
                 .set("class", "title")
                 .set("transform", format!("rotate(-90 {} {})", short(x), short(middle))),
-        );
+        )
+    });
     let words = format!(
         "{title} from {} to {}",
         super::sig(fitted.low, 3),
@@ -237,5 +261,22 @@ impl From<HeatMap> for Figure {
         let words = format!("Colours: {meaning}. Along x {}, along y {}.", x.words(), y.words());
         let drawing = Group::new().add(data).add(frame.axes(&x, &y, false)).add(bar);
         Figure::new(width, height, &heat.title, &words, drawing)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::in_lines;
+
+    #[test]
+    fn a_title_longer_than_its_bar_is_broken_between_words() {
+        // Twenty-four letters have this room.
+        const ROOM: f64 = 170.0;
+        assert_eq!(in_lines("zero order", ROOM), ["zero order"]);
+        assert_eq!(
+            in_lines("energy in a pixel, of the light there", ROOM),
+            ["energy in a pixel, of", "the light there"]
+        );
+        assert!(in_lines("", ROOM).is_empty());
     }
 }

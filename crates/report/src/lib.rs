@@ -64,7 +64,7 @@ pub use heat::HeatMap;
 pub use images::ImageGrid;
 pub use json::write_json;
 pub use matrix::Matrix;
-pub use number::{count, exact, fixed, sig};
+pub use number::{count, counted, exact, fixed, sig};
 pub use page::Page;
 pub use photo::PhotoRow;
 pub use plan::{Plan, PlanLayer};

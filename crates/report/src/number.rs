@@ -60,6 +60,11 @@ pub fn count(n: u64) -> String {
     grouped(&n.to_string())
 }
 
+/// A count with what is counted, in the singular for one: `1 term`, `12,000 terms`.
+pub fn counted(n: usize, what: &str) -> String {
+    format!("{} {what}{}", count(n as u64), if n == 1 { "" } else { "s" })
+}
+
 /// `10⁻³` and the like.
 pub fn power_of_ten(exponent: i32) -> String {
     format!("10{}", superscript(exponent))
@@ -143,6 +148,10 @@ mod tests {
         assert_eq!(fixed(-0.001, 2), "0.00");
         assert_eq!(fixed(-1234.5, 1), "−1,234.5");
         assert_eq!(count(57_702_924), "57,702,924");
+        assert_eq!(
+            [0, 1, 1_200].map(|n| counted(n, "term")),
+            ["0 terms", "1 term", "1,200 terms"]
+        );
         assert_eq!(short(-0.001), "0");
         assert_eq!(short(120.50), "120.5");
     }

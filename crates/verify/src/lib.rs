@@ -9,6 +9,7 @@ mod copies;
 mod large;
 mod media;
 mod memory;
+mod model_page;
 mod optics;
 mod page;
 mod phase;

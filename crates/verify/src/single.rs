@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::case::TransmissionTables;
 use super::single_white::SingleWhite;
 use super::white::CameraStatement;
-use super::white_page;
+use super::{model_page, white_page};
 use metalith_cell::{CellModel, Fidelity, PolarisedLight};
 use metalith_core::{Error, Lattice, LatticeKind, Progress, Result, WholeFile, WidthMap};
 use metalith_gds::extract::{ElementSite, Extraction};
@@ -254,13 +254,7 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
         ("Other shapes on the pillar layer", count(found.oddities.total())),
     ]);
     if let Some(model) = model {
-        page.paragraph(format!(
-            "As made by the calibrated model of {}: {}.",
-            model.set, model.finding
-        ));
-        for quantity in &model.not_applied {
-            page.note(quantity.to_string());
-        }
+        model_page::write(&mut page, model);
     }
     page.section("What is assumed");
     page.paragraph("A layout holds shapes alone. These were options of the command, or their defaults:");

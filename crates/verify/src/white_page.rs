@@ -1,7 +1,7 @@
 //! The part of a report that shows a point of the scene in white light.
 
 use metalith_core::part;
-use metalith_report::{Axis, Cell, Chart, Column, ImageGrid, Page, Table, exact, fixed, sig};
+use metalith_report::{Axis, Cell, Chart, Column, ImageGrid, Page, Table, exact, fixed};
 use ndarray::Array2;
 
 use super::{CameraStatement, DistinctElement, PsfResult, Verification, WhiteChannel};
@@ -42,7 +42,11 @@ pub(super) fn channels(
     alone: &[(String, &PsfResult)],
 ) {
     page.paragraph(format!(
-        "A wedge sends each wavelength to another place. Camera: {}; illuminant: {}; pixels of {} um.",
+        "{}Camera: {}; illuminant: {}; pixels of {} um.",
+        match channels.iter().any(|c| c.spread_direction_deg.is_some()) {
+            true => "A wedge sends each wavelength to another place. ",
+            false => "",
+        },
         camera.name,
         camera.illuminant,
         exact(camera.pixel_um),
@@ -116,9 +120,19 @@ fn table(camera: &CameraStatement, channels: &[WhiteChannel]) -> Table {
     }
     let least = channels.iter().map(|w| w.counted).fold(1.0, f64::min);
     table.caption(format!(
-        "Energies are of the light that arrives at the element, about the brightest place. The error of sampling is the largest change of an MTF when every second wavelength is left out. {} % of what each channel counts is simulated, or more.",
-        sig(least * 100.0, 4)
+        "Energies are of the light that arrives at the element, about the brightest place. The error of sampling is the largest change of an MTF when every second wavelength is left out. {}",
+        simulated_words(least)
     ))
+}
+
+/// How much is simulated of what channels count, from the least share of one: rounded down, since no less is simulated.
+fn simulated_words(least: f64) -> String {
+    if least < 1.0 {
+        let percent = fixed((least * 1000.0).floor() / 10.0, 1);
+        format!("At least {percent} % of what each channel counts is simulated.")
+    } else {
+        "All that each channel counts is simulated.".into()
+    }
 }
 
 /// The middle of a window of so many samples, in squares of whole samples.
@@ -138,4 +152,20 @@ fn shown(white: &WhiteChannel, samples: usize) -> (Array2<f64>, f64) {
         picture[[iy / square, ix / square]] += f64::from(*v) / (square * square) as f64;
     }
     (picture, white.step_um * square as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::simulated_words;
+
+    #[test]
+    fn a_share_that_is_simulated_is_not_rounded_up() {
+        for (least, words) in [
+            (1.0, "All that each channel counts is simulated."),
+            (0.9999, "At least 99.9 % of what each channel counts is simulated."),
+            (0.954, "At least 95.4 % of what each channel counts is simulated."),
+        ] {
+            assert_eq!(simulated_words(least), words);
+        }
+    }
 }

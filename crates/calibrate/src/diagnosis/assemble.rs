@@ -52,7 +52,11 @@ impl Diagnosis {
             true => evidence.patterns(simulator),
             false => &[],
         };
-        let ranked = |tried: &Vec<TriedEffect>| tried.iter().map(|t| Ranked::new(simulator, finding, t)).collect();
+        let ranked = |step: usize, tried: &[TriedEffect]| -> Vec<Ranked> {
+            let of_step = tried.iter().map(|t| Ranked::new(simulator, finding, t, step));
+            of_step.collect()
+        };
+        let later = finding.later.iter().enumerate();
         let captures = set.captures.iter_enumerated().map(|(c, capture)| CaptureError {
             capture: capture.name.clone(),
             before: error_of_capture(&finding.held_before[c]),
@@ -64,8 +68,8 @@ impl Diagnosis {
             remarks: remarks(simulator, evidence, verdict),
             effects: found_effects(simulator, finding, verdict),
             error,
-            ranking: ranked(&finding.ranking),
-            later_rankings: finding.later.iter().map(ranked).collect(),
+            ranking: ranked(1, &finding.ranking),
+            later_rankings: later.map(|(place, tried)| ranked(place + 2, tried)).collect(),
             patterns: patterns.iter().map(|p| FreePattern::new(simulator, p)).collect(),
             proposal: None,
             unexplained_share,
@@ -196,7 +200,8 @@ fn left_out(set: &MeasuredSet, unusable: &[UnusableCapture]) -> Vec<LeftOut> {
 }
 
 impl Ranked {
-    fn new(simulator: &Simulator<'_>, finding: &Finding, tried: &TriedEffect) -> Self {
+    /// As it was tried in a step, counted from one.
+    fn new(simulator: &Simulator<'_>, finding: &Finding, tried: &TriedEffect, step: usize) -> Self {
         let rejection = rejection(finding, tried);
         Self {
             name: simulator.effects[tried.effect].name(),
@@ -207,10 +212,21 @@ impl Ranked {
             rejected: rejection.map(Rejection::sentence),
             remark: match rejection {
                 Some(rejection) => rejection.remark(),
-                None if tried.rejected.is_some() => "taken in a later step".into(),
-                None => "taken".into(),
+                None => taken_words(&finding.later, tried, step),
             },
         }
+    }
+}
+
+/// How an effect that was found came to be taken, said of it in a table of the candidates of a step. The first table has the
+/// gain with which an effect was taken, whenever that was: without the step it would read as one of the first.
+fn taken_words(later: &[Vec<TriedEffect>], tried: &TriedEffect, step: usize) -> String {
+    let was_taken = |t: &TriedEffect| t.effect == tried.effect && t.rejected.is_none();
+    let in_step = later.iter().position(|all| all.iter().any(was_taken));
+    match in_step.map(|place| place + 2) {
+        Some(taken) if taken != step => format!("taken in step {taken}"),
+        None if tried.rejected.is_some() => "taken in a later step".into(),
+        _ => "taken".into(),
     }
 }
 
@@ -260,5 +276,40 @@ fn listed<T: Serialize>(values: &[T]) -> Value {
     match values {
         [one] => serde_json::json!(one),
         more => serde_json::json!(more),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_says_in_which_step_an_effect_was_taken() {
+        let tried = |effect, rejected| TriedEffect {
+            effect,
+            score: 0.0,
+            gain: None,
+            values: Vec::new(),
+            rejected,
+        };
+        let second = Some(Rejection::Second);
+        let later = [
+            vec![tried(4, None), tried(5, second)],
+            vec![tried(5, None), tried(6, second)],
+        ];
+        // The first table has all that was taken as taken; effect 3 was so in the first step, 6 as one of a pair.
+        for (effect, rejected, step, words) in [
+            (3, None, 1, "taken"),
+            (4, None, 1, "taken in step 2"),
+            (4, None, 2, "taken"),
+            (5, second, 2, "taken in step 3"),
+            (6, second, 3, "taken in a later step"),
+        ] {
+            assert_eq!(
+                taken_words(&later, &tried(effect, rejected), step),
+                words,
+                "{effect} in {step}"
+            );
+        }
     }
 }

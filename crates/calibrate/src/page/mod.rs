@@ -14,7 +14,7 @@ use crate::fit::WidthParts;
 use crate::search::Evidence;
 use crate::session::{Session, Simulations};
 use metalith_core::Result;
-use metalith_report::{Axis, Cell, Column, ImageGrid, Page, Ranking, Table, Verdict, fixed, sig};
+use metalith_report::{Axis, Cell, Column, ImageGrid, Page, Ranking, Table, Verdict, counted, fixed, sig};
 
 /// Write the report of a session.
 ///
@@ -30,8 +30,8 @@ pub fn write_page(
     let mut page = Page::new(
         format!("Calibration: {}", diagnosis.set),
         format!(
-            "{} captures of `{}`",
-            session.set().captures.len(),
+            "{} of `{}`",
+            counted(session.set().captures.len(), "capture"),
             session.set().path.display()
         ),
     );
@@ -200,7 +200,9 @@ fn ranking(page: &mut Page, diagnosis: &Diagnosis) {
             r.rejected.is_none(),
         );
     }
-    page.figure(chart.caption("Gain of each leader, with its 95 % confidence interval over groups of captures."));
+    page.figure(chart.caption(
+        "Gain of each leader, with its 95 % confidence interval over groups of captures. An effect that was taken in a later step has its gain beyond the effects that were taken before it.",
+    ));
     page.details("All candidates", |inner| {
         inner.table(candidates(&diagnosis.ranking));
     });

@@ -7,7 +7,7 @@ use crate::census::Census;
 use crate::contents::Contents;
 use crate::pictures;
 use metalith_core::Result;
-use metalith_report::{Cell, Column, Page, Table, count};
+use metalith_report::{Cell, Column, Page, Table, count, counted};
 
 pub(super) fn chip(page: &mut Page, c: &Contents<'_>, folder: &Path) -> Result<()> {
     page.section("Chip");
@@ -123,10 +123,6 @@ pub(super) fn cells(page: &mut Page, c: &Contents<'_>) {
             },
         );
     }
-}
-
-fn counted(n: usize, what: &str) -> String {
-    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
 /// Cells, those that hold others first, each with what it holds.

@@ -64,7 +64,7 @@ pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
             .collect::<Vec<_>>()
     };
     let mut turns = Chart::new(
-        "Phase along a radius",
+        "Phase over the radius",
         Axis::linear("radius", "um"),
         Axis::linear("phase", "turns"),
     )
@@ -79,7 +79,7 @@ pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
     };
     let (title, axis) = numbers(design);
     let mut widths =
-        Chart::new(format!("{title} along a radius"), Axis::linear("radius", "um"), axis).size(420.0, 260.0);
+        Chart::new(format!("{title} over the radius"), Axis::linear("radius", "um"), axis).size(420.0, 260.0);
     let last = along(&|ix| phase.turns(ix, n / 2)).len();
     let shown = along(&|ix| {
         Some(rows.width(ix, n / 2))

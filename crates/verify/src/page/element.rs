@@ -6,21 +6,21 @@ use crate::{DistinctElement, PsfResult, Verification, white_page};
 use metalith_cell::Fidelity;
 use metalith_core::part;
 use metalith_design::Design;
-use metalith_report::{Axis, Cell, Chart, Column, ImageGrid, Page, Table, exact, sig};
+use metalith_report::{Axis, Cell, Chart, Column, ImageGrid, Page, Table, counted, exact, sig};
 use metalith_wave::psf::PixelFrequencies;
 
 /// Decades of a PSF that are shown: below lies what a camera's noise hides.
 const PSF_DECADES: f64 = 4.0;
-/// Edge of the part of a PSF that is shown (um): some ten sensor pixels.
+/// Most of a PSF that is shown, along an axis (um): some ten sensor pixels.
 const PSF_SHOWN_UM: f64 = 60.0;
 
 /// The section of one distinct element.
 pub(super) fn write(page: &mut Page, design: &Design, found: &Verification, element: &DistinctElement) {
     page.section(format!("Element {}", element.element.label()));
     page.paragraph(format!(
-        "Stands for {} of {} elements{}. Phase errors at the wavelength of the mapping: rounding {} rad rms, {} at most; mapping, by the `{}` cell, {} rad rms, {} at most. {}",
+        "Stands for {} of {}{}. Phase errors at the wavelength of the mapping: rounding {} rad rms, {} at most; mapping, by the `{}` cell, {} rad rms, {} at most. {}",
         element.copies,
-        found.elements.len(),
+        counted(found.elements.len(), "element"),
         match element.copies {
             1 => "",
             _ => ": figures of the others are these, with places, directions and field angles turned as the table of elements says",
@@ -53,6 +53,9 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification, elem
             cut(&seen.extracted, seen.step_um),
         );
     }
+    let shown_um = shown.first().map_or(PSF_SHOWN_UM, |(_, seen)| {
+        shown_samples(&seen.designed, seen.step_um) as f64 * seen.step_um
+    });
     let mut chart = Chart::new(
         "MTF with the sensor's pixel",
         Axis::linear("spatial frequency", "1/mm"),
@@ -64,7 +67,8 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification, elem
         chart.line(format!("extracted, {colour}"), spot.judged().mtf_curve.iter().copied());
     }
     page.figure(images.caption(format!(
-        "The middle {PSF_SHOWN_UM} um about the chief ray, {PSF_DECADES} decades; extracted by the `{}` cell.",
+        "The middle {} um about the chief ray, {PSF_DECADES} decades; extracted by the `{}` cell.",
+        sig(shown_um, 3),
         found.fidelity
     )));
     page.figure(chart.caption("In the middle of the field, mean of x and y."));
@@ -180,10 +184,15 @@ fn spot_table(element: &DistinctElement, pixel_um: f64) -> Table {
     table.caption("The unrounded design phase beside the pillars read back, by each cell. Energies are of the light that arrives at the element; the centroid counts from the chief ray.")
 }
 
+/// Samples along an axis of a PSF that are shown: a small window is shown whole.
+fn shown_samples(values: &Array2<f32>, step_um: f64) -> usize {
+    ((PSF_SHOWN_UM / step_um) as usize).clamp(1, values.nrows())
+}
+
 /// The middle of a PSF.
 fn cut(values: &Array2<f32>, step_um: f64) -> Array2<f64> {
     let n = values.nrows();
-    let keep = ((PSF_SHOWN_UM / step_um) as usize).clamp(1, n);
+    let keep = shown_samples(values, step_um);
     let from = (n - keep) / 2;
     part(values.view(), from..from + keep, from..from + keep).mapv(f64::from)
 }

@@ -6,7 +6,7 @@ mod written;
 
 use std::path::Path;
 
-use super::{PsfResult, Sense, Verification, assumptions};
+use super::{PsfResult, Sense, Verification, assumptions, model_page};
 use metalith_cell::Fidelity;
 use metalith_core::Result;
 use metalith_design::array::PillarArray;
@@ -40,6 +40,7 @@ fn page(design: &Design, array: &PillarArray, found: &Verification, picture: Opt
     }
     let failed = found.checks.iter().filter(|c| !c.passed()).count();
     let words = match failed {
+        0 if found.checks.len() == 1 => "What was written is what was designed: the one limit holds.".into(),
         0 => format!(
             "What was written is what was designed: all {} limits hold.",
             found.checks.len()
@@ -49,15 +50,21 @@ fn page(design: &Design, array: &PillarArray, found: &Verification, picture: Opt
     page.verdict(Verdict::of(failed == 0), words);
     let half = exact(PixelFrequencies::of(design.verify.pixel_um).half_nyquist_lp_mm);
     let contrast_at = format!("MTF at {half} lp/mm, one wavelength");
-    page.facts(&[
+    let mut facts = vec![
         ("Pillars", count(found.layout.pillars)),
         ("Elements", found.elements.len().to_string()),
         ("of them distinct", found.distinct.len().to_string()),
         ("Strehl ratio, least to greatest", strehl(found)),
         (contrast_at.as_str(), contrast(found)),
-        ("a whole channel from one direction", white_contrast(found)),
-        ("File", format!("{} MB", sig(found.layout.bytes as f64 * 1e-6, 3))),
-    ]);
+    ];
+    let white_contrast_at = found.camera.as_ref().map(|camera| {
+        let half = exact(camera.frequencies().half_nyquist_lp_mm);
+        format!("MTF at {half} lp/mm, a whole channel from one direction")
+    });
+    // Without a camera there is no channel.
+    facts.extend(white_contrast_at.as_deref().map(|what| (what, white_contrast(found))));
+    facts.push(("File", format!("{} MB", sig(found.layout.bytes as f64 * 1e-6, 3))));
+    page.facts(&facts);
     if let Some(picture) = picture {
         page.figure(picture);
     }
@@ -142,13 +149,7 @@ fn limits(page: &mut Page, found: &Verification) {
 fn method(page: &mut Page, design: &Design, found: &Verification) {
     page.section("How it was computed");
     if let Some(model) = &found.model {
-        page.paragraph(format!(
-            "Pillars, apertures, light and sensor are those of the calibrated model of {}: {}.",
-            model.set, model.finding
-        ));
-        for quantity in &model.not_applied {
-            page.note(quantity.to_string());
-        }
+        model_page::write(page, model);
     }
     let relabelled = found
         .distinct

@@ -6,7 +6,7 @@ use crate::copies::place_words;
 use metalith_core::{PillarShape, Rectangles};
 use metalith_design::Design;
 use metalith_design::array::Symmetry;
-use metalith_report::{Axis, Cell, Chart, Column, Page, Table, count, sig};
+use metalith_report::{Axis, Cell, Chart, Column, Page, Table, count, counted, sig};
 
 /// Odd shapes that are listed in the page; all are in `report.json` up to its own limit.
 const MOST_ODDITIES: usize = 20;
@@ -60,8 +60,11 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
         ]);
     }
     page.table(layers.caption(format!(
-        "Layers of {}, all references followed: {} cells, {} deep, top cell `{}`.",
-        found.layout.file, found.layout.cells, found.layout.depth, found.layout.top_cell
+        "Layers of {}, all references followed: {}, {} deep, top cell `{}`.",
+        found.layout.file,
+        counted(found.layout.cells, "cell"),
+        found.layout.depth,
+        found.layout.top_cell
     )));
     for oddity in found.foreign.listed.iter().take(MOST_ODDITIES) {
         page.note(format!(
@@ -74,7 +77,11 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
         ));
     }
     let (title, axis) = numbers(design);
-    let mut widths = Chart::new(format!("{title}s of all pillars"), axis, Axis::linear("pillars", ""));
+    let mut widths = Chart::new(
+        format!("All pillars by {}", title.to_lowercase()),
+        axis,
+        Axis::linear("pillars", ""),
+    );
     let half = step(design) / 2.0;
     let bars = counts(design, found).into_iter();
     widths.bars("pillars", bars.map(|(at, c)| (at - half, at + half, c as f64)));

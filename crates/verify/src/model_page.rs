@@ -1,0 +1,23 @@
+//! The part of a report that says by which calibrated model chips were made.
+
+use metalith_made::ModelStatement;
+use metalith_report::Page;
+
+/// What the model changes, and what of it is not applied.
+pub(super) fn write(page: &mut Page, model: &ModelStatement) {
+    page.paragraph(format!(
+        "Pillars, apertures, light and sensor are those of the calibrated model of {}: {}. {}",
+        model.set,
+        model.finding,
+        match model.applied.is_empty() {
+            true => "It changes nothing that is simulated here.",
+            false => "It changes what is stated by, under the keys of the model file:",
+        }
+    ));
+    if !model.applied.is_empty() {
+        page.list(model.applied.iter().map(ToString::to_string));
+    }
+    for quantity in &model.not_applied {
+        page.note(quantity.to_string());
+    }
+}
