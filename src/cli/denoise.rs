@@ -72,6 +72,12 @@ pub fn run(args: &DenoiseArgs, terminal: &Terminal) -> Result<Outcome> {
         ));
     }
     if let Some(out) = &args.out {
+        if out.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
+            return Err(Error::invalid(
+                format!("{}: pictures are written as PNG", out.display()),
+                "name a file that ends in .png",
+            ));
+        }
         apart(
             [Some(args.picture.as_path()), args.weights.as_deref()]
                 .into_iter()

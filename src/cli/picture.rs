@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use metalith::made::ModelStatement;
 use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
 use metalith::picture::scene::{BuiltIn, SceneFile, SceneImage, chart, read_depth, read_scene};
 use metalith::picture::{
@@ -211,8 +212,9 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         studio.design.verify.fidelity
     };
     let mut report = report(args, &studio, &scene, &frame, found, fidelity);
-    let left_out = model.iter().flat_map(|m| m.perturbation.not_applied());
-    report.assumptions.extend(left_out.map(Assumption::from));
+    report.model = model.as_ref().map(ModelStatement::of);
+    let of_model = report.model.as_ref().map(Assumption::of_model);
+    report.assumptions.extend(of_model.into_iter().flatten());
     report.operator_error.clone_from(&error.overall);
     if let Ok(kind) = args.scene.parse::<BuiltIn>() {
         report.contrast = contrast_curves(&studio, kind, &truth, &frame, &pictures[0]);
@@ -316,6 +318,7 @@ fn report(
         contrast: Vec::new(),
         doubt: None,
         worth: Vec::new(),
+        model: None,
     }
 }
 

@@ -271,10 +271,17 @@ fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
     if found.shape.upright().is_some() && (args.analyser == Some(Analyser::Circular) || args.focused.is_some()) {
         return Err(Error::invalid(
             format!(
-                "{}: a circular analyser or a hand for upright rectangles",
-                args.layout.display()
+                "{}: its pillars are upright rectangles, which focus linear light, and {} was asked for",
+                args.layout.display(),
+                match args.focused {
+                    Some(_) => "a hand by --focused",
+                    None => "a circular analyser",
+                }
             ),
-            "leave out --focused, and give --analyser x, y or an angle: upright rectangles focus no hand",
+            match args.focused {
+                Some(_) => "leave out --focused",
+                None => "give --analyser x, y or an angle",
+            },
         ));
     }
     if args.analyser == Some(Analyser::Circular) && args.hand().is_none() {

@@ -112,8 +112,15 @@ impl Judging {
     pub fn simulation(&self, design: &Design, path: &Path) -> Result<Simulation> {
         let fidelity = self.fidelity(design);
         fidelity.check(design.cell.shape, design.cell.lattice)?;
+        if let Some(model) = self.model()? {
+            model.check_shape(design.cell.shape)?;
+        }
         let by_site = self.model.is_some() || fidelity == Fidelity::Neighbours;
         Simulation::choose(design, path, self.accuracy(), by_site, self.memory_mb)
+    }
+
+    fn model(&self) -> Result<Option<CalibratedModel>> {
+        self.model.as_deref().map(CalibratedModel::read).transpose()
     }
 
     /// Say how a layout will be simulated, if not as usual.
@@ -173,7 +180,7 @@ impl Judging {
                 return self.report(design, array, &found, None, folder, terminal);
             }
         }
-        let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
+        let model = self.model()?;
         let chip = |model| MadeChip::in_light(&design.lit_stack()?, model);
         let made = model.as_ref().map(chip).transpose()?;
         // A made chip judges, and cells of the pillars as drawn stand beside it.

@@ -39,6 +39,18 @@ pub struct ModelStatement {
     pub not_applied: Vec<NotApplied>,
 }
 
+impl ModelStatement {
+    /// Of simulations at single wavelengths by a model.
+    pub fn of(model: &CalibratedModel) -> Self {
+        Self {
+            set: model.set.clone(),
+            finding: model.finding.clone(),
+            applied: model.perturbation.applied(),
+            not_applied: model.perturbation.not_applied(),
+        }
+    }
+}
+
 /// One made element in one light: everything between a wave that arrives and the PSF on the sensor.
 pub struct MadeView<'a> {
     pub element: &'a MadeElement,
@@ -107,12 +119,7 @@ impl MadeChip {
 
     /// What to say in a report of simulations at single wavelengths.
     pub fn statement(&self) -> ModelStatement {
-        ModelStatement {
-            set: self.model.set.clone(),
-            finding: self.model.finding.clone(),
-            applied: self.perturbation().applied(),
-            not_applied: self.perturbation().not_applied(),
-        }
+        ModelStatement::of(&self.model)
     }
 
     /// |t| of a cell that passes all its power in the zero order.

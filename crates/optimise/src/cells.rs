@@ -29,12 +29,7 @@ impl TaskCells {
                 RigorousCell::obtain(&design.table_spec()?, cache, progress)?.0,
             ))
         };
-        if design.cell.shape.upright().is_some() {
-            return Err(Error::invalid(
-                "optimise and upright rectangles, which have a phase for each polarisation",
-                "use squares, circles or rotated rectangles: it finds one phase for all light",
-            ));
-        }
+        check_shape(design)?;
         if let Some(pillars) = design.cell.shape.rotated() {
             let arriving = design.cell.arriving.unwrap_or_default();
             return Ok(Self {
@@ -135,4 +130,17 @@ fn among_neighbours(design: &Design, cache: Option<&Path>, progress: &dyn Progre
     let cell = neighbour_cell(design, cache.map(Path::to_owned))?;
     cell.among_neighbours_in_band(band.0, &|_| [0.0; 2], progress)?;
     Ok(cell)
+}
+/// Nothing, if the pillars of a design are such as a phase is found for.
+///
+/// # Errors
+/// If they are upright rectangles.
+pub(super) fn check_shape(design: &Design) -> Result<()> {
+    match design.cell.shape.upright() {
+        None => Ok(()),
+        Some(_) => Err(Error::invalid(
+            "the pillars are upright rectangles, which have a phase for each polarisation",
+            "use squares, circles or rotated rectangles: the optimiser finds one phase for all light",
+        )),
+    }
 }

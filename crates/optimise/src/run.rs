@@ -1,5 +1,6 @@
 //! From a design to its optimised phase.
 
+use super::cells::check_shape;
 use super::checkpoint::Checkpoint;
 use super::field::FieldProblem;
 use super::focus::Lens;
@@ -54,6 +55,7 @@ impl OptimiseTask {
     /// # Errors
     /// If its lens has no rings or a phase over the plane, or elements have lenses of their own.
     pub fn of(design: &Design) -> Result<Self> {
+        check_shape(design)?;
         design.one_lens("the optimiser")?;
         design.radial_phase("the optimiser")?;
         let rings = Rings::new(design.lattice(), design.lens.diameter_nm)?;

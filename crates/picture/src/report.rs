@@ -5,7 +5,7 @@ use ndarray::Array3;
 use serde::Serialize;
 
 use metalith_cell::{Fidelity, FocusedLight, PolarisedLight};
-use metalith_made::NotApplied;
+use metalith_made::ModelStatement;
 
 use crate::assumed::AssumedScore;
 use crate::doubt::DoubtReport;
@@ -36,6 +36,9 @@ pub struct PictureReport {
     pub saturated: usize,
     /// The same as a share of all pixels.
     pub saturated_share: f64,
+    /// The calibrated model that the chip is made by, if one was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub model: Option<ModelStatement>,
     /// What is to be known before anything else: pixels that were lost, scenes and layouts that are not what they seem.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
@@ -98,12 +101,23 @@ pub struct Assumption {
     pub value: String,
 }
 
-impl From<NotApplied> for Assumption {
-    fn from(quantity: NotApplied) -> Self {
-        Self {
-            what: format!("`{}` of the model", quantity.quantity),
-            value: format!("{} there, not applied: {}", quantity.value, quantity.because),
-        }
+impl Assumption {
+    /// What a calibrated model says: where it comes from, what it changes, and what of it is not applied.
+    pub fn of_model(model: &ModelStatement) -> Vec<Self> {
+        let of = |quantity: &str, value: String| Self {
+            what: format!("`{quantity}` of the model"),
+            value,
+        };
+        let origin = Self {
+            what: "calibrated model".into(),
+            value: format!("of {}: {}", model.set, model.finding),
+        };
+        let applied = model.applied.iter().map(|q| of(&q.quantity, q.value.to_string()));
+        let not_applied = model.not_applied.iter().map(|q| {
+            let value = format!("{} there, not applied: {}", q.value, q.because);
+            of(q.quantity, value)
+        });
+        std::iter::once(origin).chain(applied).chain(not_applied).collect()
     }
 }
 

@@ -108,7 +108,7 @@ impl MadeRectangles {
                 "say circular light of rotated rectangles, linear light of upright ones, and none of others",
             ));
         };
-        check_model(model)?;
+        model.check_shape(stated.shape)?;
         Ok(Self {
             pillars,
             focused,
@@ -186,18 +186,31 @@ impl MadeRectangles {
     }
 }
 
+impl CalibratedModel {
+    /// Nothing, if all that the model says has a meaning for pillars of this shape.
+    ///
+    /// # Errors
+    /// If they are rectangles and it says what counts for one width alone.
+    pub fn check_shape(&self, shape: PillarShape) -> Result<()> {
+        match shape.rectangles() {
+            Some(_) => check_rectangles(self),
+            None => Ok(()),
+        }
+    }
+}
+
 /// What rectangles have no meaning for.
-fn check_model(model: &CalibratedModel) -> Result<()> {
+fn check_rectangles(model: &CalibratedModel) -> Result<()> {
     let (geometry, cell) = (&model.perturbation.geometry, &model.perturbation.cell);
     if !geometry.transmission.is_empty() || !geometry.transmission_phase_rad.is_empty() {
         return Err(Error::invalid(
-            "a model with a transmission that goes by the width of pillars, of rectangles",
+            "the pillars are rectangles, and the transmission of the model goes by one width",
             "give a model without `transmission` and `transmission_phase_rad`: rectangles are told by no one width",
         ));
     }
     if cell.corner_rounding_nm != 0.0 {
         return Err(Error::invalid(
-            "a model with rounded corners, of rectangles",
+            "the pillars are rectangles, and the model rounds corners",
             "set `corner_rounding_nm = 0` in [perturbation.cell] of the model: rectangles are solved with sharp corners",
         ));
     }
