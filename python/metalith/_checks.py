@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from . import _native
+from . import _arguments, _native
 from ._layouts import Design
 from ._types import Json, PathLike, Progress
 
@@ -53,7 +53,8 @@ def check(
     """Check a layout against design rules: those of the program if ``rules`` is left out. ``design`` puts the rules in
     force that compare with it."""
     native = design._native if design is not None else None
-    text, clean = _native.check(layout, rules, native, list(with_layouts), waivers, markers, progress)
+    most = _arguments.whole("markers", markers, 0, _arguments.MOST_32)
+    text, clean = _native.check(layout, rules, native, list(with_layouts), waivers, most, progress)
     found = json.loads(text)
     places = [Marker(rule["id"], m) for rule in found["rules"] for m in rule.get("markers", [])]
     return CheckReport(clean=clean, rules=found["rules"], markers=places, numbers=found)

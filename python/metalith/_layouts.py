@@ -10,7 +10,7 @@ from typing import Any, Literal, TypeAlias, Union
 import numpy as np
 import numpy.typing as npt
 
-from . import _native
+from . import _arguments, _native
 from ._types import Bools, Float64, Int64, PathLike, Progress, Widths
 
 
@@ -34,7 +34,7 @@ class Rectangles:
 
     def rotations_deg(self, numbers: npt.ArrayLike) -> Float64:
         """Rotations (degrees) from 0 up to 180; NaN where there is no pillar."""
-        values = _whole(np.asarray(numbers))
+        values = _arguments.widths(np.asarray(numbers))
         rotations = _native.rotations_deg(values.ravel(), *_told(self)[1:])
         return rotations.reshape(values.shape)
 
@@ -54,7 +54,7 @@ class UprightRectangles:
     def numbers(self, widths_x_nm: npt.ArrayLike, widths_y_nm: npt.ArrayLike) -> Widths:
         """The numbers that stand in maps for widths along x and y (nm): 1 to ``lengths`` squared, first along x; zero where
         both widths are."""
-        x, y = (_whole(np.asarray(widths)) for widths in (widths_x_nm, widths_y_nm))
+        x, y = (_arguments.widths(np.asarray(widths)) for widths in (widths_x_nm, widths_y_nm))
         if x.shape != y.shape:
             raise _native.MetalithError(
                 f"widths along x of shape {x.shape}, along y of {y.shape}\n  help: give both for each pillar"
@@ -63,7 +63,7 @@ class UprightRectangles:
 
     def widths_nm(self, numbers: npt.ArrayLike) -> tuple[Widths, Widths]:
         """Widths along x and along y (nm); zero where there is no pillar."""
-        values = _whole(np.asarray(numbers))
+        values = _arguments.widths(np.asarray(numbers))
         x, y = _native.upright_widths(values.ravel(), *_told(self)[1:])
         return x.reshape(values.shape), y.reshape(values.shape)
 
@@ -93,7 +93,9 @@ class Places:
 def places(sites: int, *, pitch_nm: int, lattice: Lattice = "square") -> Places:
     """Where the columns and rows of a map of ``sites`` x ``sites`` are. A hexagonal lattice has an odd number of them, one
     in the middle; ``2 * ceil(diameter / pitch) + 1`` hold a round lens."""
-    return Places(*_native.places(sites, pitch_nm, lattice))
+    most = _arguments.MOST_32
+    numbers = (_arguments.whole("sites", sites, 1, most), _arguments.whole("pitch_nm", pitch_nm, 1, most))
+    return Places(*_native.places(*numbers, lattice))
 
 
 def _lattice(told: str) -> Lattice:
@@ -103,10 +105,19 @@ def _lattice(told: str) -> Lattice:
 def _told(shape: Shape) -> tuple[str, int, int, int]:
     """A shape as the native module has it: a word and three numbers."""
     if isinstance(shape, Rectangles):
-        return ("rectangle", shape.width_nm, shape.length_nm, shape.steps)
+        return ("rectangle", *_numbers(width_nm=shape.width_nm, length_nm=shape.length_nm, steps=shape.steps))
     if isinstance(shape, UprightRectangles):
-        return ("upright_rectangle", shape.shortest_nm, shape.step_nm, shape.lengths)
+        return (
+            "upright_rectangle",
+            *_numbers(shortest_nm=shape.shortest_nm, step_nm=shape.step_nm, lengths=shape.lengths),
+        )
     return (shape, 0, 0, 0)
+
+
+def _numbers(**named: int) -> tuple[int, int, int]:
+    """Three numbers of rectangles, by their names."""
+    first, second, third = (_arguments.whole(name, value, 1, _arguments.MOST_16) for name, value in named.items())
+    return first, second, third
 
 
 def _shape(told: tuple[str, int, int, int]) -> Shape:
@@ -259,7 +270,7 @@ class Array:
         """Widths of the pillars of one element (nm), diameters of circles, numbers of rectangles: uint16,
         shape ``[sites, sites]``, rows along +y, columns along +x, zero where there is none. :meth:`places` says where these
         are: on a hexagonal lattice every other place of the grid is empty."""
-        return self._native.widths(element)
+        return self._native.widths(_arguments.element(element, len(self)))
 
     def rotations_deg(self, element: int) -> Float64:
         """Rotations of the rectangles of one element (degrees), NaN where there is none."""
@@ -277,7 +288,7 @@ class Array:
 
         ``hierarchy`` is ``folded``, ``sref`` or ``flat``, the same geometry; that of the design if left out. ``layer``
         is for arrays without a design."""
-        return self._native.write(path, hierarchy, layer, progress)
+        return self._native.write(path, hierarchy, _arguments.layer(layer), progress)
 
     def __repr__(self) -> str:
         return f"Array({len(self)} elements, {self.pillars:,} pillars)"
@@ -309,11 +320,13 @@ class Layout:
 
     def places(self, element: int) -> Places:
         """Where the columns and rows of the map of widths of one element are, from its centre."""
-        return places(len(self.widths[element]), pitch_nm=self.pitch_nm, lattice=self.lattice)
+        k = _arguments.element(element, len(self.widths))
+        return places(len(self.widths[k]), pitch_nm=self.pitch_nm, lattice=self.lattice)
 
     def rotations_deg(self, element: int) -> Float64:
         """Rotations of the rectangles of one element (degrees), NaN where there is none."""
-        return _rectangles(self.shape).rotations_deg(self.widths[element])
+        k = _arguments.element(element, len(self.widths))
+        return _rectangles(self.shape).rotations_deg(self.widths[k])
 
 
 def _rectangles(shape: Shape) -> Rectangles:
@@ -337,7 +350,7 @@ def read_layout(
     elements stand on lattices of one kind and pitch."""
     natives = (design._native if design is not None else None, array._native if array is not None else None)
     names, centres, widths, pitch_nm, lattice, pillars, others, found, shape = _native.read_layout(
-        path, layer, top, *natives, progress
+        path, _arguments.layer(layer), top, *natives, progress
     )
     return Layout(
         widths=widths,
@@ -378,23 +391,15 @@ def write_layout(
     if isinstance(shape, Rectangles):
         maps = [shape.numbers(w) for w in widths]
     else:
-        maps = [_whole(np.asarray(w)) for w in widths]
+        maps = [_arguments.widths(np.asarray(w)) for w in widths]
     if centres_nm is None and len(maps) == 1:
         centres_nm = [(0, 0)]
-    centres = [(int(x), int(y)) for x, y in centres_nm or []]
+    for one in maps:
+        _arguments.square("widths", one)
+    most = _arguments.MOST_NM
+    along = [[_arguments.whole("centres_nm", int(nm), -most, most) for nm in centre] for centre in centres_nm or []]
+    centres = [(x, y) for x, y in along]
+    pitch_nm = _arguments.whole("pitch_nm", pitch_nm, 1, _arguments.MOST_32)
     array = Array(_native.array_of_widths(maps, pitch_nm, lattice, centres, _told(shape), progress))
     array.write(path, hierarchy=hierarchy, layer=layer, progress=progress)
     return array
-
-
-def _whole(widths: npt.NDArray[np.generic]) -> Widths:
-    """Widths as uint16, if that changes none."""
-    if widths.dtype == np.uint16:
-        return np.ascontiguousarray(widths, dtype=np.uint16)
-    with np.errstate(invalid="ignore"):
-        whole = widths.astype(np.uint16)
-    if not np.array_equal(whole, widths):
-        raise _native.MetalithError(
-            "widths that are not whole nanometres from 0 to 65535\n  help: round them to even nanometres first"
-        )
-    return whole

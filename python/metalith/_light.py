@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, overload
@@ -9,13 +10,16 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 import numpy as np
 import numpy.typing as npt
 
-from . import _native
+from . import _arguments, _native
 from ._figures import imported
 from ._layouts import Array, Lattice, Layout, Rectangles, Shape, _told
-from ._types import Complex64, Complex128, Float64, Progress, Widths
+from ._types import Complex64, Complex128, Float64, Json, PathLike, Progress, Widths
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+# Along an axis of a window: what spectra of the program hold.
+MOST_SAMPLES = 8192
 
 SILICON_NITRIDE = "sin_luke_2015"
 FUSED_SILICA = "fused_silica_malitson_1965"
@@ -37,6 +41,8 @@ class Psf:
     """Places of the rows (um)."""
     values: Float64 = field(repr=False)
     """Intensity over that of the light that arrives, shape ``[samples, samples]``."""
+    pixel_um: float = field(repr=False)
+    """Edge of the sensor pixel that energies and frequencies are of (um)."""
     strehl: float
     peak_um: tuple[float, float] = field(repr=False)
     centroid_um: tuple[float, float] = field(repr=False)
@@ -63,15 +69,18 @@ class Psf:
 class PsfSet(Sequence[Psf]):
     """PSFs of elements, wavelengths and fields, in this order."""
 
-    def __init__(self, psfs: list[Psf]) -> None:
+    def __init__(self, psfs: list[Psf], model: Json | None = None) -> None:
         self._psfs = psfs
+        self.model = model
+        """What the model says that they were made by: ``set``, ``finding``, and what was ``not_applied``, each with the
+        reason; None for pillars as drawn."""
 
     @overload
     def __getitem__(self, k: int) -> Psf: ...
     @overload
     def __getitem__(self, k: slice) -> PsfSet: ...
     def __getitem__(self, k: int | slice) -> Psf | PsfSet:
-        return PsfSet(self._psfs[k]) if isinstance(k, slice) else self._psfs[k]
+        return PsfSet(self._psfs[k], self.model) if isinstance(k, slice) else self._psfs[k]
 
     def __len__(self) -> int:
         return len(self._psfs)
@@ -155,9 +164,12 @@ def psf(
     field_deg: Sequence[tuple[float, float]] = ((0.0, 0.0),),
     *,
     elements: Sequence[int] | None = None,
-    fidelity: str = "rigorous",
+    fidelity: str | None = None,
+    model: PathLike | None = None,
     fast: bool = False,
     samples: int | None = None,
+    pixel_um: float | None = None,
+    aperture_um: float | None = None,
     distance_um: float | None = None,
     pitch_nm: int | None = None,
     shape: Shape = "square",
@@ -171,11 +183,20 @@ def psf(
 ) -> PsfSet:
     """PSFs of the distinct lenses of an array, of the elements of a layout that was read, or of one map of widths.
 
-    ``field_deg`` counts from where an element looks. ``fidelity`` is ``rigorous`` (a lattice of equal pillars, along the
-    normal), ``neighbours`` (each pillar among its own neighbours;
+    ``field_deg`` counts from where an element looks. ``elements`` counts from zero. ``fidelity`` is ``rigorous`` (a lattice of
+    equal pillars, along the normal; so if left out), ``neighbours`` (each pillar among its own neighbours;
     solved in minutes for each direction of light, then kept), ``fitted`` or
-    ``published``. ``fast`` allows errors of 1e-3 instead of 1e-5 of the peak. An array of a design knows its sensor and
-    its pillars; else ``distance_um`` and, for a map of widths, ``pitch_nm`` are needed, ``shape`` where pillars are no
+    ``published``. In its place ``model`` takes the chip as made, by the ``model.toml`` of a calibration: what it adds to distance
+    and angles is added to those stated, and ``.model`` of the result says what of it was not applied. ``aperture_um`` is the
+    diameter of the openings in the metal, for a model whose aperture is off its place: that of the circle around the
+    pillars if left out.
+
+    ``pixel_um`` is the edge of the sensor pixel that ``energy_1_pixel``, ``energy_2_pixels`` and the MTF are of. Left out, it is
+    that of the design for an array of a design, and 5.86 um for all else: a layout says nothing of the sensor, also of one
+    that was read at the elements of a design. ``samples`` along an axis of the window, one pitch apart, are those of the design
+    or 128. ``fast`` allows errors of 1e-3 instead of 1e-5 of the peak.
+
+    An array of a design knows its sensor and its pillars; else ``distance_um`` and, for a map of widths, ``pitch_nm`` are needed, ``shape`` where pillars are no
     squares, and ``lattice`` where they stand on a hexagonal one, which ``rigorous`` and ``fitted`` alone know.
     Rectangles are solved by ``rigorous`` alone, in light that arrives ``left`` or ``right`` circularly
     polarised, linearly along ``x`` or ``y`` or at an angle from x towards y in degrees, or ``unpolarised`` (``arriving``);
@@ -183,38 +204,45 @@ def psf(
     ``analyser`` is what is before the sensor: ``x``, ``y`` or an angle, or, of rotated rectangles, ``circular``, which passes
     what light that arrives ``left`` or ``right`` is converted to. An
     array of a design is in the light that the design says. Intensities are over that of all light that arrives."""
-    wavelengths = [float(nm) for nm in np.atleast_1d(np.asarray(wavelengths_nm, dtype=float))]
-    fields = [(float(x), float(y)) for x, y in field_deg]
+    wavelengths = [float(nm) for nm in _arguments.wavelengths("wavelengths_nm", wavelengths_nm).ravel()]
+    if not wavelengths:
+        raise _native.MetalithError("PSFs at no wavelength\n  help: give at least one in `wavelengths_nm`")
+    fields = _arguments.fields(field_deg)
+    samples = _arguments.maybe_whole("samples", samples, 1, MOST_SAMPLES)
     if isinstance(of, Array) and of.design is not None:
-        own = (distance_um, pitch_nm, shape, lattice, arriving, analyser, pillar_height_nm, pillar, substrate)
-        if own != (None, None, "square", "square", None, None, 700.0, SILICON_NITRIDE, FUSED_SILICA):
+        own = (distance_um, aperture_um, pitch_nm, shape, lattice, arriving, analyser, pillar_height_nm, pillar, substrate)
+        if own != (None, None, None, "square", "square", None, None, 700.0, SILICON_NITRIDE, FUSED_SILICA):
             raise _native.MetalithError(
                 "an array of a design knows its sensor, its pillars and its light\n"
-                "  help: leave out `distance_um`, `pitch_nm`, `shape`, `lattice`, `arriving`, `analyser` and what pillars are made of,"
+                "  help: leave out `distance_um`, `aperture_um`, `pitch_nm`, `shape`, `lattice`, `arriving`, `analyser` and what pillars are made of,"
                 " or change the design"
             )
-        chosen = list(elements) if elements is not None else None
-        found = _native.psf_of_array(
-            of._native, wavelengths, fields, fidelity, fast, samples, chosen, progress
+        chosen = None if elements is None else _arguments.elements(elements, len(of))
+        found, said = _native.psf_of_array(
+            of._native, wavelengths, fields, fidelity, model, fast, samples, pixel_um, chosen, progress
         )
-        return PsfSet([Psf(**p) for p in found])
-    maps, pitch, lattice, shape = _maps(of, pitch_nm, lattice, shape)
-    if elements is not None:
-        maps = [maps[k] for k in elements]
+        return _set(found, said)
+    maps, centres, pitch, lattice, shape = _maps(of, pitch_nm, lattice, shape)
+    numbers = list(range(len(maps))) if elements is None else _arguments.elements(elements, len(maps))
     if distance_um is None:
         raise _native.MetalithError(
             "a layout says nothing of the sensor\n  help: give `distance_um`, from the pillar tops to the sensor"
         )
-    found = _native.psf_of_widths(
-        maps,
+    found, said = _native.psf_of_widths(
+        [maps[k] for k in numbers],
+        [f"element {k}" for k in numbers],
+        [centres[k] for k in numbers],
         pitch,
         lattice,
         wavelengths,
         fields,
         distance_um,
         fidelity,
+        model,
+        aperture_um,
         fast,
-        samples or 128,
+        128 if samples is None else samples,
+        pixel_um,
         _told(shape),
         None if arriving is None else str(arriving),
         None if analyser is None else str(analyser),
@@ -223,19 +251,26 @@ def psf(
         substrate,
         progress,
     )
-    return PsfSet([Psf(**p) for p in found])
+    return _set(found, said)
+
+
+def _set(found: list[dict[str, Any]], said: str | None) -> PsfSet:
+    return PsfSet([Psf(**p) for p in found], None if said is None else json.loads(said))
 
 
 def _maps(
     of: Array | Layout | Widths, pitch_nm: int | None, lattice: Lattice, shape: Shape
-) -> tuple[list[Widths], int, Lattice, Shape]:
+) -> tuple[list[Widths], list[tuple[int, int]], int, Lattice, Shape]:
+    """Pillars and centre (nm) of each element, and how they stand."""
     if isinstance(of, Layout):
-        return of.widths, of.pitch_nm, of.lattice, of.shape
+        return of.widths, of.centres_nm, of.pitch_nm, of.lattice, of.shape
     if isinstance(of, Array):
-        return [of.widths(k) for k in range(len(of))], of.pitch_nm, of.lattice, of.shape
+        return [of.widths(k) for k in range(len(of))], of.centres_nm, of.pitch_nm, of.lattice, of.shape
     if pitch_nm is None:
         raise _native.MetalithError("a map of widths has no pitch\n  help: give `pitch_nm`")
-    return [shape.numbers(of) if isinstance(shape, Rectangles) else of], pitch_nm, lattice, shape
+    one = shape.numbers(of) if isinstance(shape, Rectangles) else _arguments.widths(np.asarray(of))
+    _arguments.square("of", one)
+    return [one], [(0, 0)], _arguments.whole("pitch_nm", pitch_nm, 1, _arguments.MOST_32), lattice, shape
 
 
 class Transmission(np.ndarray[Any, np.dtype[np.complex128]]):
@@ -315,8 +350,9 @@ def cell(
     analysis, for light along the normal from the substrate: complex128 of the shape of ``width_nm`` followed by that of
     ``wavelength_nm``. It is a ratio of fields, from the foot of the pillars to their tops; ``orders`` along an axis, odd.
     Widths of circles are diameters; on a hexagonal lattice pillars are circles, and ``pitch_nm`` is a whole number.
-    ``.to_xarray()`` and ``.plot()`` show it with its widths and wavelengths."""
-    widths, wavelengths = np.asarray(width_nm, dtype=float), np.asarray(wavelength_nm, dtype=float)
+    A width of zero is a site without pillar, the bare substrate; a negative one is refused. No widths or no wavelengths give an
+    empty array, as numpy's own functions do. ``.to_xarray()`` and ``.plot()`` show it with its widths and wavelengths."""
+    widths, wavelengths = np.asarray(width_nm, dtype=float), _arguments.wavelengths("wavelength_nm", wavelength_nm)
     found = _native.cell(
         widths.ravel(),
         wavelengths.ravel(),
@@ -326,7 +362,7 @@ def cell(
         pillar_height_nm,
         pillar,
         substrate,
-        orders,
+        _arguments.whole("orders", orders, 1, _arguments.MOST_16),
         progress,
     )
     t = found.reshape(widths.shape + wavelengths.shape).view(Transmission)
@@ -336,7 +372,7 @@ def cell(
 
 def index(material: str, wavelength_nm: npt.ArrayLike) -> Complex128:
     """Complex refractive index of a material that a design can name, or of a CSV file; absorption is positive."""
-    wavelengths = np.asarray(wavelength_nm, dtype=float)
+    wavelengths = _arguments.wavelengths("wavelength_nm", wavelength_nm)
     return _native.index(material, wavelengths.ravel()).reshape(wavelengths.shape)
 
 
@@ -361,15 +397,16 @@ def propagate(
     cell: ``pitch_nm`` apart, of weight pitch squared, on a square lattice; on a hexagonal one zero where there is no site.
     The window is about ``at_um``, its samples ``step_um`` apart (the pitch if left out). ``direct`` takes the Rayleigh-Sommerfeld sum
     over all samples instead of folded transforms: slow, and what they are tested against."""
-    values = np.ascontiguousarray(aperture, dtype=np.complex128)
+    values = np.asarray(aperture, dtype=np.complex128)
+    _arguments.square("aperture", values)
     return _native.propagate(
-        values,
-        pitch_nm,
+        np.ascontiguousarray(values),
+        _arguments.whole("pitch_nm", pitch_nm, 1, _arguments.MOST_32),
         lattice,
-        wavelength_nm,
+        float(_arguments.wavelengths("wavelength_nm", wavelength_nm)),
         distance_um,
         at_um,
-        samples,
+        _arguments.whole("samples", samples, 1, MOST_SAMPLES),
         step_um,
         incidence_deg,
         fast,

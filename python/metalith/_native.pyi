@@ -94,22 +94,29 @@ def psf_of_array(
     array: Array,
     wavelengths_nm: list[float],
     fields_deg: list[tuple[float, float]],
-    fidelity: str,
+    fidelity: str | None,
+    model: PathLike | None,
     fast: bool,
     samples: int | None,
+    pixel_um: float | None,
     elements: list[int] | None = None,
     progress: Progress | None = None,
-) -> list[dict[str, Any]]: ...
+) -> tuple[list[dict[str, Any]], str | None]: ...
 def psf_of_widths(
     widths: list[Widths],
+    names: list[str],
+    centres_nm: list[tuple[int, int]],
     pitch_nm: int,
     lattice: str,
     wavelengths_nm: list[float],
     fields_deg: list[tuple[float, float]],
     distance_um: float,
-    fidelity: str,
+    fidelity: str | None,
+    model: PathLike | None,
+    aperture_um: float | None,
     fast: bool,
     samples: int,
+    pixel_um: float | None,
     shape: ToldShape,
     arriving: str | None,
     analyser: str | None,
@@ -117,7 +124,7 @@ def psf_of_widths(
     pillar: str,
     substrate: str,
     progress: Progress | None = None,
-) -> list[dict[str, Any]]: ...
+) -> tuple[list[dict[str, Any]], str | None]: ...
 def propagate(
     aperture: Complex128,
     pitch_nm: int,

@@ -7,9 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from . import _native
+from . import _arguments, _native
 from ._layouts import Design
 from ._types import Float64, PathLike, Progress
+
+# Pixels along a side of a scene, as in the program.
+MOST_SIDE = 4096
 
 METHODS = ("tikhonov", "tv", "richardson-lucy", "hqs", "prior")
 
@@ -56,7 +59,9 @@ class Studio:
         prior: PathLike | None = None,
         progress: Progress | None = None,
     ) -> None:
-        rows, columns = shape
+        if len(shape) != 2:
+            raise _native.MetalithError(f"a `shape` of {len(shape)} numbers\n  help: give rows and columns of the scenes")
+        rows, columns = (_arguments.whole("shape", n, 1, MOST_SIDE) for n in shape)
         self.shape = shape
         self.field_deg = field_deg
         self._native = _native.Studio.open(
@@ -64,12 +69,15 @@ class Studio:
         )
 
     def record(self, scene: npt.ArrayLike, *, seed: int = 1, progress: Progress | None = None) -> Frame:
-        """The frame of a scene ``[row, column, colour]`` in linear sRGB, white being 1; noise is drawn from ``seed``."""
-        return Frame(self._native.record(np.ascontiguousarray(scene, dtype=np.float64), seed, progress))
+        """The frame of a scene ``[row, column, colour]`` in linear sRGB, white being 1, or of a grey one ``[row, column]``; noise
+        is drawn from ``seed``."""
+        drawn = _arguments.whole("seed", seed, 0, _arguments.MOST_64)
+        return Frame(self._native.record(_scene(scene), drawn, progress))
 
     def truth(self, scene: npt.ArrayLike) -> Float64:
-        """What an ideal camera with the same channels gives of a scene, linear sRGB: what pictures are held to."""
-        return self._native.truth(np.ascontiguousarray(scene, dtype=np.float64))
+        """What an ideal camera with the same channels gives of a scene, as :meth:`record` takes it, linear sRGB: what pictures
+        are held to. It is ``[row, column, colour]``, of a grey scene too."""
+        return self._native.truth(_scene(scene))
 
     def restore(
         self, frame: Frame, method: str = "tikhonov", *, joint: bool = True, progress: Progress | None = None
@@ -81,14 +89,32 @@ class Studio:
     def samples(self, frame: Frame, count: int, *, progress: Progress | None = None) -> Sequence[Float64]:
         """Pictures that a frame may be of, drawn by the learnt prior: their mean is a picture, their spread says how sure
         it is."""
-        return self._native.samples(frame._native, count, progress)
+        wanted = _arguments.whole("count", count, 1, _arguments.MOST_32)
+        return self._native.samples(frame._native, wanted, progress)
+
+
+def _scene(given: npt.ArrayLike) -> Float64:
+    """A scene in three colours."""
+    return _arguments.colours("scene", np.asarray(given, dtype=np.float64))
 
 
 def denoise(
     values: npt.ArrayLike, deviation: npt.ArrayLike, *, weights: PathLike | None = None
 ) -> npt.NDArray[np.float32]:
-    """A picture ``[row, column, colour]`` of sRGB values from 0 to 1 without its normal noise. ``deviation``: of the noise, in
-    the same unit; one number, or one for each value."""
-    given = np.ascontiguousarray(values, dtype=np.float32)
-    everywhere = np.ascontiguousarray(np.broadcast_to(np.asarray(deviation, dtype=np.float32), given.shape))
-    return _native.denoise(given, everywhere, weights)
+    """A picture ``[row, column, colour]`` of sRGB values from 0 to 1 without its normal noise, or a grey one ``[row, column]``,
+    which stays grey. ``deviation``: of the noise, in the same unit; one number, or one for each value."""
+    given = np.asarray(values, dtype=np.float32)
+    noise = np.asarray(deviation, dtype=np.float32)
+    try:
+        everywhere = np.broadcast_to(noise, given.shape)
+    except ValueError:
+        raise _native.MetalithError(
+            f"a deviation of shape {noise.shape} for values of {given.shape}\n"
+            "  help: give one number, or one for each value"
+        ) from None
+    found = _native.denoise(_arguments.colours("values", given), _arguments.colours("deviation", everywhere), weights)
+    if given.ndim == 3 and given.shape[2] == 3:
+        return found
+    # As restoration does with the plane of a camera that sees no colours.
+    grey: npt.NDArray[np.float32] = found.mean(axis=2, dtype=np.float32).reshape(given.shape)
+    return grey

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from . import _native
+from . import _arguments, _native
 from ._types import Json, PathLike, Progress
 
 
@@ -54,7 +54,7 @@ class Study:
     ) -> None:
         self.tolerance = Path(tolerance)
         self.folder = Path(folder) if folder is not None else self.tolerance.with_suffix(".study")
-        self._draws_per_shard = draws_per_shard
+        self._draws_per_shard = _arguments.maybe_whole("draws_per_shard", draws_per_shard, 1, _arguments.MOST_64)
         self._shards: int | None = None
 
     def plan(self, progress: Progress | None = None) -> Json:
@@ -86,7 +86,8 @@ class Study:
 
     def result(self, out: PathLike | None = None, psfs: int = 0, progress: Progress | None = None) -> StudyResult:
         """All draws. ``out``: a folder for the page, with the PSFs of so many of the worst draws."""
-        found = json.loads(_native.study_merge(self.folder, out, psfs, progress))
+        shown = _arguments.whole("psfs", psfs, 0, _arguments.MOST_32)
+        found = json.loads(_native.study_merge(self.folder, out, shown, progress))
         study = found["study"]
         return StudyResult(
             draws=found["draws"],

@@ -13,7 +13,8 @@ use pyo3::prelude::*;
 use crate::arrays::Design;
 use crate::work::work;
 
-fn json(value: &impl serde::Serialize) -> String {
+/// Plain data as JSON.
+pub fn json(value: &impl serde::Serialize) -> String {
     serde_json::to_string(value).expect("plain data serialises")
 }
 

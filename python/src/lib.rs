@@ -12,6 +12,7 @@ mod pictures;
 mod psf;
 mod shapes;
 mod studies;
+mod wanted;
 mod work;
 
 use pyo3::create_exception;

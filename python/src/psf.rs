@@ -1,103 +1,68 @@
 //! PSFs of arrays and of maps of widths.
 
-use metalith::cell::{
-    Analyser, FittedCell, Handedness, PointwiseCell, Polarisation, PolarisationAxis, PolarisedLight, PublishedCell,
-    RotatedCell, UprightCell, cache_folder,
-};
-use metalith::design::band_about;
+use std::path::PathBuf;
+
+use metalith::cell::{LitStack, PolarisedLight};
 use metalith::extract::{ElementSite, ExtractedElement, Extraction};
-use metalith::grating::{Mapping, NeighbourCell};
 use metalith::verify::{Lighting, SimulationCase, SinglePsf, single_psfs};
 use metalith::wave::propagation::{incident, landing_um};
-use metalith::{
-    Accuracy, CellModel, Error, Fidelity, LatticeKind, PillarShape, Progress, Rectangles, Result, Wedge, WidthMap,
-    cell_models,
-};
+use metalith::{Accuracy, Error, MadeChip, PillarShape, Progress, Result, Wedge, WidthMap, cell_models};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{Array, no_wedge, width_map};
+use crate::checks::json;
 use crate::lattices::{kind_of, stack_on};
 use crate::light::stack;
 use crate::shapes::{ToldShape, shape_of};
+use crate::wanted::{Wanted, cell_of, focused, polarised, refuse};
 use crate::work::{error, work};
 
-/// The cell that a word names.
-fn fidelity(word: &str) -> Result<Fidelity> {
-    match word {
-        "rigorous" => Ok(Fidelity::Rigorous),
-        "neighbours" => Ok(Fidelity::Neighbours),
-        "fitted" => Ok(Fidelity::Fitted),
-        "published" => Ok(Fidelity::Published),
-        _ => Err(Error::invalid(
-            format!("there is no fidelity `{word}`"),
-            "use rigorous, neighbours, fitted or published",
+/// Edge of a sensor pixel where neither a design nor the caller says (um).
+const PIXEL_UM: f64 = 5.86;
+
+/// Edges of pixels that are taken (um), as by the program.
+const PIXELS_UM: std::ops::RangeInclusive<f64> = 0.1..=100.0;
+
+/// Diameters of openings that are taken (um), as by the program.
+const APERTURES_UM: std::ops::RangeInclusive<f64> = 0.1..=1e5;
+
+/// Nothing, if a length that is given lies within a range (um).
+fn within(what: &str, um: Option<f64>, range: &std::ops::RangeInclusive<f64>) -> Result<()> {
+    match um.filter(|um| !range.contains(um)) {
+        Some(um) => Err(Error::invalid(
+            format!("{what} = {um}"),
+            format!(
+                "give a number from {} to {}, in micrometres",
+                range.start(),
+                range.end()
+            ),
         )),
+        None => Ok(()),
     }
-}
-
-/// The light that words or angles name, at pillars of a shape.
-fn polarised(arriving: Option<&str>, analyser: Option<&str>, shape: PillarShape) -> Result<PolarisedLight> {
-    let own = match shape.upright() {
-        Some(_) => PolarisationAxis::X.polarisation(),
-        None => Polarisation::Circular(Handedness::default()),
-    };
-    let arriving: Polarisation = arriving.map_or(Ok(own), str::parse)?;
-    let analyser: Option<Analyser> = analyser.map(str::parse).transpose()?;
-    let usual = arriving == own && analyser.is_none();
-    if shape.upright().is_some() && analyser == Some(Analyser::Circular) {
-        return Err(Error::invalid(
-            "a circular analyser behind upright rectangles, which focus no hand",
-            "give `analyser` x, y or an angle",
-        ));
-    }
-    if shape.rectangles().is_none() && !usual {
-        return Err(Error::invalid(
-            format!("light of a polarisation for {}", shape.plural()),
-            "leave out `arriving` and `analyser`: they count for rectangles alone",
-        ));
-    }
-    if analyser == Some(Analyser::Circular) && !matches!(arriving, Polarisation::Circular(_)) {
-        return Err(Error::invalid(
-            format!("a circular analyser in light that arrives {arriving}"),
-            "give an array of a design, which says what the pillars focus: the analyser passes what that is converted to",
-        ));
-    }
-    Ok(PolarisedLight {
-        arriving: Some(arriving),
-        analyser,
-    })
-}
-
-/// The hand that light of these is focused in by rotated rectangles.
-fn focused(light: PolarisedLight) -> Handedness {
-    match light.arriving {
-        Some(Polarisation::Circular(hand)) if light.analyser.is_some() => hand,
-        _ => Handedness::default(),
-    }
-}
-
-/// Cells that pillars of a shape on such a lattice do not have.
-fn refuse(wanted: Fidelity, shape: PillarShape, kind: LatticeKind) -> Result<()> {
-    // Its polynomials are of squares.
-    if shape == PillarShape::Circle && wanted == Fidelity::Published {
-        return Err(Error::invalid(
-            format!("{} by the `{wanted}` cell", shape.plural()),
-            "use rigorous, neighbours or fitted",
-        ));
-    }
-    wanted.check(shape, kind)
 }
 
 /// An element to simulate.
 struct Lit {
     name: String,
+    /// Its place on the chip (nm).
+    centre_nm: [i64; 2],
+    /// Radius of the opening in the metal around it (um); that of the circle around the pillars if none is given.
+    aperture_radius_um: Option<f64>,
     shape: PillarShape,
     widths: WidthMap,
     wedge: Wedge,
     /// From the pillars to the plane that is looked at (um).
     distance_um: f64,
+}
+
+impl Lit {
+    /// What elements have alike that are simulated together; `by_place` where what is made of one depends on where it stands.
+    fn like(&self, by_place: bool) -> (Wedge, f64, Option<f64>, Option<[i64; 2]>) {
+        let place = by_place.then_some(self.centre_nm);
+        (self.wedge, self.distance_um, self.aperture_radius_um, place)
+    }
 }
 
 /// In what light elements are looked at.
@@ -115,49 +80,50 @@ struct Looked {
 struct Found {
     field_deg: (f64, f64),
     incidence_sin: [f64; 2],
+    /// Edge of the pixel that figures are of (um).
+    pixel_um: f64,
     psf: SinglePsf,
 }
 
 /// All elements, each in every light. Those that look the same way are simulated together: their cells are solved once, and
 /// of those with the same pillars one is.
-fn simulate(elements: Vec<Lit>, cell: &dyn CellModel, light: &Looked, progress: &dyn Progress) -> Result<Vec<Found>> {
+fn simulate(
+    elements: Vec<Lit>,
+    case: SimulationCase<'_>,
+    light: &Looked,
+    progress: &dyn Progress,
+) -> Result<Vec<Found>> {
+    let by_place = match case {
+        SimulationCase::Cell(_) => false,
+        SimulationCase::Made(chip) => chip.perturbation().depends_on_place(),
+    };
     let mut found: Vec<(usize, Vec<Found>)> = Vec::new();
     let mut waiting: Vec<(usize, Lit)> = elements.into_iter().enumerate().collect();
     while let Some((_, first)) = waiting.first() {
-        let (wedge, distance_um, shape) = (first.wedge, first.distance_um, first.shape);
-        let (together, others) = waiting
-            .into_iter()
-            .partition(|(_, lit)| (lit.wedge, lit.distance_um) == (wedge, distance_um));
+        let like = first.like(by_place);
+        let (together, others) = waiting.into_iter().partition(|(_, lit)| lit.like(by_place) == like);
         waiting = others;
-        found.extend(simulate_together(
-            together,
-            wedge,
-            distance_um,
-            shape,
-            cell,
-            light,
-            progress,
-        )?);
+        found.extend(simulate_together(together, case, light, progress)?);
     }
     found.sort_by_key(|(k, _)| *k);
     Ok(found.into_iter().flat_map(|(_, own)| own).collect())
 }
 
-/// Elements that look the same way, by their numbers.
+/// Elements that look the same way, by their numbers; at least one.
 fn simulate_together(
     elements: Vec<(usize, Lit)>,
-    wedge: Wedge,
-    distance_um: f64,
-    shape: PillarShape,
-    cell: &dyn CellModel,
+    case: SimulationCase<'_>,
     light: &Looked,
     progress: &dyn Progress,
 ) -> Result<Vec<(usize, Vec<Found>)>> {
+    let first = &elements[0].1;
+    let (wedge, distance_um, shape) = (first.wedge, first.distance_um, first.shape);
+    let aperture_radius_um = first.aperture_radius_um;
     let mut found: Vec<(usize, Vec<Found>)> = elements.iter().map(|(k, _)| (*k, Vec::new())).collect();
     let named = elements.into_iter().map(|(_, lit)| ExtractedElement {
         site: ElementSite {
             name: lit.name,
-            centre_nm: [0; 2],
+            centre_nm: lit.centre_nm,
             lattice: lit.widths.lattice,
             within_nm: None,
         },
@@ -194,16 +160,17 @@ fn simulate_together(
                 samples: light.samples,
                 pixel_um: light.pixel_um,
                 polarised: light.polarised,
-                aperture_radius_um: None,
+                aperture_radius_um,
                 accuracy: if light.fast { Accuracy::Fast } else { Accuracy::Accurate },
             };
-            let psfs = single_psfs(&extraction, SimulationCase::Cell(cell), &lighting, progress)?;
+            let psfs = single_psfs(&extraction, case, &lighting, progress)?;
             for (k, (_, own)) in found.iter_mut().enumerate() {
                 let place = simulated.iter().position(|s| *s == like[k]);
                 let psf = psfs[place.expect("what is like another is simulated")].clone();
                 own.push(Found {
                     field_deg: *field_deg,
                     incidence_sin: lighting.incidence_sin,
+                    pixel_um: light.pixel_um,
                     psf: SinglePsf {
                         element: names[k].clone(),
                         ..psf
@@ -215,8 +182,11 @@ fn simulate_together(
     Ok(found)
 }
 
-/// PSFs for Python: a dictionary for each.
-fn told<'py>(py: Python<'py>, found: Vec<Found>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+/// PSFs for Python: a dictionary for each. With the statement of the model that they rest on, if any, as JSON.
+type ToldPsfs<'py> = (Vec<Bound<'py, PyDict>>, Option<String>);
+
+/// What is simulated as made, if anything, with the PSFs.
+fn told<'py>(py: Python<'py>, (found, made): (Vec<Found>, Option<MadeChip>)) -> PyResult<ToldPsfs<'py>> {
     let one = |f: Found| {
         let dict = PyDict::new(py);
         let (m, window) = (f.psf.metrics, f.psf.psf.window);
@@ -228,6 +198,7 @@ fn told<'py>(py: Python<'py>, found: Vec<Found>) -> PyResult<Vec<Bound<'py, PyDi
         dict.set_item("x_um", PyArray1::from_iter(py, along(0)))?;
         dict.set_item("y_um", PyArray1::from_iter(py, along(1)))?;
         dict.set_item("values", PyArray2::from_owned_array(py, f.psf.psf.values))?;
+        dict.set_item("pixel_um", f.pixel_um)?;
         dict.set_item("strehl", m.strehl)?;
         dict.set_item("peak_um", (m.peak_um[0], m.peak_um[1]))?;
         dict.set_item("centroid_um", (m.centroid_um[0], m.centroid_um[1]))?;
@@ -238,31 +209,36 @@ fn told<'py>(py: Python<'py>, found: Vec<Found>) -> PyResult<Vec<Bound<'py, PyDi
         dict.set_item("mtf_nyquist", (m.mtf_nyquist[0], m.mtf_nyquist[1]))?;
         Ok(dict)
     };
-    found.into_iter().map(one).collect()
+    let psfs = found.into_iter().map(one).collect::<PyResult<_>>()?;
+    Ok((psfs, made.map(|chip| json(&chip.statement()))))
 }
 
 /// PSFs of the distinct lenses of an array of a design, or of the elements that are named.
 #[pyfunction]
-#[pyo3(signature = (array, wavelengths_nm, fields_deg, fidelity, fast, samples, elements=None, progress=None))]
+#[pyo3(signature = (array, wavelengths_nm, fields_deg, fidelity, model, fast, samples, pixel_um, elements=None,
+    progress=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn psf_of_array<'py>(
     py: Python<'py>,
     array: &Array,
     wavelengths_nm: Vec<f64>,
     fields_deg: Vec<(f64, f64)>,
-    fidelity: &str,
+    fidelity: Option<&str>,
+    model: Option<PathBuf>,
     fast: bool,
     samples: Option<usize>,
+    pixel_um: Option<f64>,
     elements: Option<Vec<usize>>,
     progress: Option<Py<PyAny>>,
-) -> PyResult<Vec<Bound<'py, PyDict>>> {
+) -> PyResult<ToldPsfs<'py>> {
     let design = array.design.as_ref().ok_or_else(|| {
         error(Error::invalid(
             "an array of widths says nothing of the sensor",
             "give `distance_um` and what pillars are made of",
         ))
     })?;
-    let wanted = self::fidelity(fidelity).map_err(error)?;
+    let wanted = Wanted::of(fidelity, model.as_deref()).map_err(error)?;
+    within("pixel_um", pixel_um, &PIXELS_UM).map_err(error)?;
     let placed = &array.array.placed;
     // Lenses with the same pillars may look at planes at other distances.
     let looks = |k: usize| (placed[k].class, design.lens_of(&placed[k].element).focal_length_um);
@@ -281,9 +257,14 @@ pub fn psf_of_array<'py>(
             .verify
             .wavelengths_um
             .extend(wavelengths_nm.iter().map(|nm| nm * 1e-3));
-        let cells = cell_models(&design, &[wanted])?;
+        let (cells, made) = match &wanted {
+            Wanted::Cell(fidelity) => (cell_models(&design, &[*fidelity])?, None),
+            Wanted::Model(model) => (Vec::new(), Some(MadeChip::in_light(&design.lit_stack()?, model)?)),
+        };
         let lit = chosen.iter().map(|k| Lit {
             name: placed[*k].element.label(),
+            centre_nm: placed[*k].element.centre_nm.into(),
+            aperture_radius_um: Some(design.aperture_radius_of_um(&placed[*k].element)),
             shape: array.array.shape,
             widths: array.array.widths(&placed[*k]).into_owned(),
             wedge: placed[*k].element.wedge,
@@ -293,31 +274,40 @@ pub fn psf_of_array<'py>(
             wavelengths_nm,
             fields_deg,
             samples: samples.unwrap_or(design.verify.window_samples),
-            pixel_um: design.verify.pixel_um,
+            pixel_um: pixel_um.unwrap_or(design.verify.pixel_um),
             polarised: design.verify.light(),
             fast,
         };
-        simulate(lit.collect(), cells[0].as_ref(), &light, p)
+        let case = match &made {
+            Some(chip) => SimulationCase::Made(chip),
+            None => SimulationCase::Cell(cells[0].as_ref()),
+        };
+        Ok((simulate(lit.collect(), case, &light, p)?, made))
     })?;
     told(py, found)
 }
 
 /// PSFs of maps of widths, without a design.
 #[pyfunction]
-#[pyo3(signature = (widths, pitch_nm, lattice, wavelengths_nm, fields_deg, distance_um, fidelity, fast, samples, shape,
-    arriving, analyser, height_nm, pillar, substrate, progress=None))]
+#[pyo3(signature = (widths, names, centres_nm, pitch_nm, lattice, wavelengths_nm, fields_deg, distance_um, fidelity, model,
+    aperture_um, fast, samples, pixel_um, shape, arriving, analyser, height_nm, pillar, substrate, progress=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn psf_of_widths<'py>(
     py: Python<'py>,
     widths: Vec<PyReadonlyArray2<'py, u16>>,
+    names: Vec<String>,
+    centres_nm: Vec<[i64; 2]>,
     pitch_nm: u32,
     lattice: &str,
     wavelengths_nm: Vec<f64>,
     fields_deg: Vec<(f64, f64)>,
     distance_um: f64,
-    fidelity: &str,
+    fidelity: Option<&str>,
+    model: Option<PathBuf>,
+    aperture_um: Option<f64>,
     fast: bool,
     samples: usize,
+    pixel_um: Option<f64>,
     shape: ToldShape,
     arriving: Option<&str>,
     analyser: Option<&str>,
@@ -325,12 +315,16 @@ pub fn psf_of_widths<'py>(
     pillar: &str,
     substrate: &str,
     progress: Option<Py<PyAny>>,
-) -> PyResult<Vec<Bound<'py, PyDict>>> {
-    let wanted = self::fidelity(fidelity).map_err(error)?;
+) -> PyResult<ToldPsfs<'py>> {
+    let wanted = Wanted::of(fidelity, model.as_deref()).map_err(error)?;
+    within("pixel_um", pixel_um, &PIXELS_UM).map_err(error)?;
+    within("aperture_um", aperture_um, &APERTURES_UM).map_err(error)?;
     let shape = shape_of(shape).map_err(error)?;
     let light = polarised(arriving, analyser, shape).map_err(error)?;
     let kind = kind_of(lattice).map_err(error)?;
-    refuse(wanted, shape, kind).map_err(error)?;
+    if let Wanted::Cell(fidelity) = wanted {
+        refuse(fidelity, shape, kind).map_err(error)?;
+    }
     let maps = widths
         .iter()
         .map(|w| width_map(w.as_array().to_owned(), pitch_nm, kind, shape));
@@ -340,27 +334,22 @@ pub fn psf_of_widths<'py>(
         .and_then(|stack| stack_on(stack, kind, shape))
         .map_err(error)?;
     let found = work(py, progress, |p| {
-        let drawn = drawn(&maps);
-        let cell: Box<dyn CellModel> = match (wanted, shape.rectangles()) {
-            (_, Some(Rectangles::Rotated(pillars))) => Box::new(RotatedCell::new(stack, pillars, focused(light))),
-            (_, Some(Rectangles::Upright(pillars))) => {
-                let axis = light.arriving.map_or(PolarisationAxis::X, PolarisationAxis::nearest);
-                Box::new(UprightCell::new(stack, pillars, axis).kept_in(cache_folder().as_deref()))
+        let (cell, made) = match &wanted {
+            Wanted::Cell(fidelity) => (Some(cell_of(*fidelity, stack, &maps, light, &wavelengths_nm)?), None),
+            Wanted::Model(model) => {
+                let stated = LitStack {
+                    focused: shape.rectangles().map(|_| focused(light, shape)),
+                    polarised: light,
+                    stack,
+                };
+                (None, Some(MadeChip::in_light(&stated, model)?))
             }
-            (Fidelity::Published, None) => Box::new(PublishedCell::new(pitch_nm)),
-            (Fidelity::Neighbours, None) => {
-                let mapping = Mapping::of_widths(maps.iter().map(WidthMap::histogram))?;
-                Box::new(NeighbourCell::new(stack, vec![mapping], cache_folder()))
-            }
-            (Fidelity::Fitted, None) => {
-                let band = band_about(wavelengths_nm.iter().map(|nm| nm * 1e-3), stack.range_um());
-                let range = (*drawn.first().unwrap_or(&100), *drawn.last().unwrap_or(&300));
-                Box::new(FittedCell::of_stack(&stack, band, range)?)
-            }
-            (_, None) => Box::new(PointwiseCell::new(stack, drawn)),
         };
-        let lit = maps.into_iter().enumerate().map(|(k, widths)| Lit {
-            name: format!("element {k}"),
+        let lit = maps.into_iter().zip(names).zip(centres_nm);
+        let lit = lit.map(|((widths, name), centre_nm)| Lit {
+            name,
+            centre_nm,
+            aperture_radius_um: aperture_um.map(|diameter| 0.5 * diameter),
             shape,
             widths,
             wedge: no_wedge(),
@@ -370,24 +359,15 @@ pub fn psf_of_widths<'py>(
             wavelengths_nm,
             fields_deg,
             samples,
-            pixel_um: 5.86,
+            pixel_um: pixel_um.unwrap_or(PIXEL_UM),
             polarised: light,
             fast,
         };
-        simulate(lit.collect(), cell.as_ref(), &light, p)
+        let case = match (&made, &cell) {
+            (Some(chip), _) => SimulationCase::Made(chip),
+            (None, cell) => SimulationCase::Cell(cell.as_deref().expect("a cell where there is no model")),
+        };
+        Ok((simulate(lit.collect(), case, &light, p)?, made))
     })?;
     told(py, found)
-}
-
-/// The widths that are drawn (nm), rising.
-fn drawn(maps: &[WidthMap]) -> Vec<u16> {
-    let mut widths: Vec<u16> = Vec::new();
-    for map in maps {
-        let histogram = map.histogram();
-        let there = histogram.iter().enumerate().skip(1).filter(|(_, n)| **n > 0);
-        widths.extend(there.map(|(w, _)| w as u16));
-    }
-    widths.sort_unstable();
-    widths.dedup();
-    widths
 }

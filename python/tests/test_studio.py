@@ -71,6 +71,14 @@ def test_a_frame_is_what_the_sensor_records(studio: ml.Studio) -> None:
     assert np.std((other - plane)[lit]) == pytest.approx(expected, rel=0.2)
 
 
+def test_a_grey_scene_is_one_of_three_equal_colours(studio: ml.Studio) -> None:
+    grey = scene()[:, :, 0]
+    colours = np.repeat(grey[:, :, None], 3, axis=2)
+    for given in (grey, grey[:, :, None]):
+        assert np.array_equal(studio.record(given).planes[0], studio.record(colours).planes[0])
+        assert np.array_equal(studio.truth(given), studio.truth(colours))
+
+
 def test_a_picture_is_restored(studio: ml.Studio) -> None:
     truth = studio.truth(scene())
     assert truth.shape == (*SHAPE, 3)
@@ -92,5 +100,11 @@ def test_a_picture_is_restored(studio: ml.Studio) -> None:
 def test_what_cannot_be_recorded_or_restored_is_told(studio: ml.Studio) -> None:
     with pytest.raises(ml.MetalithError, match=r"give one of shape \(48, 48, 3\)"):
         studio.record(np.zeros((20, 48, 3)))
+    with pytest.raises(ml.MetalithError, match=r"of shape \(48, 48, 2\)\n  help: give three colours.*or a grey picture"):
+        studio.record(np.zeros((*SHAPE, 2)))
+    with pytest.raises(ml.MetalithError, match="`seed` = -1"):
+        studio.record(scene(), seed=-1)
+    with pytest.raises(ml.MetalithError, match="`count` = -1"):
+        studio.samples(studio.record(scene()), -1)
     with pytest.raises(ml.MetalithError, match="magic"):
         studio.restore(studio.record(scene()), "magic")

@@ -143,14 +143,9 @@ impl CellStack {
     /// top of the mask, if one is left) over the incident field at the foot.
     ///
     /// # Errors
-    /// As [`CellStack::layers`].
+    /// As [`CellStack::layers`]; also if the width is no number, or negative.
     pub fn transmission(&self, width_nm: f64, wavelength_um: f64, orders: Orders) -> Result<Complex64> {
-        if !width_nm.is_finite() {
-            return Err(Error::invalid(
-                format!("a pillar {width_nm} nm wide"),
-                "give its width in nm",
-            ));
-        }
+        Self::check_width(width_nm)?;
         Ok(transmit(
             &self.layers(width_nm, wavelength_um)?,
             wavelength_um,
@@ -166,7 +161,7 @@ impl CellStack {
     /// from |t| as it does along the normal.
     ///
     /// # Errors
-    /// As [`CellStack::layers`]; also if no light arrives or leaves at that angle.
+    /// As [`CellStack::transmission`]; also if no light arrives or leaves at that angle.
     pub fn oblique(
         &self,
         width_nm: f64,
@@ -174,6 +169,7 @@ impl CellStack {
         sines: [f64; 2],
         orders: Orders,
     ) -> Result<[[Complex64; 2]; 2]> {
+        Self::check_width(width_nm)?;
         let layers = self.layers(width_nm, wavelength_um)?;
         let cosine = |index: Complex64| (1.0 - (sines[0].powi(2) + sines[1].powi(2)) / index.re.powi(2)).sqrt();
         let (below, above) = (cosine(layers.below), cosine(layers.above));
@@ -270,6 +266,18 @@ impl CellStack {
         self.materials()
             .map(Material::range_um)
             .fold((0.0, f64::INFINITY), |(low, high), (a, b)| (low.max(a), high.min(b)))
+    }
+
+    /// Refuses what is no width. Corrections of a width may take [`CellStack::layers`] below zero, where nothing is left of the
+    /// pillar; a width that is asked for may not be.
+    fn check_width(width_nm: f64) -> Result<()> {
+        if width_nm.is_finite() && width_nm >= 0.0 {
+            return Ok(());
+        }
+        Err(Error::invalid(
+            format!("a pillar {width_nm} nm wide"),
+            "give its width in nm, zero for a site without pillar",
+        ))
     }
 
     fn check(&self) -> Result<()> {
@@ -420,6 +428,10 @@ pub(super) mod tests {
         );
         refused(CellStack { taper: 0.1, ..paper() }, 330.0, 0.5, "foot");
         refused(paper(), 100.0, 0.25, "0.31 to 5.504");
-        refused(paper(), f64::NAN, 0.5, "NaN nm wide");
+        for width in [f64::NAN, f64::INFINITY, -5.0, -1e9] {
+            refused(paper(), width, 0.5, "nm wide");
+            let oblique = paper().oblique(width, 0.5, [0.1, 0.0], orders);
+            assert!(oblique.unwrap_err().to_string().contains("nm wide"));
+        }
     }
 }

@@ -67,11 +67,14 @@ pub enum WaveError {
     Rings { radii: usize, areas: usize },
 
     /// A field angle from which no light arrives.
-    #[error("no light arrives from {field_rad:?} rad of an element that looks at sines {}, {}", looks_at[0], looks_at[1])]
+    #[error(
+        "no light arrives at ({}, {}) degrees from where an element looks, sines {}, {}",
+        degrees(field_rad[0]), degrees(field_rad[1]), looks_at[0] + 0.0, looks_at[1] + 0.0
+    )]
     Incidence { field_rad: [f64; 2], looks_at: [f64; 2] },
 
     /// A direction behind the element that never meets the sensor.
-    #[error("light that leaves an element with sines {}, {} does not reach the sensor", sines[0], sines[1])]
+    #[error("light that leaves an element with sines {}, {} does not reach the sensor", sines[0] + 0.0, sines[1] + 0.0)]
     Landing { sines: [f64; 2] },
 
     /// Pixels that reach beyond the window that the PSF is known on.
@@ -108,6 +111,11 @@ pub enum WaveError {
     },
 }
 
+/// An angle as people gave it: without what the way to radians and back left in its last digits, zero without a sign.
+fn degrees(rad: f64) -> f64 {
+    (rad.to_degrees() * 1e9).round() / 1e9 + 0.0
+}
+
 impl WaveError {
     /// What to do about it.
     pub fn hint(&self) -> String {
@@ -127,7 +135,9 @@ impl WaveError {
             Self::Rings { .. } => {
                 "give one positive, finite area for each radius, and a positive wavelength and distance".into()
             }
-            Self::Incidence { .. } => "keep the field angles of steered elements smaller".into(),
+            Self::Incidence { .. } => {
+                "keep field angles smaller: light arrives at less than 90 degrees from the chip's normal".into()
+            }
             Self::Landing { .. } => "keep wedge and field angle smaller at the longest wavelength".into(),
             Self::Pixels { .. } => "use fewer pixels, or form the PSF on a larger window".into(),
             Self::Samples => "form both on the same number of samples and with the same step".into(),
@@ -159,6 +169,18 @@ mod tests {
         let text = metalith_core::Error::from(error).to_string();
         assert!(
             text.contains("300 nm wide") && text.contains("ends at 288 nm") && text.contains("help: make the table")
+        );
+    }
+    #[test]
+    fn angles_are_told_in_the_degrees_that_were_given() {
+        let error = WaveError::Incidence {
+            field_rad: [95.3_f64, -0.0].map(f64::to_radians),
+            looks_at: [-0.0, 0.25],
+        };
+        let text = error.to_string();
+        assert!(
+            text.contains("(95.3, 0) degrees") && text.contains("sines 0, 0.25"),
+            "{text}"
         );
     }
 }
