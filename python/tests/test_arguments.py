@@ -45,7 +45,7 @@ def array() -> ml.Array:
         (lambda a: ml.psf(a, [np.nan]), "a wavelength of nan nm in `wavelengths_nm`"),
         (lambda a: ml.psf(a, []), "no wavelength"),
         (lambda a: ml.psf(a, [530], []), "`field_deg` is no list of pairs"),
-        (lambda a: ml.psf(a, [530], (0, 0)), "`field_deg` is no list of pairs"),
+        (lambda a: ml.psf(a, [530], (0, 0)), "`field_deg` is no list of pairs"),  # type: ignore[arg-type]
         (lambda a: ml.psf(a, [530], [(95, 0)], elements=[4]), r"at \(95, 0\) degrees .*sines 0, 0\n"),
         (lambda a: ml.psf(a, [530], [(np.nan, 0)]), "no number"),
         (lambda a: ml.psf(a, [530], samples=-3), "`samples` = -3"),
@@ -107,7 +107,8 @@ def test_a_model_is_applied_as_the_program_does(array: ml.Array, tmp_path: Path)
     lens = array.widths(4)
     ml.write_layout(chip, lens, pitch_nm=350)
     light: dict[str, Any] = dict(distance_um=60.0, samples=64, fast=True, pixel_um=3.0)
-    made, drawn = (ml.psf(ml.read_layout(chip), [530], **light, **how) for how in (dict(model=model), {}))
+    ways: list[dict[str, Any]] = [dict(model=model), {}]
+    made, drawn = (ml.psf(ml.read_layout(chip), [530], **light, **how) for how in ways)
     assert drawn.model is None and made.model is not None
     assert made[:1].model == made.model and made.model["finding"] == "explained by cd_bias"
     assert not np.isclose(made[0].strehl, drawn[0].strehl, rtol=0.01)
@@ -127,7 +128,8 @@ def test_an_array_of_a_design_takes_a_model(array: ml.Array, tmp_path: Path) -> 
     model = tmp_path / "model.toml"
     model.write_text(NARROWER)
     light: dict[str, Any] = dict(elements=[4], samples=32, fast=True)
-    made, drawn = (ml.psf(array, [530], **light, **how)[0] for how in (dict(model=model), {}))
+    ways: list[dict[str, Any]] = [dict(model=model), {}]
+    made, drawn = (ml.psf(array, [530], **light, **how)[0] for how in ways)
     assert not np.isclose(made.strehl, drawn.strehl, rtol=0.01)
 
 
