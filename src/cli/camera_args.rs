@@ -6,7 +6,7 @@ use clap::Args;
 use metalith::camera::Camera;
 use metalith::{CalibratedModel, Design, Result};
 
-use super::{Terminal, standard_input};
+use super::{Terminal, fits, standard_input};
 
 /// The chip, the camera that it is in, and the field of its scenes.
 #[derive(Args)]
@@ -49,8 +49,10 @@ impl CameraArgs {
         for quantity in model.iter().flat_map(|m| m.perturbation.not_applied()) {
             terminal.say(&quantity.to_string());
         }
+        let design = standard_input::design(&self.design)?;
+        model.iter().try_for_each(|model| fits(model, &design))?;
         Ok(CameraFiles {
-            design: standard_input::design(&self.design)?,
+            design,
             camera: Camera::read(&self.camera)?,
             model,
         })

@@ -66,7 +66,7 @@ pub struct PsfArgs {
     at_y_um: f64,
 
     /// Samples an axis, one pitch apart.
-    #[arg(long, default_value_t = 256)]
+    #[arg(long, default_value_t = 256, value_parser = samples)]
     samples: usize,
 
     /// Height of the pillars (nm), for all cells but the published one.
@@ -213,6 +213,18 @@ pub fn layer(text: &str) -> std::result::Result<LayerNumber, String> {
 const STEEPEST_DEG: f64 = 89.0;
 
 /// A number from `low` to `high`.
+fn samples(text: &str) -> std::result::Result<usize, String> {
+    const SAMPLES: std::ops::RangeInclusive<usize> = 2..=8192;
+    match text.parse() {
+        Ok(value) if SAMPLES.contains(&value) => Ok(value),
+        _ => Err(format!(
+            "give a whole number from {} to {}",
+            SAMPLES.start(),
+            SAMPLES.end()
+        )),
+    }
+}
+
 fn between(low: f64, high: f64) -> impl Fn(&str) -> std::result::Result<f64, String> + Clone + Send + Sync + 'static {
     move |text| match text.parse::<f64>() {
         Ok(value) if (low..=high).contains(&value) => Ok(value),

@@ -16,7 +16,7 @@ use metalith::{
 
 use super::compensated::{CompensatedFor, judged_as_made};
 use super::standard_input::InputFile;
-use super::{Outcome, Terminal, print_json, print_line, standard_input};
+use super::{Outcome, Terminal, fits, print_json, print_line, standard_input};
 
 /// Read a layout back, compare every pillar with its design, simulate it, and write the report.
 #[derive(Args)]
@@ -113,7 +113,7 @@ impl Judging {
         let fidelity = self.fidelity(design);
         fidelity.check(design.cell.shape, design.cell.lattice)?;
         if let Some(model) = self.model()? {
-            model.check_shape(design.cell.shape)?;
+            fits(&model, design)?;
         }
         let by_site = self.model.is_some() || fidelity == Fidelity::Neighbours;
         Simulation::choose(design, path, self.accuracy(), by_site, self.memory_mb)

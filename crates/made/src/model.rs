@@ -39,6 +39,31 @@ impl CalibratedModel {
         }
     }
 
+    /// Nothing, if pillars whose edges are drawn from the one to the other of these (nm) stand beside one another as made, `nearest_nm`
+    /// from middle to middle.
+    ///
+    /// # Errors
+    /// If the bias of all widths leaves nothing of the narrowest, or joins the widest.
+    pub fn check_bias(&self, edges_nm: [f64; 2], nearest_nm: f64) -> Result<()> {
+        let bias_nm = self.perturbation.geometry.cd_bias_nm;
+        let [narrowest, widest] = edges_nm.map(|nm| nm + bias_nm);
+        if narrowest > 0.0 && widest < nearest_nm {
+            return Ok(());
+        }
+        let what = match narrowest > 0.0 {
+            true => format!("makes pillars of {widest} nm, {nearest_nm} nm from one to the next"),
+            false => format!("leaves nothing of pillars drawn {} nm wide", edges_nm[0]),
+        };
+        Err(Error::invalid(
+            format!("`cd_bias_nm` = {bias_nm} of the model {what}"),
+            format!(
+                "set it in [perturbation.geometry] between {} and {}",
+                -edges_nm[0],
+                nearest_nm - edges_nm[1]
+            ),
+        ))
+    }
+
     /// Read a model file.
     ///
     /// # Errors
@@ -113,6 +138,25 @@ mod tests {
         assert_eq!(CalibratedModel::read(&path).unwrap(), model());
         std::fs::write(&path, "schema = 7").unwrap();
         assert!(CalibratedModel::read(&path).is_err());
+    }
+
+    #[test]
+    fn a_bias_that_pillars_cannot_have_is_refused_with_what_they_can() {
+        let biased = |nm| {
+            let mut model = model();
+            model.perturbation.geometry.cd_bias_nm = nm;
+            model.check_bias([100.0, 280.0], 350.0).map_err(|e| e.to_string())
+        };
+        for nm in [-99.9, 0.0, 69.9] {
+            assert_eq!(biased(nm), Ok(()));
+        }
+        for (nm, what) in [
+            (-100.0, "leaves nothing of pillars drawn 100 nm wide"),
+            (70.0, "makes pillars of 350 nm, 350 nm from one to the next"),
+        ] {
+            let error = biased(nm).unwrap_err();
+            assert!(error.contains(what) && error.contains("between -100 and 70"), "{error}");
+        }
     }
 
     #[test]
