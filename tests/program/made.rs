@@ -285,7 +285,7 @@ fn the_program_applies_what_it_once_left_out_and_names_what_it_cannot() {
     assert_eq!(strehl(&lamps), strehl(&nothing));
     let named = &lamps["model"]["not_applied"][0];
     assert_eq!(named["quantity"], "light.led_shift_nm");
-    assert!(named["because"].as_str().unwrap().contains("one wavelength"));
+    assert!(named["because"].as_str().unwrap().contains("lamps"));
     let page = fs::read_to_string(folder.path().join("lamps/report.html")).unwrap();
     assert!(page.contains("not applied: "));
 }
