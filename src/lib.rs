@@ -112,7 +112,7 @@ pub use metalith_wave as wave;
 pub use metalith_cell::{CellModel, Fidelity};
 pub use metalith_core::{
     ElementSite, Error, Fault, Faults, FolderTurn, Lattice, LatticeKind, PillarShape, Progress, Rectangles, Result,
-    RotatedRectangles, Silent, UprightRectangles, Wedge, WholeFile, WidthMap, text,
+    RotatedRectangles, Silent, UprightRectangles, Wedge, WholeFile, WidthMap, WidthRows, text,
 };
 pub use metalith_design::{Design, Hierarchy, PillarArray, cell_models};
 pub use metalith_gds::Layout;

@@ -6,7 +6,7 @@ use clap::Args;
 use metalith::camera::Camera;
 use metalith::{CalibratedModel, Design, Result};
 
-use super::{Terminal, fits, standard_input};
+use super::{Terminal, standard_input};
 
 /// The chip, the camera that it is in, and the field of its scenes.
 #[derive(Args)]
@@ -50,7 +50,9 @@ impl CameraArgs {
             terminal.say(&quantity.to_string());
         }
         let design = standard_input::design(&self.design)?;
-        model.iter().try_for_each(|model| fits(model, &design))?;
+        model
+            .iter()
+            .try_for_each(|model| model.check_shape(design.cell.shape))?;
         Ok(CameraFiles {
             design,
             camera: Camera::read(&self.camera)?,

@@ -3,8 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::picture::scene::images_in;
-use metalith::picture::scene::read_far_scene;
+use metalith::picture::scene::{images_in, read_far_scene};
 use metalith::picture::{DatasetManifest, DatasetOrigin, Studio, check_images, write_dataset};
 use metalith::study::{PairsRequest, is_planned, plan_pairs};
 use metalith::{Error, Result};

@@ -38,7 +38,7 @@ use clap::{Parser, Subcommand};
 use miette::{Diagnostic, GraphicalReportHandler, SourceCode};
 
 use metalith::text::{printable, printable_lines};
-use metalith::{CalibratedModel, Design, Error, Faults, Result};
+use metalith::{Error, Faults};
 use output::{print_json, print_line};
 pub use terminal::Terminal;
 
@@ -234,16 +234,6 @@ impl Diagnostic for Headline<'_> {
     fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
         self.0.related()
     }
-}
-
-/// Nothing, if pillars of a design can be as a model says.
-///
-/// # Errors
-/// If they cannot.
-fn fits(model: &CalibratedModel, design: &Design) -> Result<()> {
-    model.check_shape(design.cell.shape)?;
-    let stack = design.cell_stack()?;
-    model.check_bias(design.edges_nm(), stack.lattice.nearest_nm(stack.pitch_nm))
 }
 
 #[cfg(test)]

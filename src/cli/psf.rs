@@ -212,7 +212,7 @@ pub fn layer(text: &str) -> std::result::Result<LayerNumber, String> {
 /// Light that is steeper grazes the chip: no detector of an angle is that good, and cosines become zero.
 const STEEPEST_DEG: f64 = 89.0;
 
-/// A number from `low` to `high`.
+/// Samples along an axis of a window.
 fn samples(text: &str) -> std::result::Result<usize, String> {
     const SAMPLES: std::ops::RangeInclusive<usize> = 2..=8192;
     match text.parse() {
@@ -225,6 +225,7 @@ fn samples(text: &str) -> std::result::Result<usize, String> {
     }
 }
 
+/// A number from `low` to `high`.
 fn between(low: f64, high: f64) -> impl Fn(&str) -> std::result::Result<f64, String> + Clone + Send + Sync + 'static {
     move |text| match text.parse::<f64>() {
         Ok(value) if (low..=high).contains(&value) => Ok(value),

@@ -32,6 +32,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
     Judging::announce(&simulation, terminal);
     terminal.stop_on_interrupt();
     let array = PillarArray::build(&design, terminal)?;
+    args.judging.check_drawn(&design, &array)?;
     let folder = args.target.folder(&design);
     let _turn = terminal.turn_at(&folder)?;
     // A report speaks of the layout beside it: the old one must not stand beside a new layout, whatever happens.

@@ -9,14 +9,14 @@ use metalith::picture::thumbnail;
 use metalith::report::{Figure, sig};
 use metalith::{
     Accuracy, CalibratedModel, Design, Error, Fidelity, MadeChip, PillarArray, Result, SimulationCases, Verification,
-    cell_models, verify,
+    WidthRows, cell_models, verify,
     verify::{Simulation, verify_in_parts, verify_pillars},
     write_report,
 };
 
 use super::compensated::{CompensatedFor, judged_as_made};
 use super::standard_input::InputFile;
-use super::{Outcome, Terminal, fits, print_json, print_line, standard_input};
+use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
 /// Read a layout back, compare every pillar with its design, simulate it, and write the report.
 #[derive(Args)]
@@ -113,10 +113,24 @@ impl Judging {
         let fidelity = self.fidelity(design);
         fidelity.check(design.cell.shape, design.cell.lattice)?;
         if let Some(model) = self.model()? {
-            fits(&model, design)?;
+            model.check_shape(design.cell.shape)?;
         }
         let by_site = self.model.is_some() || fidelity == Fidelity::Neighbours;
         Simulation::choose(design, path, self.accuracy(), by_site, self.memory_mb)
+    }
+
+    /// Nothing, if the pillars of an array can be as the model says; asked before anything is written.
+    ///
+    /// # Errors
+    /// If they cannot.
+    pub fn check_drawn(&self, design: &Design, array: &PillarArray) -> Result<()> {
+        match self.model()? {
+            Some(model) => {
+                let counts = array.classes.iter().map(|class| class.widths.histogram());
+                model.check_drawn(&design.cell_stack()?, counts)
+            }
+            None => Ok(()),
+        }
     }
 
     fn model(&self) -> Result<Option<CalibratedModel>> {
@@ -294,6 +308,7 @@ pub fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
         model: args.judging.model.clone().or_else(|| args.compensated.model.clone()),
         ..args.judging.clone()
     };
+    judging.check_drawn(&design, &array)?;
     let _turn = terminal.turn_at(&folder)?;
     judging.judge(&design, &array, &layout, &folder, terminal)
 }

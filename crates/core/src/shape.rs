@@ -50,6 +50,15 @@ impl PillarShape {
         }
     }
 
+    /// Both edges of a pillar as drawn (nm), of a rectangle before it is rotated; of a square or a circle the width twice.
+    pub fn edges_nm(self, number: u16) -> [f64; 2] {
+        match self {
+            Self::Square | Self::Circle => [f64::from(number); 2],
+            Self::Rectangle(Rectangles::Rotated(pillars)) => [pillars.width_nm, pillars.length_nm].map(f64::from),
+            Self::Rectangle(Rectangles::Upright(pillars)) => pillars.edges_nm(number).map(f64::from),
+        }
+    }
+
     /// Area of a pillar (nm^2).
     pub fn area_nm2(self, number: u16) -> f64 {
         self.square_nm2(number) as f64 * self.area_share()

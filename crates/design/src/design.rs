@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 use metalith_cell::{Analyser, CellStack, FocusedLight, PolarisationAxis};
 use metalith_core::document::{Document, Section, load};
 use metalith_core::text::{hex, quoted};
-use metalith_core::{ElementSite, Error, Lattice, Rectangles, Result};
+use metalith_core::{ElementSite, Error, Lattice, Result};
 
 use crate::spec::{
     ArraySpec, CellSpec, Element, FieldAngle, Footprint, LayoutSpec, LensOutline, LensSpec, LibraryFile, MappingSpec,
@@ -186,15 +186,6 @@ impl Design {
     /// The lens of an element: its own, or that all share.
     pub fn lens_of(&self, element: &Element) -> &LensSpec {
         self.array.lens_of(&self.lens, element.index)
-    }
-
-    /// The shortest and the longest edge that its pillars are drawn with (nm).
-    pub fn edges_nm(&self) -> [f64; 2] {
-        match self.cell.shape.rectangles() {
-            Some(Rectangles::Rotated(pillars)) => [pillars.width_nm, pillars.length_nm].map(f64::from),
-            Some(Rectangles::Upright(pillars)) => [pillars.shortest_nm, pillars.longest_nm()].map(f64::from),
-            None => [self.cell.width_range_nm.0, self.cell.width_range_nm.1].map(f64::from),
-        }
     }
 
     /// Radius and focal length of the lens of each element (um).

@@ -73,8 +73,8 @@ impl PillarFinder {
         }
     }
 
-    /// Whether pillars, all with edges along axes or all rectangles, have the same corners in an orientation that leaves an upright
-    /// box as it is: half a turn does so to every rectangle, a mirror about an axis to upright ones.
+    /// Whether pillars have the same corners in an orientation that leaves an upright box as it is: half a turn does so to every
+    /// rectangle, a mirror about an axis to upright ones.
     pub(super) fn keeps(&self, orientation: u8) -> bool {
         self.shape.upright().is_some() || (self.shape.rectangles().is_some() && orientation & 4 == 0)
     }

@@ -112,6 +112,14 @@ impl MadeChip {
         &self.model.perturbation
     }
 
+    /// As [`CalibratedModel::check_drawn`], of pillars of the chip.
+    ///
+    /// # Errors
+    /// As [`CalibratedModel::check_drawn`].
+    pub fn check_drawn(&self, counts: impl IntoIterator<Item = Vec<u64>>) -> Result<()> {
+        self.model.check_drawn(self.cells.stack(), counts)
+    }
+
     /// The cells as etched, by realised width.
     pub fn cells(&self) -> &RealisedCells {
         &self.cells

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::Perturbation;
+use metalith_cell::CellStack;
 use metalith_core::text::quoted;
 use metalith_core::{Error, Result, WholeFile, document};
 
@@ -39,12 +40,23 @@ impl CalibratedModel {
         }
     }
 
-    /// Nothing, if pillars whose edges are drawn from the one to the other of these (nm) stand beside one another as made, `nearest_nm`
-    /// from middle to middle.
+    /// Nothing, if pillars of a stack can be as the model says that are drawn so often, by width or number, on each of some elements.
     ///
     /// # Errors
-    /// If the bias of all widths leaves nothing of the narrowest, or joins the widest.
-    pub fn check_bias(&self, edges_nm: [f64; 2], nearest_nm: f64) -> Result<()> {
+    /// If the bias of all widths leaves nothing of the narrowest that is drawn, or joins the widest.
+    pub fn check_drawn(&self, stack: &CellStack, counts: impl IntoIterator<Item = Vec<u64>>) -> Result<()> {
+        let drawn = |counts: Vec<u64>| (1..counts.len()).filter(move |number| counts[*number] > 0);
+        let numbers = counts.into_iter().flat_map(drawn);
+        let edges = numbers.flat_map(|number| stack.shape.edges_nm(number as u16));
+        let [least, most] = edges.fold([f64::INFINITY, 0.0], |[least, most], nm| [nm.min(least), nm.max(most)]);
+        match most > 0.0 {
+            true => self.check_bias([least, most], stack.lattice.nearest_nm(stack.pitch_nm)),
+            false => Ok(()),
+        }
+    }
+
+    /// The same of pillars whose edges are drawn from the one to the other of these (nm), `nearest_nm` from middle to middle.
+    fn check_bias(&self, edges_nm: [f64; 2], nearest_nm: f64) -> Result<()> {
         let bias_nm = self.perturbation.geometry.cd_bias_nm;
         let [narrowest, widest] = edges_nm.map(|nm| nm + bias_nm);
         if narrowest > 0.0 && widest < nearest_nm {

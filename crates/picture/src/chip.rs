@@ -112,6 +112,9 @@ impl<'a> ChipInLight<'a> {
         };
         let symmetric = perturbation.keeps_symmetry() && elements.iter().all(|e| e.slope == [0.0; 2]);
         let widths: Vec<&WidthMap> = extraction.elements.iter().map(|e| &e.widths).collect();
+        if let SimulationCase::Made(chip) = case {
+            chip.check_drawn(widths.iter().map(|map| map.histogram()))?;
+        }
         let symmetries = Symmetry::ALL
             .into_iter()
             .filter(|s| symmetric && s.keeps(design.cell.shape));

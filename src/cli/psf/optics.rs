@@ -219,24 +219,7 @@ impl PsfArgs {
             focused: shape.rectangles().map(|_| self.focused(shape)),
             polarised: self.polarised_light(shape),
         };
-        let drawn = found.elements.iter().flat_map(|e| {
-            let numbers = e.widths.histogram().into_iter().enumerate();
-            numbers.filter(|(_, count)| *count > 0).map(|(number, _)| number as u16)
-        });
-        let edges = drawn
-            .filter(|number| *number > 0)
-            .flat_map(|number| match shape.rectangles() {
-                None => [f64::from(number); 2],
-                Some(Rectangles::Rotated(pillars)) => [pillars.width_nm, pillars.length_nm].map(f64::from),
-                Some(Rectangles::Upright(pillars)) => pillars.edges_nm(number).map(f64::from),
-            });
-        let ends = edges.fold(None, |ends: Option<[f64; 2]>, nm| {
-            Some(ends.map_or([nm; 2], |[least, most]| [least.min(nm), most.max(nm)]))
-        });
-        if let Some(edges_nm) = ends {
-            let stack = &stated.stack;
-            model.check_bias(edges_nm, stack.lattice.nearest_nm(stack.pitch_nm))?;
-        }
+        model.check_drawn(&stated.stack, found.elements.iter().map(|e| e.widths.histogram()))?;
         MadeChip::in_light(&stated, model)
     }
 
