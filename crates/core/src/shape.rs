@@ -137,6 +137,16 @@ impl PillarShape {
         }
     }
 
+    /// Distance (nm) that no two pillars up to a number have less than, whose centres are (dx, dy) apart (nm).
+    pub fn least_gap(self, number: u16, apart: [f64; 2]) -> f64 {
+        match (self, self.upright()) {
+            (_, Some(pillars)) => Self::Square.gap([f64::from(pillars.longest_nm()); 2], apart),
+            // Rotated ones stay within circles.
+            (Self::Rectangle(_), None) => Self::Circle.gap([self.widest_nm(number); 2], apart),
+            _ => self.gap([f64::from(number); 2], apart),
+        }
+    }
+
     /// What several of it are called.
     pub fn plural(self) -> &'static str {
         match self {
@@ -177,5 +187,38 @@ mod tests {
             let gap = shape.gap([180.0, 220.0], apart);
             assert!((gap - want).abs() < ROUNDING, "{shape} {apart:?}: {gap}");
         }
+    }
+
+    #[test]
+    fn no_two_pillars_are_nearer_than_the_least_gap() {
+        let upright = UprightRectangles::of_lengths([80, 100, 140, 200].into_iter()).unwrap();
+        let rotated = RotatedRectangles {
+            width_nm: 60,
+            length_nm: 220,
+            steps: 12,
+        };
+        for (shape, count) in [
+            (PillarShape::Square, 220),
+            (PillarShape::Circle, 220),
+            (PillarShape::Rectangle(upright.into()), upright.count()),
+            (PillarShape::Rectangle(rotated.into()), 12),
+        ] {
+            for apart in [
+                [350.0, 0.0],
+                [0.0, 350.0],
+                [350.0, -350.0],
+                [175.0, 303.1],
+                [100.0, 0.0],
+            ] {
+                let least = shape.least_gap(count, apart);
+                let all = (1..=count).flat_map(|a| (1..=count).map(move |b| [a, b]));
+                let found = all.map(|pair| shape.gap(pair.map(f64::from), apart));
+                let found = found.fold(f64::INFINITY, f64::min);
+                assert!(found >= least - ROUNDING, "{shape} {apart:?}: {found} < {least}");
+            }
+        }
+        // Their sides face one another.
+        let upright = PillarShape::Rectangle(upright.into());
+        assert_eq!(upright.least_gap(1, [350.0, 0.0]), 150.0);
     }
 }

@@ -8,7 +8,7 @@ use super::pairs::{near, place};
 use super::rule::{NO_DESIGN, NotRun, Rule, RuleOutcome, from_design};
 use super::tolerance::ROUNDING_NM;
 use metalith_core::document::{Limits, Section};
-use metalith_core::{LatticeKind, PillarShape, WidthRows};
+use metalith_core::{LatticeKind, WidthRows};
 use metalith_design::Design;
 use metalith_gds::LayerNumber;
 use metalith_rcwa::CellLattice;
@@ -208,12 +208,10 @@ fn on_lattices(
         let steps = lattice.steps_nm().map(f64::from);
         let apart = |up: usize, right: isize| [steps[0] * right as f64, steps[1] * up as f64];
         let widths = e.widths.histogram().len();
-        let widest = flat.shape.widest_nm(widths.saturating_sub(1) as u16);
-        // Between the widest there are: of rectangles, whose numbers are no widths, circles about them.
-        let least = neighbours.iter().map(|&(up, right)| match flat.shape {
-            PillarShape::Rectangle(_) => PillarShape::Circle.gap([widest; 2], apart(up, right)),
-            shape => shape.gap([widest; 2], apart(up, right)),
-        });
+        let widest = widths.saturating_sub(1) as u16;
+        let least = neighbours
+            .iter()
+            .map(|&(up, right)| flat.shape.least_gap(widest, apart(up, right)));
         if least.fold(f64::INFINITY, f64::min) >= nm {
             continue;
         }

@@ -265,7 +265,11 @@ impl Studio {
                 "restoration",
                 format!(
                     "knows the kernels of three primaries at {} of the places, one point of the scene for four pixels, and none of its spectra",
-                    if self.restored_step > 2 { "a quarter" } else { "half" }
+                    match self.restored_step {
+                        0..=2 => "half",
+                        3..=4 => "a quarter",
+                        _ => "a fifth",
+                    }
                 ),
             ),
             assumption(

@@ -64,10 +64,10 @@ impl Rectangles {
         }
     }
 
-    /// The longest diagonal of the pillars up to a number (nm).
+    /// The longest diagonal of the pillars up to a number, as drawn (nm).
     pub fn longest_diagonal_nm(self, number: u16) -> f64 {
         match self {
-            Self::Rotated(pillars) => f64::from(pillars.width_nm).hypot(f64::from(pillars.length_nm)),
+            Self::Rotated(pillars) => pillars.longest_diagonal_nm(),
             Self::Upright(pillars) => pillars.longest_diagonal_nm(number),
         }
     }

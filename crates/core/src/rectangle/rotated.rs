@@ -50,6 +50,14 @@ impl RotatedRectangles {
         [a, b, (-a.0, -a.1), (-b.0, -b.1)]
     }
 
+    /// The longest diagonal there is, of pillars as drawn (nm): corners on the grid lie up to 0.7 nm farther out than those of the
+    /// rectangle itself.
+    pub fn longest_diagonal_nm(self) -> f64 {
+        let corners = (1..=self.steps.max(1)).flat_map(|number| self.corners(number));
+        let squared = corners.map(|(x, y)| x * x + y * y).max();
+        2.0 * (squared.unwrap_or(0) as f64).sqrt()
+    }
+
     /// How far the corners of a pillar reach from its middle along x and y (nm).
     pub fn reach(self, number: u16) -> (i64, i64) {
         let [a, b, ..] = self.corners(number);
