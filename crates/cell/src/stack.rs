@@ -87,7 +87,7 @@ impl CellStack {
         if self.shape.rectangles().is_some() {
             return Err(Error::invalid(
                 "rectangular pillars, where those of a width are asked for",
-                "use squares or circles here: `photographs`, calibration and compensation know no rectangles, `optimise` and `study` no upright ones; the other \
+                "use squares or circles here: `photographs` and calibration know no rectangles, `optimise` and `study` no upright ones; the other \
                  commands do",
             ));
         }

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::Compensated;
 use super::line::Line;
+use metalith_cell::{PolarisationAxis, PolarisedLight};
 use metalith_core::{Error, Progress, Result, WidthMap};
 use metalith_design::array::PillarArray;
 use metalith_design::{CellIncidence, Design, Element};
@@ -19,11 +20,14 @@ use metalith_wave::{Accuracy, PhaseFunction, Scratch, Window};
 /// Chips that are compared.
 pub(super) const CHIPS: usize = 3;
 
-/// One element of one chip at one wavelength, in the middle of its field.
+/// One element of one chip at one wavelength, in the middle of its field; of upright rectangles in one polarisation.
 #[derive(Clone, Debug, Serialize)]
 pub struct CompensationCase {
     pub element: String,
     pub wavelength_um: f64,
+    /// Of upright rectangles, the axis that the light is polarised along.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub axis: Option<PolarisationAxis>,
     /// `intended` as stated, `made, uncorrected` and `made, corrected`.
     pub pillars: &'static str,
     /// Metrics of the PSF.
@@ -34,7 +38,7 @@ pub struct CompensationCase {
 }
 
 /// Read the compensated layout at `layout` back and simulate it as it would be made, beside the intended pillars as
-/// stated and as they would be made. For the first element of each class at each wavelength, three cases.
+/// stated and as they would be made. For the first element of each class at each wavelength and polarisation, three cases.
 ///
 /// # Errors
 /// If the layout cannot be read, a cell cannot be solved, or the user stopped it.
@@ -103,11 +107,15 @@ fn of_element(
         );
         let matched = Matched::of(&open, [chief[0], chief[1], lens.focal_length_um], um, colour.full);
         for ((pillars, chip, _), made) in chips.iter().zip(&made) {
-            let view = chip.view(made, &wave, as_lit, progress)?;
+            let view = match colour.axis {
+                None => chip.view(made, &wave, as_lit, progress)?,
+                Some(axis) => chip.view_in(made, &wave, PolarisedLight::along(axis), progress)?,
+            };
             let psf = view.psf(window, Accuracy::Accurate, &drawn, &mut scratch)?;
             cases.push(CompensationCase {
                 element: element.label(),
                 wavelength_um: um,
+                axis: colour.axis,
                 pillars,
                 spot: PsfResult::of(&psf, &matched, design.verify.pixel_um),
                 psf,

@@ -17,7 +17,7 @@ const ROUNDS: usize = 6;
 const STARTS: i32 = 12;
 const START_STEP_UM: f64 = 0.02;
 
-/// Pillars that are alike: intended width (nm) and step of density, with their number.
+/// Pillars that are alike: intended width (nm) or number, and step of density, with how many there are.
 #[derive(Default)]
 pub struct Kinds(BTreeMap<(u16, i32), u64>);
 
@@ -78,7 +78,7 @@ impl Kinds {
         best
     }
 
-    /// For each kind the width whose made pillar is nearest to the intended one, at given free phases.
+    /// For each kind the pillar that, as made, is nearest to the intended one, at given free phases.
     fn nearest(&self, line: &Line, pistons: &[Complex64]) -> BTreeMap<(u16, i32), u16> {
         let kinds: Vec<_> = self.0.keys().copied().collect();
         let of = |&(w, step): &(u16, i32)| {
@@ -88,7 +88,7 @@ impl Kinds {
                     .map(|(c, p)| (line.made(c, place, step) * p - c.stated[usize::from(w)]).norm_sqr())
                     .sum()
             };
-            let all = line.drawn_nm.iter().enumerate().map(|(place, &d)| (miss(place), d));
+            let all = line.drawn.iter().enumerate().map(|(place, &d)| (miss(place), d));
             let best = all.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(w, |b| b.1);
             ((w, step), best)
         };
@@ -103,7 +103,7 @@ impl Kinds {
             let pairs = || {
                 let kinds = self.0.iter().zip(drawn.values());
                 kinds.filter_map(|((&(w, step), &n), d)| {
-                    let place = line.drawn_nm.binary_search(d).ok()?;
+                    let place = line.drawn.binary_search(d).ok()?;
                     Some((line.made(c, place, step), c.stated[usize::from(w)], n as f64))
                 })
             };

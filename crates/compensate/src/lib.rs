@@ -1,8 +1,8 @@
 //! The layout whose pillars, as a measured line makes them, do what was intended.
 //!
 //! Each intended width is exchanged for the drawn one whose pillar, as made, transmits most like the intended
-//! pillar as stated, at the design's wavelengths together. A phase common to all pillars of a wavelength is
-//! free: it moves no light. Bias that follows density is looked up site by site, of the layout as drawn.
+//! pillar as stated, at the design's wavelengths together; of upright rectangles both widths, in light along both axes together. A
+//! phase common to all pillars of a wavelength and polarisation is free: it moves no light. Bias that follows density is looked up site by site, of the layout as drawn.
 
 mod cases;
 mod choose;
@@ -51,10 +51,11 @@ impl Compensated {
 /// Numbers of a compensation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CompensationSummary {
-    /// Root mean square of how far drawn widths moved (nm).
+    /// Root mean square of how far drawn widths moved (nm); of upright rectangles those of both edges.
     pub moved_rms_nm: f64,
     /// Root mean square error of the complex transmission over the pillars and wavelengths, made against
-    /// intended, over the root mean square of the intended one: of the layout as it was, and compensated.
+    /// intended, over the root mean square of the intended one: of the layout as it was, and compensated; of upright rectangles in
+    /// both polarisations together.
     pub error: [f64; 2],
     /// Pillars that now have the least or greatest width of the design and had not before: the range ends there.
     pub at_limit: u64,
@@ -63,7 +64,7 @@ pub struct CompensationSummary {
 /// Compensate the pillars of a design for what a model says of the line.
 ///
 /// # Errors
-/// If elements have lenses of their own, pillars are rectangles, a cell cannot be solved, or the user stopped it.
+/// If elements have lenses of their own, pillars are rotated rectangles, a cell cannot be solved, or the user stopped it.
 pub fn compensate(
     design: &Design,
     array: &PillarArray,
@@ -71,7 +72,7 @@ pub fn compensate(
     progress: &dyn Progress,
 ) -> Result<Compensated> {
     design.one_lens("the compensation")?;
-    let mut line = Line::new(design, model)?;
+    let mut line = Line::new(design, model, progress)?;
     let copies = |class: usize| array.placed.iter().filter(|p| p.class == class).count() as u64;
     let mut drawn = array.clone();
     drawn.compensated = true;
@@ -104,18 +105,24 @@ pub fn compensate(
             break;
         }
     }
-    let (narrow, wide) = design.cell.width_range_nm;
+    let shape = design.cell.shape;
+    // Least and greatest width there is, of rectangles of either edge.
+    let edges = |number: u16| shape.edges_nm(number);
+    let (first, last) = design.cell.width_range_nm;
+    let (narrow, wide) = (edges(first)[0], edges(last)[0]);
     let (mut moved, mut pillars, mut at_limit) = (0.0, 0, 0);
     for (k, (new, old)) in drawn.classes.iter_mut().zip(&array.classes).enumerate() {
         let (drawn, intended) = (new.widths.map_mut(), old.widths.map());
         for (&d, &w) in drawn.width_nm.iter().zip(&intended.width_nm) {
             if w > 0 {
-                moved += copies(k) as f64 * (f64::from(d) - f64::from(w)).powi(2);
+                let pairs = edges(d).into_iter().zip(edges(w));
+                moved += copies(k) as f64 * 0.5 * pairs.clone().map(|(d, w)| (d - w).powi(2)).sum::<f64>();
                 pillars += copies(k);
-                at_limit += copies(k) * u64::from(d != w && (d == narrow || d == wide));
+                let newly = |(d, w): (f64, f64)| d != w && (d == narrow || d == wide);
+                at_limit += copies(k) * u64::from(pairs.clone().any(newly));
             }
         }
-        new.group = SymmetryGroup::of(drawn);
+        new.group = SymmetryGroup::of_shape(drawn, shape);
     }
     Ok(Compensated {
         array: drawn,

@@ -2,20 +2,22 @@
 
 use num_complex::Complex64;
 
-use metalith_cell::{CellModel, PointwiseCell};
-use metalith_core::{Error, Progress, Result, WidthMap};
+use metalith_cell::{CellModel, LitStack, PointwiseCell, PolarisationAxis, PolarisedTables};
+use metalith_core::{Error, PillarShape, Progress, Rectangles, Result, WidthMap};
 use metalith_design::Design;
 use metalith_made::{CalibratedModel, MadeChip, Perturbation};
 
-/// Transmissions at one wavelength.
+/// Transmissions at one wavelength, of upright rectangles in one polarisation.
 #[derive(Clone, Debug)]
 pub struct ColourTransmissions {
     pub wavelength_um: f64,
+    /// Of upright rectangles, which have a phase for each: the axis that the light is polarised along.
+    pub axis: Option<PolarisationAxis>,
     /// |t| of a stated cell that passes everything.
     pub full: f64,
-    /// Of intended pillars as stated, by width (nm).
+    /// Of intended pillars as stated, by width (nm) or number.
     pub stated: Vec<Complex64>,
-    /// Of made pillars, by the place of the drawn width in [`Line::drawn_nm`] and then by step of density.
+    /// Of made pillars, by the place of the drawn pillar in [`Line::drawn`] and then by step of density.
     made: Vec<Vec<Complex64>>,
 }
 
@@ -26,8 +28,8 @@ pub struct Line {
     /// Chips as they are made.
     pub chip: MadeChip,
     pub colours: Vec<ColourTransmissions>,
-    /// Widths that may be drawn (nm).
-    pub drawn_nm: Vec<u16>,
+    /// Widths (nm) that may be drawn, or numbers of upright rectangles.
+    pub drawn: Vec<u16>,
     /// Radius of the openings in the metal (um).
     pub aperture_radius_um: f64,
     /// The least step of density that transmissions are known for.
@@ -38,10 +40,10 @@ impl Line {
     /// Solve the cells as stated; those as made are solved once the steps of density are known.
     ///
     /// # Errors
-    /// If a cell cannot be solved, or a number of the model cannot be.
-    pub fn new(design: &Design, model: &CalibratedModel) -> Result<Self> {
-        let drawn_nm: Vec<u16> = design.cell.widths_nm().collect();
-        let (_, wide) = design.cell.width_range_nm;
+    /// If a cell cannot be solved, a number of the model cannot be, it says what no width can undo, or the pillars are rotated rectangles.
+    pub fn new(design: &Design, model: &CalibratedModel, progress: &dyn Progress) -> Result<Self> {
+        let drawn: Vec<u16> = design.cell.widths_nm().collect();
+        check_shape(design.cell.shape)?;
         let directed = model.perturbation.geometry.directed_widths();
         if !directed.is_empty() {
             return Err(Error::invalid(
@@ -58,27 +60,46 @@ impl Line {
                 "take `rim_height_nm` out of the model; `metalith run --model` shows what it does",
             ));
         }
-        let stack = design.cell_stack()?;
-        let chip = MadeChip::new(&stack, model)?;
+        let lit = design.lit_stack()?;
         let nothing = CalibratedModel::new(String::new(), String::new(), Perturbation::default());
-        let as_stated = MadeChip::new(&stack, &nothing)?;
-        let stated = PointwiseCell::new(stack, drawn_nm.iter().copied());
-        let colour = |&wavelength_um: &f64| {
-            Ok(ColourTransmissions {
-                wavelength_um,
-                full: stated.full_transmission(wavelength_um)?,
-                stated: stated.transmissions(wavelength_um, wide)?,
-                made: Vec::new(),
-            })
-        };
-        Ok(Self {
-            stated: as_stated,
-            chip,
-            colours: design.verify.wavelengths_um.iter().map(colour).collect::<Result<_>>()?,
-            drawn_nm,
+        let mut line = Self {
+            stated: MadeChip::in_light(&lit, &nothing)?,
+            chip: MadeChip::in_light(&lit, model)?,
+            colours: Vec::new(),
+            drawn,
             aperture_radius_um: design.aperture_radius_um(),
             first_step: 0,
-        })
+        };
+        for &um in &design.verify.wavelengths_um {
+            let colours = line.stated_colours(&lit, um, progress)?;
+            line.colours.extend(colours);
+        }
+        Ok(line)
+    }
+
+    /// What intended pillars transmit as stated at a wavelength (um).
+    fn stated_colours(
+        &self,
+        lit: &LitStack,
+        wavelength_um: f64,
+        progress: &dyn Progress,
+    ) -> Result<Vec<ColourTransmissions>> {
+        let full = lit.stack.full_transmission(wavelength_um)?;
+        let colour = |axis, stated| ColourTransmissions {
+            wavelength_um,
+            axis,
+            full,
+            stated,
+            made: Vec::new(),
+        };
+        let found = self.stated.drawn_rectangles(&self.drawn, 0, wavelength_um, progress)?;
+        if let Some((PolarisedTables::Axes(tables), _)) = found {
+            let both = PolarisationAxis::ALL.into_iter().zip(tables.along);
+            return Ok(both.map(|(axis, table)| colour(Some(axis), table)).collect());
+        }
+        let wide = self.drawn.last().copied().unwrap_or(0);
+        let cell = PointwiseCell::new(lit.stack.clone(), self.drawn.iter().copied());
+        Ok(vec![colour(None, cell.transmissions(wavelength_um, wide)?)])
     }
 
     /// Whether the width of a pillar depends on what is drawn around it.
@@ -93,7 +114,7 @@ impl Line {
         steps.unwrap_or_else(|| vec![0; drawn.width_nm.len()])
     }
 
-    /// Solve all drawn widths as made, for these steps of density at the least and at the most.
+    /// Solve all pillars that may be drawn as made, for these steps of density at the least and at the most.
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
@@ -102,11 +123,9 @@ impl Line {
         progress.begin("pillars as they are made", (self.colours.len() * steps.len()) as u64);
         self.first_step = least;
         for colour in &mut self.colours {
-            colour.made = vec![Vec::new(); self.drawn_nm.len()];
+            colour.made = vec![Vec::new(); self.drawn.len()];
             for &step in &steps {
-                let row = self
-                    .chip
-                    .drawn_widths(&self.drawn_nm, step, colour.wavelength_um, progress)?;
+                let row = made(&self.chip, &self.drawn, step, colour, progress)?;
                 colour.made.iter_mut().zip(row).for_each(|(to, t)| to.push(t));
                 progress.advance(1);
             }
@@ -114,9 +133,42 @@ impl Line {
         Ok(())
     }
 
-    /// What a pillar transmits at one of the colours, drawn at a place of [`Line::drawn_nm`], at a step of density
+    /// What a pillar transmits at one of the colours, drawn at a place of [`Line::drawn`], at a step of density
     /// that was solved for.
     pub fn made(&self, colour: &ColourTransmissions, place: usize, step: i32) -> Complex64 {
         colour.made[place][(step - self.first_step) as usize]
+    }
+}
+
+/// What pillars of a chip transmit at one of the colours where so many steps of density are added.
+fn made(
+    chip: &MadeChip,
+    drawn: &[u16],
+    step: i32,
+    colour: &ColourTransmissions,
+    progress: &dyn Progress,
+) -> Result<Vec<Complex64>> {
+    let Some(axis) = colour.axis else {
+        return chip.drawn_widths(drawn, step, colour.wavelength_um, progress);
+    };
+    // Those of both axes are solved together, and remembered.
+    match chip.drawn_rectangles(drawn, step, colour.wavelength_um, progress)? {
+        Some((PolarisedTables::Axes(tables), _)) => {
+            let table = &tables.along[axis.index()];
+            Ok(drawn.iter().map(|number| table[usize::from(*number)]).collect())
+        }
+        _ => unreachable!("pillars that were told apart along this axis"),
+    }
+}
+
+/// Nothing, if another pillar of a design may come out as the intended one.
+fn check_shape(shape: PillarShape) -> Result<()> {
+    match shape.rectangles() {
+        Some(Rectangles::Rotated(_)) => Err(Error::invalid(
+            "the pillars are rotated rectangles of one size: no other of them is nearer to what was intended",
+            "draw edges that come out as intended: `width_nm` and `length_nm` of [cell], less the bias of the model; `metalith run --model` \
+             judges the chip that they give",
+        )),
+        Some(Rectangles::Upright(_)) | None => Ok(()),
     }
 }

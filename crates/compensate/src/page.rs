@@ -52,7 +52,7 @@ pub fn write_compensation_report(
         ("Newly at an end of the range", count(s.at_limit)),
     ]);
     page.paragraph(
-        "Error: rms difference of the complex transmission of the pillars as made from that intended, over the rms of the latter, at all wavelengths of the design together, one phase a wavelength free. Corrected pillars are those of the file that was read back.",
+        "Error: rms difference of the complex transmission of the pillars as made from that intended, over the rms of the latter, at all wavelengths of the design together, of upright rectangles in both polarisations, with one free phase for each of these. Corrected pillars are those of the file that was read back.",
     );
     page.paragraph(
         "Made elements have all that the model says of pillars, apertures, light and sensor; widths can correct the pillars alone.",
@@ -76,6 +76,14 @@ pub fn write_compensation_report(
     page.write(&folder.join("compensation.html"))
 }
 
+/// The element of a case, and the light that it is seen in where it tells polarisations apart.
+fn named(case: &CompensationCase) -> String {
+    match case.axis {
+        None => case.element.clone(),
+        Some(axis) => format!("{}, light along {axis}", case.element),
+    }
+}
+
 /// Contrasts are at these frequencies (line pairs a millimetre).
 fn table(cases: &[CompensationCase], reported: [f64; 2]) -> Table {
     let [half, nyquist] = reported.map(exact);
@@ -91,7 +99,7 @@ fn table(cases: &[CompensationCase], reported: [f64; 2]) -> Table {
     for case in cases {
         let (m, [half, nyquist]) = (&case.spot.metrics, case.spot.mtf());
         table.row([
-            Cell::from(case.element.as_str()),
+            Cell::from(named(case)),
             Cell::exact(case.wavelength_um * 1e3),
             Cell::from(case.pillars),
             Cell::sig(m.strehl, 3),
@@ -106,7 +114,7 @@ fn table(cases: &[CompensationCase], reported: [f64; 2]) -> Table {
 /// PSFs and contrast of one element at one wavelength, the three chips side by side.
 fn figures(of_one: &[CompensationCase]) -> Option<[Figure; 2]> {
     let first = of_one.first()?;
-    let title = format!("element {}, {:.0} nm", first.element, first.wavelength_um * 1e3);
+    let title = format!("element {}, {:.0} nm", named(first), first.wavelength_um * 1e3);
     let mut images = ImageGrid::new(format!("PSF, {title}"), of_one.len())
         .pixel_um(first.psf.window.step_um)
         .values("|E|² / |E inc|²", "")

@@ -174,6 +174,26 @@ impl MadeChip {
         Ok(self.viewed(element, stated, &solved))
     }
 
+    /// The same along the normal, of pillars that tell polarisations apart in this light instead of that of the chip.
+    ///
+    /// # Errors
+    /// As [`MadeChip::view`].
+    pub fn view_in<'a>(
+        &self,
+        element: &'a MadeElement,
+        stated: &PlaneWave,
+        light: PolarisedLight,
+        progress: &dyn Progress,
+    ) -> Result<MadeView<'a>> {
+        let Some(rectangles) = &self.rectangles else {
+            return self.view(element, stated, false, progress);
+        };
+        let colour = RectangleColour::Single(stated.wavelength_um);
+        let passed = |tables: &PolarisedTables| tables.passed(light);
+        let solved = self.through(rectangles, element, colour, &passed, progress)?;
+        Ok(self.viewed(element, stated, &solved))
+    }
+
     /// The same for one of many wavelengths that a band is averaged over: cells are solved more coarsely, see
     /// [`RealisedCells::solve_in_band`].
     ///
@@ -297,12 +317,7 @@ impl MadeChip {
         let stated = PlaneWave::normal(wavelength_um);
         let view = match &self.rectangles {
             None => self.view(element, &stated, false, progress)?,
-            Some(rectangles) => {
-                let colour = RectangleColour::Single(wavelength_um);
-                let focused = |tables: &PolarisedTables| tables.passed(PolarisedLight::default());
-                let solved = self.through(rectangles, element, colour, &focused, progress)?;
-                self.viewed(element, &stated, &solved)
-            }
+            Some(_) => self.view_in(element, &stated, PolarisedLight::default(), progress)?,
         };
         let mut tables = view.tables.into_iter();
         Ok(tables.next().expect("light that is focused passes"))

@@ -45,6 +45,14 @@ pub struct LitStack {
 }
 
 impl PolarisedLight {
+    /// Light along an axis, all of it before the sensor.
+    pub fn along(axis: PolarisationAxis) -> Self {
+        Self {
+            arriving: Some(axis.polarisation()),
+            analyser: None,
+        }
+    }
+
     /// The polarisation of the light that arrives at pillars that focus this light.
     pub fn arriving_at(self, focused: FocusedLight) -> Polarisation {
         self.arriving.unwrap_or(focused.polarisation())
