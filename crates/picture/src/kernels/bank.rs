@@ -120,11 +120,18 @@ impl TurnedKernel<'_> {
         };
         // Along a row kept values are equally far apart.
         let step = kept(1, 0) - kept(0, 0);
-        let row = |y: usize| {
-            let first = kept(0, y as i64);
-            (0..self.side as i64).map(move |x| self.values[(first + x * step) as usize])
-        };
-        (0..self.side).flat_map(row).collect()
+        let mut turned = Vec::with_capacity(self.values.len());
+        for y in 0..self.side {
+            let first = kept(0, y as i64) as usize;
+            let row = self.side;
+            match step {
+                1 => turned.extend_from_slice(&self.values[first..first + row]),
+                -1 => turned.extend(self.values[first + 1 - row..=first].iter().rev()),
+                down if down > 0 => turned.extend(self.values[first..].iter().step_by(row).take(row)),
+                _ => turned.extend(self.values[..=first].iter().rev().step_by(row).take(row)),
+            }
+        }
+        turned.into()
     }
 
     /// Energy in all pixels of the window.

@@ -34,7 +34,7 @@ impl BetweenNodes {
     /// Weight of one of `n` by `n` nodes at a place among them: one at its own, zero at the others; all of them add up to one.
     pub fn weight(self, place: [f32; 2], node: [usize; 2], n: usize) -> f32 {
         let axis = |a: usize| match self {
-            Self::Linear => (1.0 - (place[a] - node[a] as f32).abs()).max(0.0),
+            Self::Linear => hat(place[a] - node[a] as f32),
             Self::Sixfold => {
                 let about = self.nodes_about(place[a], n);
                 match about.contains(&node[a]) {
@@ -50,6 +50,23 @@ impl BetweenNodes {
         let first = axis(0);
         if first == 0.0 { 0.0 } else { first * axis(1) }
     }
+
+    /// Append the weights of a node at places next to one another.
+    pub fn weights(self, places: &[[f32; 2]], node: [usize; 2], n: usize, to: &mut Vec<f32>) {
+        match self {
+            // Without a branch, so that many are found at once.
+            Self::Linear => {
+                let at = node.map(|k| k as f32);
+                to.extend(places.iter().map(|p| hat(p[0] - at[0]) * hat(p[1] - at[1])));
+            }
+            Self::Sixfold => to.extend(places.iter().map(|p| self.weight(*p, node, n))),
+        }
+    }
+}
+
+/// Weight of a node by the distance in steps from it, where light is blended linearly.
+fn hat(distance: f32) -> f32 {
+    (1.0 - distance.abs()).max(0.0)
 }
 
 #[cfg(test)]
@@ -71,6 +88,9 @@ mod tests {
             for n in [1, 3, 5, 9, 33] {
                 for (y, x) in places(n).zip(places(n).collect::<Vec<_>>().into_iter().rev()) {
                     let about = [y, x].map(|p| between.nodes_about(p, n));
+                    let mut of_many = Vec::new();
+                    between.weights(&[[y, x]; 3], [n / 2, n - 1], n, &mut of_many);
+                    assert_eq!(of_many, [between.weight([y, x], [n / 2, n - 1], n); 3]);
                     let of = |i: usize| between.weight([y, x], [i / n, i % n], n);
                     let all: f32 = (0..n * n).map(of).sum();
                     assert!((all - 1.0).abs() < SINGLE, "{between:?} {n} {y} {x}: {all}");

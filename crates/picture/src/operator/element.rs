@@ -236,9 +236,12 @@ impl NodePlan {
     }
 
     fn weights_of(&self, warp: &Warp, between: BetweenNodes, n: usize) -> Vec<f32> {
-        let row = |y: usize| &warp.nodes[(self.first[0] + y) * warp.shape[1] + self.first[1]..][..self.shape[1]];
-        let places = (0..self.shape[0]).flat_map(row);
-        places.map(|place| between.weight(*place, self.node, n)).collect()
+        let mut weights = Vec::with_capacity(self.shape[0] * self.shape[1]);
+        for y in 0..self.shape[0] {
+            let row = &warp.nodes[(self.first[0] + y) * warp.shape[1] + self.first[1]..][..self.shape[1]];
+            between.weights(row, self.node, n, &mut weights);
+        }
+        weights
     }
 }
 
