@@ -73,17 +73,15 @@ pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
         Some(Rectangles::Upright(_)) => return library(args, &design, &folder, terminal),
         None => {}
     }
+    let options = StudyOptions { threshold: args.avoid };
+    options.check()?;
     let mut spec = design.table_spec()?;
     spec.orders = args.orders;
     spec.tolerance = args.tolerance;
     let cache = args.cache.clone().or_else(cache_folder);
     let (table, origin) = CellTable::obtain(&spec, cache.as_deref(), terminal)?;
     terminal.clear();
-    let mut study = CellStudy::new(
-        &design,
-        &RigorousCell::new(table),
-        StudyOptions { threshold: args.avoid },
-    )?;
+    let mut study = CellStudy::new(&design, &RigorousCell::new(table), options)?;
     if args.steered {
         study.steered = study_steered(&design, cache.as_deref(), terminal)?;
         terminal.clear();

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::camera::Camera;
+use metalith::cell::{PublishedCell, oblique_refused};
 use metalith::design::{CellIncidence, LatticeOrders};
 use metalith::picture::thumbnail;
 use metalith::report::{Figure, sig};
@@ -112,6 +113,12 @@ impl Judging {
     pub fn simulation(&self, design: &Design, path: &Path) -> Result<Simulation> {
         let fidelity = self.fidelity(design);
         fidelity.check(design.cell.shape, design.cell.lattice)?;
+        if fidelity == Fidelity::Published {
+            PublishedCell::of_stack(&design.cell_stack()?)?;
+        }
+        if self.as_lit && design.cell.shape.rectangles().is_some() {
+            return Err(oblique_refused());
+        }
         if let Some(model) = self.model()? {
             model.check_shape(design.cell.shape)?;
         }

@@ -224,12 +224,14 @@ impl Camera {
             }
             let kept: f64 = parts.iter().map(|p| p.weight).sum();
             if kept <= 0.0 {
+                let [short, long] = range_nm.map(|nm| (nm * 10.0).round() / 10.0);
                 return Err(Error::invalid(
                     format!(
-                        "channel `{}` of the camera counts no light from {} to {} nm",
-                        channel.name, range_nm[0], range_nm[1]
+                        "channel `{}` of the camera counts no light from {short} to {long} nm",
+                        channel.name
                     ),
-                    "use a channel or an illuminant in that range: it is where the materials of the cell are known",
+                    "use a channel or an illuminant in that range: it is the band of the design (`band_nm` of [cell], or about its \
+                     wavelengths), as far as its materials are known",
                 ));
             }
             channels.push(ChannelSampling {

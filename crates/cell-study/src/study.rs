@@ -41,6 +41,22 @@ impl Default for StudyOptions {
     }
 }
 
+impl StudyOptions {
+    /// Check what is asked, before cells are solved for it.
+    ///
+    /// # Errors
+    /// If the threshold is not a share of power.
+    pub fn check(&self) -> Result<()> {
+        match (0.0..1.0).contains(&self.threshold) {
+            true => Ok(()),
+            false => Err(Error::invalid(
+                format!("widths are bad below a zero order of {}", self.threshold),
+                "give a share of the incident power, such as 0.3",
+            )),
+        }
+    }
+}
+
 /// A mapping and what it does with light.
 #[derive(Clone, Debug, Serialize)]
 pub struct MappingStudy {
@@ -115,12 +131,7 @@ impl CellStudy {
     /// # Errors
     /// If the threshold is not a share of power, or the widths of the design are too few.
     pub fn new(design: &Design, cell: &RigorousCell, options: StudyOptions) -> Result<Self> {
-        if !(0.0..1.0).contains(&options.threshold) {
-            return Err(Error::invalid(
-                format!("widths are bad below a zero order of {}", options.threshold),
-                "give a share of the incident power, such as 0.3",
-            ));
-        }
+        options.check()?;
         let spec = cell.table().spec();
         let pitch_nm = f64::from(design.cell.pitch_nm);
         let (low, high) = design.cell.width_range_nm;

@@ -44,7 +44,7 @@ pub use polarisation::{
 };
 pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};
 pub use published::PublishedCell;
-pub use rectangle::{Handedness, RotatedRectangle};
+pub use rectangle::{Handedness, OBLIQUE_RECTANGLES, RotatedRectangle, oblique_refused};
 pub use rigorous::RigorousCell;
 pub use rotated::{RotatedCell, RotationSamples, Truncation};
 pub use rotation::RotationMapping;

@@ -2,8 +2,13 @@
 
 use num_complex::Complex64;
 
-use super::{CellModel, Fidelity, ForwardPolynomial};
-use metalith_core::Result;
+use super::{CellModel, CellStack, Fidelity, ForwardPolynomial};
+use metalith_core::{Error, Result};
+
+/// Wavelengths that the polynomials were published for (um).
+const PUBLISHED_UM: (f64, f64) = (0.4, 0.7);
+/// Rounding of a wavelength.
+const ROUNDING_UM: f64 = 1e-9;
 
 /// Transmission of modulus one whose phase is the published polynomial.
 #[derive(Clone, Debug)]
@@ -20,6 +25,23 @@ impl PublishedCell {
             forward: ForwardPolynomial::published(),
         }
     }
+
+    /// The published cell for pillars that it was published for.
+    ///
+    /// # Errors
+    /// If the pillars are others.
+    pub fn of_stack(stack: &CellStack) -> Result<Self> {
+        match stack.is_of_the_paper() {
+            true => Ok(Self::new(stack.pitch_nm as u32)),
+            false => Err(Error::invalid(Self::OTHERS, Self::ANOTHER_CELL)),
+        }
+    }
+
+    /// Why it does not judge other pillars than those of the paper.
+    pub const OTHERS: &str = "the `published` cell is of squares of silicon nitride alone, 700 nm high and 350 nm apart, on fused silica, in air";
+    /// What to do instead.
+    pub const ANOTHER_CELL: &str =
+        "ask for `rigorous` or `fitted`, as `fidelity` in [verify] of a design or with --fidelity";
 }
 
 impl CellModel for PublishedCell {
@@ -28,6 +50,18 @@ impl CellModel for PublishedCell {
     }
 
     fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
+        let (short, long) = PUBLISHED_UM;
+        if !(short - ROUNDING_UM..=long + ROUNDING_UM).contains(&wavelength_um) {
+            return Err(Error::invalid(
+                format!(
+                    "the `published` cell at {} nm: its polynomials are of {} to {} nm",
+                    (wavelength_um * 1e4).round() / 10.0,
+                    short * 1e3,
+                    long * 1e3
+                ),
+                Self::ANOTHER_CELL,
+            ));
+        }
         let mut table = vec![Complex64::new(0.0, 0.0)];
         table.extend((1..=max_width_nm).map(|width| {
             let turns = self.forward.turns(f64::from(width) / self.pitch_nm, wavelength_um);

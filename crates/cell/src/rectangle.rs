@@ -113,12 +113,16 @@ impl CellStack {
     }
 }
 
+/// What cells of rectangles are not solved for, and what to do instead.
+pub const OBLIQUE_RECTANGLES: [&str; 2] = [
+    "rectangular pillars in light that arrives at an angle",
+    "leave out --as-lit, or set `incidence = \"normal\"` in [verify]: their cells are solved along the normal",
+];
+
 /// Why cells of rectangles are not solved in light that arrives at an angle.
-pub(super) fn oblique_refused() -> Error {
-    Error::invalid(
-        "rectangular pillars in light that arrives at an angle",
-        "leave out --as-lit, or set `incidence = \"normal\"` in [verify]: their cells are solved along the normal",
-    )
+pub fn oblique_refused() -> Error {
+    let [what, hint] = OBLIQUE_RECTANGLES;
+    Error::invalid(what, hint)
 }
 
 #[cfg(test)]

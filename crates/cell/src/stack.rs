@@ -77,6 +77,22 @@ impl CellStack {
         })
     }
 
+    /// Whether it is the cell of the paper, whose polynomials are published: squares of any silicon nitride, 700 nm high on a pitch of
+    /// 350 nm, on fused silica, in air.
+    pub fn is_of_the_paper(&self) -> bool {
+        /// Refractive indices of silicon nitrides at 550 nm, from rich in nitrogen to rich in silicon.
+        const NITRIDES: std::ops::Range<f64> = 1.8..2.4;
+        let paper = Self::paper(350.0, 700.0).map(|paper| Self {
+            film: self.film.clone(),
+            ambient: self.ambient.clone(),
+            ..paper
+        });
+        let index = |material: &Material, um| material.index(um).ok().map(|n| n.re);
+        paper.is_ok_and(|paper| paper == *self)
+            && index(&self.ambient, 1.0) == Some(1.0)
+            && index(&self.film, 0.55).is_some_and(|n| NITRIDES.contains(&n))
+    }
+
     /// Layers of the pillar of a width (nm) at a wavelength (um), from the substrate upwards. A width of
     /// zero leaves the bare substrate.
     ///

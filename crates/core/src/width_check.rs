@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::{EighthMap, WidthRows};
+use crate::{EighthMap, PillarShape, WidthRows};
 
 /// How the pillars of one element differ from the intended ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -15,8 +15,8 @@ pub struct WidthCheck {
     pub missing: u64,
     /// Sites with a pillar that should have none.
     pub extra: u64,
-    /// Largest difference of widths where both have a pillar (nm); of rectangles of their numbers.
-    pub largest_nm: u16,
+    /// Largest difference of widths where both have a pillar (nm); none of rectangles, whose numbers are no widths.
+    pub largest_nm: Option<u16>,
 }
 
 impl WidthCheck {
@@ -27,7 +27,7 @@ impl WidthCheck {
     pub fn compare(intended: &impl WidthRows, found: &impl WidthRows) -> Self {
         let lattice = intended.lattice();
         assert_eq!(lattice, found.lattice(), "an element is read back on its own lattice");
-        let mut check = Self::default();
+        let mut check = Self::alike();
         let (n, mut room, mut other_room) = (lattice.sites(), Vec::new(), Vec::new());
         for iy in 0..n {
             let meant = intended.row(iy, 0..n, &mut room);
@@ -44,7 +44,7 @@ impl WidthCheck {
     pub fn compare_eighth(intended: &impl WidthRows, found: &EighthMap) -> Self {
         let lattice = intended.lattice();
         assert_eq!(lattice, found.lattice(), "an element is read back on its own lattice");
-        let mut check = Self::default();
+        let mut check = Self::alike();
         let (n, mut room, mut other_room) = (lattice.sites(), Vec::new(), Vec::new());
         for iy in n / 2..n {
             let meant = intended.row(iy, n / 2..iy + 1, &mut room);
@@ -71,9 +71,26 @@ impl WidthCheck {
                 (0, _) => self.extra += sites,
                 _ => {
                     self.wrong += sites;
-                    self.largest_nm = self.largest_nm.max(meant.abs_diff(got));
+                    self.largest_nm = self.largest_nm.max(Some(meant.abs_diff(got)));
                 }
             }
+        }
+    }
+
+    /// Nothing was compared so far.
+    fn alike() -> Self {
+        Self {
+            largest_nm: Some(0),
+            ..Self::default()
+        }
+    }
+
+    /// The same of pillars of this shape.
+    #[must_use]
+    pub fn of_shape(self, shape: PillarShape) -> Self {
+        Self {
+            largest_nm: self.largest_nm.filter(|_| shape.rectangles().is_none()),
+            ..self
         }
     }
 
@@ -86,7 +103,7 @@ impl WidthCheck {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Lattice, WidthMap};
+    use crate::{Lattice, UprightRectangles, WidthMap};
 
     #[test]
     fn every_kind_of_difference_is_counted_once() {
@@ -104,10 +121,13 @@ mod tests {
             wrong: 2,
             missing: 1,
             extra: 1,
-            largest_nm: 6,
+            largest_nm: Some(6),
         };
         assert_eq!(check, expected);
         assert_eq!(check.faults(), 4);
+        assert_eq!(check.of_shape(PillarShape::Circle), expected);
+        let upright = PillarShape::Rectangle(UprightRectangles::of_lengths([100, 120].into_iter()).unwrap().into());
+        assert_eq!(check.of_shape(upright).largest_nm, None);
         assert_eq!(WidthCheck::compare(&intended, &intended).faults(), 0);
     }
 

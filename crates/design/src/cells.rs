@@ -151,7 +151,7 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
                 None => {}
             }
             match fidelity {
-                Fidelity::Published => Ok(Box::new(PublishedCell::new(design.cell.pitch_nm))),
+                Fidelity::Published => Ok(Box::new(PublishedCell::of_stack(&design.cell_stack()?)?)),
                 Fidelity::Rigorous => {
                     let stack = design.cell_stack()?;
                     Ok(Box::new(PointwiseCell::new(stack, design.cell.widths_nm())))

@@ -404,7 +404,7 @@ fn compare<W>(
 ) -> Vec<ElementCheck> {
     let check = |(placed, found): (&PlacedElement, &ExtractedElement<W>)| ElementCheck {
         element: placed.element,
-        widths: widths(placed, &found.widths),
+        widths: widths(placed, &found.widths).of_shape(extraction.shape),
         copy_of: None,
         turned: None,
     };

@@ -237,7 +237,7 @@ impl PsfArgs {
             _ => {}
         }
         if matches!(self.fidelity, FidelityArg::Published) {
-            return Ok(Box::new(PublishedCell::new(stack.pitch_nm as u32)));
+            return Ok(Box::new(PublishedCell::of_stack(&stack)?));
         }
         if matches!(self.fidelity, FidelityArg::Neighbours) {
             let mapping = Mapping::of_widths(found.elements.iter().map(|e| e.widths.histogram()))?;

@@ -95,12 +95,7 @@ pub struct Stack {
 impl Stack {
     /// Whether it is the cell of the published polynomials, whatever its film was measured to be.
     pub fn is_of_the_paper(&self) -> bool {
-        let paper = CellStack::paper(350.0, 700.0).map(|paper| CellStack {
-            film: self.cell.film.clone(),
-            ambient: self.cell.ambient.clone(),
-            ..paper
-        });
-        paper.is_ok_and(|paper| paper == self.cell) && self.cell.ambient.index(1.0).is_ok_and(|n| n.re == 1.0)
+        self.cell.is_of_the_paper()
     }
 }
 

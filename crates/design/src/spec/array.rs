@@ -175,13 +175,11 @@ impl ArraySpec {
         sections: &[Section<'_, '_>],
     ) -> Self {
         for key in ["elements", "spacing_um", "steering_deg"] {
-            if s.has(key) {
-                s.fault(
-                    key,
-                    "a grid beside elements that are placed one by one",
-                    format!("leave `{key}` out, or the sections `[[element]]`"),
-                );
-            }
+            s.refuse(
+                key,
+                "a grid beside elements that are placed one by one",
+                format!("leave `{key}` out, or the sections `[[element]]`"),
+            );
         }
         let angle = Limits::new(-89.0..=89.0, "degrees");
         let placed: Vec<_> = sections

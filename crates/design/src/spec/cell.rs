@@ -6,6 +6,7 @@ use super::lens::WAVELENGTH;
 use metalith_cell::{FocusedLight, Handedness, InversePolynomial, Polarisation, PolarisationAxis};
 use metalith_core::document::{Limits, Section};
 use metalith_core::{LatticeKind, PillarShape, RotatedRectangles, UprightRectangles};
+use metalith_rcwa::Material;
 
 /// The unit cell: a pillar on a lattice.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -113,9 +114,15 @@ impl CellSpec {
             .map(|_| s.choice("arriving", &Handedness::CHOICES, Some(Handedness::default())));
         // Widths and places are whole nanometres; the key is there so that a design says so.
         s.optional_integer("database_unit_nm", 1..=1, "nm, the only unit that is written");
-        let pillar_material = s
-            .optional_text("pillar_material")
-            .unwrap_or_else(|| DEFAULT_FILM.into());
+        let pillar_material = read_material(s, "pillar_material").unwrap_or_else(|| DEFAULT_FILM.into());
+        let ambient_material = read_material(s, "ambient_material");
+        if ambient_material.is_some() && s.has("ambient_index") {
+            s.fault(
+                "ambient_index",
+                "an index beside the material that stands in for it",
+                "leave out `ambient_index` or `ambient_material`",
+            );
+        }
         let cell = Self {
             pitch_nm: pitch_nm & !1,
             lattice,
@@ -127,13 +134,11 @@ impl CellSpec {
             under: read_under(s, &pillar_material),
             band_um: read_band(s),
             pillar_material,
-            substrate_material: s
-                .optional_text("substrate_material")
-                .unwrap_or_else(|| DEFAULT_SUBSTRATE.into()),
+            substrate_material: read_material(s, "substrate_material").unwrap_or_else(|| DEFAULT_SUBSTRATE.into()),
             ambient_index: s
                 .optional_float("ambient_index", Limits::new(1.0..=3.0, ""))
                 .unwrap_or(1.0),
-            ambient_material: s.optional_text("ambient_material"),
+            ambient_material,
         };
         s.finish();
         cell
@@ -334,6 +339,17 @@ fn read_rectangles(s: &Section<'_, '_>, widest: u32) -> RotatedRectangles {
     }
 }
 
+/// The material at a key, if it is there. Those that have a name are known here; tables are read with the files of the design.
+fn read_material(s: &Section<'_, '_>, key: &str) -> Option<String> {
+    let text = s.optional_text(key)?;
+    if !Material::is_table(&text)
+        && let Err(error) = Material::named(&text)
+    {
+        s.fault(key, error.to_string(), error.remedy());
+    }
+    Some(text)
+}
+
 /// A spacer on the substrate, then what the etch left of the film.
 fn read_under(s: &Section<'_, '_>, pillar_material: &str) -> Vec<UnderSpec> {
     let height = |key: &str| {
@@ -341,7 +357,14 @@ fn read_under(s: &Section<'_, '_>, pillar_material: &str) -> Vec<UnderSpec> {
             .unwrap_or(0.0)
     };
     let spacer_nm = height("spacer_nm");
-    let spacer = s.optional_text("spacer_material");
+    let spacer = read_material(s, "spacer_material");
+    if spacer.is_some() && !s.has("spacer_nm") {
+        s.fault(
+            "spacer_material",
+            "a spacer without a thickness",
+            "add `spacer_nm`, or leave `spacer_material` out",
+        );
+    }
     if spacer_nm > 0.0 && spacer.is_none() {
         s.fault(
             "spacer_nm",
@@ -361,10 +384,7 @@ fn read_under(s: &Section<'_, '_>, pillar_material: &str) -> Vec<UnderSpec> {
 
 /// The band, shortest wavelength first.
 pub(super) fn read_band(s: &Section<'_, '_>) -> Option<(f64, f64)> {
-    if !s.has("band_nm") {
-        return None;
-    }
-    let [short, long] = s.array::<2>("band_nm", WAVELENGTH);
+    let [short, long] = s.optional_array::<2>("band_nm", WAVELENGTH)?;
     if short >= long {
         s.fault(
             "band_nm",

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use metalith_cell::{Analyser, Fidelity, Polarisation, PolarisedLight};
+use metalith_cell::{Analyser, Fidelity, OBLIQUE_RECTANGLES, Polarisation, PolarisedLight, PublishedCell};
 use metalith_core::document::{Limits, Section};
 
 use super::CellSpec;
@@ -116,11 +116,7 @@ impl VerifySpec {
             wavelengths_um: wavelengths_nm.iter().map(|nm| nm * 1e-3).collect(),
             field_angles,
             fidelity: read_fidelity(s, cell),
-            incidence: s.choice(
-                "incidence",
-                &[("normal", CellIncidence::Normal), ("as_lit", CellIncidence::AsLit)],
-                Some(CellIncidence::Normal),
-            ),
+            incidence: read_incidence(s, cell),
             window_samples: s
                 .optional_integer("window_samples", 16..=2048, "samples")
                 .unwrap_or(256) as usize,
@@ -187,6 +183,16 @@ fn polarising(s: &Section<'_, '_>, key: &str, what: &str, cell: &CellSpec) {
     }
 }
 
+fn read_incidence(s: &Section<'_, '_>, cell: &CellSpec) -> CellIncidence {
+    let choices = [("normal", CellIncidence::Normal), ("as_lit", CellIncidence::AsLit)];
+    let incidence = s.choice("incidence", &choices, Some(CellIncidence::Normal));
+    if incidence == CellIncidence::AsLit && cell.shape.rectangles().is_some() {
+        let [what, hint] = OBLIQUE_RECTANGLES;
+        s.fault_given(&["cell.shape"], "incidence", what, hint);
+    }
+    incidence
+}
+
 /// The cell that judges, if it is left out: unlike neighbours for the cell that they were compared with real rows of, else
 /// equal ones.
 fn read_fidelity(s: &Section<'_, '_>, cell: &CellSpec) -> Fidelity {
@@ -204,6 +210,8 @@ fn read_fidelity(s: &Section<'_, '_>, cell: &CellSpec) -> Fidelity {
     let fidelity = s.choice("fidelity", &choices, Some(usual));
     if let Some((what, hint)) = fidelity.refusal(cell.shape, cell.lattice) {
         s.fault_given(&["cell.shape", "cell.lattice"], "fidelity", what, hint);
+    } else if fidelity == Fidelity::Published && cell.is_known_to_be_another(s) {
+        s.fault("fidelity", PublishedCell::OTHERS, PublishedCell::ANOTHER_CELL);
     }
     fidelity
 }

@@ -58,11 +58,16 @@ impl Material {
     /// # Errors
     /// As [`Material::named`] and [`Material::read_csv`].
     pub fn resolve(text: &str, folder: &Path) -> Result<Self> {
-        if text.to_ascii_lowercase().ends_with(".csv") {
+        if Self::is_table(text) {
             Self::read_csv(&folder.join(text))
         } else {
             Self::named(text)
         }
+    }
+
+    /// Whether a text file that names a material so means a CSV table.
+    pub fn is_table(text: &str) -> bool {
+        text.to_ascii_lowercase().ends_with(".csv")
     }
 
     /// The same index at all wavelengths.

@@ -124,6 +124,14 @@ impl<'d, 't> Section<'d, 't> {
         }
     }
 
+    /// Record that a key, which is known, has no place beside others, if it is there.
+    pub fn refuse(&self, key: &str, what: impl Into<String>, hint: impl Into<String>) {
+        if self.has(key) {
+            self.asked.borrow_mut().insert(key.to_owned());
+            self.fault(key, what, hint);
+        }
+    }
+
     /// Whether the key holds a list.
     pub fn is_list(&self, key: &str) -> bool {
         matches!(self.table.get(key).map(Spanned::get_ref), Some(DeValue::Array(_)))

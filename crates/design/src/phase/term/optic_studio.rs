@@ -151,13 +151,24 @@ impl Surface<'_> {
         let radius_um = self.data.get(1).copied().unwrap_or(0.0) * unit_um;
         let coefficients = self.data.get(2..count.saturating_add(2)).unwrap_or_default();
         if count == 0 || coefficients.len() < count || radius_um <= 0.0 {
-            return Err(fault.whole(format!(
-                "surface {} has {count} coefficients over a radius of {radius_um} um, and {} are there",
-                self.number,
-                self.data.len().saturating_sub(2)
-            )));
+            return Err(fault.error(
+                None,
+                format!(
+                    "surface {} has {count} coefficients over a radius of {radius_um} um, and {} are there",
+                    self.number,
+                    self.data.len().saturating_sub(2)
+                ),
+                "give the number of coefficients as XDAT 1, the radius as XDAT 2, and each coefficient after them",
+            ));
         }
         let order = self.order.unwrap_or(1.0);
+        if order == 0.0 {
+            return Err(fault.error(
+                None,
+                format!("surface {} is of diffraction order 0, in which no phase is left", self.number),
+                "give the order that is focused as PARM 0, such as 1",
+            ));
+        }
         let coefficients = coefficients.iter().map(|a| a * order);
         Ok(match self.phase() {
             Some(Kind::Binary1) => TermForm::Polynomial {
