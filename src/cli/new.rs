@@ -198,10 +198,7 @@ pub fn run(args: &NewArgs, terminal: &Terminal) -> Result<Outcome> {
     print_line!("{}", args.design.display());
     match INFRARED_NM.contains(&nm) || VISIBLE_NM.contains(&nm) {
         true => print_line!("next: metalith run {}", args.design.display()),
-        false => print_line!(
-            "next: change it, then metalith run {}",
-            args.design.display()
-        ),
+        false => print_line!("next: change it, then metalith run {}", args.design.display()),
     }
     Ok(Outcome::Fine)
 }

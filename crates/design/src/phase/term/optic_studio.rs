@@ -165,7 +165,10 @@ impl Surface<'_> {
         if order == 0.0 {
             return Err(fault.error(
                 None,
-                format!("surface {} is of diffraction order 0, in which no phase is left", self.number),
+                format!(
+                    "surface {} is of diffraction order 0, in which no phase is left",
+                    self.number
+                ),
                 "give the order that is focused as PARM 0, such as 1",
             ));
         }
