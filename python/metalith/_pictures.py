@@ -74,6 +74,14 @@ class Studio:
         drawn = _arguments.whole("seed", seed, 0, _arguments.MOST_64)
         return Frame(self._native.record(_scene(scene), drawn, progress))
 
+    def frame(self, planes: Sequence[npt.ArrayLike]) -> Frame:
+        """The frame that a camera recorded, to be restored: ``planes`` as those of :attr:`Frame.planes`, full scale being 1 and no
+        signal 0. How bright its pictures are follows from ``white`` in ``[exposure]`` of the camera."""
+        signals = [np.ascontiguousarray(plane, dtype=np.float32) for plane in planes]
+        for plane in signals:
+            _arguments.square("planes", plane)
+        return Frame(self._native.frame(signals))
+
     def truth(self, scene: npt.ArrayLike) -> Float64:
         """What an ideal camera with the same channels gives of a scene, as :meth:`record` takes it, linear sRGB: what pictures
         are held to. It is ``[row, column, colour]``, of a grey scene too."""

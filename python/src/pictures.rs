@@ -10,7 +10,7 @@ use metalith::picture::{self, OperatorError, Rehearsal};
 use metalith::prior::NetworkDenoiser;
 use metalith::{CalibratedModel, Error, Result};
 use ndarray::Array3;
-use numpy::{PyArray2, PyArray3, PyReadonlyArray3};
+use numpy::{PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 
 use crate::arrays::Design;
@@ -101,6 +101,13 @@ impl Studio {
             let scene = self.scene(&rgb)?;
             self.studio.record(&self.studio.simulation(), &scene, seed)
         })?;
+        Ok(Frame { frame })
+    }
+
+    /// The frame of signals that a camera recorded, full scale being one.
+    fn frame(&self, planes: Vec<PyReadonlyArray2<'_, f32>>) -> PyResult<Frame> {
+        let signals = planes.iter().map(|plane| plane.as_array().to_owned()).collect();
+        let frame = self.studio.frame_of(signals).map_err(error)?;
         Ok(Frame { frame })
     }
 

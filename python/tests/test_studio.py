@@ -97,6 +97,22 @@ def test_a_picture_is_restored(studio: ml.Studio) -> None:
     assert np.array_equal(studio.restore(frame), found["tikhonov"])
 
 
+def test_a_frame_from_elsewhere_is_restored_as_one_that_was_simulated(studio: ml.Studio) -> None:
+    frame = studio.record(scene())
+    again = studio.frame(frame.planes)
+    assert again.saturated == frame.saturated
+    assert np.array_equal(studio.restore(again), studio.restore(frame))
+    plane = frame.planes[0]
+    with pytest.raises(ml.MetalithError, match="2 planes of a frame, and the camera gives 1"):
+        studio.frame([plane, plane])
+    with pytest.raises(ml.MetalithError, match="another camera"):
+        studio.frame([plane[:-2]])
+    with pytest.raises(ml.MetalithError, match=r"`planes` of shape \(3,\)"):
+        studio.frame([[1.0, 2.0, 3.0]])
+    with pytest.raises(ml.MetalithError, match="no numbers"):
+        studio.frame([plane * np.nan])
+
+
 def test_what_cannot_be_recorded_or_restored_is_told(studio: ml.Studio) -> None:
     with pytest.raises(ml.MetalithError, match=r"give one of shape \(48, 48, 3\)"):
         studio.record(np.zeros((20, 48, 3)))

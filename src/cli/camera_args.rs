@@ -26,10 +26,6 @@ pub struct CameraArgs {
     /// Angle from the left to the right edge of a scene (degrees).
     #[arg(long, default_value_t = 90.0)]
     pub field_deg: f64,
-
-    /// Seed of the noise.
-    #[arg(long, default_value_t = 1)]
-    pub seed: u64,
 }
 
 /// What the files of [`CameraArgs`] hold.

@@ -32,6 +32,10 @@ pub struct DatasetArgs {
     #[command(flatten)]
     with: CameraArgs,
 
+    /// Seed of the noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+
     /// Folder for the pairs.
     #[arg(long, short, value_name = "FOLDER")]
     out: PathBuf,
@@ -55,7 +59,7 @@ fn plan(args: &DatasetArgs, images: Vec<PathBuf>, terminal: &Terminal) -> Result
         camera: args.with.camera.clone(),
         model: args.with.model.clone(),
         field_deg: args.with.field_deg,
-        seed: args.with.seed,
+        seed: args.seed,
         images,
     };
     let plan = plan_pairs(&request, &args.out, args.images_per_shard, terminal)?;
@@ -90,7 +94,7 @@ pub fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     let origin = DatasetOrigin::of(&design, &layout, &camera, args.with.model.as_deref())?;
     let studio = Studio::open(&design, &layout, &camera, model.as_ref(), &read(&images[0])?, terminal)?;
     let operator = studio.simulation();
-    let head = DatasetManifest::of(&studio, origin, args.with.seed);
+    let head = DatasetManifest::of(&studio, origin, args.seed);
     let manifest = write_dataset(&studio, &operator, &images, &read, head, &args.out, terminal)?;
     terminal.clear();
     print_line!("{} pairs in {}", manifest.pairs.len(), args.out.display());

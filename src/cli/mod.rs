@@ -22,6 +22,7 @@ mod photographs;
 mod picture;
 mod plan;
 mod psf;
+mod restore;
 mod run;
 mod standard_input;
 mod study;
@@ -84,6 +85,7 @@ enum Command {
     Optimise(optimise::OptimiseArgs),
     Photographs(photographs::PhotographsArgs),
     Picture(picture::PictureArgs),
+    Restore(restore::RestoreArgs),
     Dataset(dataset::DatasetArgs),
     Train(train::TrainArgs),
     Denoise(denoise::DenoiseArgs),
@@ -176,6 +178,7 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::Denoise(args) => denoise::run(args, terminal),
         Command::Compare(args) => compare::run(args, terminal),
         Command::Picture(args) => picture::run(args, terminal),
+        Command::Restore(args) => restore::run(args, terminal),
         Command::Handoff(args) => handoff::run(args, terminal),
         Command::Verify(args) => verify::run(args, terminal),
         Command::Psf(args) => psf::run(args, terminal),

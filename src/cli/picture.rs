@@ -36,6 +36,10 @@ pub struct PictureArgs {
     #[command(flatten)]
     with: CameraArgs,
 
+    /// Seed of the noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+
     /// Distance of the scene (mm); far if left out.
     #[arg(long)]
     distance_mm: Option<f64>,
@@ -152,13 +156,7 @@ impl PictureArgs {
 
 pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
-    let mut methods: Vec<RestorationMethod> = Vec::new();
-    for name in &args.method {
-        let method = name.parse()?;
-        if !methods.contains(&method) {
-            methods.push(method);
-        }
-    }
+    let methods = RestorationMethod::of_names(&args.method)?;
     let CameraFiles { design, camera, model } = args.with.read(terminal)?;
     let scene = args.scene()?;
     let outputs = args.outputs(&methods);
@@ -175,7 +173,7 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     // Once: it is asked for again and again.
     let scene = studio.simulated(&scene).into_owned();
     let simulation = studio.simulation_of(&scene);
-    let frame = studio.record(&simulation, &scene, args.with.seed)?;
+    let frame = studio.record(&simulation, &scene, args.seed)?;
     let truth = studio.truth(&scene);
     drop(simulation);
     if let Some(note) = frame.saturation_note(&truth) {
@@ -240,7 +238,7 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
             &KeptKernels::of_user(),
             terminal,
         )?;
-        report.worth = worth_of_assumptions(&studio, &narrow, &scene, args.with.seed, terminal)?;
+        report.worth = worth_of_assumptions(&studio, &narrow, &scene, args.seed, terminal)?;
     }
     report.notes = studio.notes(&frame, &truth);
     report.notes.extend(limited);

@@ -96,3 +96,41 @@ fn files_that_are_not_what_they_seem_are_refused() {
         .stderr(contains("divide it by its white"));
     assert!(!Path::new(&out).exists());
 }
+
+/// What no frame of the camera is, and what does not say its full scale, before any kernel is simulated.
+#[test]
+fn frames_that_cannot_be_restored_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let grey = |name: &str, width: u32, height: u32| {
+        let path = folder.path().join(name);
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, width, height);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_depth(png::BitDepth::Sixteen);
+        let data = 9u16.to_be_bytes().repeat((width * height) as usize);
+        encoder.write_header().unwrap().write_image_data(&data).unwrap();
+        fs::write(&path, bytes).unwrap();
+        path.display().to_string()
+    };
+    let [small, whole] = [grey("small.png", 64, 64), grey("whole.png", 1936, 1216)];
+    let out = folder.path().join("out").display().to_string();
+    for (frame, more, words) in [
+        (
+            &small,
+            &[][..],
+            "the frame is of another camera: it has 64 x 64 pixels, and the camera gives 1936 x 1216",
+        ),
+        (&whole, &[], "add --white"),
+        (&whole, &["--white", "20", "--black-level", "20"], "above --black-level"),
+        (&whole, &["--white", "4095", "--method", "magic"], "no way to restore"),
+    ] {
+        let mut command = Command::cargo_bin("metalith").unwrap();
+        command
+            .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")))
+            .args(["restore", "golden/mini_3x3/folded.gds.gz", frame, "--design", DESIGN])
+            .args(["--camera", "cameras/gt1930.toml", "--out", &out])
+            .args(more);
+        command.assert().code(2).stderr(contains(words));
+        assert!(!Path::new(&out).exists());
+    }
+}

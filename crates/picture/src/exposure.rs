@@ -84,7 +84,6 @@ pub fn expose(camera: &Camera, gain: &[f64], light: &[Array2<f32>], seed: u64) -
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let noise = camera.sensor.noise.of_exposure(camera.exposure.time_s);
     let sensor = &camera.sensor;
-    let (step, full) = (sensor.step(), sensor.largest_signal());
     let names = camera.channel_names();
     let signal = |channel: usize, i: (usize, usize)| gain[channel] * f64::from(light[channel][i]);
     let ideal: Vec<Array2<f64>> = match sensor.filter {
@@ -96,23 +95,32 @@ pub fn expose(camera: &Camera, gain: &[f64], light: &[Array2<f32>], seed: u64) -
         })],
     };
     // Below zero stays: cameras add a level and subtract it again.
-    let recorded = |v: f64| ((v.min(full) / step).round() * step) as f32;
     let planes = ideal
         .iter()
-        .map(|plane| noise.expose(plane, &mut random).mapv(recorded));
-    let planes: Vec<Array2<f32>> = planes.collect();
-    let top = recorded(full);
-    Frame {
-        saturated: planes.iter().flatten().filter(|v| **v >= top).count(),
-        planes,
-        filter: sensor.filter,
-        gain: gain.to_vec(),
-        noise,
-        full: top,
-    }
+        .map(|plane| noise.expose(plane, &mut random).mapv(|v| recorded(camera, v)));
+    Frame::of_signals(camera, gain, planes.collect())
+}
+
+/// The signal that a camera says for one that falls on its sensor, both of full scale.
+pub(crate) fn recorded(camera: &Camera, signal: f64) -> f32 {
+    let step = camera.sensor.step();
+    ((signal.min(camera.sensor.largest_signal()) / step).round() * step) as f32
 }
 
 impl Frame {
+    /// Of signals that were recorded, of full scale, in the planes that the sensor of a camera has; `gain` as [`gains`] has it.
+    pub fn of_signals(camera: &Camera, gain: &[f64], planes: Vec<Array2<f32>>) -> Self {
+        let full = recorded(camera, f64::INFINITY);
+        Self {
+            saturated: planes.iter().flatten().filter(|v| **v >= full).count(),
+            planes,
+            filter: camera.sensor.filter,
+            gain: gain.to_vec(),
+            noise: camera.sensor.noise.of_exposure(camera.exposure.time_s),
+            full,
+        }
+    }
+
     /// Whether it can be of a sensor of so many rows and columns behind so many channels.
     ///
     /// # Errors

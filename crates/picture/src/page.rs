@@ -153,7 +153,7 @@ fn page(pages: &PicturePages<'_>) -> Page {
     budget(&mut page, report);
     geometry(&mut page, report);
     worth(&mut page, &report.worth);
-    assumptions(&mut page, &report.assumptions);
+    list_assumptions(&mut page, &report.assumptions);
     page
 }
 
@@ -319,7 +319,8 @@ fn geometry(page: &mut Page, report: &PictureReport) {
     page.table(table.caption("Distance of the chief rays from the best homography of scene and sub-image."));
 }
 
-fn assumptions(page: &mut Page, all: &[Assumption]) {
+/// List what was assumed.
+pub(crate) fn list_assumptions(page: &mut Page, all: &[Assumption]) {
     page.section("What was assumed");
     page.list(all.iter().map(|a| format!("{}: {}", a.what, a.value)));
 }

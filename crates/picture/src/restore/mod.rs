@@ -59,6 +59,21 @@ impl RestorationMethod {
         Self::LearnedPrior,
     ];
 
+    /// Those that are named, each once; `wiener` is another name of `tikhonov`, which knows the spectrum of scenes.
+    ///
+    /// # Errors
+    /// If one is no way to restore.
+    pub fn of_names(names: &[String]) -> Result<Vec<Self>> {
+        let mut methods = Vec::new();
+        for name in names {
+            let method = name.parse()?;
+            if !methods.contains(&method) {
+                methods.push(method);
+            }
+        }
+        Ok(methods)
+    }
+
     /// Name in options and reports.
     pub fn name(self) -> &'static str {
         match self {
@@ -75,10 +90,11 @@ impl FromStr for RestorationMethod {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        Self::ALL.into_iter().find(|m| m.name() == text).ok_or_else(|| {
+        let known = |m: &Self| m.name() == text || (*m == Self::Tikhonov && text == "wiener");
+        Self::ALL.into_iter().find(known).ok_or_else(|| {
             Error::invalid(
                 format!("`{text}` is no way to restore a picture"),
-                "use tikhonov, tv, richardson-lucy, hqs or prior",
+                "use tikhonov (or wiener, which is the same here), tv, richardson-lucy, hqs or prior",
             )
         })
     }

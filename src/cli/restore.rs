@@ -1,0 +1,178 @@
+//! `metalith restore`: the picture that a recorded frame is of.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use metalith::made::ModelStatement;
+use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
+use metalith::picture::scene::SceneImage;
+use metalith::picture::{
+    Assumption, FrameNumbers, Rehearsal, RestoredPicture, RestoredReport, Studio, check_scored, read_signals,
+};
+use metalith::{Error, Fidelity, Result};
+use ndarray::Array3;
+
+use super::camera_args::{CameraArgs, CameraFiles};
+use super::paths::apart;
+use super::standard_input::InputFile;
+use super::{Outcome, Terminal, print_json, print_line};
+
+/// Restore the picture from a frame that a camera with the chip has recorded.
+#[derive(Args)]
+#[command(
+    after_help = "Example:\n  metalith restore out/prototype_3x3/prototype_3x3_pillars.gds out/picture/frame.png \\\n    --design designs/prototype_3x3.toml --camera cameras/gt1930.toml --out out/restored\n\n\
+    The frame is a grey PNG of 8 or 16 bits of all pixels of the sensor: the mosaic of its colour filter array, without one \
+    channel by channel below one another. How bright the picture is follows from `white` in [exposure] of the camera. Kernels \
+    are those of `metalith picture`, kept on the disk."
+)]
+pub struct RestoreArgs {
+    /// The pillar layout; `-` for standard input.
+    layout: PathBuf,
+
+    /// The frame: a grey PNG of 8 or 16 bits.
+    frame: PathBuf,
+
+    #[command(flatten)]
+    with: CameraArgs,
+
+    /// Number in the frame's file that stands for no signal; 0 if left out. Frames by `metalith picture` need none.
+    #[arg(long, value_name = "N")]
+    black_level: Option<u16>,
+
+    /// Number in the frame's file that stands for full scale, such as 4095; 255 of 8 bits if left out.
+    #[arg(long, value_name = "N")]
+    white: Option<u16>,
+
+    /// Distance of the scene (mm); far if left out.
+    #[arg(long)]
+    distance_mm: Option<f64>,
+
+    /// Pixels of the picture an axis.
+    #[arg(long, default_value_t = 800, value_parser = clap::value_parser!(u16).range(64..=4096))]
+    pixels: u16,
+
+    /// Ways to restore: tikhonov, tv, richardson-lucy, hqs, prior (learnt from photographs).
+    #[arg(long, value_delimiter = ',', default_value = "tikhonov")]
+    method: Vec<String>,
+
+    /// Restore by each element alone too.
+    #[arg(long)]
+    separate: bool,
+
+    /// File of weights for the learnt prior that `metalith train` wrote, or a denoiser of one's own as `.onnx`; those of
+    /// the program if left out.
+    #[arg(long, value_name = "FILE")]
+    prior: Option<PathBuf>,
+
+    /// Folder for `restored.html` and `restored.json`, and beside them a `restored_METHOD.png` of 16 bits for each way to restore.
+    #[arg(long, short, default_value = "out/restored", value_name = "FOLDER")]
+    out: PathBuf,
+
+    /// Print the numbers of `restored.json` to standard output: all its fields but the first two, `report` and `metalith`.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &RestoreArgs, terminal: &Terminal) -> Result<Outcome> {
+    terminal.stop_on_interrupt();
+    let wanted = pictures(&args.method, args.separate)?;
+    let CameraFiles { design, camera, model } = args.with.read(terminal)?;
+    let distance_um = match args.distance_mm {
+        None => f64::INFINITY,
+        Some(mm) if mm > 0.0 => mm * 1e3,
+        Some(_) => {
+            return Err(Error::invalid(
+                "a scene at no distance",
+                "give a positive --distance-mm",
+            ));
+        }
+    };
+    let side = usize::from(args.pixels);
+    // Nothing is known of it but its size and its field.
+    let scene = SceneImage::of_rgb(
+        "unknown",
+        &Array3::zeros((side, side, 3)),
+        args.with.field_deg,
+        distance_um,
+    );
+    check_scored(&scene.view)?;
+    let outputs: Vec<PathBuf> = [RestoredReport::PAGE, "restored.json"]
+        .into_iter()
+        .chain(wanted.iter().map(|(restored, _)| restored.picture.as_str()))
+        .map(|name| args.out.join(name))
+        .collect();
+    let inputs = [&args.layout, &args.frame, &args.with.design, &args.with.camera].map(PathBuf::as_path);
+    let written: Vec<&Path> = outputs.iter().map(PathBuf::as_path).collect();
+    apart(inputs, &written)?;
+    let numbers = FrameNumbers {
+        black_level: args.black_level,
+        white: args.white,
+    };
+    let signals = read_signals(&args.frame, &camera, numbers)?;
+    let layout = InputFile::of(&args.layout)?;
+    let prior = args.prior.as_deref().map(LearnedDenoiser::read).transpose()?;
+    let mut studio = Studio::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
+    if let Some(prior) = prior {
+        studio.prior = prior;
+    }
+    let frame = studio.frame_of(signals)?;
+    let operator = studio.restoration();
+    let rehearsal = Rehearsal::new(&studio, &operator);
+    let error = &rehearsal.operator_error;
+    let mut notes = studio.notes(&frame, &Array3::zeros((1, 1, 3)));
+    notes.extend(error.note(&camera.channel_names()));
+    for note in &notes {
+        terminal.say(note);
+    }
+    let mut restored = Vec::new();
+    for (picture, method) in &wanted {
+        restored.push(studio.restore(&operator, error, &frame, *method, picture.joint, terminal)?);
+    }
+    let fidelity = match model.is_some() {
+        true => Fidelity::Calibrated,
+        false => studio.design.verify.fidelity,
+    };
+    let statement = model.as_ref().map(ModelStatement::of);
+    let mut assumptions = studio.assumptions(&scene, fidelity);
+    assumptions.extend(statement.as_ref().map(Assumption::of_model).into_iter().flatten());
+    let name = |path: &Path| {
+        path.file_name()
+            .map_or_else(String::new, |n| n.to_string_lossy().into_owned())
+    };
+    let report = RestoredReport {
+        design: studio.design.name.clone(),
+        layout: name(&args.layout),
+        camera: camera.name.clone(),
+        frame: name(&args.frame),
+        field_deg: args.with.field_deg,
+        distance_mm: args.distance_mm,
+        saturated: frame.saturated,
+        saturated_share: frame.saturated_share(),
+        model: statement,
+        notes,
+        pictures: wanted.into_iter().map(|(picture, _)| picture).collect(),
+        operator_error: error.overall.clone(),
+        assumptions,
+    };
+    report.write(&frame, &restored, &camera, &args.out)?;
+    terminal.clear();
+    if args.json {
+        print_json(&report);
+        return Ok(Outcome::Fine);
+    }
+    print_line!("page: {}", args.out.join(RestoredReport::PAGE).display());
+    for picture in &report.pictures {
+        print_line!("picture: {}", args.out.join(&picture.picture).display());
+    }
+    Ok(Outcome::Fine)
+}
+
+/// The pictures that are asked for, each once.
+fn pictures(names: &[String], separate: bool) -> Result<Vec<(RestoredPicture, RestorationMethod)>> {
+    let ways: &[bool] = if separate { &[true, false] } else { &[true] };
+    let all = RestorationMethod::of_names(names)?.into_iter().flat_map(|method| {
+        ways.iter()
+            .map(move |joint| (RestoredPicture::new(method, *joint), method))
+    });
+    Ok(all.collect())
+}
