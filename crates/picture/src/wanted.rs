@@ -33,7 +33,8 @@ const NODES_OF_NARROW: usize = 2 * (NODES - 1) + 1;
 const NODES_OF_SIXFOLD: usize = 5 * (NODES - 1) / 2 + 1;
 /// Steps an axis between the nodes that a restoration knows.
 const RESTORED_STEPS: usize = (NODES - 1) / 2;
-/// Radius of lenses whose accurate fields cost next to nothing, and whose fast ones err by more (um).
+/// Radius of lenses whose fast fields err by more than accurate ones, which cost as much there: what is seen of them is mostly the
+/// window of a kernel (um).
 const SMALL_UM: f64 = 150.0;
 /// Pixels an axis of a kernel.
 const WINDOW: usize = 64;
