@@ -6,18 +6,10 @@ needs: pip install klayout
 import math
 import sys
 
-import klayout.db as db
+from compare_xor import region
 
 # Half the diagonal of a step of the grid, and the chord error of the designs (nm).
 ROUNDED, CHORD = 0.7072, 0.5
-
-
-def region(path):
-    layout = db.Layout()
-    layout.read(path)
-    flat = db.Region()
-    flat.insert(layout.top_cell().begin_shapes_rec(layout.layer(1, 0)))
-    return flat
 
 
 def main():

@@ -8,7 +8,8 @@ needs: pip install klayout
 import math
 import sys
 
-from compare_circles import ROUNDED, region
+from compare_circles import ROUNDED
+from compare_xor import region
 
 
 def off_rectangle(corners, width, length, step):

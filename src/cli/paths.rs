@@ -1,4 +1,4 @@
-//! What is read and what is written are different files.
+//! Names of files; what is read and what is written are different ones.
 
 use std::path::{Path, PathBuf};
 
@@ -25,6 +25,12 @@ pub fn apart<'p>(inputs: impl IntoIterator<Item = &'p Path>, outputs: &[&Path]) 
         ));
     }
     Ok(())
+}
+
+/// The name of a file without its folders.
+pub fn name_of(path: &Path) -> String {
+    path.file_name()
+        .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
 
 /// Find out whether files can be written, before the work that they are for. What stands there stays, and folders are made.

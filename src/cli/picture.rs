@@ -3,18 +3,18 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::made::ModelStatement;
+use metalith::made::CalibratedModel;
 use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
 use metalith::picture::scene::{BuiltIn, SceneFile, SceneImage, chart, read_depth, read_scene};
 use metalith::picture::{
-    Assumption, Doubt, Frame, FrameFile, KeptKernels, PicturePages, PictureReport, Rehearsal, RestorationReport,
+    Doubt, Frame, FrameFile, FrameStatement, KeptKernels, PicturePages, PictureReport, Rehearsal, RestorationReport,
     ScenePower, Studio, ZoneScore, check_scored, contrast_curves, picture_file, psnr_words, scores,
     worth_of_assumptions, write_pages,
 };
-use metalith::{Error, Fidelity, Result};
+use metalith::{Error, Result};
 
 use super::camera_args::{CameraArgs, CameraFiles};
-use super::paths::apart;
+use super::paths::{apart, name_of};
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_json, print_line};
 
@@ -204,16 +204,8 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
             }
         }
     }
-    let fidelity = if model.is_some() {
-        Fidelity::Calibrated
-    } else {
-        studio.design.verify.fidelity
-    };
-    let mut report = report(args, &studio, &scene, &frame, found, fidelity);
-    report.model = model.as_ref().map(ModelStatement::of);
-    let of_model = report.model.as_ref().map(Assumption::of_model);
-    report.assumptions.extend(of_model.into_iter().flatten());
-    report.operator_error.clone_from(&error.overall);
+    let mut report = report(args, &studio, &scene, &frame, found, model.as_ref());
+    report.of_frame.operator_error.clone_from(&error.overall);
     if let Ok(kind) = args.scene.parse::<BuiltIn>() {
         report.contrast = contrast_curves(&studio, kind, &truth, &frame, &pictures[0]);
     }
@@ -240,8 +232,8 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         )?;
         report.worth = worth_of_assumptions(&studio, &narrow, &scene, args.seed, terminal)?;
     }
-    report.notes = studio.notes(&frame, &truth);
-    report.notes.extend(limited);
+    report.of_frame.notes = studio.notes(&frame, &truth);
+    report.of_frame.notes.extend(limited);
     let pages = PicturePages {
         report: &report,
         scene: &truth,
@@ -290,33 +282,19 @@ fn report(
     scene: &SceneImage,
     frame: &Frame,
     restorations: Vec<RestorationReport>,
-    fidelity: Fidelity,
+    model: Option<&CalibratedModel>,
 ) -> PictureReport {
-    let name = |path: &PathBuf| {
-        path.file_name()
-            .map_or_else(String::new, |n| n.to_string_lossy().into_owned())
-    };
     PictureReport {
-        design: studio.design.name.clone(),
-        layout: name(&args.layout),
-        camera: studio.camera.name.clone(),
         scene: scene.name.clone(),
-        field_deg: args.with.field_deg,
-        distance_mm: args.distance_mm,
-        saturated: frame.saturated,
-        saturated_share: frame.saturated_share(),
-        notes: Vec::new(),
+        of_frame: FrameStatement::new(studio, name_of(&args.layout), scene, frame, model),
         frame: FrameFile::of(&studio.camera, frame),
         restorations,
-        operator_error: Vec::new(),
         budget: studio.budget(),
         points: studio.point_images(),
         homographies: studio.homographies(),
-        assumptions: studio.assumptions(scene, fidelity),
         contrast: Vec::new(),
         doubt: None,
         worth: Vec::new(),
-        model: None,
     }
 }
 

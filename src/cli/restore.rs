@@ -3,17 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::made::ModelStatement;
 use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
 use metalith::picture::scene::SceneImage;
 use metalith::picture::{
-    Assumption, FrameNumbers, Rehearsal, RestoredPicture, RestoredReport, Studio, check_scored, read_signals,
+    FrameNumbers, FrameStatement, Rehearsal, RestoredPicture, RestoredReport, Studio, check_scored, read_signals,
 };
-use metalith::{Error, Fidelity, Result};
+use metalith::{Error, Result};
 use ndarray::Array3;
 
 use super::camera_args::{CameraArgs, CameraFiles};
-use super::paths::apart;
+use super::paths::{apart, name_of};
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_json, print_line};
 
@@ -128,31 +127,15 @@ pub fn run(args: &RestoreArgs, terminal: &Terminal) -> Result<Outcome> {
     for (picture, method) in &wanted {
         restored.push(studio.restore(&operator, error, &frame, *method, picture.joint, terminal)?);
     }
-    let fidelity = match model.is_some() {
-        true => Fidelity::Calibrated,
-        false => studio.design.verify.fidelity,
-    };
-    let statement = model.as_ref().map(ModelStatement::of);
-    let mut assumptions = studio.assumptions(&scene, fidelity);
-    assumptions.extend(statement.as_ref().map(Assumption::of_model).into_iter().flatten());
-    let name = |path: &Path| {
-        path.file_name()
-            .map_or_else(String::new, |n| n.to_string_lossy().into_owned())
+    let of_frame = FrameStatement {
+        notes,
+        operator_error: error.overall.clone(),
+        ..FrameStatement::new(&studio, name_of(&args.layout), &scene, &frame, model.as_ref())
     };
     let report = RestoredReport {
-        design: studio.design.name.clone(),
-        layout: name(&args.layout),
-        camera: camera.name.clone(),
-        frame: name(&args.frame),
-        field_deg: args.with.field_deg,
-        distance_mm: args.distance_mm,
-        saturated: frame.saturated,
-        saturated_share: frame.saturated_share(),
-        model: statement,
-        notes,
+        frame: name_of(&args.frame),
+        of_frame,
         pictures: wanted.into_iter().map(|(picture, _)| picture).collect(),
-        operator_error: error.overall.clone(),
-        assumptions,
     };
     report.write(&frame, &restored, &camera, &args.out)?;
     terminal.clear();

@@ -61,7 +61,7 @@ pub use png16::write_picture;
 pub use point_image::PointImage;
 pub use recorded_frame::{FrameNumbers, read_signals};
 pub use rehearsal::Rehearsal;
-pub use report::{Assumption, ChannelBudget, HomographyResidual, PictureReport, RestorationReport};
+pub use report::{Assumption, ChannelBudget, FrameStatement, HomographyResidual, PictureReport, RestorationReport};
 pub use resolution::{ContrastCurve, contrast_curves};
 pub use restored_page::{RestoredPicture, RestoredReport};
 pub use score::{MOST_DB, Zone, ZoneScore, check_scored, psnr_words, scores};

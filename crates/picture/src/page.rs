@@ -94,13 +94,13 @@ pub fn shown(frame: &Frame, names: &[String]) -> Array3<f64> {
 fn page(pages: &PicturePages<'_>) -> Page {
     let report = pages.report;
     let mut page = Page::new(
-        format!("The picture that {} will take", report.design),
+        format!("The picture that {} will take", report.of_frame.design),
         format!(
             "{} through {}, behind the bytes of {}",
-            report.scene, report.camera, report.layout
+            report.scene, report.of_frame.camera, report.of_frame.layout
         ),
     );
-    for note in &report.notes {
+    for note in &report.of_frame.notes {
         page.note(note);
     }
     let names = pages.camera.channel_names();
@@ -139,7 +139,11 @@ fn page(pages: &PicturePages<'_>) -> Page {
         ),
         (
             "Pixels at full scale",
-            format!("{} ({} %)", report.saturated, fixed(100.0 * report.saturated_share, 1)),
+            format!(
+                "{} ({} %)",
+                report.of_frame.saturated,
+                fixed(100.0 * report.of_frame.saturated_share, 1)
+            ),
         ),
     ]);
     zooms(&mut page, pages);
@@ -153,7 +157,7 @@ fn page(pages: &PicturePages<'_>) -> Page {
     budget(&mut page, report);
     geometry(&mut page, report);
     worth(&mut page, &report.worth);
-    list_assumptions(&mut page, &report.assumptions);
+    list_assumptions(&mut page, &report.of_frame.assumptions);
     page
 }
 
@@ -247,6 +251,7 @@ fn scores(page: &mut Page, report: &PictureReport) {
         }
     }
     let errors: Vec<String> = report
+        .of_frame
         .operator_error
         .iter()
         .map(|e| format!("{} %", fixed(100.0 * e, 2)))

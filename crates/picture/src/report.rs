@@ -5,7 +5,7 @@ use ndarray::Array3;
 use serde::Serialize;
 
 use metalith_cell::{Fidelity, FocusedLight, PolarisedLight};
-use metalith_made::ModelStatement;
+use metalith_made::{CalibratedModel, ModelStatement};
 
 use crate::assumed::AssumedScore;
 use crate::doubt::DoubtReport;
@@ -23,13 +23,12 @@ use crate::studio::Studio;
 use crate::veil::LightShares;
 use crate::wanted::averaging;
 
-/// Everything that the page of a picture says, in numbers.
+/// What is said of a frame, simulated or recorded, whatever is made of it.
 #[derive(Clone, Debug, Serialize)]
-pub struct PictureReport {
+pub struct FrameStatement {
     pub design: String,
     pub layout: String,
     pub camera: String,
-    pub scene: String,
     pub field_deg: f64,
     /// Distance of the scene (mm); none for one that is far.
     pub distance_mm: Option<f64>,
@@ -42,16 +41,58 @@ pub struct PictureReport {
     /// What is to be known before anything else: pixels that were lost, scenes and layouts that are not what they seem.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
+    /// What the operator of the restoration errs by, by channel; see [`crate::Rehearsal::operator_error`].
+    pub operator_error: Vec<f64>,
+    pub assumptions: Vec<Assumption>,
+}
+
+impl FrameStatement {
+    /// Of a frame behind a layout whose file has this name; its chip is made by a model, if one is given. Notes and what the
+    /// operator errs by are added.
+    pub fn new(
+        studio: &Studio,
+        layout: String,
+        scene: &SceneImage,
+        frame: &Frame,
+        model: Option<&CalibratedModel>,
+    ) -> Self {
+        let fidelity = match model {
+            Some(_) => Fidelity::Calibrated,
+            None => studio.design.verify.fidelity,
+        };
+        let model = model.map(ModelStatement::of);
+        let mut assumptions = studio.assumptions(scene, fidelity);
+        assumptions.extend(model.iter().flat_map(Assumption::of_model));
+        let distance_mm = scene.view.distance_um * 1e-3;
+        Self {
+            design: studio.design.name.clone(),
+            layout,
+            camera: studio.camera.name.clone(),
+            field_deg: scene.view.field_deg,
+            distance_mm: distance_mm.is_finite().then_some(distance_mm),
+            saturated: frame.saturated,
+            saturated_share: frame.saturated_share(),
+            model,
+            notes: Vec::new(),
+            operator_error: Vec::new(),
+            assumptions,
+        }
+    }
+}
+
+/// Everything that the page of a picture says, in numbers.
+#[derive(Clone, Debug, Serialize)]
+pub struct PictureReport {
+    pub scene: String,
+    #[serde(flatten)]
+    pub of_frame: FrameStatement,
     /// The frame as a file.
     pub frame: FrameFile,
     pub restorations: Vec<RestorationReport>,
-    /// What the operator of the restoration errs by, by channel; see [`crate::Rehearsal::operator_error`].
-    pub operator_error: Vec<f64>,
     pub budget: Vec<ChannelBudget>,
     /// Images of a white point by each distinct element and channel.
     pub points: Vec<PointImage>,
     pub homographies: Vec<HomographyResidual>,
-    pub assumptions: Vec<Assumption>,
     /// Contrast of fine detail, for scenes that say it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub contrast: Vec<ContrastCurve>,

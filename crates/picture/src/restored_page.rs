@@ -4,7 +4,6 @@ use std::path::Path;
 
 use metalith_camera::Camera;
 use metalith_core::{Result, srgb};
-use metalith_made::ModelStatement;
 use metalith_report::{Page, PhotoRow, fixed, write_json};
 use ndarray::Array3;
 use serde::Serialize;
@@ -12,33 +11,17 @@ use serde::Serialize;
 use crate::exposure::Frame;
 use crate::files::{picture_file, write_restored};
 use crate::page::{list_assumptions, shown};
-use crate::report::Assumption;
+use crate::report::FrameStatement;
 use crate::restore::RestorationMethod;
 
 /// What the page of a restored frame says, in numbers.
 #[derive(Clone, Debug, Serialize)]
 pub struct RestoredReport {
-    pub design: String,
-    pub layout: String,
-    pub camera: String,
     /// Name of the file of the frame.
     pub frame: String,
-    pub field_deg: f64,
-    /// Distance of the scene (mm); none for one that is far.
-    pub distance_mm: Option<f64>,
-    pub saturated: usize,
-    /// The same as a share of all pixels.
-    pub saturated_share: f64,
-    /// The calibrated model that the chip is made by, if one was given.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub model: Option<ModelStatement>,
-    /// What is to be known before anything else.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub notes: Vec<String>,
+    #[serde(flatten)]
+    pub of_frame: FrameStatement,
     pub pictures: Vec<RestoredPicture>,
-    /// What the operator of the restoration errs by, by channel; see [`crate::Rehearsal::operator_error`].
-    pub operator_error: Vec<f64>,
-    pub assumptions: Vec<Assumption>,
 }
 
 /// One way of restoring, and its file.
@@ -79,11 +62,12 @@ impl RestoredReport {
     }
 
     fn page(&self, frame: &Frame, pictures: &[Array3<f64>], camera: &Camera) -> Page {
+        let of = &self.of_frame;
         let mut page = Page::new(
             format!("The picture of {}", self.frame),
-            format!("recorded by {} behind {}, {}", self.camera, self.design, self.layout),
+            format!("recorded by {} behind {}, {}", of.camera, of.design, of.layout),
         );
-        for note in &self.notes {
+        for note in &of.notes {
             page.note(note);
         }
         let names = camera.channel_names();
@@ -96,7 +80,7 @@ impl RestoredReport {
         page.figure(row.caption(
             "The mosaic of the frame is shown as colours. Pictures are restored from this frame alone; how bright they are follows from `white` in [exposure] of the camera.",
         ));
-        let errors: Vec<String> = self
+        let errors: Vec<String> = of
             .operator_error
             .iter()
             .map(|e| format!("{} %", fixed(100.0 * e, 2)))
@@ -104,12 +88,12 @@ impl RestoredReport {
         page.facts(&[
             (
                 "Pixels at full scale",
-                format!("{} ({} %)", self.saturated, fixed(100.0 * self.saturated_share, 1)),
+                format!("{} ({} %)", of.saturated, fixed(100.0 * of.saturated_share, 1)),
             ),
             ("Mean signal, of full scale", fixed(frame.mean_signal(), 3)),
             ("The operator of the restoration errs by", errors.join(", ")),
         ]);
-        list_assumptions(&mut page, &self.assumptions);
+        list_assumptions(&mut page, &of.assumptions);
         page
     }
 }
