@@ -60,7 +60,7 @@ pub use point_image::PointImage;
 pub use rehearsal::Rehearsal;
 pub use report::{Assumption, ChannelBudget, HomographyResidual, PictureReport, RestorationReport};
 pub use resolution::{ContrastCurve, contrast_curves};
-pub use score::{MOST_DB, Zone, ZoneScore, check_scored, psnr_words, scores};
+pub use score::{MOST_DB, SCORED_SIDES, Zone, ZoneScore, check_scored, psnr_words, scores};
 pub use studio::Studio;
 pub use thumbnail::thumbnail;
 pub use veil::{LightShares, Veil};
