@@ -73,6 +73,9 @@ pub fn verify(
         let model = model.as_deref().map(CalibratedModel::read).transpose()?;
         let chip = |model| MadeChip::in_light(&design.lit_stack()?, model);
         let made = model.as_ref().map(chip).transpose()?;
+        if let Some(chip) = &made {
+            chip.check_drawn(array.classes.iter().map(|class| class.widths.histogram()))?;
+        }
         let cells = match &made {
             None => cell_models(design, &[design.verify.fidelity])?,
             Some(_) => Vec::new(),

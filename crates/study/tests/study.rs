@@ -63,6 +63,26 @@ fn the_draws_depend_neither_on_the_cut_nor_on_the_order_nor_on_threads() {
     }
 }
 
+/// A draw whose bias leaves nothing of the pillars is told when the study is planned, and not in the middle of it.
+#[test]
+fn a_bias_that_pillars_cannot_have_is_refused_before_any_draw() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = tolerance(folder.path(), 1);
+    let text = fs::read_to_string(&path).unwrap();
+    let (head, limit) = (
+        &text[..text.find("[[vary]]").unwrap()],
+        &text[text.find("[[limit]]").unwrap()..],
+    );
+    let bias = "[[grid]]\neffect = \"cd_bias\"\nvalues = [0.0, -150.0]\n";
+    fs::write(&path, format!("{head}{bias}{limit}")).unwrap();
+    let error = plan(&path, &folder.path().join("study"), PlanSettings::default(), &Silent).unwrap_err();
+    let error = error.to_string();
+    assert!(
+        error.contains("draw 1 of the study: `cd_bias_nm` = -150") && error.contains("vary `cd_bias` over less"),
+        "{error}"
+    );
+}
+
 /// Without anything random, a design of a grid and the same design in a file of its own have the same figures to the bit.
 #[test]
 #[ignore = "second tier: CPU time, run by .ci/run"]
