@@ -7,7 +7,9 @@ use metalith::cell::cache_folder;
 use metalith::drc::{self, CheckInput, Date, Deck, Waivers};
 use metalith::extract::GdsPillars;
 use metalith::gds::ReadLimits;
-use metalith::{Accuracy, CalibratedModel, Layout, MadeChip, PillarArray, SimulationCases, cell_models};
+use metalith::{
+    Accuracy, CalibratedModel, Layout, MadeChip, PillarArray, SimulationCases, WidthRows as _, cell_models,
+};
 use pyo3::prelude::*;
 
 use crate::arrays::Design;

@@ -6,7 +6,9 @@ use metalith::cell::{LitStack, PolarisedLight};
 use metalith::extract::{ElementSite, ExtractedElement, Extraction};
 use metalith::verify::{Lighting, SimulationCase, SinglePsf, single_psfs};
 use metalith::wave::propagation::{incident, landing_um};
-use metalith::{Accuracy, Error, MadeChip, PillarShape, Progress, Result, Wedge, WidthMap, cell_models};
+use metalith::{
+    Accuracy, Error, MadeChip, PillarShape, Progress, Result, Wedge, WidthMap, WidthRows as _, cell_models,
+};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

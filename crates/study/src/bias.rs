@@ -38,7 +38,7 @@ pub(crate) fn check_biases(
         model.check_drawn(stack, counts.clone()).map_err(|error| match error {
             Error::Invalid { what, hint, .. } => Error::invalid(
                 format!("draw {k} of the study: {what}"),
-                format!("vary `cd_bias` over less: {hint}"),
+                format!("vary `cd_bias` over less, or {hint}"),
             ),
             other => other,
         })?;

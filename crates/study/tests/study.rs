@@ -8,6 +8,7 @@ use std::path::Path;
 use common::{SMALL_CAMERA, tolerance};
 use metalith_core::Silent;
 use metalith_core::document::Scalar;
+use metalith_made::{CalibratedModel, Perturbation};
 use metalith_picture::restore::RestorationMethod;
 use metalith_picture::scene::{BuiltIn, chart};
 use metalith_picture::{Rehearsal, Studio, scores};
@@ -69,16 +70,19 @@ fn a_bias_that_pillars_cannot_have_is_refused_before_any_draw() {
     let folder = tempfile::tempdir().unwrap();
     let path = tolerance(folder.path(), 1);
     let text = fs::read_to_string(&path).unwrap();
-    let (head, limit) = (
-        &text[..text.find("[[vary]]").unwrap()],
-        &text[text.find("[[limit]]").unwrap()..],
-    );
-    let bias = "[[grid]]\neffect = \"cd_bias\"\nvalues = [0.0, -150.0]\n";
-    fs::write(&path, format!("{head}{bias}{limit}")).unwrap();
+    let mut made = Perturbation::default();
+    made.geometry.cd_bias_nm = -150.0;
+    let model = CalibratedModel::new("chip".into(), "too thin".into(), made);
+    model.write(&folder.path().join("model.toml")).unwrap();
+    let other = text
+        .replacen("effect = \"cd_bias\"", "effect = \"film_height\"", 1)
+        .replacen("draws = 1\n", "draws = 1\nmodel = \"model.toml\"\n", 1);
+    fs::write(&path, other).unwrap();
     let error = plan(&path, &folder.path().join("study"), PlanSettings::default(), &Silent).unwrap_err();
     let error = error.to_string();
     assert!(
-        error.contains("draw 1 of the study: `cd_bias_nm` = -150") && error.contains("vary `cd_bias` over less"),
+        error.contains("draw 0 of the study: `cd_bias_nm` = -150")
+            && error.contains("vary `cd_bias` over less, or set it in"),
         "{error}"
     );
 }
